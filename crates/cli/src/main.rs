@@ -1,0 +1,3 @@
+//! The `endowire` command.
+
+fn main() {}

@@ -1,0 +1,13 @@
+//! Catheters and guidewires in blood vessels.
+//!
+//! Units everywhere: millimetre, newton, second, radian; energy in N·mm = mJ.
+
+pub mod error;
+pub mod shape;
+pub mod vessel;
+
+pub use error::{Error, Result};
+pub use nalgebra;
+
+/// A point or direction in space, millimetres or unit length as its name says.
+pub type Vec3 = nalgebra::Vector3<f64>;

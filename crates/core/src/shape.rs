@@ -1,0 +1,33 @@
+//! The centre line of an inserted device, as methods produce it and recorders and viewers read it.
+
+use crate::Vec3;
+
+/// The inserted part of a device, from the sheath to the tip.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Shape {
+    /// Node positions, sheath first, in millimetres.
+    pub positions_mm: Vec<Vec3>,
+    /// Tangents dx/ds at the nodes (unit length unless the method does not enforce it).
+    pub tangents: Vec<Vec3>,
+    /// Device arc length at each node, measured **from the tip** in millimetres: the last entry is 0.
+    ///
+    /// From the tip, because that names a point of the device whatever length is inserted.
+    pub from_tip_mm: Vec<f64>,
+}
+
+impl Shape {
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.positions_mm.len()
+    }
+
+    /// Whether there are no nodes.
+    pub fn is_empty(&self) -> bool {
+        self.positions_mm.is_empty()
+    }
+
+    /// Position of the tip, if anything is inserted.
+    pub fn tip_mm(&self) -> Option<Vec3> {
+        self.positions_mm.last().copied()
+    }
+}

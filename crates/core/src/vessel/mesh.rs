@@ -1,0 +1,37 @@
+//! A triangle surface: vertices and index triples, nothing derived.
+
+use crate::Vec3;
+
+/// A triangle surface in millimetres. Triangles are counter-clockwise seen from outside the lumen.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SurfaceMesh {
+    /// Vertex positions in millimetres.
+    pub vertices_mm: Vec<Vec3>,
+    /// Vertex indices of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl SurfaceMesh {
+    /// The three corners of triangle `index`.
+    pub fn corners(&self, index: usize) -> [Vec3; 3] {
+        self.triangles[index].map(|v| self.vertices_mm[v as usize])
+    }
+
+    /// Smallest and largest coordinates, or `None` without vertices.
+    pub fn bounds_mm(&self) -> Option<(Vec3, Vec3)> {
+        let first = *self.vertices_mm.first()?;
+        Some(self.vertices_mm.iter().fold((first, first), |(low, high), v| (low.inf(v), high.sup(v))))
+    }
+
+    /// Signed enclosed volume in mm³: positive when triangles are counter-clockwise seen from outside.
+    /// Exact for closed surfaces (divergence theorem), meaningless for open ones.
+    pub fn signed_volume_mm3(&self) -> f64 {
+        let origin = self.vertices_mm.first().copied().unwrap_or_default();
+        (0..self.triangles.len())
+            .map(|i| {
+                let [a, b, c] = self.corners(i).map(|v| v - origin);
+                a.dot(&b.cross(&c)) / 6.0
+            })
+            .sum()
+    }
+}

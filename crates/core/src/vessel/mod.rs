@@ -1,0 +1,5 @@
+//! What a device is pushed into.
+
+mod mesh;
+
+pub use mesh::SurfaceMesh;
