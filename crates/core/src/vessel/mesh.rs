@@ -35,3 +35,9 @@ impl SurfaceMesh {
             .sum()
     }
 }
+
+/// Area of a triangle in mm².
+pub(crate) fn area(corners: &[Vec3; 3]) -> f64 {
+    let [a, b, c] = corners;
+    (b - a).cross(&(c - a)).norm() / 2.0
+}

@@ -1,0 +1,54 @@
+//! Inside or outside, by the generalized winding number.
+//!
+//! Jacobson, Kavan, Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers", ACM TOG 32
+//! (2013): the sum of the signed solid angles of all triangles over 4π is 1 inside and 0 outside a closed surface, and
+//! departs from integers where the surface is broken. Solid angles by Van Oosterom and Strackee, IEEE Trans. Biomed.
+//! Eng. 30 (1983), eq. 8.
+
+use std::f64::consts::PI;
+
+use super::Wall;
+use crate::{Error, Result, Vec3};
+
+/// How far a winding number may be from an integer before the answer is refused.
+const LARGEST_DEVIATION: f64 = 0.1;
+
+/// Signed solid angle of a triangle seen from the origin, in steradian: positive if its winding is clockwise from there,
+/// which is what an outward triangle shows to a point inside.
+fn solid_angle(corners: [Vec3; 3]) -> f64 {
+    let [a, b, c] = corners;
+    let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
+    let volume = a.dot(&b.cross(&c));
+    let denominator = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+    // A point in the plane of the triangle: in its interior the angle has no sign, and we count none.
+    if volume == 0.0 { 0.0 } else { 2.0 * volume.atan2(denominator) }
+}
+
+impl Wall {
+    /// Generalized winding number of the wall and its caps around `point_mm`: 1 in the lumen, 0 outside, for a sound surface.
+    /// Exact sum over all triangles; NaN for a point that is not finite.
+    pub fn winding_number(&self, point_mm: &Vec3) -> f64 {
+        let mesh = (0..self.mesh.triangles.len()).map(|i| self.mesh.corners(i));
+        let sum: f64 =
+            mesh.chain(self.caps.iter().copied()).map(|t| solid_angle(t.map(|v| v - point_mm))).sum();
+        sum / (4.0 * PI)
+    }
+
+    /// Whether `point_mm` is in the lumen.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if the winding number is more than 0.1 from an integer: the surface is too broken to tell, or the
+    /// point lies on it.
+    pub fn contains(&self, point_mm: &Vec3) -> Result<bool> {
+        let number = self.winding_number(point_mm);
+        // Not `>`: a NaN must end here too.
+        if (number - number.round()).abs() <= LARGEST_DEVIATION {
+            return Ok(number.round() >= 1.0);
+        }
+        Err(Error::Mesh(format!(
+            "too broken to tell inside from outside at ({:.4}, {:.4}, {:.4}): winding number {number:.3} is not an integer \
+             (or the point lies on the wall); {} stray open edges, {} non-manifold edges: close or clean the surface",
+            point_mm.x, point_mm.y, point_mm.z, self.report.stray_edges, self.report.non_manifold_edges
+        )))
+    }
+}

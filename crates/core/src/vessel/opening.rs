@@ -1,0 +1,173 @@
+//! The holes of a wall: where blood and devices pass.
+
+use std::collections::BTreeMap;
+
+use super::SurfaceMesh;
+use super::topology::{EdgeTable, NONE};
+use crate::Vec3;
+
+/// An open end of a wall: one closed loop of edges that belong to a single triangle each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Opening {
+    /// Its number: largest radius first, ties by centre (x, then y, then z).
+    pub index: usize,
+    /// Centre in mm: mean of the loop, each vertex weighted with the length of its edges.
+    pub centre_mm: Vec3,
+    /// Mean distance of the loop from the centre in mm, weighted in the same way: exact for a polygon inscribed in a circle.
+    pub radius_mm: f64,
+    /// Unit vector along the loop's vector area, pointing out of the vessel. Pushing a device in goes against it.
+    pub direction: Vec3,
+    /// The loop's vertices, in the direction in which the triangles of a cap would run along it.
+    pub boundary: Vec<u32>,
+}
+
+impl Opening {
+    /// Centre, radius and direction of a loop of vertices; `index` is left 0.
+    fn of_loop(mesh: &SurfaceMesh, boundary: Vec<u32>) -> Self {
+        let at = |k: usize| mesh.vertices_mm[boundary[k % boundary.len()] as usize];
+        let count = boundary.len();
+        let weight = |k: usize| (at(k + 1) - at(k)).norm() + (at(k) - at(k + count - 1)).norm();
+        let total: f64 = (0..count).map(weight).sum::<f64>().max(f64::MIN_POSITIVE);
+        let centre_mm = (0..count).map(|k| weight(k) * at(k)).sum::<Vec3>() / total;
+        let radius_mm = (0..count).map(|k| weight(k) * (at(k) - centre_mm).norm()).sum::<f64>() / total;
+        let area: Vec3 = (0..count).map(|k| (at(k) - centre_mm).cross(&(at(k + 1) - centre_mm)) / 2.0).sum();
+        // A slit encloses no area; any direction is as good as another, but it must be a unit vector.
+        let direction = area.try_normalize(1e-12 * radius_mm * radius_mm).unwrap_or_else(Vec3::x);
+        Self { index: 0, centre_mm, radius_mm, direction, boundary }
+    }
+
+    /// The triangles that close the opening: a fan around its centre, facing out.
+    pub fn cap(&self, mesh: &SurfaceMesh) -> impl Iterator<Item = [Vec3; 3]> {
+        let at = |k: usize| mesh.vertices_mm[self.boundary[k % self.boundary.len()] as usize];
+        (0..self.boundary.len()).map(move |k| [at(k), at(k + 1), self.centre_mm])
+    }
+}
+
+/// Boundary loops of a consistently oriented mesh.
+#[derive(Debug)]
+pub(crate) struct Boundary {
+    /// The openings, numbered.
+    pub(crate) openings: Vec<Opening>,
+    /// For each opening the triangle that holds its first edge.
+    pub(crate) first_triangle: Vec<u32>,
+    /// Open edges that close to no loop, because they end at a non-manifold edge.
+    pub(crate) stray_edges: usize,
+    /// Open edges in total.
+    pub(crate) open_edges: usize,
+}
+
+/// Follows all open edges of `mesh` into loops.
+///
+/// At a vertex where several loops touch (a figure eight) the walk goes around the vertex through the triangles between
+/// the incoming and the outgoing edge, so that loops never cross over.
+pub(crate) fn boundary(mesh: &SurfaceMesh) -> Boundary {
+    let triangles = &mesh.triangles;
+    let table = EdgeTable::new(triangles);
+    let across = table.neighbours(triangles.len());
+    let mut open: BTreeMap<(u32, u8), bool> = BTreeMap::new();
+    for uses in table.edges() {
+        if let [only] = uses {
+            open.insert((only.triangle, only.side), false);
+        }
+    }
+    let mut loops = Vec::new();
+    let mut stray_edges = 0;
+    let starts: Vec<(u32, u8)> = open.keys().copied().collect();
+    for start in &starts {
+        if open[start] {
+            continue;
+        }
+        let mut walked = Vec::new();
+        let mut edge = *start;
+        let closed = loop {
+            match open.get_mut(&edge) {
+                Some(visited) if !*visited => *visited = true,
+                Some(_) => break edge == *start,
+                None => break false,
+            }
+            walked.push(triangles[edge.0 as usize][edge.1 as usize]);
+            edge = match next_open_edge(triangles, &across, edge) {
+                Some(next) => next,
+                None => break false,
+            };
+        };
+        if closed && walked.len() >= 3 {
+            walked.reverse();
+            loops.push((Opening::of_loop(mesh, walked), start.0));
+        } else {
+            stray_edges += walked.len();
+        }
+    }
+    loops.sort_by(|(a, _), (b, _)| {
+        let key = |o: &Opening| [-o.radius_mm, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z];
+        let order = |k: usize| key(a)[k].total_cmp(&key(b)[k]);
+        order(0).then(order(1)).then(order(2)).then(order(3)).then(a.boundary.cmp(&b.boundary))
+    });
+    for (index, (opening, _)) in loops.iter_mut().enumerate() {
+        opening.index = index;
+    }
+    let (openings, first_triangle) = loops.into_iter().unzip();
+    Boundary { openings, first_triangle, stray_edges, open_edges: starts.len() }
+}
+
+/// The open edge that leaves the head of open edge `from`, found by turning around that vertex inside the surface.
+fn next_open_edge(triangles: &[[u32; 3]], across: &[[u32; 3]], from: (u32, u8)) -> Option<(u32, u8)> {
+    let vertex = triangles[from.0 as usize][(from.1 as usize + 1) % 3];
+    let mut triangle = from.0;
+    // A fan has no more triangles than the mesh: the bound stops walks around broken vertices.
+    for _ in 0..=triangles.len() {
+        let corners = triangles[triangle as usize];
+        let side = corners.iter().position(|&v| v == vertex)?;
+        let beyond = across[triangle as usize][side];
+        if beyond == NONE {
+            return Some((triangle, side as u8));
+        }
+        triangle = beyond;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square_grid(n: usize, keep: impl Fn(usize, usize) -> bool) -> SurfaceMesh {
+        let mut mesh = SurfaceMesh::default();
+        for y in 0..=n {
+            for x in 0..=n {
+                mesh.vertices_mm.push(Vec3::new(x as f64, y as f64, 0.0));
+            }
+        }
+        let id = |x: usize, y: usize| (y * (n + 1) + x) as u32;
+        for y in 0..n {
+            for x in 0..n {
+                if keep(x, y) {
+                    mesh.triangles.push([id(x, y), id(x + 1, y), id(x, y + 1)]);
+                    mesh.triangles.push([id(x + 1, y), id(x + 1, y + 1), id(x, y + 1)]);
+                }
+            }
+        }
+        mesh
+    }
+
+    #[test]
+    fn holes_that_touch_in_one_vertex_stay_two_loops() {
+        // Two missing squares on a diagonal share the vertex (2, 2); the outer border is the third loop.
+        let mesh = square_grid(5, |x, y| (x, y) != (1, 1) && (x, y) != (2, 2));
+        let found = boundary(&mesh);
+        let lengths: Vec<usize> = found.openings.iter().map(|o| o.boundary.len()).collect();
+        assert_eq!(lengths, [20, 4, 4]);
+        assert_eq!((found.stray_edges, found.open_edges), (0, 28));
+        assert!((found.openings[1].centre_mm - Vec3::new(1.5, 1.5, 0.0)).norm() < 1e-12);
+        assert!((found.openings[2].centre_mm - Vec3::new(2.5, 2.5, 0.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_mean_radius_of_an_inscribed_polygon_is_its_circle() {
+        let mesh = square_grid(1, |_, _| true);
+        let found = boundary(&mesh);
+        assert!((found.openings[0].radius_mm - 0.5_f64.sqrt()).abs() < 1e-15);
+        // The sheet faces +z, so its cap faces −z.
+        assert!((found.openings[0].direction + Vec3::z()).norm() < 1e-15);
+    }
+}

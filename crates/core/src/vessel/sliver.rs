@@ -1,0 +1,96 @@
+//! Removing triangles without area, without opening slits.
+
+use super::SurfaceMesh;
+use super::topology::{EdgeTable, NONE};
+use crate::Vec3;
+
+/// Each pass removes every sliver but those next to another one; chains of slivers need a few passes.
+const PASSES: usize = 16;
+
+/// Whether a triangle is thinner than `tolerance_mm` (or no thicker than rounding).
+pub(crate) fn is_degenerate(corners: &[Vec3; 3], tolerance_mm: f64) -> bool {
+    let [a, b, c] = *corners;
+    let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+    (b - a).cross(&(c - a)).norm() <= longest * tolerance_mm.max(1e-12 * longest)
+}
+
+/// Removes triangles with a repeated vertex, and needles: corners distinct but in line. Removing a needle alone would
+/// leave a slit between its long edge and its two short ones, so the long edge is flipped together with the triangle
+/// across it. Returns the number of degenerate triangles that went.
+pub(crate) fn remove_degenerate(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> usize {
+    let before = mesh.triangles.len();
+    let repeated = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+    mesh.triangles.retain(|t| !repeated(t));
+    let mut removed = before - mesh.triangles.len();
+    for _ in 0..PASSES {
+        let slivers: Vec<usize> =
+            (0..mesh.triangles.len()).filter(|&i| is_degenerate(&mesh.corners(i), tolerance_mm)).collect();
+        if slivers.is_empty() {
+            return removed;
+        }
+        let across = EdgeTable::new(&mesh.triangles).neighbours(mesh.triangles.len());
+        let mut touched = vec![false; mesh.triangles.len()];
+        let mut gone = vec![false; mesh.triangles.len()];
+        for &index in &slivers {
+            let corners = mesh.corners(index);
+            let length = |side: usize| (corners[(side + 1) % 3] - corners[side]).norm();
+            let side = (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
+            let beyond = across[index][side];
+            if beyond == NONE {
+                // On the border the needle simply goes: its short edges become the border.
+                gone[index] = !touched[index];
+            } else if !touched[index] && !touched[beyond as usize] {
+                (touched[index], touched[beyond as usize]) = (true, true);
+                flip_long_edge(&mut mesh.triangles, index, side, beyond as usize);
+            }
+            touched[index] = true;
+        }
+        let mut index = 0;
+        mesh.triangles.retain(|t| {
+            index += 1;
+            !gone[index - 1] && !repeated(t)
+        });
+        removed = before - mesh.triangles.len();
+    }
+    // What is left sits in knots of slivers that flips only pass around.
+    let survivors: Vec<bool> =
+        (0..mesh.triangles.len()).map(|i| !is_degenerate(&mesh.corners(i), tolerance_mm)).collect();
+    let mut index = 0;
+    mesh.triangles.retain(|_| {
+        index += 1;
+        survivors[index - 1]
+    });
+    before - mesh.triangles.len()
+}
+
+/// Replaces needle (a, b, c), long edge a–b, and its neighbour across a–b by the two halves of the neighbour cut at c.
+/// Counted as two triangles before and after, of which none is a needle unless c lies on another edge as well.
+fn flip_long_edge(triangles: &mut [[u32; 3]], needle: usize, side: usize, beyond: usize) {
+    let (a, b) = (triangles[needle][side], triangles[needle][(side + 1) % 3]);
+    let c = triangles[needle][(side + 2) % 3];
+    let other = triangles[beyond];
+    let with = |from: u32, to: u32| other.map(|v| if v == from { to } else { v });
+    triangles[needle] = with(a, c);
+    triangles[beyond] = with(b, c);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::opening;
+    use super::*;
+
+    #[test]
+    fn a_needle_goes_without_opening_a_slit() {
+        // A square of two triangles plus a needle (0, 2, 4) on its diagonal, 4 in its middle.
+        let mut mesh = SurfaceMesh {
+            vertices_mm: [[0., 0.], [1., 0.], [1., 1.], [0., 1.], [0.5, 0.5]].map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 4], [0, 4, 3], [4, 2, 3]],
+        };
+        let area = |m: &SurfaceMesh| (0..m.triangles.len()).map(|i| crate::vessel::area(&m.corners(i))).sum::<f64>();
+        assert_eq!(opening::boundary(&mesh).openings.len(), 1);
+        remove_degenerate(&mut mesh, 1e-6);
+        assert!((0..mesh.triangles.len()).all(|i| !is_degenerate(&mesh.corners(i), 1e-6)));
+        assert_eq!(opening::boundary(&mesh).open_edges, 4);
+        assert!((area(&mesh) - 1.0).abs() < 1e-15);
+    }
+}

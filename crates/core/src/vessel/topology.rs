@@ -1,0 +1,148 @@
+//! Which triangles meet at which edge.
+
+/// Marks an edge that has no single partner: open, or shared by more than two triangles.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// One use of an undirected edge by a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct EdgeUse {
+    /// Smaller vertex index.
+    pub(crate) low: u32,
+    /// Larger vertex index.
+    pub(crate) high: u32,
+    /// The triangle.
+    pub(crate) triangle: u32,
+    /// Which of its edges: `k` runs from corner `k` to corner `k + 1`.
+    pub(crate) side: u8,
+    /// Whether the triangle runs along the edge from `low` to `high`.
+    pub(crate) forward: bool,
+}
+
+/// All edge uses, sorted by edge and then by triangle, so that what is derived from them is deterministic.
+#[derive(Debug, Clone)]
+pub(crate) struct EdgeTable {
+    uses: Vec<EdgeUse>,
+}
+
+impl EdgeTable {
+    /// Sorts the edges of `triangles`, O(n log n). Triangles with a repeated vertex are skipped.
+    pub(crate) fn new(triangles: &[[u32; 3]]) -> Self {
+        let mut uses = Vec::with_capacity(3 * triangles.len());
+        for (index, t) in triangles.iter().enumerate() {
+            if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
+                continue;
+            }
+            for side in 0..3 {
+                let (from, to) = (t[side], t[(side + 1) % 3]);
+                uses.push(EdgeUse {
+                    low: from.min(to),
+                    high: from.max(to),
+                    triangle: index as u32,
+                    side: side as u8,
+                    forward: from < to,
+                });
+            }
+        }
+        uses.sort_unstable();
+        Self { uses }
+    }
+
+    /// The uses of each edge, edge after edge.
+    pub(crate) fn edges(&self) -> impl Iterator<Item = &[EdgeUse]> {
+        self.uses.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high))
+    }
+
+    /// Number of edges shared by more than two triangles.
+    pub(crate) fn non_manifold(&self) -> usize {
+        self.edges().filter(|uses| uses.len() > 2).count()
+    }
+
+    /// For every triangle and side, the triangle across it, or [`NONE`] unless exactly two triangles share the edge.
+    pub(crate) fn neighbours(&self, triangle_count: usize) -> Vec<[u32; 3]> {
+        let mut across = vec![[NONE; 3]; triangle_count];
+        for uses in self.edges() {
+            if let [a, b] = uses {
+                across[a.triangle as usize][a.side as usize] = b.triangle;
+                across[b.triangle as usize][b.side as usize] = a.triangle;
+            }
+        }
+        across
+    }
+
+    /// For every triangle, the number of its connected component (triangles that share an edge are connected), and
+    /// how many there are. Components are numbered by their first triangle.
+    pub(crate) fn components(&self, triangle_count: usize) -> (Vec<u32>, usize) {
+        let mut sets = DisjointSets::new(triangle_count);
+        for uses in self.edges() {
+            for other in &uses[1..] {
+                sets.join(uses[0].triangle, other.triangle);
+            }
+        }
+        sets.number()
+    }
+}
+
+/// Union–find in which the smallest member stands for its set, so that the result depends on no order.
+#[derive(Debug)]
+pub(crate) struct DisjointSets {
+    parent: Vec<u32>,
+}
+
+impl DisjointSets {
+    pub(crate) fn new(len: usize) -> Self {
+        Self { parent: (0..len as u32).collect() }
+    }
+
+    /// The smallest member of the set of `item`.
+    pub(crate) fn find(&mut self, mut item: u32) -> u32 {
+        while self.parent[item as usize] != item {
+            let grandparent = self.parent[self.parent[item as usize] as usize];
+            self.parent[item as usize] = grandparent;
+            item = grandparent;
+        }
+        item
+    }
+
+    pub(crate) fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.parent[a.max(b) as usize] = a.min(b);
+    }
+
+    /// A number per item, equal within a set, counted up by smallest member; and the count.
+    pub(crate) fn number(&mut self) -> (Vec<u32>, usize) {
+        let mut numbers = vec![0; self.parent.len()];
+        let mut count = 0;
+        for item in 0..self.parent.len() {
+            let root = self.find(item as u32) as usize;
+            if root == item {
+                numbers[item] = count;
+                count += 1;
+            } else {
+                numbers[item] = numbers[root];
+            }
+        }
+        (numbers, count as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_triangles_on_an_edge_are_neighbours_and_a_third_makes_it_non_manifold() {
+        let pair = [[0, 1, 2], [2, 1, 3]];
+        let table = EdgeTable::new(&pair);
+        assert_eq!(table.neighbours(2), [[NONE, 1, NONE], [0, NONE, NONE]]);
+        assert_eq!(table.non_manifold(), 0);
+        let fin = EdgeTable::new(&[[0, 1, 2], [2, 1, 3], [1, 2, 4]]);
+        assert_eq!(fin.non_manifold(), 1);
+        assert_eq!(fin.neighbours(3)[0], [NONE; 3]);
+    }
+
+    #[test]
+    fn components_are_numbered_by_their_first_triangle() {
+        let (component, count) = EdgeTable::new(&[[5, 6, 7], [0, 1, 2], [2, 1, 3], [6, 5, 8]]).components(4);
+        assert_eq!((component, count), (vec![0, 1, 1, 0], 2));
+    }
+}

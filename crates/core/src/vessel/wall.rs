@@ -1,0 +1,266 @@
+//! A surface made fit to be a vessel wall, with a record of what that took.
+
+use super::opening::{self, Opening};
+use super::topology::EdgeTable;
+use super::{SurfaceMesh, orient, sliver, weld};
+use crate::{Error, Result, Vec3};
+
+/// Vertices closer than this fraction of the bounding box diagonal are one vertex: ten times the resolution of the
+/// 32-bit floats of an STL file, and far below any detail of an anatomy.
+const WELD_TOLERANCE: f64 = 1e-6;
+
+/// A vessel wall: triangles counter-clockwise seen from outside the lumen, with numbered openings.
+#[derive(Debug, Clone)]
+pub struct Wall {
+    pub(super) mesh: SurfaceMesh,
+    pub(super) openings: Vec<Opening>,
+    pub(super) caps: Vec<[Vec3; 3]>,
+    pub(super) report: RepairReport,
+}
+
+/// What [`Wall::from_surface`] found and did.
+#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
+pub struct RepairReport {
+    /// Triangles as given.
+    pub triangles_given: usize,
+    /// Vertices as given.
+    pub vertices_given: usize,
+    /// Vertices merged into another one.
+    pub vertices_welded: usize,
+    /// Vertices dropped because no triangle used them.
+    pub vertices_unreferenced: usize,
+    /// Triangles without area that were removed (for needles the neighbour's edge was flipped, so that no slit opens).
+    pub degenerate_removed: usize,
+    /// Triangles on the same three vertices as an earlier one, removed.
+    pub duplicates_removed: usize,
+    /// Triangles whose winding was reversed: flipped faces, or all of a surface that was inside out.
+    pub triangles_flipped: usize,
+    /// Whether the whole surface was inside out.
+    pub inside_out: bool,
+    /// Connected pieces of the surface. More than one is legitimate (two vessels) or dirt: `smallest_component` helps to tell.
+    pub components: usize,
+    /// Triangles of the smallest component.
+    pub smallest_component: usize,
+    /// Openings found: boundary loops.
+    pub openings: usize,
+    /// Open edges that form no loop.
+    pub stray_edges: usize,
+    /// Edges shared by more than two triangles.
+    pub non_manifold_edges: usize,
+    /// Edges across which no winding agrees: the surface is one-sided.
+    pub one_sided_edges: usize,
+}
+
+impl RepairReport {
+    /// One line per thing that was done or is odd; empty for a clean surface.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        let mut note = |count: usize, text: &str| {
+            if count > 0 {
+                notes.push(format!("{count} {text}"));
+            }
+        };
+        note(self.vertices_welded, "duplicate vertices welded");
+        note(self.vertices_unreferenced, "unused vertices dropped");
+        note(self.degenerate_removed, "degenerate triangles removed");
+        note(self.duplicates_removed, "duplicate triangles removed");
+        note(self.triangles_flipped, "triangles turned over");
+        note(self.stray_edges, "open edges form no loop");
+        note(self.non_manifold_edges, "edges belong to more than two triangles");
+        note(self.one_sided_edges, "edges make the surface one-sided");
+        if self.components > 1 {
+            notes.push(format!(
+                "{} separate pieces, the smallest of {} triangles",
+                self.components, self.smallest_component
+            ));
+        }
+        notes
+    }
+}
+
+impl Wall {
+    /// Repairs `surface` into a wall: welds, removes degenerate and duplicate triangles, makes the winding consistent and
+    /// outward, and takes boundary loops as openings. Positions of the vertices that stay are not changed.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if there is no triangle with area, an index is out of range or a coordinate is not finite.
+    pub fn from_surface(surface: &SurfaceMesh) -> Result<Self> {
+        validate(surface)?;
+        let mut report = RepairReport {
+            triangles_given: surface.triangles.len(),
+            vertices_given: surface.vertices_mm.len(),
+            ..Default::default()
+        };
+        let tolerance_mm = weld_tolerance_mm(surface);
+        let target = weld::merge_targets(&surface.vertices_mm, tolerance_mm);
+        report.vertices_welded = target.iter().enumerate().filter(|(v, t)| *v != **t as usize).count();
+        let mut mesh = SurfaceMesh {
+            vertices_mm: surface.vertices_mm.clone(),
+            triangles: surface.triangles.iter().map(|t| t.map(|v| target[v as usize])).collect(),
+        };
+        report.degenerate_removed = sliver::remove_degenerate(&mut mesh, tolerance_mm);
+        report.duplicates_removed = remove_duplicates(&mut mesh.triangles);
+        if mesh.triangles.is_empty() {
+            return Err(Error::Mesh("no triangle has an area; check the file and its unit".into()));
+        }
+        report.vertices_unreferenced = drop_unreferenced(&mut mesh) - report.vertices_welded;
+        let before = mesh.triangles.clone();
+        let consistency = orient::make_consistent(&mut mesh.triangles);
+        turn_outward(&mut mesh, &consistency);
+        // Turning over swaps two corners; turning twice restores them exactly.
+        report.triangles_flipped = before.iter().zip(&mesh.triangles).filter(|(a, b)| a != b).count();
+        report.inside_out = report.triangles_flipped == mesh.triangles.len();
+        report.one_sided_edges = consistency.contradictions;
+        let table = EdgeTable::new(&mesh.triangles);
+        report.non_manifold_edges = table.non_manifold();
+        let (component, count) = table.components(mesh.triangles.len());
+        let mut sizes = vec![0; count];
+        for c in component {
+            sizes[c as usize] += 1;
+        }
+        report.components = count;
+        report.smallest_component = sizes.into_iter().min().unwrap_or(0);
+        let boundary = opening::boundary(&mesh);
+        report.openings = boundary.openings.len();
+        report.stray_edges = boundary.stray_edges;
+        let caps = boundary.openings.iter().flat_map(|o| o.cap(&mesh).collect::<Vec<_>>()).collect();
+        Ok(Self { mesh, openings: boundary.openings, caps, report })
+    }
+
+    /// The repaired surface, open where the vessel is open.
+    pub fn mesh(&self) -> &SurfaceMesh {
+        &self.mesh
+    }
+
+    /// The openings, largest first.
+    pub fn openings(&self) -> &[Opening] {
+        &self.openings
+    }
+
+    /// The triangles that close the openings; they serve the inside test only and are no wall.
+    pub fn caps(&self) -> &[[Vec3; 3]] {
+        &self.caps
+    }
+
+    /// What was found and done.
+    pub fn report(&self) -> &RepairReport {
+        &self.report
+    }
+
+    /// Volume enclosed by the wall and its caps in mm³.
+    pub fn volume_mm3(&self) -> f64 {
+        let origin = self.mesh.vertices_mm.first().copied().unwrap_or_default();
+        self.mesh.signed_volume_mm3() + self.caps.iter().map(|cap| signed_volume(cap, origin)).sum::<f64>()
+    }
+}
+
+/// Welding tolerance for `surface` in mm.
+pub(crate) fn weld_tolerance_mm(surface: &SurfaceMesh) -> f64 {
+    surface.bounds_mm().map_or(0.0, |(low, high)| WELD_TOLERANCE * (high - low).norm())
+}
+
+/// Rejects what no repair can help.
+pub(crate) fn validate(surface: &SurfaceMesh) -> Result<()> {
+    if surface.triangles.is_empty() {
+        return Err(Error::Mesh("no triangles; a wall needs a surface".into()));
+    }
+    if surface.vertices_mm.len() >= u32::MAX as usize || surface.triangles.len() >= u32::MAX as usize / 4 {
+        return Err(Error::Mesh(format!(
+            "{} vertices and {} triangles are more than 32-bit indices hold; decimate the surface",
+            surface.vertices_mm.len(),
+            surface.triangles.len()
+        )));
+    }
+    // Squares and cubes of coordinates must stay finite too.
+    let usable = |c: &f64| c.abs() < 1e100;
+    if let Some((i, v)) = surface.vertices_mm.iter().enumerate().find(|(_, v)| !v.iter().all(usable)) {
+        return Err(Error::Mesh(format!("vertex {i} is at ({}, {}, {}); all coordinates must be finite", v.x, v.y, v.z)));
+    }
+    let count = surface.vertices_mm.len();
+    let out_of_range = |t: &[u32; 3]| t.iter().any(|&v| v as usize >= count);
+    if let Some((i, t)) = surface.triangles.iter().enumerate().find(|(_, t)| out_of_range(t)) {
+        return Err(Error::Mesh(format!("triangle {i} = {t:?} names a vertex beyond the last one, {}", count.max(1) - 1)));
+    }
+    Ok(())
+}
+
+/// Keeps the first of all triangles on the same vertices, whatever their winding.
+fn remove_duplicates(triangles: &mut Vec<[u32; 3]>) -> usize {
+    let before = triangles.len();
+    let mut keep = vec![true; before];
+    for (earlier, later) in duplicate_pairs(triangles) {
+        debug_assert!(earlier < later);
+        keep[later] = false;
+    }
+    let mut index = 0;
+    triangles.retain(|_| {
+        index += 1;
+        keep[index - 1]
+    });
+    before - triangles.len()
+}
+
+/// Triangles on the same three vertices: (first, any later one), sorted.
+pub(crate) fn duplicate_pairs(triangles: &[[u32; 3]]) -> Vec<(usize, usize)> {
+    let mut order: Vec<([u32; 3], usize)> = triangles
+        .iter()
+        .enumerate()
+        .map(|(index, t)| {
+            let mut sorted = *t;
+            sorted.sort_unstable();
+            (sorted, index)
+        })
+        .collect();
+    order.sort_unstable();
+    let mut pairs: Vec<(usize, usize)> = order
+        .chunk_by(|a, b| a.0 == b.0)
+        .flat_map(|same| same[1..].iter().map(move |other| (same[0].1, other.1)))
+        .collect();
+    pairs.sort_unstable();
+    pairs
+}
+
+/// Removes vertices that no triangle uses; returns how many.
+pub(crate) fn drop_unreferenced(mesh: &mut SurfaceMesh) -> usize {
+    let mut used = vec![false; mesh.vertices_mm.len()];
+    for v in mesh.triangles.iter().flatten() {
+        used[*v as usize] = true;
+    }
+    let mut renumbered = vec![0; used.len()];
+    let mut kept = Vec::with_capacity(used.len());
+    for (v, _) in used.iter().enumerate().filter(|(_, used)| **used) {
+        renumbered[v] = kept.len() as u32;
+        kept.push(mesh.vertices_mm[v]);
+    }
+    let dropped = used.len() - kept.len();
+    mesh.vertices_mm = kept;
+    for t in &mut mesh.triangles {
+        *t = t.map(|v| renumbered[v as usize]);
+    }
+    dropped
+}
+
+/// Turns over each patch whose volume, closed by the caps of its openings, is negative.
+fn turn_outward(mesh: &mut SurfaceMesh, consistency: &orient::Consistency) {
+    let origin = mesh.vertices_mm[0];
+    let mut volume = vec![0.0; consistency.patches];
+    for (index, &patch) in consistency.patch.iter().enumerate() {
+        volume[patch as usize] += signed_volume(&mesh.corners(index), origin);
+    }
+    let boundary = opening::boundary(mesh);
+    for (opening, &triangle) in boundary.openings.iter().zip(&boundary.first_triangle) {
+        let patch = consistency.patch[triangle as usize] as usize;
+        volume[patch] += opening.cap(mesh).map(|cap| signed_volume(&cap, origin)).sum::<f64>();
+    }
+    for (triangle, &patch) in mesh.triangles.iter_mut().zip(&consistency.patch) {
+        if volume[patch as usize] < 0.0 {
+            triangle.swap(1, 2);
+        }
+    }
+}
+
+/// Signed volume of the tetrahedron over a triangle in mm³.
+pub(crate) fn signed_volume(corners: &[Vec3; 3], origin: Vec3) -> f64 {
+    let [a, b, c] = corners.map(|v| v - origin);
+    a.dot(&b.cross(&c)) / 6.0
+}
