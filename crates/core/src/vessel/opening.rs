@@ -58,8 +58,8 @@ pub(crate) struct Boundary {
 
 /// Follows all open edges of `mesh` into loops.
 ///
-/// At a vertex where several loops touch (a figure eight) the walk goes around the vertex through the triangles between
-/// the incoming and the outgoing edge, so that loops never cross over.
+/// Where two sheets touch in a vertex, the walk goes around it through the triangles between the incoming and the outgoing
+/// edge and so stays on its sheet; where two holes of one sheet touch (a figure eight), the loop is cut in two there.
 pub(crate) fn boundary(mesh: &SurfaceMesh) -> Boundary {
     let triangles = &mesh.triangles;
     let table = EdgeTable::new(triangles);
@@ -91,11 +91,17 @@ pub(crate) fn boundary(mesh: &SurfaceMesh) -> Boundary {
                 None => break false,
             };
         };
-        if closed && walked.len() >= 3 {
-            walked.reverse();
-            loops.push((Opening::of_loop(mesh, walked), start.0));
-        } else {
+        if !closed {
             stray_edges += walked.len();
+            continue;
+        }
+        for mut simple in simple_loops(&walked) {
+            if simple.len() < 3 {
+                stray_edges += simple.len();
+                continue;
+            }
+            simple.reverse();
+            loops.push((Opening::of_loop(mesh, simple), start.0));
         }
     }
     loops.sort_by(|(a, _), (b, _)| {
@@ -108,6 +114,26 @@ pub(crate) fn boundary(mesh: &SurfaceMesh) -> Boundary {
     }
     let (openings, first_triangle) = loops.into_iter().unzip();
     Boundary { openings, first_triangle, stray_edges, open_edges: starts.len() }
+}
+
+/// Cuts a closed walk at vertices it passes more than once.
+fn simple_loops(walked: &[u32]) -> Vec<Vec<u32>> {
+    let mut loops = Vec::new();
+    let mut path: Vec<u32> = Vec::new();
+    let mut place: BTreeMap<u32, usize> = BTreeMap::new();
+    for &vertex in walked {
+        if let Some(&earlier) = place.get(&vertex) {
+            let cut = path.split_off(earlier);
+            for v in &cut {
+                place.remove(v);
+            }
+            loops.push(cut);
+        }
+        place.insert(vertex, path.len());
+        path.push(vertex);
+    }
+    loops.push(path);
+    loops
 }
 
 /// The open edge that leaves the head of open edge `from`, found by turning around that vertex inside the surface.

@@ -88,8 +88,9 @@ impl WallQuery {
     /// The closest point of the wall if it is less than `reach_mm` away. `None` also for a point that is not finite.
     pub fn nearest(&self, point_mm: &Vec3, reach_mm: f64) -> Option<Nearest> {
         let reach = reach_mm.min(f64::MAX);
-        let (projection, (triangle, location)) =
-            self.shape.project_local_point_and_get_location_with_max_dist(to_parry(point_mm), false, reach)?;
+        let (projection, (triangle, location)) = self
+            .shape
+            .project_local_point_and_get_location_with_max_dist(to_parry(point_mm), false, reach)?;
         let closest = from_parry(projection.point);
         let offset = point_mm - closest;
         let length = offset.norm();

@@ -83,10 +83,13 @@ mod tests {
     fn a_needle_goes_without_opening_a_slit() {
         // A square of two triangles plus a needle (0, 2, 4) on its diagonal, 4 in its middle.
         let mut mesh = SurfaceMesh {
-            vertices_mm: [[0., 0.], [1., 0.], [1., 1.], [0., 1.], [0.5, 0.5]].map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec(),
+            vertices_mm: [[0., 0.], [1., 0.], [1., 1.], [0., 1.], [0.5, 0.5]]
+                .map(|[x, y]| Vec3::new(x, y, 0.0))
+                .to_vec(),
             triangles: vec![[0, 1, 2], [0, 2, 4], [0, 4, 3], [4, 2, 3]],
         };
-        let area = |m: &SurfaceMesh| (0..m.triangles.len()).map(|i| crate::vessel::area(&m.corners(i))).sum::<f64>();
+        let area =
+            |m: &SurfaceMesh| (0..m.triangles.len()).map(|i| crate::vessel::area(&m.corners(i))).sum::<f64>();
         assert_eq!(opening::boundary(&mesh).openings.len(), 1);
         remove_degenerate(&mut mesh, 1e-6);
         assert!((0..mesh.triangles.len()).all(|i| !is_degenerate(&mesh.corners(i), 1e-6)));

@@ -174,12 +174,18 @@ pub(crate) fn validate(surface: &SurfaceMesh) -> Result<()> {
     // Squares and cubes of coordinates must stay finite too.
     let usable = |c: &f64| c.abs() < 1e100;
     if let Some((i, v)) = surface.vertices_mm.iter().enumerate().find(|(_, v)| !v.iter().all(usable)) {
-        return Err(Error::Mesh(format!("vertex {i} is at ({}, {}, {}); all coordinates must be finite", v.x, v.y, v.z)));
+        return Err(Error::Mesh(format!(
+            "vertex {i} is at ({}, {}, {}); all coordinates must be finite",
+            v.x, v.y, v.z
+        )));
     }
     let count = surface.vertices_mm.len();
     let out_of_range = |t: &[u32; 3]| t.iter().any(|&v| v as usize >= count);
     if let Some((i, t)) = surface.triangles.iter().enumerate().find(|(_, t)| out_of_range(t)) {
-        return Err(Error::Mesh(format!("triangle {i} = {t:?} names a vertex beyond the last one, {}", count.max(1) - 1)));
+        return Err(Error::Mesh(format!(
+            "triangle {i} = {t:?} names a vertex beyond the last one, {}",
+            count.max(1) - 1
+        )));
     }
     Ok(())
 }

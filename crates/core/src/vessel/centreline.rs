@@ -1,0 +1,238 @@
+//! The centre line of a vessel tree: points with radii, each joined to its parent.
+//!
+//! As a table, one point a line: `x y z radius parent`, separated by blanks, tabs, commas or semicolons; millimetres; `parent`
+//! is the row (counted from 0, without comments and header) of an earlier point, −1 for the root. `#` starts a comment, and the
+//! first line that is not a comment may be a header of words.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use crate::{Error, Result, Vec3};
+
+/// A point of a centre line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CentrelineNode {
+    /// Position in mm.
+    pub position_mm: Vec3,
+    /// Lumen radius in mm.
+    pub radius_mm: f64,
+    /// The node before it, towards the root; `None` for the root.
+    pub parent: Option<usize>,
+}
+
+/// A tree of centre-line points: one root, parents before their children, no two joined points in one place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CentrelineTree {
+    nodes: Vec<CentrelineNode>,
+}
+
+impl CentrelineTree {
+    /// A tree of `nodes`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the row if a number is not finite, a radius is not positive, a parent is not an earlier
+    /// row, a point coincides with its parent, or there is not exactly one root with at least one child.
+    pub fn new(nodes: Vec<CentrelineNode>) -> Result<Self> {
+        for row in 0..nodes.len() {
+            check_row(&nodes, row).map_err(|(column, value, mend)| {
+                Error::parameter(format!("centreline row {row}, {column}"), value, mend)
+            })?;
+        }
+        if nodes.len() < 2 {
+            return Err(Error::parameter("centreline rows", nodes.len(), "a vessel needs at least 2 points"));
+        }
+        Ok(Self { nodes })
+    }
+
+    /// Reads a table.
+    ///
+    /// # Errors
+    /// [`Error::File`] if it cannot be read; [`Error::Content`] naming line and value for what [`CentrelineTree::new`] refuses
+    /// and for what is no number.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        Self::parse(&String::from_utf8_lossy(&bytes)).map_err(|reason| Error::content(path, reason))
+    }
+
+    /// Reads the text of a table; the error names line and value.
+    fn parse(text: &str) -> std::result::Result<Self, String> {
+        let mut nodes: Vec<CentrelineNode> = Vec::new();
+        let mut may_be_header = true;
+        for (index, line) in text.lines().enumerate() {
+            let words: Vec<&str> = line
+                .split('#')
+                .next()
+                .unwrap_or_default()
+                .split(|c: char| c.is_whitespace() || c == ',' || c == ';')
+                .filter(|word| !word.is_empty())
+                .collect();
+            if words.is_empty() {
+                continue;
+            }
+            let is_header = may_be_header && words.iter().all(|word| word.parse::<f64>().is_err());
+            may_be_header = false;
+            if is_header {
+                continue;
+            }
+            nodes.push(parse_row(&words).map_err(|reason| format!("line {}: {reason}", index + 1))?);
+            check_row(&nodes, nodes.len() - 1)
+                .map_err(|(column, value, mend)| format!("line {}: {column} = {value}: {mend}", index + 1))?;
+        }
+        if nodes.len() < 2 {
+            return Err(format!("{} centre-line points; a vessel needs at least 2", nodes.len()));
+        }
+        Ok(Self { nodes })
+    }
+
+    /// Writes the table with `comment` above it. Reading it back gives the same bits.
+    ///
+    /// # Errors
+    /// [`Error::File`] if writing fails.
+    pub fn write(&self, path: &Path, comment: &str) -> Result<()> {
+        std::fs::write(path, self.table(comment)).map_err(|e| Error::file(path, e))
+    }
+
+    /// The table as text.
+    pub fn table(&self, comment: &str) -> String {
+        let mut out: String = comment.lines().map(|line| format!("# {line}\n")).collect();
+        out.push_str("x,y,z,radius,parent\n");
+        for node in &self.nodes {
+            let (p, parent) = (node.position_mm, node.parent.map_or(-1, |row| row as i64));
+            // Writing to a string cannot fail.
+            let _ = writeln!(out, "{},{},{},{},{parent}", p.x, p.y, p.z, node.radius_mm);
+        }
+        out
+    }
+
+    /// The points, parents before children; the first is the root.
+    pub fn nodes(&self) -> &[CentrelineNode] {
+        &self.nodes
+    }
+
+    /// For each node its children, in order.
+    pub fn children(&self) -> Vec<Vec<usize>> {
+        let mut children = vec![Vec::new(); self.nodes.len()];
+        for (row, node) in self.nodes.iter().enumerate() {
+            if let Some(parent) = node.parent {
+                children[parent].push(row);
+            }
+        }
+        children
+    }
+}
+
+fn parse_row(words: &[&str]) -> std::result::Result<CentrelineNode, String> {
+    let [x, y, z, radius, parent] = words else {
+        return Err(format!("{} values; expected 5: x y z radius parent", words.len()));
+    };
+    let number = |name: &str, word: &str| {
+        word.parse::<f64>().map_err(|_| format!("{name} = {word:?} is not a number"))
+    };
+    let parent: i64 = parent.parse().map_err(|_| format!("parent = {parent:?} is not a whole number"))?;
+    Ok(CentrelineNode {
+        position_mm: Vec3::new(number("x", x)?, number("y", y)?, number("z", z)?),
+        radius_mm: number("radius", radius)?,
+        // What is negative but not −1 becomes a row that cannot be there, and is refused as such.
+        parent: (parent != -1).then(|| usize::try_from(parent).unwrap_or(usize::MAX)),
+    })
+}
+
+/// Largest usable number: distances and their squares stay well inside f64, and no vessel is a kilometre long.
+const LARGEST_MM: f64 = 1e6;
+
+/// Checks a row against the rows before it: (column, value, how to mend it).
+fn check_row(
+    nodes: &[CentrelineNode],
+    row: usize,
+) -> std::result::Result<(), (&'static str, String, String)> {
+    let node = &nodes[row];
+    for (name, value) in ["x", "y", "z"].into_iter().zip(node.position_mm.iter()) {
+        // Written so that NaN fails.
+        if !(value.abs() <= LARGEST_MM) {
+            return Err((name, value.to_string(), format!("must be finite and at most {LARGEST_MM} mm")));
+        }
+    }
+    if !(node.radius_mm > 0.0 && node.radius_mm <= LARGEST_MM) {
+        return Err(("radius", node.radius_mm.to_string(), "must be positive and finite (mm)".into()));
+    }
+    match node.parent {
+        None if row == 0 => Ok(()),
+        None => Err(("parent", "-1".into(), "only the first row is a root; name an earlier row".into())),
+        Some(_) if row == 0 => {
+            Err(("parent", describe(node.parent), "the first row is the root; its parent is -1".into()))
+        }
+        Some(parent) if parent >= row => {
+            Err(("parent", describe(node.parent), format!("must be an earlier row: this is row {row}")))
+        }
+        Some(parent) if (nodes[parent].position_mm - node.position_mm).norm() <= 1e-9 => {
+            Err(("parent", describe(node.parent), "the point lies on its parent; remove one of them".into()))
+        }
+        Some(_) => Ok(()),
+    }
+}
+
+fn describe(parent: Option<usize>) -> String {
+    parent.map_or("-1".into(), |p| if p == usize::MAX { "a negative row".into() } else { p.to_string() })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn blanks_commas_comments_and_a_header_read_to_the_same_tree() {
+        let plain = CentrelineTree::parse("0 0 0 2 -1\n0 0 5 1.5 0\n0 0 9 1 1\n0 3 9 1 1\n").unwrap();
+        let dressed = "# a vessel\n\nx,y,z,radius,parent\n0,0,0,2,-1\n0, 0, 5, 1.5, 0 # bend\r\n0;0;9;1;1\n0\t3\t9\t1\t1";
+        assert_eq!(CentrelineTree::parse(dressed).unwrap(), plain);
+        assert_eq!(plain.children(), [vec![1], vec![2, 3], vec![], vec![]]);
+    }
+
+    #[test]
+    fn every_error_names_line_and_value() {
+        for (table, expected) in [
+            ("0 0 0 1 -1\n0 0 nan 1 0", "line 2: z = NaN"),
+            ("0 0 0 1 -1\n0 0 inf 1 0", "line 2: z = inf"),
+            ("0 0 0 0 -1", "line 1: radius = 0"),
+            ("# c\n0 0 0 1 -1\n0 0 1 -2 0", "line 3: radius = -2"),
+            ("0 0 0 1 -1\n0 0 1 1 7", "line 2: parent = 7"),
+            ("0 0 0 1 -1\n0 0 1 1 1", "line 2: parent = 1"),
+            ("0 0 0 1 -1\n0 0 1 1 -3", "line 2: parent = a negative row"),
+            ("0 0 0 1 -1\n0 0 1 1 -1", "line 2: parent = -1: only the first"),
+            ("0 0 0 1 0", "line 1: parent = 0: the first"),
+            ("0 0 0 1 -1\n0 0 0 1 0", "line 2: parent = 0: the point lies on its parent"),
+            ("0 0 0 1 -1\n0 0 1 1 0.5", "line 2: parent = \"0.5\""),
+            ("0 0 0 1 -1\n0 0 one 1 0", "line 2: z = \"one\""),
+            ("0 0 0 1 -1\n0 0 1 1", "line 2: 4 values"),
+            ("", "0 centre-line points"),
+            ("0 0 0 1 -1", "1 centre-line points"),
+        ] {
+            let reason = CentrelineTree::parse(table).unwrap_err();
+            assert!(reason.starts_with(expected), "{table:?}: {reason}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_table_reads_back_to_the_same_bits(
+            rows in prop::collection::vec((prop::array::uniform3(-1e3f64..1e3), 1e-3f64..50.0, any::<prop::sample::Index>()), 2..30)
+        ) {
+            let nodes = rows.iter().enumerate().map(|(row, (p, radius_mm, parent))| CentrelineNode {
+                position_mm: Vec3::from(*p), radius_mm: *radius_mm, parent: (row > 0).then(|| parent.index(row)),
+            }).collect();
+            let tree = CentrelineTree::new(nodes).unwrap();
+            let text = tree.table("two\nlines");
+            prop_assert_eq!(&CentrelineTree::parse(&text).unwrap(), &tree);
+            // The twin: one changed digit is a different tree.
+            let mut moved = tree.nodes().to_vec();
+            moved[0].radius_mm *= 1.0 + 1e-15;
+            prop_assert_ne!(CentrelineTree::new(moved).unwrap(), tree);
+        }
+
+        #[test]
+        fn noise_never_panics(text in "([-0-9. ,\n#]|nan|inf|e)*") {
+            let _ = CentrelineTree::parse(&text);
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! Surface meshes in files: STL, OBJ and PLY, told apart by extension.
+//!
+//! Files carry no unit, so the caller gives one: millimetres per file unit.
+
+mod obj;
+mod ply;
+mod stl;
+
+use std::path::Path;
+
+use super::SurfaceMesh;
+use crate::{Error, Result, Vec3};
+
+/// The formats, as messages name them.
+const KNOWN: &str = "use .stl, .obj or .ply";
+
+/// Why the content of a file is not usable, without the file's name.
+type Reason = String;
+
+#[derive(Clone, Copy)]
+enum Format {
+    Stl,
+    Obj,
+    Ply,
+}
+
+fn format_of(path: &Path) -> Result<Format> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("stl") => Ok(Format::Stl),
+        Some("obj") => Ok(Format::Obj),
+        Some("ply") => Ok(Format::Ply),
+        Some(other) => Err(Error::content(path, format!("unknown mesh format .{other}; {KNOWN}"))),
+        None => Err(Error::content(path, format!("no extension tells the mesh format; {KNOWN}"))),
+    }
+}
+
+impl SurfaceMesh {
+    /// Reads an STL (ASCII or binary), OBJ or PLY (ASCII or binary) surface. Polygons are cut into fans of triangles.
+    /// The surface is returned as it is in the file, scaled; [`Wall::from_surface`](super::Wall::from_surface) repairs it.
+    ///
+    /// `unit_mm`: millimetres per file unit (1 for millimetres, 10 for centimetres, 1000 for metres).
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a unit that is not finite and positive, [`Error::File`] for a file that cannot be read,
+    /// [`Error::Content`] for an unknown extension or unusable content; the reason says where.
+    pub fn read(path: &Path, unit_mm: f64) -> Result<Self> {
+        check_unit(unit_mm)?;
+        let format = format_of(path)?;
+        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        let mesh = parse(format, &bytes).map_err(|reason| Error::content(path, reason))?;
+        scaled(mesh, unit_mm).map_err(|reason| Error::content(path, reason))
+    }
+
+    /// Writes the surface in millimetres: `.stl` as binary STL (32-bit), `.obj` as text, `.ply` as binary little-endian PLY
+    /// (64-bit).
+    ///
+    /// # Errors
+    /// [`Error::Content`] for an unknown extension, [`Error::File`] if writing fails.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let bytes = match format_of(path)? {
+            Format::Stl => stl::bytes(self),
+            Format::Obj => obj::bytes(self),
+            Format::Ply => ply::bytes(self),
+        };
+        std::fs::write(path, bytes).map_err(|e| Error::file(path, e))
+    }
+}
+
+fn check_unit(unit_mm: f64) -> Result<()> {
+    if unit_mm.is_finite() && unit_mm > 0.0 {
+        return Ok(());
+    }
+    Err(Error::parameter(
+        "unit_mm",
+        unit_mm,
+        "must be finite and positive: millimetres per file unit (1000 for metres)",
+    ))
+}
+
+fn parse(format: Format, bytes: &[u8]) -> std::result::Result<SurfaceMesh, Reason> {
+    if bytes.is_empty() {
+        return Err("the file is empty".into());
+    }
+    let mesh = match format {
+        Format::Stl => stl::parse(bytes),
+        Format::Obj => obj::parse(bytes),
+        Format::Ply => ply::parse(bytes),
+    }?;
+    if mesh.triangles.is_empty() {
+        return Err("the file holds no triangles".into());
+    }
+    Ok(mesh)
+}
+
+fn scaled(mut mesh: SurfaceMesh, unit_mm: f64) -> std::result::Result<SurfaceMesh, Reason> {
+    for (index, v) in mesh.vertices_mm.iter_mut().enumerate() {
+        *v *= unit_mm;
+        if !v.iter().all(|c| c.is_finite()) {
+            return Err(format!(
+                "vertex {index} is at ({}, {}, {}); coordinates must be finite",
+                v.x, v.y, v.z
+            ));
+        }
+    }
+    Ok(mesh)
+}
+
+/// Cuts a polygon into a fan of triangles after checking its indices; `what` names it in messages.
+fn push_fan(
+    mesh: &mut SurfaceMesh,
+    polygon: &[i64],
+    what: impl Fn() -> String,
+) -> std::result::Result<(), Reason> {
+    let count = mesh.vertices_mm.len();
+    if polygon.len() < 3 {
+        return Err(format!("{} has {} corners; a face needs at least 3", what(), polygon.len()));
+    }
+    if let Some(bad) = polygon.iter().find(|&&v| v < 0 || v >= count as i64 || v >= i64::from(u32::MAX)) {
+        return Err(format!(
+            "{} names vertex {bad} (counted from 0), but there are {count} vertices",
+            what()
+        ));
+    }
+    for pair in polygon[1..].windows(2) {
+        mesh.triangles.push([polygon[0] as u32, pair[0] as u32, pair[1] as u32]);
+    }
+    Ok(())
+}
+
+/// Three coordinates from an iterator of words.
+fn coordinates<'a>(
+    mut words: impl Iterator<Item = &'a str>,
+    what: impl Fn() -> String,
+) -> std::result::Result<Vec3, Reason> {
+    let mut point = Vec3::zeros();
+    for axis in 0..3 {
+        let word = words.next().ok_or_else(|| format!("{} has fewer than 3 coordinates", what()))?;
+        point[axis] = word.parse().map_err(|_| format!("{}: {word:?} is not a number", what()))?;
+    }
+    Ok(point)
+}
+
+#[cfg(test)]
+mod tests;
