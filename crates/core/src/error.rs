@@ -68,3 +68,14 @@ impl Error {
         !matches!(self, Self::Computation(_))
     }
 }
+
+/// Checks that `value` is finite and in (0, limit].
+///
+/// # Errors
+/// A [`Error::Parameter`] naming `name`.
+pub(crate) fn in_range(name: &str, value: f64, limit: f64) -> Result<()> {
+    if value.is_finite() && value > 0.0 && value <= limit {
+        return Ok(());
+    }
+    Err(Error::parameter(name, value, format!("must be a number above 0 and at most {limit}")))
+}

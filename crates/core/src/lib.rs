@@ -1,8 +1,15 @@
 //! Catheters and guidewires in blood vessels.
 //!
 //! Units everywhere: millimetre, newton, second, radian; energy in N·mm = mJ.
+//!
+//! A scene file becomes a [`scene::Scene`], that builds an [`insertion::Simulation`], which is stepped by
+//! [`insertion::Command`]s and always tells its [`shape::Shape`] and an [`insertion::StepReport`].
 
+pub mod device;
 pub mod error;
+pub mod insertion;
+pub mod methods;
+pub mod scene;
 pub mod shape;
 pub mod vessel;
 

@@ -85,6 +85,11 @@ impl WallQuery {
         Ok(Self { shape, inward, open_side, open_vertex })
     }
 
+    /// Unit normal of a triangle, into the lumen. `triangle` is one that [`WallQuery::nearest`] returned.
+    pub fn inward_normal(&self, triangle: u32) -> Vec3 {
+        self.inward[triangle as usize]
+    }
+
     /// The closest point of the wall if it is less than `reach_mm` away. `None` also for a point that is not finite.
     pub fn nearest(&self, point_mm: &Vec3, reach_mm: f64) -> Option<Nearest> {
         let reach = reach_mm.min(f64::MAX);

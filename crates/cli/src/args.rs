@@ -1,0 +1,90 @@
+//! Command line arguments.
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+
+/// Simulates catheters and guidewires in blood vessels: scripted insertions, experiments, 3D and fluoroscopic frames.
+///
+/// Exit codes: 0 done; 1 the computation failed; 2 bad input or usage.
+#[derive(Debug, Parser)]
+#[command(name = "endowire", version, propagate_version = true)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run the scripted insertion of a scene and record it: summary.json, steps.csv, shapes.npz, frames/*.png
+    Run(RunArgs),
+    /// Check or generate vessel walls
+    #[command(subcommand)]
+    Vessel(VesselCommand),
+    /// Repeat an experiment of Li et al. 2011
+    #[command(subcommand)]
+    Experiment(ExperimentCommand),
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct RunArgs {
+    /// Scene file (TOML)
+    pub(crate) scene: PathBuf,
+    /// Folder for the recording; out/NAME OF THE SCENE if absent
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the summary as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum VesselCommand {
+    /// Report on a surface: openings, flipped and degenerate triangles, self-intersections, volume
+    Check {
+        /// Surface mesh (STL, OBJ or PLY)
+        file: PathBuf,
+        /// Millimetres per unit of the file
+        #[arg(long, default_value_t = 1.0, value_name = "MM")]
+        unit_mm: f64,
+        /// Print the report as one JSON document on stdout
+        #[arg(long)]
+        json: bool,
+    },
+    /// Build a wall from a centre-line tree
+    Generate {
+        /// Centre-line table (x y z radius parent, mm), or the name of a built-in anatomy
+        tree: PathBuf,
+        /// Surface file to write (.stl, .obj or .ply)
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+        /// Edge length of the triangles, mm; a quarter of the smallest radius if absent
+        #[arg(long, value_name = "MM")]
+        edge_mm: Option<f64>,
+        /// Print a report as one JSON document on stdout
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum ExperimentCommand {
+    /// Experiment 1: time per calculation against the number of nodes (the paper's Table 1)
+    Timing(TimingArgs),
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct TimingArgs {
+    /// Numbers of nodes
+    #[arg(long, value_delimiter = ',', default_values_t = [50, 100, 150, 200, 300], value_name = "N,N,…")]
+    pub(crate) nodes: Vec<usize>,
+    /// Timed calculations for each number of nodes
+    #[arg(long, default_value_t = 15, value_name = "COUNT")]
+    pub(crate) repeats: usize,
+    /// Folder for timing.csv and timing.json
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}

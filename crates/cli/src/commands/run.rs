@@ -1,0 +1,122 @@
+//! `endowire run`: a scripted insertion, recorded.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use endowire_core::insertion::Simulation;
+use endowire_core::scene::Scene;
+
+use crate::args::RunArgs;
+use crate::failure::Failure;
+use crate::output::progress;
+use crate::output::provenance::{Provenance, read_input};
+use crate::output::recorder::{Recorder, StepFailure, Summary};
+use crate::output::{frames::FrameWriter, print_json};
+
+/// Runs the scene's script and records every step.
+pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
+    let started = Instant::now();
+    let scene = Scene::read(&args.scene)?;
+    let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
+    let commands = scene.commands(&scene.device().map_err(in_scene)?).map_err(in_scene)?;
+    let mut simulation = scene.simulation().map_err(in_scene)?;
+    let mut frames = FrameWriter::new(&args.scene, &simulation)?;
+    let vessel = read_input(&scene.vessel_path().map_err(in_scene)?)?;
+    let provenance = Provenance::new(&[scene.text().as_bytes(), &vessel], scene.seed);
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
+    let mut recorder = Recorder::new(&folder)?;
+
+    let bar = progress::bar(commands.len(), "step");
+    let mut step_time_s = 0.0;
+    let mut max_penetration_mm: f64 = 0.0;
+    let mut converged = true;
+    let mut failure = None;
+    for (index, command) in commands.iter().enumerate() {
+        let clock = Instant::now();
+        let result = simulation.step(*command);
+        step_time_s += clock.elapsed().as_secs_f64();
+        match result {
+            Ok(report) => {
+                max_penetration_mm = max_penetration_mm.max(report.max_penetration_mm);
+                converged &= report.converged;
+            }
+            Err(error) => {
+                failure = Some(StepFailure { step: index + 1, reason: error.to_string() });
+                break;
+            }
+        }
+        recorder.record(*command, simulation.report(), simulation.shape())?;
+        let last = index + 1 == commands.len();
+        frames.step(index + 1, last, &simulation, &mut recorder)?;
+        bar.set_message(format!("{:.1} mm inserted", simulation.report().inserted_mm));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    if failure.is_some() && recorder.steps() > 0 {
+        frames.step(recorder.steps(), true, &simulation, &mut recorder)?;
+    }
+
+    let report = simulation.report();
+    let summary = Summary {
+        provenance,
+        scene: scene.name.clone(),
+        method: scene.method.name(),
+        steps: recorder.steps(),
+        steps_asked: commands.len(),
+        converged: converged && failure.is_none(),
+        failure: failure.clone(),
+        inserted_mm: report.inserted_mm,
+        rotation_rad: report.rotation_rad,
+        tip_mm: simulation.shape().tip_mm().map(Into::into),
+        push_force_n: report.push_force_n,
+        torque_nmm: report.torque_nmm,
+        energy_mj: report.energy,
+        max_penetration_mm,
+        step_time_s,
+        wall_time_s: started.elapsed().as_secs_f64(),
+        renderer: frames.renderer(),
+        frames: recorder.frames.clone(),
+    };
+    recorder.finish(&summary)?;
+    if args.json {
+        print_json(&summary)?;
+    } else {
+        tell(&summary, &folder, &simulation);
+    }
+    match failure {
+        Some(StepFailure { step, reason }) => Err(Failure::Computation(format!(
+            "{}: step {step}: {reason} (the {} steps before it are kept in {})",
+            args.scene.display(),
+            summary.steps,
+            folder.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// The summary for a person, on stderr: stdout is for documents.
+fn tell(summary: &Summary, folder: &PathBuf, simulation: &Simulation) {
+    let tip = summary.tip_mm.unwrap_or_default();
+    eprintln!(
+        "{}: {} of {} steps by {} in {:.2} s ({:.2} s simulating)\n\
+         inserted {:.2} mm, tip at [{:.2}, {:.2}, {:.2}] mm, push force {:.4} N, {} contacts, \
+         deepest penetration {:.3} mm\n\
+         {} frames{} in {}",
+        summary.scene,
+        summary.steps,
+        summary.steps_asked,
+        summary.method,
+        summary.wall_time_s,
+        summary.step_time_s,
+        summary.inserted_mm,
+        tip[0],
+        tip[1],
+        tip[2],
+        summary.push_force_n,
+        simulation.report().contacts.len(),
+        summary.max_penetration_mm,
+        summary.frames.len(),
+        summary.renderer.as_ref().map_or(String::new(), |r| format!(" by {r}")),
+        folder.display()
+    );
+}

@@ -1,0 +1,51 @@
+//! Why a command did not do what it was asked, and the exit code that says so.
+
+use std::fmt;
+use std::path::Path;
+use std::process::ExitCode;
+
+/// What ends a command early.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The input or its use is at fault: exit code 2.
+    Input(String),
+    /// The computation failed on good input: exit code 1.
+    Computation(String),
+}
+
+impl Failure {
+    /// 2 for bad input, 1 for a failed computation (0 is success, by `main`).
+    pub(crate) fn exit_code(&self) -> ExitCode {
+        ExitCode::from(match self {
+            Self::Input(_) => 2,
+            Self::Computation(_) => 1,
+        })
+    }
+
+    /// The same failure, with where it happened in front.
+    pub(crate) fn at(self, place: impl fmt::Display) -> Self {
+        match self {
+            Self::Input(text) => Self::Input(format!("{place}: {text}")),
+            Self::Computation(text) => Self::Computation(format!("{place}: {text}")),
+        }
+    }
+
+    /// An output file or folder that cannot be written.
+    pub(crate) fn write(path: &Path, error: &std::io::Error) -> Self {
+        Self::Input(format!("cannot write {}: {error}", path.display()))
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Input(text) | Self::Computation(text) => f.write_str(text),
+        }
+    }
+}
+
+impl From<endowire_core::Error> for Failure {
+    fn from(error: endowire_core::Error) -> Self {
+        if error.is_input() { Self::Input(error.to_string()) } else { Self::Computation(error.to_string()) }
+    }
+}

@@ -1,0 +1,91 @@
+//! Arrays for numpy: an uncompressed zip of `.npy` members, written without holding them in memory.
+//!
+//! Format: NumPy enhancement proposal 1, version 1.0. Only the 60-byte header is ours; the crates that read and write
+//! the whole format bring a parser generator for it.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Read, Seek, Write};
+use std::path::Path;
+
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
+
+/// Number type of an array.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Kind {
+    /// 64-bit float.
+    F64,
+    /// 64-bit signed integer.
+    I64,
+}
+
+/// One array that grows row by row, kept in an unnamed temporary file until it is packed.
+pub(crate) struct ArrayStream {
+    name: &'static str,
+    kind: Kind,
+    /// Numbers in a row; 1 makes a one-dimensional array.
+    columns: usize,
+    numbers: u64,
+    file: BufWriter<File>,
+}
+
+impl ArrayStream {
+    /// An empty array.
+    pub(crate) fn new(name: &'static str, kind: Kind, columns: usize) -> io::Result<Self> {
+        Ok(Self { name, kind, columns, numbers: 0, file: BufWriter::new(tempfile::tempfile()?) })
+    }
+
+    /// Appends floats.
+    pub(crate) fn push_f64(&mut self, values: impl IntoIterator<Item = f64>) -> io::Result<()> {
+        for value in values {
+            self.file.write_all(&value.to_le_bytes())?;
+            self.numbers += 1;
+        }
+        Ok(())
+    }
+
+    /// Appends an integer.
+    pub(crate) fn push_i64(&mut self, value: i64) -> io::Result<()> {
+        self.numbers += 1;
+        self.file.write_all(&value.to_le_bytes())
+    }
+
+    /// Magic string, version, and the dictionary padded so that the data starts at a multiple of 64 bytes.
+    fn header(&self) -> Vec<u8> {
+        let kind = match self.kind {
+            Kind::F64 => "<f8",
+            Kind::I64 => "<i8",
+        };
+        let shape = match self.columns {
+            1 => format!("({},)", self.numbers),
+            columns => format!("({}, {columns})", self.numbers / columns as u64),
+        };
+        let mut text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+        while (10 + text.len() + 1) % 64 != 0 {
+            text.push(' ');
+        }
+        text.push('\n');
+        let mut header = b"\x93NUMPY\x01\x00".to_vec();
+        header.extend((text.len() as u16).to_le_bytes());
+        header.extend(text.as_bytes());
+        header
+    }
+}
+
+/// Packs arrays into a `.npz` file.
+pub(crate) fn write(path: &Path, arrays: Vec<ArrayStream>) -> io::Result<()> {
+    let mut archive = ZipWriter::new(BufWriter::new(File::create(path)?));
+    // Stored, with the fixed time stamp of the zip epoch: the same arrays are the same bytes.
+    let options = SimpleFileOptions::default()
+        .compression_method(zip::CompressionMethod::Stored)
+        .last_modified_time(zip::DateTime::default())
+        .large_file(true);
+    for array in arrays {
+        archive.start_file(format!("{}.npy", array.name), options)?;
+        archive.write_all(&array.header())?;
+        let mut data = array.file.into_inner().map_err(io::IntoInnerError::into_error)?;
+        data.rewind()?;
+        io::copy(&mut data.take(u64::MAX), &mut archive)?;
+    }
+    archive.finish()?.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
+}

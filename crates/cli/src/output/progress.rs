@@ -1,0 +1,12 @@
+//! Progress bars, on a terminal only.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// A bar of `length` steps on stderr; invisible where stderr is no terminal.
+pub(crate) fn bar(length: usize, what: &'static str) -> ProgressBar {
+    let bar = ProgressBar::new(length as u64).with_prefix(what);
+    if let Ok(style) = ProgressStyle::with_template("{prefix} {bar:40} {pos}/{len} {msg} [{elapsed}<{eta}]") {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -1,0 +1,204 @@
+//! A run on disk: steps.csv line by line, shapes.npz and summary.json at the end — also at an early one.
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use endowire_core::insertion::{Command, Energy, StepReport};
+use endowire_core::shape::Shape;
+use serde::Serialize;
+
+use super::npz::{self, ArrayStream, Kind};
+use super::provenance::Provenance;
+use super::to_json;
+use crate::failure::Failure;
+
+/// What `run` tells of a whole insertion: summary.json.
+#[derive(Debug, Serialize)]
+pub(crate) struct Summary {
+    /// Where the result comes from.
+    #[serde(flatten)]
+    pub(crate) provenance: Provenance,
+    /// Name of the scene.
+    pub(crate) scene: String,
+    /// Name of the method.
+    pub(crate) method: &'static str,
+    /// Steps carried out.
+    pub(crate) steps: usize,
+    /// Steps of the script.
+    pub(crate) steps_asked: usize,
+    /// Whether all steps were carried out and every one met its convergence test.
+    pub(crate) converged: bool,
+    /// The step that failed and why, if one did.
+    pub(crate) failure: Option<StepFailure>,
+    /// Length inserted at the end, mm.
+    pub(crate) inserted_mm: f64,
+    /// Turn of the tail at the end, rad.
+    pub(crate) rotation_rad: f64,
+    /// Tip at the end, mm.
+    pub(crate) tip_mm: Option<[f64; 3]>,
+    /// Push force at the end, N.
+    pub(crate) push_force_n: f64,
+    /// Torque at the end, N·mm.
+    pub(crate) torque_nmm: f64,
+    /// Energy at the end, mJ.
+    pub(crate) energy_mj: Energy,
+    /// Deepest penetration of the wall in any step, mm.
+    pub(crate) max_penetration_mm: f64,
+    /// Time of the simulation, s, without recording and frames.
+    pub(crate) step_time_s: f64,
+    /// Time of the whole run, s.
+    pub(crate) wall_time_s: f64,
+    /// What drew the frames.
+    pub(crate) renderer: Option<String>,
+    /// Frames, relative to the folder of this file.
+    pub(crate) frames: Vec<String>,
+}
+
+/// A step that found no equilibrium.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct StepFailure {
+    /// Number of the step, from 1.
+    pub(crate) step: usize,
+    /// What the method said.
+    pub(crate) reason: String,
+}
+
+/// One line of steps.csv.
+#[derive(Serialize)]
+struct Row {
+    step: usize,
+    advance_mm: f64,
+    rotate_rad: f64,
+    inserted_mm: f64,
+    rotation_rad: f64,
+    nodes: usize,
+    tip_x_mm: f64,
+    tip_y_mm: f64,
+    tip_z_mm: f64,
+    push_force_n: f64,
+    torque_nmm: f64,
+    bend_mj: f64,
+    twist_mj: f64,
+    wall_mj: f64,
+    contacts: usize,
+    max_penetration_mm: f64,
+    iterations: u32,
+    converged: bool,
+}
+
+/// Writes a run into a folder.
+pub(crate) struct Recorder {
+    folder: PathBuf,
+    table: csv::Writer<File>,
+    positions: ArrayStream,
+    tangents: ArrayStream,
+    from_tip: ArrayStream,
+    offsets: ArrayStream,
+    nodes: i64,
+    steps: usize,
+    /// Frames written so far, relative to the folder.
+    pub(crate) frames: Vec<String>,
+}
+
+impl Recorder {
+    /// Starts a recording in `folder`, which is made if it is not there; an earlier recording in it is replaced.
+    pub(crate) fn new(folder: &Path) -> Result<Self, Failure> {
+        let create = || -> io::Result<Self> {
+            std::fs::create_dir_all(folder)?;
+            remove_earlier(folder)?;
+            let mut offsets = ArrayStream::new("offsets", Kind::I64, 1)?;
+            offsets.push_i64(0)?;
+            Ok(Self {
+                folder: folder.to_path_buf(),
+                table: csv::Writer::from_writer(File::create(folder.join("steps.csv"))?),
+                positions: ArrayStream::new("positions_mm", Kind::F64, 3)?,
+                tangents: ArrayStream::new("tangents", Kind::F64, 3)?,
+                from_tip: ArrayStream::new("from_tip_mm", Kind::F64, 1)?,
+                offsets,
+                nodes: 0,
+                steps: 0,
+                frames: Vec::new(),
+            })
+        };
+        create().map_err(|e| Failure::write(folder, &e))
+    }
+
+    /// Adds one step.
+    pub(crate) fn record(&mut self, command: Command, report: &StepReport, shape: &Shape) -> Result<(), Failure> {
+        self.steps += 1;
+        let tip = shape.tip_mm().unwrap_or_default();
+        let row = Row {
+            step: self.steps,
+            advance_mm: command.advance_mm,
+            rotate_rad: command.rotate_rad,
+            inserted_mm: report.inserted_mm,
+            rotation_rad: report.rotation_rad,
+            nodes: shape.len(),
+            tip_x_mm: tip.x,
+            tip_y_mm: tip.y,
+            tip_z_mm: tip.z,
+            push_force_n: report.push_force_n,
+            torque_nmm: report.torque_nmm,
+            bend_mj: report.energy.bend,
+            twist_mj: report.energy.twist,
+            wall_mj: report.energy.wall,
+            contacts: report.contacts.len(),
+            max_penetration_mm: report.max_penetration_mm,
+            iterations: report.iterations,
+            converged: report.converged,
+        };
+        let mut write = || -> io::Result<()> {
+            self.table.serialize(row)?;
+            self.table.flush()?;
+            self.positions.push_f64(shape.positions_mm.iter().flat_map(|x| [x.x, x.y, x.z]))?;
+            self.tangents.push_f64(shape.tangents.iter().flat_map(|t| [t.x, t.y, t.z]))?;
+            self.from_tip.push_f64(shape.from_tip_mm.iter().copied())?;
+            self.nodes += shape.len() as i64;
+            self.offsets.push_i64(self.nodes)
+        };
+        write().map_err(|e| Failure::write(&self.folder, &e))
+    }
+
+    /// Path of a new frame of the current step, noted for the summary.
+    pub(crate) fn frame(&mut self, view: &str) -> Result<PathBuf, Failure> {
+        let folder = self.folder.join("frames");
+        std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
+        let name = format!("step_{:06}_{view}.png", self.steps);
+        self.frames.push(format!("frames/{name}"));
+        Ok(folder.join(name))
+    }
+
+    /// Steps recorded so far.
+    pub(crate) fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// Writes shapes.npz and summary.json.
+    pub(crate) fn finish(self, summary: &Summary) -> Result<(), Failure> {
+        let folder = &self.folder;
+        npz::write(&folder.join("shapes.npz"), vec![self.positions, self.tangents, self.from_tip, self.offsets])
+            .map_err(|e| Failure::write(&folder.join("shapes.npz"), &e))?;
+        let path = folder.join("summary.json");
+        std::fs::write(&path, to_json(summary)? + "\n").map_err(|e| Failure::write(&path, &e))
+    }
+}
+
+/// Removes what an earlier recording left, and nothing else.
+fn remove_earlier(folder: &Path) -> io::Result<()> {
+    for name in ["summary.json", "steps.csv", "shapes.npz"] {
+        match std::fs::remove_file(folder.join(name)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+    }
+    let Ok(frames) = std::fs::read_dir(folder.join("frames")) else { return Ok(()) };
+    for entry in frames {
+        let path = entry?.path();
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        if name.starts_with("step_") && name.ends_with(".png") {
+            std::fs::remove_file(path)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,201 @@
+//! Bad input ends with exit code 2 and one clear line that names file, key and value; nothing panics.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A working scene in a folder of its own, to be spoilt one value at a time.
+struct Scene {
+    folder: tempfile::TempDir,
+    text: String,
+}
+
+const GOOD: &str = r#"
+[vessel]
+tree = "tube.csv"
+edge_mm = 2.0
+
+[[device.section]]
+length_mm = 60.0
+radius_mm = 0.5
+bending_stiffness_nmm2 = 10.0
+
+[sheath]
+position_mm = [1.0, 0.0, 0.0]
+direction = [1.0, 0.0, 0.0]
+
+[[script]]
+advance_mm = 20.0
+step_mm = 2.0
+"#;
+
+const TUBE: &str = "0 0 0 4 -1\n80 0 0 4 0\n";
+
+impl Scene {
+    fn good() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("tube.csv"), TUBE).unwrap();
+        Self { folder, text: GOOD.to_owned() }
+    }
+
+    fn with(mut self, from: &str, to: &str) -> Self {
+        assert!(self.text.contains(from), "{from} is not in the scene");
+        self.text = self.text.replace(from, to);
+        self
+    }
+
+    fn file(self, name: &str, bytes: &[u8]) -> Self {
+        std::fs::write(self.path(name), bytes).unwrap();
+        self
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn run(&self) -> Output {
+        std::fs::write(self.path("scene.toml"), &self.text).unwrap();
+        endowire(&["run".as_ref(), self.path("scene.toml").as_ref(), "--out".as_ref(), self.path("out").as_ref()])
+    }
+
+    /// Runs, expects exit code 2 and a single line with all of `words`.
+    fn is_refused(&self, words: &[&str]) {
+        let output = self.run();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        assert_eq!(text.trim_end().lines().count(), 1, "one line is wanted: {text}");
+        for word in words {
+            assert!(text.contains(word), "`{word}` is missing in: {text}");
+        }
+    }
+}
+
+fn endowire(args: &[&Path]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_endowire")).args(args).output().unwrap()
+}
+
+#[test]
+fn the_scene_that_is_spoilt_below_is_good() {
+    let output = Scene::good().run();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn a_missing_scene_is_named() {
+    let output = endowire(&["run".as_ref(), "no/such/scene.toml".as_ref()]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("no/such/scene.toml"));
+}
+
+#[test]
+fn a_missing_vessel_or_device_file_is_named() {
+    Scene::good().with("tube.csv", "gone.csv").is_refused(&["gone.csv"]);
+    Scene::good().with("[[device.section]]", "[device]\nfile = \"gone.toml\"\n[[device.section]]").is_refused(&["device"]);
+    let sections = &GOOD[GOOD.find("[[device.section]]").unwrap()..GOOD.find("[sheath]").unwrap()];
+    Scene::good().with(sections, "[device]\nfile = \"gone.toml\"\n").is_refused(&["gone.toml"]);
+}
+
+#[test]
+fn a_wrong_key_comes_with_the_nearest_right_one() {
+    Scene::good().with("radius_mm", "radius").is_refused(&["scene.toml", "line 8", "`radius`", "did you mean `radius_mm`?"]);
+    Scene::good().with("step_mm", "stepmm").is_refused(&["`stepmm`", "did you mean `step_mm`?"]);
+    Scene::good().with("[sheath]", "[sheat]").is_refused(&["`sheat`", "did you mean `sheath`?"]);
+    Scene::good()
+        .with("[sheath]", "[view]\nsise_px = [8, 8]\n[sheath]")
+        .is_refused(&["`sise_px`", "did you mean `size_px`?"]);
+    Scene::good()
+        .with("[sheath]", "[method]\nname = \"li2011-bandet\"\n[sheath]")
+        .is_refused(&["li2011-bandet", "did you mean `li2011-banded`?"]);
+}
+
+#[test]
+fn values_that_are_not_finite_are_named() {
+    Scene::good().with("radius_mm = 0.5", "radius_mm = nan").is_refused(&["scene.toml", "device.section[0].radius_mm", "NaN"]);
+    Scene::good().with("= 10.0", "= inf").is_refused(&["bending_stiffness_nmm2", "inf"]);
+    Scene::good().with("[1.0, 0.0, 0.0]\ndirection", "[nan, 0.0, 0.0]\ndirection").is_refused(&["sheath.position_mm", "NaN"]);
+    Scene::good().with("advance_mm = 20.0", "advance_mm = nan").is_refused(&["script[0].advance_mm", "NaN"]);
+    Scene::good().file("tube.csv", b"0 0 0 4 -1\n80 0 nan 4 0\n").is_refused(&["tube.csv", "line 2"]);
+}
+
+#[test]
+fn a_device_without_length_is_refused() {
+    Scene::good().with("length_mm = 60.0", "length_mm = 0.0").is_refused(&["device.section[0].length_mm = 0"]);
+    Scene::good().with("length_mm = 60.0", "length_mm = -60.0").is_refused(&["length_mm = -60"]);
+}
+
+#[test]
+fn a_sheath_outside_the_vessel_is_refused() {
+    Scene::good()
+        .with("position_mm = [1.0, 0.0, 0.0]", "position_mm = [1.0, 9.0, 0.0]")
+        .is_refused(&["sheath.position_mm", "[1, 9, 0]", "outside"]);
+    Scene::good()
+        .with("position_mm = [1.0, 0.0, 0.0]\ndirection = [1.0, 0.0, 0.0]", "opening = 7")
+        .is_refused(&["sheath.opening = 7", "2 openings"]);
+}
+
+#[test]
+fn a_sheath_without_direction_is_refused() {
+    Scene::good().with("direction = [1.0, 0.0, 0.0]", "direction = [0.0, 0.0, 0.0]").is_refused(&["sheath.direction"]);
+}
+
+#[test]
+fn an_empty_mesh_is_refused() {
+    for (name, bytes) in [
+        ("empty.stl", &b"solid nothing\nendsolid nothing\n"[..]),
+        ("empty.stl", &[0; 84][..]),
+        ("empty.stl", &b""[..]),
+        ("empty.obj", &b"# nothing\n"[..]),
+    ] {
+        Scene::good()
+            .file(name, bytes)
+            .with("tree = \"tube.csv\"\nedge_mm = 2.0", &format!("file = \"{name}\""))
+            .is_refused(&[name]);
+    }
+}
+
+#[test]
+fn a_mesh_too_broken_to_tell_inside_from_outside_is_refused() {
+    // Two triangles of a wall: no lumen.
+    let obj = b"v 0 -4 -4\nv 80 -4 -4\nv 80 -4 4\nv 0 4 4\nf 1 2 3\nf 1 3 4\n";
+    Scene::good()
+        .file("sheet.obj", obj)
+        .with("tree = \"tube.csv\"\nedge_mm = 2.0", "file = \"sheet.obj\"")
+        .is_refused(&["sheet.obj"]);
+}
+
+#[test]
+fn absurd_sizes_are_refused_before_memory_is() {
+    Scene::good().with("edge_mm = 2.0", "edge_mm = 1e-9").is_refused(&["edge_mm"]);
+    Scene::good().with("step_mm = 2.0", "step_mm = 1e-30").is_refused(&["script[0]"]);
+    Scene::good().with("length_mm = 60.0", "length_mm = 6e30").is_refused(&["length_mm"]);
+    Scene::good().with("[sheath]", "[method]\nname = \"li2011-dense\"\nelement_mm = 1e-6\n[sheath]").is_refused(&["element_mm"]);
+    Scene::good().with("[sheath]", "[view]\nviews = [\"3d\"]\nsize_px = [100000000, 4]\n[sheath]").is_refused(&["size_px"]);
+    let mut huge = vec![0; 84];
+    huge[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
+    Scene::good()
+        .file("huge.stl", &huge)
+        .with("tree = \"tube.csv\"\nedge_mm = 2.0", "file = \"huge.stl\"")
+        .is_refused(&["huge.stl"]);
+}
+
+#[test]
+fn moving_beyond_the_ends_of_the_device_is_refused_before_the_run() {
+    Scene::good().with("advance_mm = 20.0", "advance_mm = 61.0").is_refused(&["advance_mm", "60 mm long"]);
+    Scene::good().with("advance_mm", "retract_mm").is_refused(&["retract_mm", "0 mm are inserted"]);
+}
+
+#[test]
+fn contradicting_keys_are_refused() {
+    Scene::good().with("edge_mm = 2.0", "edge_mm = 2.0\nunit_mm = 10.0").is_refused(&["vessel.unit_mm = 10"]);
+    Scene::good().with("edge_mm = 2.0", "file = \"a.stl\"").is_refused(&["vessel.file"]);
+    Scene::good().with("tree = \"tube.csv\"\nedge_mm = 2.0", "").is_refused(&["vessel"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let scene = Scene::good().file("taken", b"a file, not a folder");
+    std::fs::write(scene.path("scene.toml"), &scene.text).unwrap();
+    let output =
+        endowire(&["run".as_ref(), scene.path("scene.toml").as_ref(), "--out".as_ref(), scene.path("taken").as_ref()]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("taken"));
+}

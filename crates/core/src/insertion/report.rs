@@ -1,0 +1,64 @@
+//! What a step tells.
+
+use serde::Serialize;
+
+use crate::Vec3;
+
+/// The terms of the total potential energy, mJ.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Energy {
+    /// Bending.
+    pub bend: f64,
+    /// Twist; 0 for methods without it.
+    pub twist: f64,
+    /// Deformation of the vessel wall.
+    pub wall: f64,
+}
+
+impl Energy {
+    /// Sum of all terms, mJ.
+    pub fn total(&self) -> f64 {
+        self.bend + self.twist + self.wall
+    }
+}
+
+/// One place where the wall holds the device.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Position on the device's axis, mm.
+    pub position_mm: Vec3,
+    /// Direction of the wall's normal force on the device: into the lumen, unit length.
+    pub normal: Vec3,
+    /// Normal force, N.
+    pub force_n: f64,
+    /// Depth to which the device's surface is beyond the wall, mm.
+    pub penetration_mm: f64,
+    /// Triangle of the wall mesh.
+    pub triangle: u32,
+}
+
+/// State of an insertion after a step.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StepReport {
+    /// Length inside the sheath's mouth, mm.
+    pub inserted_mm: f64,
+    /// Turn of the tail since the start, rad.
+    pub rotation_rad: f64,
+    /// Energy terms, mJ.
+    pub energy: Energy,
+    /// Force with which the hand must push to hold the device, N; negative where it must pull.
+    ///
+    /// F = −n·t − |m|²/(2EI) at the sheath, with n and m the internal force and moment: the second,
+    /// configurational term makes it the derivative of the energy with respect to the inserted length.
+    pub push_force_n: f64,
+    /// Torque with which the hand must hold the tail, N·mm.
+    pub torque_nmm: f64,
+    /// Deepest penetration of the device's surface into the wall at any node, mm; 0 without contact.
+    pub max_penetration_mm: f64,
+    /// Where the wall holds the device.
+    pub contacts: Vec<Contact>,
+    /// Iterations (linear solves) of this step.
+    pub iterations: u32,
+    /// Whether the step met the method's own convergence test.
+    pub converged: bool,
+}

@@ -1,0 +1,142 @@
+//! A device, a vessel and a method, stepped by commands.
+
+use crate::device::Device;
+use crate::insertion::{Command, Sheath, StepReport};
+use crate::methods::{Method, MethodChoice};
+use crate::shape::Shape;
+use crate::vessel::{Wall, WallQuery};
+use crate::{Error, Result};
+
+/// What surrounds a method's unknowns: it may read all of it and change none.
+#[derive(Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// Distance queries to the vessel wall.
+    pub query: &'a WallQuery,
+    /// Where the device comes from.
+    pub sheath: &'a Sheath,
+    /// The device.
+    pub device: &'a Device,
+}
+
+/// An insertion under way.
+pub struct Simulation {
+    wall: Wall,
+    query: WallQuery,
+    sheath: Sheath,
+    device: Device,
+    method: Box<dyn Method>,
+}
+
+/// How far in front of the sheath's mouth, mm, the inside test looks: the mouth itself may lie in the plane of an
+/// opening, where inside and outside meet.
+const MOUTH_MM: f64 = 1e-3;
+
+impl Simulation {
+    /// A device at the mouth of the sheath, nothing inserted.
+    ///
+    /// # Errors
+    /// A sheath that is not inside the vessel, a wall too broken to tell, or method options out of range.
+    pub fn new(wall: Wall, device: Device, sheath: Sheath, method: &MethodChoice) -> Result<Self> {
+        if !wall.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
+            let p = sheath.position_mm;
+            let openings: Vec<String> = wall
+                .openings()
+                .iter()
+                .map(|o| format!("{} at [{:.1}, {:.1}, {:.1}]", o.index, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z))
+                .collect();
+            return Err(Error::parameter(
+                "sheath.position_mm",
+                format!("[{}, {}, {}]", p.x, p.y, p.z),
+                format!(
+                    "is outside the vessel: place it inside, or name an opening (sheath.opening); openings: {}",
+                    if openings.is_empty() { "none".to_owned() } else { openings.join(", ") }
+                ),
+            ));
+        }
+        let query = WallQuery::new(&wall)?;
+        let method = method.start(&Surroundings { query: &query, sheath: &sheath, device: &device })?;
+        Ok(Self { wall, query, sheath, device, method })
+    }
+
+    /// Carries out one command. After an error the state is as before.
+    ///
+    /// # Errors
+    /// A command that is not finite, pushes in more than the device's length or pulls out more than is inserted
+    /// (all [`Error::Parameter`]); a step that found no equilibrium ([`Error::Computation`]).
+    pub fn step(&mut self, command: Command) -> Result<&StepReport> {
+        check_command(command, self.method.report().inserted_mm, self.device.length_mm())?;
+        let surroundings = Surroundings { query: &self.query, sheath: &self.sheath, device: &self.device };
+        self.method.step(&surroundings, command)?;
+        Ok(self.method.report())
+    }
+
+    /// The inserted centre line, sheath to tip.
+    pub fn shape(&self) -> &Shape {
+        self.method.shape()
+    }
+
+    /// What the last step found.
+    pub fn report(&self) -> &StepReport {
+        self.method.report()
+    }
+
+    /// The vessel.
+    pub fn wall(&self) -> &Wall {
+        &self.wall
+    }
+
+    /// The device.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// The sheath.
+    pub fn sheath(&self) -> &Sheath {
+        &self.sheath
+    }
+}
+
+/// Slack in inserted length, mm: the rounding of thousands of summed increments.
+const LENGTH_SLACK_MM: f64 = 1e-6;
+
+fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<()> {
+    for (name, value) in [("advance_mm", command.advance_mm), ("rotate_rad", command.rotate_rad)] {
+        if !value.is_finite() {
+            return Err(Error::parameter(name, value, "must be a finite number"));
+        }
+    }
+    let target = inserted_mm + command.advance_mm;
+    if target > device_mm + LENGTH_SLACK_MM {
+        return Err(Error::parameter(
+            "advance_mm",
+            command.advance_mm,
+            format!("the device is {device_mm} mm long and {inserted_mm} mm are inserted: advance less"),
+        ));
+    }
+    if target < -LENGTH_SLACK_MM {
+        return Err(Error::parameter(
+            "retract_mm",
+            -command.advance_mm,
+            format!("only {inserted_mm} mm are inserted: retract less"),
+        ));
+    }
+    Ok(())
+}
+
+/// Checks a whole list of commands against a device before the first is carried out.
+///
+/// # Errors
+/// As [`Simulation::step`], naming the command's number.
+pub fn check_commands(list: &[Command], device: &Device) -> Result<()> {
+    let mut inserted_mm = 0.0;
+    for (index, command) in list.iter().enumerate() {
+        check_command(*command, inserted_mm, device.length_mm()).map_err(|error| match error {
+            Error::Parameter { name, value, mend } => {
+                Error::Parameter { name: format!("script step {}: {name}", index + 1), value, mend }
+            }
+            other => other,
+        })?;
+        inserted_mm += command.advance_mm;
+    }
+    Ok(())
+}

@@ -1,0 +1,70 @@
+//! Whole methods that answer a command with the next equilibrium, behind one trait.
+
+pub mod li2011;
+
+use serde::{Deserialize, Serialize};
+
+use crate::Result;
+use crate::insertion::{Command, StepReport, Surroundings};
+use crate::shape::Shape;
+use li2011::{Li2011, Li2011Options, LinearSolver};
+
+/// A method keeps its own unknowns from step to step and moves them by commands.
+pub trait Method: Send {
+    /// Carries out one command and finds the equilibrium after it.
+    ///
+    /// After an error the method is as it was before the command.
+    ///
+    /// # Errors
+    /// A command that the device or the method cannot follow (input), or an equilibrium not found (computation).
+    fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()>;
+
+    /// The inserted centre line.
+    fn shape(&self) -> &Shape;
+
+    /// What the last step found.
+    fn report(&self) -> &StepReport;
+}
+
+/// A method by name, with its options: the `[method]` table of a scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "name")]
+pub enum MethodChoice {
+    /// Li et al. 2011 with the paper's dense solve.
+    #[serde(rename = "li2011-dense")]
+    Li2011Dense(Li2011Options),
+    /// Li et al. 2011, the same equations solved in O(n).
+    #[serde(rename = "li2011-banded")]
+    Li2011Banded(Li2011Options),
+}
+
+impl Default for MethodChoice {
+    fn default() -> Self {
+        Self::Li2011Banded(Li2011Options::default())
+    }
+}
+
+impl MethodChoice {
+    /// The name used in scene files and results.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Li2011Dense(_) => "li2011-dense",
+            Self::Li2011Banded(_) => "li2011-banded",
+        }
+    }
+
+    /// The method at rest at the sheath, nothing inserted.
+    ///
+    /// # Errors
+    /// Options out of range.
+    pub fn start(&self, surroundings: &Surroundings<'_>) -> Result<Box<dyn Method>> {
+        Ok(match self {
+            Self::Li2011Dense(options) => {
+                Box::new(Li2011::new(*options, LinearSolver::Dense, surroundings)?)
+            }
+            Self::Li2011Banded(options) => {
+                Box::new(Li2011::new(*options, LinearSolver::Banded, surroundings)?)
+            }
+        })
+    }
+}

@@ -1,0 +1,34 @@
+//! Scene files: one TOML document that says what is pushed into what, how, and what is recorded.
+//!
+//! The core reads every table but `[view]`, which belongs to the viewer. Paths are relative to the scene file.
+//!
+//! ```toml
+//! name = "curved_tube"
+//!
+//! [vessel]
+//! tree = "../vessels/curved_tube.csv"   # or: file = "wall.stl", with unit_mm
+//! edge_mm = 1.0
+//!
+//! [device]
+//! [[device.section]]                    # tip first
+//! length_mm = 300.0
+//! radius_mm = 0.45
+//! bending_stiffness_nmm2 = 10.0
+//!
+//! [sheath]
+//! opening = 0                           # or: position_mm and direction
+//!
+//! [method]
+//! name = "li2011-banded"
+//! element_mm = 2.0
+//!
+//! [[script]]
+//! advance_mm = 200.0
+//! step_mm = 1.0
+//! ```
+
+mod parse;
+mod spec;
+
+pub use parse::from_toml;
+pub use spec::{DeviceSpec, Scene, SheathSpec, VesselSpec};

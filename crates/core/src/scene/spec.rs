@@ -1,0 +1,243 @@
+//! The tables of a scene file and what they build.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+use super::parse::from_toml;
+use crate::device::{Device, Section};
+use crate::insertion::{Command, ScriptLine, Sheath, Simulation, check_commands, commands};
+use crate::methods::MethodChoice;
+use crate::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall};
+use crate::{Error, Result, Vec3};
+
+/// A scene as its file says it, with the folder that its paths start from.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Name of the scene; the file's stem if absent.
+    #[serde(default)]
+    pub name: String,
+    /// Seed of everything random in the scene.
+    #[serde(default)]
+    pub seed: u64,
+    /// What the device is pushed into.
+    pub vessel: VesselSpec,
+    /// What is pushed.
+    pub device: DeviceSpec,
+    /// Where it enters.
+    pub sheath: SheathSpec,
+    /// How its equilibrium is found.
+    #[serde(default)]
+    pub method: MethodChoice,
+    /// What the hand does.
+    #[serde(default)]
+    pub script: Vec<ScriptLine>,
+    /// Left to the viewer.
+    #[serde(default, rename = "view")]
+    _view: IgnoredAny,
+    #[serde(skip)]
+    folder: PathBuf,
+    #[serde(skip)]
+    text: String,
+}
+
+/// `[vessel]`: a surface file, or a centre-line tree to build the surface from.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VesselSpec {
+    /// Surface mesh (STL, OBJ or PLY).
+    pub file: Option<PathBuf>,
+    /// Millimetres per unit of the surface file; 1 if absent.
+    pub unit_mm: Option<f64>,
+    /// Centre-line table (x y z radius parent, mm).
+    pub tree: Option<PathBuf>,
+    /// Edge length of the wall built from the tree, mm.
+    pub edge_mm: Option<f64>,
+    /// Number of triangles of the wall built from the tree, in place of `edge_mm`.
+    pub triangles: Option<usize>,
+}
+
+impl VesselSpec {
+    /// How fine the wall is built from `tree`.
+    fn resolution(&self, tree: &CentrelineTree) -> Result<Resolution> {
+        match (self.edge_mm, self.triangles) {
+            (Some(edge_mm), None) => Ok(Resolution::EdgeMm(edge_mm)),
+            (None, Some(triangles)) => Ok(Resolution::Triangles(triangles)),
+            (None, None) => Ok(Resolution::fitting(tree)),
+            (Some(edge_mm), Some(_)) => Err(Error::parameter(
+                "vessel.edge_mm",
+                edge_mm,
+                "vessel.triangles is given too: keep one of the two",
+            )),
+        }
+    }
+}
+
+/// `[device]`: sections here, or a file that has them.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeviceSpec {
+    /// A device file with `[[section]]` tables.
+    pub file: Option<PathBuf>,
+    /// Sections, tip first.
+    #[serde(default)]
+    pub section: Vec<Section>,
+}
+
+/// A device file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DeviceFile {
+    #[serde(default, rename = "name")]
+    _name: IgnoredAny,
+    #[serde(default, rename = "source")]
+    _source: IgnoredAny,
+    section: Vec<Section>,
+}
+
+/// `[sheath]`: an opening of the vessel, or a point and a direction.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SheathSpec {
+    /// Number of an opening; the device enters in its middle, against its outward direction.
+    pub opening: Option<usize>,
+    /// How far inside the opening the mouth lies, mm; 1 if absent.
+    pub depth_mm: Option<f64>,
+    /// Mouth of the sheath, mm.
+    pub position_mm: Option<[f64; 3]>,
+    /// Direction of insertion, any length.
+    pub direction: Option<[f64; 3]>,
+}
+
+/// Depth of the sheath's mouth inside an opening, mm, unless the scene says otherwise: clear of the rim.
+const DEPTH_MM: f64 = 1.0;
+
+impl Scene {
+    /// Reads a scene file.
+    ///
+    /// # Errors
+    /// Names file, line and key of what does not fit.
+    pub fn read(path: &Path) -> Result<Self> {
+        let (mut scene, text): (Self, String) = from_toml(path)?;
+        scene.folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        scene.text = text;
+        if scene.name.is_empty() {
+            scene.name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        }
+        Ok(scene)
+    }
+
+    /// The text the scene was read from.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// A path of the scene, seen from the working directory.
+    pub fn resolve(&self, path: &Path) -> PathBuf {
+        self.folder.join(path)
+    }
+
+    /// The file the vessel comes from.
+    ///
+    /// # Errors
+    /// None or two of `vessel.file` and `vessel.tree`.
+    pub fn vessel_path(&self) -> Result<PathBuf> {
+        match (&self.vessel.file, &self.vessel.tree) {
+            (Some(path), None) | (None, Some(path)) => Ok(self.resolve(path)),
+            (None, None) => Err(Error::parameter("vessel", "{}", "give vessel.file or vessel.tree")),
+            (Some(path), Some(_)) => Err(Error::parameter(
+                "vessel.file",
+                path.display(),
+                "vessel.tree is given too: keep one of the two",
+            )),
+        }
+    }
+
+    /// Reads or builds the vessel wall.
+    ///
+    /// # Errors
+    /// A missing or unusable file, options that do not belong together, a wall that cannot be used.
+    pub fn wall(&self) -> Result<Wall> {
+        let path = self.vessel_path()?;
+        let spec = &self.vessel;
+        if spec.tree.is_some() {
+            if let Some(unit_mm) = spec.unit_mm {
+                return Err(Error::parameter("vessel.unit_mm", unit_mm, "only with vessel.file: a tree is in millimetres"));
+            }
+            let tree = CentrelineTree::read(&path)?;
+            return Ok(GeneratedWall::new(&tree, spec.resolution(&tree)?)?.wall);
+        }
+        for (name, given) in [("vessel.edge_mm", spec.edge_mm.is_some()), ("vessel.triangles", spec.triangles.is_some())] {
+            if given {
+                return Err(Error::parameter(name, "given", "only with vessel.tree: a file has its own mesh"));
+            }
+        }
+        let surface = SurfaceMesh::read(&path, spec.unit_mm.unwrap_or(1.0))?;
+        Wall::from_surface(&surface).map_err(|e| Error::content(&path, e.to_string()))
+    }
+
+    /// The device.
+    ///
+    /// # Errors
+    /// A missing or unusable file, values out of range.
+    pub fn device(&self) -> Result<Device> {
+        match (&self.device.file, self.device.section.is_empty()) {
+            (Some(file), true) => {
+                let path = self.resolve(file);
+                let (device, _): (DeviceFile, _) = from_toml(&path)?;
+                Device::new(device.section).map_err(|e| Error::content(&path, e.to_string()))
+            }
+            (Some(file), false) => Err(Error::parameter(
+                "device.file",
+                file.display(),
+                "device.section is given too: keep one of the two",
+            )),
+            (None, _) => Device::new(self.device.section.clone()),
+        }
+    }
+
+    /// The sheath in `wall`.
+    ///
+    /// # Errors
+    /// An opening that is not there, keys that contradict each other, values that are not finite.
+    pub fn sheath(&self, wall: &Wall) -> Result<Sheath> {
+        let spec = &self.sheath;
+        match (spec.opening, spec.position_mm, spec.direction) {
+            (Some(opening), None, None) => Sheath::at_opening(wall, opening, spec.depth_mm.unwrap_or(DEPTH_MM)),
+            (None, Some(position), Some(direction)) if spec.depth_mm.is_none() => {
+                Sheath::new(Vec3::from(position), Vec3::from(direction))
+            }
+            _ => Err(Error::parameter(
+                "sheath",
+                "{…}",
+                "give either opening (with depth_mm if wanted) or position_mm and direction",
+            )),
+        }
+    }
+
+    /// The commands of the script, checked against the device.
+    ///
+    /// # Errors
+    /// A line that is not finite, contradictory, absurd, or moves the device beyond its ends.
+    pub fn commands(&self, device: &Device) -> Result<Vec<Command>> {
+        let list = commands(&self.script)?;
+        check_commands(&list, device)?;
+        Ok(list)
+    }
+
+    /// The simulation, nothing inserted yet.
+    ///
+    /// # Errors
+    /// As [`Scene::wall`], [`Scene::device`], [`Scene::sheath`] and [`Simulation::new`].
+    pub fn simulation(&self) -> Result<Simulation> {
+        let wall = self.wall()?;
+        let sheath = self.sheath(&wall)?;
+        Simulation::new(wall, self.device()?, sheath, &self.method).map_err(|error| match error {
+            // What is wrong with a surface is wrong with its file.
+            Error::Mesh(reason) => self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason)),
+            other => other,
+        })
+    }
+}

@@ -1,0 +1,50 @@
+//! The paper's method over a whole insertion: both solves are one method.
+
+use endowire_core::device::Device;
+use endowire_core::insertion::{Command, Sheath, Simulation};
+use endowire_core::methods::MethodChoice;
+use endowire_core::methods::li2011::Li2011Options;
+use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
+
+fn curved_tube() -> (Wall, Sheath) {
+    let generated = GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(1.2)).unwrap();
+    let sheath = Sheath::at_opening(&generated.wall, generated.inlet, 1.0).unwrap();
+    (generated.wall, sheath)
+}
+
+/// Largest distance between nodes of two methods over the same insertion: in, a turn, and half way out again.
+fn largest_difference(a: &MethodChoice, b: &MethodChoice) -> f64 {
+    let (wall, sheath) = curved_tube();
+    let start = |method| {
+        Simulation::new(wall.clone(), Device::uniform(300.0, 0.45, 10.0).unwrap(), sheath, method).unwrap()
+    };
+    let (mut first, mut second) = (start(a), start(b));
+    let mut commands = vec![Command::advance(1.5); 120];
+    commands.push(Command::rotate(1.0));
+    commands.extend(vec![Command::retract(2.0); 45]);
+    let mut largest: f64 = 0.0;
+    for command in commands {
+        first.step(command).unwrap();
+        second.step(command).unwrap();
+        let (x, y) = (&first.shape().positions_mm, &second.shape().positions_mm);
+        assert_eq!(x.len(), y.len());
+        largest = x.iter().zip(y).map(|(x, y)| (x - y).norm()).fold(largest, f64::max);
+    }
+    assert!(first.report().contacts.len() > 10, "the wire must lean on the wall");
+    largest
+}
+
+#[test]
+fn dense_and_banded_agree_over_a_whole_insertion() {
+    let options = Li2011Options { element_mm: 3.0, ..Default::default() };
+    let difference = largest_difference(&MethodChoice::Li2011Dense(options), &MethodChoice::Li2011Banded(options));
+    assert!(difference < 1e-8, "{difference:e} mm");
+}
+
+#[test]
+fn another_wall_stiffness_is_seen_by_the_same_comparison() {
+    let options = Li2011Options { element_mm: 3.0, ..Default::default() };
+    let stiffer = Li2011Options { wall_stiffness_n_per_mm: 1.0 + 1e-6, ..options };
+    let difference = largest_difference(&MethodChoice::Li2011Banded(options), &MethodChoice::Li2011Banded(stiffer));
+    assert!(difference > 1e-8, "{difference:e} mm");
+}
