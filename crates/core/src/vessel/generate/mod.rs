@@ -157,9 +157,9 @@ fn implicit_mesh(field: &Field, ends: &[End], edge: f64) -> Result<SurfaceMesh> 
         check_end_is_free(field, end)?;
     }
     let mut nets = nets::mesh(field, edge)?;
-    even_out(field, &mut nets, edge)?;
+    even_out(field, &mut nets, edge);
     let mut mesh =
-        SurfaceMesh { vertices_mm: nets.vertices, triangles: Vec::with_capacity(2 * nets.quads.len()) };
+        SurfaceMesh { vertices_mm: nets.vertices.clone(), triangles: Vec::with_capacity(2 * nets.quads.len()) };
     for quad in &nets.quads {
         push_polygon(&mesh.vertices_mm, quad, &mut mesh.triangles);
     }
