@@ -147,8 +147,7 @@ fn check_row(
 ) -> std::result::Result<(), (&'static str, String, String)> {
     let node = &nodes[row];
     for (name, value) in ["x", "y", "z"].into_iter().zip(node.position_mm.iter()) {
-        // Written so that NaN fails.
-        if !(value.abs() <= LARGEST_MM) {
+        if value.is_nan() || value.abs() > LARGEST_MM {
             return Err((name, value.to_string(), format!("must be finite and at most {LARGEST_MM} mm")));
         }
     }

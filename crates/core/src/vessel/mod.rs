@@ -1,8 +1,12 @@
 //! What a device is pushed into.
 
+pub mod anatomy;
 mod centreline;
+mod check;
 mod files;
+mod generate;
 mod inside;
+mod intersect;
 mod mesh;
 mod opening;
 mod orient;
@@ -13,8 +17,9 @@ mod wall;
 mod weld;
 
 pub use centreline::{CentrelineNode, CentrelineTree};
+pub use check::{CheckReport, OpeningReport, check};
+pub use generate::{GeneratedWall, Resolution};
 pub use mesh::SurfaceMesh;
-pub(crate) use mesh::area;
 pub use opening::Opening;
 pub use query::{Nearest, WallQuery};
 pub use wall::{RepairReport, Wall};

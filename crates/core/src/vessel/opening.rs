@@ -52,8 +52,6 @@ pub(crate) struct Boundary {
     pub(crate) first_triangle: Vec<u32>,
     /// Open edges that close to no loop, because they end at a non-manifold edge.
     pub(crate) stray_edges: usize,
-    /// Open edges in total.
-    pub(crate) open_edges: usize,
 }
 
 /// Follows all open edges of `mesh` into loops.
@@ -113,7 +111,7 @@ pub(crate) fn boundary(mesh: &SurfaceMesh) -> Boundary {
         opening.index = index;
     }
     let (openings, first_triangle) = loops.into_iter().unzip();
-    Boundary { openings, first_triangle, stray_edges, open_edges: starts.len() }
+    Boundary { openings, first_triangle, stray_edges }
 }
 
 /// Cuts a closed walk at vertices it passes more than once.
@@ -183,7 +181,7 @@ mod tests {
         let found = boundary(&mesh);
         let lengths: Vec<usize> = found.openings.iter().map(|o| o.boundary.len()).collect();
         assert_eq!(lengths, [20, 4, 4]);
-        assert_eq!((found.stray_edges, found.open_edges), (0, 28));
+        assert_eq!(found.stray_edges, 0);
         assert!((found.openings[1].centre_mm - Vec3::new(1.5, 1.5, 0.0)).norm() < 1e-12);
         assert!((found.openings[2].centre_mm - Vec3::new(2.5, 2.5, 0.0)).norm() < 1e-12);
     }

@@ -10,7 +10,8 @@ pub(crate) struct Consistency {
     /// Number of patches.
     pub(crate) patches: usize,
     /// Triangles turned over.
-    pub(crate) flipped: Vec<bool>,
+    #[cfg(test)]
+    flipped: Vec<bool>,
     /// Edges across which no choice agrees: the surface is one-sided there (a Möbius strip).
     pub(crate) contradictions: usize,
 }
@@ -69,7 +70,13 @@ pub(crate) fn make_consistent(triangles: &mut [[u32; 3]]) -> Consistency {
         triangle.swap(1, 2);
     }
     // Each contradiction was met from both sides.
-    Consistency { patch, patches: patches as usize, flipped, contradictions: contradictions / 2 }
+    Consistency {
+        patch,
+        patches: patches as usize,
+        #[cfg(test)]
+        flipped,
+        contradictions: contradictions / 2,
+    }
 }
 
 #[cfg(test)]

@@ -1,0 +1,225 @@
+//! Built-in vessels, as centre-line trees made from published dimensions.
+//!
+//! Anatomies use patient axes: +x to the patient's left, +y to the back (posterior), +z to the head (cranial); millimetres. Published
+//! diameters are averages of living adults; courses are drawn to look like the textbook, not measured on one patient.
+
+use std::f64::consts::PI;
+
+use super::{CentrelineNode, CentrelineTree, Resolution};
+use crate::Vec3;
+
+/// Names of the built-in vessels, for messages.
+pub const NAMES: [&str; 4] = ["straight_tube", "curved_tube", "aortic_arch", "hepatic"];
+
+/// The built-in vessel of that name.
+pub fn tree(name: &str) -> Option<CentrelineTree> {
+    let nodes = match name {
+        "straight_tube" => straight_tube(),
+        "curved_tube" => curved_tube(),
+        "aortic_arch" => aortic_arch(),
+        "hepatic" => hepatic(),
+        _ => return None,
+    };
+    CentrelineTree::new(nodes).ok()
+}
+
+/// What a built-in vessel is and where its numbers come from, for the head of its table.
+pub fn description(name: &str) -> Option<&'static str> {
+    match name {
+        "straight_tube" => Some(STRAIGHT_TUBE),
+        "curved_tube" => Some(CURVED_TUBE),
+        "aortic_arch" => Some(AORTIC_ARCH),
+        "hepatic" => Some(HEPATIC),
+        _ => None,
+    }
+}
+
+/// How fine the wall of a built-in vessel is in `assets/vessels`: small enough to keep in a repository, fine enough to use.
+pub fn asset_resolution(name: &str) -> Resolution {
+    match name {
+        "straight_tube" => Resolution::EdgeMm(1.25),
+        "curved_tube" => Resolution::EdgeMm(1.2),
+        _ => Resolution::Triangles(20_000),
+    }
+}
+
+const STRAIGHT_TUBE: &str =
+    "straight_tube: 100 mm along +y from the origin, inner radius 4 mm. A test piece.";
+
+fn straight_tube() -> Vec<CentrelineNode> {
+    Course::new()
+        .root(Vec3::zeros(), 4.0)
+        .to(Vec3::new(0.0, 50.0, 0.0), 4.0)
+        .to(Vec3::new(0.0, 100.0, 0.0), 4.0)
+        .nodes
+}
+
+const CURVED_TUBE: &str = "curved_tube: the plastic tube of Li et al. 2011, figure 5, of which the paper gives the extent, \
+14 cm x 9 cm, and no radius.
+Axis in the plane z = 0: 95 mm along +y from the origin, a semicircle of radius 45 mm towards +x, 20 mm along -y: it spans
+140 mm in y and 90 mm in x. Inner radius 4 mm: an assumption.";
+
+fn curved_tube() -> Vec<CentrelineNode> {
+    const LEG: f64 = 95.0;
+    const BEND: f64 = 45.0;
+    const END: f64 = 20.0;
+    const RADIUS: f64 = 4.0;
+    // Points 2.5 mm apart: the spline then follows lines and arc within a few micrometres.
+    const SPACING: f64 = 2.5;
+    let mut course = Course::new().root(Vec3::zeros(), RADIUS);
+    let steps = |length: f64| (length / SPACING).round() as usize;
+    let leg = steps(LEG);
+    for k in 1..=leg {
+        course = course.to(Vec3::new(0.0, LEG * k as f64 / leg as f64, 0.0), RADIUS);
+    }
+    let arc = steps(PI * BEND);
+    for k in 1..=arc {
+        let angle = PI * k as f64 / arc as f64;
+        course = course.to(Vec3::new(BEND - BEND * angle.cos(), LEG + BEND * angle.sin(), 0.0), RADIUS);
+    }
+    let end = steps(END);
+    for k in 1..=end {
+        course = course.to(Vec3::new(2.0 * BEND, LEG - END * k as f64 / end as f64, 0.0), RADIUS);
+    }
+    course.nodes
+}
+
+const AORTIC_ARCH: &str = "aortic_arch: thoracic aorta with a type I arch; the inlet is the lower end of the descending aorta.
+Diameters: ascending aorta 34.6, innominate 12.5, left common carotid 8.3, left subclavian 10.4 mm (means of n = 217 adults);
+arch to descending aorta 31.8 to 23.9 mm over 200 mm. Type I: all three branches leave within one carotid diameter of the top
+of the arch. Course of the axis drawn. Axes: +x left, +y posterior, +z cranial; origin at the lower end.";
+
+fn aortic_arch() -> Vec<CentrelineNode> {
+    // The arch rises from the heart in front and to the right, and comes down behind and to the left.
+    let mut course = Course::new().root(Vec3::new(0.0, 0.0, 0.0), 23.9 / 2.0);
+    for (z, diameter) in
+        [(25.0, 24.8), (50.0, 25.8), (75.0, 26.8), (100.0, 27.8), (125.0, 28.8), (150.0, 29.8), (172.0, 30.7)]
+    {
+        course = course.to(Vec3::new(0.0, 0.0, z), diameter / 2.0);
+    }
+    let descending = course.nodes.len() - 1;
+    // Half an ellipse from behind left to front right: half width 33 mm, height 40 mm.
+    let (half_width, height) = (33.0, 40.0);
+    let across = Vec3::new(-0.62, -0.785, 0.0).normalize();
+    let base = course.nodes[descending].position_mm;
+    let on_arch = |degrees: f64| {
+        let angle = degrees.to_radians();
+        base + across * (half_width * (1.0 - angle.cos())) + Vec3::z() * (height * angle.sin())
+    };
+    let mut branch_rows = [0; 3];
+    for (degrees, diameter, branch) in [
+        (20.0, 31.2, None),
+        (40.0, 31.8, None),
+        (66.0, 32.2, Some(2)),
+        (90.0, 32.8, Some(1)),
+        (116.0, 33.4, Some(0)),
+        (140.0, 34.0, None),
+        (160.0, 34.4, None),
+        (180.0, 34.6, None),
+    ] {
+        course = course.to(on_arch(degrees), diameter / 2.0);
+        if let Some(which) = branch {
+            branch_rows[which] = course.nodes.len() - 1;
+        }
+    }
+    let root = on_arch(180.0);
+    course = course
+        .to(root + Vec3::new(0.5, -1.0, -18.0), 34.6 / 2.0)
+        .to(root + Vec3::new(2.5, -3.0, -36.0), 34.6 / 2.0);
+    let leave = |course: Course, row: usize, diameter: f64, path: [[f64; 3]; 4]| {
+        let from = course.nodes[row].position_mm;
+        path.iter().fold(course.at(row), |course, step| course.to(from + Vec3::from(*step), diameter / 2.0))
+    };
+    let course = leave(
+        course,
+        branch_rows[0],
+        12.5,
+        [[-4., -2., 20.], [-9., -3., 34.], [-15., -3., 48.], [-21., -1., 62.]],
+    );
+    let course =
+        leave(course, branch_rows[1], 8.3, [[1., -1., 20.], [3., -2., 38.], [5., -2., 56.], [6., 0., 76.]]);
+    let course =
+        leave(course, branch_rows[2], 10.4, [[4., 2., 20.], [9., 3., 36.], [17., 3., 50.], [28., 1., 60.]]);
+    course.nodes
+}
+
+const HEPATIC: &str = "hepatic: abdominal aorta with coeliac trunk and the arteries to the liver; the inlet is the lower end of the aorta.
+Diameters: aorta 20 mm at the coeliac trunk (Rogers et al., J. Vasc. Surg. 58, 2013: 19-21 mm in adults without aneurysm);
+coeliac trunk 7.9, common hepatic 5.0, splenic 5.6, proper hepatic 4.5, left hepatic 2.9, right hepatic 3.5, gastroduodenal
+3.7 mm (means of Silveira et al., Int. J. Morphol. 27, 2009, and Malnar et al., Coll. Antropol. 34, 2010, rounded).
+Course of the axis drawn. Axes: +x left, +y posterior, +z cranial; origin on the aorta's axis 60 mm below the coeliac trunk.";
+
+fn hepatic() -> Vec<CentrelineNode> {
+    let mut course = Course::new().root(Vec3::zeros(), 10.0);
+    for z in [20.0, 40.0, 60.0, 80.0, 100.0] {
+        course = course.to(Vec3::new(0.0, 0.0, z), 10.0);
+    }
+    // Forward and a little down from the front of the aorta.
+    let course = course.at(3).to(Vec3::new(-0.5, -14.0, 58.0), 3.95).to(Vec3::new(-1.0, -22.0, 57.0), 3.95);
+    let course = course.to(Vec3::new(-1.0, -30.0, 57.5), 3.95);
+    let fork = course.nodes.len() - 1;
+    let course = course
+        .at(fork)
+        .to(Vec3::new(9.0, -35.0, 59.0), 2.8)
+        .to(Vec3::new(22.0, -32.0, 62.0), 2.8)
+        .to(Vec3::new(36.0, -24.0, 61.0), 2.7)
+        .to(Vec3::new(50.0, -14.0, 64.0), 2.6)
+        .to(Vec3::new(64.0, -6.0, 68.0), 2.5);
+    let course = course
+        .at(fork)
+        .to(Vec3::new(-10.0, -36.0, 57.0), 2.5)
+        .to(Vec3::new(-22.0, -39.0, 55.5), 2.5)
+        .to(Vec3::new(-34.0, -40.0, 57.0), 2.5);
+    let division = course.nodes.len() - 1;
+    let course = course
+        .at(division)
+        .to(Vec3::new(-39.0, -42.0, 48.0), 1.85)
+        .to(Vec3::new(-40.0, -43.0, 36.0), 1.85)
+        .to(Vec3::new(-37.0, -44.0, 22.0), 1.75);
+    let course = course
+        .at(division)
+        .to(Vec3::new(-43.0, -40.0, 62.0), 2.25)
+        .to(Vec3::new(-50.0, -39.0, 70.0), 2.25)
+        .to(Vec3::new(-55.0, -38.0, 80.0), 2.25);
+    let liver = course.nodes.len() - 1;
+    let course = course
+        .at(liver)
+        .to(Vec3::new(-62.0, -35.0, 89.0), 1.75)
+        .to(Vec3::new(-72.0, -31.0, 96.0), 1.7)
+        .to(Vec3::new(-84.0, -27.0, 101.0), 1.6);
+    course
+        .at(liver)
+        .to(Vec3::new(-52.0, -41.0, 91.0), 1.45)
+        .to(Vec3::new(-46.0, -44.0, 102.0), 1.4)
+        .to(Vec3::new(-38.0, -46.0, 112.0), 1.4)
+        .nodes
+}
+
+/// A pen that draws a tree point by point.
+struct Course {
+    nodes: Vec<CentrelineNode>,
+    at: usize,
+}
+
+impl Course {
+    fn new() -> Self {
+        Self { nodes: Vec::new(), at: 0 }
+    }
+
+    fn root(mut self, position_mm: Vec3, radius_mm: f64) -> Self {
+        self.nodes.push(CentrelineNode { position_mm, radius_mm, parent: None });
+        self
+    }
+
+    /// Goes on from `row`.
+    fn at(mut self, row: usize) -> Self {
+        self.at = row;
+        self
+    }
+
+    fn to(mut self, position_mm: Vec3, radius_mm: f64) -> Self {
+        self.nodes.push(CentrelineNode { position_mm, radius_mm, parent: Some(self.at) });
+        self.at = self.nodes.len() - 1;
+        self
+    }
+}

@@ -1,0 +1,193 @@
+//! What is right and wrong with a surface, as it is.
+
+use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
+
+use super::intersect::triangles_intersect;
+use super::topology::EdgeTable;
+use super::wall::{duplicate_pairs, validate, weld_tolerance_mm};
+use super::{SurfaceMesh, Wall, sliver};
+use crate::{Result, Vec3};
+
+/// Intersecting pairs named in a report; a list of thousands helps nobody.
+const PAIRS_NAMED: usize = 10;
+
+/// A boundary loop in a report.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct OpeningReport {
+    /// Number, largest first.
+    pub index: usize,
+    /// Centre in mm.
+    pub centre_mm: [f64; 3],
+    /// Mean radius in mm.
+    pub radius_mm: f64,
+    /// Unit vector out of the vessel.
+    pub direction: [f64; 3],
+    /// Edges of the loop.
+    pub edges: usize,
+}
+
+/// What [`check`] found. Faces, volume and openings are those of the surface with duplicate vertices welded; counts of
+/// faults are those of the surface as given.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct CheckReport {
+    /// Triangles as given.
+    pub triangles: usize,
+    /// Vertices after welding.
+    pub vertices: usize,
+    /// Vertices that lie on another one (normal in STL, which stores each corner anew).
+    pub duplicate_vertices: usize,
+    /// Pieces connected by edges.
+    pub components: usize,
+    /// Whether every edge belongs to exactly two triangles.
+    pub watertight: bool,
+    /// Edges of a single triangle.
+    pub open_edges: usize,
+    /// Open edges that form no loop.
+    pub stray_edges: usize,
+    /// The loops of open edges.
+    pub openings: Vec<OpeningReport>,
+    /// Edges of more than two triangles.
+    pub non_manifold_edges: usize,
+    /// Triangles wound against their neighbours or inwards.
+    pub flipped_triangles: usize,
+    /// Whether all triangles are wound inwards.
+    pub inside_out: bool,
+    /// Triangles without area.
+    pub degenerate_triangles: usize,
+    /// Triangles on the same vertices as an earlier one.
+    pub duplicate_triangles: usize,
+    /// Pairs of triangles that cross, touch or are folded onto each other beyond their common vertices.
+    pub self_intersections: usize,
+    /// The first of these pairs, by triangle number in the file.
+    pub intersecting_pairs: Vec<[usize; 2]>,
+    /// Volume enclosed by the wall and flat caps in mm³.
+    pub volume_mm3: f64,
+    /// Area of the wall in mm².
+    pub area_mm2: f64,
+    /// Smallest coordinates in mm.
+    pub low_mm: [f64; 3],
+    /// Largest coordinates in mm.
+    pub high_mm: [f64; 3],
+    /// Shortest edge in mm.
+    pub edge_min_mm: f64,
+    /// Median edge in mm.
+    pub edge_median_mm: f64,
+    /// Longest edge in mm.
+    pub edge_max_mm: f64,
+}
+
+impl CheckReport {
+    /// Whether a device can be simulated in this wall as it is: consistent, outward, manifold, free of faults. Open ends are fine.
+    pub fn is_sound(&self) -> bool {
+        let faults = [
+            self.non_manifold_edges,
+            self.flipped_triangles,
+            self.degenerate_triangles,
+            self.duplicate_triangles,
+            self.self_intersections,
+            self.stray_edges,
+        ];
+        faults.iter().all(|count| *count == 0)
+    }
+}
+
+/// Checks a surface as it comes from a file.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if there is no triangle with area, an index is out of range or a coordinate is not finite.
+pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
+    validate(surface)?;
+    let wall = Wall::from_surface(surface)?;
+    let tolerance_mm = weld_tolerance_mm(surface);
+    let target = super::weld::merge_targets(&surface.vertices_mm, tolerance_mm);
+    let welded = SurfaceMesh {
+        vertices_mm: surface.vertices_mm.clone(),
+        triangles: surface.triangles.iter().map(|t| t.map(|v| target[v as usize])).collect(),
+    };
+    let degenerate = |i: &usize| sliver::is_degenerate(&welded.corners(*i), tolerance_mm);
+    let table = EdgeTable::new(&welded.triangles);
+    let open_edges = table.edges().filter(|uses| uses.len() == 1).count();
+    let (self_intersections, intersecting_pairs) = self_intersections(&welded, tolerance_mm);
+    let mut edges: Vec<f64> = table
+        .edges()
+        .map(|uses| {
+            (welded.vertices_mm[uses[0].low as usize] - welded.vertices_mm[uses[0].high as usize]).norm()
+        })
+        .collect();
+    edges.sort_by(f64::total_cmp);
+    let edge = |k: usize| edges.get(k).copied().unwrap_or(0.0);
+    let (low, high) = surface.bounds_mm().unwrap_or_default();
+    let report = wall.report();
+    let non_manifold_edges = table.non_manifold();
+    Ok(CheckReport {
+        triangles: surface.triangles.len(),
+        vertices: surface.vertices_mm.len() - report.vertices_welded,
+        duplicate_vertices: report.vertices_welded,
+        components: report.components,
+        watertight: open_edges == 0 && non_manifold_edges == 0,
+        open_edges,
+        stray_edges: report.stray_edges,
+        openings: wall
+            .openings()
+            .iter()
+            .map(|o| OpeningReport {
+                index: o.index,
+                centre_mm: o.centre_mm.into(),
+                radius_mm: o.radius_mm,
+                direction: o.direction.into(),
+                edges: o.boundary.len(),
+            })
+            .collect(),
+        non_manifold_edges,
+        flipped_triangles: report.triangles_flipped,
+        inside_out: report.inside_out,
+        degenerate_triangles: (0..welded.triangles.len()).filter(degenerate).count(),
+        duplicate_triangles: duplicate_pairs(&welded.triangles).len(),
+        self_intersections,
+        intersecting_pairs,
+        volume_mm3: wall.volume_mm3(),
+        area_mm2: area_mm2(&welded),
+        low_mm: low.into(),
+        high_mm: high.into(),
+        edge_min_mm: edge(0),
+        edge_median_mm: edge(edges.len() / 2),
+        edge_max_mm: edge(edges.len().saturating_sub(1)),
+    })
+}
+
+/// Area of all triangles, mm².
+pub(crate) fn area_mm2(mesh: &SurfaceMesh) -> f64 {
+    (0..mesh.triangles.len()).map(|i| super::mesh::area(&mesh.corners(i))).sum()
+}
+
+/// Counts intersecting pairs among the triangles with area, and names the first few.
+fn self_intersections(mesh: &SurfaceMesh, tolerance_mm: f64) -> (usize, Vec<[usize; 2]>) {
+    let solid: Vec<usize> = (0..mesh.triangles.len())
+        .filter(|&i| !sliver::is_degenerate(&mesh.corners(i), tolerance_mm))
+        .collect();
+    let boxes: Vec<Aabb> = solid.iter().map(|&i| bounding_box(&mesh.corners(i))).collect();
+    let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
+    let mut pairs = Vec::new();
+    for (a, bounds) in boxes.iter().enumerate() {
+        // Each pair once; leaves come in the order of the tree, so pairs are sorted below.
+        for b in tree.intersect_aabb(bounds).map(|b| b as usize).filter(|&b| b > a) {
+            let (first, second) = (solid[a], solid[b]);
+            if boxes[b].intersects(bounds)
+                && triangles_intersect(&mesh.vertices_mm, mesh.triangles[first], mesh.triangles[second])
+            {
+                pairs.push([first, second]);
+            }
+        }
+    }
+    pairs.sort_unstable();
+    let count = pairs.len();
+    pairs.truncate(PAIRS_NAMED);
+    (count, pairs)
+}
+
+fn bounding_box(corners: &[Vec3; 3]) -> Aabb {
+    let low = corners[0].inf(&corners[1]).inf(&corners[2]);
+    let high = corners[0].sup(&corners[1]).sup(&corners[2]);
+    Aabb::new([low.x, low.y, low.z].into(), [high.x, high.y, high.z].into())
+}

@@ -1,0 +1,289 @@
+//! Walls from centre-line trees.
+//!
+//! A tree without forks becomes a swept tube ([`sweep`]); one with forks an implicit surface ([`field`]) meshed by surface nets
+//! ([`nets`]), evened out, projected back and cut open at its ends ([`trim`]).
+
+mod curve;
+mod field;
+mod nets;
+mod sweep;
+#[cfg(test)]
+mod tests;
+mod trim;
+
+use std::f64::consts::TAU;
+
+use super::topology::EdgeTable;
+use super::wall::drop_unreferenced;
+use super::{CentrelineTree, SurfaceMesh, Wall};
+use crate::{Error, Result, Vec3};
+use field::Field;
+use trim::End;
+
+/// Vertices are projected until the field is this small.
+const ON_SURFACE_MM: f64 = 1e-10;
+
+/// What is guaranteed in the end.
+const GUARANTEED_MM: f64 = 1e-6;
+
+/// Newton along an approximate gradient: quadratic on plain tubes, linear with a small factor in fillets.
+const PROJECTION_STEPS: usize = 50;
+
+/// Rounds of evening out. Surface nets leave short edges where the grid grazes the surface; more rounds change little.
+const SMOOTHING_ROUNDS: usize = 8;
+
+/// Surface nets on a random plane make 1.5 quadrilaterals per grid face area.
+const TRIANGLES_PER_FACE: f64 = 3.0;
+
+/// Most triangles that are attempted: some gigabytes and a minute.
+const MOST_TRIANGLES: f64 = 5e6;
+
+/// Attempts to reach a triangle count, and the relative error at which they end.
+const COUNT_ATTEMPTS: usize = 5;
+const COUNT_TOLERANCE: f64 = 0.02;
+
+/// How fine a generated wall is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Resolution {
+    /// Typical length of an edge in mm.
+    EdgeMm(f64),
+    /// Number of triangles, met within 2 % where the geometry allows it.
+    Triangles(usize),
+}
+
+/// A wall made from a centre-line tree.
+#[derive(Debug, Clone)]
+pub struct GeneratedWall {
+    /// The wall, open at the root and at every leaf.
+    pub wall: Wall,
+    /// Which opening of the wall is the root of the tree.
+    pub inlet: usize,
+    /// For each open end of the tree, the root first: row in the centre-line table, and opening of the wall.
+    pub ends: Vec<(usize, usize)>,
+    /// The typical edge length used, mm.
+    pub edge_mm: f64,
+}
+
+impl GeneratedWall {
+    /// Generates the wall of `tree`.
+    ///
+    /// Without a fork the vertices lie on circles about the centre line (the polygonal lumen is inscribed), with forks on an
+    /// implicit surface of the same radius; both within 1e-6 mm. Ends are cut flat across the centre line.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for an edge length that is not positive, larger than the smallest radius, or so small that more than
+    /// five million triangles would come out; for a bend tighter than the vessel is wide; for a branch that ends
+    /// inside another one. [`Error::Mesh`] if branches come so close that the grid cannot tell them apart.
+    pub fn new(tree: &CentrelineTree, resolution: Resolution) -> Result<Self> {
+        let branches = curve::branches(tree)?;
+        let edge_mm = match resolution {
+            Resolution::EdgeMm(edge_mm) => edge_mm,
+            Resolution::Triangles(0) => {
+                return Err(Error::parameter("triangles", 0, "must be positive"));
+            }
+            Resolution::Triangles(count) => {
+                return Self::with_count(&branches, count);
+            }
+        };
+        Self::with_edge(&branches, edge_mm)
+    }
+
+    /// Closed surface: the wall with a fan of triangles over each opening.
+    pub fn closed_mesh(&self) -> SurfaceMesh {
+        let mut mesh = self.wall.mesh().clone();
+        for opening in self.wall.openings() {
+            let centre = mesh.vertices_mm.len() as u32;
+            mesh.vertices_mm.push(opening.centre_mm);
+            let next = opening.boundary.iter().cycle().skip(1);
+            mesh.triangles.extend(opening.boundary.iter().zip(next).map(|(&a, &b)| [a, b, centre]));
+        }
+        mesh
+    }
+
+    fn with_count(branches: &[curve::Branch], count: usize) -> Result<Self> {
+        let mut edge = (branch_area(branches) * TRIANGLES_PER_FACE / count as f64).sqrt();
+        let mut best: Option<(f64, Self)> = None;
+        for _ in 0..COUNT_ATTEMPTS {
+            let made = Self::with_edge(branches, edge)?;
+            let ratio = made.wall.mesh().triangles.len() as f64 / count as f64;
+            let miss = (ratio - 1.0).abs();
+            if best.as_ref().is_none_or(|(least, _)| miss < *least) {
+                best = Some((miss, made));
+            }
+            if miss <= COUNT_TOLERANCE {
+                break;
+            }
+            edge *= ratio.sqrt();
+        }
+        best.map(|(_, made)| made).ok_or_else(|| Error::Computation("no mesh was attempted".into()))
+    }
+
+    fn with_edge(branches: &[curve::Branch], edge_mm: f64) -> Result<Self> {
+        let radii = branches.iter().flat_map(|b| b.samples.iter().map(|s| s.radius));
+        let smallest = radii.fold(f64::INFINITY, f64::min);
+        if !(edge_mm > 0.0 && edge_mm <= smallest) {
+            let mend = format!(
+                "must be positive and at most the smallest radius, {smallest:.3} mm, to resolve the vessel"
+            );
+            return Err(Error::parameter("edge_mm", edge_mm, mend));
+        }
+        let expected = branch_area(branches) * TRIANGLES_PER_FACE / (edge_mm * edge_mm);
+        if expected > MOST_TRIANGLES {
+            let mend = format!(
+                "would give about {expected:.1e} triangles; at most {MOST_TRIANGLES:.0e} are made: choose larger"
+            );
+            return Err(Error::parameter("edge_mm", edge_mm, mend));
+        }
+        let field = Field { branches: branches.to_vec(), extension: 4.0 * edge_mm };
+        let ends = trim::ends(&field);
+        let mesh = match branches {
+            [only] if ends.len() == 2 => sweep::tube(only, edge_mm),
+            _ => implicit_mesh(&field, &ends, edge_mm)?,
+        };
+        let wall = Wall::from_surface(&mesh)?;
+        let ends = match_openings(&wall, &ends, edge_mm)?;
+        Ok(Self { inlet: ends[0].1, wall, ends, edge_mm })
+    }
+}
+
+/// Area of all branches taken alone, mm².
+fn branch_area(branches: &[curve::Branch]) -> f64 {
+    branches.iter().map(|b| b.samples.iter().map(|s| TAU * s.radius * b.step).sum::<f64>()).sum()
+}
+
+/// The wall of a tree with forks.
+fn implicit_mesh(field: &Field, ends: &[End], edge: f64) -> Result<SurfaceMesh> {
+    for end in ends {
+        check_end_is_free(field, end)?;
+    }
+    let mut nets = nets::mesh(field, edge)?;
+    even_out(field, &mut nets, edge);
+    let mut mesh =
+        SurfaceMesh { vertices_mm: nets.vertices.clone(), triangles: Vec::with_capacity(2 * nets.quads.len()) };
+    for quad in &nets.quads {
+        push_polygon(&mesh.vertices_mm, quad, &mut mesh.triangles);
+    }
+    let mut worst: f64 = 0.0;
+    for end in ends {
+        worst = worst.max(trim::cut(&mut mesh, field, end, edge));
+    }
+    // Vertices of the nets keep their number until the unused ones are dropped. Those on a rim were looked at in the cut.
+    for v in mesh.triangles.iter().flatten().map(|v| *v as usize) {
+        if nets.vertices.get(v) == Some(&mesh.vertices_mm[v]) {
+            let local = &nets.locals[nets.local_of[v] as usize];
+            worst = worst.max(field.value(local, &mesh.vertices_mm[v]).f.abs());
+        }
+    }
+    if worst > GUARANTEED_MM {
+        return Err(Error::Computation(format!(
+            "vertices stay {worst:.1e} mm off the implicit surface: branches meet in a crease; choose a smaller edge_mm"
+        )));
+    }
+    drop_unreferenced(&mut mesh);
+    let odd = EdgeTable::new(&mesh.triangles).non_manifold();
+    if odd > 0 {
+        return Err(Error::Mesh(format!(
+            "{odd} edges belong to more than two triangles: branches come closer than edge_mm = {edge}; choose a smaller one"
+        )));
+    }
+    Ok(mesh)
+}
+
+/// Moves vertices towards the mean of their neighbours along the surface, and back onto it.
+fn even_out(field: &Field, nets: &mut nets::Nets, edge: f64) {
+    for round in 0..=SMOOTHING_ROUNDS {
+        let mut sum = vec![Vec3::zeros(); nets.vertices.len()];
+        let mut count = vec![0.0; nets.vertices.len()];
+        for quad in &nets.quads {
+            for k in 0..4 {
+                let (a, b) = (quad[k] as usize, quad[(k + 1) % 4] as usize);
+                sum[a] += nets.vertices[b];
+                count[a] += 1.0;
+            }
+        }
+        for (index, v) in nets.vertices.iter_mut().enumerate() {
+            let local = &nets.locals[nets.local_of[index] as usize];
+            if round > 0 && count[index] > 0.0 {
+                let normal = field.value(local, v).gradient.try_normalize(1e-6).unwrap_or_default();
+                let pull = sum[index] / count[index] - *v;
+                *v += 0.5 * (pull - normal * normal.dot(&pull));
+            }
+            project(field, local, v, edge);
+        }
+    }
+}
+
+/// Newton along the gradient.
+fn project(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) {
+    for _ in 0..PROJECTION_STEPS {
+        let value = field.value(local, point);
+        if value.f.abs() <= ON_SURFACE_MM {
+            break;
+        }
+        let step = value.gradient * (-value.f / value.gradient.norm_squared().max(1e-6));
+        *point += step.cap_magnitude(0.5 * edge);
+    }
+}
+
+/// Adds a triangle or a quadrilateral, the latter cut along its shorter diagonal.
+fn push_polygon(vertices: &[Vec3], polygon: &[u32], triangles: &mut Vec<[u32; 3]>) {
+    match *polygon {
+        [a, b, c] => triangles.push([a, b, c]),
+        [a, b, c, d] => {
+            let length = |i: u32, j: u32| (vertices[i as usize] - vertices[j as usize]).norm();
+            if length(a, c) <= length(b, d) {
+                triangles.extend([[a, b, c], [a, c, d]]);
+            } else {
+                triangles.extend([[a, b, d], [b, c, d]]);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Points looked at around an end.
+const END_PROBES: usize = 24;
+
+/// Refuses an end that another branch reaches: its rim would be no clean loop.
+fn check_end_is_free(field: &Field, end: &End) -> Result<()> {
+    let u = sweep::any_perpendicular(&end.outward);
+    let v = end.outward.cross(&u);
+    let local = field.local(&end.centre, 2.0 * end.radius);
+    for k in 0..END_PROBES {
+        let angle = TAU * k as f64 / END_PROBES as f64;
+        let at = end.centre + end.radius * (angle.cos() * u + angle.sin() * v);
+        let value = field.value(&local, &at).f;
+        if value < -1e-3 * end.radius {
+            return Err(Error::parameter(
+                format!("centreline row {}", end.row),
+                format!("({:.3}, {:.3}, {:.3})", end.centre.x, end.centre.y, end.centre.z),
+                "this end lies in or touches another branch; let the branch go on until it is clear of it",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Pairs the ends of the tree with the openings of the wall; there must be as many, each in its place.
+fn match_openings(wall: &Wall, ends: &[End], edge: f64) -> Result<Vec<(usize, usize)>> {
+    let found = wall.openings().len();
+    if found != ends.len() {
+        return Err(Error::Mesh(format!(
+            "the tree has {} open ends, but the wall has {found} openings: branches overlap near an end, or edge_mm = {edge} is too coarse",
+            ends.len()
+        )));
+    }
+    ends.iter()
+        .map(|end| {
+            let distance = |k: &usize| (wall.openings()[*k].centre_mm - end.centre).norm();
+            let nearest = (0..found).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0);
+            if distance(&nearest) > 0.5 * end.radius {
+                return Err(Error::Mesh(format!(
+                    "no opening where centreline row {} ends; choose a smaller edge_mm",
+                    end.row
+                )));
+            }
+            Ok((end.row, nearest))
+        })
+        .collect()
+}
