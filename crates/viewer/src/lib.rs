@@ -1,1 +1,44 @@
 //! Scene in, frames out: a 3D view and a simulated fluoroscopic view, without a window.
+//!
+//! A [`ViewSpec`] says which frames are wanted, a [`Renderer`] prepares them for a vessel wall and draws devices in it. Frames
+//! come from a graphics processor through wgpu where there is one, and otherwise from plain Rust, which is also
+//! the exact reference for path lengths. Units: millimetre, degree and keV where a name says so.
+//!
+//! ```
+//! use endowire_core::{Vec3, vessel::SurfaceMesh};
+//! use endowire_viewer::{Backend, DevicePoint, DeviceView, Renderer, View, ViewSpec};
+//!
+//! // A vessel: here a tetrahedron, counter-clockwise seen from outside.
+//! let wall = SurfaceMesh {
+//!     vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],
+//!     triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+//! };
+//! let point = |x: f64| DevicePoint { position_mm: Vec3::new(x, 5.0, 5.0), tangent: Vec3::x(), radius_mm: 0.4 };
+//! let wire = DeviceView { points: vec![point(1.0), point(20.0)], material: None };
+//!
+//! let spec =
+//!     ViewSpec { views: vec![View::Fluoro], size_px: [64, 64], backend: Backend::Cpu, ..ViewSpec::default() };
+//! let mut renderer = Renderer::new(&spec, &wall)?;
+//! let frames = renderer.render(&[wire])?;
+//! assert_eq!(frames.fluoro.map(|image| image.width()), Some(64));
+//! assert!(frames.three_d.is_none());
+//! # Ok::<(), endowire_core::Error>(())
+//! ```
+
+mod c_arm;
+mod cpu;
+mod device;
+mod gpu;
+mod image;
+mod renderer;
+mod scene;
+mod spec;
+mod three_d;
+mod xray;
+
+pub use c_arm::CArm;
+pub use device::{DevicePoint, DeviceView};
+pub use image::{Image, PixelFormat};
+pub use renderer::{Frames, Renderer};
+pub use spec::{Backend, CArmSpec, CameraSpec, View, ViewSpec, XRaySpec};
+pub use xray::{Material, PathLengths};

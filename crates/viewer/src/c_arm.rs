@@ -1,0 +1,279 @@
+//! Geometry of a C-arm: which ray a pixel sees.
+//!
+//! **Patient axes** as in DICOM (LPS): +x to the patient's left, +y posterior, +z towards the head. With both angles zero
+//! the source is posterior (under the table) and the detector anterior.
+//!
+//! **Angles** with the signs of DICOM: the primary angle α (0018,1510) is positive towards LAO and turns the detector to the
+//! patient's left; the secondary angle β (0018,1511) is positive towards cranial and tilts it to the head. From the
+//! isocentre the detector lies in direction
+//!
+//! ```text
+//! d = cos β (sin α, −cos α, 0) + sin β (0, 0, 1)
+//! ```
+//!
+//! **Picture.** Seen from the detector, head up, so the patient's left is on the right of the screen: columns run along
+//! e_u = (cos α, sin α, 0), rows along e_v = −d × e_u. The source is at isocentre − SOD·d, the detector plane SID from it and
+//! centred on the axis. A point at (a, b, c) along (e_u, e_v, d) from the isocentre is seen at
+//!
+//! ```text
+//! u = W/2 + (SID/pitch) · a/(SOD + c),   v = H/2 + (SID/pitch) · b/(SOD + c)
+//! ```
+//!
+//! in pixels; the centre of the pixel in column i is at u = i + ½. A ray is (x, y, 1)·(SOD + c) with
+//! x = (u − W/2)·pitch/SID, and √(1 + x² + y²) millimetres long per millimetre of depth: its *obliquity*.
+
+use endowire_core::vessel::SurfaceMesh;
+use endowire_core::{Error, Result, Vec3};
+
+use crate::spec::CArmSpec;
+
+/// Part of the half frame that the vessel fills where the pixel pitch is left to us.
+const FILL: f64 = 0.92;
+/// Least depth in front of the source, mm: anything nearer would project to the whole plane.
+const NEAREST_MM: f64 = 1.0;
+
+/// A C-arm in place: a pinhole camera with its source as the pinhole.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CArm {
+    isocentre_mm: Vec3,
+    /// Columns, rows and depth (source to detector) as unit directions in patient axes.
+    axes: [Vec3; 3],
+    sid_mm: f64,
+    sod_mm: f64,
+    pixel_mm: f64,
+    size_px: [u32; 2],
+}
+
+impl CArm {
+    /// Places a C-arm; what `spec` leaves open is chosen so that `wall` fills the frame.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where the vessel does not lie between source and detector. `spec` must be valid.
+    pub(crate) fn new(spec: &CArmSpec, size_px: [u32; 2], wall: &SurfaceMesh) -> Result<Self> {
+        let (low, high) = wall.bounds_mm().ok_or_else(|| Error::Mesh("the wall has no vertices".into()))?;
+        let (alpha, beta) = (spec.primary_deg.to_radians(), spec.secondary_deg.to_radians());
+        let toward_left = Vec3::new(alpha.cos(), alpha.sin(), 0.0);
+        let detector = Vec3::new(alpha.sin(), -alpha.cos(), 0.0) * beta.cos() + Vec3::z() * beta.sin();
+        let mut arm = Self {
+            isocentre_mm: spec.isocentre_mm.map_or((low + high) / 2.0, Vec3::from),
+            axes: [toward_left, -detector.cross(&toward_left), detector],
+            sid_mm: spec.sid_mm,
+            sod_mm: spec.sod_mm,
+            pixel_mm: 1.0,
+            size_px,
+        };
+        for vertex in &wall.vertices_mm {
+            arm.check_between("vessel", vertex)?;
+        }
+        arm.pixel_mm = match spec.pixel_mm {
+            Some(pitch) => pitch,
+            None => arm.fitting_pitch(wall)?,
+        };
+        Ok(arm)
+    }
+
+    fn fitting_pitch(&self, wall: &SurfaceMesh) -> Result<f64> {
+        let pitch = wall.vertices_mm.iter().map(|v| self.in_beam(v)).fold(0.0_f64, |pitch, b| {
+            let magnification = self.sid_mm / (self.sod_mm + b.z);
+            let half = self.size_px.map(|n| f64::from(n) / 2.0 * FILL);
+            pitch.max(b.x.abs() * magnification / half[0]).max(b.y.abs() * magnification / half[1])
+        });
+        if pitch > 0.0 {
+            return Ok(pitch);
+        }
+        Err(Error::parameter(
+            "view.c_arm.pixel_mm",
+            "absent",
+            "the vessel has no extent to fit; give a pitch",
+        ))
+    }
+
+    /// Refuses a point that is not between source and detector.
+    pub(crate) fn check_between(&self, what: &str, point_mm: &Vec3) -> Result<()> {
+        let depth = self.sod_mm + self.in_beam(point_mm).z;
+        if (NEAREST_MM..=self.sid_mm).contains(&depth) {
+            return Ok(());
+        }
+        let mend = format!(
+            "the {what} must lie between source and detector, but its point ({:.1}, {:.1}, {:.1}) mm is {depth:.1} mm from \
+             the source along the beam while the detector is at {} mm; mend the isocentre or the distances",
+            point_mm.x, point_mm.y, point_mm.z, self.sid_mm
+        );
+        Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, mend))
+    }
+
+    /// Coordinates along columns, rows and depth, from the isocentre.
+    pub(crate) fn in_beam(&self, point_mm: &Vec3) -> Vec3 {
+        let r = point_mm - self.isocentre_mm;
+        Vec3::new(r.dot(&self.axes[0]), r.dot(&self.axes[1]), r.dot(&self.axes[2]))
+    }
+
+    /// A direction along columns, rows and depth.
+    pub(crate) fn direction_in_beam(&self, direction: &Vec3) -> Vec3 {
+        Vec3::new(direction.dot(&self.axes[0]), direction.dot(&self.axes[1]), direction.dot(&self.axes[2]))
+    }
+
+    /// Pixel coordinates of a point given by [`Self::in_beam`].
+    pub(crate) fn pixel_of(&self, beam: &Vec3) -> [f64; 2] {
+        let scale = self.focal_px() / (self.sod_mm + beam.z);
+        let [w, h] = self.size_px.map(f64::from);
+        [w / 2.0 + scale * beam.x, h / 2.0 + scale * beam.y]
+    }
+
+    /// Slopes (x, y) of the ray through a pixel coordinate.
+    pub(crate) fn slopes(&self, pixel: [f64; 2]) -> [f64; 2] {
+        let [w, h] = self.size_px.map(f64::from);
+        [(pixel[0] - w / 2.0) / self.focal_px(), (pixel[1] - h / 2.0) / self.focal_px()]
+    }
+
+    /// Obliquity of the central ray of pixel number `index`, counted row by row.
+    pub(crate) fn obliquity_at(&self, index: usize) -> f64 {
+        let width = self.size_px[0] as usize;
+        let [x, y] = self.slopes([(index % width) as f64 + 0.5, (index / width) as f64 + 0.5]);
+        (1.0 + x * x + y * y).sqrt()
+    }
+
+    /// The same view with `factor` × `factor` pixels for each one.
+    pub(crate) fn refined(&self, factor: u32) -> Self {
+        let pixel_mm = self.pixel_mm / f64::from(factor);
+        Self { pixel_mm, size_px: self.size_px.map(|n| n * factor), ..self.clone() }
+    }
+
+    /// The same view with pixels merged until no side has more than `most`.
+    pub(crate) fn decimated(&self, most: u32) -> Self {
+        let factor = self.size_px[0].max(self.size_px[1]).div_ceil(most).max(1);
+        let pixel_mm = self.pixel_mm * f64::from(factor);
+        Self { pixel_mm, size_px: self.size_px.map(|n| n.div_ceil(factor)), ..self.clone() }
+    }
+
+    /// SID in pixels.
+    pub(crate) fn focal_px(&self) -> f64 {
+        self.sid_mm / self.pixel_mm
+    }
+
+    /// Where a point is seen: columns to the right, rows downwards, pixel centres at halves.
+    ///
+    /// Exactly the projection that draws the frames. A point beside or behind the source gives no finite pixel.
+    pub fn project(&self, point_mm: &Vec3) -> [f64; 2] {
+        self.pixel_of(&self.in_beam(point_mm))
+    }
+
+    /// Origin and unit direction of the ray through a pixel coordinate, the inverse of [`Self::project`].
+    pub fn ray(&self, pixel: [f64; 2]) -> (Vec3, Vec3) {
+        let [x, y] = self.slopes(pixel);
+        let direction = self.axes[0] * x + self.axes[1] * y + self.axes[2];
+        (self.source_mm(), direction.normalize())
+    }
+
+    /// Position of the source.
+    pub fn source_mm(&self) -> Vec3 {
+        self.isocentre_mm - self.axes[2] * self.sod_mm
+    }
+
+    /// The point that all rotations leave in place.
+    pub fn isocentre_mm(&self) -> Vec3 {
+        self.isocentre_mm
+    }
+
+    /// Source to detector.
+    pub fn sid_mm(&self) -> f64 {
+        self.sid_mm
+    }
+
+    /// Source to isocentre.
+    pub fn sod_mm(&self) -> f64 {
+        self.sod_mm
+    }
+
+    /// Pixel pitch at the detector.
+    pub fn pixel_mm(&self) -> f64 {
+        self.pixel_mm
+    }
+
+    /// Columns and rows.
+    pub fn size_px(&self) -> [u32; 2] {
+        self.size_px
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arm(primary_deg: f64, secondary_deg: f64) -> CArm {
+        let wall = SurfaceMesh {
+            vertices_mm: vec![Vec3::new(-50.0, -40.0, -30.0), Vec3::new(50.0, 40.0, 30.0)],
+            triangles: vec![],
+        };
+        let spec = CArmSpec { primary_deg, secondary_deg, pixel_mm: Some(0.25), ..CArmSpec::default() };
+        CArm::new(&spec, [600, 400], &wall).unwrap()
+    }
+
+    #[test]
+    fn at_zero_the_source_is_posterior_and_the_patients_left_is_right_on_screen() {
+        let arm = arm(0.0, 0.0);
+        assert!((arm.source_mm() - Vec3::new(0.0, 750.0, 0.0)).norm() < 1e-12);
+        assert_eq!(arm.project(&Vec3::zeros()), [300.0, 200.0]);
+        let [u, v] = arm.project(&Vec3::new(10.0, 0.0, 0.0));
+        assert!((u - 300.0 - 10.0 * 1100.0 / 750.0 / 0.25).abs() < 1e-9 && (v - 200.0).abs() < 1e-9);
+        let [u, v] = arm.project(&Vec3::new(0.0, 0.0, 10.0));
+        assert!((u - 300.0).abs() < 1e-9 && v < 200.0 - 10.0, "the head is up: {v}");
+    }
+
+    #[test]
+    fn lao_moves_the_detector_to_the_left_and_cranial_to_the_head() {
+        assert!((arm(90.0, 0.0).source_mm() - Vec3::new(-750.0, 0.0, 0.0)).norm() < 1e-9);
+        let source = arm(0.0, 30.0).source_mm();
+        assert!(source.z < -370.0 && source.y > 0.0, "detector to the head, source to the feet: {source}");
+        // In LAO, what is anterior moves towards the patient's right, left on screen.
+        let [u, _] = arm(30.0, 0.0).project(&Vec3::new(0.0, -20.0, 0.0));
+        assert!(u < 300.0, "{u}");
+        // Cranial view: what is anterior moves down.
+        let [_, v] = arm(0.0, 30.0).project(&Vec3::new(0.0, -20.0, 0.0));
+        assert!(v > 200.0, "{v}");
+    }
+
+    #[test]
+    fn nearer_to_the_source_is_larger() {
+        let arm = arm(0.0, 0.0);
+        let at = |y| arm.project(&Vec3::new(10.0, y, 0.0))[0] - 300.0;
+        assert!(at(30.0) > at(-30.0));
+    }
+
+    #[test]
+    fn axes_are_orthonormal_and_rays_invert_projection() {
+        let arm = arm(-37.0, 22.0);
+        for i in 0..3 {
+            for j in 0..3 {
+                let expected = if i == j { 1.0 } else { 0.0 };
+                assert!((arm.axes[i].dot(&arm.axes[j]) - expected).abs() < 1e-14);
+            }
+        }
+        // Seen from the detector the picture is not mirrored: columns × (upwards) points to the viewer.
+        assert!((arm.axes[0].cross(&-arm.axes[1]) - arm.axes[2]).norm() < 1e-14);
+        let point = Vec3::new(12.0, -34.0, 25.0);
+        let (origin, direction) = arm.ray(arm.project(&point));
+        let off = (point - origin) - direction * (point - origin).dot(&direction);
+        assert!(off.norm() < 1e-10, "{off}");
+    }
+
+    #[test]
+    fn left_alone_the_pitch_lets_the_vessel_fill_the_frame() {
+        let wall = SurfaceMesh {
+            vertices_mm: vec![Vec3::new(-50.0, -40.0, -30.0), Vec3::new(50.0, 40.0, 30.0)],
+            triangles: vec![],
+        };
+        let arm = CArm::new(&CArmSpec::default(), [600, 600], &wall).unwrap();
+        let widest = wall.vertices_mm.iter().map(|v| (arm.project(v)[0] - 300.0).abs()).fold(0.0, f64::max);
+        assert!((widest - 300.0 * FILL).abs() < 1e-9, "{widest}");
+    }
+
+    #[test]
+    fn a_vessel_beyond_the_source_or_the_detector_is_refused() {
+        let far =
+            SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::new(0.0, 2000.0, 0.0)], triangles: vec![] };
+        let spec = CArmSpec { isocentre_mm: Some([0.0; 3]), ..CArmSpec::default() };
+        let error = CArm::new(&spec, [64, 64], &far).unwrap_err().to_string();
+        assert!(error.contains("between source and detector"), "{error}");
+    }
+}

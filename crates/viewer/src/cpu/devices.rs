@@ -1,0 +1,68 @@
+//! Devices over a detector: which pixels a piece may touch, and its length on each ray.
+
+use std::ops::Range;
+
+use endowire_core::{Result, Vec3};
+
+use crate::c_arm::CArm;
+use crate::cpu::piece::inside;
+use crate::cpu::raster::span;
+use crate::device::{DevicePoint, Piece, pieces};
+
+/// The pieces of a refined centre line in beam coordinates (columns, rows, depth from the isocentre).
+pub(crate) fn pieces_in_beam(c_arm: &CArm, points: &[DevicePoint]) -> Result<Vec<Piece>> {
+    for point in points {
+        c_arm.check_between("device", &point.position_mm)?;
+    }
+    let turned: Vec<DevicePoint> = points
+        .iter()
+        .map(|p| DevicePoint {
+            position_mm: c_arm.in_beam(&p.position_mm),
+            tangent: c_arm.direction_in_beam(&p.tangent),
+            radius_mm: p.radius_mm,
+        })
+        .collect();
+    Ok(pieces(&turned))
+}
+
+/// Columns and rows of the pixels that `piece` may touch: those of the two spheres that enclose it.
+pub(crate) fn pixels_of(c_arm: &CArm, piece: &Piece) -> [Range<usize>; 2] {
+    let size = c_arm.size_px();
+    let ends = [piece.start, piece.start + piece.axis * piece.length];
+    [0, 1].map(|k| {
+        let (mut low, mut high) = (f64::MAX, f64::MIN);
+        for end in ends {
+            for side in [-piece.reach, piece.reach] {
+                for depth in [-piece.reach, piece.reach] {
+                    // A sphere that reaches behind the source may be seen anywhere.
+                    if c_arm.sod_mm() + end.z + depth <= 0.0 {
+                        return 0..size[k] as usize;
+                    }
+                    let corner = end + Vec3::new(side, side, depth);
+                    let at = c_arm.pixel_of(&corner)[k];
+                    (low, high) = (low.min(at), high.max(at));
+                }
+            }
+        }
+        span(low, high, size[k])
+    })
+}
+
+/// Calls `visit(index, length_mm)` for every pixel whose central ray meets `piece`.
+pub(crate) fn cast(c_arm: &CArm, piece: &Piece, mut visit: impl FnMut(usize, f64)) {
+    let [columns, rows] = pixels_of(c_arm, piece);
+    let width = c_arm.size_px()[0] as usize;
+    let depth = c_arm.sod_mm() + piece.start.z;
+    for y in rows {
+        for x in columns.clone() {
+            let [sx, sy] = c_arm.slopes([x as f64 + 0.5, y as f64 + 0.5]);
+            let direction = Vec3::new(sx, sy, 1.0);
+            // The ray at the depth of the first centre, relative to it.
+            let q = Vec3::new(depth * sx - piece.start.x, depth * sy - piece.start.y, 0.0);
+            let [enter, leave] = inside(piece, &q, &direction);
+            if leave > enter {
+                visit(y * width + x, (leave - enter) * direction.norm());
+            }
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! The 3D view in plain Rust: a supersampled rasteriser.
+//!
+//! The wall's fragments are made once and kept per sample. A frame draws the devices with a depth buffer and composes anew
+//! only where they are.
+
+use endowire_core::vessel::SurfaceMesh;
+use glam::{Vec3, Vec4};
+
+use crate::cpu::raster::ScreenTriangle;
+use crate::image::{Image, PixelFormat};
+use crate::scene::RefinedDevice;
+use crate::three_d::{Camera, Style, Vertex, device_triangles, wall_triangles};
+
+/// Samples across a pixel: nine levels of edge smoothing.
+const SAMPLES: u32 = 3;
+
+/// A piece of wall on a sample.
+#[derive(Debug, Clone, Copy, Default)]
+struct Fragment {
+    distance: f32,
+    rgba: [u8; 4],
+}
+
+#[derive(Debug)]
+pub(crate) struct CpuView3d {
+    camera: Camera,
+    style: Style,
+    /// Fragments of all samples, and where those of each sample end.
+    fragments: Vec<Fragment>,
+    ends: Vec<u32>,
+    /// The picture without devices.
+    still: Vec<u8>,
+    /// Distance and colour of the nearest device; infinite between frames.
+    distance: Vec<f32>,
+    colour: Vec<[u8; 3]>,
+}
+
+impl CpuView3d {
+    pub(crate) fn new(camera: &Camera, wall: &SurfaceMesh) -> Self {
+        let style = Style::new(camera);
+        let samples = camera.size_px.iter().map(|&n| (n * SAMPLES) as usize).product::<usize>();
+        let triangles = wall_triangles(camera, wall);
+        let mut found: Vec<(u32, Fragment)> = Vec::new();
+        for corners in triangles.chunks_exact(3) {
+            draw(camera, corners, |sample, position, normal| {
+                let rgba = style.shade_wall(position, normal).to_array().map(to_byte);
+                found.push((sample as u32, Fragment { distance: -position.z, rgba }));
+            });
+        }
+        // Sorted by sample by counting; within a sample the order of the mesh stays.
+        let mut ends = vec![0_u32; samples + 1];
+        found.iter().for_each(|(sample, _)| ends[*sample as usize + 1] += 1);
+        for i in 0..samples {
+            ends[i + 1] += ends[i];
+        }
+        let mut fragments = vec![Fragment::default(); found.len()];
+        for (sample, fragment) in found {
+            let place = &mut ends[sample as usize];
+            fragments[*place as usize] = fragment;
+            *place += 1;
+        }
+        // Each start has moved to the end of its sample.
+        ends.pop();
+        let mut view = Self {
+            camera: camera.clone(),
+            style,
+            fragments,
+            ends,
+            still: Vec::new(),
+            distance: vec![f32::INFINITY; samples],
+            colour: vec![[0; 3]; samples],
+        };
+        let [width, height] = camera.size_px.map(|n| n as usize);
+        view.still = (0..width * height).flat_map(|pixel| view.pixel(pixel)).collect();
+        view
+    }
+
+    pub(crate) fn frame(&mut self, devices: &[RefinedDevice]) -> Image {
+        let [width, height] = self.camera.size_px;
+        let (row, sub) = ((width * SAMPLES) as usize, SAMPLES as usize);
+        let mut touched = Vec::new();
+        for device in devices {
+            for corners in device_triangles(&self.camera, &device.points).chunks_exact(3) {
+                draw(&self.camera, corners, |sample, position, normal| {
+                    if -position.z < self.distance[sample] {
+                        self.distance[sample] = -position.z;
+                        self.colour[sample] =
+                            self.style.shade_device(position, normal).to_array().map(to_byte);
+                        touched.push(sample / row / sub * width as usize + sample % row / sub);
+                    }
+                });
+            }
+        }
+        touched.sort_unstable();
+        touched.dedup();
+        let mut data = self.still.clone();
+        for &pixel in &touched {
+            data[4 * pixel..][..4].copy_from_slice(&self.pixel(pixel));
+        }
+        for &pixel in &touched {
+            for sample in samples_of(pixel, width as usize) {
+                self.distance[sample] = f32::INFINITY;
+            }
+        }
+        Image::new(width, height, PixelFormat::Rgba8, data)
+    }
+
+    /// The finished pixel: the mean of its samples.
+    fn pixel(&self, pixel: usize) -> [u8; 4] {
+        let mut sum = Vec3::ZERO;
+        for sample in samples_of(pixel, self.camera.size_px[0] as usize) {
+            sum += self.sample(sample);
+        }
+        let [r, g, b] = (sum / (SAMPLES * SAMPLES) as f32).to_array().map(to_byte);
+        [r, g, b, 255]
+    }
+
+    fn sample(&self, sample: usize) -> Vec3 {
+        let nearest = self.distance[sample];
+        let opaque = if nearest.is_finite() {
+            Vec3::from_array(self.colour[sample].map(from_byte))
+        } else {
+            self.style.background()
+        };
+        let start = if sample == 0 { 0 } else { self.ends[sample - 1] as usize };
+        let (mut sum, mut through) = (Vec4::ZERO, 1.0);
+        for fragment in &self.fragments[start..self.ends[sample] as usize] {
+            if fragment.distance < nearest {
+                let [r, g, b, a] = fragment.rgba.map(from_byte);
+                sum += Vec4::new(r, g, b, 1.0) * (a * self.style.weight(fragment.distance));
+                through *= 1.0 - a;
+            }
+        }
+        if sum.w > 0.0 { (sum.truncate() / sum.w).lerp(opaque, through) } else { opaque }
+    }
+}
+
+/// The samples of a pixel.
+fn samples_of(pixel: usize, width: usize) -> impl Iterator<Item = usize> {
+    let sub = SAMPLES as usize;
+    let first = pixel / width * sub * width * sub + pixel % width * sub;
+    (0..sub * sub).map(move |k| first + k / sub * width * sub + k % sub)
+}
+
+/// Calls `visit(sample, position, normal)` for each sample that a triangle covers; triangles that reach behind the
+/// near plane are left out.
+fn draw(camera: &Camera, corners: &[Vertex], mut visit: impl FnMut(usize, Vec3, Vec3)) {
+    let size = camera.size_px.map(|n| n * SAMPLES);
+    let positions = [0, 1, 2].map(|i| Vec3::from_array(corners[i].position));
+    let normals = [0, 1, 2].map(|i| Vec3::from_array(corners[i].normal));
+    if positions.iter().any(|p| f64::from(-p.z) < camera.near) {
+        return;
+    }
+    let on_screen = positions.map(|p| camera.pixel_of(p.to_array().map(f64::from), SAMPLES));
+    let Some(triangle) = ScreenTriangle::new(on_screen) else { return };
+    triangle.scan(size, |x, y, weights| {
+        // Perspective: weights over distance are linear on the screen.
+        let w: [f32; 3] = std::array::from_fn(|i| weights[i] as f32 / positions[i].z);
+        let scale = 1.0 / (w[0] + w[1] + w[2]);
+        let mix = |v: [Vec3; 3]| (v[0] * w[0] + v[1] * w[1] + v[2] * w[2]) * scale;
+        visit(y * size[0] as usize + x, mix(positions), mix(normals));
+    });
+}
+
+fn to_byte(value: f32) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0).round() as u8
+}
+
+fn from_byte(value: u8) -> f32 {
+    f32::from(value) / 255.0
+}

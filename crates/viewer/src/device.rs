@@ -1,0 +1,216 @@
+//! Devices as the viewer sees them: a centre line with a radius, refined into short straight pieces.
+//!
+//! Between two points the centre line is the cubic Hermite curve through positions and tangents, the same curve the rod solver
+//! integrates. It is cut so finely that a piece's chord stays within [`SAGITTA`] radii of it: for curvature κ and
+//! length h, the sagitta is κh²/8. A chord offset by s from the axis of a round wire of radius r shortens the central ray from 2r to
+//! 2√(r² − s²) ≈ 2r(1 − s²/2r²), so 0.04 r costs less than 0.1 % of the diameter.
+//!
+//! Each piece is a cone frustum, cut at both ends by the plane that bisects it and its neighbour (a mitre). Neighbouring
+//! cylinders meet that plane in the same ellipse, so pieces neither overlap nor gape in bends. The two end planes are
+//! perpendicular to the axis: ends are flat.
+
+use endowire_core::shape::Shape;
+use endowire_core::{Error, Result, Vec3};
+
+use crate::xray::Material;
+
+/// Largest distance of a piece's chord from the curve, in radii.
+const SAGITTA: f64 = 0.04;
+/// Longest piece, mm: keeps the screen rectangle of an oblique straight piece small.
+const LONGEST_MM: f64 = 4.0;
+/// Most pieces between two given points, so that absurd input cannot exhaust memory.
+const MOST_PIECES: f64 = 4096.0;
+
+/// One point of a device's centre line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DevicePoint {
+    /// Where it is.
+    pub position_mm: Vec3,
+    /// Direction of the centre line there, of any length above zero.
+    pub tangent: Vec3,
+    /// Outer radius.
+    pub radius_mm: f64,
+}
+
+/// A device to draw: a solid round rod along a centre line.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DeviceView {
+    /// The centre line in order; fewer than two points draw nothing.
+    pub points: Vec<DevicePoint>,
+    /// What it is made of; `None`: the scene's `device_material`.
+    pub material: Option<Material>,
+}
+
+impl DeviceView {
+    /// The device with centre line `shape` and an outer radius given by the arc length from the tip in millimetres.
+    pub fn from_shape(shape: &Shape, radius_mm: impl Fn(f64) -> f64) -> Self {
+        let points = (shape.positions_mm.iter().zip(&shape.tangents).zip(&shape.from_tip_mm))
+            .map(|((&position_mm, &tangent), &s)| DevicePoint {
+                position_mm,
+                tangent,
+                radius_mm: radius_mm(s),
+            })
+            .collect();
+        Self { points, material: None }
+    }
+
+    /// Refines the centre line; empty where there is nothing to draw.
+    pub(crate) fn refined(&self) -> Result<Vec<DevicePoint>> {
+        for (i, p) in self.points.iter().enumerate() {
+            let finite =
+                p.position_mm.iter().chain(&p.tangent).all(|x| x.is_finite()) && p.radius_mm.is_finite();
+            if !finite || p.radius_mm < 0.0 {
+                let mend = "positions, tangents and radii must be finite, radii not negative";
+                return Err(Error::parameter(format!("device.points[{i}]"), format!("{p:?}"), mend));
+            }
+        }
+        let mut fine: Vec<DevicePoint> = Vec::with_capacity(2 * self.points.len());
+        for pair in self.points.windows(2) {
+            let chord = pair[1].position_mm - pair[0].position_mm;
+            let length = chord.norm();
+            // Coinciding points carry no direction; the piece before or after them covers the place.
+            let Some(along) = chord.try_normalize(f64::EPSILON * (1.0 + pair[0].position_mm.amax())) else {
+                continue;
+            };
+            let [t0, t1] = [0, 1].map(|i| pair[i].tangent.try_normalize(0.0).unwrap_or(along));
+            if fine.is_empty() {
+                fine.push(DevicePoint { tangent: t0, ..pair[0] });
+            }
+            let turn = t0.angle(&along) + t1.angle(&along);
+            let radius = pair[0].radius_mm.max(pair[1].radius_mm).max(f64::MIN_POSITIVE);
+            let by_bend = (length * turn / (8.0 * SAGITTA * radius)).sqrt();
+            let pieces = by_bend.max(length / LONGEST_MM).ceil().clamp(1.0, MOST_PIECES) as usize;
+            // Handles of this length make the curve match a circular arc through both ends to sixth order:
+            // chord / cos²(θ/4) with θ the angle between the end tangents.
+            let half_cos = ((1.0 + t0.dot(&t1).clamp(-1.0, 1.0)) / 2.0).sqrt();
+            let handle = length * 2.0 / (1.0 + half_cos);
+            for k in 1..pieces {
+                fine.push(hermite(pair, [t0 * handle, t1 * handle], k as f64 / pieces as f64));
+            }
+            fine.push(DevicePoint { tangent: t1, ..pair[1] });
+        }
+        Ok(fine)
+    }
+}
+
+/// Point at parameter `w` of the cubic Hermite curve between two points with end derivatives `d`.
+fn hermite(pair: &[DevicePoint], d: [Vec3; 2], w: f64) -> DevicePoint {
+    let [p0, p1] = [pair[0].position_mm, pair[1].position_mm];
+    let v = 1.0 - w;
+    let position_mm = p0 * (v * v * (1.0 + 2.0 * w)) + p1 * (w * w * (1.0 + 2.0 * v)) + d[0] * (w * v * v)
+        - d[1] * (w * w * v);
+    let tangent = (p1 - p0) * (6.0 * w * v) + d[0] * (v * (1.0 - 3.0 * w)) + d[1] * (w * (3.0 * w - 2.0));
+    DevicePoint {
+        position_mm,
+        tangent: tangent.try_normalize(0.0).unwrap_or(p1 - p0),
+        radius_mm: v * pair[0].radius_mm + w * pair[1].radius_mm,
+    }
+}
+
+/// A frustum between two mitre planes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Piece {
+    /// Centre of the first end.
+    pub(crate) start: Vec3,
+    /// Unit direction to the second end.
+    pub(crate) axis: Vec3,
+    pub(crate) length: f64,
+    /// Plane normals at both ends, pointing onwards.
+    pub(crate) planes: [Vec3; 2],
+    pub(crate) radius: f64,
+    /// Change of the radius per length.
+    pub(crate) slope: f64,
+    /// Radius of a sphere about each end that, with the other, encloses the piece.
+    pub(crate) reach: f64,
+}
+
+/// Mitres are cut no sharper than at this cosine of half the turn (a turn of 150°); beyond it a corner is blunted.
+const SHARPEST_MITRE: f64 = 0.26;
+
+/// The mitred pieces between consecutive points of a refined centre line.
+pub(crate) fn pieces(points: &[DevicePoint]) -> Vec<Piece> {
+    let chords: Vec<(Vec3, f64)> = points
+        .windows(2)
+        .map(|pair| {
+            let chord = pair[1].position_mm - pair[0].position_mm;
+            let length = chord.norm();
+            (chord / length.max(f64::MIN_POSITIVE), length)
+        })
+        .collect();
+    let plane = |k: usize| {
+        let before = chords[k.saturating_sub(1)].0;
+        let after = chords[k.min(chords.len() - 1)].0;
+        (before + after).try_normalize(2.0 * SHARPEST_MITRE).unwrap_or(before)
+    };
+    (chords.iter().enumerate())
+        .map(|(k, &(axis, length))| {
+            let [r0, r1] = [points[k].radius_mm, points[k + 1].radius_mm];
+            let planes = [plane(k), plane(k + 1)];
+            let sharpest = planes[0].dot(&axis).min(planes[1].dot(&axis)).max(SHARPEST_MITRE);
+            Piece {
+                start: points[k].position_mm,
+                axis,
+                length,
+                planes,
+                radius: r0,
+                slope: (r1 - r0) / length.max(f64::MIN_POSITIVE),
+                reach: r0.max(r1) / sharpest,
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn arc(radius: f64, degrees: f64, points: usize, wire: f64) -> DeviceView {
+        let points = (0..points)
+            .map(|i| {
+                let a = degrees.to_radians() * i as f64 / (points - 1) as f64;
+                DevicePoint {
+                    position_mm: Vec3::new(radius * a.cos(), radius * a.sin(), 0.0),
+                    tangent: Vec3::new(-a.sin(), a.cos(), 0.0),
+                    radius_mm: wire,
+                }
+            })
+            .collect();
+        DeviceView { points, material: None }
+    }
+
+    #[test]
+    fn a_bend_of_five_millimetres_is_refined_onto_its_circle() {
+        let wire = 0.2;
+        let fine = arc(5.0, 180.0, 7, wire).refined().unwrap();
+        for pair in fine.windows(2) {
+            let middle = (pair[0].position_mm + pair[1].position_mm) / 2.0;
+            assert!((middle.norm() - 5.0).abs() < SAGITTA * wire + 1e-3, "{}", middle.norm());
+            assert!((pair[0].position_mm.norm() - 5.0).abs() < 1e-3);
+        }
+        // Without refinement the same check fails.
+        let coarse = arc(5.0, 180.0, 7, wire).points;
+        let middle = (coarse[0].position_mm + coarse[1].position_mm) / 2.0;
+        assert!((middle.norm() - 5.0).abs() > 10.0 * SAGITTA * wire);
+    }
+
+    #[test]
+    fn mitres_are_shared_and_ends_are_flat() {
+        let fine = arc(5.0, 90.0, 4, 0.2).refined().unwrap();
+        let pieces = pieces(&fine);
+        for pair in pieces.windows(2) {
+            assert_eq!(pair[0].planes[1], pair[1].planes[0]);
+        }
+        assert!((pieces[0].planes[0] - pieces[0].axis).norm() < 1e-12);
+    }
+
+    #[test]
+    fn too_few_or_coinciding_points_draw_nothing_and_bad_ones_are_named() {
+        let mut device = arc(5.0, 10.0, 2, 0.2);
+        device.points[1] = device.points[0];
+        assert!(device.refined().unwrap().is_empty());
+        device.points.truncate(1);
+        assert!(device.refined().unwrap().is_empty());
+        device.points[0].radius_mm = f64::NAN;
+        assert!(device.refined().unwrap_err().to_string().contains("device.points[0]"));
+    }
+}

@@ -1,0 +1,124 @@
+//! Finished frames: 8-bit pictures, row by row from the top left.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use endowire_core::{Error, Result};
+
+/// How a pixel of an [`Image`] is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PixelFormat {
+    /// One byte a pixel, 0 = black.
+    Gray8,
+    /// Red, green, blue, alpha; one byte each, display (sRGB) values.
+    Rgba8,
+}
+
+impl PixelFormat {
+    /// Bytes a pixel.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::Gray8 => 1,
+            Self::Rgba8 => 4,
+        }
+    }
+}
+
+/// A picture.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Image {
+    width: u32,
+    height: u32,
+    format: PixelFormat,
+    data: Vec<u8>,
+}
+
+impl Image {
+    /// Wraps `data`; its length must be `width · height · format.bytes()`.
+    pub(crate) fn new(width: u32, height: u32, format: PixelFormat, data: Vec<u8>) -> Self {
+        debug_assert_eq!(data.len(), width as usize * height as usize * format.bytes());
+        Self { width, height, format, data }
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// What a pixel consists of.
+    pub fn format(&self) -> PixelFormat {
+        self.format
+    }
+
+    /// All pixels, row by row from the top left.
+    pub fn data(&self) -> &[u8] {
+        &self.data
+    }
+
+    /// The bytes of the pixel in column `x` and row `y`, or `None` outside the picture.
+    pub fn pixel(&self, x: u32, y: u32) -> Option<&[u8]> {
+        if x >= self.width || y >= self.height {
+            return None;
+        }
+        let start = (y as usize * self.width as usize + x as usize) * self.format.bytes();
+        self.data.get(start..start + self.format.bytes())
+    }
+
+    /// Writes the picture as a PNG file.
+    ///
+    /// # Errors
+    /// [`Error::File`] naming `path` when the file cannot be written.
+    pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        let file = File::create(path).map_err(|source| Error::file(path, source))?;
+        let mut encoder = png::Encoder::new(BufWriter::new(file), self.width, self.height);
+        encoder.set_color(match self.format {
+            PixelFormat::Gray8 => png::ColorType::Grayscale,
+            PixelFormat::Rgba8 => png::ColorType::Rgba,
+        });
+        encoder.set_depth(png::BitDepth::Eight);
+        let failed = |error| Error::file(path, std::io::Error::other(error));
+        let mut writer = encoder.write_header().map_err(failed)?;
+        writer.write_image_data(&self.data).map_err(failed)?;
+        writer.finish().map_err(failed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_png_reads_back_as_it_was_written() {
+        let image = Image::new(3, 2, PixelFormat::Gray8, vec![0, 50, 100, 150, 200, 250]);
+        let path = std::env::temp_dir().join(format!("endowire-image-{}.png", std::process::id()));
+        image.write_png(&path).unwrap();
+        let decoder = png::Decoder::new(std::io::BufReader::new(File::open(&path).unwrap()));
+        let mut reader = decoder.read_info().unwrap();
+        let mut data = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut data).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!((info.width, info.height), (3, 2));
+        assert_eq!(data, image.data());
+    }
+
+    #[test]
+    fn an_unwritable_path_is_named() {
+        let image = Image::new(1, 1, PixelFormat::Rgba8, vec![0; 4]);
+        let error = image.write_png("no-such-folder/frame.png").unwrap_err();
+        assert!(error.to_string().contains("no-such-folder"), "{error}");
+    }
+
+    #[test]
+    fn pixels_outside_are_none() {
+        let image = Image::new(2, 1, PixelFormat::Gray8, vec![7, 9]);
+        assert_eq!(image.pixel(1, 0), Some(&[9][..]));
+        assert_eq!(image.pixel(2, 0), None);
+    }
+}

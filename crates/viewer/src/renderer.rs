@@ -1,0 +1,152 @@
+//! From a scene to frames: chooses an engine, prepares what the wanted views need, draws.
+
+use endowire_core::vessel::SurfaceMesh;
+use endowire_core::{Error, Result};
+
+use crate::c_arm::CArm;
+use crate::cpu::CpuEngine;
+use crate::device::DeviceView;
+use crate::gpu::GpuEngine;
+use crate::image::Image;
+use crate::scene::{RefinedDevice, Setup};
+use crate::spec::{Backend, ViewSpec};
+use crate::xray::{Material, PathLengths};
+
+/// What draws. Views that the set-up lacks give `None`.
+pub(crate) trait Engine: Send {
+    /// Name for people.
+    fn describe(&self) -> String;
+    fn fluoro(&mut self, devices: &[RefinedDevice]) -> Result<Option<Image>>;
+    fn three_d(&mut self, devices: &[RefinedDevice]) -> Result<Option<Image>>;
+    /// Length inside the wall of each pixel's central ray.
+    fn lumen_path(&mut self, setup: &Setup) -> Result<Vec<f32>>;
+    /// Length inside one device of each pixel's central ray.
+    fn device_path(&mut self, setup: &Setup, device: &RefinedDevice) -> Result<Vec<f32>>;
+}
+
+/// The frames of one moment.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frames {
+    /// The 3D view, if wanted; 8-bit RGBA.
+    pub three_d: Option<Image>,
+    /// The fluoroscopic view, if wanted; 8-bit grey.
+    pub fluoro: Option<Image>,
+}
+
+/// Draws the wanted views of devices in a vessel.
+pub struct Renderer {
+    setup: Setup,
+    engine: Box<dyn Engine>,
+    is_cpu: bool,
+    description: String,
+}
+
+impl std::fmt::Debug for Renderer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Renderer").field("backend", &self.description).finish_non_exhaustive()
+    }
+}
+
+impl Renderer {
+    /// Prepares the views that `spec` asks for, and nothing else, for a **closed** wall with outward triangles (cap the openings).
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a bad `spec`, a vessel that is not between source and detector, or `backend = gpu` without a fitting
+    /// adapter; [`Error::Mesh`] for a wall that is open, wound inconsistently or inside out.
+    pub fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
+        let setup = Setup::new(spec, wall)?;
+        let nothing = setup.fluoro.is_none() && setup.camera.is_none();
+        let gpu = match spec.backend {
+            Backend::Cpu => None,
+            _ if nothing => None,
+            Backend::Auto => GpuEngine::new(&setup, true).ok(),
+            Backend::Gpu => Some(GpuEngine::new(&setup, false).map_err(|reason| {
+                Error::parameter("view.backend", "gpu", format!("{reason}; use \"auto\" or \"cpu\""))
+            })?),
+        };
+        let is_cpu = gpu.is_none();
+        let engine: Box<dyn Engine> = match gpu {
+            Some(gpu) => Box::new(gpu),
+            None => Box::new(CpuEngine::new(&setup)),
+        };
+        let description = engine.describe();
+        Ok(Self { setup, engine, is_cpu, description })
+    }
+
+    /// What computes the frames, for people: "CPU reference", or the graphics interface and adapter. Changes where a lost
+    /// adapter made the CPU take over.
+    pub fn backend(&self) -> &str {
+        &self.description
+    }
+
+    /// The C-arm of the fluoroscopic view, if that is wanted: projects points exactly as the frames do.
+    pub fn c_arm(&self) -> Option<&CArm> {
+        self.setup.fluoro.as_ref().map(|f| &f.c_arm)
+    }
+
+    /// Draws the wanted views.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a device with values that are not finite or that is not between source and detector.
+    pub fn render(&mut self, devices: &[DeviceView]) -> Result<Frames> {
+        let devices = RefinedDevice::all(devices)?;
+        self.with_fallback(|engine, _| {
+            Ok(Frames { three_d: engine.three_d(&devices)?, fluoro: engine.fluoro(&devices)? })
+        })
+    }
+
+    /// Path lengths of the rays through the pixel centres.
+    ///
+    /// # Errors
+    /// As [`Self::render`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
+    pub fn path_lengths(&mut self, devices: &[DeviceView]) -> Result<PathLengths> {
+        let Some(fluoro) = &self.setup.fluoro else {
+            let mend = "path lengths belong to the fluoroscopic view; add \"fluoro\"";
+            return Err(Error::parameter("view.views", "without fluoro", mend));
+        };
+        let [width, height] = fluoro.c_arm.size_px();
+        let body_mm = (0..width as usize * height as usize)
+            .map(|i| (fluoro.beam.tissue_mm * fluoro.c_arm.obliquity_at(i)) as f32)
+            .collect();
+        let default = fluoro.beam.device_material(None);
+        let devices = RefinedDevice::all(devices)?;
+        let (lumen_mm, devices_mm) = self.with_fallback(|engine, setup| {
+            let mut maps: Vec<(Material, Vec<f32>)> = Vec::new();
+            for device in &devices {
+                let material = device.material.unwrap_or(default);
+                let map = engine.device_path(setup, device)?;
+                match maps.iter_mut().find(|(m, _)| *m == material) {
+                    Some((_, sum)) => sum.iter_mut().zip(map).for_each(|(sum, length)| *sum += length),
+                    None => maps.push((material, map)),
+                }
+            }
+            Ok((engine.lumen_path(setup)?, maps))
+        })?;
+        Ok(PathLengths { width, height, body_mm, lumen_mm, devices_mm })
+    }
+
+    /// Transmitted fraction I/I₀ = exp(−Σ μL) of the given path lengths with this scene's energy and fillings.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where the fluoroscopic view was not asked for.
+    pub fn transmission(&self, paths: &PathLengths) -> Result<Vec<f32>> {
+        match &self.setup.fluoro {
+            Some(fluoro) => fluoro.beam.transmission(paths),
+            None => Err(Error::parameter("view.views", "without fluoro", "add \"fluoro\"")),
+        }
+    }
+
+    /// Runs `job`; where an adapter fails in it, hands over to the CPU and runs it again.
+    fn with_fallback<T>(&mut self, job: impl Fn(&mut dyn Engine, &Setup) -> Result<T>) -> Result<T> {
+        match job(self.engine.as_mut(), &self.setup) {
+            Err(Error::Computation(reason)) if !self.is_cpu => {
+                let cpu = CpuEngine::new(&self.setup);
+                self.description = format!("{} ({} failed: {reason})", cpu.describe(), self.description);
+                self.engine = Box::new(cpu);
+                self.is_cpu = true;
+                job(self.engine.as_mut(), &self.setup)
+            }
+            done => done,
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! The camera of the 3D view, fitted so that the whole vessel is in the frame.
+
+use endowire_core::Vec3;
+use endowire_core::vessel::SurfaceMesh;
+
+use crate::spec::CameraSpec;
+
+/// Half the opening angle along the longer side of the frame, degrees: a mild perspective.
+const HALF_ANGLE_DEG: f64 = 14.0;
+/// Part of the frame that the vessel may fill.
+const FILL: f64 = 0.88;
+/// Where the camera looks from unless told: front, slightly from the left and above.
+const AZIMUTH_DEG: f64 = 25.0;
+const ELEVATION_DEG: f64 = 18.0;
+/// A view that shows less than this part of the largest possible spread of the vessel is exchanged for one across its plane.
+const LEAST_SPREAD: f64 = 0.6;
+/// Part of the distance to the vessel that is kept free in front of the camera.
+const NEAR: f64 = 0.02;
+
+/// A perspective camera. View coordinates are rightwards, upwards and backwards from the eye.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Camera {
+    eye_mm: Vec3,
+    axes: [Vec3; 3],
+    /// Tangents of half the opening angles, across and up.
+    pub(crate) tangents: [f64; 2],
+    pub(crate) size_px: [u32; 2],
+    /// Nearest and farthest distance of the wall along the view.
+    pub(crate) wall_range: [f64; 2],
+    pub(crate) near: f64,
+    pub(crate) far: f64,
+}
+
+impl Camera {
+    /// Fits a camera to a wall with at least one vertex.
+    pub(crate) fn new(spec: &CameraSpec, size_px: [u32; 2], wall: &SurfaceMesh) -> Self {
+        let back = match (spec.azimuth_deg, spec.elevation_deg) {
+            (None, None) => natural_direction(wall),
+            (azimuth, elevation) => from_angles(azimuth.unwrap_or(0.0), elevation.unwrap_or(0.0)),
+        };
+        // Head up; looking along the body, the front is up.
+        let upright = if back.z.abs() > 0.999 { -Vec3::y() } else { Vec3::z() };
+        let right = upright.cross(&back).normalize();
+        let axes = [right, back.cross(&right), back];
+        let longer = f64::from(size_px[0].max(size_px[1]));
+        let tangents = size_px.map(|n| HALF_ANGLE_DEG.to_radians().tan() * f64::from(n) / longer);
+
+        // A vertex at (x, y, z) is in the frame of an eye at (cx, cy, D) when |x − cx| ≤ k (D − z): the extremes of x + kz and
+        // −x + kz give the tightest D and the centre that goes with it, for each direction alone.
+        let local: Vec<[f64; 3]> = wall.vertices_mm.iter().map(|v| axes.map(|axis| v.dot(&axis))).collect();
+        let fit = |side: usize| {
+            let k = tangents[side] * FILL;
+            let (plus, minus) = local.iter().fold((f64::MIN, f64::MIN), |(plus, minus), p| {
+                (plus.max(p[side] + k * p[2]), minus.max(k * p[2] - p[side]))
+            });
+            ((plus - minus) / 2.0, (plus + minus) / (2.0 * k))
+        };
+        let ((cx, dx), (cy, dy)) = (fit(0), fit(1));
+        let (front, rear) =
+            local.iter().fold((f64::MIN, f64::MAX), |(front, rear), p| (front.max(p[2]), rear.min(p[2])));
+        // A wall without extent across the view still needs a distance.
+        let distance = dx.max(dy).max(front + 1.0);
+        Self {
+            eye_mm: axes[0] * cx + axes[1] * cy + axes[2] * distance,
+            axes,
+            tangents,
+            size_px,
+            wall_range: [distance - front, distance - rear],
+            near: NEAR * (distance - front),
+            far: 3.0 * (distance - rear),
+        }
+    }
+
+    /// View coordinates of a point.
+    pub(crate) fn in_view(&self, point_mm: &Vec3) -> [f64; 3] {
+        let r = point_mm - self.eye_mm;
+        self.axes.map(|axis| r.dot(&axis))
+    }
+
+    /// View coordinates of a direction.
+    pub(crate) fn direction_in_view(&self, direction: &Vec3) -> [f64; 3] {
+        self.axes.map(|axis| direction.dot(&axis))
+    }
+
+    /// Pixel coordinates of a point in view coordinates, on a frame with `scale` pixels for each one.
+    pub(crate) fn pixel_of(&self, view: [f64; 3], scale: u32) -> [f64; 2] {
+        let [w, h] = self.size_px.map(|n| f64::from(n * scale) / 2.0);
+        [
+            w * (1.0 - view[0] / (self.tangents[0] * view[2])),
+            h * (1.0 + view[1] / (self.tangents[1] * view[2])),
+        ]
+    }
+
+    /// Size in millimetres of a pixel at the given distance along the view.
+    pub(crate) fn pixel_mm_at(&self, distance: f64) -> f64 {
+        2.0 * self.tangents[0] * distance / f64::from(self.size_px[0])
+    }
+}
+
+/// Unit vector from the vessel to the camera.
+fn from_angles(azimuth_deg: f64, elevation_deg: f64) -> Vec3 {
+    let (a, e) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
+    Vec3::new(a.sin() * e.cos(), -a.cos() * e.cos(), e.sin())
+}
+
+/// The usual oblique front view; for a vessel that it shows edge-on, one across the vessel's plane instead.
+fn natural_direction(wall: &SurfaceMesh) -> Vec3 {
+    let usual = from_angles(AZIMUTH_DEG, ELEVATION_DEG);
+    let n = wall.vertices_mm.len().max(1) as f64;
+    let mean = wall.vertices_mm.iter().sum::<Vec3>() / n;
+    let mut covariance = endowire_core::nalgebra::Matrix3::zeros();
+    for v in &wall.vertices_mm {
+        covariance += (v - mean) * (v - mean).transpose();
+    }
+    let eigen = covariance.symmetric_eigen();
+    // Spread seen along d: √ of the determinant of the covariance projected along d, which is √(dᵀ adj(C) d).
+    let [l0, l1, l2] = [0, 1, 2].map(|i| eigen.eigenvalues[i].max(0.0));
+    let adjugate = [l1 * l2, l0 * l2, l0 * l1];
+    let spread = |d: &Vec3| -> f64 {
+        (0..3).map(|i| adjugate[i] * eigen.eigenvectors.column(i).dot(d).powi(2)).sum::<f64>().sqrt()
+    };
+    let thinnest = (0..3).max_by(|&i, &j| adjugate[i].total_cmp(&adjugate[j])).unwrap_or(0);
+    let across: Vec3 = eigen.eigenvectors.column(thinnest).into_owned();
+    if spread(&usual) >= LEAST_SPREAD * spread(&across) {
+        return usual;
+    }
+    let facing = if across.dot(&usual) < 0.0 { -across } else { across };
+    // Not quite across, so that depth shows.
+    (facing + usual * 0.35).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud(x: f64, y: f64, z: f64) -> SurfaceMesh {
+        let vertices_mm = (0..500)
+            .map(|i| {
+                let a = f64::from(i);
+                Vec3::new(x * (0.7 * a).sin() + 90.0, y * (1.3 * a).cos(), z * (2.1 * a).sin() - 40.0)
+            })
+            .collect();
+        SurfaceMesh { vertices_mm, triangles: vec![] }
+    }
+
+    #[test]
+    fn the_whole_vessel_is_in_the_frame_and_fills_it() {
+        for size in [[640, 640], [800, 300], [200, 900]] {
+            let wall = cloud(80.0, 20.0, 50.0);
+            let camera = Camera::new(&CameraSpec::default(), size, &wall);
+            let mut widest: f64 = 0.0;
+            for v in &wall.vertices_mm {
+                let view = camera.in_view(v);
+                assert!(-view[2] >= camera.near && -view[2] <= camera.far);
+                let pixel = camera.pixel_of(view, 1);
+                for k in 0..2 {
+                    let half = f64::from(size[k]) / 2.0;
+                    widest = widest.max((pixel[k] - half).abs() / half);
+                }
+            }
+            assert!((widest - FILL).abs() < 1e-9, "{size:?}: {widest}");
+        }
+    }
+
+    #[test]
+    fn the_front_is_seen_with_the_head_up_and_the_left_on_the_right() {
+        let spec = CameraSpec { azimuth_deg: Some(0.0), elevation_deg: Some(0.0) };
+        let camera = Camera::new(&spec, [400, 400], &cloud(80.0, 20.0, 50.0));
+        let at = |p: Vec3| camera.pixel_of(camera.in_view(&p), 1);
+        let centre = at(Vec3::new(90.0, 0.0, -40.0));
+        assert!(at(Vec3::new(95.0, 0.0, -40.0))[0] > centre[0]);
+        assert!(at(Vec3::new(90.0, 0.0, -35.0))[1] < centre[1]);
+    }
+
+    #[test]
+    fn a_vessel_in_a_transverse_plane_is_not_seen_edge_on() {
+        let flat = natural_direction(&cloud(80.0, 60.0, 3.0));
+        assert!(flat.z > 0.8, "{flat}");
+        let upright = natural_direction(&cloud(80.0, 3.0, 60.0));
+        assert!((upright - from_angles(AZIMUTH_DEG, ELEVATION_DEG)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn looking_along_the_body_works() {
+        let spec = CameraSpec { azimuth_deg: None, elevation_deg: Some(90.0) };
+        let camera = Camera::new(&spec, [100, 100], &cloud(10.0, 20.0, 30.0));
+        assert!(camera.eye_mm.iter().all(|x| x.is_finite()));
+    }
+}

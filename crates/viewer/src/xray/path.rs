@@ -1,0 +1,28 @@
+//! Path length maps: the geometry of a fluoroscopic frame before any physics.
+
+use crate::xray::Material;
+
+/// Length of each pixel's central ray inside each thing, in millimetres, row by row from the top left.
+///
+/// Lengths are geometric, before nesting: `lumen_mm` is the length inside the closed wall whatever device lies there.
+/// A device displaces what fills the lumen, so the length through blood is `lumen_mm` minus those of the devices.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PathLengths {
+    /// Pixels a row.
+    pub width: u32,
+    /// Number of rows.
+    pub height: u32,
+    /// Length inside the body (a slab, see [`crate::XRaySpec::tissue_mm`]).
+    pub body_mm: Vec<f32>,
+    /// Length inside the closed wall.
+    pub lumen_mm: Vec<f32>,
+    /// Length inside devices, one map per material, in order of first appearance.
+    pub devices_mm: Vec<(Material, Vec<f32>)>,
+}
+
+impl PathLengths {
+    /// Index of the pixel in column `x` and row `y`.
+    pub fn index(&self, x: u32, y: u32) -> usize {
+        y as usize * self.width as usize + x as usize
+    }
+}
