@@ -52,19 +52,25 @@ pub(crate) enum VesselCommand {
         json: bool,
     },
     /// Build a wall from a centre-line tree
-    Generate {
-        /// Centre-line table (x y z radius parent, mm), or the name of a built-in anatomy
-        tree: PathBuf,
-        /// Surface file to write (.stl, .obj or .ply)
-        #[arg(long, value_name = "FILE")]
-        out: PathBuf,
-        /// Edge length of the triangles, mm; a quarter of the smallest radius if absent
-        #[arg(long, value_name = "MM")]
-        edge_mm: Option<f64>,
-        /// Print a report as one JSON document on stdout
-        #[arg(long)]
-        json: bool,
-    },
+    Generate(GenerateArgs),
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct GenerateArgs {
+    /// Centre-line table (x y z radius parent, mm), or the name of a built-in anatomy
+    pub(crate) tree: PathBuf,
+    /// Surface file to write (.stl, .obj or .ply)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// Length of the triangles' edges; a quarter of the smallest radius if absent
+    #[arg(long, value_name = "MM", conflicts_with = "triangles")]
+    pub(crate) edge_mm: Option<f64>,
+    /// Number of triangles, met within a few percent
+    #[arg(long, value_name = "COUNT")]
+    pub(crate) triangles: Option<usize>,
+    /// Print the report as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Subcommand)]

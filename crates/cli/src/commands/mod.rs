@@ -11,10 +11,8 @@ use crate::failure::Failure;
 pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Run(args) => run::run(args),
-        Command::Vessel(VesselCommand::Check { file, unit_mm, json }) => vessel::check(file, *unit_mm, *json),
-        Command::Vessel(VesselCommand::Generate { tree, out, edge_mm, json }) => {
-            vessel::generate(tree, out, *edge_mm, *json)
-        }
+        Command::Vessel(VesselCommand::Check { file, unit_mm, json }) => vessel::check_file(file, *unit_mm, *json),
+        Command::Vessel(VesselCommand::Generate(args)) => vessel::generate(args),
         Command::Experiment(ExperimentCommand::Timing(args)) => timing::timing(args),
     }
 }

@@ -81,7 +81,11 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
     if let Some(folder) = &args.out {
         write(folder, &document)?;
     }
-    if args.json { print_json(&document) } else { Ok(print_table(&document.rows)) }
+    if args.json {
+        return print_json(&document);
+    }
+    print_table(&document.rows);
+    Ok(())
 }
 
 /// Both solves over the same insertion, timed at its end.

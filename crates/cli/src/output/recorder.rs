@@ -148,7 +148,7 @@ impl Recorder {
             iterations: report.iterations,
             converged: report.converged,
         };
-        let mut write = || -> io::Result<()> {
+        let write = || -> io::Result<()> {
             self.table.serialize(row)?;
             self.table.flush()?;
             self.positions.push_f64(shape.positions_mm.iter().flat_map(|x| [x.x, x.y, x.z]))?;

@@ -142,6 +142,18 @@ impl Wall {
         &self.caps
     }
 
+    /// The wall closed by a fan of triangles over each opening, sharing its vertices: for volumes and pictures.
+    pub fn closed_mesh(&self) -> SurfaceMesh {
+        let mut mesh = self.mesh.clone();
+        for opening in &self.openings {
+            let centre = mesh.vertices_mm.len() as u32;
+            mesh.vertices_mm.push(opening.centre_mm);
+            let next = opening.boundary.iter().cycle().skip(1);
+            mesh.triangles.extend(opening.boundary.iter().zip(next).map(|(&a, &b)| [a, b, centre]));
+        }
+        mesh
+    }
+
     /// What was found and done.
     pub fn report(&self) -> &RepairReport {
         &self.report

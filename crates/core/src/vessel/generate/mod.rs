@@ -51,6 +51,13 @@ pub enum Resolution {
     Triangles(usize),
 }
 
+impl Resolution {
+    /// Edges of a quarter of the tree's smallest radius: 25 triangles around the thinnest vessel.
+    pub fn fitting(tree: &CentrelineTree) -> Self {
+        Self::EdgeMm(0.25 * tree.nodes().iter().map(|n| n.radius_mm).fold(f64::MAX, f64::min))
+    }
+}
+
 /// A wall made from a centre-line tree.
 #[derive(Debug, Clone)]
 pub struct GeneratedWall {
@@ -86,18 +93,6 @@ impl GeneratedWall {
             }
         };
         Self::with_edge(&branches, edge_mm)
-    }
-
-    /// Closed surface: the wall with a fan of triangles over each opening.
-    pub fn closed_mesh(&self) -> SurfaceMesh {
-        let mut mesh = self.wall.mesh().clone();
-        for opening in self.wall.openings() {
-            let centre = mesh.vertices_mm.len() as u32;
-            mesh.vertices_mm.push(opening.centre_mm);
-            let next = opening.boundary.iter().cycle().skip(1);
-            mesh.triangles.extend(opening.boundary.iter().zip(next).map(|(&a, &b)| [a, b, centre]));
-        }
-        mesh
     }
 
     fn with_count(branches: &[curve::Branch], count: usize) -> Result<Self> {
