@@ -103,4 +103,36 @@ impl Chain {
             previous = *t;
         }
     }
+
+    /// −∂U/∂tᵢ at the tangents t₁…tₙ and their positions: what is left of eq. 10.
+    ///
+    /// Summed as a person would: the force on everything beyond an element acts on its tangents with the lever ½h, and
+    /// wall forces come from penetrations. The same residual as b − At, but free of the cancellation between
+    /// stiffness times position and offset, which costs A and b six digits.
+    pub fn residual(&self, tangents: &[Vec3], positions_mm: &[Vec3], residual: &mut Vec<Vec3>) {
+        let n = self.elements();
+        residual.clear();
+        residual.extend_from_slice(&self.forces_n);
+        for contact in &self.contacts {
+            residual[contact.node - 1] += contact.normal * self.contact_force_n(contact, positions_mm);
+        }
+        // Force on node i and all beyond it, then its levers, both from the tip.
+        for i in (1..n).rev() {
+            let beyond = residual[i];
+            residual[i - 1] += beyond;
+        }
+        for i in 0..n {
+            let next = if i + 1 < n { residual[i + 1] * (0.5 * self.lengths_mm[i + 1]) } else { Vec3::zeros() };
+            residual[i] = residual[i] * (0.5 * self.lengths_mm[i]) + next;
+        }
+        let mut previous = self.start_tangent;
+        for i in 0..n {
+            let moment = (tangents[i] - previous) * (self.bending_stiffness_nmm2[i] / self.lengths_mm[i]);
+            residual[i] -= moment;
+            if i > 0 {
+                residual[i - 1] += moment;
+            }
+            previous = tangents[i];
+        }
+    }
 }

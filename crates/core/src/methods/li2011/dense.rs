@@ -8,6 +8,10 @@
 //! A = K + κ Σⱼ Bⱼᵀ nⱼ nⱼᵀ Bⱼ                K: bending, block tridiagonal
 //! b = K₁₀ t₀ + Σⱼ κ (dⱼ − nⱼ·c) Bⱼᵀ nⱼ + Bᵀ f
 //! ```
+//!
+//! A B⁻¹ mixes levers of the whole length with those of one element: its condition number reaches 10¹⁰ at 300 nodes, and
+//! one solve leaves a micrometre. Iterative refinement with the residual of the equations themselves
+//! ([`Chain::residual`]) removes it for the price of a few triangular solves.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
@@ -40,15 +44,29 @@ pub fn solve(chain: &Chain, positions_mm: &mut Vec<Vec3>, tangents: &mut Vec<Vec
         1.0,
         Par::Seq,
     );
-    let solution = system.partial_piv_lu().solve(&b);
+    let factors = system.partial_piv_lu();
+    tangents.resize(n, Vec3::zeros());
+    add_tangents(chain, &factors.solve(&b), tangents);
+    let mut residual = Vec::with_capacity(n);
+    for _ in 0..REFINEMENTS {
+        chain.integrate(tangents, positions_mm);
+        chain.residual(tangents, positions_mm, &mut residual);
+        let right = Mat::from_fn(3 * n, 1, |row, _| residual[row / 3][row % 3]);
+        add_tangents(chain, &factors.solve(&right), tangents);
+    }
+    chain.integrate(tangents, positions_mm);
+}
 
-    let sheath_part = sheath_part(chain);
-    let (mut x_previous, mut t_previous) = (chain.start_mm, chain.start_tangent);
-    for i in 0..n {
-        let x = sheath_part + Vec3::from_fn(|k, _| solution[(3 * i + k, 0)]);
+/// Rounds of refinement: each gains about six digits at 300 nodes; the second reaches rounding.
+const REFINEMENTS: usize = 2;
+
+/// t += B⁻¹ x for a column x.
+fn add_tangents(chain: &Chain, x: &Mat<f64>, tangents: &mut [Vec3]) {
+    let (mut x_previous, mut t_previous) = (Vec3::zeros(), Vec3::zeros());
+    for (i, tangent) in tangents.iter_mut().enumerate() {
+        let x = Vec3::from_fn(|k, _| x[(3 * i + k, 0)]);
         let t = (x - x_previous) * (2.0 / chain.lengths_mm[i]) - t_previous;
-        positions_mm.push(x);
-        tangents.push(t);
+        *tangent += t;
         (x_previous, t_previous) = (x, t);
     }
 }

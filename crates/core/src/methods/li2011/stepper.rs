@@ -45,6 +45,10 @@ pub enum LinearSolver {
 /// How far beyond its own radius a node looks for the wall, mm, on top of the step. A node that is deeper outside
 /// is lost to the penalty; soft walls yield by a millimetre or two at most.
 const SEARCH_MM: f64 = 5.0;
+/// Collisions are detected at positions rounded to this, mm. A wire in a plane of symmetry of the mesh lies on the
+/// boundary between two triangles, where the twelfth digit of the last solve would choose one, and with it a branch
+/// millimetres away: that digit is no reason.
+const DETECTION_GRID_MM: f64 = 1e-6;
 /// Most nodes: (3n)² numbers of 8 bytes in four matrices are 2.6 GB at 3,000 for the dense solve.
 const NODE_LIMIT_DENSE: f64 = 3_000.0;
 /// Most nodes of the banded solve.
@@ -127,7 +131,8 @@ impl Li2011 {
         self.positions_mm.clear();
         let mut element = 0;
         for &s in &self.from_tip_mm[1..] {
-            self.positions_mm.push(on_curve(&self.shape, s, &mut element) + displacement);
+            let x = on_curve(&self.shape, s, &mut element) + displacement;
+            self.positions_mm.push(x.map(|c| (c / DETECTION_GRID_MM).round() * DETECTION_GRID_MM));
         }
 
         self.chain.lengths_mm.clear();
