@@ -42,9 +42,9 @@ pub enum LinearSolver {
     Banded,
 }
 
-/// How far beyond its own radius a node looks for the wall, mm, on top of the step. A node that is deeper outside
-/// is lost to the penalty; soft walls yield by a millimetre or two at most.
-const SEARCH_MM: f64 = 5.0;
+/// A node is never lost: wherever one solve has thrown it, the next finds its nearest triangle, as the hierarchy of
+/// the paper's reference 22 would.
+const REACH_MM: f64 = f64::MAX;
 /// Collisions are detected at positions rounded to this, mm. A wire in a plane of symmetry of the mesh lies on the
 /// boundary between two triangles, where the twelfth digit of the last solve would choose one, and with it a branch
 /// millimetres away: that digit is no reason.
@@ -147,11 +147,11 @@ impl Li2011 {
     }
 
     /// Step 3: the nodes whose surface is beyond the wall, each with the plane of its nearest triangle.
-    fn collide(&mut self, surroundings: &Surroundings<'_>, travel_mm: f64) {
+    fn collide(&mut self, surroundings: &Surroundings<'_>) {
         self.chain.contacts.clear();
         for (index, x) in self.positions_mm.iter().enumerate() {
             let radius = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
-            let Some(near) = surroundings.query.nearest(x, radius + SEARCH_MM + travel_mm.abs()) else { continue };
+            let Some(near) = surroundings.query.nearest(x, REACH_MM) else { continue };
             if near.rim {
                 continue;
             }
@@ -229,7 +229,7 @@ impl Li2011 {
         report.max_penetration_mm = 0.0;
         for (x, s) in self.positions_mm.iter().zip(&self.from_tip_mm[1..]) {
             let radius = surroundings.device.section_at(*s).radius_mm;
-            if let Some(near) = surroundings.query.nearest(x, radius + SEARCH_MM)
+            if let Some(near) = surroundings.query.nearest(x, REACH_MM)
                 && !near.rim
             {
                 report.max_penetration_mm = report.max_penetration_mm.max(radius - near.distance_mm);
@@ -243,7 +243,7 @@ impl Method for Li2011 {
         let inserted_mm = self.report.inserted_mm + command.advance_mm;
         let inserted_mm = if inserted_mm < ZERO_LENGTH_MM { 0.0 } else { inserted_mm };
         self.translate(surroundings.device, inserted_mm, command.advance_mm);
-        self.collide(surroundings, command.advance_mm);
+        self.collide(surroundings);
         self.solve()?;
         self.update(surroundings, command);
         Ok(())
