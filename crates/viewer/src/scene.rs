@@ -1,5 +1,7 @@
 //! What all engines draw: the wall, the devices refined once, and the resolved set-up of each wanted view.
 
+use std::sync::Arc;
+
 use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result};
 
@@ -32,7 +34,7 @@ impl RefinedDevice {
 }
 
 /// Geometry and physics of the fluoroscopic view.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct FluoroSetup {
     pub(crate) c_arm: CArm,
     pub(crate) beam: Beam,
@@ -41,7 +43,7 @@ pub(crate) struct FluoroSetup {
 /// All that an engine needs, and no more than the wanted views need.
 #[derive(Debug)]
 pub(crate) struct Setup {
-    pub(crate) wall: SurfaceMesh,
+    pub(crate) wall: Arc<SurfaceMesh>,
     pub(crate) fluoro: Option<FluoroSetup>,
     pub(crate) camera: Option<Camera>,
 }
@@ -50,7 +52,7 @@ impl Setup {
     pub(crate) fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
         spec.validate()?;
         if spec.views.is_empty() {
-            return Ok(Self { wall: SurfaceMesh::default(), fluoro: None, camera: None });
+            return Ok(Self { wall: Arc::default(), fluoro: None, camera: None });
         }
         if wall.triangles.is_empty() {
             return Err(Error::Mesh("the wall has no triangles".into()));
@@ -63,6 +65,6 @@ impl Setup {
             fluoro = Some(FluoroSetup { c_arm, beam });
         }
         let camera = spec.wants(View::ThreeD).then(|| Camera::new(&spec.camera, spec.size_px, wall));
-        Ok(Self { wall: wall.clone(), fluoro, camera })
+        Ok(Self { wall: Arc::new(wall.clone()), fluoro, camera })
     }
 }

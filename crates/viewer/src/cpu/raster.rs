@@ -123,17 +123,15 @@ mod tests {
     #[test]
     fn a_grid_with_vertices_on_centres_has_no_seams() {
         let mut triangles = Vec::new();
-        for i in 0..4 {
-            for j in 0..4 {
-                let [x, y] = [0.5 + 4.0 * f64::from(i), 0.5 + 4.0 * f64::from(j)];
-                // Alternate the diagonal, and the sense of rotation too.
+        for i in 0..5 {
+            for j in 0..5 {
+                let [x, y] = [4.0 * f64::from(i) - 3.5, 4.0 * f64::from(j) - 3.5];
                 triangles.push([[x, y], [x + 4.0, y], [x + 4.0, y + 4.0]]);
                 triangles.push([[x, y + 4.0], [x + 4.0, y + 4.0], [x, y]]);
             }
         }
         let count = cover(&triangles, 16);
-        assert_eq!(count.iter().sum::<u32>(), 256);
-        assert!(count.iter().all(|&c| c <= 1));
+        assert!(count.iter().all(|&c| c == 1), "{count:?}");
     }
 
     #[test]

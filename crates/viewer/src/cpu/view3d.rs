@@ -3,11 +3,13 @@
 //! The wall's fragments are made once and kept per sample. A frame draws the devices with a depth buffer and composes anew
 //! only where they are.
 
+use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 use glam::{Vec3, Vec4};
 
 use crate::cpu::raster::ScreenTriangle;
 use crate::image::{Image, PixelFormat};
+use crate::renderer::ThreeDEngine;
 use crate::scene::RefinedDevice;
 use crate::three_d::{Camera, Style, Vertex, device_triangles, wall_triangles};
 
@@ -75,36 +77,6 @@ impl CpuView3d {
         view
     }
 
-    pub(crate) fn frame(&mut self, devices: &[RefinedDevice]) -> Image {
-        let [width, height] = self.camera.size_px;
-        let (row, sub) = ((width * SAMPLES) as usize, SAMPLES as usize);
-        let mut touched = Vec::new();
-        for device in devices {
-            for corners in device_triangles(&self.camera, &device.points).chunks_exact(3) {
-                draw(&self.camera, corners, |sample, position, normal| {
-                    if -position.z < self.distance[sample] {
-                        self.distance[sample] = -position.z;
-                        self.colour[sample] =
-                            self.style.shade_device(position, normal).to_array().map(to_byte);
-                        touched.push(sample / row / sub * width as usize + sample % row / sub);
-                    }
-                });
-            }
-        }
-        touched.sort_unstable();
-        touched.dedup();
-        let mut data = self.still.clone();
-        for &pixel in &touched {
-            data[4 * pixel..][..4].copy_from_slice(&self.pixel(pixel));
-        }
-        for &pixel in &touched {
-            for sample in samples_of(pixel, width as usize) {
-                self.distance[sample] = f32::INFINITY;
-            }
-        }
-        Image::new(width, height, PixelFormat::Rgba8, data)
-    }
-
     /// The finished pixel: the mean of its samples.
     fn pixel(&self, pixel: usize) -> [u8; 4] {
         let mut sum = Vec3::ZERO;
@@ -132,6 +104,38 @@ impl CpuView3d {
             }
         }
         if sum.w > 0.0 { (sum.truncate() / sum.w).lerp(opaque, through) } else { opaque }
+    }
+}
+
+impl ThreeDEngine for CpuView3d {
+    fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image> {
+        let [width, height] = self.camera.size_px;
+        let (row, sub) = ((width * SAMPLES) as usize, SAMPLES as usize);
+        let mut touched = Vec::new();
+        for device in devices {
+            for corners in device_triangles(&self.camera, &device.points).chunks_exact(3) {
+                draw(&self.camera, corners, |sample, position, normal| {
+                    if -position.z < self.distance[sample] {
+                        self.distance[sample] = -position.z;
+                        self.colour[sample] =
+                            self.style.shade_device(position, normal).to_array().map(to_byte);
+                        touched.push(sample / row / sub * width as usize + sample % row / sub);
+                    }
+                });
+            }
+        }
+        touched.sort_unstable();
+        touched.dedup();
+        let mut data = self.still.clone();
+        for &pixel in &touched {
+            data[4 * pixel..][..4].copy_from_slice(&self.pixel(pixel));
+        }
+        for &pixel in &touched {
+            for sample in samples_of(pixel, width as usize) {
+                self.distance[sample] = f32::INFINITY;
+            }
+        }
+        Ok(Image::new(width, height, PixelFormat::Rgba8, data))
     }
 }
 
