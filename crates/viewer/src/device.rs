@@ -114,9 +114,12 @@ pub(crate) struct Piece {
     pub(crate) start: Vec3,
     /// Unit direction to the second end.
     pub(crate) axis: Vec3,
-    pub(crate) length: f64,
+    /// Centre of the second end.
+    pub(crate) end: Vec3,
     /// Plane normals at both ends, pointing onwards.
     pub(crate) planes: [Vec3; 2],
+    /// Products of these normals with the centres. Neighbours hold the very same numbers for their common plane.
+    pub(crate) offsets: [f64; 2],
     pub(crate) radius: f64,
     /// Change of the radius per length.
     pub(crate) slope: f64,
@@ -150,8 +153,9 @@ pub(crate) fn pieces(points: &[DevicePoint]) -> Vec<Piece> {
             Piece {
                 start: points[k].position_mm,
                 axis,
-                length,
+                end: points[k + 1].position_mm,
                 planes,
+                offsets: [planes[0].dot(&points[k].position_mm), planes[1].dot(&points[k + 1].position_mm)],
                 radius: r0,
                 slope: (r1 - r0) / length.max(f64::MIN_POSITIVE),
                 reach: r0.max(r1) / sharpest,

@@ -43,9 +43,10 @@ struct PieceInstance {
     /// Pixels it may touch: left, top, right, bottom.
     rectangle: [f32; 4],
     start_radius: [f32; 4],
-    axis_length: [f32; 4],
-    plane0_slope: [f32; 4],
-    plane1_weight: [f32; 4],
+    axis_slope: [f32; 4],
+    /// Mitre planes: unit normals and their products with the centres.
+    planes: [[f32; 4]; 2],
+    weight: f32,
 }
 
 /// The shader's view of a C-arm.
@@ -118,7 +119,7 @@ impl GpuFluoro {
                 array_stride: size_of::<PieceInstance>() as u64,
                 step_mode: wgpu::VertexStepMode::Instance,
                 attributes: &wgpu::vertex_attr_array![
-                    0 => Float32x4, 1 => Float32x4, 2 => Float32x4, 3 => Float32x4, 4 => Float32x4
+                    0 => Float32x4, 1 => Float32x4, 2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Float32
                 ],
             },
         );
@@ -287,9 +288,9 @@ fn instance(c_arm: &CArm, piece: &Piece, weight: f64) -> PieceInstance {
     PieceInstance {
         rectangle: [columns.start, rows.start, columns.end, rows.end].map(|n| n as f32),
         start_radius: four(&piece.start, piece.radius),
-        axis_length: four(&piece.axis, piece.length),
-        plane0_slope: four(&piece.planes[0], piece.slope),
-        plane1_weight: four(&piece.planes[1], weight),
+        axis_slope: four(&piece.axis, piece.slope),
+        planes: [0, 1].map(|k| four(&piece.planes[k], piece.offsets[k])),
+        weight: weight as f32,
     }
 }
 

@@ -12,17 +12,19 @@ struct View {
 struct Piece {
     @location(0) rectangle: vec4f,
     @location(1) start_radius: vec4f,
-    @location(2) axis_length: vec4f,
-    @location(3) plane0_slope: vec4f,
-    @location(4) plane1_weight: vec4f,
+    @location(2) axis_slope: vec4f,
+    @location(3) plane0: vec4f,
+    @location(4) plane1: vec4f,
+    @location(5) weight: f32,
 }
 
 struct Corner {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(flat) start_radius: vec4f,
-    @location(1) @interpolate(flat) axis_length: vec4f,
-    @location(2) @interpolate(flat) plane0_slope: vec4f,
-    @location(3) @interpolate(flat) plane1_weight: vec4f,
+    @location(1) @interpolate(flat) axis_slope: vec4f,
+    @location(2) @interpolate(flat) plane0: vec4f,
+    @location(3) @interpolate(flat) plane1: vec4f,
+    @location(4) @interpolate(flat) weight: f32,
 }
 
 @vertex
@@ -38,33 +40,23 @@ fn vertex(@builtin(vertex_index) index: u32, piece: Piece) -> Corner {
     return Corner(
         vec4f(xy.x, -xy.y, 0.5, 1.0),
         piece.start_radius,
-        piece.axis_length,
-        piece.plane0_slope,
-        piece.plane1_weight,
+        piece.axis_slope,
+        piece.plane0,
+        piece.plane1,
+        piece.weight,
     );
 }
 
 const FAR = 1e6;
 const ALONG = 1e-10;
 
-// Clips an interval to where height + t rise >= 0.
-fn clip(interval: vec2f, height: f32, rise: f32) -> vec2f {
-    if rise > 0.0 {
-        return vec2f(max(interval.x, -height / rise), interval.y);
-    }
-    if rise < 0.0 {
-        return vec2f(interval.x, min(interval.y, -height / rise));
-    }
-    return select(vec2f(0.0), interval, height >= 0.0);
-}
-
 @fragment
 fn fragment(piece: Corner) -> @location(0) f32 {
     let slopes = (piece.clip.xy - view.half_size) / view.focal_px;
     let ray = vec3f(slopes, 1.0);
     let start = piece.start_radius.xyz;
-    let axis = piece.axis_length.xyz;
-    let slope = piece.plane0_slope.w;
+    let axis = piece.axis_slope.xyz;
+    let slope = piece.axis_slope.w;
     // The ray at the depth of the first centre, relative to it.
     let q = vec3f((view.sod_mm + start.z) * slopes - start.xy, 0.0);
 
@@ -95,9 +87,24 @@ fn fragment(piece: Corner) -> @location(0) f32 {
     } else if c > 0.0 {
         return 0.0;
     }
-    let plane0 = piece.plane0_slope.xyz;
-    let plane1 = piece.plane1_weight.xyz;
-    interval = clip(interval, dot(plane0, q), dot(plane0, ray));
-    interval = clip(interval, -dot(plane1, q - axis * piece.axis_length.w), -dot(plane1, ray));
-    return piece.plane1_weight.w * max(interval.y - interval.x, 0.0) * length(ray);
+    // Mitre planes, crossed by the ray from its point on the plane of the isocentre: the same numbers for both neighbours.
+    let origin = vec3f(view.sod_mm * slopes, 0.0);
+    let heights = vec2f(dot(piece.plane0.xyz, origin) - piece.plane0.w, dot(piece.plane1.xyz, origin) - piece.plane1.w);
+    let rises = vec2f(dot(piece.plane0.xyz, ray), dot(piece.plane1.xyz, ray));
+    let crossings = -heights / rises - start.z;
+    if rises.x > 0.0 {
+        interval.x = max(interval.x, crossings.x);
+    } else if rises.x < 0.0 {
+        interval.y = min(interval.y, crossings.x);
+    } else if heights.x < 0.0 {
+        return 0.0;
+    }
+    if rises.y > 0.0 {
+        interval.y = min(interval.y, crossings.y);
+    } else if rises.y < 0.0 {
+        interval.x = max(interval.x, crossings.y);
+    } else if heights.y >= 0.0 {
+        return 0.0;
+    }
+    return piece.weight * max(interval.y - interval.x, 0.0) * length(ray);
 }

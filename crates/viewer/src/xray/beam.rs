@@ -28,7 +28,7 @@ pub(crate) const SUBRAYS: u32 = 2;
 
 /// Part of the display window kept brighter than the most transparent place of the anatomy, in units of p:
 /// the background stays grey rather than white.
-const WINDOW_BELOW: f64 = 0.15;
+const WINDOW_BELOW: f64 = 0.1;
 /// Part of the window kept darker than the densest place of the anatomy: what 0.4 mm of steel or 0.55 mm of nitinol add
 /// at 60 keV shows as black.
 const WINDOW_ABOVE: f64 = 0.4;
