@@ -157,3 +157,66 @@ impl Renderer {
 fn no_fluoro() -> Error {
     Error::parameter("view.views", "without fluoro", "this belongs to the fluoroscopic view; add \"fluoro\"")
 }
+
+#[cfg(test)]
+mod tests {
+    use endowire_core::Vec3;
+
+    use super::*;
+    use crate::spec::View;
+
+    /// An adapter that fails in every frame.
+    struct Broken;
+
+    fn lost<T>() -> Result<T> {
+        Err(Error::Computation("the device was lost".into()))
+    }
+
+    impl FluoroEngine for Broken {
+        fn frame(&mut self, _: &[RefinedDevice]) -> Result<Image> {
+            lost()
+        }
+
+        fn lumen_path(&mut self) -> Result<Vec<f32>> {
+            lost()
+        }
+
+        fn device_path(&mut self, _: &RefinedDevice) -> Result<Vec<f32>> {
+            lost()
+        }
+    }
+
+    impl ThreeDEngine for Broken {
+        fn frame(&mut self, _: &[RefinedDevice]) -> Result<Image> {
+            lost()
+        }
+    }
+
+    #[test]
+    fn a_lost_adapter_hands_over_to_the_cpu_and_says_so() {
+        let wall = SurfaceMesh {
+            vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        };
+        let spec = ViewSpec {
+            views: vec![View::ThreeD, View::Fluoro],
+            size_px: [32, 32],
+            backend: Backend::Cpu,
+            ..ViewSpec::default()
+        };
+        let mut whole = Renderer::new(&spec, &wall).unwrap();
+        let broken = || Engines {
+            fluoro: Some(Box::new(Broken)),
+            three_d: Some(Box::new(Broken)),
+            name: "adapter".into(),
+        };
+        let setup = || Setup::new(&spec, &wall).unwrap();
+        let mut renderer = Renderer { setup: setup(), engines: broken(), is_cpu: false };
+        assert_eq!(renderer.render(&[]).unwrap(), whole.render(&[]).unwrap());
+        assert_eq!(renderer.backend(), "CPU reference (adapter failed: the device was lost)");
+        assert_eq!(renderer.path_lengths(&[]).unwrap(), whole.path_lengths(&[]).unwrap());
+        // The twin: without anything to fall back on, the failure is reported.
+        let mut last = Renderer { setup: setup(), engines: broken(), is_cpu: true };
+        assert!(last.render(&[]).is_err());
+    }
+}

@@ -16,7 +16,7 @@ fn worst(
     least: f64,
     exact: impl Fn((Vec3, Vec3)) -> f64,
 ) -> (f64, usize) {
-    let arm = renderer.c_arm().unwrap();
+    let arm = renderer.c_arm().expect("a fluoroscopic view");
     let (mut worst, mut count) = (0.0_f64, 0);
     for (i, &length) in lengths.iter().enumerate() {
         let exact = exact(arm.ray(pixel_centre(i, arm.size_px()[0])));

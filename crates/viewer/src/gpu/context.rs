@@ -190,3 +190,31 @@ pub(crate) fn attachment<'a>(
     let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store };
     wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target, ops }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_destroyed_device_gives_an_error_and_no_panic() {
+        let gpu = match Gpu::open(wgpu::Features::empty(), true) {
+            Ok(gpu) => gpu,
+            Err(reason) => {
+                let required = std::env::var("ENDOWIRE_REQUIRE_GPU").is_ok_and(|v| v == "1");
+                assert!(!required, "ENDOWIRE_REQUIRE_GPU=1, but {reason}");
+                eprintln!("skipped: {reason}");
+                return;
+            }
+        };
+        let read = || {
+            let texture = gpu.target([8, 8], wgpu::TextureFormat::R8Unorm, 1);
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let view = texture.create_view(&Default::default());
+            drop(color_pass(&mut encoder, &view, wgpu::Color::WHITE));
+            gpu.read_back(encoder, &texture)
+        };
+        assert_eq!(read().unwrap(), [255; 64]);
+        gpu.device.destroy();
+        assert!(matches!(read(), Err(Error::Computation(_))));
+    }
+}

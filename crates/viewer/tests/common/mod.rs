@@ -107,7 +107,7 @@ pub fn on_gpu(spec: &ViewSpec, wall: &SurfaceMesh) -> Option<Renderer> {
 /// The renderers to test: the CPU, and an adapter if there is one.
 pub fn engines(spec: &ViewSpec, wall: &SurfaceMesh) -> Vec<Renderer> {
     let cpu = ViewSpec { backend: Backend::Cpu, ..spec.clone() };
-    let mut all = vec![Renderer::new(&cpu, wall).unwrap()];
+    let mut all = vec![Renderer::new(&cpu, wall).expect("a valid scene")];
     all.extend(on_gpu(spec, wall));
     all
 }
