@@ -44,7 +44,7 @@ impl CpuView3d {
         let triangles = wall_triangles(camera, wall);
         let mut found: Vec<(u32, Fragment)> = Vec::new();
         for corners in triangles.chunks_exact(3) {
-            draw(camera, corners, |sample, position, normal| {
+            draw(camera, corners, Faces::Both, |sample, position, normal| {
                 let rgba = style.shade_wall(position, normal).to_array().map(to_byte);
                 found.push((sample as u32, Fragment { distance: -position.z, rgba }));
             });
@@ -114,7 +114,7 @@ impl ThreeDEngine for CpuView3d {
         let mut touched = Vec::new();
         for device in devices {
             for corners in device_triangles(&self.camera, &device.points).chunks_exact(3) {
-                draw(&self.camera, corners, |sample, position, normal| {
+                draw(&self.camera, corners, Faces::Front, |sample, position, normal| {
                     if -position.z < self.distance[sample] {
                         self.distance[sample] = -position.z;
                         self.colour[sample] =
@@ -146,9 +146,17 @@ fn samples_of(pixel: usize, width: usize) -> impl Iterator<Item = usize> {
     (0..sub * sub).map(move |k| first + k / sub * width * sub + k % sub)
 }
 
+/// Which triangles are drawn.
+#[derive(Clone, Copy, PartialEq)]
+enum Faces {
+    Both,
+    /// Those whose outside is seen; of an opaque closed surface these are all that can be.
+    Front,
+}
+
 /// Calls `visit(sample, position, normal)` for each sample that a triangle covers; triangles that reach behind the
 /// near plane are left out.
-fn draw(camera: &Camera, corners: &[Vertex], mut visit: impl FnMut(usize, Vec3, Vec3)) {
+fn draw(camera: &Camera, corners: &[Vertex], faces: Faces, mut visit: impl FnMut(usize, Vec3, Vec3)) {
     let size = camera.size_px.map(|n| n * SAMPLES);
     let positions = [0, 1, 2].map(|i| Vec3::from_array(corners[i].position));
     let normals = [0, 1, 2].map(|i| Vec3::from_array(corners[i].normal));
@@ -157,6 +165,9 @@ fn draw(camera: &Camera, corners: &[Vertex], mut visit: impl FnMut(usize, Vec3, 
     }
     let on_screen = positions.map(|p| camera.pixel_of(p.to_array().map(f64::from), SAMPLES));
     let Some(triangle) = ScreenTriangle::new(on_screen) else { return };
+    if faces == Faces::Front && triangle.area2() > 0.0 {
+        return;
+    }
     triangle.scan(size, |x, y, weights| {
         // Perspective: weights over distance are linear on the screen.
         let w: [f32; 3] = std::array::from_fn(|i| weights[i] as f32 / positions[i].z);

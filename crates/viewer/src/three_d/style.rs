@@ -36,10 +36,10 @@ impl Style {
         let [front, rear] = camera.wall_range.map(|d| d as f32);
         Self {
             background: Vec4::new(0.965, 0.972, 0.980, 0.45),
-            wall: Vec4::new(0.86, 0.36, 0.31, 0.45),
+            wall: Vec4::new(0.88, 0.35, 0.30, 0.50),
             device: Vec4::new(0.10, 0.16, 0.30, 0.55),
             lamp: Vec3::new(-0.45, 0.62, 0.64).normalize().extend(0.35),
-            sheet: Vec4::new(0.16, 0.80, 2.2, 0.80),
+            sheet: Vec4::new(0.22, 0.85, 2.0, 0.72),
             frustum: Vec4::new(tx, ty, front, rear),
             planes: Vec4::new(camera.near as f32, camera.far as f32, 0.0, 0.0),
         }
