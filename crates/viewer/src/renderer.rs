@@ -57,11 +57,13 @@ impl std::fmt::Debug for Renderer {
 }
 
 impl Renderer {
-    /// Prepares the views that `spec` asks for, and nothing else, for a **closed** wall with outward triangles (cap the openings).
+    /// Prepares the views that `spec` asks for, and nothing else. The fluoroscopic view needs a **closed**
+    /// wall with outward triangles (cap the openings); the 3D view shows any.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a bad `spec`, a vessel that is not between source and detector, or `backend = gpu` without a fitting
-    /// adapter; [`Error::Mesh`] for a wall that is open, wound inconsistently or inside out.
+    /// [`Error::Parameter`] for a bad `spec`, a vessel that is not between source and detector, or `backend =
+    /// gpu` without a fitting adapter; [`Error::Mesh`] for a wall that is open, wound inconsistently or
+    /// inside out.
     pub fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
         let setup = Setup::new(spec, wall)?;
         let nothing = setup.fluoro.is_none() && setup.camera.is_none();
@@ -78,8 +80,8 @@ impl Renderer {
         Ok(Self { setup, engines, is_cpu })
     }
 
-    /// What computes the frames, for people: "CPU reference", or the graphics interface and adapter. Changes where a lost
-    /// adapter made the CPU take over.
+    /// What computes the frames, for people: "CPU reference", or the graphics interface and adapter. Changes
+    /// where a lost adapter made the CPU take over.
     pub fn backend(&self) -> &str {
         &self.engines.name
     }
@@ -92,7 +94,8 @@ impl Renderer {
     /// Draws the wanted views.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a device with values that are not finite or that is not between source and detector.
+    /// [`Error::Parameter`] for a device with values that are not finite or that is not between source and
+    /// detector.
     pub fn render(&mut self, devices: &[DeviceView]) -> Result<Frames> {
         let devices = RefinedDevice::all(devices)?;
         self.with_fallback(|engines| {
@@ -131,7 +134,8 @@ impl Renderer {
         Ok(PathLengths { width, height, body_mm, lumen_mm, devices_mm })
     }
 
-    /// Transmitted fraction I/I₀ = exp(−Σ μL) of the given path lengths with this scene's energy and fillings.
+    /// Transmitted fraction I/I₀ = exp(−Σ μL) of the given path lengths with this scene's energy and
+    /// fillings.
     ///
     /// # Errors
     /// [`Error::Parameter`] where the fluoroscopic view was not asked for.

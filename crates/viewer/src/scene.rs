@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
+use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
-use endowire_core::{Error, Result};
 
 use crate::c_arm::CArm;
-use crate::cpu::check_closed;
+use crate::cpu::{check_closed, check_drawable};
 use crate::device::{DevicePoint, DeviceView};
 use crate::spec::{View, ViewSpec};
 use crate::three_d::Camera;
@@ -54,12 +54,10 @@ impl Setup {
         if spec.views.is_empty() {
             return Ok(Self { wall: Arc::default(), fluoro: None, camera: None });
         }
-        if wall.triangles.is_empty() {
-            return Err(Error::Mesh("the wall has no triangles".into()));
-        }
-        check_closed(wall)?;
+        check_drawable(wall)?;
         let mut fluoro = None;
         if spec.wants(View::Fluoro) {
+            check_closed(wall)?;
             let c_arm = CArm::new(&spec.c_arm, spec.size_px, wall)?;
             let beam = Beam::new(&spec.xray, &c_arm, wall)?;
             fluoro = Some(FluoroSetup { c_arm, beam });

@@ -57,6 +57,31 @@ fn path_lengths_agree_to_a_micrometre_in_the_mean_and_a_shift_of_a_tenth_of_a_mi
 }
 
 #[test]
+fn devices_seen_end_on_agree_too() {
+    let wall = sphere(40.0, 24, Vec3::zeros());
+    let spec = spec(Backend::Cpu, 200, 0.1);
+    let Some(mut gpu) = on_gpu(&spec, &wall) else { return };
+    let mut cpu = Renderer::new(&spec, &wall).unwrap();
+    // Along the beam, almost along it, a taper pointing at the source, and a loop that passes through the direction.
+    let straight = device(9, 0.8, |w| Vec3::new(2.0, 40.0 * (w - 0.5), -2.0));
+    let slanted = device(9, 0.5, |w| Vec3::new(-3.0 + 0.4 * w, 40.0 * (w - 0.5), 2.0));
+    let mut taper = device(9, 1.0, |w| Vec3::new(0.1, 30.0 * (w - 0.5), 0.2));
+    (0..9).for_each(|i| taper.points[i].radius_mm = 0.1 + 0.1 * i as f64);
+    let turn = device(40, 0.3, |w| {
+        let (s, c) = (std::f64::consts::TAU * w).sin_cos();
+        Vec3::new(5.0 * c, 5.0 * s, 3.0 * w)
+    });
+    for (name, device) in [("straight", straight), ("slanted", slanted), ("taper", taper), ("turn", turn)] {
+        let [a, b] =
+            [&mut cpu, &mut gpu].map(|r| r.path_lengths(std::slice::from_ref(&device)).unwrap().devices_mm);
+        let difference = mean_difference(&a[0].1, &b[0].1);
+        let longest = a[0].1.iter().copied().fold(0.0, f32::max);
+        eprintln!("{name}: mean difference {difference:.1e} mm, longest path {longest:.2} mm");
+        assert!(longest > 1.0 && difference <= 1e-3, "{name}: {difference}");
+    }
+}
+
+#[test]
 fn frames_look_alike_and_a_frame_without_the_device_does_not() {
     let (spec, wall, devices) = scene();
     let Some(mut gpu) = on_gpu(&spec, &wall) else { return };

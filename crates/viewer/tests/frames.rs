@@ -145,6 +145,8 @@ fn walls_without_an_inside_are_refused() {
     broken.triangles[0][0] = 10_000;
     let mut poisoned = good.clone();
     poisoned.vertices_mm[3].y = f64::NAN;
+    let three_d = ViewSpec { views: vec![View::ThreeD], ..spec.clone() };
+    assert!(Renderer::new(&three_d, &open).is_ok(), "the 3D view needs no inside");
     for (mesh, word) in [
         (open, "open"),
         (flipped, "wound"),

@@ -97,12 +97,14 @@ fn in_a_bend_of_five_millimetres_the_path_at_the_axis_is_the_diameter() {
 
 #[test]
 fn rays_through_vertices_and_edges_and_along_faces_leave_no_seam() {
-    // An odd number of pixels, an isocentre on the axis and few sides: many rays meet vertices or edges, and faces are seen edge-on.
+    // An odd number of pixels, an isocentre on the axis and few sides: many rays meet vertices or edges, and
+    // faces are seen edge-on.
     for sides in [4, 6, 8] {
         let mesh = cylinder(10.0, 12.0, sides, Vec3::zeros());
         for mut renderer in engines(&spec(Backend::Cpu, 151, 0.25), &mesh) {
             let paths = renderer.path_lengths(&[]).unwrap();
-            // A seam is a pixel unlike those around it: one missed face is off by the distance to the plane of the isocentre.
+            // A seam is a pixel unlike those around it: one missed face is off by the distance to the plane
+            // of the isocentre.
             for y in 1..150 {
                 for x in 1..150 {
                     let at = |x, y| paths.lumen_mm[paths.index(x, y)];

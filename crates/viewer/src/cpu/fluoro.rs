@@ -1,7 +1,8 @@
-//! Fluoroscopic frames in plain Rust: the exact reference, and the fast path where there is no graphics processor.
+//! Fluoroscopic frames in plain Rust: the exact reference, and the fast path where there is no graphics
+//! processor.
 //!
-//! The anatomy does not move, so its line integrals and its finished picture are kept. A frame copies the picture and
-//! redoes only the pixels that a device touches.
+//! The anatomy does not move, so its line integrals and its finished picture are kept. A frame copies the
+//! picture and redoes only the pixels that a device touches.
 
 use std::sync::Arc;
 

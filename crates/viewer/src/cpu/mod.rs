@@ -10,7 +10,7 @@ mod wall;
 use std::sync::Arc;
 
 pub(crate) use devices::{pieces_in_beam, pixels_of};
-pub(crate) use wall::{check_closed, wall_path_mm};
+pub(crate) use wall::{check_closed, check_drawable, wall_path_mm};
 
 use crate::renderer::Engines;
 use crate::scene::Setup;

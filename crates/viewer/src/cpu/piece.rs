@@ -1,15 +1,15 @@
 //! Length of a ray inside one mitred frustum, exactly.
 //!
-//! With the ray q + tD relative to the frustum's first centre, its unit axis a and radius R(s) = r + g s at s along the axis,
-//! the infinite cone is |x|² − (x·a)² ≤ R(x·a)², that is At² + 2Bt + C ≤ 0 with
+//! With the ray q + tD relative to the frustum's first centre, its unit axis a and radius R(s) = r + g s at s
+//! along the axis, the infinite cone is |x|² − (x·a)² ≤ R(x·a)², that is At² + 2Bt + C ≤ 0 with
 //!
 //! ```text
 //! A = D·D − (1 + g²)(D·a)²,   B = D·q − (D·a)(q·a) − g (D·a) R(q·a),   C = q·q − (q·a)² − R(q·a)²
 //! ```
 //!
-//! For A > 0 the inside is the interval between the roots. For A ≤ 0 the ray is steeper than the cone's flank: the inside is beyond
-//! the roots, and of these two parts the one with R > 0 counts. The interval is then clipped by the half-spaces
-//! of the two mitre planes.
+//! For A > 0 the inside is the interval between the roots. For A ≤ 0 the ray is steeper than the cone's
+//! flank: the inside is beyond the roots, and of these two parts the one with R > 0 counts. The interval is
+//! then clipped by the half-spaces of the two mitre planes.
 
 use endowire_core::Vec3;
 
@@ -20,8 +20,9 @@ const ALONG: f64 = 1e-13;
 
 /// Length of the line through `origin` inside `piece`.
 ///
-/// All pieces of a device must be asked with the same `origin` for the same line: their common planes then cut it at the same place,
-/// rounding included, and a line that lies in such a plane belongs to one of them only.
+/// All pieces of a device must be asked with the same `origin` for the same line: their common planes then
+/// cut it at the same place, rounding included, and a line that lies in such a plane belongs to one of them
+/// only.
 pub(crate) fn chord(piece: &Piece, origin: &Vec3, direction: &Vec3) -> f64 {
     // Work from the point nearest to the first centre: the source is far away, and squares would cancel.
     let dd = direction.norm_squared();

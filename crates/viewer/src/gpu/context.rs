@@ -1,7 +1,8 @@
 //! An adapter, its device and queue, and a way back for pixels.
 //!
-//! wgpu reports most failures outside the call that caused them and panics where nobody listens. Here a handler keeps the
-//! first report, and every read-back returns it as an error: a failing adapter costs a frame, never the program.
+//! wgpu reports most failures outside the call that caused them and panics where nobody listens. Here a
+//! handler keeps the first report, and every read-back returns it as an error: a failing adapter costs a
+//! frame, never the program.
 
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 
@@ -20,8 +21,8 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    /// Opens the best adapter that has `features`: discrete before integrated before others; software adapters last, and
-    /// only where `software` allows them.
+    /// Opens the best adapter that has `features`: discrete before integrated before others; software
+    /// adapters last, and only where `software` allows them.
     ///
     /// # Errors
     /// Why there is none, as a clause.
@@ -152,7 +153,8 @@ impl Gpu {
         self.check()?;
         let failed = |what: &str| Error::Computation(format!("reading a frame back: {what}"));
         let (sender, receiver) = mpsc::channel();
-        // The receiver outlives the callback unless this function has returned with an error; then nobody waits.
+        // The receiver outlives the callback unless this function has returned with an error; then nobody
+        // waits.
         buffer.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
         self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(&e.to_string()))?;
         match receiver.try_recv() {

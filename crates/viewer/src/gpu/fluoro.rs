@@ -1,11 +1,11 @@
 //! Fluoroscopic frames through wgpu: signed depth by rasterisation.
 //!
-//! Faces are added into a float target, minus their distance along the ray where they face the source and plus where they do
-//! not; what remains is the length inside (see `cpu/wall.rs`). Distances are taken from the plane through the isocentre
-//! across the beam: being constant along a ray, the shift cancels in the sum, and f32 keeps its digits for millimetres
-//! rather than for the 750 mm before them. Each pixel intersects its own ray with the triangle's plane, so the rasteriser's
-//! rounding of corners to 1/256 pixel moves silhouettes only. All depths are given as the middle of the clip range:
-//! no plane can cut the mesh.
+//! Faces are added into a float target, minus their distance along the ray where they face the source and
+//! plus where they do not; what remains is the length inside (see `cpu/wall.rs`). Distances are taken from
+//! the plane through the isocentre across the beam: being constant along a ray, the shift cancels in the sum,
+//! and f32 keeps its digits for millimetres rather than for the 750 mm before them. Each pixel intersects its
+//! own ray with the triangle's plane, so the rasteriser's rounding of corners to 1/256 pixel moves
+//! silhouettes only. All depths are given as the middle of the clip range: no plane can cut the mesh.
 //!
 //! Devices are rectangles, one for each mitred piece, whose pixels solve the cone of `cpu/piece.rs`.
 
@@ -315,7 +315,8 @@ fn path_pipeline(
         label: Some("path lengths"),
         layout: None,
         vertex: vertex_state(&shader, &[Some(layout.clone())]),
-        // Outward triangles turn clockwise on the screen where they face the source: the picture is seen from the detector.
+        // Outward triangles turn clockwise on the screen where they face the source: the picture is seen from
+        // the detector.
         primitive: wgpu::PrimitiveState { front_face: wgpu::FrontFace::Cw, ..Default::default() },
         depth_stencil: None,
         multisample: wgpu::MultisampleState::default(),

@@ -1,5 +1,5 @@
-// Length of each ray inside one mitred frustum, times a weight. Derivation: cpu/piece.rs; here |D x a|^2 stands for
-// D.D - (D.a)^2 and so on (Lagrange's identity), which does not cancel.
+// Length of each ray inside one mitred frustum, times a weight. Derivation: cpu/piece.rs; here |D x a|^2
+// stands for D.D - (D.a)^2 and so on (Lagrange's identity), which does not cancel.
 
 struct View {
     half_size: vec2f,
@@ -87,7 +87,8 @@ fn fragment(piece: Corner) -> @location(0) f32 {
     } else if c > 0.0 {
         return 0.0;
     }
-    // Mitre planes, crossed by the ray from its point on the plane of the isocentre: the same numbers for both neighbours.
+    // Mitre planes, crossed by the ray from its point on the plane of the isocentre: the same numbers for
+    // both neighbours.
     let origin = vec3f(view.sod_mm * slopes, 0.0);
     let heights = vec2f(dot(piece.plane0.xyz, origin) - piece.plane0.w, dot(piece.plane1.xyz, origin) - piece.plane1.w);
     let rises = vec2f(dot(piece.plane0.xyz, ray), dot(piece.plane1.xyz, ray));

@@ -1,9 +1,11 @@
-//! How surfaces of the 3D view look. The WGSL shader holds the same formulas, and reads the same numbers as a uniform.
+//! How surfaces of the 3D view look. The WGSL shader holds the same formulas, and reads the same numbers as a
+//! uniform.
 //!
-//! **Wall.** A thin sheet lit from the upper left, more opaque where it is seen edge-on (a light path through a sheet grows as
-//! 1/cos), which draws the silhouettes that make a translucent tube readable. Farther parts fade to the background. **Order
-//! independence** is that of McGuire and Bavoil (Journal of Computer Graphics Techniques 2(2), 2013): the colours in front of
-//! the opaque scene are averaged with weights αw that fall with distance, and cover it by 1 − Π(1 − α).
+//! **Wall.** A thin sheet lit from the upper left, more opaque where it is seen edge-on (a light path through
+//! a sheet grows as 1/cos), which draws the silhouettes that make a translucent tube readable. Farther parts
+//! fade to the background. **Order independence** is that of McGuire and Bavoil (Journal of Computer Graphics
+//! Techniques 2(2), 2013): the colours in front of the opaque scene are averaged with weights αw that fall
+//! with distance, and cover it by 1 − Π(1 − α).
 //!
 //! Colours are display values, blended as they are.
 

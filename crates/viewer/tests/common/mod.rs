@@ -8,7 +8,8 @@ use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_viewer::{Backend, CArmSpec, DevicePoint, DeviceView, Renderer, View, ViewSpec};
 
-/// A surface of revolution about z through the given (radius, height) profile from the bottom pole to the top pole.
+/// A surface of revolution about z through the given (radius, height) profile from the bottom pole to the top
+/// pole.
 pub fn revolved(profile: &[(f64, f64)], sides: u32, centre: Vec3) -> SurfaceMesh {
     let mut mesh = SurfaceMesh::default();
     let inner = &profile[1..profile.len() - 1];
@@ -90,7 +91,8 @@ pub fn spec(backend: Backend, size: u32, pixel_mm: f64) -> ViewSpec {
     }
 }
 
-/// A renderer on an adapter. Without one: a failure where ENDOWIRE_REQUIRE_GPU=1 asks for it, else `None` and a message.
+/// A renderer on an adapter. Without one: a failure where ENDOWIRE_REQUIRE_GPU=1 asks for it, else `None` and
+/// a message.
 pub fn on_gpu(spec: &ViewSpec, wall: &SurfaceMesh) -> Option<Renderer> {
     let spec = ViewSpec { backend: Backend::Gpu, ..spec.clone() };
     match Renderer::new(&spec, wall) {
