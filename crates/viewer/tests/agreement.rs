@@ -47,6 +47,7 @@ fn path_lengths_agree_to_a_micrometre_in_the_mean_and_a_shift_of_a_tenth_of_a_mi
     let lumen = mean_difference(&a.lumen_mm, &b.lumen_mm);
     let device = mean_difference(&a.devices_mm[0].1, &b.devices_mm[0].1);
     eprintln!("{}: mean difference: lumen {lumen:.2e} mm, devices {device:.2e} mm", gpu.backend());
+    assert!(!gpu.backend().contains("CPU reference"), "the CPU has taken over: {}", gpu.backend());
     assert!(lumen <= 1e-3, "lumen: {lumen}");
     assert!(device <= 1e-4, "devices: {device}");
 
@@ -87,6 +88,7 @@ fn frames_look_alike_and_a_frame_without_the_device_does_not() {
     let Some(mut gpu) = on_gpu(&spec, &wall) else { return };
     let mut cpu = Renderer::new(&spec, &wall).unwrap();
     let [a, b] = [&mut cpu, &mut gpu].map(|r| r.render(&devices).unwrap());
+    assert!(!gpu.backend().contains("CPU reference"), "the CPU has taken over: {}", gpu.backend());
     let bare = cpu.render(&[]).unwrap();
     let [a, b, bare] = [a, b, bare].map(|frames| [frames.three_d.unwrap(), frames.fluoro.unwrap()]);
     for (view, bound) in [(0, 1.0), (1, 0.1)] {
