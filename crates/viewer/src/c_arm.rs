@@ -1,19 +1,20 @@
 //! Geometry of a C-arm: which ray a pixel sees.
 //!
-//! **Patient axes** as in DICOM (LPS): +x to the patient's left, +y posterior, +z towards the head. With both angles zero
-//! the source is posterior (under the table) and the detector anterior.
+//! **Patient axes** as in DICOM (LPS): +x to the patient's left, +y posterior, +z towards the head. With both
+//! angles zero the source is posterior (under the table) and the detector anterior.
 //!
-//! **Angles** with the signs of DICOM: the primary angle α (0018,1510) is positive towards LAO and turns the detector to the
-//! patient's left; the secondary angle β (0018,1511) is positive towards cranial and tilts it to the head. From the
-//! isocentre the detector lies in direction
+//! **Angles** with the signs of DICOM: the primary angle α (0018,1510) is positive towards LAO and turns the
+//! detector to the patient's left; the secondary angle β (0018,1511) is positive towards cranial and tilts it
+//! to the head. From the isocentre the detector lies in direction
 //!
 //! ```text
 //! d = cos β (sin α, −cos α, 0) + sin β (0, 0, 1)
 //! ```
 //!
-//! **Picture.** Seen from the detector, head up, so the patient's left is on the right of the screen: columns run along
-//! e_u = (cos α, sin α, 0), rows along e_v = −d × e_u. The source is at isocentre − SOD·d, the detector plane SID from it and
-//! centred on the axis. A point at (a, b, c) along (e_u, e_v, d) from the isocentre is seen at
+//! **Picture.** Seen from the detector, head up, so the patient's left is on the right of the screen: columns
+//! run along e_u = (cos α, sin α, 0), rows along e_v = −d × e_u. The source is at isocentre − SOD·d, the
+//! detector plane SID from it and centred on the axis. A point at (a, b, c) along (e_u, e_v, d) from the
+//! isocentre is seen at
 //!
 //! ```text
 //! u = W/2 + (SID/pitch) · a/(SOD + c),   v = H/2 + (SID/pitch) · b/(SOD + c)
@@ -153,7 +154,8 @@ impl CArm {
 
     /// Where a point is seen: columns to the right, rows downwards, pixel centres at halves.
     ///
-    /// Exactly the projection that draws the frames. A point beside or behind the source gives no finite pixel.
+    /// Exactly the projection that draws the frames. A point beside or behind the source gives no finite
+    /// pixel.
     pub fn project(&self, point_mm: &Vec3) -> [f64; 2] {
         self.pixel_of(&self.in_beam(point_mm))
     }

@@ -1,13 +1,14 @@
 //! Devices as the viewer sees them: a centre line with a radius, refined into short straight pieces.
 //!
-//! Between two points the centre line is the cubic Hermite curve through positions and tangents, the same curve the rod solver
-//! integrates. It is cut so finely that a piece's chord stays within [`SAGITTA`] radii of it: for curvature κ and
-//! length h, the sagitta is κh²/8. A chord offset by s from the axis of a round wire of radius r shortens the central ray from 2r to
-//! 2√(r² − s²) ≈ 2r(1 − s²/2r²), so 0.04 r costs less than 0.1 % of the diameter.
+//! Between two points the centre line is the cubic Hermite curve through positions and tangents, the same
+//! curve the rod solver integrates. It is cut so finely that a piece's chord stays within [`SAGITTA`] radii
+//! of it: for curvature κ and length h, the sagitta is κh²/8. A chord offset by s from the axis of a round
+//! wire of radius r shortens the central ray from 2r to 2√(r² − s²) ≈ 2r(1 − s²/2r²), so 0.04 r costs less
+//! than 0.1 % of the diameter.
 //!
-//! Each piece is a cone frustum, cut at both ends by the plane that bisects it and its neighbour (a mitre). Neighbouring
-//! cylinders meet that plane in the same ellipse, so pieces neither overlap nor gape in bends. The two end planes are
-//! perpendicular to the axis: ends are flat.
+//! Each piece is a cone frustum, cut at both ends by the plane that bisects it and its neighbour (a mitre).
+//! Neighbouring cylinders meet that plane in the same ellipse, so pieces neither overlap nor gape in bends.
+//! The two end planes are perpendicular to the axis: ends are flat.
 
 use endowire_core::shape::Shape;
 use endowire_core::{Error, Result, Vec3};
@@ -42,7 +43,8 @@ pub struct DeviceView {
 }
 
 impl DeviceView {
-    /// The device with centre line `shape` and an outer radius given by the arc length from the tip in millimetres.
+    /// The device with centre line `shape` and an outer radius given by the arc length from the tip in
+    /// millimetres.
     pub fn from_shape(shape: &Shape, radius_mm: impl Fn(f64) -> f64) -> Self {
         let points = (shape.positions_mm.iter().zip(&shape.tangents).zip(&shape.from_tip_mm))
             .map(|((&position_mm, &tangent), &s)| DevicePoint {
@@ -114,9 +116,13 @@ pub(crate) struct Piece {
     pub(crate) start: Vec3,
     /// Unit direction to the second end.
     pub(crate) axis: Vec3,
-    pub(crate) length: f64,
+    /// Centre of the second end.
+    pub(crate) end: Vec3,
     /// Plane normals at both ends, pointing onwards.
     pub(crate) planes: [Vec3; 2],
+    /// Products of these normals with the centres. Neighbours hold the very same numbers for their common
+    /// plane.
+    pub(crate) offsets: [f64; 2],
     pub(crate) radius: f64,
     /// Change of the radius per length.
     pub(crate) slope: f64,
@@ -124,7 +130,8 @@ pub(crate) struct Piece {
     pub(crate) reach: f64,
 }
 
-/// Mitres are cut no sharper than at this cosine of half the turn (a turn of 150°); beyond it a corner is blunted.
+/// Mitres are cut no sharper than at this cosine of half the turn (a turn of 150°); beyond it a corner is
+/// blunted.
 const SHARPEST_MITRE: f64 = 0.26;
 
 /// The mitred pieces between consecutive points of a refined centre line.
@@ -150,8 +157,9 @@ pub(crate) fn pieces(points: &[DevicePoint]) -> Vec<Piece> {
             Piece {
                 start: points[k].position_mm,
                 axis,
-                length,
+                end: points[k + 1].position_mm,
                 planes,
+                offsets: [planes[0].dot(&points[k].position_mm), planes[1].dot(&points[k + 1].position_mm)],
                 radius: r0,
                 slope: (r1 - r0) / length.max(f64::MIN_POSITIVE),
                 reach: r0.max(r1) / sharpest,

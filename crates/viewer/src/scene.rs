@@ -1,10 +1,12 @@
 //! What all engines draw: the wall, the devices refined once, and the resolved set-up of each wanted view.
 
+use std::sync::Arc;
+
+use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
-use endowire_core::{Error, Result};
 
 use crate::c_arm::CArm;
-use crate::cpu::check_closed;
+use crate::cpu::{check_closed, check_drawable};
 use crate::device::{DevicePoint, DeviceView};
 use crate::spec::{View, ViewSpec};
 use crate::three_d::Camera;
@@ -32,7 +34,7 @@ impl RefinedDevice {
 }
 
 /// Geometry and physics of the fluoroscopic view.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct FluoroSetup {
     pub(crate) c_arm: CArm,
     pub(crate) beam: Beam,
@@ -41,7 +43,7 @@ pub(crate) struct FluoroSetup {
 /// All that an engine needs, and no more than the wanted views need.
 #[derive(Debug)]
 pub(crate) struct Setup {
-    pub(crate) wall: SurfaceMesh,
+    pub(crate) wall: Arc<SurfaceMesh>,
     pub(crate) fluoro: Option<FluoroSetup>,
     pub(crate) camera: Option<Camera>,
 }
@@ -50,19 +52,17 @@ impl Setup {
     pub(crate) fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
         spec.validate()?;
         if spec.views.is_empty() {
-            return Ok(Self { wall: SurfaceMesh::default(), fluoro: None, camera: None });
+            return Ok(Self { wall: Arc::default(), fluoro: None, camera: None });
         }
-        if wall.triangles.is_empty() {
-            return Err(Error::Mesh("the wall has no triangles".into()));
-        }
-        check_closed(wall)?;
+        check_drawable(wall)?;
         let mut fluoro = None;
         if spec.wants(View::Fluoro) {
+            check_closed(wall)?;
             let c_arm = CArm::new(&spec.c_arm, spec.size_px, wall)?;
             let beam = Beam::new(&spec.xray, &c_arm, wall)?;
             fluoro = Some(FluoroSetup { c_arm, beam });
         }
         let camera = spec.wants(View::ThreeD).then(|| Camera::new(&spec.camera, spec.size_px, wall));
-        Ok(Self { wall: wall.clone(), fluoro, camera })
+        Ok(Self { wall: Arc::new(wall.clone()), fluoro, camera })
     }
 }

@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::xray::Material;
 
-/// Largest side of a frame. Beyond it a typo is likelier than a wish, and textures end soon after.
-const LARGEST_SIDE_PX: u32 = 8192;
+/// Largest side of a frame. Flat detectors have up to about 3000 pixels a side, and with two rays across a
+/// pixel this is the texture size that every adapter offers.
+const LARGEST_SIDE_PX: u32 = 4096;
 
 /// One of the two kinds of frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize)]
@@ -23,7 +24,8 @@ pub enum View {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Backend {
-    /// A graphics processor where there is one, else the plain Rust path, which is faster than a software adapter.
+    /// A graphics processor where there is one, else the plain Rust path, which is faster than a software
+    /// adapter.
     #[default]
     Auto,
     /// wgpu, a software adapter included; an error without any adapter.
@@ -109,13 +111,14 @@ impl Default for CArmSpec {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct XRaySpec {
-    /// Photon energy, 40 to 80 keV: one line in place of a spectrum. 60 keV is near the mean of 80 kVp with 0.2 mm Cu
-    /// behind 20 cm of water (57.8 keV).
+    /// Photon energy, 40 to 80 keV: one line in place of a spectrum. 60 keV is near the mean of 80 kVp with
+    /// 0.2 mm Cu behind 20 cm of water (57.8 keV).
     pub energy_kev: f64,
     /// Volume fraction of contrast medium (370 mg iodine per ml) in the blood, 0 to 1.
     pub contrast_fraction: f64,
-    /// Thickness of soft tissue along the central ray. The body is a slab across the beam, as the 20 cm water phantom of
-    /// acceptance tests is: an even background from every angle, whose path lengths are known exactly. 0 is air.
+    /// Thickness of soft tissue along the central ray. The body is a slab across the beam, as the 20 cm water
+    /// phantom of acceptance tests is: an even background from every angle, whose path lengths are known
+    /// exactly. 0 is air.
     pub tissue_mm: f64,
     /// Material of devices that do not name their own.
     pub device_material: Material,
@@ -135,8 +138,8 @@ impl Default for XRaySpec {
     }
 }
 
-/// The `[view.camera]` table of the 3D view. With neither angle given, the camera looks from the front, slightly from the left
-/// and above, or across the plane of a vessel that lies in one.
+/// The `[view.camera]` table of the 3D view. With neither angle given, the camera looks from the front,
+/// slightly from the left and above, or across the plane of a vessel that lies in one.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CameraSpec {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use endowire_core::{Result, Vec3};
 
 use crate::c_arm::CArm;
-use crate::cpu::piece::inside;
+use crate::cpu::piece::chord;
 use crate::cpu::raster::span;
 use crate::device::{DevicePoint, Piece, pieces};
 
@@ -28,7 +28,7 @@ pub(crate) fn pieces_in_beam(c_arm: &CArm, points: &[DevicePoint]) -> Result<Vec
 /// Columns and rows of the pixels that `piece` may touch: those of the two spheres that enclose it.
 pub(crate) fn pixels_of(c_arm: &CArm, piece: &Piece) -> [Range<usize>; 2] {
     let size = c_arm.size_px();
-    let ends = [piece.start, piece.start + piece.axis * piece.length];
+    let ends = [piece.start, piece.end];
     [0, 1].map(|k| {
         let (mut low, mut high) = (f64::MAX, f64::MIN);
         for end in ends {
@@ -52,16 +52,13 @@ pub(crate) fn pixels_of(c_arm: &CArm, piece: &Piece) -> [Range<usize>; 2] {
 pub(crate) fn cast(c_arm: &CArm, piece: &Piece, mut visit: impl FnMut(usize, f64)) {
     let [columns, rows] = pixels_of(c_arm, piece);
     let width = c_arm.size_px()[0] as usize;
-    let depth = c_arm.sod_mm() + piece.start.z;
     for y in rows {
         for x in columns.clone() {
             let [sx, sy] = c_arm.slopes([x as f64 + 0.5, y as f64 + 0.5]);
-            let direction = Vec3::new(sx, sy, 1.0);
-            // The ray at the depth of the first centre, relative to it.
-            let q = Vec3::new(depth * sx - piece.start.x, depth * sy - piece.start.y, 0.0);
-            let [enter, leave] = inside(piece, &q, &direction);
-            if leave > enter {
-                visit(y * width + x, (leave - enter) * direction.norm());
+            let origin = Vec3::new(sx, sy, 0.0) * c_arm.sod_mm();
+            let length = chord(piece, &origin, &Vec3::new(sx, sy, 1.0));
+            if length > 0.0 {
+                visit(y * width + x, length);
             }
         }
     }

@@ -1,7 +1,10 @@
-//! Fluoroscopic frames in plain Rust: the exact reference, and the fast path where there is no graphics processor.
+//! Fluoroscopic frames in plain Rust: the exact reference, and the fast path where there is no graphics
+//! processor.
 //!
-//! The anatomy does not move, so its line integrals and its finished picture are kept. A frame copies the picture and
-//! redoes only the pixels that a device touches.
+//! The anatomy does not move, so its line integrals and its finished picture are kept. A frame copies the
+//! picture and redoes only the pixels that a device touches.
+
+use std::sync::Arc;
 
 use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
@@ -10,7 +13,8 @@ use crate::c_arm::CArm;
 use crate::cpu::devices::{cast, pieces_in_beam};
 use crate::cpu::wall::wall_path_mm;
 use crate::image::{Image, PixelFormat};
-use crate::scene::RefinedDevice;
+use crate::renderer::FluoroEngine;
+use crate::scene::{FluoroSetup, RefinedDevice};
 use crate::xray::{Beam, SUBRAYS};
 
 /// Everything about a fluoroscopic view that stays from frame to frame.
@@ -20,6 +24,7 @@ pub(crate) struct CpuFluoro {
     /// The same view with one pixel a ray.
     rays: CArm,
     beam: Beam,
+    wall: Arc<SurfaceMesh>,
     /// Line integral of the anatomy on each ray.
     anatomy: Vec<f32>,
     /// The picture without devices.
@@ -29,15 +34,15 @@ pub(crate) struct CpuFluoro {
 }
 
 impl CpuFluoro {
-    pub(crate) fn new(c_arm: &CArm, beam: &Beam, wall: &SurfaceMesh) -> Self {
+    pub(crate) fn new(setup: &FluoroSetup, wall: Arc<SurfaceMesh>) -> Self {
+        let FluoroSetup { c_arm, beam } = setup.clone();
         let rays = c_arm.refined(SUBRAYS);
-        let lumen = wall_path_mm(&rays, wall);
+        let lumen = wall_path_mm(&rays, &wall);
         let anatomy: Vec<f32> =
             (lumen.iter().enumerate()).map(|(i, &l)| beam.anatomy(rays.obliquity_at(i), l) as f32).collect();
         let [width, height] = c_arm.size_px().map(|n| n as usize);
         let excess = vec![0.0; anatomy.len()];
-        let mut fluoro =
-            Self { c_arm: c_arm.clone(), rays, beam: beam.clone(), anatomy, still: vec![], excess };
+        let mut fluoro = Self { c_arm, rays, beam, wall, anatomy, still: vec![], excess };
         fluoro.still = (0..width * height).map(|pixel| fluoro.grey(pixel)).collect();
         fluoro
     }
@@ -56,10 +61,13 @@ impl CpuFluoro {
                 sum += self.beam.relative_transmission(self.anatomy[ray] + self.excess[ray]);
             }
         }
-        self.beam.grey(sum / (SUBRAYS * SUBRAYS) as f32)
+        let width = self.c_arm.size_px()[0] as usize;
+        self.beam.grey(sum / (SUBRAYS * SUBRAYS) as f32, pixel % width, pixel / width)
     }
+}
 
-    pub(crate) fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image> {
+impl FluoroEngine for CpuFluoro {
+    fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image> {
         let [width, height] = self.c_arm.size_px();
         let (row, sub) = ((width * SUBRAYS) as usize, SUBRAYS as usize);
         let mut chains = Vec::with_capacity(devices.len());
@@ -91,14 +99,16 @@ impl CpuFluoro {
         }
         Ok(Image::new(width, height, PixelFormat::Gray8, data))
     }
-}
 
-/// Length of each pixel's central ray inside one device.
-pub(crate) fn device_path_mm(c_arm: &CArm, device: &RefinedDevice) -> Result<Vec<f64>> {
-    let [width, height] = c_arm.size_px().map(|n| n as usize);
-    let mut path = vec![0.0; width * height];
-    for piece in pieces_in_beam(c_arm, &device.points)? {
-        cast(c_arm, &piece, |pixel, length| path[pixel] += length);
+    fn lumen_path(&mut self) -> Result<Vec<f32>> {
+        Ok(wall_path_mm(&self.c_arm, &self.wall).into_iter().map(|v| v as f32).collect())
     }
-    Ok(path)
+
+    fn device_path(&mut self, device: &RefinedDevice) -> Result<Vec<f32>> {
+        let mut path = vec![0.0; self.still.len()];
+        for piece in pieces_in_beam(&self.c_arm, &device.points)? {
+            cast(&self.c_arm, &piece, |pixel, length| path[pixel] += length);
+        }
+        Ok(path.into_iter().map(|v| v as f32).collect())
+    }
 }

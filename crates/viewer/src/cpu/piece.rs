@@ -1,15 +1,15 @@
 //! Length of a ray inside one mitred frustum, exactly.
 //!
-//! With the ray q + tD relative to the frustum's first centre, its unit axis a and radius R(s) = r + g s at s along the axis,
-//! the infinite cone is |x|² − (x·a)² ≤ R(x·a)², that is At² + 2Bt + C ≤ 0 with
+//! With the ray q + tD relative to the frustum's first centre, its unit axis a and radius R(s) = r + g s at s
+//! along the axis, the infinite cone is |x|² − (x·a)² ≤ R(x·a)², that is At² + 2Bt + C ≤ 0 with
 //!
 //! ```text
 //! A = D·D − (1 + g²)(D·a)²,   B = D·q − (D·a)(q·a) − g (D·a) R(q·a),   C = q·q − (q·a)² − R(q·a)²
 //! ```
 //!
-//! For A > 0 the inside is the interval between the roots. For A ≤ 0 the ray is steeper than the cone's flank: the inside is beyond
-//! the roots, and of these two parts the one with R > 0 counts. The interval is then clipped by the half-spaces
-//! of the two mitre planes.
+//! For A > 0 the inside is the interval between the roots. For A ≤ 0 the ray is steeper than the cone's
+//! flank: the inside is beyond the roots, and of these two parts the one with R > 0 counts. The interval is
+//! then clipped by the half-spaces of the two mitre planes.
 
 use endowire_core::Vec3;
 
@@ -18,21 +18,26 @@ use crate::device::Piece;
 /// Below this share of D·D, A is taken as zero: the ray runs along the flank.
 const ALONG: f64 = 1e-13;
 
-/// The interval of t in which the ray q + tD, q relative to `piece.start`, is inside; its end does not exceed its start
-/// where there is none.
-pub(crate) fn inside(piece: &Piece, q: &Vec3, direction: &Vec3) -> [f64; 2] {
-    const NONE: [f64; 2] = [0.0, 0.0];
+/// Length of the line through `origin` inside `piece`.
+///
+/// All pieces of a device must be asked with the same `origin` for the same line: their common planes then
+/// cut it at the same place, rounding included, and a line that lies in such a plane belongs to one of them
+/// only.
+pub(crate) fn chord(piece: &Piece, origin: &Vec3, direction: &Vec3) -> f64 {
+    // Work from the point nearest to the first centre: the source is far away, and squares would cancel.
+    let dd = direction.norm_squared();
+    let shift = (piece.start - origin).dot(direction) / dd;
+    let q = origin - piece.start + direction * shift;
     let (da, qa, g) = (direction.dot(&piece.axis), q.dot(&piece.axis), piece.slope);
     let radius = piece.radius + g * qa;
-    let dd = direction.norm_squared();
     let a = dd - da * da * (1.0 + g * g);
-    let b = direction.dot(q) - da * qa - g * da * radius;
+    let b = direction.dot(&q) - da * qa - g * da * radius;
     let c = q.norm_squared() - qa * qa - radius * radius;
     let disc = b * b - a * c;
     let mut interval = [f64::NEG_INFINITY, f64::INFINITY];
     if a > ALONG * dd {
         if disc <= 0.0 {
-            return NONE;
+            return 0.0;
         }
         let root = disc.sqrt();
         interval = [(-b - root) / a, (-b + root) / a];
@@ -49,27 +54,21 @@ pub(crate) fn inside(piece: &Piece, q: &Vec3, direction: &Vec3) -> [f64; 2] {
     } else if b.abs() > ALONG * dd {
         interval[usize::from(b > 0.0)] = -c / (2.0 * b);
     } else if c > 0.0 {
-        return NONE;
+        return 0.0;
     }
-    let ends = [(piece.planes[0], *q), (-piece.planes[1], q - piece.axis * piece.length)];
-    for (normal, from) in ends {
-        let (height, rise) = (normal.dot(&from), normal.dot(direction));
-        if rise > 0.0 {
-            interval[0] = interval[0].max(-height / rise);
-        } else if rise < 0.0 {
-            interval[1] = interval[1].min(-height / rise);
-        } else if height < 0.0 {
-            return NONE;
+    let heights = [0, 1].map(|k| piece.planes[k].dot(origin) - piece.offsets[k]);
+    let rises = piece.planes.map(|normal| normal.dot(direction));
+    for (k, onwards) in [(0, 1.0), (1, -1.0)] {
+        let crossing = -heights[k] / rises[k] - shift;
+        if onwards * rises[k] > 0.0 {
+            interval[0] = interval[0].max(crossing);
+        } else if onwards * rises[k] < 0.0 {
+            interval[1] = interval[1].min(crossing);
+        } else if (heights[k] < 0.0) == (k == 0) {
+            return 0.0;
         }
     }
-    interval
-}
-
-/// Length of a line inside `piece`.
-#[cfg(test)]
-pub(crate) fn chord(piece: &Piece, origin: &Vec3, direction: &Vec3) -> f64 {
-    let [enter, leave] = inside(piece, &(origin - piece.start), direction);
-    (leave - enter).max(0.0) * direction.norm()
+    (interval[1] - interval[0]).max(0.0) * dd.sqrt()
 }
 
 #[cfg(test)]
@@ -99,8 +98,9 @@ mod tests {
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
         near(total(&rod, Vec3::new(3.0, 0.0, -9.0), Vec3::z()), 1.0);
         near(total(&rod, Vec3::new(3.0, 0.3, -9.0), Vec3::z() * 2.0), 0.8);
-        // A ray in the very plane where two pieces meet is counted once, not twice (measure zero either way).
-        near(total(&rod, Vec3::new(4.0 + 1e-9, 0.0, -9.0), Vec3::z()), 1.0);
+        // A ray in the very plane where two pieces meet is counted once, not twice.
+        near(total(&rod, Vec3::new(4.0, 0.0, -9.0), Vec3::z()), 1.0);
+        near(total(&rod, Vec3::new(4.0 + 1e-16, 0.0, -750.0), Vec3::new(1e-17, 0.0, 1.0)), 1.0);
         near(total(&rod, Vec3::new(-7.0, 0.1, 0.2), Vec3::x()), 10.0);
         near(total(&rod, Vec3::new(-7.0, 0.6, 0.0), Vec3::x()), 0.0);
         near(total(&rod, Vec3::new(5.0, 0.0, 0.0), Vec3::new(1.0, 0.0, 1.0)), 2.0_f64.sqrt());
@@ -110,7 +110,7 @@ mod tests {
     fn a_bend_has_neither_gap_nor_overlap() {
         // An L of two legs: the volume by rays is that of two mitred cylinders, π r² (length along the axes).
         let rod = rod(&[(-3.0, 0.0, 0.0, 0.5), (0.0, 0.0, 0.0, 0.5), (0.0, 3.0, 0.0, 0.5)]);
-        let n = 400;
+        let n = 1200;
         let step = 8.0 / f64::from(n);
         let mut volume = 0.0;
         for i in 0..n {
@@ -120,11 +120,11 @@ mod tests {
             }
         }
         let exact = std::f64::consts::PI * 0.25 * 6.0;
-        assert!((volume / exact - 1.0).abs() < 2e-3, "{volume} {exact}");
-        // The twin: flat ends at the corner double the inner and miss the outer wedge.
+        assert!((volume / exact - 1.0).abs() < 1e-3, "{volume} {exact}");
+        // The twin: a flat end at the corner misses the outer wedge.
         let mut flat = rod.clone();
         flat[0].planes[1] = flat[0].axis;
-        let ray = (Vec3::new(0.2, -0.2, -5.0), Vec3::z());
+        let ray = (Vec3::new(0.2, -0.3, -5.0), Vec3::z());
         assert!(
             total(&rod, ray.0, ray.1) > 0.5
                 && (total(&flat, ray.0, ray.1) - total(&rod, ray.0, ray.1)).abs() > 0.3

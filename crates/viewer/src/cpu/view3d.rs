@@ -1,18 +1,23 @@
 //! The 3D view in plain Rust: a supersampled rasteriser.
 //!
-//! The wall's fragments are made once and kept per sample. A frame draws the devices with a depth buffer and composes anew
-//! only where they are.
+//! The wall's fragments are made once and kept per sample. A frame draws the devices with a depth buffer and
+//! composes anew only where they are.
 
+use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 use glam::{Vec3, Vec4};
 
 use crate::cpu::raster::ScreenTriangle;
 use crate::image::{Image, PixelFormat};
+use crate::renderer::ThreeDEngine;
 use crate::scene::RefinedDevice;
 use crate::three_d::{Camera, Style, Vertex, device_triangles, wall_triangles};
 
 /// Samples across a pixel: nine levels of edge smoothing.
 const SAMPLES: u32 = 3;
+/// Most samples in all. They take about 25 bytes each; a larger frame, which shows its steps less, gets fewer
+/// for a pixel.
+const MOST_SAMPLES: u64 = 40_000_000;
 
 /// A piece of wall on a sample.
 #[derive(Debug, Clone, Copy, Default)]
@@ -25,6 +30,8 @@ struct Fragment {
 pub(crate) struct CpuView3d {
     camera: Camera,
     style: Style,
+    /// Samples across a pixel.
+    sub: u32,
     /// Fragments of all samples, and where those of each sample end.
     fragments: Vec<Fragment>,
     ends: Vec<u32>,
@@ -38,11 +45,13 @@ pub(crate) struct CpuView3d {
 impl CpuView3d {
     pub(crate) fn new(camera: &Camera, wall: &SurfaceMesh) -> Self {
         let style = Style::new(camera);
-        let samples = camera.size_px.iter().map(|&n| (n * SAMPLES) as usize).product::<usize>();
+        let pixels: u64 = camera.size_px.map(u64::from).iter().product();
+        let sub = (1..=SAMPLES).rev().find(|&n| pixels * u64::from(n * n) <= MOST_SAMPLES).unwrap_or(1);
+        let samples = pixels as usize * (sub * sub) as usize;
         let triangles = wall_triangles(camera, wall);
         let mut found: Vec<(u32, Fragment)> = Vec::new();
         for corners in triangles.chunks_exact(3) {
-            draw(camera, corners, |sample, position, normal| {
+            draw(camera, sub, corners, Faces::Both, |sample, position, normal| {
                 let rgba = style.shade_wall(position, normal).to_array().map(to_byte);
                 found.push((sample as u32, Fragment { distance: -position.z, rgba }));
             });
@@ -64,6 +73,7 @@ impl CpuView3d {
         let mut view = Self {
             camera: camera.clone(),
             style,
+            sub,
             fragments,
             ends,
             still: Vec::new(),
@@ -75,43 +85,13 @@ impl CpuView3d {
         view
     }
 
-    pub(crate) fn frame(&mut self, devices: &[RefinedDevice]) -> Image {
-        let [width, height] = self.camera.size_px;
-        let (row, sub) = ((width * SAMPLES) as usize, SAMPLES as usize);
-        let mut touched = Vec::new();
-        for device in devices {
-            for corners in device_triangles(&self.camera, &device.points).chunks_exact(3) {
-                draw(&self.camera, corners, |sample, position, normal| {
-                    if -position.z < self.distance[sample] {
-                        self.distance[sample] = -position.z;
-                        self.colour[sample] =
-                            self.style.shade_device(position, normal).to_array().map(to_byte);
-                        touched.push(sample / row / sub * width as usize + sample % row / sub);
-                    }
-                });
-            }
-        }
-        touched.sort_unstable();
-        touched.dedup();
-        let mut data = self.still.clone();
-        for &pixel in &touched {
-            data[4 * pixel..][..4].copy_from_slice(&self.pixel(pixel));
-        }
-        for &pixel in &touched {
-            for sample in samples_of(pixel, width as usize) {
-                self.distance[sample] = f32::INFINITY;
-            }
-        }
-        Image::new(width, height, PixelFormat::Rgba8, data)
-    }
-
     /// The finished pixel: the mean of its samples.
     fn pixel(&self, pixel: usize) -> [u8; 4] {
         let mut sum = Vec3::ZERO;
-        for sample in samples_of(pixel, self.camera.size_px[0] as usize) {
+        for sample in samples_of(pixel, self.camera.size_px[0] as usize, self.sub as usize) {
             sum += self.sample(sample);
         }
-        let [r, g, b] = (sum / (SAMPLES * SAMPLES) as f32).to_array().map(to_byte);
+        let [r, g, b] = (sum / (self.sub * self.sub) as f32).to_array().map(to_byte);
         [r, g, b, 255]
     }
 
@@ -135,24 +115,72 @@ impl CpuView3d {
     }
 }
 
+impl ThreeDEngine for CpuView3d {
+    fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image> {
+        let [width, height] = self.camera.size_px;
+        let (row, sub) = ((width * self.sub) as usize, self.sub as usize);
+        let mut touched = Vec::new();
+        for device in devices {
+            for corners in device_triangles(&self.camera, &device.points).chunks_exact(3) {
+                draw(&self.camera, self.sub, corners, Faces::Front, |sample, position, normal| {
+                    if -position.z < self.distance[sample] {
+                        self.distance[sample] = -position.z;
+                        self.colour[sample] =
+                            self.style.shade_device(position, normal).to_array().map(to_byte);
+                        touched.push(sample / row / sub * width as usize + sample % row / sub);
+                    }
+                });
+            }
+        }
+        touched.sort_unstable();
+        touched.dedup();
+        let mut data = self.still.clone();
+        for &pixel in &touched {
+            data[4 * pixel..][..4].copy_from_slice(&self.pixel(pixel));
+        }
+        for &pixel in &touched {
+            for sample in samples_of(pixel, width as usize, sub) {
+                self.distance[sample] = f32::INFINITY;
+            }
+        }
+        Ok(Image::new(width, height, PixelFormat::Rgba8, data))
+    }
+}
+
 /// The samples of a pixel.
-fn samples_of(pixel: usize, width: usize) -> impl Iterator<Item = usize> {
-    let sub = SAMPLES as usize;
+fn samples_of(pixel: usize, width: usize, sub: usize) -> impl Iterator<Item = usize> {
     let first = pixel / width * sub * width * sub + pixel % width * sub;
     (0..sub * sub).map(move |k| first + k / sub * width * sub + k % sub)
 }
 
-/// Calls `visit(sample, position, normal)` for each sample that a triangle covers; triangles that reach behind the
-/// near plane are left out.
-fn draw(camera: &Camera, corners: &[Vertex], mut visit: impl FnMut(usize, Vec3, Vec3)) {
-    let size = camera.size_px.map(|n| n * SAMPLES);
+/// Which triangles are drawn.
+#[derive(Clone, Copy, PartialEq)]
+enum Faces {
+    Both,
+    /// Those whose outside is seen; of an opaque closed surface these are all that can be.
+    Front,
+}
+
+/// Calls `visit(sample, position, normal)` for each sample that a triangle covers; triangles that reach
+/// behind the near plane are left out.
+fn draw(
+    camera: &Camera,
+    sub: u32,
+    corners: &[Vertex],
+    faces: Faces,
+    mut visit: impl FnMut(usize, Vec3, Vec3),
+) {
+    let size = camera.size_px.map(|n| n * sub);
     let positions = [0, 1, 2].map(|i| Vec3::from_array(corners[i].position));
     let normals = [0, 1, 2].map(|i| Vec3::from_array(corners[i].normal));
     if positions.iter().any(|p| f64::from(-p.z) < camera.near) {
         return;
     }
-    let on_screen = positions.map(|p| camera.pixel_of(p.to_array().map(f64::from), SAMPLES));
+    let on_screen = positions.map(|p| camera.pixel_of(p.to_array().map(f64::from), sub));
     let Some(triangle) = ScreenTriangle::new(on_screen) else { return };
+    if faces == Faces::Front && triangle.area2() > 0.0 {
+        return;
+    }
     triangle.scan(size, |x, y, weights| {
         // Perspective: weights over distance are linear on the screen.
         let w: [f32; 3] = std::array::from_fn(|i| weights[i] as f32 / positions[i].z);

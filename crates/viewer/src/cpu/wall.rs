@@ -1,10 +1,10 @@
 //! Length of every ray inside a closed wall: signed depth.
 //!
-//! A ray enters a closed surface wherever it meets a triangle from outside and leaves it wherever it meets one from inside, so the
-//! length inside is Σ ±t, minus at entries and plus at exits. Along a ray, t = depth · obliquity, and on a plane 1/depth is
-//! linear over the screen: from the corners it is interpolated with the pixel's weights, which cannot overshoot
-//! even for a triangle seen almost edge-on. Neighbours agree on their shared edge, so a silhouette contributes
-//! nothing rather than a spike.
+//! A ray enters a closed surface wherever it meets a triangle from outside and leaves it wherever it meets
+//! one from inside, so the length inside is Σ ±t, minus at entries and plus at exits. Along a ray, t = depth
+//! · obliquity, and on a plane 1/depth is linear over the screen: from the corners it is interpolated with
+//! the pixel's weights, which cannot overshoot even for a triangle seen almost edge-on. Neighbours agree on
+//! their shared edge, so a silhouette contributes nothing rather than a spike.
 
 use std::collections::HashMap;
 
@@ -27,7 +27,8 @@ pub(crate) fn wall_path_mm(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<f64> {
     for corners in &wall.triangles {
         let corners = corners.map(|v| seen[v as usize]);
         let Some(triangle) = ScreenTriangle::new(corners.map(|c| c.0)) else { continue };
-        // Outward triangles turn clockwise on the screen (positive area, rows downwards) where they face the source.
+        // Outward triangles turn clockwise on the screen (positive area, rows downwards) where they face the
+        // source.
         let sign = -triangle.area2().signum();
         let [i0, i1, i2] = corners.map(|c| c.1);
         triangle.scan([width, height], |x, y, [w0, w1, w2]| {
@@ -40,11 +41,15 @@ pub(crate) fn wall_path_mm(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<f64> {
     path
 }
 
-/// Checks that signed depth means anything: finite, closed, outward.
+/// Checks that a wall can be drawn at all: it has triangles, they name vertices that exist, and these are
+/// finite.
 ///
 /// # Errors
 /// [`Error::Mesh`] saying what is wrong.
-pub(crate) fn check_closed(wall: &SurfaceMesh) -> Result<()> {
+pub(crate) fn check_drawable(wall: &SurfaceMesh) -> Result<()> {
+    if wall.triangles.is_empty() {
+        return Err(Error::Mesh("the wall has no triangles".into()));
+    }
     if let Some(i) = wall.vertices_mm.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
         return Err(Error::Mesh(format!("vertex {i} is not finite")));
     }
@@ -53,6 +58,14 @@ pub(crate) fn check_closed(wall: &SurfaceMesh) -> Result<()> {
     {
         return Err(Error::Mesh(format!("triangle {i} names a vertex that does not exist")));
     }
+    Ok(())
+}
+
+/// Checks that signed depth means anything: the wall is closed and outward.
+///
+/// # Errors
+/// [`Error::Mesh`] saying what is wrong.
+pub(crate) fn check_closed(wall: &SurfaceMesh) -> Result<()> {
     // Vertices at the same place count as one: files often repeat them for every triangle.
     let mut first: HashMap<[u64; 3], usize> = HashMap::with_capacity(wall.vertices_mm.len());
     let place = |v: &Vec3| [v.x + 0.0, v.y + 0.0, v.z + 0.0].map(f64::to_bits);

@@ -1,28 +1,41 @@
 //! Frames through wgpu.
-use crate::image::Image;
-use crate::renderer::Engine;
-use crate::scene::{RefinedDevice, Setup};
-use endowire_core::Result;
-pub(crate) struct GpuEngine;
-impl GpuEngine {
-    pub(crate) fn new(_: &Setup, _: bool) -> std::result::Result<Self, String> {
-        Err("none".into())
+
+mod context;
+mod fluoro;
+mod view3d;
+
+use crate::renderer::Engines;
+use crate::scene::Setup;
+use crate::xray::SUBRAYS;
+use context::Gpu;
+use fluoro::GpuFluoro;
+use view3d::GpuView3d;
+
+/// Opens an adapter and prepares the views of `setup`; software adapters only where `software` allows them.
+///
+/// # Errors
+/// Why there is no fitting adapter, as a clause.
+pub(crate) fn engines(setup: &Setup, software: bool) -> Result<Engines, String> {
+    let mut features = wgpu::Features::empty();
+    if setup.fluoro.is_some() {
+        features |= wgpu::Features::FLOAT32_BLENDABLE;
     }
-}
-impl Engine for GpuEngine {
-    fn describe(&self) -> String {
-        String::new()
+    let gpu = Gpu::open(features, software)?;
+    let fluoro_size = setup.fluoro.as_ref().map(|f| f.c_arm.size_px().map(|n| n * SUBRAYS));
+    let camera_size = setup.camera.as_ref().map(|c| c.size_px);
+    let most = gpu.device.limits().max_texture_dimension_2d;
+    for side in [fluoro_size, camera_size].into_iter().flatten().flatten() {
+        if side > most {
+            return Err(format!("{} draws at most {most} pixels a side, {side} are needed", gpu.name()));
+        }
     }
-    fn fluoro(&mut self, _: &[RefinedDevice]) -> Result<Option<Image>> {
-        Ok(None)
+    let mut engines = Engines { fluoro: None, three_d: None, name: gpu.name().to_string() };
+    if let Some(fluoro) = &setup.fluoro {
+        engines.fluoro = Some(Box::new(GpuFluoro::new(&gpu, fluoro, &setup.wall)));
     }
-    fn three_d(&mut self, _: &[RefinedDevice]) -> Result<Option<Image>> {
-        Ok(None)
+    if let Some(camera) = &setup.camera {
+        engines.three_d = Some(Box::new(GpuView3d::new(&gpu, camera, &setup.wall)));
     }
-    fn lumen_path(&mut self, _: &Setup) -> Result<Vec<f32>> {
-        Ok(vec![])
-    }
-    fn device_path(&mut self, _: &Setup, _: &RefinedDevice) -> Result<Vec<f32>> {
-        Ok(vec![])
-    }
+    gpu.check().map_err(|e| format!("{}: {e}", gpu.name()))?;
+    Ok(engines)
 }

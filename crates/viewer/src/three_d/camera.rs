@@ -12,7 +12,8 @@ const FILL: f64 = 0.88;
 /// Where the camera looks from unless told: front, slightly from the left and above.
 const AZIMUTH_DEG: f64 = 25.0;
 const ELEVATION_DEG: f64 = 18.0;
-/// A view that shows less than this part of the largest possible spread of the vessel is exchanged for one across its plane.
+/// A view that shows less than this part of the largest possible spread of the vessel is exchanged for one
+/// across its plane.
 const LEAST_SPREAD: f64 = 0.6;
 /// Part of the distance to the vessel that is kept free in front of the camera.
 const NEAR: f64 = 0.02;
@@ -45,8 +46,9 @@ impl Camera {
         let longer = f64::from(size_px[0].max(size_px[1]));
         let tangents = size_px.map(|n| HALF_ANGLE_DEG.to_radians().tan() * f64::from(n) / longer);
 
-        // A vertex at (x, y, z) is in the frame of an eye at (cx, cy, D) when |x − cx| ≤ k (D − z): the extremes of x + kz and
-        // −x + kz give the tightest D and the centre that goes with it, for each direction alone.
+        // A vertex at (x, y, z) is in the frame of an eye at (cx, cy, D) when |x − cx| ≤ k (D − z): the
+        // extremes of x + kz and −x + kz give the tightest D and the centre that goes with it, for each
+        // direction alone.
         let local: Vec<[f64; 3]> = wall.vertices_mm.iter().map(|v| axes.map(|axis| v.dot(&axis))).collect();
         let fit = |side: usize| {
             let k = tangents[side] * FILL;

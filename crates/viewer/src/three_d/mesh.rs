@@ -7,13 +7,15 @@ use endowire_core::vessel::SurfaceMesh;
 use crate::device::DevicePoint;
 use crate::three_d::Camera;
 
-/// Faces that meet at a sharper angle than the one with this cosine (40°) keep their edge: a cap on a tube stays flat.
+/// Faces that meet at a sharper angle than the one with this cosine (40°) keep their edge: a cap on a tube
+/// stays flat.
 const CREASE: f64 = 0.766;
 /// Corners of a device's cross section.
 const SIDES: usize = 14;
 /// Rings of each rounded end.
 const CAP_RINGS: usize = 4;
-/// Least width of a device on screen, pixels: half a millimetre of wire in a long scene would vanish otherwise.
+/// Least width of a device on screen, pixels: half a millimetre of wire in a long scene would vanish
+/// otherwise.
 const LEAST_WIDTH_PX: f64 = 2.4;
 
 /// A corner of a triangle.

@@ -1,9 +1,11 @@
-//! How surfaces of the 3D view look. The WGSL shader holds the same formulas, and reads the same numbers as a uniform.
+//! How surfaces of the 3D view look. The WGSL shader holds the same formulas, and reads the same numbers as a
+//! uniform.
 //!
-//! **Wall.** A thin sheet lit from the upper left, more opaque where it is seen edge-on (a light path through a sheet grows as
-//! 1/cos), which draws the silhouettes that make a translucent tube readable. Farther parts fade to the background. **Order
-//! independence** is that of McGuire and Bavoil (Journal of Computer Graphics Techniques 2(2), 2013): the colours in front of
-//! the opaque scene are averaged with weights αw that fall with distance, and cover it by 1 − Π(1 − α).
+//! **Wall.** A thin sheet lit from the upper left, more opaque where it is seen edge-on (a light path through
+//! a sheet grows as 1/cos), which draws the silhouettes that make a translucent tube readable. Farther parts
+//! fade to the background. **Order independence** is that of McGuire and Bavoil (Journal of Computer Graphics
+//! Techniques 2(2), 2013): the colours in front of the opaque scene are averaged with weights αw that fall
+//! with distance, and cover it by 1 − Π(1 − α).
 //!
 //! Colours are display values, blended as they are.
 
@@ -36,10 +38,10 @@ impl Style {
         let [front, rear] = camera.wall_range.map(|d| d as f32);
         Self {
             background: Vec4::new(0.965, 0.972, 0.980, 0.45),
-            wall: Vec4::new(0.86, 0.36, 0.31, 0.45),
+            wall: Vec4::new(0.88, 0.35, 0.30, 0.50),
             device: Vec4::new(0.10, 0.16, 0.30, 0.55),
             lamp: Vec3::new(-0.45, 0.62, 0.64).normalize().extend(0.35),
-            sheet: Vec4::new(0.16, 0.80, 2.2, 0.80),
+            sheet: Vec4::new(0.22, 0.85, 2.0, 0.72),
             frustum: Vec4::new(tx, ty, front, rear),
             planes: Vec4::new(camera.near as f32, camera.far as f32, 0.0, 0.0),
         }

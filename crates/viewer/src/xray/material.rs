@@ -1,9 +1,10 @@
 //! Linear attenuation coefficients.
 //!
-//! The table holds values of xraylib 4.3 (Schoonjans et al., Spectrochimica Acta B 66, 2011, 776–784) at 40, 50, 60 and
-//! 80 keV. Photoelectric and Compton attenuation are close to power laws of the energy, so between the entries
-//! ln μ is interpolated linearly in ln E. That holds between K-edges only: platinum (78.4 keV) and tungsten
-//! (69.5 keV) jump between the last two entries, where no value is given rather than a wrong one.
+//! The table holds values of xraylib 4.3 (Schoonjans et al., Spectrochimica Acta B 66, 2011, 776–784) at 40,
+//! 50, 60 and 80 keV. Photoelectric and Compton attenuation are close to power laws of the energy, so between
+//! the entries ln μ is interpolated linearly in ln E. That holds between K-edges only: platinum (78.4 keV)
+//! and tungsten (69.5 keV) jump between the last two entries, where no value is given rather than a wrong
+//! one.
 
 use std::fmt;
 use std::str::FromStr;
@@ -76,7 +77,8 @@ impl Material {
     /// Linear attenuation coefficient in 1/mm at `energy_kev`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] outside 40 to 80 keV, and between 60 and 80 keV for a material whose K-edge lies there.
+    /// [`Error::Parameter`] outside 40 to 80 keV, and between 60 and 80 keV for a material whose K-edge lies
+    /// there.
     pub fn attenuation_per_mm(self, energy_kev: f64) -> Result<f64> {
         const KEY: &str = "view.xray.energy_kev";
         let (_, name, mu, k_edge) = self.row();

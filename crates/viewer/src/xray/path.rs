@@ -4,8 +4,9 @@ use crate::xray::Material;
 
 /// Length of each pixel's central ray inside each thing, in millimetres, row by row from the top left.
 ///
-/// Lengths are geometric, before nesting: `lumen_mm` is the length inside the closed wall whatever device lies there.
-/// A device displaces what fills the lumen, so the length through blood is `lumen_mm` minus those of the devices.
+/// Lengths are geometric, before nesting: `lumen_mm` is the length inside the closed wall whatever device
+/// lies there. A device displaces what fills the lumen, so the length through blood is `lumen_mm` minus those
+/// of the devices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathLengths {
     /// Pixels a row.

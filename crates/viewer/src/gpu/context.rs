@@ -1,0 +1,222 @@
+//! An adapter, its device and queue, and a way back for pixels.
+//!
+//! wgpu reports most failures outside the call that caused them and panics where nobody listens. Here a
+//! handler keeps the first report, and every read-back returns it as an error: a failing adapter costs a
+//! frame, never the program.
+
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+
+use endowire_core::{Error, Result};
+
+/// The first failure an adapter has reported.
+type Failure = Arc<Mutex<Option<String>>>;
+
+/// An open graphics device; clones share it.
+#[derive(Debug, Clone)]
+pub(crate) struct Gpu {
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    name: String,
+    failure: Failure,
+}
+
+impl Gpu {
+    /// Opens the best adapter that has `features`: discrete before integrated before others; software
+    /// adapters last, and only where `software` allows them.
+    ///
+    /// # Errors
+    /// Why there is none, as a clause.
+    pub(crate) fn open(features: wgpu::Features, software: bool) -> std::result::Result<Self, String> {
+        let descriptor = wgpu::InstanceDescriptor {
+            flags: wgpu::InstanceFlags::empty(),
+            ..wgpu::InstanceDescriptor::new_without_display_handle()
+        };
+        let instance = wgpu::Instance::new(descriptor);
+        let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+        adapters.retain(|a| software || a.get_info().device_type != wgpu::DeviceType::Cpu);
+        if adapters.is_empty() {
+            return Err("no graphics adapter was found".into());
+        }
+        adapters.retain(|a| a.features().contains(features));
+        let Some(adapter) = adapters.into_iter().min_by_key(|a| match a.get_info().device_type {
+            wgpu::DeviceType::DiscreteGpu => 0,
+            wgpu::DeviceType::IntegratedGpu => 1,
+            wgpu::DeviceType::VirtualGpu => 2,
+            wgpu::DeviceType::Other => 3,
+            wgpu::DeviceType::Cpu => 4,
+        }) else {
+            return Err(format!("no graphics adapter offers {features:?}"));
+        };
+        let info = adapter.get_info();
+        let request = adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("endowire"),
+            required_features: features,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        });
+        let (device, queue) = pollster::block_on(request).map_err(|e| format!("{}: {e}", info.name))?;
+        let failure = Failure::default();
+        let report = |failure: &Failure, text: String| {
+            failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
+        };
+        let heard = failure.clone();
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| report(&heard, error.to_string())));
+        let heard = failure.clone();
+        device.set_device_lost_callback(move |reason, text| {
+            report(&heard, format!("the device was lost ({reason:?}) {text}"));
+        });
+        Ok(Self { device, queue, name: format!("{:?} {}", info.backend, info.name), failure })
+    }
+
+    /// Graphics interface and adapter.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What the adapter has reported so far, as an error.
+    pub(crate) fn check(&self) -> Result<()> {
+        match self.failure.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
+            Some(text) => Err(Error::Computation(text.clone())),
+            None => Ok(()),
+        }
+    }
+
+    pub(crate) fn buffer(&self, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        use wgpu::util::DeviceExt;
+        let label = Some("endowire");
+        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label, contents, usage })
+    }
+
+    /// A texture that is drawn into, then sampled or copied.
+    pub(crate) fn target(&self, size: [u32; 2], format: wgpu::TextureFormat, samples: u32) -> wgpu::Texture {
+        let mut usage = wgpu::TextureUsages::RENDER_ATTACHMENT;
+        if samples == 1 {
+            usage |= wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        }
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: samples,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        })
+    }
+
+    pub(crate) fn shader(&self, source: &'static str) -> wgpu::ShaderModule {
+        self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: None,
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        })
+    }
+
+    /// A bind group of a pipeline's group 0, with the resources at bindings 0, 1, ….
+    pub(crate) fn bind(
+        &self,
+        pipeline: &wgpu::RenderPipeline,
+        resources: &[wgpu::BindingResource<'_>],
+    ) -> wgpu::BindGroup {
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
+            .collect();
+        let layout = pipeline.get_bind_group_layout(0);
+        let descriptor = wgpu::BindGroupDescriptor { label: None, layout: &layout, entries: &entries };
+        self.device.create_bind_group(&descriptor)
+    }
+
+    /// Submits `encoder` and returns the bytes of `texture` after it, rows without padding.
+    pub(crate) fn read_back(
+        &self,
+        mut encoder: wgpu::CommandEncoder,
+        texture: &wgpu::Texture,
+    ) -> Result<Vec<u8>> {
+        let size = texture.size();
+        let row = size.width * texture.format().block_copy_size(None).unwrap_or(4);
+        let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: u64::from(padded) * u64::from(size.height),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let layout =
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: None };
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+            size,
+        );
+        self.queue.submit([encoder.finish()]);
+        self.check()?;
+        let failed = |what: &str| Error::Computation(format!("reading a frame back: {what}"));
+        let (sender, receiver) = mpsc::channel();
+        // The receiver outlives the callback unless this function has returned with an error; then nobody
+        // waits.
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(&e.to_string()))?;
+        match receiver.try_recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(failed(&error.to_string())),
+            Err(_) => return Err(failed("the adapter did not answer")),
+        }
+        self.check()?;
+        let mapped = buffer.get_mapped_range(..).map_err(|e| failed(&e.to_string()))?;
+        let mut data = Vec::with_capacity(row as usize * size.height as usize);
+        mapped.chunks_exact(padded as usize).for_each(|line| data.extend_from_slice(&line[..row as usize]));
+        Ok(data)
+    }
+}
+
+/// A render pass over one texture that starts from `clear`, or from what is there.
+pub(crate) fn color_pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    view: &wgpu::TextureView,
+    clear: wgpu::Color,
+) -> wgpu::RenderPass<'a> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &[Some(attachment(view, None, clear))],
+        ..Default::default()
+    })
+}
+
+/// A colour attachment that starts from `clear`; with a `resolve` target only the resolved texture is kept.
+pub(crate) fn attachment<'a>(
+    view: &'a wgpu::TextureView,
+    resolve_target: Option<&'a wgpu::TextureView>,
+    clear: wgpu::Color,
+) -> wgpu::RenderPassColorAttachment<'a> {
+    let store = if resolve_target.is_some() { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store };
+    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store };
+    wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target, ops }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_destroyed_device_gives_an_error_and_no_panic() {
+        let gpu = match Gpu::open(wgpu::Features::empty(), true) {
+            Ok(gpu) => gpu,
+            Err(reason) => {
+                let required = std::env::var("ENDOWIRE_REQUIRE_GPU").is_ok_and(|v| v == "1");
+                assert!(!required, "ENDOWIRE_REQUIRE_GPU=1, but {reason}");
+                eprintln!("skipped: {reason}");
+                return;
+            }
+        };
+        let read = || {
+            let texture = gpu.target([8, 8], wgpu::TextureFormat::R8Unorm, 1);
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let view = texture.create_view(&Default::default());
+            drop(color_pass(&mut encoder, &view, wgpu::Color::WHITE));
+            gpu.read_back(encoder, &texture)
+        };
+        assert_eq!(read().unwrap(), [255; 64]);
+        gpu.device.destroy();
+        assert!(matches!(read(), Err(Error::Computation(_))));
+    }
+}

@@ -1,0 +1,211 @@
+//! The 3D view through wgpu: devices with a depth buffer, then the wall in any order, then both together.
+
+use endowire_core::Result;
+use endowire_core::vessel::SurfaceMesh;
+
+use crate::gpu::context::{Gpu, attachment, color_pass};
+use crate::image::{Image, PixelFormat};
+use crate::renderer::ThreeDEngine;
+use crate::scene::RefinedDevice;
+use crate::three_d::{Camera, Style, Vertex, device_triangles, wall_triangles};
+
+/// The only count every adapter has.
+const SAMPLES: u32 = 4;
+const COLOUR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Weighted sum of colours and weights.
+const SUM: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+/// Product of what fragments let through.
+const THROUGH: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
+
+/// Pipelines, wall and targets of the 3D view.
+#[derive(Debug)]
+pub(crate) struct GpuView3d {
+    gpu: Gpu,
+    camera: Camera,
+    background: wgpu::Color,
+    wall: wgpu::Buffer,
+    draw_device: wgpu::RenderPipeline,
+    device_group: wgpu::BindGroup,
+    draw_wall: wgpu::RenderPipeline,
+    wall_group: wgpu::BindGroup,
+    compose: wgpu::RenderPipeline,
+    compose_group: wgpu::BindGroup,
+    /// Multisampled colour, depth, sum and product.
+    sampled: [wgpu::TextureView; 4],
+    /// Resolved colour, sum and product.
+    resolved: [wgpu::TextureView; 3],
+    picture: wgpu::Texture,
+}
+
+impl GpuView3d {
+    pub(crate) fn new(gpu: &Gpu, camera: &Camera, wall: &SurfaceMesh) -> Self {
+        let style = Style::new(camera);
+        let uniform = gpu.buffer(bytemuck::cast_slice(&style.uniform()), wgpu::BufferUsages::UNIFORM);
+        let vertices = wall_triangles(camera, wall);
+        let wall = gpu.buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX);
+        let view =
+            |format, samples| gpu.target(camera.size_px, format, samples).create_view(&Default::default());
+        let sampled = [COLOUR, DEPTH, SUM, THROUGH].map(|format| view(format, SAMPLES));
+        let resolved = [COLOUR, SUM, THROUGH].map(|format| view(format, 1));
+
+        let shader = gpu.shader(include_str!("view3d.wgsl"));
+        let draw_device = pipeline(gpu, &shader, Stage::Device);
+        let draw_wall = pipeline(gpu, &shader, Stage::Wall);
+        let compose = pipeline(gpu, &shader, Stage::Compose);
+        let device_group = gpu.bind(&draw_device, &[uniform.as_entire_binding()]);
+        let wall_group = gpu.bind(&draw_wall, &[uniform.as_entire_binding()]);
+        let compose_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &compose.get_bind_group_layout(0),
+            entries: &[1, 2, 3].map(|binding| wgpu::BindGroupEntry {
+                binding,
+                resource: wgpu::BindingResource::TextureView(&resolved[binding as usize - 1]),
+            }),
+        });
+        let [r, g, b] = style.background().to_array().map(f64::from);
+        Self {
+            gpu: gpu.clone(),
+            camera: camera.clone(),
+            background: wgpu::Color { r, g, b, a: 1.0 },
+            wall,
+            draw_device,
+            device_group,
+            draw_wall,
+            wall_group,
+            compose,
+            compose_group,
+            sampled,
+            resolved,
+            picture: gpu.target(camera.size_px, COLOUR, 1),
+        }
+    }
+}
+
+impl ThreeDEngine for GpuView3d {
+    fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image> {
+        let Self { gpu, camera, .. } = self;
+        let vertices: Vec<Vertex> =
+            devices.iter().flat_map(|device| device_triangles(camera, &device.points)).collect();
+        let buffer = (!vertices.is_empty())
+            .then(|| gpu.buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX));
+        let [colour, depth, sum, through] = &self.sampled;
+        let [resolved_colour, resolved_sum, resolved_through] = &self.resolved;
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("devices"),
+                color_attachments: &[Some(attachment(colour, Some(resolved_colour), self.background))],
+                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                    view: depth,
+                    depth_ops: Some(wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(1.0),
+                        store: wgpu::StoreOp::Store,
+                    }),
+                    stencil_ops: None,
+                }),
+                ..Default::default()
+            });
+            if let Some(buffer) = &buffer {
+                pass.set_pipeline(&self.draw_device);
+                pass.set_bind_group(0, &self.device_group, &[]);
+                pass.set_vertex_buffer(0, buffer.slice(..));
+                pass.draw(0..vertices.len() as u32, 0..1);
+            }
+        }
+        {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("wall"),
+                color_attachments: &[
+                    Some(attachment(sum, Some(resolved_sum), wgpu::Color::TRANSPARENT)),
+                    Some(attachment(through, Some(resolved_through), wgpu::Color::WHITE)),
+                ],
+                // Without operations the depth buffer is read, not written.
+                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                    view: depth,
+                    depth_ops: None,
+                    stencil_ops: None,
+                }),
+                ..Default::default()
+            });
+            pass.set_pipeline(&self.draw_wall);
+            pass.set_bind_group(0, &self.wall_group, &[]);
+            pass.set_vertex_buffer(0, self.wall.slice(..));
+            pass.draw(0..(self.wall.size() / size_of::<Vertex>() as u64) as u32, 0..1);
+        }
+        {
+            let target = self.picture.create_view(&Default::default());
+            let mut pass = color_pass(&mut encoder, &target, wgpu::Color::BLACK);
+            pass.set_pipeline(&self.compose);
+            pass.set_bind_group(0, &self.compose_group, &[]);
+            pass.draw(0..3, 0..1);
+        }
+        let data = gpu.read_back(encoder, &self.picture)?;
+        Ok(Image::new(camera.size_px[0], camera.size_px[1], PixelFormat::Rgba8, data))
+    }
+}
+
+/// What a pipeline draws.
+#[derive(Clone, Copy, PartialEq)]
+enum Stage {
+    Device,
+    Wall,
+    Compose,
+}
+
+fn pipeline(gpu: &Gpu, shader: &wgpu::ShaderModule, stage: Stage) -> wgpu::RenderPipeline {
+    let (vertex, fragment) = match stage {
+        Stage::Device => ("surface", "device"),
+        Stage::Wall => ("surface", "wall"),
+        Stage::Compose => ("everywhere", "compose"),
+    };
+    let blended = |format, src_factor, dst_factor| {
+        let component = wgpu::BlendComponent { src_factor, dst_factor, operation: wgpu::BlendOperation::Add };
+        let blend = Some(wgpu::BlendState { color: component, alpha: component });
+        Some(wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL })
+    };
+    let targets = match stage {
+        Stage::Wall => vec![
+            blended(SUM, wgpu::BlendFactor::One, wgpu::BlendFactor::One),
+            blended(THROUGH, wgpu::BlendFactor::Zero, wgpu::BlendFactor::Src),
+        ],
+        Stage::Device | Stage::Compose => vec![Some(COLOUR.into())],
+    };
+    let layout = wgpu::VertexBufferLayout {
+        array_stride: size_of::<Vertex>() as u64,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
+    };
+    let surface = stage != Stage::Compose;
+    let buffers = [Some(layout)];
+    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(fragment),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: shader,
+            entry_point: Some(vertex),
+            compilation_options: Default::default(),
+            buffers: if surface { &buffers } else { &[] },
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: surface.then(|| wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(stage == Stage::Device),
+            depth_compare: Some(wgpu::CompareFunction::Less),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: wgpu::MultisampleState {
+            count: if surface { SAMPLES } else { 1 },
+            ..Default::default()
+        },
+        fragment: Some(wgpu::FragmentState {
+            module: shader,
+            entry_point: Some(fragment),
+            compilation_options: Default::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
