@@ -4,6 +4,10 @@
 //! multiples of the element length from the tip, as marks on the device, and enter with it; only the first element,
 //! between the sheath and the first such node, has another length: between half and one and a half elements, so that
 //! no sliver arises.
+//!
+//! It also leaves open what collides. A node does here if its surface is beyond the wall before or after the
+//! translation: seen only after it, pulling would lift every node off the outside of a bend, and the next solve would
+//! shoot the wire straight through the wall.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +17,7 @@ use crate::device::Device;
 use crate::insertion::{Command, Contact, Energy, StepReport, Surroundings};
 use crate::methods::Method;
 use crate::shape::Shape;
+use crate::vessel::WallQuery;
 use crate::{Error, Result, Vec3};
 
 /// Options of the paper's method.
@@ -67,6 +72,34 @@ pub struct Li2011 {
     from_tip_mm: Vec<f64>,
     positions_mm: Vec<Vec3>,
     tangents: Vec<Vec3>,
+    /// The wall that each node is beyond in the last equilibrium, **tip first**: so nodes keep their index.
+    beyond: Vec<Option<Plane>>,
+}
+
+/// The plane of a wall triangle, offset by the device's radius.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    normal: Vec3,
+    offset_mm: f64,
+    triangle: u32,
+}
+
+impl Plane {
+    /// The plane of the triangle nearest to `x`, if a surface of radius `radius_mm` about `x` is beyond it.
+    ///
+    /// Past the end of the vessel there is no wall.
+    fn beyond(query: &WallQuery, x: &Vec3, radius_mm: f64) -> Option<Self> {
+        let x = &x.map(|c| (c / DETECTION_GRID_MM).round() * DETECTION_GRID_MM);
+        let near = query.nearest(x, REACH_MM).filter(|near| !near.rim)?;
+        let normal = query.inward_normal(near.triangle);
+        let plane = Self { normal, offset_mm: normal.dot(&near.point_mm) + radius_mm, triangle: near.triangle };
+        (plane.depth_mm(x) > DETECTION_GRID_MM).then_some(plane)
+    }
+
+    /// How far `x` is beyond the plane, mm.
+    fn depth_mm(&self, x: &Vec3) -> f64 {
+        self.offset_mm - self.normal.dot(x)
+    }
 }
 
 impl Li2011 {
@@ -111,6 +144,7 @@ impl Li2011 {
             from_tip_mm: Vec::new(),
             positions_mm: Vec::new(),
             tangents: Vec::new(),
+            beyond: Vec::new(),
         })
     }
 
@@ -131,8 +165,7 @@ impl Li2011 {
         self.positions_mm.clear();
         let mut element = 0;
         for &s in &self.from_tip_mm[1..] {
-            let x = on_curve(&self.shape, s, &mut element) + displacement;
-            self.positions_mm.push(x.map(|c| (c / DETECTION_GRID_MM).round() * DETECTION_GRID_MM));
+            self.positions_mm.push(on_curve(&self.shape, s, &mut element) + displacement);
         }
 
         self.chain.lengths_mm.clear();
@@ -149,16 +182,14 @@ impl Li2011 {
     /// Step 3: the nodes whose surface is beyond the wall, each with the plane of its nearest triangle.
     fn collide(&mut self, surroundings: &Surroundings<'_>) {
         self.chain.contacts.clear();
+        let nodes = self.positions_mm.len();
         for (index, x) in self.positions_mm.iter().enumerate() {
-            let radius = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
-            let Some(near) = surroundings.query.nearest(x, REACH_MM) else { continue };
-            if near.rim {
-                continue;
-            }
-            let normal = surroundings.query.inward_normal(near.triangle);
-            let offset_mm = normal.dot(&near.point_mm) + radius;
-            if normal.dot(x) < offset_mm {
-                self.chain.contacts.push(PlaneContact { node: index + 1, normal, offset_mm, triangle: near.triangle });
+            let radius_mm = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
+            let before = self.beyond.get(nodes - 1 - index).copied().flatten();
+            if let Some(Plane { normal, offset_mm, triangle }) =
+                Plane::beyond(surroundings.query, x, radius_mm).or(before)
+            {
+                self.chain.contacts.push(PlaneContact { node: index + 1, normal, offset_mm, triangle });
             }
         }
     }
@@ -227,13 +258,12 @@ impl Li2011 {
             _ => 0.0,
         };
         report.max_penetration_mm = 0.0;
-        for (x, s) in self.positions_mm.iter().zip(&self.from_tip_mm[1..]) {
-            let radius = surroundings.device.section_at(*s).radius_mm;
-            if let Some(near) = surroundings.query.nearest(x, REACH_MM)
-                && !near.rim
-            {
-                report.max_penetration_mm = report.max_penetration_mm.max(radius - near.distance_mm);
-            }
+        self.beyond.clear();
+        for (x, s) in self.positions_mm.iter().zip(&self.from_tip_mm[1..]).rev() {
+            let plane = Plane::beyond(surroundings.query, x, surroundings.device.section_at(*s).radius_mm);
+            let depth_mm = plane.map_or(0.0, |plane| plane.depth_mm(x));
+            report.max_penetration_mm = report.max_penetration_mm.max(depth_mm);
+            self.beyond.push(plane);
         }
     }
 }
