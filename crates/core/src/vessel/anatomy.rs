@@ -39,7 +39,8 @@ pub fn asset_resolution(name: &str) -> Resolution {
     match name {
         "straight_tube" => Resolution::EdgeMm(1.25),
         "curved_tube" => Resolution::EdgeMm(1.2),
-        _ => Resolution::Triangles(20_000),
+        "aortic_arch" => Resolution::EdgeMm(2.25),
+        _ => Resolution::EdgeMm(1.05),
     }
 }
 

@@ -10,8 +10,8 @@
 use super::curve::Branch;
 use crate::Vec3;
 
-/// Blend width over the radius of the thinner branch: a fillet of about the child's radius at a right-angled fork.
-const BLEND: f64 = 0.8;
+/// Blend width over the radius of the thinner branch: makes a fillet of about that radius at a right-angled fork.
+const BLEND: f64 = 1.4;
 
 /// Cosines of the angle between gradients at which blending begins and is complete: 20° and 60°.
 const BLEND_COSINES: [f64; 2] = [0.94, 0.5];
