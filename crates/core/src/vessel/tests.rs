@@ -247,10 +247,19 @@ fn a_real_carotid_surface_is_repaired_and_its_ends_found() {
     let Some(path) = shared("carotids.stl") else { return };
     let surface = SurfaceMesh::read(&path, 1.0).unwrap();
     let wall = Wall::from_surface(&surface).unwrap();
-    eprintln!("{:?}\n{:?}", wall.report(), wall.report().notes());
-    for o in wall.openings() {
-        eprintln!("{} {:?} r={} {:?} {}", o.index, o.centre_mm, o.radius_mm, o.direction, o.boundary.len());
+    // A common carotid that divides in two, as shipped wound inwards throughout.
+    let report = wall.report();
+    assert_eq!((report.components, report.non_manifold_edges, report.stray_edges), (1, 0, 0));
+    assert!(report.inside_out && report.vertices_welded > 5000, "{report:?}");
+    let radii: Vec<f64> = wall.openings().iter().map(|o| o.radius_mm).collect();
+    assert!(radii.len() == 3 && radii.iter().all(|r| (2.5..5.5).contains(r)), "{radii:?}");
+    for opening in wall.openings() {
+        let inside = opening.centre_mm - opening.direction;
+        assert!(
+            wall.contains(&inside).unwrap()
+                && !wall.contains(&(opening.centre_mm + opening.direction)).unwrap()
+        );
     }
-    eprintln!("{:?}", check(&surface).unwrap());
-    eprintln!("{} {:?}", wall.volume_mm3(), wall.mesh().bounds_mm());
+    let checked = check(&surface).unwrap();
+    assert!((checked.volume_mm3 - wall.volume_mm3()).abs() < 1e-9 && checked.inside_out);
 }

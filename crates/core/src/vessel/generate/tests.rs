@@ -87,8 +87,9 @@ fn away_from_forks_the_radius_is_kept_and_the_far_wall_does_not_bulge() {
     for (angle, trunk, branch) in [(90.0, 6.0, 3.0), (50.0, 5.0, 4.9)] {
         let made = generate(&fork(angle, trunk, branch), 1.0);
         let off = |v: &&Vec3| (v.x.hypot(v.y) / trunk - 1.0).abs();
-        let far = made.wall.mesh().vertices_mm.iter().filter(|v| v.z < 25.0 || v.x < -0.3 * trunk);
-        assert!(far.map(|v| off(&v)).fold(0.0, f64::max) < 5e-3);
+        let far = made.wall.mesh().vertices_mm.iter().filter(|v| v.z < 30.0 || v.x < -0.3 * trunk);
+        let worst = far.max_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+        assert!(off(&worst) < 5e-3, "{angle}: {worst} {}", off(&worst));
         // The twin: at the fork itself the wall does leave the trunk's cylinder.
         assert!(made.wall.mesh().vertices_mm.iter().any(|v| off(&v) > 0.1));
     }
@@ -126,9 +127,10 @@ fn a_triangle_count_is_met_and_thin_branches_stay_resolved() {
 
 #[test]
 fn an_end_inside_another_branch_and_a_tight_bend_are_refused_by_row() {
-    let buried = fork(90.0, 30.0, 3.0);
-    let message = GeneratedWall::new(&buried, Resolution::EdgeMm(1.0)).map(|_| ()).unwrap_err().to_string();
-    assert!(message.is_empty() || message.starts_with("centreline row"), "{message}");
+    // The branch is 40 mm long and does not get out of a trunk of 41 mm.
+    let message =
+        GeneratedWall::new(&fork(90.0, 41.0, 3.0), Resolution::EdgeMm(1.0)).unwrap_err().to_string();
+    assert!(message.starts_with("centreline row 4"), "{message}");
     let hairpin = tree(&[
         ([0., 0., 0.], 5.0, -1),
         ([0., 0., 30.], 5.0, 0),
