@@ -20,6 +20,8 @@ const ROUNDS: usize = 6;
 const PASSES: usize = 12;
 /// Edges shorter than this fraction of the target go, and none longer than that fraction may arise (Botsch and Kobbelt: 4/5, 4/3).
 const SHORT: f64 = 0.8;
+/// Where the grid is as coarse as wanted, one round takes out only the stumps that cuts and grazing cells leave.
+const STUMP: f64 = 0.45;
 const LONG: f64 = 1.4;
 /// Cosine by which a triangle may turn in a collapse or flip.
 const LEAST_COSINE: f64 = 0.8;
@@ -61,9 +63,10 @@ impl Coarsener<'_> {
                 target: self.target(v),
             })
             .collect();
-        for _ in 0..ROUNDS {
+        let (rounds, short) = if self.nets.edge < self.edge { (ROUNDS, SHORT) } else { (1, STUMP) };
+        for _ in 0..rounds {
             for _ in 0..PASSES {
-                if self.collapse(mesh, &mut info) == 0 {
+                if self.collapse(mesh, &mut info, short) == 0 {
                     break;
                 }
             }
@@ -93,7 +96,7 @@ impl Coarsener<'_> {
     }
 
     /// One pass of collapses, shortest edges (relative to their target) first; returns how many.
-    fn collapse(&self, mesh: &mut SurfaceMesh, info: &mut [Vertex]) -> usize {
+    fn collapse(&self, mesh: &mut SurfaceMesh, info: &mut [Vertex], shortest: f64) -> usize {
         let around = triangles_around(mesh);
         let mut short: Vec<(f64, u32, u32, bool)> = EdgeTable::new(&mesh.triangles)
             .edges()
@@ -101,7 +104,7 @@ impl Coarsener<'_> {
             .filter_map(|(a, b, open)| {
                 let wanted = info[a as usize].target.min(info[b as usize].target);
                 let length = (mesh.vertices_mm[a as usize] - mesh.vertices_mm[b as usize]).norm();
-                (length < SHORT * wanted).then_some((length / wanted, a, b, open))
+                (length < shortest * wanted).then_some((length / wanted, a, b, open))
             })
             .collect();
         short.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));

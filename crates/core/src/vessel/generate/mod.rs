@@ -56,7 +56,8 @@ const COUNT_TOLERANCE: f64 = 0.02;
 /// How fine a generated wall is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Resolution {
-    /// Typical length of an edge in mm.
+    /// Typical length of an edge in mm. In a tree with forks, branches thinner than this resolves get shorter edges, about ten
+    /// around.
     EdgeMm(f64),
     /// Number of triangles, met within 2 % where the geometry allows it.
     Triangles(usize),
@@ -82,7 +83,7 @@ impl GeneratedWall {
     /// implicit surface of the same radius; both within 1e-6 mm. Ends are cut flat across the centre line.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for an edge length that is not positive, larger than the smallest radius, or so small that more than
+    /// [`Error::Parameter`] for an edge length that is not positive, larger than the largest radius, or so small that more than
     /// five million triangles would come out; for a bend tighter than the vessel is wide; for a branch that ends
     /// inside another one. [`Error::Mesh`] if branches come so close that the grid cannot tell them apart.
     pub fn new(tree: &CentrelineTree, resolution: Resolution) -> Result<Self> {
@@ -177,10 +178,8 @@ fn implicit_mesh(field: &Field, ends: &[End], edge: f64) -> Result<SurfaceMesh> 
     }
     let spacing = edge.min(GRID_PER_RADIUS * smallest_radius(&field.branches));
     let (nets, mut mesh) = manifold_nets(field, ends, spacing)?;
-    if spacing < edge {
-        coarsen::Coarsener { field, nets: &nets, ends, edge }.run(&mut mesh);
-        drop_unreferenced(&mut mesh);
-    }
+    coarsen::Coarsener { field, nets: &nets, ends, edge }.run(&mut mesh);
+    drop_unreferenced(&mut mesh);
     let off = |v: &Vec3| nets.with_local(field, v, |local| field.value(local, v)).f.abs();
     let worst = mesh.vertices_mm.iter().map(off).fold(0.0, f64::max);
     if worst > GUARANTEED_MM {
