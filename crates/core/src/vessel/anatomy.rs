@@ -39,7 +39,8 @@ pub fn asset_resolution(name: &str) -> Resolution {
     match name {
         "straight_tube" => Resolution::EdgeMm(1.25),
         "curved_tube" => Resolution::EdgeMm(1.2),
-        _ => Resolution::Triangles(20_000),
+        "aortic_arch" => Resolution::EdgeMm(2.25),
+        _ => Resolution::EdgeMm(1.05),
     }
 }
 
@@ -221,5 +222,67 @@ impl Course {
         self.nodes.push(CentrelineNode { position_mm, radius_mm, parent: Some(self.at) });
         self.at = self.nodes.len() - 1;
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::vessel::{GeneratedWall, SurfaceMesh, check};
+
+    fn asset(name: &str) -> PathBuf {
+        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels").join(name)
+    }
+
+    #[test]
+    fn every_built_in_vessel_has_a_tree_a_description_and_a_sound_wall_of_moderate_size() {
+        for name in NAMES {
+            let tree = tree(name).unwrap_or_else(|| panic!("{name}"));
+            assert!(description(name).unwrap().starts_with(name));
+            let made = GeneratedWall::new(&tree, asset_resolution(name)).unwrap();
+            let report = check(made.wall.mesh()).unwrap();
+            assert!(report.is_sound() && report.components == 1, "{name}: {report:?}");
+            let most = if name == "straight_tube" { 4_000 } else { 20_000 };
+            assert!(report.triangles <= most, "{name}: {}", report.triangles);
+            let inlet = &made.wall.openings()[made.inlet];
+            assert!(inlet.centre_mm.norm() < 0.01, "{name}: the root is the origin");
+            assert_stored(name, &tree, made.wall.mesh());
+        }
+        assert!(super::tree("aorta").is_none());
+    }
+
+    /// The files in `assets/` are what this code makes; the example `make_assets` renews them.
+    fn assert_stored(name: &str, tree: &CentrelineTree, mesh: &SurfaceMesh) {
+        if !asset("straight_tube.csv").exists() {
+            // A packaged crate is without the assets of the repository.
+            return;
+        }
+        assert_eq!(&CentrelineTree::read(&asset(&format!("{name}.csv"))).unwrap(), tree);
+        let stored = SurfaceMesh::read(&asset(&format!("{name}.stl")), 1.0).unwrap();
+        let largest_difference = |shift: f64| {
+            let same = |i: usize| {
+                stored
+                    .corners(i)
+                    .into_iter()
+                    .zip(mesh.corners(i))
+                    .map(|(a, b)| (a.add_scalar(shift) - b).amax())
+            };
+            (0..mesh.triangles.len()).flat_map(same).fold(0.0, f64::max)
+        };
+        assert_eq!(stored.triangles.len(), mesh.triangles.len(), "{name}");
+        assert!(largest_difference(0.0) < 1e-4, "{name}: {}", largest_difference(0.0));
+        assert!(largest_difference(2e-4) > 1e-4, "the comparison can fail");
+    }
+
+    #[test]
+    fn the_curved_tube_spans_the_extent_of_the_figure() {
+        let tree = tree("curved_tube").unwrap();
+        let (mut low, mut high) = (Vec3::zeros(), Vec3::zeros());
+        for node in tree.nodes() {
+            (low, high) = (low.inf(&node.position_mm), high.sup(&node.position_mm));
+        }
+        assert!((high - low - Vec3::new(90.0, 140.0, 0.0)).norm() < 0.02, "{}", high - low);
     }
 }

@@ -12,6 +12,8 @@ mod opening;
 mod orient;
 mod query;
 mod sliver;
+#[cfg(test)]
+mod tests;
 mod topology;
 mod wall;
 mod weld;

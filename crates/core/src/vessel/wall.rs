@@ -9,6 +9,9 @@ use crate::{Error, Result, Vec3};
 /// 32-bit floats of an STL file, and far below any detail of an anatomy.
 const WELD_TOLERANCE: f64 = 1e-6;
 
+/// Volume of a sheet over the cube of the surface's size below which it has no inside.
+const FLAT: f64 = 1e-14;
+
 /// A vessel wall: triangles counter-clockwise seen from outside the lumen, with numbered openings.
 #[derive(Debug, Clone)]
 pub struct Wall {
@@ -270,8 +273,10 @@ fn turn_outward(mesh: &mut SurfaceMesh, consistency: &orient::Consistency) {
         let patch = consistency.patch[triangle as usize] as usize;
         volume[patch] += opening.cap(mesh).map(|cap| signed_volume(&cap, origin)).sum::<f64>();
     }
+    // A flat sheet encloses nothing but rounding; it stays as it is.
+    let size = mesh.bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
     for (triangle, &patch) in mesh.triangles.iter_mut().zip(&consistency.patch) {
-        if volume[patch as usize] < 0.0 {
+        if volume[patch as usize] < -FLAT * size.powi(3) {
             triangle.swap(1, 2);
         }
     }

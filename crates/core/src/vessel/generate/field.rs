@@ -10,11 +10,15 @@
 use super::curve::Branch;
 use crate::Vec3;
 
-/// Blend width over the radius of the thinner branch: a fillet of about the child's radius at a right-angled fork.
-const BLEND: f64 = 0.8;
+/// Blend width over the radius of the thinner branch: makes a fillet of about that radius at a right-angled fork.
+const BLEND: f64 = 1.4;
 
 /// Cosines of the angle between gradients at which blending begins and is complete: 20° and 60°.
 const BLEND_COSINES: [f64; 2] = [0.94, 0.5];
+
+/// Length over radius in which blending sets in behind a closed end. Such an end is hidden inside another branch; if its round cap
+/// blended, the other branch would bulge over it.
+const HIDDEN: f64 = 0.3;
 
 /// Newton steps to the foot; from a sample a quarter radius away three are enough.
 const FOOT_STEPS: usize = 8;
@@ -33,6 +37,8 @@ pub(super) struct Value {
     pub(super) f: f64,
     pub(super) gradient: Vec3,
     pub(super) radius: f64,
+    /// How far blending has set in here: 0 at a hidden end, 1 away from it.
+    exposure: f64,
 }
 
 /// What of the tree matters near a ball: per branch the samples that can be closest to a point of the ball.
@@ -79,7 +85,12 @@ impl Field {
     /// The field at `point`, which must be within the reach of `local`.
     pub(super) fn value(&self, local: &Local, point: &Vec3) -> Value {
         let mut values = local.parts.iter().map(|part| self.branch_value(part, point));
-        let first = values.next().unwrap_or(Value { f: f64::INFINITY, gradient: Vec3::zeros(), radius: 1.0 });
+        let first = values.next().unwrap_or(Value {
+            f: f64::INFINITY,
+            gradient: Vec3::zeros(),
+            radius: 1.0,
+            exposure: 0.0,
+        });
         values.fold(first, smooth_minimum)
     }
 
@@ -121,13 +132,22 @@ impl Field {
         let beyond = (-s).max(s - branch.length()) - self.extension;
         if beyond > radial {
             let outward = if s < 0.0 { -place.first } else { place.first };
-            return Value { f: beyond, gradient: outward, radius: place.radius };
+            return Value { f: beyond, gradient: outward, radius: place.radius, exposure: 1.0 };
         }
         let clamped = (!low && s <= 0.0) || (!high && s >= branch.length());
         let along = if clamped { Vec3::zeros() } else { place.first / stretch };
         let gradient = offset / distance.max(f64::MIN_POSITIVE) - place.slope * along;
-        Value { f: radial, gradient, radius: place.radius }
+        let from_start = if low { f64::INFINITY } else { s };
+        let from_end = if high { f64::INFINITY } else { branch.length() - s };
+        let exposure = smooth_step(from_start.min(from_end) / (HIDDEN * place.radius));
+        Value { f: radial, gradient, radius: place.radius, exposure }
     }
+}
+
+/// From 0 at 0 to 1 at 1, level at both.
+fn smooth_step(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
 }
 
 /// Cubic polynomial smooth minimum with a width that depends on the angle between the gradients.
@@ -135,8 +155,8 @@ fn smooth_minimum(a: Value, b: Value) -> Value {
     let (low, high) = if a.f <= b.f { (a, b) } else { (b, a) };
     let cosine = low.gradient.dot(&high.gradient)
         / (low.gradient.norm() * high.gradient.norm()).max(f64::MIN_POSITIVE);
-    let t = ((BLEND_COSINES[0] - cosine) / (BLEND_COSINES[0] - BLEND_COSINES[1])).clamp(0.0, 1.0);
-    let width = BLEND * low.radius.min(high.radius) * t * t * (3.0 - 2.0 * t);
+    let opposed = smooth_step((BLEND_COSINES[0] - cosine) / (BLEND_COSINES[0] - BLEND_COSINES[1]));
+    let width = BLEND * low.radius.min(high.radius) * opposed * low.exposure * high.exposure;
     let gap = width - (high.f - low.f);
     if gap <= 0.0 {
         return low;
@@ -147,5 +167,6 @@ fn smooth_minimum(a: Value, b: Value) -> Value {
         f: low.f - h * h * h * width / 6.0,
         gradient: (1.0 - weight) * low.gradient + weight * high.gradient,
         radius: (1.0 - weight) * low.radius + weight * high.radius,
+        exposure: (1.0 - weight) * low.exposure + weight * high.exposure,
     }
 }

@@ -3,6 +3,7 @@
 //! A tree without forks becomes a swept tube ([`sweep`]); one with forks an implicit surface ([`field`]) meshed by surface nets
 //! ([`nets`]), evened out, projected back and cut open at its ends ([`trim`]).
 
+mod coarsen;
 mod curve;
 mod field;
 mod nets;
@@ -35,6 +36,16 @@ const SMOOTHING_ROUNDS: usize = 8;
 /// Surface nets on a random plane make 1.5 quadrilaterals per grid face area.
 const TRIANGLES_PER_FACE: f64 = 3.0;
 
+/// Grid spacing over the smallest radius: ten cells around the thinnest vessel, enough for forks to come out sound.
+const GRID_PER_RADIUS: f64 = 0.6;
+
+/// Grids tried until one makes a manifold, and how much finer each is.
+const GRID_ATTEMPTS: usize = 6;
+const GRID_SHRINK: f64 = 0.95;
+
+/// Target of coarsening over edge length, so that it and the plain grid give about the same number of triangles.
+const COARSENING: f64 = 1.0;
+
 /// Most triangles that are attempted: some gigabytes and a minute.
 const MOST_TRIANGLES: f64 = 5e6;
 
@@ -45,7 +56,8 @@ const COUNT_TOLERANCE: f64 = 0.02;
 /// How fine a generated wall is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Resolution {
-    /// Typical length of an edge in mm.
+    /// Typical length of an edge in mm. In a tree with forks, branches thinner than this resolves get shorter edges, about ten
+    /// around.
     EdgeMm(f64),
     /// Number of triangles, met within 2 % where the geometry allows it.
     Triangles(usize),
@@ -78,7 +90,7 @@ impl GeneratedWall {
     /// implicit surface of the same radius; both within 1e-6 mm. Ends are cut flat across the centre line.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for an edge length that is not positive, larger than the smallest radius, or so small that more than
+    /// [`Error::Parameter`] for an edge length that is not positive, larger than the largest radius, or so small that more than
     /// five million triangles would come out; for a bend tighter than the vessel is wide; for a branch that ends
     /// inside another one. [`Error::Mesh`] if branches come so close that the grid cannot tell them apart.
     pub fn new(tree: &CentrelineTree, resolution: Resolution) -> Result<Self> {
@@ -114,22 +126,21 @@ impl GeneratedWall {
     }
 
     fn with_edge(branches: &[curve::Branch], edge_mm: f64) -> Result<Self> {
-        let radii = branches.iter().flat_map(|b| b.samples.iter().map(|s| s.radius));
-        let smallest = radii.fold(f64::INFINITY, f64::min);
-        if !(edge_mm > 0.0 && edge_mm <= smallest) {
+        let largest = branches.iter().flat_map(|b| b.samples.iter().map(|s| s.radius)).fold(0.0, f64::max);
+        if edge_mm.is_nan() || edge_mm <= 0.0 || edge_mm > largest {
             let mend = format!(
-                "must be positive and at most the smallest radius, {smallest:.3} mm, to resolve the vessel"
+                "must be positive and at most the largest radius, {largest:.3} mm, to resolve the vessel"
             );
             return Err(Error::parameter("edge_mm", edge_mm, mend));
         }
-        let expected = branch_area(branches) * TRIANGLES_PER_FACE / (edge_mm * edge_mm);
+        let grid = edge_mm.min(GRID_PER_RADIUS * smallest_radius(branches));
+        let expected = branch_area(branches) * TRIANGLES_PER_FACE / (grid * grid);
         if expected > MOST_TRIANGLES {
-            let mend = format!(
-                "would give about {expected:.1e} triangles; at most {MOST_TRIANGLES:.0e} are made: choose larger"
-            );
+            let mend =
+                format!("would need about {expected:.1e} triangles; at most {MOST_TRIANGLES:.0e} are made");
             return Err(Error::parameter("edge_mm", edge_mm, mend));
         }
-        let field = Field { branches: branches.to_vec(), extension: 4.0 * edge_mm };
+        let field = Field { branches: branches.to_vec(), extension: 4.0 * grid };
         let ends = trim::ends(&field);
         let mesh = match branches {
             [only] if ends.len() == 2 => sweep::tube(only, edge_mm),
@@ -146,66 +157,86 @@ fn branch_area(branches: &[curve::Branch]) -> f64 {
     branches.iter().map(|b| b.samples.iter().map(|s| TAU * s.radius * b.step).sum::<f64>()).sum()
 }
 
+fn smallest_radius(branches: &[curve::Branch]) -> f64 {
+    branches.iter().flat_map(|b| b.samples.iter().map(|s| s.radius)).fold(f64::INFINITY, f64::min)
+}
+
+/// Wanted edge length where the vessel has `radius`: thin branches keep about ten edges around.
+fn local_edge(edge: f64, radius: f64) -> f64 {
+    COARSENING * edge.min(GRID_PER_RADIUS * radius)
+}
+
 /// The wall of a tree with forks.
 fn implicit_mesh(field: &Field, ends: &[End], edge: f64) -> Result<SurfaceMesh> {
     for end in ends {
         check_end_is_free(field, end)?;
     }
-    let mut nets = nets::mesh(field, edge)?;
-    even_out(field, &mut nets, edge);
-    let mut mesh =
-        SurfaceMesh { vertices_mm: nets.vertices.clone(), triangles: Vec::with_capacity(2 * nets.quads.len()) };
-    for quad in &nets.quads {
-        push_polygon(&mesh.vertices_mm, quad, &mut mesh.triangles);
-    }
-    let mut worst: f64 = 0.0;
-    for end in ends {
-        worst = worst.max(trim::cut(&mut mesh, field, end, edge));
-    }
-    // Vertices of the nets keep their number until the unused ones are dropped. Those on a rim were looked at in the cut.
-    for v in mesh.triangles.iter().flatten().map(|v| *v as usize) {
-        if nets.vertices.get(v) == Some(&mesh.vertices_mm[v]) {
-            let local = &nets.locals[nets.local_of[v] as usize];
-            worst = worst.max(field.value(local, &mesh.vertices_mm[v]).f.abs());
-        }
-    }
+    let spacing = edge.min(GRID_PER_RADIUS * smallest_radius(&field.branches));
+    let (nets, mut mesh) = manifold_nets(field, ends, spacing)?;
+    coarsen::Coarsener { field, nets: &nets, ends, edge }.run(&mut mesh);
+    drop_unreferenced(&mut mesh);
+    let off = |v: &Vec3| nets.with_local(field, v, |local| field.value(local, v)).f.abs();
+    let worst = mesh.vertices_mm.iter().map(off).fold(0.0, f64::max);
     if worst > GUARANTEED_MM {
         return Err(Error::Computation(format!(
             "vertices stay {worst:.1e} mm off the implicit surface: branches meet in a crease; choose a smaller edge_mm"
         )));
     }
-    drop_unreferenced(&mut mesh);
-    let odd = EdgeTable::new(&mesh.triangles).non_manifold();
-    if odd > 0 {
-        return Err(Error::Mesh(format!(
-            "{odd} edges belong to more than two triangles: branches come closer than edge_mm = {edge}; choose a smaller one"
-        )));
-    }
     Ok(mesh)
 }
 
+/// Surface nets, cut open, without edges of more than two triangles. Those arise where opposite corners of a grid cell are cut
+/// off in the same cell, by chance in the narrow angle of a fork; a slightly finer grid falls differently.
+fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<(nets::Nets, SurfaceMesh)> {
+    let mut attempt = spacing;
+    for _ in 0..GRID_ATTEMPTS {
+        let mut nets = nets::mesh(field, attempt)?;
+        even_out(field, &mut nets);
+        let mut mesh = SurfaceMesh {
+            vertices_mm: std::mem::take(&mut nets.vertices),
+            triangles: Vec::with_capacity(2 * nets.quads.len()),
+        };
+        for quad in &nets.quads {
+            push_polygon(&mesh.vertices_mm, quad, &mut mesh.triangles);
+        }
+        for end in ends {
+            trim::cut(&mut mesh, field, end, attempt);
+        }
+        drop_unreferenced(&mut mesh);
+        if EdgeTable::new(&mesh.triangles).non_manifold() == 0 {
+            return Ok((nets, mesh));
+        }
+        attempt *= GRID_SHRINK;
+    }
+    Err(Error::Mesh(format!(
+        "branches come closer to each other than a grid of {attempt:.3} mm resolves; choose a smaller edge_mm"
+    )))
+}
+
 /// Moves vertices towards the mean of their neighbours along the surface, and back onto it.
-fn even_out(field: &Field, nets: &mut nets::Nets, edge: f64) {
+fn even_out(field: &Field, nets: &mut nets::Nets) {
+    let mut vertices = std::mem::take(&mut nets.vertices);
     for round in 0..=SMOOTHING_ROUNDS {
-        let mut sum = vec![Vec3::zeros(); nets.vertices.len()];
-        let mut count = vec![0.0; nets.vertices.len()];
+        let mut sum = vec![(Vec3::zeros(), 0.0); vertices.len()];
         for quad in &nets.quads {
             for k in 0..4 {
                 let (a, b) = (quad[k] as usize, quad[(k + 1) % 4] as usize);
-                sum[a] += nets.vertices[b];
-                count[a] += 1.0;
+                sum[a].0 += vertices[b];
+                sum[a].1 += 1.0;
             }
         }
-        for (index, v) in nets.vertices.iter_mut().enumerate() {
-            let local = &nets.locals[nets.local_of[index] as usize];
-            if round > 0 && count[index] > 0.0 {
-                let normal = field.value(local, v).gradient.try_normalize(1e-6).unwrap_or_default();
-                let pull = sum[index] / count[index] - *v;
-                *v += 0.5 * (pull - normal * normal.dot(&pull));
-            }
-            project(field, local, v, edge);
+        for (v, (sum, count)) in vertices.iter_mut().zip(sum) {
+            nets.with_local(field, &v.clone(), |local| {
+                if round > 0 && count > 0.0 {
+                    let normal = field.value(local, v).gradient.try_normalize(1e-6).unwrap_or_default();
+                    let pull = sum / count - *v;
+                    *v += 0.5 * (pull - normal * normal.dot(&pull));
+                }
+                project(field, local, v, nets.edge);
+            });
         }
     }
+    nets.vertices = vertices;
 }
 
 /// Newton along the gradient.

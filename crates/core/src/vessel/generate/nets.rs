@@ -16,7 +16,7 @@ const CORNERS: usize = BLOCK + 1;
 /// Shifts the grid off round coordinates, where symmetric vessels would meet grid points exactly.
 const OFFSET: [f64; 3] = [0.3819, 0.2361, 0.1459];
 
-/// Room around a block within which its vertices may be moved later, in cells.
+/// Room around a block, in cells: points are looked up by where they start from, and may move a little.
 const MARGIN: f64 = 3.0;
 
 type Key = [i32; 3];
@@ -25,9 +25,21 @@ type Key = [i32; 3];
 pub(super) struct Nets {
     pub(super) vertices: Vec<Vec3>,
     pub(super) quads: Vec<[u32; 4]>,
-    /// For each vertex, which of `locals` to evaluate the field with.
-    pub(super) local_of: Vec<u32>,
-    pub(super) locals: Vec<Local>,
+    /// Spacing of the grid, mm.
+    pub(super) edge: f64,
+    locals: BTreeMap<Key, Local>,
+}
+
+impl Nets {
+    /// Calls `evaluate` with what of the field matters near `point`: from the block it is in, or looked for anew if that has no surface.
+    pub(super) fn with_local<T>(&self, field: &Field, point: &Vec3, evaluate: impl FnOnce(&Local) -> T) -> T {
+        let key =
+            [0, 1, 2].map(|axis| ((point[axis] / self.edge - OFFSET[axis]) / BLOCK as f64).floor() as i32);
+        match self.locals.get(&key) {
+            Some(local) => evaluate(local),
+            None => evaluate(&field.local(point, MARGIN * self.edge)),
+        }
+    }
 }
 
 struct Block {
@@ -50,7 +62,7 @@ pub(super) fn mesh(field: &Field, edge: f64) -> Result<Nets> {
     let position = |cell: [f64; 3]| Vec3::from_fn(|axis, _| (cell[axis] + OFFSET[axis]) * edge);
     let half_diagonal = width * 0.75_f64.sqrt();
     let steepness = field.steepness();
-    let mut nets = Nets { vertices: Vec::new(), quads: Vec::new(), local_of: Vec::new(), locals: Vec::new() };
+    let mut nets = Nets { vertices: Vec::new(), quads: Vec::new(), edge, locals: BTreeMap::new() };
     let mut blocks: BTreeMap<Key, Block> = BTreeMap::new();
     for key in candidates(field, edge) {
         let first = key.map(|k| f64::from(k) * BLOCK as f64);
@@ -75,11 +87,10 @@ pub(super) fn mesh(field: &Field, edge: f64) -> Result<Nets> {
                 cells[cell_index(at)] = nets.vertices.len() as u32;
                 nets.vertices
                     .push(position([0, 1, 2].map(|axis| first[axis] + at[axis] as f64 + inside[axis])));
-                nets.local_of.push(nets.locals.len() as u32);
             }
         });
         if nets.vertices.len() > before {
-            nets.locals.push(local);
+            nets.locals.insert(key, local);
             blocks.insert(key, Block { corners, cells });
         }
     }

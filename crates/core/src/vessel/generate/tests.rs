@@ -1,1 +1,189 @@
+use std::f64::consts::PI;
 
+use proptest::prelude::*;
+
+use super::*;
+use crate::vessel::{CentrelineNode, check};
+
+fn tree(rows: &[([f64; 3], f64, i64)]) -> CentrelineTree {
+    let node = |&(p, radius_mm, parent): &([f64; 3], f64, i64)| CentrelineNode {
+        position_mm: Vec3::from(p),
+        radius_mm,
+        parent: usize::try_from(parent).ok(),
+    };
+    CentrelineTree::new(rows.iter().map(node).collect()).unwrap()
+}
+
+fn generate(tree: &CentrelineTree, edge_mm: f64) -> GeneratedWall {
+    GeneratedWall::new(tree, Resolution::EdgeMm(edge_mm)).unwrap()
+}
+
+/// A trunk along z with a thinner branch at the angle given, degrees from the trunk.
+fn fork(angle: f64, trunk: f64, branch: f64) -> CentrelineTree {
+    let (sin, cos) = angle.to_radians().sin_cos();
+    let along = |s: f64| [s * sin, 0.0, 40.0 + s * cos];
+    tree(&[
+        ([0.0, 0.0, 0.0], trunk, -1),
+        ([0.0, 0.0, 40.0], trunk, 0),
+        ([0.0, 0.0, 80.0], trunk, 1),
+        (along(20.0), branch, 1),
+        (along(40.0), branch, 3),
+    ])
+}
+
+#[test]
+fn the_volume_of_a_tube_converges_at_order_two() {
+    let tube = tree(&[([1.0, 2.0, 3.0], 4.0, -1), ([11.0, 42.0, -27.0], 4.0, 0)]);
+    let exact = PI * 16.0 * 2600.0_f64.sqrt();
+    let error = |edge| (generate(&tube, edge).wall.volume_mm3() / exact - 1.0).abs();
+    let (coarse, fine) = (error(1.0), error(0.5));
+    assert!(coarse < 0.012, "{coarse}");
+    assert!((coarse / fine - 4.0).abs() < 0.2, "{coarse} {fine}");
+}
+
+#[test]
+fn a_coarse_table_of_a_circle_gives_a_smooth_torus() {
+    // Pappus: V = π r² · length. Points 20° apart; the spline errs by about the fourth power of that.
+    let rows: Vec<_> = (0..=9)
+        .map(|k| {
+            let (sin, cos) = (20.0 * f64::from(k)).to_radians().sin_cos();
+            ([30.0 * cos, 30.0 * sin, 0.0], 5.0, i64::from(k) - 1)
+        })
+        .collect();
+    let made = generate(&tree(&rows), 0.4);
+    let exact = PI * 25.0 * PI * 30.0;
+    assert!((made.wall.volume_mm3() / exact - 1.0).abs() < 5e-3);
+    assert!(check(made.wall.mesh()).unwrap().is_sound());
+}
+
+#[test]
+fn a_cone_of_two_points_tapers_evenly() {
+    let made = generate(&tree(&[([0.0; 3], 6.0, -1), ([0.0, 0.0, 60.0], 3.0, 0)]), 0.4);
+    let exact = PI * 60.0 * (36.0 + 18.0 + 9.0) / 3.0;
+    assert!((made.wall.volume_mm3() / exact - 1.0).abs() < 5e-3);
+}
+
+#[test]
+fn forks_of_every_angle_are_sound_open_at_their_ends_and_closed_by_caps() {
+    for (angle, trunk, branch) in [(90.0, 8.0, 4.0), (35.0, 6.0, 3.0), (140.0, 6.0, 3.0), (60.0, 5.0, 5.0)] {
+        let made = generate(&fork(angle, trunk, branch), 1.2);
+        let report = check(made.wall.mesh()).unwrap();
+        assert!(report.is_sound(), "{angle}: {report:?}");
+        assert_eq!((report.components, made.ends.len()), (1, 3));
+        let closed = check(&made.closed_mesh()).unwrap();
+        assert!(closed.watertight && closed.is_sound(), "{angle}: {closed:?}");
+        let inlet = &made.wall.openings()[made.inlet];
+        assert!((inlet.direction + Vec3::z()).norm() < 1e-9 && inlet.centre_mm.z.abs() < 1e-9);
+        assert!((inlet.radius_mm / trunk - 1.0).abs() < 1e-6, "{}", inlet.radius_mm);
+        for v in &inlet.boundary {
+            assert!(made.wall.mesh().vertices_mm[*v as usize].z.abs() < 1e-12, "the rim lies in its plane");
+        }
+        assert!(made.wall.contains(&Vec3::new(0.0, 0.0, 40.0)).unwrap());
+    }
+}
+
+#[test]
+fn away_from_forks_the_radius_is_kept_and_the_far_wall_does_not_bulge() {
+    for (angle, trunk, branch) in [(90.0, 6.0, 3.0), (50.0, 5.0, 4.9)] {
+        let made = generate(&fork(angle, trunk, branch), 1.0);
+        let off = |v: &&Vec3| (v.x.hypot(v.y) / trunk - 1.0).abs();
+        let far = made.wall.mesh().vertices_mm.iter().filter(|v| v.z < 30.0 || v.x < -0.3 * trunk);
+        let worst = far.max_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+        assert!(off(&worst) < 5e-3, "{angle}: {worst} {}", off(&worst));
+        // The twin: at the fork itself the wall does leave the trunk's cylinder.
+        assert!(made.wall.mesh().vertices_mm.iter().any(|v| off(&v) > 0.1));
+    }
+}
+
+#[test]
+fn a_fork_is_rounded_and_not_creased() {
+    // Plain union of the two cylinders meets at 90°; in the fillet neighbouring triangles turn by less.
+    let made = generate(&fork(90.0, 8.0, 4.0), 0.8);
+    let mesh = made.wall.mesh();
+    let normal = |t: usize| {
+        let [a, b, c] = mesh.corners(t);
+        (b - a).cross(&(c - a)).normalize()
+    };
+    let across = EdgeTable::new(&mesh.triangles).neighbours(mesh.triangles.len());
+    let sharpest = (0..mesh.triangles.len())
+        .flat_map(|t| across[t].into_iter().filter(|o| *o != u32::MAX).map(move |o| (t, o as usize)))
+        .map(|(t, o)| normal(t).angle(&normal(o)).to_degrees())
+        .fold(0.0, f64::max);
+    assert!(sharpest < 45.0, "{sharpest}");
+}
+
+#[test]
+fn a_triangle_count_is_met_and_thin_branches_stay_resolved() {
+    let tree = fork(70.0, 12.0, 3.0);
+    for wanted in [3_000, 12_000] {
+        let made = GeneratedWall::new(&tree, Resolution::Triangles(wanted)).unwrap();
+        let count = made.wall.mesh().triangles.len();
+        assert!((count as f64 / wanted as f64 - 1.0).abs() < 0.03, "{count}");
+        assert!(check(made.wall.mesh()).unwrap().is_sound());
+        let thin = made.wall.openings().last().unwrap();
+        assert!(thin.boundary.len() >= 8, "{}", thin.boundary.len());
+    }
+}
+
+#[test]
+fn an_end_inside_another_branch_and_a_tight_bend_are_refused_by_row() {
+    // The branch is 40 mm long and does not get out of a trunk of 41 mm.
+    let message =
+        GeneratedWall::new(&fork(90.0, 41.0, 3.0), Resolution::EdgeMm(1.0)).unwrap_err().to_string();
+    assert!(message.starts_with("centreline row 4"), "{message}");
+    let hairpin = tree(&[
+        ([0., 0., 0.], 5.0, -1),
+        ([0., 0., 30.], 5.0, 0),
+        ([2., 0., 32.], 5.0, 1),
+        ([4., 0., 0.], 5.0, 2),
+    ]);
+    let message = GeneratedWall::new(&hairpin, Resolution::EdgeMm(1.0)).unwrap_err().to_string();
+    assert!(message.contains("bend radius"), "{message}");
+}
+
+#[test]
+fn absurd_resolutions_are_refused_with_a_reason() {
+    let fork = fork(90.0, 8.0, 4.0);
+    for edge in [0.0, -1.0, f64::NAN, f64::INFINITY, 9.0, 1e-6, 1e-300] {
+        let error = GeneratedWall::new(&fork, Resolution::EdgeMm(edge)).unwrap_err();
+        assert!(error.to_string().starts_with("edge_mm = "), "{edge}: {error}");
+    }
+    for count in [0, usize::MAX, 3] {
+        let error = GeneratedWall::new(&fork, Resolution::Triangles(count)).unwrap_err();
+        assert!(error.is_input(), "{count}: {error}");
+    }
+}
+
+#[test]
+fn gradients_agree_with_differences_away_from_blends() {
+    let curved = tree(&[([0., 0., 0.], 3.0, -1), ([5., 0., 20.], 4.0, 0), ([0., 8., 40.], 2.0, 1)]);
+    let field = Field { branches: curve::branches(&curved).unwrap(), extension: 1.0 };
+    let point = Vec3::new(4.0, 5.0, 18.0);
+    let value = field.branch_alone(0, &point);
+    let step = 1e-5;
+    let difference = Vec3::from_fn(|axis, _| {
+        let at = |sign: f64| {
+            let mut p = point;
+            p[axis] += sign * step;
+            field.branch_alone(0, &p).f
+        };
+        (at(1.0) - at(-1.0)) / (2.0 * step)
+    });
+    assert!((difference - value.gradient).norm() < 1e-6, "{difference} {}", value.gradient);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn any_tree_gives_a_wall_or_an_error_but_never_a_panic(
+        rows in prop::collection::vec((prop::array::uniform3(-40.0f64..40.0), 0.5f64..6.0, any::<prop::sample::Index>()), 2..7)
+    ) {
+        let nodes = rows.iter().enumerate().map(|(row, (p, radius_mm, parent))| CentrelineNode {
+            position_mm: Vec3::from(*p), radius_mm: *radius_mm, parent: (row > 0).then(|| parent.index(row)),
+        }).collect();
+        if let Ok(made) = GeneratedWall::new(&CentrelineTree::new(nodes).unwrap(), Resolution::Triangles(2_000)) {
+            prop_assert_eq!(made.wall.report().non_manifold_edges, 0);
+            prop_assert!(made.wall.volume_mm3() > 0.0);
+        }
+    }
+}

@@ -47,8 +47,8 @@ pub(super) fn ends(field: &Field) -> Vec<End> {
     ends
 }
 
-/// Cuts off what lies beyond `end`. Returns how far rim vertices are from the wall at most, mm.
-pub(super) fn cut(mesh: &mut SurfaceMesh, field: &Field, end: &End, edge: f64) -> f64 {
+/// Cuts off what lies beyond `end`.
+pub(super) fn cut(mesh: &mut SurfaceMesh, field: &Field, end: &End, edge: f64) {
     let reach = field.extension + 2.0 * edge;
     let local = field.local(&end.centre, 1.2 * end.radius + reach);
     let height = |v: &Vec3| (v - end.centre).dot(&end.outward);
@@ -103,17 +103,10 @@ pub(super) fn cut(mesh: &mut SurfaceMesh, field: &Field, end: &End, edge: f64) -
         super::push_polygon(&mesh.vertices_mm, &polygon, &mut kept);
     }
     mesh.triangles = kept;
-    let cuts =
-        (heights.len()..mesh.vertices_mm.len()).chain((0..heights.len()).filter(|&v| heights[v] == 0.0));
-    let used = mesh.triangles.iter().flatten().fold(vec![false; mesh.vertices_mm.len()], |mut used, v| {
-        used[*v as usize] = true;
-        used
-    });
-    cuts.filter(|&v| used[v]).map(|v| field.value(&local, &mesh.vertices_mm[v]).f.abs()).fold(0.0, f64::max)
 }
 
 /// Moves a point onto the curve in which the end's plane meets the wall.
-fn onto_rim(field: &Field, local: &Local, end: &End, start: Vec3, edge: f64) -> Vec3 {
+pub(super) fn onto_rim(field: &Field, local: &Local, end: &End, start: Vec3, edge: f64) -> Vec3 {
     let flat = |v: Vec3| v - end.outward * v.dot(&end.outward);
     let mut point = end.centre + flat(start - end.centre);
     for _ in 0..super::PROJECTION_STEPS {

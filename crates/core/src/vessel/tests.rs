@@ -1,0 +1,265 @@
+//! Walls, queries and checks on surfaces that are dirty in known ways, and on a real one.
+
+use std::path::PathBuf;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::{Error, Vec3};
+
+/// A tube of radius 4 along +y from 0 to 100, open at both ends.
+fn tube() -> Wall {
+    let tree = anatomy::tree("straight_tube").unwrap();
+    GeneratedWall::new(&tree, Resolution::EdgeMm(2.0)).unwrap().wall
+}
+
+/// Every triangle with vertices of its own, as in an STL file.
+fn soup(mesh: &SurfaceMesh) -> SurfaceMesh {
+    let vertices_mm: Vec<Vec3> = (0..mesh.triangles.len()).flat_map(|i| mesh.corners(i)).collect();
+    SurfaceMesh {
+        triangles: (0..vertices_mm.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+        vertices_mm,
+    }
+}
+
+fn flip_some(mesh: &mut SurfaceMesh, which: impl Fn(usize) -> bool) -> usize {
+    let chosen: Vec<usize> = (0..mesh.triangles.len()).filter(|&i| which(i)).collect();
+    chosen.iter().for_each(|&i| mesh.triangles[i].swap(1, 2));
+    chosen.len()
+}
+
+#[test]
+fn a_clean_wall_is_left_as_it_is() {
+    let wall = tube();
+    let again = Wall::from_surface(wall.mesh()).unwrap();
+    assert_eq!(again.mesh(), wall.mesh());
+    assert!(again.report().notes().is_empty(), "{:?}", again.report().notes());
+    let [first, second] = again.openings() else { panic!("two openings") };
+    assert!((first.radius_mm - 4.0).abs() < 1e-12 && (second.radius_mm - 4.0).abs() < 1e-12);
+    assert!((first.direction + second.direction).norm() < 1e-12);
+    assert!((first.centre_mm - Vec3::zeros()).norm() < 1e-9 && (first.direction + Vec3::y()).norm() < 1e-12);
+}
+
+#[test]
+fn dirt_is_removed_and_reported() {
+    let clean = tube();
+    let mut dirty = soup(clean.mesh());
+    let flipped = flip_some(&mut dirty, |i| i % 7 == 3);
+    dirty.triangles.push(dirty.triangles[5]);
+    dirty.triangles.push([0, 0, 1]);
+    dirty.vertices_mm.push(Vec3::new(1.0, 50.0, 0.0));
+    let wall = Wall::from_surface(&dirty).unwrap();
+    let report = wall.report();
+    assert_eq!(report.triangles_flipped, flipped);
+    assert_eq!(
+        (report.duplicates_removed, report.degenerate_removed, report.vertices_unreferenced),
+        (1, 1, 1)
+    );
+    assert_eq!(
+        (report.components, report.openings, report.non_manifold_edges, report.stray_edges),
+        (1, 2, 0, 0)
+    );
+    assert_eq!(wall.mesh().triangles.len(), clean.mesh().triangles.len());
+    assert_eq!(wall.mesh().vertices_mm.len(), clean.mesh().vertices_mm.len());
+    assert!((wall.volume_mm3() - clean.volume_mm3()).abs() < 1e-9);
+    assert_eq!(report.notes().len(), 5);
+}
+
+#[test]
+fn a_surface_that_is_inside_out_is_turned() {
+    let clean = tube();
+    let mut inverted = clean.mesh().clone();
+    flip_some(&mut inverted, |_| true);
+    let wall = Wall::from_surface(&inverted).unwrap();
+    assert!(wall.report().inside_out && wall.volume_mm3() > 0.0);
+    assert!(!clean.report().inside_out);
+}
+
+#[test]
+fn a_speck_beside_the_vessel_is_kept_and_told() {
+    let mut mesh = tube().mesh().clone();
+    let first = mesh.vertices_mm.len() as u32;
+    let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]];
+    mesh.vertices_mm.extend(corners.map(|c| Vec3::new(20.0, 0.0, 0.0) + Vec3::from(c)));
+    mesh.triangles.extend([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]].map(|t| t.map(|v| v + first)));
+    let report = Wall::from_surface(&mesh).unwrap().report().clone();
+    assert_eq!((report.components, report.smallest_component, report.triangles_flipped), (2, 4, 4));
+}
+
+#[test]
+fn unusable_surfaces_are_refused() {
+    let triangle = |vertices_mm: Vec<Vec3>, t| SurfaceMesh { vertices_mm, triangles: vec![t] };
+    let unit = vec![Vec3::zeros(), Vec3::x(), Vec3::y()];
+    let mut broken = unit.clone();
+    broken[1].y = f64::NAN;
+    for (mesh, reason) in [
+        (SurfaceMesh::default(), "no triangles"),
+        (triangle(unit.clone(), [0, 1, 3]), "names a vertex beyond"),
+        (triangle(broken, [0, 1, 2]), "vertex 1 is at (1, NaN, 0)"),
+        (triangle(unit, [0, 1, 1]), "no triangle has an area"),
+    ] {
+        for error in [Wall::from_surface(&mesh).map(|_| ()), check(&mesh).map(|_| ())] {
+            let error = error.unwrap_err();
+            assert!(matches!(error, Error::Mesh(_)) && error.to_string().contains(reason), "{error}");
+        }
+    }
+}
+
+#[test]
+fn winding_numbers_tell_inside_from_outside_and_refuse_a_torn_surface() {
+    let wall = tube();
+    for (y, radius, inside) in
+        [(50.0, 0.0, true), (50.0, 3.5, true), (50.0, 4.1, false), (0.1, 3.0, true), (-0.1, 3.0, false)]
+    {
+        assert_eq!(wall.contains(&Vec3::new(radius, y, 0.1)).unwrap(), inside, "{y} {radius}");
+    }
+    assert!((wall.winding_number(&Vec3::new(0.3, 30.0, 0.2)) - 1.0).abs() < 1e-12);
+    let mut torn = tube();
+    torn.mesh.triangles.truncate(torn.mesh.triangles.len() / 2);
+    let message = torn.contains(&Vec3::new(0.0, 50.0, 0.0)).unwrap_err().to_string();
+    assert!(message.contains("too broken to tell inside from outside"), "{message}");
+    assert!(wall.contains(&Vec3::new(f64::NAN, 0.0, 0.0)).is_err());
+}
+
+#[test]
+fn distances_are_signed_and_normals_point_into_the_lumen() {
+    let wall = tube();
+    let query = WallQuery::new(&wall).unwrap();
+    for (radius, sign) in [(3.0, 1.0), (4.5, -1.0)] {
+        let hit = query.nearest(&Vec3::new(radius, 40.3, 0.2), 5.0).unwrap();
+        assert!((hit.distance_mm - (4.0 - radius)).abs() < 0.2 && hit.distance_mm * sign > 0.0);
+        assert!((hit.normal + Vec3::x()).norm() < 0.3 && (hit.normal.norm() - 1.0).abs() < 1e-12);
+        assert!(!hit.rim);
+    }
+    assert!(query.nearest(&Vec3::new(0.0, 50.0, 0.0), 1.0).is_none(), "beyond reach");
+    assert!(query.nearest(&Vec3::new(f64::NAN, 0.0, 0.0), f64::INFINITY).is_none());
+    assert!(query.nearest(&Vec3::new(0.0, -5.0, 0.0), f64::INFINITY).unwrap().rim, "before the inlet");
+    assert!(!query.nearest(&Vec3::new(0.0, 5.0, 0.0), f64::INFINITY).unwrap().rim);
+}
+
+#[test]
+fn on_the_wall_the_normal_is_that_of_the_triangle_even_at_vertices() {
+    let wall = tube();
+    let query = WallQuery::new(&wall).unwrap();
+    let inner = wall.mesh().vertices_mm.iter().find(|v| v.y > 40.0).unwrap();
+    let hit = query.nearest(inner, 1.0).unwrap();
+    assert!(hit.distance_mm.abs() < 1e-12);
+    assert!((hit.normal + Vec3::new(inner.x, 0.0, inner.z) / 4.0).norm() < 0.3);
+}
+
+#[test]
+fn the_sign_is_right_beside_sharp_edges_and_corners() {
+    // A thin wedge: near its edge, both faces are seen from the far side of the other one.
+    let corners = [[0., 0., 0.], [4., 0., 0.], [0., 0.4, 0.], [1.0, 0.1, 6.0]];
+    let mesh = SurfaceMesh {
+        vertices_mm: corners.map(Vec3::from).to_vec(),
+        triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+    };
+    let wall = Wall::from_surface(&mesh).unwrap();
+    let query = WallQuery::new(&wall).unwrap();
+    let mut checked = [0, 0];
+    for i in 0..20_i32 {
+        for j in 0..20_i32 {
+            for k in 0..20_i32 {
+                let p =
+                    Vec3::new(f64::from(i) * 0.31 - 1.0, f64::from(j) * 0.07 - 0.4, f64::from(k) * 0.4 - 1.0);
+                let hit = query.nearest(&p, f64::INFINITY).unwrap();
+                if hit.distance_mm.abs() > 1e-6 {
+                    let inside = wall.contains(&p).unwrap();
+                    assert_eq!(hit.distance_mm > 0.0, inside, "{p}");
+                    checked[usize::from(inside)] += 1;
+                }
+            }
+        }
+    }
+    assert!(checked[0] > 1000 && checked[1] > 20, "{checked:?}");
+}
+
+#[test]
+fn a_check_counts_each_fault_and_a_clean_tube_has_none() {
+    let clean = check(&soup(tube().mesh())).unwrap();
+    assert!(clean.is_sound() && !clean.watertight && clean.openings.len() == 2, "{clean:?}");
+    assert!((clean.area_mm2 / (2.0 * std::f64::consts::PI * 400.0) - 1.0).abs() < 0.02);
+
+    let mut mesh = tube().mesh().clone();
+    flip_some(&mut mesh, |i| i == 40);
+    mesh.triangles.push(mesh.triangles[0]);
+    mesh.triangles.push([0, 1, 1]);
+    let v = mesh.vertices_mm.len() as u32;
+    // A blade through the wall.
+    mesh.vertices_mm.extend([
+        Vec3::new(0.0, 50.0, 0.0),
+        Vec3::new(9.0, 50.2, 0.3),
+        Vec3::new(9.0, 50.0, 0.1),
+    ]);
+    mesh.triangles.push([v, v + 1, v + 2]);
+    let dirty = check(&mesh).unwrap();
+    assert_eq!((dirty.flipped_triangles, dirty.duplicate_triangles, dirty.degenerate_triangles), (1, 1, 1));
+    assert!(dirty.self_intersections > 0 && !dirty.intersecting_pairs.is_empty() && !dirty.is_sound());
+    assert!(serde_json::to_string(&dirty).unwrap().contains("\"volume_mm3\""));
+}
+
+#[test]
+fn crossing_tubes_are_found_to_intersect() {
+    let tube = tube();
+    let mut both = tube.mesh().clone();
+    let shift = both.vertices_mm.len() as u32;
+    both.vertices_mm
+        .extend(tube.mesh().vertices_mm.iter().map(|v| Vec3::new(v.y - 50.0, v.x + 50.3, v.z + 1.1)));
+    both.triangles.extend(tube.mesh().triangles.iter().map(|t| t.map(|v| v + shift)));
+    let report = check(&both).unwrap();
+    assert!(report.self_intersections > 20 && report.components == 2, "{report:?}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn repair_undoes_any_flips_and_any_split_of_vertices(flips in prop::collection::vec(any::<bool>(), 200), jitter in 0.0f64..2e-5) {
+        let clean = tube();
+        let mut dirty = soup(clean.mesh());
+        for (i, v) in dirty.vertices_mm.iter_mut().enumerate() {
+            // Well below the tolerance of a millionth of the diagonal.
+            *v += Vec3::new((i as f64).sin(), (2.0 * i as f64).sin(), (3.0 * i as f64).sin()) * jitter;
+        }
+        flip_some(&mut dirty, |i| flips[i % flips.len()]);
+        let wall = Wall::from_surface(&dirty).unwrap();
+        prop_assert_eq!(wall.mesh().vertices_mm.len(), clean.mesh().vertices_mm.len());
+        prop_assert!((wall.volume_mm3() / clean.volume_mm3() - 1.0).abs() < 1e-4);
+        prop_assert_eq!(wall.openings().len(), 2);
+        // The twin: jitter beyond the tolerance tears the surface apart.
+        for (i, v) in dirty.vertices_mm.iter_mut().enumerate() {
+            v.x += 0.01 * (i as f64).cos();
+        }
+        prop_assert!(Wall::from_surface(&dirty).unwrap().openings().len() > 2);
+    }
+}
+
+/// The folder of shared data, where a machine has it.
+fn shared(file: &str) -> Option<PathBuf> {
+    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
+    let folder = std::env::var_os("ENDOWIRE_SHARED").map_or_else(beside, PathBuf::from);
+    let path = folder.join("data").join(file);
+    path.exists().then_some(path)
+}
+
+#[test]
+fn a_real_carotid_surface_is_repaired_and_its_ends_found() {
+    let Some(path) = shared("carotids.stl") else { return };
+    let surface = SurfaceMesh::read(&path, 1.0).unwrap();
+    let wall = Wall::from_surface(&surface).unwrap();
+    // A common carotid that divides in two, as shipped wound inwards throughout.
+    let report = wall.report();
+    assert_eq!((report.components, report.non_manifold_edges, report.stray_edges), (1, 0, 0));
+    assert!(report.inside_out && report.vertices_welded > 5000, "{report:?}");
+    let radii: Vec<f64> = wall.openings().iter().map(|o| o.radius_mm).collect();
+    assert!(radii.len() == 3 && radii.iter().all(|r| (2.5..5.5).contains(r)), "{radii:?}");
+    for opening in wall.openings() {
+        let inside = opening.centre_mm - opening.direction;
+        assert!(
+            wall.contains(&inside).unwrap()
+                && !wall.contains(&(opening.centre_mm + opening.direction)).unwrap()
+        );
+    }
+    let checked = check(&surface).unwrap();
+    assert!((checked.volume_mm3 - wall.volume_mm3()).abs() < 1e-9 && checked.inside_out);
+}
