@@ -11,7 +11,10 @@ fn main() {
 /// The revision of a packaged crate is in the file that cargo puts there, that of a checkout in git.
 fn revision() -> Option<String> {
     if let Ok(info) = std::fs::read_to_string(".cargo_vcs_info.json") {
-        return info.split('"').find(|s| s.len() == 40 && s.bytes().all(|b| b.is_ascii_hexdigit())).map(str::to_owned);
+        return info
+            .split('"')
+            .find(|s| s.len() == 40 && s.bytes().all(|b| b.is_ascii_hexdigit()))
+            .map(str::to_owned);
     }
     // A crate unpacked inside somebody else's repository must not take that one's revision.
     if !std::path::Path::new("../../crates/cli/build.rs").exists() {

@@ -33,7 +33,11 @@ fn length(x: &[Vec3]) -> f64 {
 fn deflection_and_growth_are_those_of_the_quadratic_energy() {
     // Load, exact deflection of the inextensible rod (Bisshopp and Drucker 1945; a = 0.5 from the quoted +2.79 %),
     // overshoot in percent, length.
-    let cases = [(1.0, 0.301720773800, 10.48, 1.06379), (5.0, 0.713791523612, 133.0, 2.00114), (10.0, 0.810609024880, 311.0, 3.53906)];
+    let cases = [
+        (1.0, 0.301720773800, 10.48, 1.06379),
+        (5.0, 0.713791523612, 133.0, 2.00114),
+        (10.0, 0.810609024880, 311.0, 3.53906),
+    ];
     for (load, exact_rod, overshoot_percent, grown) in cases {
         let (x, _) = cantilever(load, 400);
         let w = x[399].y;

@@ -1,5 +1,7 @@
 //! Bad input ends with exit code 2 and one clear line that names file, key and value; nothing panics.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -54,7 +56,12 @@ impl Scene {
 
     fn run(&self) -> Output {
         std::fs::write(self.path("scene.toml"), &self.text).unwrap();
-        endowire(&["run".as_ref(), self.path("scene.toml").as_ref(), "--out".as_ref(), self.path("out").as_ref()])
+        endowire(&[
+            "run".as_ref(),
+            self.path("scene.toml").as_ref(),
+            "--out".as_ref(),
+            self.path("out").as_ref(),
+        ])
     }
 
     /// Runs, expects exit code 2 and a single line with all of `words`.
@@ -89,14 +96,21 @@ fn a_missing_scene_is_named() {
 #[test]
 fn a_missing_vessel_or_device_file_is_named() {
     Scene::good().with("tube.csv", "gone.csv").is_refused(&["gone.csv"]);
-    Scene::good().with("[[device.section]]", "[device]\nfile = \"gone.toml\"\n[[device.section]]").is_refused(&["device"]);
+    Scene::good()
+        .with("[[device.section]]", "[device]\nfile = \"gone.toml\"\n[[device.section]]")
+        .is_refused(&["device"]);
     let sections = &GOOD[GOOD.find("[[device.section]]").unwrap()..GOOD.find("[sheath]").unwrap()];
     Scene::good().with(sections, "[device]\nfile = \"gone.toml\"\n").is_refused(&["gone.toml"]);
 }
 
 #[test]
 fn a_wrong_key_comes_with_the_nearest_right_one() {
-    Scene::good().with("radius_mm", "radius").is_refused(&["scene.toml", "line 8", "`radius`", "did you mean `radius_mm`?"]);
+    Scene::good().with("radius_mm", "radius").is_refused(&[
+        "scene.toml",
+        "line 8",
+        "`radius`",
+        "did you mean `radius_mm`?",
+    ]);
     Scene::good().with("step_mm", "stepmm").is_refused(&["`stepmm`", "did you mean `step_mm`?"]);
     Scene::good().with("[sheath]", "[sheat]").is_refused(&["`sheat`", "did you mean `sheath`?"]);
     Scene::good()
@@ -109,24 +123,34 @@ fn a_wrong_key_comes_with_the_nearest_right_one() {
 
 #[test]
 fn values_that_are_not_finite_are_named() {
-    Scene::good().with("radius_mm = 0.5", "radius_mm = nan").is_refused(&["scene.toml", "device.section[0].radius_mm", "NaN"]);
+    Scene::good().with("radius_mm = 0.5", "radius_mm = nan").is_refused(&[
+        "scene.toml",
+        "device.section[0].radius_mm",
+        "NaN",
+    ]);
     Scene::good().with("= 10.0", "= inf").is_refused(&["bending_stiffness_nmm2", "inf"]);
-    Scene::good().with("[1.0, 0.0, 0.0]\ndirection", "[nan, 0.0, 0.0]\ndirection").is_refused(&["sheath.position_mm", "NaN"]);
+    Scene::good()
+        .with("[1.0, 0.0, 0.0]\ndirection", "[nan, 0.0, 0.0]\ndirection")
+        .is_refused(&["sheath.position_mm", "NaN"]);
     Scene::good().with("advance_mm = 20.0", "advance_mm = nan").is_refused(&["script[0].advance_mm", "NaN"]);
     Scene::good().file("tube.csv", b"0 0 0 4 -1\n80 0 nan 4 0\n").is_refused(&["tube.csv", "line 2"]);
 }
 
 #[test]
 fn a_device_without_length_is_refused() {
-    Scene::good().with("length_mm = 60.0", "length_mm = 0.0").is_refused(&["device.section[0].length_mm = 0"]);
+    Scene::good()
+        .with("length_mm = 60.0", "length_mm = 0.0")
+        .is_refused(&["device.section[0].length_mm = 0"]);
     Scene::good().with("length_mm = 60.0", "length_mm = -60.0").is_refused(&["length_mm = -60"]);
 }
 
 #[test]
 fn a_sheath_outside_the_vessel_is_refused() {
-    Scene::good()
-        .with("position_mm = [1.0, 0.0, 0.0]", "position_mm = [1.0, 9.0, 0.0]")
-        .is_refused(&["sheath.position_mm", "[1, 9, 0]", "outside"]);
+    Scene::good().with("position_mm = [1.0, 0.0, 0.0]", "position_mm = [1.0, 9.0, 0.0]").is_refused(&[
+        "sheath.position_mm",
+        "[1, 9, 0]",
+        "outside",
+    ]);
     Scene::good()
         .with("position_mm = [1.0, 0.0, 0.0]\ndirection = [1.0, 0.0, 0.0]", "opening = 7")
         .is_refused(&["sheath.opening = 7", "2 openings"]);
@@ -134,7 +158,9 @@ fn a_sheath_outside_the_vessel_is_refused() {
 
 #[test]
 fn a_sheath_without_direction_is_refused() {
-    Scene::good().with("direction = [1.0, 0.0, 0.0]", "direction = [0.0, 0.0, 0.0]").is_refused(&["sheath.direction"]);
+    Scene::good()
+        .with("direction = [1.0, 0.0, 0.0]", "direction = [0.0, 0.0, 0.0]")
+        .is_refused(&["sheath.direction"]);
 }
 
 #[test]
@@ -154,12 +180,13 @@ fn an_empty_mesh_is_refused() {
 
 #[test]
 fn a_mesh_too_broken_to_tell_inside_from_outside_is_refused() {
-    // Two triangles of a wall: no lumen.
-    let obj = b"v 0 -4 -4\nv 80 -4 -4\nv 80 -4 4\nv 0 4 4\nf 1 2 3\nf 1 3 4\n";
+    // Three sheets that meet in one edge: no boundary closes, and the sheath lies between two of them.
+    let obj = b"v 0 5 0\nv 80 5 0\nv 0 -5 5\nv 80 -5 5\nv 0 -5 -5\nv 80 -5 -5\nv 0 15 0\nv 80 15 0\n\
+        f 1 2 4 3\nf 2 1 5 6\nf 1 2 8 7\n";
     Scene::good()
-        .file("sheet.obj", obj)
-        .with("tree = \"tube.csv\"\nedge_mm = 2.0", "file = \"sheet.obj\"")
-        .is_refused(&["sheet.obj"]);
+        .file("sheets.obj", obj)
+        .with("tree = \"tube.csv\"\nedge_mm = 2.0", "file = \"sheets.obj\"")
+        .is_refused(&["sheets.obj", "inside from outside"]);
 }
 
 #[test]
@@ -167,8 +194,12 @@ fn absurd_sizes_are_refused_before_memory_is() {
     Scene::good().with("edge_mm = 2.0", "edge_mm = 1e-9").is_refused(&["edge_mm"]);
     Scene::good().with("step_mm = 2.0", "step_mm = 1e-30").is_refused(&["script[0]"]);
     Scene::good().with("length_mm = 60.0", "length_mm = 6e30").is_refused(&["length_mm"]);
-    Scene::good().with("[sheath]", "[method]\nname = \"li2011-dense\"\nelement_mm = 1e-6\n[sheath]").is_refused(&["element_mm"]);
-    Scene::good().with("[sheath]", "[view]\nviews = [\"3d\"]\nsize_px = [100000000, 4]\n[sheath]").is_refused(&["size_px"]);
+    Scene::good()
+        .with("[sheath]", "[method]\nname = \"li2011-dense\"\nelement_mm = 1e-6\n[sheath]")
+        .is_refused(&["element_mm"]);
+    Scene::good()
+        .with("[sheath]", "[view]\nviews = [\"3d\"]\nsize_px = [100000000, 4]\n[sheath]")
+        .is_refused(&["size_px"]);
     let mut huge = vec![0; 84];
     huge[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
     Scene::good()
@@ -194,8 +225,12 @@ fn contradicting_keys_are_refused() {
 fn a_folder_that_cannot_be_written_is_named() {
     let scene = Scene::good().file("taken", b"a file, not a folder");
     std::fs::write(scene.path("scene.toml"), &scene.text).unwrap();
-    let output =
-        endowire(&["run".as_ref(), scene.path("scene.toml").as_ref(), "--out".as_ref(), scene.path("taken").as_ref()]);
+    let output = endowire(&[
+        "run".as_ref(),
+        scene.path("scene.toml").as_ref(),
+        "--out".as_ref(),
+        scene.path("taken").as_ref(),
+    ]);
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("taken"));
 }

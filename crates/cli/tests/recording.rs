@@ -1,5 +1,7 @@
 //! What `endowire run` leaves on disk, read back by an independent reader.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -58,13 +60,23 @@ fn a_run_is_recorded_whole_and_the_parts_agree() {
     assert_eq!(summary["converged"], true);
     assert!((summary["inserted_mm"].as_f64().unwrap() - 20.0).abs() < 1e-9);
     for key in [
-        "version", "git_revision", "scene_hash", "seed", "tip_mm", "push_force_n", "torque_nmm", "energy_mj",
-        "max_penetration_mm", "wall_time_s", "frames",
+        "version",
+        "git_revision",
+        "scene_hash",
+        "seed",
+        "tip_mm",
+        "push_force_n",
+        "torque_nmm",
+        "energy_mj",
+        "max_penetration_mm",
+        "wall_time_s",
+        "frames",
     ] {
         assert!(!summary[key].is_null(), "{key} is missing");
     }
     assert_eq!(summary["scene_hash"].as_str().unwrap().len(), 64);
-    let on_disk: Value = serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
+    let on_disk: Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
     assert_eq!(on_disk, summary);
 
     let table = std::fs::read_to_string(out.join("steps.csv")).unwrap();
@@ -84,7 +96,9 @@ fn a_run_is_recorded_whole_and_the_parts_agree() {
     let frames = summary["frames"].as_array().unwrap();
     assert_eq!(frames.len(), 2 * 3, "steps 20, 40 and the last one, both views");
     for frame in frames {
-        let decoder = png::Decoder::new(std::io::BufReader::new(File::open(out.join(frame.as_str().unwrap())).unwrap()));
+        let decoder = png::Decoder::new(std::io::BufReader::new(
+            File::open(out.join(frame.as_str().unwrap())).unwrap(),
+        ));
         let info = decoder.read_info().unwrap();
         assert_eq!((info.info().width, info.info().height), (96, 64));
     }
@@ -100,7 +114,10 @@ fn the_same_scene_gives_the_same_bytes() {
     let mut names = vec!["steps.csv".to_owned(), "shapes.npz".to_owned()];
     names.extend(summary["frames"].as_array().unwrap().iter().map(|f| f.as_str().unwrap().to_owned()));
     for name in names {
-        assert!(std::fs::read(a.join(&name)).unwrap() == std::fs::read(b.join(&name)).unwrap(), "{name} differs");
+        assert!(
+            std::fs::read(a.join(&name)).unwrap() == std::fs::read(b.join(&name)).unwrap(),
+            "{name} differs"
+        );
     }
 }
 

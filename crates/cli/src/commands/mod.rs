@@ -11,7 +11,9 @@ use crate::failure::Failure;
 pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Run(args) => run::run(args),
-        Command::Vessel(VesselCommand::Check { file, unit_mm, json }) => vessel::check_file(file, *unit_mm, *json),
+        Command::Vessel(VesselCommand::Check { file, unit_mm, json }) => {
+            vessel::check_file(file, *unit_mm, *json)
+        }
         Command::Vessel(VesselCommand::Generate(args)) => vessel::generate(args),
         Command::Experiment(ExperimentCommand::Timing(args)) => timing::timing(args),
     }

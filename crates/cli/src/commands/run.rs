@@ -1,6 +1,6 @@
 //! `endowire run`: a scripted insertion, recorded.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use endowire_core::insertion::Simulation;
@@ -95,7 +95,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
 }
 
 /// The summary for a person, on stderr: stdout is for documents.
-fn tell(summary: &Summary, folder: &PathBuf, simulation: &Simulation) {
+fn tell(summary: &Summary, folder: &Path, simulation: &Simulation) {
     let tip = summary.tip_mm.unwrap_or_default();
     eprintln!(
         "{}: {} of {} steps by {} in {:.2} s ({:.2} s simulating)\n\

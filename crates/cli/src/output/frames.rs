@@ -51,11 +51,14 @@ impl FrameWriter {
         simulation: &Simulation,
         recorder: &mut Recorder,
     ) -> Result<(), Failure> {
-        let Some(renderer) = self.renderer.as_mut().filter(|_| last || step.is_multiple_of(self.every)) else {
+        let Some(renderer) = self.renderer.as_mut().filter(|_| last || step.is_multiple_of(self.every))
+        else {
             return Ok(());
         };
         let device = simulation.device();
-        let view = DeviceView::from_shape(simulation.shape(), |from_tip_mm| device.section_at(from_tip_mm).radius_mm);
+        let view = DeviceView::from_shape(simulation.shape(), |from_tip_mm| {
+            device.section_at(from_tip_mm).radius_mm
+        });
         let frames = renderer.render(&[view])?;
         for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {

@@ -27,7 +27,12 @@ impl Provenance {
             hash.update(input);
         }
         let scene_hash = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
-        Self { version: env!("CARGO_PKG_VERSION"), git_revision: env!("ENDOWIRE_GIT_REVISION"), scene_hash, seed }
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            git_revision: env!("ENDOWIRE_GIT_REVISION"),
+            scene_hash,
+            seed,
+        }
     }
 
     /// For a result that depends on the program and its arguments alone.

@@ -125,7 +125,12 @@ impl Recorder {
     }
 
     /// Adds one step.
-    pub(crate) fn record(&mut self, command: Command, report: &StepReport, shape: &Shape) -> Result<(), Failure> {
+    pub(crate) fn record(
+        &mut self,
+        command: Command,
+        report: &StepReport,
+        shape: &Shape,
+    ) -> Result<(), Failure> {
         self.steps += 1;
         let tip = shape.tip_mm().unwrap_or_default();
         let row = Row {
@@ -177,8 +182,11 @@ impl Recorder {
     /// Writes shapes.npz and summary.json.
     pub(crate) fn finish(self, summary: &Summary) -> Result<(), Failure> {
         let folder = &self.folder;
-        npz::write(&folder.join("shapes.npz"), vec![self.positions, self.tangents, self.from_tip, self.offsets])
-            .map_err(|e| Failure::write(&folder.join("shapes.npz"), &e))?;
+        npz::write(
+            &folder.join("shapes.npz"),
+            vec![self.positions, self.tangents, self.from_tip, self.offsets],
+        )
+        .map_err(|e| Failure::write(&folder.join("shapes.npz"), &e))?;
         let path = folder.join("summary.json");
         std::fs::write(&path, to_json(summary)? + "\n").map_err(|e| Failure::write(&path, &e))
     }

@@ -20,11 +20,19 @@ impl Sheath {
     pub fn new(position_mm: Vec3, direction: Vec3) -> Result<Self> {
         let show = |v: &Vec3| format!("[{}, {}, {}]", v.x, v.y, v.z);
         if !position_mm.iter().all(|c| c.is_finite()) {
-            return Err(Error::parameter("sheath.position_mm", show(&position_mm), "must be three finite numbers"));
+            return Err(Error::parameter(
+                "sheath.position_mm",
+                show(&position_mm),
+                "must be three finite numbers",
+            ));
         }
         let length = direction.norm();
         if !(length.is_finite() && length > 0.0) {
-            return Err(Error::parameter("sheath.direction", show(&direction), "must be a direction, not all zero"));
+            return Err(Error::parameter(
+                "sheath.direction",
+                show(&direction),
+                "must be a direction, not all zero",
+            ));
         }
         Ok(Self { position_mm, direction: direction / length })
     }

@@ -42,7 +42,12 @@ impl Simulation {
             let openings: Vec<String> = wall
                 .openings()
                 .iter()
-                .map(|o| format!("{} at [{:.1}, {:.1}, {:.1}]", o.index, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z))
+                .map(|o| {
+                    format!(
+                        "{} at [{:.1}, {:.1}, {:.1}]",
+                        o.index, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z
+                    )
+                })
                 .collect();
             return Err(Error::parameter(
                 "sheath.position_mm",

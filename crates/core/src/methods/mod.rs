@@ -59,9 +59,7 @@ impl MethodChoice {
     /// Options out of range.
     pub fn start(&self, surroundings: &Surroundings<'_>) -> Result<Box<dyn Method>> {
         Ok(match self {
-            Self::Li2011Dense(options) => {
-                Box::new(Li2011::new(*options, LinearSolver::Dense, surroundings)?)
-            }
+            Self::Li2011Dense(options) => Box::new(Li2011::new(*options, LinearSolver::Dense, surroundings)?),
             Self::Li2011Banded(options) => {
                 Box::new(Li2011::new(*options, LinearSolver::Banded, surroundings)?)
             }

@@ -19,7 +19,10 @@ const SIMILAR: f64 = 0.75;
 pub fn from_toml<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
     let size = std::fs::metadata(path).map_err(|e| Error::file(path, e))?.len();
     if size > SIZE_LIMIT {
-        return Err(Error::content(path, format!("{size} bytes are too many for a TOML file: at most {SIZE_LIMIT}")));
+        return Err(Error::content(
+            path,
+            format!("{size} bytes are too many for a TOML file: at most {SIZE_LIMIT}"),
+        ));
     }
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
     let value = toml::from_str(&text).map_err(|e| Error::content(path, explain(&e, &text)))?;
@@ -37,10 +40,8 @@ fn explain(error: &toml::de::Error, text: &str) -> String {
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     let hint = match quoted.split_first() {
         Some((wrong, known)) if message.starts_with("unknown ") => {
-            let best = known
-                .iter()
-                .map(|k| (strsim::jaro_winkler(wrong, k), k))
-                .max_by(|a, b| a.0.total_cmp(&b.0));
+            let best =
+                known.iter().map(|k| (strsim::jaro_winkler(wrong, k), k)).max_by(|a, b| a.0.total_cmp(&b.0));
             match best {
                 Some((likeness, key)) if likeness >= SIMILAR => format!(" – did you mean `{key}`?"),
                 _ => String::new(),

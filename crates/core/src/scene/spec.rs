@@ -164,14 +164,24 @@ impl Scene {
         let spec = &self.vessel;
         if spec.tree.is_some() {
             if let Some(unit_mm) = spec.unit_mm {
-                return Err(Error::parameter("vessel.unit_mm", unit_mm, "only with vessel.file: a tree is in millimetres"));
+                return Err(Error::parameter(
+                    "vessel.unit_mm",
+                    unit_mm,
+                    "only with vessel.file: a tree is in millimetres",
+                ));
             }
             let tree = CentrelineTree::read(&path)?;
             return Ok(GeneratedWall::new(&tree, spec.resolution(&tree)?)?.wall);
         }
-        for (name, given) in [("vessel.edge_mm", spec.edge_mm.is_some()), ("vessel.triangles", spec.triangles.is_some())] {
+        for (name, given) in
+            [("vessel.edge_mm", spec.edge_mm.is_some()), ("vessel.triangles", spec.triangles.is_some())]
+        {
             if given {
-                return Err(Error::parameter(name, "given", "only with vessel.tree: a file has its own mesh"));
+                return Err(Error::parameter(
+                    name,
+                    "given",
+                    "only with vessel.tree: a file has its own mesh",
+                ));
             }
         }
         let surface = SurfaceMesh::read(&path, spec.unit_mm.unwrap_or(1.0))?;
@@ -205,7 +215,9 @@ impl Scene {
     pub fn sheath(&self, wall: &Wall) -> Result<Sheath> {
         let spec = &self.sheath;
         match (spec.opening, spec.position_mm, spec.direction) {
-            (Some(opening), None, None) => Sheath::at_opening(wall, opening, spec.depth_mm.unwrap_or(DEPTH_MM)),
+            (Some(opening), None, None) => {
+                Sheath::at_opening(wall, opening, spec.depth_mm.unwrap_or(DEPTH_MM))
+            }
             (None, Some(position), Some(direction)) if spec.depth_mm.is_none() => {
                 Sheath::new(Vec3::from(position), Vec3::from(direction))
             }
@@ -236,7 +248,9 @@ impl Scene {
         let sheath = self.sheath(&wall)?;
         Simulation::new(wall, self.device()?, sheath, &self.method).map_err(|error| match error {
             // What is wrong with a surface is wrong with its file.
-            Error::Mesh(reason) => self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason)),
+            Error::Mesh(reason) => {
+                self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason))
+            }
             other => other,
         })
     }

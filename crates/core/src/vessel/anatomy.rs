@@ -45,20 +45,20 @@ pub fn asset_resolution(name: &str) -> Resolution {
 }
 
 const STRAIGHT_TUBE: &str =
-    "straight_tube: 100 mm along +y from the origin, inner radius 4 mm. A test piece.";
+    "straight_tube: 100 mm along +z from the origin, inner radius 4 mm. A test piece.";
 
 fn straight_tube() -> Vec<CentrelineNode> {
     Course::new()
         .root(Vec3::zeros(), 4.0)
-        .to(Vec3::new(0.0, 50.0, 0.0), 4.0)
-        .to(Vec3::new(0.0, 100.0, 0.0), 4.0)
+        .to(Vec3::new(0.0, 0.0, 50.0), 4.0)
+        .to(Vec3::new(0.0, 0.0, 100.0), 4.0)
         .nodes
 }
 
 const CURVED_TUBE: &str = "curved_tube: the plastic tube of Li et al. 2011, figure 5, of which the paper gives the extent, \
 14 cm x 9 cm, and no radius.
-Axis in the plane z = 0: 95 mm along +y from the origin, a semicircle of radius 45 mm towards +x, 20 mm along -y: it spans
-140 mm in y and 90 mm in x. Inner radius 4 mm: an assumption.";
+Axis in the plane y = 0: 95 mm along +z from the origin, a semicircle of radius 45 mm towards +x, 20 mm along -z: it spans
+140 mm in z and 90 mm in x. Inner radius 4 mm: an assumption.";
 
 fn curved_tube() -> Vec<CentrelineNode> {
     const LEG: f64 = 95.0;
@@ -71,16 +71,16 @@ fn curved_tube() -> Vec<CentrelineNode> {
     let steps = |length: f64| (length / SPACING).round() as usize;
     let leg = steps(LEG);
     for k in 1..=leg {
-        course = course.to(Vec3::new(0.0, LEG * k as f64 / leg as f64, 0.0), RADIUS);
+        course = course.to(Vec3::new(0.0, 0.0, LEG * k as f64 / leg as f64), RADIUS);
     }
     let arc = steps(PI * BEND);
     for k in 1..=arc {
         let angle = PI * k as f64 / arc as f64;
-        course = course.to(Vec3::new(BEND - BEND * angle.cos(), LEG + BEND * angle.sin(), 0.0), RADIUS);
+        course = course.to(Vec3::new(BEND - BEND * angle.cos(), 0.0, LEG + BEND * angle.sin()), RADIUS);
     }
     let end = steps(END);
     for k in 1..=end {
-        course = course.to(Vec3::new(2.0 * BEND, LEG - END * k as f64 / end as f64, 0.0), RADIUS);
+        course = course.to(Vec3::new(2.0 * BEND, 0.0, LEG - END * k as f64 / end as f64), RADIUS);
     }
     course.nodes
 }

@@ -42,7 +42,12 @@ struct Beyond {
 /// Solves for positions x₁…xₙ and tangents t₁…tₙ at the minimum of the energy of `chain`, in O(n).
 ///
 /// Positions are measured from the sheath throughout, which keeps the rounding of far-away vessels out.
-pub fn solve(chain: &Chain, workspace: &mut Workspace, positions_mm: &mut Vec<Vec3>, tangents: &mut Vec<Vec3>) {
+pub fn solve(
+    chain: &Chain,
+    workspace: &mut Workspace,
+    positions_mm: &mut Vec<Vec3>,
+    tangents: &mut Vec<Vec3>,
+) {
     let n = chain.elements();
     let kappa = chain.wall_stiffness_n_per_mm;
     workspace.eliminations.clear();
@@ -61,8 +66,7 @@ pub fn solve(chain: &Chain, workspace: &mut Workspace, positions_mm: &mut Vec<Ve
             beyond.xx += stiff_normal * contact.normal.transpose();
             beyond.qx += stiff_normal * (contact.offset_mm - contact.normal.dot(&chain.start_mm));
         }
-        let elimination =
-            beyond.eliminate(chain.lengths_mm[i - 1], chain.bending_stiffness_nmm2[i - 1]);
+        let elimination = beyond.eliminate(chain.lengths_mm[i - 1], chain.bending_stiffness_nmm2[i - 1]);
         workspace.eliminations.push(elimination);
     }
 

@@ -47,7 +47,13 @@ pub struct Chain {
 
 impl Chain {
     /// A straight chain of `elements` equal elements from the sheath, without load or contact.
-    pub fn uniform(start_mm: Vec3, start_tangent: Vec3, length_mm: f64, elements: usize, stiffness_nmm2: f64) -> Self {
+    pub fn uniform(
+        start_mm: Vec3,
+        start_tangent: Vec3,
+        length_mm: f64,
+        elements: usize,
+        stiffness_nmm2: f64,
+    ) -> Self {
         Self {
             start_mm,
             start_tangent,
@@ -122,7 +128,8 @@ impl Chain {
             residual[i - 1] += beyond;
         }
         for i in 0..n {
-            let next = if i + 1 < n { residual[i + 1] * (0.5 * self.lengths_mm[i + 1]) } else { Vec3::zeros() };
+            let next =
+                if i + 1 < n { residual[i + 1] * (0.5 * self.lengths_mm[i + 1]) } else { Vec3::zeros() };
             residual[i] = residual[i] * (0.5 * self.lengths_mm[i]) + next;
         }
         let mut previous = self.start_tangent;

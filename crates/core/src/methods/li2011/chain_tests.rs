@@ -28,7 +28,8 @@ fn largest_difference(a: &[Vec3], b: &[Vec3]) -> f64 {
 
 /// A chain of unequal elements and stiffness, loaded at every node and held at every third.
 fn irregular_chain(elements: usize) -> Chain {
-    let mut chain = Chain::uniform(Vec3::new(3.0, -2.0, 1.0), Vec3::new(0.6, 0.8, 0.0), 100.0, elements, 20.0);
+    let mut chain =
+        Chain::uniform(Vec3::new(3.0, -2.0, 1.0), Vec3::new(0.6, 0.8, 0.0), 100.0, elements, 20.0);
     for i in 0..elements {
         let wave = (i as f64 * 0.7).sin();
         chain.lengths_mm[i] *= 1.0 + 0.4 * wave;

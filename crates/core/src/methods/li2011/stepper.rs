@@ -92,7 +92,8 @@ impl Plane {
         let x = &x.map(|c| (c / DETECTION_GRID_MM).round() * DETECTION_GRID_MM);
         let near = query.nearest(x, REACH_MM).filter(|near| !near.rim)?;
         let normal = query.inward_normal(near.triangle);
-        let plane = Self { normal, offset_mm: normal.dot(&near.point_mm) + radius_mm, triangle: near.triangle };
+        let plane =
+            Self { normal, offset_mm: normal.dot(&near.point_mm) + radius_mm, triangle: near.triangle };
         (plane.depth_mm(x) > DETECTION_GRID_MM).then_some(plane)
     }
 
@@ -107,7 +108,11 @@ impl Li2011 {
     ///
     /// # Errors
     /// An element length or wall stiffness that is not positive, or a number of nodes beyond memory.
-    pub fn new(options: Li2011Options, solver: LinearSolver, surroundings: &Surroundings<'_>) -> Result<Self> {
+    pub fn new(
+        options: Li2011Options,
+        solver: LinearSolver,
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Self> {
         let length_mm = surroundings.device.length_mm();
         crate::error::in_range("method.element_mm", options.element_mm, length_mm)?;
         crate::error::in_range("method.wall_stiffness_n_per_mm", options.wall_stiffness_n_per_mm, 1e9)?;
@@ -120,7 +125,9 @@ impl Li2011 {
             return Err(Error::parameter(
                 "method.element_mm",
                 options.element_mm,
-                format!("cuts the device of {length_mm} mm into {nodes:.0} elements; at most {limit} fit: use longer elements"),
+                format!(
+                    "cuts the device of {length_mm} mm into {nodes:.0} elements; at most {limit} fit: use longer elements"
+                ),
             ));
         }
         let sheath = surroundings.sheath;

@@ -70,7 +70,7 @@ fn forks_of_every_angle_are_sound_open_at_their_ends_and_closed_by_caps() {
         let report = check(made.wall.mesh()).unwrap();
         assert!(report.is_sound(), "{angle}: {report:?}");
         assert_eq!((report.components, made.ends.len()), (1, 3));
-        let closed = check(&made.closed_mesh()).unwrap();
+        let closed = check(&made.wall.closed_mesh()).unwrap();
         assert!(closed.watertight && closed.is_sound(), "{angle}: {closed:?}");
         let inlet = &made.wall.openings()[made.inlet];
         assert!((inlet.direction + Vec3::z()).norm() < 1e-9 && inlet.centre_mm.z.abs() < 1e-9);
