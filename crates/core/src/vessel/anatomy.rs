@@ -40,7 +40,7 @@ pub fn asset_resolution(name: &str) -> Resolution {
         "straight_tube" => Resolution::EdgeMm(1.25),
         "curved_tube" => Resolution::EdgeMm(1.2),
         "aortic_arch" => Resolution::EdgeMm(2.25),
-        _ => Resolution::EdgeMm(1.05),
+        _ => Resolution::EdgeMm(1.1),
     }
 }
 
@@ -145,54 +145,54 @@ fn aortic_arch() -> Vec<CentrelineNode> {
 }
 
 const HEPATIC: &str = "hepatic: abdominal aorta with coeliac trunk and the arteries to the liver; the inlet is the lower end of the aorta.
-Diameters: aorta 20 mm at the coeliac trunk (Rogers et al., J. Vasc. Surg. 58, 2013: 19-21 mm in adults without aneurysm);
-coeliac trunk 7.9, common hepatic 5.0, splenic 5.6, proper hepatic 4.5, left hepatic 2.9, right hepatic 3.5, gastroduodenal
-3.7 mm (means of Silveira et al., Int. J. Morphol. 27, 2009, and Malnar et al., Coll. Antropol. 34, 2010, rounded).
+Mean diameters in mm: aorta 22.0, right hepatic 2.9, left hepatic 2.5 (Bilir et al., Int. J. Morphol., 2021, CT, n = 500);
+coeliac trunk 7.8, splenic 6.1 (Malnar et al., Coll. Antropol. 34, 2010, dissection, n = 90); common hepatic 5.2, proper hepatic
+4.8, gastroduodenal 4.1 (cast specimens from Bucaramanga, Rev. Col. Bras. Cir., n = 26).
 Course of the axis drawn. Axes: +x left, +y posterior, +z cranial; origin on the aorta's axis 60 mm below the coeliac trunk.";
 
 fn hepatic() -> Vec<CentrelineNode> {
-    let mut course = Course::new().root(Vec3::zeros(), 10.0);
+    let mut course = Course::new().root(Vec3::zeros(), 11.0);
     for z in [20.0, 40.0, 60.0, 80.0, 100.0] {
-        course = course.to(Vec3::new(0.0, 0.0, z), 10.0);
+        course = course.to(Vec3::new(0.0, 0.0, z), 11.0);
     }
     // Forward and a little down from the front of the aorta.
-    let course = course.at(3).to(Vec3::new(-0.5, -14.0, 58.0), 3.95).to(Vec3::new(-1.0, -22.0, 57.0), 3.95);
-    let course = course.to(Vec3::new(-1.0, -30.0, 57.5), 3.95);
+    let course = course.at(3).to(Vec3::new(-0.5, -14.0, 58.0), 3.9).to(Vec3::new(-1.0, -22.0, 57.0), 3.9);
+    let course = course.to(Vec3::new(-1.0, -30.0, 57.5), 3.9);
     let fork = course.nodes.len() - 1;
     let course = course
         .at(fork)
-        .to(Vec3::new(9.0, -35.0, 59.0), 2.8)
-        .to(Vec3::new(22.0, -32.0, 62.0), 2.8)
-        .to(Vec3::new(36.0, -24.0, 61.0), 2.7)
-        .to(Vec3::new(50.0, -14.0, 64.0), 2.6)
-        .to(Vec3::new(64.0, -6.0, 68.0), 2.5);
+        .to(Vec3::new(9.0, -35.0, 59.0), 3.05)
+        .to(Vec3::new(22.0, -32.0, 62.0), 3.05)
+        .to(Vec3::new(36.0, -24.0, 61.0), 3.05)
+        .to(Vec3::new(50.0, -14.0, 64.0), 3.05)
+        .to(Vec3::new(64.0, -6.0, 68.0), 3.05);
     let course = course
         .at(fork)
-        .to(Vec3::new(-10.0, -36.0, 57.0), 2.5)
-        .to(Vec3::new(-22.0, -39.0, 55.5), 2.5)
-        .to(Vec3::new(-34.0, -40.0, 57.0), 2.5);
+        .to(Vec3::new(-10.0, -36.0, 57.0), 2.6)
+        .to(Vec3::new(-22.0, -39.0, 55.5), 2.6)
+        .to(Vec3::new(-34.0, -40.0, 57.0), 2.6);
     let division = course.nodes.len() - 1;
     let course = course
         .at(division)
-        .to(Vec3::new(-39.0, -42.0, 48.0), 1.85)
-        .to(Vec3::new(-40.0, -43.0, 36.0), 1.85)
-        .to(Vec3::new(-37.0, -44.0, 22.0), 1.75);
+        .to(Vec3::new(-39.0, -42.0, 48.0), 2.05)
+        .to(Vec3::new(-40.0, -43.0, 36.0), 2.05)
+        .to(Vec3::new(-37.0, -44.0, 22.0), 2.05);
     let course = course
         .at(division)
-        .to(Vec3::new(-43.0, -40.0, 62.0), 2.25)
-        .to(Vec3::new(-50.0, -39.0, 70.0), 2.25)
-        .to(Vec3::new(-55.0, -38.0, 80.0), 2.25);
+        .to(Vec3::new(-43.0, -40.0, 62.0), 2.4)
+        .to(Vec3::new(-50.0, -39.0, 70.0), 2.4)
+        .to(Vec3::new(-55.0, -38.0, 80.0), 2.4);
     let liver = course.nodes.len() - 1;
     let course = course
         .at(liver)
-        .to(Vec3::new(-62.0, -35.0, 89.0), 1.75)
-        .to(Vec3::new(-72.0, -31.0, 96.0), 1.7)
-        .to(Vec3::new(-84.0, -27.0, 101.0), 1.6);
+        .to(Vec3::new(-62.0, -35.0, 89.0), 1.46)
+        .to(Vec3::new(-72.0, -31.0, 96.0), 1.46)
+        .to(Vec3::new(-84.0, -27.0, 101.0), 1.46);
     course
         .at(liver)
-        .to(Vec3::new(-52.0, -41.0, 91.0), 1.45)
-        .to(Vec3::new(-46.0, -44.0, 102.0), 1.4)
-        .to(Vec3::new(-38.0, -46.0, 112.0), 1.4)
+        .to(Vec3::new(-52.0, -41.0, 91.0), 1.25)
+        .to(Vec3::new(-46.0, -44.0, 102.0), 1.25)
+        .to(Vec3::new(-38.0, -46.0, 112.0), 1.25)
         .nodes
 }
 
