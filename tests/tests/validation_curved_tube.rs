@@ -26,14 +26,16 @@ fn largest_difference(a: &MethodChoice, b: &MethodChoice) -> f64 {
     commands.push(Command::rotate(1.0));
     commands.extend(vec![Command::retract(2.0); 45]);
     let mut largest: f64 = 0.0;
+    let mut most_contacts = 0;
     for command in commands {
         first.step(command).unwrap();
         second.step(command).unwrap();
         let (x, y) = (&first.shape().positions_mm, &second.shape().positions_mm);
         assert_eq!(x.len(), y.len());
+        most_contacts = most_contacts.max(first.report().contacts.len());
         largest = x.iter().zip(y).map(|(x, y)| (x - y).norm()).fold(largest, f64::max);
     }
-    assert!(first.report().contacts.len() > 10, "the wire must lean on the wall");
+    assert!(most_contacts > 10, "the wire must lean on the wall");
     largest
 }
 

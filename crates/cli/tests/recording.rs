@@ -41,7 +41,7 @@ fn short_scene(folder: &Path) -> PathBuf {
     let assets = assets().canonicalize().unwrap();
     let text = text
         .replace("\"../", &format!("\"{}/", assets.display()))
-        .replace("advance_mm = 230.0", "advance_mm = 30.0")
+        .replace("advance_mm = 220.0", "advance_mm = 30.0")
         .replace("size_px = [640, 640]", "size_px = [96, 64]");
     let path = folder.join("short.toml");
     std::fs::write(&path, text).unwrap();
@@ -56,9 +56,9 @@ fn a_run_is_recorded_whole_and_the_parts_agree() {
     assert_eq!(code, Some(0));
 
     let steps = summary["steps"].as_u64().unwrap() as usize;
-    assert_eq!(steps, 30 + 6 + 10);
+    assert_eq!(steps, 60 + 6 + 40);
     assert_eq!(summary["converged"], true);
-    assert!((summary["inserted_mm"].as_f64().unwrap() - 20.0).abs() < 1e-9);
+    assert!((summary["inserted_mm"].as_f64().unwrap() - 10.0).abs() < 1e-9);
     for key in [
         "version",
         "git_revision",
@@ -94,7 +94,7 @@ fn a_run_is_recorded_whole_and_the_parts_agree() {
     assert_eq!(floats(&out.join("shapes.npz"), "from_tip_mm").0, [offsets[steps] as u64]);
 
     let frames = summary["frames"].as_array().unwrap();
-    assert_eq!(frames.len(), 2 * 3, "steps 20, 40 and the last one, both views");
+    assert_eq!(frames.len(), 2 * 3, "steps 40, 80 and the last one, both views");
     for frame in frames {
         let decoder = png::Decoder::new(std::io::BufReader::new(
             File::open(out.join(frame.as_str().unwrap())).unwrap(),

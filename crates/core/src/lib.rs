@@ -18,3 +18,8 @@ pub use nalgebra;
 
 /// A point or direction in space, millimetres or unit length as its name says.
 pub type Vec3 = nalgebra::Vector3<f64>;
+
+/// The README's example is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

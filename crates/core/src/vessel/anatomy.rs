@@ -283,6 +283,6 @@ mod tests {
         for node in tree.nodes() {
             (low, high) = (low.inf(&node.position_mm), high.sup(&node.position_mm));
         }
-        assert!((high - low - Vec3::new(90.0, 140.0, 0.0)).norm() < 0.02, "{}", high - low);
+        assert!((high - low - Vec3::new(90.0, 0.0, 140.0)).norm() < 0.02, "{}", high - low);
     }
 }

@@ -9,7 +9,9 @@ use crate::{Error, Vec3};
 
 /// A tube of radius 4 along +y from 0 to 100, open at both ends.
 fn tube() -> Wall {
-    let tree = anatomy::tree("straight_tube").unwrap();
+    let node =
+        |y: f64, parent| CentrelineNode { position_mm: Vec3::new(0.0, y, 0.0), radius_mm: 4.0, parent };
+    let tree = CentrelineTree::new(vec![node(0.0, None), node(50.0, Some(0)), node(100.0, Some(1))]).unwrap();
     GeneratedWall::new(&tree, Resolution::EdgeMm(2.0)).unwrap().wall
 }
 
