@@ -3,7 +3,9 @@
 //! Units everywhere: millimetre, newton, second, radian; energy in N·mm = mJ.
 
 pub mod error;
+pub mod rod;
 pub mod shape;
+pub mod solve;
 pub mod vessel;
 
 pub use error::{Error, Result};
