@@ -23,6 +23,7 @@ pub mod frame;
 pub mod layout;
 pub mod quadrature;
 pub mod state;
+pub mod supports;
 pub mod torsion;
 
 pub use assembly::Assembly;
@@ -30,6 +31,7 @@ pub use element::{ElementData, Energy};
 pub use frame::Frame;
 pub use layout::{Layout, PLAIN, TWISTED};
 pub use state::RodState;
+pub use supports::{EndAngle, Supports};
 
 #[cfg(test)]
 mod derivative_tests;
