@@ -10,6 +10,7 @@ use super::element::ElementData;
 use super::layout::Layout;
 use super::state::RodState;
 use crate::Vec3;
+use crate::solve::BandMatrix;
 
 /// Flexibility of the end supports, as a fraction of the rod's own.
 const SUPPORT_FLEXIBILITY: f64 = 1e-9;
@@ -149,12 +150,12 @@ impl Supports {
         }
     }
 
-    /// Holds the rows of the first node and clears their residual.
-    pub fn hold<const C: usize>(&self, assembly: &mut Assembly<C>) {
+    /// Rows of the first node that are held.
+    pub fn held<const C: usize>(&self) -> [Option<usize>; 6] {
         let l = Layout::<C>;
         let mut held = [None; 6];
-        for a in 0..3 {
-            held[a] = Some(l.position(0) + a);
+        for (a, row) in held.iter_mut().enumerate().take(3) {
+            *row = Some(l.position(0) + a);
         }
         if self.start_tangent {
             held[3] = Some(l.tangent(0));
@@ -163,8 +164,20 @@ impl Supports {
         if Layout::<C>::TWIST && self.start_angle {
             held[5] = Some(l.angle(0));
         }
-        for row in held.into_iter().flatten() {
-            assembly.matrix.hold(row);
+        held
+    }
+
+    /// Holds the rows of the first node in a matrix.
+    pub fn hold_rows<const C: usize>(&self, matrix: &mut BandMatrix<C>) {
+        for row in self.held::<C>().into_iter().flatten() {
+            matrix.hold(row);
+        }
+    }
+
+    /// Holds the rows of the first node and clears their residual.
+    pub fn hold<const C: usize>(&self, assembly: &mut Assembly<C>) {
+        self.hold_rows(&mut assembly.matrix);
+        for row in self.held::<C>().into_iter().flatten() {
             assembly.residual[row] = 0.0;
             assembly.correction[row] = 0.0;
         }

@@ -177,9 +177,10 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
-    pub fn inertia(&mut self, elements: &[ElementData], sigma: f64) -> Option<Inertia> {
+    pub fn inertia(&mut self, elements: &[ElementData], supports: &Supports, sigma: f64) -> Option<Inertia> {
         self.shifted.copy_from(&self.assembly.matrix);
         Assembly::add_shift(&mut self.shifted, elements, sigma);
+        supports.hold_rows(&mut self.shifted);
         self.factor.factor(&self.shifted).ok()
     }
 
@@ -246,6 +247,7 @@ impl<const C: usize> Newton<C> {
                 }
                 self.shifted.copy_from(&self.assembly.matrix);
                 Assembly::add_shift(&mut self.shifted, elements, whisper + sigma);
+                supports.hold_rows(&mut self.shifted);
                 let found = self.factor.factor_solve(&self.shifted, &mut self.step);
                 if sigma == 0.0 {
                     natural = found.ok();
@@ -285,7 +287,7 @@ impl<const C: usize> Newton<C> {
 
             if arrived {
                 // A saddle: leave it along the most negative curvature.
-                self.negative_curvature(elements, state);
+                self.negative_curvature(elements, supports, state);
                 let record = self.leave(elements, supports, external, state);
                 match record {
                     Some(step) => report.steps.push(StepRecord { residual, shift, ..step }),
@@ -550,7 +552,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Replaces the step by the direction of most negative curvature: inverse iteration with the shifted factor.
-    fn negative_curvature(&mut self, elements: &[ElementData], state: &RodState) {
+    fn negative_curvature(&mut self, elements: &[ElementData], supports: &Supports, state: &RodState) {
         let l = Layout::<C>;
         let n = elements.len();
         let first = l.support(n);
@@ -575,13 +577,8 @@ impl<const C: usize> Newton<C> {
                     self.spare[l.angle(i)] = h * self.step[l.angle(i)];
                 }
             }
-            // Held rows answer to nothing.
-            for row in 0..Layout::<C>::BLOCK {
-                let held = self.assembly.matrix.get(row, row) == 1.0
-                    && (1..C).all(|k| self.assembly.matrix.get(row, row + k) == 0.0);
-                if held {
-                    self.spare[row] = 0.0;
-                }
+            for row in supports.held::<C>().into_iter().flatten() {
+                self.spare[row] = 0.0;
             }
             self.factor.solve(&mut self.spare);
             let size = self.spare[..first].iter().fold(0.0f64, |m, v| m.max(v.abs()));

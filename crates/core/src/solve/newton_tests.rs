@@ -36,13 +36,13 @@ fn cantilever(n: usize, force: Vec3, options: &NewtonOptions) -> (RodState, Newt
 
 #[test]
 fn first_light() {
-    for turn in [0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0] {
+    for turn in [0.7, 1.0, 1.5] {
         for (a, w, u) in [
             (1.0, 0.301720773800, 0.0564332362834),
             (10.0, 0.810609024880, 0.554995597754),
             (50.0, 0.917155447304, 0.800000396050),
         ] {
-            for n in [4, 8, 16, 32, 64] {
+            for n in [16, 32, 64] {
                 let options = NewtonOptions { max_turn: turn, ..NewtonOptions::default() };
                 let (s, r) = cantilever(n, Vec3::new(0.0, -a, 0.0), &options);
                 let tip = s.positions[n];
