@@ -6,6 +6,7 @@ pub mod error;
 pub mod rod;
 pub mod shape;
 pub mod solve;
+pub mod statics;
 pub mod vessel;
 
 pub use error::{Error, Result};
