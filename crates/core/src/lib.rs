@@ -3,6 +3,7 @@
 //! Units everywhere: millimetre, newton, second, radian; energy in N·mm = mJ.
 
 pub mod error;
+pub mod reference;
 pub mod rod;
 pub mod shape;
 pub mod solve;

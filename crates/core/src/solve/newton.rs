@@ -347,6 +347,11 @@ impl<const C: usize> Newton<C> {
                 let energy_change = self.energy(elements, external, state) - before;
                 let change = energy_change + weigh(&supports.gaps(&self.trial)) - weighed;
                 let enough = change <= 1e-4 * alpha * slope.min(0.0) + rounding;
+                // On a path of unstable states the energy says nothing; steps there are short and Newton's own.
+                if !options.minimum && change.is_finite() {
+                    accepted = Some(StepRecord { energy_change, merit_change: change, energy_scale, residual, fraction: alpha, shift });
+                    break;
+                }
                 // Loads that follow the rod have no energy; near their equilibrium the full step is right.
                 if (change.is_finite() && enough) || (follows && attempt >= 3 && change.is_finite()) {
                     accepted = Some(StepRecord {

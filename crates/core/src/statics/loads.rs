@@ -17,13 +17,15 @@ pub struct Loads {
     pub distributed: Vec<(usize, usize, Vec3)>,
     /// Forces that follow the rod (node, components along t, d₁, d₂).
     pub followers: Vec<(usize, Vec3)>,
-    /// All loads are multiplied by this.
+    /// Dead forces that `factor` leaves alone.
+    pub constant: Vec<(usize, Vec3)>,
+    /// All other loads are multiplied by this.
     pub factor: f64,
 }
 
 impl Default for Loads {
     fn default() -> Self {
-        Self { forces: vec![], moments: vec![], distributed: vec![], followers: vec![], factor: 1.0 }
+        Self { forces: vec![], moments: vec![], distributed: vec![], followers: vec![], constant: vec![], factor: 1.0 }
     }
 }
 
@@ -45,7 +47,11 @@ impl<const C: usize> External<C> for Loads {
                 sum -= q.dot(&(centroid(elements, state, e) - state.positions[0])) * elements[e].length;
             }
         }
-        sum * self.factor
+        sum *= self.factor;
+        for (i, f) in &self.constant {
+            sum -= f.dot(&(state.positions[*i] - state.positions[0]));
+        }
+        sum
     }
 
     fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
@@ -53,6 +59,9 @@ impl<const C: usize> External<C> for Loads {
         assembly.external_energy += External::<C>::energy(self, elements, state);
         for (i, f) in &self.forces {
             assembly.add_node(*i, &(f * -self.factor), &Matrix3::zeros());
+        }
+        for (i, f) in &self.constant {
+            assembly.add_node(*i, &-f, &Matrix3::zeros());
         }
         for (first, last, q) in &self.distributed {
             let q = q * self.factor;
@@ -152,7 +161,8 @@ impl<const C: usize> External<C> for Loads {
     fn scale(&self) -> [f64; 2] {
         let force = self.forces.iter().chain(&self.followers).map(|(_, f)| f.norm()).fold(0.0, f64::max);
         let moment = self.moments.iter().map(|(_, m)| m.norm()).fold(0.0, f64::max);
-        [force * self.factor.abs(), moment * self.factor.abs()]
+        let constant = self.constant.iter().map(|(_, f)| f.norm()).fold(0.0, f64::max);
+        [constant.max(force * self.factor.abs()), moment * self.factor.abs()]
     }
 }
 

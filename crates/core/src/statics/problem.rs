@@ -143,6 +143,12 @@ impl StaticProblem {
         Ok(Self { elements, supports, loads, initial, twisted, options, load_steps, gj_given })
     }
 
+    /// Adds a constant force along the end's tangent that load factors leave alone.
+    pub fn pulled_by(&mut self, tension: f64) {
+        let n = self.elements.len();
+        self.loads.constant.push((n, self.initial.frames[n].t * tension));
+    }
+
     /// Solves from the initial shape.
     pub fn solve(&self) -> Result<StaticSolution> {
         let solved = self.solve_state()?;
