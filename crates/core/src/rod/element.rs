@@ -115,6 +115,27 @@ pub fn elongation(length: f64, mid: &Vec3) -> f64 {
     2.0 / 3.0 * length * (mid.norm() - 1.0)
 }
 
+/// What the bending energy is multiplied by beside its mean speed, with its first and second derivative in c = t₀·t₁.
+///
+/// A cubic with unit end slopes and |r′(½)| = 1 that spans a circular arc of angle φ costs more than the arc, by 7φ⁴/2880 of its
+/// energy: 4/2880 because its curvature wavers (the interpolation error r⁗B, B = s²(h−s)²/24, has the normal part κ³B), 4/2880
+/// because that makes it shorter (by κ·κ³B), less 1/2880 because the condition in the middle makes the chord longer. With
+/// q = 2(1 − c) = φ² + O(φ⁴) the factor 1 − 7q²/2880 takes the excess out: constant curvature is met to order 6, and where
+/// curvature varies the error at order 4 is a third of what it is without. It is 1 for an element whose ends
+/// are parallel and never less than 0.96.
+#[inline]
+fn arc_factor(t0: &Vec3, t1: &Vec3) -> (f64, f64, f64) {
+    let q = 2.0 * (1.0 - t0.dot(t1));
+    const EXCESS: f64 = 7.0 / 2880.0;
+    (1.0 - EXCESS * q * q, 4.0 * EXCESS * q, -8.0 * EXCESS)
+}
+
+/// Mean of |r′| over the element from that in its middle, Simpson's rule with unit slopes at the nodes.
+#[inline]
+fn mean_speed(mid: f64) -> f64 {
+    (1.0 + 2.0 * mid) / 3.0
+}
+
 /// The element's energy alone.
 pub fn element_energy(data: &ElementData, s: &ElementState, twisted: bool) -> Energy {
     let (t0, t1) = (s.first.t, s.second.t);
@@ -123,7 +144,7 @@ pub fn element_energy(data: &ElementData, s: &ElementState, twisted: bool) -> En
         let (y, z) = point.derivatives(&s.chord, &t0, &t1);
         energy.bend += point.weight * data.bending[k] * bending_value(&y, &z);
     }
-    energy.bend /= data.length;
+    energy.bend *= arc_factor(&t0, &t1).0 * mean_speed(mid_slope(&t0, &s.chord, &t1).norm()) / data.length;
     if twisted {
         let (chord, end) = (s.first.local(&s.chord), s.first.local(&t1));
         for (k, point) in GAUSS.iter().enumerate() {
@@ -204,11 +225,42 @@ pub fn element_system<const M: usize>(data: &ElementData, s: &ElementState, out:
         h11 += hyy * (y1 * y1) + (hyz + hzy) * (y1 * z1) + hzz * (z1 * z1);
     }
 
-    // Axial force at the middle: N c, c = ⅔h(|y| − 1), y = 1.5 e − ¼(t₀ + t₁).
+    // The middle: m = y/|y| with y = 1.5 e − ¼(t₀ + t₁).
     let mid = mid_slope(&t0, &s.chord, &t1);
-    let length = mid.norm();
-    let m = mid / length;
-    let c = 2.0 / 3.0 * h * (length - 1.0);
+    let speed = mid.norm();
+    let m = mid / speed;
+
+    // Times the factor f = g(t₀·t₁) (1 + 2|y|)/3: f ∇U + U ∇f, and so on. ∇|y| = m (1.5, −¼, −¼).
+    let (arc, slope, curve) = arc_factor(&t0, &t1);
+    let stored = energy.bend;
+    let mean = mean_speed(speed);
+    let f = arc * mean;
+    energy.bend *= f;
+    let ends = m * (arc / 6.0);
+    let (fe, f0, f1) = (m * arc, t1 * (slope * mean) - ends, t0 * (slope * mean) - ends);
+    // ∇∇f without the part of |y|'s own curvature, which joins that of the axial force below.
+    let (mt, cross) = (m * (2.0 / 3.0 * slope * stored), curve * mean * stored);
+    let bare = (ge, g0, g1);
+    ge = ge * f + fe * stored;
+    g0 = g0 * f + f0 * stored;
+    g1 = g1 * f + f1 * stored;
+    let both = |a: &Vec3, b: &Vec3| a * b.transpose();
+    let pee = both(&fe, &bare.0);
+    hee = hee * f + pee + pee.transpose();
+    he0 = he0 * f + both(&fe, &bare.1) + both(&bare.0, &f0) + both(&mt, &t1) * 1.5;
+    he1 = he1 * f + both(&fe, &bare.2) + both(&bare.0, &f1) + both(&mt, &t0) * 1.5;
+    let (p00, p11) = (
+        both(&f0, &bare.1) - both(&mt, &t1) * 0.25,
+        both(&f1, &bare.2) - both(&mt, &t0) * 0.25,
+    );
+    h00 = h00 * f + p00 + p00.transpose() + both(&t1, &t1) * cross;
+    h11 = h11 * f + p11 + p11.transpose() + both(&t0, &t0) * cross;
+    h01 = h01 * f + both(&f0, &bare.2) + both(&bare.1, &f1) + both(&t1, &t0) * cross
+        - (both(&mt, &t0) + both(&t1, &mt)) * 0.25
+        + Matrix3::identity() * (slope * mean * stored);
+
+    // Axial force at the middle: N c, c = ⅔h(|y| − 1).
+    let c = 2.0 / 3.0 * h * (speed - 1.0);
     if data.flexibility > 0.0 {
         energy.axial = 0.5 * c * c / data.flexibility;
     }
@@ -216,7 +268,8 @@ pub fn element_system<const M: usize>(data: &ElementData, s: &ElementState, out:
     ge += m * (h * s.tension);
     g0 += ct * s.tension;
     g1 += ct * s.tension;
-    let across = (Matrix3::identity() - m * m.transpose()) * (2.0 / 3.0 * h * s.tension / length);
+    let across =
+        (Matrix3::identity() - m * m.transpose()) * ((2.0 / 3.0 * (h * s.tension + arc * stored)) / speed);
     hee += across * 2.25;
     he0 -= across * 0.375;
     he1 -= across * 0.375;
@@ -225,7 +278,7 @@ pub fn element_system<const M: usize>(data: &ElementData, s: &ElementState, out:
     h11 += across * 0.0625;
 
     out.hessian = [[0.0; M]; M];
-    let (f0, f1) = ([s.first.u, s.first.v], [s.second.u, s.second.v]);
+    let (d0, d1) = ([s.first.u, s.first.v], [s.second.u, s.second.v]);
     let (gx, hxx) = (ge * ih, hee * (ih * ih));
     for i in 0..3 {
         out.gradient[i] = -gx[i];
@@ -242,23 +295,23 @@ pub fn element_system<const M: usize>(data: &ElementData, s: &ElementState, out:
     }
     let (curve0, curve1) = (g0.dot(&t0), g1.dot(&t1));
     for a in 0..2 {
-        out.gradient[t0_at + a] = g0.dot(&f0[a]);
-        out.gradient[t1_at + a] = g1.dot(&f1[a]);
-        out.stretch[t0_at + a] = ct.dot(&f0[a]);
-        out.stretch[t1_at + a] = ct.dot(&f1[a]);
-        let (column0, column1) = (he0 * f0[a] * ih, he1 * f1[a] * ih);
+        out.gradient[t0_at + a] = g0.dot(&d0[a]);
+        out.gradient[t1_at + a] = g1.dot(&d1[a]);
+        out.stretch[t0_at + a] = ct.dot(&d0[a]);
+        out.stretch[t1_at + a] = ct.dot(&d1[a]);
+        let (column0, column1) = (he0 * d0[a] * ih, he1 * d1[a] * ih);
         for i in 0..3 {
             out.hessian[i][t0_at + a] = -column0[i];
             out.hessian[t0_at + a][x1_at + i] = column0[i];
             out.hessian[i][t1_at + a] = -column1[i];
             out.hessian[x1_at + i][t1_at + a] = column1[i];
         }
-        let (h00a, h10a, h11a) = (h00 * f0[a], h01.tr_mul(&f0[a]), h11 * f1[a]);
+        let (h00a, h10a, h11a) = (h00 * d0[a], h01.tr_mul(&d0[a]), h11 * d1[a]);
         for b in 0..2 {
-            out.hessian[t0_at + a][t1_at + b] = h10a.dot(&f1[b]);
+            out.hessian[t0_at + a][t1_at + b] = h10a.dot(&d1[b]);
             if b >= a {
-                out.hessian[t0_at + a][t0_at + b] = h00a.dot(&f0[b]);
-                out.hessian[t1_at + a][t1_at + b] = h11a.dot(&f1[b]);
+                out.hessian[t0_at + a][t0_at + b] = h00a.dot(&d0[b]);
+                out.hessian[t1_at + a][t1_at + b] = h11a.dot(&d1[b]);
             }
         }
         out.hessian[t0_at + a][t0_at + a] -= curve0;

@@ -26,6 +26,10 @@ pub trait External<const C: usize> {
     fn work(&self, _from: &RodState, _to: &RodState) -> f64 {
         0.0
     }
+    /// Whether all of it has a potential. Where not, the stiffness is unsymmetric and there are no minima to look for.
+    fn conservative(&self) -> bool {
+        true
+    }
     /// Size of the forces and moments it exerts, for the scale of the residual.
     fn scale(&self) -> [f64; 2] {
         [0.0; 2]
@@ -235,6 +239,9 @@ impl<const C: usize> Newton<C> {
             let floor = stalled >= 3 && tiny_steps && residual < 1e-6;
             let arrived = small || floor;
 
+            // Loads without potential make the stiffness unsymmetric: its symmetric part says nothing about minima.
+            let follows = !external.conservative();
+            let minimum = options.minimum && !follows;
             // Factor, with a shift until the inertia is right.
             let mut sigma = if arrived || shift < 8.0 * whisper { 0.0 } else { shift / 8.0 };
             let mut tries = 0;
@@ -253,7 +260,7 @@ impl<const C: usize> Newton<C> {
                     natural = found.ok();
                 }
                 match found {
-                    Ok(inertia) if inertia.negative == multipliers || !options.minimum => break,
+                    Ok(inertia) if inertia.negative == multipliers || !minimum => break,
                     Err(super::band::FactorError::NotFinite { .. }) if tries > 20 => {
                         report.reason = StopReason::NotFinite;
                         return report;
@@ -272,8 +279,13 @@ impl<const C: usize> Newton<C> {
                 if let Some(inertia) = natural {
                     report.inertia = inertia;
                     report.stable = inertia.negative == multipliers;
+                    if follows {
+                        // Divergence: the sign of the determinant of the whole, unsymmetric matrix.
+                        let sign = self.unsymmetric();
+                        report.stable = sign != 0.0 && (sign < 0.0) == ((inertia.negative + multipliers) % 2 == 1);
+                    }
                 }
-                if report.stable || !options.minimum {
+                if report.stable || !minimum {
                     report.converged = true;
                     report.reason = if small { StopReason::Converged } else { StopReason::RoundingFloor };
                     return report;
@@ -337,13 +349,17 @@ impl<const C: usize> Newton<C> {
             let before = stored.total() + self.assembly.external_energy;
             let energy_scale = stored.total().abs() + self.assembly.external_energy.abs() + weighed + slope.abs();
             let rounding = ENERGY_ROUNDING * energy_scale;
-            let follows = !self.assembly.rank_ones.is_empty();
             let mut accepted = None;
+            let old_multipliers = supports.multipliers;
+            for j in 0..6 {
+                supports.multipliers[j] += self.step[first + j];
+            }
             for attempt in 0..24 {
                 self.trial.advance::<C>(elements, state, &self.step, alpha);
                 if supports.conditions() > 0 {
                     self.correct(elements, supports, first);
                 }
+                self.tensions(elements, state);
                 let energy_change = self.energy(elements, external, state) - before;
                 let change = energy_change + weigh(&supports.gaps(&self.trial)) - weighed;
                 let enough = change <= 1e-4 * alpha * slope.min(0.0) + rounding;
@@ -352,8 +368,15 @@ impl<const C: usize> Newton<C> {
                     accepted = Some(StepRecord { energy_change, merit_change: change, energy_scale, residual, fraction: alpha, shift });
                     break;
                 }
-                // Loads that follow the rod have no energy; near their equilibrium the full step is right.
-                if (change.is_finite() && enough) || (follows && attempt >= 3 && change.is_finite()) {
+                // Where loads have no potential a smaller residual is as good; it costs an assembly, so it is asked last.
+                let accept = change.is_finite() && (enough || follows && {
+                    let trial = std::mem::take(&mut self.trial);
+                    self.assemble(elements, supports, external, &trial);
+                    self.trial = trial;
+                    let (found, _) = self.residual(elements, external, supports, options.tolerance);
+                    found < 0.9 * residual || (attempt > 6 && found < 2.0 * residual)
+                });
+                if accept {
                     accepted = Some(StepRecord {
                         energy_change,
                         merit_change: change,
@@ -370,6 +393,7 @@ impl<const C: usize> Newton<C> {
                 alpha *= if parabola.is_finite() { parabola.clamp(0.1, 0.6) } else { 0.1 };
             }
             let Some(record) = accepted else {
+                supports.multipliers = old_multipliers;
                 report.reason =
                     if best < 1e-6 { StopReason::RoundingFloor } else { StopReason::NoDescent };
                 report.converged = best < 1e-6;
@@ -380,19 +404,20 @@ impl<const C: usize> Newton<C> {
                 return report;
             };
             report.steps.push(record);
-            for (e, data) in elements.iter().enumerate() {
-                self.trial.tensions[e] = if data.flexibility > 0.0 {
-                    let (f0, f1) = (&self.trial.frames[e], &self.trial.frames[e + 1]);
-                    elongation(data.length, &mid_slope(&f0.t, &self.trial.chords[e], &f1.t)) / data.flexibility
-                } else {
-                    state.tensions[e] + self.step[l.tension(e)]
-                };
-            }
-            for j in 0..6 {
-                supports.multipliers[j] += self.step[first + j];
-            }
             std::mem::swap(state, &mut self.trial);
             supports.follow(state);
+        }
+    }
+
+    /// Axial forces of the trial state: of stretchable elements from their strain, of others the full step.
+    fn tensions(&mut self, elements: &[ElementData], state: &RodState) {
+        for (e, data) in elements.iter().enumerate() {
+            self.trial.tensions[e] = if data.flexibility > 0.0 {
+                let (f0, f1) = (&self.trial.frames[e], &self.trial.frames[e + 1]);
+                elongation(data.length, &mid_slope(&f0.t, &self.trial.chords[e], &f1.t)) / data.flexibility
+            } else {
+                state.tensions[e] + self.step[Layout::<C>.tension(e)]
+            };
         }
     }
 
@@ -435,11 +460,13 @@ impl<const C: usize> Newton<C> {
         }
     }
 
-    /// Woodbury's formula for the unsymmetric rank-one terms: Newton's step stays exact.
-    fn unsymmetric(&mut self) {
+    /// Woodbury's formula for the unsymmetric rank-one terms: Newton's step stays exact. Returns the sign of
+    /// det(I + QᵀS⁻¹P), the ratio of the determinants with and without them.
+    fn unsymmetric(&mut self) -> f64 {
         let rank = self.assembly.rank_ones.len().min(MAX_RANK);
+        let mut sign = 1.0;
         if rank == 0 {
-            return;
+            return sign;
         }
         while self.columns.len() < rank {
             self.columns.push(vec![0.0; self.step.len()]);
@@ -470,10 +497,14 @@ impl<const C: usize> Newton<C> {
                     p = i;
                 }
             }
-            small.swap(k, p);
-            if small[k][k].abs() < 1e-12 {
-                return;
+            if p != k {
+                small.swap(k, p);
+                sign = -sign;
             }
+            if small[k][k].abs() < 1e-12 {
+                return 0.0;
+            }
+            sign *= small[k][k].signum();
             for i in k + 1..rank {
                 let f = small[i][k] / small[k][k];
                 for j in k..=MAX_RANK {
@@ -494,6 +525,7 @@ impl<const C: usize> Newton<C> {
                 *s -= value * c;
             }
         }
+        sign
     }
 
     /// Relative residual, and whether it is below `tolerance` or rounding in every row.

@@ -158,6 +158,10 @@ impl<const C: usize> External<C> for Loads {
         sum * self.factor
     }
 
+    fn conservative(&self) -> bool {
+        self.moments.is_empty() && self.followers.is_empty()
+    }
+
     fn scale(&self) -> [f64; 2] {
         let force = self.forces.iter().chain(&self.followers).map(|(_, f)| f.norm()).fold(0.0, f64::max);
         let moment = self.moments.iter().map(|(_, m)| m.norm()).fold(0.0, f64::max);

@@ -107,8 +107,8 @@ impl StaticProblem {
         let turned = holds && clamped && (gj_given || case.end.turns.is_some_and(|t| t != 0.0));
         let twisted = shaped
             || turned
-            || !loads.moments.is_empty()
-            || loads.followers.iter().any(|(_, f)| f.y != 0.0 || f.z != 0.0);
+            || gj_given
+                && (!loads.moments.is_empty() || loads.followers.iter().any(|(_, f)| f.y != 0.0 || f.z != 0.0));
 
         let mut supports = Supports { start_tangent: clamped, start_angle: clamped, ..Supports::default() };
         if let Some(p) = case.end.position {
@@ -159,7 +159,12 @@ impl StaticProblem {
     pub fn solve_state(&self) -> Result<Solved> {
         let solved = if self.twisted { self.run::<TWISTED>() } else { self.run::<PLAIN>() };
         let energy = &solved.energy;
-        if self.twisted && !self.gj_given && energy.twist > TWIST_MATTERS * (energy.total + energy.load.abs()) {
+        let matters = if self.twisted {
+            energy.twist > TWIST_MATTERS * (energy.total + energy.load.abs())
+        } else {
+            self.torque_without_angles(&solved.state)
+        };
+        if matters && !self.gj_given {
             return Err(Error::parameter(
                 "rod.section.GJ",
                 "missing",
@@ -167,6 +172,18 @@ impl StaticProblem {
             ));
         }
         Ok(solved)
+    }
+
+    /// Whether loads exert a torque on a rod that carries no angles, or follow a frame that a spatial shape would twist.
+    fn torque_without_angles(&self, state: &RodState) -> bool {
+        let torque = self.loads.moments.iter().any(|(i, m)| m.dot(&state.frames[*i].t).abs() > 1e-9 * m.norm());
+        let t0 = state.frames[0].t;
+        let across = self.loads.followers.iter().map(|(i, f)| state.frames[*i].u * f.y + state.frames[*i].v * f.z);
+        let spatial = across.map(|f| t0.cross(&f)).filter(|n| n.norm() > 1e-12).any(|n| {
+            let n = n.normalize();
+            state.frames.iter().any(|f| f.t.dot(&n).abs() > 1e-9)
+        });
+        torque || spatial
     }
 
     fn run<const C: usize>(&self) -> Solved {
