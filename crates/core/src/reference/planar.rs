@@ -26,7 +26,7 @@ pub(super) fn cantilever() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for ([a, angle, w, u], n, bound) in CANTILEVER {
         let name = format!("A1 a={a}, {n} elements");
-        let s = tip_load(n, [0.0, -a, 0.0]).solve()?;
+        let s = tip_load(n, [0.0, -a, 0.0]).solve()?.checked()?;
         rows.push(
             Row::point(&name, "tip", s.tip, [1.0 - u, -w, 0.0], 1.0, bound).iterations(s.iterations),
         );
@@ -35,14 +35,14 @@ pub(super) fn cantilever() -> Result<Vec<Row>> {
     }
     let limit = |n: usize| if n == 16 { 15.0 } else { 20.0 };
     for n in [16, 32] {
-        let s = tip_load(n, [0.0, -10.0, 0.0]).solve()?;
+        let s = tip_load(n, [0.0, -10.0, 0.0]).solve()?.checked()?;
         let count = s.iterations as f64;
         let name = format!("A1 a=10, {n} elements, from straight in one step");
         rows.push(Row::with_error(&name, "Newton iterations", count, limit(n), count, limit(n)));
     }
     let mut errors = Vec::new();
     for n in [8, 16, 32] {
-        let s = tip_load(n, [0.0, -10.0, 0.0]).solve()?;
+        let s = tip_load(n, [0.0, -10.0, 0.0]).solve()?.checked()?;
         let (w, u) = (0.810609024880, 0.554995597754);
         errors.push((s.tip[0] - 1.0 + u).hypot(s.tip[1] + w));
     }
@@ -59,7 +59,7 @@ pub(super) fn end_moment() -> Result<Vec<Row>> {
     for m in [0.5, FRAC_PI_2, PI, 5.0, 2.0 * PI] {
         let mut case = unit_rod(32);
         case.load = vec![at_end(LoadKind::Moment, [0.0, 0.0, m])];
-        let s = case.solve()?;
+        let s = case.solve()?.checked()?;
         let tip = [m.sin() / m, (1.0 - m.cos()) / m, 0.0];
         let name = format!("A2 m={m:.4}, 32 elements");
         rows.push(Row::point(&name, "tip", s.tip, tip, 1.0, 1e-6).iterations(s.iterations));
@@ -77,7 +77,7 @@ const POST_BUCKLED: [[f64; 4]; 2] = [
 pub(super) fn column() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for [angle, p, x, y] in POST_BUCKLED {
-        let s = tip_load(64, [-p, 0.0, 0.0]).solve()?;
+        let s = tip_load(64, [-p, 0.0, 0.0]).solve()?.checked()?;
         let name = format!("A3 tip angle {angle}°, 64 elements");
         let across = s.tip[1].hypot(s.tip[2]);
         rows.push(Row::point(&name, "tip", [s.tip[0], across, 0.0], [x, y, 0.0], 1.0, 1e-4).iterations(s.iterations));
@@ -112,7 +112,7 @@ pub(super) fn column() -> Result<Vec<Row>> {
 pub(super) fn precurved() -> Result<Vec<Row>> {
     let mut case = tip_load(32, [0.0, -1.0, 0.0]);
     case.rod.section[0].rest_curvature = [FRAC_PI_2, 0.0];
-    let s = case.solve()?;
+    let s = case.solve()?.checked()?;
     let name = "A4 φ₀=π/2, 32 elements";
     // The root moment of the list is the rod's; the clamp exerts its opposite.
     Ok(vec![
@@ -127,7 +127,7 @@ pub(super) fn own_weight() -> Result<Vec<Row>> {
     for (q, x, y) in [(1.0, 0.9912463953, -0.1234714020), (10.0, 0.6563537612, -0.7001997155)] {
         let mut case = unit_rod(32);
         case.load = vec![at_end(LoadKind::Distributed, [0.0, -q, 0.0])];
-        let s = case.solve()?;
+        let s = case.solve()?.checked()?;
         let name = format!("A6 qL³/EI={q}, 32 elements");
         rows.push(Row::point(&name, "tip", s.tip, [x, y, 0.0], 1.0, 1e-5).iterations(s.iterations));
     }
@@ -140,7 +140,7 @@ pub(super) fn floppy_tip() -> Result<Vec<Row>> {
         case.rod.section = vec![section(0.7, 1.0), section(1.0, 0.1)];
         case
     };
-    let s = two([0.0, 0.5, 0.0], 32).solve()?;
+    let s = two([0.0, 0.5, 0.0], 32).solve()?.checked()?;
     let name = "A7 32 elements";
     let critical =
         StaticProblem::new(&two([-1.0, 0.0, 0.0], 64))?.critical(Parameter::Loads, 1.0, 2.0, 1e-10)?;

@@ -82,3 +82,16 @@ pub struct StaticSolution {
     /// Whether the energy fell at every accepted step (to rounding).
     pub monotone: bool,
 }
+
+impl StaticSolution {
+    /// Itself if it is an equilibrium, an error that says why not otherwise.
+    pub fn checked(self) -> crate::Result<Self> {
+        if self.converged {
+            return Ok(self);
+        }
+        Err(crate::Error::Computation(format!(
+            "no equilibrium after {} iterations, residual {:.1e}: {}",
+            self.iterations, self.residual, self.stop
+        )))
+    }
+}
