@@ -4,6 +4,7 @@
 
 mod planar;
 mod spatial;
+pub mod stress;
 
 use crate::statics::{
     End, EndKind, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase,
@@ -172,6 +173,16 @@ mod tests {
                 );
                 failed += usize::from(!row.pass);
             }
+        }
+        assert_eq!(failed, 0);
+    }
+
+    #[test]
+    fn every_stressed_case_converges() {
+        let mut failed = 0;
+        for row in super::stress::run_all() {
+            println!("{:<60} {} {} {:4} {:9.2e} {} {}", row.name, row.converged, row.stable, row.iterations, row.residual, row.monotone, row.stop);
+            failed += usize::from(!(row.converged && row.stable && row.monotone));
         }
         assert_eq!(failed, 0);
     }

@@ -107,7 +107,7 @@ fn love(elements: usize, length: f64, tension: f64, m: f64) -> Vec<Vec3> {
 pub(super) fn localised() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     let (gj, tension) = (0.77, 1.0f64);
-    for (m, length, elements) in [(1.5, 50.0, 240), (1.2, 40.0, 240)] {
+    for (m, length, elements) in [(1.5, 50.0, 240), (1.6, 40.0, 240)] {
         let moment = m * tension.sqrt();
         let shortening = (16.0 / tension - 4.0 * moment * moment / (tension * tension)).sqrt();
         let rotation = moment * length / gj + 4.0 * (0.5f64 * m).acos();

@@ -98,8 +98,8 @@ impl RodState {
 
     /// Sets this state to `base` moved by `alpha` times the Newton step `d`.
     ///
-    /// Node tangents and the slopes in the middle of the elements move along geodesics of the sphere, the strain
-    /// moves linearly (an inextensible element keeps |r′| = 1 exactly), and chords and positions follow. So a state that
+    /// Node tangents and the slopes in the middle of the elements move along geodesics of the sphere, axial forces
+    /// of stretchable elements move linearly and give the strain (an inextensible element keeps |r′| = 1 exactly), and chords and positions follow. So a state that
     /// satisfies the constraints stays on them: no feasibility is lost to the length of a step, and the energy
     /// along the step is the potential energy itself. Constant curvature is reproduced exactly: a pure end moment of
     /// any size is solved by one full step.
@@ -126,7 +126,13 @@ impl RodState {
             } else {
                 m
             };
-            let length = if data.flexibility > 0.0 { size + alpha * along } else { 1.0 };
+            // c = D N exactly: the strain follows from the force, not the force from a strain that rounding has spoilt.
+            let length = if data.flexibility > 0.0 {
+                self.tensions[e] = base.tensions[e] + alpha * d[l.tension(e)];
+                1.0 + 1.5 * data.flexibility * self.tensions[e] / data.length
+            } else {
+                1.0
+            };
             let ends = self.frames[e].t + self.frames[e + 1].t;
             self.chords[e] = (direction * (length / direction.norm()) + ends * 0.25) / 1.5;
             self.positions[e + 1] = self.positions[e] + self.chords[e] * data.length;

@@ -13,7 +13,7 @@
 //! residual is never shifted.
 
 use super::band::{BandMatrix, Factor, Inertia};
-use crate::rod::element::{element_energy, elongation, mid_slope};
+use crate::rod::element::element_energy;
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
 
 /// Energies outside the rod: loads, walls.
@@ -313,6 +313,7 @@ impl<const C: usize> Newton<C> {
             }
 
             self.unsymmetric();
+            Self::restore_tensions(elements, &mut self.step);
             let first = l.support(elements.len());
             let gaps = supports.gaps(state);
             // Multipliers take their full step: they are estimates at this state, however far it moves.
@@ -409,15 +410,20 @@ impl<const C: usize> Newton<C> {
         }
     }
 
-    /// Axial forces of the trial state: of stretchable elements from their strain, of others the full step.
+    /// Axial forces of inextensible elements at the trial state: they are multipliers and take their full step. (Those of
+    /// stretchable elements moved with the state.)
     fn tensions(&mut self, elements: &[ElementData], state: &RodState) {
         for (e, data) in elements.iter().enumerate() {
-            self.trial.tensions[e] = if data.flexibility > 0.0 {
-                let (f0, f1) = (&self.trial.frames[e], &self.trial.frames[e + 1]);
-                elongation(data.length, &mid_slope(&f0.t, &self.trial.chords[e], &f1.t)) / data.flexibility
-            } else {
-                state.tensions[e] + self.step[Layout::<C>.tension(e)]
-            };
+            if data.flexibility == 0.0 {
+                self.trial.tensions[e] = state.tensions[e] + self.step[Layout::<C>.tension(e)];
+            }
+        }
+    }
+
+    /// Undoes the change of multiplier of [`crate::rod::assembly`]: dN = m/(1 − γD).
+    fn restore_tensions(elements: &[ElementData], step: &mut [f64]) {
+        for (e, data) in elements.iter().enumerate() {
+            step[Layout::<C>.tension(e)] /= 1.0 - data.augmentation() * data.flexibility;
         }
     }
 
@@ -445,6 +451,7 @@ impl<const C: usize> Newton<C> {
                 self.spare[first + j] = -gaps[j];
             }
             self.factor.solve(&mut self.spare);
+            Self::restore_tensions(elements, &mut self.spare);
             self.other.copy_from(&self.trial);
             let (turn, _) = RodState::largest_turn::<C>(elements, &self.other, &self.spare);
             // A correction is small or it is none.
@@ -654,9 +661,7 @@ impl<const C: usize> Newton<C> {
                 let gaps = supports.gaps(&self.trial);
                 let closed = gaps.iter().all(|g| g.abs() < 1e-6);
                 if change < 0.0 && closed {
-                    for e in 0..elements.len() {
-                        self.trial.tensions[e] = state.tensions[e];
-                    }
+                    self.trial.tensions.copy_from_slice(&state.tensions);
                     std::mem::swap(state, &mut self.trial);
                     supports.follow(state);
                     return Some(StepRecord {

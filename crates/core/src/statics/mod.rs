@@ -9,8 +9,6 @@ pub mod loads;
 pub mod problem;
 pub mod solution;
 mod validate;
-#[cfg(test)]
-mod scratch;
 
 pub use case::{End, EndKind, Initial, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase};
 pub use critical::Parameter;
