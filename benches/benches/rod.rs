@@ -58,7 +58,9 @@ fn element(c: &mut Criterion) {
         stretch: [0.0; 14],
         energy: Energy::default(),
     };
-    group.bench_function("system twisted", |b| b.iter(|| element_system(&elements[1], black_box(&s), &mut full)));
+    group.bench_function("system twisted", |b| {
+        b.iter(|| element_system(&elements[1], black_box(&s), &mut full))
+    });
     group.finish();
 }
 
@@ -119,7 +121,13 @@ fn solve<const C: usize>(c: &mut Criterion, name: &str) {
                 for _ in 0..rounds {
                     state.copy_from(&start);
                     let clock = std::time::Instant::now();
-                    black_box(newton.solve(&elements, &mut supports(), &mut tip_load(n), &mut state, &options));
+                    black_box(newton.solve(
+                        &elements,
+                        &mut supports(),
+                        &mut tip_load(n),
+                        &mut state,
+                        &options,
+                    ));
                     sum += clock.elapsed();
                 }
                 sum / count

@@ -74,9 +74,17 @@ fn imbalance(case: &StaticCase, s: &StaticSolution) -> f64 {
 
 #[test]
 fn reactions_balance_the_loads() {
-    for name in
-        ["tip_force", "end_moment", "j_tip", "bend_45", "pinned", "sliding", "guided", "clamped_turned", "load_steps"]
-    {
+    for name in [
+        "tip_force",
+        "end_moment",
+        "j_tip",
+        "bend_45",
+        "pinned",
+        "sliding",
+        "guided",
+        "clamped_turned",
+        "load_steps",
+    ] {
         let (c, s) = (case(name), solve(name));
         let off = imbalance(&c, &s);
         assert!(off < 1e-7, "{name}: {off:e} {:?}", s.reactions);
@@ -187,4 +195,15 @@ fn a_torque_without_torsion_stiffness_is_refused() {
     c.load[0].kind = LoadKind::Moment;
     c.load[0].value = [1.0, 0.0, 0.0];
     assert!(c.solve().unwrap_err().to_string().contains("GJ"));
+}
+
+#[test]
+fn a_follower_across_the_tip_never_loses_stability() {
+    // A load fixed to the tip's triad has exactly one equilibrium (integrate from the tip), so none is ever lost.
+    let mut c = case("follower");
+    for p in [0.5, 2.0, 4.0, 8.0] {
+        c.load[0].value = [0.0, p, 0.0];
+        let s = c.solve().unwrap();
+        assert!(s.converged && s.stable && s.iterations < 20, "{p}: {} {}", s.stop, s.iterations);
+    }
 }

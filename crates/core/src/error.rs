@@ -45,7 +45,11 @@ pub enum Error {
 
 impl Error {
     /// A [`Error::Parameter`] from anything printable.
-    pub fn parameter(name: impl Into<String>, value: impl std::fmt::Display, mend: impl Into<String>) -> Self {
+    pub fn parameter(
+        name: impl Into<String>,
+        value: impl std::fmt::Display,
+        mend: impl Into<String>,
+    ) -> Self {
         Self::Parameter { name: name.into(), value: value.to_string(), mend: mend.into() }
     }
 

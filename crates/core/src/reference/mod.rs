@@ -6,9 +6,7 @@ mod planar;
 mod spatial;
 pub mod stress;
 
-use crate::statics::{
-    End, EndKind, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase,
-};
+use crate::statics::{End, EndKind, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase};
 use crate::{Result, Vec3};
 use serde::Serialize;
 
@@ -43,13 +41,27 @@ impl Row {
     }
 
     /// A point with its distance from the reference over `scale`; the numbers shown are the distances from the origin.
-    pub fn point(name: &str, quantity: &str, computed: [f64; 3], expected: [f64; 3], scale: f64, bound: f64) -> Self {
+    pub fn point(
+        name: &str,
+        quantity: &str,
+        computed: [f64; 3],
+        expected: [f64; 3],
+        scale: f64,
+        bound: f64,
+    ) -> Self {
         let (c, e) = (Vec3::from(computed), Vec3::from(expected));
         Self::with_error(name, quantity, c.norm(), e.norm(), (c - e).norm() / scale, bound)
     }
 
     /// An error computed by the caller.
-    pub fn with_error(name: &str, quantity: &str, computed: f64, expected: f64, error: f64, bound: f64) -> Self {
+    pub fn with_error(
+        name: &str,
+        quantity: &str,
+        computed: f64,
+        expected: f64,
+        error: f64,
+        bound: f64,
+    ) -> Self {
         Self {
             name: name.to_owned(),
             quantity: quantity.to_owned(),
@@ -95,16 +107,36 @@ impl Family {
 
 /// All families of parts A and B.
 pub const FAMILIES: &[Family] = &[
-    Family { id: "A1", title: "Cantilever under a dead transverse tip load (Bisshopp and Drucker 1945)", run: planar::cantilever },
+    Family {
+        id: "A1",
+        title: "Cantilever under a dead transverse tip load (Bisshopp and Drucker 1945)",
+        run: planar::cantilever,
+    },
     Family { id: "A2", title: "End moment, up to the full circle", run: planar::end_moment },
-    Family { id: "A3", title: "Column: post-buckled shapes and critical loads (Euler, Greenhill)", run: planar::column },
+    Family {
+        id: "A3",
+        title: "Column: post-buckled shapes and critical loads (Euler, Greenhill)",
+        run: planar::column,
+    },
     Family { id: "A4", title: "Pre-curved cantilever (J-tip)", run: planar::precurved },
     Family { id: "A6", title: "Cantilever under its own weight", run: planar::own_weight },
     Family { id: "A7", title: "Stiff shaft with a floppy tip", run: planar::floppy_tip },
-    Family { id: "B1", title: "45° bend under an out-of-plane load (Bathe and Bolourchi 1979)", run: spatial::bend },
-    Family { id: "B2", title: "Twisted straight rod under tension (Greenhill 1883)", run: spatial::twisted_rod },
+    Family {
+        id: "B1",
+        title: "45° bend under an out-of-plane load (Bathe and Bolourchi 1979)",
+        run: spatial::bend,
+    },
+    Family {
+        id: "B2",
+        title: "Twisted straight rod under tension (Greenhill 1883)",
+        run: spatial::twisted_rod,
+    },
     Family { id: "B3", title: "Closed ring under twist (Michell 1889, Zajac 1962)", run: spatial::ring },
-    Family { id: "B4", title: "Localised buckle of a long twisted rod (Coyne 1990)", run: spatial::localised },
+    Family {
+        id: "B4",
+        title: "Localised buckle of a long twisted rod (Coyne 1990)",
+        run: spatial::localised,
+    },
 ];
 
 /// Runs every family in order.
@@ -169,7 +201,14 @@ mod tests {
                 println!(
                     "{} {:<40} {:<22} {:>18.12} {:>18.12} {:9.2e} / {:7.1e} {:?} {:?}",
                     if row.pass { "ok  " } else { "FAIL" },
-                    row.name, row.quantity, row.computed, row.expected, row.error, row.bound, row.iterations, row.order
+                    row.name,
+                    row.quantity,
+                    row.computed,
+                    row.expected,
+                    row.error,
+                    row.bound,
+                    row.iterations,
+                    row.order
                 );
                 failed += usize::from(!row.pass);
             }
@@ -181,7 +220,10 @@ mod tests {
     fn every_stressed_case_converges() {
         let mut failed = 0;
         for row in super::stress::run_all() {
-            println!("{:<60} {} {} {:4} {:9.2e} {} {}", row.name, row.converged, row.stable, row.iterations, row.residual, row.monotone, row.stop);
+            println!(
+                "{:<60} {} {} {:4} {:9.2e} {} {}",
+                row.name, row.converged, row.stable, row.iterations, row.residual, row.monotone, row.stop
+            );
             failed += usize::from(!(row.converged && row.stable && row.monotone));
         }
         assert_eq!(failed, 0);

@@ -27,9 +27,7 @@ pub(super) fn cantilever() -> Result<Vec<Row>> {
     for ([a, angle, w, u], n, bound) in CANTILEVER {
         let name = format!("A1 a={a}, {n} elements");
         let s = tip_load(n, [0.0, -a, 0.0]).solve()?.checked()?;
-        rows.push(
-            Row::point(&name, "tip", s.tip, [1.0 - u, -w, 0.0], 1.0, bound).iterations(s.iterations),
-        );
+        rows.push(Row::point(&name, "tip", s.tip, [1.0 - u, -w, 0.0], 1.0, bound).iterations(s.iterations));
         // The angle is a derivative: allow it ten times the error of the position.
         rows.push(Row::relative(&name, "tip angle", s.tip_angle, angle, 10.0 * bound));
     }
@@ -48,7 +46,8 @@ pub(super) fn cantilever() -> Result<Vec<Row>> {
     }
     let found = order(&errors);
     // The bound is on how far the order falls short of 4.
-    let mut row = Row::with_error("A1 a=10, 8 to 32 elements", "order of convergence", found, 4.0, 4.0 - found, 0.2);
+    let mut row =
+        Row::with_error("A1 a=10, 8 to 32 elements", "order of convergence", found, 4.0, 4.0 - found, 0.2);
     row.order = Some(found);
     rows.push(row);
     Ok(rows)
@@ -80,7 +79,10 @@ pub(super) fn column() -> Result<Vec<Row>> {
         let s = tip_load(64, [-p, 0.0, 0.0]).solve()?.checked()?;
         let name = format!("A3 tip angle {angle}°, 64 elements");
         let across = s.tip[1].hypot(s.tip[2]);
-        rows.push(Row::point(&name, "tip", [s.tip[0], across, 0.0], [x, y, 0.0], 1.0, 1e-4).iterations(s.iterations));
+        rows.push(
+            Row::point(&name, "tip", [s.tip[0], across, 0.0], [x, y, 0.0], 1.0, 1e-4)
+                .iterations(s.iterations),
+        );
         rows.push(Row::relative(&name, "tip angle", s.tip_angle, angle.to_radians(), 1e-4));
     }
     let squeezed = |start: StartKind, end: EndKind| {
@@ -116,7 +118,8 @@ pub(super) fn precurved() -> Result<Vec<Row>> {
     let name = "A4 φ₀=π/2, 32 elements";
     // The root moment of the list is the rod's; the clamp exerts its opposite.
     Ok(vec![
-        Row::point(name, "tip", s.tip, [0.804105101290, 0.481870697044, 0.0], 1.0, 1e-5).iterations(s.iterations),
+        Row::point(name, "tip", s.tip, [0.804105101290, 0.481870697044, 0.0], 1.0, 1e-5)
+            .iterations(s.iterations),
         Row::relative(name, "tip angle", s.tip_angle, 1.22202359389, 1e-5),
         Row::relative(name, "root moment", -s.reactions.start.moment[2], -0.804105101290, 1e-5),
     ])

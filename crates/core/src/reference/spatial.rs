@@ -9,10 +9,9 @@ use std::f64::consts::{FRAC_PI_4, PI};
 
 pub(super) fn bend() -> Result<Vec<Row>> {
     let mut rows = Vec::new();
-    for (p, tip) in [
-        (300.0, [22.24503474, 58.77968539, 40.18828384]),
-        (600.0, [15.68507816, 47.15129440, 53.46859844]),
-    ] {
+    for (p, tip) in
+        [(300.0, [22.24503474, 58.77968539, 40.18828384]), (600.0, [15.68507816, 47.15129440, 53.46859844])]
+    {
         // R = 100, E = 1e7, G = 5e6, unit square: EI = E/12; J = 1/6 is the one of the list. Clamped along y at the origin,
         // bending to +x.
         let mut case = unit_rod(24);
@@ -42,7 +41,8 @@ pub(super) fn twisted_rod() -> Result<Vec<Row>> {
         case.end.slide = Some([1.0, 0.0, 0.0]);
         case.end.turns = Some(1.0);
         case.load = vec![at_end(LoadKind::Force, [tension, 0.0, 0.0])];
-        let found = StaticProblem::new(&case)?.critical(Parameter::Turns, 0.5 * expected, 1.3 * expected, 1e-10)?;
+        let found =
+            StaticProblem::new(&case)?.critical(Parameter::Turns, 0.5 * expected, 1.3 * expected, 1e-10)?;
         let name = format!("B2 clamped, T={tension}, 64 elements");
         rows.push(Row::relative(&name, "critical moment", found, expected, 1e-4));
     }
@@ -82,7 +82,8 @@ pub(super) fn ring() -> Result<Vec<Row>> {
         case.end.kind = EndKind::Clamped;
         case.end.position = Some([0.0; 3]);
         case.initial = Some(Initial { curvature: [2.0 * PI, 0.0] });
-        let found = StaticProblem::new(&case)?.critical(Parameter::Turns, 0.7 * expected, 1.2 * expected, 1e-10)?;
+        let found =
+            StaticProblem::new(&case)?.critical(Parameter::Turns, 0.7 * expected, 1.2 * expected, 1e-10)?;
         let name = format!("B3 GJ/EI={gj}, 64 elements");
         rows.push(Row::relative(&name, "critical twist", found, expected, 1e-4));
     }
@@ -135,7 +136,13 @@ pub(super) fn localised() -> Result<Vec<Row>> {
         rows.push(Row::relative(&name, "moment", end.torque, moment, 1e-3));
         let (t, m) = (end.force[0], end.torque);
         let found = (16.0 / t - 4.0 * m * m / (t * t)).sqrt();
-        rows.push(Row::relative(&name, "shortening of the measured tension and moment", found, shortening, 1e-3));
+        rows.push(Row::relative(
+            &name,
+            "shortening of the measured tension and moment",
+            found,
+            shortening,
+            1e-3,
+        ));
     }
     Ok(rows)
 }

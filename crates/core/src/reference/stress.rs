@@ -75,7 +75,10 @@ fn solved(name: String, case: &StaticCase) -> StressRow {
 pub fn run_all() -> Vec<StressRow> {
     let mut rows = Vec::new();
     for ei in [1e-3, 1.0, 1e2, 1e5] {
-        rows.push(solved(format!("EI = {ei:.0e} N·mm², 300 mm, 100 elements, PL²/EI = 10"), &case(100, 300.0, ei, 10.0)));
+        rows.push(solved(
+            format!("EI = {ei:.0e} N·mm², 300 mm, 100 elements, PL²/EI = 10"),
+            &case(100, 300.0, ei, 10.0),
+        ));
     }
     for (first, second) in [(1.0, 1e-6), (1e-6, 1.0), (1e6, 1.0), (1e-3, 1e3)] {
         let mut c = case(64, 1.0, 1.0, 0.0);

@@ -1,6 +1,8 @@
 //! Gradients and Hessians of the element against fourth-order differences of its energy.
 
-use super::element::{ElementData, ElementState, ElementSystem, element_energy, element_system, elongation, mid_slope};
+use super::element::{
+    ElementData, ElementState, ElementSystem, element_energy, element_system, elongation, mid_slope,
+};
 use super::frame::{Frame, reference_twist};
 use crate::Vec3;
 
@@ -22,7 +24,8 @@ fn state(seed: &mut u64, angle: f64, spread: f64) -> ElementState {
         .turned(noise(seed))
         .transported(spread * noise(seed), spread * noise(seed));
     // The chord of an arc through both tangents, so that no state is absurdly stretched.
-    let chord = (first.t + second.t) / (1.0 + 0.7 * first.t.dot(&second.t)).max(0.3) * 0.85 + vector(seed) * spread;
+    let chord =
+        (first.t + second.t) / (1.0 + 0.7 * first.t.dot(&second.t)).max(0.3) * 0.85 + vector(seed) * spread;
     ElementState {
         first,
         second,
@@ -64,7 +67,12 @@ fn lagrangian(data: &ElementData, s: &ElementState, d: &[f64; 14]) -> f64 {
 
 /// Largest errors of gradient and Hessian, relative to their largest entries.
 fn errors(data: &ElementData, s: &ElementState, spoil: f64) -> (f64, f64) {
-    let mut out = ElementSystem { gradient: [0.0; 14], hessian: [[0.0; 14]; 14], stretch: [0.0; 14], energy: Default::default() };
+    let mut out = ElementSystem {
+        gradient: [0.0; 14],
+        hessian: [[0.0; 14]; 14],
+        stretch: [0.0; 14],
+        energy: Default::default(),
+    };
     element_system(data, s, &mut out);
     out.gradient[4] += spoil;
     out.hessian[3][11] += spoil;
@@ -126,8 +134,18 @@ fn elements_with_and_without_twist_agree_where_nothing_twists() {
     d.rest_twist = [0.0; 3];
     d.torsion = [0.0; 3];
     q.angles = [0.0; 3];
-    let mut full = ElementSystem { gradient: [0.0; 14], hessian: [[0.0; 14]; 14], stretch: [0.0; 14], energy: Default::default() };
-    let mut plain = ElementSystem { gradient: [0.0; 11], hessian: [[0.0; 11]; 11], stretch: [0.0; 11], energy: Default::default() };
+    let mut full = ElementSystem {
+        gradient: [0.0; 14],
+        hessian: [[0.0; 14]; 14],
+        stretch: [0.0; 14],
+        energy: Default::default(),
+    };
+    let mut plain = ElementSystem {
+        gradient: [0.0; 11],
+        hessian: [[0.0; 11]; 11],
+        stretch: [0.0; 11],
+        energy: Default::default(),
+    };
     element_system(&d, &q, &mut full);
     element_system(&d, &q, &mut plain);
     let map = [0, 1, 2, 3, 4, 7, 8, 9, 10, 11, 13];

@@ -249,10 +249,7 @@ pub fn element_system<const M: usize>(data: &ElementData, s: &ElementState, out:
     hee = hee * f + pee + pee.transpose();
     he0 = he0 * f + both(&fe, &bare.1) + both(&bare.0, &f0) + both(&mt, &t1) * 1.5;
     he1 = he1 * f + both(&fe, &bare.2) + both(&bare.0, &f1) + both(&mt, &t0) * 1.5;
-    let (p00, p11) = (
-        both(&f0, &bare.1) - both(&mt, &t1) * 0.25,
-        both(&f1, &bare.2) - both(&mt, &t0) * 0.25,
-    );
+    let (p00, p11) = (both(&f0, &bare.1) - both(&mt, &t1) * 0.25, both(&f1, &bare.2) - both(&mt, &t0) * 0.25);
     h00 = h00 * f + p00 + p00.transpose() + both(&t1, &t1) * cross;
     h11 = h11 * f + p11 + p11.transpose() + both(&t0, &t0) * cross;
     h01 = h01 * f + both(&f0, &bare.2) + both(&bare.1, &f1) + both(&t1, &t0) * cross
@@ -363,17 +360,14 @@ fn add_torsion<const M: usize>(
                     (y_of[a] * y_of[b], y_of[a] * z_of[b], z_of[a] * y_of[b], z_of[a] * z_of[b]);
                 for i in 0..3 {
                     for j in 0..3 {
-                        hess[3 * a + i][3 * b + j] += yy * f.hyy[(i, j)]
-                            + yz * f.hyz[(i, j)]
-                            + zy * f.hyz[(j, i)]
-                            + zz * f.hzz[(i, j)];
+                        hess[3 * a + i][3 * b + j] +=
+                            yy * f.hyy[(i, j)] + yz * f.hyz[(i, j)] + zy * f.hyz[(j, i)] + zz * f.hzz[(i, j)];
                     }
                 }
             }
             for p in 0..3 {
                 for i in 0..3 {
-                    hess[3 * a + i][6 + p] += point.phi[p]
-                        * (y_of[a] * f.hyp[0][i] + z_of[a] * f.hzp[0][i])
+                    hess[3 * a + i][6 + p] += point.phi[p] * (y_of[a] * f.hyp[0][i] + z_of[a] * f.hzp[0][i])
                         + point.dphi[p] * (y_of[a] * f.hyp[1][i] + z_of[a] * f.hzp[1][i]);
                 }
             }
@@ -418,10 +412,8 @@ fn add_torsion<const M: usize>(
     jac[6][5] = 1.0;
     jac[7][12] = 1.0;
     jac[8][6] = 1.0;
-    for a in 0..2 {
-        jac[7][3 + a] = k0[a];
-        jac[7][10 + a] = k1[a];
-    }
+    jac[7][3..5].copy_from_slice(&k0);
+    jac[7][10..12].copy_from_slice(&k1);
     for j in 0..13 {
         let mut column = [0.0; 9];
         for l in 0..9 {
@@ -469,12 +461,10 @@ fn add_torsion<const M: usize>(
             let p = ends[b];
             // −ω × p for ω along the turn of the first triad.
             let swing = if a == 0 { gt.x * p.y - gt.y * p.x } else { gt.x * p.z - gt.z * p.x };
-            let twist =
-                0.5 * c * (first[a].dot(&sum.cross(&p)) - (k0[a] * ends[b].x + k1[b] * end[1 + a]));
+            let twist = 0.5 * c * (first[a].dot(&sum.cross(&p)) - (k0[a] * ends[b].x + k1[b] * end[1 + a]));
             out.hessian[3 + a][10 + b] += swing + gp * twist;
             if b >= a {
-                out.hessian[3 + a][3 + b] -=
-                    0.5 * c * gp * (k0[a] * end[1 + b] + k0[b] * end[1 + a]);
+                out.hessian[3 + a][3 + b] -= 0.5 * c * gp * (k0[a] * end[1 + b] + k0[b] * end[1 + a]);
                 out.hessian[10 + a][10 + b] -= 0.5 * c * gp * (k1[a] * ends[b].x + k1[b] * ends[a].x);
             }
         }

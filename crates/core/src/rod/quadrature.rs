@@ -42,10 +42,7 @@ impl Point {
     /// y and z for the given chord and tangents.
     #[inline]
     pub fn derivatives(&self, e: &Vec3, t0: &Vec3, t1: &Vec3) -> (Vec3, Vec3) {
-        (
-            e * self.y[0] + t0 * self.y[1] + t1 * self.y[2],
-            e * self.z[0] + t0 * self.z[1] + t1 * self.z[2],
-        )
+        (e * self.y[0] + t0 * self.y[1] + t1 * self.y[2], e * self.z[0] + t0 * self.z[1] + t1 * self.z[2])
     }
 }
 
@@ -54,11 +51,8 @@ const OUTER: f64 = 0.387_298_334_620_741_7;
 
 /// The three-point Gauss rule on [0, 1], exact for polynomials of degree 5: one more than the squared curvature of
 /// a straight-reference element needs, and enough for order 4 where the element is strongly bent.
-pub const GAUSS: [Point; 3] = [
-    Point::at(0.5 - OUTER, 5.0 / 18.0),
-    Point::at(0.5, 8.0 / 18.0),
-    Point::at(0.5 + OUTER, 5.0 / 18.0),
-];
+pub const GAUSS: [Point; 3] =
+    [Point::at(0.5 - OUTER, 5.0 / 18.0), Point::at(0.5, 8.0 / 18.0), Point::at(0.5 + OUTER, 5.0 / 18.0)];
 
 /// Weights of (x₀, h t₀, x₁, h t₁) in the centre line at ξ.
 pub fn hermite(xi: f64) -> [f64; 4] {

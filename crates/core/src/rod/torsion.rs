@@ -140,9 +140,8 @@ pub fn torsion(y: &Vec3, z: &Vec3, phi: f64, dphi: f64, p: &TorsionInput) -> Tor
             + wgq.transpose()
             + (hg * q + gd + gd.transpose() + hq * g) * n;
         // Rows y, columns z.
-        hyz += y * w.transpose() * ia3
-            + (w * g + dg * n) * lift.transpose()
-            + (eye * ia - yy * ia3) * (n * g);
+        hyz +=
+            y * w.transpose() * ia3 + (w * g + dg * n) * lift.transpose() + (eye * ia - yy * ia3) * (n * g);
     }
     TorsionDensity {
         bend,

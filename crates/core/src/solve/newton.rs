@@ -235,7 +235,12 @@ impl<const C: usize> Newton<C> {
             stalled = if residual < 0.5 * best { 0 } else { stalled + 1 };
             best = best.min(residual);
             let tiny_steps = report.steps.len() >= 3
-                && report.steps.iter().rev().take(3).all(|s| s.energy_change.abs() <= ENERGY_ROUNDING * s.energy_scale);
+                && report
+                    .steps
+                    .iter()
+                    .rev()
+                    .take(3)
+                    .all(|s| s.energy_change.abs() <= ENERGY_ROUNDING * s.energy_scale);
             let floor = stalled >= 3 && tiny_steps && residual < 1e-6;
             let arrived = small || floor;
 
@@ -282,7 +287,8 @@ impl<const C: usize> Newton<C> {
                     if follows {
                         // Divergence: the sign of the determinant of the whole, unsymmetric matrix.
                         let sign = self.unsymmetric();
-                        report.stable = sign != 0.0 && (sign < 0.0) == ((inertia.negative + multipliers) % 2 == 1);
+                        report.stable =
+                            sign != 0.0 && (sign < 0.0) == ((inertia.negative + multipliers) % 2 == 1);
                     }
                 }
                 if report.stable || !minimum {
@@ -348,7 +354,8 @@ impl<const C: usize> Newton<C> {
             let mut alpha = if turn > options.max_turn { options.max_turn / turn } else { 1.0 };
             let stored = self.assembly.energy;
             let before = stored.total() + self.assembly.external_energy;
-            let energy_scale = stored.total().abs() + self.assembly.external_energy.abs() + weighed + slope.abs();
+            let energy_scale =
+                stored.total().abs() + self.assembly.external_energy.abs() + weighed + slope.abs();
             let rounding = ENERGY_ROUNDING * energy_scale;
             let mut accepted = None;
             let old_multipliers = supports.multipliers;
@@ -366,17 +373,26 @@ impl<const C: usize> Newton<C> {
                 let enough = change <= 1e-4 * alpha * slope.min(0.0) + rounding;
                 // On a path of unstable states the energy says nothing; steps there are short and Newton's own.
                 if !options.minimum && change.is_finite() {
-                    accepted = Some(StepRecord { energy_change, merit_change: change, energy_scale, residual, fraction: alpha, shift });
+                    accepted = Some(StepRecord {
+                        energy_change,
+                        merit_change: change,
+                        energy_scale,
+                        residual,
+                        fraction: alpha,
+                        shift,
+                    });
                     break;
                 }
                 // Where loads have no potential a smaller residual is as good; it costs an assembly, so it is asked last.
-                let accept = change.is_finite() && (enough || follows && {
-                    let trial = std::mem::take(&mut self.trial);
-                    self.assemble(elements, supports, external, &trial);
-                    self.trial = trial;
-                    let (found, _) = self.residual(elements, external, supports, options.tolerance);
-                    found < 0.9 * residual || (attempt > 6 && found < 2.0 * residual)
-                });
+                let accept = change.is_finite()
+                    && (enough
+                        || follows && {
+                            let trial = std::mem::take(&mut self.trial);
+                            self.assemble(elements, supports, external, &trial);
+                            self.trial = trial;
+                            let (found, _) = self.residual(elements, external, supports, options.tolerance);
+                            found < 0.9 * residual || (attempt > 6 && found < 2.0 * residual)
+                        });
                 if accept {
                     accepted = Some(StepRecord {
                         energy_change,
@@ -395,8 +411,7 @@ impl<const C: usize> Newton<C> {
             }
             let Some(record) = accepted else {
                 supports.multipliers = old_multipliers;
-                report.reason =
-                    if best < 1e-6 { StopReason::RoundingFloor } else { StopReason::NoDescent };
+                report.reason = if best < 1e-6 { StopReason::RoundingFloor } else { StopReason::NoDescent };
                 report.converged = best < 1e-6;
                 if let Some(inertia) = natural {
                     report.inertia = inertia;
@@ -442,7 +457,7 @@ impl<const C: usize> Newton<C> {
         for _ in 0..4 {
             let gaps = supports.gaps(&self.trial);
             let size = gaps.iter().fold(0.0f64, |m, g| m.max(g.abs()));
-            if !(size < last) || size < 1e-14 {
+            if size.is_nan() || size >= last || size < 1e-14 {
                 break;
             }
             last = size;
@@ -455,12 +470,12 @@ impl<const C: usize> Newton<C> {
             self.other.copy_from(&self.trial);
             let (turn, _) = RodState::largest_turn::<C>(elements, &self.other, &self.spare);
             // A correction is small or it is none.
-            if !(turn < 0.3) {
+            if turn.is_nan() || turn > 0.3 {
                 break;
             }
             self.trial.advance::<C>(elements, &self.other, &self.spare, 1.0);
             let after = supports.gaps(&self.trial).iter().fold(0.0f64, |m, g| m.max(g.abs()));
-            if !(after < size) {
+            if after.is_nan() || after >= size {
                 std::mem::swap(&mut self.trial, &mut self.other);
                 break;
             }
@@ -564,11 +579,12 @@ impl<const C: usize> Newton<C> {
             let floor = 100.0 * f64::EPSILON * stiff;
             let mut row = |value: f64, scale: f64, floor: f64| {
                 let value = value.abs();
-                if !(value <= tolerance * scale + floor) {
+                if value.is_nan() || value > tolerance * scale + floor {
                     small = false;
                 }
-                let r = if value <= 1e-3 * floor { 0.0 } else { value / (scale + floor / f64::EPSILON * 1e-16) };
-                relative = if r.is_nan() { f64::NAN } else { relative.max(r) };
+                let r =
+                    if value <= 1e-3 * floor { 0.0 } else { value / (scale + floor / f64::EPSILON * 1e-16) };
+                relative = if r.is_nan() || relative.is_nan() { f64::NAN } else { relative.max(r) };
             };
             for k in 0..3 {
                 row(self.assembly.residual[l.position(i) + k], forces, floor);
@@ -587,10 +603,10 @@ impl<const C: usize> Newton<C> {
         for j in 0..6 {
             let scale = if j < 3 { length } else { 1.0 };
             let value = self.assembly.residual[first + j].abs() / scale;
-            if !(value <= tolerance) {
+            if value.is_nan() || value > tolerance {
                 small = false;
             }
-            relative = if value.is_nan() { f64::NAN } else { relative.max(value) };
+            relative = if value.is_nan() || relative.is_nan() { f64::NAN } else { relative.max(value) };
         }
         (relative, small)
     }

@@ -63,7 +63,10 @@ impl<const C: usize> Path<C> {
         let report =
             self.newton.solve(&problem.elements, &mut self.supports, &mut loads, &mut self.state, &options);
         if !report.converged {
-            return Err(Error::Computation(format!("no equilibrium at parameter {value}: {}", report.reason)));
+            return Err(Error::Computation(format!(
+                "no equilibrium at parameter {value}: {}",
+                report.reason
+            )));
         }
         self.newton.assemble(&problem.elements, &self.supports, &mut loads, &self.state);
         let shift = Newton::<C>::whisper(&problem.elements);
@@ -86,7 +89,13 @@ impl StaticProblem {
         }
     }
 
-    fn bisect<const C: usize>(&self, parameter: Parameter, from: f64, to: f64, tolerance: f64) -> Result<f64> {
+    fn bisect<const C: usize>(
+        &self,
+        parameter: Parameter,
+        from: f64,
+        to: f64,
+        tolerance: f64,
+    ) -> Result<f64> {
         let mut path = Path::<C>::new(self, parameter);
         let base = path.at(from)?;
         let (mut low, mut high) = (from, to);

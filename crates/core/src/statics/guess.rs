@@ -46,7 +46,8 @@ pub fn towards_end(elements: &[ElementData], start: Vec3, frame: Frame, supports
     let length: f64 = elements.iter().map(|e| e.length).sum();
     // A pinned start may point at the end first.
     let aim = supports.end_position - start;
-    let frame = if !supports.start_tangent && supports.end_directions.len() == 3 && aim.norm() > 1e-9 * length {
+    let frame = if !supports.start_tangent && supports.end_directions.len() == 3 && aim.norm() > 1e-9 * length
+    {
         frame.transported_to(&(aim / aim.norm()))
     } else {
         frame
@@ -81,8 +82,7 @@ pub fn towards_end(elements: &[ElementData], start: Vec3, frame: Frame, supports
             let mut frames = Vec::with_capacity(elements.len() + 1);
             for i in 0..=elements.len() {
                 let x = s / length;
-                let shape =
-                    if supports.start_tangent { (2.0 * PI * x).sin() } else { (PI * x).cos() };
+                let shape = if supports.start_tangent { (2.0 * PI * x).sin() } else { (PI * x).cos() };
                 frames.push(frame.transported(amplitude * shape, 0.0));
                 s += elements.get(i).map_or(0.0, |e| e.length);
             }

@@ -25,7 +25,14 @@ pub struct Loads {
 
 impl Default for Loads {
     fn default() -> Self {
-        Self { forces: vec![], moments: vec![], distributed: vec![], followers: vec![], constant: vec![], factor: 1.0 }
+        Self {
+            forces: vec![],
+            moments: vec![],
+            distributed: vec![],
+            followers: vec![],
+            constant: vec![],
+            factor: 1.0,
+        }
     }
 }
 
@@ -116,11 +123,8 @@ impl<const C: usize> External<C> for Loads {
             assembly.add_node(*i, &-force, &Matrix3::zeros());
             let frame = &state.frames[*i];
             let (along, u, v) = (value.x, force.dot(&frame.u), force.dot(&frame.v));
-            let rates = [
-                frame.u * along - frame.t * u,
-                frame.v * along - frame.t * v,
-                frame.v * u - frame.u * v,
-            ];
+            let rates =
+                [frame.u * along - frame.t * u, frame.v * along - frame.t * v, frame.v * u - frame.u * v];
             let count = if Layout::<C>::TWIST { 3 } else { 2 };
             for (k, rate) in rates.iter().enumerate().take(count) {
                 let mut q = [0.0; 3];
@@ -145,7 +149,8 @@ impl<const C: usize> External<C> for Loads {
             let turn = a.hypot(b);
             let twist = to.angles[*i] - from.angles[*i];
             let mean = if turn > 1e-6 {
-                frame.t * (turn.sin() / turn) + (frame.u * a + frame.v * b) * ((1.0 - turn.cos()) / (turn * turn))
+                frame.t * (turn.sin() / turn)
+                    + (frame.u * a + frame.v * b) * ((1.0 - turn.cos()) / (turn * turn))
             } else {
                 frame.t + (frame.u * a + frame.v * b) * 0.5
             };
@@ -173,5 +178,6 @@ impl<const C: usize> External<C> for Loads {
 /// Mean position of an element.
 fn centroid(elements: &[ElementData], state: &RodState, e: usize) -> Vec3 {
     let h = elements[e].length;
-    (state.positions[e] + state.positions[e + 1]) * 0.5 + (state.frames[e].t - state.frames[e + 1].t) * (h / 12.0)
+    (state.positions[e] + state.positions[e + 1]) * 0.5
+        + (state.frames[e].t - state.frames[e + 1].t) * (h / 12.0)
 }

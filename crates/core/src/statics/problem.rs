@@ -5,7 +5,7 @@ use super::guess;
 use super::loads::Loads;
 use super::solution::{Energies, Reaction, Reactions, StaticSolution};
 use crate::rod::quadrature::GAUSS;
-use crate::rod::{EndAngle, ElementData, Frame, Layout, PLAIN, RodState, Supports, TWISTED};
+use crate::rod::{ElementData, EndAngle, Frame, Layout, PLAIN, RodState, Supports, TWISTED};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport};
 use crate::{Error, Result, Vec3};
 
@@ -99,16 +99,14 @@ impl StaticProblem {
         }
 
         let gj_given = case.rod.section[0].gj.is_some();
-        let shaped = elements
-            .iter()
-            .any(|e| e.rest_curvature != [[0.0; 2]; 3] || e.rest_twist != [0.0; 3]);
+        let shaped = elements.iter().any(|e| e.rest_curvature != [[0.0; 2]; 3] || e.rest_twist != [0.0; 3]);
         let holds = matches!(case.end.kind, EndKind::Clamped | EndKind::Guided);
         let clamped = case.start.kind == StartKind::Clamped;
         let turned = holds && clamped && (gj_given || case.end.turns.is_some_and(|t| t != 0.0));
         let twisted = shaped
             || turned
-            || gj_given
-                && (!loads.moments.is_empty() || loads.followers.iter().any(|(_, f)| f.y != 0.0 || f.z != 0.0));
+            || !loads.moments.is_empty()
+            || loads.followers.iter().any(|(_, f)| f.y != 0.0 || f.z != 0.0);
 
         let mut supports = Supports { start_tangent: clamped, start_angle: clamped, ..Supports::default() };
         if let Some(p) = case.end.position {
@@ -159,12 +157,8 @@ impl StaticProblem {
     pub fn solve_state(&self) -> Result<Solved> {
         let solved = if self.twisted { self.run::<TWISTED>() } else { self.run::<PLAIN>() };
         let energy = &solved.energy;
-        let matters = if self.twisted {
-            energy.twist > TWIST_MATTERS * (energy.total + energy.load.abs())
-        } else {
-            self.torque_without_angles(&solved.state)
-        };
-        if matters && !self.gj_given {
+        if self.twisted && !self.gj_given && energy.twist > TWIST_MATTERS * (energy.total + energy.load.abs())
+        {
             return Err(Error::parameter(
                 "rod.section.GJ",
                 "missing",
@@ -172,18 +166,6 @@ impl StaticProblem {
             ));
         }
         Ok(solved)
-    }
-
-    /// Whether loads exert a torque on a rod that carries no angles, or follow a frame that a spatial shape would twist.
-    fn torque_without_angles(&self, state: &RodState) -> bool {
-        let torque = self.loads.moments.iter().any(|(i, m)| m.dot(&state.frames[*i].t).abs() > 1e-9 * m.norm());
-        let t0 = state.frames[0].t;
-        let across = self.loads.followers.iter().map(|(i, f)| state.frames[*i].u * f.y + state.frames[*i].v * f.z);
-        let spatial = across.map(|f| t0.cross(&f)).filter(|n| n.norm() > 1e-12).any(|n| {
-            let n = n.normalize();
-            state.frames.iter().any(|f| f.t.dot(&n).abs() > 1e-9)
-        });
-        torque || spatial
     }
 
     fn run<const C: usize>(&self) -> Solved {
@@ -212,7 +194,8 @@ impl StaticProblem {
             loads.factor = self.loads.factor * step as f64 / self.load_steps as f64;
             let report = newton.solve(&self.elements, &mut supports, &mut loads, &mut state, &self.options);
             iterations += report.iterations;
-            monotone &= report.steps.iter().all(|s| s.merit_change <= 1e-12 * s.energy_scale);
+            monotone &= !External::<C>::conservative(&loads)
+                || report.steps.iter().all(|s| s.merit_change <= 1e-12 * s.energy_scale);
             let failed = !report.converged;
             last = Some(report);
             if failed {
@@ -351,8 +334,7 @@ fn element(section: &Section, begin: f64, from: f64, to: f64) -> ElementData {
         let w = ((from + point.xi * h - begin) / (section.until - begin)).clamp(0.0, 1.0);
         let mix = |a: f64, b: Option<f64>| a + w * (b.unwrap_or(a) - a);
         data.bending[p] = mix(section.ei, section.ei_end);
-        data.torsion[p] =
-            section.gj.map_or(ASSUMED_GJ_RATIO * data.bending[p], |gj| mix(gj, section.gj_end));
+        data.torsion[p] = section.gj.map_or(ASSUMED_GJ_RATIO * data.bending[p], |gj| mix(gj, section.gj_end));
         let end = section.rest_curvature_end.unwrap_or(section.rest_curvature);
         for a in 0..2 {
             data.rest_curvature[p][a] = mix(section.rest_curvature[a], Some(end[a]));

@@ -79,7 +79,7 @@ pub struct StaticSolution {
     pub stop: String,
     /// Whether the rod carried angles.
     pub twisted: bool,
-    /// Whether the energy fell at every accepted step (to rounding).
+    /// Whether the energy fell at every accepted step (to rounding); true where loads have no potential to fall.
     pub monotone: bool,
 }
 

@@ -34,7 +34,11 @@ fn across(name: &str, normal: &[f64; 3], tangent: &[f64; 3]) -> Result<()> {
     direction(name, normal)?;
     let (n, t) = (Vec3::from(*normal).normalize(), Vec3::from(*tangent).normalize());
     if n.cross(&t).norm() < 1e-6 {
-        return Err(Error::parameter(name, format!("{normal:?}"), "is along the tangent; give a direction across it"));
+        return Err(Error::parameter(
+            name,
+            format!("{normal:?}"),
+            "is along the tangent; give a direction across it",
+        ));
     }
     Ok(())
 }
@@ -45,7 +49,11 @@ impl StaticCase {
         let length = self.rod.length;
         positive("rod.length", length)?;
         if self.rod.elements == 0 || self.rod.elements > MAX_ELEMENTS {
-            return Err(Error::parameter("rod.elements", self.rod.elements, format!("must be 1 to {MAX_ELEMENTS}")));
+            return Err(Error::parameter(
+                "rod.elements",
+                self.rod.elements,
+                format!("must be 1 to {MAX_ELEMENTS}"),
+            ));
         }
         self.check_sections()?;
         direction("start.tangent", &self.start.tangent)?;
@@ -68,10 +76,18 @@ impl StaticCase {
             span("to", load.to)?;
             let spread = load.kind == LoadKind::Distributed;
             if spread && load.at.is_some() {
-                return Err(Error::parameter(name("at"), "given", "a distributed load has no point; use from and to"));
+                return Err(Error::parameter(
+                    name("at"),
+                    "given",
+                    "a distributed load has no point; use from and to",
+                ));
             }
             if !spread && (load.from.is_some() || load.to.is_some()) {
-                return Err(Error::parameter(name("from"), "given", "only a distributed load has from and to; use at"));
+                return Err(Error::parameter(
+                    name("from"),
+                    "given",
+                    "only a distributed load has from and to; use at",
+                ));
             }
             if load.from.unwrap_or(0.0) >= load.to.unwrap_or(length) {
                 return Err(Error::parameter(name("from"), load.from.unwrap_or(0.0), "must be less than to"));
@@ -80,7 +96,10 @@ impl StaticCase {
         if let Some(initial) = &self.initial {
             finite("initial.curvature", &initial.curvature)?;
         }
-        if self.solver.max_iterations == 0 || self.solver.load_steps == 0 || self.solver.load_steps > 1_000_000 {
+        if self.solver.max_iterations == 0
+            || self.solver.load_steps == 0
+            || self.solver.load_steps > 1_000_000
+        {
             return Err(Error::parameter("solver", "0", "max_iterations and load_steps must be at least 1"));
         }
         Ok(())
@@ -114,7 +133,11 @@ impl StaticCase {
             }
             for (key, end, begin) in [("GJ_end", gj_end, gj), ("EA_end", ea_end, ea)] {
                 if end.is_some() && begin.is_none() {
-                    return Err(Error::parameter(name(key), "given", "needs the value at the section's begin too"));
+                    return Err(Error::parameter(
+                        name(key),
+                        "given",
+                        "needs the value at the section's begin too",
+                    ));
                 }
             }
             finite(&name("rest_curvature"), &section.rest_curvature)?;
@@ -130,7 +153,11 @@ impl StaticCase {
         }
         let known = self.rod.section.iter().filter(|s| s.gj.is_some()).count();
         if known != 0 && known != self.rod.section.len() {
-            return Err(Error::parameter("rod.section.GJ", "missing in some sections", "give it in all or in none"));
+            return Err(Error::parameter(
+                "rod.section.GJ",
+                "missing in some sections",
+                "give it in all or in none",
+            ));
         }
         Ok(())
     }
@@ -138,7 +165,11 @@ impl StaticCase {
     fn check_end(&self) -> Result<()> {
         let end = &self.end;
         let wrong = |key: &str, mend: &str| {
-            Err(Error::parameter(format!("end.{key}"), format!("given with type {:?}", end.kind).to_lowercase(), mend))
+            Err(Error::parameter(
+                format!("end.{key}"),
+                format!("given with type {:?}", end.kind).to_lowercase(),
+                mend,
+            ))
         };
         if end.kind == EndKind::Free || end.kind == EndKind::Guided {
             if end.position.is_some() {
