@@ -10,11 +10,11 @@ fn folder() -> std::path::PathBuf {
 }
 
 fn case(name: &str) -> StaticCase {
-    StaticCase::from_file(&folder().join(format!("{name}.toml"))).unwrap()
+    StaticCase::from_file(&folder().join(format!("{name}.toml"))).expect("an example case is valid")
 }
 
 fn solve(name: &str) -> StaticSolution {
-    case(name).solve().unwrap()
+    case(name).solve().expect("an example case is solvable")
 }
 
 fn parse(text: &str) -> Result<StaticCase, endowire_core::Error> {
@@ -61,7 +61,7 @@ fn imbalance(case: &StaticCase, s: &StaticSolution) -> f64 {
     for load in &case.load {
         let value = Vec3::from(load.value);
         let at = load.at.unwrap_or(case.rod.length);
-        let node = s.arc_lengths.iter().position(|x| (x - at).abs() < 1e-9).unwrap();
+        let node = s.arc_lengths.iter().position(|x| (x - at).abs() < 1e-9).expect("loads stand at nodes");
         if load.kind == LoadKind::Force {
             force += value;
             moment += Vec3::from(s.nodes[node]).cross(&value);
@@ -232,7 +232,7 @@ fn continuation_passes_the_limit_point_of_a_shallow_arch() {
         value: up,
     }];
     let problem = endowire_core::statics::StaticProblem::new(&c).unwrap();
-    let path = problem.continuation(0.05, 120).unwrap();
+    let path = problem.continuation(0.004, 90).unwrap();
     let highest = path.iter().map(|p| p.factor).fold(0.0, f64::max);
     let at = path.iter().position(|p| p.factor == highest).unwrap();
     assert!(highest > 1.0 && at > 2 && at < path.len() - 10, "highest {highest} at {at} of {}", path.len());
