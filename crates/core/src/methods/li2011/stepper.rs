@@ -5,7 +5,8 @@
 //! between the sheath and the first such node, has another length: between half and one and a half elements, so that
 //! no sliver arises.
 //!
-//! It also leaves open what collides. A node does here if its surface is beyond the wall before or after the
+//! It also leaves open what collides. A node does here if its surface reaches the wall, which its distance to the
+//! nearest triangle tells (not to the plane of that triangle, which goes on where the wall does not), before or after the
 //! translation: seen only after it, pulling would lift every node off the outside of a bend, and the next solve would
 //! shoot the wire straight through the wall.
 
@@ -82,24 +83,22 @@ struct Plane {
     normal: Vec3,
     offset_mm: f64,
     triangle: u32,
+    /// How far the device's surface is in the wall, mm.
+    depth_mm: f64,
 }
 
 impl Plane {
-    /// The plane of the triangle nearest to `x`, if a surface of radius `radius_mm` about `x` is beyond it.
+    /// The plane of the triangle nearest to `x`, if a surface of radius `radius_mm` about `x` reaches that triangle.
     ///
     /// Past the end of the vessel there is no wall.
     fn beyond(query: &WallQuery, x: &Vec3, radius_mm: f64) -> Option<Self> {
         let x = &x.map(|c| (c / DETECTION_GRID_MM).round() * DETECTION_GRID_MM);
         let near = query.nearest(x, REACH_MM).filter(|near| !near.rim)?;
+        let depth_mm = radius_mm - near.distance_mm;
         let normal = query.inward_normal(near.triangle);
-        let plane =
-            Self { normal, offset_mm: normal.dot(&near.point_mm) + radius_mm, triangle: near.triangle };
-        (plane.depth_mm(x) > DETECTION_GRID_MM).then_some(plane)
-    }
-
-    /// How far `x` is beyond the plane, mm.
-    fn depth_mm(&self, x: &Vec3) -> f64 {
-        self.offset_mm - self.normal.dot(x)
+        let offset_mm = normal.dot(&near.point_mm) + radius_mm;
+        let reaches = depth_mm > DETECTION_GRID_MM && offset_mm - normal.dot(x) > DETECTION_GRID_MM;
+        reaches.then_some(Self { normal, offset_mm, triangle: near.triangle, depth_mm })
     }
 }
 
@@ -193,7 +192,7 @@ impl Li2011 {
         for (index, x) in self.positions_mm.iter().enumerate() {
             let radius_mm = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
             let before = self.beyond.get(nodes - 1 - index).copied().flatten();
-            if let Some(Plane { normal, offset_mm, triangle }) =
+            if let Some(Plane { normal, offset_mm, triangle, .. }) =
                 Plane::beyond(surroundings.query, x, radius_mm).or(before)
             {
                 self.chain.contacts.push(PlaneContact { node: index + 1, normal, offset_mm, triangle });
@@ -240,7 +239,17 @@ impl Li2011 {
             wall: self.chain.wall_energy_mj(&self.positions_mm),
         };
         report.iterations = 1;
-        report.converged = true;
+
+        report.max_penetration_mm = 0.0;
+        self.beyond.clear();
+        for (x, s) in self.positions_mm.iter().zip(&self.from_tip_mm[1..]).rev() {
+            let plane = Plane::beyond(surroundings.query, x, surroundings.device.section_at(*s).radius_mm);
+            report.max_penetration_mm = plane.map_or(0.0, |p| p.depth_mm).max(report.max_penetration_mm);
+            self.beyond.push(plane);
+        }
+        let nodes = self.positions_mm.len();
+        let reached = (1..=nodes).filter_map(|node| Some((node, self.beyond[nodes - node]?.triangle)));
+        report.converged = self.chain.contacts.iter().map(|c| (c.node, c.triangle)).eq(reached);
 
         report.contacts.clear();
         let mut held_by = Vec3::zeros();
@@ -252,7 +261,7 @@ impl Li2011 {
                 position_mm,
                 normal: contact.normal,
                 force_n,
-                penetration_mm: (contact.offset_mm - contact.normal.dot(&position_mm)).max(0.0),
+                penetration_mm: self.beyond[nodes - contact.node].map_or(0.0, |plane| plane.depth_mm),
                 triangle: contact.triangle,
             });
         }
@@ -264,14 +273,6 @@ impl Li2011 {
             }
             _ => 0.0,
         };
-        report.max_penetration_mm = 0.0;
-        self.beyond.clear();
-        for (x, s) in self.positions_mm.iter().zip(&self.from_tip_mm[1..]).rev() {
-            let plane = Plane::beyond(surroundings.query, x, surroundings.device.section_at(*s).radius_mm);
-            let depth_mm = plane.map_or(0.0, |plane| plane.depth_mm(x));
-            report.max_penetration_mm = report.max_penetration_mm.max(depth_mm);
-            self.beyond.push(plane);
-        }
     }
 }
 
@@ -310,4 +311,41 @@ fn on_curve(shape: &Shape, s: f64, element: &mut usize) -> Vec3 {
     let h = from_tip[a] - from_tip[b];
     let along = from_tip[a] - s;
     x[a] + t[a] * along + (t[b] - t[a]) * (0.5 * along * along / h)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vessel::{SurfaceMesh, Wall};
+
+    /// A box with a narrow wedge from its far side up to z = 20: a carina.
+    fn wedge() -> WallQuery {
+        let profile = [[0., 20.], [-1., 60.], [-10., 60.], [-10., 0.], [10., 0.], [10., 60.], [1., 60.]];
+        let n = profile.len() as u32;
+        let mut mesh = SurfaceMesh::default();
+        for y in [-10.0, 10.0] {
+            mesh.vertices_mm.extend(profile.map(|[x, z]| Vec3::new(x, y, z)));
+        }
+        for k in 0..n {
+            let next = (k + 1) % n;
+            mesh.triangles.extend([[k, next, k + n], [next, next + n, k + n]]);
+        }
+        for k in 1..n - 1 {
+            mesh.triangles.extend([[0, k + 1, k], [n, n + k, n + k + 1]]);
+        }
+        WallQuery::new(&Wall::from_surface(&mesh).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_node_in_front_of_a_wedge_touches_it_only_where_it_is_near() {
+        let query = wedge();
+        let reached = |z: f64| Plane::beyond(&query, &Vec3::new(0.0, 0.5, z), 0.4);
+        // Beyond the planes of both flanks, and five millimetres away from them.
+        assert!(reached(15.0).is_none());
+        assert!(reached(19.59).is_none());
+        let depth_mm = reached(19.9).map(|plane| plane.depth_mm).unwrap();
+        assert!((depth_mm - 0.3).abs() < 1e-6, "{depth_mm}");
+        // Behind the edge, inside the wedge: the distance is negative.
+        assert!(reached(21.0).unwrap().depth_mm > 0.4);
+    }
 }
