@@ -64,7 +64,7 @@ impl CArm {
             size_px,
         };
         for vertex in &wall.vertices_mm {
-            arm.check_between("vessel", vertex)?;
+            arm.check_between(vertex)?;
         }
         arm.pixel_mm = match spec.pixel_mm {
             Some(pitch) => pitch,
@@ -89,14 +89,20 @@ impl CArm {
         ))
     }
 
-    /// Refuses a point that is not between source and detector.
-    pub(crate) fn check_between(&self, what: &str, point_mm: &Vec3) -> Result<()> {
-        let depth = self.sod_mm + self.in_beam(point_mm).z;
-        if (NEAREST_MM..=self.sid_mm).contains(&depth) {
+    /// Whether a point given by [`Self::in_beam`] is between source and detector.
+    pub(crate) fn is_between(&self, beam: &Vec3) -> bool {
+        (NEAREST_MM..=self.sid_mm).contains(&(self.sod_mm + beam.z))
+    }
+
+    /// Refuses a point of the vessel that is not between source and detector.
+    fn check_between(&self, point_mm: &Vec3) -> Result<()> {
+        let beam = self.in_beam(point_mm);
+        if self.is_between(&beam) {
             return Ok(());
         }
+        let depth = self.sod_mm + beam.z;
         let mend = format!(
-            "the {what} must lie between source and detector, but its point ({:.1}, {:.1}, {:.1}) mm is {depth:.1} mm from \
+            "the vessel must lie between source and detector, but its point ({:.1}, {:.1}, {:.1}) mm is {depth:.1} mm from \
              the source along the beam while the detector is at {} mm; mend the isocentre or the distances",
             point_mm.x, point_mm.y, point_mm.z, self.sid_mm
         );

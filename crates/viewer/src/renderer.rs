@@ -91,11 +91,10 @@ impl Renderer {
         self.setup.fluoro.as_ref().map(|f| &f.c_arm)
     }
 
-    /// Draws the wanted views.
+    /// Draws the wanted views. Fluoroscopy leaves out what of a device is not between source and detector.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a device with values that are not finite or that is not between source and
-    /// detector.
+    /// [`Error::Parameter`] for a device with values that are not finite.
     pub fn render(&mut self, devices: &[DeviceView]) -> Result<Frames> {
         let devices = RefinedDevice::all(devices)?;
         self.with_fallback(|engines| {

@@ -2,18 +2,16 @@
 
 use std::ops::Range;
 
-use endowire_core::{Result, Vec3};
+use endowire_core::Vec3;
 
 use crate::c_arm::CArm;
 use crate::cpu::piece::chord;
 use crate::cpu::raster::span;
 use crate::device::{DevicePoint, Piece, pieces};
 
-/// The pieces of a refined centre line in beam coordinates (columns, rows, depth from the isocentre).
-pub(crate) fn pieces_in_beam(c_arm: &CArm, points: &[DevicePoint]) -> Result<Vec<Piece>> {
-    for point in points {
-        c_arm.check_between("device", &point.position_mm)?;
-    }
+/// The pieces of a refined centre line in beam coordinates (columns, rows, depth from the isocentre). Those that are not
+/// between source and detector throw no shadow: a device may go where the C-arm does not look.
+pub(crate) fn pieces_in_beam(c_arm: &CArm, points: &[DevicePoint]) -> Vec<Piece> {
     let turned: Vec<DevicePoint> = points
         .iter()
         .map(|p| DevicePoint {
@@ -22,7 +20,9 @@ pub(crate) fn pieces_in_beam(c_arm: &CArm, points: &[DevicePoint]) -> Result<Vec
             radius_mm: p.radius_mm,
         })
         .collect();
-    Ok(pieces(&turned))
+    let mut pieces = pieces(&turned);
+    pieces.retain(|piece| c_arm.is_between(&piece.start) && c_arm.is_between(&piece.end));
+    pieces
 }
 
 /// Columns and rows of the pixels that `piece` may touch: those of the two spheres that enclose it.

@@ -73,7 +73,7 @@ impl FluoroEngine for CpuFluoro {
         let mut chains = Vec::with_capacity(devices.len());
         for device in devices {
             let weight = self.beam.device_excess_per_mm(device.material)?;
-            chains.push((weight, pieces_in_beam(&self.rays, &device.points)?));
+            chains.push((weight, pieces_in_beam(&self.rays, &device.points)));
         }
         let mut touched = Vec::new();
         for (weight, pieces) in &chains {
@@ -106,7 +106,7 @@ impl FluoroEngine for CpuFluoro {
 
     fn device_path(&mut self, device: &RefinedDevice) -> Result<Vec<f32>> {
         let mut path = vec![0.0; self.still.len()];
-        for piece in pieces_in_beam(&self.c_arm, &device.points)? {
+        for piece in pieces_in_beam(&self.c_arm, &device.points) {
             cast(&self.c_arm, &piece, |pixel, length| path[pixel] += length);
         }
         Ok(path.into_iter().map(|v| v as f32).collect())

@@ -234,7 +234,7 @@ impl FluoroEngine for GpuFluoro {
         let mut instances = Vec::new();
         for device in devices {
             let weight = setup.beam.device_excess_per_mm(device.material)?;
-            let pieces = pieces_in_beam(&self.rays, &device.points)?;
+            let pieces = pieces_in_beam(&self.rays, &device.points);
             instances.extend(pieces.iter().map(|piece| instance(&self.rays, piece, weight)));
         }
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -257,7 +257,7 @@ impl FluoroEngine for GpuFluoro {
 
     fn device_path(&mut self, device: &RefinedDevice) -> Result<Vec<f32>> {
         let c_arm = &self.setup.c_arm;
-        let pieces = pieces_in_beam(c_arm, &device.points)?;
+        let pieces = pieces_in_beam(c_arm, &device.points);
         let instances: Vec<PieceInstance> = pieces.iter().map(|piece| instance(c_arm, piece, 1.0)).collect();
         self.path(|encoder, target, view| self.encode_pieces(encoder, target, view, &instances))
     }
