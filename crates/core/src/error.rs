@@ -43,6 +43,9 @@ pub enum Error {
     Computation(String),
 }
 
+/// Numbers of no more characters stand as they are.
+const SHORT: usize = 6;
+
 impl Error {
     /// A [`Error::Parameter`] from anything printable.
     pub fn parameter(
@@ -50,7 +53,10 @@ impl Error {
         value: impl std::fmt::Display,
         mend: impl Into<String>,
     ) -> Self {
-        Self::Parameter { name: name.into(), value: value.to_string(), mend: mend.into() }
+        // A number of three hundred digits hides what is wrong with it.
+        let text = value.to_string();
+        let value = if text.len() > SHORT { text.parse().map_or(text, number) } else { text };
+        Self::Parameter { name: name.into(), value, mend: mend.into() }
     }
 
     /// A [`Error::File`] for `path`.
@@ -69,6 +75,20 @@ impl Error {
     }
 }
 
+/// A number for people: with an exponent where digits would only be zeros.
+pub(crate) fn number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() || (1e-4..1e9).contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
+/// A vector for people.
+pub(crate) fn vector(v: &crate::Vec3) -> String {
+    format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
+}
+
 /// Checks that `value` is finite and in (0, limit].
 ///
 /// # Errors
@@ -78,4 +98,21 @@ pub(crate) fn in_range(name: &str, value: f64, limit: f64) -> Result<()> {
         return Ok(());
     }
     Err(Error::parameter(name, value, format!("must be a number above 0 and at most {limit}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_stay_readable() {
+        let shown = |value: f64| Error::parameter("a", value, "b").to_string();
+        assert_eq!(shown(1e300), "a = 1e300: b");
+        assert_eq!(shown(-2.5e-300), "a = -2.5e-300: b");
+        assert_eq!(shown(123_456.789), "a = 123456.789: b");
+        assert_eq!(shown(0.0), "a = 0: b");
+        assert_eq!(shown(f64::INFINITY), "a = inf: b");
+        assert_eq!(Error::parameter("a", "12 steps", "b").to_string(), "a = 12 steps: b");
+        assert_eq!(vector(&crate::Vec3::new(1e200, 0.5, 0.0)), "[1e200, 0.5, 0]");
+    }
 }

@@ -7,6 +7,7 @@
 
 pub mod device;
 pub mod error;
+pub mod file;
 pub mod insertion;
 pub mod methods;
 pub mod reference;

@@ -50,7 +50,7 @@ impl CentrelineTree {
     /// [`Error::File`] if it cannot be read; [`Error::Content`] naming line and value for what [`CentrelineTree::new`] refuses
     /// and for what is no number.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        let bytes = crate::file::read(path, SIZE_LIMIT)?;
         Self::parse(&String::from_utf8_lossy(&bytes)).map_err(|reason| Error::content(path, reason))
     }
 
@@ -136,6 +136,9 @@ fn parse_row(words: &[&str]) -> std::result::Result<CentrelineNode, String> {
         parent: (parent != -1).then(|| usize::try_from(parent).unwrap_or(usize::MAX)),
     })
 }
+
+/// Largest table in bytes: a million points.
+const SIZE_LIMIT: u64 = 64 << 20;
 
 /// Largest usable number: distances and their squares stay well inside f64, and no vessel is a kilometre long.
 const LARGEST_MM: f64 = 1e6;

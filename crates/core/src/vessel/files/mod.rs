@@ -14,6 +14,12 @@ use crate::{Error, Result, Vec3};
 /// The formats, as messages name them.
 const KNOWN: &str = "use .stl, .obj or .ply";
 
+/// Largest surface file in bytes: the binary STL of 40 million triangles.
+const SIZE_LIMIT: u64 = 2 << 30;
+
+/// Largest surface accepted, mm: no vessel is ten metres long, and a wrong unit is easily a factor of a thousand.
+const EXTENT_LIMIT_MM: f64 = 10_000.0;
+
 /// Why the content of a file is not usable, without the file's name.
 type Reason = String;
 
@@ -43,11 +49,11 @@ impl SurfaceMesh {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a unit that is not finite and positive, [`Error::File`] for a file that cannot be read,
-    /// [`Error::Content`] for an unknown extension or unusable content; the reason says where.
+    /// [`Error::Content`] for an unknown extension, unusable content (the reason says where) or a surface over 10 m across.
     pub fn read(path: &Path, unit_mm: f64) -> Result<Self> {
         check_unit(unit_mm)?;
         let format = format_of(path)?;
-        let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        let bytes = crate::file::read(path, SIZE_LIMIT)?;
         let mesh = parse(format, &bytes).map_err(|reason| Error::content(path, reason))?;
         scaled(mesh, unit_mm).map_err(|reason| Error::content(path, reason))
     }
@@ -102,6 +108,15 @@ fn scaled(mut mesh: SurfaceMesh, unit_mm: f64) -> std::result::Result<SurfaceMes
                 v.x, v.y, v.z
             ));
         }
+    }
+    let extent_mm = mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
+    if extent_mm > EXTENT_LIMIT_MM {
+        return Err(format!(
+            "with unit_mm = {} the surface is {} mm across, and no vessel more than {EXTENT_LIMIT_MM}: give the millimetres \
+             per unit of the file",
+            crate::error::number(unit_mm),
+            crate::error::number(extent_mm)
+        ));
     }
     Ok(mesh)
 }

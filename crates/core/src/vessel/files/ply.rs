@@ -92,9 +92,9 @@ impl PropertyAccess for Row {
 pub(super) fn parse(bytes: &[u8]) -> Result<SurfaceMesh, Reason> {
     let parser = Parser::<Row>::new();
     let mut reader = Reader::new(BufReader::new(bytes));
-    let header = parser.read_header(&mut reader).map_err(|e| e.to_string())?;
+    let header = parser.read_header(&mut reader).map_err(|e| one_line(&e))?;
     check_counts(&header, bytes.len())?;
-    let payload = parser.read_payload(&mut reader, &header).map_err(|e| e.to_string())?;
+    let payload = parser.read_payload(&mut reader, &header).map_err(|e| one_line(&e))?;
     let mut mesh = SurfaceMesh::default();
     let rows = |name: &str| payload.iter().find(|(key, _)| key.as_str() == name).map(|(_, rows)| rows);
     for (index, row) in rows("vertex").into_iter().flatten().enumerate() {
@@ -107,6 +107,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<SurfaceMesh, Reason> {
         super::push_fan(&mut mesh, &row.polygon, || format!("face {index}"))?;
     }
     Ok(mesh)
+}
+
+/// What the parser says over several lines, on one.
+fn one_line(error: &impl ToString) -> Reason {
+    error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// A row takes at least a byte, so a header that declares more rows than bytes is broken or malicious.

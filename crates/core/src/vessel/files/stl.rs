@@ -22,7 +22,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<SurfaceMesh, Reason> {
     let text = String::from_utf8_lossy(bytes);
     let begins_solid = text.trim_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case("solid"));
     match declared {
-        _ if begins_solid && text.contains("facet") => parse_ascii(&text),
+        _ if begins_solid && text.to_ascii_lowercase().contains("facet") => parse_ascii(&text),
         // Trailing bytes are harmless; missing ones are not.
         Some(count) if count.checked_mul(RECORD).is_some_and(|n| n < bytes.len() - HEADER - 4) => {
             Ok(parse_binary(bytes))
