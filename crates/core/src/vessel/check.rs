@@ -5,12 +5,15 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
 use super::intersect::triangles_intersect;
 use super::topology::EdgeTable;
-use super::wall::{duplicate_pairs, validate, weld_tolerance_mm};
+use super::wall::{duplicate_pairs, flat_volume_mm3, validate, weld_tolerance_mm};
 use super::{SurfaceMesh, Wall, sliver};
 use crate::{Result, Vec3};
 
 /// Intersecting pairs named in a report; a list of thousands helps nobody.
 const PAIRS_NAMED: usize = 10;
+/// Intersecting pairs after which counting ends, and pairs of close triangles after which looking ends: seconds.
+const PAIRS_COUNTED: usize = 100_000;
+const PAIRS_TRIED: usize = 20_000_000;
 
 /// A boundary loop in a report.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -59,8 +62,12 @@ pub struct CheckReport {
     pub duplicate_triangles: usize,
     /// Pairs of triangles that cross, touch or are folded onto each other beyond their common vertices.
     pub self_intersections: usize,
+    /// Whether counting ended before all pairs were seen: there are at least so many.
+    pub self_intersections_capped: bool,
     /// The first of these pairs, by triangle number in the file.
     pub intersecting_pairs: Vec<[usize; 2]>,
+    /// Whether the surface encloses nothing but rounding: a sheet.
+    pub flat: bool,
     /// Volume enclosed by the wall and flat caps in mm³.
     pub volume_mm3: f64,
     /// Area of the wall in mm².
@@ -78,7 +85,8 @@ pub struct CheckReport {
 }
 
 impl CheckReport {
-    /// Whether a device can be simulated in this wall as it is: consistent, outward, manifold, free of faults. Open ends are fine.
+    /// Whether a device can be simulated in this wall as it is: consistent, outward, manifold, free of faults, around a volume.
+    /// Open ends are fine.
     pub fn is_sound(&self) -> bool {
         let faults = [
             self.non_manifold_edges,
@@ -88,7 +96,7 @@ impl CheckReport {
             self.self_intersections,
             self.stray_edges,
         ];
-        faults.iter().all(|count| *count == 0)
+        faults.iter().all(|count| *count == 0) && !self.flat
     }
 }
 
@@ -108,7 +116,7 @@ pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
     let degenerate = |i: &usize| sliver::is_degenerate(&welded.corners(*i), tolerance_mm);
     let table = EdgeTable::new(&welded.triangles);
     let open_edges = table.edges().filter(|uses| uses.len() == 1).count();
-    let (self_intersections, intersecting_pairs) = self_intersections(&welded, tolerance_mm);
+    let intersections = self_intersections(&welded, tolerance_mm);
     let mut edges: Vec<f64> = table
         .edges()
         .map(|uses| {
@@ -117,7 +125,7 @@ pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
         .collect();
     edges.sort_by(f64::total_cmp);
     let edge = |k: usize| edges.get(k).copied().unwrap_or(0.0);
-    let (low, high) = surface.bounds_mm().unwrap_or_default();
+    let (low, high) = surface.used_bounds_mm().unwrap_or_default();
     let report = wall.report();
     let non_manifold_edges = table.non_manifold();
     Ok(CheckReport {
@@ -144,8 +152,10 @@ pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
         inside_out: report.inside_out,
         degenerate_triangles: (0..welded.triangles.len()).filter(degenerate).count(),
         duplicate_triangles: duplicate_pairs(&welded.triangles).len(),
-        self_intersections,
-        intersecting_pairs,
+        self_intersections: intersections.count,
+        self_intersections_capped: intersections.capped,
+        intersecting_pairs: intersections.first,
+        flat: wall.volume_mm3() <= flat_volume_mm3(wall.mesh()),
         volume_mm3: wall.volume_mm3(),
         area_mm2: area_mm2(&welded),
         low_mm: low.into(),
@@ -161,29 +171,50 @@ pub(crate) fn area_mm2(mesh: &SurfaceMesh) -> f64 {
     (0..mesh.triangles.len()).map(|i| super::mesh::area(&mesh.corners(i))).sum()
 }
 
+/// What [`self_intersections`] found.
+pub(crate) struct Intersections {
+    /// Intersecting pairs, all or those seen before the limit.
+    pub(crate) count: usize,
+    /// Whether the limit ended the count.
+    pub(crate) capped: bool,
+    /// The pairs with the smallest numbers.
+    pub(crate) first: Vec<[usize; 2]>,
+}
+
 /// Counts intersecting pairs among the triangles with area, and names the first few.
-fn self_intersections(mesh: &SurfaceMesh, tolerance_mm: f64) -> (usize, Vec<[usize; 2]>) {
+pub(crate) fn self_intersections(mesh: &SurfaceMesh, tolerance_mm: f64) -> Intersections {
     let solid: Vec<usize> = (0..mesh.triangles.len())
         .filter(|&i| !sliver::is_degenerate(&mesh.corners(i), tolerance_mm))
         .collect();
     let boxes: Vec<Aabb> = solid.iter().map(|&i| bounding_box(&mesh.corners(i))).collect();
     let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-    let mut pairs = Vec::new();
+    let mut found = Intersections { count: 0, capped: false, first: Vec::new() };
+    let mut tried = 0;
+    let mut partners = Vec::new();
     for (a, bounds) in boxes.iter().enumerate() {
-        // Each pair once; leaves come in the order of the tree, so pairs are sorted below.
+        partners.clear();
+        // Each pair once; leaves come in the order of the tree, so partners are sorted below.
         for b in tree.intersect_aabb(bounds).map(|b| b as usize).filter(|&b| b > a) {
-            let (first, second) = (solid[a], solid[b]);
+            tried += 1;
+            if found.count + partners.len() >= PAIRS_COUNTED || tried > PAIRS_TRIED {
+                found.capped = true;
+                break;
+            }
             if boxes[b].intersects(bounds)
-                && triangles_intersect(&mesh.vertices_mm, mesh.triangles[first], mesh.triangles[second])
+                && triangles_intersect(&mesh.vertices_mm, mesh.triangles[solid[a]], mesh.triangles[solid[b]])
             {
-                pairs.push([first, second]);
+                partners.push(b);
             }
         }
+        partners.sort_unstable();
+        let room = PAIRS_NAMED - found.first.len();
+        found.first.extend(partners.iter().take(room).map(|&b| [solid[a], solid[b]]));
+        found.count += partners.len();
+        if found.capped {
+            break;
+        }
     }
-    pairs.sort_unstable();
-    let count = pairs.len();
-    pairs.truncate(PAIRS_NAMED);
-    (count, pairs)
+    found
 }
 
 fn bounding_box(corners: &[Vec3; 3]) -> Aabb {

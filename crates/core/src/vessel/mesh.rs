@@ -23,6 +23,14 @@ impl SurfaceMesh {
         Some(self.vertices_mm.iter().fold((first, first), |(low, high), v| (low.inf(v), high.sup(v))))
     }
 
+    /// [`SurfaceMesh::bounds_mm`] of the vertices that triangles use: others may be anywhere and mean nothing. Indices must
+    /// be in range.
+    pub(crate) fn used_bounds_mm(&self) -> Option<(Vec3, Vec3)> {
+        let mut used = self.triangles.iter().flatten().map(|v| self.vertices_mm[*v as usize]);
+        let first = used.next()?;
+        Some(used.fold((first, first), |(low, high), v| (low.inf(&v), high.sup(&v))))
+    }
+
     /// Signed enclosed volume in mm³: positive when triangles are counter-clockwise seen from outside.
     /// Exact for closed surfaces (divergence theorem), meaningless for open ones.
     pub fn signed_volume_mm3(&self) -> f64 {

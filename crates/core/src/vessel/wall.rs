@@ -5,7 +5,7 @@ use super::topology::EdgeTable;
 use super::{SurfaceMesh, orient, sliver, weld};
 use crate::{Error, Result, Vec3};
 
-/// Vertices closer than this fraction of the bounding box diagonal are one vertex: ten times the resolution of the
+/// Vertices closer than this fraction of the diagonal of the triangles' bounding box are one vertex: ten times the resolution of the
 /// 32-bit floats of an STL file, and far below any detail of an anatomy.
 const WELD_TOLERANCE: f64 = 1e-6;
 
@@ -171,7 +171,12 @@ impl Wall {
 
 /// Welding tolerance for `surface` in mm.
 pub(crate) fn weld_tolerance_mm(surface: &SurfaceMesh) -> f64 {
-    surface.bounds_mm().map_or(0.0, |(low, high)| WELD_TOLERANCE * (high - low).norm())
+    surface.used_bounds_mm().map_or(0.0, |(low, high)| WELD_TOLERANCE * (high - low).norm())
+}
+
+/// Volume in mm³ up to which a surface is a flat sheet: it encloses nothing but rounding.
+pub(crate) fn flat_volume_mm3(mesh: &SurfaceMesh) -> f64 {
+    FLAT * mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm()).powi(3)
 }
 
 /// Rejects what no repair can help.
@@ -273,10 +278,9 @@ fn turn_outward(mesh: &mut SurfaceMesh, consistency: &orient::Consistency) {
         let patch = consistency.patch[triangle as usize] as usize;
         volume[patch] += opening.cap(mesh).map(|cap| signed_volume(&cap, origin)).sum::<f64>();
     }
-    // A flat sheet encloses nothing but rounding; it stays as it is.
-    let size = mesh.bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
+    let rounding_mm3 = flat_volume_mm3(mesh);
     for (triangle, &patch) in mesh.triangles.iter_mut().zip(&consistency.patch) {
-        if volume[patch as usize] < -FLAT * size.powi(3) {
+        if volume[patch as usize] < -rounding_mm3 {
             triangle.swap(1, 2);
         }
     }
