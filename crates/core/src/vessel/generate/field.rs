@@ -58,12 +58,7 @@ impl Field {
     pub(super) fn local(&self, centre: &Vec3, reach: f64) -> Local {
         let mut parts = Vec::new();
         for (index, branch) in self.branches.iter().enumerate() {
-            let distance = |p: &Vec3| (p - centre).norm();
-            let nearest = branch.samples.iter().map(|s| distance(&s.position)).fold(f64::INFINITY, f64::min);
-            let limit = nearest + 2.0 * reach;
-            let samples = (0..branch.samples.len() as u32)
-                .filter(|&k| distance(&branch.samples[k as usize].position) <= limit);
-            parts.push((index, samples.collect::<Vec<u32>>()));
+            parts.push((index, near(branch, centre, 2.0 * reach)));
         }
         // Branches too far off to blend with anything in the ball are left out; their samples do not change the value.
         let all = Local { parts };
@@ -142,6 +137,31 @@ impl Field {
         let exposure = smooth_step(from_start.min(from_end) / (HIDDEN * place.radius));
         Value { f: radial, gradient, radius: place.radius, exposure }
     }
+}
+
+/// The samples of a branch that are no more than `slack` farther from `centre` than the nearest one.
+fn near(branch: &Branch, centre: &Vec3, slack: f64) -> Vec<u32> {
+    let distance = |k: usize| (branch.samples[k].position - centre).norm();
+    // Samples are `step` apart along the curve, so that the distance changes by no more from one to the next: what is far
+    // off is passed in strides that cannot leap over anything nearer than asked for.
+    let stride = |excess: f64| ((excess / branch.step) as usize).max(1);
+    let (mut nearest, mut k) = (f64::INFINITY, 0);
+    while k < branch.samples.len() {
+        let here = distance(k);
+        nearest = nearest.min(here);
+        k += stride(here - nearest);
+    }
+    let limit = nearest + slack;
+    let mut samples = Vec::new();
+    k = 0;
+    while k < branch.samples.len() {
+        let here = distance(k);
+        if here <= limit {
+            samples.push(k as u32);
+        }
+        k += stride(here - limit);
+    }
+    samples
 }
 
 /// From 0 at 0 to 1 at 1, level at both.

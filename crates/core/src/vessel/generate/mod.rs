@@ -14,6 +14,7 @@ mod trim;
 
 use std::f64::consts::TAU;
 
+use super::check::self_intersections;
 use super::topology::EdgeTable;
 use super::wall::drop_unreferenced;
 use super::{CentrelineTree, SurfaceMesh, Wall};
@@ -42,6 +43,9 @@ const GRID_PER_RADIUS: f64 = 0.6;
 /// Grids tried until one makes a manifold, and how much finer each is.
 const GRID_ATTEMPTS: usize = 6;
 const GRID_SHRINK: f64 = 0.95;
+
+/// Non-manifold edges that one grid may make by chance.
+const CHANCE_FAULTS: usize = 8;
 
 /// Target of coarsening over edge length, so that it and the plain grid give about the same number of triangles.
 const COARSENING: f64 = 1.0;
@@ -111,7 +115,13 @@ impl GeneratedWall {
         let mut edge = (branch_area(branches) * TRIANGLES_PER_FACE / count as f64).sqrt();
         let mut best: Option<(f64, Self)> = None;
         for _ in 0..COUNT_ATTEMPTS {
-            let made = Self::with_edge(branches, edge)?;
+            // The edge length is ours; what was asked for is the count.
+            let made = Self::with_edge(branches, edge).map_err(|error| match error {
+                Error::Parameter { name, value, mend } if name == "edge_mm" => {
+                    Error::parameter("triangles", count, format!("means edges of {value} mm: {mend}"))
+                }
+                other => other,
+            })?;
             let ratio = made.wall.mesh().triangles.len() as f64 / count as f64;
             let miss = (ratio - 1.0).abs();
             if best.as_ref().is_none_or(|(least, _)| miss < *least) {
@@ -143,13 +153,30 @@ impl GeneratedWall {
         let field = Field { branches: branches.to_vec(), extension: 4.0 * grid };
         let ends = trim::ends(&field);
         let mesh = match branches {
-            [only] if ends.len() == 2 => sweep::tube(only, edge_mm),
+            [only] if ends.len() == 2 => {
+                let mesh = sweep::tube(only, edge_mm);
+                check_apart(&mesh)?;
+                mesh
+            }
             _ => implicit_mesh(&field, &ends, edge_mm)?,
         };
         let wall = Wall::from_surface(&mesh)?;
         let ends = match_openings(&wall, &ends, edge_mm)?;
         Ok(Self { inlet: ends[0].1, wall, ends, edge_mm })
     }
+}
+
+/// Refuses a tube that runs into itself: between samples of the centre line a bend can be tighter than at them, a polygon of
+/// rings folds before its axis does, and a vessel may simply cross itself.
+fn check_apart(mesh: &SurfaceMesh) -> Result<()> {
+    let found = self_intersections(mesh, 0.0);
+    let Some([triangle, _]) = found.first.first() else { return Ok(()) };
+    let at = mesh.corners(*triangle)[0];
+    Err(Error::Mesh(format!(
+        "the wall cuts itself near ({:.2}, {:.2}, {:.2}) mm: the vessel bends tighter than it is wide or runs into itself; \
+         smooth the centre line",
+        at.x, at.y, at.z
+    )))
 }
 
 /// Area of all branches taken alone, mm².
@@ -189,7 +216,10 @@ fn implicit_mesh(field: &Field, ends: &[End], edge: f64) -> Result<SurfaceMesh> 
 /// off in the same cell, by chance in the narrow angle of a fork; a slightly finer grid falls differently.
 fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<(nets::Nets, SurfaceMesh)> {
     let mut attempt = spacing;
+    let mut tried = spacing;
+    let mut fewest = usize::MAX;
     for _ in 0..GRID_ATTEMPTS {
+        tried = attempt;
         let mut nets = nets::mesh(field, attempt)?;
         even_out(field, &mut nets);
         let mut mesh = SurfaceMesh {
@@ -203,13 +233,19 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<(nets::Net
             trim::cut(&mut mesh, field, end, attempt);
         }
         drop_unreferenced(&mut mesh);
-        if EdgeTable::new(&mesh.triangles).non_manifold() == 0 {
+        let faults = EdgeTable::new(&mesh.triangles).non_manifold();
+        if faults == 0 {
             return Ok((nets, mesh));
         }
+        // Chance makes a few, and another grid others; many that stay are in the tree.
+        if faults > CHANCE_FAULTS && faults >= fewest {
+            break;
+        }
+        fewest = fewest.min(faults);
         attempt *= GRID_SHRINK;
     }
     Err(Error::Mesh(format!(
-        "branches come closer to each other than a grid of {attempt:.3} mm resolves; choose a smaller edge_mm"
+        "branches come closer to each other than a grid of {tried:.3} mm resolves; choose a smaller edge_mm"
     )))
 }
 
