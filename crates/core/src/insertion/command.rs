@@ -85,7 +85,7 @@ impl ScriptLine {
     }
 
     /// Number of equal increments of the line.
-    fn increments(&self, name: &str) -> Result<usize> {
+    pub(super) fn increments(&self, name: &str) -> Result<usize> {
         let (mm, rad) = self.travel(name)?;
         let mut count: f64 = 1.0;
         for (field, step, travel) in [
@@ -101,7 +101,7 @@ impl ScriptLine {
         if count > STEP_LIMIT {
             return Err(Error::parameter(
                 name,
-                format!("{count} steps"),
+                format!("{} steps", crate::error::number(count)),
                 format!("at most {STEP_LIMIT} steps in a line: use larger increments"),
             ));
         }

@@ -8,4 +8,4 @@ mod simulation;
 pub use command::{Command, ScriptLine, commands};
 pub use report::{Contact, Energy, StepReport};
 pub use sheath::Sheath;
-pub use simulation::{Simulation, Surroundings, check_commands};
+pub use simulation::{Simulation, Surroundings, check_commands, script_commands};

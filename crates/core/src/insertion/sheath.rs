@@ -18,7 +18,7 @@ impl Sheath {
     /// # Errors
     /// Names the value that is not finite, or a direction of zero length.
     pub fn new(position_mm: Vec3, direction: Vec3) -> Result<Self> {
-        let show = |v: &Vec3| format!("[{}, {}, {}]", v.x, v.y, v.z);
+        use crate::error::vector as show;
         if !position_mm.iter().all(|c| c.is_finite()) {
             return Err(Error::parameter(
                 "sheath.position_mm",
@@ -26,15 +26,17 @@ impl Sheath {
                 "must be three finite numbers",
             ));
         }
-        let length = direction.norm();
-        if !(length.is_finite() && length > 0.0) {
+        // Of any length: the largest component is taken out first, so that squares neither overflow nor vanish.
+        let largest = direction.amax();
+        let unit = (direction / largest).normalize();
+        if !(direction.iter().all(|c| c.is_finite()) && unit.iter().all(|c| c.is_finite())) {
             return Err(Error::parameter(
                 "sheath.direction",
                 show(&direction),
                 "must be a direction, not all zero",
             ));
         }
-        Ok(Self { position_mm, direction: direction / length })
+        Ok(Self { position_mm, direction: unit })
     }
 
     /// A sheath in the middle of an opening of the wall, pointing into the vessel.
@@ -42,7 +44,7 @@ impl Sheath {
     /// `depth_mm` is how far inside the opening's plane the mouth lies.
     ///
     /// # Errors
-    /// An opening that the wall does not have.
+    /// An opening that the wall does not have, or a depth that is not 0 or more.
     pub fn at_opening(wall: &Wall, opening: usize, depth_mm: f64) -> Result<Self> {
         let openings = wall.openings();
         let Some(place) = openings.get(opening) else {
@@ -52,9 +54,29 @@ impl Sheath {
                 format!("the vessel has {} openings, numbered from 0", openings.len()),
             ));
         };
-        if !depth_mm.is_finite() {
-            return Err(Error::parameter("sheath.depth_mm", depth_mm, "must be a finite number"));
+        if !(depth_mm.is_finite() && depth_mm >= 0.0) {
+            return Err(Error::parameter(
+                "sheath.depth_mm",
+                depth_mm,
+                "must be a number of 0 or more: it counts from the opening into the vessel",
+            ));
         }
         Self::new(place.centre_mm - place.direction * depth_mm, -place.direction)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_direction_of_any_length_will_do_and_none_will_not() {
+        for length in [1e-300, 1.0, 1e200, f64::MAX] {
+            let sheath = Sheath::new(Vec3::zeros(), Vec3::new(0.0, 0.0, length)).unwrap();
+            assert!((sheath.direction - Vec3::z()).norm() < 1e-15, "{length}");
+        }
+        for direction in [Vec3::zeros(), Vec3::x() * f64::INFINITY, Vec3::x() * f64::NAN] {
+            assert!(Sheath::new(Vec3::zeros(), direction).is_err(), "{direction}");
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! A device, a vessel and a method, stepped by commands.
 
 use crate::device::Device;
-use crate::insertion::{Command, Sheath, StepReport};
+use crate::error::vector;
+use crate::insertion::{Command, ScriptLine, Sheath, StepReport, commands};
 use crate::methods::{Method, MethodChoice};
 use crate::shape::Shape;
 use crate::vessel::{Wall, WallQuery};
@@ -35,7 +36,8 @@ impl Simulation {
     /// A device at the mouth of the sheath, nothing inserted.
     ///
     /// # Errors
-    /// A sheath that is not inside the vessel, a wall too broken to tell, or method options out of range.
+    /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
+    /// tell, or method options out of range.
     pub fn new(wall: Wall, device: Device, sheath: Sheath, method: &MethodChoice) -> Result<Self> {
         if !wall.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
             let p = sheath.position_mm;
@@ -51,7 +53,7 @@ impl Simulation {
                 .collect();
             return Err(Error::parameter(
                 "sheath.position_mm",
-                format!("[{}, {}, {}]", p.x, p.y, p.z),
+                vector(&p),
                 format!(
                     "is outside the vessel: place it inside, or name an opening (sheath.opening); openings: {}",
                     if openings.is_empty() { "none".to_owned() } else { openings.join(", ") }
@@ -59,6 +61,7 @@ impl Simulation {
             ));
         }
         let query = WallQuery::new(&wall)?;
+        check_mouth(&query, &device, &sheath)?;
         let method = method.start(&Surroundings { query: &query, sheath: &sheath, device: &device })?;
         Ok(Self { wall, query, sheath, device, method })
     }
@@ -101,10 +104,31 @@ impl Simulation {
     }
 }
 
+/// Refuses a device that is in the wall from the start. Further in a vessel may be narrower: there the device does not pass.
+fn check_mouth(query: &WallQuery, device: &Device, sheath: &Sheath) -> Result<()> {
+    let Some(near) = query.nearest(&sheath.position_mm, f64::MAX) else { return Ok(()) };
+    // At the rim of an opening the distance has no sign.
+    let room_mm = near.distance_mm.abs();
+    let thickest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
+    match device.sections().iter().map(|s| s.radius_mm).enumerate().max_by(thickest) {
+        Some((section, radius_mm)) if radius_mm > room_mm => Err(Error::parameter(
+            format!("device.section[{section}].radius_mm"),
+            radius_mm,
+            format!(
+                "the wall is {room_mm:.3} mm from the sheath's mouth at {}: use a thinner device or move the sheath",
+                vector(&sheath.position_mm)
+            ),
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// Slack in inserted length, mm: the rounding of thousands of summed increments.
 const LENGTH_SLACK_MM: f64 = 1e-6;
 
 fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<()> {
+    // Without the last digits of a sum of increments.
+    let shown_mm = (inserted_mm * 1e6).round() / 1e6;
     for (name, value) in [("advance_mm", command.advance_mm), ("rotate_rad", command.rotate_rad)] {
         if !value.is_finite() {
             return Err(Error::parameter(name, value, "must be a finite number"));
@@ -115,14 +139,14 @@ fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<(
         return Err(Error::parameter(
             "advance_mm",
             command.advance_mm,
-            format!("the device is {device_mm} mm long and {inserted_mm} mm are inserted: advance less"),
+            format!("the device is {device_mm} mm long and {shown_mm} mm are inserted: advance less"),
         ));
     }
     if target < -LENGTH_SLACK_MM {
         return Err(Error::parameter(
             "retract_mm",
             -command.advance_mm,
-            format!("only {inserted_mm} mm are inserted: retract less"),
+            format!("only {shown_mm} mm are inserted: retract less"),
         ));
     }
     Ok(())
@@ -144,4 +168,32 @@ pub fn check_commands(list: &[Command], device: &Device) -> Result<()> {
         inserted_mm += command.advance_mm;
     }
     Ok(())
+}
+
+/// The commands of a script, checked against a device before the first is carried out.
+///
+/// # Errors
+/// As [`commands`] and [`Simulation::step`], naming the line of the script and its key.
+pub fn script_commands(script: &[ScriptLine], device: &Device) -> Result<Vec<Command>> {
+    let list = commands(script)?;
+    let mut rest = list.iter();
+    let mut inserted_mm = 0.0;
+    for (index, line) in script.iter().enumerate() {
+        let name = format!("script[{index}]");
+        for (step, command) in rest.by_ref().take(line.increments(&name)?).enumerate() {
+            check_command(*command, inserted_mm, device.length_mm()).map_err(|error| match error {
+                Error::Parameter { name: key, mend, .. } => {
+                    let value = line.advance_mm.or(line.retract_mm).unwrap_or(0.0);
+                    Error::parameter(
+                        format!("{name}.{key}"),
+                        value,
+                        format!("in its step {}, {mend}", step + 1),
+                    )
+                }
+                other => other,
+            })?;
+            inserted_mm += command.advance_mm;
+        }
+    }
+    Ok(list)
 }

@@ -30,5 +30,5 @@
 mod parse;
 mod spec;
 
-pub use parse::from_toml;
+pub use parse::{from_toml, parse_toml};
 pub use spec::{DeviceSpec, Scene, SheathSpec, VesselSpec};

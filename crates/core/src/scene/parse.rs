@@ -17,24 +17,54 @@ const SIMILAR: f64 = 0.75;
 /// # Errors
 /// A file that cannot be read, is no TOML, or does not fit `T`; unknown keys come with the nearest known one.
 pub fn from_toml<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
-    let size = std::fs::metadata(path).map_err(|e| Error::file(path, e))?.len();
-    if size > SIZE_LIMIT {
-        return Err(Error::content(
-            path,
-            format!("{size} bytes are too many for a TOML file: at most {SIZE_LIMIT}"),
-        ));
+    let text = String::from_utf8(crate::file::read(path, SIZE_LIMIT)?)
+        .map_err(|e| Error::content(path, format!("is no text: {}", e.utf8_error())))?;
+    Ok((parse_toml(&text, path)?, text))
+}
+
+/// Reads TOML text into `T`; `name` is what errors call it.
+///
+/// # Errors
+/// As [`from_toml`], less those of the file.
+pub fn parse_toml<T: DeserializeOwned>(text: &str, name: &Path) -> Result<T> {
+    toml::from_str(text).map_err(|e| {
+        let fits = |text: &str| toml::from_str::<T>(text).is_ok();
+        Error::content(name, explain(&e, text, fits))
+    })
+}
+
+/// Most lines of a table that are tried one by one.
+const LINES_TRIED: usize = 64;
+
+/// Line and key at fault in the table with its header on line `header`, for messages that know the table alone: the line
+/// without which all fits.
+fn culprit(text: &str, header: usize, fits: impl Fn(&str) -> bool) -> Option<String> {
+    let lines: Vec<&str> = text.lines().collect();
+    let table =
+        lines.iter().enumerate().skip(header).take_while(|(_, line)| !line.trim_start().starts_with('['));
+    for (index, line) in table.take(LINES_TRIED) {
+        let Some((key, _)) = line.split_once('=') else { continue };
+        let mut others = lines.clone();
+        others[index] = "";
+        if fits(&others.join("\n")) {
+            return Some(format!("line {}: {}: ", index + 1, key.trim()));
+        }
     }
-    let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
-    let value = toml::from_str(&text).map_err(|e| Error::content(path, explain(&e, &text)))?;
-    Ok((value, text))
+    None
 }
 
 /// One line: where, what, and the nearest right key.
-fn explain(error: &toml::de::Error, text: &str) -> String {
+fn explain(error: &toml::de::Error, text: &str, fits: impl Fn(&str) -> bool) -> String {
     let message = error.message().trim().replace('\n', " ");
     let place = error.span().map_or(String::new(), |span| {
-        let line = text[..span.start.min(text.len())].matches('\n').count() + 1;
-        format!("line {line}: ")
+        let at = span.start.min(text.len());
+        let line = text[..at].matches('\n').count() + 1;
+        // The key whose value begins here, if one does.
+        let before = text[..at].rsplit('\n').next().unwrap_or_default();
+        match before.split_once('=') {
+            Some((key, _)) => format!("line {line}: {}: ", key.trim()),
+            None => culprit(text, line, fits).unwrap_or_else(|| format!("line {line}: ")),
+        }
     });
     // serde's wording for names it does not know: "unknown field `a`, expected one of `b`, `c`".
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
@@ -50,4 +80,44 @@ fn explain(error: &toml::de::Error, text: &str) -> String {
         _ => String::new(),
     };
     format!("{place}{message}{hint}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct File {
+        #[serde(rename = "radius_mm")]
+        _radius_mm: f64,
+        #[serde(rename = "method")]
+        _method: Tagged,
+    }
+
+    /// Tagged enums are read twice, and the second reader knows no places.
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(tag = "name")]
+    enum Tagged {
+        #[serde(rename = "a")]
+        A {
+            #[serde(default, rename = "element_mm")]
+            _element_mm: f64,
+        },
+    }
+
+    #[test]
+    fn a_value_of_the_wrong_type_is_named_by_line_and_key() {
+        let good = "radius_mm = 1.0\n[method]\n# comment\nname = \"a\"\nelement_mm = 2.0\n";
+        assert!(parse_toml::<File>(good, Path::new("f.toml")).is_ok());
+        for (from, to, start) in [
+            ("1.0", "\"x\"", "f.toml: line 1: radius_mm: invalid type: string \"x\""),
+            ("2.0", "true", "f.toml: line 5: element_mm: invalid type: boolean `true`"),
+            ("\"a\"", "5", "f.toml: line 4: name: invalid type: integer `5`"),
+        ] {
+            let text = good.replace(from, to);
+            let message = parse_toml::<File>(&text, Path::new("f.toml")).unwrap_err().to_string();
+            assert!(message.starts_with(start), "{message}");
+        }
+    }
 }

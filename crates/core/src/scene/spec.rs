@@ -7,7 +7,7 @@ use serde::de::IgnoredAny;
 
 use super::parse::from_toml;
 use crate::device::{Device, Section};
-use crate::insertion::{Command, ScriptLine, Sheath, Simulation, check_commands, commands};
+use crate::insertion::{Command, ScriptLine, Sheath, Simulation, script_commands};
 use crate::methods::MethodChoice;
 use crate::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall};
 use crate::{Error, Result, Vec3};
@@ -114,6 +114,41 @@ pub struct SheathSpec {
 /// Depth of the sheath's mouth inside an opening, mm, unless the scene says otherwise: clear of the rim.
 const DEPTH_MM: f64 = 1.0;
 
+impl SheathSpec {
+    /// The keys that are given, for messages.
+    fn given(&self) -> String {
+        let keys = [
+            ("opening", self.opening.is_some()),
+            ("depth_mm", self.depth_mm.is_some()),
+            ("position_mm", self.position_mm.is_some()),
+            ("direction", self.direction.is_some()),
+        ];
+        let given: Vec<&str> = keys.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
+        format!("{{{}}}", given.join(", "))
+    }
+}
+
+/// A file that cannot be read, with the key that names it in front.
+fn missing(key: &str, error: Error) -> Error {
+    match error {
+        Error::File { path, source } => Error::parameter(key, path.display(), source.to_string()),
+        other => other,
+    }
+}
+
+/// Recordings get a folder of the scene's name: it must be one word to a file system.
+fn check_name(name: &str) -> Result<()> {
+    let odd = |c: char| c.is_control() || matches!(c, '/' | '\\' | ':');
+    if name.chars().any(odd) || matches!(name, "." | "..") {
+        return Err(Error::parameter(
+            "name",
+            format!("{name:?}"),
+            "names a folder: no slashes, colons, line breaks or dots alone",
+        ));
+    }
+    Ok(())
+}
+
 impl Scene {
     /// Reads a scene file.
     ///
@@ -126,6 +161,7 @@ impl Scene {
         if scene.name.is_empty() {
             scene.name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         }
+        check_name(&scene.name).map_err(|e| Error::content(path, e.to_string()))?;
         Ok(scene)
     }
 
@@ -155,6 +191,12 @@ impl Scene {
         }
     }
 
+    /// The files that the scene names, in the order of its tables: with [`Scene::text`] all that it is made of.
+    pub fn input_paths(&self) -> Vec<PathBuf> {
+        let named = [&self.vessel.file, &self.vessel.tree, &self.device.file];
+        named.into_iter().flatten().map(|path| self.resolve(path)).collect()
+    }
+
     /// Reads or builds the vessel wall.
     ///
     /// # Errors
@@ -170,21 +212,30 @@ impl Scene {
                     "only with vessel.file: a tree is in millimetres",
                 ));
             }
-            let tree = CentrelineTree::read(&path)?;
-            return Ok(GeneratedWall::new(&tree, spec.resolution(&tree)?)?.wall);
+            let tree = CentrelineTree::read(&path).map_err(|e| missing("vessel.tree", e))?;
+            let resolution = spec.resolution(&tree)?;
+            let generated = GeneratedWall::new(&tree, resolution).map_err(|error| match error {
+                Error::Parameter { name, value, mend } if name == "edge_mm" || name == "triangles" => {
+                    Error::parameter(format!("vessel.{name}"), value, format!("{}: {mend}", path.display()))
+                }
+                other => Error::content(&path, other.to_string()),
+            })?;
+            return Ok(generated.wall);
         }
-        for (name, given) in
-            [("vessel.edge_mm", spec.edge_mm.is_some()), ("vessel.triangles", spec.triangles.is_some())]
-        {
-            if given {
-                return Err(Error::parameter(
-                    name,
-                    "given",
-                    "only with vessel.tree: a file has its own mesh",
-                ));
+        for (name, given) in [
+            ("vessel.edge_mm", spec.edge_mm.map(|v| v.to_string())),
+            ("vessel.triangles", spec.triangles.map(|v| v.to_string())),
+        ] {
+            if let Some(value) = given {
+                return Err(Error::parameter(name, value, "only with vessel.tree: a file has its own mesh"));
             }
         }
-        let surface = SurfaceMesh::read(&path, spec.unit_mm.unwrap_or(1.0))?;
+        let surface = SurfaceMesh::read(&path, spec.unit_mm.unwrap_or(1.0)).map_err(|error| match error {
+            Error::Parameter { name, value, mend } => {
+                Error::Parameter { name: format!("vessel.{name}"), value, mend }
+            }
+            other => missing("vessel.file", other),
+        })?;
         Wall::from_surface(&surface).map_err(|e| Error::content(&path, e.to_string()))
     }
 
@@ -196,7 +247,7 @@ impl Scene {
         match (&self.device.file, self.device.section.is_empty()) {
             (Some(file), true) => {
                 let path = self.resolve(file);
-                let (device, _): (DeviceFile, _) = from_toml(&path)?;
+                let (device, _): (DeviceFile, _) = from_toml(&path).map_err(|e| missing("device.file", e))?;
                 Device::new(device.section).map_err(|e| Error::content(&path, e.to_string()))
             }
             (Some(file), false) => Err(Error::parameter(
@@ -223,7 +274,7 @@ impl Scene {
             }
             _ => Err(Error::parameter(
                 "sheath",
-                "{…}",
+                spec.given(),
                 "give either opening (with depth_mm if wanted) or position_mm and direction",
             )),
         }
@@ -234,9 +285,7 @@ impl Scene {
     /// # Errors
     /// A line that is not finite, contradictory, absurd, or moves the device beyond its ends.
     pub fn commands(&self, device: &Device) -> Result<Vec<Command>> {
-        let list = commands(&self.script)?;
-        check_commands(&list, device)?;
-        Ok(list)
+        script_commands(&self.script, device)
     }
 
     /// The simulation, nothing inserted yet.
@@ -250,6 +299,17 @@ impl Scene {
             // What is wrong with a surface is wrong with its file.
             Error::Mesh(reason) => {
                 self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason))
+            }
+            // The position came from an opening: what can be changed is the depth.
+            Error::Parameter { name, value, mend } if name == "sheath.position_mm" => {
+                match self.sheath.opening {
+                    Some(_) => Error::parameter(
+                        "sheath.depth_mm",
+                        self.sheath.depth_mm.unwrap_or(DEPTH_MM),
+                        format!("the mouth at {value} {mend}"),
+                    ),
+                    None => Error::Parameter { name, value, mend },
+                }
             }
             other => other,
         })

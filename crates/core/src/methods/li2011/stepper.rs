@@ -55,10 +55,11 @@ const REACH_MM: f64 = f64::MAX;
 /// boundary between two triangles, where the twelfth digit of the last solve would choose one, and with it a branch
 /// millimetres away: that digit is no reason.
 const DETECTION_GRID_MM: f64 = 1e-6;
-/// Most nodes: (3n)² numbers of 8 bytes in four matrices are 2.6 GB at 3,000 for the dense solve.
-const NODE_LIMIT_DENSE: f64 = 3_000.0;
-/// Most nodes of the banded solve.
-const NODE_LIMIT_BANDED: f64 = 1_000_000.0;
+/// Most elements: (3n)² numbers of 8 bytes in four matrices are 0.6 GB at 1,500 for the dense solve, and one step takes
+/// seconds.
+const ELEMENT_LIMIT_DENSE: f64 = 1_500.0;
+/// Most elements of the banded solve.
+const ELEMENT_LIMIT_BANDED: f64 = 1_000_000.0;
 /// Retracting to within this of the sheath, mm, is retracting to it: the rounding of summed increments.
 const ZERO_LENGTH_MM: f64 = 1e-9;
 
@@ -116,16 +117,18 @@ impl Li2011 {
         crate::error::in_range("method.element_mm", options.element_mm, length_mm)?;
         crate::error::in_range("method.wall_stiffness_n_per_mm", options.wall_stiffness_n_per_mm, 1e9)?;
         let limit = match solver {
-            LinearSolver::Dense => NODE_LIMIT_DENSE,
-            LinearSolver::Banded => NODE_LIMIT_BANDED,
+            LinearSolver::Dense => ELEMENT_LIMIT_DENSE,
+            LinearSolver::Banded => ELEMENT_LIMIT_BANDED,
         };
-        let nodes = length_mm / options.element_mm;
-        if nodes > limit {
+        let elements = length_mm / options.element_mm;
+        if elements > limit {
             return Err(Error::parameter(
                 "method.element_mm",
                 options.element_mm,
                 format!(
-                    "cuts the device of {length_mm} mm into {nodes:.0} elements; at most {limit} fit: use longer elements"
+                    "cuts the device of {length_mm} mm into {} elements, more than the {limit} that this method takes: use \
+                     longer elements",
+                    crate::error::number(elements.ceil())
                 ),
             ));
         }
