@@ -3,12 +3,20 @@
 use std::process::Command;
 
 fn main() {
-    println!("cargo:rerun-if-changed=../../.git/HEAD");
-    println!("cargo:rerun-if-changed=../../.git/refs/heads");
+    // Where git keeps what a commit changes: elsewhere in a second worktree.
+    for name in ["HEAD", "refs/heads"] {
+        if let Some(path) = git(&["rev-parse", "--git-path", name]) {
+            println!("cargo:rerun-if-changed={path}");
+        }
+    }
+    for path in ["src", "../core/src", "../viewer/src", "build.rs"] {
+        println!("cargo:rerun-if-changed={path}");
+    }
     println!("cargo:rustc-env=ENDOWIRE_GIT_REVISION={}", revision().unwrap_or_else(|| "unknown".to_owned()));
 }
 
-/// The revision of a packaged crate is in the file that cargo puts there, that of a checkout in git.
+/// The revision of a packaged crate is in the file that cargo puts there, that of a checkout in git; "-dirty" where the
+/// sources differ from it.
 fn revision() -> Option<String> {
     if let Ok(info) = std::fs::read_to_string(".cargo_vcs_info.json") {
         return info
@@ -20,7 +28,13 @@ fn revision() -> Option<String> {
     if !std::path::Path::new("../../crates/cli/build.rs").exists() {
         return None;
     }
-    let output = Command::new("git").args(["rev-parse", "HEAD"]).output().ok()?;
+    let revision = git(&["rev-parse", "HEAD"])?;
+    let changed = git(&["status", "--porcelain", "--", "..", "../../Cargo.toml", "../../Cargo.lock"]);
+    Some(if changed.is_none_or(|list| !list.is_empty()) { revision + "-dirty" } else { revision })
+}
+
+fn git(args: &[&str]) -> Option<String> {
+    let output = Command::new("git").args(args).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;
     output.status.success().then(|| text.trim().to_owned())
 }

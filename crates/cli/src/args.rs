@@ -6,7 +6,7 @@ use clap::{Parser, Subcommand};
 
 /// Simulates catheters and guidewires in blood vessels: scripted insertions, experiments, 3D and fluoroscopic frames.
 ///
-/// Exit codes: 0 done; 1 the computation failed; 2 bad input or usage.
+/// Exit codes: 0 done; 1 the computation failed or was interrupted (Ctrl-C; what was recorded is kept); 2 bad input or usage.
 #[derive(Debug, Parser)]
 #[command(name = "endowire", version, propagate_version = true)]
 pub(crate) struct Args {
@@ -45,7 +45,7 @@ pub(crate) enum VesselCommand {
         /// Surface mesh (STL, OBJ or PLY)
         file: PathBuf,
         /// Millimetres per unit of the file
-        #[arg(long, default_value_t = 1.0, value_name = "MM")]
+        #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
         unit_mm: f64,
         /// Print the report as one JSON document on stdout
         #[arg(long)]
@@ -63,7 +63,7 @@ pub(crate) struct GenerateArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) out: PathBuf,
     /// Length of the triangles' edges; a quarter of the smallest radius if absent
-    #[arg(long, value_name = "MM", conflicts_with = "triangles")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with = "triangles")]
     pub(crate) edge_mm: Option<f64>,
     /// Number of triangles, met within a few percent
     #[arg(long, value_name = "COUNT")]

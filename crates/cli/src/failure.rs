@@ -30,6 +30,11 @@ impl Failure {
         }
     }
 
+    /// The same failure after the computation has begun: no input would have avoided it.
+    pub(crate) fn into_computation(self) -> Self {
+        Self::Computation(self.to_string())
+    }
+
     /// An output file or folder that cannot be written.
     pub(crate) fn write(path: &Path, error: &std::io::Error) -> Self {
         Self::Input(format!("cannot write {}: {error}", path.display()))

@@ -13,7 +13,11 @@ fn main() -> ExitCode {
     match commands::dispatch(&args::Args::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("endowire: {failure}");
+            // One failure, one line, whatever a library has put into it.
+            let text = failure.to_string();
+            let line =
+                text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ");
+            output::tell(format_args!("endowire: {line}"));
             failure.exit_code()
         }
     }

@@ -95,7 +95,7 @@ fn a_missing_scene_is_named() {
 
 #[test]
 fn a_missing_vessel_or_device_file_is_named() {
-    Scene::good().with("tube.csv", "gone.csv").is_refused(&["gone.csv"]);
+    Scene::good().with("tube.csv", "gone.csv").is_refused(&["vessel.tree", "gone.csv"]);
     Scene::good()
         .with("[[device.section]]", "[device]\nfile = \"gone.toml\"\n[[device.section]]")
         .is_refused(&["device"]);
@@ -211,13 +211,26 @@ fn absurd_sizes_are_refused_before_memory_is() {
 #[test]
 fn moving_beyond_the_ends_of_the_device_is_refused_before_the_run() {
     Scene::good().with("advance_mm = 20.0", "advance_mm = 61.0").is_refused(&["advance_mm", "60 mm long"]);
-    Scene::good().with("advance_mm", "retract_mm").is_refused(&["retract_mm", "0 mm are inserted"]);
+    Scene::good()
+        .with("advance_mm", "retract_mm")
+        .is_refused(&["script[0].retract_mm = 20", "0 mm are inserted"]);
+    let second =
+        "[[script]]\nadvance_mm = 20.0\nstep_mm = 2.0\n[[script]]\nadvance_mm = 45.0\nstep_mm = 2.0\n";
+    Scene::good()
+        .with("[[script]]\nadvance_mm = 20.0\nstep_mm = 2.0\n", second)
+        .is_refused(&["script[1].advance_mm = 45", "60 mm long"]);
 }
 
 #[test]
 fn contradicting_keys_are_refused() {
     Scene::good().with("edge_mm = 2.0", "edge_mm = 2.0\nunit_mm = 10.0").is_refused(&["vessel.unit_mm = 10"]);
     Scene::good().with("edge_mm = 2.0", "file = \"a.stl\"").is_refused(&["vessel.file"]);
+    Scene::good()
+        .with("tree = \"tube.csv\"", "file = \"a.stl\"")
+        .is_refused(&["vessel.edge_mm = 2: only with vessel.tree"]);
+    Scene::good()
+        .with("position_mm = [1.0, 0.0, 0.0]", "opening = 0")
+        .is_refused(&["sheath = {opening, direction}"]);
     Scene::good().with("tree = \"tube.csv\"\nedge_mm = 2.0", "").is_refused(&["vessel"]);
 }
 
@@ -233,4 +246,125 @@ fn a_folder_that_cannot_be_written_is_named() {
     ]);
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("taken"));
+}
+
+#[test]
+fn values_of_the_wrong_type_are_named_by_line_and_key() {
+    Scene::good()
+        .with("radius_mm = 0.5", "radius_mm = \"x\"")
+        .is_refused(&["line 8: radius_mm: invalid type"]);
+    Scene::good()
+        .with("[sheath]", "[method]\nname = \"li2011-banded\"\nelement_mm = \"x\"\n[sheath]")
+        .is_refused(&["line 13: element_mm: invalid type"]);
+}
+
+#[test]
+fn what_is_wrong_with_a_generated_wall_is_said_of_the_key_that_asked_for_it() {
+    Scene::good().with("edge_mm = 2.0", "edge_mm = -2.0").is_refused(&["vessel.edge_mm = -2", "tube.csv"]);
+    Scene::good().with("edge_mm = 2.0", "triangles = 1").is_refused(&["vessel.triangles = 1:", "tube.csv"]);
+    Scene::good()
+        .with("edge_mm = 2.0", "triangles = 10000000000")
+        .is_refused(&["vessel.triangles = 1e10:", "tube.csv"]);
+}
+
+#[test]
+fn a_sheath_too_deep_or_before_the_opening_blames_its_depth() {
+    for (depth, words) in [("-5.0", "sheath.depth_mm = -5"), ("500.0", "sheath.depth_mm = 500")] {
+        Scene::good()
+            .with(
+                "position_mm = [1.0, 0.0, 0.0]\ndirection = [1.0, 0.0, 0.0]",
+                &format!("opening = 0\ndepth_mm = {depth}"),
+            )
+            .is_refused(&[words]);
+    }
+}
+
+#[test]
+fn a_device_thicker_than_the_vessel_at_the_sheath_is_refused() {
+    Scene::good()
+        .with("radius_mm = 0.5", "radius_mm = 4.1")
+        .is_refused(&["device.section[0].radius_mm = 4.1", "the wall is 3."]);
+    // Further in the vessel may be narrower: then the device stops there.
+    let narrowing = Scene::good().file("tube.csv", b"0 0 0 4 -1\n40 0 0 1 0\n80 0 0 1 1\n");
+    let output = narrowing.with("radius_mm = 0.5", "radius_mm = 1.5").run();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn a_name_that_is_no_folder_is_refused() {
+    for name in ["../x", "/x", "a\\nb", "..", "a\\\\b"] {
+        Scene::good().with("\n[vessel]", &format!("name = \"{name}\"\n[vessel]")).is_refused(&["name = "]);
+    }
+}
+
+#[test]
+fn a_scene_without_a_script_has_nothing_to_run() {
+    Scene::good()
+        .with("[[script]]\nadvance_mm = 20.0\nstep_mm = 2.0\n", "")
+        .is_refused(&["script", "[[script]]"]);
+}
+
+#[test]
+fn a_vessel_in_the_wrong_unit_is_refused_by_its_size() {
+    let obj = b"v 0 0 0\nv 100 0 0\nv 0 100 0\nv 0 0 100\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    Scene::good()
+        .file("box.obj", obj)
+        .with("tree = \"tube.csv\"\nedge_mm = 2.0", "file = \"box.obj\"\nunit_mm = 1e99")
+        .is_refused(&["box.obj", "unit_mm = 1e99"]);
+}
+
+#[test]
+fn a_broken_ply_is_told_in_one_line() {
+    Scene::good()
+        .file("broken.ply", b"ply\nformat ascii 9.0\nelement nonsense\n")
+        .with("tree = \"tube.csv\"\nedge_mm = 2.0", "file = \"broken.ply\"")
+        .is_refused(&["broken.ply"]);
+}
+
+#[test]
+fn arguments_are_named_by_their_flag() {
+    for (args, words) in [
+        (&["experiment", "timing", "--nodes", "100000"][..], "--nodes 100000"),
+        (&["experiment", "timing", "--repeats", "1000000000"][..], "--repeats 1000000000"),
+        (&["vessel", "generate", "curved_tube", "--out", "a.stl", "--edge-mm", "-1"][..], "--edge-mm = -1"),
+    ] {
+        let args: Vec<&Path> = args.iter().map(Path::new).collect();
+        let output = endowire(&args);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        assert!(text.contains(words) && text.trim_end().lines().count() == 1, "{text}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn temporary_files_that_cannot_be_written_are_named_by_their_folder() {
+    let scene = Scene::good();
+    std::fs::write(scene.path("scene.toml"), &scene.text).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
+        .env("TMPDIR", "/no/such/folder")
+        .args([
+            "run".as_ref(),
+            scene.path("scene.toml").as_path(),
+            "--out".as_ref(),
+            scene.path("out").as_path(),
+        ])
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("/no/such/folder") && text.contains("TMPDIR"), "{text}");
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_and_pipes_are_no_input_files() {
+    let scene = Scene::good();
+    std::os::unix::fs::symlink("/dev/zero", scene.path("endless.stl")).unwrap();
+    scene
+        .with("tree = \"tube.csv\"\nedge_mm = 2.0", "file = \"endless.stl\"")
+        .is_refused(&["endless.stl", "regular file"]);
+    let output = endowire(&["run".as_ref(), "/dev/zero".as_ref()]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("regular file"));
 }

@@ -6,8 +6,9 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use npyz::npz::NpzArchive;
+use npyz::NpyFile;
 use serde_json::Value;
+use zip::ZipArchive;
 
 fn assets() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets")
@@ -24,15 +25,19 @@ fn run(scene: &Path, out: &Path) -> (Option<i32>, Value) {
     (output.status.code(), summary)
 }
 
-fn floats(path: &Path, name: &str) -> (Vec<u64>, Vec<f64>) {
-    let mut archive = NpzArchive::new(File::open(path).unwrap()).unwrap();
-    let array = archive.by_name(name).unwrap().unwrap();
+/// Shape and numbers of an array.
+fn array<T: npyz::Deserialize>(path: &Path, name: &str) -> (Vec<u64>, Vec<T>) {
+    let mut archive = ZipArchive::new(File::open(path).unwrap()).unwrap();
+    let array = NpyFile::new(archive.by_name(&format!("{name}.npy")).unwrap()).unwrap();
     (array.shape().to_vec(), array.into_vec().unwrap())
 }
 
+fn floats(path: &Path, name: &str) -> (Vec<u64>, Vec<f64>) {
+    array(path, name)
+}
+
 fn integers(path: &Path, name: &str) -> Vec<i64> {
-    let mut archive = NpzArchive::new(File::open(path).unwrap()).unwrap();
-    archive.by_name(name).unwrap().unwrap().into_vec().unwrap()
+    array(path, name).1
 }
 
 /// A short run in the curved tube with two frames of each view.
@@ -144,4 +149,104 @@ fn recording_anew_replaces_the_old_recording_and_nothing_else() {
     run(&scene, &out);
     assert!(out.join("notes.txt").exists());
     assert!(!out.join("frames/step_999999_3d.png").exists());
+}
+
+fn summary(folder: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(folder.join("summary.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn a_frame_that_cannot_be_written_ends_the_run_and_keeps_the_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = short_scene(folder.path());
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("frames"), "a file, not a folder").unwrap();
+    let (code, told) = run(&scene, &out);
+    assert_eq!(code, Some(1));
+    assert_eq!((told["failure"]["step"].as_u64(), told["steps"].as_u64()), (Some(40), Some(40)));
+    assert!(told["failure"]["reason"].as_str().unwrap().contains("frames"));
+    assert_eq!(summary(&out), told);
+    let offsets = integers(&out.join("shapes.npz"), "offsets");
+    assert_eq!(offsets.len(), 41);
+    assert_eq!(floats(&out.join("shapes.npz"), "positions_mm").0, [offsets[40] as u64, 3]);
+}
+
+#[test]
+fn the_hash_of_a_scene_covers_its_device_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(short_scene(folder.path())).unwrap();
+    let from = text.find("[[device.section]]").unwrap();
+    let to = text.find("[sheath]").unwrap();
+    let text = format!("{}[device]\nfile = \"wire.toml\"\n{}", &text[..from], &text[to..])
+        .replace("\"3d\", \"fluoro\"", "");
+    let scene = folder.path().join("scene.toml");
+    std::fs::write(&scene, text).unwrap();
+    let hash = |stiffness: &str| {
+        let wire = format!(
+            "[[section]]\nlength_mm = 300.0\nradius_mm = 0.445\nbending_stiffness_nmm2 = {stiffness}\n"
+        );
+        std::fs::write(folder.path().join("wire.toml"), wire).unwrap();
+        run(&scene, &folder.path().join("out")).1["scene_hash"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(hash("5.0"), hash("5.0"));
+    assert_ne!(hash("5.0"), hash("6.0"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_reader_that_leaves_is_no_failure_and_a_full_disk_is() {
+    use std::process::Stdio;
+    let folder = tempfile::tempdir().unwrap();
+    let command = |stdout: Stdio| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_endowire"));
+        command
+            .args(["vessel", "generate", "straight_tube", "--json", "--out"])
+            .arg(folder.path().join("a.stl"));
+        command.stdout(stdout).stderr(Stdio::piped());
+        command
+    };
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let output = command(writer.into()).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let output = command(full.into()).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("standard output") && text.trim_end().lines().count() == 1, "{text}");
+    // Nobody hears what is said: the exit code still tells.
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let status =
+        Command::new(env!("CARGO_BIN_EXE_endowire")).args(["run", "no/such"]).stderr(full).status().unwrap();
+    assert_eq!(status.code(), Some(2));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_the_run_after_the_step_under_way_and_keeps_the_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = short_scene(folder.path());
+    let text = std::fs::read_to_string(&scene).unwrap().replace("\"3d\", \"fluoro\"", "");
+    std::fs::write(&scene, text.replace("step_mm = 0.5", "step_mm = 0.0001")).unwrap();
+    let out = folder.path().join("out");
+    let child = Command::new(env!("CARGO_BIN_EXE_endowire"))
+        .args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let rows = || std::fs::read_to_string(out.join("steps.csv")).map_or(0, |text| text.lines().count());
+    while rows() < 10 {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("interrupted"), "{text}");
+    let told = summary(&out);
+    let steps = told["steps"].as_u64().unwrap() as usize;
+    assert!(steps < told["steps_asked"].as_u64().unwrap() as usize);
+    assert_eq!((told["failure"]["step"].as_u64(), rows()), (Some(steps as u64 + 1), steps + 1));
+    assert_eq!(integers(&out.join("shapes.npz"), "offsets").len(), steps + 1);
 }

@@ -1,6 +1,8 @@
 //! `endowire run`: a scripted insertion, recorded.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use endowire_core::insertion::Simulation;
@@ -11,7 +13,7 @@ use crate::failure::Failure;
 use crate::output::progress;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::recorder::{Recorder, StepFailure, Summary};
-use crate::output::{frames::FrameWriter, print_json};
+use crate::output::{frames::FrameWriter, print_json, tell};
 
 /// Runs the scene's script and records every step.
 pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
@@ -19,19 +21,33 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let scene = Scene::read(&args.scene)?;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
     let commands = scene.commands(&scene.device().map_err(in_scene)?).map_err(in_scene)?;
+    if commands.is_empty() {
+        let text = "script = []: give at least one [[script]] table, what the hand does".to_owned();
+        return Err(Failure::Input(text).at(args.scene.display()));
+    }
     let mut simulation = scene.simulation().map_err(in_scene)?;
     let mut frames = FrameWriter::new(&args.scene, &simulation)?;
-    let vessel = read_input(&scene.vessel_path().map_err(in_scene)?)?;
-    let provenance = Provenance::new(&[scene.text().as_bytes(), &vessel], scene.seed);
+    let mut inputs = vec![scene.text().as_bytes().to_vec()];
+    for path in scene.input_paths() {
+        inputs.push(read_input(&path)?);
+    }
+    let provenance = Provenance::new(&inputs, scene.seed);
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let mut recorder = Recorder::new(&folder)?;
 
+    // From here on something is recorded: whatever happens, it is kept.
+    let interrupted = interrupts();
     let bar = progress::bar(commands.len(), "step");
     let mut step_time_s = 0.0;
     let mut max_penetration_mm: f64 = 0.0;
     let mut converged = true;
     let mut failure = None;
     for (index, command) in commands.iter().enumerate() {
+        let failed = |reason: String| Some(StepFailure { step: index + 1, reason });
+        if interrupted.load(Ordering::Relaxed) {
+            failure = failed("interrupted before it".to_owned());
+            break;
+        }
         let clock = Instant::now();
         let result = simulation.step(*command);
         step_time_s += clock.elapsed().as_secs_f64();
@@ -41,19 +57,25 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
                 converged &= report.converged;
             }
             Err(error) => {
-                failure = Some(StepFailure { step: index + 1, reason: error.to_string() });
+                failure = failed(error.to_string());
                 break;
             }
         }
-        recorder.record(*command, simulation.report(), simulation.shape())?;
         let last = index + 1 == commands.len();
-        frames.step(index + 1, last, &simulation, &mut recorder)?;
+        let recorded = recorder
+            .record(*command, simulation.report(), simulation.shape())
+            .and_then(|()| frames.step(index + 1, last, &simulation, &mut recorder));
+        if let Err(error) = recorded {
+            failure = failed(error.to_string());
+            break;
+        }
         bar.set_message(format!("{:.1} mm inserted", simulation.report().inserted_mm));
         bar.inc(1);
     }
     bar.finish_and_clear();
     if failure.is_some() && recorder.steps() > 0 {
-        frames.step(recorder.steps(), true, &simulation, &mut recorder)?;
+        // The picture of the end is a help; the first failure is the one to tell.
+        let _ = frames.step(recorder.steps(), true, &simulation, &mut recorder);
     }
 
     let report = simulation.report();
@@ -77,27 +99,41 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         renderer: frames.renderer(),
         frames: recorder.frames.clone(),
     };
-    recorder.finish(&summary)?;
+    let finished = recorder.finish(&summary).map_err(Failure::into_computation);
     if args.json {
         print_json(&summary)?;
     } else {
-        tell(&summary, &folder, &simulation);
+        tell(text(&summary, &folder, &simulation));
     }
     match failure {
-        Some(StepFailure { step, reason }) => Err(Failure::Computation(format!(
-            "{}: step {step}: {reason} (the {} steps before it are kept in {})",
-            args.scene.display(),
-            summary.steps,
-            folder.display()
-        ))),
-        None => Ok(()),
+        Some(StepFailure { step, reason }) => {
+            let kept = match finished {
+                Ok(()) => format!("{} steps are kept in {}", summary.steps, folder.display()),
+                Err(error) => error.to_string(),
+            };
+            Err(Failure::Computation(format!("{}: step {step}: {reason} ({kept})", args.scene.display())))
+        }
+        None => finished,
     }
 }
 
-/// The summary for a person, on stderr: stdout is for documents.
-fn tell(summary: &Summary, folder: &Path, simulation: &Simulation) {
+/// Set by Ctrl-C, or by a request to terminate: the step under way is finished and recorded. A second one ends at once.
+fn interrupts() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let heard = Arc::clone(&flag);
+    // Without a handler an interrupt ends the program at once, as elsewhere.
+    let _ = ctrlc::set_handler(move || {
+        if heard.swap(true, Ordering::Relaxed) {
+            std::process::exit(1);
+        }
+    });
+    flag
+}
+
+/// The summary for a person, for stderr: stdout is for documents.
+fn text(summary: &Summary, folder: &Path, simulation: &Simulation) -> String {
     let tip = summary.tip_mm.unwrap_or_default();
-    eprintln!(
+    format!(
         "{}: {} of {} steps by {} in {:.2} s ({:.2} s simulating)\n\
          inserted {:.2} mm, tip at [{:.2}, {:.2}, {:.2}] mm, push force {:.4} N, {} contacts, \
          deepest penetration {:.3} mm\n\
@@ -118,5 +154,5 @@ fn tell(summary: &Summary, folder: &Path, simulation: &Simulation) {
         summary.frames.len(),
         summary.renderer.as_ref().map_or(String::new(), |r| format!(" by {r}")),
         folder.display()
-    );
+    )
 }

@@ -18,7 +18,7 @@ use serde::Serialize;
 use crate::args::TimingArgs;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::{print_json, progress, to_json};
+use crate::output::{print, print_json, progress, to_json};
 
 /// The paper's Table 1: nodes, milliseconds, on an Intel Core2 6700 with a GeForce 8800.
 const PAPER_MS: [(usize, f64); 5] = [(50, 9.2), (100, 15.4), (150, 24.8), (200, 36.7), (300, 58.4)];
@@ -30,6 +30,12 @@ const TIMED_MM: f64 = 0.2;
 /// A 0.035″ wire of medium stiffness.
 const RADIUS_MM: f64 = 0.445;
 const STIFFNESS_NMM2: f64 = 20.0;
+/// Largest distance between the nodes of the two solves, mm.
+const AGREEMENT_MM: f64 = 1e-8;
+/// Most nodes: dense, a calculation with 1,000 takes seconds and half a gigabyte.
+const MOST_NODES: usize = 1_000;
+/// Most timed calculations: those that the tube has room for.
+const MOST_REPEATS: usize = 100;
 
 #[derive(Debug, Serialize)]
 struct Document {
@@ -54,17 +60,23 @@ struct Row {
 
 /// Times every number of nodes and prints the table.
 pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
-    if args.repeats == 0 {
-        return Err(Failure::Input("--repeats 0: time at least one calculation".to_owned()));
+    if !(1..=MOST_REPEATS).contains(&args.repeats) {
+        return Err(Failure::Input(format!(
+            "--repeats {}: time 1 to {MOST_REPEATS} calculations",
+            args.repeats
+        )));
     }
     if args.nodes.is_empty() {
         return Err(Failure::Input("--nodes: give at least one number of nodes".to_owned()));
+    }
+    if let Some(nodes) = args.nodes.iter().find(|nodes| !(2..=MOST_NODES).contains(*nodes)) {
+        return Err(Failure::Input(format!("--nodes {nodes}: give 2 to {MOST_NODES}")));
     }
     let tree = anatomy::tree("curved_tube").ok_or_else(|| Failure::Input("no curved_tube".to_owned()))?;
     let generated = GeneratedWall::new(&tree, Resolution::fitting(&tree))?;
     let query = WallQuery::new(&generated.wall)?;
     let sheath = Sheath::at_opening(&generated.wall, generated.inlet, 1.0)?;
-    let device = Device::uniform(2.0 * INSERTED_MM, RADIUS_MM, STIFFNESS_NMM2)?;
+    let device = Device::uniform(INSERTED_MM + TIMED_MM * args.repeats as f64, RADIUS_MM, STIFFNESS_NMM2)?;
     let surroundings = Surroundings { query: &query, sheath: &sheath, device: &device };
 
     let bar = progress::bar(args.nodes.len(), "row");
@@ -82,17 +94,15 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
         write(folder, &document)?;
     }
     if args.json {
-        return print_json(&document);
+        print_json(&document)?;
+    } else {
+        print(table(&document.rows))?;
     }
-    print_table(&document.rows);
-    Ok(())
+    check_agreement(&document.rows)
 }
 
 /// Both solves over the same insertion, timed at its end.
 fn time_nodes(nodes: usize, repeats: usize, surroundings: &Surroundings<'_>) -> Result<[Row; 2], Failure> {
-    if nodes < 2 {
-        return Err(Failure::Input(format!("--nodes {nodes}: at least 2")));
-    }
     // `nodes` counts the sheath's node too; the timed increments stay within the last element.
     let options = Li2011Options {
         element_mm: (INSERTED_MM + 0.5 * TIMED_MM * repeats as f64) / (nodes - 1) as f64,
@@ -174,17 +184,31 @@ fn median(mut values: Vec<f64>) -> f64 {
     if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
 }
 
-fn print_table(rows: &[Row]) {
-    println!(
+/// The table for a person.
+fn table(rows: &[Row]) -> String {
+    let mut lines = vec![format!(
         "{:>5}  {:<14} {:>12} {:>12} {:>10} {:>16}",
         "nodes", "method", "solve ms", "step ms", "paper ms", "difference mm"
-    );
+    )];
     for row in rows {
         let paper = row.paper_ms.map_or("–".to_owned(), |ms| format!("{ms:.1}"));
-        println!(
+        lines.push(format!(
             "{:>5}  {:<14} {:>12.4} {:>12.4} {:>10} {:>16.1e}",
             row.nodes, row.method, row.median_ms, row.step_ms, paper, row.max_difference_mm
-        );
+        ));
+    }
+    lines.join("\n")
+}
+
+/// Both solves are one method: their nodes must agree.
+fn check_agreement(rows: &[Row]) -> Result<(), Failure> {
+    match rows.iter().find(|row| row.max_difference_mm.is_nan() || row.max_difference_mm > AGREEMENT_MM) {
+        None => Ok(()),
+        Some(row) => Err(Failure::Computation(format!(
+            "with {} nodes {} is {:.1e} mm from li2011-banded: the two solves of the same equations must agree within \
+             {AGREEMENT_MM:e} mm",
+            row.nodes, row.method, row.max_difference_mm
+        ))),
     }
 }
 
@@ -200,4 +224,26 @@ fn write(folder: &Path, document: &Document) -> Result<(), Failure> {
     save().map_err(|e| Failure::write(folder, &e))?;
     let path = folder.join("timing.json");
     std::fs::write(&path, to_json(document)? + "\n").map_err(|e| Failure::write(&path, &e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn solves_that_differ_fail_the_experiment() {
+        let row = |max_difference_mm| Row {
+            method: "li2011-dense",
+            nodes: 50,
+            median_ms: 1.0,
+            step_ms: 1.0,
+            paper_ms: None,
+            max_difference_mm,
+        };
+        assert!(check_agreement(&[row(0.0), row(9e-9)]).is_ok());
+        for difference in [2e-8, f64::NAN] {
+            let failure = check_agreement(&[row(0.0), row(difference)]).unwrap_err();
+            assert!(matches!(&failure, Failure::Computation(text) if text.contains("50 nodes")), "{failure}");
+        }
+    }
 }

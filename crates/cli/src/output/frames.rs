@@ -62,7 +62,7 @@ impl FrameWriter {
         let frames = renderer.render(&[view])?;
         for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {
-                image.write_png(&recorder.frame(name)?)?;
+                recorder.frame(name, |path| Ok(image.write_png(path)?))?;
             }
         }
         Ok(())

@@ -6,14 +6,32 @@ pub(crate) mod progress;
 pub(crate) mod provenance;
 pub(crate) mod recorder;
 
+use std::fmt::Display;
+use std::io::{ErrorKind, Write, stderr, stdout};
+
 use serde::Serialize;
 
 use crate::failure::Failure;
 
+/// Prints a document and a line break on stdout. A reader that has left (`| head`) has what it wanted.
+pub(crate) fn print(document: impl Display) -> Result<(), Failure> {
+    let mut out = stdout().lock();
+    match writeln!(out, "{document}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::Computation(format!("cannot write to the standard output: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Tells a person on stderr, who may have closed it: what was computed does not depend on it.
+pub(crate) fn tell(text: impl Display) {
+    let _ = writeln!(stderr().lock(), "{text}");
+}
+
 /// Prints one JSON document on stdout.
 pub(crate) fn print_json(document: &impl Serialize) -> Result<(), Failure> {
-    println!("{}", to_json(document)?);
-    Ok(())
+    print(to_json(document)?)
 }
 
 /// A document as indented JSON.

@@ -10,6 +10,9 @@ use std::path::Path;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
+/// Bytes of a number, of either kind.
+const NUMBER_BYTES: u64 = 8;
+
 /// Number type of an array.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Kind {
@@ -30,6 +33,16 @@ pub(crate) struct ArrayStream {
 }
 
 impl ArrayStream {
+    /// Numbers so far.
+    pub(crate) fn len(&self) -> u64 {
+        self.numbers
+    }
+
+    /// Forgets all but the first numbers: what a write that failed half way has left.
+    pub(crate) fn truncate(&mut self, numbers: u64) {
+        self.numbers = self.numbers.min(numbers);
+    }
+
     /// An empty array.
     pub(crate) fn new(name: &'static str, kind: Kind, columns: usize) -> io::Result<Self> {
         Ok(Self { name, kind, columns, numbers: 0, file: BufWriter::new(tempfile::tempfile()?) })
@@ -85,7 +98,7 @@ pub(crate) fn write(path: &Path, arrays: Vec<ArrayStream>) -> io::Result<()> {
         archive.write_all(&array.header())?;
         let mut data = array.file.into_inner().map_err(io::IntoInnerError::into_error)?;
         data.rewind()?;
-        io::copy(&mut data.take(u64::MAX), &mut archive)?;
+        io::copy(&mut data.take(array.numbers * NUMBER_BYTES), &mut archive)?;
     }
     archive.finish()?.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
 }

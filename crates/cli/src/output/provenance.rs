@@ -19,9 +19,9 @@ pub(crate) struct Provenance {
 
 impl Provenance {
     /// For a result of `inputs`: file contents, in order.
-    pub(crate) fn new(inputs: &[&[u8]], seed: u64) -> Self {
+    pub(crate) fn new(inputs: &[impl AsRef<[u8]>], seed: u64) -> Self {
         let mut hash = Sha256::new();
-        for input in inputs {
+        for input in inputs.iter().map(AsRef::as_ref) {
             // Lengths keep two inputs from hashing like their concatenation cut elsewhere.
             hash.update((input.len() as u64).to_le_bytes());
             hash.update(input);
@@ -43,5 +43,5 @@ impl Provenance {
 
 /// Reads an input file whole, for its hash.
 pub(crate) fn read_input(path: &Path) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|e| Failure::Input(format!("{}: {e}", path.display())))
+    Ok(endowire_core::file::read(path, u64::MAX)?)
 }

@@ -55,12 +55,12 @@ pub(crate) struct Summary {
     pub(crate) frames: Vec<String>,
 }
 
-/// A step that found no equilibrium.
+/// What ended a run early: no equilibrium, a recording or frame that could not be written, or an interrupt.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct StepFailure {
     /// Number of the step, from 1.
     pub(crate) step: usize,
-    /// What the method said.
+    /// What was said.
     pub(crate) reason: String,
 }
 
@@ -104,37 +104,46 @@ pub(crate) struct Recorder {
 impl Recorder {
     /// Starts a recording in `folder`, which is made if it is not there; an earlier recording in it is replaced.
     pub(crate) fn new(folder: &Path) -> Result<Self, Failure> {
-        let create = || -> io::Result<Self> {
+        let table = || -> io::Result<_> {
             std::fs::create_dir_all(folder)?;
             remove_earlier(folder)?;
-            let mut offsets = ArrayStream::new("offsets", Kind::I64, 1)?;
-            offsets.push_i64(0)?;
-            Ok(Self {
-                folder: folder.to_path_buf(),
-                table: csv::Writer::from_writer(File::create(folder.join("steps.csv"))?),
-                positions: ArrayStream::new("positions_mm", Kind::F64, 3)?,
-                tangents: ArrayStream::new("tangents", Kind::F64, 3)?,
-                from_tip: ArrayStream::new("from_tip_mm", Kind::F64, 1)?,
-                offsets,
-                nodes: 0,
-                steps: 0,
-                frames: Vec::new(),
+            File::create(folder.join("steps.csv"))
+        };
+        let table = csv::Writer::from_writer(table().map_err(|e| Failure::write(folder, &e))?);
+        let array = |name, kind, columns| {
+            ArrayStream::new(name, kind, columns).map_err(|error| {
+                let place = std::env::temp_dir();
+                Failure::Input(format!(
+                    "cannot write temporary files in {}: {error} (TMPDIR names another folder)",
+                    place.display()
+                ))
             })
         };
-        create().map_err(|e| Failure::write(folder, &e))
+        let mut offsets = array("offsets", Kind::I64, 1)?;
+        offsets.push_i64(0).map_err(|e| Failure::write(folder, &e))?;
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            table,
+            positions: array("positions_mm", Kind::F64, 3)?,
+            tangents: array("tangents", Kind::F64, 3)?,
+            from_tip: array("from_tip_mm", Kind::F64, 1)?,
+            offsets,
+            nodes: 0,
+            steps: 0,
+            frames: Vec::new(),
+        })
     }
 
-    /// Adds one step.
+    /// Adds one step; where that fails, the steps before it stay.
     pub(crate) fn record(
         &mut self,
         command: Command,
         report: &StepReport,
         shape: &Shape,
     ) -> Result<(), Failure> {
-        self.steps += 1;
         let tip = shape.tip_mm().unwrap_or_default();
         let row = Row {
-            step: self.steps,
+            step: self.steps + 1,
             advance_mm: command.advance_mm,
             rotate_rad: command.rotate_rad,
             inserted_mm: report.inserted_mm,
@@ -153,25 +162,41 @@ impl Recorder {
             iterations: report.iterations,
             converged: report.converged,
         };
+        let whole = [&self.positions, &self.tangents, &self.from_tip, &self.offsets].map(ArrayStream::len);
         let write = || -> io::Result<()> {
             self.table.serialize(row)?;
             self.table.flush()?;
             self.positions.push_f64(shape.positions_mm.iter().flat_map(|x| [x.x, x.y, x.z]))?;
             self.tangents.push_f64(shape.tangents.iter().flat_map(|t| [t.x, t.y, t.z]))?;
             self.from_tip.push_f64(shape.from_tip_mm.iter().copied())?;
-            self.nodes += shape.len() as i64;
-            self.offsets.push_i64(self.nodes)
+            self.offsets.push_i64(self.nodes + shape.len() as i64)
         };
-        write().map_err(|e| Failure::write(&self.folder, &e))
+        match write() {
+            Ok(()) => {
+                self.steps += 1;
+                self.nodes += shape.len() as i64;
+                Ok(())
+            }
+            Err(error) => {
+                let arrays = [&mut self.positions, &mut self.tangents, &mut self.from_tip, &mut self.offsets];
+                arrays.into_iter().zip(whole).for_each(|(array, numbers)| array.truncate(numbers));
+                Err(Failure::write(&self.folder, &error))
+            }
+        }
     }
 
-    /// Path of a new frame of the current step, noted for the summary.
-    pub(crate) fn frame(&mut self, view: &str) -> Result<PathBuf, Failure> {
+    /// Writes a frame of the current step with `write`, and notes it for the summary.
+    pub(crate) fn frame(
+        &mut self,
+        view: &str,
+        write: impl FnOnce(&Path) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
         let folder = self.folder.join("frames");
         std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
         let name = format!("step_{:06}_{view}.png", self.steps);
+        write(&folder.join(&name))?;
         self.frames.push(format!("frames/{name}"));
-        Ok(folder.join(name))
+        Ok(())
     }
 
     /// Steps recorded so far.
@@ -179,16 +204,15 @@ impl Recorder {
         self.steps
     }
 
-    /// Writes shapes.npz and summary.json.
+    /// Writes shapes.npz and summary.json; the second also where the first cannot be written.
     pub(crate) fn finish(self, summary: &Summary) -> Result<(), Failure> {
         let folder = &self.folder;
-        npz::write(
-            &folder.join("shapes.npz"),
-            vec![self.positions, self.tangents, self.from_tip, self.offsets],
-        )
-        .map_err(|e| Failure::write(&folder.join("shapes.npz"), &e))?;
+        let arrays = vec![self.positions, self.tangents, self.from_tip, self.offsets];
+        let shapes = npz::write(&folder.join("shapes.npz"), arrays)
+            .map_err(|e| Failure::write(&folder.join("shapes.npz"), &e));
         let path = folder.join("summary.json");
-        std::fs::write(&path, to_json(summary)? + "\n").map_err(|e| Failure::write(&path, &e))
+        std::fs::write(&path, to_json(summary)? + "\n").map_err(|e| Failure::write(&path, &e))?;
+        shapes
     }
 }
 
