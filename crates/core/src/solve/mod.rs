@@ -4,7 +4,7 @@ pub mod band;
 pub mod newton;
 
 pub use band::{BandMatrix, Factor, FactorError, Inertia};
-pub use newton::{External, Newton, NewtonOptions, NewtonReport, StepRecord, StopReason};
+pub use newton::{External, Newton, NewtonOptions, NewtonReport, ResidualSize, StepRecord, StopReason};
 
 #[cfg(test)]
 mod newton_tests;

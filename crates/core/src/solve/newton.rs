@@ -102,6 +102,18 @@ pub struct StepRecord {
     pub shift: f64,
 }
 
+/// Size of a residual.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResidualSize {
+    /// Largest force or moment left at a node over the largest in the rod, its loads and supports.
+    pub relative: f64,
+    /// Whether every row is below its tolerance.
+    pub small: bool,
+    /// Whether every row is below its tolerance or what rounding of the unknowns may leave in it. Rows of short, stiff elements
+    /// beside weak forces get no smaller; whether one is as small as it gets shows only when steps cease to shrink it.
+    pub rounding: bool,
+}
+
 /// How a solution was found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewtonReport {
@@ -199,15 +211,21 @@ impl<const C: usize> Newton<C> {
         Self::restore_tensions(elements, b);
     }
 
-    /// Relative residual of the assembled system, and whether it is below `tolerance` or rounding in every row.
-    pub fn relative_residual(
-        &self,
-        elements: &[ElementData],
-        external: &dyn External<C>,
-        supports: &Supports,
-        tolerance: f64,
-    ) -> (f64, bool) {
-        self.residual(elements, external, supports, tolerance)
+    /// Newton's step from the assembled state, with the shift that is always on; `None` where the matrix cannot be factored.
+    pub fn full_step(&mut self, elements: &[ElementData], supports: &Supports) -> Option<&[f64]> {
+        self.factor(elements, supports)?;
+        self.right_hand_side();
+        self.factor.solve(&mut self.step);
+        Self::restore_tensions(elements, &mut self.step);
+        Some(&self.step)
+    }
+
+    /// Sets the step to the right-hand side it answers.
+    fn right_hand_side(&mut self) {
+        let (residual, correction) = (&self.assembly.residual, &self.assembly.correction);
+        for (s, (r, c)) in self.step.iter_mut().zip(residual.iter().zip(correction)) {
+            *s = -(r + c);
+        }
     }
 
     /// The shift that is always on.
@@ -248,7 +266,8 @@ impl<const C: usize> Newton<C> {
         let mut stalled = 0;
         loop {
             self.assemble(elements, supports, external, state);
-            let (residual, small) = self.residual(elements, external, supports, options.tolerance);
+            let size = self.residual(elements, external, supports, options.tolerance);
+            let residual = size.relative;
             report.residual = residual;
             if !residual.is_finite() {
                 report.reason = StopReason::NotFinite;
@@ -263,8 +282,8 @@ impl<const C: usize> Newton<C> {
                     .rev()
                     .take(3)
                     .all(|s| s.energy_change.abs() <= ENERGY_ROUNDING * s.energy_scale);
-            let floor = stalled >= 3 && tiny_steps && residual < 1e-6;
-            let arrived = small || floor;
+            let floor = (size.rounding && stalled >= 1) || (stalled >= 3 && tiny_steps && residual < 1e-6);
+            let arrived = size.small || floor;
 
             // Loads without potential make the stiffness unsymmetric: its symmetric part says nothing about minima.
             let follows = !external.conservative();
@@ -274,11 +293,7 @@ impl<const C: usize> Newton<C> {
             let mut tries = 0;
             let mut natural = None;
             loop {
-                for (s, (r, c)) in
-                    self.step.iter_mut().zip(self.assembly.residual.iter().zip(&self.assembly.correction))
-                {
-                    *s = -(r + c);
-                }
+                self.right_hand_side();
                 self.shifted.copy_from(&self.assembly.matrix);
                 Assembly::add_shift(&mut self.shifted, elements, whisper + sigma);
                 supports.hold_rows(&mut self.shifted);
@@ -315,7 +330,8 @@ impl<const C: usize> Newton<C> {
                 }
                 if report.stable || !minimum {
                     report.converged = true;
-                    report.reason = if small { StopReason::Converged } else { StopReason::RoundingFloor };
+                    report.reason =
+                        if size.small { StopReason::Converged } else { StopReason::RoundingFloor };
                     return report;
                 }
             }
@@ -332,7 +348,11 @@ impl<const C: usize> Newton<C> {
                 match record {
                     Some(step) => report.steps.push(StepRecord { residual, shift, ..step }),
                     None => {
-                        report.reason = StopReason::NoDescent;
+                        // A negative curvature that gains nothing: as good as neutral, but no minimum.
+                        report.iterations -= 1;
+                        report.converged = true;
+                        report.reason =
+                            if size.small { StopReason::Converged } else { StopReason::RoundingFloor };
                         return report;
                     }
                 }
@@ -412,7 +432,8 @@ impl<const C: usize> Newton<C> {
                             let trial = std::mem::take(&mut self.trial);
                             self.assemble(elements, supports, external, &trial);
                             self.trial = trial;
-                            let (found, _) = self.residual(elements, external, supports, options.tolerance);
+                            let found =
+                                self.residual(elements, external, supports, options.tolerance).relative;
                             found < 0.9 * residual || (attempt > 6 && found < 2.0 * residual)
                         });
                 if accept {
@@ -572,14 +593,14 @@ impl<const C: usize> Newton<C> {
         sign
     }
 
-    /// Relative residual, and whether it is below `tolerance` or rounding in every row.
-    fn residual(
+    /// How large the residual of the assembled system is.
+    pub fn residual(
         &self,
         elements: &[ElementData],
         external: &dyn External<C>,
         supports: &Supports,
         tolerance: f64,
-    ) -> (f64, bool) {
+    ) -> ResidualSize {
         let l = Layout::<C>;
         let n = elements.len();
         let length: f64 = elements.iter().map(|e| e.length).sum();
@@ -590,7 +611,7 @@ impl<const C: usize> Newton<C> {
         let mut moment = self.assembly.scale[1].max(outside[1]);
         moment = held[3..].iter().fold(moment, |m, v| m.max(v.abs()));
         let mut relative = 0.0f64;
-        let mut small = true;
+        let (mut small, mut rounding) = (true, true);
         for i in 0..=n {
             let (a, b) = (&elements[i.saturating_sub(1)], &elements[i.min(n - 1)]);
             let h = a.length.min(b.length);
@@ -601,9 +622,8 @@ impl<const C: usize> Newton<C> {
             let floor = 100.0 * f64::EPSILON * stiff;
             let mut row = |value: f64, scale: f64, floor: f64| {
                 let value = value.abs();
-                if value.is_nan() || value > tolerance * scale + floor {
-                    small = false;
-                }
+                small &= value <= tolerance * scale;
+                rounding &= value <= tolerance * scale + floor;
                 let r =
                     if value <= 1e-3 * floor { 0.0 } else { value / (scale + floor / f64::EPSILON * 1e-16) };
                 relative = if r.is_nan() || relative.is_nan() { f64::NAN } else { relative.max(r) };
@@ -625,12 +645,11 @@ impl<const C: usize> Newton<C> {
         for j in 0..6 {
             let scale = if j < 3 { length } else { 1.0 };
             let value = self.assembly.residual[first + j].abs() / scale;
-            if value.is_nan() || value > tolerance {
-                small = false;
-            }
+            small &= value <= tolerance;
+            rounding &= value <= tolerance;
             relative = if value.is_nan() || relative.is_nan() { f64::NAN } else { relative.max(value) };
         }
-        (relative, small)
+        ResidualSize { relative, small, rounding }
     }
 
     /// Replaces the step by the direction of most negative curvature: inverse iteration with the shifted factor.
@@ -695,15 +714,21 @@ impl<const C: usize> Newton<C> {
                 if supports.conditions() > 0 {
                     self.correct(elements, supports, first);
                 }
-                let change = self.energy(elements, external, state) - before;
-                let gaps = supports.gaps(&self.trial);
-                let closed = gaps.iter().all(|g| g.abs() < 1e-6);
-                if change < 0.0 && closed {
+                let energy_change = self.energy(elements, external, state) - before;
+                // Reactions times gaps: what opening the supports would gain is no descent.
+                let opened: f64 = supports
+                    .gaps(&self.trial)
+                    .iter()
+                    .zip(&supports.multipliers)
+                    .map(|(gap, multiplier)| 2.0 * (gap * multiplier).abs())
+                    .sum();
+                let change = energy_change + opened;
+                if change < -ENERGY_ROUNDING * scale {
                     self.trial.tensions.copy_from_slice(&state.tensions);
                     std::mem::swap(state, &mut self.trial);
                     supports.follow(state);
                     return Some(StepRecord {
-                        energy_change: change,
+                        energy_change,
                         merit_change: change,
                         energy_scale: scale,
                         residual: 0.0,

@@ -1,4 +1,4 @@
-//! TOML into types, with errors that name file, line and key, and the nearest right key.
+//! Input files: TOML into types, with errors that name file, line and key, and the nearest right key.
 
 use std::path::Path;
 
@@ -25,16 +25,29 @@ pub fn from_toml<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
         ));
     }
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
-    let value = toml::from_str(&text).map_err(|e| Error::content(path, explain(&e, &text)))?;
-    Ok((value, text))
+    Ok((parse_toml(&text, path)?, text))
+}
+
+/// Reads TOML text into `T`; `name` is what errors call it.
+///
+/// # Errors
+/// As [`from_toml`], less those of the file.
+pub fn parse_toml<T: DeserializeOwned>(text: &str, name: &Path) -> Result<T> {
+    toml::from_str(text).map_err(|e| Error::content(name, explain(&e, text)))
 }
 
 /// One line: where, what, and the nearest right key.
 fn explain(error: &toml::de::Error, text: &str) -> String {
     let message = error.message().trim().replace('\n', " ");
     let place = error.span().map_or(String::new(), |span| {
-        let line = text[..span.start.min(text.len())].matches('\n').count() + 1;
-        format!("line {line}: ")
+        let at = span.start.min(text.len());
+        let line = text[..at].matches('\n').count() + 1;
+        // The key whose value begins here, if one does.
+        let before = text[..at].rsplit('\n').next().unwrap_or_default();
+        match before.split_once('=') {
+            Some((key, _)) => format!("line {line}: {}: ", key.trim()),
+            None => format!("line {line}: "),
+        }
     });
     // serde's wording for names it does not know: "unknown field `a`, expected one of `b`, `c`".
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
