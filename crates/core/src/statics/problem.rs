@@ -224,7 +224,6 @@ impl StaticProblem {
             newton.solve(&self.elements, &mut supports, &mut loads, &mut state, &self.options)
         });
         report.iterations = iterations;
-        newton.assemble(&self.elements, &supports, &mut loads, &state);
         let stored = newton.assembly.energy;
         let energy = Energies {
             bend: stored.bend,
