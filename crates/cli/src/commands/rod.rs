@@ -51,7 +51,7 @@ fn print_solution(document: &Document) {
     }
     let e = &s.energy;
     println!(
-        "  energy        {:.9} = bend {:.9} + twist {:.9} + axial {:.3e}; load {:.9}",
+        "  energy        {:.9} = bend {:.9} + twist {:.9} + axial {:.9}; load {:.9}",
         e.total, e.bend, e.twist, e.axial, e.load
     );
     print_reaction("start", &s.reactions.start);
@@ -71,6 +71,7 @@ fn print_reaction(end: &str, r: &Reaction) {
 }
 
 fn vector(v: &[f64; 3]) -> String {
-    // + 0.0 turns −0 into 0.
-    format!("[{:.9}, {:.9}, {:.9}]", v[0] + 0.0, v[1] + 0.0, v[2] + 0.0)
+    // What rounds to zero is zero, without a sign.
+    let [x, y, z] = v.map(|c| if c.abs() < 5e-10 { 0.0 } else { c });
+    format!("[{x:.9}, {y:.9}, {z:.9}]")
 }
