@@ -18,6 +18,10 @@ pub(crate) struct Args {
 pub(crate) enum Command {
     /// Run the scripted insertion of a scene and record it: summary.json, steps.csv, shapes.npz, frames/*.png
     Run(RunArgs),
+    /// Solve one static rod: sections, supports and loads in, shape, energy and reactions out
+    Rod(RodArgs),
+    /// Compare every reference case with its exact or independently computed answer
+    Verify(VerifyArgs),
     /// Check or generate vessel walls
     #[command(subcommand)]
     Vessel(VesselCommand),
@@ -34,6 +38,25 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the summary as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct RodArgs {
+    /// Case file (TOML)
+    pub(crate) case: PathBuf,
+    /// Print the solution as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct VerifyArgs {
+    /// Add the numerical stress table: stiffness, loads, meshes and shapes far from the ordinary
+    #[arg(long)]
+    pub(crate) stress: bool,
+    /// Print the rows as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -4,10 +4,15 @@
 //!
 //! A scene file becomes a [`scene::Scene`], that builds an [`insertion::Simulation`], which is stepped by
 //! [`insertion::Command`]s and always tells its [`shape::Shape`] and an [`insertion::StepReport`].
+//!
+//! The exact rod stands on its own: a [`statics::StaticCase`] (a file or a value) is solved into a
+//! [`statics::StaticSolution`] by [`solve::Newton`] on the elements of [`rod`], and [`reference`](mod@reference) holds the
+//! answers it is measured against.
 
 pub mod device;
 pub mod error;
 pub mod file;
+pub mod input;
 pub mod insertion;
 pub mod methods;
 pub mod reference;

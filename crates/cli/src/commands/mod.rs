@@ -1,7 +1,9 @@
 //! One file a command.
 
+mod rod;
 mod run;
 mod timing;
+mod verify;
 mod vessel;
 
 use crate::args::{Args, Command, ExperimentCommand, VesselCommand};
@@ -11,6 +13,8 @@ use crate::failure::Failure;
 pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Run(args) => run::run(args),
+        Command::Rod(args) => rod::rod(args),
+        Command::Verify(args) => verify::verify(args),
         Command::Vessel(VesselCommand::Check { file, unit_mm, json }) => {
             vessel::check_file(file, *unit_mm, *json)
         }

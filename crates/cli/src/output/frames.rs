@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use endowire_core::input::from_toml;
 use endowire_core::insertion::Simulation;
-use endowire_core::scene::from_toml;
 use endowire_viewer::{DeviceView, Renderer, ViewSpec};
 use serde::Deserialize;
 

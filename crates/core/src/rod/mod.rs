@@ -19,6 +19,7 @@
 pub mod assembly;
 pub mod bending;
 pub mod element;
+mod element_torsion;
 pub mod frame;
 pub mod layout;
 pub mod quadrature;

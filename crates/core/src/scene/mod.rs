@@ -27,8 +27,6 @@
 //! step_mm = 1.0
 //! ```
 
-mod parse;
 mod spec;
 
-pub use parse::{from_toml, parse_toml};
 pub use spec::{DeviceSpec, Scene, SheathSpec, VesselSpec};

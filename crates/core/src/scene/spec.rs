@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
-use super::parse::from_toml;
 use crate::device::{Device, Section};
+use crate::input::from_toml;
 use crate::insertion::{Command, ScriptLine, Sheath, Simulation, script_commands};
 use crate::methods::MethodChoice;
 use crate::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall};

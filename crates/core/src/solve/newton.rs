@@ -12,8 +12,8 @@
 //! can turn freely (a buckled column about its axis) solvable and cannot be seen in the result, since the
 //! residual is never shifted.
 
-use super::band::{BandMatrix, Factor, Inertia};
-use crate::rod::element::element_energy;
+use super::band::{BandMatrix, Factor, FactorError, Inertia};
+use super::report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
 
 /// Energies outside the rod: loads, walls.
@@ -36,99 +36,12 @@ pub trait External<const C: usize> {
     }
 }
 
-/// Settings of Newton's method.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NewtonOptions {
-    /// Iterations (factorisations with a step) allowed.
-    pub max_iterations: usize,
-    /// Residual over force scale below which a state is an equilibrium.
-    pub tolerance: f64,
-    /// Largest rotation of a node in one step, in radians.
-    pub max_turn: f64,
-    /// Whether to look for a minimum (or take any equilibrium, as continuation does).
-    pub minimum: bool,
-}
-
-impl Default for NewtonOptions {
-    fn default() -> Self {
-        Self { max_iterations: 500, tolerance: 1e-10, max_turn: 1.0, minimum: true }
-    }
-}
-
-/// Why Newton's method stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StopReason {
-    /// The residual is below its tolerance.
-    Converged,
-    /// The residual is as small as rounding lets it be on this mesh.
-    RoundingFloor,
-    /// The iterations allowed are used up.
-    MaxIterations,
-    /// No step along the search direction lowers the merit.
-    NoDescent,
-    /// The matrix stayed singular or of wrong inertia under every shift.
-    Singular,
-    /// The state or the matrix holds a number that is not finite.
-    NotFinite,
-}
-
-impl std::fmt::Display for StopReason {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Converged => "converged",
-            Self::RoundingFloor => "converged to rounding level",
-            Self::MaxIterations => "iterations used up",
-            Self::NoDescent => "no step lowers the energy",
-            Self::Singular => "the stiffness matrix is singular",
-            Self::NotFinite => "a number is not finite",
-        })
-    }
-}
-
-/// One accepted step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StepRecord {
-    /// Change of the potential energy.
-    pub energy_change: f64,
-    /// Change of the merit: the energy, plus the weighted gaps of the end conditions.
-    pub merit_change: f64,
-    /// Size of the energies the change is a difference of; changes below 1e-13 of it are rounding.
-    pub energy_scale: f64,
-    /// Relative residual before the step.
-    pub residual: f64,
-    /// Part of the Newton step taken.
-    pub fraction: f64,
-    /// Shift used.
-    pub shift: f64,
-}
-
-/// How a solution was found.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NewtonReport {
-    /// Steps taken.
-    pub iterations: usize,
-    /// Relative residual of the final state.
-    pub residual: f64,
-    /// Inertia of the final matrix.
-    pub inertia: Inertia,
-    /// Negative pivots a minimum has.
-    pub multipliers: usize,
-    /// Whether the final state is a minimum (neutral directions allowed).
-    pub stable: bool,
-    /// Whether the final state is an equilibrium.
-    pub converged: bool,
-    /// Why the method stopped.
-    pub reason: StopReason,
-    /// The accepted steps.
-    pub steps: Vec<StepRecord>,
-}
-
 /// Part of EI/L² that is always added as a uniform tension.
 const WHISPER: f64 = 1e-8;
+/// Shifts tried beyond the first before a matrix is called singular.
+const SHIFTS: usize = 60;
 /// Changes of energy below this part of the energies' size are rounding.
-const ENERGY_ROUNDING: f64 = 1e-13;
-/// Largest number of unsymmetric rank-one terms.
-const MAX_RANK: usize = 24;
+pub(super) const ENERGY_ROUNDING: f64 = 1e-13;
 
 /// Newton's method with its memory, for rods of one size. Nothing is allocated per iteration.
 #[derive(Debug, Clone)]
@@ -138,12 +51,12 @@ pub struct Newton<const C: usize> {
     /// Residual rows of the first node before they were held: its reactions.
     pub start_residual: [f64; 8],
     shifted: BandMatrix<C>,
-    factor: Factor<C>,
-    step: Vec<f64>,
-    spare: Vec<f64>,
-    columns: Vec<Vec<f64>>,
-    trial: RodState,
-    other: RodState,
+    pub(super) factor: Factor<C>,
+    pub(super) step: Vec<f64>,
+    pub(super) spare: Vec<f64>,
+    pub(super) columns: Vec<Vec<f64>>,
+    pub(super) trial: RodState,
+    pub(super) other: RodState,
 }
 
 impl<const C: usize> Newton<C> {
@@ -199,15 +112,21 @@ impl<const C: usize> Newton<C> {
         Self::restore_tensions(elements, b);
     }
 
-    /// Relative residual of the assembled system, and whether it is below `tolerance` or rounding in every row.
-    pub fn relative_residual(
-        &self,
-        elements: &[ElementData],
-        external: &dyn External<C>,
-        supports: &Supports,
-        tolerance: f64,
-    ) -> (f64, bool) {
-        self.residual(elements, external, supports, tolerance)
+    /// Newton's step from the assembled state, with the shift that is always on; `None` where the matrix cannot be factored.
+    pub fn full_step(&mut self, elements: &[ElementData], supports: &Supports) -> Option<&[f64]> {
+        self.factor(elements, supports)?;
+        self.right_hand_side();
+        self.factor.solve(&mut self.step);
+        Self::restore_tensions(elements, &mut self.step);
+        Some(&self.step)
+    }
+
+    /// Sets the step to the right-hand side it answers.
+    fn right_hand_side(&mut self) {
+        let (residual, correction) = (&self.assembly.residual, &self.assembly.correction);
+        for (s, (r, c)) in self.step.iter_mut().zip(residual.iter().zip(correction)) {
+            *s = -(r + c);
+        }
     }
 
     /// The shift that is always on.
@@ -218,7 +137,42 @@ impl<const C: usize> Newton<C> {
         WHISPER / (length * soft)
     }
 
-    /// Moves `state` to an equilibrium.
+    /// Factors the matrix and solves for the step, under the whisper and a shift. It begins at an eighth of the last one, or
+    /// at none if that was small or `bare` is set, and grows until there are `wanted` negative pivots, if a number is wanted.
+    /// Returns the shift, and the inertia under the whisper alone if that was tried and could be factored.
+    fn factor_shifted(
+        &mut self,
+        elements: &[ElementData],
+        supports: &Supports,
+        last: f64,
+        bare: bool,
+        wanted: Option<usize>,
+    ) -> Result<(f64, Option<Inertia>), StopReason> {
+        let whisper = Self::whisper(elements);
+        let mut sigma = if bare || last < 8.0 * whisper { 0.0 } else { last / 8.0 };
+        let mut natural = None;
+        for attempt in 0..=SHIFTS {
+            self.right_hand_side();
+            self.shifted.copy_from(&self.assembly.matrix);
+            Assembly::add_shift(&mut self.shifted, elements, whisper + sigma);
+            supports.hold_rows(&mut self.shifted);
+            let found = self.factor.factor_solve(&self.shifted, &mut self.step);
+            if sigma == 0.0 {
+                natural = found.ok();
+            }
+            match found {
+                Ok(inertia) if wanted.is_none_or(|negative| inertia.negative == negative) => {
+                    return Ok((sigma, natural));
+                }
+                Err(FactorError::NotFinite { .. }) if attempt > 20 => return Err(StopReason::NotFinite),
+                _ => {}
+            }
+            sigma = if sigma == 0.0 { (1e5 * whisper).max(last / 8.0) } else { sigma * 4.0 };
+        }
+        Err(StopReason::Singular)
+    }
+
+    /// Moves `state` to an equilibrium, and leaves the system assembled there.
     pub fn solve(
         &mut self,
         elements: &[ElementData],
@@ -229,7 +183,6 @@ impl<const C: usize> Newton<C> {
     ) -> NewtonReport {
         let l = Layout::<C>;
         let multipliers = elements.len() + supports.conditions();
-        let whisper = Self::whisper(elements);
         let mut report = NewtonReport {
             iterations: 0,
             residual: f64::INFINITY,
@@ -246,9 +199,13 @@ impl<const C: usize> Newton<C> {
         let mut penalty = [0.0f64; 2];
         let mut best = f64::INFINITY;
         let mut stalled = 0;
+        let mut assembled = false;
         loop {
-            self.assemble(elements, supports, external, state);
-            let (residual, small) = self.residual(elements, external, supports, options.tolerance);
+            if !std::mem::take(&mut assembled) {
+                self.assemble(elements, supports, external, state);
+            }
+            let size = self.residual(elements, external, supports, options.tolerance);
+            let residual = size.relative;
             report.residual = residual;
             if !residual.is_finite() {
                 report.reason = StopReason::NotFinite;
@@ -263,44 +220,20 @@ impl<const C: usize> Newton<C> {
                     .rev()
                     .take(3)
                     .all(|s| s.energy_change.abs() <= ENERGY_ROUNDING * s.energy_scale);
-            let floor = stalled >= 3 && tiny_steps && residual < 1e-6;
-            let arrived = small || floor;
+            let floor = (size.rounding && stalled >= 1) || (stalled >= 3 && tiny_steps && residual < 1e-6);
+            let arrived = size.small || floor;
 
             // Loads without potential make the stiffness unsymmetric: its symmetric part says nothing about minima.
             let follows = !external.conservative();
             let minimum = options.minimum && !follows;
-            // Factor, with a shift until the inertia is right.
-            let mut sigma = if arrived || shift < 8.0 * whisper { 0.0 } else { shift / 8.0 };
-            let mut tries = 0;
-            let mut natural = None;
-            loop {
-                for (s, (r, c)) in
-                    self.step.iter_mut().zip(self.assembly.residual.iter().zip(&self.assembly.correction))
-                {
-                    *s = -(r + c);
-                }
-                self.shifted.copy_from(&self.assembly.matrix);
-                Assembly::add_shift(&mut self.shifted, elements, whisper + sigma);
-                supports.hold_rows(&mut self.shifted);
-                let found = self.factor.factor_solve(&self.shifted, &mut self.step);
-                if sigma == 0.0 {
-                    natural = found.ok();
-                }
-                match found {
-                    Ok(inertia) if inertia.negative == multipliers || !minimum => break,
-                    Err(super::band::FactorError::NotFinite { .. }) if tries > 20 => {
-                        report.reason = StopReason::NotFinite;
-                        return report;
-                    }
-                    _ => {}
-                }
-                tries += 1;
-                if tries > 60 {
-                    report.reason = StopReason::Singular;
+            let wanted = minimum.then_some(multipliers);
+            let (sigma, natural) = match self.factor_shifted(elements, supports, shift, arrived, wanted) {
+                Ok(found) => found,
+                Err(reason) => {
+                    report.reason = reason;
                     return report;
                 }
-                sigma = if sigma == 0.0 { (1e5 * whisper).max(shift / 8.0) } else { sigma * 4.0 };
-            }
+            };
             shift = sigma;
             if arrived {
                 if let Some(inertia) = natural {
@@ -315,7 +248,8 @@ impl<const C: usize> Newton<C> {
                 }
                 if report.stable || !minimum {
                     report.converged = true;
-                    report.reason = if small { StopReason::Converged } else { StopReason::RoundingFloor };
+                    report.reason =
+                        if size.small { StopReason::Converged } else { StopReason::RoundingFloor };
                     return report;
                 }
             }
@@ -332,7 +266,11 @@ impl<const C: usize> Newton<C> {
                 match record {
                     Some(step) => report.steps.push(StepRecord { residual, shift, ..step }),
                     None => {
-                        report.reason = StopReason::NoDescent;
+                        // A negative curvature that gains nothing: as good as neutral, but no minimum.
+                        report.iterations -= 1;
+                        report.converged = true;
+                        report.reason =
+                            if size.small { StopReason::Converged } else { StopReason::RoundingFloor };
                         return report;
                     }
                 }
@@ -385,6 +323,7 @@ impl<const C: usize> Newton<C> {
                 supports.multipliers[j] += self.step[first + j];
             }
             for attempt in 0..24 {
+                assembled = false;
                 self.trial.advance::<C>(elements, state, &self.step, alpha);
                 if supports.conditions() > 0 {
                     self.correct(elements, supports, first);
@@ -409,10 +348,12 @@ impl<const C: usize> Newton<C> {
                 let accept = change.is_finite()
                     && (enough
                         || follows && {
+                            assembled = true;
                             let trial = std::mem::take(&mut self.trial);
                             self.assemble(elements, supports, external, &trial);
                             self.trial = trial;
-                            let (found, _) = self.residual(elements, external, supports, options.tolerance);
+                            let found =
+                                self.residual(elements, external, supports, options.tolerance).relative;
                             found < 0.9 * residual || (attempt > 6 && found < 2.0 * residual)
                         });
                 if accept {
@@ -433,6 +374,9 @@ impl<const C: usize> Newton<C> {
             }
             let Some(record) = accepted else {
                 supports.multipliers = old_multipliers;
+                if follows {
+                    self.assemble(elements, supports, external, state);
+                }
                 report.reason = if best < 1e-6 { StopReason::RoundingFloor } else { StopReason::NoDescent };
                 report.converged = best < 1e-6;
                 if let Some(inertia) = natural {
@@ -445,275 +389,5 @@ impl<const C: usize> Newton<C> {
             std::mem::swap(state, &mut self.trial);
             supports.follow(state);
         }
-    }
-
-    /// Axial forces of inextensible elements at the trial state: they are multipliers and take their full step. (Those of
-    /// stretchable elements moved with the state.)
-    fn tensions(&mut self, elements: &[ElementData], state: &RodState) {
-        for (e, data) in elements.iter().enumerate() {
-            if data.flexibility == 0.0 {
-                self.trial.tensions[e] = state.tensions[e] + self.step[Layout::<C>.tension(e)];
-            }
-        }
-    }
-
-    /// Undoes the change of multiplier of [`crate::rod::assembly`]: dN = m/(1 − γD).
-    fn restore_tensions(elements: &[ElementData], step: &mut [f64]) {
-        for (e, data) in elements.iter().enumerate() {
-            step[Layout::<C>.tension(e)] /= 1.0 - data.augmentation() * data.flexibility;
-        }
-    }
-
-    /// Potential energy of the trial state, less the work done on the way from `state`.
-    fn energy(&self, elements: &[ElementData], external: &mut dyn External<C>, state: &RodState) -> f64 {
-        let mut stored = 0.0;
-        for (e, data) in elements.iter().enumerate() {
-            stored += element_energy(data, &self.trial.element(e), Layout::<C>::TWIST).total();
-        }
-        stored + external.energy(elements, &self.trial) - external.work(state, &self.trial)
-    }
-
-    /// Second-order corrections of the end conditions with the factorisation at hand.
-    fn correct(&mut self, elements: &[ElementData], supports: &Supports, first: usize) {
-        let mut last = f64::INFINITY;
-        for _ in 0..4 {
-            let gaps = supports.gaps(&self.trial);
-            let size = gaps.iter().fold(0.0f64, |m, g| m.max(g.abs()));
-            if size.is_nan() || size >= last || size < 1e-14 {
-                break;
-            }
-            last = size;
-            self.spare.fill(0.0);
-            for j in 0..6 {
-                self.spare[first + j] = -gaps[j];
-            }
-            self.factor.solve(&mut self.spare);
-            Self::restore_tensions(elements, &mut self.spare);
-            self.other.copy_from(&self.trial);
-            let (turn, _) = RodState::largest_turn::<C>(elements, &self.other, &self.spare);
-            // A correction is small or it is none.
-            if turn.is_nan() || turn > 0.3 {
-                break;
-            }
-            self.trial.advance::<C>(elements, &self.other, &self.spare, 1.0);
-            let after = supports.gaps(&self.trial).iter().fold(0.0f64, |m, g| m.max(g.abs()));
-            if after.is_nan() || after >= size {
-                std::mem::swap(&mut self.trial, &mut self.other);
-                break;
-            }
-        }
-    }
-
-    /// Woodbury's formula for the unsymmetric rank-one terms: Newton's step stays exact. Returns the sign of
-    /// det(I + QᵀS⁻¹P), the ratio of the determinants with and without them.
-    fn unsymmetric(&mut self) -> f64 {
-        let rank = self.assembly.rank_ones.len().min(MAX_RANK);
-        let mut sign = 1.0;
-        if rank == 0 {
-            return sign;
-        }
-        while self.columns.len() < rank {
-            self.columns.push(vec![0.0; self.step.len()]);
-        }
-        let terms = &self.assembly.rank_ones[..rank];
-        let mut small = [[0.0; MAX_RANK + 1]; MAX_RANK];
-        for (k, term) in terms.iter().enumerate() {
-            let column = &mut self.columns[k];
-            column.fill(0.0);
-            column[term.row..term.row + 3].copy_from_slice(&term.p);
-            self.factor.solve(column);
-        }
-        let along = |x: &[f64], k: usize| -> f64 {
-            let t = &terms[k];
-            (0..3).map(|a| t.q[a] * x[t.column + a]).sum()
-        };
-        for i in 0..rank {
-            for j in 0..rank {
-                small[i][j] = along(&self.columns[j], i) + f64::from(u8::from(i == j));
-            }
-            small[i][MAX_RANK] = along(&self.step, i);
-        }
-        // Gauss with partial pivoting.
-        for k in 0..rank {
-            let mut p = k;
-            for i in k + 1..rank {
-                if small[i][k].abs() > small[p][k].abs() {
-                    p = i;
-                }
-            }
-            if p != k {
-                small.swap(k, p);
-                sign = -sign;
-            }
-            if small[k][k].abs() < 1e-12 {
-                return 0.0;
-            }
-            sign *= small[k][k].signum();
-            for i in k + 1..rank {
-                let f = small[i][k] / small[k][k];
-                for j in k..=MAX_RANK {
-                    small[i][j] -= f * small[k][j];
-                }
-            }
-        }
-        let mut x = [0.0; MAX_RANK];
-        for k in (0..rank).rev() {
-            let mut sum = small[k][MAX_RANK];
-            for j in k + 1..rank {
-                sum -= small[k][j] * x[j];
-            }
-            x[k] = sum / small[k][k];
-        }
-        for (k, value) in x[..rank].iter().enumerate() {
-            for (s, c) in self.step.iter_mut().zip(&self.columns[k]) {
-                *s -= value * c;
-            }
-        }
-        sign
-    }
-
-    /// Relative residual, and whether it is below `tolerance` or rounding in every row.
-    fn residual(
-        &self,
-        elements: &[ElementData],
-        external: &dyn External<C>,
-        supports: &Supports,
-        tolerance: f64,
-    ) -> (f64, bool) {
-        let l = Layout::<C>;
-        let n = elements.len();
-        let length: f64 = elements.iter().map(|e| e.length).sum();
-        let outside = external.scale();
-        let held = supports.multipliers;
-        let mut force = self.assembly.scale[0].max(outside[0]);
-        force = held[..3].iter().fold(force, |m, v| m.max(v.abs()));
-        let mut moment = self.assembly.scale[1].max(outside[1]);
-        moment = held[3..].iter().fold(moment, |m, v| m.max(v.abs()));
-        let mut relative = 0.0f64;
-        let mut small = true;
-        for i in 0..=n {
-            let (a, b) = (&elements[i.saturating_sub(1)], &elements[i.min(n - 1)]);
-            let h = a.length.min(b.length);
-            let stiff = (a.bending[2] / (a.length * a.length)).max(b.bending[0] / (b.length * b.length));
-            let forces = force + moment / length;
-            let moments = moment + force * h;
-            // What rounding of unit vectors leaves of a force 12 EI/h² δ and of a moment 6 EI/h δ.
-            let floor = 100.0 * f64::EPSILON * stiff;
-            let mut row = |value: f64, scale: f64, floor: f64| {
-                let value = value.abs();
-                if value.is_nan() || value > tolerance * scale + floor {
-                    small = false;
-                }
-                let r =
-                    if value <= 1e-3 * floor { 0.0 } else { value / (scale + floor / f64::EPSILON * 1e-16) };
-                relative = if r.is_nan() || relative.is_nan() { f64::NAN } else { relative.max(r) };
-            };
-            for k in 0..3 {
-                row(self.assembly.residual[l.position(i) + k], forces, floor);
-            }
-            for k in 0..2 {
-                row(self.assembly.residual[l.tangent(i) + k], moments, floor * h);
-            }
-            if Layout::<C>::TWIST {
-                row(self.assembly.residual[l.angle(i)], moments, floor * h);
-                if i < n {
-                    row(self.assembly.residual[l.bubble(i)], moments, floor * h);
-                }
-            }
-        }
-        let first = l.support(n);
-        for j in 0..6 {
-            let scale = if j < 3 { length } else { 1.0 };
-            let value = self.assembly.residual[first + j].abs() / scale;
-            if value.is_nan() || value > tolerance {
-                small = false;
-            }
-            relative = if value.is_nan() || relative.is_nan() { f64::NAN } else { relative.max(value) };
-        }
-        (relative, small)
-    }
-
-    /// Replaces the step by the direction of most negative curvature: inverse iteration with the shifted factor.
-    fn negative_curvature(&mut self, elements: &[ElementData], supports: &Supports, state: &RodState) {
-        let l = Layout::<C>;
-        let n = elements.len();
-        let first = l.support(n);
-        self.step.fill(0.0);
-        // A start that is orthogonal to no mode: both directions across, no symmetry along the rod.
-        for i in 0..=n {
-            let s = (i as f64 + 0.37) / (n as f64 + 1.0);
-            let frame = &state.frames[i];
-            let w = frame.local(&crate::Vec3::new(0.31 + s, 0.83 - 0.6 * s * s, 0.29 + 0.4 * s));
-            self.step[l.tangent(i)] = w.y;
-            self.step[l.tangent(i) + 1] = w.z;
-        }
-        for _ in 0..6 {
-            self.spare.fill(0.0);
-            for i in 0..=n {
-                let h = elements[i.min(n - 1)].length;
-                for a in 0..2 {
-                    let row = l.tangent(i) + a;
-                    self.spare[row] = h * self.step[row];
-                }
-                if Layout::<C>::TWIST {
-                    self.spare[l.angle(i)] = h * self.step[l.angle(i)];
-                }
-            }
-            for row in supports.held::<C>().into_iter().flatten() {
-                self.spare[row] = 0.0;
-            }
-            self.factor.solve(&mut self.spare);
-            let size = self.spare[..first].iter().fold(0.0f64, |m, v| m.max(v.abs()));
-            let scale = if size > 0.0 { 1.0 / size } else { 1.0 };
-            for (s, v) in self.step.iter_mut().zip(&self.spare) {
-                *s = v * scale;
-            }
-        }
-        for value in &mut self.step[first..] {
-            *value = 0.0;
-        }
-    }
-
-    /// Moves along the negative curvature in `self.step`, as far as the energy falls.
-    fn leave(
-        &mut self,
-        elements: &[ElementData],
-        supports: &mut Supports,
-        external: &mut dyn External<C>,
-        state: &mut RodState,
-    ) -> Option<StepRecord> {
-        let l = Layout::<C>;
-        let first = l.support(elements.len());
-        let (turn, twist) = RodState::largest_turn::<C>(elements, state, &self.step);
-        let unit = 0.5 / turn.max(twist).max(1e-300);
-        let before = self.assembly.energy.total() + self.assembly.external_energy;
-        let scale = self.assembly.energy.total().abs() + self.assembly.external_energy.abs();
-        let mut alpha = unit;
-        for _ in 0..20 {
-            for sign in [1.0, -1.0] {
-                self.trial.advance::<C>(elements, state, &self.step, sign * alpha);
-                if supports.conditions() > 0 {
-                    self.correct(elements, supports, first);
-                }
-                let change = self.energy(elements, external, state) - before;
-                let gaps = supports.gaps(&self.trial);
-                let closed = gaps.iter().all(|g| g.abs() < 1e-6);
-                if change < 0.0 && closed {
-                    self.trial.tensions.copy_from_slice(&state.tensions);
-                    std::mem::swap(state, &mut self.trial);
-                    supports.follow(state);
-                    return Some(StepRecord {
-                        energy_change: change,
-                        merit_change: change,
-                        energy_scale: scale,
-                        residual: 0.0,
-                        fraction: sign * alpha / unit,
-                        shift: 0.0,
-                    });
-                }
-            }
-            alpha *= 0.5;
-        }
-        None
     }
 }

@@ -1,6 +1,7 @@
 //! The schema of CASE.toml.
 
-use crate::{Error, Result};
+use super::{StaticProblem, StaticSolution};
+use crate::{Error, Result, input};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -205,21 +206,33 @@ impl Default for Solver {
 
 impl StaticCase {
     /// Reads a case from TOML text and checks it; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// Names file, line and key of what does not fit, or key and value of what cannot be.
     pub fn from_toml(text: &str, name: &Path) -> Result<Self> {
-        let case: Self = toml::from_str(text).map_err(|e| Error::content(name, e.to_string()))?;
-        case.check()?;
-        Ok(case)
+        input::parse_toml::<Self>(text, name)?.checked(name)
     }
 
     /// Reads a case from a file and checks it.
+    ///
+    /// # Errors
+    /// As [`Self::from_toml`], and a file that cannot be read.
     pub fn from_file(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
-        Self::from_toml(&text, path)
+        let (case, _) = input::from_toml::<Self>(path)?;
+        case.checked(path)
+    }
+
+    fn checked(self, name: &Path) -> Result<Self> {
+        self.check().map_err(|e| Error::content(name, e.to_string()))?;
+        Ok(self)
     }
 
     /// Solves the case. A case that is wrong is an error; one whose solution is not found is a solution with
     /// `converged = false` and the reason.
-    pub fn solve(&self) -> Result<super::StaticSolution> {
-        super::StaticProblem::new(self)?.solve()
+    ///
+    /// # Errors
+    /// Values that contradict each other, or a rod that twists and has no torsion stiffness.
+    pub fn solve(&self) -> Result<StaticSolution> {
+        StaticProblem::new(self)?.solve()
     }
 }

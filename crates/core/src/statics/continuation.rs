@@ -87,29 +87,19 @@ impl StaticProblem {
                 for _ in 0..CORRECTIONS {
                     loads.factor = lambda;
                     newton.assemble(elements, &held, &mut loads, &base);
-                    let (residual, small) =
-                        newton.relative_residual(elements, &loads, &held, self.options.tolerance);
-                    if small {
+                    let size = newton.residual(elements, &loads, &held, self.options.tolerance);
+                    if size.rounding {
                         let inertia = newton.factor(elements, &held).unwrap_or_default();
                         found = Some((
                             lambda,
-                            residual,
+                            size.relative,
                             inertia.negative.saturating_sub(multipliers),
                             held.clone(),
                         ));
                         break;
                     }
-                    if newton.factor(elements, &held).is_none() {
-                        break;
-                    }
-                    let mut correction: Vec<f64> = newton
-                        .assembly
-                        .residual
-                        .iter()
-                        .zip(&newton.assembly.correction)
-                        .map(|(r, c)| -(r + c))
-                        .collect();
-                    newton.apply_inverse(elements, &mut correction);
+                    let Some(step) = newton.full_step(elements, &held) else { break };
+                    let mut correction = step.to_vec();
                     let response = self.load_response(&mut newton, &base, &held, lambda)?;
                     let across = product(elements, l, &direction, &response);
                     let change = -product(elements, l, &direction, &correction) / across;

@@ -68,7 +68,6 @@ impl<const C: usize> Path<C> {
                 report.reason
             )));
         }
-        self.newton.assemble(&problem.elements, &self.supports, &mut loads, &self.state);
         let shift = Newton::<C>::whisper(&problem.elements);
         let inertia = self
             .newton

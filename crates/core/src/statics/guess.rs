@@ -6,7 +6,7 @@ use crate::rod::{ElementData, Frame, RodState, Supports};
 use std::f64::consts::PI;
 
 /// The rest state, laid out from the start.
-pub fn rest_shape(elements: &[ElementData], start: Vec3, frame: Frame) -> RodState {
+pub(super) fn rest_shape(elements: &[ElementData], start: Vec3, frame: Frame) -> RodState {
     let mut frames = vec![frame];
     let mut material = frame;
     let mut angle = 0.0;
@@ -30,7 +30,7 @@ pub fn rest_shape(elements: &[ElementData], start: Vec3, frame: Frame) -> RodSta
 }
 
 /// Constant curvature along d₁ and d₂ of the start.
-pub fn arc(elements: &[ElementData], start: Vec3, frame: Frame, curvature: [f64; 2]) -> RodState {
+pub(super) fn arc(elements: &[ElementData], start: Vec3, frame: Frame, curvature: [f64; 2]) -> RodState {
     let mut frames = vec![frame];
     let mut last = frame;
     for data in elements {
@@ -42,7 +42,12 @@ pub fn arc(elements: &[ElementData], start: Vec3, frame: Frame, curvature: [f64;
 
 /// A shape near one that meets the end: the rest shape or an arc, whichever comes closest, bowed where it is too straight for
 /// its span.
-pub fn towards_end(elements: &[ElementData], start: Vec3, frame: Frame, supports: &Supports) -> RodState {
+pub(super) fn towards_end(
+    elements: &[ElementData],
+    start: Vec3,
+    frame: Frame,
+    supports: &Supports,
+) -> RodState {
     let length: f64 = elements.iter().map(|e| e.length).sum();
     // A pinned start may point at the end first.
     let aim = supports.end_position - start;

@@ -2,18 +2,18 @@
 //!
 //! Units are the caller's: any consistent set, or none at all (a case may well say length 1 and EI 1).
 
-pub mod case;
-pub mod continuation;
-pub mod critical;
-pub mod guess;
-pub mod loads;
-pub mod problem;
-pub mod solution;
+mod case;
+mod continuation;
+mod critical;
+mod guess;
+mod loads;
+mod problem;
+mod solution;
 mod validate;
 
 pub use case::{End, EndKind, Initial, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase};
 pub use continuation::PathPoint;
 pub use critical::Parameter;
 pub use loads::Loads;
-pub use problem::StaticProblem;
+pub use problem::{Solved, StaticProblem};
 pub use solution::{Energies, Reaction, Reactions, StaticSolution};

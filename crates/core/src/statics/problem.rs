@@ -168,6 +168,24 @@ impl StaticProblem {
         Ok(solved)
     }
 
+    /// How much one more Newton step would change the bend of a solved state: changes of the angle between the end tangents of
+    /// the elements, summed along the rod, in radians. It tells how far the state is from the equilibrium of its mesh, whatever
+    /// the scale of its residual, and is blind to turns of the whole rod that change nothing. For loads with a potential.
+    pub fn next_bend(&self, solved: &Solved) -> f64 {
+        if self.twisted { self.bend_after::<TWISTED>(solved) } else { self.bend_after::<PLAIN>(solved) }
+    }
+
+    fn bend_after<const C: usize>(&self, solved: &Solved) -> f64 {
+        let state = &solved.state;
+        let mut newton = Newton::<C>::new(self.elements.len());
+        newton.assemble(&self.elements, &solved.supports, &mut self.loads.clone(), state);
+        let Some(step) = newton.full_step(&self.elements, &solved.supports) else { return f64::NAN };
+        let mut next = state.clone();
+        next.advance::<C>(&self.elements, state, step, 1.0);
+        let bend = |s: &RodState, e: usize| s.frames[e].t.cross(&s.frames[e + 1].t).norm();
+        (0..state.elements()).map(|e| (bend(&next, e) - bend(state, e)).abs()).sum()
+    }
+
     fn run<const C: usize>(&self) -> Solved {
         let mut newton = Newton::<C>::new(self.elements.len());
         let mut state = self.initial.clone();
@@ -206,7 +224,6 @@ impl StaticProblem {
             newton.solve(&self.elements, &mut supports, &mut loads, &mut state, &self.options)
         });
         report.iterations = iterations;
-        newton.assemble(&self.elements, &supports, &mut loads, &state);
         let stored = newton.assembly.energy;
         let energy = Energies {
             bend: stored.bend,

@@ -84,14 +84,24 @@ pub struct StaticSolution {
 }
 
 impl StaticSolution {
+    /// Why this is no equilibrium; `None` where it is one.
+    pub fn failure(&self) -> Option<String> {
+        (!self.converged).then(|| {
+            format!(
+                "no equilibrium after {} iterations, residual {:.1e}: {}",
+                self.iterations, self.residual, self.stop
+            )
+        })
+    }
+
     /// Itself if it is an equilibrium, an error that says why not otherwise.
+    ///
+    /// # Errors
+    /// [`Self::failure`] as a failed computation.
     pub fn checked(self) -> crate::Result<Self> {
-        if self.converged {
-            return Ok(self);
+        match self.failure() {
+            None => Ok(self),
+            Some(reason) => Err(crate::Error::Computation(reason)),
         }
-        Err(crate::Error::Computation(format!(
-            "no equilibrium after {} iterations, residual {:.1e}: {}",
-            self.iterations, self.residual, self.stop
-        )))
     }
 }

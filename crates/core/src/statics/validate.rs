@@ -1,6 +1,6 @@
 //! Checks of a case before anything is computed. Every error names the key at fault.
 
-use super::case::{EndKind, LoadKind, Section, StaticCase};
+use super::case::{EndKind, LoadKind, Section, StartKind, StaticCase};
 use crate::{Error, Result, Vec3};
 
 /// Most elements a case may ask for: far beyond use, far below what exhausts memory.
@@ -223,6 +223,29 @@ impl StaticCase {
                         span.norm(),
                         self.rod.length
                     ),
+                ));
+            }
+            if inextensible && end.slide.is_none() && span.norm() > self.rod.length * (1.0 - 1e-12) {
+                self.check_straight(&span)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A rod as long as its span is straight: the tangents that are held must lie along it.
+    fn check_straight(&self, span: &Vec3) -> Result<()> {
+        let clamped = self.start.kind == StartKind::Clamped;
+        let held =
+            self.end.tangent.or(Some(self.start.tangent)).filter(|_| self.end.kind == EndKind::Clamped);
+        for (name, tangent) in
+            [("start.tangent", clamped.then_some(self.start.tangent)), ("end.tangent", held)]
+        {
+            let Some(tangent) = tangent else { continue };
+            if Vec3::from(tangent).normalize().cross(&(span / span.norm())).norm() > 1e-9 {
+                return Err(Error::parameter(
+                    name,
+                    format!("{tangent:?}"),
+                    "the ends are as far apart as the rod is long, so it is straight; turn this along it or give EA",
                 ));
             }
         }

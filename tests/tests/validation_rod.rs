@@ -1,6 +1,6 @@
 //! The rod against exact solutions and against itself. Validation: nothing here was recorded from this program.
 
-use endowire_core::reference::{FAMILIES, stress};
+use endowire_core::reference::{FAMILIES, Row, stress};
 use endowire_core::statics::{LoadKind, StaticCase, StaticSolution};
 use endowire_core::{Vec3, nalgebra};
 use std::path::Path;
@@ -31,9 +31,21 @@ fn every_reference_case_is_within_its_bound() {
 }
 
 #[test]
-fn every_stressed_case_converges_to_a_minimum() {
-    for row in stress::run_all() {
-        assert!(row.converged && row.stable && row.monotone, "{row:?}");
+fn a_wrong_reference_would_be_seen() {
+    // Twin of the comparison: each kind of row fails on a value that is off by ten bounds.
+    let tip = [0.4, -0.8, 0.0];
+    assert!(!Row::relative("", "", 1.0 + 1e-5, 1.0, 1e-6).pass);
+    assert!(!Row::point("", "", tip, [0.4, -0.8, 1e-5], 1.0, 1e-6).pass);
+    assert!(!Row::relative("", "", f64::NAN, 1.0, 1e-6).pass);
+    assert!(!Row::failed("", "").pass);
+    assert!(Row::point("", "", tip, [0.4, -0.8, 1e-7], 1.0, 1e-6).pass);
+}
+
+#[test]
+fn every_stressed_case_settles_in_a_minimum() {
+    for case in stress::cases() {
+        let row = case.run();
+        assert!(row.pass, "{row:?}");
     }
 }
 

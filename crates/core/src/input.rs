@@ -1,4 +1,4 @@
-//! TOML into types, with errors that name file, line and key, and the nearest right key.
+//! Input files: TOML into types, with errors that name file, line and key, and the nearest right key.
 
 use std::path::Path;
 

@@ -1,0 +1,128 @@
+//! `endowire verify`: the reference cases, and the stress table.
+
+use std::time::Instant;
+
+use endowire_core::reference::{FAMILIES, Row, stress};
+use serde::Serialize;
+
+use crate::args::VerifyArgs;
+use crate::failure::Failure;
+use crate::output::print_json;
+use crate::output::progress;
+use crate::output::provenance::Provenance;
+
+#[derive(Serialize)]
+struct Document {
+    #[serde(flatten)]
+    provenance: Provenance,
+    cases: Vec<Row>,
+    passed: usize,
+    failed: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stress: Option<Vec<Stress>>,
+}
+
+/// A stressed case and the time it took.
+#[derive(Serialize)]
+struct Stress {
+    #[serde(flatten)]
+    row: stress::StressRow,
+    time_s: f64,
+}
+
+/// Runs every reference case and prints the table.
+pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
+    let stressed = if args.stress { stress::cases() } else { Vec::new() };
+    let bar = progress::bar(FAMILIES.len() + stressed.len(), "case");
+    let mut cases = Vec::new();
+    for family in FAMILIES {
+        bar.set_message(family.id);
+        cases.extend(family.run());
+        bar.inc(1);
+    }
+    let mut rows = Vec::with_capacity(stressed.len());
+    for case in &stressed {
+        bar.set_message(case.name.clone());
+        let clock = Instant::now();
+        let row = case.run();
+        rows.push(Stress { row, time_s: clock.elapsed().as_secs_f64() });
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+
+    let passed = cases.iter().filter(|row| row.pass).count();
+    let document = Document {
+        provenance: Provenance::of_program("verify"),
+        passed,
+        failed: cases.len() - passed,
+        cases,
+        stress: args.stress.then_some(rows),
+    };
+    if args.json {
+        print_json(&document)?;
+    } else {
+        print_cases(&document);
+    }
+    let unexplained = document.stress.iter().flatten().filter(|s| !s.row.pass).count();
+    if document.failed > 0 || unexplained > 0 {
+        return Err(Failure::Computation(format!(
+            "{} of {} reference rows and {unexplained} stressed cases fail",
+            document.failed,
+            document.cases.len()
+        )));
+    }
+    Ok(())
+}
+
+fn print_cases(document: &Document) {
+    println!(
+        "{:<6}{:<30} {:<31} {:>15} {:>15} {:>8} {:>8} {:>5} {:>5}",
+        "", "case", "quantity", "computed", "expected", "error", "bound", "order", "iter."
+    );
+    let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".to_owned());
+    for row in &document.cases {
+        println!(
+            "{:<6}{:<30} {:<31} {:>15.10} {:>15.10} {:>8.1e} {:>8.1e} {:>5} {:>5}",
+            if row.pass { "pass" } else { "FAIL" },
+            row.name,
+            row.quantity,
+            row.computed,
+            row.expected,
+            row.error,
+            row.bound,
+            or_dash(row.order.map(|order| format!("{order:.2}"))),
+            or_dash(row.iterations.map(|iterations| iterations.to_string())),
+        );
+    }
+    println!("{} passed, {} failed", document.passed, document.failed);
+    if let Some(rows) = &document.stress {
+        print_stress(rows);
+    }
+}
+
+fn print_stress(rows: &[Stress]) {
+    println!();
+    println!(
+        "{:<54} {:<28} {:>8} {:>9} {:>5} {:>9}",
+        "stressed", "outcome", "residual", "next bend", "iter.", "time ms"
+    );
+    let mut outcomes: Vec<(String, usize)> = Vec::new();
+    for Stress { row, time_s } in rows {
+        let outcome = row.outcome();
+        println!(
+            "{:<54} {:<28} {:>8.1e} {:>9.1e} {:>5} {:>9.2}",
+            row.name,
+            outcome,
+            row.residual,
+            row.next_bend,
+            row.iterations,
+            1e3 * time_s
+        );
+        match outcomes.iter_mut().find(|(known, _)| *known == outcome) {
+            Some((_, count)) => *count += 1,
+            None => outcomes.push((outcome, 1)),
+        }
+    }
+    let counts: Vec<String> = outcomes.iter().map(|(outcome, count)| format!("{count} {outcome}")).collect();
+    println!("{} stressed cases: {}", rows.len(), counts.join(", "));
+}

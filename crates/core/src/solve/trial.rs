@@ -1,0 +1,69 @@
+//! The trial state of a line search: its axial forces, its energy, and its way back to the end conditions.
+
+use super::newton::{External, Newton};
+use crate::rod::element::element_energy;
+use crate::rod::{ElementData, Layout, RodState, Supports};
+
+impl<const C: usize> Newton<C> {
+    /// Axial forces of inextensible elements at the trial state: they are multipliers and take their full step. (Those of
+    /// stretchable elements moved with the state.)
+    pub(super) fn tensions(&mut self, elements: &[ElementData], state: &RodState) {
+        for (e, data) in elements.iter().enumerate() {
+            if data.flexibility == 0.0 {
+                self.trial.tensions[e] = state.tensions[e] + self.step[Layout::<C>.tension(e)];
+            }
+        }
+    }
+
+    /// Undoes the change of multiplier of [`crate::rod::assembly`]: dN = m/(1 − γD).
+    pub(super) fn restore_tensions(elements: &[ElementData], step: &mut [f64]) {
+        for (e, data) in elements.iter().enumerate() {
+            step[Layout::<C>.tension(e)] /= 1.0 - data.augmentation() * data.flexibility;
+        }
+    }
+
+    /// Potential energy of the trial state, less the work done on the way from `state`.
+    pub(super) fn energy(
+        &self,
+        elements: &[ElementData],
+        external: &mut dyn External<C>,
+        state: &RodState,
+    ) -> f64 {
+        let mut stored = 0.0;
+        for (e, data) in elements.iter().enumerate() {
+            stored += element_energy(data, &self.trial.element(e), Layout::<C>::TWIST).total();
+        }
+        stored + external.energy(elements, &self.trial) - external.work(state, &self.trial)
+    }
+
+    /// Second-order corrections of the end conditions with the factorisation at hand.
+    pub(super) fn correct(&mut self, elements: &[ElementData], supports: &Supports, first: usize) {
+        let mut last = f64::INFINITY;
+        for _ in 0..4 {
+            let gaps = supports.gaps(&self.trial);
+            let size = gaps.iter().fold(0.0f64, |m, g| m.max(g.abs()));
+            if size.is_nan() || size >= last || size < 1e-14 {
+                break;
+            }
+            last = size;
+            self.spare.fill(0.0);
+            for j in 0..6 {
+                self.spare[first + j] = -gaps[j];
+            }
+            self.factor.solve(&mut self.spare);
+            Self::restore_tensions(elements, &mut self.spare);
+            self.other.copy_from(&self.trial);
+            let (turn, _) = RodState::largest_turn::<C>(elements, &self.other, &self.spare);
+            // A correction is small or it is none.
+            if turn.is_nan() || turn > 0.3 {
+                break;
+            }
+            self.trial.advance::<C>(elements, &self.other, &self.spare, 1.0);
+            let after = supports.gaps(&self.trial).iter().fold(0.0f64, |m, g| m.max(g.abs()));
+            if after.is_nan() || after >= size {
+                std::mem::swap(&mut self.trial, &mut self.other);
+                break;
+            }
+        }
+    }
+}
