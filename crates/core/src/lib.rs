@@ -10,7 +10,11 @@ pub mod error;
 pub mod insertion;
 pub mod methods;
 pub mod scene;
+pub mod reference;
+pub mod rod;
 pub mod shape;
+pub mod solve;
+pub mod statics;
 pub mod vessel;
 
 pub use error::{Error, Result};

@@ -1,0 +1,222 @@
+//! Assembly of the banded Newton system.
+//!
+//! With c the elongations, D the axial flexibilities and N the axial forces, the equilibrium equations are
+//!
+//!   r(q) + Cᵀ N = 0,   c(q) − D N = 0,   C = ∂c/∂q,
+//!
+//! and Newton's step solves [K Cᵀ; C −D](dq, dN) = −(r, c). Along the rod K alone has no stiffness (bending energy is blind
+//! to stretch) and an inextensible element has D = 0, so without pivoting that matrix has no LDLᵀ. Adding γCᵀ times the
+//! second row to the first, and writing dN = m/(1 − γD), gives the symmetric system
+//!
+//!   [K + γCᵀC, Cᵀ; C, −D/(1 − γD)](dq, m) = −(r + γCᵀc, c)
+//!
+//! with the same dq: an augmentation of the linear algebra, not of the mechanics. Its inertia tells minima from saddle
+//! points just as that of the first form does.
+
+use super::element::{ElementData, ElementSystem, Energy, element_system};
+use super::layout::Layout;
+use super::quadrature::hermite;
+use super::state::RodState;
+use crate::Vec3;
+use crate::solve::BandMatrix;
+use nalgebra::Matrix3;
+
+/// A rank-one addition p qᵀ to the matrix that is not symmetric: loads that follow the rod.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RankOne {
+    /// First of three consecutive rows p lives in.
+    pub row: usize,
+    /// Its entries.
+    pub p: [f64; 3],
+    /// First of three consecutive columns q lives in.
+    pub column: usize,
+    /// Its entries.
+    pub q: [f64; 3],
+}
+
+/// Matrix, residual and energy at one state. External energies add to it with the `add_*` methods.
+#[derive(Debug, Clone)]
+pub struct Assembly<const C: usize> {
+    /// The augmented matrix.
+    pub matrix: BandMatrix<C>,
+    /// Gradient of the Lagrangian; in the rows of N, c − D N; in support rows, the gaps.
+    pub residual: Vec<f64>,
+    /// γCᵀ(c − D N), which the right-hand side needs beside the residual.
+    pub correction: Vec<f64>,
+    /// Stored energy of the rod.
+    pub energy: Energy,
+    /// Energy of everything outside the rod.
+    pub external_energy: f64,
+    /// Unsymmetric additions to the matrix.
+    pub rank_ones: Vec<RankOne>,
+    /// Largest force and moment an element exerts on a node: the scale of the residual.
+    pub scale: [f64; 2],
+}
+
+impl<const C: usize> Assembly<C> {
+    /// Room for a rod of `elements` elements.
+    pub fn new(elements: usize) -> Self {
+        let n = Layout::<C>::dimension(elements);
+        Self {
+            matrix: BandMatrix::zeros(n),
+            residual: vec![0.0; n],
+            correction: vec![0.0; n],
+            energy: Energy::default(),
+            external_energy: 0.0,
+            rank_ones: Vec::with_capacity(32),
+            scale: [0.0; 2],
+        }
+    }
+
+    /// Clears everything and adds the rod's elements.
+    pub fn assemble(&mut self, elements: &[ElementData], state: &RodState) {
+        self.matrix.clear();
+        self.residual.fill(0.0);
+        self.correction.fill(0.0);
+        self.energy = Energy::default();
+        self.external_energy = 0.0;
+        self.rank_ones.clear();
+        self.scale = [0.0; 2];
+        if Layout::<C>::TWIST {
+            self.add_elements::<14>(elements, state);
+        } else {
+            self.add_elements::<11>(elements, state);
+        }
+        let l = Layout::<C>;
+        // Rows without meaning.
+        self.matrix.add(Layout::<C>::BLOCK - 1, Layout::<C>::BLOCK - 1, 1.0);
+        if Layout::<C>::TWIST {
+            self.matrix.add(0, 0, 1.0);
+        }
+        let first = l.support(elements.len());
+        for row in first + 6..first + Layout::<C>::BLOCK {
+            self.matrix.add(row, row, 1.0);
+        }
+    }
+
+    fn add_elements<const M: usize>(&mut self, elements: &[ElementData], state: &RodState) {
+        let l = Layout::<C>;
+        let n_at = M - 1;
+        let mut rows = [0; M];
+        for (k, row) in rows.iter_mut().enumerate() {
+            *row = l.row(0, k);
+        }
+        let mut system = ElementSystem::<M> {
+            gradient: [0.0; M],
+            hessian: [[0.0; M]; M],
+            stretch: [0.0; M],
+            energy: Energy::default(),
+        };
+        for (e, data) in elements.iter().enumerate() {
+            element_system(data, &state.element(e), &mut system);
+            self.energy.add(&system.energy);
+            let g = &system.gradient;
+            let force = g[0].abs().max(g[1].abs()).max(g[2].abs());
+            let moment = g[3].abs().max(g[4].abs());
+            self.scale = [self.scale[0].max(force), self.scale[1].max(moment)];
+            let gamma = data.augmentation();
+            let base = Layout::<C>::BLOCK * e;
+            let gap = g[n_at];
+            for i in 0..M {
+                self.residual[base + rows[i]] += g[i];
+                let weight = gamma * system.stretch[i];
+                self.correction[base + rows[i]] += weight * gap;
+                let row = self.matrix.row_mut(base + rows[i]);
+                for j in i..M {
+                    row[rows[j] - rows[i]] += system.hessian[i][j] + weight * system.stretch[j];
+                }
+            }
+            // Now the flexibility of the transformed multiplier.
+            let extra = data.flexibility - data.flexibility / (1.0 - gamma * data.flexibility);
+            self.matrix.row_mut(base + rows[n_at])[0] += extra;
+        }
+    }
+
+    /// Adds an energy of the position of node `i`.
+    pub fn add_node(&mut self, i: usize, gradient: &Vec3, hessian: &Matrix3<f64>) {
+        let at = Layout::<C>.position(i);
+        for a in 0..3 {
+            self.residual[at + a] += gradient[a];
+            for b in a..3 {
+                self.matrix.add(at + a, at + b, hessian[(a, b)]);
+            }
+        }
+    }
+
+    /// Adds an energy of the angle of node `i`; nothing where the rod carries no angles.
+    pub fn add_angle(&mut self, i: usize, gradient: f64, hessian: f64) {
+        if Layout::<C>::TWIST {
+            let at = Layout::<C>.angle(i);
+            self.residual[at] += gradient;
+            self.matrix.add(at, at, hessian);
+        }
+    }
+
+    /// Adds an energy of the point at ξ of element `e`, whose gradient and Hessian in that point's position are given.
+    pub fn add_point(
+        &mut self,
+        state: &RodState,
+        element: &ElementData,
+        e: usize,
+        xi: f64,
+        gradient: &Vec3,
+        hessian: &Matrix3<f64>,
+    ) {
+        let l = Layout::<C>;
+        let [w0, s0, w1, s1] = hermite(xi);
+        let (s0, s1) = (s0 * element.length, s1 * element.length);
+        let (f0, f1) = (&state.frames[e], &state.frames[e + 1]);
+        // The point moves by w₀ dx₀ + s₀(u a + v b) + …, and by −½ s |δ|² t at second order.
+        let columns = [
+            (l.position(e), Vec3::x() * w0),
+            (l.position(e) + 1, Vec3::y() * w0),
+            (l.position(e) + 2, Vec3::z() * w0),
+            (l.tangent(e), f0.u * s0),
+            (l.tangent(e) + 1, f0.v * s0),
+            (l.position(e + 1), Vec3::x() * w1),
+            (l.position(e + 1) + 1, Vec3::y() * w1),
+            (l.position(e + 1) + 2, Vec3::z() * w1),
+            (l.tangent(e + 1), f1.u * s1),
+            (l.tangent(e + 1) + 1, f1.v * s1),
+        ];
+        for (i, (row, p)) in columns.iter().enumerate() {
+            self.residual[*row] += gradient.dot(p);
+            let hp = hessian * p;
+            for (column, q) in &columns[i..] {
+                self.matrix.add(*row, *column, hp.dot(q));
+            }
+        }
+        for (at, s, t) in [(l.tangent(e), s0, &f0.t), (l.tangent(e + 1), s1, &f1.t)] {
+            let curve = s * gradient.dot(t);
+            self.matrix.add(at, at, -curve);
+            self.matrix.add(at + 1, at + 1, -curve);
+        }
+    }
+
+    /// Adds σ∫|δr′|² (and σ∫δθ²) to `matrix`: the stiffness of a uniform tension σ, which is what cures the negative
+    /// curvature of compression, the commonest kind.
+    pub fn add_shift(matrix: &mut BandMatrix<C>, elements: &[ElementData], sigma: f64) {
+        let l = Layout::<C>;
+        for (e, data) in elements.iter().enumerate() {
+            let across = 1.5 * sigma / data.length;
+            let along = 0.5 * sigma * data.length;
+            for a in 0..3 {
+                let (p, q) = (l.position(e) + a, l.position(e + 1) + a);
+                matrix.add(p, p, across);
+                matrix.add(q, q, across);
+                matrix.add(p, q, -across);
+            }
+            for i in [e, e + 1] {
+                for a in 0..2 {
+                    matrix.add(l.tangent(i) + a, l.tangent(i) + a, along);
+                }
+                if Layout::<C>::TWIST {
+                    matrix.add(l.angle(i), l.angle(i), along);
+                }
+            }
+            if Layout::<C>::TWIST {
+                matrix.add(l.bubble(e), l.bubble(e), along);
+            }
+        }
+    }
+}

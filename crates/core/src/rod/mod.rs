@@ -1,0 +1,37 @@
+//! The rod: its state, one element's energy, gradient and Hessian, and the assembly of the banded Newton system.
+//!
+//! An inextensible or stretchable, unshearable, isotropic Kirchhoff rod. Unknowns per node are the position x, the unit
+//! tangent t and, where rest curvature or torque needs it, the material angle θ; per element the axial force N as an
+//! independent unknown (Hellinger–Reissner) and, with angles, an angle bubble b that makes the angle quadratic in
+//! the element. The Lagrangian is
+//!
+//!   ½∫EI |r′×r″|²/|r′|⁴ ds − ∫EI κ⁰·t′ ds + ½∫EI |κ⁰|² ds      bending ([`bending`], [`torsion`])
+//!   + ½∫GJ (τ − τ⁰)² ds                                        twist ([`torsion`])
+//!   + Σ N c − ½ D N²                                          axial ([`element`])
+//!
+//! with c = ⅔h(|r′(½)| − 1), Simpson's elongation of an element whose end slopes are unit vectors, and D = ∫ds/EA.
+//! Sources: C. Meier, A. Popp, W. A. Wall, *An objective 3D large deformation finite element formulation for
+//! geometrically exact curved Kirchhoff rods*, CMAME 278 (2014); *A locking-free finite element formulation and reduced models
+//! for geometrically exact Kirchhoff rods*, CMAME 290 (2015); M. Bergou et al., *Discrete viscous threads*, SIGGRAPH 2010.
+//!
+//! Units are the caller's, any consistent set: nothing here knows a millimetre.
+
+pub mod assembly;
+pub mod bending;
+pub mod element;
+pub mod frame;
+pub mod layout;
+pub mod quadrature;
+pub mod state;
+pub mod supports;
+pub mod torsion;
+
+pub use assembly::Assembly;
+pub use element::{ElementData, Energy};
+pub use frame::Frame;
+pub use layout::{Layout, PLAIN, TWISTED};
+pub use state::RodState;
+pub use supports::{EndAngle, Supports};
+
+#[cfg(test)]
+mod derivative_tests;

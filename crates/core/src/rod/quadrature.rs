@@ -1,0 +1,61 @@
+//! Cubic Hermite interpolation of the centre line and the three-point Gauss rule.
+//!
+//! On an element of length h with end tangents t₀, t₁ and chord e = (x₁ − x₀)/h,
+//!
+//!   y = r′   = 6ξ(1−ξ) e + (1−4ξ+3ξ²) t₀ + (3ξ²−2ξ) t₁,
+//!   z = h r″ = 6(1−2ξ) e + (6ξ−4) t₀ + (6ξ−2) t₁,
+//!
+//! both free of the unit of length: energies of an element depend on h only through EI/h and GJ/h.
+
+use crate::Vec3;
+
+/// Weights of (e, t₀, t₁) in y and z, and of (θ₀, θ₁, b) in the angle, at one point of an element.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// Place in the element, 0 to 1.
+    pub xi: f64,
+    /// Quadrature weight; the weights sum to 1.
+    pub weight: f64,
+    /// Weights in y = r′.
+    pub y: [f64; 3],
+    /// Weights in z = h r″.
+    pub z: [f64; 3],
+    /// Weights of (θ₀, θ₁, b) in the angle φ.
+    pub phi: [f64; 3],
+    /// Weights of (θ₀, θ₁, b) in h φ′.
+    pub dphi: [f64; 3],
+}
+
+impl Point {
+    /// The weights at `xi`.
+    pub const fn at(xi: f64, weight: f64) -> Self {
+        Self {
+            xi,
+            weight,
+            y: [6.0 * xi * (1.0 - xi), 1.0 - 4.0 * xi + 3.0 * xi * xi, 3.0 * xi * xi - 2.0 * xi],
+            z: [6.0 * (1.0 - 2.0 * xi), 6.0 * xi - 4.0, 6.0 * xi - 2.0],
+            phi: [1.0 - xi, xi, 4.0 * xi * (1.0 - xi)],
+            dphi: [-1.0, 1.0, 4.0 * (1.0 - 2.0 * xi)],
+        }
+    }
+
+    /// y and z for the given chord and tangents.
+    #[inline]
+    pub fn derivatives(&self, e: &Vec3, t0: &Vec3, t1: &Vec3) -> (Vec3, Vec3) {
+        (e * self.y[0] + t0 * self.y[1] + t1 * self.y[2], e * self.z[0] + t0 * self.z[1] + t1 * self.z[2])
+    }
+}
+
+/// Distance of the outer Gauss points from the middle, ½√(3/5).
+const OUTER: f64 = 0.387_298_334_620_741_7;
+
+/// The three-point Gauss rule on [0, 1], exact for polynomials of degree 5: one more than the squared curvature of
+/// a straight-reference element needs, and enough for order 4 where the element is strongly bent.
+pub const GAUSS: [Point; 3] =
+    [Point::at(0.5 - OUTER, 5.0 / 18.0), Point::at(0.5, 8.0 / 18.0), Point::at(0.5 + OUTER, 5.0 / 18.0)];
+
+/// Weights of (x₀, h t₀, x₁, h t₁) in the centre line at ξ.
+pub fn hermite(xi: f64) -> [f64; 4] {
+    let (a, b) = (xi, 1.0 - xi);
+    [b * b * (1.0 + 2.0 * a), a * b * b, a * a * (1.0 + 2.0 * b), -a * a * b]
+}

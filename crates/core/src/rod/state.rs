@@ -1,0 +1,183 @@
+//! Where the rod is, and how a Newton step moves it.
+
+use super::element::{ElementData, ElementState, mid_slope};
+use super::frame::{Frame, reference_twist};
+use super::layout::Layout;
+use crate::Vec3;
+
+/// State of a rod of n elements: n + 1 nodes.
+///
+/// Chords are kept beside positions, not as their differences: on a fine mesh the difference of two positions has
+/// lost the digits that curvature is made of.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RodState {
+    /// Node triads. `t` is the tangent of the rod; `u`, `v` are the reference the angles are counted from.
+    pub frames: Vec<Frame>,
+    /// Chords (x₁ − x₀)/h of the elements.
+    pub chords: Vec<Vec3>,
+    /// Axial forces of the elements.
+    pub tensions: Vec<f64>,
+    /// Angle of the material triad against the reference triad, at the nodes.
+    pub angles: Vec<f64>,
+    /// Angle bubbles of the elements: the angle at the middle beyond the mean of its ends.
+    pub bubbles: Vec<f64>,
+    /// Reference twist of the elements, followed continuously over full turns.
+    pub reference_twists: Vec<f64>,
+    /// Node positions; they follow from the first one and the chords.
+    pub positions: Vec<Vec3>,
+}
+
+impl RodState {
+    /// A straight rod from `start` along `frame.t`, untwisted.
+    pub fn straight(elements: &[ElementData], start: Vec3, frame: Frame) -> Self {
+        Self::from_frames(elements, start, vec![frame; elements.len() + 1])
+    }
+
+    /// A rod with the given node tangents: the middle slopes are halfway between them, all angles are zero. The reference
+    /// triads are carried along the rod from the first by smallest rotations.
+    pub fn from_frames(elements: &[ElementData], start: Vec3, mut frames: Vec<Frame>) -> Self {
+        let n = elements.len();
+        let mut chords = Vec::with_capacity(n);
+        for e in 0..n {
+            frames[e + 1] = frames[e].transported_to(&frames[e + 1].t);
+            let sum = frames[e].t + frames[e + 1].t;
+            chords.push((sum / sum.norm().max(1e-9) + sum * 0.25) / 1.5);
+        }
+        let mut state = Self {
+            frames,
+            chords,
+            tensions: vec![0.0; n],
+            angles: vec![0.0; n + 1],
+            bubbles: vec![0.0; n],
+            reference_twists: vec![0.0; n],
+            positions: vec![start; n + 1],
+        };
+        state.place(elements);
+        state
+    }
+
+    /// Number of elements.
+    pub fn elements(&self) -> usize {
+        self.chords.len()
+    }
+
+    /// Positions from the first node and the chords.
+    pub fn place(&mut self, elements: &[ElementData]) {
+        for e in 0..self.chords.len() {
+            self.positions[e + 1] = self.positions[e] + self.chords[e] * elements[e].length;
+        }
+    }
+
+    /// State of element `e`.
+    #[inline]
+    pub fn element(&self, e: usize) -> ElementState {
+        ElementState {
+            first: self.frames[e],
+            second: self.frames[e + 1],
+            chord: self.chords[e],
+            tension: self.tensions[e],
+            angles: [self.angles[e], self.angles[e + 1] + self.reference_twists[e], self.bubbles[e]],
+        }
+    }
+
+    /// The material triad (t, d₁, d₂) of node `i`.
+    pub fn material_frame(&self, i: usize) -> Frame {
+        self.frames[i].turned(self.angles[i])
+    }
+
+    /// Copies another state of the same size without allocating.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.frames.clone_from(&other.frames);
+        self.chords.clone_from(&other.chords);
+        self.tensions.clone_from(&other.tensions);
+        self.angles.clone_from(&other.angles);
+        self.bubbles.clone_from(&other.bubbles);
+        self.reference_twists.clone_from(&other.reference_twists);
+        self.positions.clone_from(&other.positions);
+    }
+
+    /// Sets this state to `base` moved by `alpha` times the Newton step `d`.
+    ///
+    /// Node tangents and the slopes in the middle of the elements move along geodesics of the sphere, axial forces
+    /// of stretchable elements move linearly and give the strain (an inextensible element keeps |r′| = 1 exactly), and chords and positions follow. So a state that
+    /// satisfies the constraints stays on them: no feasibility is lost to the length of a step, and the energy
+    /// along the step is the potential energy itself. Constant curvature is reproduced exactly: a pure end moment of
+    /// any size is solved by one full step.
+    pub fn advance<const C: usize>(&mut self, elements: &[ElementData], base: &Self, d: &[f64], alpha: f64) {
+        let l = Layout::<C>;
+        for i in 0..base.frames.len() {
+            let t = l.tangent(i);
+            self.frames[i] = base.frames[i].transported(alpha * d[t], alpha * d[t + 1]);
+            if Layout::<C>::TWIST {
+                self.angles[i] = base.angles[i] + alpha * d[l.angle(i)];
+            }
+        }
+        self.positions[0] = base.positions[0] + position_step(d, l.position(0)) * alpha;
+        for (e, data) in elements.iter().enumerate() {
+            let (before, rate) = mid_rate::<C>(elements, base, d, e);
+            let size = before.norm();
+            let m = before / size;
+            let along = m.dot(&rate);
+            let turn = (rate - m * along) * (alpha / size);
+            let angle = turn.norm();
+            let direction = if angle > 0.0 {
+                let (sin, cos) = angle.sin_cos();
+                m * cos + turn * (sin / angle)
+            } else {
+                m
+            };
+            // c = D N exactly: the strain follows from the force, not the force from a strain that rounding has spoilt.
+            let length = if data.flexibility > 0.0 {
+                self.tensions[e] = base.tensions[e] + alpha * d[l.tension(e)];
+                1.0 + 1.5 * data.flexibility * self.tensions[e] / data.length
+            } else {
+                1.0
+            };
+            let ends = self.frames[e].t + self.frames[e + 1].t;
+            self.chords[e] = (direction * (length / direction.norm()) + ends * 0.25) / 1.5;
+            self.positions[e + 1] = self.positions[e] + self.chords[e] * data.length;
+            if Layout::<C>::TWIST {
+                self.bubbles[e] = base.bubbles[e] + alpha * d[l.bubble(e)];
+                let psi = reference_twist(&self.frames[e], &self.frames[e + 1]);
+                let turns = ((base.reference_twists[e] - psi) / std::f64::consts::TAU).round();
+                self.reference_twists[e] = psi + turns * std::f64::consts::TAU;
+            }
+        }
+    }
+
+    /// The largest rotation a step holds, at nodes and in the middle of elements, and the largest change of angle.
+    pub fn largest_turn<const C: usize>(elements: &[ElementData], base: &Self, d: &[f64]) -> (f64, f64) {
+        let l = Layout::<C>;
+        let (mut turn, mut twist) = (0.0f64, 0.0f64);
+        for i in 0..base.frames.len() {
+            let t = l.tangent(i);
+            turn = turn.max(d[t].hypot(d[t + 1]));
+            if Layout::<C>::TWIST {
+                twist = twist.max(d[l.angle(i)].abs());
+            }
+        }
+        for e in 0..elements.len() {
+            let (mid, rate) = mid_rate::<C>(elements, base, d, e);
+            let m = mid / mid.norm();
+            turn = turn.max((rate - m * m.dot(&rate)).norm() / mid.norm());
+        }
+        (turn, twist)
+    }
+}
+
+/// The slope in the middle of element `e` and its rate of change along the step `d`.
+#[inline]
+fn mid_rate<const C: usize>(elements: &[ElementData], base: &RodState, d: &[f64], e: usize) -> (Vec3, Vec3) {
+    let l = Layout::<C>;
+    let (f0, f1) = (&base.frames[e], &base.frames[e + 1]);
+    let (t0, t1) = (l.tangent(e), l.tangent(e + 1));
+    let chord = (position_step(d, l.position(e + 1)) - position_step(d, l.position(e))) / elements[e].length;
+    let ends = f0.u * d[t0] + f0.v * d[t0 + 1] + f1.u * d[t1] + f1.v * d[t1 + 1];
+    (mid_slope(&f0.t, &base.chords[e], &f1.t), chord * 1.5 - ends * 0.25)
+}
+
+/// Three entries of a step.
+#[inline]
+fn position_step(d: &[f64], at: usize) -> Vec3 {
+    Vec3::new(d[at], d[at + 1], d[at + 2])
+}

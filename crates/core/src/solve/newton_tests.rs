@@ -1,0 +1,107 @@
+//! The bare solver on cantilevers.
+
+use super::{External, Newton, NewtonOptions, NewtonReport};
+use crate::Vec3;
+use crate::rod::{Assembly, ElementData, Frame, PLAIN, RodState, Supports};
+
+struct Tip(Vec3);
+impl<const C: usize> External<C> for Tip {
+    fn energy(&mut self, _: &[ElementData], state: &RodState) -> f64 {
+        -self.0.dot(&state.positions[state.elements()])
+    }
+    fn add(&mut self, _: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
+        let n = state.elements();
+        assembly.add_node(n, &-self.0, &nalgebra::Matrix3::zeros());
+        assembly.external_energy -= self.0.dot(&state.positions[n]);
+    }
+}
+
+/// A spring from the middle of element `e` to a point: an energy between nodes, as a wall is.
+struct Spring(usize, Vec3, f64);
+impl<const C: usize> External<C> for Spring {
+    fn energy(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+        0.5 * self.2 * (self.place(elements, state) - self.1).norm_squared()
+    }
+    fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
+        let off = self.place(elements, state) - self.1;
+        assembly.external_energy += External::<C>::energy(self, elements, state);
+        let hessian = nalgebra::Matrix3::identity() * self.2;
+        assembly.add_point(state, &elements[self.0], self.0, 0.3, &(off * self.2), &hessian);
+    }
+}
+impl Spring {
+    fn place(&self, elements: &[ElementData], state: &RodState) -> Vec3 {
+        let [a, b, c, d] = crate::rod::quadrature::hermite(0.3);
+        let (e, h) = (self.0, elements[self.0].length);
+        state.positions[e] * a
+            + state.frames[e].t * (b * h)
+            + state.positions[e + 1] * c
+            + state.frames[e + 1].t * (d * h)
+    }
+}
+
+fn cantilever(n: usize, outside: &mut dyn External<PLAIN>) -> (RodState, NewtonReport) {
+    let data = ElementData {
+        length: 1.0 / n as f64,
+        bending: [1.0; 3],
+        torsion: [0.0; 3],
+        rest_curvature: [[0.0; 2]; 3],
+        rest_twist: [0.0; 3],
+        flexibility: 0.0,
+    };
+    let elements = vec![data; n];
+    let mut state = RodState::straight(&elements, Vec3::zeros(), Frame::new(Vec3::x(), Some(Vec3::y())));
+    let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
+    let mut newton = Newton::<PLAIN>::new(n);
+    let report = newton.solve(&elements, &mut supports, outside, &mut state, &NewtonOptions::default());
+    (state, report)
+}
+
+#[test]
+fn iterations_do_not_grow_with_the_mesh_or_the_load() {
+    for a in [1.0, 10.0, 50.0, 1000.0] {
+        for n in [8, 64, 512] {
+            let (_, r) = cantilever(n, &mut Tip(Vec3::new(0.0, -a, 0.0)));
+            assert!(
+                r.converged && r.stable && r.iterations <= 10,
+                "a {a}, n {n}: {} {}",
+                r.iterations,
+                r.reason
+            );
+        }
+    }
+}
+
+#[test]
+fn the_energy_falls_at_every_step() {
+    for force in [Vec3::new(0.0, -10.0, 0.0), Vec3::new(-30.0, 0.0, 0.0), Vec3::new(-5.0, 1.0, 3.0)] {
+        let (_, r) = cantilever(64, &mut Tip(force));
+        assert!(r.steps.len() > 3);
+        for s in &r.steps {
+            assert!(s.energy_change <= 1e-13 * s.energy_scale, "{s:?}");
+        }
+    }
+}
+
+#[test]
+fn a_column_stays_straight_below_its_euler_load_and_leaves_above() {
+    let (s, r) = cantilever(16, &mut Tip(Vec3::new(-2.4, 0.0, 0.0)));
+    assert!(r.stable && (s.positions[16].x - 1.0).abs() < 1e-12);
+    let (s, r) = cantilever(16, &mut Tip(Vec3::new(-2.5, 0.0, 0.0)));
+    assert!(r.stable && s.positions[16].x < 0.98);
+}
+
+#[test]
+fn energies_between_nodes_converge_quadratically() {
+    let (_, r) = cantilever(16, &mut Spring(11, Vec3::new(0.6, 0.2, 0.1), 500.0));
+    assert!(r.converged && r.stable && r.iterations <= 12, "{} {}", r.iterations, r.reason);
+    let last = &r.steps[r.steps.len() - 2..];
+    assert!(last[1].residual < 1e2 * last[0].residual * last[0].residual + 1e-10, "{last:?}");
+}
+
+#[test]
+fn a_force_that_is_not_a_number_is_named() {
+    let (_, r) = cantilever(8, &mut Tip(Vec3::new(f64::NAN, 0.0, 0.0)));
+    assert_eq!(r.reason, super::StopReason::NotFinite);
+    assert!(!r.converged);
+}

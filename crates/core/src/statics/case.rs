@@ -1,0 +1,225 @@
+//! The schema of CASE.toml.
+
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A static problem of one rod, as written in CASE.toml. Units are the caller's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StaticCase {
+    /// The rod.
+    pub rod: Rod,
+    /// What holds its start.
+    pub start: Start,
+    /// What holds its end; free where absent.
+    #[serde(default)]
+    pub end: End,
+    /// Loads, any number.
+    #[serde(default)]
+    pub load: Vec<Load>,
+    /// Where the search starts; the unloaded shape, or a shape that meets the end, where absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub initial: Option<Initial>,
+    /// How to solve.
+    #[serde(default)]
+    pub solver: Solver,
+}
+
+/// The rod.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rod {
+    /// Length.
+    pub length: f64,
+    /// Number of elements; they are spread so that sections and point loads begin at nodes, so a rod with more of those
+    /// than elements gets one element for each.
+    pub elements: usize,
+    /// Sections in order from the start.
+    pub section: Vec<Section>,
+}
+
+/// A stretch of the rod. Values with an `_end` vary linearly from the section's begin to its end.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Section {
+    /// Arc length at which it ends; the last one ends at the rod's length.
+    pub until: f64,
+    /// Bending stiffness.
+    #[serde(rename = "EI")]
+    pub ei: f64,
+    /// Bending stiffness at the section's end, if it tapers.
+    #[serde(rename = "EI_end", default, skip_serializing_if = "Option::is_none")]
+    pub ei_end: Option<f64>,
+    /// Torsion stiffness; may be absent where nothing twists.
+    #[serde(rename = "GJ", default, skip_serializing_if = "Option::is_none")]
+    pub gj: Option<f64>,
+    /// Torsion stiffness at the section's end.
+    #[serde(rename = "GJ_end", default, skip_serializing_if = "Option::is_none")]
+    pub gj_end: Option<f64>,
+    /// Axial stiffness; absent = inextensible.
+    #[serde(rename = "EA", default, skip_serializing_if = "Option::is_none")]
+    pub ea: Option<f64>,
+    /// Axial stiffness at the section's end.
+    #[serde(rename = "EA_end", default, skip_serializing_if = "Option::is_none")]
+    pub ea_end: Option<f64>,
+    /// Rest state t′ = k₁ d₁ + k₂ d₂, d₁ the normal, d₂ = t × d₁.
+    #[serde(default)]
+    pub rest_curvature: [f64; 2],
+    /// Rest curvature at the section's end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest_curvature_end: Option<[f64; 2]>,
+    /// Twist of the rest state per length (a rod that was twisted when made).
+    #[serde(default)]
+    pub rest_twist: f64,
+}
+
+/// Kinds of start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StartKind {
+    /// Position, tangent and rotation about it are held.
+    Clamped,
+    /// The position is held; a ball joint.
+    Pinned,
+}
+
+/// The start of the rod.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Start {
+    /// Kind.
+    #[serde(rename = "type")]
+    pub kind: StartKind,
+    /// Position.
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Tangent (any length); along x where absent. For a pinned start: of the shape the search starts from.
+    #[serde(default = "x_axis")]
+    pub tangent: [f64; 3],
+    /// Direction d₁, made orthogonal to the tangent; where absent, the axis farthest from the tangent, y for a tangent along
+    /// x.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f64; 3]>,
+}
+
+fn x_axis() -> [f64; 3] {
+    [1.0, 0.0, 0.0]
+}
+
+/// Kinds of end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EndKind {
+    /// Nothing is held.
+    #[default]
+    Free,
+    /// Tangent and rotation are held, and the position where given.
+    Clamped,
+    /// The position is held; a ball joint.
+    Pinned,
+    /// Tangent and rotation are held, the position is free in all directions: a block that moves without turning.
+    Guided,
+}
+
+/// The end of the rod.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct End {
+    /// Kind.
+    #[serde(rename = "type", default)]
+    pub kind: EndKind,
+    /// Position (pinned: needed; clamped: absent = free to move).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position: Option<[f64; 3]>,
+    /// Direction along which the held position may slide.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slide: Option<[f64; 3]>,
+    /// Tangent (clamped, guided); the start's where absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tangent: Option<[f64; 3]>,
+    /// Direction d₁ (clamped, guided); the start's where absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f64; 3]>,
+    /// Further rotation about the tangent in radians, any number of turns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turns: Option<f64>,
+}
+
+/// Kinds of load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LoadKind {
+    /// A dead force at a point.
+    Force,
+    /// A dead moment at a point: its vector keeps its direction in space.
+    Moment,
+    /// A dead force per length over the rod, or from `from` to `to`.
+    Distributed,
+    /// A force at a point that turns with the rod; `value` is along (t, d₁, d₂) there.
+    Follower,
+}
+
+/// A load.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Load {
+    /// Kind.
+    pub kind: LoadKind,
+    /// Arc length of the point; the end of the rod where absent. Not for distributed loads.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at: Option<f64>,
+    /// Begin of a distributed load.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<f64>,
+    /// End of a distributed load.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<f64>,
+    /// Force, moment or force per length.
+    pub value: [f64; 3],
+}
+
+/// A shape to start the search from: constant curvature.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Initial {
+    /// Curvature along the start's d₁ and d₂; zero = straight.
+    pub curvature: [f64; 2],
+}
+
+/// How to solve.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Solver {
+    /// Newton iterations allowed (in each load step).
+    pub max_iterations: usize,
+    /// Number of equal load steps.
+    pub load_steps: usize,
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        Self { max_iterations: 500, load_steps: 1 }
+    }
+}
+
+impl StaticCase {
+    /// Reads a case from TOML text and checks it; `name` is what errors call it.
+    pub fn from_toml(text: &str, name: &Path) -> Result<Self> {
+        let case: Self = toml::from_str(text).map_err(|e| Error::content(name, e.to_string()))?;
+        case.check()?;
+        Ok(case)
+    }
+
+    /// Reads a case from a file and checks it.
+    pub fn from_file(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
+        Self::from_toml(&text, path)
+    }
+
+    /// Solves the case. A case that is wrong is an error; one whose solution is not found is a solution with
+    /// `converged = false` and the reason.
+    pub fn solve(&self) -> Result<super::StaticSolution> {
+        super::StaticProblem::new(self)?.solve()
+    }
+}

@@ -1,0 +1,93 @@
+//! Shapes to start the search from.
+
+use crate::Vec3;
+use crate::rod::quadrature::GAUSS;
+use crate::rod::{ElementData, Frame, RodState, Supports};
+use std::f64::consts::PI;
+
+/// The rest state, laid out from the start.
+pub fn rest_shape(elements: &[ElementData], start: Vec3, frame: Frame) -> RodState {
+    let mut frames = vec![frame];
+    let mut material = frame;
+    let mut angle = 0.0;
+    let mut angles = vec![0.0];
+    for data in elements {
+        let (mut k, mut twist) = ([0.0; 2], 0.0);
+        for (p, point) in GAUSS.iter().enumerate() {
+            k[0] += point.weight * data.rest_curvature[p][0];
+            k[1] += point.weight * data.rest_curvature[p][1];
+            twist += point.weight * data.rest_twist[p];
+        }
+        let turn = 0.5 * data.length * twist;
+        material = material.turned(turn).transported(k[0] * data.length, k[1] * data.length).turned(turn);
+        angle += 2.0 * turn;
+        frames.push(material);
+        angles.push(angle);
+    }
+    let mut state = RodState::from_frames(elements, start, frames);
+    state.angles = angles;
+    state
+}
+
+/// Constant curvature along d₁ and d₂ of the start.
+pub fn arc(elements: &[ElementData], start: Vec3, frame: Frame, curvature: [f64; 2]) -> RodState {
+    let mut frames = vec![frame];
+    let mut last = frame;
+    for data in elements {
+        last = last.transported(curvature[0] * data.length, curvature[1] * data.length);
+        frames.push(last);
+    }
+    RodState::from_frames(elements, start, frames)
+}
+
+/// A shape near one that meets the end: the rest shape or an arc, whichever comes closest, bowed where it is too straight for
+/// its span.
+pub fn towards_end(elements: &[ElementData], start: Vec3, frame: Frame, supports: &Supports) -> RodState {
+    let length: f64 = elements.iter().map(|e| e.length).sum();
+    // A pinned start may point at the end first.
+    let aim = supports.end_position - start;
+    let frame = if !supports.start_tangent && supports.end_directions.len() == 3 && aim.norm() > 1e-9 * length
+    {
+        frame.transported_to(&(aim / aim.norm()))
+    } else {
+        frame
+    };
+    let score = |s: &RodState| {
+        let g = supports.gaps(s);
+        let place = (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt() / length;
+        place + 0.3 * g[3].hypot(g[4])
+    };
+    let mut best = rest_shape(elements, start, frame);
+    let mut least = score(&best);
+    for step in 0..=24 {
+        let k = f64::from(step) * PI / 12.0 / length;
+        let ways = if step == 0 { 1 } else { 8 };
+        for way in 0..ways {
+            let (sin, cos) = (f64::from(way) * PI / 4.0).sin_cos();
+            let trial = arc(elements, start, frame, [k * cos, k * sin]);
+            let found = score(&trial);
+            // Only what is clearly better: symmetric choices must not depend on rounding.
+            if found < least - 1e-6 {
+                (best, least) = (trial, found);
+            }
+        }
+    }
+    let straight = best.frames.iter().all(|f| f.t.dot(&frame.t) > 1.0 - 1e-9);
+    if straight && supports.end_directions.len() == 3 {
+        let slack = (1.0 - aim.norm() / length).max(0.0);
+        if slack > 1e-12 {
+            // A bow of amplitude A shortens by A²/4.
+            let amplitude = 2.0 * slack.sqrt().min(0.7);
+            let mut s = 0.0;
+            let mut frames = Vec::with_capacity(elements.len() + 1);
+            for i in 0..=elements.len() {
+                let x = s / length;
+                let shape = if supports.start_tangent { (2.0 * PI * x).sin() } else { (PI * x).cos() };
+                frames.push(frame.transported(amplitude * shape, 0.0));
+                s += elements.get(i).map_or(0.0, |e| e.length);
+            }
+            best = RodState::from_frames(elements, start, frames);
+        }
+    }
+    best
+}

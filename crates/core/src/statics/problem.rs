@@ -1,0 +1,347 @@
+//! From a case to a mesh, supports and loads, and from Newton's result to a solution.
+
+use super::case::{EndKind, LoadKind, Section, StartKind, StaticCase};
+use super::guess;
+use super::loads::Loads;
+use super::solution::{Energies, Reaction, Reactions, StaticSolution};
+use crate::rod::quadrature::GAUSS;
+use crate::rod::{ElementData, EndAngle, Frame, Layout, PLAIN, RodState, Supports, TWISTED};
+use crate::solve::{External, Newton, NewtonOptions, NewtonReport};
+use crate::{Error, Result, Vec3};
+
+/// GJ/EI assumed where GJ is absent and turns out not to matter (a round wire with ν = 0.3).
+const ASSUMED_GJ_RATIO: f64 = 1.0 / 1.3;
+/// Twist energy above this part of the rest shows that GJ did matter.
+const TWIST_MATTERS: f64 = 1e-9;
+
+/// A static problem, ready to solve.
+#[derive(Debug, Clone)]
+pub struct StaticProblem {
+    /// The mesh.
+    pub elements: Vec<ElementData>,
+    /// What holds the ends.
+    pub supports: Supports,
+    /// Loads.
+    pub loads: Loads,
+    /// Shape the search starts from.
+    pub initial: RodState,
+    /// Whether angles are carried.
+    pub twisted: bool,
+    /// Settings of Newton's method.
+    pub options: NewtonOptions,
+    /// Number of load steps.
+    pub load_steps: usize,
+    gj_given: bool,
+}
+
+/// Result of the solver before it is written out.
+#[derive(Debug, Clone)]
+pub struct Solved {
+    /// Final state.
+    pub state: RodState,
+    /// Supports with their multipliers.
+    pub supports: Supports,
+    /// Report of the last load step; iterations count all.
+    pub report: NewtonReport,
+    /// Whether every accepted step of every load step lowered the energy.
+    pub monotone: bool,
+    /// Stored energies.
+    pub energy: Energies,
+    /// What the start exerts on the rod.
+    pub start: Reaction,
+}
+
+impl StaticProblem {
+    /// Builds the problem of a case.
+    pub fn new(case: &StaticCase) -> Result<Self> {
+        case.check()?;
+        let length = case.rod.length;
+        let mut breaks: Vec<f64> = vec![0.0, length];
+        breaks.extend(case.rod.section.iter().map(|s| s.until.min(length)));
+        for load in &case.load {
+            breaks.extend([load.at, load.from, load.to].into_iter().flatten());
+        }
+        breaks.sort_by(f64::total_cmp);
+        breaks.dedup_by(|b, a| *b - *a <= 1e-12 * length);
+        let nodes = spread(&breaks, case.rod.elements);
+        let elements = mesh(case, &nodes);
+        let node_at = |s: f64| {
+            let mut best = 0;
+            for (i, x) in nodes.iter().enumerate() {
+                if (x - s).abs() < (nodes[best] - s).abs() {
+                    best = i;
+                }
+            }
+            best
+        };
+
+        let tangent = Vec3::from(case.start.tangent);
+        let normal = case.start.normal.map_or_else(
+            || if tangent.normalize().y.abs() < 0.9 { Vec3::y() } else { Vec3::z() },
+            Vec3::from,
+        );
+        let frame = Frame::new(tangent, Some(normal));
+        let start = Vec3::from(case.start.position);
+        let mut loads = Loads::default();
+        for load in &case.load {
+            let value = Vec3::from(load.value);
+            let at = node_at(load.at.unwrap_or(length));
+            match load.kind {
+                LoadKind::Force => loads.forces.push((at, value)),
+                LoadKind::Moment => loads.moments.push((at, value)),
+                LoadKind::Follower => loads.followers.push((at, value)),
+                LoadKind::Distributed => loads.distributed.push((
+                    node_at(load.from.unwrap_or(0.0)),
+                    node_at(load.to.unwrap_or(length)),
+                    value,
+                )),
+            }
+        }
+
+        let gj_given = case.rod.section[0].gj.is_some();
+        let shaped = elements.iter().any(|e| e.rest_curvature != [[0.0; 2]; 3] || e.rest_twist != [0.0; 3]);
+        let holds = matches!(case.end.kind, EndKind::Clamped | EndKind::Guided);
+        let clamped = case.start.kind == StartKind::Clamped;
+        let turned = holds && clamped && (gj_given || case.end.turns.is_some_and(|t| t != 0.0));
+        let twisted = shaped
+            || turned
+            || !loads.moments.is_empty()
+            || loads.followers.iter().any(|(_, f)| f.y != 0.0 || f.z != 0.0);
+
+        let mut supports = Supports { start_tangent: clamped, start_angle: clamped, ..Supports::default() };
+        if let Some(p) = case.end.position {
+            supports.end_position = Vec3::from(p);
+            supports.end_directions = match case.end.slide {
+                None => vec![Vec3::x(), Vec3::y(), Vec3::z()],
+                Some(s) => {
+                    let across = Frame::new(Vec3::from(s), None);
+                    vec![across.u, across.v]
+                }
+            };
+        }
+        if holds {
+            let end = Frame::new(
+                case.end.tangent.map_or(frame.t, Vec3::from),
+                Some(case.end.normal.map_or(frame.u, Vec3::from)),
+            );
+            supports.end_tangent = Some(end.t);
+            if twisted {
+                let turns = case.end.turns.unwrap_or(0.0);
+                supports.end_angle = Some(EndAngle { normal: end.u, turns, target: 0.0 });
+            }
+        }
+        let initial = match &case.initial {
+            Some(shape) => guess::arc(&elements, start, frame, shape.curvature),
+            None if supports.conditions() > 0 => guess::towards_end(&elements, start, frame, &supports),
+            None => guess::rest_shape(&elements, start, frame),
+        };
+        let options =
+            NewtonOptions { max_iterations: case.solver.max_iterations, ..NewtonOptions::default() };
+        let load_steps = case.solver.load_steps;
+        Ok(Self { elements, supports, loads, initial, twisted, options, load_steps, gj_given })
+    }
+
+    /// Adds a constant force along the end's tangent that load factors leave alone.
+    pub fn pulled_by(&mut self, tension: f64) {
+        let n = self.elements.len();
+        self.loads.constant.push((n, self.initial.frames[n].t * tension));
+    }
+
+    /// Solves from the initial shape.
+    pub fn solve(&self) -> Result<StaticSolution> {
+        let solved = self.solve_state()?;
+        Ok(self.solution(&solved))
+    }
+
+    /// Solves from the initial shape and returns the state itself.
+    pub fn solve_state(&self) -> Result<Solved> {
+        let solved = if self.twisted { self.run::<TWISTED>() } else { self.run::<PLAIN>() };
+        let energy = &solved.energy;
+        if self.twisted && !self.gj_given && energy.twist > TWIST_MATTERS * (energy.total + energy.load.abs())
+        {
+            return Err(Error::parameter(
+                "rod.section.GJ",
+                "missing",
+                "this case twists the rod: give the torsion stiffness GJ in every section",
+            ));
+        }
+        Ok(solved)
+    }
+
+    fn run<const C: usize>(&self) -> Solved {
+        let mut newton = Newton::<C>::new(self.elements.len());
+        let mut state = self.initial.clone();
+        let mut supports = self.supports.clone();
+        if let (Some(end), true) = (supports.end_angle, supports.start_angle) {
+            // Spread the rotation: a straight rod is then twisted without one step.
+            supports.begin(&state);
+            let target = supports.end_angle.map_or(end.target, |e| e.target);
+            let total: f64 = self.elements.iter().map(|e| e.length).sum();
+            let change = target - state.angles[self.elements.len()];
+            let mut s = 0.0;
+            for i in 0..=self.elements.len() {
+                state.angles[i] += change * s / total;
+                s += self.elements.get(i).map_or(0.0, |e| e.length);
+            }
+        } else {
+            supports.begin(&state);
+        }
+        let mut loads = self.loads.clone();
+        let mut iterations = 0;
+        let mut monotone = true;
+        let mut last = None;
+        for step in 1..=self.load_steps {
+            loads.factor = self.loads.factor * step as f64 / self.load_steps as f64;
+            let report = newton.solve(&self.elements, &mut supports, &mut loads, &mut state, &self.options);
+            iterations += report.iterations;
+            monotone &= !External::<C>::conservative(&loads)
+                || report.steps.iter().all(|s| s.merit_change <= 1e-12 * s.energy_scale);
+            let failed = !report.converged;
+            last = Some(report);
+            if failed {
+                break;
+            }
+        }
+        let mut report = last.unwrap_or_else(|| {
+            newton.solve(&self.elements, &mut supports, &mut loads, &mut state, &self.options)
+        });
+        report.iterations = iterations;
+        newton.assemble(&self.elements, &supports, &mut loads, &state);
+        let stored = newton.assembly.energy;
+        let energy = Energies {
+            bend: stored.bend,
+            twist: stored.twist,
+            axial: stored.axial,
+            total: stored.total(),
+            load: External::<C>::energy(&mut loads, &self.elements, &state),
+        };
+        let l = Layout::<C>;
+        let r = &newton.start_residual;
+        let x = l.position(0);
+        let t = l.tangent(0);
+        let frame = &state.frames[0];
+        let torque = if Layout::<C>::TWIST { r[l.angle(0)] } else { 0.0 };
+        let moment = frame.v * r[t] - frame.u * r[t + 1] + frame.t * torque;
+        let start = Reaction {
+            force: [r[x], r[x + 1], r[x + 2]],
+            moment: if supports.start_tangent { moment.into() } else { [0.0; 3] },
+            torque: if supports.start_tangent { torque } else { 0.0 },
+        };
+        Solved { state, supports, report, monotone, energy, start }
+    }
+
+    /// Writes a solved state out.
+    pub fn solution(&self, solved: &Solved) -> StaticSolution {
+        let state = &solved.state;
+        let n = self.elements.len();
+        let frame = &state.frames[n];
+        let m = &solved.supports.multipliers;
+        let mut force = Vec3::zeros();
+        for (q, value) in solved.supports.end_directions.iter().zip(m) {
+            force -= q * *value;
+        }
+        let moment = -(frame.v * m[3] - frame.u * m[4] + frame.t * m[5]);
+        let mut arc = 0.0;
+        let mut arc_lengths = vec![0.0];
+        for e in &self.elements {
+            arc += e.length;
+            arc_lengths.push(arc);
+        }
+        let twist = state.angles[n] - state.angles[0] + state.reference_twists.iter().sum::<f64>();
+        let report = &solved.report;
+        let (a, b) = (&state.frames[0].t, &frame.t);
+        StaticSolution {
+            tip: state.positions[n].into(),
+            tip_tangent: frame.t.into(),
+            tip_angle: a.cross(b).norm().atan2(a.dot(b)),
+            arc_lengths,
+            nodes: state.positions.iter().map(|p| (*p).into()).collect(),
+            tangents: state.frames.iter().map(|f| f.t.into()).collect(),
+            normals: (0..=n).map(|i| state.material_frame(i).u.into()).collect(),
+            twist: if self.twisted { twist } else { 0.0 },
+            tensions: state.tensions.clone(),
+            energy: solved.energy,
+            reactions: Reactions {
+                start: solved.start,
+                end: Reaction { force: force.into(), moment: moment.into(), torque: -m[5] },
+            },
+            iterations: report.iterations,
+            residual: report.residual,
+            inertia: [report.inertia.positive, report.inertia.negative],
+            negative_modes: report.inertia.negative.saturating_sub(report.multipliers),
+            stable: report.stable,
+            converged: report.converged,
+            stop: report.reason.to_string(),
+            twisted: self.twisted,
+            monotone: solved.monotone,
+        }
+    }
+}
+
+/// Nodes such that every break is one, `elements` of them if that is enough, as even as can be.
+fn spread(breaks: &[f64], elements: usize) -> Vec<f64> {
+    let length = breaks[breaks.len() - 1];
+    let mut counts: Vec<usize> = breaks
+        .windows(2)
+        .map(|w| (((w[1] - w[0]) / length * elements as f64).floor() as usize).max(1))
+        .collect();
+    let mut used: usize = counts.iter().sum();
+    while used < elements {
+        // One more where elements are longest.
+        let mut best = 0;
+        for k in 0..counts.len() {
+            let size = |k: usize| (breaks[k + 1] - breaks[k]) / counts[k] as f64;
+            if size(k) > size(best) * (1.0 + 1e-9) {
+                best = k;
+            }
+        }
+        counts[best] += 1;
+        used += 1;
+    }
+    let mut nodes = vec![0.0];
+    for (w, count) in breaks.windows(2).zip(&counts) {
+        for k in 1..=*count {
+            nodes.push(w[0] + (w[1] - w[0]) * k as f64 / *count as f64);
+        }
+    }
+    nodes
+}
+
+fn mesh(case: &StaticCase, nodes: &[f64]) -> Vec<ElementData> {
+    let mut out = Vec::with_capacity(nodes.len() - 1);
+    for w in nodes.windows(2) {
+        let middle = 0.5 * (w[0] + w[1]);
+        let k = case.rod.section.iter().position(|s| middle < s.until).unwrap_or(case.rod.section.len() - 1);
+        let section = &case.rod.section[k];
+        let begin = if k == 0 { 0.0 } else { case.rod.section[k - 1].until };
+        out.push(element(section, begin, w[0], w[1]));
+    }
+    out
+}
+
+/// An element of a section that begins at `begin`.
+fn element(section: &Section, begin: f64, from: f64, to: f64) -> ElementData {
+    let h = to - from;
+    let mut data = ElementData {
+        length: h,
+        bending: [0.0; 3],
+        torsion: [0.0; 3],
+        rest_curvature: [[0.0; 2]; 3],
+        rest_twist: [section.rest_twist; 3],
+        flexibility: 0.0,
+    };
+    for (p, point) in GAUSS.iter().enumerate() {
+        let w = ((from + point.xi * h - begin) / (section.until - begin)).clamp(0.0, 1.0);
+        let mix = |a: f64, b: Option<f64>| a + w * (b.unwrap_or(a) - a);
+        data.bending[p] = mix(section.ei, section.ei_end);
+        data.torsion[p] = section.gj.map_or(ASSUMED_GJ_RATIO * data.bending[p], |gj| mix(gj, section.gj_end));
+        let end = section.rest_curvature_end.unwrap_or(section.rest_curvature);
+        for a in 0..2 {
+            data.rest_curvature[p][a] = mix(section.rest_curvature[a], Some(end[a]));
+        }
+        if let Some(ea) = section.ea {
+            data.flexibility += point.weight * h / mix(ea, section.ea_end);
+        }
+    }
+    data
+}

@@ -1,0 +1,97 @@
+//! What a static problem returns.
+
+use serde::Serialize;
+
+/// Energies of the rod.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Energies {
+    /// Bending.
+    pub bend: f64,
+    /// Twist.
+    pub twist: f64,
+    /// Stretch.
+    pub axial: f64,
+    /// The sum of the three.
+    pub total: f64,
+    /// Potential of dead forces, zero at the start of the rod.
+    pub load: f64,
+}
+
+/// What a support exerts on the rod.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Reaction {
+    /// Force.
+    pub force: [f64; 3],
+    /// Moment about the support, including torque.
+    pub moment: [f64; 3],
+    /// Its part along the tangent.
+    pub torque: f64,
+}
+
+/// Reactions at both ends.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Reactions {
+    /// At the start.
+    pub start: Reaction,
+    /// At the end; zero where it is free.
+    pub end: Reaction,
+}
+
+/// A solved case.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StaticSolution {
+    /// Position of the end.
+    pub tip: [f64; 3],
+    /// Tangent of the end.
+    pub tip_tangent: [f64; 3],
+    /// Angle between the tangents of start and end, in radians, 0 to π.
+    pub tip_angle: f64,
+    /// Arc length of the nodes.
+    pub arc_lengths: Vec<f64>,
+    /// Positions of the nodes.
+    pub nodes: Vec<[f64; 3]>,
+    /// Tangents of the nodes.
+    pub tangents: Vec<[f64; 3]>,
+    /// Material directions d₁ of the nodes; of a rod that carries no angles, the untwisted reference.
+    pub normals: Vec<[f64; 3]>,
+    /// Twist of the whole rod in radians, any number of turns; zero where the rod carries no angles.
+    pub twist: f64,
+    /// Axial force of the elements.
+    pub tensions: Vec<f64>,
+    /// Energies.
+    pub energy: Energies,
+    /// Reactions.
+    pub reactions: Reactions,
+    /// Newton iterations, all load steps together.
+    pub iterations: usize,
+    /// Largest residual over the force scale.
+    pub residual: f64,
+    /// Positive and negative pivots of the final matrix.
+    pub inertia: [usize; 2],
+    /// Negative pivots beyond those of the multipliers: dimension of the unstable space.
+    pub negative_modes: usize,
+    /// Whether the state is a minimum of the energy. With loads that have no potential (moments, followers) this speaks of
+    /// the symmetric part of the stiffness.
+    pub stable: bool,
+    /// Whether the state is an equilibrium.
+    pub converged: bool,
+    /// Why the iteration stopped.
+    pub stop: String,
+    /// Whether the rod carried angles.
+    pub twisted: bool,
+    /// Whether the energy fell at every accepted step (to rounding); true where loads have no potential to fall.
+    pub monotone: bool,
+}
+
+impl StaticSolution {
+    /// Itself if it is an equilibrium, an error that says why not otherwise.
+    pub fn checked(self) -> crate::Result<Self> {
+        if self.converged {
+            return Ok(self);
+        }
+        Err(crate::Error::Computation(format!(
+            "no equilibrium after {} iterations, residual {:.1e}: {}",
+            self.iterations, self.residual, self.stop
+        )))
+    }
+}

@@ -1,0 +1,231 @@
+//! Checks of a case before anything is computed. Every error names the key at fault.
+
+use super::case::{EndKind, LoadKind, Section, StaticCase};
+use crate::{Error, Result, Vec3};
+
+/// Most elements a case may ask for: far beyond use, far below what exhausts memory.
+const MAX_ELEMENTS: usize = 1_000_000;
+
+fn positive(name: &str, value: f64) -> Result<()> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(Error::parameter(name, value, "must be a positive, finite number"))
+}
+
+fn finite(name: &str, values: &[f64]) -> Result<()> {
+    for v in values {
+        if !v.is_finite() {
+            return Err(Error::parameter(name, v, "must be a finite number"));
+        }
+    }
+    Ok(())
+}
+
+fn direction(name: &str, value: &[f64; 3]) -> Result<()> {
+    finite(name, value)?;
+    if Vec3::from(*value).norm() < 1e-12 {
+        return Err(Error::parameter(name, format!("{value:?}"), "is a direction and must not be zero"));
+    }
+    Ok(())
+}
+
+fn across(name: &str, normal: &[f64; 3], tangent: &[f64; 3]) -> Result<()> {
+    direction(name, normal)?;
+    let (n, t) = (Vec3::from(*normal).normalize(), Vec3::from(*tangent).normalize());
+    if n.cross(&t).norm() < 1e-6 {
+        return Err(Error::parameter(
+            name,
+            format!("{normal:?}"),
+            "is along the tangent; give a direction across it",
+        ));
+    }
+    Ok(())
+}
+
+impl StaticCase {
+    /// Checks every value and that none contradicts another.
+    pub fn check(&self) -> Result<()> {
+        let length = self.rod.length;
+        positive("rod.length", length)?;
+        if self.rod.elements == 0 || self.rod.elements > MAX_ELEMENTS {
+            return Err(Error::parameter(
+                "rod.elements",
+                self.rod.elements,
+                format!("must be 1 to {MAX_ELEMENTS}"),
+            ));
+        }
+        self.check_sections()?;
+        direction("start.tangent", &self.start.tangent)?;
+        finite("start.position", &self.start.position)?;
+        if let Some(n) = &self.start.normal {
+            across("start.normal", n, &self.start.tangent)?;
+        }
+        self.check_end()?;
+        for (k, load) in self.load.iter().enumerate() {
+            let name = |key: &str| format!("load[{k}].{key}");
+            finite(&name("value"), &load.value)?;
+            let span = |key: &str, s: Option<f64>| match s {
+                Some(s) if !(0.0..=length).contains(&s) => {
+                    Err(Error::parameter(name(key), s, format!("must lie on the rod, 0 to {length}")))
+                }
+                _ => Ok(()),
+            };
+            span("at", load.at)?;
+            span("from", load.from)?;
+            span("to", load.to)?;
+            let spread = load.kind == LoadKind::Distributed;
+            if spread && load.at.is_some() {
+                return Err(Error::parameter(
+                    name("at"),
+                    "given",
+                    "a distributed load has no point; use from and to",
+                ));
+            }
+            if !spread && (load.from.is_some() || load.to.is_some()) {
+                return Err(Error::parameter(
+                    name("from"),
+                    "given",
+                    "only a distributed load has from and to; use at",
+                ));
+            }
+            if load.from.unwrap_or(0.0) >= load.to.unwrap_or(length) {
+                return Err(Error::parameter(name("from"), load.from.unwrap_or(0.0), "must be less than to"));
+            }
+        }
+        if let Some(initial) = &self.initial {
+            finite("initial.curvature", &initial.curvature)?;
+        }
+        if self.solver.max_iterations == 0
+            || self.solver.load_steps == 0
+            || self.solver.load_steps > 1_000_000
+        {
+            return Err(Error::parameter("solver", "0", "max_iterations and load_steps must be at least 1"));
+        }
+        Ok(())
+    }
+
+    fn check_sections(&self) -> Result<()> {
+        let length = self.rod.length;
+        if self.rod.section.is_empty() {
+            return Err(Error::parameter("rod.section", "none", "a rod has at least one [[rod.section]]"));
+        }
+        let mut begin = 0.0;
+        for (k, section) in self.rod.section.iter().enumerate() {
+            let name = |key: &str| format!("rod.section[{k}].{key}");
+            positive(&name("until"), section.until)?;
+            if section.until <= begin || section.until > length * (1.0 + 1e-9) {
+                return Err(Error::parameter(
+                    name("until"),
+                    section.until,
+                    format!("sections come in order: more than {begin}, at most the length {length}"),
+                ));
+            }
+            begin = section.until;
+            let Section { ei, ei_end, gj, gj_end, ea, ea_end, .. } = section;
+            positive(&name("EI"), *ei)?;
+            for (key, value) in
+                [("EI_end", ei_end), ("GJ", gj), ("GJ_end", gj_end), ("EA", ea), ("EA_end", ea_end)]
+            {
+                if let Some(value) = value {
+                    positive(&name(key), *value)?;
+                }
+            }
+            for (key, end, begin) in [("GJ_end", gj_end, gj), ("EA_end", ea_end, ea)] {
+                if end.is_some() && begin.is_none() {
+                    return Err(Error::parameter(
+                        name(key),
+                        "given",
+                        "needs the value at the section's begin too",
+                    ));
+                }
+            }
+            finite(&name("rest_curvature"), &section.rest_curvature)?;
+            finite(&name("rest_curvature_end"), &section.rest_curvature_end.unwrap_or_default())?;
+            finite(&name("rest_twist"), &[section.rest_twist])?;
+        }
+        if (begin - length).abs() > 1e-9 * length {
+            return Err(Error::parameter(
+                format!("rod.section[{}].until", self.rod.section.len() - 1),
+                begin,
+                format!("the last section must end at the rod's length {length}"),
+            ));
+        }
+        let known = self.rod.section.iter().filter(|s| s.gj.is_some()).count();
+        if known != 0 && known != self.rod.section.len() {
+            return Err(Error::parameter(
+                "rod.section.GJ",
+                "missing in some sections",
+                "give it in all or in none",
+            ));
+        }
+        Ok(())
+    }
+
+    fn check_end(&self) -> Result<()> {
+        let end = &self.end;
+        let wrong = |key: &str, mend: &str| {
+            Err(Error::parameter(
+                format!("end.{key}"),
+                format!("given with type {:?}", end.kind).to_lowercase(),
+                mend,
+            ))
+        };
+        if end.kind == EndKind::Free || end.kind == EndKind::Guided {
+            if end.position.is_some() {
+                return wrong("position", "this end is free to move; use clamped or pinned");
+            }
+            if end.slide.is_some() {
+                return wrong("slide", "this end is free to move already");
+            }
+        }
+        if end.kind == EndKind::Free || end.kind == EndKind::Pinned {
+            if end.tangent.is_some() {
+                return wrong("tangent", "this end is free to turn; use clamped or guided");
+            }
+            if end.normal.is_some() {
+                return wrong("normal", "this end is free to turn; use clamped or guided");
+            }
+            if end.turns.is_some() {
+                return wrong("turns", "this end is free to turn; use clamped or guided");
+            }
+        }
+        if end.kind == EndKind::Pinned && end.position.is_none() {
+            return Err(Error::parameter("end.position", "missing", "a pinned end needs its position"));
+        }
+        if end.slide.is_some() && end.position.is_none() {
+            return wrong("slide", "needs a position to slide from");
+        }
+        if let Some(t) = &end.tangent {
+            direction("end.tangent", t)?;
+        }
+        if let Some(s) = &end.slide {
+            direction("end.slide", s)?;
+        }
+        if let Some(n) = &end.normal {
+            across("end.normal", n, &end.tangent.unwrap_or(self.start.tangent))?;
+        }
+        finite("end.turns", &[end.turns.unwrap_or(0.0)])?;
+        if let Some(p) = &end.position {
+            finite("end.position", p)?;
+            let mut span = Vec3::from(*p) - Vec3::from(self.start.position);
+            if let Some(s) = &end.slide {
+                let s = Vec3::from(*s).normalize();
+                span -= s * s.dot(&span);
+            }
+            let inextensible = self.rod.section.iter().all(|s| s.ea.is_none());
+            if inextensible && span.norm() > self.rod.length * (1.0 + 1e-12) {
+                return Err(Error::parameter(
+                    "end.position",
+                    format!("{p:?}"),
+                    format!(
+                        "is {} away from the start, but the rod is inextensible and {} long; bring it nearer or give EA",
+                        span.norm(),
+                        self.rod.length
+                    ),
+                ));
+            }
+        }
+        Ok(())
+    }
+}
