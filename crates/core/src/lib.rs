@@ -5,6 +5,7 @@
 //! A scene file becomes a [`scene::Scene`], that builds an [`insertion::Simulation`], which is stepped by
 //! [`insertion::Command`]s and always tells its [`shape::Shape`] and an [`insertion::StepReport`].
 
+pub mod contact;
 pub mod device;
 pub mod error;
 pub mod insertion;

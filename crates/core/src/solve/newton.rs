@@ -30,6 +30,10 @@ pub trait External<const C: usize> {
     fn conservative(&self) -> bool {
         true
     }
+    /// Part of the way from the state last given to [`External::add`] to `to` that crosses nothing.
+    fn safe_fraction(&mut self, _elements: &[ElementData], _to: &RodState) -> f64 {
+        1.0
+    }
     /// Size of the forces and moments it exerts, for the scale of the residual.
     fn scale(&self) -> [f64; 2] {
         [0.0; 2]
@@ -364,6 +368,14 @@ impl<const C: usize> Newton<C> {
             }
             for attempt in 0..24 {
                 self.trial.advance::<C>(elements, state, &self.step, alpha);
+                for _ in 0..4 {
+                    let safe = external.safe_fraction(elements, &self.trial);
+                    if safe >= 1.0 {
+                        break;
+                    }
+                    alpha *= safe;
+                    self.trial.advance::<C>(elements, state, &self.step, alpha);
+                }
                 if supports.conditions() > 0 {
                     self.correct(elements, supports, first);
                 }

@@ -1,0 +1,9 @@
+//! What the wall does to a device: distance, energy, friction.
+
+pub mod distance;
+pub mod potential;
+pub mod wall;
+
+pub use distance::{Distance, Foot, SmoothWall};
+pub use potential::WallPotential;
+pub use wall::{ContactPoint, Counters, WallContact};
