@@ -51,7 +51,9 @@ fn element(c: &mut Criterion) {
         stretch: [0.0; 11],
         energy: Energy::default(),
     };
-    group.bench_function("system", |b| b.iter(|| element_system(&elements[1], black_box(&s), &mut plain)));
+    group.bench_function("system", |b| {
+        b.iter(|| element_system(&elements[1], black_box(&s), &mut plain));
+    });
     let mut full = ElementSystem::<14> {
         gradient: [0.0; 14],
         hessian: [[0.0; 14]; 14],
@@ -59,7 +61,7 @@ fn element(c: &mut Criterion) {
         energy: Energy::default(),
     };
     group.bench_function("system twisted", |b| {
-        b.iter(|| element_system(&elements[1], black_box(&s), &mut full))
+        b.iter(|| element_system(&elements[1], black_box(&s), &mut full));
     });
     group.finish();
 }

@@ -10,11 +10,11 @@ fn folder() -> std::path::PathBuf {
 }
 
 fn case(name: &str) -> StaticCase {
-    StaticCase::from_file(&folder().join(format!("{name}.toml"))).unwrap()
+    StaticCase::from_file(&folder().join(format!("{name}.toml"))).expect("an example case is valid")
 }
 
 fn solve(name: &str) -> StaticSolution {
-    case(name).solve().unwrap()
+    case(name).solve().expect("an example case is solvable")
 }
 
 fn parse(text: &str) -> Result<StaticCase, endowire_core::Error> {
@@ -61,7 +61,7 @@ fn imbalance(case: &StaticCase, s: &StaticSolution) -> f64 {
     for load in &case.load {
         let value = Vec3::from(load.value);
         let at = load.at.unwrap_or(case.rod.length);
-        let node = s.arc_lengths.iter().position(|x| (x - at).abs() < 1e-9).unwrap();
+        let node = s.arc_lengths.iter().position(|x| (x - at).abs() < 1e-9).expect("loads stand at nodes");
         if load.kind == LoadKind::Force {
             force += value;
             moment += Vec3::from(s.nodes[node]).cross(&value);
@@ -206,4 +206,38 @@ fn a_follower_across_the_tip_never_loses_stability() {
         let s = c.solve().unwrap();
         assert!(s.converged && s.stable && s.iterations < 20, "{p}: {} {}", s.stop, s.iterations);
     }
+}
+
+#[test]
+fn continuation_passes_the_limit_point_of_a_shallow_arch() {
+    // A clamped arch pushed down at its crown: the load rises, falls and rises again.
+    let mut c = case("ring");
+    c.rod.section[0].gj = None;
+    c.end.turns = None;
+    c.initial = None;
+    c.rod.section[0].rest_curvature = [0.0; 2];
+    c.end.position = Some([0.98, 0.0, 0.0]);
+    let bow = c.solve().unwrap();
+    let crown = bow.nodes[16];
+    let up = if crown[1].abs() > crown[2].abs() {
+        [0.0, -crown[1].signum(), 0.0]
+    } else {
+        [0.0, 0.0, -crown[2].signum()]
+    };
+    c.load = vec![endowire_core::statics::Load {
+        kind: LoadKind::Force,
+        at: Some(0.5),
+        from: None,
+        to: None,
+        value: up,
+    }];
+    let problem = endowire_core::statics::StaticProblem::new(&c).unwrap();
+    let path = problem.continuation(0.004, 90).unwrap();
+    let highest = path.iter().map(|p| p.factor).fold(0.0, f64::max);
+    let at = path.iter().position(|p| p.factor == highest).unwrap();
+    assert!(highest > 1.0 && at > 2 && at < path.len() - 10, "highest {highest} at {at} of {}", path.len());
+    assert!(path[at..].iter().any(|p| p.factor < 0.5 * highest), "the load must fall beyond the limit point");
+    assert!(path.iter().all(|p| p.residual < 1e-7));
+    // In space the arch may also roll over sideways; the limit point adds one more unstable direction.
+    assert!(path[at + 2].negative_modes > path[at - 2].negative_modes);
 }

@@ -12,8 +12,9 @@ use super::state::RodState;
 use crate::Vec3;
 use crate::solve::BandMatrix;
 
-/// Flexibility of the end supports, as a fraction of the rod's own.
-const SUPPORT_FLEXIBILITY: f64 = 1e-9;
+/// Flexibility of the end supports, as a fraction of the rod's own: above rounding, and so far below the shift that is always on
+/// that a shape which can turn freely between its supports still counts as neutral.
+const SUPPORT_FLEXIBILITY: f64 = 1e-12;
 
 /// Supports of both ends.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -192,6 +192,28 @@ impl<const C: usize> Newton<C> {
         self.factor.factor(&self.shifted).ok()
     }
 
+    /// Factors the assembled matrix with the shift that is always on, for [`Self::apply_inverse`].
+    pub fn factor(&mut self, elements: &[ElementData], supports: &Supports) -> Option<Inertia> {
+        self.inertia(elements, supports, Self::whisper(elements))
+    }
+
+    /// Replaces a right-hand side by the step that answers it, with the matrix factored last.
+    pub fn apply_inverse(&self, elements: &[ElementData], b: &mut [f64]) {
+        self.factor.solve(b);
+        Self::restore_tensions(elements, b);
+    }
+
+    /// Relative residual of the assembled system, and whether it is below `tolerance` or rounding in every row.
+    pub fn relative_residual(
+        &self,
+        elements: &[ElementData],
+        external: &dyn External<C>,
+        supports: &Supports,
+        tolerance: f64,
+    ) -> (f64, bool) {
+        self.residual(elements, external, supports, tolerance)
+    }
+
     /// The shift that is always on.
     pub fn whisper(elements: &[ElementData]) -> f64 {
         let length: f64 = elements.iter().map(|e| e.length).sum();
