@@ -12,12 +12,10 @@
 //! x = q(λ) + s M(λ),  d(x) = s |M|   the distance of x: three equations for λ and s
 //! ```
 //!
-//! With y = (λ₁, λ₂, s), G(y) = q + sM, φ(y) = s|M| and rows rₖ of (∂G/∂y)⁻¹, implicit differentiation gives the
-//! derivatives of d exactly:
-//!
-//! ```text
-//! ∇d = Σ φₖ rₖ,     ∇∇d = Σ (φₖₗ − ∇d·Gₖₗ) rₖ rₗᵀ
-//! ```
+//! The patches meet without gaps and so do their normals, but they are bent a little across their edges, so ∇d differs from
+//! n = M/|M| by a third-order angle that jumps there. What pushes a device must not jump: with ∇d itself a point can
+//! come to rest in an edge, where no equilibrium exists. The force acts along n, which is continuous, and its derivative is
+//! that of n: with rows rₖ of (∂x/∂(λ₁, λ₂, s))⁻¹, ∂n/∂x = (I − nnᵀ) Σ ∂M/∂λₖ rₖ / |M|.
 //!
 //! A point walks from triangle to triangle until its foot lies inside one; between steps of a device that is one or two
 //! triangles, so the bounding volume hierarchy is asked only where something new may have come near.
@@ -50,10 +48,10 @@ pub struct Foot {
 pub struct Distance {
     /// Distance d, mm.
     pub value_mm: f64,
-    /// ∇d: into the lumen, nearly of unit length.
-    pub gradient: Vec3,
-    /// ∇∇d, 1/mm.
-    pub hessian: Matrix3<f64>,
+    /// Direction n of the wall's force: into the lumen, unit length, continuous.
+    pub normal: Vec3,
+    /// The symmetric part of ∂n/∂x, 1/mm.
+    pub curvature: Matrix3<f64>,
 }
 
 /// One triangle's patch.
@@ -183,27 +181,15 @@ impl SmoothWall {
         let patch = &self.patches[foot.triangle as usize];
         let local = patch.local(&foot.coordinates);
         let r = inverse_rows(&local.first)?;
-        let s = foot.coordinates[2];
         let size = local.normal.norm();
-        let m = local.normal / size;
-        let [ma, mb] = local.normal_rates;
-        let (da, db) = (m.dot(&ma), m.dot(&mb));
-        let gradient = r[0] * (s * da) + r[1] * (s * db) + r[2] * size;
-        let [c01, c12, c20] = patch.correction;
-        let bend = |p: &Vec3, q: &Vec3, dp: f64, dq: f64| s * (p.dot(q) - dp * dq) / size;
-        let h = [
-            [bend(&ma, &ma, da, da) - gradient.dot(&(c01 * 2.0)), bend(&ma, &mb, da, db) - gradient.dot(&(c01 - c12 + c20)), da - gradient.dot(&ma)],
-            [0.0, bend(&mb, &mb, db, db) - gradient.dot(&(c20 * 2.0)), db - gradient.dot(&mb)],
-        ];
-        let mut hessian = Matrix3::zeros();
+        let normal = local.normal / size;
+        let mut rate = Matrix3::zeros();
         for k in 0..2 {
-            hessian += r[k] * r[k].transpose() * h[k][k];
-            for l in k + 1..3 {
-                let mixed = r[k] * r[l].transpose() * h[k][l];
-                hessian += mixed + mixed.transpose();
-            }
+            let across = local.normal_rates[k] - normal * normal.dot(&local.normal_rates[k]);
+            rate += across * (r[k] / size).transpose();
         }
-        Some(Distance { value_mm: s * size, gradient, hessian })
+        let curvature = (rate + rate.transpose()) * 0.5;
+        Some(Distance { value_mm: foot.coordinates[2] * size, normal, curvature })
     }
 }
 

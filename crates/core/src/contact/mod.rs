@@ -6,4 +6,4 @@ pub mod wall;
 
 pub use distance::{Distance, Foot, SmoothWall};
 pub use potential::WallPotential;
-pub use wall::{ContactPoint, Counters, WallContact};
+pub use wall::{ContactPoint, Counters, KnownPoint, WallContact};

@@ -67,6 +67,15 @@ pub struct Counters {
     pub avoided: u64,
 }
 
+impl Counters {
+    /// Adds another count.
+    pub fn add(&mut self, other: &Self) {
+        self.queries += other.queries;
+        self.walked += other.walked;
+        self.avoided += other.avoided;
+    }
+}
+
 /// How near a point stands.
 #[derive(Debug, Clone, Copy)]
 enum Reading {
@@ -162,8 +171,8 @@ impl<'a> WallContact<'a> {
         known.foot = self.wall.walk(x, &self.wall.start(x, nearest.triangle));
         let distance = known.foot.and_then(|foot| self.wall.distance(&foot)).unwrap_or(Distance {
             value_mm: nearest.distance_mm,
-            gradient: nearest.normal,
-            hessian: Matrix3::zeros(),
+            normal: nearest.normal,
+            curvature: Matrix3::zeros(),
         });
         if distance.value_mm > 0.0 { Reading::Near(distance) } else { Reading::Outside }
     }
@@ -223,8 +232,8 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let w = point.weight_mm;
             assembly.external_energy += w * point.potential.value(d.value_mm);
             let (first, second) = point.potential.derivatives(d.value_mm);
-            let gradient = d.gradient * (w * first);
-            let hessian = d.gradient * d.gradient.transpose() * (w * second) + d.hessian * (w * first);
+            let gradient = d.normal * (w * first);
+            let hessian = d.normal * d.normal.transpose() * (w * second) + d.curvature * (w * first);
             let e = point.element;
             if point.xi == 1.0 {
                 assembly.add_node(e + 1, &gradient, &hessian);
@@ -232,6 +241,10 @@ impl<const C: usize> External<C> for WallContact<'_> {
                 assembly.add_point(state, &elements[e], e, point.xi, &gradient, &hessian);
             }
         }
+    }
+
+    fn rough(&self) -> bool {
+        true
     }
 
     /// A point may move by nearly its clearance: the ball about it holds no wall, so no wall is crossed on the way.

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::Vec3;
+use crate::contact::Counters;
 
 /// The terms of the total potential energy, mJ.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -59,6 +60,12 @@ pub struct StepReport {
     pub contacts: Vec<Contact>,
     /// Iterations (linear solves) of this step.
     pub iterations: u32,
+    /// Parts that the command was cut into.
+    pub substeps: u32,
+    /// Whether the device jumped to a lower minimum: it set free energy that the hand had put in.
+    pub jumped: bool,
+    /// Wall queries made and avoided since the start.
+    pub counters: Counters,
     /// Whether the step met the method's own convergence test.
     pub converged: bool,
 }

@@ -7,7 +7,7 @@ use serde::de::IgnoredAny;
 
 use super::parse::from_toml;
 use crate::device::{Device, Section};
-use crate::insertion::{Command, ScriptLine, Sheath, Simulation, check_commands, commands};
+use crate::insertion::{Command, ScriptLine, Sheath, Simulation, WallProperties, check_commands, commands};
 use crate::methods::MethodChoice;
 use crate::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall};
 use crate::{Error, Result, Vec3};
@@ -57,6 +57,9 @@ pub struct VesselSpec {
     pub edge_mm: Option<f64>,
     /// Number of triangles of the wall built from the tree, in place of `edge_mm`.
     pub triangles: Option<usize>,
+    /// How the wall yields and rubs.
+    #[serde(default)]
+    pub wall: WallProperties,
 }
 
 impl VesselSpec {
@@ -246,7 +249,7 @@ impl Scene {
     pub fn simulation(&self) -> Result<Simulation> {
         let wall = self.wall()?;
         let sheath = self.sheath(&wall)?;
-        Simulation::new(wall, self.device()?, sheath, &self.method).map_err(|error| match error {
+        Simulation::with_properties(wall, self.vessel.wall, self.device()?, sheath, &self.method).map_err(|error| match error {
             // What is wrong with a surface is wrong with its file.
             Error::Mesh(reason) => {
                 self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason))

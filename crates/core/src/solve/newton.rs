@@ -30,6 +30,11 @@ pub trait External<const C: usize> {
     fn conservative(&self) -> bool {
         true
     }
+    /// Whether the forces are only nearly those of the energy: near an equilibrium a smaller residual then counts as much
+    /// as a lower energy.
+    fn rough(&self) -> bool {
+        false
+    }
     /// Part of the way from the state last given to [`External::add`] to `to` that crosses nothing.
     fn safe_fraction(&mut self, _elements: &[ElementData], _to: &RodState) -> f64 {
         1.0
@@ -420,7 +425,7 @@ impl<const C: usize> Newton<C> {
                 // Where loads have no potential a smaller residual is as good; it costs an assembly, so it is asked last.
                 let accept = change.is_finite()
                     && (enough
-                        || follows && {
+                        || (follows || external.rough()) && {
                             let trial = std::mem::take(&mut self.trial);
                             self.assemble(elements, supports, external, &trial);
                             self.trial = trial;
