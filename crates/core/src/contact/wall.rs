@@ -104,6 +104,8 @@ pub struct WallContact<'a> {
     /// Whether clearances and walks may replace queries.
     skip: bool,
     points: &'a [ContactPoint],
+    /// Part of the modulus that acts: a rigid wall is approached from a softer one.
+    pub softness: f64,
     known: &'a mut Vec<KnownPoint>,
     /// Work done and avoided.
     pub counters: Counters,
@@ -124,7 +126,7 @@ impl<'a> WallContact<'a> {
         skip: bool,
     ) -> Self {
         known.resize(points.len(), KnownPoint::default());
-        Self { wall, query, reach_mm, skip, points, known, counters: Counters::default() }
+        Self { wall, query, reach_mm, skip, points, softness: 1.0, known, counters: Counters::default() }
     }
 
     /// Position of point `index`, mm.
@@ -203,7 +205,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let point = self.points[index];
             match self.read(index, &x) {
                 Reading::Free(_) => {}
-                Reading::Near(d) => sum += point.weight_mm * point.potential.value(d.value_mm),
+                Reading::Near(d) => sum += self.softness * point.weight_mm * point.potential.value(d.value_mm),
                 Reading::Outside => return f64::INFINITY,
             }
         }
@@ -229,7 +231,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
             if d.value_mm >= point.potential.radius_mm {
                 continue;
             }
-            let w = point.weight_mm;
+            let w = self.softness * point.weight_mm;
             assembly.external_energy += w * point.potential.value(d.value_mm);
             let (first, second) = point.potential.derivatives(d.value_mm);
             let gradient = d.normal * (w * first);

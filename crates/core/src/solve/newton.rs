@@ -136,6 +136,8 @@ pub struct NewtonReport {
 const WHISPER: f64 = 1e-8;
 /// Changes of energy below this part of the energies' size are rounding.
 const ENERGY_ROUNDING: f64 = 1e-13;
+/// Halvings towards the minimum along a step that a wall cut short.
+const REFINEMENTS: usize = 12;
 /// Largest number of unsymmetric rank-one terms.
 const MAX_RANK: usize = 24;
 
@@ -389,6 +391,7 @@ impl<const C: usize> Newton<C> {
                 stored.total().abs() + self.assembly.external_energy.abs() + weighed + slope.abs();
             let rounding = ENERGY_ROUNDING * energy_scale;
             let mut accepted = None;
+            let mut refused = None;
             let old_multipliers = supports.multipliers;
             for j in 0..6 {
                 supports.multipliers[j] += self.step[first + j];
@@ -433,6 +436,26 @@ impl<const C: usize> Newton<C> {
                             found < 0.9 * residual || (attempt > 6 && found < 2.0 * residual)
                         });
                 if accept {
+                    // A wall hit on the way: the energy falls up to it and rises steeply beyond. The minimum between the
+                    // last refusal and here lies in touch with it; short of it the next step would meet it again.
+                    let (mut energy_change, mut change) = (energy_change, change);
+                    if let Some(refused) = refused {
+                        let (mut low, mut high) = (alpha, refused);
+                        for _ in 0..REFINEMENTS {
+                            let middle = 0.5 * (low + high);
+                            self.trial.advance::<C>(elements, state, &self.step, middle);
+                            self.tensions(elements, state);
+                            let trial_change = self.energy(elements, external, state) - before;
+                            if trial_change < energy_change {
+                                low = middle;
+                                (alpha, energy_change, change) = (middle, trial_change, trial_change);
+                            } else {
+                                high = middle;
+                            }
+                        }
+                        self.trial.advance::<C>(elements, state, &self.step, alpha);
+                        self.tensions(elements, state);
+                    }
                     accepted = Some(StepRecord {
                         energy_change,
                         merit_change: change,
@@ -442,6 +465,9 @@ impl<const C: usize> Newton<C> {
                         shift,
                     });
                     break;
+                }
+                if external.rough() {
+                    refused = Some(alpha);
                 }
                 // Minimum of the parabola through value, slope and trial value.
                 let curve = change - slope * alpha;

@@ -25,7 +25,7 @@ use crate::shape::Shape;
 use crate::solve::{External, Newton, NewtonOptions};
 use crate::{Error, Result};
 use mesh::Mesh;
-use slide::slide;
+use slide::{Extension, slide};
 
 /// Options of the exact rod.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -55,10 +55,12 @@ const SUBSTEP_LIMIT: usize = 4096;
 const TOLERANCE: f64 = 1e-9;
 /// How far beyond its radius and the step a point looks for the wall, mm: what it sees it need not ask for again.
 const LOOK_MM: f64 = 3.0;
-/// Part of the clearance in front of it that the tip may go in one sub-step.
-const TIP_SAFE: f64 = 0.8;
-/// Part of its radius that the axis of the tip keeps from the wall while it is slid.
-const TIP_CLEAR: f64 = 0.3;
+/// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, …
+const SOFTEST: f64 = 30.0;
+/// … each solved to this residual.
+const LOOSE: f64 = 1e-3;
+/// Part of the tip's radius by which a device is pushed on at least, where its tip stands head-on against the wall.
+const LEAST_WAY: f64 = 0.05;
 /// A step is a jump if more than this part of the stored energy was set free.
 const JUMP: f64 = 0.02;
 
@@ -71,6 +73,7 @@ pub struct Kirchhoff<const C: usize> {
     state: RodState,
     next_mesh: Mesh,
     next: RodState,
+    extension: Extension,
     known: Vec<KnownPoint>,
     shape: Shape,
     report: StepReport,
@@ -111,6 +114,7 @@ impl<const C: usize> Kirchhoff<C> {
             state,
             next_mesh: Mesh::default(),
             next: RodState::default(),
+            extension: Extension::default(),
             known: Vec::new(),
             shape: Shape::default(),
             report: StepReport { converged: true, ..Default::default() },
@@ -126,30 +130,6 @@ impl<const C: usize> Kirchhoff<C> {
         self.shape.from_tip_mm.clone_from(&self.mesh.from_tip_mm);
     }
 
-    /// How far the tip can go straight on: sphere tracing along its tangent.
-    fn free_way_mm(&self, surroundings: &Surroundings<'_>, wanted_mm: f64) -> f64 {
-        let last = self.state.elements();
-        let (tip, t) = (self.state.positions[last], self.state.frames[last].t);
-        let radius = surroundings.device.section_at(0.0).radius_mm;
-        let mut way = 0.0;
-        while way < wanted_mm {
-            let Some(near) = surroundings.query.nearest(&(tip + t * way), wanted_mm + radius) else {
-                return wanted_mm;
-            };
-            if near.rim {
-                way += near.distance_mm.abs().max(0.1 * radius);
-                continue;
-            }
-            // The axis keeps this distance; the surface may press into the wall, which pushes back.
-            let step = near.distance_mm - TIP_CLEAR * radius;
-            if step < 0.02 * radius {
-                break;
-            }
-            way += step;
-        }
-        way.min(wanted_mm)
-    }
-
     /// One sub-step: slides and solves on `self.next`; the current state is not touched.
     fn try_step(
         &mut self,
@@ -159,7 +139,7 @@ impl<const C: usize> Kirchhoff<C> {
     ) -> std::result::Result<usize, String> {
         let modulus = surroundings.properties.modulus_n_per_mm2;
         self.next_mesh.build(surroundings.device, inserted_mm, self.options.element_mm, modulus);
-        slide(&self.mesh, &self.state, &self.next_mesh, tail_rad, &mut self.next);
+        slide(&self.mesh, &self.state, &self.extension, &self.next_mesh, tail_rad, &mut self.next);
         let elements = self.next_mesh.elements.len();
         if self.newton.assembly.residual.len() != Layout::<C>::dimension(elements) {
             self.newton = Newton::new(elements);
@@ -178,18 +158,35 @@ impl<const C: usize> Kirchhoff<C> {
             return Err("the slid rod is beyond the wall".to_owned());
         }
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
-        let options = NewtonOptions {
-            max_iterations: self.options.max_iterations,
-            tolerance: TOLERANCE,
-            ..NewtonOptions::default()
+        // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
+        let data = &self.next_mesh.elements[elements - 1];
+        let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
+        let mut softness = (SOFTEST * element_stiffness / modulus).min(1.0);
+        let mut iterations = 0;
+        let found = loop {
+            contact.softness = softness;
+            let options = NewtonOptions {
+                max_iterations: self.options.max_iterations,
+                tolerance: if softness < 1.0 { LOOSE } else { TOLERANCE },
+                ..NewtonOptions::default()
+            };
+            let found =
+                self.newton.solve(&self.next_mesh.elements, &mut supports, &mut contact, &mut self.next, &options);
+            iterations += found.iterations;
+            if softness == 1.0 || !found.converged {
+                break found;
+            }
+            softness = (10.0 * softness).min(1.0);
         };
-        let found =
-            self.newton.solve(&self.next_mesh.elements, &mut supports, &mut contact, &mut self.next, &options);
         self.report.counters.add(&contact.counters);
+        if found.iterations > 25 && std::env::var("DBG").is_ok() {
+            eprintln!("== ins {inserted_mm} its {} {:?} res {:e}", found.iterations, found.reason, found.residual);
+            for (i, st) in found.steps.iter().enumerate().take(60) { eprintln!("{i} dE {:.3e} merit {:.3e} scale {:.2e} res {:.3e} frac {:.3e} shift {:.2e}", st.energy_change, st.merit_change, st.energy_scale, st.residual, st.fraction, st.shift); }
+        }
         if !found.converged {
             return Err(format!("{} (residual {:.1e})", found.reason, found.residual));
         }
-        Ok(found.iterations)
+        Ok(iterations)
     }
 
     /// Takes over the solved sub-step.
@@ -282,9 +279,11 @@ impl<const C: usize> Method for Kirchhoff<C> {
             let here = self.mesh.from_tip_mm[0];
             let wanted = (target - start) * part;
             if wanted > 0.0 {
-                let way = TIP_SAFE * self.free_way_mm(surroundings, wanted / TIP_SAFE);
-                let least = 0.05 * surroundings.device.section_at(0.0).radius_mm;
-                part *= (way.max(least) / wanted).min(1.0);
+                let last = self.state.elements();
+                let (tip, tangent) = (self.state.positions[last], self.state.frames[last].t);
+                let radius = surroundings.device.section_at(0.0).radius_mm;
+                let way = self.extension.trace(surroundings.query, tip, tangent, radius, wanted);
+                part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
             }
             let next = if part >= rest { 1.0 } else { done + part };
             let inserted = if next == 1.0 { target } else { start + (target - start) * next };
