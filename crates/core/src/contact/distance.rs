@@ -1,227 +1,232 @@
 //! A smooth signed distance to a triangulated wall.
 //!
-//! The distance to the flat triangles is not smooth where a device leans: inside a tube the closest triangle jumps at
-//! every bisector of two facets, the force direction with it, and Newton's method chatters; and the flat wall stands off
-//! the vessel it samples by edge²/8R. Both go away when the wall is taken as a smooth surface with a continuous normal
-//! field (the projection of Panozzo et al., *Weighted averages on surfaces*, SIGGRAPH 2013, on a quadratic patch in the
-//! manner of Nagata, *Simple local interpolation of surfaces using normal vectors*, CAGD 2005):
+//! The distance to flat triangles is not smooth where a device leans: inside a tube the closest triangle jumps at every
+//! bisector of two facets, the force's direction with it, and Newton's method chatters; and the flat wall stands off the
+//! vessel it samples by edge²/8R. Here every vertex carries a quadric fitted to its neighbours, and the quadrics are
+//! blended by a partition of unity (Ohtake et al., *Multi-level partition of unity implicits*, SIGGRAPH 2003):
 //!
 //! ```text
-//! q(λ) = Σ λᵢ Vᵢ − Σ λᵢλⱼ cᵢⱼ      patch over a triangle, the edges' corrections cᵢⱼ bend it to the vertex normals
-//! M(λ) = Σ λᵢ Nᵢ                    normal field, continuous over edges
-//! x = q(λ) + s M(λ),  d(x) = s |M|   the distance of x: three equations for λ and s
+//! Qᵢ(x) = Nᵢ·y − ½ τᵀSᵢτ,   y = x − Vᵢ,  τ = y − Nᵢ(Nᵢ·y)
+//! wᵢ(x) = (1 − |τ|²/ρᵢ²)³   where positive
+//! f(x)  = Σ wᵢQᵢ / Σ wᵢ
 //! ```
 //!
-//! The patches meet without gaps and so do their normals, but they are bent a little across their edges, so ∇d differs from
-//! n = M/|M| by a third-order angle that jumps there. What pushes a device must not jump: with ∇d itself a point can
-//! come to rest in an edge, where no equilibrium exists. The force acts along n, which is continuous, and its derivative is
-//! that of n: with rows rₖ of (∂x/∂(λ₁, λ₂, s))⁻¹, ∂n/∂x = (I − nnᵀ) Σ ∂M/∂λₖ rₖ / |M|.
+//! with Nᵢ the inward normal, Sᵢ the curvature and ρᵢ a little more than the longest edge at the vertex. f is twice
+//! continuously differentiable, so a device feels an energy with an exact gradient and Hessian; it differs from the distance
+//! to the sampled surface at third order in the edge length. With W = Σ wᵢ,
 //!
-//! A point walks from triangle to triangle until its foot lies inside one; between steps of a device that is one or two
-//! triangles, so the bounding volume hierarchy is asked only where something new may have come near.
+//! ```text
+//! ∇f  = Σ [(Qᵢ − f) ∇wᵢ + wᵢ ∇Qᵢ] / W
+//! ∇∇f = Σ [(Qᵢ − f) ∇∇wᵢ + ∇wᵢ(∇Qᵢ − ∇f)ᵀ + (∇Qᵢ − ∇f)∇wᵢᵀ + wᵢ ∇∇Qᵢ] / W
+//! ```
 
-use nalgebra::Matrix3;
+use std::collections::VecDeque;
+
+use nalgebra::{Matrix3, SMatrix, SVector};
 
 use crate::Vec3;
-use crate::vessel::{NO_NEIGHBOUR, Wall};
+use crate::vessel::Wall;
 
-/// Largest bend of an edge, as a part of its length: beyond a crease of about 50° a corner is a corner.
-const LARGEST_CORRECTION: f64 = 0.25;
-/// Triangles a walk may cross before the flat distance is used instead.
-const LONGEST_WALK: usize = 24;
-/// Newton iterations in one triangle.
-const ITERATIONS: usize = 12;
-/// How far outside its triangle a foot may lie, in barycentric coordinates: rounding must not bounce it over an edge.
-const EDGE_SLACK: f64 = 1e-9;
-
-/// Where a point stands on the wall.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Foot {
-    /// Triangle of the wall mesh.
-    pub triangle: u32,
-    /// Barycentric coordinates λ₁, λ₂ and height s of the point.
-    coordinates: [f64; 3],
-}
+/// Support of a vertex over its longest edge: every point of a triangle lies well inside that of its three corners.
+const SUPPORT: f64 = 1.3;
+/// Largest curvature times support: beyond it a corner is a corner, and a quadric would fold over.
+const LARGEST_BEND: f64 = 0.8;
+/// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.
+const REGULAR: f64 = 1e-6;
 
 /// Signed distance with derivatives; positive in the lumen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
-    /// Distance d, mm.
+    /// Distance, mm.
     pub value_mm: f64,
-    /// Direction n of the wall's force: into the lumen, unit length, continuous.
-    pub normal: Vec3,
-    /// The symmetric part of ∂n/∂x, 1/mm.
-    pub curvature: Matrix3<f64>,
+    /// Its gradient: into the lumen, of nearly unit length.
+    pub gradient: Vec3,
+    /// Its Hessian, 1/mm.
+    pub hessian: Matrix3<f64>,
 }
 
-/// One triangle's patch.
+/// The quadric of one vertex.
 #[derive(Debug, Clone, Copy)]
-struct Patch {
-    vertex: [Vec3; 3],
-    normal: [Vec3; 3],
-    /// c₀₁, c₁₂, c₂₀.
-    correction: [Vec3; 3],
-    neighbour: [u32; 3],
+struct Quadric {
+    position: Vec3,
+    normal: Vec3,
+    curvature: Matrix3<f64>,
+    /// 1/ρ².
+    inverse_square: f64,
 }
 
 /// The smooth wall.
 #[derive(Debug, Clone)]
 pub struct SmoothWall {
-    patches: Vec<Patch>,
-}
-
-/// Derivatives of G at one y.
-struct Local {
-    point: Vec3,
-    /// G_λ₁, G_λ₂, G_s.
-    first: [Vec3; 3],
-    normal: Vec3,
-    normal_rates: [Vec3; 2],
-}
-
-impl Patch {
-    fn local(&self, y: &[f64; 3]) -> Local {
-        let [a, b, s] = *y;
-        let l = 1.0 - a - b;
-        let [v0, v1, v2] = self.vertex;
-        let [c01, c12, c20] = self.correction;
-        let normal_rates = [self.normal[1] - self.normal[0], self.normal[2] - self.normal[0]];
-        let normal = self.normal[0] + normal_rates[0] * a + normal_rates[1] * b;
-        let q = v0 * l + v1 * a + v2 * b - c01 * (l * a) - c12 * (a * b) - c20 * (b * l);
-        let qa = (v1 - v0) - c01 * (l - a) - c12 * b + c20 * b;
-        let qb = (v2 - v0) + c01 * a - c12 * a - c20 * (l - b);
-        Local {
-            point: q + normal * s,
-            first: [qa + normal_rates[0] * s, qb + normal_rates[1] * s, normal],
-            normal,
-            normal_rates,
-        }
-    }
-}
-
-/// Rows of the inverse of the matrix with these columns; `None` where it is singular or nearly so.
-fn inverse_rows(columns: &[Vec3; 3]) -> Option<[Vec3; 3]> {
-    let [a, b, c] = columns;
-    let bc = b.cross(c);
-    let det = a.dot(&bc);
-    if !(det.abs() > 1e-12 * a.norm() * b.norm() * c.norm()) {
-        return None;
-    }
-    let inv = 1.0 / det;
-    Some([bc * inv, c.cross(a) * inv, a.cross(b) * inv])
+    quadrics: Vec<Quadric>,
+    /// For every triangle, where its list of vertices begins.
+    starts: Vec<u32>,
+    /// Vertices whose support may reach a point over the triangle.
+    lists: Vec<u32>,
 }
 
 impl SmoothWall {
-    /// The smooth surface through the vertices of `wall`.
-    pub fn new(wall: &Wall) -> Self {
+    /// The smooth surface of `wall` for points up to about `height_mm` from it.
+    pub fn new(wall: &Wall, height_mm: f64) -> Self {
         let mesh = wall.mesh();
-        let mut normals = vec![Vec3::zeros(); mesh.vertices_mm.len()];
+        let count = mesh.vertices_mm.len();
+        let neighbours = vertex_neighbours(&mesh.triangles, count);
+        let normals = vertex_normals(mesh);
+        let quadrics: Vec<Quadric> =
+            (0..count).map(|v| fit(v, &mesh.vertices_mm, &normals, &neighbours)).collect();
+
+        let mut starts = Vec::with_capacity(mesh.triangles.len() + 1);
+        let mut lists = Vec::new();
+        let mut seen = vec![u32::MAX; count];
+        let mut queue = VecDeque::new();
         for (index, triangle) in mesh.triangles.iter().enumerate() {
-            let corner = mesh.corners(index);
-            let outward = (corner[1] - corner[0]).cross(&(corner[2] - corner[0]));
-            let Some(unit) = outward.try_normalize(0.0) else { continue };
-            for k in 0..3 {
-                let (e, f) = (corner[(k + 1) % 3] - corner[k], corner[(k + 2) % 3] - corner[k]);
-                let angle = e.cross(&f).norm().atan2(e.dot(&f));
-                normals[triangle[k] as usize] -= unit * angle;
+            starts.push(lists.len() as u32);
+            let corners = mesh.corners(index);
+            let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+            let size = corners.iter().map(|c| (c - centre).norm()).fold(0.0, f64::max);
+            queue.extend(triangle.iter().copied());
+            triangle.iter().for_each(|&v| seen[v as usize] = index as u32);
+            // Over the surface, not through space: the other side of a thin septum is another wall.
+            while let Some(v) = queue.pop_front() {
+                let q = &quadrics[v as usize];
+                let reach = q.inverse_square.sqrt().recip() + size + height_mm;
+                if (q.position - centre).norm() > reach {
+                    continue;
+                }
+                lists.push(v);
+                for &w in &neighbours[v as usize] {
+                    if seen[w as usize] != index as u32 {
+                        seen[w as usize] = index as u32;
+                        queue.push_back(w);
+                    }
+                }
             }
         }
-        for normal in &mut normals {
-            *normal = normal.try_normalize(1e-12).unwrap_or_else(Vec3::zeros);
-        }
-        let neighbours = wall.neighbours();
-        let patches = (0..mesh.triangles.len())
-            .map(|index| {
-                let vertex = mesh.corners(index);
-                let normal = mesh.triangles[index].map(|v| normals[v as usize]);
-                let correction =
-                    [0, 1, 2].map(|k| correction(&vertex[k], &vertex[(k + 1) % 3], &normal[k], &normal[(k + 1) % 3]));
-                Patch { vertex, normal, correction, neighbour: neighbours[index] }
-            })
-            .collect();
-        Self { patches }
+        starts.push(lists.len() as u32);
+        Self { quadrics, starts, lists }
     }
 
-    /// A foot to start walking from: the point `x` over the plane of `triangle`.
-    pub fn start(&self, x: &Vec3, triangle: u32) -> Foot {
-        let [v0, v1, v2] = self.patches[triangle as usize].vertex;
-        let (e, f, w) = (v1 - v0, v2 - v0, x - v0);
-        let n = e.cross(&f);
-        let square = n.norm_squared().max(f64::MIN_POSITIVE);
-        let a = w.cross(&f).dot(&n) / square;
-        let b = e.cross(&w).dot(&n) / square;
-        // Triangles are counter-clockwise from outside, heights count into the lumen.
-        Foot { triangle, coordinates: [a.clamp(0.0, 1.0), b.clamp(0.0, 1.0), -w.dot(&n) / square.sqrt()] }
-    }
-
-    /// Walks `foot` to where `x` stands now. `None` where there is no foot: past a rim, or where the wall is too rough
-    /// for its normals; the flat distance is right there.
-    pub fn walk(&self, x: &Vec3, foot: &Foot) -> Option<Foot> {
-        let mut foot = *foot;
-        for _ in 0..LONGEST_WALK {
-            let patch = &self.patches[foot.triangle as usize];
-            let y = solve(patch, x, foot.coordinates)?;
-            let l = [1.0 - y[0] - y[1], y[0], y[1]];
-            // The edge opposite to the most negative coordinate is the one to cross.
-            let least = (0..3).min_by(|i, j| l[*i].total_cmp(&l[*j]))?;
-            if l[least] >= -EDGE_SLACK {
-                return Some(Foot { triangle: foot.triangle, coordinates: y });
+    /// The distance of `x`, whose nearest triangle is `triangle` or close to it. `None` where no vertex reaches.
+    pub fn distance(&self, x: &Vec3, triangle: u32) -> Option<Distance> {
+        let t = triangle as usize;
+        let list = &self.lists[self.starts[t] as usize..self.starts[t + 1] as usize];
+        let (mut weight, mut value) = (0.0, 0.0);
+        let (mut weight1, mut value1) = (Vec3::zeros(), Vec3::zeros());
+        let (mut weight2, mut value2) = (Matrix3::zeros(), Matrix3::zeros());
+        for &v in list {
+            let q = &self.quadrics[v as usize];
+            let y = x - q.position;
+            let height = q.normal.dot(&y);
+            let u = (y.norm_squared() - height * height) * q.inverse_square;
+            if u >= 1.0 {
+                continue;
             }
-            let next = patch.neighbour[(least + 1) % 3];
-            if next == NO_NEIGHBOUR {
-                return None;
-            }
-            foot = Foot { coordinates: [1.0 / 3.0, 1.0 / 3.0, y[2]], triangle: next };
+            let tau = y - q.normal * height;
+            let bend = q.curvature * tau;
+            let (f, f1) = (height - 0.5 * tau.dot(&bend), q.normal - bend);
+            let g = 1.0 - u;
+            let w = g * g * g;
+            // ∇u = 2τ/ρ²; w′(u) = −3g², w″(u) = 6g.
+            let slope = -6.0 * g * g * q.inverse_square;
+            let w1 = tau * slope;
+            let curve = 24.0 * g * q.inverse_square * q.inverse_square;
+            let w2 = tau * tau.transpose() * curve
+                + (Matrix3::identity() - q.normal * q.normal.transpose()) * slope;
+            weight += w;
+            weight1 += w1;
+            weight2 += w2;
+            value += w * f;
+            value1 += w1 * f + f1 * w;
+            let mixed = w1 * f1.transpose();
+            value2 += w2 * f + mixed + mixed.transpose() - q.curvature * w;
         }
-        None
-    }
-
-    /// The distance of the point whose foot is `foot`, with derivatives.
-    pub fn distance(&self, foot: &Foot) -> Option<Distance> {
-        let patch = &self.patches[foot.triangle as usize];
-        let local = patch.local(&foot.coordinates);
-        let r = inverse_rows(&local.first)?;
-        let size = local.normal.norm();
-        let normal = local.normal / size;
-        let mut rate = Matrix3::zeros();
-        for k in 0..2 {
-            let across = local.normal_rates[k] - normal * normal.dot(&local.normal_rates[k]);
-            rate += across * (r[k] / size).transpose();
+        if weight < 1e-9 {
+            return None;
         }
-        let curvature = (rate + rate.transpose()) * 0.5;
-        Some(Distance { value_mm: foot.coordinates[2] * size, normal, curvature })
+        let inv = 1.0 / weight;
+        let f = value * inv;
+        let gradient = (value1 - weight1 * f) * inv;
+        let mixed = weight1 * gradient.transpose();
+        let hessian = (value2 - weight2 * f - mixed - mixed.transpose()) * inv;
+        Some(Distance { value_mm: f, gradient, hessian })
     }
 }
 
-/// Newton's method for x = q(λ) + s M(λ) in one patch, from `y`.
-fn solve(patch: &Patch, x: &Vec3, mut y: [f64; 3]) -> Option<[f64; 3]> {
-    let scale = (patch.vertex[1] - patch.vertex[0]).norm();
-    for _ in 0..ITERATIONS {
-        let local = patch.local(&y);
-        let r = inverse_rows(&local.first)?;
-        let miss = x - local.point;
-        let step = [r[0].dot(&miss), r[1].dot(&miss), r[2].dot(&miss)];
-        y = [y[0] + step[0], y[1] + step[1], y[2] + step[2]];
-        // A foot far outside lies in another triangle, and the patch means nothing there.
-        if !(y[0].abs() < 4.0 && y[1].abs() < 4.0) {
-            return y.iter().all(|v| v.is_finite()).then(|| [y[0].clamp(-2.0, 3.0), y[1].clamp(-2.0, 3.0), y[2]]);
-        }
-        if miss.norm_squared() < (1e-14 * scale).powi(2) || step[0].abs() + step[1].abs() < 1e-13 {
-            return Some(y);
+/// Vertices that share an edge with each vertex, ascending.
+fn vertex_neighbours(triangles: &[[u32; 3]], count: usize) -> Vec<Vec<u32>> {
+    let mut neighbours = vec![Vec::new(); count];
+    for t in triangles {
+        for k in 0..3 {
+            neighbours[t[k] as usize].extend([t[(k + 1) % 3], t[(k + 2) % 3]]);
         }
     }
-    Some(y)
+    for list in &mut neighbours {
+        list.sort_unstable();
+        list.dedup();
+    }
+    neighbours
 }
 
-/// The bend of an edge between vertices with unit normals: zero where both normals are across the edge.
-fn correction(v0: &Vec3, v1: &Vec3, n0: &Vec3, n1: &Vec3) -> Vec3 {
-    let edge = v1 - v0;
-    let Some(mean) = (n0 + n1).try_normalize(1e-6) else { return Vec3::zeros() };
-    let along = mean.dot(n0);
-    if along < 0.5 {
-        return Vec3::zeros();
+/// Angle-weighted inward normals.
+fn vertex_normals(mesh: &crate::vessel::SurfaceMesh) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::zeros(); mesh.vertices_mm.len()];
+    for (index, triangle) in mesh.triangles.iter().enumerate() {
+        let corner = mesh.corners(index);
+        let Some(outward) = (corner[1] - corner[0]).cross(&(corner[2] - corner[0])).try_normalize(0.0) else {
+            continue;
+        };
+        for k in 0..3 {
+            let (e, f) = (corner[(k + 1) % 3] - corner[k], corner[(k + 2) % 3] - corner[k]);
+            normals[triangle[k] as usize] -= outward * e.cross(&f).norm().atan2(e.dot(&f));
+        }
     }
-    // The curve v(t) = v₀ + t e − t(1−t) c leaves each end across that end's normal, on the average of both.
-    let size = 0.5 * (n0 - n1).dot(&edge) / along;
-    mean * size.clamp(-LARGEST_CORRECTION * edge.norm(), LARGEST_CORRECTION * edge.norm())
+    for normal in &mut normals {
+        *normal = normal.try_normalize(1e-12).unwrap_or_else(Vec3::x);
+    }
+    normals
+}
+
+/// The quadric of vertex `v`: heights of its neighbours and theirs, g·τ + ½ τᵀSτ in its tangent plane, least squares.
+fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[Vec<u32>]) -> Quadric {
+    let (origin, normal) = (vertices[v], normals[v]);
+    let longest = neighbours[v].iter().map(|&w| (vertices[w as usize] - origin).norm()).fold(0.0, f64::max);
+    let rho = SUPPORT * longest.max(1e-12);
+    let mut ring: Vec<u32> = neighbours[v].clone();
+    for &w in &neighbours[v] {
+        ring.extend(neighbours[w as usize].iter().copied());
+    }
+    ring.sort_unstable();
+    ring.dedup();
+    let a = {
+        let axis = Vec3::ith(normal.iamin(), 1.0);
+        (axis - normal * normal.dot(&axis)).normalize()
+    };
+    let b = normal.cross(&a);
+    let mut matrix = SMatrix::<f64, 5, 5>::identity() * REGULAR;
+    let mut right = SVector::<f64, 5>::zeros();
+    for &w in &ring {
+        // Beyond a crease or far away there is another surface.
+        if w as usize == v || normals[w as usize].dot(&normal) < 0.3 {
+            continue;
+        }
+        let y = (vertices[w as usize] - origin) / longest;
+        let (p, q, h) = (y.dot(&a), y.dot(&b), y.dot(&normal));
+        let row = SVector::<f64, 5>::new(p, q, 0.5 * p * p, p * q, 0.5 * q * q);
+        let weight = 1.0 / (1.0 + y.norm_squared());
+        matrix += row * row.transpose() * weight;
+        right += row * (h * weight);
+    }
+    let found = matrix.cholesky().map_or_else(SVector::zeros, |c| c.solve(&right));
+    let tilt = found[0].hypot(found[1]);
+    if !(tilt < 0.5) {
+        return Quadric { position: origin, normal, curvature: Matrix3::zeros(), inverse_square: rho.powi(-2) };
+    }
+    let (saa, sab, sbb) = (found[2] / longest, found[3] / longest, found[4] / longest);
+    let size = saa.abs().max(sbb.abs()) + sab.abs();
+    let scale = (LARGEST_BEND / rho / size.max(1e-300)).min(1.0);
+    let tangent = a * a.transpose() * saa + (a * b.transpose() + b * a.transpose()) * sab + b * b.transpose() * sbb;
+    // The plane of the fit, and the curvature seen from it.
+    let normal = (normal - a * found[0] - b * found[1]).normalize();
+    let across = Matrix3::identity() - normal * normal.transpose();
+    Quadric { position: origin, normal, curvature: across * tangent * across * scale, inverse_square: rho.powi(-2) }
 }

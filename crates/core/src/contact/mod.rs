@@ -4,6 +4,6 @@ pub mod distance;
 pub mod potential;
 pub mod wall;
 
-pub use distance::{Distance, Foot, SmoothWall};
+pub use distance::{Distance, SmoothWall};
 pub use potential::WallPotential;
 pub use wall::{ContactPoint, Counters, KnownPoint, WallContact};

@@ -9,7 +9,7 @@
 //! its last clearance, nothing can touch it.
 
 use crate::Vec3;
-use crate::contact::{Distance, Foot, SmoothWall, WallPotential};
+use crate::contact::{Distance, SmoothWall, WallPotential};
 use crate::rod::quadrature::hermite;
 use crate::rod::{Assembly, ElementData, RodState};
 use crate::solve::External;
@@ -36,8 +36,8 @@ struct Known {
     looked_at: Vec3,
     /// No wall is nearer to that place than this, mm.
     clearance_mm: f64,
-    /// Foot on the wall, if it is near.
-    foot: Option<Foot>,
+    /// The nearest triangle then, if the wall was near.
+    triangle: Option<u32>,
     /// Position at the state that Newton's method is leaving.
     base: Vec3,
     /// No wall is nearer to it than this, mm.
@@ -49,7 +49,7 @@ impl Default for Known {
         Self {
             looked_at: Vec3::zeros(),
             clearance_mm: -1.0,
-            foot: None,
+            triangle: None,
             base: Vec3::zeros(),
             base_clearance_mm: 0.0,
         }
@@ -85,6 +85,12 @@ enum Reading {
     Near(Distance),
     /// The point is beyond the wall.
     Outside,
+}
+
+impl Reading {
+    fn of(distance: Distance) -> Self {
+        if distance.value_mm > 0.0 { Self::Near(distance) } else { Self::Outside }
+    }
 }
 
 /// Beyond its radius, a point is followed over the wall's triangles within this part of it: the smooth wall and the flat
@@ -149,18 +155,16 @@ impl<'a> WallContact<'a> {
                 self.counters.avoided += 1;
                 return Reading::Free(clearance);
             }
-            if let Some(foot) = known.foot.filter(|_| moved < LOOK_AGAIN * radius)
-                && let Some(foot) = self.wall.walk(x, &foot)
-                && let Some(distance) = self.wall.distance(&foot)
+            if let Some(triangle) = known.triangle.filter(|_| moved < LOOK_AGAIN * radius)
+                && let Some(distance) = self.wall.distance(x, triangle)
             {
                 self.counters.walked += 1;
-                known.foot = Some(foot);
-                return if distance.value_mm > 0.0 { Reading::Near(distance) } else { Reading::Outside };
+                return Reading::of(distance);
             }
         }
         self.counters.queries += 1;
         known.looked_at = *x;
-        known.foot = None;
+        known.triangle = None;
         let Some(nearest) = self.query.nearest(x, self.reach_mm) else {
             known.clearance_mm = self.reach_mm;
             return Reading::Free(self.reach_mm);
@@ -170,20 +174,19 @@ impl<'a> WallContact<'a> {
         if nearest.rim || nearest.distance_mm > near {
             return Reading::Free(known.clearance_mm);
         }
-        known.foot = self.wall.walk(x, &self.wall.start(x, nearest.triangle));
-        let distance = known.foot.and_then(|foot| self.wall.distance(&foot)).unwrap_or(Distance {
+        known.triangle = Some(nearest.triangle);
+        Reading::of(self.wall.distance(x, nearest.triangle).unwrap_or(Distance {
             value_mm: nearest.distance_mm,
-            normal: nearest.normal,
-            curvature: Matrix3::zeros(),
-        });
-        if distance.value_mm > 0.0 { Reading::Near(distance) } else { Reading::Outside }
+            gradient: nearest.normal,
+            hessian: Matrix3::zeros(),
+        }))
     }
 
     /// Distance of point `index` at the given state, where the wall is near, and its triangle.
     pub fn distance_at(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<(Distance, u32)> {
         let x = self.position(elements, state, index);
         match self.read(index, &x) {
-            Reading::Near(distance) => Some((distance, self.known[index].0.foot.map_or(0, |f| f.triangle))),
+            Reading::Near(distance) => Some((distance, self.known[index].0.triangle.unwrap_or(0))),
             Reading::Free(_) | Reading::Outside => None,
         }
     }
@@ -234,8 +237,8 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let w = self.softness * point.weight_mm;
             assembly.external_energy += w * point.potential.value(d.value_mm);
             let (first, second) = point.potential.derivatives(d.value_mm);
-            let gradient = d.normal * (w * first);
-            let hessian = d.normal * d.normal.transpose() * (w * second) + d.curvature * (w * first);
+            let gradient = d.gradient * (w * first);
+            let hessian = d.gradient * d.gradient.transpose() * (w * second) + d.hessian * (w * first);
             let e = point.element;
             if point.xi == 1.0 {
                 assembly.add_node(e + 1, &gradient, &hessian);
@@ -245,7 +248,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
         }
     }
 
-    fn rough(&self) -> bool {
+    fn obstructs(&self) -> bool {
         true
     }
 

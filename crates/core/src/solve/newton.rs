@@ -30,9 +30,8 @@ pub trait External<const C: usize> {
     fn conservative(&self) -> bool {
         true
     }
-    /// Whether the forces are only nearly those of the energy: near an equilibrium a smaller residual then counts as much
-    /// as a lower energy.
-    fn rough(&self) -> bool {
+    /// Whether it can stop a step short, as a wall does.
+    fn obstructs(&self) -> bool {
         false
     }
     /// Part of the way from the state last given to [`External::add`] to `to` that crosses nothing.
@@ -428,7 +427,7 @@ impl<const C: usize> Newton<C> {
                 // Where loads have no potential a smaller residual is as good; it costs an assembly, so it is asked last.
                 let accept = change.is_finite()
                     && (enough
-                        || (follows || external.rough()) && {
+                        || follows && {
                             let trial = std::mem::take(&mut self.trial);
                             self.assemble(elements, supports, external, &trial);
                             self.trial = trial;
@@ -466,7 +465,7 @@ impl<const C: usize> Newton<C> {
                     });
                     break;
                 }
-                if external.rough() {
+                if external.obstructs() {
                     refused = Some(alpha);
                 }
                 // Minimum of the parabola through value, slope and trial value.

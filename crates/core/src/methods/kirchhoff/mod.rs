@@ -108,7 +108,7 @@ impl<const C: usize> Kirchhoff<C> {
         mesh.from_tip_mm.push(0.0);
         let mut method = Self {
             options,
-            smooth: SmoothWall::new(surroundings.wall),
+            smooth: SmoothWall::new(surroundings.wall, surroundings.device.max_radius_mm()),
             newton: Newton::new(1),
             mesh,
             state,
@@ -230,7 +230,7 @@ impl<const C: usize> Kirchhoff<C> {
                 report.max_penetration_mm = report.max_penetration_mm.max(penetration_mm);
                 report.contacts.push(Contact {
                     position_mm: contact.position(&self.mesh.elements, &self.state, index),
-                    normal: distance.normal,
+                    normal: distance.gradient,
                     force_n: -point.weight_mm * point.potential.derivatives(distance.value_mm).0,
                     penetration_mm,
                     triangle,
