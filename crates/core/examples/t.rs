@@ -7,7 +7,7 @@ fn main() -> endowire_core::Result<()> {
  let sheath=Sheath::new(endowire_core::Vec3::new(0.,0.,1.),endowire_core::Vec3::z())?;
  let h=arg(1,1.0); let ei=arg(2,5.0); let k=arg(3,1.0); let l=arg(4,2.0); let total=arg(5,230.0);
  let d=Device::uniform(400.,0.445,ei)?;
- let mut sim=Simulation::with_properties(wall,WallProperties{modulus_n_per_mm2:k,friction:0.0},d,sheath,&MethodChoice::Kirchhoff(KirchhoffOptions{element_mm:l,..Default::default()}))?;
+ let mut sim=Simulation::with_properties(wall,WallProperties{modulus_n_per_mm2:k},d,sheath,&MethodChoice::Kirchhoff(KirchhoffOptions{element_mm:l,..Default::default()}))?;
  let n=(total/h).round() as usize; let mut tt=0.0; let mut its=0; let mut subs=0; let mut work=0.0; let mut lastf=0.0; let mut worst=0.0f64;
  for i in 0..n { let c=Instant::now(); let r=match sim.step(Command::advance(h)) { Ok(r)=>r.clone(), Err(e)=>{println!("{e}"); break;} }; let dt=c.elapsed().as_secs_f64(); tt+=dt; worst=worst.max(dt); its+=r.iterations; subs+=r.substeps;
   work+=0.5*(lastf+r.push_force_n)*h; lastf=r.push_force_n;

@@ -28,7 +28,7 @@ use crate::Vec3;
 use crate::vessel::Wall;
 
 /// Support of a vertex over its longest edge: every point of a triangle lies well inside that of its three corners.
-const SUPPORT: f64 = 1.3;
+const SUPPORT: f64 = 1.1;
 /// Largest curvature times support: beyond it a corner is a corner, and a quadric would fold over.
 const LARGEST_BEND: f64 = 0.8;
 /// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.

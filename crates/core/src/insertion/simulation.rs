@@ -22,20 +22,18 @@ pub struct Surroundings<'a> {
     pub device: &'a Device,
 }
 
-/// How a vessel's wall answers a device.
+/// How a vessel's wall answers a device that presses on it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct WallProperties {
     /// Foundation modulus k, N/mm²: force per length per depth.
     pub modulus_n_per_mm2: f64,
-    /// Coulomb friction coefficient μ.
-    pub friction: f64,
 }
 
 impl Default for WallProperties {
-    /// An artery's modulus in order of magnitude, without friction.
+    /// An artery's modulus in order of magnitude.
     fn default() -> Self {
-        Self { modulus_n_per_mm2: 1.0, friction: 0.0 }
+        Self { modulus_n_per_mm2: 1.0 }
     }
 }
 
@@ -74,9 +72,6 @@ impl Simulation {
         method: &MethodChoice,
     ) -> Result<Self> {
         crate::error::in_range("vessel.wall.modulus_n_per_mm2", properties.modulus_n_per_mm2, 1e9)?;
-        if !(0.0..=10.0).contains(&properties.friction) {
-            return Err(Error::parameter("vessel.wall.friction", properties.friction, "must be between 0 and 10"));
-        }
         if !wall.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
             let p = sheath.position_mm;
             let openings: Vec<String> = wall

@@ -7,6 +7,9 @@ use crate::rod::quadrature::GAUSS;
 
 /// Contact points lie no farther apart than this many radii of the device.
 const SPACING_RADII: f64 = 2.0;
+/// At the tip they begin this close, in radii, and double: a tip that touches the wall at an angle leaves it within a
+/// tenth of its radius.
+const TIP_SPACING_RADII: f64 = 1.0 / 256.0;
 /// Fewest and most intervals between contact points in an element.
 const INTERVALS: (f64, f64) = (2.0, 8.0);
 
@@ -43,23 +46,31 @@ impl Mesh {
             });
         }
         self.points.clear();
-        let mut last_half = 0.0;
+        // Half of the interval beyond the point at hand; beyond the tip there is its cap.
+        let mut half_beyond = device.section_at(0.0).radius_mm;
         for (e, data) in self.elements.iter().enumerate().rev() {
             let radius_mm = device.section_at(self.from_tip_mm[e + 1]).radius_mm;
             let intervals = (data.length / (SPACING_RADII * radius_mm)).ceil().clamp(INTERVALS.0, INTERVALS.1);
             let spacing = data.length / intervals;
-            // The node at the element's far end is shared; the tip's has the cap instead of a neighbour.
-            let beyond = if e + 1 == self.elements.len() { radius_mm } else { last_half };
-            for j in (1..=intervals as usize).rev() {
-                let at_end = j == intervals as usize;
+            let is_last = e + 1 == self.elements.len();
+            // Distance from the element's far end.
+            let mut at = 0.0;
+            let mut fine = if is_last { TIP_SPACING_RADII * radius_mm } else { spacing };
+            while at < (1.0 - 1e-9) * data.length {
+                let left = data.length - at;
+                let step = fine.min(spacing);
+                // The intervals that are left are made equal where the fine ones end.
+                let step = if step >= spacing { left / (left / spacing - 1e-9).ceil() } else { step.min(left) };
                 self.points.push(ContactPoint {
                     element: e,
-                    xi: if at_end { 1.0 } else { j as f64 / intervals },
-                    weight_mm: if at_end { 0.5 * spacing + beyond } else { spacing },
+                    xi: 1.0 - at / data.length,
+                    weight_mm: half_beyond + 0.5 * step,
                     potential: WallPotential { modulus_n_per_mm2, radius_mm },
                 });
+                half_beyond = 0.5 * step;
+                at += step;
+                fine *= 2.0;
             }
-            last_half = 0.5 * spacing;
         }
     }
 }

@@ -179,10 +179,6 @@ impl<const C: usize> Kirchhoff<C> {
             softness = (10.0 * softness).min(1.0);
         };
         self.report.counters.add(&contact.counters);
-        if found.iterations > 25 && std::env::var("DBG").is_ok() {
-            eprintln!("== ins {inserted_mm} its {} {:?} res {:e}", found.iterations, found.reason, found.residual);
-            for (i, st) in found.steps.iter().enumerate().take(60) { eprintln!("{i} dE {:.3e} merit {:.3e} scale {:.2e} res {:.3e} frac {:.3e} shift {:.2e}", st.energy_change, st.merit_change, st.energy_scale, st.residual, st.fraction, st.shift); }
-        }
         if !found.converged {
             return Err(format!("{} (residual {:.1e})", found.reason, found.residual));
         }
