@@ -1,6 +1,7 @@
 //! What the wall does to a device: distance, energy, friction.
 
 pub mod distance;
+pub mod extension;
 pub mod potential;
 pub mod wall;
 

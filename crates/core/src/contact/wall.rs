@@ -98,6 +98,8 @@ impl Reading {
 const FOLLOW: f64 = 0.5;
 /// A point looks for other walls again when it has moved by this part of its radius.
 const LOOK_AGAIN: f64 = 0.5;
+/// Radius of the gentlest bend worth a number, mm.
+const LEAST_BEND_MM: f64 = 100.0;
 /// Part of its clearance that a point may move in one step of Newton's method.
 const SAFE: f64 = 0.9;
 
@@ -110,6 +112,8 @@ pub struct WallContact<'a> {
     /// Whether clearances and walks may replace queries.
     skip: bool,
     points: &'a [ContactPoint],
+    /// Moment of the softest piece at [`LEAST_BEND_MM`], N·mm.
+    least_moment_nmm: f64,
     /// Part of the modulus that acts: a rigid wall is approached from a softer one.
     pub softness: f64,
     known: &'a mut Vec<KnownPoint>,
@@ -122,17 +126,19 @@ pub struct WallContact<'a> {
 pub struct KnownPoint(Known);
 
 impl<'a> WallContact<'a> {
-    /// The wall's energy at `points` (tip first), with what is known from earlier steps.
+    /// The wall's energy at `points` (tip first), with what is known from earlier steps. `softest_nmm2` is the device's
+    /// least bending stiffness.
     pub fn new(
         wall: &'a SmoothWall,
         query: &'a WallQuery,
         points: &'a [ContactPoint],
         known: &'a mut Vec<KnownPoint>,
+        softest_nmm2: f64,
         reach_mm: f64,
         skip: bool,
     ) -> Self {
         known.resize(points.len(), KnownPoint::default());
-        Self { wall, query, reach_mm, skip, points, softness: 1.0, known, counters: Counters::default() }
+        Self { wall, query, reach_mm, skip, points, least_moment_nmm: softest_nmm2 / LEAST_BEND_MM, softness: 1.0, known, counters: Counters::default() }
     }
 
     /// Position of point `index`, mm.
@@ -246,6 +252,12 @@ impl<const C: usize> External<C> for WallContact<'_> {
                 assembly.add_point(state, &elements[e], e, point.xi, &gradient, &hessian);
             }
         }
+    }
+
+    /// A device bent to [`LEAST_BEND_MM`] carries this; in a device that carries less, force and moment have no scale of
+    /// their own to be compared with.
+    fn scale(&self) -> [f64; 2] {
+        [self.least_moment_nmm / LEAST_BEND_MM, self.least_moment_nmm]
     }
 
     fn obstructs(&self) -> bool {

@@ -58,6 +58,8 @@ pub struct StepReport {
     pub max_penetration_mm: f64,
     /// Where the wall holds the device.
     pub contacts: Vec<Contact>,
+    /// The opening through which the tip has left the vessel, while it is beyond it.
+    pub left_through: Option<usize>,
     /// Iterations (linear solves) of this step.
     pub iterations: u32,
     /// Parts that the command was cut into.

@@ -17,11 +17,14 @@ mod slide;
 
 use serde::{Deserialize, Serialize};
 
+use crate::contact::extension::{EXTENSION_MM, extended, left_through};
 use crate::contact::{KnownPoint, SmoothWall, WallContact};
+use crate::device::Device;
 use crate::insertion::{Command, Contact, Energy, StepReport, Surroundings};
 use crate::methods::Method;
 use crate::rod::{Frame, Layout, RodState, Supports};
 use crate::shape::Shape;
+use crate::vessel::{Wall, WallQuery};
 use crate::solve::{External, Newton, NewtonOptions};
 use crate::{Error, Result};
 use mesh::Mesh;
@@ -63,11 +66,15 @@ const LOOSE: f64 = 1e-3;
 const LEAST_WAY: f64 = 0.05;
 /// A step is a jump if more than this part of the stored energy was set free.
 const JUMP: f64 = 0.02;
+/// Stored energy below which nothing is called a jump, mJ.
+const JUMP_FLOOR_MJ: f64 = 1e-6;
 
 /// The exact rod as an insertion method, with or without material angles.
 pub struct Kirchhoff<const C: usize> {
     options: KirchhoffOptions,
+    /// The vessel as the device feels it, extended beyond its openings.
     smooth: SmoothWall,
+    query: WallQuery,
     newton: Newton<C>,
     mesh: Mesh,
     state: RodState,
@@ -106,9 +113,12 @@ impl<const C: usize> Kirchhoff<C> {
         };
         let mut mesh = Mesh::default();
         mesh.from_tip_mm.push(0.0);
+        let radius_mm = surroundings.device.max_radius_mm();
+        let felt = Wall::from_surface(&extended(surroundings.wall, radius_mm))?;
         let mut method = Self {
             options,
-            smooth: SmoothWall::new(surroundings.wall, surroundings.device.max_radius_mm()),
+            smooth: SmoothWall::new(&felt, radius_mm),
+            query: WallQuery::new(&felt)?,
             newton: Newton::new(1),
             mesh,
             state,
@@ -148,9 +158,10 @@ impl<const C: usize> Kirchhoff<C> {
         let reach = surroundings.device.max_radius_mm() + travel + LOOK_MM;
         let mut contact = WallContact::new(
             &self.smooth,
-            surroundings.query,
+            &self.query,
             &self.next_mesh.points,
             &mut self.known,
+            softest(surroundings.device),
             reach,
             self.options.skip,
         );
@@ -197,6 +208,8 @@ impl<const C: usize> Kirchhoff<C> {
         report.contacts.clear();
         report.max_penetration_mm = 0.0;
         report.inserted_mm = self.mesh.from_tip_mm[0];
+        let tip = self.state.positions[self.state.elements()];
+        report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening);
         if self.mesh.elements.is_empty() {
             report.energy = Energy::default();
             (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
@@ -205,9 +218,10 @@ impl<const C: usize> Kirchhoff<C> {
         let reach = surroundings.device.max_radius_mm() + LOOK_MM;
         let mut contact = WallContact::new(
             &self.smooth,
-            surroundings.query,
+            &self.query,
             &self.mesh.points,
             &mut self.known,
+            softest(surroundings.device),
             reach,
             self.options.skip,
         );
@@ -265,6 +279,16 @@ impl<const C: usize> Method for Kirchhoff<C> {
         self.report.substeps = 0;
         self.report.jumped = false;
         let saved = (self.mesh.clone(), self.state.clone());
+        let tip = self.state.positions[self.state.elements()];
+        if command.advance_mm > 0.0
+            && let Some((opening, beyond)) = left_through(surroundings.wall, &tip)
+            && beyond + command.advance_mm > EXTENSION_MM
+        {
+            return Err(Error::Computation(format!(
+                "the tip has left the vessel through opening {opening} by {beyond:.1} mm, and beyond {EXTENSION_MM} mm nothing \
+                 is known: stop the script earlier or use a vessel that goes on"
+            )));
+        }
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
         let mut share = 1.0f64;
@@ -278,7 +302,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 let last = self.state.elements();
                 let (tip, tangent) = (self.state.positions[last], self.state.frames[last].t);
                 let radius = surroundings.device.section_at(0.0).radius_mm;
-                let way = self.extension.trace(surroundings.query, tip, tangent, radius, wanted);
+                let way = self.extension.trace(&self.query, tip, tangent, radius, wanted);
                 part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
             }
             let next = if part >= rest { 1.0 } else { done + part };
@@ -326,7 +350,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let work = 0.5 * (before.push_force_n + self.report.push_force_n) * (target - start)
             + 0.5 * (before.torque_nmm + self.report.torque_nmm) * command.rotate_rad;
         let lost = work - (self.report.energy.total() - before.energy.total());
-        self.report.jumped = lost > JUMP * before.energy.total().max(self.report.energy.total());
+        self.report.jumped =
+            lost > JUMP * before.energy.total().max(self.report.energy.total()).max(JUMP_FLOOR_MJ);
         Ok(())
     }
 
@@ -337,4 +362,9 @@ impl<const C: usize> Method for Kirchhoff<C> {
     fn report(&self) -> &StepReport {
         &self.report
     }
+}
+
+/// Least bending stiffness of a device, N·mm².
+fn softest(device: &Device) -> f64 {
+    device.sections().iter().map(|s| s.bending_stiffness_nmm2).fold(f64::MAX, f64::min)
 }
