@@ -100,6 +100,8 @@ const FOLLOW: f64 = 0.5;
 const LOOK_AGAIN: f64 = 0.5;
 /// Radius of the gentlest bend worth a number, mm.
 const LEAST_BEND_MM: f64 = 100.0;
+/// Smooth and flat distance differ by less than this part of the radius, or the flat one is taken.
+const DISAGREE: f64 = 0.8;
 /// Part of its clearance that a point may move in one step of Newton's method.
 const SAFE: f64 = 0.9;
 
@@ -162,7 +164,7 @@ impl<'a> WallContact<'a> {
                 return Reading::Free(clearance);
             }
             if let Some(triangle) = known.triangle.filter(|_| moved < LOOK_AGAIN * radius)
-                && let Some(distance) = self.wall.distance(x, triangle)
+                && let Some(distance) = self.wall.distance(x, triangle).filter(|d| d.value_mm > 0.0)
             {
                 self.counters.walked += 1;
                 return Reading::of(distance);
@@ -181,7 +183,9 @@ impl<'a> WallContact<'a> {
             return Reading::Free(known.clearance_mm);
         }
         known.triangle = Some(nearest.triangle);
-        Reading::of(self.wall.distance(x, nearest.triangle).unwrap_or(Distance {
+        // Where the surface is folded or torn the quadrics contradict the triangles, and the triangles are right.
+        let smooth = self.wall.distance(x, nearest.triangle);
+        Reading::of(smooth.filter(|d| (d.value_mm - nearest.distance_mm).abs() < DISAGREE * radius).unwrap_or(Distance {
             value_mm: nearest.distance_mm,
             gradient: nearest.normal,
             hessian: Matrix3::zeros(),
