@@ -70,7 +70,8 @@ mod tests {
 
     #[test]
     fn the_extended_vessel_is_sound_and_keeps_its_triangles() {
-        let wall = GeneratedWall::new(&anatomy::tree("aortic_arch").unwrap(), Resolution::EdgeMm(3.0)).unwrap().wall;
+        let wall =
+            GeneratedWall::new(&anatomy::tree("aortic_arch").unwrap(), Resolution::EdgeMm(3.0)).unwrap().wall;
         let mesh = extended(&wall, 0.5);
         assert_eq!(mesh.triangles[..wall.mesh().triangles.len()], wall.mesh().triangles[..]);
         let report = check(&mesh).unwrap();
@@ -81,7 +82,9 @@ mod tests {
 
     #[test]
     fn a_point_past_an_opening_has_left_through_it() {
-        let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(2.0)).unwrap().wall;
+        let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(2.0))
+            .unwrap()
+            .wall;
         let top = wall.openings().iter().find(|o| o.direction.z > 0.5).unwrap();
         let found = left_through(&wall, &Vec3::new(1.0, 0.0, 105.0)).unwrap();
         assert!(found.0 == top.index && (found.1 - 5.0).abs() < 1e-6);

@@ -4,12 +4,13 @@
 //! beyond the wall,
 //!
 //! ```text
-//! ψ(d) = ½ k p²  for p > 0,  plus  −k (d − d̂)² ln(d/d̂)  for d < d̂ = r/2
+//! ψ(d) = ½ k p²  for p > 0,  plus  −k (g − ĝ)² ln(g/ĝ)  for g = d − 0.3 r < ĝ = 0.3 r
 //! ```
 //!
 //! The first term is a foundation of modulus k (N/mm²), soft or rigid. The second is the barrier of Li et al.,
 //! *Incremental potential contact*, SIGGRAPH 2020: twice continuously differentiable, zero in any sensible state, and
-//! infinite where the axis would cross the wall. So a wall can be too soft for a device, but never be passed.
+//! infinite at three tenths of the radius, more than the smooth wall stands off the flat triangles. So a wall can be
+//! too soft for a device, but its axis never crosses it.
 
 /// Wall energy per length at one radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +21,10 @@ pub struct WallPotential {
     pub radius_mm: f64,
 }
 
-/// Part of the radius below which the barrier acts.
-const BARRIER: f64 = 0.5;
+/// Distance in radii at which the barrier is infinite, …
+const FLOOR: f64 = 0.3;
+/// … and how far above it the barrier begins.
+const BARRIER: f64 = 0.3;
 
 impl WallPotential {
     /// Depth of the surface beyond the wall, mm; 0 where it is clear of it.
@@ -35,26 +38,31 @@ impl WallPotential {
         if d >= r {
             return 0.0;
         }
-        if d <= 0.0 {
+        if !self.is_allowed(d) {
             return f64::INFINITY;
         }
         let spring = 0.5 * k * (r - d) * (r - d);
-        let edge = BARRIER * r;
-        if d >= edge { spring } else { spring - k * (d - edge) * (d - edge) * (d / edge).ln() }
+        let (gap, edge) = (d - FLOOR * r, BARRIER * r);
+        if gap >= edge { spring } else { spring - k * (gap - edge) * (gap - edge) * (gap / edge).ln() }
     }
 
-    /// ψ′(d) in N/mm and ψ″(d) in N/mm²; `d` is above 0.
+    /// Whether the energy is finite at this distance.
+    pub fn is_allowed(&self, distance_mm: f64) -> bool {
+        distance_mm > FLOOR * self.radius_mm
+    }
+
+    /// ψ′(d) in N/mm and ψ″(d) in N/mm², at an allowed distance.
     pub fn derivatives(&self, distance_mm: f64) -> (f64, f64) {
         let (k, d, r) = (self.modulus_n_per_mm2, distance_mm, self.radius_mm);
         if d >= r {
             return (0.0, 0.0);
         }
         let (mut first, mut second) = (-k * (r - d), k);
-        let edge = BARRIER * r;
-        if d < edge {
-            let (gap, log) = (d - edge, (d / edge).ln());
-            first -= k * (2.0 * gap * log + gap * gap / d);
-            second -= k * (2.0 * log + 4.0 * gap / d - gap * gap / (d * d));
+        let (gap, edge) = (d - FLOOR * r, BARRIER * r);
+        if gap < edge {
+            let (short, log) = (gap - edge, (gap / edge).ln());
+            first -= k * (2.0 * short * log + short * short / gap);
+            second -= k * (2.0 * log + 4.0 * short / gap - short * short / (gap * gap));
         }
         (first, second)
     }
@@ -68,8 +76,8 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_the_value() {
-        for d in [0.02, 0.1, 0.19, 0.21, 0.3, 0.39, 0.5] {
-            let h = 1e-5 * d;
+        for d in [0.125, 0.15, 0.23, 0.25, 0.3, 0.39, 0.5] {
+            let h = 1e-6;
             let (plus, minus, here) = (POTENTIAL.value(d + h), POTENTIAL.value(d - h), POTENTIAL.value(d));
             let (first, second) = POTENTIAL.derivatives(d);
             assert!(((plus - minus) / (2.0 * h) - first).abs() < 1e-6 * (1.0 + first.abs()), "first at {d}");
@@ -80,7 +88,7 @@ mod tests {
 
     #[test]
     fn the_force_is_continuous_where_terms_switch_on() {
-        for switch in [0.2, 0.4] {
+        for switch in [0.24, 0.4] {
             let (below, above) = (POTENTIAL.derivatives(switch - 1e-9), POTENTIAL.derivatives(switch + 1e-9));
             assert!((below.0 - above.0).abs() < 1e-7, "at {switch}");
         }
@@ -88,7 +96,10 @@ mod tests {
 
     #[test]
     fn the_axis_cannot_reach_the_wall() {
-        assert!(POTENTIAL.value(1e-300) > POTENTIAL.value(1e-3) && POTENTIAL.derivatives(1e-6).0 < -1e3);
-        assert_eq!(POTENTIAL.value(0.0), f64::INFINITY);
+        assert!(
+            POTENTIAL.value(0.12 + 1e-12) > POTENTIAL.value(0.13)
+                && POTENTIAL.derivatives(0.12 + 1e-6).0 < -1e3
+        );
+        assert_eq!(POTENTIAL.value(0.12), f64::INFINITY);
     }
 }

@@ -83,13 +83,13 @@ enum Reading {
     Free(f64),
     /// The wall is near.
     Near(Distance),
-    /// The point is beyond the wall.
+    /// The point is where the potential does not allow it.
     Outside,
 }
 
 impl Reading {
-    fn of(distance: Distance) -> Self {
-        if distance.value_mm > 0.0 { Self::Near(distance) } else { Self::Outside }
+    fn of(distance: Distance, potential: &WallPotential) -> Self {
+        if potential.is_allowed(distance.value_mm) { Self::Near(distance) } else { Self::Outside }
     }
 }
 
@@ -140,7 +140,17 @@ impl<'a> WallContact<'a> {
         skip: bool,
     ) -> Self {
         known.resize(points.len(), KnownPoint::default());
-        Self { wall, query, reach_mm, skip, points, least_moment_nmm: softest_nmm2 / LEAST_BEND_MM, softness: 1.0, known, counters: Counters::default() }
+        Self {
+            wall,
+            query,
+            reach_mm,
+            skip,
+            points,
+            least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
+            softness: 1.0,
+            known,
+            counters: Counters::default(),
+        }
     }
 
     /// Position of point `index`, mm.
@@ -148,12 +158,15 @@ impl<'a> WallContact<'a> {
         let ContactPoint { element: e, xi, .. } = self.points[index];
         let [w0, s0, w1, s1] = hermite(xi);
         let h = elements[e].length;
-        state.positions[e] * w0 + state.positions[e + 1] * w1 + (state.frames[e].t * s0 + state.frames[e + 1].t * s1) * h
+        state.positions[e] * w0
+            + state.positions[e + 1] * w1
+            + (state.frames[e].t * s0 + state.frames[e + 1].t * s1) * h
     }
 
     /// How near the wall point `index` would be at `x`.
     fn read(&mut self, index: usize, x: &Vec3) -> Reading {
-        let radius = self.points[index].potential.radius_mm;
+        let potential = self.points[index].potential;
+        let radius = potential.radius_mm;
         let near = radius * (1.0 + FOLLOW);
         let KnownPoint(known) = &mut self.known[index];
         if self.skip {
@@ -167,7 +180,7 @@ impl<'a> WallContact<'a> {
                 && let Some(distance) = self.wall.distance(x, triangle).filter(|d| d.value_mm > 0.0)
             {
                 self.counters.walked += 1;
-                return Reading::of(distance);
+                return Reading::of(distance, &potential);
             }
         }
         self.counters.queries += 1;
@@ -185,15 +198,25 @@ impl<'a> WallContact<'a> {
         known.triangle = Some(nearest.triangle);
         // Where the surface is folded or torn the quadrics contradict the triangles, and the triangles are right.
         let smooth = self.wall.distance(x, nearest.triangle);
-        Reading::of(smooth.filter(|d| (d.value_mm - nearest.distance_mm).abs() < DISAGREE * radius).unwrap_or(Distance {
-            value_mm: nearest.distance_mm,
-            gradient: nearest.normal,
-            hessian: Matrix3::zeros(),
-        }))
+        Reading::of(
+            smooth.filter(|d| (d.value_mm - nearest.distance_mm).abs() < DISAGREE * radius).unwrap_or(
+                Distance {
+                    value_mm: nearest.distance_mm,
+                    gradient: nearest.normal,
+                    hessian: Matrix3::zeros(),
+                },
+            ),
+            &potential,
+        )
     }
 
     /// Distance of point `index` at the given state, where the wall is near, and its triangle.
-    pub fn distance_at(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<(Distance, u32)> {
+    pub fn distance_at(
+        &mut self,
+        elements: &[ElementData],
+        state: &RodState,
+        index: usize,
+    ) -> Option<(Distance, u32)> {
         let x = self.position(elements, state, index);
         match self.read(index, &x) {
             Reading::Near(distance) => Some((distance, self.known[index].0.triangle.unwrap_or(0))),
@@ -218,7 +241,9 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let point = self.points[index];
             match self.read(index, &x) {
                 Reading::Free(_) => {}
-                Reading::Near(d) => sum += self.softness * point.weight_mm * point.potential.value(d.value_mm),
+                Reading::Near(d) => {
+                    sum += self.softness * point.weight_mm * point.potential.value(d.value_mm);
+                }
                 Reading::Outside => return f64::INFINITY,
             }
         }

@@ -75,7 +75,8 @@ impl Device {
                 crate::error::in_range(&format!("device.section[{index}].{field}"), value, limit)?;
             }
             let curvature = section.rest_curvature_per_mm;
-            if !(curvature[0].hypot(curvature[1]) * section.radius_mm <= 1.0) {
+            let bend = curvature[0].hypot(curvature[1]) * section.radius_mm;
+            if bend.is_nan() || bend > 1.0 {
                 return Err(Error::parameter(
                     format!("device.section[{index}].rest_curvature_per_mm"),
                     format!("{curvature:?}"),

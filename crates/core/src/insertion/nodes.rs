@@ -6,8 +6,7 @@
 /// element has another length: between half and one and a half elements, so that no sliver arises while a device is
 /// pushed by fractions of an element; it is shorter only where nothing else is inserted. Nothing inserted is one node.
 pub(crate) fn nodes_from_tip(inserted_mm: f64, element_mm: f64, from_tip_mm: &mut Vec<f64>) {
-    let elements =
-        if inserted_mm > 0.0 { ((inserted_mm / element_mm).round() as usize).max(1) } else { 0 };
+    let elements = if inserted_mm > 0.0 { ((inserted_mm / element_mm).round() as usize).max(1) } else { 0 };
     from_tip_mm.clear();
     from_tip_mm.push(inserted_mm);
     from_tip_mm.extend((0..elements).rev().map(|k| k as f64 * element_mm));

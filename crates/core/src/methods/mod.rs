@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::Result;
 use crate::insertion::{Command, StepReport, Surroundings};
-use crate::shape::Shape;
 use crate::rod::{PLAIN, TWISTED};
+use crate::shape::Shape;
 use kirchhoff::{Kirchhoff, KirchhoffOptions};
 use li2011::{Li2011, Li2011Options, LinearSolver};
 

@@ -249,12 +249,14 @@ impl Scene {
     pub fn simulation(&self) -> Result<Simulation> {
         let wall = self.wall()?;
         let sheath = self.sheath(&wall)?;
-        Simulation::with_properties(wall, self.vessel.wall, self.device()?, sheath, &self.method).map_err(|error| match error {
-            // What is wrong with a surface is wrong with its file.
-            Error::Mesh(reason) => {
-                self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason))
-            }
-            other => other,
-        })
+        Simulation::with_properties(wall, self.vessel.wall, self.device()?, sheath, &self.method).map_err(
+            |error| match error {
+                // What is wrong with a surface is wrong with its file.
+                Error::Mesh(reason) => {
+                    self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason))
+                }
+                other => other,
+            },
+        )
     }
 }

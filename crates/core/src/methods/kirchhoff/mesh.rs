@@ -29,7 +29,13 @@ impl Mesh {
     ///
     /// Nodes are marks on the device, at whole element lengths from the tip; the first element is between half and one
     /// and a half elements long, shorter only where that is all there is.
-    pub(super) fn build(&mut self, device: &Device, inserted_mm: f64, element_mm: f64, modulus_n_per_mm2: f64) {
+    pub(super) fn build(
+        &mut self,
+        device: &Device,
+        inserted_mm: f64,
+        element_mm: f64,
+        modulus_n_per_mm2: f64,
+    ) {
         crate::insertion::nodes_from_tip(inserted_mm, element_mm, &mut self.from_tip_mm);
         self.elements.clear();
         for ends in self.from_tip_mm.windows(2) {
@@ -50,7 +56,8 @@ impl Mesh {
         let mut half_beyond = device.section_at(0.0).radius_mm;
         for (e, data) in self.elements.iter().enumerate().rev() {
             let radius_mm = device.section_at(self.from_tip_mm[e + 1]).radius_mm;
-            let intervals = (data.length / (SPACING_RADII * radius_mm)).ceil().clamp(INTERVALS.0, INTERVALS.1);
+            let intervals =
+                (data.length / (SPACING_RADII * radius_mm)).ceil().clamp(INTERVALS.0, INTERVALS.1);
             let spacing = data.length / intervals;
             let is_last = e + 1 == self.elements.len();
             // Distance from the element's far end.
@@ -60,7 +67,8 @@ impl Mesh {
                 let left = data.length - at;
                 let step = fine.min(spacing);
                 // The intervals that are left are made equal where the fine ones end.
-                let step = if step >= spacing { left / (left / spacing - 1e-9).ceil() } else { step.min(left) };
+                let step =
+                    if step >= spacing { left / (left / spacing - 1e-9).ceil() } else { step.min(left) };
                 self.points.push(ContactPoint {
                     element: e,
                     xi: 1.0 - at / data.length,

@@ -24,8 +24,8 @@ use crate::insertion::{Command, Contact, Energy, StepReport, Surroundings};
 use crate::methods::Method;
 use crate::rod::{Frame, Layout, RodState, Supports};
 use crate::shape::Shape;
-use crate::vessel::{Wall, WallQuery};
 use crate::solve::{External, Newton, NewtonOptions};
+use crate::vessel::{Wall, WallQuery};
 use crate::{Error, Result};
 use mesh::Mesh;
 use slide::{Extension, slide};
@@ -44,7 +44,7 @@ pub struct KirchhoffOptions {
 
 impl Default for KirchhoffOptions {
     fn default() -> Self {
-        Self { element_mm: 2.0, max_iterations: 60, skip: true }
+        Self { element_mm: 2.0, max_iterations: 500, skip: true }
     }
 }
 
@@ -98,7 +98,9 @@ impl<const C: usize> Kirchhoff<C> {
             return Err(Error::parameter(
                 "method.element_mm",
                 options.element_mm,
-                format!("cuts the device of {length_mm} mm into more than {ELEMENT_LIMIT} elements: use longer ones"),
+                format!(
+                    "cuts the device of {length_mm} mm into more than {ELEMENT_LIMIT} elements: use longer ones"
+                ),
             ));
         }
         if options.max_iterations == 0 {
@@ -181,8 +183,13 @@ impl<const C: usize> Kirchhoff<C> {
                 tolerance: if softness < 1.0 { LOOSE } else { TOLERANCE },
                 ..NewtonOptions::default()
             };
-            let found =
-                self.newton.solve(&self.next_mesh.elements, &mut supports, &mut contact, &mut self.next, &options);
+            let found = self.newton.solve(
+                &self.next_mesh.elements,
+                &mut supports,
+                &mut contact,
+                &mut self.next,
+                &options,
+            );
             iterations += found.iterations;
             if softness == 1.0 || !found.converged {
                 break found;
@@ -232,7 +239,8 @@ impl<const C: usize> Kirchhoff<C> {
             wall: External::<C>::energy(&mut contact, &self.mesh.elements, &self.state),
         };
         for (index, point) in self.mesh.points.iter().enumerate() {
-            let Some((distance, triangle)) = contact.distance_at(&self.mesh.elements, &self.state, index) else {
+            let Some((distance, triangle)) = contact.distance_at(&self.mesh.elements, &self.state, index)
+            else {
                 continue;
             };
             let penetration_mm = point.potential.penetration_mm(distance.value_mm);
@@ -314,7 +322,9 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 self.state.frames.truncate(1);
                 self.state.positions.truncate(1);
                 self.state.angles.truncate(1);
-                for list in [&mut self.state.tensions, &mut self.state.bubbles, &mut self.state.reference_twists] {
+                for list in
+                    [&mut self.state.tensions, &mut self.state.bubbles, &mut self.state.reference_twists]
+                {
                     list.clear();
                 }
                 self.state.chords.clear();

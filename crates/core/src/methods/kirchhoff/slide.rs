@@ -23,7 +23,14 @@ const HEAD_ON: f64 = -0.995;
 impl Extension {
     /// Traces up to `wanted_mm` in front of the tip: straight on while the wall is farther than the tip's radius, then
     /// along it. Returns how far it came.
-    pub(super) fn trace(&mut self, query: &WallQuery, tip: Vec3, tangent: Vec3, radius_mm: f64, wanted_mm: f64) -> f64 {
+    pub(super) fn trace(
+        &mut self,
+        query: &WallQuery,
+        tip: Vec3,
+        tangent: Vec3,
+        radius_mm: f64,
+        wanted_mm: f64,
+    ) -> f64 {
         self.pieces.clear();
         let count = (wanted_mm / (PIECE * radius_mm)).ceil().max(1.0);
         self.piece_mm = wanted_mm / count;
@@ -39,11 +46,15 @@ impl Extension {
                 }
                 // The piece ends where its surface would just touch, as far as one piece can turn.
                 let along = t - near.normal * t.dot(&near.normal);
-                let lift = (t.dot(&near.normal) + (radius_mm - near.distance_mm) / self.piece_mm).clamp(-0.5, 0.5);
+                let lift =
+                    (t.dot(&near.normal) + (radius_mm - near.distance_mm) / self.piece_mm).clamp(-0.5, 0.5);
                 t = (along.normalize() + near.normal * lift).normalize();
             }
             let next = x + t * self.piece_mm;
-            if query.nearest(&next, radius_mm).is_some_and(|near| !near.rim && near.distance_mm < CLEAR * radius_mm) {
+            if query
+                .nearest(&next, radius_mm)
+                .is_some_and(|near| !near.rim && near.distance_mm < CLEAR * radius_mm)
+            {
                 break;
             }
             x = next;
@@ -64,7 +75,7 @@ impl Extension {
 }
 
 /// Part of its radius that the axis keeps from the wall while it is traced.
-const CLEAR: f64 = 0.4;
+const CLEAR: f64 = 0.5;
 
 /// Position and unit tangent at an arc length from the sheath on the curve of `state`.
 ///
