@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use endowire_core::device::Device;
-use endowire_core::insertion::{Command, Sheath, Surroundings};
+use endowire_core::insertion::{Command, Sheath, Surroundings, WallProperties};
 use endowire_core::methods::Method;
 use endowire_core::methods::li2011::{Chain, Li2011, Li2011Options, LinearSolver, banded, dense};
 use endowire_core::vessel::{GeneratedWall, Resolution, WallQuery, anatomy};
@@ -77,7 +77,13 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
     let query = WallQuery::new(&generated.wall)?;
     let sheath = Sheath::at_opening(&generated.wall, generated.inlet, 1.0)?;
     let device = Device::uniform(INSERTED_MM + TIMED_MM * args.repeats as f64, RADIUS_MM, STIFFNESS_NMM2)?;
-    let surroundings = Surroundings { query: &query, sheath: &sheath, device: &device };
+    let surroundings = Surroundings {
+        wall: &generated.wall,
+        properties: &WallProperties::default(),
+        query: &query,
+        sheath: &sheath,
+        device: &device,
+    };
 
     let bar = progress::bar(args.nodes.len(), "row");
     let mut rows = Vec::new();

@@ -14,6 +14,30 @@ pub struct Section {
     pub radius_mm: f64,
     /// Bending stiffness EI, N·mm².
     pub bending_stiffness_nmm2: f64,
+    /// Torsional stiffness GJ, N·mm²; EI/1.3 if absent: a solid round wire of Poisson ratio 0.3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torsional_stiffness_nmm2: Option<f64>,
+    /// Rest curvature along the first and second material direction, 1/mm: a shaped tip.
+    #[serde(default)]
+    pub rest_curvature_per_mm: [f64; 2],
+}
+
+impl Section {
+    /// A straight section of a solid round wire.
+    pub fn straight(length_mm: f64, radius_mm: f64, bending_stiffness_nmm2: f64) -> Self {
+        Self {
+            length_mm,
+            radius_mm,
+            bending_stiffness_nmm2,
+            torsional_stiffness_nmm2: None,
+            rest_curvature_per_mm: [0.0; 2],
+        }
+    }
+
+    /// GJ, N·mm².
+    pub fn torsion_nmm2(&self) -> f64 {
+        self.torsional_stiffness_nmm2.unwrap_or(self.bending_stiffness_nmm2 / 1.3)
+    }
 }
 
 /// A device: its sections, **tip first**, because the tip is what enters first.
@@ -46,8 +70,18 @@ impl Device {
                 ("length_mm", section.length_mm, LENGTH_LIMIT_MM),
                 ("radius_mm", section.radius_mm, RADIUS_LIMIT_MM),
                 ("bending_stiffness_nmm2", section.bending_stiffness_nmm2, STIFFNESS_LIMIT_NMM2),
+                ("torsional_stiffness_nmm2", section.torsion_nmm2(), STIFFNESS_LIMIT_NMM2),
             ] {
                 crate::error::in_range(&format!("device.section[{index}].{field}"), value, limit)?;
+            }
+            let curvature = section.rest_curvature_per_mm;
+            let bend = curvature[0].hypot(curvature[1]) * section.radius_mm;
+            if bend.is_nan() || bend > 1.0 {
+                return Err(Error::parameter(
+                    format!("device.section[{index}].rest_curvature_per_mm"),
+                    format!("{curvature:?}"),
+                    "must be finite, and its radius no smaller than the device's own",
+                ));
             }
         }
         let length_mm = sections.iter().map(|s| s.length_mm).sum();
@@ -60,7 +94,7 @@ impl Device {
     /// # Errors
     /// As [`Device::new`].
     pub fn uniform(length_mm: f64, radius_mm: f64, bending_stiffness_nmm2: f64) -> Result<Self> {
-        Self::new(vec![Section { length_mm, radius_mm, bending_stiffness_nmm2 }])
+        Self::new(vec![Section::straight(length_mm, radius_mm, bending_stiffness_nmm2)])
     }
 
     /// Whole length, mm.
@@ -84,6 +118,11 @@ impl Device {
         }
         // `new` refuses devices without sections.
         &self.sections[self.sections.len() - 1]
+    }
+
+    /// Whether the device has a shape of its own, so that turning its tail moves it.
+    pub fn is_shaped(&self) -> bool {
+        self.sections.iter().any(|s| s.rest_curvature_per_mm != [0.0; 2])
     }
 
     /// Largest outer radius, mm.

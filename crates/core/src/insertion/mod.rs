@@ -1,11 +1,13 @@
 //! Pushing, pulling and turning a device through a sheath into a vessel.
 
 mod command;
+mod nodes;
 mod report;
 mod sheath;
 mod simulation;
 
 pub use command::{Command, ScriptLine, commands};
+pub(crate) use nodes::nodes_from_tip;
 pub use report::{Contact, Energy, StepReport};
 pub use sheath::Sheath;
-pub use simulation::{Simulation, Surroundings, check_commands, script_commands};
+pub use simulation::{Simulation, Surroundings, WallProperties, check_commands, script_commands};

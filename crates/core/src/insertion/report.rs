@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::Vec3;
+use crate::contact::Counters;
 
 /// The terms of the total potential energy, mJ.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -57,8 +58,16 @@ pub struct StepReport {
     pub max_penetration_mm: f64,
     /// Where the wall holds the device.
     pub contacts: Vec<Contact>,
+    /// The opening through which the tip has left the vessel, while it is beyond it.
+    pub left_through: Option<usize>,
     /// Iterations (linear solves) of this step.
     pub iterations: u32,
+    /// Parts that the command was cut into.
+    pub substeps: u32,
+    /// Whether the device jumped to a lower minimum: it set free energy that the hand had put in.
+    pub jumped: bool,
+    /// Wall queries made and avoided since the start.
+    pub counters: Counters,
     /// Whether the step met the method's own convergence test.
     pub converged: bool,
 }

@@ -11,6 +11,10 @@ use crate::{Error, Result};
 /// What surrounds a method's unknowns: it may read all of it and change none.
 #[derive(Clone, Copy)]
 pub struct Surroundings<'a> {
+    /// The vessel.
+    pub wall: &'a Wall,
+    /// How the vessel's wall yields and rubs.
+    pub properties: &'a WallProperties,
     /// Distance queries to the vessel wall.
     pub query: &'a WallQuery,
     /// Where the device comes from.
@@ -19,9 +23,25 @@ pub struct Surroundings<'a> {
     pub device: &'a Device,
 }
 
+/// How a vessel's wall answers a device that presses on it.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WallProperties {
+    /// Foundation modulus k, N/mm²: force per length per depth.
+    pub modulus_n_per_mm2: f64,
+}
+
+impl Default for WallProperties {
+    /// An artery's modulus in order of magnitude.
+    fn default() -> Self {
+        Self { modulus_n_per_mm2: 1.0 }
+    }
+}
+
 /// An insertion under way.
 pub struct Simulation {
     wall: Wall,
+    properties: WallProperties,
     query: WallQuery,
     sheath: Sheath,
     device: Device,
@@ -39,6 +59,21 @@ impl Simulation {
     /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
     /// tell, or method options out of range.
     pub fn new(wall: Wall, device: Device, sheath: Sheath, method: &MethodChoice) -> Result<Self> {
+        Self::with_properties(wall, WallProperties::default(), device, sheath, method)
+    }
+
+    /// As [`Simulation::new`], with a wall of given modulus.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`], and wall properties out of range.
+    pub fn with_properties(
+        wall: Wall,
+        properties: WallProperties,
+        device: Device,
+        sheath: Sheath,
+        method: &MethodChoice,
+    ) -> Result<Self> {
+        crate::error::in_range("vessel.wall.modulus_n_per_mm2", properties.modulus_n_per_mm2, 1e9)?;
         if !wall.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
             let p = sheath.position_mm;
             let openings: Vec<String> = wall
@@ -62,8 +97,14 @@ impl Simulation {
         }
         let query = WallQuery::new(&wall)?;
         check_mouth(&query, &device, &sheath)?;
-        let method = method.start(&Surroundings { query: &query, sheath: &sheath, device: &device })?;
-        Ok(Self { wall, query, sheath, device, method })
+        let method = method.start(&Surroundings {
+            wall: &wall,
+            properties: &properties,
+            query: &query,
+            sheath: &sheath,
+            device: &device,
+        })?;
+        Ok(Self { wall, properties, query, sheath, device, method })
     }
 
     /// Carries out one command. After an error the state is as before.
@@ -73,7 +114,13 @@ impl Simulation {
     /// (all [`Error::Parameter`]); a step that found no equilibrium ([`Error::Computation`]).
     pub fn step(&mut self, command: Command) -> Result<&StepReport> {
         check_command(command, self.method.report().inserted_mm, self.device.length_mm())?;
-        let surroundings = Surroundings { query: &self.query, sheath: &self.sheath, device: &self.device };
+        let surroundings = Surroundings {
+            wall: &self.wall,
+            properties: &self.properties,
+            query: &self.query,
+            sheath: &self.sheath,
+            device: &self.device,
+        };
         self.method.step(&surroundings, command)?;
         Ok(self.method.report())
     }

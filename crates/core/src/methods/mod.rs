@@ -1,12 +1,15 @@
 //! Whole methods that answer a command with the next equilibrium, behind one trait.
 
+pub mod kirchhoff;
 pub mod li2011;
 
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
 use crate::insertion::{Command, StepReport, Surroundings};
+use crate::rod::{PLAIN, TWISTED};
 use crate::shape::Shape;
+use kirchhoff::{Kirchhoff, KirchhoffOptions};
 use li2011::{Li2011, Li2011Options, LinearSolver};
 
 /// A method keeps its own unknowns from step to step and moves them by commands.
@@ -30,6 +33,9 @@ pub trait Method: Send {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name")]
 pub enum MethodChoice {
+    /// The exact rod in equilibrium with the wall.
+    #[serde(rename = "kirchhoff")]
+    Kirchhoff(KirchhoffOptions),
     /// Li et al. 2011 with the paper's dense solve.
     #[serde(rename = "li2011-dense")]
     Li2011Dense(Li2011Options),
@@ -40,7 +46,7 @@ pub enum MethodChoice {
 
 impl Default for MethodChoice {
     fn default() -> Self {
-        Self::Li2011Banded(Li2011Options::default())
+        Self::Kirchhoff(KirchhoffOptions::default())
     }
 }
 
@@ -48,6 +54,7 @@ impl MethodChoice {
     /// The name used in scene files and results.
     pub fn name(&self) -> &'static str {
         match self {
+            Self::Kirchhoff(_) => "kirchhoff",
             Self::Li2011Dense(_) => "li2011-dense",
             Self::Li2011Banded(_) => "li2011-banded",
         }
@@ -59,6 +66,10 @@ impl MethodChoice {
     /// Options out of range.
     pub fn start(&self, surroundings: &Surroundings<'_>) -> Result<Box<dyn Method>> {
         Ok(match self {
+            Self::Kirchhoff(options) if surroundings.device.is_shaped() => {
+                Box::new(Kirchhoff::<TWISTED>::new(*options, surroundings)?)
+            }
+            Self::Kirchhoff(options) => Box::new(Kirchhoff::<PLAIN>::new(*options, surroundings)?),
             Self::Li2011Dense(options) => Box::new(Li2011::new(*options, LinearSolver::Dense, surroundings)?),
             Self::Li2011Banded(options) => {
                 Box::new(Li2011::new(*options, LinearSolver::Banded, surroundings)?)

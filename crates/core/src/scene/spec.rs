@@ -7,7 +7,7 @@ use serde::de::IgnoredAny;
 
 use crate::device::{Device, Section};
 use crate::input::from_toml;
-use crate::insertion::{Command, ScriptLine, Sheath, Simulation, script_commands};
+use crate::insertion::{Command, ScriptLine, Sheath, Simulation, WallProperties, script_commands};
 use crate::methods::MethodChoice;
 use crate::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall};
 use crate::{Error, Result, Vec3};
@@ -57,6 +57,9 @@ pub struct VesselSpec {
     pub edge_mm: Option<f64>,
     /// Number of triangles of the wall built from the tree, in place of `edge_mm`.
     pub triangles: Option<usize>,
+    /// How the wall yields and rubs.
+    #[serde(default)]
+    pub wall: WallProperties,
 }
 
 impl VesselSpec {
@@ -295,23 +298,25 @@ impl Scene {
     pub fn simulation(&self) -> Result<Simulation> {
         let wall = self.wall()?;
         let sheath = self.sheath(&wall)?;
-        Simulation::new(wall, self.device()?, sheath, &self.method).map_err(|error| match error {
-            // What is wrong with a surface is wrong with its file.
-            Error::Mesh(reason) => {
-                self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason))
-            }
-            // The position came from an opening: what can be changed is the depth.
-            Error::Parameter { name, value, mend } if name == "sheath.position_mm" => {
-                match self.sheath.opening {
-                    Some(_) => Error::parameter(
-                        "sheath.depth_mm",
-                        self.sheath.depth_mm.unwrap_or(DEPTH_MM),
-                        format!("the mouth at {value} {mend}"),
-                    ),
-                    None => Error::Parameter { name, value, mend },
+        Simulation::with_properties(wall, self.vessel.wall, self.device()?, sheath, &self.method).map_err(
+            |error| match error {
+                // What is wrong with a surface is wrong with its file.
+                Error::Mesh(reason) => {
+                    self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason))
                 }
-            }
-            other => other,
-        })
+                // The position came from an opening: what can be changed is the depth.
+                Error::Parameter { name, value, mend } if name == "sheath.position_mm" => {
+                    match self.sheath.opening {
+                        Some(_) => Error::parameter(
+                            "sheath.depth_mm",
+                            self.sheath.depth_mm.unwrap_or(DEPTH_MM),
+                            format!("the mouth at {value} {mend}"),
+                        ),
+                        None => Error::Parameter { name, value, mend },
+                    }
+                }
+                other => other,
+            },
+        )
     }
 }

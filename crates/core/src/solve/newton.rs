@@ -30,6 +30,14 @@ pub trait External<const C: usize> {
     fn conservative(&self) -> bool {
         true
     }
+    /// Whether it can stop a step short, as a wall does.
+    fn obstructs(&self) -> bool {
+        false
+    }
+    /// Part of the way from the state last given to [`External::add`] to `to` that crosses nothing.
+    fn safe_fraction(&mut self, _elements: &[ElementData], _to: &RodState) -> f64 {
+        1.0
+    }
     /// Size of the forces and moments it exerts, for the scale of the residual.
     fn scale(&self) -> [f64; 2] {
         [0.0; 2]
@@ -318,6 +326,7 @@ impl<const C: usize> Newton<C> {
                 stored.total().abs() + self.assembly.external_energy.abs() + weighed + slope.abs();
             let rounding = ENERGY_ROUNDING * energy_scale;
             let mut accepted = None;
+            let mut refused = None;
             let old_multipliers = supports.multipliers;
             for j in 0..6 {
                 supports.multipliers[j] += self.step[first + j];
@@ -325,6 +334,14 @@ impl<const C: usize> Newton<C> {
             for attempt in 0..24 {
                 assembled = false;
                 self.trial.advance::<C>(elements, state, &self.step, alpha);
+                for _ in 0..4 {
+                    let safe = external.safe_fraction(elements, &self.trial);
+                    if safe >= 1.0 {
+                        break;
+                    }
+                    alpha *= safe;
+                    self.trial.advance::<C>(elements, state, &self.step, alpha);
+                }
                 if supports.conditions() > 0 {
                     self.correct(elements, supports, first);
                 }
@@ -357,6 +374,17 @@ impl<const C: usize> Newton<C> {
                             found < 0.9 * residual || (attempt > 6 && found < 2.0 * residual)
                         });
                 if accept {
+                    let (mut energy_change, mut change) = (energy_change, change);
+                    if let Some(refused) = refused {
+                        (alpha, energy_change) = self.reach_wall(
+                            elements,
+                            external,
+                            state,
+                            before,
+                            (alpha, refused, energy_change),
+                        );
+                        (change, assembled) = (energy_change, false);
+                    }
                     accepted = Some(StepRecord {
                         energy_change,
                         merit_change: change,
@@ -366,6 +394,9 @@ impl<const C: usize> Newton<C> {
                         shift,
                     });
                     break;
+                }
+                if external.obstructs() {
+                    refused = Some(alpha);
                 }
                 // Minimum of the parabola through value, slope and trial value.
                 let curve = change - slope * alpha;

@@ -4,6 +4,9 @@ use super::newton::{External, Newton};
 use crate::rod::element::element_energy;
 use crate::rod::{ElementData, Layout, RodState, Supports};
 
+/// Halvings towards the minimum along a step that a wall cut short.
+const REFINEMENTS: usize = 12;
+
 impl<const C: usize> Newton<C> {
     /// Axial forces of inextensible elements at the trial state: they are multipliers and take their full step. (Those of
     /// stretchable elements moved with the state.)
@@ -65,5 +68,35 @@ impl<const C: usize> Newton<C> {
                 break;
             }
         }
+    }
+
+    /// A wall was hit on the way: the energy falls up to it and rises steeply beyond. The minimum between the accepted
+    /// and the refused part of the step lies in touch with it; short of it the next step would meet it again.
+    ///
+    /// `ends` are the accepted part, the refused part and the change of energy of the former; returns the part taken and
+    /// its change of energy.
+    pub(super) fn reach_wall(
+        &mut self,
+        elements: &[ElementData],
+        external: &mut dyn External<C>,
+        state: &RodState,
+        before: f64,
+        ends: (f64, f64, f64),
+    ) -> (f64, f64) {
+        let (mut low, mut high, mut lowest) = ends;
+        for _ in 0..REFINEMENTS {
+            let middle = 0.5 * (low + high);
+            self.trial.advance::<C>(elements, state, &self.step, middle);
+            self.tensions(elements, state);
+            let change = self.energy(elements, external, state) - before;
+            if change < lowest {
+                (low, lowest) = (middle, change);
+            } else {
+                high = middle;
+            }
+        }
+        self.trial.advance::<C>(elements, state, &self.step, low);
+        self.tensions(elements, state);
+        (low, lowest)
     }
 }

@@ -24,4 +24,4 @@ pub use generate::{GeneratedWall, Resolution};
 pub use mesh::SurfaceMesh;
 pub use opening::Opening;
 pub use query::{Nearest, WallQuery};
-pub use wall::{RepairReport, Wall};
+pub use wall::{NO_NEIGHBOUR, RepairReport, Wall};

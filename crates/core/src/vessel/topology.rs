@@ -1,7 +1,7 @@
 //! Which triangles meet at which edge.
 
 /// Marks an edge that has no single partner: open, or shared by more than two triangles.
-pub(crate) const NONE: u32 = u32::MAX;
+pub const NONE: u32 = u32::MAX;
 
 /// One use of an undirected edge by a triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -2,6 +2,7 @@
 
 use super::opening::{self, Opening};
 use super::topology::EdgeTable;
+pub use super::topology::NONE as NO_NEIGHBOUR;
 use super::{SurfaceMesh, orient, sliver, weld};
 use crate::{Error, Result, Vec3};
 
@@ -133,6 +134,11 @@ impl Wall {
     /// The repaired surface, open where the vessel is open.
     pub fn mesh(&self) -> &SurfaceMesh {
         &self.mesh
+    }
+
+    /// For every triangle, the one across each of its sides (side k runs from corner k to the next), or [`NO_NEIGHBOUR`].
+    pub fn neighbours(&self) -> Vec<[u32; 3]> {
+        EdgeTable::new(&self.mesh.triangles).neighbours(self.mesh.triangles.len())
     }
 
     /// The openings, largest first.

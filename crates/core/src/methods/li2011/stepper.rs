@@ -164,11 +164,8 @@ impl Li2011 {
 
     /// Steps 1 and 2 of Algorithm 1: the nodes of the new inserted length, rigidly translated along the sheath.
     fn translate(&mut self, device: &Device, inserted_mm: f64, travel_mm: f64) {
-        let l = self.options.element_mm;
-        let elements = if inserted_mm == 0.0 { 0 } else { ((inserted_mm / l).round() as usize).max(1) };
-        self.from_tip_mm.clear();
-        self.from_tip_mm.push(inserted_mm);
-        self.from_tip_mm.extend((0..elements).rev().map(|k| k as f64 * l));
+        crate::insertion::nodes_from_tip(inserted_mm, self.options.element_mm, &mut self.from_tip_mm);
+        let elements = self.from_tip_mm.len() - 1;
 
         let displacement = self.chain.start_tangent * travel_mm;
         self.positions_mm.clear();

@@ -1,0 +1,93 @@
+//! The wall as a device feels it: the vessel goes on beyond its ends.
+//!
+//! A surface ends where the scan ended, and a wall that stops holding a tip from one point to the next has no
+//! equilibrium there. Every opening that a device can pass is extended straight along its direction, as flow extensions
+//! are in vessel models; smaller ones are holes of the mesh and closed. The triangles of the vessel keep their numbers.
+
+use crate::Vec3;
+use crate::vessel::{Opening, SurfaceMesh, Wall};
+
+/// Length of the extensions, mm.
+pub const EXTENSION_MM: f64 = 30.0;
+
+/// The surface of `wall` with its openings wider than `radius_mm` extended and the others closed.
+pub fn extended(wall: &Wall, radius_mm: f64) -> SurfaceMesh {
+    let mut mesh = wall.mesh().clone();
+    for opening in wall.openings() {
+        if opening.radius_mm > radius_mm {
+            extend(&mut mesh, opening);
+        } else {
+            close(&mut mesh, opening);
+        }
+    }
+    mesh
+}
+
+/// Rings along the opening's direction, as far apart as the rim's vertices.
+fn extend(mesh: &mut SurfaceMesh, opening: &Opening) {
+    let count = opening.boundary.len();
+    let at = |k: usize| mesh.vertices_mm[opening.boundary[k % count] as usize];
+    let around: f64 = (0..count).map(|k| (at(k + 1) - at(k)).norm()).sum();
+    let rings = (EXTENSION_MM / (around / count as f64)).ceil().clamp(1.0, 1000.0) as usize;
+    let rim: Vec<Vec3> = (0..count).map(at).collect();
+    let mut last = opening.boundary.clone();
+    for ring in 1..=rings {
+        let way = opening.direction * (EXTENSION_MM * ring as f64 / rings as f64);
+        let first = mesh.vertices_mm.len() as u32;
+        mesh.vertices_mm.extend(rim.iter().map(|v| v + way));
+        let next: Vec<u32> = (first..first + count as u32).collect();
+        for k in 0..count {
+            let l = (k + 1) % count;
+            // A cap would run along the boundary like this; so does the first triangle of the strip.
+            mesh.triangles.push([last[k], last[l], next[k]]);
+            mesh.triangles.push([last[l], next[l], next[k]]);
+        }
+        last = next;
+    }
+}
+
+fn close(mesh: &mut SurfaceMesh, opening: &Opening) {
+    let centre = mesh.vertices_mm.len() as u32;
+    mesh.vertices_mm.push(opening.centre_mm);
+    let next = opening.boundary.iter().cycle().skip(1);
+    mesh.triangles.extend(opening.boundary.iter().zip(next).map(|(&a, &b)| [a, b, centre]));
+}
+
+/// The opening beyond whose plane `x` lies, within its extension.
+pub fn left_through(wall: &Wall, x: &Vec3) -> Option<(usize, f64)> {
+    wall.openings().iter().find_map(|o| {
+        let offset = x - o.centre_mm;
+        let beyond = offset.dot(&o.direction);
+        let aside = (offset - o.direction * beyond).norm();
+        (beyond > 0.0 && beyond <= EXTENSION_MM && aside < 1.5 * o.radius_mm).then_some((o.index, beyond))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vessel::{GeneratedWall, Resolution, anatomy, check};
+
+    #[test]
+    fn the_extended_vessel_is_sound_and_keeps_its_triangles() {
+        let wall =
+            GeneratedWall::new(&anatomy::tree("aortic_arch").unwrap(), Resolution::EdgeMm(3.0)).unwrap().wall;
+        let mesh = extended(&wall, 0.5);
+        assert_eq!(mesh.triangles[..wall.mesh().triangles.len()], wall.mesh().triangles[..]);
+        let report = check(&mesh).unwrap();
+        assert!(report.is_sound() && report.openings.len() == wall.openings().len(), "{report:?}");
+        let closed = check(&extended(&wall, 100.0)).unwrap();
+        assert!(closed.watertight && closed.is_sound(), "{closed:?}");
+    }
+
+    #[test]
+    fn a_point_past_an_opening_has_left_through_it() {
+        let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(2.0))
+            .unwrap()
+            .wall;
+        let top = wall.openings().iter().find(|o| o.direction.z > 0.5).unwrap();
+        let found = left_through(&wall, &Vec3::new(1.0, 0.0, 105.0)).unwrap();
+        assert!(found.0 == top.index && (found.1 - 5.0).abs() < 1e-6);
+        assert!(left_through(&wall, &Vec3::new(1.0, 0.0, 95.0)).is_none());
+    }
+}

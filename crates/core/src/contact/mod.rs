@@ -1,0 +1,10 @@
+//! What the wall does to a device: distance, energy, friction.
+
+pub mod distance;
+pub mod extension;
+pub mod potential;
+pub mod wall;
+
+pub use distance::{Distance, SmoothWall};
+pub use potential::WallPotential;
+pub use wall::{ContactPoint, Counters, KnownPoint, WallContact};

@@ -1,0 +1,317 @@
+//! The wall as an energy of the rod: quadrature points along the device, each with its distance from the wall.
+//!
+//! U = Σᵢ wᵢ ψ(d(xᵢ)) with the trapezoidal rule over each element, which is the most exact one for a pressure that
+//! begins and ends inside it, and the tip's cap as a further weight r at the last point: ½ k r p² (without it the force of
+//! the tip gathers in a layer that no mesh resolves). Points are labelled from the tip, like everything on a device, so
+//! what is known of their surroundings stays with them while the device slides.
+//!
+//! A point asks the bounding volume hierarchy only when it may have come near something new: while it has moved less than
+//! its last clearance, nothing can touch it.
+
+use crate::Vec3;
+use crate::contact::{Distance, SmoothWall, WallPotential};
+use crate::rod::quadrature::hermite;
+use crate::rod::{Assembly, ElementData, RodState};
+use crate::solve::External;
+use crate::vessel::WallQuery;
+use nalgebra::Matrix3;
+
+/// A place on the device where the wall is felt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactPoint {
+    /// Element and local coordinate 0…1.
+    pub element: usize,
+    /// Local coordinate in the element.
+    pub xi: f64,
+    /// Length of device that the point stands for, mm.
+    pub weight_mm: f64,
+    /// Energy per length.
+    pub potential: WallPotential,
+}
+
+/// What a point knows of its surroundings.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    /// Where the wall was last looked for.
+    looked_at: Vec3,
+    /// No wall is nearer to that place than this, mm.
+    clearance_mm: f64,
+    /// The nearest triangle then, if the wall was near.
+    triangle: Option<u32>,
+    /// Position at the state that Newton's method is leaving.
+    base: Vec3,
+    /// No wall is nearer to it than this, mm.
+    base_clearance_mm: f64,
+}
+
+impl Default for Known {
+    fn default() -> Self {
+        Self {
+            looked_at: Vec3::zeros(),
+            clearance_mm: -1.0,
+            triangle: None,
+            base: Vec3::zeros(),
+            base_clearance_mm: 0.0,
+        }
+    }
+}
+
+/// Work done and avoided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+pub struct Counters {
+    /// Questions to the bounding volume hierarchy.
+    pub queries: u64,
+    /// Questions that a walk over neighbouring triangles answered.
+    pub walked: u64,
+    /// Questions that the last clearance answered.
+    pub avoided: u64,
+}
+
+impl Counters {
+    /// Adds another count.
+    pub fn add(&mut self, other: &Self) {
+        self.queries += other.queries;
+        self.walked += other.walked;
+        self.avoided += other.avoided;
+    }
+}
+
+/// How near a point stands.
+#[derive(Debug, Clone, Copy)]
+enum Reading {
+    /// Nothing within reach; no wall is nearer than this, mm.
+    Free(f64),
+    /// The wall is near.
+    Near(Distance),
+    /// The point is where the potential does not allow it.
+    Outside,
+}
+
+impl Reading {
+    fn of(distance: Distance, potential: &WallPotential) -> Self {
+        if potential.is_allowed(distance.value_mm) { Self::Near(distance) } else { Self::Outside }
+    }
+}
+
+/// Beyond its radius, a point is followed over the wall's triangles within this part of it: the smooth wall and the flat
+/// one differ by less.
+const FOLLOW: f64 = 0.5;
+/// A point looks for other walls again when it has moved by this part of its radius.
+const LOOK_AGAIN: f64 = 0.5;
+/// Radius of the gentlest bend worth a number, mm.
+const LEAST_BEND_MM: f64 = 100.0;
+/// Smooth and flat distance differ by less than this part of the radius, or the flat one is taken.
+const DISAGREE: f64 = 0.8;
+/// Part of its clearance that a point may move in one step of Newton's method.
+const SAFE: f64 = 0.9;
+
+/// The wall's energy along a device.
+pub struct WallContact<'a> {
+    wall: &'a SmoothWall,
+    query: &'a WallQuery,
+    /// How far a point looks for the wall, mm.
+    reach_mm: f64,
+    /// Whether clearances and walks may replace queries.
+    skip: bool,
+    points: &'a [ContactPoint],
+    /// Moment of the softest piece at [`LEAST_BEND_MM`], N·mm.
+    least_moment_nmm: f64,
+    /// Part of the modulus that acts: a rigid wall is approached from a softer one.
+    pub softness: f64,
+    known: &'a mut Vec<KnownPoint>,
+    /// Work done and avoided.
+    pub counters: Counters,
+}
+
+/// Opaque memory of one point, kept between steps.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct KnownPoint(Known);
+
+impl<'a> WallContact<'a> {
+    /// The wall's energy at `points` (tip first), with what is known from earlier steps. `softest_nmm2` is the device's
+    /// least bending stiffness.
+    pub fn new(
+        wall: &'a SmoothWall,
+        query: &'a WallQuery,
+        points: &'a [ContactPoint],
+        known: &'a mut Vec<KnownPoint>,
+        softest_nmm2: f64,
+        reach_mm: f64,
+        skip: bool,
+    ) -> Self {
+        known.resize(points.len(), KnownPoint::default());
+        Self {
+            wall,
+            query,
+            reach_mm,
+            skip,
+            points,
+            least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
+            softness: 1.0,
+            known,
+            counters: Counters::default(),
+        }
+    }
+
+    /// Position of point `index`, mm.
+    pub fn position(&self, elements: &[ElementData], state: &RodState, index: usize) -> Vec3 {
+        let ContactPoint { element: e, xi, .. } = self.points[index];
+        let [w0, s0, w1, s1] = hermite(xi);
+        let h = elements[e].length;
+        state.positions[e] * w0
+            + state.positions[e + 1] * w1
+            + (state.frames[e].t * s0 + state.frames[e + 1].t * s1) * h
+    }
+
+    /// How near the wall point `index` would be at `x`.
+    fn read(&mut self, index: usize, x: &Vec3) -> Reading {
+        let potential = self.points[index].potential;
+        let radius = potential.radius_mm;
+        let near = radius * (1.0 + FOLLOW);
+        let KnownPoint(known) = &mut self.known[index];
+        if self.skip {
+            let moved = (x - known.looked_at).norm();
+            let clearance = known.clearance_mm - moved;
+            if clearance > near {
+                self.counters.avoided += 1;
+                return Reading::Free(clearance);
+            }
+            if let Some(triangle) = known.triangle.filter(|_| moved < LOOK_AGAIN * radius)
+                && let Some(distance) = self.wall.distance(x, triangle).filter(|d| d.value_mm > 0.0)
+            {
+                self.counters.walked += 1;
+                return Reading::of(distance, &potential);
+            }
+        }
+        self.counters.queries += 1;
+        known.looked_at = *x;
+        known.triangle = None;
+        let Some(nearest) = self.query.nearest(x, self.reach_mm) else {
+            known.clearance_mm = self.reach_mm;
+            return Reading::Free(self.reach_mm);
+        };
+        known.clearance_mm = nearest.distance_mm.abs();
+        // Past an opening there is no wall.
+        if nearest.rim || nearest.distance_mm > near {
+            return Reading::Free(known.clearance_mm);
+        }
+        known.triangle = Some(nearest.triangle);
+        // Where the surface is folded or torn the quadrics contradict the triangles, and the triangles are right.
+        let smooth = self.wall.distance(x, nearest.triangle);
+        Reading::of(
+            smooth.filter(|d| (d.value_mm - nearest.distance_mm).abs() < DISAGREE * radius).unwrap_or(
+                Distance {
+                    value_mm: nearest.distance_mm,
+                    gradient: nearest.normal,
+                    hessian: Matrix3::zeros(),
+                },
+            ),
+            &potential,
+        )
+    }
+
+    /// Distance of point `index` at the given state, where the wall is near, and its triangle.
+    pub fn distance_at(
+        &mut self,
+        elements: &[ElementData],
+        state: &RodState,
+        index: usize,
+    ) -> Option<(Distance, u32)> {
+        let x = self.position(elements, state, index);
+        match self.read(index, &x) {
+            Reading::Near(distance) => Some((distance, self.known[index].0.triangle.unwrap_or(0))),
+            Reading::Free(_) | Reading::Outside => None,
+        }
+    }
+
+    /// Whether a point is beyond the wall.
+    pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
+        (0..self.points.len()).any(|index| {
+            let x = self.position(elements, state, index);
+            matches!(self.read(index, &x), Reading::Outside)
+        })
+    }
+}
+
+impl<const C: usize> External<C> for WallContact<'_> {
+    fn energy(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+        let mut sum = 0.0;
+        for index in 0..self.points.len() {
+            let x = self.position(elements, state, index);
+            let point = self.points[index];
+            match self.read(index, &x) {
+                Reading::Free(_) => {}
+                Reading::Near(d) => {
+                    sum += self.softness * point.weight_mm * point.potential.value(d.value_mm);
+                }
+                Reading::Outside => return f64::INFINITY,
+            }
+        }
+        sum
+    }
+
+    fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
+        for index in 0..self.points.len() {
+            let x = self.position(elements, state, index);
+            let point = self.points[index];
+            let reading = self.read(index, &x);
+            let KnownPoint(known) = &mut self.known[index];
+            known.base = x;
+            known.base_clearance_mm = match reading {
+                Reading::Free(clearance) => clearance,
+                Reading::Near(d) => d.value_mm,
+                Reading::Outside => {
+                    assembly.external_energy = f64::INFINITY;
+                    return;
+                }
+            };
+            let Reading::Near(d) = reading else { continue };
+            if d.value_mm >= point.potential.radius_mm {
+                continue;
+            }
+            let w = self.softness * point.weight_mm;
+            assembly.external_energy += w * point.potential.value(d.value_mm);
+            let (first, second) = point.potential.derivatives(d.value_mm);
+            let gradient = d.gradient * (w * first);
+            let hessian = d.gradient * d.gradient.transpose() * (w * second) + d.hessian * (w * first);
+            let e = point.element;
+            if point.xi == 1.0 {
+                assembly.add_node(e + 1, &gradient, &hessian);
+            } else {
+                assembly.add_point(state, &elements[e], e, point.xi, &gradient, &hessian);
+            }
+        }
+    }
+
+    /// A device bent to [`LEAST_BEND_MM`] carries this; in a device that carries less, force and moment have no scale of
+    /// their own to be compared with.
+    fn scale(&self) -> [f64; 2] {
+        [self.least_moment_nmm / LEAST_BEND_MM, self.least_moment_nmm]
+    }
+
+    fn obstructs(&self) -> bool {
+        true
+    }
+
+    /// A point may move by nearly its clearance: the ball about it holds no wall, so no wall is crossed on the way.
+    fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
+        let mut fraction: f64 = 1.0;
+        for index in 0..self.points.len() {
+            let x = self.position(elements, to, index);
+            let KnownPoint(known) = &self.known[index];
+            let (base, mut clearance) = (known.base, known.base_clearance_mm);
+            let moved = (x - base).norm();
+            if moved <= SAFE * clearance * fraction.min(1.0) || moved == 0.0 {
+                continue;
+            }
+            if let Some(nearest) = self.query.nearest(&base, moved.min(1e6) / SAFE) {
+                self.counters.queries += 1;
+                clearance = clearance.max(nearest.distance_mm.abs());
+            } else {
+                continue;
+            }
+            fraction = fraction.min(SAFE * clearance / moved);
+        }
+        fraction
+    }
+}

@@ -1,0 +1,84 @@
+//! The rod's mesh on an inserted device: elements, their sections, and the points where the wall is felt.
+
+use crate::contact::{ContactPoint, WallPotential};
+use crate::device::Device;
+use crate::rod::ElementData;
+use crate::rod::quadrature::GAUSS;
+
+/// Contact points lie no farther apart than this many radii of the device.
+const SPACING_RADII: f64 = 2.0;
+/// At the tip they begin this close, in radii, and double: a tip that touches the wall at an angle leaves it within a
+/// tenth of its radius.
+const TIP_SPACING_RADII: f64 = 1.0 / 256.0;
+/// Fewest and most intervals between contact points in an element.
+const INTERVALS: (f64, f64) = (2.0, 8.0);
+
+/// Elements and contact points of an inserted length.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Mesh {
+    /// Arc length from the tip of every node, mm, sheath first.
+    pub(super) from_tip_mm: Vec<f64>,
+    /// Elements, sheath first.
+    pub(super) elements: Vec<ElementData>,
+    /// Contact points, tip first.
+    pub(super) points: Vec<ContactPoint>,
+}
+
+impl Mesh {
+    /// Meshes `inserted_mm` (above 0) of `device` with elements of `element_mm`.
+    ///
+    /// Nodes are marks on the device, at whole element lengths from the tip; the first element is between half and one
+    /// and a half elements long, shorter only where that is all there is.
+    pub(super) fn build(
+        &mut self,
+        device: &Device,
+        inserted_mm: f64,
+        element_mm: f64,
+        modulus_n_per_mm2: f64,
+    ) {
+        crate::insertion::nodes_from_tip(inserted_mm, element_mm, &mut self.from_tip_mm);
+        self.elements.clear();
+        for ends in self.from_tip_mm.windows(2) {
+            let length = ends[0] - ends[1];
+            let section = |xi: f64| device.section_at(ends[0] - xi * length);
+            let sample = GAUSS.map(|g| section(g.xi));
+            self.elements.push(ElementData {
+                length,
+                bending: sample.map(|s| s.bending_stiffness_nmm2),
+                torsion: sample.map(|s| s.torsion_nmm2()),
+                rest_curvature: sample.map(|s| s.rest_curvature_per_mm),
+                rest_twist: [0.0; 3],
+                flexibility: 0.0,
+            });
+        }
+        self.points.clear();
+        // Half of the interval beyond the point at hand; beyond the tip there is its cap.
+        let mut half_beyond = device.section_at(0.0).radius_mm;
+        for (e, data) in self.elements.iter().enumerate().rev() {
+            let radius_mm = device.section_at(self.from_tip_mm[e + 1]).radius_mm;
+            let intervals =
+                (data.length / (SPACING_RADII * radius_mm)).ceil().clamp(INTERVALS.0, INTERVALS.1);
+            let spacing = data.length / intervals;
+            let is_last = e + 1 == self.elements.len();
+            // Distance from the element's far end.
+            let mut at = 0.0;
+            let mut fine = if is_last { TIP_SPACING_RADII * radius_mm } else { spacing };
+            while at < (1.0 - 1e-9) * data.length {
+                let left = data.length - at;
+                let step = fine.min(spacing);
+                // The intervals that are left are made equal where the fine ones end.
+                let step =
+                    if step >= spacing { left / (left / spacing - 1e-9).ceil() } else { step.min(left) };
+                self.points.push(ContactPoint {
+                    element: e,
+                    xi: 1.0 - at / data.length,
+                    weight_mm: half_beyond + 0.5 * step,
+                    potential: WallPotential { modulus_n_per_mm2, radius_mm },
+                });
+                half_beyond = 0.5 * step;
+                at += step;
+                fine *= 2.0;
+            }
+        }
+    }
+}
