@@ -94,6 +94,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         torque_nmm: report.torque_nmm,
         energy_mj: report.energy,
         max_penetration_mm,
+        left_through: report.left_through,
         step_time_s,
         wall_time_s: started.elapsed().as_secs_f64(),
         renderer: frames.renderer(),

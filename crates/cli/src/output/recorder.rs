@@ -45,6 +45,8 @@ pub(crate) struct Summary {
     pub(crate) energy_mj: Energy,
     /// Deepest penetration of the wall in any step, mm.
     pub(crate) max_penetration_mm: f64,
+    /// The opening through which the tip has left the vessel at the end.
+    pub(crate) left_through: Option<usize>,
     /// Time of the simulation, s, without recording and frames.
     pub(crate) step_time_s: f64,
     /// Time of the whole run, s.
@@ -84,6 +86,9 @@ struct Row {
     contacts: usize,
     max_penetration_mm: f64,
     iterations: u32,
+    substeps: u32,
+    jumped: bool,
+    left_through: Option<usize>,
     converged: bool,
 }
 
@@ -160,6 +165,9 @@ impl Recorder {
             contacts: report.contacts.len(),
             max_penetration_mm: report.max_penetration_mm,
             iterations: report.iterations,
+            substeps: report.substeps,
+            jumped: report.jumped,
+            left_through: report.left_through,
             converged: report.converged,
         };
         let whole = [&self.positions, &self.tangents, &self.from_tip, &self.offsets].map(ArrayStream::len);
