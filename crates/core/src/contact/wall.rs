@@ -114,7 +114,7 @@ pub struct WallContact<'a> {
     /// Whether clearances and walks may replace queries.
     skip: bool,
     points: &'a [ContactPoint],
-    /// Moment of the softest piece at [`LEAST_BEND_MM`], N·mm.
+    /// Moment of the softest piece at a radius of 100 mm, N·mm.
     least_moment_nmm: f64,
     /// Part of the modulus that acts: a rigid wall is approached from a softer one.
     pub softness: f64,
@@ -283,7 +283,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
         }
     }
 
-    /// A device bent to [`LEAST_BEND_MM`] carries this; in a device that carries less, force and moment have no scale of
+    /// A device bent to a radius of 100 mm carries this; in a device that carries less, force and moment have no scale of
     /// their own to be compared with.
     fn scale(&self) -> [f64; 2] {
         [self.least_moment_nmm / LEAST_BEND_MM, self.least_moment_nmm]

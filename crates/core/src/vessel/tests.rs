@@ -213,8 +213,29 @@ fn crossing_tubes_are_found_to_intersect() {
     assert!(report.self_intersections > 20 && report.components == 2, "{report:?}");
 }
 
+#[test]
+fn a_flat_sheet_is_no_vessel() {
+    let sheet = SurfaceMesh {
+        vertices_mm: [[0., 0.], [9., 0.], [9., 7.], [0., 7.]].map(|[x, y]| Vec3::new(x, y, 3.0)).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    };
+    let report = check(&sheet).unwrap();
+    assert!(report.flat && !report.is_sound(), "{report:?}");
+    assert!(!check(tube().mesh()).unwrap().flat);
+}
+
+/// The same cases in every run, and so many: tests fail for a reason, and in bounded time.
+pub(super) fn steady(cases: u32) -> ProptestConfig {
+    ProptestConfig {
+        cases,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(2011),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(steady(24))]
     #[test]
     fn repair_undoes_any_flips_and_any_split_of_vertices(flips in prop::collection::vec(any::<bool>(), 200), jitter in 0.0f64..2e-5) {
         let clean = tube();

@@ -139,6 +139,28 @@ fn an_end_inside_another_branch_and_a_tight_bend_are_refused_by_row() {
     ]);
     let message = GeneratedWall::new(&hairpin, Resolution::EdgeMm(1.0)).unwrap_err().to_string();
     assert!(message.contains("bend radius"), "{message}");
+    // No bend is tight here, but the vessel comes back to where it was.
+    let mut rows: Vec<_> = (0..=18)
+        .map(|k| {
+            let (sin, cos) = (20.0 * f64::from(k)).to_radians().sin_cos();
+            ([30.0 * cos, 30.0 * sin, 0.2 * f64::from(k)], 5.0, i64::from(k) - 1)
+        })
+        .collect();
+    let message = GeneratedWall::new(&tree(&rows), Resolution::EdgeMm(2.0)).unwrap_err().to_string();
+    assert!(message.contains("the wall cuts itself near"), "{message}");
+    rows.iter_mut().for_each(|row| row.0[2] *= 5.0);
+    assert!(GeneratedWall::new(&tree(&rows), Resolution::EdgeMm(2.0)).is_ok());
+}
+
+#[test]
+fn many_branches_from_one_point_end_soon_with_the_grid_that_was_tried() {
+    let mut rows = vec![([0.0, 0.0, 0.0], 1.0, -1), ([0.0, 0.0, 6.0], 1.0, 0)];
+    rows.extend((0..20).map(|k| {
+        let (sin, cos) = (18.0 * f64::from(k)).to_radians().sin_cos();
+        ([9.0 * cos, 9.0 * sin, 15.0], 0.2, 1)
+    }));
+    let message = GeneratedWall::new(&tree(&rows), Resolution::EdgeMm(0.5)).unwrap_err().to_string();
+    assert!(message.contains("a grid of 0.1"), "{message}");
 }
 
 #[test]
@@ -173,7 +195,7 @@ fn gradients_agree_with_differences_away_from_blends() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(16))]
+    #![proptest_config(crate::vessel::tests::steady(12))]
     #[test]
     fn any_tree_gives_a_wall_or_an_error_but_never_a_panic(
         rows in prop::collection::vec((prop::array::uniform3(-40.0f64..40.0), 0.5f64..6.0, any::<prop::sample::Index>()), 2..7)
