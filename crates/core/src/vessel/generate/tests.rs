@@ -153,17 +153,6 @@ fn an_end_inside_another_branch_and_a_tight_bend_are_refused_by_row() {
 }
 
 #[test]
-fn many_branches_from_one_point_end_soon_with_the_grid_that_was_tried() {
-    let mut rows = vec![([0.0, 0.0, 0.0], 1.0, -1), ([0.0, 0.0, 6.0], 1.0, 0)];
-    rows.extend((0..20).map(|k| {
-        let (sin, cos) = (18.0 * f64::from(k)).to_radians().sin_cos();
-        ([9.0 * cos, 9.0 * sin, 15.0], 0.2, 1)
-    }));
-    let message = GeneratedWall::new(&tree(&rows), Resolution::EdgeMm(0.5)).unwrap_err().to_string();
-    assert!(message.contains("a grid of 0.1"), "{message}");
-}
-
-#[test]
 fn absurd_resolutions_are_refused_with_a_reason() {
     let fork = fork(90.0, 8.0, 4.0);
     for edge in [0.0, -1.0, f64::NAN, f64::INFINITY, 9.0, 1e-6, 1e-300] {
