@@ -216,6 +216,7 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(crate::vessel::tests::steady(100))]
         #[test]
         fn a_table_reads_back_to_the_same_bits(
             rows in prop::collection::vec((prop::array::uniform3(-1e3f64..1e3), 1e-3f64..50.0, any::<prop::sample::Index>()), 2..30)
