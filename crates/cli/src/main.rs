@@ -2,6 +2,7 @@
 
 mod args;
 mod commands;
+mod environment;
 mod failure;
 mod output;
 
@@ -10,7 +11,11 @@ use std::process::ExitCode;
 use clap::Parser;
 
 fn main() -> ExitCode {
-    match commands::dispatch(&args::Args::parse()) {
+    let args = args::Args::parse();
+    if matches!(args.command, args::Command::Run(_)) {
+        environment::without_desktop();
+    }
+    match commands::dispatch(&args) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             // One failure, one line, whatever a library has put into it.

@@ -250,3 +250,20 @@ fn an_interrupt_ends_the_run_after_the_step_under_way_and_keeps_the_recording() 
     assert_eq!((told["failure"]["step"].as_u64(), rows()), (Some(steps as u64 + 1), steps + 1));
     assert_eq!(integers(&out.join("shapes.npz"), "offsets").len(), steps + 1);
 }
+
+#[test]
+fn without_a_desktop_nothing_but_the_summary_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
+        .env_remove("XDG_RUNTIME_DIR")
+        .args([
+            "run".as_ref(),
+            short_scene(folder.path()).as_path(),
+            "--out".as_ref(),
+            folder.path().join("out").as_path(),
+        ])
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(text.starts_with("curved_tube: 106 of 106 steps") && !text.contains("XDG"), "{text}");
+}

@@ -214,6 +214,21 @@ fn crossing_tubes_are_found_to_intersect() {
 }
 
 #[test]
+fn a_vertex_that_no_triangle_uses_changes_no_tolerance() {
+    let clean = tube();
+    let mut stray = soup(clean.mesh());
+    stray.vertices_mm.push(Vec3::new(1e9, 0.0, 0.0));
+    let wall = Wall::from_surface(&stray).unwrap();
+    assert_eq!(wall.mesh(), Wall::from_surface(&soup(clean.mesh())).unwrap().mesh());
+    let report = check(&stray).unwrap();
+    assert!(report.is_sound() && report.high_mm[0] < 5.0, "{report:?}");
+    // The twin: as a triangle's corner it does set the scale, and the tube is a point to it.
+    let far = stray.vertices_mm.len() as u32 - 1;
+    stray.triangles.push([0, 1, far]);
+    assert!(!check(&stray).is_ok_and(|report| report.is_sound()));
+}
+
+#[test]
 fn a_flat_sheet_is_no_vessel() {
     let sheet = SurfaceMesh {
         vertices_mm: [[0., 0.], [9., 0.], [9., 7.], [0., 7.]].map(|[x, y]| Vec3::new(x, y, 3.0)).to_vec(),
@@ -222,6 +237,26 @@ fn a_flat_sheet_is_no_vessel() {
     let report = check(&sheet).unwrap();
     assert!(report.flat && !report.is_sound(), "{report:?}");
     assert!(!check(tube().mesh()).unwrap().flat);
+}
+
+#[test]
+fn thousands_of_overlapping_triangles_are_counted_up_to_a_limit() {
+    // Blades about one axis, each a little turned and shifted: every one crosses every other.
+    let mut pile = SurfaceMesh::default();
+    for k in 0..1_000_u32 {
+        let (sin, cos) = (3.0 * f64::from(k) / 1_000.0).sin_cos();
+        let shift = f64::from(k) * 1e-4;
+        pile.vertices_mm.extend(
+            [[-9., -5.], [9., -5.], [0., 9.]]
+                .map(|[across, along]| Vec3::new(across * cos, across * sin, along + shift)),
+        );
+        pile.triangles.push([3 * k, 3 * k + 1, 3 * k + 2]);
+    }
+    let report = check(&pile).unwrap();
+    assert!(report.self_intersections_capped, "{}", report.self_intersections);
+    assert_eq!(report.self_intersections, 100_000);
+    assert!(report.intersecting_pairs.len() == 10 && report.intersecting_pairs.is_sorted());
+    assert!(!check(tube().mesh()).unwrap().self_intersections_capped);
 }
 
 /// The same cases in every run, and so many: tests fail for a reason, and in bounded time.

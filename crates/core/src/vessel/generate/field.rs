@@ -23,6 +23,9 @@ const HIDDEN: f64 = 0.3;
 /// Newton steps to the foot; from a sample a quarter radius away three are enough.
 const FOOT_STEPS: usize = 8;
 
+/// Relative error of distances that decide what is left out.
+const ROUNDING: f64 = 1e-12;
+
 /// The implicit surface of a tree.
 #[derive(Debug)]
 pub(super) struct Field {
@@ -96,8 +99,7 @@ impl Field {
 
     fn branch_value(&self, (index, samples): &(usize, Vec<u32>), point: &Vec3) -> Value {
         let branch = &self.branches[*index];
-        let squared = |k: u32| (branch.samples[k as usize].position - point).norm_squared();
-        let nearest = samples.iter().copied().min_by(|&a, &b| squared(a).total_cmp(&squared(b))).unwrap_or(0);
+        let nearest = nearest_of(branch, samples, point);
         let (low, high) = (branch.root_row.is_some(), branch.leaf_row.is_some());
         let ends =
             (if low { f64::NEG_INFINITY } else { 0.0 }, if high { f64::INFINITY } else { branch.length() });
@@ -140,7 +142,7 @@ impl Field {
 }
 
 /// The samples of a branch that are no more than `slack` farther from `centre` than the nearest one.
-fn near(branch: &Branch, centre: &Vec3, slack: f64) -> Vec<u32> {
+pub(super) fn near(branch: &Branch, centre: &Vec3, slack: f64) -> Vec<u32> {
     let distance = |k: usize| (branch.samples[k].position - centre).norm();
     // Samples are `step` apart along the curve, so that the distance changes by no more from one to the next: what is far
     // off is passed in strides that cannot leap over anything nearer than asked for.
@@ -149,7 +151,7 @@ fn near(branch: &Branch, centre: &Vec3, slack: f64) -> Vec<u32> {
     while k < branch.samples.len() {
         let here = distance(k);
         nearest = nearest.min(here);
-        k += stride(here - nearest);
+        k += stride((here - nearest) * (1.0 - ROUNDING));
     }
     let limit = nearest + slack;
     let mut samples = Vec::new();
@@ -159,9 +161,45 @@ fn near(branch: &Branch, centre: &Vec3, slack: f64) -> Vec<u32> {
         if here <= limit {
             samples.push(k as u32);
         }
-        k += stride(here - limit);
+        k += stride((here - limit) * (1.0 - ROUNDING));
     }
     samples
+}
+
+/// Samples that are compared one by one.
+const FEW: usize = 4;
+
+/// The one of `samples` (ascending) nearest to `point`, the first of equals; by halves, of which those are left out that
+/// cannot come near enough: along the curve the distance changes by no more than `step` from one sample to the next.
+pub(super) fn nearest_of(branch: &Branch, samples: &[u32], point: &Vec3) -> u32 {
+    fn search(branch: &Branch, samples: &[u32], point: &Vec3, best: &mut (f64, u32)) {
+        let distance = |k: u32| (branch.samples[k as usize].position - point).norm();
+        let mut look = |k: u32| {
+            let here = distance(k);
+            if here < best.0 || (here == best.0 && k < best.1) {
+                *best = (here, k);
+            }
+            here
+        };
+        if samples.len() <= FEW {
+            samples.iter().for_each(|&k| {
+                look(k);
+            });
+            return;
+        }
+        let (before, rest) = samples.split_at(samples.len() / 2);
+        let (middle, after) = (rest[0], &rest[1..]);
+        let here = look(middle);
+        for (half, end) in [(before, before[0]), (after, after[after.len() - 1])] {
+            let least = here - branch.step * f64::from(end.abs_diff(middle));
+            if least <= best.0 + ROUNDING * here {
+                search(branch, half, point, best);
+            }
+        }
+    }
+    let mut best = (f64::INFINITY, 0);
+    search(branch, samples, point, &mut best);
+    best.1
 }
 
 /// From 0 at 0 to 1 at 1, level at both.

@@ -221,6 +221,16 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<(nets::Net
     for _ in 0..GRID_ATTEMPTS {
         tried = attempt;
         let mut nets = nets::mesh(field, attempt)?;
+        // Chance makes a few, and another grid others; many that stay are in the tree. Evening out changes none of them.
+        let many = crowded_edges(&nets.quads);
+        if many > CHANCE_FAULTS {
+            if many > fewest / 2 {
+                break;
+            }
+            fewest = many;
+            attempt *= GRID_SHRINK;
+            continue;
+        }
         even_out(field, &mut nets);
         let mut mesh = SurfaceMesh {
             vertices_mm: std::mem::take(&mut nets.vertices),
@@ -233,20 +243,26 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<(nets::Net
             trim::cut(&mut mesh, field, end, attempt);
         }
         drop_unreferenced(&mut mesh);
-        let faults = EdgeTable::new(&mesh.triangles).non_manifold();
-        if faults == 0 {
+        if EdgeTable::new(&mesh.triangles).non_manifold() == 0 {
             return Ok((nets, mesh));
         }
-        // Chance makes a few, and another grid others; many that stay are in the tree.
-        if faults > CHANCE_FAULTS && faults >= fewest {
-            break;
-        }
-        fewest = fewest.min(faults);
         attempt *= GRID_SHRINK;
     }
     Err(Error::Mesh(format!(
         "branches come closer to each other than a grid of {tried:.3} mm resolves; choose a smaller edge_mm"
     )))
+}
+
+/// Edges of more than two quadrilaterals.
+fn crowded_edges(quads: &[[u32; 4]]) -> usize {
+    let edge = |quad: &[u32; 4], k: usize| {
+        let (a, b) = (quad[k], quad[(k + 1) % 4]);
+        (a.min(b), a.max(b))
+    };
+    let mut edges: Vec<(u32, u32)> =
+        quads.iter().flat_map(|quad| (0..4).map(move |k| edge(quad, k))).collect();
+    edges.sort_unstable();
+    edges.chunk_by(|a, b| a == b).filter(|uses| uses.len() > 2).count()
 }
 
 /// Moves vertices towards the mean of their neighbours along the surface, and back onto it.

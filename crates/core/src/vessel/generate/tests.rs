@@ -153,6 +153,38 @@ fn an_end_inside_another_branch_and_a_tight_bend_are_refused_by_row() {
 }
 
 #[test]
+fn many_branches_from_one_point_end_soon_with_the_grid_that_was_tried() {
+    let mut rows = vec![([0.0, 0.0, 0.0], 1.0, -1), ([0.0, 0.0, 6.0], 1.0, 0)];
+    rows.extend((0..20).map(|k| {
+        let (sin, cos) = (18.0 * f64::from(k)).to_radians().sin_cos();
+        ([4.0 * cos, 4.0 * sin, 9.0], 0.2, 1)
+    }));
+    let message = GeneratedWall::new(&tree(&rows), Resolution::EdgeMm(0.5)).unwrap_err().to_string();
+    assert!(message.contains("a grid of 0.1"), "{message}");
+}
+
+#[test]
+fn samples_are_found_as_by_looking_at_all_of_them() {
+    let curved = tree(&[([0., 0., 0.], 0.5, -1), ([5., 0., 20.], 0.7, 0), ([0., 8., 40.], 0.4, 1)]);
+    let field = Field { branches: curve::branches(&curved).unwrap(), extension: 1.0 };
+    let samples = &field.branches[0].samples;
+    for k in 0..300 {
+        let at = f64::from(k);
+        let point = Vec3::new(9.0 * at.sin(), 9.0 * (1.7 * at).cos(), 0.15 * at - 2.0);
+        let all = |reach: f64| {
+            let distance = |k: u32| (samples[k as usize].position - point).norm();
+            let nearest = (0..samples.len() as u32).map(distance).fold(f64::INFINITY, f64::min);
+            (0..samples.len() as u32).filter(|&k| distance(k) <= nearest + reach).collect::<Vec<u32>>()
+        };
+        for reach in [0.0, 0.1, 3.0] {
+            assert_eq!(field::near(&field.branches[0], &point, reach), all(reach), "{point}");
+        }
+        let every: Vec<u32> = (0..samples.len() as u32).collect();
+        assert_eq!(field::nearest_of(&field.branches[0], &every, &point), all(0.0)[0]);
+    }
+}
+
+#[test]
 fn absurd_resolutions_are_refused_with_a_reason() {
     let fork = fork(90.0, 8.0, 4.0);
     for edge in [0.0, -1.0, f64::NAN, f64::INFINITY, 9.0, 1e-6, 1e-300] {
