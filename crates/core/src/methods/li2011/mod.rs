@@ -17,7 +17,9 @@
 //!   10 %, 35 %, 133 %, 311 % too far, and no mesh cures it: it is a small-bending model.
 //! - **Wall stiffness per node** (eq. 7): refining the chain stiffens the wall.
 //! - **One linear solve per input**: a contact found at the translated position acts for the whole step; what the
-//!   solve pushes into the wall elsewhere is found at the next input.
+//!   solve pushes into the wall elsewhere is found at the next input. A step is reported as converged if the nodes and
+//!   triangles in contact after the solve are those that it was solved with; where they are not, the wire may be
+//!   millimetres beyond the wall for that step (`endowire run` reports how far).
 //! - No twist, no rest curvature, no friction.
 //!
 //! # Misprints read as meant

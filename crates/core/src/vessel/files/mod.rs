@@ -112,10 +112,9 @@ fn scaled(mut mesh: SurfaceMesh, unit_mm: f64) -> std::result::Result<SurfaceMes
     let extent_mm = mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
     if extent_mm > EXTENT_LIMIT_MM {
         return Err(format!(
-            "with unit_mm = {} the surface is {} mm across, and no vessel more than {EXTENT_LIMIT_MM}: give the millimetres \
-             per unit of the file",
-            crate::error::number(unit_mm),
-            crate::error::number(extent_mm)
+            "with unit_mm = {} the surface is {extent_mm:.1e} mm across, and no vessel more than {EXTENT_LIMIT_MM:.0e}: give \
+             the millimetres per unit of the file",
+            crate::error::number(unit_mm)
         ));
     }
     Ok(mesh)

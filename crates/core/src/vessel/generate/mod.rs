@@ -117,8 +117,8 @@ impl GeneratedWall {
         for _ in 0..COUNT_ATTEMPTS {
             // The edge length is ours; what was asked for is the count.
             let made = Self::with_edge(branches, edge).map_err(|error| match error {
-                Error::Parameter { name, value, mend } if name == "edge_mm" => {
-                    Error::parameter("triangles", count, format!("means edges of {value} mm: {mend}"))
+                Error::Parameter { name, mend, .. } if name == "edge_mm" => {
+                    Error::parameter("triangles", count, format!("means edges of {edge:.1e} mm: {mend}"))
                 }
                 other => other,
             })?;
