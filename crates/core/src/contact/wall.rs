@@ -61,7 +61,7 @@ impl Default for Known {
 pub struct Counters {
     /// Questions to the bounding volume hierarchy.
     pub queries: u64,
-    /// Questions that a walk over neighbouring triangles answered.
+    /// Questions that the quadrics about the last triangle answered.
     pub walked: u64,
     /// Questions that the last clearance answered.
     pub avoided: u64,
@@ -93,7 +93,7 @@ impl Reading {
     }
 }
 
-/// Beyond its radius, a point is followed over the wall's triangles within this part of it: the smooth wall and the flat
+/// Beyond its radius, a point is followed within this part of it: the smooth wall and the flat
 /// one differ by less.
 const FOLLOW: f64 = 0.5;
 /// A point looks for other walls again when it has moved by this part of its radius.
@@ -111,7 +111,7 @@ pub struct WallContact<'a> {
     query: &'a WallQuery,
     /// How far a point looks for the wall, mm.
     reach_mm: f64,
-    /// Whether clearances and walks may replace queries.
+    /// Whether clearances and the last triangle may replace queries.
     skip: bool,
     points: &'a [ContactPoint],
     /// Moment of the softest piece at a radius of 100 mm, N·mm.

@@ -279,14 +279,6 @@ impl<const C: usize> Kirchhoff<C> {
 
 impl<const C: usize> Method for Kirchhoff<C> {
     fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()> {
-        let start = self.report.inserted_mm;
-        let target = (start + command.advance_mm).min(surroundings.device.length_mm());
-        let target = if target < ZERO_LENGTH_MM { 0.0 } else { target };
-        let before = self.report.clone();
-        self.report.iterations = 0;
-        self.report.substeps = 0;
-        self.report.jumped = false;
-        let saved = (self.mesh.clone(), self.state.clone());
         let tip = self.state.positions[self.state.elements()];
         if command.advance_mm > 0.0
             && let Some((opening, beyond)) = left_through(surroundings.wall, &tip)
@@ -297,6 +289,14 @@ impl<const C: usize> Method for Kirchhoff<C> {
                  is known: stop the script earlier or use a vessel that goes on"
             )));
         }
+        let start = self.report.inserted_mm;
+        let target = (start + command.advance_mm).min(surroundings.device.length_mm());
+        let target = if target < ZERO_LENGTH_MM { 0.0 } else { target };
+        let before = self.report.clone();
+        self.report.iterations = 0;
+        self.report.substeps = 0;
+        self.report.jumped = false;
+        let saved = (self.mesh.clone(), self.state.clone());
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
         let mut share = 1.0f64;
@@ -304,7 +304,6 @@ impl<const C: usize> Method for Kirchhoff<C> {
         while done < 1.0 {
             let rest = 1.0 - done;
             let mut part = rest.min(share);
-            let here = self.mesh.from_tip_mm[0];
             let wanted = (target - start) * part;
             if wanted > 0.0 {
                 let last = self.state.elements();
@@ -316,7 +315,6 @@ impl<const C: usize> Method for Kirchhoff<C> {
             let next = if part >= rest { 1.0 } else { done + part };
             let inserted = if next == 1.0 { target } else { start + (target - start) * next };
             let tail = before.rotation_rad + command.rotate_rad * next;
-            let _ = here;
             self.report.substeps += 1;
             if inserted == 0.0 {
                 self.state.frames.truncate(1);
