@@ -6,14 +6,20 @@
 //! blended by a partition of unity (Ohtake et al., *Multi-level partition of unity implicits*, SIGGRAPH 2003):
 //!
 //! ```text
-//! Qᵢ(x) = Nᵢ·y − ½ τᵀSᵢτ,   y = x − Vᵢ,  τ = y − Nᵢ(Nᵢ·y)
-//! wᵢ(x) = (1 − |τ|²/ρᵢ²)³   where positive
+//! Qᵢ(x) = Nᵢ·y − ½ τᵀSᵢτ − cᵢ,   y = x − Vᵢ,  τ = y − Nᵢ(Nᵢ·y)
+//! wᵢ(x) = (1 − |τ|²/ρᵢ²)³ b(Qᵢ)   where positive
 //! f(x)  = Σ wᵢQᵢ / Σ wᵢ
 //! ```
 //!
-//! with Nᵢ the inward normal, Sᵢ the curvature and ρᵢ a little more than the longest edge at the vertex. f is twice
+//! with Nᵢ the inward normal, Sᵢ the curvature and ρᵢ a little more than the longest edge at the vertex. The window b, 1 for
+//! small |Qᵢ| and 0 far away, leaves out the other side of a narrow lumen and the back of a thin septum. f is twice
 //! continuously differentiable, so a device feels an energy with an exact gradient and Hessian; it differs from the distance
-//! to the sampled surface at second order in the edge length, by a sixth of what the flat triangles do. With W = Σ wᵢ,
+//! to the sampled surface at second order in the edge length, by a sixth of what the flat triangles do.
+//!
+//! Vertices sample a vessel, and between them the smooth wall lies beyond the triangles. Where a mesh is so coarse that it
+//! would do so by more than a device keeps from the wall, the offsets cᵢ draw it in; on all other meshes they are 0.
+//!
+//! With W = Σ wᵢ,
 //!
 //! ```text
 //! ∇f  = Σ [(Qᵢ − f) ∇wᵢ + wᵢ ∇Qᵢ] / W
@@ -25,7 +31,7 @@ use std::collections::VecDeque;
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 use crate::Vec3;
-use crate::vessel::Wall;
+use crate::vessel::{SurfaceMesh, Wall};
 
 /// Support of a vertex over its longest edge: every point of a triangle lies well inside that of its three corners.
 const SUPPORT: f64 = 1.1;
@@ -33,6 +39,10 @@ const SUPPORT: f64 = 1.1;
 const LARGEST_BEND: f64 = 0.8;
 /// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.
 const REGULAR: f64 = 1e-6;
+/// Sum of weights below which no vertex reaches a point.
+const LEAST_WEIGHT: f64 = 1e-9;
+/// Height above the surface up to which the lists of vertices are complete, in radii of the thickest device and in supports.
+const HEIGHT: (f64, f64) = (1.5, 0.5);
 
 /// Signed distance with derivatives; positive in the lumen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +63,64 @@ struct Quadric {
     curvature: Matrix3<f64>,
     /// 1/ρ².
     inverse_square: f64,
+    /// cᵢ, mm.
+    offset_mm: f64,
+    /// Height of the window, mm.
+    window_mm: f64,
+}
+
+/// Window over the radius of the device, and over the support of a vertex: what a fit may be off by on a coarse mesh.
+const WINDOW: (f64, f64) = (1.25, 0.3);
+/// In heights of the window: it falls from 1 at the first to 0 at the second, above and below the surface.
+const ABOVE: (f64, f64) = (1.0, 1.8);
+const BELOW: (f64, f64) = (-0.3, -0.8);
+/// The smooth wall lies no farther than this part of the thinnest device's radius beyond a triangle: the barrier of
+/// [`crate::contact::WallPotential`] stands at three tenths.
+const BEYOND: f64 = 0.2;
+/// Intervals along each side of a triangle at whose ends that is checked, …
+const CHECKED: u32 = 4;
+/// … unless few points differ by less than this part of what is allowed.
+const ENOUGH: f64 = 0.25;
+
+/// A window and its derivatives: 1 up to `from`, 0 from `to` on, in between 1 − t³(10 − 15t + 6t²).
+#[inline]
+fn fall(at: f64, from: f64, to: f64) -> [f64; 3] {
+    let inverse = 1.0 / (to - from);
+    let t = (at - from) * inverse;
+    if t <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    if t >= 1.0 {
+        return [0.0; 3];
+    }
+    let (s, tt) = (1.0 - t, t * t);
+    [
+        1.0 - tt * t * (10.0 + t * (6.0 * t - 15.0)),
+        -30.0 * tt * s * s * inverse,
+        -60.0 * t * s * (s - t) * inverse * inverse,
+    ]
+}
+
+impl Quadric {
+    /// τ, height − c and u = |τ|²/ρ² at `x`; `None` beyond the support.
+    #[inline]
+    fn local(&self, x: &Vec3) -> Option<(Vec3, f64, f64)> {
+        let y = x - self.position;
+        let height = self.normal.dot(&y);
+        let u = (y.norm_squared() - height * height) * self.inverse_square;
+        (u < 1.0).then(|| (y - self.normal * height, height - self.offset_mm, u))
+    }
+
+    /// b(Q) and its derivatives.
+    #[inline]
+    fn window(&self, value: f64) -> [f64; 3] {
+        let size = self.window_mm;
+        if value > 0.0 {
+            fall(value, ABOVE.0 * size, ABOVE.1 * size)
+        } else {
+            fall(value, BELOW.0 * size, BELOW.1 * size)
+        }
+    }
 }
 
 /// The smooth wall.
@@ -63,17 +131,24 @@ pub struct SmoothWall {
     starts: Vec<u32>,
     /// Vertices whose support may reach a point over the triangle.
     lists: Vec<u32>,
+    /// How far the smooth wall lies inside each triangle, mm, …
+    insets_mm: Vec<f32>,
+    /// … and the largest of these.
+    deepest_inset_mm: f64,
 }
 
 impl SmoothWall {
-    /// The smooth surface of `wall` for points up to about `height_mm` from it.
-    pub fn new(wall: &Wall, height_mm: f64) -> Self {
+    /// The smooth surface of `wall` for devices with radii from `thinnest_mm` to `thickest_mm`.
+    pub fn new(wall: &Wall, thinnest_mm: f64, thickest_mm: f64) -> Self {
         let mesh = wall.mesh();
         let count = mesh.vertices_mm.len();
         let neighbours = vertex_neighbours(&mesh.triangles, count);
         let normals = vertex_normals(mesh);
-        let quadrics: Vec<Quadric> =
+        let mut quadrics: Vec<Quadric> =
             (0..count).map(|v| fit(v, &mesh.vertices_mm, &normals, &neighbours)).collect();
+        for q in &mut quadrics {
+            q.window_mm = (WINDOW.0 * thickest_mm).max(WINDOW.1 / q.inverse_square.sqrt());
+        }
 
         let mut starts = Vec::with_capacity(mesh.triangles.len() + 1);
         let mut lists = Vec::new();
@@ -89,7 +164,8 @@ impl SmoothWall {
             // Over the surface, not through space: the other side of a thin septum is another wall.
             while let Some(v) = queue.pop_front() {
                 let q = &quadrics[v as usize];
-                let reach = q.inverse_square.sqrt().recip() + size + height_mm;
+                let support = q.inverse_square.sqrt().recip();
+                let reach = support + size + (HEIGHT.0 * thickest_mm).max(HEIGHT.1 * support);
                 if (q.position - centre).norm() > reach {
                     continue;
                 }
@@ -103,35 +179,118 @@ impl SmoothWall {
             }
         }
         starts.push(lists.len() as u32);
-        Self { quadrics, starts, lists }
+        let mut smooth =
+            Self { quadrics, starts, lists, insets_mm: Vec::new(), deepest_inset_mm: 0.0 };
+        smooth.draw_in(mesh, BEYOND * thinnest_mm);
+        smooth
+    }
+
+    /// Least and largest f on a triangle of the mesh, at the points of a grid: of one interval a side with the middles of
+    /// these and of the triangle if that stays below `enough_mm`, or of [`CHECKED`].
+    fn range(&self, mesh: &SurfaceMesh, index: usize, enough_mm: f64) -> (f64, f64) {
+        let [a, b, c] = mesh.corners(index);
+        let list = self.list(index);
+        let (mut least, mut largest) = (f64::MAX, f64::MIN);
+        let mut look = |u: f64, v: f64| {
+            let f = self.value(&(a + (b - a) * u + (c - a) * v), list).unwrap_or(0.0);
+            (least, largest) = (least.min(f), largest.max(f));
+            (least, largest)
+        };
+        let third = 1.0 / 3.0;
+        let few = [(0.5, 0.0), (0.0, 0.5), (0.5, 0.5), (third, third)];
+        let found = few.map(|(u, v)| look(u, v))[3];
+        if found.1 - found.0 < enough_mm {
+            return found;
+        }
+        let part = |k: u32| f64::from(k) / f64::from(CHECKED);
+        for i in 0..=CHECKED {
+            for j in 0..=CHECKED - i {
+                look(part(i), part(j));
+            }
+        }
+        (least, largest)
+    }
+
+    /// Sets the offsets so that f is at most `limit_mm` on the triangles, and measures how far inside them it lies.
+    fn draw_in(&mut self, mesh: &SurfaceMesh, limit_mm: f64) {
+        let enough_mm = ENOUGH * limit_mm;
+        let mut offsets = vec![0.0f64; self.quadrics.len()];
+        for index in 0..mesh.triangles.len() {
+            let (least, largest) = self.range(mesh, index, enough_mm);
+            self.insets_mm.push((-least).max(0.0) as f32);
+            for &v in self.list(index) {
+                offsets[v as usize] = offsets[v as usize].max(largest - limit_mm);
+            }
+        }
+        for (q, offset) in self.quadrics.iter_mut().zip(offsets) {
+            q.offset_mm = offset;
+        }
+        for index in 0..mesh.triangles.len() {
+            if self.list(index).iter().any(|&v| self.quadrics[v as usize].offset_mm > 0.0) {
+                self.insets_mm[index] = (-self.range(mesh, index, enough_mm).0).max(0.0) as f32;
+            }
+        }
+        self.deepest_inset_mm = self.insets_mm.iter().copied().fold(0.0, f32::max).into();
+    }
+
+    /// How far the smooth wall lies inside a triangle, mm: 0 where it lies beyond it.
+    pub fn inset_mm(&self, triangle: u32) -> f64 {
+        self.insets_mm[triangle as usize].into()
+    }
+
+    /// The largest of all [`SmoothWall::inset_mm`].
+    pub fn deepest_inset_mm(&self) -> f64 {
+        self.deepest_inset_mm
+    }
+
+    fn list(&self, triangle: usize) -> &[u32] {
+        &self.lists[self.starts[triangle] as usize..self.starts[triangle + 1] as usize]
+    }
+
+    /// f alone.
+    fn value(&self, x: &Vec3, list: &[u32]) -> Option<f64> {
+        let (mut weight, mut value) = (0.0, 0.0);
+        for &v in list {
+            let q = &self.quadrics[v as usize];
+            let Some((tau, height, u)) = q.local(x) else { continue };
+            let f = height - 0.5 * tau.dot(&(q.curvature * tau));
+            let w = (1.0 - u).powi(3) * q.window(f)[0];
+            weight += w;
+            value += w * f;
+        }
+        (weight >= LEAST_WEIGHT).then(|| value / weight)
     }
 
     /// The distance of `x`, whose nearest triangle is `triangle` or close to it. `None` where no vertex reaches.
     pub fn distance(&self, x: &Vec3, triangle: u32) -> Option<Distance> {
-        let t = triangle as usize;
-        let list = &self.lists[self.starts[t] as usize..self.starts[t + 1] as usize];
         let (mut weight, mut value) = (0.0, 0.0);
         let (mut weight1, mut value1) = (Vec3::zeros(), Vec3::zeros());
         let (mut weight2, mut value2) = (Matrix3::zeros(), Matrix3::zeros());
-        for &v in list {
+        for &v in self.list(triangle as usize) {
             let q = &self.quadrics[v as usize];
-            let y = x - q.position;
-            let height = q.normal.dot(&y);
-            let u = (y.norm_squared() - height * height) * q.inverse_square;
-            if u >= 1.0 {
-                continue;
-            }
-            let tau = y - q.normal * height;
+            let Some((tau, height, u)) = q.local(x) else { continue };
             let bend = q.curvature * tau;
             let (f, f1) = (height - 0.5 * tau.dot(&bend), q.normal - bend);
+            let [b, b1, b2] = q.window(f);
+            if b == 0.0 {
+                continue;
+            }
             let g = 1.0 - u;
-            let w = g * g * g;
-            // ∇u = 2τ/ρ²; w′(u) = −3g², w″(u) = 6g.
+            // ∇u = 2τ/ρ²; a = (1 − u)³ has a′(u) = −3g², a″(u) = 6g.
+            let a = g * g * g;
             let slope = -6.0 * g * g * q.inverse_square;
-            let w1 = tau * slope;
+            let a1 = tau * slope;
             let curve = 24.0 * g * q.inverse_square * q.inverse_square;
-            let w2 = tau * tau.transpose() * curve
+            let a2 = tau * tau.transpose() * curve
                 + (Matrix3::identity() - q.normal * q.normal.transpose()) * slope;
+            let (mut w, mut w1, mut w2) = (a, a1, a2);
+            if b < 1.0 {
+                let turned = a1 * f1.transpose();
+                w = a * b;
+                w1 = a1 * b + f1 * (a * b1);
+                w2 = a2 * b + (turned + turned.transpose() - q.curvature * a) * b1
+                    + f1 * f1.transpose() * (a * b2);
+            }
             weight += w;
             weight1 += w1;
             weight2 += w2;
@@ -140,7 +299,7 @@ impl SmoothWall {
             let mixed = w1 * f1.transpose();
             value2 += w2 * f + mixed + mixed.transpose() - q.curvature * w;
         }
-        if weight < 1e-9 {
+        if weight < LEAST_WEIGHT {
             return None;
         }
         let inv = 1.0 / weight;
@@ -168,7 +327,7 @@ fn vertex_neighbours(triangles: &[[u32; 3]], count: usize) -> Vec<Vec<u32>> {
 }
 
 /// Angle-weighted inward normals.
-fn vertex_normals(mesh: &crate::vessel::SurfaceMesh) -> Vec<Vec3> {
+fn vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
     let mut normals = vec![Vec3::zeros(); mesh.vertices_mm.len()];
     for (index, triangle) in mesh.triangles.iter().enumerate() {
         let corner = mesh.corners(index);
@@ -224,6 +383,8 @@ fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[Vec<u32>]) -
             normal,
             curvature: Matrix3::zeros(),
             inverse_square: rho.powi(-2),
+            offset_mm: 0.0,
+            window_mm: 0.0,
         };
     }
     let (saa, sab, sbb) = (found[2] / longest, found[3] / longest, found[4] / longest);
@@ -239,6 +400,8 @@ fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[Vec<u32>]) -
         normal,
         curvature: across * tangent * across * scale,
         inverse_square: rho.powi(-2),
+        offset_mm: 0.0,
+        window_mm: 0.0,
     }
 }
 
@@ -252,7 +415,7 @@ mod tests {
         let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(edge_mm))
             .unwrap()
             .wall;
-        (SmoothWall::new(&wall, 0.5), WallQuery::new(&wall).unwrap())
+        (SmoothWall::new(&wall, 0.5, 0.5), WallQuery::new(&wall).unwrap())
     }
 
     fn at(wall: &(SmoothWall, WallQuery), x: &Vec3) -> Distance {

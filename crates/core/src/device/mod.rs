@@ -125,6 +125,11 @@ impl Device {
         self.sections.iter().any(|s| s.rest_curvature_per_mm != [0.0; 2])
     }
 
+    /// Smallest outer radius, mm.
+    pub fn min_radius_mm(&self) -> f64 {
+        self.sections.iter().map(|s| s.radius_mm).fold(f64::MAX, f64::min)
+    }
+
     /// Largest outer radius, mm.
     pub fn max_radius_mm(&self) -> f64 {
         self.sections.iter().map(|s| s.radius_mm).fold(0.0, f64::max)

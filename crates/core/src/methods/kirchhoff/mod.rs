@@ -119,7 +119,7 @@ impl<const C: usize> Kirchhoff<C> {
         let felt = Wall::from_surface(&extended(surroundings.wall, radius_mm))?;
         let mut method = Self {
             options,
-            smooth: SmoothWall::new(&felt, radius_mm),
+            smooth: SmoothWall::new(&felt, surroundings.device.min_radius_mm(), radius_mm),
             query: WallQuery::new(&felt)?,
             newton: Newton::new(1),
             mesh,
@@ -309,10 +309,11 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 let last = self.state.elements();
                 let (tip, tangent) = (self.state.positions[last], self.state.frames[last].t);
                 let radius = surroundings.device.section_at(0.0).radius_mm;
-                let way = self.extension.trace(&self.query, tip, tangent, radius, wanted);
+                let way = self.extension.trace((&self.smooth, &self.query), tip, tangent, radius, wanted);
                 part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
             }
-            let next = if part >= rest { 1.0 } else { done + part };
+            // A rest that is rounding is none.
+            let next = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
             let inserted = if next == 1.0 { target } else { start + (target - start) * next };
             let tail = before.rotation_rad + command.rotate_rad * next;
             self.report.substeps += 1;

@@ -1,6 +1,7 @@
 //! The warm start: the rod slides along its own curve, and beyond its tip goes on straight, or along the wall it meets.
 
 use crate::Vec3;
+use crate::contact::SmoothWall;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{Frame, RodState};
 use crate::vessel::WallQuery;
@@ -25,7 +26,7 @@ impl Extension {
     /// along it. Returns how far it came.
     pub(super) fn trace(
         &mut self,
-        query: &WallQuery,
+        wall: (&SmoothWall, &WallQuery),
         tip: Vec3,
         tangent: Vec3,
         radius_mm: f64,
@@ -37,24 +38,19 @@ impl Extension {
         let (mut x, mut t) = (tip, tangent);
         for _ in 0..count as usize {
             let ahead = x + t * self.piece_mm;
-            if let Some(near) = query.nearest(&ahead, radius_mm + self.piece_mm)
-                && !near.rim
-                && near.distance_mm < radius_mm
+            if let Some((distance_mm, normal)) = near(wall, &ahead, radius_mm + self.piece_mm)
+                && distance_mm < radius_mm
             {
-                if t.dot(&near.normal) < HEAD_ON {
+                if t.dot(&normal) < HEAD_ON {
                     break;
                 }
                 // The piece ends where its surface would just touch, as far as one piece can turn.
-                let along = t - near.normal * t.dot(&near.normal);
-                let lift =
-                    (t.dot(&near.normal) + (radius_mm - near.distance_mm) / self.piece_mm).clamp(-0.5, 0.5);
-                t = (along.normalize() + near.normal * lift).normalize();
+                let along = t - normal * t.dot(&normal);
+                let lift = (t.dot(&normal) + (radius_mm - distance_mm) / self.piece_mm).clamp(-0.5, 0.5);
+                t = (along.normalize() + normal * lift).normalize();
             }
             let next = x + t * self.piece_mm;
-            if query
-                .nearest(&next, radius_mm)
-                .is_some_and(|near| !near.rim && near.distance_mm < CLEAR * radius_mm)
-            {
+            if near(wall, &next, radius_mm).is_some_and(|(distance_mm, _)| distance_mm < CLEAR * radius_mm) {
                 break;
             }
             x = next;
@@ -72,6 +68,14 @@ impl Extension {
         let (end, t) = self.pieces[index];
         (end + t * (beyond_mm - (index + 1) as f64 * self.piece_mm), t)
     }
+}
+
+/// Distance from the wall and its direction, where the wall is within reach.
+fn near((smooth, query): (&SmoothWall, &WallQuery), x: &Vec3, reach_mm: f64) -> Option<(f64, Vec3)> {
+    let nearest = query.nearest(x, reach_mm).filter(|nearest| !nearest.rim)?;
+    Some(smooth.distance(x, nearest.triangle).map_or((nearest.distance_mm, nearest.normal), |d| {
+        (d.value_mm, d.gradient.try_normalize(1e-6).unwrap_or(nearest.normal))
+    }))
 }
 
 /// Part of its radius that the axis keeps from the wall while it is traced.
