@@ -7,11 +7,11 @@
 //!
 //! ```text
 //! Qᵢ(x) = Nᵢ·y − ½ τᵀSᵢτ − cᵢ,   y = x − Vᵢ,  τ = y − Nᵢ(Nᵢ·y)
-//! wᵢ(x) = (1 − |τ|²/ρᵢ²)³ b(Qᵢ)   where positive
+//! wᵢ(x) = (1 − τᵀMᵢτ)³ b(Qᵢ)   where positive
 //! f(x)  = Σ wᵢQᵢ / Σ wᵢ
 //! ```
 //!
-//! with Nᵢ the inward normal, Sᵢ the curvature and ρᵢ a little more than the longest edge at the vertex. The window b, 1 for
+//! with Nᵢ the inward normal, Sᵢ the curvature and Mᵢ an ellipse that holds the neighbours of the vertex. The window b, 1 for
 //! small |Qᵢ| and 0 far away, leaves out the other side of a narrow lumen and the back of a thin septum. f is twice
 //! continuously differentiable, so a device feels an energy with an exact gradient and Hessian; it differs from the distance
 //! to the sampled surface at second order in the edge length, by a sixth of what the flat triangles do.
@@ -28,15 +28,17 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2};
 
 use crate::Vec3;
 use crate::vessel::{SurfaceMesh, Wall};
 
-/// Support of a vertex over its longest edge: every point of a triangle lies well inside that of its three corners.
+/// Support of a vertex over its edges: every point of a triangle lies well inside that of its three corners.
 const SUPPORT: f64 = 1.1;
 /// Largest curvature times support: beyond it a corner is a corner, and a quadric would fold over.
 const LARGEST_BEND: f64 = 0.8;
+/// Square of the thinnest ellipse's ratio of axes, about.
+const THINNEST: f64 = 0.01;
 /// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.
 const REGULAR: f64 = 1e-6;
 /// Sum of weights below which no vertex reaches a point.
@@ -61,8 +63,10 @@ struct Quadric {
     position: Vec3,
     normal: Vec3,
     curvature: Matrix3<f64>,
-    /// 1/ρ².
-    inverse_square: f64,
+    /// M, 1/mm².
+    support: Matrix3<f64>,
+    /// Half axes of the support, shortest and longest, mm.
+    half_axes_mm: (f64, f64),
     /// cᵢ, mm.
     offset_mm: f64,
     /// Height of the window, mm.
@@ -102,13 +106,13 @@ fn fall(at: f64, from: f64, to: f64) -> [f64; 3] {
 }
 
 impl Quadric {
-    /// τ, height − c and u = |τ|²/ρ² at `x`; `None` beyond the support.
+    /// y, Mτ, height and u = τᵀMτ at `x`; `None` beyond the support.
     #[inline]
-    fn local(&self, x: &Vec3) -> Option<(Vec3, f64, f64)> {
+    fn local(&self, x: &Vec3) -> Option<(Vec3, Vec3, f64, f64)> {
         let y = x - self.position;
-        let height = self.normal.dot(&y);
-        let u = (y.norm_squared() - height * height) * self.inverse_square;
-        (u < 1.0).then(|| (y - self.normal * height, height - self.offset_mm, u))
+        let across = self.support * y;
+        let u = y.dot(&across);
+        (u < 1.0).then(|| (y, across, self.normal.dot(&y) - self.offset_mm, u))
     }
 
     /// b(Q) and its derivatives.
@@ -147,7 +151,7 @@ impl SmoothWall {
         let mut quadrics: Vec<Quadric> =
             (0..count).map(|v| fit(v, &mesh.vertices_mm, &normals, &neighbours)).collect();
         for q in &mut quadrics {
-            q.window_mm = (WINDOW.0 * thickest_mm).max(WINDOW.1 / q.inverse_square.sqrt());
+            q.window_mm = (WINDOW.0 * thickest_mm).max(WINDOW.1 * q.half_axes_mm.0);
         }
 
         let mut starts = Vec::with_capacity(mesh.triangles.len() + 1);
@@ -164,8 +168,8 @@ impl SmoothWall {
             // Over the surface, not through space: the other side of a thin septum is another wall.
             while let Some(v) = queue.pop_front() {
                 let q = &quadrics[v as usize];
-                let support = q.inverse_square.sqrt().recip();
-                let reach = support + size + (HEIGHT.0 * thickest_mm).max(HEIGHT.1 * support);
+                let (short, long) = q.half_axes_mm;
+                let reach = long + size + (HEIGHT.0 * thickest_mm).max(HEIGHT.1 * short);
                 if (q.position - centre).norm() > reach {
                     continue;
                 }
@@ -179,36 +183,22 @@ impl SmoothWall {
             }
         }
         starts.push(lists.len() as u32);
-        let mut smooth =
-            Self { quadrics, starts, lists, insets_mm: Vec::new(), deepest_inset_mm: 0.0 };
+        let mut smooth = Self { quadrics, starts, lists, insets_mm: Vec::new(), deepest_inset_mm: 0.0 };
         smooth.draw_in(mesh, BEYOND * thinnest_mm);
         smooth
     }
 
-    /// Least and largest f on a triangle of the mesh, at the points of a grid: of one interval a side with the middles of
-    /// these and of the triangle if that stays below `enough_mm`, or of [`CHECKED`].
+    /// Least and largest f on a triangle of the mesh, at few points if they differ by less than `enough_mm`, or at all of a
+    /// grid.
     fn range(&self, mesh: &SurfaceMesh, index: usize, enough_mm: f64) -> (f64, f64) {
-        let [a, b, c] = mesh.corners(index);
+        let corners = mesh.corners(index);
         let list = self.list(index);
-        let (mut least, mut largest) = (f64::MAX, f64::MIN);
-        let mut look = |u: f64, v: f64| {
-            let f = self.value(&(a + (b - a) * u + (c - a) * v), list).unwrap_or(0.0);
-            (least, largest) = (least.min(f), largest.max(f));
-            (least, largest)
+        let look = |(least, largest): (f64, f64), x: Vec3| {
+            let f = self.value(&x, list).unwrap_or(0.0);
+            (least.min(f), largest.max(f))
         };
-        let third = 1.0 / 3.0;
-        let few = [(0.5, 0.0), (0.0, 0.5), (0.5, 0.5), (third, third)];
-        let found = few.map(|(u, v)| look(u, v))[3];
-        if found.1 - found.0 < enough_mm {
-            return found;
-        }
-        let part = |k: u32| f64::from(k) / f64::from(CHECKED);
-        for i in 0..=CHECKED {
-            for j in 0..=CHECKED - i {
-                look(part(i), part(j));
-            }
-        }
-        (least, largest)
+        let found = few(&corners).into_iter().fold((f64::MAX, f64::MIN), look);
+        if found.1 - found.0 > enough_mm { grid(corners).fold(found, look) } else { found }
     }
 
     /// Sets the offsets so that f is at most `limit_mm` on the triangles, and measures how far inside them it lies.
@@ -218,8 +208,15 @@ impl SmoothWall {
         for index in 0..mesh.triangles.len() {
             let (least, largest) = self.range(mesh, index, enough_mm);
             self.insets_mm.push((-least).max(0.0) as f32);
-            for &v in self.list(index) {
-                offsets[v as usize] = offsets[v as usize].max(largest - limit_mm);
+            if largest <= limit_mm {
+                continue;
+            }
+            for x in grid(mesh.corners(index)) {
+                let list = self.list(index);
+                let beyond = self.value(&x, list).unwrap_or(0.0) - limit_mm;
+                for &v in list.iter().filter(|&&v| self.quadrics[v as usize].local(&x).is_some()) {
+                    offsets[v as usize] = offsets[v as usize].max(beyond);
+                }
             }
         }
         for (q, offset) in self.quadrics.iter_mut().zip(offsets) {
@@ -252,8 +249,8 @@ impl SmoothWall {
         let (mut weight, mut value) = (0.0, 0.0);
         for &v in list {
             let q = &self.quadrics[v as usize];
-            let Some((tau, height, u)) = q.local(x) else { continue };
-            let f = height - 0.5 * tau.dot(&(q.curvature * tau));
+            let Some((y, _, height, u)) = q.local(x) else { continue };
+            let f = height - 0.5 * y.dot(&(q.curvature * y));
             let w = (1.0 - u).powi(3) * q.window(f)[0];
             weight += w;
             value += w * f;
@@ -268,27 +265,26 @@ impl SmoothWall {
         let (mut weight2, mut value2) = (Matrix3::zeros(), Matrix3::zeros());
         for &v in self.list(triangle as usize) {
             let q = &self.quadrics[v as usize];
-            let Some((tau, height, u)) = q.local(x) else { continue };
-            let bend = q.curvature * tau;
-            let (f, f1) = (height - 0.5 * tau.dot(&bend), q.normal - bend);
+            let Some((y, across, height, u)) = q.local(x) else { continue };
+            // M and S see only what is across the normal, so they take y for τ.
+            let bend = q.curvature * y;
+            let (f, f1) = (height - 0.5 * y.dot(&bend), q.normal - bend);
             let [b, b1, b2] = q.window(f);
             if b == 0.0 {
                 continue;
             }
             let g = 1.0 - u;
-            // ∇u = 2τ/ρ²; a = (1 − u)³ has a′(u) = −3g², a″(u) = 6g.
+            // ∇u = 2Mτ, ∇∇u = 2M; a = (1 − u)³ has a′(u) = −3g², a″(u) = 6g.
             let a = g * g * g;
-            let slope = -6.0 * g * g * q.inverse_square;
-            let a1 = tau * slope;
-            let curve = 24.0 * g * q.inverse_square * q.inverse_square;
-            let a2 = tau * tau.transpose() * curve
-                + (Matrix3::identity() - q.normal * q.normal.transpose()) * slope;
+            let a1 = across * (-6.0 * g * g);
+            let a2 = across * across.transpose() * (24.0 * g) - q.support * (6.0 * g * g);
             let (mut w, mut w1, mut w2) = (a, a1, a2);
             if b < 1.0 {
                 let turned = a1 * f1.transpose();
                 w = a * b;
                 w1 = a1 * b + f1 * (a * b1);
-                w2 = a2 * b + (turned + turned.transpose() - q.curvature * a) * b1
+                w2 = a2 * b
+                    + (turned + turned.transpose() - q.curvature * a) * b1
                     + f1 * f1.transpose() * (a * b2);
             }
             weight += w;
@@ -309,6 +305,17 @@ impl SmoothWall {
         let hessian = (value2 - weight2 * f - mixed - mixed.transpose()) * inv;
         Some(Distance { value_mm: f, gradient, hessian })
     }
+}
+
+/// The middles of a triangle and its sides.
+fn few([a, b, c]: &[Vec3; 3]) -> [Vec3; 4] {
+    [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5, (a + b + c) / 3.0]
+}
+
+/// Points all over a triangle.
+fn grid([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
+    let part = |k: u32| f64::from(k) / f64::from(CHECKED);
+    (0..=CHECKED).flat_map(move |i| (0..=CHECKED - i).map(move |j| a + (b - a) * part(i) + (c - a) * part(j)))
 }
 
 /// Vertices that share an edge with each vertex, ascending.
@@ -345,22 +352,43 @@ fn vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
     normals
 }
 
+/// The smallest ellipse of its shape that holds points of a plane, as a matrix: Σ y yᵀ gives the shape.
+fn ellipse(points: impl Iterator<Item = (f64, f64)> + Clone) -> Matrix2<f64> {
+    let mut spread = Matrix2::zeros();
+    for (p, q) in points.clone() {
+        let y = Vector2::new(p, q);
+        spread += y * y.transpose();
+    }
+    // Neighbours on a line, or none: no needles.
+    spread += Matrix2::identity() * (THINNEST * spread.trace()).max(f64::MIN_POSITIVE);
+    let shape = spread.try_inverse().unwrap_or_else(Matrix2::identity);
+    let farthest =
+        points.map(|(p, q)| Vector2::new(p, q).dot(&(shape * Vector2::new(p, q)))).fold(0.0, f64::max);
+    shape / farthest.max(f64::MIN_POSITIVE)
+}
+
 /// The quadric of vertex `v`: heights of its neighbours and theirs, g·τ + ½ τᵀSτ in its tangent plane, least squares.
 fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[Vec<u32>]) -> Quadric {
     let (origin, normal) = (vertices[v], normals[v]);
-    let longest = neighbours[v].iter().map(|&w| (vertices[w as usize] - origin).norm()).fold(0.0, f64::max);
-    let rho = SUPPORT * longest.max(1e-12);
+    let a = {
+        let axis = Vec3::ith(normal.iamin(), 1.0);
+        (axis - normal * normal.dot(&axis)).normalize()
+    };
+    let b = normal.cross(&a);
+    let flat = |w: u32| {
+        let y = vertices[w as usize] - origin;
+        (y.dot(&a), y.dot(&b), y.dot(&normal))
+    };
+    let plane = ellipse(neighbours[v].iter().map(|&w| flat(w)).map(|(p, q, _)| (p, q))) / (SUPPORT * SUPPORT);
+    let axes = plane.symmetric_eigenvalues();
+    let half_axes_mm = (axes.max().sqrt().recip(), axes.min().sqrt().recip());
     let mut ring: Vec<u32> = neighbours[v].clone();
     for &w in &neighbours[v] {
         ring.extend(neighbours[w as usize].iter().copied());
     }
     ring.sort_unstable();
     ring.dedup();
-    let a = {
-        let axis = Vec3::ith(normal.iamin(), 1.0);
-        (axis - normal * normal.dot(&axis)).normalize()
-    };
-    let b = normal.cross(&a);
+    let long = half_axes_mm.1;
     let mut matrix = SMatrix::<f64, 5, 5>::identity() * REGULAR;
     let mut right = SVector::<f64, 5>::zeros();
     for &w in &ring {
@@ -368,38 +396,45 @@ fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[Vec<u32>]) -
         if w as usize == v || normals[w as usize].dot(&normal) < 0.3 {
             continue;
         }
-        let y = (vertices[w as usize] - origin) / longest;
-        let (p, q, h) = (y.dot(&a), y.dot(&b), y.dot(&normal));
+        let (p, q, h) = flat(w);
+        let weight = 1.0 / (1.0 + Vector2::new(p, q).dot(&(plane * Vector2::new(p, q))));
+        let (p, q, h) = (p / long, q / long, h / long);
         let row = SVector::<f64, 5>::new(p, q, 0.5 * p * p, p * q, 0.5 * q * q);
-        let weight = 1.0 / (1.0 + y.norm_squared());
         matrix += row * row.transpose() * weight;
         right += row * (h * weight);
     }
     let found = matrix.cholesky().map_or_else(SVector::zeros, |c| c.solve(&right));
     // A fit that leans over is none; neither is one that is not a number.
-    if found[0].hypot(found[1]).max(0.5) != 0.5 || found[0].is_nan() {
-        return Quadric {
-            position: origin,
-            normal,
-            curvature: Matrix3::zeros(),
-            inverse_square: rho.powi(-2),
-            offset_mm: 0.0,
-            window_mm: 0.0,
-        };
-    }
-    let (saa, sab, sbb) = (found[2] / longest, found[3] / longest, found[4] / longest);
-    let size = saa.abs().max(sbb.abs()) + sab.abs();
-    let scale = (LARGEST_BEND / rho / size.max(1e-300)).min(1.0);
-    let tangent =
-        a * a.transpose() * saa + (a * b.transpose() + b * a.transpose()) * sab + b * b.transpose() * sbb;
-    // The plane of the fit, and the curvature seen from it.
-    let normal = (normal - a * found[0] - b * found[1]).normalize();
+    let usable = found[0].hypot(found[1]) <= 0.5;
+    let (tilt, bend) = if usable {
+        (Vector2::new(found[0], found[1]), Matrix2::new(found[2], found[3], found[3], found[4]) / long)
+    } else {
+        (Vector2::zeros(), Matrix2::zeros())
+    };
+    // Sag over the support against its half axes, direction by direction.
+    let size = (0..2)
+        .map(|i| {
+            (0..2)
+                .map(|j| (bend[(i, j)] / plane[(i, i)].sqrt().sqrt() / plane[(j, j)].sqrt().sqrt()).abs())
+                .sum::<f64>()
+        })
+        .fold(0.0, f64::max);
+    let bend = bend * (LARGEST_BEND / size.max(1e-300)).min(1.0);
+    // The plane of the fit, and curvature and support seen from it.
+    let normal = (normal - a * tilt.x - b * tilt.y).normalize();
     let across = Matrix3::identity() - normal * normal.transpose();
+    let seen = |m: &Matrix2<f64>| {
+        let whole = a * a.transpose() * m[(0, 0)]
+            + (a * b.transpose() + b * a.transpose()) * m[(0, 1)]
+            + b * b.transpose() * m[(1, 1)];
+        across * whole * across
+    };
     Quadric {
         position: origin,
         normal,
-        curvature: across * tangent * across * scale,
-        inverse_square: rho.powi(-2),
+        curvature: seen(&bend),
+        support: seen(&plane),
+        half_axes_mm,
         offset_mm: 0.0,
         window_mm: 0.0,
     }

@@ -17,7 +17,7 @@ mod slide;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::extension::{EXTENSION_MM, extended, left_through};
+use crate::contact::extension::{LEAVE_MM, extended, left_through};
 use crate::contact::{KnownPoint, SmoothWall, WallContact};
 use crate::device::Device;
 use crate::insertion::{Command, Contact, Energy, StepReport, Surroundings};
@@ -282,12 +282,9 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let tip = self.state.positions[self.state.elements()];
         if command.advance_mm > 0.0
             && let Some((opening, beyond)) = left_through(surroundings.wall, &tip)
-            && beyond + command.advance_mm > EXTENSION_MM
+            && beyond + command.advance_mm > LEAVE_MM
         {
-            return Err(Error::Computation(format!(
-                "the tip has left the vessel through opening {opening} by {beyond:.1} mm, and beyond {EXTENSION_MM} mm nothing \
-                 is known: stop the script earlier or use a vessel that goes on"
-            )));
+            return Err(left(opening, beyond));
         }
         let start = self.report.inserted_mm;
         let target = (start + command.advance_mm).min(surroundings.device.length_mm());
@@ -334,6 +331,14 @@ impl<const C: usize> Method for Kirchhoff<C> {
             match self.try_step(surroundings, inserted, tail) {
                 Ok(iterations) => {
                     self.report.iterations += iterations as u32;
+                    let tip = self.next.positions[self.next.elements()];
+                    if let Some((opening, beyond)) = left_through(surroundings.wall, &tip)
+                        && beyond > LEAVE_MM
+                    {
+                        (self.mesh, self.state) = saved;
+                        self.report = before;
+                        return Err(left(opening, beyond));
+                    }
                     self.accept();
                     done = next;
                     share = (2.0 * part).min(1.0);
@@ -371,6 +376,14 @@ impl<const C: usize> Method for Kirchhoff<C> {
     fn report(&self) -> &StepReport {
         &self.report
     }
+}
+
+/// The tip would be farther beyond an opening than anything is known.
+fn left(opening: usize, beyond_mm: f64) -> Error {
+    Error::Computation(format!(
+        "the tip has left the vessel through opening {opening} by {beyond_mm:.1} mm, and beyond {LEAVE_MM} mm nothing is \
+         known: stop the script earlier or use a vessel that goes on"
+    ))
 }
 
 /// Least bending stiffness of a device, N·mm².
