@@ -110,15 +110,8 @@ fn on_curve(
 
 /// The state on the mesh `to` of the rod that was in `state` on the mesh `from`, slid along its curve.
 ///
-/// Material angles stay with the device; what enters from the sheath has the sheath's angle `tail_rad`.
-pub(super) fn slide(
-    from: &Mesh,
-    state: &RodState,
-    extension: &Extension,
-    to: &Mesh,
-    tail_rad: f64,
-    out: &mut RodState,
-) {
+/// Material angles stay with the device; what enters from the sheath has the angle that the tail has had.
+pub(super) fn slide(from: &Mesh, state: &RodState, extension: &Extension, to: &Mesh, out: &mut RodState) {
     let inserted = to.from_tip_mm[0];
     let first = state.frames[0];
     let n = to.elements.len();
@@ -146,12 +139,13 @@ pub(super) fn slide(
         out.bubbles.push(known.filter(|k| *k > 0).map_or(0.0, |k| state.bubbles[k]));
     }
     // Against triads carried along the rod without twist, which is what the new ones are.
+    let tail = state.angles[0];
     let mut carried = 0.0;
     let mut k = 1;
     for i in 0..=n {
         let known = old.checked_sub(n - i).filter(|k| *k > 0);
         let Some(known) = known else {
-            out.angles.push(tail_rad);
+            out.angles.push(tail);
             continue;
         };
         while k <= known {
@@ -160,7 +154,7 @@ pub(super) fn slide(
         }
         out.angles.push(state.angles[known] + carried);
     }
-    out.angles[0] = tail_rad;
+    out.angles[0] = tail;
     out.reference_twists.clear();
     out.reference_twists.resize(n, 0.0);
     out.positions.clear();
