@@ -339,7 +339,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 let last = self.state.elements();
                 let (tip, tangent) = (self.state.positions[last], self.state.frames[last].t);
                 let radius = surroundings.device.section_at(0.0).radius_mm;
-                let way = self.extension.trace(&self.query, tip, tangent, radius, wanted);
+                let way = self.extension.trace((&self.smooth, &self.query), tip, tangent, radius, wanted);
                 part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
             }
             let next = if part >= rest { 1.0 } else { done + part };
