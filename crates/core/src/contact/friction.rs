@@ -19,9 +19,9 @@
 //! μN against the slip wherever the point slips farther than ε, and less where it sticks. A stuck point creeps
 //! by less than ε a step, and ε is a thousandth of what the hand moved in it.
 //!
-//! The normal force N and the normal n are lagged: D has fixed ones, so the energy keeps a symmetric Hessian and a minimum, and
-//! they are renewed from the minimum until they no longer change ([`Friction::renew`]). What is left at the
-//! end is Coulomb's law of the final state.
+//! The normal force N and the normal n are lagged: within one step of Newton's method D has fixed ones, so the energy keeps
+//! a symmetric Hessian and steps that descend; between steps they are renewed until they no longer change
+//! ([`Friction::follow`]). What is left at the end is Coulomb's law of the final state.
 
 use nalgebra::Matrix3;
 
@@ -38,6 +38,12 @@ const LEAST_STICK_MM: f64 = 1e-8;
 /// one that was felt where they come to lie, since the wall does not move.
 const TIP_RADII: f64 = 10.0;
 
+/// Normal forces are renewed once the last step of Newton's method has changed them by no more than this part; before, they
+/// have little to do with those of the equilibrium …
+const STEADY: f64 = 0.3;
+/// … and no more once they differ from the lagged ones by less than this part.
+pub(super) const SETTLED: f64 = 1e-4;
+
 /// A contact point in a step with friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Slider {
@@ -51,6 +57,8 @@ struct Slider {
     normal: Vec3,
     /// Normal force N.
     force_n: f64,
+    /// Normal and force at the state seen last.
+    seen: (Vec3, f64),
 }
 
 /// Derivatives of a point's friction energy in its position and its angle.
@@ -74,6 +82,8 @@ pub struct Friction {
     coefficient: f64,
     /// ε, mm.
     stick_mm: f64,
+    /// Whether normal forces are no longer renewed in this step.
+    settled: bool,
     sliders: Vec<Slider>,
 }
 
@@ -111,6 +121,7 @@ impl Friction {
         hand: HandMotion,
     ) {
         self.sliders.clear();
+        self.settled = false;
         if !self.acts() {
             return;
         }
@@ -132,6 +143,7 @@ impl Friction {
                 along,
                 normal: Vec3::zeros(),
                 force_n: 0.0,
+                seen: (Vec3::zeros(), 0.0),
             };
             if point.from_tip_mm < near_tip {
                 if index < count {
@@ -213,16 +225,37 @@ impl Friction {
         })
     }
 
-    /// Renews normals and normal forces from those of an equilibrium, a pair for every point; returns how much force has
-    /// changed and how much there is, N.
-    pub fn renew(&mut self, pressed: impl Iterator<Item = (Vec3, f64)>) -> (f64, f64) {
-        let (mut change, mut sum) = (0.0, 0.0);
-        for (slider, (normal, force)) in self.sliders.iter_mut().zip(pressed) {
-            change += (slider.normal * slider.force_n - normal * force).norm();
-            sum += force;
-            (slider.normal, slider.force_n) = (normal, force);
+    /// Looks at what presses at the state that Newton's method has come to, a normal and a force for every point, and
+    /// renews the lagged ones unless they are still on their way or have settled. `least_n` is a force not worth settling.
+    pub fn follow(&mut self, pressed: impl Iterator<Item = (Vec3, f64)>, least_n: f64) {
+        let (mut moved, mut sum) = (0.0, least_n);
+        for (slider, now) in self.sliders.iter_mut().zip(pressed) {
+            moved += (slider.seen.0 * slider.seen.1 - now.0 * now.1).norm();
+            sum += now.1;
+            slider.seen = now;
         }
-        (change, sum)
+        if self.settled || moved > STEADY * sum {
+            return;
+        }
+        self.settled = self.unsettled(least_n) < SETTLED;
+        for slider in &mut self.sliders {
+            (slider.normal, slider.force_n) = slider.seen;
+        }
+    }
+
+    /// How much of the normal force has changed since it was last renewed.
+    pub fn unsettled(&self, least_n: f64) -> f64 {
+        let (mut change, mut sum) = (0.0, least_n);
+        for slider in &self.sliders {
+            change += (slider.normal * slider.force_n - slider.seen.0 * slider.seen.1).norm();
+            sum += slider.seen.1;
+        }
+        change / sum
+    }
+
+    /// Lets the normal forces be renewed again.
+    pub fn unsettle(&mut self) {
+        self.settled = false;
     }
 }
 
@@ -235,9 +268,16 @@ mod tests {
     fn friction(slip: Vec3) -> (Friction, Vec3) {
         let normal = Vec3::new(0.3, -0.5, 0.8).normalize();
         let along = normal.cross(&Vec3::new(0.9, 0.1, 0.2)).normalize();
-        let slider = Slider { from_mm: Vec3::new(1.0, 2.0, 3.0), from_rad: 0.7, along, normal, force_n: 2.0 };
+        let slider = Slider {
+            from_mm: Vec3::new(1.0, 2.0, 3.0),
+            from_rad: 0.7,
+            along,
+            normal,
+            force_n: 2.0,
+            seen: (normal, 2.0),
+        };
         let at = slider.from_mm + (slip - normal * normal.dot(&slip));
-        (Friction { coefficient: 0.25, stick_mm: 0.01, sliders: vec![slider] }, at)
+        (Friction { coefficient: 0.25, stick_mm: 0.01, settled: false, sliders: vec![slider] }, at)
     }
 
     #[test]

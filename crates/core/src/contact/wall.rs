@@ -9,7 +9,7 @@
 //! its last clearance, nothing can touch it.
 
 use crate::Vec3;
-use crate::contact::{Distance, Friction, SmoothWall, WallPotential};
+use crate::contact::{Distance, Friction, SmoothWall, WallPotential, friction};
 use crate::insertion::Contact;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{Assembly, ElementData, RodState};
@@ -46,6 +46,13 @@ impl ContactPoint {
             + (state.frames[e].t * s0 + state.frames[e + 1].t * s1) * h
     }
 
+    /// Normal of the wall and force on it at a distance, N; `softness` as in [`WallContact`].
+    fn pressed(&self, d: &Distance, softness: f64) -> (Vec3, f64) {
+        // The smooth distance has a gradient of nearly unit length; the normal has one.
+        let size = d.gradient.norm();
+        (d.gradient / size, -softness * self.weight_mm * self.potential.derivatives(d.value_mm).0 * size)
+    }
+
     /// Material angle, rad.
     pub fn angle(&self, state: &RodState) -> f64 {
         let [w0, w1, wb] = Point::at(self.xi, 0.0).phi;
@@ -67,6 +74,8 @@ struct Known {
     base: Vec3,
     /// No wall is nearer to it than this, mm.
     base_clearance_mm: f64,
+    /// Distance there, if the wall is near.
+    near: Option<Distance>,
 }
 
 impl Default for Known {
@@ -77,6 +86,7 @@ impl Default for Known {
             triangle: None,
             base: Vec3::zeros(),
             base_clearance_mm: 0.0,
+            near: None,
         }
     }
 }
@@ -255,23 +265,16 @@ impl<'a> WallContact<'a> {
         assembly.add_turn(state, &elements[e], e, point.xi, &f.mixed, (f.turn, f.turn2));
     }
 
-    /// Renews the normal forces that friction is reckoned with from those at `state`. Returns by how much they changed, as a
-    /// part of all that presses.
-    pub fn renew_friction(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
-        let mut friction = std::mem::take(self.friction);
-        let pressed = (0..self.points.len()).map(|index| {
-            let point = self.points[index];
-            match self.read(index, &point.position(elements, state)) {
-                Reading::Near(d) => {
-                    let force = -self.softness * point.weight_mm * point.potential.derivatives(d.value_mm).0;
-                    (d.gradient, force)
-                }
-                Reading::Free(_) | Reading::Outside => (Vec3::zeros(), 0.0),
-            }
-        });
-        let (change, sum) = friction.renew(pressed);
-        *self.friction = friction;
-        change / sum.max(self.least_moment_nmm / LEAST_BEND_MM)
+    /// Whether friction knows the normal forces of the equilibrium that was found. If not, it may renew them again.
+    pub fn friction_settled(&mut self) -> bool {
+        let settled = self.friction.unsettled(self.least_force_n()) < friction::SETTLED;
+        self.friction.unsettle();
+        settled
+    }
+
+    /// A device bent to a radius of 100 mm carries this.
+    fn least_force_n(&self) -> f64 {
+        self.least_moment_nmm / LEAST_BEND_MM
     }
 
     /// What happens at point `index` at the given state, where the wall is pressed.
@@ -284,13 +287,14 @@ impl<'a> WallContact<'a> {
             return None;
         }
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
+        let (normal, force_n) = point.pressed(&distance, 1.0);
         let rub = self.friction.derivatives(index, &x, angle, radius_mm);
         Some(Touch {
             energy_mj: point.weight_mm * point.potential.value(distance.value_mm),
             contact: Contact {
                 position_mm: x,
-                normal: distance.gradient,
-                force_n: -point.weight_mm * point.potential.derivatives(distance.value_mm).0,
+                normal,
+                force_n,
                 friction_n: rub.map_or_else(Vec3::zeros, |f| -f.gradient),
                 penetration_mm,
                 triangle: self.known[index].0.triangle.unwrap_or(0),
@@ -330,25 +334,31 @@ impl<const C: usize> External<C> for WallContact<'_> {
     fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, state);
-            let point = self.points[index];
             let reading = self.read(index, &x);
             let KnownPoint(known) = &mut self.known[index];
             known.base = x;
-            known.base_clearance_mm = match reading {
-                Reading::Free(clearance) => clearance,
-                Reading::Near(d) => d.value_mm,
+            (known.base_clearance_mm, known.near) = match reading {
+                Reading::Free(clearance) => (clearance, None),
+                Reading::Near(d) => (d.value_mm, Some(d)),
                 Reading::Outside => {
                     assembly.external_energy = f64::INFINITY;
                     return;
                 }
             };
+        }
+        if self.friction.acts() {
+            let pressed = self.points.iter().zip(self.known.iter()).map(|(point, KnownPoint(known))| {
+                known.near.map_or((Vec3::zeros(), 0.0), |d| point.pressed(&d, self.softness))
+            });
+            self.friction.follow(pressed, self.least_moment_nmm / LEAST_BEND_MM);
+        }
+        for index in 0..self.points.len() {
+            let point = self.points[index];
+            let KnownPoint(known) = self.known[index];
             if self.friction.acts() {
-                self.add_friction(elements, state, assembly, index, &x);
+                self.add_friction(elements, state, assembly, index, &known.base);
             }
-            let Reading::Near(d) = reading else { continue };
-            if d.value_mm >= point.potential.radius_mm {
-                continue;
-            }
+            let Some(d) = known.near.filter(|d| d.value_mm < point.potential.radius_mm) else { continue };
             let w = self.softness * point.weight_mm;
             assembly.external_energy += w * point.potential.value(d.value_mm);
             let (first, second) = point.potential.derivatives(d.value_mm);
@@ -363,10 +373,9 @@ impl<const C: usize> External<C> for WallContact<'_> {
         }
     }
 
-    /// A device bent to a radius of 100 mm carries this; in a device that carries less, force and moment have no scale of
-    /// their own to be compared with.
+    /// In a device that carries less, force and moment have no scale of their own to be compared with.
     fn scale(&self) -> [f64; 2] {
-        [self.least_moment_nmm / LEAST_BEND_MM, self.least_moment_nmm]
+        [self.least_force_n(), self.least_moment_nmm]
     }
 
     fn obstructs(&self) -> bool {

@@ -62,9 +62,7 @@ const LOOK_MM: f64 = 3.0;
 const SOFTEST: f64 = 30.0;
 /// … each solved to this residual.
 const LOOSE: f64 = 1e-3;
-/// Normal forces have settled when friction changes them by no more than this part, …
-const RENEWED: f64 = 1e-4;
-/// … and must do so within this many renewals.
+/// Equilibria that may be found before friction and the forces it follows from have settled.
 const RENEWALS: usize = 100;
 /// Part of the tip's radius by which a device is pushed on at least, where its tip stands head-on against the wall.
 const LEAST_WAY: f64 = 0.05;
@@ -221,18 +219,12 @@ impl<const C: usize> Kirchhoff<C> {
                 softness = (10.0 * softness).min(1.0);
                 continue;
             }
-            if surroundings.properties.friction == 0.0 {
-                break found;
-            }
-            let change = contact.renew_friction(&self.next_mesh.elements, &self.next);
-            if change < RENEWED {
+            if surroundings.properties.friction == 0.0 || contact.friction_settled() {
                 break found;
             }
             renewals += 1;
             if renewals > RENEWALS {
-                return Err(format!(
-                    "friction and wall forces do not settle (they still change by {change:.1e})"
-                ));
+                return Err("friction and wall forces do not settle".to_owned());
             }
         };
         self.report.counters.add(&contact.counters);
