@@ -48,7 +48,7 @@ fn soft_tube(edge_mm: f64, modulus_n_per_mm2: f64) -> (usize, Vec3, StepReport) 
     let triangles = wall.mesh().triangles.len();
     let sheath = Sheath::new(Vec3::zeros(), Vec3::x()).unwrap();
     let wire = Device::uniform(100.0, 0.45, 10.0).unwrap();
-    let soft = WallProperties { modulus_n_per_mm2 };
+    let soft = WallProperties { modulus_n_per_mm2, ..Default::default() };
     let mut simulation = Simulation::with_properties(wall, soft, wire, sheath, &kirchhoff(1.0)).unwrap();
     for _ in 0..20 {
         simulation.step(Command::advance(2.0)).unwrap();
@@ -89,8 +89,14 @@ fn curved_tube() -> (Wall, Sheath) {
 fn in_curved_tube(modulus_n_per_mm2: f64) -> Simulation {
     let (wall, sheath) = curved_tube();
     let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
-    Simulation::with_properties(wall, WallProperties { modulus_n_per_mm2 }, wire, sheath, &kirchhoff(2.0))
-        .unwrap()
+    Simulation::with_properties(
+        wall,
+        WallProperties { modulus_n_per_mm2, ..Default::default() },
+        wire,
+        sheath,
+        &kirchhoff(2.0),
+    )
+    .unwrap()
 }
 
 #[test]
