@@ -28,7 +28,7 @@ use crate::solve::{Newton, NewtonOptions};
 use crate::vessel::{Wall, WallQuery};
 use crate::{Error, Result};
 use mesh::Mesh;
-use slide::{Extension, slide};
+use slide::{Extension, carry, slide};
 
 /// Options of the exact rod.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -83,6 +83,10 @@ pub struct Kirchhoff<const C: usize> {
     friction: Friction,
     next_mesh: Mesh,
     next: RodState,
+    /// The other guess at it.
+    carried: RodState,
+    /// Length from the tip within which the device has a shape of its own, mm.
+    shaped_mm: f64,
     next_friction: Friction,
     extension: Extension,
     known: Vec<KnownPoint>,
@@ -131,6 +135,8 @@ impl<const C: usize> Kirchhoff<C> {
             next_mesh: Mesh::default(),
             friction: Friction::new(surroundings.properties.friction),
             next: RodState::default(),
+            carried: RodState::default(),
+            shaped_mm: surroundings.device.shaped_mm(),
             next_friction: Friction::new(surroundings.properties.friction),
             extension: Extension::default(),
             known: Vec::new(),
@@ -148,12 +154,14 @@ impl<const C: usize> Kirchhoff<C> {
         self.shape.from_tip_mm.clone_from(&self.mesh.from_tip_mm);
     }
 
-    /// One sub-step: slides and solves on `self.next`; the current state is not touched.
+    /// One sub-step: slides and solves on `self.next`; the current state is not touched. Where the tip's way is blocked,
+    /// the guess that slides is none: the one that carries the tip's shape must do.
     fn try_step(
         &mut self,
         surroundings: &Surroundings<'_>,
         inserted_mm: f64,
         tail_rad: f64,
+        blocked: bool,
     ) -> std::result::Result<(usize, f64), String> {
         let modulus = surroundings.properties.modulus_n_per_mm2;
         self.next_mesh.build(surroundings.device, inserted_mm, self.options.element_mm, modulus);
@@ -187,7 +195,31 @@ impl<const C: usize> Kirchhoff<C> {
             reach,
             self.options.skip,
         );
-        if contact.is_outside(&self.next_mesh.elements, &self.next) {
+        let mut outside = contact.is_outside(&self.next_mesh.elements, &self.next);
+        if self.shaped_mm > 0.0 {
+            self.carried.clone_from(&self.next);
+            self.carried.angles[0] = tail_rad;
+            carry(
+                (&self.mesh, &self.state),
+                &self.next_mesh,
+                self.shaped_mm,
+                hand.turn_rad,
+                &mut self.carried,
+            );
+            let elements = &self.next_mesh.elements;
+            if !contact.is_outside(elements, &self.carried)
+                && (outside
+                    || blocked
+                    || self.newton.energy_at(elements, &mut contact, &self.carried)
+                        < self.newton.energy_at(elements, &mut contact, &self.next))
+            {
+                std::mem::swap(&mut self.next, &mut self.carried);
+                outside = false;
+            } else {
+                outside |= blocked;
+            }
+        }
+        if outside {
             return Err("the slid rod is beyond the wall".to_owned());
         }
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
@@ -326,16 +358,21 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let mut done = 0.0f64;
         let mut share = 1.0f64;
         let mut failure = String::new();
+        let mut may_carry = self.shaped_mm > 0.0;
         while done < 1.0 {
             let rest = 1.0 - done;
             let mut part = rest.min(share);
             let wanted = (target - start) * part;
+            let mut blocked = false;
             if wanted > 0.0 {
                 let last = self.state.elements();
                 let (tip, tangent) = (self.state.positions[last], self.state.frames[last].t);
                 let radius = surroundings.device.section_at(0.0).radius_mm;
                 let way = self.extension.trace((&self.smooth, &self.query), tip, tangent, radius, wanted);
-                part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
+                blocked = may_carry && way < (1.0 - 1e-9) * wanted;
+                if !blocked {
+                    part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
+                }
             }
             // A rest that is rounding is none.
             let next = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
@@ -356,7 +393,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 done = next;
                 continue;
             }
-            match self.try_step(surroundings, inserted, tail) {
+            match self.try_step(surroundings, inserted, tail, blocked) {
                 Ok((iterations, dissipated_mj)) => {
                     self.report.iterations += iterations as u32;
                     self.report.dissipated_mj += dissipated_mj;
@@ -370,10 +407,12 @@ impl<const C: usize> Method for Kirchhoff<C> {
                     self.accept();
                     done = next;
                     share = (2.0 * part).min(1.0);
+                    may_carry = self.shaped_mm > 0.0;
                 }
                 Err(reason) => {
                     failure = reason;
-                    share = 0.25 * part;
+                    share = if blocked { part } else { 0.25 * part };
+                    may_carry = false;
                 }
             }
             if share < 1e-7 || self.report.substeps as usize > SUBSTEP_LIMIT {
