@@ -78,6 +78,9 @@ const WINDOW: (f64, f64) = (1.25, 0.3);
 /// In heights of the window: it falls from 1 at the first to 0 at the second, above and below the surface.
 const ABOVE: (f64, f64) = (1.0, 1.8);
 const BELOW: (f64, f64) = (-0.3, -0.8);
+/// In heights of the window: a wall that is farther than another by this much counts e times less. In a lumen narrower than
+/// the device both sides are near, and their mean would hold nothing.
+const NEARER: f64 = 0.3;
 /// The smooth wall lies no farther than this part of the thinnest device's radius beyond a triangle: the barrier of
 /// [`crate::contact::WallPotential`] stands at three tenths.
 const BEYOND: f64 = 0.2;
@@ -119,11 +122,17 @@ impl Quadric {
     #[inline]
     fn window(&self, value: f64) -> [f64; 3] {
         let size = self.window_mm;
-        if value > 0.0 {
+        let [b, b1, b2] = if value > 0.0 {
             fall(value, ABOVE.0 * size, ABOVE.1 * size)
         } else {
             fall(value, BELOW.0 * size, BELOW.1 * size)
+        };
+        if b == 0.0 {
+            return [0.0; 3];
         }
+        let rate = 1.0 / (NEARER * size);
+        let e = (-rate * value).exp();
+        [b * e, (b1 - rate * b) * e, (b2 - 2.0 * rate * b1 + rate * rate * b) * e]
     }
 }
 
@@ -278,15 +287,12 @@ impl SmoothWall {
             let a = g * g * g;
             let a1 = across * (-6.0 * g * g);
             let a2 = across * across.transpose() * (24.0 * g) - q.support * (6.0 * g * g);
-            let (mut w, mut w1, mut w2) = (a, a1, a2);
-            if b < 1.0 {
-                let turned = a1 * f1.transpose();
-                w = a * b;
-                w1 = a1 * b + f1 * (a * b1);
-                w2 = a2 * b
-                    + (turned + turned.transpose() - q.curvature * a) * b1
-                    + f1 * f1.transpose() * (a * b2);
-            }
+            let turned = a1 * f1.transpose();
+            let w = a * b;
+            let w1 = a1 * b + f1 * (a * b1);
+            let w2 = a2 * b
+                + (turned + turned.transpose() - q.curvature * a) * b1
+                + f1 * f1.transpose() * (a * b2);
             weight += w;
             weight1 += w1;
             weight2 += w2;
