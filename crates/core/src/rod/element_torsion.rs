@@ -19,7 +19,7 @@ struct Local {
 /// Turns of either tangent move all local unknowns; displacements move the chord alone and angles themselves, so the
 /// chain rule needs products with four columns, not thirteen.
 #[inline]
-pub(super) fn add_torsion<const M: usize>(
+pub(super) fn add_torsion<const M: usize, const HESSIAN: bool>(
     data: &ElementData,
     s: &ElementState,
     out: &mut ElementSystem<M>,
@@ -73,23 +73,33 @@ pub(super) fn add_torsion<const M: usize>(
         Local { chord: Vec3::zeros(), end: u1, angles: spin(k1[0]) },
         Local { chord: Vec3::zeros(), end: v1, angles: spin(k1[1]) },
     ];
-    let products = turns.map(|d| Local {
-        chord: hcc * d.chord + hce * d.end + hca * d.angles,
-        end: hce.tr_mul(&d.chord) + hee * d.end + hea * d.angles,
-        angles: hca.tr_mul(&d.chord) + hea.tr_mul(&d.end) + haa * d.angles,
-    });
-
     const TURNS: [usize; 4] = [3, 4, 10, 11];
     // θ₀, θ₁ and b.
     const ANGLES: [usize; 3] = [5, 12, 6];
     // From the first triad back to space.
     let axes = Matrix3::from_columns(&[f0.t, f0.u, f0.v]);
     let force = axes * gc * ih;
-    let stiffness = axes * hcc * axes.transpose() * (ih * ih);
-    let crossed = axes * hca * ih;
     for i in 0..3 {
         out.gradient[i] -= force[i];
         out.gradient[7 + i] += force[i];
+        out.gradient[ANGLES[i]] += ga[i];
+    }
+    for (d, row) in turns.iter().zip(TURNS) {
+        out.gradient[row] += gc.dot(&d.chord) + gt.dot(&d.end) + ga.dot(&d.angles);
+    }
+    if !HESSIAN {
+        return;
+    }
+
+    let products = turns.map(|d| Local {
+        chord: hcc * d.chord + hce * d.end + hca * d.angles,
+        end: hce.tr_mul(&d.chord) + hee * d.end + hea * d.angles,
+        angles: hca.tr_mul(&d.chord) + hea.tr_mul(&d.end) + haa * d.angles,
+    });
+
+    let stiffness = axes * hcc * axes.transpose() * (ih * ih);
+    let crossed = axes * hca * ih;
+    for i in 0..3 {
         for j in 0..3 {
             out.hessian[i][7 + j] -= stiffness[(i, j)];
             if j >= i {
@@ -102,7 +112,6 @@ pub(super) fn add_torsion<const M: usize>(
         out.hessian[5][7 + i] += crossed[(i, 0)];
         out.hessian[7 + i][12] += crossed[(i, 1)];
         out.hessian[6][7 + i] += crossed[(i, 2)];
-        out.gradient[ANGLES[i]] += ga[i];
     }
     for (i, j, value) in [
         (5, 5, haa[(0, 0)]),
@@ -115,8 +124,6 @@ pub(super) fn add_torsion<const M: usize>(
         out.hessian[i][j] += value;
     }
     for (a, &row) in TURNS.iter().enumerate() {
-        let d = &turns[a];
-        out.gradient[row] += gc.dot(&d.chord) + gt.dot(&d.end) + ga.dot(&d.angles);
         let product = axes * products[a].chord * ih;
         for i in 0..3 {
             out.hessian[i][row] -= product[i];

@@ -180,9 +180,7 @@ impl<const C: usize> Kirchhoff<C> {
         );
         self.next.angles[0] = tail_rad;
         let elements = self.next_mesh.elements.len();
-        if self.newton.assembly.residual.len() != Layout::<C>::dimension(elements) {
-            self.newton = Newton::new(elements);
-        }
+        self.newton.resize(elements);
         let travel = (inserted_mm - self.mesh.from_tip_mm[0]).abs();
         let reach = surroundings.device.max_radius_mm() + travel + LOOK_MM;
         let mut contact = WallContact::new(
