@@ -362,6 +362,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
             let mut part = rest.min(share);
             let wanted = (target - start) * part;
             let mut blocked = false;
+            self.extension = Extension::default();
             if wanted > 0.0 {
                 let last = self.state.elements();
                 let (tip, tangent) = (self.state.positions[last], self.state.frames[last].t);
