@@ -96,6 +96,15 @@ impl<const C: usize> Newton<C> {
         }
     }
 
+    /// Takes memory for rods of up to `elements` elements.
+    pub fn reserve(&mut self, elements: usize) {
+        let now = self.trial.elements();
+        self.resize(elements);
+        self.resize(now);
+        self.trial.reserve(elements);
+        self.other.reserve(elements);
+    }
+
     /// Changes the size; keeps the memory.
     pub fn resize(&mut self, elements: usize) {
         let n = Layout::<C>::dimension(elements);
