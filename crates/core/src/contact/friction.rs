@@ -104,6 +104,18 @@ impl Friction {
         Self { coefficient, ..Self::default() }
     }
 
+    /// Forgets all points. Keeps the memory.
+    pub fn clear(&mut self) {
+        self.sliders.clear();
+    }
+
+    /// Takes memory for `points` points.
+    pub fn reserve(&mut self, points: usize) {
+        if self.acts() {
+            self.sliders.reserve(points.saturating_sub(self.sliders.len()));
+        }
+    }
+
     /// Whether there is any.
     pub fn acts(&self) -> bool {
         self.coefficient > 0.0

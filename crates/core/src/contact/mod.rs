@@ -2,11 +2,13 @@
 
 pub mod distance;
 pub mod extension;
+pub mod felt;
 pub mod friction;
 pub mod potential;
 pub mod wall;
 
 pub use distance::{Distance, SmoothWall};
+pub use felt::FeltWall;
 pub use friction::{Friction, HandMotion};
 pub use potential::WallPotential;
 pub use wall::{ContactPoint, Counters, KnownPoint, WallContact};

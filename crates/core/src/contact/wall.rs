@@ -9,7 +9,7 @@
 //! its last clearance, nothing can touch it.
 
 use crate::Vec3;
-use crate::contact::{Distance, Friction, SmoothWall, WallPotential, friction};
+use crate::contact::{Distance, FeltWall, Friction, SmoothWall, WallPotential, friction};
 use crate::insertion::Contact;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{Assembly, ElementData, RodState};
@@ -173,8 +173,7 @@ impl<'a> WallContact<'a> {
     /// The wall's energy at `points` (tip first), with what is known from earlier steps. `softest_nmm2` is the device's
     /// least bending stiffness.
     pub fn new(
-        wall: &'a SmoothWall,
-        query: &'a WallQuery,
+        felt: &'a FeltWall,
         points: &'a [ContactPoint],
         known: &'a mut Vec<KnownPoint>,
         friction: &'a mut Friction,
@@ -184,8 +183,8 @@ impl<'a> WallContact<'a> {
     ) -> Self {
         known.resize(points.len(), KnownPoint::default());
         Self {
-            wall,
-            query,
+            wall: &felt.smooth,
+            query: &felt.query,
             reach_mm,
             skip,
             points,

@@ -36,7 +36,8 @@ pub fn bending_value(y: &Vec3, z: &Vec3) -> f64 {
 }
 
 /// The density with its derivatives.
-#[inline]
+// Always inlined: where no Hessian is wanted the compiler leaves its half out.
+#[inline(always)]
 pub fn bending(y: &Vec3, z: &Vec3) -> BendingDensity {
     let a = 1.0 / y.dot(y);
     let b = y.dot(z);

@@ -85,6 +85,29 @@ impl RodState {
         self.frames[i].turned(self.angles[i])
     }
 
+    /// Leaves the first node alone. Keeps the memory.
+    pub fn clear(&mut self) {
+        self.frames.truncate(1);
+        self.angles.truncate(1);
+        self.positions.truncate(1);
+        self.chords.clear();
+        for list in [&mut self.tensions, &mut self.bubbles, &mut self.reference_twists] {
+            list.clear();
+        }
+    }
+
+    /// Takes memory for `elements` elements, so that a rod may grow to them without allocating.
+    pub fn reserve(&mut self, elements: usize) {
+        let more = |len: usize| (elements + 1).saturating_sub(len);
+        self.frames.reserve(more(self.frames.len()));
+        self.angles.reserve(more(self.angles.len()));
+        self.positions.reserve(more(self.positions.len()));
+        self.chords.reserve(more(self.chords.len()));
+        for list in [&mut self.tensions, &mut self.bubbles, &mut self.reference_twists] {
+            list.reserve(more(list.len()));
+        }
+    }
+
     /// Copies another state of the same size without allocating.
     pub fn copy_from(&mut self, other: &Self) {
         self.frames.clone_from(&other.frames);

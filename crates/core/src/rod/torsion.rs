@@ -67,7 +67,8 @@ pub fn torsion_value(y: &Vec3, z: &Vec3, phi: f64, dphi: f64, p: &TorsionInput) 
 }
 
 /// The energies with their derivatives.
-#[inline]
+// Always inlined: where no Hessian is wanted the compiler leaves its half out.
+#[inline(always)]
 pub fn torsion(y: &Vec3, z: &Vec3, phi: f64, dphi: f64, p: &TorsionInput) -> TorsionDensity {
     let a = y.norm();
     let ia = 1.0 / a;

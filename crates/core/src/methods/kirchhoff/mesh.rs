@@ -12,6 +12,8 @@ const SPACING_RADII: f64 = 2.0;
 const TIP_SPACING_RADII: f64 = 1.0 / 256.0;
 /// Fewest and most intervals between contact points in an element.
 const INTERVALS: (f64, f64) = (2.0, 8.0);
+/// No element has more contact points.
+pub(super) const MOST_POINTS: usize = 64;
 
 /// Elements and contact points of an inserted length.
 #[derive(Debug, Clone, Default)]
@@ -25,6 +27,21 @@ pub(super) struct Mesh {
 }
 
 impl Mesh {
+    /// Nothing inserted: one node. Keeps the memory.
+    pub(super) fn clear(&mut self) {
+        self.from_tip_mm.clear();
+        self.from_tip_mm.push(0.0);
+        self.elements.clear();
+        self.points.clear();
+    }
+
+    /// Takes memory for more elements and contact points.
+    pub(super) fn reserve(&mut self, elements: usize, points: usize) {
+        self.from_tip_mm.reserve(elements);
+        self.elements.reserve(elements);
+        self.points.reserve(points);
+    }
+
     /// Meshes `inserted_mm` (above 0) of `device` with elements of `element_mm`.
     ///
     /// Nodes are marks on the device, at whole element lengths from the tip; the first element is between half and one

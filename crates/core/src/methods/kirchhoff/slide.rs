@@ -60,8 +60,8 @@ impl Extension {
         let count = (wanted_mm / (PIECE * radius_mm)).ceil().max(1.0);
         let piece_mm = wanted_mm / count;
         let (mut x, mut t) = (tip, tangent);
-        let mut way = 0.0;
-        for _ in 0..count as usize {
+        let mut pieces = 0.0;
+        while pieces < count {
             let mut next = x + t * piece_mm;
             if let Some((d, normal)) = distance(&next, radius_mm + piece_mm)
                 && d < touch
@@ -82,8 +82,9 @@ impl Extension {
                 }
             }
             x = next;
-            way += piece_mm;
+            pieces += 1.0;
         }
+        let way = wanted_mm * (pieces / count);
         self.bent_mm = (BENT_ADVANCES * way).max(BENT_RADII * radius_mm);
         // An even bend over a length l moves its end aside by ½κl².
         let aside = x - tip;

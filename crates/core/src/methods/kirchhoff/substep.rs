@@ -1,0 +1,132 @@
+//! One sub-step: a guess of where the device will be, and Newton's method from there.
+
+use super::slide::{carry, slide};
+use super::{Kirchhoff, LOOK_MM, softest};
+use crate::contact::{HandMotion, WallContact};
+use crate::insertion::Surroundings;
+use crate::rod::Supports;
+use crate::solve::NewtonOptions;
+
+/// Residual over force scale at which a state is an equilibrium.
+const TOLERANCE: f64 = 1e-9;
+/// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, …
+const SOFTEST: f64 = 30.0;
+/// … each solved to this residual.
+const LOOSE: f64 = 1e-3;
+/// Equilibria that may be found before friction and the forces it follows from have settled.
+const RENEWALS: usize = 100;
+
+/// How an equilibrium was found.
+pub(super) struct Found {
+    /// Newton iterations.
+    pub(super) iterations: usize,
+    /// Energy that friction took, mJ.
+    pub(super) dissipated_mj: f64,
+}
+
+impl<const C: usize> Kirchhoff<C> {
+    /// One sub-step: slides and solves on `self.next`; the current state is not touched. Where the tip's way is blocked,
+    /// the guess that slides is none: the one that carries the tip's shape must do.
+    pub(super) fn try_step(
+        &mut self,
+        surroundings: &Surroundings<'_>,
+        inserted_mm: f64,
+        tail_rad: f64,
+        blocked: bool,
+    ) -> std::result::Result<Found, String> {
+        let modulus = surroundings.properties.modulus_n_per_mm2;
+        let (now, next) = (&self.current, &mut self.next);
+        next.mesh.build(surroundings.device, inserted_mm, self.options.element_mm, modulus);
+        slide(&now.mesh, &now.state, &self.extension, &next.mesh, &mut next.state);
+        let hand = HandMotion {
+            from_mm: now.inserted_mm(),
+            to_mm: inserted_mm,
+            turn_rad: tail_rad - now.state.angles[0],
+        };
+        next.friction.begin(
+            &next.mesh.elements,
+            &next.state,
+            &next.mesh.points,
+            (&now.mesh.points, &now.friction),
+            hand,
+        );
+        next.state.angles[0] = tail_rad;
+        let elements = next.mesh.elements.len();
+        self.newton.resize(elements);
+        let travel = (inserted_mm - now.inserted_mm()).abs();
+        let reach = surroundings.device.max_radius_mm() + travel + LOOK_MM;
+        let mut contact = WallContact::new(
+            &self.felt,
+            &next.mesh.points,
+            &mut self.known,
+            &mut next.friction,
+            softest(surroundings.device),
+            reach,
+            self.options.skip,
+        );
+        let mut outside = contact.is_outside(&next.mesh.elements, &next.state);
+        if self.shaped_mm > 0.0 {
+            self.carried.copy_from(&next.state);
+            self.carried.angles[0] = tail_rad;
+            carry((&now.mesh, &now.state), &next.mesh, self.shaped_mm, hand.turn_rad, &mut self.carried);
+            let elements = &next.mesh.elements;
+            if !contact.is_outside(elements, &self.carried)
+                && (outside
+                    || blocked
+                    || self.newton.energy_at(elements, &mut contact, &self.carried)
+                        < self.newton.energy_at(elements, &mut contact, &next.state))
+            {
+                std::mem::swap(&mut next.state, &mut self.carried);
+                outside = false;
+            } else {
+                outside |= blocked;
+            }
+        }
+        if outside {
+            return Err("the slid rod is beyond the wall".to_owned());
+        }
+        let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
+        // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
+        let data = &next.mesh.elements[elements - 1];
+        let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
+        let mut softness = (SOFTEST * element_stiffness / modulus).min(1.0);
+        let mut iterations = 0;
+        let mut renewals = 0;
+        let found = loop {
+            contact.softness = softness;
+            let options = NewtonOptions {
+                max_iterations: self.options.max_iterations,
+                tolerance: if softness < 1.0 { LOOSE } else { TOLERANCE },
+                ..NewtonOptions::default()
+            };
+            let found = self.newton.solve(
+                &next.mesh.elements,
+                &mut supports,
+                &mut contact,
+                &mut next.state,
+                &options,
+            );
+            iterations += found.iterations;
+            if !found.converged {
+                break found;
+            }
+            if softness < 1.0 {
+                softness = (10.0 * softness).min(1.0);
+                continue;
+            }
+            if surroundings.properties.friction == 0.0 || contact.friction_settled() {
+                break found;
+            }
+            renewals += 1;
+            if renewals > RENEWALS {
+                return Err("friction and wall forces do not settle".to_owned());
+            }
+        };
+        self.report.counters.add(&contact.counters);
+        if !found.converged {
+            return Err(format!("{} (residual {:.1e})", found.reason, found.residual));
+        }
+        let dissipated_mj = next.friction.dissipated_mj(&next.mesh.elements, &next.state, &next.mesh.points);
+        Ok(Found { iterations, dissipated_mj })
+    }
+}
