@@ -60,7 +60,7 @@ fn wire(reach: f64, radius_mm: f64, points: usize) -> DeviceView {
             DevicePoint { position_mm: at(w), tangent: at(w + 1e-5) - at(w - 1e-5), radius_mm }
         })
         .collect();
-    DeviceView { points, material: Some(Material::Nitinol) }
+    DeviceView { points, material: Some(Material::Nitinol), ..DeviceView::default() }
 }
 
 fn main() -> Result<()> {

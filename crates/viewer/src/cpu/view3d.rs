@@ -8,9 +8,9 @@ use endowire_core::vessel::SurfaceMesh;
 use glam::{Vec3, Vec4};
 
 use crate::cpu::raster::ScreenTriangle;
-use crate::image::{Image, PixelFormat};
+use crate::device::RefinedDevice;
+use crate::output::{Image, PixelFormat};
 use crate::renderer::ThreeDEngine;
-use crate::scene::RefinedDevice;
 use crate::three_d::{Camera, Style, Vertex, device_triangles, wall_triangles};
 
 /// Samples across a pixel: nine levels of edge smoothing.

@@ -4,9 +4,9 @@ use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 
 use crate::gpu::context::{Gpu, attachment, color_pass};
-use crate::image::{Image, PixelFormat};
+use crate::device::RefinedDevice;
+use crate::output::{Image, PixelFormat};
 use crate::renderer::ThreeDEngine;
-use crate::scene::RefinedDevice;
 use crate::three_d::{Camera, Style, Vertex, device_triangles, wall_triangles};
 
 /// The only count every adapter has.
