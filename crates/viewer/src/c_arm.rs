@@ -146,6 +146,19 @@ impl CArm {
         [(pixel[0] - w / 2.0) / self.focal_px(), (pixel[1] - h / 2.0) / self.focal_px()]
     }
 
+    /// Obliquity of the central ray of each pixel, row by row.
+    pub(crate) fn obliquities(&self) -> impl Iterator<Item = f64> + use<> {
+        let [width, height] = self.size_px;
+        let squares = |n: u32, k: usize| -> Vec<f64> {
+            (0..n).map(|i| self.slopes([f64::from(i) + 0.5; 2])[k].powi(2)).collect()
+        };
+        let (columns, rows) = (squares(width, 0), squares(height, 1));
+        rows.into_iter().flat_map(move |y| {
+            let columns = columns.clone();
+            columns.into_iter().map(move |x| (1.0 + x + y).sqrt())
+        })
+    }
+
     /// Obliquity of the central ray of pixel number `index`, counted row by row.
     pub(crate) fn obliquity_at(&self, index: usize) -> f64 {
         let width = self.size_px[0] as usize;
@@ -209,6 +222,15 @@ impl CArm {
     /// Position of the source.
     pub fn source_mm(&self) -> Vec3 {
         self.isocentre_mm - self.axes[2] * self.sod_mm
+    }
+
+    /// Corners of the detector, around.
+    pub(crate) fn detector_corners_mm(&self) -> [Vec3; 4] {
+        let [w, h] = self.size_px.map(f64::from);
+        [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]].map(|pixel| {
+            let [x, y] = self.slopes(pixel);
+            self.source_mm() + (self.axes[0] * x + self.axes[1] * y + self.axes[2]) * self.sid_mm
+        })
     }
 
     /// The point that all rotations leave in place.

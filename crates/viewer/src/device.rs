@@ -200,7 +200,8 @@ impl RefinedDevice {
     fn cut(mut points: Vec<DevicePoint>, device: &DeviceView) -> Result<Self> {
         if device.parts.is_empty() {
             let pieces = 0..points.len() - 1;
-            let layer = Layer { material: device.material, pieces, outer_radius_mm: None, inner_radius_mm: 0.0 };
+            let layer =
+                Layer { material: device.material, pieces, outer_radius_mm: None, inner_radius_mm: 0.0 };
             return Ok(Self { points, layers: vec![layer] });
         }
         // Arc length from the tip, which is the last point.
@@ -245,6 +246,14 @@ impl RefinedDevice {
             }
         }
         Ok(Self { points, layers })
+    }
+}
+
+impl RefinedDevice {
+    /// Material and outer radius that are seen on a piece: those of the last part there.
+    pub(crate) fn looks(&self, piece: usize) -> (Option<Material>, Option<f64>) {
+        let layer = self.layers.iter().rev().find(|layer| layer.pieces.contains(&piece));
+        layer.map_or((None, None), |layer| (layer.material, layer.outer_radius_mm))
     }
 }
 
@@ -406,7 +415,14 @@ mod tests {
         let refined = RefinedDevice::all(std::slice::from_ref(&device)).unwrap().remove(0);
         assert_eq!(refined.layers.len(), 2, "what is beyond the device is not there");
         let pieces = pieces(&refined.points);
-        let length = |layer: &Layer| layer.signed(&pieces).iter().filter(|p| p.1 > 0.0).map(|(p, _)| (p.end - p.start).norm()).sum::<f64>();
+        let length = |layer: &Layer| {
+            layer
+                .signed(&pieces)
+                .iter()
+                .filter(|p| p.1 > 0.0)
+                .map(|(p, _)| (p.end - p.start).norm())
+                .sum::<f64>()
+        };
         assert!((length(&refined.layers[1]) - 1.5).abs() < 1e-9);
         assert!((length(&refined.layers[0]) - 50.0 * std::f64::consts::FRAC_PI_2).abs() < 0.04);
         let near = refined.layers[1].signed(&pieces);

@@ -46,7 +46,8 @@ pub use fluoro::Moment;
 pub use output::{Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, PixelFormat};
 pub use renderer::{Frames, Renderer};
 pub use spec::{
-    Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, FlowSpec, InjectionSpec, Mode, PatientSpec, Pose, TorsoSpec, View,
-    ViewSpec, XRaySpec,
+    Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, FlowSpec, InjectionSpec, Mode, PatientSpec, Pose,
+    TorsoSpec, View, ViewSpec, XRaySpec,
 };
+pub use three_d::ContactView;
 pub use xray::{Material, PathLengths};

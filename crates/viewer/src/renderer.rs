@@ -11,11 +11,12 @@ use crate::gpu;
 use crate::output::{ContactLabel, DeviceLabel, Image, Labels, PixelFormat};
 use crate::scene::Setup;
 use crate::spec::{Backend, ViewSpec};
+use crate::three_d::{ContactView, Solids, draw_scale_bar};
 use crate::xray::{Material, PathLengths};
 
 /// Draws 3D frames of one set-up.
 pub(crate) trait ThreeDEngine: Send {
-    fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image>;
+    fn frame(&mut self, solids: &Solids) -> Result<Image>;
 }
 
 /// The engines of the wanted views, all on the same processor.
@@ -40,6 +41,7 @@ pub struct Renderer {
     setup: Setup,
     engines: Engines,
     fluoro: Option<(Fluoroscope, Sequence)>,
+    contacts: Vec<ContactView>,
     is_cpu: bool,
     next_frame: u64,
 }
@@ -75,7 +77,7 @@ impl Renderer {
         if let Some(reason) = refused {
             engines.name = format!("{} ({reason})", engines.name);
         }
-        let mut renderer = Self { setup, engines, fluoro: None, is_cpu, next_frame: 0 };
+        let mut renderer = Self { setup, engines, fluoro: None, contacts: vec![], is_cpu, next_frame: 0 };
         if let Some(c_arm) = renderer.setup.c_arm.clone() {
             let fluoroscope = renderer.with_fallback(|setup, engines, _| {
                 let paths = engines.paths.as_mut().ok_or_else(no_fluoro)?;
@@ -125,8 +127,16 @@ impl Renderer {
             return Err(Error::parameter("time_s", moment.time_s, "must be finite"));
         }
         let devices = RefinedDevice::all(devices)?;
-        let frames = self.with_fallback(|_, engines, fluoro| {
-            let three_d = engines.three_d.as_mut().map(|engine| engine.frame(&devices)).transpose()?;
+        let contacts = std::mem::take(&mut self.contacts);
+        let frames = self.with_fallback(|setup, engines, fluoro| {
+            let c_arm = setup.c_arm.as_ref().filter(|_| setup.spec.camera.c_arm);
+            let solids = Solids { devices: &devices, contacts: &contacts, c_arm };
+            let mut three_d = engines.three_d.as_mut().map(|engine| engine.frame(&solids)).transpose()?;
+            if let (Some(image), Some(camera), true) =
+                (&mut three_d, &setup.camera, setup.spec.camera.scale_bar)
+            {
+                draw_scale_bar(image, camera);
+            }
             let fluoro = match (fluoro, &mut engines.paths) {
                 (Some((scope, sequence)), Some(paths)) => {
                     Some(sequence.next(scope, paths.as_mut(), &devices, moment)?)
@@ -134,9 +144,17 @@ impl Renderer {
                 _ => None,
             };
             Ok(Frames { three_d, fluoro })
-        })?;
+        });
+        self.contacts = contacts;
+        let frames = frames?;
         self.next_frame = moment.frame + 1;
         Ok(frames)
+    }
+
+    /// Shows contacts and their forces in the 3D frames from now on.
+    pub fn show_contacts(&mut self, contacts: &[ContactView]) {
+        self.contacts.clear();
+        self.contacts.extend_from_slice(contacts);
     }
 
     /// Takes the mask of a subtraction anew: the scene with `devices` as they are, before any injection.
@@ -228,7 +246,15 @@ impl Renderer {
             Ok((Anatomy::new(setup, &c_arm, engine.as_mut())?, maps))
         })?;
         let Anatomy { body, bone, lung, lumen, .. } = anatomy;
-        Ok(PathLengths { width, height, body_mm: body, bone_mm: bone, lung_mm: lung, lumen_mm: lumen, devices_mm })
+        Ok(PathLengths {
+            width,
+            height,
+            body_mm: body,
+            bone_mm: bone,
+            lung_mm: lung,
+            lumen_mm: lumen,
+            devices_mm,
+        })
     }
 
     /// Transmitted share of the absorbed energy behind the given path lengths, with this scene's spectrum, detector and
@@ -242,7 +268,8 @@ impl Renderer {
         let at = |map: &[f32], i: usize| f64::from(map.get(i).copied().unwrap_or(0.0));
         (0..paths.lumen_mm.len())
             .map(|i| {
-                let [bone, lung, lumen] = [&paths.bone_mm, &paths.lung_mm, &paths.lumen_mm].map(|map| at(map, i));
+                let [bone, lung, lumen] =
+                    [&paths.bone_mm, &paths.lung_mm, &paths.lumen_mm].map(|map| at(map, i));
                 let inside: f64 = paths.devices_mm.iter().map(|map| at(&map.1, i)).sum();
                 let tissue = (at(&paths.body_mm, i) - bone - lung - lumen).max(0.0);
                 let lengths = [
@@ -309,7 +336,7 @@ mod tests {
     }
 
     impl ThreeDEngine for Broken {
-        fn frame(&mut self, _: &[RefinedDevice]) -> Result<Image> {
+        fn frame(&mut self, _: &Solids) -> Result<Image> {
             lost()
         }
     }
@@ -327,12 +354,19 @@ mod tests {
             ..ViewSpec::default()
         };
         let mut whole = Renderer::new(&spec, &wall).unwrap();
-        let point = |x: f64| crate::DevicePoint { position_mm: Vec3::new(x, 5.0, 5.0), tangent: Vec3::x(), radius_mm: 0.4 };
+        let point = |x: f64| crate::DevicePoint {
+            position_mm: Vec3::new(x, 5.0, 5.0),
+            tangent: Vec3::x(),
+            radius_mm: 0.4,
+        };
         let wire = [DeviceView { points: vec![point(1.0), point(20.0)], ..DeviceView::default() }];
         let broken = || {
             let mut renderer = Renderer::new(&spec, &wall).unwrap();
-            renderer.engines =
-                Engines { paths: Some(Box::new(Broken)), three_d: Some(Box::new(Broken)), name: "adapter".into() };
+            renderer.engines = Engines {
+                paths: Some(Box::new(Broken)),
+                three_d: Some(Box::new(Broken)),
+                name: "adapter".into(),
+            };
             renderer
         };
         let mut renderer = Renderer { is_cpu: false, ..broken() };

@@ -40,7 +40,13 @@ impl Setup {
             setup.c_arm = Some(CArm::new(&spec.c_arm, spec.size_px, wall)?);
             setup.patient = Patient::new(spec, wall)?;
         }
-        setup.camera = spec.wants(View::ThreeD).then(|| Camera::new(&spec.camera, spec.size_px, wall));
+        let beam: Vec<_> = match &setup.c_arm {
+            Some(c_arm) if spec.camera.c_arm => {
+                c_arm.detector_corners_mm().into_iter().chain([c_arm.source_mm()]).collect()
+            }
+            _ => vec![],
+        };
+        setup.camera = spec.wants(View::ThreeD).then(|| Camera::new(&spec.camera, spec.size_px, wall, &beam));
         setup.wall = Arc::new(wall.clone());
         Ok(setup)
     }

@@ -143,12 +143,18 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
             let near = Vec3::from(near);
             let ends = (0..points.len()).filter(|&i| neighbours[i].len() == 1);
             let distance = |i: &usize| (points[*i].position_mm - near).norm();
-            ends.min_by(|a, b| distance(a).total_cmp(&distance(b)))
-                .ok_or_else(|| Error::parameter("view.flow.inlet_mm", format!("{near:?}"), "the tree has no end"))?
+            ends.min_by(|a, b| distance(a).total_cmp(&distance(b))).ok_or_else(|| {
+                Error::parameter("view.flow.inlet_mm", format!("{near:?}"), "the tree has no end")
+            })?
         }
     };
     let place = |i: usize| (points[i].position_mm, points[i].radius_mm);
-    let node = |(position_mm, radius_mm): (Vec3, f64), upstream, share| Node { position_mm, radius_mm, upstream, share };
+    let node = |(position_mm, radius_mm): (Vec3, f64), upstream, share| Node {
+        position_mm,
+        radius_mm,
+        upstream,
+        share,
+    };
     let mut nodes = vec![node(place(inlet), None, 1.0)];
     // Points whose downstream neighbours are still to come, with the point before and the node they became.
     let mut open = vec![(inlet, usize::MAX, 0_usize)];

@@ -42,9 +42,7 @@ pub(crate) fn wall_path_mm(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<f64> {
     let [width, height] = c_arm.size_px();
     let mut path = vec![0.0; width as usize * height as usize];
     meetings(c_arm, wall, |pixel, sign, depth| path[pixel] += sign * depth);
-    for (i, length) in path.iter_mut().enumerate() {
-        *length *= c_arm.obliquity_at(i);
-    }
+    path.iter_mut().zip(c_arm.obliquities()).for_each(|(length, obliquity)| *length *= obliquity);
     path
 }
 

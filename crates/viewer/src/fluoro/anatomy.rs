@@ -27,8 +27,7 @@ impl Anatomy {
         let mut maps = Self { lumen, ..Self::default() };
         match &setup.patient {
             Patient::Slab { tissue_mm } => {
-                maps.body =
-                    (0..maps.lumen.len()).map(|i| (tissue_mm * view.obliquity_at(i)) as f32).collect();
+                maps.body = view.obliquities().map(|obliquity| (tissue_mm * obliquity) as f32).collect();
             }
             Patient::Torso(body) => {
                 maps.body = engine.mesh(view, &body.skin)?;
@@ -75,7 +74,8 @@ impl Anatomy {
             let mu = |m: Material| m.attenuation_per_mm(KEV).unwrap_or(0.0);
             (mu(material) / mu(Material::SoftTissue)) as f32
         };
-        let factors = [Material::SoftTissue, Material::CorticalBone, Material::Lung, Material::Blood].map(relative);
+        let factors =
+            [Material::SoftTissue, Material::CorticalBone, Material::Lung, Material::Blood].map(relative);
         let [width, height] = view.size_px().map(|n| n as usize);
         let mut depths = Vec::new();
         for y in height / 3..(2 * height).div_ceil(3) {

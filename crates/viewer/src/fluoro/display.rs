@@ -48,7 +48,13 @@ fn dither(x: usize, y: usize) -> f32 {
 }
 
 /// The picture of values in a window; `dithered` where no noise hides the steps of eight bits.
-pub(super) fn picture(values: &[f32], [white, black]: Window, size: [u32; 2], bits: u32, dithered: bool) -> Image {
+pub(super) fn picture(
+    values: &[f32],
+    [white, black]: Window,
+    size: [u32; 2],
+    bits: u32,
+    dithered: bool,
+) -> Image {
     let [width, height] = size;
     let scale = 1.0 / (black - white);
     if bits == 16 {

@@ -220,8 +220,7 @@ impl Fluoroscope {
                 let more = injected.next_if(|f| f.0 == pixel).map_or(0.0, |f| f.1);
                 let pixel = pixel as usize;
                 let [signal, energy] = self.primary(pixel, (self.fraction + more).min(1.0));
-                let scattered =
-                    |map: &[f32]| map.get(pixel).copied().unwrap_or(0.0);
+                let scattered = |map: &[f32]| map.get(pixel).copied().unwrap_or(0.0);
                 now.signal[pixel] = signal + scattered(&self.scatter.signal);
                 now.energy[pixel] = energy + scattered(&self.scatter.energy);
             }

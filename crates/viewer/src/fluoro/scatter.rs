@@ -85,7 +85,8 @@ mod tests {
 
     #[test]
     fn it_is_the_wanted_share_and_smooth() {
-        let wall = SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::new(50.0, 0.0, 50.0)], triangles: vec![] };
+        let wall =
+            SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::new(50.0, 0.0, 50.0)], triangles: vec![] };
         let spec = CArmSpec { pixel_mm: Some(0.5), ..CArmSpec::default() };
         let arm = CArm::new(&spec, [400, 300], &wall).unwrap();
         let flat = Signal { signal: vec![2.0; 120_000], energy: vec![100.0; 120_000] };

@@ -85,7 +85,9 @@ impl Sequence {
             match self.mode {
                 Mode::Fluoro | Mode::Cine => {}
                 Mode::Dsa => self.take_mask(fluoroscope, engine, devices)?,
-                Mode::Roadmap => self.store(&fluoroscope.opacified()?, Mode::Dsa.dose_ngy() / self.mode.dose_ngy()),
+                Mode::Roadmap => {
+                    self.store(&fluoroscope.opacified()?, Mode::Dsa.dose_ngy() / self.mode.dose_ngy())
+                }
             }
         }
         let signal = fluoroscope.signal(engine, devices, Some(moment.time_s))?;

@@ -110,7 +110,8 @@ impl GpuPaths {
         [vertices, instances]: [u32; 2],
     ) -> Result<Vec<f32>> {
         let gpu = &self.gpu;
-        let target = self.targets.entry(view.size_px()).or_insert_with_key(|size| gpu.target(*size, PATH_FORMAT, 1));
+        let target =
+            self.targets.entry(view.size_px()).or_insert_with_key(|size| gpu.target(*size, PATH_FORMAT, 1));
         let uniform = gpu.buffer(bytemuck::bytes_of(&ViewUniform::new(view)), wgpu::BufferUsages::UNIFORM);
         let group = gpu.bind(pipeline, &[uniform.as_entire_binding()]);
         let buffer = gpu.buffer(data, wgpu::BufferUsages::VERTEX);
@@ -149,7 +150,8 @@ impl PathEngine for GpuPaths {
         let instances: Vec<PieceInstance> =
             pieces.iter().map(|(piece, sign)| instance(view, piece, *sign)).collect();
         let pipeline = self.draw_pieces.clone();
-        let drawn = self.lengths(view, &pipeline, bytemuck::cast_slice(&instances), [6, instances.len() as u32])?;
+        let drawn =
+            self.lengths(view, &pipeline, bytemuck::cast_slice(&instances), [6, instances.len() as u32])?;
         for (ray, (sum, length)) in (0..).zip(lengths.iter_mut().zip(drawn)) {
             if length != 0.0 {
                 *sum += length;

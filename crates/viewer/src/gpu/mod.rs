@@ -4,9 +4,9 @@ mod context;
 mod fluoro;
 mod view3d;
 
+use crate::fluoro::SUBRAYS;
 use crate::renderer::Engines;
 use crate::scene::Setup;
-use crate::fluoro::SUBRAYS;
 use context::Gpu;
 use fluoro::GpuPaths;
 use view3d::GpuView3d;
@@ -30,7 +30,8 @@ pub(crate) fn engines(setup: &Setup, software: bool) -> Result<Engines, String> 
         }
     }
     let paths = setup.c_arm.is_some().then(|| Box::new(GpuPaths::new(&gpu)) as _);
-    let three_d = setup.camera.as_ref().map(|camera| Box::new(GpuView3d::new(&gpu, camera, &setup.wall)) as _);
+    let three_d =
+        setup.camera.as_ref().map(|camera| Box::new(GpuView3d::new(&gpu, camera, &setup.wall)) as _);
     let engines = Engines { paths, three_d, name: gpu.name().to_string() };
     gpu.check().map_err(|e| format!("{}: {e}", gpu.name()))?;
     Ok(engines)

@@ -33,13 +33,19 @@ impl Angiogram<'_> {
     /// [`Error::Parameter`] without frames or for frames that differ, [`Error::File`] where the file cannot be written.
     pub fn write(&self, path: impl AsRef<Path>, frames: &[Image]) -> Result<()> {
         let path = path.as_ref();
-        let first = frames.first().ok_or_else(|| Error::parameter("frames", 0, "a file needs at least one"))?;
+        let first =
+            frames.first().ok_or_else(|| Error::parameter("frames", 0, "a file needs at least one"))?;
         let shape = |i: &Image| (i.width(), i.height(), i.format());
         if first.format() == PixelFormat::Rgba8 || frames.iter().any(|f| shape(f) != shape(first)) {
-            return Err(Error::parameter("frames", format!("{:?}", shape(first)), "must all be grey and alike"));
+            return Err(Error::parameter(
+                "frames",
+                format!("{:?}", shape(first)),
+                "must all be grey and alike",
+            ));
         }
         let object = self.object(frames, first);
-        let failed = |error: &dyn std::fmt::Display| Error::file(path, std::io::Error::other(error.to_string()));
+        let failed =
+            |error: &dyn std::fmt::Display| Error::file(path, std::io::Error::other(error.to_string()));
         let meta = FileMetaTableBuilder::new()
             .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
             .media_storage_sop_class_uid(uids::X_RAY_ANGIOGRAPHIC_IMAGE_STORAGE);

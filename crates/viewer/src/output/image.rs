@@ -73,6 +73,14 @@ impl Image {
         self.data.get(start..start + self.format.bytes())
     }
 
+    /// Changes the pixel of an RGBA picture; nothing outside.
+    pub(crate) fn set(&mut self, x: u32, y: u32, rgba: [u8; 4]) {
+        if x < self.width && y < self.height && self.format == PixelFormat::Rgba8 {
+            let start = 4 * (y as usize * self.width as usize + x as usize);
+            self.data[start..start + 4].copy_from_slice(&rgba);
+        }
+    }
+
     /// Both pictures side by side as RGBA, the lower one filled up with white.
     pub fn beside(&self, right: &Self) -> Self {
         let (width, height) = (self.width + right.width, self.height.max(right.height));

@@ -6,7 +6,9 @@
 
 use endowire_core::nalgebra::Matrix3;
 use endowire_core::{Error, Result, Vec3};
-use nifti::{InMemNiftiObject, NiftiHeader, NiftiObject, NiftiVolume, RandomAccessNiftiVolume, ReaderOptions};
+use nifti::{
+    InMemNiftiObject, NiftiHeader, NiftiObject, NiftiVolume, RandomAccessNiftiVolume, ReaderOptions,
+};
 
 use crate::c_arm::CArm;
 use crate::spec::CtSpec;
@@ -51,9 +53,8 @@ impl Volume {
     /// [`Error::Parameter`] naming the key for a file that is not there, [`Error::Content`] for one that is no usable volume.
     pub(crate) fn read(spec: &CtSpec) -> Result<Self> {
         let path = &spec.file;
-        std::fs::metadata(path).map_err(|source| {
-            Error::parameter("view.patient.ct.file", path.display(), source.to_string())
-        })?;
+        std::fs::metadata(path)
+            .map_err(|source| Error::parameter("view.patient.ct.file", path.display(), source.to_string()))?;
         let object: InMemNiftiObject = ReaderOptions::new()
             .read_file(path)
             .map_err(|error| Error::content(path, format!("is no NIfTI volume: {error}")))?;
@@ -110,9 +111,8 @@ impl Volume {
             let place = |n: usize| ((n as f32 + 0.5) / EVERY as f32, n / EVERY);
             let ((x, i), (y, j)) = (place(pixel % width), place(pixel / width));
             let (u, v) = (x - i as f32, y - j as f32);
-            let row = |j: usize| {
-                coarse[j * nodes[0] + i][k] * (1.0 - u) + coarse[j * nodes[0] + i + 1][k] * u
-            };
+            let row =
+                |j: usize| coarse[j * nodes[0] + i][k] * (1.0 - u) + coarse[j * nodes[0] + i + 1][k] * u;
             row(j) * (1.0 - v) + row(j + 1) * v
         };
         [0, 1].map(|k| (0..width * height).map(|pixel| at(pixel, k)).collect())
@@ -244,7 +244,9 @@ mod tests {
     #[test]
     fn rays_through_a_ball_are_as_long_as_its_chords() {
         let ball = ball();
-        for spec in [CArmSpec::default(), CArmSpec { primary_deg: 40.0, secondary_deg: 25.0, ..CArmSpec::default() }] {
+        for spec in
+            [CArmSpec::default(), CArmSpec { primary_deg: 40.0, secondary_deg: 25.0, ..CArmSpec::default() }]
+        {
             let arm = arm(&spec);
             let [tissue, bone] = ball.project(&arm);
             let middle = 32 * 64 + 32;
@@ -283,7 +285,9 @@ mod tests {
         };
         let (axes, origin) = placement(&header).unwrap();
         assert_eq!(origin, Vec3::new(-100.0, 50.0, 7.0));
-        assert!((axes[(0, 0)] - 0.5).abs() < 1e-6 && (axes[(1, 1)] + 0.6).abs() < 1e-6 && axes[(2, 2)] == 2.0);
+        assert!(
+            (axes[(0, 0)] - 0.5).abs() < 1e-6 && (axes[(1, 1)] + 0.6).abs() < 1e-6 && axes[(2, 2)] == 2.0
+        );
     }
 
     #[test]

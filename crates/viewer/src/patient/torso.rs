@@ -135,23 +135,28 @@ impl Trunk {
             let [wide, deep] = VERTEBRA_HALF_MM.map(|half| half - inset);
             let half = VERTEBRA_MM[0] / 2.0 - inset;
             // Wider at the end plates than between them.
-            let rings: Vec<Vec<Vec3>> = [(-1.0, 0.96), (-0.85, 1.0), (-0.4, 0.9), (0.4, 0.9), (0.85, 1.0), (1.0, 0.96)]
-                .into_iter()
-                .map(|(h, waist): (f64, f64)| {
-                    (0..24)
-                        .map(|k| {
-                            let (s, c) = (TAU * f64::from(k) / 24.0).sin_cos();
-                            Vec3::new(x + wide * waist * c, y + deep * waist * s, z + half * h)
-                        })
-                        .collect()
-                })
-                .collect();
+            let rings: Vec<Vec<Vec3>> =
+                [(-1.0, 0.96), (-0.85, 1.0), (-0.4, 0.9), (0.4, 0.9), (0.85, 1.0), (1.0, 0.96)]
+                    .into_iter()
+                    .map(|(h, waist): (f64, f64)| {
+                        (0..24)
+                            .map(|k| {
+                                let (s, c) = (TAU * f64::from(k) / 24.0).sin_cos();
+                                Vec3::new(x + wide * waist * c, y + deep * waist * s, z + half * h)
+                            })
+                            .collect()
+                    })
+                    .collect();
             loft(mesh, &rings);
             let at = |side: f64, back: f64, up: f64| Vec3::new(x + side, y + back, z + up);
             for side in [-1.0, 1.0] {
                 // Pedicle, then transverse process.
                 tube(mesh, &[at(side * 11.0, 13.5, 3.0), at(side * 12.0, 25.0, 3.0)], 4.0 - inset);
-                tube(mesh, &[at(side * 12.0, 26.0, 2.0), at(side * 22.0, 30.0, 4.0), at(side * 31.0, 33.0, 6.0)], 4.5 - inset);
+                tube(
+                    mesh,
+                    &[at(side * 12.0, 26.0, 2.0), at(side * 22.0, 30.0, 4.0), at(side * 31.0, 33.0, 6.0)],
+                    4.5 - inset,
+                );
             }
             tube(mesh, &[at(0.0, 26.0, 0.0), at(0.0, 38.0, -9.0), at(0.0, 47.0, -19.0)], 3.2 - inset);
         }
@@ -250,7 +255,8 @@ fn loft(mesh: &mut SurfaceMesh, rings: &[Vec<Vec3>]) {
     let corner = |ring: u32, k: u32| first + ring * sides + k % sides;
     for ring in 0..rings.len() as u32 - 1 {
         for k in 0..sides {
-            let [a, b, c, d] = [corner(ring, k), corner(ring, k + 1), corner(ring + 1, k + 1), corner(ring + 1, k)];
+            let [a, b, c, d] =
+                [corner(ring, k), corner(ring, k + 1), corner(ring + 1, k + 1), corner(ring + 1, k)];
             mesh.triangles.extend([[a, b, c], [a, c, d]]);
         }
     }

@@ -130,8 +130,9 @@ impl TryFrom<String> for Pose {
 
 impl From<Pose> for String {
     fn from(pose: Pose) -> Self {
-        let [lao, cra] = [("LAO", "RAO", pose.primary_deg), ("CRA", "CAU", pose.secondary_deg)]
-            .map(|(plus, minus, angle)| format!("{} {}", if angle < 0.0 { minus } else { plus }, angle.abs()));
+        let [lao, cra] = [("LAO", "RAO", pose.primary_deg), ("CRA", "CAU", pose.secondary_deg)].map(
+            |(plus, minus, angle)| format!("{} {}", if angle < 0.0 { minus } else { plus }, angle.abs()),
+        );
         format!("{lao} {cra}")
     }
 }
@@ -148,13 +149,18 @@ impl CArmSpec {
         for (key, angle) in [("primary_deg", self.primary_deg), ("secondary_deg", self.secondary_deg)] {
             if self.pose.is_some() && angle != 0.0 {
                 let key = format!("view.c_arm.{key}");
-                return Err(Error::parameter(key, angle, "view.c_arm.pose is given too: keep one of the two"));
+                return Err(Error::parameter(
+                    key,
+                    angle,
+                    "view.c_arm.pose is given too: keep one of the two",
+                ));
             }
         }
         positive("view.c_arm.sid_mm", self.sid_mm)?;
         positive("view.c_arm.sod_mm", self.sod_mm)?;
         if self.sod_mm >= self.sid_mm {
-            let mend = format!("must be less than sid_mm = {}: the isocentre is before the detector", self.sid_mm);
+            let mend =
+                format!("must be less than sid_mm = {}: the isocentre is before the detector", self.sid_mm);
             return Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, mend));
         }
         for (key, value) in [("pixel_mm", self.pixel_mm), ("field_mm", self.field_mm)] {

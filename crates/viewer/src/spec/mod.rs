@@ -108,13 +108,23 @@ impl Default for ViewSpec {
 
 /// The `[view.camera]` table of the 3D view. With neither angle given, the camera looks from the front,
 /// slightly from the left and above, or across the plane of a vessel that lies in one.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CameraSpec {
     /// Around the long axis of the patient: 0 is anterior, 90 the patient's left.
     pub azimuth_deg: Option<f64>,
     /// Above the transverse plane, towards the head.
     pub elevation_deg: Option<f64>,
+    /// Whether a scale bar is drawn.
+    pub scale_bar: bool,
+    /// Whether the beam of the C-arm is drawn, if there is a fluoroscopic view; the camera then steps back to show it.
+    pub c_arm: bool,
+}
+
+impl Default for CameraSpec {
+    fn default() -> Self {
+        Self { azimuth_deg: None, elevation_deg: None, scale_bar: true, c_arm: false }
+    }
 }
 
 impl ViewSpec {

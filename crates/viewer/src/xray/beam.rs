@@ -156,8 +156,7 @@ fn reduced(lines: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
         return lines.to_vec();
     }
     // Caesium and barium have edges beside iodine's; telling them apart is worth no node.
-    let edges: Vec<f64> =
-        ATTENUATION.edges_kev().into_iter().filter(|e| !(34.0..60.0).contains(e)).collect();
+    let edges: Vec<f64> = ATTENUATION.edges_kev().into_iter().filter(|e| !(34.0..60.0).contains(e)).collect();
     let mut parts: Vec<Vec<(f64, f64)>> = vec![vec![]; edges.len() + 1];
     for &line in lines {
         parts[edges.partition_point(|&e| e <= line.0)].push(line);
@@ -167,12 +166,10 @@ fn reduced(lines: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
     // One node each, the others where most is left for a node to stand for.
     let mut nodes = vec![1_usize; parts.len()];
     for _ in parts.len()..count {
-        let most = (0..parts.len())
-            .filter(|&i| nodes[i] < parts[i].len())
-            .max_by(|&a, &b| {
-                let load = |i: usize| share(&parts[i]) / (nodes[i] * nodes[i]) as f64;
-                load(a).total_cmp(&load(b))
-            });
+        let most = (0..parts.len()).filter(|&i| nodes[i] < parts[i].len()).max_by(|&a, &b| {
+            let load = |i: usize| share(&parts[i]) / (nodes[i] * nodes[i]) as f64;
+            load(a).total_cmp(&load(b))
+        });
         match most {
             Some(i) => nodes[i] += 1,
             None => break,
@@ -255,7 +252,8 @@ mod tests {
     fn one_energy_is_beer_lambert() {
         let spec = XRaySpec { energy_kev: Some(60.0), ..XRaySpec::default() };
         let beam = Beam::new(&spec, 150.0).unwrap();
-        let t = beam.transmission([(Material::SoftTissue, 100.0), (Material::Nitinol, 1.0)].into_iter()).unwrap();
+        let t =
+            beam.transmission([(Material::SoftTissue, 100.0), (Material::Nitinol, 1.0)].into_iter()).unwrap();
         let mu = |m: Material| m.attenuation_per_mm(60.0).unwrap();
         let p = mu(Material::SoftTissue) * 100.0 + mu(Material::Nitinol);
         assert!((-t.ln() / p - 1.0).abs() < 1e-12);

@@ -142,7 +142,8 @@ mod tests {
 
     /// Mean and variance of each pixel over `frames`.
     fn moments(frames: u64, correlated: f64) -> (Vec<f64>, Vec<f64>) {
-        let mut detector = detector(&DetectorSpec { blur_mm: correlated, lag: 0.0, ..DetectorSpec::default() });
+        let mut detector =
+            detector(&DetectorSpec { blur_mm: correlated, lag: 0.0, ..DetectorSpec::default() });
         let signal = ramp();
         let energy: Vec<f32> = signal.iter().map(|s| s * 60.0).collect();
         let (mut sum, mut squares) = (vec![0.0; 256], vec![0.0; 256]);

@@ -82,7 +82,9 @@ impl Material {
     pub fn attenuation_per_mm(self, energy_kev: f64) -> Result<f64> {
         let [low, high] = ATTENUATION.range_kev();
         match ATTENUATION.column(self.name()) {
-            Some(column) if (low..=high).contains(&energy_kev) => Ok(ATTENUATION.at(column, energy_kev) / 10.0),
+            Some(column) if (low..=high).contains(&energy_kev) => {
+                Ok(ATTENUATION.at(column, energy_kev) / 10.0)
+            }
             _ => {
                 let mend = format!("the table covers {low} to {high} keV");
                 Err(Error::parameter("view.xray.energy_kev", energy_kev, mend))

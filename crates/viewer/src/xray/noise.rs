@@ -71,7 +71,8 @@ pub(super) fn poisson(mean: f32, word: u32, normal: &[f32; QUANTILES]) -> f32 {
         return few(mean, word);
     }
     // The sum of two independent quantiles reaches further into the tails than one of so few.
-    let z = (normal[(word >> 20) as usize] + normal[(word & 0xFFF) as usize]) * std::f32::consts::FRAC_1_SQRT_2;
+    let z =
+        (normal[(word >> 20) as usize] + normal[(word & 0xFFF) as usize]) * std::f32::consts::FRAC_1_SQRT_2;
     mean + mean.sqrt() * z + (z * z - 1.0) * (1.0 / 6.0)
 }
 
@@ -100,7 +101,10 @@ mod tests {
     fn philox_gives_the_published_words() {
         // Known answers of the authors' library.
         assert_eq!(philox([0; 4], [0; 2]), [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]);
-        assert_eq!(philox([u32::MAX; 4], [u32::MAX; 2]), [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]);
+        assert_eq!(
+            philox([u32::MAX; 4], [u32::MAX; 2]),
+            [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]
+        );
         assert_eq!(
             philox([0x243f_6a88, 0x85a3_08d3, 0x1319_8a2e, 0x0370_7344], [0xa409_3822, 0x299f_31d0]),
             [0xd16c_fe09, 0x94fd_cceb, 0x5001_e420, 0x2412_6ea1]

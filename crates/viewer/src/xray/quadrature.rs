@@ -34,9 +34,8 @@ pub(super) fn gauss(points: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
         }
     }
     let eigen = jacobi.symmetric_eigen();
-    let mut rule: Vec<(f64, f64)> = (0..count)
-        .map(|k| (eigen.eigenvalues[k], total * eigen.eigenvectors[(0, k)].powi(2)))
-        .collect();
+    let mut rule: Vec<(f64, f64)> =
+        (0..count).map(|k| (eigen.eigenvalues[k], total * eigen.eigenvectors[(0, k)].powi(2))).collect();
     rule.sort_by(|a, b| a.0.total_cmp(&b.0));
     rule
 }
