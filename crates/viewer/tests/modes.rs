@@ -21,7 +21,7 @@ fn scene(folder: &std::path::Path, mode: Mode) -> (ViewSpec, endowire_core::vess
     let mut view = spec(Backend::Cpu, 160, 0.8);
     view.xray.energy_kev = None;
     view.xray.mode = mode;
-    view.detector = DetectorSpec { seed: 3, ..DetectorSpec::default() };
+    view.detector = DetectorSpec { seed: 3, lag: 0.0, ..DetectorSpec::default() };
     view.flow.tree = Some(path);
     view.flow.inflow_ml_per_s = 20.0;
     view.injection = vec![InjectionSpec { start_s: 1.0, duration_s: 1.0, rate_ml_per_s: 8.0, at_mm: None }];

@@ -12,7 +12,9 @@ const WINDOW_BELOW: f32 = 0.12;
 /// as black.
 const WINDOW_ABOVE: f32 = 0.4;
 /// Shares of the pixels that may be brighter or darker than the anatomy's range.
-const OUTLIERS: f64 = 0.005;
+const OUTLIERS: f64 = 0.01;
+/// The window is fitted to this part of the frame's width and height, around its middle: beyond the skin all may be white.
+const FITTED: f64 = 0.7;
 /// Signals below this are told apart no more.
 const DARKEST: f32 = 1e-6;
 
@@ -27,9 +29,15 @@ pub(super) fn logarithm(signal: &[f32]) -> Vec<f32> {
     out
 }
 
-/// The window that shows all of an anatomy: `values` where `seen`.
-pub(super) fn fitted(values: &[f32], seen: impl Fn(usize) -> bool) -> Window {
-    let mut sorted: Vec<f32> = (0..values.len()).filter(|&i| seen(i)).map(|i| values[i]).collect();
+/// The window that shows the middle of an anatomy: `values` where `seen`.
+pub(super) fn fitted(values: &[f32], size: [u32; 2], seen: impl Fn(usize) -> bool) -> Window {
+    let width = size[0] as usize;
+    let middle = |i: usize| {
+        let off = |at: usize, n: u32| ((at as f64 + 0.5) / f64::from(n) - 0.5).abs();
+        off(i % width, size[0]) <= FITTED / 2.0 && off(i / width, size[1]) <= FITTED / 2.0
+    };
+    let mut sorted: Vec<f32> =
+        (0..values.len()).filter(|&i| middle(i) && seen(i)).map(|i| values[i]).collect();
     if sorted.is_empty() {
         return [0.0, 1.0];
     }

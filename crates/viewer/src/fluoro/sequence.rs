@@ -15,10 +15,15 @@ const MASK_FRAMES: u64 = 4;
 const MASK_NUMBERS: u64 = 1 << 63;
 /// Weight of the newest frame in the last image hold.
 const HOLD_WEIGHT: f32 = 0.4;
-/// ln(mask) − ln(frame) shown white and black: 1 cm of blood with a tenth of contrast medium adds about 0.3.
-const DSA_WINDOW: Window = [-0.15, 0.75];
-/// ln(angiogram) − ln(frame) shown white and black, around a grey background.
-const ROADMAP_WINDOW: Window = [-0.55, 0.45];
+/// Subtracted values as parts of the vessels' strongest: what is shown white, and black.
+const DSA_SHARES: Window = [-0.15, 1.05];
+/// Share of the pixels with contrast medium that may be darker than black.
+const DSA_OUTLIERS: f64 = 0.02;
+/// Strongest opacification that a window assumes where nothing is ever injected.
+const FAINTEST: f32 = 0.3;
+/// Roadmap values shown white and black, around a grey background, and that of the strongest vessel.
+const ROADMAP_WINDOW: Window = [-0.55, 0.55];
+const ROADMAP_VESSEL: f32 = -0.4;
 
 /// Number and time of a frame. The number seeds its noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -55,10 +60,14 @@ impl Sequence {
             // Line integrals against the open beam, where signals are told against the reference.
             (Mode::Fluoro | Mode::Cine, Some(window)) => window.map(|p| (p + offset) as f32),
             (Mode::Fluoro | Mode::Cine, None) => {
-                fitted(&logarithm(&fluoroscope.still.signal), |pixel| c_arm.openness(pixel) == 1.0)
+                let values = logarithm(&fluoroscope.still.signal);
+                fitted(&values, c_arm.size_px(), |pixel| c_arm.openness(pixel) == 1.0)
             }
             (_, Some(window)) => window.map(|p| p as f32),
-            (Mode::Dsa, None) => DSA_WINDOW,
+            (Mode::Dsa, None) => {
+                let strongest = strongest(fluoroscope);
+                DSA_SHARES.map(|share| share * strongest)
+            }
             (Mode::Roadmap, None) => ROADMAP_WINDOW,
         };
         Self {
@@ -85,12 +94,12 @@ impl Sequence {
             match self.mode {
                 Mode::Fluoro | Mode::Cine => {}
                 Mode::Dsa => self.take_mask(fluoroscope, engine, devices)?,
-                Mode::Roadmap => {
-                    self.store(&fluoroscope.opacified()?, Mode::Dsa.dose_ngy() / self.mode.dose_ngy())
-                }
+                Mode::Roadmap => self.store_roadmap(fluoroscope)?,
             }
         }
-        let signal = fluoroscope.signal(engine, devices, Some(moment.time_s))?;
+        // The injections of a roadmap are those of its angiogram.
+        let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
+        let signal = fluoroscope.signal(engine, devices, time)?;
         let read = self.detector.read(&signal.signal, &signal.energy, self.kev, moment.frame);
         let mut values = logarithm(&read);
         if let Some(mask) = &self.mask {
@@ -121,19 +130,45 @@ impl Sequence {
         devices: &[RefinedDevice],
     ) -> Result<()> {
         let signal = fluoroscope.signal(engine, devices, None)?;
-        self.store(&signal, 1.0);
+        self.mask = Some(self.stored(&signal, self.kev));
         Ok(())
     }
 
-    /// Stores a signal, read a few times with `dose` times the dose of a frame.
-    fn store(&mut self, signal: &Signal, dose: f64) {
+    /// Stores the anatomy, with the vessels of the angiogram as bright as they are to be shown.
+    fn store_roadmap(&mut self, fluoroscope: &Fluoroscope) -> Result<()> {
+        let full = fluoroscope.opacified()?;
+        let kev = self.kev * Mode::Dsa.dose_ngy() / self.mode.dose_ngy();
+        let scale = ROADMAP_VESSEL / strongest(fluoroscope);
+        let mut map = self.stored(&fluoroscope.still, kev);
+        let full = self.stored(&full, kev);
+        // A frame less this is −scale in the vessel.
+        map.iter_mut().zip(full).for_each(|(map, full)| *map -= scale * (full - *map));
+        self.mask = Some(map);
+        Ok(())
+    }
+
+    /// −ln of a signal's mean over a few frames.
+    fn stored(&mut self, signal: &Signal, kev: f64) -> Vec<f32> {
         let mut mean = vec![0.0; signal.signal.len()];
         for k in 0..MASK_FRAMES {
             self.detector.reset();
-            let read = self.detector.read(&signal.signal, &signal.energy, self.kev * dose, MASK_NUMBERS + k);
+            let read = self.detector.read(&signal.signal, &signal.energy, kev, MASK_NUMBERS + k);
             mean.iter_mut().zip(read).for_each(|(mean, v)| *mean += v / MASK_FRAMES as f32);
         }
         self.detector.reset();
-        self.mask = Some(logarithm(&mean));
+        logarithm(&mean)
     }
+}
+
+/// Strongest subtracted value that contrast medium ever brings, but for the darkest few pixels.
+fn strongest(fluoroscope: &Fluoroscope) -> f32 {
+    let Ok(full) = fluoroscope.opacified() else { return FAINTEST };
+    let still = logarithm(&fluoroscope.still.signal);
+    let mut values: Vec<f32> =
+        logarithm(&full.signal).iter().zip(still).map(|(v, still)| v - still).filter(|v| *v > 0.02).collect();
+    if values.is_empty() {
+        return FAINTEST;
+    }
+    let place = ((values.len() - 1) as f64 * (1.0 - DSA_OUTLIERS)).round() as usize;
+    values.select_nth_unstable_by(place, f32::total_cmp).1.max(FAINTEST)
 }
