@@ -1,4 +1,4 @@
-//! Scattered quanta: a smooth addend.
+//! What is smooth over tens of millimetres: scattered quanta, and the shading that displays take out.
 //!
 //! What patients scatter reaches the detector tens of millimetres from where the primary beam would have, so it is the primary
 //! picture, spread widely, scaled to the wanted share of all quanta. It is computed for the anatomy; a device changes it by less
@@ -8,7 +8,9 @@ use super::Signal;
 use crate::c_arm::CArm;
 
 /// Standard deviation of the spread at the detector, mm.
-const SPREAD_MM: f64 = 35.0;
+const SCATTER_MM: f64 = 35.0;
+/// The same for shading.
+const SHADING_MM: f64 = 25.0;
 /// Pixels are gathered into cells of a quarter of it.
 const CELLS: f64 = 4.0;
 /// The Gaussian ends at this many deviations.
@@ -16,27 +18,37 @@ const REACH: f64 = 3.0;
 
 /// The scattered signal beside `primary` when it is on average `share` of all.
 pub(super) fn scattered(primary: &Signal, c_arm: &CArm, share: f64) -> Signal {
-    let size = c_arm.size_px().map(|n| n as usize);
-    let cell = ((SPREAD_MM / CELLS / c_arm.pixel_mm()).round() as usize).clamp(1, size[0].min(size[1]));
     let gain = (share / (1.0 - share)) as f32;
-    let spread = |map: &[f32]| -> Vec<f32> {
-        let (coarse, cells) = gathered(map, size, cell);
-        let coarse = blurred(&coarse, cells);
-        let at = |x: f32, y: f32| {
-            let place = |v: f32, n: usize| {
-                let v = (v / cell as f32 - 0.5).clamp(0.0, (n - 1) as f32);
-                let i = (v as usize).min(n.saturating_sub(2));
-                (i, (i + 1).min(n - 1), v - i as f32)
-            };
-            let ((x0, x1, u), (y0, y1, v)) = (place(x, cells[0]), place(y, cells[1]));
-            let row = |y: usize| coarse[y * cells[0] + x0] * (1.0 - u) + coarse[y * cells[0] + x1] * u;
-            row(y0) * (1.0 - v) + row(y1) * v
-        };
-        (0..size[0] * size[1])
-            .map(|i| gain * at((i % size[0]) as f32 + 0.5, (i / size[0]) as f32 + 0.5))
-            .collect()
+    let spread = |map: &[f32]| {
+        let mut map = spread(map, c_arm, SCATTER_MM);
+        map.iter_mut().for_each(|v| *v *= gain);
+        map
     };
     Signal { signal: spread(&primary.signal), energy: spread(&primary.energy) }
+}
+
+/// The coarse part of logarithmic values.
+pub(super) fn shading(values: &[f32], c_arm: &CArm) -> Vec<f32> {
+    spread(values, c_arm, SHADING_MM)
+}
+
+/// A map convolved with a wide Gaussian.
+fn spread(map: &[f32], c_arm: &CArm, deviation_mm: f64) -> Vec<f32> {
+    let size = c_arm.size_px().map(|n| n as usize);
+    let cell = ((deviation_mm / CELLS / c_arm.pixel_mm()).round() as usize).clamp(1, size[0].min(size[1]));
+    let (coarse, cells) = gathered(map, size, cell);
+    let coarse = blurred(&coarse, cells);
+    let at = |x: f32, y: f32| {
+        let place = |v: f32, n: usize| {
+            let v = (v / cell as f32 - 0.5).clamp(0.0, (n - 1) as f32);
+            let i = (v as usize).min(n.saturating_sub(2));
+            (i, (i + 1).min(n - 1), v - i as f32)
+        };
+        let ((x0, x1, u), (y0, y1, v)) = (place(x, cells[0]), place(y, cells[1]));
+        let row = |y: usize| coarse[y * cells[0] + x0] * (1.0 - u) + coarse[y * cells[0] + x1] * u;
+        row(y0) * (1.0 - v) + row(y1) * v
+    };
+    (0..size[0] * size[1]).map(|i| at((i % size[0]) as f32 + 0.5, (i / size[0]) as f32 + 0.5)).collect()
 }
 
 /// Means over cells, and their numbers.

@@ -3,6 +3,7 @@
 use endowire_core::Result;
 
 use super::display::{Window, fitted, logarithm, picture};
+use super::scatter::shading;
 use super::{Fluoroscope, PathEngine, Signal};
 use crate::device::RefinedDevice;
 use crate::output::Image;
@@ -44,7 +45,7 @@ pub(crate) struct Sequence {
     window: Window,
     bits: u32,
     noisy: bool,
-    /// −ln of the stored mask or angiogram.
+    /// What is subtracted from −ln of each frame: the stored mask or angiogram, or shading.
     mask: Option<Vec<f32>>,
     /// Values of the last frames, the newest weighing most.
     held: Vec<f32>,
@@ -56,11 +57,20 @@ impl Sequence {
         let mode = spec.xray.mode;
         let dose = spec.detector.dose_ngy.unwrap_or_else(|| mode.dose_ngy());
         let offset = fluoroscope.beam.ln_reference();
+        let share = spec.xray.harmonised as f32;
+        let mask: Option<Vec<f32>> = (matches!(mode, Mode::Fluoro | Mode::Cine) && share > 0.0).then(|| {
+            // Relative to the reference, whose logarithm is zero: the middle keeps its grey.
+            let values = logarithm(&fluoroscope.still.signal);
+            shading(&values, c_arm).iter().map(|v| share * v).collect()
+        });
         let window = match (mode, spec.xray.window) {
             // Line integrals against the open beam, where signals are told against the reference.
             (Mode::Fluoro | Mode::Cine, Some(window)) => window.map(|p| (p + offset) as f32),
             (Mode::Fluoro | Mode::Cine, None) => {
-                let values = logarithm(&fluoroscope.still.signal);
+                let mut values = logarithm(&fluoroscope.still.signal);
+                if let Some(mask) = &mask {
+                    values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
+                }
                 fitted(&values, c_arm.size_px(), |pixel| c_arm.openness(pixel) == 1.0)
             }
             (_, Some(window)) => window.map(|p| p as f32),
@@ -77,7 +87,7 @@ impl Sequence {
             window,
             bits: spec.bits,
             noisy: spec.detector.noise,
-            mask: None,
+            mask,
             held: vec![],
         }
     }

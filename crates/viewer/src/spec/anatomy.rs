@@ -93,7 +93,7 @@ pub struct FlowSpec {
     pub inlet_mm: Option<[f64; 3]>,
     /// Blood flow there.
     pub inflow_ml_per_s: f64,
-    /// At a bifurcation the flow divides as radiusⁿ; 3 is Murray's law.
+    /// At a bifurcation the flow divides as radiusⁿ: 2 for large arteries, 3 (Murray's law) for small ones.
     pub split_exponent: f64,
     /// How fast a bolus spreads: its standard deviation in time grows as this times the square root of the transit time, s^½.
     pub dispersion: f64,
@@ -102,7 +102,7 @@ pub struct FlowSpec {
 impl Default for FlowSpec {
     fn default() -> Self {
         // A resting heart pumps 5 l/min.
-        Self { tree: None, inlet_mm: None, inflow_ml_per_s: 80.0, split_exponent: 3.0, dispersion: 0.12 }
+        Self { tree: None, inlet_mm: None, inflow_ml_per_s: 80.0, split_exponent: 2.0, dispersion: 0.12 }
     }
 }
 

@@ -58,6 +58,9 @@ pub struct XRaySpec {
     pub csi_mm: f64,
     /// Material of devices that do not name their own.
     pub device_material: Material,
+    /// Share of the anatomy's coarse shading that the display takes out in fluoroscopy and cine, so that lungs and spine are both
+    /// seen; 0 shows the logarithm of the signal as it is.
+    pub harmonised: f64,
     /// Line integrals shown white and black in fluoroscopy and cine; absent: fitted to the anatomy, the same for all frames of
     /// a run.
     pub window: Option<[f64; 2]>,
@@ -77,6 +80,7 @@ impl Default for XRaySpec {
             // Absorbs 88 % at 57.8 keV.
             csi_mm: 0.6,
             device_material: Material::Steel316L,
+            harmonised: 0.55,
             window: None,
         }
     }
@@ -96,6 +100,7 @@ impl XRaySpec {
         finite_within("view.xray.contrast_fraction", self.contrast_fraction, [0.0, 1.0])?;
         finite_within("view.xray.tissue_mm", self.tissue_mm, [0.0, 1000.0])?;
         positive("view.xray.csi_mm", self.csi_mm)?;
+        finite_within("view.xray.harmonised", self.harmonised, [0.0, 1.0])?;
         if let Some([white, black]) = self.window
             && !(white.is_finite() && black.is_finite() && white < black)
         {
@@ -127,7 +132,7 @@ pub struct DetectorSpec {
 
 impl Default for DetectorSpec {
     fn default() -> Self {
-        Self { dose_ngy: None, noise: true, seed: 1, blur_mm: 0.15, lag: 0.04, scatter_fraction: 0.25 }
+        Self { dose_ngy: None, noise: true, seed: 1, blur_mm: 0.15, lag: 0.04, scatter_fraction: 0.15 }
     }
 }
 

@@ -54,6 +54,7 @@ fn colour(material: Option<Material>) -> [u8; 4] {
 }
 
 /// A cross section of a tube: centre, radius, direction, and tilt of the normal out of it (sine, cosine).
+#[derive(Debug, Clone, Copy)]
 struct Section {
     centre: Vec3,
     radius: f64,

@@ -88,7 +88,7 @@ pub fn spec(backend: Backend, size: u32, pixel_mm: f64) -> ViewSpec {
         size_px: [size, size],
         views: vec![View::Fluoro],
         backend,
-        xray: XRaySpec { energy_kev: Some(60.0), ..XRaySpec::default() },
+        xray: XRaySpec { energy_kev: Some(60.0), harmonised: 0.0, ..XRaySpec::default() },
         detector: DetectorSpec::ideal(),
         c_arm: CArmSpec { pixel_mm: Some(pixel_mm), isocentre_mm: Some([0.0; 3]), ..CArmSpec::default() },
         ..ViewSpec::default()
