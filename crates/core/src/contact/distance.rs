@@ -6,14 +6,20 @@
 //! blended by a partition of unity (Ohtake et al., *Multi-level partition of unity implicits*, SIGGRAPH 2003):
 //!
 //! ```text
-//! Qᵢ(x) = Nᵢ·y − ½ τᵀSᵢτ,   y = x − Vᵢ,  τ = y − Nᵢ(Nᵢ·y)
-//! wᵢ(x) = (1 − |τ|²/ρᵢ²)³   where positive
+//! Qᵢ(x) = Nᵢ·y − ½ τᵀSᵢτ − cᵢ,   y = x − Vᵢ,  τ = y − Nᵢ(Nᵢ·y)
+//! wᵢ(x) = (1 − τᵀMᵢτ)³ b(Qᵢ)   where positive
 //! f(x)  = Σ wᵢQᵢ / Σ wᵢ
 //! ```
 //!
-//! with Nᵢ the inward normal, Sᵢ the curvature and ρᵢ a little more than the longest edge at the vertex. f is twice
+//! with Nᵢ the inward normal, Sᵢ the curvature and Mᵢ an ellipse that holds the neighbours of the vertex. The window b, 1 for
+//! small |Qᵢ| and 0 far away, leaves out the other side of a narrow lumen and the back of a thin septum. f is twice
 //! continuously differentiable, so a device feels an energy with an exact gradient and Hessian; it differs from the distance
-//! to the sampled surface at second order in the edge length, by a sixth of what the flat triangles do. With W = Σ wᵢ,
+//! to the sampled surface at second order in the edge length, by a sixth of what the flat triangles do.
+//!
+//! Vertices sample a vessel, and between them the smooth wall lies beyond the triangles. Where a mesh is so coarse that it
+//! would do so by more than a device keeps from the wall, the offsets cᵢ draw it in; on all other meshes they are 0.
+//!
+//! With W = Σ wᵢ,
 //!
 //! ```text
 //! ∇f  = Σ [(Qᵢ − f) ∇wᵢ + wᵢ ∇Qᵢ] / W
@@ -22,17 +28,23 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2};
 
 use crate::Vec3;
-use crate::vessel::Wall;
+use crate::vessel::{SurfaceMesh, Wall};
 
-/// Support of a vertex over its longest edge: every point of a triangle lies well inside that of its three corners.
+/// Support of a vertex over its edges: every point of a triangle lies well inside that of its three corners.
 const SUPPORT: f64 = 1.1;
 /// Largest curvature times support: beyond it a corner is a corner, and a quadric would fold over.
 const LARGEST_BEND: f64 = 0.8;
+/// Square of the thinnest ellipse's ratio of axes, about.
+const THINNEST: f64 = 0.01;
 /// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.
 const REGULAR: f64 = 1e-6;
+/// Sum of weights below which no vertex reaches a point.
+const LEAST_WEIGHT: f64 = 1e-9;
+/// Height above the surface up to which the lists of vertices are complete, in radii of the thickest device and in supports.
+const HEIGHT: (f64, f64) = (1.5, 0.5);
 
 /// Signed distance with derivatives; positive in the lumen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,8 +63,68 @@ struct Quadric {
     position: Vec3,
     normal: Vec3,
     curvature: Matrix3<f64>,
-    /// 1/ρ².
-    inverse_square: f64,
+    /// M, 1/mm².
+    support: Matrix3<f64>,
+    /// Half axes of the support, shortest and longest, mm.
+    half_axes_mm: (f64, f64),
+    /// cᵢ, mm.
+    offset_mm: f64,
+    /// Height of the window, mm.
+    window_mm: f64,
+}
+
+/// Window over the radius of the device, and over the support of a vertex: what a fit may be off by on a coarse mesh.
+const WINDOW: (f64, f64) = (1.25, 0.3);
+/// In heights of the window: it falls from 1 at the first to 0 at the second, above and below the surface.
+const ABOVE: (f64, f64) = (1.0, 1.8);
+const BELOW: (f64, f64) = (-0.3, -0.8);
+/// The smooth wall lies no farther than this part of the thinnest device's radius beyond a triangle: the barrier of
+/// [`crate::contact::WallPotential`] stands at three tenths.
+const BEYOND: f64 = 0.2;
+/// Intervals along each side of a triangle at whose ends that is checked, …
+const CHECKED: u32 = 4;
+/// … unless few points differ by less than this part of what is allowed.
+const ENOUGH: f64 = 0.25;
+
+/// A window and its derivatives: 1 up to `from`, 0 from `to` on, in between 1 − t³(10 − 15t + 6t²).
+#[inline]
+fn fall(at: f64, from: f64, to: f64) -> [f64; 3] {
+    let inverse = 1.0 / (to - from);
+    let t = (at - from) * inverse;
+    if t <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    if t >= 1.0 {
+        return [0.0; 3];
+    }
+    let (s, tt) = (1.0 - t, t * t);
+    [
+        1.0 - tt * t * (10.0 + t * (6.0 * t - 15.0)),
+        -30.0 * tt * s * s * inverse,
+        -60.0 * t * s * (s - t) * inverse * inverse,
+    ]
+}
+
+impl Quadric {
+    /// y, Mτ, height and u = τᵀMτ at `x`; `None` beyond the support.
+    #[inline]
+    fn local(&self, x: &Vec3) -> Option<(Vec3, Vec3, f64, f64)> {
+        let y = x - self.position;
+        let across = self.support * y;
+        let u = y.dot(&across);
+        (u < 1.0).then(|| (y, across, self.normal.dot(&y) - self.offset_mm, u))
+    }
+
+    /// b(Q) and its derivatives.
+    #[inline]
+    fn window(&self, value: f64) -> [f64; 3] {
+        let size = self.window_mm;
+        if value > 0.0 {
+            fall(value, ABOVE.0 * size, ABOVE.1 * size)
+        } else {
+            fall(value, BELOW.0 * size, BELOW.1 * size)
+        }
+    }
 }
 
 /// The smooth wall.
@@ -63,17 +135,24 @@ pub struct SmoothWall {
     starts: Vec<u32>,
     /// Vertices whose support may reach a point over the triangle.
     lists: Vec<u32>,
+    /// How far the smooth wall lies inside each triangle, mm, …
+    insets_mm: Vec<f32>,
+    /// … and the largest of these.
+    deepest_inset_mm: f64,
 }
 
 impl SmoothWall {
-    /// The smooth surface of `wall` for points up to about `height_mm` from it.
-    pub fn new(wall: &Wall, height_mm: f64) -> Self {
+    /// The smooth surface of `wall` for devices with radii from `thinnest_mm` to `thickest_mm`.
+    pub fn new(wall: &Wall, thinnest_mm: f64, thickest_mm: f64) -> Self {
         let mesh = wall.mesh();
         let count = mesh.vertices_mm.len();
         let neighbours = vertex_neighbours(&mesh.triangles, count);
         let normals = vertex_normals(mesh);
-        let quadrics: Vec<Quadric> =
+        let mut quadrics: Vec<Quadric> =
             (0..count).map(|v| fit(v, &mesh.vertices_mm, &normals, &neighbours)).collect();
+        for q in &mut quadrics {
+            q.window_mm = (WINDOW.0 * thickest_mm).max(WINDOW.1 * q.half_axes_mm.0);
+        }
 
         let mut starts = Vec::with_capacity(mesh.triangles.len() + 1);
         let mut lists = Vec::new();
@@ -89,7 +168,8 @@ impl SmoothWall {
             // Over the surface, not through space: the other side of a thin septum is another wall.
             while let Some(v) = queue.pop_front() {
                 let q = &quadrics[v as usize];
-                let reach = q.inverse_square.sqrt().recip() + size + height_mm;
+                let (short, long) = q.half_axes_mm;
+                let reach = long + size + (HEIGHT.0 * thickest_mm).max(HEIGHT.1 * short);
                 if (q.position - centre).norm() > reach {
                     continue;
                 }
@@ -103,35 +183,110 @@ impl SmoothWall {
             }
         }
         starts.push(lists.len() as u32);
-        Self { quadrics, starts, lists }
+        let mut smooth = Self { quadrics, starts, lists, insets_mm: Vec::new(), deepest_inset_mm: 0.0 };
+        smooth.draw_in(mesh, BEYOND * thinnest_mm);
+        smooth
+    }
+
+    /// Least and largest f on a triangle of the mesh, at few points if they differ by less than `enough_mm`, or at all of a
+    /// grid.
+    fn range(&self, mesh: &SurfaceMesh, index: usize, enough_mm: f64) -> (f64, f64) {
+        let corners = mesh.corners(index);
+        let list = self.list(index);
+        let look = |(least, largest): (f64, f64), x: Vec3| {
+            let f = self.value(&x, list).unwrap_or(0.0);
+            (least.min(f), largest.max(f))
+        };
+        let found = few(&corners).into_iter().fold((f64::MAX, f64::MIN), look);
+        if found.1 - found.0 > enough_mm { grid(corners).fold(found, look) } else { found }
+    }
+
+    /// Sets the offsets so that f is at most `limit_mm` on the triangles, and measures how far inside them it lies.
+    fn draw_in(&mut self, mesh: &SurfaceMesh, limit_mm: f64) {
+        let enough_mm = ENOUGH * limit_mm;
+        let mut offsets = vec![0.0f64; self.quadrics.len()];
+        for index in 0..mesh.triangles.len() {
+            let (least, largest) = self.range(mesh, index, enough_mm);
+            self.insets_mm.push((-least).max(0.0) as f32);
+            if largest <= limit_mm {
+                continue;
+            }
+            for x in grid(mesh.corners(index)) {
+                let list = self.list(index);
+                let beyond = self.value(&x, list).unwrap_or(0.0) - limit_mm;
+                for &v in list.iter().filter(|&&v| self.quadrics[v as usize].local(&x).is_some()) {
+                    offsets[v as usize] = offsets[v as usize].max(beyond);
+                }
+            }
+        }
+        for (q, offset) in self.quadrics.iter_mut().zip(offsets) {
+            q.offset_mm = offset;
+        }
+        for index in 0..mesh.triangles.len() {
+            if self.list(index).iter().any(|&v| self.quadrics[v as usize].offset_mm > 0.0) {
+                self.insets_mm[index] = (-self.range(mesh, index, enough_mm).0).max(0.0) as f32;
+            }
+        }
+        self.deepest_inset_mm = self.insets_mm.iter().copied().fold(0.0, f32::max).into();
+    }
+
+    /// How far the smooth wall lies inside a triangle, mm: 0 where it lies beyond it.
+    pub fn inset_mm(&self, triangle: u32) -> f64 {
+        self.insets_mm[triangle as usize].into()
+    }
+
+    /// The largest of all [`SmoothWall::inset_mm`].
+    pub fn deepest_inset_mm(&self) -> f64 {
+        self.deepest_inset_mm
+    }
+
+    fn list(&self, triangle: usize) -> &[u32] {
+        &self.lists[self.starts[triangle] as usize..self.starts[triangle + 1] as usize]
+    }
+
+    /// f alone.
+    fn value(&self, x: &Vec3, list: &[u32]) -> Option<f64> {
+        let (mut weight, mut value) = (0.0, 0.0);
+        for &v in list {
+            let q = &self.quadrics[v as usize];
+            let Some((y, _, height, u)) = q.local(x) else { continue };
+            let f = height - 0.5 * y.dot(&(q.curvature * y));
+            let w = (1.0 - u).powi(3) * q.window(f)[0];
+            weight += w;
+            value += w * f;
+        }
+        (weight >= LEAST_WEIGHT).then(|| value / weight)
     }
 
     /// The distance of `x`, whose nearest triangle is `triangle` or close to it. `None` where no vertex reaches.
     pub fn distance(&self, x: &Vec3, triangle: u32) -> Option<Distance> {
-        let t = triangle as usize;
-        let list = &self.lists[self.starts[t] as usize..self.starts[t + 1] as usize];
         let (mut weight, mut value) = (0.0, 0.0);
         let (mut weight1, mut value1) = (Vec3::zeros(), Vec3::zeros());
         let (mut weight2, mut value2) = (Matrix3::zeros(), Matrix3::zeros());
-        for &v in list {
+        for &v in self.list(triangle as usize) {
             let q = &self.quadrics[v as usize];
-            let y = x - q.position;
-            let height = q.normal.dot(&y);
-            let u = (y.norm_squared() - height * height) * q.inverse_square;
-            if u >= 1.0 {
+            let Some((y, across, height, u)) = q.local(x) else { continue };
+            // M and S see only what is across the normal, so they take y for τ.
+            let bend = q.curvature * y;
+            let (f, f1) = (height - 0.5 * y.dot(&bend), q.normal - bend);
+            let [b, b1, b2] = q.window(f);
+            if b == 0.0 {
                 continue;
             }
-            let tau = y - q.normal * height;
-            let bend = q.curvature * tau;
-            let (f, f1) = (height - 0.5 * tau.dot(&bend), q.normal - bend);
             let g = 1.0 - u;
-            let w = g * g * g;
-            // ∇u = 2τ/ρ²; w′(u) = −3g², w″(u) = 6g.
-            let slope = -6.0 * g * g * q.inverse_square;
-            let w1 = tau * slope;
-            let curve = 24.0 * g * q.inverse_square * q.inverse_square;
-            let w2 = tau * tau.transpose() * curve
-                + (Matrix3::identity() - q.normal * q.normal.transpose()) * slope;
+            // ∇u = 2Mτ, ∇∇u = 2M; a = (1 − u)³ has a′(u) = −3g², a″(u) = 6g.
+            let a = g * g * g;
+            let a1 = across * (-6.0 * g * g);
+            let a2 = across * across.transpose() * (24.0 * g) - q.support * (6.0 * g * g);
+            let (mut w, mut w1, mut w2) = (a, a1, a2);
+            if b < 1.0 {
+                let turned = a1 * f1.transpose();
+                w = a * b;
+                w1 = a1 * b + f1 * (a * b1);
+                w2 = a2 * b
+                    + (turned + turned.transpose() - q.curvature * a) * b1
+                    + f1 * f1.transpose() * (a * b2);
+            }
             weight += w;
             weight1 += w1;
             weight2 += w2;
@@ -140,7 +295,7 @@ impl SmoothWall {
             let mixed = w1 * f1.transpose();
             value2 += w2 * f + mixed + mixed.transpose() - q.curvature * w;
         }
-        if weight < 1e-9 {
+        if weight < LEAST_WEIGHT {
             return None;
         }
         let inv = 1.0 / weight;
@@ -150,6 +305,17 @@ impl SmoothWall {
         let hessian = (value2 - weight2 * f - mixed - mixed.transpose()) * inv;
         Some(Distance { value_mm: f, gradient, hessian })
     }
+}
+
+/// The middles of a triangle and its sides.
+fn few([a, b, c]: &[Vec3; 3]) -> [Vec3; 4] {
+    [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5, (a + b + c) / 3.0]
+}
+
+/// Points all over a triangle.
+fn grid([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
+    let part = |k: u32| f64::from(k) / f64::from(CHECKED);
+    (0..=CHECKED).flat_map(move |i| (0..=CHECKED - i).map(move |j| a + (b - a) * part(i) + (c - a) * part(j)))
 }
 
 /// Vertices that share an edge with each vertex, ascending.
@@ -168,7 +334,7 @@ fn vertex_neighbours(triangles: &[[u32; 3]], count: usize) -> Vec<Vec<u32>> {
 }
 
 /// Angle-weighted inward normals.
-fn vertex_normals(mesh: &crate::vessel::SurfaceMesh) -> Vec<Vec3> {
+fn vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
     let mut normals = vec![Vec3::zeros(); mesh.vertices_mm.len()];
     for (index, triangle) in mesh.triangles.iter().enumerate() {
         let corner = mesh.corners(index);
@@ -186,22 +352,43 @@ fn vertex_normals(mesh: &crate::vessel::SurfaceMesh) -> Vec<Vec3> {
     normals
 }
 
+/// The smallest ellipse of its shape that holds points of a plane, as a matrix: Σ y yᵀ gives the shape.
+fn ellipse(points: impl Iterator<Item = (f64, f64)> + Clone) -> Matrix2<f64> {
+    let mut spread = Matrix2::zeros();
+    for (p, q) in points.clone() {
+        let y = Vector2::new(p, q);
+        spread += y * y.transpose();
+    }
+    // Neighbours on a line, or none: no needles.
+    spread += Matrix2::identity() * (THINNEST * spread.trace()).max(f64::MIN_POSITIVE);
+    let shape = spread.try_inverse().unwrap_or_else(Matrix2::identity);
+    let farthest =
+        points.map(|(p, q)| Vector2::new(p, q).dot(&(shape * Vector2::new(p, q)))).fold(0.0, f64::max);
+    shape / farthest.max(f64::MIN_POSITIVE)
+}
+
 /// The quadric of vertex `v`: heights of its neighbours and theirs, g·τ + ½ τᵀSτ in its tangent plane, least squares.
 fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[Vec<u32>]) -> Quadric {
     let (origin, normal) = (vertices[v], normals[v]);
-    let longest = neighbours[v].iter().map(|&w| (vertices[w as usize] - origin).norm()).fold(0.0, f64::max);
-    let rho = SUPPORT * longest.max(1e-12);
+    let a = {
+        let axis = Vec3::ith(normal.iamin(), 1.0);
+        (axis - normal * normal.dot(&axis)).normalize()
+    };
+    let b = normal.cross(&a);
+    let flat = |w: u32| {
+        let y = vertices[w as usize] - origin;
+        (y.dot(&a), y.dot(&b), y.dot(&normal))
+    };
+    let plane = ellipse(neighbours[v].iter().map(|&w| flat(w)).map(|(p, q, _)| (p, q))) / (SUPPORT * SUPPORT);
+    let axes = plane.symmetric_eigenvalues();
+    let half_axes_mm = (axes.max().sqrt().recip(), axes.min().sqrt().recip());
     let mut ring: Vec<u32> = neighbours[v].clone();
     for &w in &neighbours[v] {
         ring.extend(neighbours[w as usize].iter().copied());
     }
     ring.sort_unstable();
     ring.dedup();
-    let a = {
-        let axis = Vec3::ith(normal.iamin(), 1.0);
-        (axis - normal * normal.dot(&axis)).normalize()
-    };
-    let b = normal.cross(&a);
+    let long = half_axes_mm.1;
     let mut matrix = SMatrix::<f64, 5, 5>::identity() * REGULAR;
     let mut right = SVector::<f64, 5>::zeros();
     for &w in &ring {
@@ -209,36 +396,47 @@ fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[Vec<u32>]) -
         if w as usize == v || normals[w as usize].dot(&normal) < 0.3 {
             continue;
         }
-        let y = (vertices[w as usize] - origin) / longest;
-        let (p, q, h) = (y.dot(&a), y.dot(&b), y.dot(&normal));
+        let (p, q, h) = flat(w);
+        let weight = 1.0 / (1.0 + Vector2::new(p, q).dot(&(plane * Vector2::new(p, q))));
+        let (p, q, h) = (p / long, q / long, h / long);
         let row = SVector::<f64, 5>::new(p, q, 0.5 * p * p, p * q, 0.5 * q * q);
-        let weight = 1.0 / (1.0 + y.norm_squared());
         matrix += row * row.transpose() * weight;
         right += row * (h * weight);
     }
     let found = matrix.cholesky().map_or_else(SVector::zeros, |c| c.solve(&right));
     // A fit that leans over is none; neither is one that is not a number.
-    if found[0].hypot(found[1]).max(0.5) != 0.5 || found[0].is_nan() {
-        return Quadric {
-            position: origin,
-            normal,
-            curvature: Matrix3::zeros(),
-            inverse_square: rho.powi(-2),
-        };
-    }
-    let (saa, sab, sbb) = (found[2] / longest, found[3] / longest, found[4] / longest);
-    let size = saa.abs().max(sbb.abs()) + sab.abs();
-    let scale = (LARGEST_BEND / rho / size.max(1e-300)).min(1.0);
-    let tangent =
-        a * a.transpose() * saa + (a * b.transpose() + b * a.transpose()) * sab + b * b.transpose() * sbb;
-    // The plane of the fit, and the curvature seen from it.
-    let normal = (normal - a * found[0] - b * found[1]).normalize();
+    let usable = found[0].hypot(found[1]) <= 0.5;
+    let (tilt, bend) = if usable {
+        (Vector2::new(found[0], found[1]), Matrix2::new(found[2], found[3], found[3], found[4]) / long)
+    } else {
+        (Vector2::zeros(), Matrix2::zeros())
+    };
+    // Sag over the support against its half axes, direction by direction.
+    let size = (0..2)
+        .map(|i| {
+            (0..2)
+                .map(|j| (bend[(i, j)] / plane[(i, i)].sqrt().sqrt() / plane[(j, j)].sqrt().sqrt()).abs())
+                .sum::<f64>()
+        })
+        .fold(0.0, f64::max);
+    let bend = bend * (LARGEST_BEND / size.max(1e-300)).min(1.0);
+    // The plane of the fit, and curvature and support seen from it.
+    let normal = (normal - a * tilt.x - b * tilt.y).normalize();
     let across = Matrix3::identity() - normal * normal.transpose();
+    let seen = |m: &Matrix2<f64>| {
+        let whole = a * a.transpose() * m[(0, 0)]
+            + (a * b.transpose() + b * a.transpose()) * m[(0, 1)]
+            + b * b.transpose() * m[(1, 1)];
+        across * whole * across
+    };
     Quadric {
         position: origin,
         normal,
-        curvature: across * tangent * across * scale,
-        inverse_square: rho.powi(-2),
+        curvature: seen(&bend),
+        support: seen(&plane),
+        half_axes_mm,
+        offset_mm: 0.0,
+        window_mm: 0.0,
     }
 }
 
@@ -252,7 +450,7 @@ mod tests {
         let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(edge_mm))
             .unwrap()
             .wall;
-        (SmoothWall::new(&wall, 0.5), WallQuery::new(&wall).unwrap())
+        (SmoothWall::new(&wall, 0.5, 0.5), WallQuery::new(&wall).unwrap())
     }
 
     fn at(wall: &(SmoothWall, WallQuery), x: &Vec3) -> Distance {
