@@ -34,9 +34,8 @@ impl CrossingTest {
 
     fn cells_of(&self, low: &Vec3, high: &Vec3) -> impl Iterator<Item = [i64; 3]> + use<> {
         let [low, high] = [low, high].map(|x| x.map(|c| (c / self.cell_mm).floor() as i64));
-        (low.x..=high.x).flat_map(move |x| {
-            (low.y..=high.y).flat_map(move |y| (low.z..=high.z).map(move |z| [x, y, z]))
-        })
+        (low.x..=high.x)
+            .flat_map(move |x| (low.y..=high.y).flat_map(move |y| (low.z..=high.z).map(move |z| [x, y, z])))
     }
 
     /// Whether any piece of the line through `points` passes through a triangle.

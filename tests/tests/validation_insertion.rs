@@ -9,9 +9,7 @@ use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, StepReport, WallProperties};
 use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::vessel::{
-    CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall, anatomy,
-};
+use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall, anatomy};
 use endowire_tests::crossing::CrossingTest;
 
 fn kirchhoff(element_mm: f64) -> MethodChoice {

@@ -25,6 +25,8 @@ pub(crate) enum Command {
     /// Check or generate vessel walls
     #[command(subcommand)]
     Vessel(VesselCommand),
+    /// Run time against error, method by method: tables and a work–precision picture
+    Compare(CompareArgs),
     /// Repeat an experiment of Li et al. 2011
     #[command(subcommand)]
     Experiment(ExperimentCommand),
@@ -92,6 +94,25 @@ pub(crate) struct GenerateArgs {
     #[arg(long, value_name = "COUNT")]
     pub(crate) triangles: Option<usize>,
     /// Print the report as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct CompareArgs {
+    /// Folder for compare.csv, .json, .svg and .png; rows that compare.csv already has are not run again
+    #[arg(long, default_value = "out/compare", value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Cases to run; all if absent
+    #[arg(long, value_delimiter = ',', value_name = "CASE,…")]
+    pub(crate) cases: Vec<String>,
+    /// Methods to run; all if absent
+    #[arg(long, value_delimiter = ',', value_name = "METHOD,…")]
+    pub(crate) methods: Vec<String>,
+    /// Longest time of one solve or insertion
+    #[arg(long, default_value_t = 30.0, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) limit_s: f64,
+    /// Print the rows as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -23,7 +23,7 @@ pub struct InsertionOptions {
 
 impl Default for InsertionOptions {
     fn default() -> Self {
-        Self { element_mm: 2.0, tolerance: 1e-3 }
+        Self { element_mm: 2.0, tolerance: 1e-2 }
     }
 }
 
@@ -57,6 +57,14 @@ impl Insertion {
         surroundings: &Surroundings<'_>,
     ) -> Result<Self> {
         model.check(surroundings.device)?;
+        let friction = surroundings.properties.friction;
+        if friction != 0.0 {
+            return Err(Error::parameter(
+                "vessel.wall.friction",
+                friction,
+                format!("{} has no friction here: set it to 0 or use another method", model.name()),
+            ));
+        }
         let length_mm = surroundings.device.length_mm();
         in_range("method.element_mm", options.element_mm, length_mm)?;
         in_range("method.tolerance", options.tolerance, 1.0)?;

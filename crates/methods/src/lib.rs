@@ -75,14 +75,38 @@ pub trait RodModel: Send {
 pub const NAMES: [&str; 6] =
     ["rigid-links", "mass-spring", "beam-fem", "beam-fem-damped", "chord-energy", "discrete-rod"];
 
-/// The method of that name with the parameters that serve it best.
-pub fn by_name(name: &str) -> Option<Box<dyn RodModel>> {
+/// What a method is asked to do: its best parameters depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Task {
+    /// One static solve from the unloaded shape: the motion is as long as the device.
+    Cantilever,
+    /// Insertion: the device is held along its length, and each step is short.
+    Insertion,
+}
+
+/// The method of that name with the parameters that serve it best in `task`, as found by the example `tune`.
+pub fn by_name(name: &str, task: Task) -> Option<Box<dyn RodModel>> {
+    let insertion = task == Task::Insertion;
     Some(match name {
+        "rigid-links" if insertion => {
+            Box::new(RigidLinks { time_step: 0.015, damping: 0.015, ..RigidLinks::default() })
+        }
         "rigid-links" => Box::new(RigidLinks::default()),
+        "mass-spring" if insertion => Box::new(MassSpring {
+            axial_ratio: 16.0,
+            damping: 10.0,
+            max_iterations: 200_000,
+            ..MassSpring::default()
+        }),
         "mass-spring" => Box::new(MassSpring::default()),
         "beam-fem" => Box::new(BeamFem::default()),
+        "beam-fem-damped" if insertion => Box::new(BeamFem { damping: 3e4, ..BeamFem::default() }),
         "beam-fem-damped" => Box::new(BeamFem::damped()),
+        "chord-energy" if insertion => Box::new(ChordEnergy { max_iterations: 20_000 }),
         "chord-energy" => Box::new(ChordEnergy::default()),
+        "discrete-rod" if insertion => {
+            Box::new(DiscreteRod { damping: 10.0, max_iterations: 200_000, ..DiscreteRod::default() })
+        }
         "discrete-rod" => Box::new(DiscreteRod::default()),
         _ => return None,
     })

@@ -26,7 +26,10 @@ impl FeltWall {
     pub(crate) fn new(surroundings: &Surroundings<'_>) -> Result<Self> {
         let radius_mm = surroundings.device.max_radius_mm();
         let felt = Wall::from_surface(&extended(surroundings.wall, radius_mm))?;
-        Ok(Self { smooth: SmoothWall::new(&felt, radius_mm), query: WallQuery::new(&felt)? })
+        Ok(Self {
+            smooth: SmoothWall::new(&felt, surroundings.device.min_radius_mm(), radius_mm),
+            query: WallQuery::new(&felt)?,
+        })
     }
 }
 
@@ -95,6 +98,7 @@ impl<'a> WallLoad<'a> {
                 position_mm: positions_mm[node],
                 normal,
                 force_n: self.stiffness[node] * depth,
+                friction_n: Vec3::zeros(),
                 penetration_mm: depth,
                 triangle,
             });

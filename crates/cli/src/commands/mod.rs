@@ -1,5 +1,6 @@
 //! One file a command.
 
+mod compare;
 mod rod;
 mod run;
 mod timing;
@@ -19,6 +20,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
             vessel::check_file(file, *unit_mm, *json)
         }
         Command::Vessel(VesselCommand::Generate(args)) => vessel::generate(args),
+        Command::Compare(args) => compare::compare(args),
         Command::Experiment(ExperimentCommand::Timing(args)) => timing::timing(args),
     }
 }
