@@ -41,7 +41,7 @@ pub struct DiscreteRod {
 
 impl Default for DiscreteRod {
     fn default() -> Self {
-        Self { damping: 1.5, time_step: 0.9, length_tolerance: 1e-2, max_iterations: 4_000_000 }
+        Self { damping: 1.5, time_step: 0.9, length_tolerance: 1e-2, max_iterations: 1_000_000 }
     }
 }
 

@@ -1,13 +1,13 @@
 //! One file a command.
 
 mod compare;
+mod experiment;
 mod rod;
 mod run;
-mod timing;
 mod verify;
 mod vessel;
 
-use crate::args::{Args, Command, ExperimentCommand, VesselCommand};
+use crate::args::{Args, Command, VesselCommand};
 use crate::failure::Failure;
 
 /// Runs the command that was asked for.
@@ -21,6 +21,6 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         }
         Command::Vessel(VesselCommand::Generate(args)) => vessel::generate(args),
         Command::Compare(args) => compare::compare(args),
-        Command::Experiment(ExperimentCommand::Timing(args)) => timing::timing(args),
+        Command::Experiment(command) => experiment::experiment(command),
     }
 }
