@@ -115,6 +115,7 @@ impl BeamFem {
             posture.positions_mm[i + 1] += u.fixed_rows::<3>(0) * scale;
             let turn: Vec3 = u.fixed_rows::<3>(3) * scale;
             posture.frames[i + 1] = Rotation3::new(turn) * posture.frames[i + 1];
+            posture.frames[i + 1].renormalize();
         }
     }
 }
@@ -127,6 +128,14 @@ pub(crate) fn smallest_rotation(a: &Vec3, b: &Vec3) -> Rotation3<f64> {
     }
     let w = axis.cross_matrix();
     Rotation3::from_matrix_unchecked(Matrix3::identity() + w + w * w / (1.0 + cosine))
+}
+
+/// The rotation vector of a rotation by less than π, also of one that rounding has taken off the orthogonal matrices.
+fn rotation_vector(rotation: &Rotation3<f64>) -> Vec3 {
+    let m = rotation.matrix();
+    let axis = Vec3::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)]) * 0.5;
+    let sine = axis.norm();
+    if sine < 1e-12 { axis } else { axis * (sine.atan2(0.5 * (m.trace() - 1.0)) / sine) }
 }
 
 /// The block tridiagonal system of the nodes after the clamp.
@@ -205,14 +214,14 @@ impl Element {
         let (a, b) = (&posture.frames[i], &posture.frames[i + 1]);
         let chord = posture.chord(i);
         let length = chord.norm();
-        let middle = a * Rotation3::new((a.inverse() * b).scaled_axis() * 0.5);
+        let middle = a * Rotation3::new(rotation_vector(&(a.inverse() * b)) * 0.5);
         let t: Vec3 = middle.matrix().column(0).into();
         let frame = smallest_rotation(&t, &(chord / length)) * middle;
         let [k1, k2] = chain.rest_curvature_per_mm[i];
         // Half of the rotation vector t × t′ of the rest shape.
         let rest = Vec3::new(0.0, -k2, k1) * (0.5 * h);
         let inverse = frame.inverse();
-        let turns = [(inverse * a).scaled_axis() + rest, (inverse * b).scaled_axis() - rest];
+        let turns = [rotation_vector(&(inverse * a)) + rest, rotation_vector(&(inverse * b)) - rest];
         let axial = axial_ratio * chain.bending_nmm2[i] / (h * h);
         // The chord of an arc.
         let chord_at_rest = h * (1.0 - (k1 * k1 + k2 * k2) * h * h / 24.0);

@@ -34,7 +34,12 @@ pub(crate) fn font(size: u32) -> TextStyle<'static> {
 
 /// A label of a logarithmic axis.
 pub(crate) fn power(value: &f64) -> String {
-    if (0.01..1e4).contains(value) { format!("{value}") } else { format!("{value:e}") }
+    // The axis computes its powers of ten with rounding.
+    if (0.009..9e3).contains(value) {
+        format!("{}", (value * 1e4).round() / 1e4)
+    } else {
+        format!("1e{}", value.log10().round())
+    }
 }
 
 /// A chart that draws itself on any backend.

@@ -13,6 +13,8 @@ pub(crate) struct Front {
     pub(crate) rows: Vec<(String, usize)>,
     /// Methods with such rows.
     pub(crate) methods: Vec<String>,
+    /// The least error of the other methods on the front: below it the first of `methods` is alone.
+    pub(crate) alone_below: Option<f64>,
     /// The error at which times are compared, in the case's unit.
     pub(crate) at_error: f64,
     /// Time of each method that reaches it, s, fastest first: interpolated between its rows on logarithmic scales.
@@ -36,6 +38,8 @@ pub(crate) fn front(case: &str, rows: &[&Row], at_error: f64) -> Front {
             methods.push(row.method.clone());
         }
     }
+    let others = best.iter().filter(|(row, ..)| Some(&row.method) != methods.first()).map(|(_, e, _)| *e);
+    let alone_below = others.min_by(f64::total_cmp);
     let mut names: Vec<&str> = points.iter().map(|(row, ..)| row.method.as_str()).collect();
     names.dedup();
     let mut time_s: Vec<(String, f64)> = names
@@ -48,7 +52,7 @@ pub(crate) fn front(case: &str, rows: &[&Row], at_error: f64) -> Front {
         .collect();
     time_s.sort_by(|a, b| a.1.total_cmp(&b.1));
     let rows = best.iter().map(|(row, ..)| (row.method.clone(), row.resolution)).collect();
-    Front { case: case.to_owned(), rows, methods, at_error, time_s }
+    Front { case: case.to_owned(), rows, methods, alone_below, at_error, time_s }
 }
 
 /// Least time at which a method is known to have at most `at_error`, from its (error, time) by rising resolution.
@@ -92,6 +96,7 @@ mod tests {
         let found = front("c", &all, 1e-3);
         assert_eq!(found.rows, [("b".to_owned(), 2), ("a".to_owned(), 2), ("a".to_owned(), 1)]);
         assert_eq!(found.methods, ["b", "a"]);
+        assert_eq!(found.alone_below, Some(1e-4));
         // Half way on both logarithmic scales.
         assert!((found.time_s[0].1 - 2.0).abs() < 1e-12, "{:?}", found.time_s);
         assert_eq!(front("c", &all[..1], 1e-3).time_s, []);

@@ -258,7 +258,13 @@ fn text(document: &Document, cases: &[(&'static str, &'static str, f64)]) -> Str
             );
         }
         if let Some(front) = document.fronts.iter().find(|front| front.case == *name) {
-            lines.push(format!("Pareto front: {}", front.methods.join(", ")));
+            lines.push(match (front.methods.split_first(), front.alone_below) {
+                (Some((first, others)), Some(error)) => format!(
+                    "Pareto front: {first}, alone below {error:.1e} {unit}; above also {}",
+                    others.join(", ")
+                ),
+                _ => format!("Pareto front: {}", front.methods.join(", ")),
+            });
             let fastest = front.time_s.first().map_or(1.0, |f| f.1);
             let times: Vec<String> = front
                 .time_s

@@ -120,13 +120,13 @@ fn measure(simulation: &Simulation, stopped_at: &mut Option<f64>) -> Row {
     if stopped_at.is_none() && tip.z > TUBE_MM && !report.contacts.is_empty() {
         *stopped_at = Some(report.inserted_mm);
     }
-    let beyond = x.iter().filter(|x| x.z >= tip.z).map(|x| x.x);
-    let (low, high) = beyond.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
+    let beyond: Vec<&Vec3> = x.iter().filter(|x| x.z >= tip.z).collect();
+    let across = |a: &Vec3| beyond.iter().map(|b| (a - *b).xy().norm()).fold(0.0, f64::max);
     Row {
         inserted_mm: report.inserted_mm,
         advance_mm: stopped_at.map_or(0.0, |at| report.inserted_mm - at),
         loop_depth_mm: farthest - tip.z,
-        loop_width_mm: high - low,
+        loop_width_mm: beyond.iter().map(|a| across(a)).fold(0.0, f64::max),
         turned_deg: shape.tangents[shape.len() - 1].z.clamp(-1.0, 1.0).acos().to_degrees(),
         push_force_n: report.push_force_n,
         max_penetration_mm: report.max_penetration_mm,
@@ -246,7 +246,7 @@ impl chart::Chart for Growth<'_> {
             let line = rows.iter().filter(|r| r.advance_mm > 0.0).map(|r| (r.advance_mm, value(r)));
             plot.draw_series(LineSeries::new(line, colour.stroke_width(3)))?;
             if let Some(last) = rows.last() {
-                let at = (0.93 * far, value(last) + 0.03 * high);
+                let at = (0.92 * far, value(last) + 0.08 * high);
                 plot.draw_series([Text::new(name, at, chart::font(18).color(&colour))])?;
             }
         }

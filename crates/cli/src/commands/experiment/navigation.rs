@@ -38,7 +38,7 @@ const ANATOMIES: [Anatomy; 2] = [
         targets: &["ascending aorta", "innominate", "left carotid", "left subclavian"],
         edge_mm: 2.25,
         radius_mm: 0.445,
-        tip_curvature_per_mm: 0.05,
+        tip_curvature_per_mm: 0.06,
         tip_mm: 25.0,
         primary_deg: 40.0,
     },
@@ -56,15 +56,16 @@ const ANATOMIES: [Anatomy; 2] = [
 const COMMANDS: usize = 500;
 /// Advance of one command, mm.
 const STEP_MM: f64 = 2.0;
-/// How far ahead on the way the hand aims, mm, and how far before its end it has arrived.
-const AHEAD_MM: f64 = 12.0;
+/// How far ahead on the way the hand aims, in radii of the vessel.
+const AHEAD_RADII: f64 = 1.5;
+/// How far before the way's end the tip has arrived, mm.
 const ARRIVED_MM: f64 = 6.0;
 /// Largest turn of one command, rad.
 const TURN_RAD: f64 = 0.35;
 /// Pulled back after going astray, mm.
-const BACK_MM: f64 = 20.0;
+const BACK_MM: f64 = 30.0;
 /// Pushed in without getting farther, mm, before the hand tries something else.
-const PATIENCE_MM: f64 = 16.0;
+const PATIENCE_MM: f64 = 24.0;
 /// Every so many commands there is a frame.
 const FRAME_EVERY: usize = 50;
 
@@ -250,6 +251,8 @@ struct Hand {
     back_mm: f64,
     turn_rad: f64,
     retries: usize,
+    /// Until so much is inserted again, mm, the other turn is kept.
+    keep_until_mm: f64,
 }
 
 impl Hand {
@@ -272,27 +275,31 @@ impl Hand {
         let astray = off > radius + 1.0 && inserted > BACK_MM;
         if astray || inserted - self.best_inserted_mm > PATIENCE_MM {
             self.retries += 1;
+            self.keep_until_mm = inserted + STEP_MM;
             self.back_mm = BACK_MM;
             // Each time another turn: golden angles fill the circle evenly.
             self.turn_rad = PI * (3.0 - 5.0f64.sqrt());
             return Command::rotate(0.0);
         }
-        Command { advance_mm: STEP_MM, rotate_rad: self.aim(simulation, way, reached, tip, tip_mm) }
+        let kept = inserted < self.keep_until_mm;
+        let rotate_rad = if kept { 0.0 } else { self.aim(simulation, way, reached, tip, tip_mm) };
+        Command { advance_mm: STEP_MM, rotate_rad }
     }
 
     /// Turn of the tail that brings the bend of the tip towards the way ahead.
     fn aim(&self, simulation: &Simulation, way: &[(Vec3, f64)], reached: f64, tip: Vec3, tip_mm: f64) -> f64 {
         let shape = simulation.shape();
-        if simulation.report().inserted_mm < tip_mm {
+        if simulation.report().inserted_mm < tip_mm + 2.0 * STEP_MM {
             return 0.0;
         }
         // The line from which the tip bends away.
         let root = point_at(shape, tip_mm);
         let axis = (root - point_at(shape, tip_mm + 2.0)).normalize();
         let across = |v: Vec3| v - axis * axis.dot(&v);
-        let (bend, wish) = (across(tip - root), across(along(way, reached + AHEAD_MM) - root));
+        let ahead = AHEAD_RADII * nearest(way, &tip).2;
+        let (bend, wish) = (across(tip - root), across(along(way, reached + ahead) - root));
         // A way that goes straight on needs no turn.
-        if wish.norm() < 0.15 * (AHEAD_MM + tip_mm) || bend.norm() < 1e-3 {
+        if wish.norm() < 0.15 * (ahead + tip_mm) || bend.norm() < 1e-3 {
             return 0.0;
         }
         let angle = axis.dot(&bend.cross(&wish)).atan2(bend.dot(&wish));
