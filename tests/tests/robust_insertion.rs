@@ -324,8 +324,7 @@ fn leaving_through_an_opening_is_reported_and_ends_with_a_reason_at_any_incremen
 
 #[test]
 fn a_tip_on_a_carina_takes_a_side_or_stops_with_a_reason() {
-    let arch =
-        GeneratedWall::new(&anatomy::tree("hepatic").unwrap(), Resolution::Triangles(10_000)).unwrap();
+    let arch = GeneratedWall::new(&anatomy::tree("hepatic").unwrap(), Resolution::Triangles(10_000)).unwrap();
     // From the coeliac trunk straight at the edge between its two branches.
     let sheath = Sheath::new(Vec3::new(-0.5, -14.0, 58.0), Vec3::new(-0.03, -1.0, 0.02)).unwrap();
     for (advance, bend) in [(1.0, 0.0), (4.0, 0.0), (1.0, 0.03)] {

@@ -30,6 +30,8 @@ pub(crate) enum Command {
     /// Check or generate vessel walls
     #[command(subcommand)]
     Vessel(VesselCommand),
+    /// Run time against error, method by method: tables and a work–precision picture
+    Compare(CompareArgs),
     /// Repeat an experiment of Li et al. 2011
     #[command(subcommand)]
     Experiment(ExperimentCommand),
@@ -198,10 +200,71 @@ pub(crate) struct GenerateArgs {
     pub(crate) json: bool,
 }
 
+#[derive(Debug, clap::Args)]
+pub(crate) struct CompareArgs {
+    /// Folder for compare.csv, .json, .svg and .png; rows that compare.csv already has are not run again
+    #[arg(long, default_value = "out/compare", value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Cases to run; all if absent
+    #[arg(long, value_delimiter = ',', value_name = "CASE,…")]
+    pub(crate) cases: Vec<String>,
+    /// Methods to run; all if absent
+    #[arg(long, value_delimiter = ',', value_name = "METHOD,…")]
+    pub(crate) methods: Vec<String>,
+    /// Longest time of one solve or insertion
+    #[arg(long, default_value_t = 30.0, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) limit_s: f64,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
 #[derive(Debug, Subcommand)]
 pub(crate) enum ExperimentCommand {
     /// Experiment 1: time per calculation against the number of nodes (the paper's Table 1)
     Timing(TimingArgs),
+    /// Experiment 2: a shaped wire steered to every named target of the aortic arch and the hepatic arteries
+    Navigation(NavigationArgs),
+    /// Experiment 3: a soft tip stopped in a tube, and the loop that grows (the paper's figure 4)
+    Loop(LoopArgs),
+    /// Experiment 4: shape in the curved tube against a ground truth (the paper's Table 2)
+    Deformation(DeformationArgs),
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct NavigationArgs {
+    /// Folder for navigation.csv, navigation.json and frames of both views
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct LoopArgs {
+    /// Folder for loop.csv, loop.json, four frames of both views, and loop.svg and .png
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct DeformationArgs {
+    /// Measured points (CSV: x_mm,y_mm,z_mm from the sheath to the tip) instead of the computed ground truth
+    #[arg(long, value_name = "FILE")]
+    pub(crate) measured: Option<PathBuf>,
+    /// Method
+    #[arg(long, default_value = "kirchhoff", value_name = "METHOD")]
+    pub(crate) method: String,
+    /// Folder for deformation.csv and deformation.json
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, clap::Args)]
@@ -212,6 +275,12 @@ pub(crate) struct TimingArgs {
     /// Timed calculations for each number of nodes
     #[arg(long, default_value_t = 15, value_name = "COUNT")]
     pub(crate) repeats: usize,
+    /// Methods: all, or some of them
+    #[arg(long, value_delimiter = ',', default_values_t = ["li2011-dense", "li2011-banded", "kirchhoff"].map(String::from), value_name = "METHOD,…")]
+    pub(crate) methods: Vec<String>,
+    /// Longest time for a method of the others to be brought in position
+    #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) limit_s: f64,
     /// Folder for timing.csv and timing.json
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,

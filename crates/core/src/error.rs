@@ -93,7 +93,7 @@ pub(crate) fn vector(v: &crate::Vec3) -> String {
 ///
 /// # Errors
 /// A [`Error::Parameter`] naming `name`.
-pub(crate) fn in_range(name: &str, value: f64, limit: f64) -> Result<()> {
+pub fn in_range(name: &str, value: f64, limit: f64) -> Result<()> {
     if value.is_finite() && value > 0.0 && value <= limit {
         return Ok(());
     }

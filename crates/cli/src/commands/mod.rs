@@ -1,14 +1,15 @@
 //! One file a command.
 
+mod compare;
+mod experiment;
 mod fluoro;
 mod render;
 mod rod;
 mod run;
-mod timing;
 mod verify;
 mod vessel;
 
-use crate::args::{Args, Command, ExperimentCommand, VesselCommand};
+use crate::args::{Args, Command, VesselCommand};
 use crate::failure::Failure;
 
 /// Runs the command that was asked for.
@@ -23,6 +24,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
             vessel::check_file(file, *unit_mm, *json)
         }
         Command::Vessel(VesselCommand::Generate(args)) => vessel::generate(args),
-        Command::Experiment(ExperimentCommand::Timing(args)) => timing::timing(args),
+        Command::Compare(args) => compare::compare(args),
+        Command::Experiment(command) => experiment::experiment(command),
     }
 }

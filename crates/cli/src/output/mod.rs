@@ -1,5 +1,6 @@
 //! Everything that leaves the program: recordings, arrays, provenance, progress.
 
+pub(crate) mod chart;
 pub(crate) mod frames;
 pub(crate) mod npz;
 pub(crate) mod progress;

@@ -7,7 +7,7 @@ mod sheath;
 mod simulation;
 
 pub use command::{Command, ScriptLine, commands};
-pub(crate) use nodes::nodes_from_tip;
+pub use nodes::nodes_from_tip;
 pub use report::{Contact, Energy, StepReport};
 pub use sheath::Sheath;
 pub use simulation::{Simulation, Surroundings, WallProperties, check_commands, script_commands};

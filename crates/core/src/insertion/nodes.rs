@@ -5,7 +5,7 @@
 /// Nodes are marks on the device, at whole multiples of `element_mm` from the tip, and enter with it. Only the first
 /// element has another length: between half and one and a half elements, so that no sliver arises while a device is
 /// pushed by fractions of an element; it is shorter only where nothing else is inserted. Nothing inserted is one node.
-pub(crate) fn nodes_from_tip(inserted_mm: f64, element_mm: f64, from_tip_mm: &mut Vec<f64>) {
+pub fn nodes_from_tip(inserted_mm: f64, element_mm: f64, from_tip_mm: &mut Vec<f64>) {
     let elements = if inserted_mm > 0.0 { ((inserted_mm / element_mm).round() as usize).max(1) } else { 0 };
     from_tip_mm.clear();
     from_tip_mm.push(inserted_mm);

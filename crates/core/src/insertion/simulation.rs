@@ -78,6 +78,20 @@ impl Simulation {
         sheath: Sheath,
         method: &MethodChoice,
     ) -> Result<Self> {
+        Self::with_method(wall, properties, device, sheath, |surroundings| method.start(surroundings))
+    }
+
+    /// As [`Simulation::with_properties`], with any method: `start` makes it for these surroundings.
+    ///
+    /// # Errors
+    /// As [`Simulation::with_properties`], and what `start` refuses.
+    pub fn with_method(
+        wall: Wall,
+        properties: WallProperties,
+        device: Device,
+        sheath: Sheath,
+        start: impl FnOnce(&Surroundings<'_>) -> Result<Box<dyn Method>>,
+    ) -> Result<Self> {
         crate::error::in_range("vessel.wall.modulus_n_per_mm2", properties.modulus_n_per_mm2, 1e9)?;
         if !(0.0..=LARGEST_FRICTION).contains(&properties.friction) {
             return Err(Error::parameter(
@@ -109,7 +123,7 @@ impl Simulation {
         }
         let query = WallQuery::new(&wall)?;
         check_mouth(&query, &device, &sheath)?;
-        let method = method.start(&Surroundings {
+        let method = start(&Surroundings {
             wall: &wall,
             properties: &properties,
             query: &query,

@@ -1,0 +1,115 @@
+//! The methods that are compared, core's and the field's, started in one way.
+
+use endowire_core::device::Device;
+use endowire_core::insertion::{Sheath, Simulation, WallProperties};
+use endowire_core::methods::MethodChoice;
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::methods::li2011::{Chain, Li2011Options, banded, dense};
+use endowire_core::statics::{End, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase};
+use endowire_core::vessel::Wall;
+use endowire_core::{Error, Result, Vec3};
+use endowire_methods::{Insertion, InsertionOptions, Task, by_name};
+
+/// All names, ours first.
+pub(crate) fn names() -> Vec<&'static str> {
+    let mut names = vec!["kirchhoff", "li2011-dense", "li2011-banded"];
+    names.extend(endowire_methods::NAMES);
+    names
+}
+
+/// A name that [`names`] does not have.
+fn unknown(method: &str) -> Error {
+    Error::parameter("method", method, format!("the methods are {}", names().join(", ")))
+}
+
+/// A device in a vessel, moved by `method` on elements of `element_mm`.
+///
+/// # Errors
+/// What the method or the simulation refuses.
+pub(crate) fn insertion(
+    method: &str,
+    element_mm: f64,
+    wall: Wall,
+    properties: WallProperties,
+    device: Device,
+    sheath: Sheath,
+) -> Result<Simulation> {
+    // Wall stiffness is per node in Li et al.: the same wall as the others' is the modulus times the element.
+    let li = Li2011Options { element_mm, wall_stiffness_n_per_mm: properties.modulus_n_per_mm2 * element_mm };
+    let choice = match method {
+        "kirchhoff" => MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..Default::default() }),
+        "li2011-dense" => MethodChoice::Li2011Dense(li),
+        "li2011-banded" => MethodChoice::Li2011Banded(li),
+        _ => {
+            let model = by_name(method, Task::Insertion).ok_or_else(|| unknown(method))?;
+            let options = InsertionOptions { element_mm, ..Default::default() };
+            return Simulation::with_method(wall, properties, device, sheath, |surroundings| {
+                Ok(Box::new(Insertion::new(model, options, surroundings)?))
+            });
+        }
+    };
+    Simulation::with_properties(wall, properties, device, sheath, &choice)
+}
+
+/// Out-of-balance force of a static solve on n elements, in EI/L² over 1/n²: below what the elements get wrong.
+const STATIC_TOLERANCE: f64 = 0.5;
+
+/// Tip and iterations of a cantilever of unit length and stiffness along x under the dead load (0, −a, 0).
+///
+/// # Errors
+/// A solve that came to no equilibrium.
+pub(crate) fn cantilever(method: &str, elements: usize, a: f64) -> Result<(Vec3, usize)> {
+    match method {
+        "kirchhoff" => {
+            let solution = tip_load(elements, a).solve()?.checked()?;
+            Ok((Vec3::from(solution.tip), solution.iterations))
+        }
+        "li2011-dense" | "li2011-banded" => {
+            let mut chain = Chain::uniform(Vec3::zeros(), Vec3::x(), 1.0, elements, 1.0);
+            chain.forces_n[elements - 1] = Vec3::new(0.0, -a, 0.0);
+            let (mut x, mut t) = (Vec::new(), Vec::new());
+            if method == "li2011-dense" {
+                dense::solve(&chain, &mut x, &mut t);
+            } else {
+                banded::solve(&chain, &mut banded::Workspace::default(), &mut x, &mut t);
+            }
+            Ok((x[elements - 1], 1))
+        }
+        _ => {
+            let model = by_name(method, Task::Cantilever).ok_or_else(|| unknown(method))?;
+            let tolerance = STATIC_TOLERANCE / (elements * elements) as f64;
+            let force = Vec3::new(0.0, -a, 0.0);
+            let solution = endowire_methods::cantilever(&*model, elements, force, tolerance)?;
+            if !solution.converged {
+                return Err(Error::Computation(format!(
+                    "{method}: no equilibrium with {elements} elements after {} iterations",
+                    solution.iterations
+                )));
+            }
+            Ok((solution.nodes[elements], solution.iterations))
+        }
+    }
+}
+
+fn tip_load(elements: usize, a: f64) -> StaticCase {
+    let section = Section {
+        until: 1.0,
+        ei: 1.0,
+        ei_end: None,
+        gj: None,
+        gj_end: None,
+        ea: None,
+        ea_end: None,
+        rest_curvature: [0.0; 2],
+        rest_curvature_end: None,
+        rest_twist: 0.0,
+    };
+    StaticCase {
+        rod: Rod { length: 1.0, elements, section: vec![section] },
+        start: Start { kind: StartKind::Clamped, position: [0.0; 3], tangent: [1.0, 0.0, 0.0], normal: None },
+        end: End::default(),
+        load: vec![Load { kind: LoadKind::Force, at: None, from: None, to: None, value: [0.0, -a, 0.0] }],
+        initial: None,
+        solver: Solver::default(),
+    }
+}

@@ -1,0 +1,266 @@
+//! `endowire experiment deformation`: the paper's experiment 4, Table 2.
+//!
+//! A wire is pushed into the curved tube of figure 5 by increments h on segments l, and its shape is compared with a ground truth.
+//! The paper's truth is a real catheter in a plastic tube, whose points it does not print. Here it is our own converged
+//! solution, with its convergence shown, or a user's measured points.
+
+use std::path::Path;
+use std::time::Instant;
+
+use endowire_core::Vec3;
+use endowire_core::device::Device;
+use endowire_core::insertion::{Command, Sheath, WallProperties};
+use endowire_core::shape::Shape;
+use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
+use serde::{Deserialize, Serialize};
+
+use crate::args::DeformationArgs;
+use crate::commands::compare::case::rms_distance;
+use crate::commands::compare::contender;
+use crate::failure::Failure;
+use crate::output::provenance::{Provenance, read_input};
+use crate::output::{print, print_json, progress};
+
+/// The paper's Table 2: segment length l in mm, h/l as 1 over, RMS mm, maximum mm, run time s.
+const PAPER: [(f64, u32, f64, f64, f64); 15] = [
+    (1.0, 40, 1.38, 2.32, 180.7),
+    (2.0, 40, 1.54, 2.42, 49.7),
+    (3.0, 40, 1.76, 2.74, 29.5),
+    (1.0, 20, 1.16, 2.12, 84.5),
+    (2.0, 20, 1.47, 2.24, 23.2),
+    (3.0, 20, 1.66, 2.38, 15.4),
+    (1.0, 10, 1.12, 2.16, 41.4),
+    (2.0, 10, 1.35, 2.36, 11.5),
+    (3.0, 10, 1.86, 2.45, 6.9),
+    (1.0, 5, 0.96, 1.52, 20.5),
+    (2.0, 5, 1.26, 1.88, 5.9),
+    (3.0, 5, 1.44, 2.56, 3.9),
+    (1.0, 3, 1.05, 1.76, 11.6),
+    (2.0, 3, 1.24, 2.13, 3.5),
+    (3.0, 3, 1.62, 2.22, 2.1),
+];
+/// Length pushed in, mm: through most of the bend. The paper does not print it.
+const INSERTED_MM: f64 = 200.0;
+/// Meshes of the truth, mm, and its increment.
+const TRUTH_MM: [f64; 3] = [1.0, 0.5, 0.25];
+const TRUTH_STEP_MM: f64 = 1.0;
+/// A 0.035″ wire.
+const RADIUS_MM: f64 = 0.445;
+const STIFFNESS_NMM2: f64 = 10.0;
+/// Edge of the tube's triangles, mm.
+const EDGE_MM: f64 = 0.8;
+
+#[derive(Debug, Serialize)]
+struct Row {
+    method: String,
+    l_mm: f64,
+    /// l/h.
+    l_over_h: u32,
+    rms_mm: f64,
+    max_mm: f64,
+    time_s: f64,
+    paper_rms_mm: f64,
+    paper_max_mm: f64,
+    paper_time_s: f64,
+    /// The paper's time over ours.
+    speedup: f64,
+}
+
+/// Change of the truth from one of its meshes to the next.
+#[derive(Debug, Serialize)]
+struct Refinement {
+    from_mm: f64,
+    to_mm: f64,
+    rms_change_mm: f64,
+    max_change_mm: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Document {
+    #[serde(flatten)]
+    provenance: Provenance,
+    ground_truth: String,
+    convergence: Vec<Refinement>,
+    rows: Vec<Row>,
+    total_time_s: f64,
+    paper_total_time_s: f64,
+}
+
+/// Vessel, sheath and wire of all cells.
+struct Tube {
+    made: GeneratedWall,
+    sheath: Sheath,
+    wire: Device,
+}
+
+impl Tube {
+    /// The shape after the whole insertion, and the time it took, s.
+    fn insert(&self, method: &str, l_mm: f64, h_mm: f64) -> Result<(Shape, f64), Failure> {
+        let mut simulation = contender::insertion(
+            method,
+            l_mm,
+            self.made.wall.clone(),
+            WallProperties::default(),
+            self.wire.clone(),
+            self.sheath,
+        )?;
+        let steps = (INSERTED_MM / h_mm - 1e-9).ceil() as usize;
+        let clock = Instant::now();
+        for k in 0..steps {
+            let inserted = simulation.report().inserted_mm;
+            let target = if k + 1 == steps { INSERTED_MM } else { h_mm * (k + 1) as f64 };
+            simulation.step(Command::advance(target - inserted))?;
+        }
+        Ok((simulation.shape().clone(), clock.elapsed().as_secs_f64()))
+    }
+}
+
+/// Runs the grid and prints it beside the paper's.
+pub(super) fn deformation(args: &DeformationArgs) -> Result<(), Failure> {
+    let tree = anatomy::tree("curved_tube").ok_or_else(|| Failure::Input("no curved_tube".to_owned()))?;
+    let made = GeneratedWall::new(&tree, Resolution::EdgeMm(EDGE_MM))?;
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0)?;
+    let tube = Tube { made, sheath, wire: Device::uniform(INSERTED_MM + 1.0, RADIUS_MM, STIFFNESS_NMM2)? };
+    let bar = progress::bar(PAPER.len() + TRUTH_MM.len(), "cell");
+
+    let mut inputs = vec![format!("experiment deformation {}", args.method).into_bytes()];
+    let mut convergence = Vec::new();
+    let (truth, ground_truth) = if let Some(path) = &args.measured {
+        inputs.push(read_input(path)?);
+        bar.inc(TRUTH_MM.len() as u64);
+        (measured(path)?, format!("measured points of {}", path.display()))
+    } else {
+        let mut shapes: Vec<Shape> = Vec::new();
+        for l_mm in TRUTH_MM {
+            bar.set_message(format!("truth, {l_mm} mm"));
+            shapes.push(tube.insert("kirchhoff", l_mm, TRUTH_STEP_MM)?.0);
+            bar.inc(1);
+        }
+        for (k, pair) in shapes.windows(2).enumerate() {
+            let (rms_change_mm, max_change_mm) = rms_distance(&pair[0], &pair[1]);
+            let (from_mm, to_mm) = (TRUTH_MM[k], TRUTH_MM[k + 1]);
+            convergence.push(Refinement { from_mm, to_mm, rms_change_mm, max_change_mm });
+        }
+        let finest = TRUTH_MM[TRUTH_MM.len() - 1];
+        let text = format!("computed: kirchhoff with elements of {finest} mm, not a real catheter");
+        (shapes.swap_remove(TRUTH_MM.len() - 1), text)
+    };
+
+    let mut rows = Vec::new();
+    for (l_mm, l_over_h, paper_rms_mm, paper_max_mm, paper_time_s) in PAPER {
+        bar.set_message(format!("l = {l_mm} mm, h = l/{l_over_h}"));
+        let (shape, time_s) = tube.insert(&args.method, l_mm, l_mm / f64::from(l_over_h))?;
+        let (rms_mm, max_mm) = rms_distance(&shape, &truth);
+        rows.push(Row {
+            method: args.method.clone(),
+            l_mm,
+            l_over_h,
+            rms_mm,
+            max_mm,
+            time_s,
+            paper_rms_mm,
+            paper_max_mm,
+            paper_time_s,
+            speedup: paper_time_s / time_s,
+        });
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let document = Document {
+        provenance: Provenance::new(&inputs, 0),
+        ground_truth,
+        convergence,
+        total_time_s: rows.iter().map(|row| row.time_s).sum(),
+        paper_total_time_s: rows.iter().map(|row| row.paper_time_s).sum(),
+        rows,
+    };
+    if let Some(folder) = &args.out {
+        super::write(folder, "deformation", &document.rows, &document)?;
+    }
+    if args.json { print_json(&document) } else { print(table(&document)) }
+}
+
+/// One measured point, mm, in the tube's coordinates.
+#[derive(Debug, Deserialize)]
+struct Point {
+    x_mm: f64,
+    y_mm: f64,
+    z_mm: f64,
+}
+
+/// Measured points from the sheath to the tip, as a polyline that begins at the sheath's mouth.
+fn measured(path: &Path) -> Result<Shape, Failure> {
+    let unusable = |reason: String| Failure::Input(format!("{}: {reason}", path.display()));
+    let mut reader = csv::Reader::from_path(path).map_err(|e| unusable(e.to_string()))?;
+    let mut x: Vec<Vec3> = Vec::new();
+    for (index, point) in reader.deserialize().enumerate() {
+        let point: Point = point.map_err(|e| unusable(e.to_string()))?;
+        let p = Vec3::new(point.x_mm, point.y_mm, point.z_mm);
+        if !p.iter().all(|c| c.is_finite()) || x.last().is_some_and(|last| *last == p) {
+            return Err(unusable(format!(
+                "point {}: must be finite and differ from the one before",
+                index + 1
+            )));
+        }
+        x.push(p);
+    }
+    if x.len() < 2 {
+        return Err(unusable(
+            "give at least two points x_mm,y_mm,z_mm, from the sheath to the tip".to_owned(),
+        ));
+    }
+    let mut shape = Shape { positions_mm: x, ..Shape::default() };
+    let n = shape.len();
+    let chord = |i: usize| shape.positions_mm[i + 1] - shape.positions_mm[i];
+    let mut from_tip = 0.0;
+    let mut from_tip_mm = vec![0.0; n];
+    for i in (0..n - 1).rev() {
+        from_tip += chord(i).norm();
+        from_tip_mm[i] = from_tip;
+    }
+    // Each node between the directions of its two chords.
+    let tangents = (0..n)
+        .map(|i| {
+            let before = chord(i.max(1) - 1).normalize();
+            let after = chord(i.min(n - 2)).normalize();
+            (before + after).try_normalize(1e-12).unwrap_or(after)
+        })
+        .collect();
+    (shape.from_tip_mm, shape.tangents) = (from_tip_mm, tangents);
+    Ok(shape)
+}
+
+fn table(document: &Document) -> String {
+    let mut lines = vec![format!("ground truth: {}", document.ground_truth)];
+    for r in &document.convergence {
+        lines.push(format!(
+            "  its elements from {} to {} mm change it by {:.1e} mm RMS, {:.1e} mm at most",
+            r.from_mm, r.to_mm, r.rms_change_mm, r.max_change_mm
+        ));
+    }
+    lines.push(format!(
+        "{:>5} {:>5} {:>10} {:>10} {:>9}   {:>9} {:>9} {:>9} {:>9}",
+        "l mm", "h/l", "RMS mm", "max mm", "time s", "paper RMS", "paper max", "paper s", "faster"
+    ));
+    for row in &document.rows {
+        lines.push(format!(
+            "{:>5} {:>5} {:>10.5} {:>10.5} {:>9.3}   {:>9.2} {:>9.2} {:>9.1} {:>8.0}×",
+            row.l_mm,
+            format!("1/{}", row.l_over_h),
+            row.rms_mm,
+            row.max_mm,
+            row.time_s,
+            row.paper_rms_mm,
+            row.paper_max_mm,
+            row.paper_time_s,
+            row.speedup
+        ));
+    }
+    lines.push(format!(
+        "whole grid: {:.2} s, the paper's {:.1} s: {:.0}× faster",
+        document.total_time_s,
+        document.paper_total_time_s,
+        document.paper_total_time_s / document.total_time_s
+    ));
+    lines.join("\n")
+}

@@ -1,0 +1,44 @@
+//! `endowire experiment`: the four experiments of Li et al. 2011.
+
+mod deformation;
+mod looping;
+mod navigation;
+mod timing;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::args::ExperimentCommand;
+use crate::failure::Failure;
+use crate::output::to_json;
+
+/// Runs the experiment that was asked for.
+pub(crate) fn experiment(command: &ExperimentCommand) -> Result<(), Failure> {
+    match command {
+        ExperimentCommand::Timing(args) => timing::timing(args),
+        ExperimentCommand::Navigation(args) => navigation::navigation(args),
+        ExperimentCommand::Loop(args) => looping::looping(args),
+        ExperimentCommand::Deformation(args) => deformation::deformation(args),
+    }
+}
+
+/// Writes NAME.csv from the rows and NAME.json from the document.
+fn write<R: Serialize>(
+    folder: &Path,
+    name: &str,
+    rows: &[R],
+    document: &impl Serialize,
+) -> Result<(), Failure> {
+    let save = || -> std::io::Result<()> {
+        std::fs::create_dir_all(folder)?;
+        let mut table = csv::Writer::from_path(folder.join(format!("{name}.csv")))?;
+        for row in rows {
+            table.serialize(row)?;
+        }
+        table.flush()
+    };
+    save().map_err(|e| Failure::write(folder, &e))?;
+    let path = folder.join(format!("{name}.json"));
+    std::fs::write(&path, to_json(document)? + "\n").map_err(|e| Failure::write(&path, &e))
+}

@@ -1,0 +1,367 @@
+//! `endowire experiment timing`: the paper's experiment 1, Table 1.
+//!
+//! A wire of n nodes is advanced through the curved tube by both solves at once. Two times are taken at the full
+//! length, each the median over the timed increments: building and solving the linear system (steps 4 and 5 of
+//! Algorithm 1), which is where dense and banded differ, and one whole calculation (steps 2 to 6, with collision
+//! detection and read-outs), which is what the paper's column counts.
+
+use std::time::Instant;
+
+use endowire_core::device::Device;
+use endowire_core::insertion::{Command, Sheath, Surroundings, WallProperties};
+use endowire_core::methods::Method;
+use endowire_core::methods::li2011::{Chain, Li2011, Li2011Options, LinearSolver, banded, dense};
+use endowire_core::vessel::{GeneratedWall, Resolution, Wall, WallQuery, anatomy};
+use serde::Serialize;
+
+use crate::args::TimingArgs;
+use crate::commands::compare::contender;
+use crate::failure::Failure;
+use crate::output::provenance::Provenance;
+use crate::output::{print, print_json, progress};
+
+/// The paper's Table 1: nodes, milliseconds, on an Intel Core2 6700 with a GeForce 8800.
+const PAPER_MS: [(usize, f64); 5] = [(50, 9.2), (100, 15.4), (150, 24.8), (200, 36.7), (300, 58.4)];
+/// Length at which the calculations are timed, mm: past the bend of the curved tube.
+const INSERTED_MM: f64 = 220.0;
+/// Increment of the approach, mm, and of the timed calculations.
+const APPROACH_MM: f64 = 2.0;
+const TIMED_MM: f64 = 0.2;
+/// A 0.035″ wire of medium stiffness.
+const RADIUS_MM: f64 = 0.445;
+const STIFFNESS_NMM2: f64 = 20.0;
+/// Largest distance between the nodes of the two solves, mm.
+const AGREEMENT_MM: f64 = 1e-8;
+/// Most nodes, …
+const MOST_NODES: usize = 10_000;
+/// … and of the dense solve: a calculation with 1,000 takes seconds and half a gigabyte.
+const MOST_DENSE: usize = 1_000;
+/// The paper's frames a second with 300 nodes.
+const PAPER_FPS: f64 = 17.0;
+/// Most timed calculations: those that the tube has room for.
+const MOST_REPEATS: usize = 100;
+
+#[derive(Debug, Serialize)]
+struct Document {
+    #[serde(flatten)]
+    provenance: Provenance,
+    rows: Vec<Row>,
+}
+
+#[derive(Debug, Serialize)]
+struct Row {
+    method: &'static str,
+    nodes: usize,
+    /// Median time to build and solve the linear system, ms; of the whole calculation where there is no one system. None
+    /// where the method was not timed, as the note says.
+    median_ms: Option<f64>,
+    /// Median time of one whole calculation, collision detection and read-outs included, ms.
+    step_ms: Option<f64>,
+    /// The paper's time of one calculation, ms, where it has one.
+    paper_ms: Option<f64>,
+    /// Of the two solves of the paper's method: largest distance, over the whole insertion, between a node and the same
+    /// node of li2011-banded, mm.
+    max_difference_mm: Option<f64>,
+    /// Why a method was not timed, or what is to be known of it.
+    note: String,
+}
+
+/// Times every number of nodes and prints the table.
+pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
+    if !(1..=MOST_REPEATS).contains(&args.repeats) {
+        return Err(Failure::Input(format!(
+            "--repeats {}: time 1 to {MOST_REPEATS} calculations",
+            args.repeats
+        )));
+    }
+    if !(args.limit_s.is_finite() && args.limit_s > 0.0) {
+        return Err(Failure::Input(format!("--limit-s {}: give a time above 0", args.limit_s)));
+    }
+    if args.nodes.is_empty() {
+        return Err(Failure::Input("--nodes: give at least one number of nodes".to_owned()));
+    }
+    if let Some(nodes) = args.nodes.iter().find(|nodes| !(2..=MOST_NODES).contains(*nodes)) {
+        return Err(Failure::Input(format!("--nodes {nodes}: give 2 to {MOST_NODES}")));
+    }
+    let tree = anatomy::tree("curved_tube").ok_or_else(|| Failure::Input("no curved_tube".to_owned()))?;
+    let generated = GeneratedWall::new(&tree, Resolution::fitting(&tree))?;
+    let query = WallQuery::new(&generated.wall)?;
+    let sheath = Sheath::at_opening(&generated.wall, generated.inlet, 1.0)?;
+    let device = Device::uniform(INSERTED_MM + TIMED_MM * args.repeats as f64, RADIUS_MM, STIFFNESS_NMM2)?;
+    let surroundings = Surroundings {
+        wall: &generated.wall,
+        properties: &WallProperties::default(),
+        query: &query,
+        sheath: &sheath,
+        device: &device,
+    };
+
+    let methods = methods(&args.methods)?;
+    let (paper, others): (Vec<&str>, Vec<&str>) = methods.iter().partition(|m| m.starts_with("li2011"));
+    let bar = progress::bar(args.nodes.len() * (usize::from(!paper.is_empty()) + others.len()), "row");
+    let mut rows = Vec::new();
+    for &nodes in &args.nodes {
+        if !paper.is_empty() {
+            bar.set_message(format!("{nodes} nodes, li2011"));
+            let dense = paper.contains(&"li2011-dense") && nodes <= MOST_DENSE;
+            let timed = time_paper(nodes, args.repeats, dense, &surroundings)?;
+            rows.extend(timed.into_iter().filter(|row| paper.contains(&row.method)));
+            if paper.contains(&"li2011-dense") && !dense {
+                rows.push(Row::untimed(
+                    "li2011-dense",
+                    nodes,
+                    format!("not timed beyond {MOST_DENSE} nodes"),
+                ));
+            }
+            bar.inc(1);
+        }
+        for method in &others {
+            bar.set_message(format!("{nodes} nodes, {method}"));
+            rows.push(time_other(method, nodes, args, &generated.wall, sheath, &device)?);
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+
+    let arguments = format!("experiment timing {:?} {} {methods:?}", args.nodes, args.repeats);
+    let document = Document { provenance: Provenance::of_program(&arguments), rows };
+    if let Some(folder) = &args.out {
+        super::write(folder, "timing", &document.rows, &document)?;
+    }
+    if args.json {
+        print_json(&document)?;
+    } else {
+        print(table(&document.rows))?;
+    }
+    check_agreement(&document.rows)
+}
+
+impl Row {
+    fn untimed(method: &'static str, nodes: usize, note: String) -> Self {
+        Self {
+            method,
+            nodes,
+            median_ms: None,
+            step_ms: None,
+            paper_ms: paper_ms(nodes),
+            max_difference_mm: None,
+            note,
+        }
+    }
+}
+
+/// The paper's time with so many nodes, ms.
+fn paper_ms(nodes: usize) -> Option<f64> {
+    PAPER_MS.iter().find(|(n, _)| *n == nodes).map(|(_, ms)| *ms)
+}
+
+/// The methods asked for, in the order of the table.
+fn methods(asked: &[String]) -> Result<Vec<&'static str>, Failure> {
+    let mut known = vec!["li2011-dense", "li2011-banded", "kirchhoff"];
+    known.extend(endowire_methods::NAMES);
+    if asked.iter().any(|name| name == "all") {
+        return Ok(known);
+    }
+    if let Some(name) = asked.iter().find(|name| !known.contains(&name.as_str())) {
+        return Err(Failure::Input(format!("--methods {name}: choose from all, {}", known.join(", "))));
+    }
+    known.retain(|name| asked.iter().any(|wanted| wanted == name));
+    Ok(known)
+}
+
+/// Element length with which `nodes` nodes, the sheath's too, are inserted; the timed increments stay within one element.
+fn element_mm(nodes: usize, repeats: usize) -> f64 {
+    (INSERTED_MM + 0.5 * TIMED_MM * repeats as f64) / (nodes - 1) as f64
+}
+
+/// A method without a linear system to be timed by itself. What goes wrong is told in the row.
+fn time_other(
+    method: &'static str,
+    nodes: usize,
+    args: &TimingArgs,
+    wall: &Wall,
+    sheath: Sheath,
+    device: &Device,
+) -> Result<Row, Failure> {
+    let element = element_mm(nodes, args.repeats);
+    let properties = WallProperties::default();
+    let mut simulation =
+        contender::insertion(method, element, wall.clone(), properties, device.clone(), sheath)?;
+    let begun = Instant::now();
+    let mut steps = Vec::new();
+    let mut unconverged = 0;
+    let approach = (INSERTED_MM / APPROACH_MM).round() as usize;
+    for step in 0..approach + args.repeats {
+        let timed = step >= approach;
+        let clock = Instant::now();
+        match simulation.step(Command::advance(if timed { TIMED_MM } else { APPROACH_MM })) {
+            Ok(report) => unconverged += usize::from(timed && !report.converged),
+            Err(error) => return Ok(Row::untimed(method, nodes, error.to_string())),
+        }
+        if timed {
+            steps.push(milliseconds(clock));
+        }
+        if begun.elapsed().as_secs_f64() > args.limit_s && steps.is_empty() {
+            let note = format!("stopped at the limit of {} s, {step} steps in", args.limit_s);
+            return Ok(Row::untimed(method, nodes, note));
+        }
+        if begun.elapsed().as_secs_f64() > 2.0 * args.limit_s {
+            break;
+        }
+    }
+    let note = if unconverged > 0 { format!("{unconverged} steps unconverged") } else { String::new() };
+    let median_ms = Some(median(steps));
+    Ok(Row { median_ms, step_ms: median_ms, ..Row::untimed(method, nodes, note) })
+}
+
+/// Both solves of the paper's method over the same insertion, timed at its end; the dense one only if asked for.
+fn time_paper(
+    nodes: usize,
+    repeats: usize,
+    dense: bool,
+    surroundings: &Surroundings<'_>,
+) -> Result<Vec<Row>, Failure> {
+    let options = Li2011Options { element_mm: element_mm(nodes, repeats), ..Default::default() };
+    let mut dense_method = Li2011::new(options, LinearSolver::Dense, surroundings)?;
+    let mut banded_method = Li2011::new(options, LinearSolver::Banded, surroundings)?;
+    let mut max_difference_mm: f64 = 0.0;
+    let mut step_both = |command: Command| -> Result<[f64; 2], Failure> {
+        let clock = Instant::now();
+        if dense {
+            dense_method.step(surroundings, command)?;
+        }
+        let dense_ms = milliseconds(clock);
+        let clock = Instant::now();
+        banded_method.step(surroundings, command)?;
+        let banded_ms = milliseconds(clock);
+        let (a, b) = (dense_method.shape(), banded_method.shape());
+        for (a, b) in a.positions_mm.iter().zip(&b.positions_mm) {
+            max_difference_mm = max_difference_mm.max((a - b).norm());
+        }
+        Ok([dense_ms, banded_ms])
+    };
+    for _ in 0..(INSERTED_MM / APPROACH_MM).round() as usize {
+        step_both(Command::advance(APPROACH_MM))?;
+    }
+    let mut steps = [Vec::new(), Vec::new()];
+    for _ in 0..repeats {
+        let times = step_both(Command::advance(TIMED_MM))?;
+        steps[0].push(times[0]);
+        steps[1].push(times[1]);
+    }
+    let [dense_solves, banded_solves] = time_solves(banded_method.chain(), repeats, dense);
+    let [dense_steps, banded_steps] = steps;
+    let row = |method, solves, steps, difference| Row {
+        median_ms: Some(median(solves)),
+        step_ms: Some(median(steps)),
+        max_difference_mm: Some(difference),
+        ..Row::untimed(method, nodes, String::new())
+    };
+    let mut rows = Vec::new();
+    if dense {
+        rows.push(row("li2011-dense", dense_solves, dense_steps, max_difference_mm));
+    }
+    rows.push(row("li2011-banded", banded_solves, banded_steps, 0.0));
+    Ok(rows)
+}
+
+/// Times of the linear system alone, both solves of the same chain.
+fn time_solves(chain: &Chain, repeats: usize, dense: bool) -> [Vec<f64>; 2] {
+    let (mut x, mut t) = (Vec::new(), Vec::new());
+    let mut workspace = banded::Workspace::default();
+    let mut times = [Vec::new(), Vec::new()];
+    for _ in 0..repeats {
+        if dense {
+            let clock = Instant::now();
+            dense::solve(chain, &mut x, &mut t);
+            times[0].push(milliseconds(clock));
+        }
+        let clock = Instant::now();
+        banded::solve(chain, &mut workspace, &mut x, &mut t);
+        times[1].push(milliseconds(clock));
+    }
+    times
+}
+
+fn milliseconds(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}
+
+/// Median; `values` is not empty.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
+}
+
+/// The table for a person.
+fn table(rows: &[Row]) -> String {
+    let mut lines = vec![format!(
+        "{:>5}  {:<15} {:>12} {:>12} {:>10} {:>16}",
+        "nodes", "method", "solve ms", "step ms", "paper ms", "difference mm"
+    )];
+    let number = |value: Option<f64>, digits: usize| {
+        value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
+    };
+    for row in rows {
+        let difference = row.max_difference_mm.map_or_else(|| "–".to_owned(), |mm| format!("{mm:.1e}"));
+        lines.push(
+            format!(
+                "{:>5}  {:<15} {:>12} {:>12} {:>10} {:>16}  {}",
+                row.nodes,
+                row.method,
+                number(row.median_ms, 4),
+                number(row.step_ms, 4),
+                number(row.paper_ms, 1),
+                difference,
+                row.note
+            )
+            .trim_end()
+            .to_owned(),
+        );
+    }
+    for row in rows.iter().filter(|row| row.nodes == 300 && row.method != "li2011-dense") {
+        if let Some(step_ms) = row.step_ms {
+            let fps = 1e3 / step_ms;
+            lines.push(format!(
+                "300 nodes, {}: {fps:.0} calculations a second, {:.0} times the paper's {PAPER_FPS}",
+                row.method,
+                fps / PAPER_FPS
+            ));
+        }
+    }
+    lines.join("\n")
+}
+
+/// Both solves are one method: their nodes must agree.
+fn check_agreement(rows: &[Row]) -> Result<(), Failure> {
+    for row in rows {
+        let Some(difference) = row.max_difference_mm else { continue };
+        if difference.is_nan() || difference > AGREEMENT_MM {
+            return Err(Failure::Computation(format!(
+                "with {} nodes {} is {difference:.1e} mm from li2011-banded: the two solves of the same equations must agree \
+                 within {AGREEMENT_MM:e} mm",
+                row.nodes, row.method
+            )));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn solves_that_differ_fail_the_experiment() {
+        let row = |difference| Row {
+            max_difference_mm: Some(difference),
+            ..Row::untimed("li2011-dense", 50, String::new())
+        };
+        assert!(check_agreement(&[row(0.0), row(9e-9)]).is_ok());
+        for difference in [2e-8, f64::NAN] {
+            let failure = check_agreement(&[row(0.0), row(difference)]).unwrap_err();
+            assert!(matches!(&failure, Failure::Computation(text) if text.contains("50 nodes")), "{failure}");
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! Any of the methods as an insertion: core's trait `Method`.
+
+use endowire_core::contact::extension::left_through;
+use endowire_core::error::in_range;
+use endowire_core::insertion::{Command, Energy, StepReport, Surroundings, nodes_from_tip};
+use endowire_core::methods::Method;
+use endowire_core::shape::Shape;
+use endowire_core::{Error, Result, Vec3};
+use nalgebra::Rotation3;
+
+use crate::beam_fem::smallest_rotation;
+use crate::wall_load::{FeltWall, WallLoad};
+use crate::{Chain, Posture, RodModel};
+
+/// How a device is cut up and how well its equilibria are met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InsertionOptions {
+    /// Length of a segment, mm.
+    pub element_mm: f64,
+    /// Force that may be out of balance in all, in units of EI/L².
+    pub tolerance: f64,
+}
+
+impl Default for InsertionOptions {
+    fn default() -> Self {
+        Self { element_mm: 2.0, tolerance: 1e-2 }
+    }
+}
+
+/// Most segments.
+const SEGMENT_LIMIT: f64 = 100_000.0;
+/// Retracting to within this of the sheath, mm, is retracting to it.
+const ZERO_LENGTH_MM: f64 = 1e-9;
+/// A command is cut into parts of this many radii at most: a tip that is pushed on straight meets the wall by its surface.
+const PART_RADII: f64 = 2.0;
+
+/// A method under way in a vessel. Nodes are marks on the device, as in core's methods.
+pub struct Insertion {
+    model: Box<dyn RodModel>,
+    options: InsertionOptions,
+    chain: Chain,
+    posture: Posture,
+    from_tip_mm: Vec<f64>,
+    wall: FeltWall,
+    shape: Shape,
+    report: StepReport,
+}
+
+impl Insertion {
+    /// The method with nothing inserted.
+    ///
+    /// # Errors
+    /// A device that the method refuses, or options out of range.
+    pub fn new(
+        model: Box<dyn RodModel>,
+        options: InsertionOptions,
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Self> {
+        model.check(surroundings.device)?;
+        let friction = surroundings.properties.friction;
+        if friction != 0.0 {
+            return Err(Error::parameter(
+                "vessel.wall.friction",
+                friction,
+                format!("{} has no friction here: set it to 0 or use another method", model.name()),
+            ));
+        }
+        let length_mm = surroundings.device.length_mm();
+        in_range("method.element_mm", options.element_mm, length_mm)?;
+        in_range("method.tolerance", options.tolerance, 1.0)?;
+        if length_mm / options.element_mm > SEGMENT_LIMIT {
+            return Err(Error::parameter(
+                "method.element_mm",
+                options.element_mm,
+                format!("cuts the device into more than {SEGMENT_LIMIT} segments: use longer ones"),
+            ));
+        }
+        let sheath = surroundings.sheath;
+        let chain = Chain { start_mm: sheath.position_mm, direction: sheath.direction, ..Chain::default() };
+        let mut insertion = Self {
+            model,
+            options,
+            posture: chain.straight(),
+            chain,
+            from_tip_mm: vec![0.0],
+            wall: FeltWall::new(surroundings)?,
+            shape: Shape::default(),
+            report: StepReport { converged: true, ..StepReport::default() },
+        };
+        insertion.write_shape();
+        Ok(insertion)
+    }
+
+    /// One part of a command: the chain slides along its own curve and relaxes.
+    fn part(&mut self, surroundings: &Surroundings<'_>, inserted_mm: f64) -> Result<()> {
+        let mut from_tip_mm = Vec::new();
+        nodes_from_tip(inserted_mm, self.options.element_mm, &mut from_tip_mm);
+        let mut posture = self.slid(&from_tip_mm);
+        self.fill_chain(surroundings, &from_tip_mm);
+        let mut load = WallLoad::new(&self.wall, surroundings, &from_tip_mm);
+        let outcome = self.model.relax(&self.chain, &mut load, &mut posture, self.options.tolerance);
+        if !posture.is_finite() {
+            return Err(Error::Computation(format!(
+                "{}: diverged at {inserted_mm:.3} mm inserted: use longer segments or a softer wall",
+                self.model.name()
+            )));
+        }
+        (self.posture, self.from_tip_mm) = (posture, from_tip_mm);
+        self.report.iterations = self.report.iterations.saturating_add(outcome.iterations as u32);
+        self.report.converged &= outcome.converged;
+        Ok(())
+    }
+
+    fn fill_chain(&mut self, surroundings: &Surroundings<'_>, from_tip_mm: &[f64]) {
+        let chain = &mut self.chain;
+        chain.lengths_mm.clear();
+        chain.bending_nmm2.clear();
+        chain.torsion_nmm2.clear();
+        chain.rest_curvature_per_mm.clear();
+        for ends in from_tip_mm.windows(2) {
+            let section = surroundings.device.section_at(0.5 * (ends[0] + ends[1]));
+            chain.lengths_mm.push(ends[0] - ends[1]);
+            chain.bending_nmm2.push(section.bending_stiffness_nmm2);
+            chain.torsion_nmm2.push(section.torsion_nmm2());
+            chain.rest_curvature_per_mm.push(section.rest_curvature_per_mm);
+        }
+    }
+
+    /// The new nodes on the present curve, which goes straight on beyond its tip.
+    fn slid(&self, from_tip_mm: &[f64]) -> Posture {
+        let inserted = from_tip_mm[0];
+        let tangents = tangents(&self.chain, &self.posture);
+        let n = from_tip_mm.len() - 1;
+        let mut posture = Posture::default();
+        let mut element = 0;
+        let mut at = |from_sheath: f64| self.on_curve(&tangents, from_sheath, &mut element);
+        let mut directions = Vec::with_capacity(n + 1);
+        for s in from_tip_mm {
+            let (x, t) = at(inserted - s);
+            posture.positions_mm.push(x);
+            directions.push(t);
+        }
+        // The triads of the same marks on the device, turned to their new directions.
+        let known = self.posture.frames.len();
+        let clamp = self.chain.clamp_frame();
+        for (i, direction) in directions.iter().enumerate() {
+            let frame: Rotation3<f64> = match known.checked_sub(n + 1 - i).filter(|k| *k > 0) {
+                Some(k) => self.posture.frames[k],
+                None => clamp,
+            };
+            let t: Vec3 = frame.matrix().column(0).into();
+            posture.frames.push(smallest_rotation(&t, direction) * frame);
+        }
+        posture.frames[0] = clamp;
+        posture
+    }
+
+    /// Position and direction at an arc length from the sheath: cubic between nodes. Calls go from the sheath to the tip.
+    fn on_curve(&self, tangents: &[Vec3], from_sheath_mm: f64, element: &mut usize) -> (Vec3, Vec3) {
+        let x = &self.posture.positions_mm;
+        let last = x.len() - 1;
+        let s = self.from_tip_mm[0] - from_sheath_mm;
+        if s <= 0.0 {
+            return (x[last] - tangents[last] * s, tangents[last]);
+        }
+        while *element + 1 < last && self.from_tip_mm[*element + 1] > s {
+            *element += 1;
+        }
+        let (a, b) = (*element, *element + 1);
+        let h = self.from_tip_mm[a] - self.from_tip_mm[b];
+        let u = (self.from_tip_mm[a] - s) / h;
+        let (v, chord) = (1.0 - u, x[b] - x[a]);
+        let length = chord.norm();
+        let (p, q) = (tangents[a] * length, tangents[b] * length);
+        let position = x[a] + chord * (u * u * (3.0 - 2.0 * u)) + (p * v - q * u) * (u * v);
+        let slope = chord * (6.0 * u * v) + p * (v * (1.0 - 3.0 * u)) + q * (u * (3.0 * u - 2.0));
+        (position, slope.normalize())
+    }
+
+    fn write_shape(&mut self) {
+        self.shape.positions_mm.clone_from(&self.posture.positions_mm);
+        self.shape.tangents = tangents(&self.chain, &self.posture);
+        self.shape.from_tip_mm.clone_from(&self.from_tip_mm);
+    }
+
+    fn write_report(&mut self, surroundings: &Surroundings<'_>) {
+        let report = &mut self.report;
+        report.inserted_mm = self.from_tip_mm[0];
+        let tip = self.posture.positions_mm[self.posture.positions_mm.len() - 1];
+        report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening);
+        let mut load = WallLoad::new(&self.wall, surroundings, &self.from_tip_mm);
+        let wall = load.contacts(&self.posture.positions_mm, &mut report.contacts);
+        let bend = self.chain.bending_energy_mj(&self.posture);
+        report.energy = Energy { bend, twist: 0.0, wall };
+        report.max_penetration_mm = report.contacts.iter().map(|c| c.penetration_mm).fold(0.0, f64::max);
+        report.push_force_n = 0.0;
+        if self.chain.segments() > 0 {
+            let held: Vec3 = report.contacts.iter().map(|c| c.normal * c.force_n).sum();
+            let (t, d) = (self.chain.direction, self.posture.chord(0).normalize());
+            let moment = self.chain.joint_stiffness(0) * t.cross(&d).norm().atan2(t.dot(&d));
+            report.push_force_n = -held.dot(&t) - 0.5 * moment * moment / self.chain.bending_nmm2[0];
+        }
+    }
+}
+
+impl Method for Insertion {
+    fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()> {
+        let start = self.report.inserted_mm;
+        let target = (start + command.advance_mm).min(surroundings.device.length_mm());
+        let target = if target < ZERO_LENGTH_MM { 0.0 } else { target };
+        let radius = surroundings.device.section_at(0.0).radius_mm;
+        let parts = (command.advance_mm.abs() / (PART_RADII * radius)).ceil().max(1.0);
+        let before = (self.chain.clone(), self.posture.clone(), self.from_tip_mm.clone());
+        let report = self.report.clone();
+        self.report.iterations = 0;
+        self.report.converged = true;
+        self.report.substeps = parts as u32;
+        for k in 1..=parts as usize {
+            let share = k as f64 / parts;
+            let inserted = if k as f64 == parts { target } else { start + (target - start) * share };
+            self.chain.turn_rad = report.rotation_rad + command.rotate_rad * share;
+            if inserted == 0.0 {
+                self.fill_chain(surroundings, &[0.0]);
+                (self.posture, self.from_tip_mm) = (self.chain.straight(), vec![0.0]);
+                continue;
+            }
+            if let Err(error) = self.part(surroundings, inserted) {
+                (self.chain, self.posture, self.from_tip_mm) = before;
+                self.report = report;
+                return Err(error);
+            }
+        }
+        self.report.rotation_rad = report.rotation_rad + command.rotate_rad;
+        self.write_report(surroundings);
+        self.write_shape();
+        Ok(())
+    }
+
+    fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    fn report(&self) -> &StepReport {
+        &self.report
+    }
+}
+
+/// Unit tangents at the nodes: the clamp's, the mean of the chords on either side, and at the tip the last chord turned on by as
+/// much as it is from the mean at its other end.
+fn tangents(chain: &Chain, posture: &Posture) -> Vec<Vec3> {
+    let n = posture.positions_mm.len() - 1;
+    let mut tangents = vec![chain.direction];
+    for i in 1..=n {
+        let before = posture.chord(i - 1).normalize();
+        let after = if i < n { posture.chord(i).normalize() } else { before * 2.0 - tangents[n - 1] };
+        let sum = if i < n { before + after } else { after };
+        tangents.push(sum.try_normalize(1e-12).unwrap_or(before));
+    }
+    tangents
+}
