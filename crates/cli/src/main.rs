@@ -12,7 +12,7 @@ use clap::Parser;
 
 fn main() -> ExitCode {
     let args = args::Args::parse();
-    if matches!(args.command, args::Command::Run(_)) {
+    if matches!(args.command, args::Command::Run(_) | args::Command::Render(_) | args::Command::Fluoro(_)) {
         environment::without_desktop();
     }
     match commands::dispatch(&args) {

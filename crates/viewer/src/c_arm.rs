@@ -20,7 +20,7 @@
 //! u = W/2 + (SID/pitch) · a/(SOD + c),   v = H/2 + (SID/pitch) · b/(SOD + c)
 //! ```
 //!
-//! in pixels; the centre of the pixel in column i is at u = i + ½. A ray is (x, y, 1)·(SOD + c) with
+//! A rotation of the picture turns e_u and e_v about d, so that what is shown turns clockwise on the screen. All in pixels; the centre of the pixel in column i is at u = i + ½. A ray is (x, y, 1)·(SOD + c) with
 //! x = (u − W/2)·pitch/SID, and √(1 + x² + y²) millimetres long per millimetre of depth: its *obliquity*.
 
 use endowire_core::vessel::SurfaceMesh;
@@ -43,6 +43,10 @@ pub struct CArm {
     sod_mm: f64,
     pixel_mm: f64,
     size_px: [u32; 2],
+    angles_deg: [f64; 2],
+    rotation_deg: f64,
+    /// Half width and height between the blades, pixels.
+    opening_px: Option<[f64; 2]>,
 }
 
 impl CArm {
@@ -52,24 +56,33 @@ impl CArm {
     /// [`Error::Parameter`] where the vessel does not lie between source and detector. `spec` must be valid.
     pub(crate) fn new(spec: &CArmSpec, size_px: [u32; 2], wall: &SurfaceMesh) -> Result<Self> {
         let (low, high) = wall.bounds_mm().ok_or_else(|| Error::Mesh("the wall has no vertices".into()))?;
-        let (alpha, beta) = (spec.primary_deg.to_radians(), spec.secondary_deg.to_radians());
+        let angles_deg = spec.angles_deg();
+        let [alpha, beta] = angles_deg.map(f64::to_radians);
         let toward_left = Vec3::new(alpha.cos(), alpha.sin(), 0.0);
         let detector = Vec3::new(alpha.sin(), -alpha.cos(), 0.0) * beta.cos() + Vec3::z() * beta.sin();
+        let down = -detector.cross(&toward_left);
+        let (sin, cos) = spec.rotation_deg.to_radians().sin_cos();
         let mut arm = Self {
             isocentre_mm: spec.isocentre_mm.map_or((low + high) / 2.0, Vec3::from),
-            axes: [toward_left, -detector.cross(&toward_left), detector],
+            axes: [toward_left * cos - down * sin, toward_left * sin + down * cos, detector],
             sid_mm: spec.sid_mm,
             sod_mm: spec.sod_mm,
             pixel_mm: 1.0,
             size_px,
+            angles_deg,
+            rotation_deg: spec.rotation_deg,
+            opening_px: None,
         };
         for vertex in &wall.vertices_mm {
             arm.check_between(vertex)?;
         }
-        arm.pixel_mm = match spec.pixel_mm {
-            Some(pitch) => pitch,
-            None => arm.fitting_pitch(wall)?,
+        let whole = match (spec.pixel_mm, spec.field_mm) {
+            (Some(pitch), _) => pitch,
+            (None, Some(field)) => field / f64::from(size_px[0].max(size_px[1])),
+            (None, None) => arm.fitting_pitch(wall)?,
         };
+        arm.pixel_mm = whole / spec.magnification;
+        arm.opening_px = spec.collimation_mm.map(|sides| sides.map(|side| side / 2.0 / arm.pixel_mm));
         Ok(arm)
     }
 
@@ -133,6 +146,19 @@ impl CArm {
         [(pixel[0] - w / 2.0) / self.focal_px(), (pixel[1] - h / 2.0) / self.focal_px()]
     }
 
+    /// Obliquity of the central ray of each pixel, row by row.
+    pub(crate) fn obliquities(&self) -> impl Iterator<Item = f64> + use<> {
+        let [width, height] = self.size_px;
+        let squares = |n: u32, k: usize| -> Vec<f64> {
+            (0..n).map(|i| self.slopes([f64::from(i) + 0.5; 2])[k].powi(2)).collect()
+        };
+        let (columns, rows) = (squares(width, 0), squares(height, 1));
+        rows.into_iter().flat_map(move |y| {
+            let columns = columns.clone();
+            columns.into_iter().map(move |x| (1.0 + x + y).sqrt())
+        })
+    }
+
     /// Obliquity of the central ray of pixel number `index`, counted row by row.
     pub(crate) fn obliquity_at(&self, index: usize) -> f64 {
         let width = self.size_px[0] as usize;
@@ -142,15 +168,35 @@ impl CArm {
 
     /// The same view with `factor` × `factor` pixels for each one.
     pub(crate) fn refined(&self, factor: u32) -> Self {
-        let pixel_mm = self.pixel_mm / f64::from(factor);
-        Self { pixel_mm, size_px: self.size_px.map(|n| n * factor), ..self.clone() }
+        let factor_f = f64::from(factor);
+        let opening_px = self.opening_px.map(|sides| sides.map(|n| n * factor_f));
+        Self {
+            pixel_mm: self.pixel_mm / factor_f,
+            size_px: self.size_px.map(|n| n * factor),
+            opening_px,
+            ..self.clone()
+        }
     }
 
-    /// The same view with pixels merged until no side has more than `most`.
-    pub(crate) fn decimated(&self, most: u32) -> Self {
-        let factor = self.size_px[0].max(self.size_px[1]).div_ceil(most).max(1);
-        let pixel_mm = self.pixel_mm * f64::from(factor);
-        Self { pixel_mm, size_px: self.size_px.map(|n| n.div_ceil(factor)), ..self.clone() }
+    /// Share of pixel number `index` that the blades leave open.
+    pub(crate) fn openness(&self, index: usize) -> f64 {
+        let Some(opening) = self.opening_px else { return 1.0 };
+        let width = self.size_px[0] as usize;
+        let at = [(index % width) as f64 + 0.5, (index / width) as f64 + 0.5];
+        let share = |k: usize| {
+            let from_edge = opening[k] - (at[k] - f64::from(self.size_px[k]) / 2.0).abs();
+            (from_edge + 0.5).clamp(0.0, 1.0)
+        };
+        share(0) * share(1)
+    }
+
+    /// Whether a pixel coordinate is on the detector and between the blades.
+    pub fn sees(&self, pixel: [f64; 2]) -> bool {
+        (0..2).all(|k| {
+            let half = f64::from(self.size_px[k]) / 2.0;
+            let open = self.opening_px.map_or(half, |opening| opening[k].min(half));
+            (pixel[k] - half).abs() <= open
+        })
     }
 
     /// SID in pixels.
@@ -178,9 +224,33 @@ impl CArm {
         self.isocentre_mm - self.axes[2] * self.sod_mm
     }
 
+    /// Corners of the detector, around.
+    pub(crate) fn detector_corners_mm(&self) -> [Vec3; 4] {
+        let [w, h] = self.size_px.map(f64::from);
+        [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]].map(|pixel| {
+            let [x, y] = self.slopes(pixel);
+            self.source_mm() + (self.axes[0] * x + self.axes[1] * y + self.axes[2]) * self.sid_mm
+        })
+    }
+
     /// The point that all rotations leave in place.
     pub fn isocentre_mm(&self) -> Vec3 {
         self.isocentre_mm
+    }
+
+    /// Positioner angles, LAO and cranial positive.
+    pub fn angles_deg(&self) -> [f64; 2] {
+        self.angles_deg
+    }
+
+    /// Clockwise turn of the picture.
+    pub fn rotation_deg(&self) -> f64 {
+        self.rotation_deg
+    }
+
+    /// Width and height between the blades in pixels, if there are any.
+    pub fn opening_px(&self) -> Option<[f64; 2]> {
+        self.opening_px.map(|half| half.map(|n| 2.0 * n))
     }
 
     /// Source to detector.
@@ -239,6 +309,33 @@ mod tests {
         // Cranial view: what is anterior moves down.
         let [_, v] = arm(0.0, 30.0).project(&Vec3::new(0.0, -20.0, 0.0));
         assert!(v > 200.0, "{v}");
+    }
+
+    #[test]
+    fn a_rotation_turns_the_picture_clockwise_and_magnification_enlarges_it() {
+        let wall = SurfaceMesh {
+            vertices_mm: vec![Vec3::new(-50.0, -40.0, -30.0), Vec3::new(50.0, 40.0, 30.0)],
+            triangles: vec![],
+        };
+        let spec = CArmSpec {
+            rotation_deg: 90.0,
+            magnification: 2.0,
+            field_mm: Some(150.0),
+            collimation_mm: Some([30.0, 15.0]),
+            ..CArmSpec::default()
+        };
+        let arm = CArm::new(&spec, [600, 400], &wall).unwrap();
+        assert!((arm.pixel_mm() - 0.125).abs() < 1e-12);
+        // The head, up before, is to the right.
+        let [u, v] = arm.project(&Vec3::new(0.0, 0.0, 5.0));
+        assert!(u > 350.0 && (v - 200.0).abs() < 1e-9, "{u} {v}");
+        let point = Vec3::new(3.0, -4.0, 5.0);
+        let (origin, direction) = arm.ray(arm.project(&point));
+        assert!((point - origin).cross(&direction).norm() < 1e-10);
+        assert_eq!(arm.opening_px().unwrap(), [240.0, 120.0]);
+        assert!(arm.sees([300.0, 200.0]) && arm.sees([181.0, 141.0]) && !arm.sees([179.0, 200.0]));
+        let at = |x: usize, y: usize| arm.openness(y * 600 + x);
+        assert_eq!([at(300, 200), at(180, 200), at(179, 200), at(178, 200)], [1.0, 1.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -9,9 +9,15 @@
 //! Each piece is a cone frustum, cut at both ends by the plane that bisects it and its neighbour (a mitre).
 //! Neighbouring cylinders meet that plane in the same ellipse, so pieces neither overlap nor gape in bends.
 //! The two end planes are perpendicular to the axis: ends are flat.
+//!
+//! A device is made of *parts*, tubes of one material over a stretch of arc length: a hollow catheter is its outer frustum minus
+//! its inner one, a marker band a ring around it.
+
+use std::ops::Range;
 
 use endowire_core::shape::Shape;
 use endowire_core::{Error, Result, Vec3};
+use serde::{Deserialize, Serialize};
 
 use crate::xray::Material;
 
@@ -33,13 +39,59 @@ pub struct DevicePoint {
     pub radius_mm: f64,
 }
 
-/// A device to draw: a solid round rod along a centre line.
+/// A device to draw: parts along a centre line.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DeviceView {
-    /// The centre line in order; fewer than two points draw nothing.
+    /// The centre line in order, the tip last; fewer than two points draw nothing.
     pub points: Vec<DevicePoint>,
-    /// What it is made of; `None`: the scene's `device_material`.
+    /// What it is made of where a part does not say; `None`: the scene's `device_material`.
     pub material: Option<Material>,
+    /// Its parts, which must not overlap; none: one solid rod.
+    pub parts: Vec<DevicePart>,
+}
+
+/// A tube of one material over a stretch of a device, for instance a `[[view.device]]` table of a scene.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct DevicePart {
+    /// Where it begins and ends, in arc length from the tip in mm; absent: the whole device.
+    #[serde(default)]
+    pub from_tip_mm: Option<[f64; 2]>,
+    /// What it is made of; absent: as the device.
+    #[serde(default)]
+    pub material: Option<Material>,
+    /// Outer radius; absent: that of the device.
+    #[serde(default)]
+    pub outer_radius_mm: Option<f64>,
+    /// Radius of the bore; 0 is solid.
+    #[serde(default)]
+    pub inner_radius_mm: f64,
+}
+
+impl DevicePart {
+    /// Checks the part on its own; errors begin with `name`.
+    pub(crate) fn validate(&self, name: &str) -> Result<()> {
+        let refuse = |key: &str, value: String, mend: &str| {
+            Err(Error::parameter(format!("{name}.{key}"), value, mend))
+        };
+        if let Some([first, last]) = self.from_tip_mm
+            && !(first >= 0.0 && first < last && last.is_finite())
+        {
+            let mend = "must be two finite lengths from the tip, the first less than the second";
+            return refuse("from_tip_mm", format!("[{first}, {last}]"), mend);
+        }
+        let most = match self.outer_radius_mm {
+            Some(outer) if !(outer.is_finite() && outer > 0.0) => {
+                return refuse("outer_radius_mm", outer.to_string(), "must be a finite number above 0");
+            }
+            outer => outer.unwrap_or(f64::MAX),
+        };
+        if !(0.0..most).contains(&self.inner_radius_mm) {
+            let mend = "must be at least 0 and less than the outer radius";
+            return refuse("inner_radius_mm", self.inner_radius_mm.to_string(), mend);
+        }
+        Ok(())
+    }
 }
 
 impl DeviceView {
@@ -53,7 +105,7 @@ impl DeviceView {
                 radius_mm: radius_mm(s),
             })
             .collect();
-        Self { points, material: None }
+        Self { points, ..Self::default() }
     }
 
     /// Refines the centre line; empty where there is nothing to draw.
@@ -109,6 +161,119 @@ fn hermite(pair: &[DevicePoint], d: [Vec3; 2], w: f64) -> DevicePoint {
     }
 }
 
+/// A stretch of a refined centre line that is one material.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Layer {
+    pub(crate) material: Option<Material>,
+    /// Pieces between consecutive points.
+    pieces: Range<usize>,
+    outer_radius_mm: Option<f64>,
+    inner_radius_mm: f64,
+}
+
+/// A device with its centre line refined and cut where its parts begin and end.
+#[derive(Debug, Clone)]
+pub(crate) struct RefinedDevice {
+    pub(crate) points: Vec<DevicePoint>,
+    pub(crate) layers: Vec<Layer>,
+}
+
+/// Cuts nearer to a point than this are made at the point.
+const SAME_PLACE_MM: f64 = 1e-6;
+
+impl RefinedDevice {
+    /// The devices that have something to draw.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for points or parts that are not finite or out of order.
+    pub(crate) fn all(devices: &[DeviceView]) -> Result<Vec<Self>> {
+        let mut refined = Vec::with_capacity(devices.len());
+        for device in devices {
+            let points = device.refined()?;
+            if !points.is_empty() {
+                refined.push(Self::cut(points, device)?);
+            }
+        }
+        Ok(refined)
+    }
+
+    fn cut(mut points: Vec<DevicePoint>, device: &DeviceView) -> Result<Self> {
+        if device.parts.is_empty() {
+            let pieces = 0..points.len() - 1;
+            let layer =
+                Layer { material: device.material, pieces, outer_radius_mm: None, inner_radius_mm: 0.0 };
+            return Ok(Self { points, layers: vec![layer] });
+        }
+        // Arc length from the tip, which is the last point.
+        let mut from_tip = vec![0.0; points.len()];
+        for i in (0..points.len() - 1).rev() {
+            from_tip[i] = from_tip[i + 1] + (points[i + 1].position_mm - points[i].position_mm).norm();
+        }
+        for part in &device.parts {
+            for cut in part.from_tip_mm.into_iter().flatten() {
+                let after = from_tip.partition_point(|&s| s > cut);
+                if after == 0 || after == points.len() {
+                    continue;
+                }
+                let [s0, s1] = [from_tip[after - 1], from_tip[after]];
+                if s0 - cut > SAME_PLACE_MM && cut - s1 > SAME_PLACE_MM {
+                    let w = (s0 - cut) / (s0 - s1);
+                    let [a, b] = [points[after - 1], points[after]];
+                    let mix = |x: Vec3, y: Vec3| x * (1.0 - w) + y * w;
+                    let point = DevicePoint {
+                        position_mm: mix(a.position_mm, b.position_mm),
+                        tangent: mix(a.tangent, b.tangent),
+                        radius_mm: a.radius_mm * (1.0 - w) + b.radius_mm * w,
+                    };
+                    points.insert(after, point);
+                    from_tip.insert(after, cut);
+                }
+            }
+        }
+        let mut layers = Vec::with_capacity(device.parts.len());
+        for (i, part) in device.parts.iter().enumerate() {
+            part.validate(&format!("device.parts[{i}]"))?;
+            let [near, far] = part.from_tip_mm.unwrap_or([0.0, f64::MAX]);
+            let first = from_tip.partition_point(|&s| s > far + SAME_PLACE_MM);
+            let last = from_tip.partition_point(|&s| s >= near - SAME_PLACE_MM).saturating_sub(1);
+            if first < last {
+                layers.push(Layer {
+                    material: part.material.or(device.material),
+                    pieces: first..last,
+                    outer_radius_mm: part.outer_radius_mm,
+                    inner_radius_mm: part.inner_radius_mm,
+                });
+            }
+        }
+        Ok(Self { points, layers })
+    }
+}
+
+impl RefinedDevice {
+    /// Material and outer radius that are seen on a piece: those of the last part there.
+    pub(crate) fn looks(&self, piece: usize) -> (Option<Material>, Option<f64>) {
+        let layer = self.layers.iter().rev().find(|layer| layer.pieces.contains(&piece));
+        layer.map_or((None, None), |layer| (layer.material, layer.outer_radius_mm))
+    }
+}
+
+impl Layer {
+    /// The frusta that make this layer out of all `pieces` of its device, each with the sign of its length.
+    pub(crate) fn signed(&self, pieces: &[Piece]) -> Vec<(Piece, f64)> {
+        let mut signed = Vec::with_capacity(2 * self.pieces.len());
+        for piece in &pieces[self.pieces.clone()] {
+            signed.push((self.outer_radius_mm.map_or(*piece, |radius| piece.with_radius(radius)), 1.0));
+            if self.inner_radius_mm > 0.0 {
+                // A bore as wide as the device or wider leaves nothing.
+                let most = piece.radius.min(piece.radius + piece.slope * (piece.end - piece.start).norm());
+                let bore = self.inner_radius_mm.min(self.outer_radius_mm.unwrap_or(most));
+                signed.push((piece.with_radius(bore), -1.0));
+            }
+        }
+        signed
+    }
+}
+
 /// A frustum between two mitre planes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Piece {
@@ -126,8 +291,21 @@ pub(crate) struct Piece {
     pub(crate) radius: f64,
     /// Change of the radius per length.
     pub(crate) slope: f64,
+    /// Largest radius, and how much further than it a mitre reaches.
+    largest: f64,
+    mitre: f64,
+}
+
+impl Piece {
     /// Radius of a sphere about each end that, with the other, encloses the piece.
-    pub(crate) reach: f64,
+    pub(crate) fn reach(&self) -> f64 {
+        self.largest * self.mitre
+    }
+
+    /// The piece as a cylinder of another radius.
+    fn with_radius(&self, radius: f64) -> Self {
+        Self { radius, slope: 0.0, largest: radius, ..*self }
+    }
 }
 
 /// Mitres are cut no sharper than at this cosine of half the turn (a turn of 150°); beyond it a corner is
@@ -162,7 +340,8 @@ pub(crate) fn pieces(points: &[DevicePoint]) -> Vec<Piece> {
                 offsets: [planes[0].dot(&points[k].position_mm), planes[1].dot(&points[k + 1].position_mm)],
                 radius: r0,
                 slope: (r1 - r0) / length.max(f64::MIN_POSITIVE),
-                reach: r0.max(r1) / sharpest,
+                largest: r0.max(r1),
+                mitre: 1.0 / sharpest,
             }
         })
         .collect()
@@ -183,7 +362,7 @@ mod tests {
                 }
             })
             .collect();
-        DeviceView { points, material: None }
+        DeviceView { points, ..DeviceView::default() }
     }
 
     #[test]
@@ -220,5 +399,42 @@ mod tests {
         assert!(device.refined().unwrap().is_empty());
         device.points[0].radius_mm = f64::NAN;
         assert!(device.refined().unwrap_err().to_string().contains("device.points[0]"));
+    }
+
+    #[test]
+    fn parts_cut_the_centre_line_at_their_ends_and_bad_ones_are_named() {
+        let mut device = arc(50.0, 90.0, 9, 0.9);
+        let band = DevicePart {
+            from_tip_mm: Some([2.0, 3.5]),
+            outer_radius_mm: Some(1.0),
+            inner_radius_mm: 0.9,
+            ..DevicePart::default()
+        };
+        let shaft = DevicePart { inner_radius_mm: 0.6, ..DevicePart::default() };
+        device.parts = vec![shaft, band, DevicePart { from_tip_mm: Some([500.0, 600.0]), ..band }];
+        let refined = RefinedDevice::all(std::slice::from_ref(&device)).unwrap().remove(0);
+        assert_eq!(refined.layers.len(), 2, "what is beyond the device is not there");
+        let pieces = pieces(&refined.points);
+        let length = |layer: &Layer| {
+            layer
+                .signed(&pieces)
+                .iter()
+                .filter(|p| p.1 > 0.0)
+                .map(|(p, _)| (p.end - p.start).norm())
+                .sum::<f64>()
+        };
+        assert!((length(&refined.layers[1]) - 1.5).abs() < 1e-9);
+        assert!((length(&refined.layers[0]) - 50.0 * std::f64::consts::FRAC_PI_2).abs() < 0.04);
+        let near = refined.layers[1].signed(&pieces);
+        assert!(near.iter().all(|(p, sign)| p.radius == if *sign > 0.0 { 1.0 } else { 0.9 }));
+        for (part, key) in [
+            (DevicePart { from_tip_mm: Some([3.0, 2.0]), ..band }, "from_tip_mm"),
+            (DevicePart { inner_radius_mm: 1.0, ..band }, "inner_radius_mm"),
+            (DevicePart { outer_radius_mm: Some(f64::NAN), ..band }, "outer_radius_mm"),
+        ] {
+            device.parts = vec![part];
+            let error = RefinedDevice::all(std::slice::from_ref(&device)).unwrap_err().to_string();
+            assert!(error.contains(key) && error.contains("device.parts[0]"), "{error}");
+        }
     }
 }

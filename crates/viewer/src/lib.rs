@@ -15,7 +15,7 @@
 //!     triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
 //! };
 //! let point = |x: f64| DevicePoint { position_mm: Vec3::new(x, 5.0, 5.0), tangent: Vec3::x(), radius_mm: 0.4 };
-//! let wire = DeviceView { points: vec![point(1.0), point(20.0)], material: None };
+//! let wire = DeviceView { points: vec![point(1.0), point(20.0)], ..DeviceView::default() };
 //!
 //! let spec =
 //!     ViewSpec { views: vec![View::Fluoro], size_px: [64, 64], backend: Backend::Cpu, ..ViewSpec::default() };
@@ -27,10 +27,13 @@
 //! ```
 
 mod c_arm;
+mod contrast;
 mod cpu;
 mod device;
+mod fluoro;
 mod gpu;
-mod image;
+mod output;
+mod patient;
 mod renderer;
 mod scene;
 mod spec;
@@ -38,8 +41,13 @@ mod three_d;
 mod xray;
 
 pub use c_arm::CArm;
-pub use device::{DevicePoint, DeviceView};
-pub use image::{Image, PixelFormat};
+pub use device::{DevicePart, DevicePoint, DeviceView};
+pub use fluoro::Moment;
+pub use output::{Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, PixelFormat};
 pub use renderer::{Frames, Renderer};
-pub use spec::{Backend, CArmSpec, CameraSpec, View, ViewSpec, XRaySpec};
+pub use spec::{
+    Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, FlowSpec, InjectionSpec, Mode, PatientSpec, Pose,
+    TorsoSpec, View, ViewSpec, XRaySpec,
+};
+pub use three_d::ContactView;
 pub use xray::{Material, PathLengths};

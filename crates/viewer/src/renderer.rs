@@ -1,34 +1,27 @@
 //! From a scene to frames: chooses an engine, prepares what the wanted views need, draws.
 
 use endowire_core::vessel::SurfaceMesh;
-use endowire_core::{Error, Result};
+use endowire_core::{Error, Result, Vec3};
 
 use crate::c_arm::CArm;
 use crate::cpu;
-use crate::device::DeviceView;
+use crate::device::{DeviceView, RefinedDevice};
+use crate::fluoro::{Anatomy, Fluoroscope, Moment, PathEngine, SUBRAYS, Sequence};
 use crate::gpu;
-use crate::image::Image;
-use crate::scene::{RefinedDevice, Setup};
+use crate::output::{ContactLabel, DeviceLabel, Image, Labels, PixelFormat};
+use crate::scene::Setup;
 use crate::spec::{Backend, ViewSpec};
+use crate::three_d::{ContactView, Solids, draw_scale_bar};
 use crate::xray::{Material, PathLengths};
-
-/// Draws fluoroscopic frames of one set-up.
-pub(crate) trait FluoroEngine: Send {
-    fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image>;
-    /// Length inside the wall of each pixel's central ray.
-    fn lumen_path(&mut self) -> Result<Vec<f32>>;
-    /// Length inside one device of each pixel's central ray.
-    fn device_path(&mut self, device: &RefinedDevice) -> Result<Vec<f32>>;
-}
 
 /// Draws 3D frames of one set-up.
 pub(crate) trait ThreeDEngine: Send {
-    fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image>;
+    fn frame(&mut self, solids: &Solids) -> Result<Image>;
 }
 
 /// The engines of the wanted views, all on the same processor.
 pub(crate) struct Engines {
-    pub(crate) fluoro: Option<Box<dyn FluoroEngine>>,
+    pub(crate) paths: Option<Box<dyn PathEngine>>,
     pub(crate) three_d: Option<Box<dyn ThreeDEngine>>,
     /// Name for people.
     pub(crate) name: String,
@@ -47,7 +40,10 @@ pub struct Frames {
 pub struct Renderer {
     setup: Setup,
     engines: Engines,
+    fluoro: Option<(Fluoroscope, Sequence)>,
+    contacts: Vec<ContactView>,
     is_cpu: bool,
+    next_frame: u64,
 }
 
 impl std::fmt::Debug for Renderer {
@@ -61,96 +57,246 @@ impl Renderer {
     /// wall with outward triangles (cap the openings); the 3D view shows any.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a bad `spec`, a vessel that is not between source and detector, or `backend =
-    /// gpu` without a fitting adapter; [`Error::Mesh`] for a wall that is open, wound inconsistently or
-    /// inside out.
+    /// [`Error::Parameter`] for a bad `spec`, a vessel that is not between source and detector, files that are not there, or
+    /// `backend = gpu` without a fitting adapter; [`Error::Mesh`] for a wall that is open, wound inconsistently or
+    /// inside out; [`Error::Content`] for a centre line or a tomogram that cannot be used.
     pub fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
         let setup = Setup::new(spec, wall)?;
-        let nothing = setup.fluoro.is_none() && setup.camera.is_none();
+        let nothing = setup.c_arm.is_none() && setup.camera.is_none();
+        let mut refused = None;
         let on_gpu = match spec.backend {
             Backend::Cpu => None,
             _ if nothing => None,
-            Backend::Auto => gpu::engines(&setup, false).ok(),
+            Backend::Auto => gpu::engines(&setup, false).map_err(|reason| refused = Some(reason)).ok(),
             Backend::Gpu => Some(gpu::engines(&setup, true).map_err(|reason| {
                 Error::parameter("view.backend", "gpu", format!("{reason}; use \"auto\" or \"cpu\""))
             })?),
         };
         let is_cpu = on_gpu.is_none();
-        let engines = on_gpu.unwrap_or_else(|| cpu::engines(&setup));
-        Ok(Self { setup, engines, is_cpu })
+        let mut engines = on_gpu.unwrap_or_else(|| cpu::engines(&setup));
+        if let Some(reason) = refused {
+            engines.name = format!("{} ({reason})", engines.name);
+        }
+        let mut renderer = Self { setup, engines, fluoro: None, contacts: vec![], is_cpu, next_frame: 0 };
+        if let Some(c_arm) = renderer.setup.c_arm.clone() {
+            let fluoroscope = renderer.with_fallback(|setup, engines, _| {
+                let paths = engines.paths.as_mut().ok_or_else(no_fluoro)?;
+                Fluoroscope::new(setup, &c_arm, paths.as_mut())
+            })?;
+            let sequence = Sequence::new(&renderer.setup.spec, &fluoroscope);
+            renderer.fluoro = Some((fluoroscope, sequence));
+        }
+        Ok(renderer)
     }
 
-    /// What computes the frames, for people: "CPU reference", or the graphics interface and adapter. Changes
-    /// where a lost adapter made the CPU take over.
+    /// What computes the frames, for people: "CPU reference", or the graphics interface and adapter. Says why where a
+    /// graphics processor was wanted and is not used, and changes where a lost adapter made the CPU take over.
     pub fn backend(&self) -> &str {
         &self.engines.name
     }
 
     /// The C-arm of the fluoroscopic view, if that is wanted: projects points exactly as the frames do.
     pub fn c_arm(&self) -> Option<&CArm> {
-        self.setup.fluoro.as_ref().map(|f| &f.c_arm)
+        self.setup.c_arm.as_ref()
     }
 
-    /// Draws the wanted views. Fluoroscopy leaves out what of a device is not between source and detector.
+    /// What the renderer was made for.
+    pub fn spec(&self) -> &ViewSpec {
+        &self.setup.spec
+    }
+
+    /// Draws the wanted views as the next frame at its time by `frames_per_s`. Fluoroscopy leaves out what of a device is not
+    /// between source and detector.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a device with values that are not finite.
+    /// As [`Self::render_at`].
     pub fn render(&mut self, devices: &[DeviceView]) -> Result<Frames> {
+        let frame = self.next_frame;
+        let moment = Moment { frame, time_s: frame as f64 / self.setup.spec.frames_per_s };
+        self.render_at(devices, moment)
+    }
+
+    /// Draws the wanted views of a moment: its number seeds the noise, its time tells where contrast medium is.
+    ///
+    /// In subtraction modes the first frame also takes the mask: the scene and the devices as they are then, before any injection.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a device with values that are not finite, a time that is not, or a roadmap without an injection.
+    pub fn render_at(&mut self, devices: &[DeviceView], moment: Moment) -> Result<Frames> {
+        if !moment.time_s.is_finite() {
+            return Err(Error::parameter("time_s", moment.time_s, "must be finite"));
+        }
         let devices = RefinedDevice::all(devices)?;
-        self.with_fallback(|engines| {
-            Ok(Frames {
-                three_d: engines.three_d.as_mut().map(|engine| engine.frame(&devices)).transpose()?,
-                fluoro: engines.fluoro.as_mut().map(|engine| engine.frame(&devices)).transpose()?,
-            })
+        let contacts = std::mem::take(&mut self.contacts);
+        let frames = self.with_fallback(|setup, engines, fluoro| {
+            let c_arm = setup.c_arm.as_ref().filter(|_| setup.spec.camera.c_arm);
+            let solids = Solids { devices: &devices, contacts: &contacts, c_arm };
+            let mut three_d = engines.three_d.as_mut().map(|engine| engine.frame(&solids)).transpose()?;
+            if let (Some(image), Some(camera), true) =
+                (&mut three_d, &setup.camera, setup.spec.camera.scale_bar)
+            {
+                draw_scale_bar(image, camera);
+            }
+            let fluoro = match (fluoro, &mut engines.paths) {
+                (Some((scope, sequence)), Some(paths)) => {
+                    Some(sequence.next(scope, paths.as_mut(), &devices, moment)?)
+                }
+                _ => None,
+            };
+            Ok(Frames { three_d, fluoro })
+        });
+        self.contacts = contacts;
+        let frames = frames?;
+        self.next_frame = moment.frame + 1;
+        Ok(frames)
+    }
+
+    /// Shows contacts and their forces in the 3D frames from now on.
+    pub fn show_contacts(&mut self, contacts: &[ContactView]) {
+        self.contacts.clear();
+        self.contacts.extend_from_slice(contacts);
+    }
+
+    /// Takes the mask of a subtraction anew: the scene with `devices` as they are, before any injection.
+    ///
+    /// # Errors
+    /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
+    pub fn take_mask(&mut self, devices: &[DeviceView]) -> Result<()> {
+        let devices = RefinedDevice::all(devices)?;
+        self.with_fallback(|_, engines, fluoro| {
+            let (scope, sequence) = fluoro.as_mut().ok_or_else(no_fluoro)?;
+            let paths = engines.paths.as_mut().ok_or_else(no_fluoro)?;
+            sequence.take_mask(scope, paths.as_mut(), &devices)
         })
+    }
+
+    /// The last image hold: the last frames as one, the newest weighing most. `None` before the first frame.
+    pub fn last_image_hold(&self) -> Option<Image> {
+        let (scope, sequence) = self.fluoro.as_ref()?;
+        sequence.hold(scope)
+    }
+
+    /// What a fluoroscopic frame of these devices shows, with the contacts at the given places.
+    ///
+    /// # Errors
+    /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
+    pub fn labels(&mut self, devices: &[DeviceView], contacts_mm: &[Vec3]) -> Result<Labels> {
+        let c_arm = self.setup.c_arm.clone().ok_or_else(no_fluoro)?;
+        let seen = |point: &Vec3| c_arm.is_between(&c_arm.in_beam(point)).then(|| c_arm.project(point));
+        let contacts = contacts_mm
+            .iter()
+            .map(|point| {
+                let pixel = seen(point);
+                ContactLabel { pixel, visible: pixel.is_some_and(|p| c_arm.sees(p)) }
+            })
+            .collect();
+        let [width, height] = c_arm.size_px();
+        let rays = c_arm.refined(SUBRAYS);
+        let mut mask = vec![0_u8; width as usize * height as usize];
+        let mut labels = Vec::with_capacity(devices.len());
+        for (number, device) in (1_u8..=u8::MAX).zip(devices) {
+            let refined = RefinedDevice::all(std::slice::from_ref(device))?;
+            let touched = self.with_fallback(|_, engines, _| {
+                let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
+                let mut lengths = vec![0.0; mask.len() * (SUBRAYS * SUBRAYS) as usize];
+                let mut touched = Vec::new();
+                for device in &refined {
+                    for (_, pieces) in cpu::layers_in_beam(&rays, device) {
+                        engine.pieces(&rays, &pieces, &mut lengths, &mut touched)?;
+                    }
+                }
+                Ok(touched)
+            })?;
+            for ray in touched {
+                let (x, y) = (ray % (width * SUBRAYS) / SUBRAYS, ray / (width * SUBRAYS) / SUBRAYS);
+                mask[(y * width + x) as usize] = number;
+            }
+            let points = refined.first().map_or(&[][..], |device| &device.points);
+            let centre_line_px: Vec<[f64; 2]> = points.iter().filter_map(|p| seen(&p.position_mm)).collect();
+            let tip_px = points.last().and_then(|p| seen(&p.position_mm));
+            let tip_visible = tip_px.is_some_and(|p| c_arm.sees(p));
+            labels.push(DeviceLabel { centre_line_px, tip_px, tip_visible });
+        }
+        let mask = Image::new(width, height, PixelFormat::Gray8, mask);
+        Ok(Labels { size_px: [width, height], devices: labels, contacts, mask })
     }
 
     /// Path lengths of the rays through the pixel centres.
     ///
     /// # Errors
-    /// As [`Self::render`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
+    /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn path_lengths(&mut self, devices: &[DeviceView]) -> Result<PathLengths> {
-        let fluoro = self.setup.fluoro.as_ref().ok_or_else(no_fluoro)?;
-        let [width, height] = fluoro.c_arm.size_px();
-        let body_mm = (0..width as usize * height as usize)
-            .map(|i| (fluoro.beam.tissue_mm * fluoro.c_arm.obliquity_at(i)) as f32)
-            .collect();
-        let default = fluoro.beam.device_material(None);
+        let c_arm = self.setup.c_arm.clone().ok_or_else(no_fluoro)?;
+        let [width, height] = c_arm.size_px();
+        let default = self.setup.spec.xray.device_material;
         let devices = RefinedDevice::all(devices)?;
-        let (lumen_mm, devices_mm) = self.with_fallback(|engines| {
-            let engine = engines.fluoro.as_mut().ok_or_else(no_fluoro)?;
+        let (anatomy, devices_mm) = self.with_fallback(|setup, engines, _| {
+            let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
             let mut maps: Vec<(Material, Vec<f32>)> = Vec::new();
             for device in &devices {
-                let material = device.material.unwrap_or(default);
-                let map = engine.device_path(device)?;
-                match maps.iter_mut().find(|(m, _)| *m == material) {
-                    Some((_, sum)) => sum.iter_mut().zip(map).for_each(|(sum, length)| *sum += length),
-                    None => maps.push((material, map)),
+                for (layer, pieces) in cpu::layers_in_beam(&c_arm, device) {
+                    let material = layer.material.unwrap_or(default);
+                    let place = maps.iter().position(|map| map.0 == material).unwrap_or_else(|| {
+                        maps.push((material, vec![0.0; width as usize * height as usize]));
+                        maps.len() - 1
+                    });
+                    engine.pieces(&c_arm, &pieces, &mut maps[place].1, &mut Vec::new())?;
                 }
             }
-            Ok((engine.lumen_path()?, maps))
+            Ok((Anatomy::new(setup, &c_arm, engine.as_mut())?, maps))
         })?;
-        Ok(PathLengths { width, height, body_mm, lumen_mm, devices_mm })
+        let Anatomy { body, bone, lung, lumen, .. } = anatomy;
+        Ok(PathLengths {
+            width,
+            height,
+            body_mm: body,
+            bone_mm: bone,
+            lung_mm: lung,
+            lumen_mm: lumen,
+            devices_mm,
+        })
     }
 
-    /// Transmitted fraction I/I₀ = exp(−Σ μL) of the given path lengths with this scene's energy and
-    /// fillings.
+    /// Transmitted share of the absorbed energy behind the given path lengths, with this scene's spectrum, detector and
+    /// fillings: the signal over that of the open beam. −ln of it is the line integral.
     ///
     /// # Errors
     /// [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn transmission(&self, paths: &PathLengths) -> Result<Vec<f32>> {
-        self.setup.fluoro.as_ref().ok_or_else(no_fluoro)?.beam.transmission(paths)
+        let (scope, _) = self.fluoro.as_ref().ok_or_else(no_fluoro)?;
+        let fraction = self.setup.spec.xray.contrast_fraction;
+        let at = |map: &[f32], i: usize| f64::from(map.get(i).copied().unwrap_or(0.0));
+        (0..paths.lumen_mm.len())
+            .map(|i| {
+                let [bone, lung, lumen] =
+                    [&paths.bone_mm, &paths.lung_mm, &paths.lumen_mm].map(|map| at(map, i));
+                let inside: f64 = paths.devices_mm.iter().map(|map| at(&map.1, i)).sum();
+                let tissue = (at(&paths.body_mm, i) - bone - lung - lumen).max(0.0);
+                let lengths = [
+                    (Material::SoftTissue, tissue),
+                    (Material::CorticalBone, bone),
+                    (Material::Lung, lung),
+                    (Material::Blood, (lumen - inside) * (1.0 - fraction)),
+                    (Material::Contrast370, (lumen - inside) * fraction),
+                ];
+                let devices = paths.devices_mm.iter().map(|(material, map)| (*material, at(map, i)));
+                Ok(scope.beam.transmission(lengths.into_iter().chain(devices))? as f32)
+            })
+            .collect()
     }
 
     /// Runs `job`; where an adapter fails in it, hands over to the CPU and runs it again.
-    fn with_fallback<T>(&mut self, job: impl Fn(&mut Engines) -> Result<T>) -> Result<T> {
-        match job(&mut self.engines) {
+    fn with_fallback<T>(
+        &mut self,
+        job: impl Fn(&Setup, &mut Engines, &mut Option<(Fluoroscope, Sequence)>) -> Result<T>,
+    ) -> Result<T> {
+        match job(&self.setup, &mut self.engines, &mut self.fluoro) {
             Err(Error::Computation(reason)) if !self.is_cpu => {
                 let mut engines = cpu::engines(&self.setup);
                 engines.name = format!("{} ({} failed: {reason})", engines.name, self.engines.name);
                 self.engines = engines;
                 self.is_cpu = true;
-                job(&mut self.engines)
+                job(&self.setup, &mut self.engines, &mut self.fluoro)
             }
             done => done,
         }
@@ -163,8 +309,6 @@ fn no_fluoro() -> Error {
 
 #[cfg(test)]
 mod tests {
-    use endowire_core::Vec3;
-
     use super::*;
     use crate::spec::View;
 
@@ -175,22 +319,24 @@ mod tests {
         Err(Error::Computation("the device was lost".into()))
     }
 
-    impl FluoroEngine for Broken {
-        fn frame(&mut self, _: &[RefinedDevice]) -> Result<Image> {
+    impl PathEngine for Broken {
+        fn mesh(&mut self, _: &CArm, _: &SurfaceMesh) -> Result<Vec<f32>> {
             lost()
         }
 
-        fn lumen_path(&mut self) -> Result<Vec<f32>> {
-            lost()
-        }
-
-        fn device_path(&mut self, _: &RefinedDevice) -> Result<Vec<f32>> {
+        fn pieces(
+            &mut self,
+            _: &CArm,
+            _: &[(crate::device::Piece, f64)],
+            _: &mut [f32],
+            _: &mut Vec<u32>,
+        ) -> Result<()> {
             lost()
         }
     }
 
     impl ThreeDEngine for Broken {
-        fn frame(&mut self, _: &[RefinedDevice]) -> Result<Image> {
+        fn frame(&mut self, _: &Solids) -> Result<Image> {
             lost()
         }
     }
@@ -208,18 +354,26 @@ mod tests {
             ..ViewSpec::default()
         };
         let mut whole = Renderer::new(&spec, &wall).unwrap();
-        let broken = || Engines {
-            fluoro: Some(Box::new(Broken)),
-            three_d: Some(Box::new(Broken)),
-            name: "adapter".into(),
+        let point = |x: f64| crate::DevicePoint {
+            position_mm: Vec3::new(x, 5.0, 5.0),
+            tangent: Vec3::x(),
+            radius_mm: 0.4,
         };
-        let setup = || Setup::new(&spec, &wall).unwrap();
-        let mut renderer = Renderer { setup: setup(), engines: broken(), is_cpu: false };
-        assert_eq!(renderer.render(&[]).unwrap(), whole.render(&[]).unwrap());
+        let wire = [DeviceView { points: vec![point(1.0), point(20.0)], ..DeviceView::default() }];
+        let broken = || {
+            let mut renderer = Renderer::new(&spec, &wall).unwrap();
+            renderer.engines = Engines {
+                paths: Some(Box::new(Broken)),
+                three_d: Some(Box::new(Broken)),
+                name: "adapter".into(),
+            };
+            renderer
+        };
+        let mut renderer = Renderer { is_cpu: false, ..broken() };
+        assert_eq!(renderer.render(&wire).unwrap(), whole.render(&wire).unwrap());
         assert_eq!(renderer.backend(), "CPU reference (adapter failed: the device was lost)");
-        assert_eq!(renderer.path_lengths(&[]).unwrap(), whole.path_lengths(&[]).unwrap());
+        assert_eq!(renderer.path_lengths(&wire).unwrap(), whole.path_lengths(&wire).unwrap());
         // The twin: without anything to fall back on, the failure is reported.
-        let mut last = Renderer { setup: setup(), engines: broken(), is_cpu: true };
-        assert!(last.render(&[]).is_err());
+        assert!(broken().render(&wire).is_err());
     }
 }

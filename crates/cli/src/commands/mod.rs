@@ -1,5 +1,7 @@
 //! One file a command.
 
+mod fluoro;
+mod render;
 mod rod;
 mod run;
 mod timing;
@@ -13,6 +15,8 @@ use crate::failure::Failure;
 pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Run(args) => run::run(args),
+        Command::Render(args) => render::render(args),
+        Command::Fluoro(args) => fluoro::fluoro(args),
         Command::Rod(args) => rod::rod(args),
         Command::Verify(args) => verify::verify(args),
         Command::Vessel(VesselCommand::Check { file, unit_mm, json }) => {

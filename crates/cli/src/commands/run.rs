@@ -26,7 +26,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         return Err(Failure::Input(text).at(args.scene.display()));
     }
     let mut simulation = scene.simulation().map_err(in_scene)?;
-    let mut frames = FrameWriter::new(&args.scene, &simulation)?;
+    let mut frames = FrameWriter::new(&args.scene, &scene, &simulation)?;
     let mut inputs = vec![scene.text().as_bytes().to_vec()];
     for path in scene.input_paths() {
         inputs.push(read_input(&path)?);
@@ -82,6 +82,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let summary = Summary {
         provenance,
         scene: scene.name.clone(),
+        scene_file: std::path::absolute(&args.scene).unwrap_or_else(|_| args.scene.clone()),
         method: scene.method.name(),
         steps: recorder.steps(),
         steps_asked: commands.len(),

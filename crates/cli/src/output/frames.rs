@@ -1,13 +1,23 @@
-//! Frames of a run: the scene's `[view]` table, the renderer it asks for, and the PNG files.
+//! Frames: the scene's `[view]` table, the renderer it asks for, and the files.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use endowire_core::device::Device;
 use endowire_core::input::from_toml;
 use endowire_core::insertion::Simulation;
-use endowire_viewer::{DeviceView, Renderer, ViewSpec};
-use serde::Deserialize;
+use endowire_core::scene::Scene;
+use endowire_core::shape::Shape;
+use endowire_core::vessel::SurfaceMesh;
+use endowire_viewer::{
+    Angiogram, Animation, ContactView, DeviceView, Frames, Image, Moment, Renderer, View, ViewSpec,
+};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
+use super::npz::write_map;
 use super::recorder::Recorder;
+use super::to_json;
+use crate::args::{FrameArgs, ViewChoice};
 use crate::failure::Failure;
 
 /// The part of a scene file that is the viewer's; the core reads the rest.
@@ -17,25 +27,43 @@ struct ViewTable {
     view: ViewSpec,
 }
 
-/// Draws the steps that the scene wants to see.
+/// The `[view]` table of a scene: paths start from its folder, and contrast medium flows in the vessel's own tree unless the table
+/// names another.
+fn view_table(path: &Path, scene: &Scene) -> Result<ViewSpec, Failure> {
+    let (ViewTable { view }, _) = from_toml(path)?;
+    let mut view = view.in_folder(path.parent().unwrap_or(Path::new("")));
+    if let (None, Some(tree)) = (&view.flow.tree, &scene.vessel.tree) {
+        view.flow.tree = Some(scene.resolve(tree));
+    }
+    Ok(view)
+}
+
+/// The device as the viewer sees it.
+fn device_view(shape: &Shape, device: &Device, spec: &ViewSpec) -> DeviceView {
+    let mut view = DeviceView::from_shape(shape, |from_tip_mm| device.section_at(from_tip_mm).radius_mm);
+    view.parts.clone_from(&spec.device);
+    view
+}
+
+/// Draws the steps of a run that the scene wants to see.
 pub(crate) struct FrameWriter {
-    every: usize,
+    spec: ViewSpec,
     /// None where no view is asked for: then nothing is built.
     renderer: Option<Renderer>,
 }
 
 impl FrameWriter {
     /// Prepares what the scene file asks for.
-    pub(crate) fn new(scene: &Path, simulation: &Simulation) -> Result<Self, Failure> {
-        let in_scene = |e: endowire_core::Error| Failure::from(e).at(scene.display());
-        let (ViewTable { view }, _) = from_toml(scene)?;
-        view.validate().map_err(in_scene)?;
-        let renderer = if view.views.is_empty() {
+    pub(crate) fn new(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, Failure> {
+        let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
+        let spec = view_table(path, scene)?;
+        spec.validate().map_err(in_scene)?;
+        let renderer = if spec.views.is_empty() {
             None
         } else {
-            Some(Renderer::new(&view, &simulation.wall().closed_mesh()).map_err(in_scene)?)
+            Some(Renderer::new(&spec, &simulation.wall().closed_mesh()).map_err(in_scene)?)
         };
-        Ok(Self { every: view.every as usize, renderer })
+        Ok(Self { spec, renderer })
     }
 
     /// What draws, for the summary.
@@ -51,15 +79,11 @@ impl FrameWriter {
         simulation: &Simulation,
         recorder: &mut Recorder,
     ) -> Result<(), Failure> {
-        let Some(renderer) = self.renderer.as_mut().filter(|_| last || step.is_multiple_of(self.every))
-        else {
-            return Ok(());
-        };
-        let device = simulation.device();
-        let view = DeviceView::from_shape(simulation.shape(), |from_tip_mm| {
-            device.section_at(from_tip_mm).radius_mm
-        });
-        let frames = renderer.render(&[view])?;
+        let due = last || step.is_multiple_of(self.spec.every as usize);
+        let Some(renderer) = self.renderer.as_mut().filter(|_| due) else { return Ok(()) };
+        let view = device_view(simulation.shape(), simulation.device(), &self.spec);
+        let moment = Moment { frame: step as u64, time_s: step as f64 / self.spec.frames_per_s };
+        let frames = renderer.render_at(&[view], moment)?;
         for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {
                 recorder.frame(name, |path| Ok(image.write_png(path)?))?;
@@ -67,4 +91,243 @@ impl FrameWriter {
         }
         Ok(())
     }
+}
+
+/// One moment to draw.
+pub(crate) struct Still<'a> {
+    /// Begins the names of its files.
+    pub(crate) name: String,
+    pub(crate) moment: Moment,
+    pub(crate) shape: &'a Shape,
+    pub(crate) contacts: &'a [ContactView],
+}
+
+/// What was written: the JSON document of `render` and `fluoro`.
+#[derive(Debug, Serialize)]
+pub(crate) struct Written {
+    /// What drew.
+    pub(crate) renderer: String,
+    /// Folder of the frames.
+    pub(crate) folder: PathBuf,
+    /// Every file, relative to the folder where it lies there.
+    pub(crate) files: Vec<PathBuf>,
+}
+
+/// Draws frames with the wishes of the command line.
+pub(crate) struct Studio<'a> {
+    args: &'a FrameArgs,
+    spec: ViewSpec,
+    wall: SurfaceMesh,
+    device: Device,
+    renderer: Renderer,
+    folder: PathBuf,
+    frames: usize,
+    drawn: usize,
+    animation: Option<Animation>,
+    series: Vec<Image>,
+    files: Vec<PathBuf>,
+}
+
+impl<'a> Studio<'a> {
+    /// Prepares `frames` frames of a scene, in `folder`.
+    pub(crate) fn new(
+        args: &'a FrameArgs,
+        path: &Path,
+        scene: &Scene,
+        default: ViewChoice,
+        folder: PathBuf,
+        frames: usize,
+    ) -> Result<Self, Failure> {
+        let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
+        let spec = wished(view_table(path, scene)?, args, default)?;
+        let wall = scene.wall().map_err(in_scene)?.closed_mesh();
+        let device = scene.device().map_err(in_scene)?;
+        let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
+        if !spec.wants(View::Fluoro) && (args.dicom.is_some() || args.labels || args.raw) {
+            let text = "--dicom, --labels and --raw belong to fluoroscopy: use --view fluoro or --view both";
+            return Err(Failure::Input(text.to_owned()));
+        }
+        std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
+        Ok(Self {
+            args,
+            spec,
+            wall,
+            device,
+            renderer,
+            folder,
+            frames,
+            drawn: 0,
+            animation: None,
+            series: vec![],
+            files: vec![],
+        })
+    }
+
+    /// Frames a second.
+    pub(crate) fn frames_per_s(&self) -> f64 {
+        self.spec.frames_per_s
+    }
+
+    /// Draws a moment and writes what is wanted of it.
+    pub(crate) fn draw(&mut self, still: &Still) -> Result<(), Failure> {
+        if let (Some(orbit), true) = (self.args.orbit, self.drawn > 0) {
+            let mut spec = ViewSpec { views: vec![View::ThreeD], ..self.spec.clone() };
+            let part = self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64;
+            spec.camera.azimuth_deg = Some(spec.camera.azimuth_deg.unwrap_or(0.0) + orbit * part);
+            let device = device_view(still.shape, &self.device, &self.spec);
+            let mut orbiting = Renderer::new(&spec, &self.wall)?;
+            orbiting.show_contacts(still.contacts);
+            let three_d = orbiting.render_at(std::slice::from_ref(&device), still.moment)?.three_d;
+            let fluoro = match self.spec.wants(View::Fluoro) {
+                true => self.renderer.render_at(&[device], still.moment)?.fluoro,
+                false => None,
+            };
+            return self.write(still, &Frames { three_d, fluoro });
+        }
+        let device = device_view(still.shape, &self.device, &self.spec);
+        self.renderer.show_contacts(still.contacts);
+        let frames = self.renderer.render_at(&[device], still.moment)?;
+        self.write(still, &frames)
+    }
+
+    fn write(&mut self, still: &Still, frames: &Frames) -> Result<(), Failure> {
+        self.drawn += 1;
+        for (view, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
+            if let Some(image) = image {
+                let path = self.file(&format!("{}_{view}.png", still.name));
+                image.write_png(&path)?;
+            }
+        }
+        let both = match (&frames.three_d, &frames.fluoro) {
+            (Some(left), Some(right)) => Some(left.beside(right)),
+            _ => None,
+        };
+        if let Some(both) = &both {
+            let path = self.file(&format!("{}_both.png", still.name));
+            both.write_png(&path)?;
+        }
+        if let (Some(path), Some(shown)) =
+            (&self.args.animate, both.as_ref().or(frames.three_d.as_ref()).or(frames.fluoro.as_ref()))
+        {
+            let mut animation = match self.animation.take() {
+                Some(animation) => animation,
+                None => Animation::new(path, shown, self.frames as u32, self.spec.frames_per_s)?,
+            };
+            animation.push(shown)?;
+            self.animation = Some(animation);
+        }
+        if let (Some(image), true) = (&frames.fluoro, self.args.dicom.is_some()) {
+            self.series.push(image.clone());
+        }
+        if self.args.labels || self.args.raw {
+            self.write_data(still)?;
+        }
+        Ok(())
+    }
+
+    /// Labels and arrays.
+    fn write_data(&mut self, still: &Still) -> Result<(), Failure> {
+        let device = [device_view(still.shape, &self.device, &self.spec)];
+        if self.args.labels {
+            let contacts: Vec<_> = still.contacts.iter().map(|c| c.position_mm).collect();
+            let labels = self.renderer.labels(&device, &contacts)?;
+            let path = self.file(&format!("{}_mask.png", still.name));
+            labels.mask.write_png(&path)?;
+            let path = self.file(&format!("{}_labels.json", still.name));
+            std::fs::write(&path, to_json(&labels)? + "\n").map_err(|e| Failure::write(&path, &e))?;
+        }
+        if self.args.raw {
+            let paths = self.renderer.path_lengths(&device)?;
+            let line: Vec<f32> = self.renderer.transmission(&paths)?.iter().map(|t| -t.ln()).collect();
+            let mut maps = vec![("line_integral".to_owned(), &line)];
+            for (name, map) in [
+                ("body_mm", &paths.body_mm),
+                ("bone_mm", &paths.bone_mm),
+                ("lung_mm", &paths.lung_mm),
+                ("lumen_mm", &paths.lumen_mm),
+            ] {
+                if !map.is_empty() {
+                    maps.push((name.to_owned(), map));
+                }
+            }
+            maps.extend(paths.devices_mm.iter().map(|(material, map)| (format!("{material}_mm"), map)));
+            for (name, map) in maps {
+                let path = self.file(&format!("{}_{name}.npy", still.name));
+                write_map(&path, paths.width as usize, map).map_err(|e| Failure::write(&path, &e))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A file of the folder, noted.
+    fn file(&mut self, name: &str) -> PathBuf {
+        self.files.push(name.into());
+        self.folder.join(name)
+    }
+
+    /// Ends animation and series.
+    pub(crate) fn finish(mut self) -> Result<Written, Failure> {
+        if let (Some(animation), Some(path)) = (self.animation.take(), &self.args.animate) {
+            animation.finish()?;
+            self.files.push(path.clone());
+        }
+        if let (Some(path), Some(c_arm)) = (&self.args.dicom, self.renderer.c_arm()) {
+            let angiogram = Angiogram {
+                c_arm,
+                kvp: self.spec.xray.kvp,
+                frames_per_s: self.spec.frames_per_s,
+                description: "endowire",
+            };
+            angiogram.write(path, &self.series)?;
+            self.files.push(path.clone());
+        }
+        Ok(Written { renderer: self.renderer.backend().to_owned(), folder: self.folder, files: self.files })
+    }
+}
+
+/// A `[view]` table with the wishes of the command line.
+fn wished(mut spec: ViewSpec, args: &FrameArgs, default: ViewChoice) -> Result<ViewSpec, Failure> {
+    let choice = args.view.or(spec.views.is_empty().then_some(default));
+    if let Some(choice) = choice {
+        spec.views = match choice {
+            ViewChoice::ThreeD => vec![View::ThreeD],
+            ViewChoice::Fluoro => vec![View::Fluoro],
+            ViewChoice::Both => vec![View::ThreeD, View::Fluoro],
+        };
+    }
+    if let Some(pose) = args.pose {
+        (spec.c_arm.primary_deg, spec.c_arm.secondary_deg) = (0.0, 0.0);
+        spec.c_arm.pose = Some(pose);
+    }
+    spec.xray.mode = args.mode.unwrap_or(spec.xray.mode);
+    spec.bits = args.bits.unwrap_or(spec.bits);
+    match args.size.as_deref() {
+        None => {}
+        Some([side]) => spec.size_px = [*side, *side],
+        Some([width, height]) => spec.size_px = [*width, *height],
+        Some(other) => return Err(Failure::Input(format!("--size {other:?}: give WIDTH or WIDTHxHEIGHT"))),
+    }
+    if args.set.is_empty() {
+        return Ok(spec);
+    }
+    let failed = |text: String| Failure::Input(format!("--set: {text}"));
+    let mut table = serde_json::to_value(&spec).map_err(|e| failed(e.to_string()))?;
+    for set in &args.set {
+        let (key, value) = set.split_once('=').ok_or_else(|| failed(format!("{set}: say KEY=VALUE")))?;
+        let value = serde_json::from_str(value).unwrap_or_else(|_| Value::from(value));
+        let mut place = &mut table;
+        for part in key.trim().split('.') {
+            if place.is_null() {
+                *place = Value::Object(serde_json::Map::new());
+            }
+            let Value::Object(members) = place else {
+                return Err(failed(format!("{key}: there is nothing inside {part}'s parent")));
+            };
+            place = members.entry(part).or_insert(Value::Null);
+        }
+        *place = value;
+        // One by one, so that the message names the one at fault.
+        serde_json::from_value::<ViewSpec>(table.clone()).map_err(|e| failed(format!("{set}: {e}")))?;
+    }
+    serde_json::from_value(table).map_err(|e| failed(e.to_string()))
 }

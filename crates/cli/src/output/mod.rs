@@ -5,6 +5,7 @@ pub(crate) mod npz;
 pub(crate) mod progress;
 pub(crate) mod provenance;
 pub(crate) mod recorder;
+pub(crate) mod recording;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};

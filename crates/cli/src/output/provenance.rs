@@ -35,6 +35,11 @@ impl Provenance {
         }
     }
 
+    /// SHA-256 of the inputs.
+    pub(crate) fn scene_hash(&self) -> &str {
+        &self.scene_hash
+    }
+
     /// For a result that depends on the program and its arguments alone.
     pub(crate) fn of_program(arguments: &str) -> Self {
         Self::new(&[arguments.as_bytes()], 0)

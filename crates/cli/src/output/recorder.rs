@@ -21,6 +21,8 @@ pub(crate) struct Summary {
     pub(crate) provenance: Provenance,
     /// Name of the scene.
     pub(crate) scene: String,
+    /// The scene's file, for frames afterwards.
+    pub(crate) scene_file: PathBuf,
     /// Name of the method.
     pub(crate) method: &'static str,
     /// Steps carried out.
@@ -100,6 +102,10 @@ pub(crate) struct Recorder {
     tangents: ArrayStream,
     from_tip: ArrayStream,
     offsets: ArrayStream,
+    contact_points: ArrayStream,
+    contact_forces: ArrayStream,
+    contact_offsets: ArrayStream,
+    contacts: i64,
     nodes: i64,
     steps: usize,
     /// Frames written so far, relative to the folder.
@@ -126,6 +132,8 @@ impl Recorder {
         };
         let mut offsets = array("offsets", Kind::I64, 1)?;
         offsets.push_i64(0).map_err(|e| Failure::write(folder, &e))?;
+        let mut contact_offsets = array("contact_offsets", Kind::I64, 1)?;
+        contact_offsets.push_i64(0).map_err(|e| Failure::write(folder, &e))?;
         Ok(Self {
             folder: folder.to_path_buf(),
             table,
@@ -133,6 +141,10 @@ impl Recorder {
             tangents: array("tangents", Kind::F64, 3)?,
             from_tip: array("from_tip_mm", Kind::F64, 1)?,
             offsets,
+            contact_points: array("contact_positions_mm", Kind::F64, 3)?,
+            contact_forces: array("contact_forces_n", Kind::F64, 3)?,
+            contact_offsets,
+            contacts: 0,
             nodes: 0,
             steps: 0,
             frames: Vec::new(),
@@ -170,27 +182,44 @@ impl Recorder {
             left_through: report.left_through,
             converged: report.converged,
         };
-        let whole = [&self.positions, &self.tangents, &self.from_tip, &self.offsets].map(ArrayStream::len);
+        let whole = self.arrays().map(|array| array.len());
         let write = || -> io::Result<()> {
             self.table.serialize(row)?;
             self.table.flush()?;
             self.positions.push_f64(shape.positions_mm.iter().flat_map(|x| [x.x, x.y, x.z]))?;
             self.tangents.push_f64(shape.tangents.iter().flat_map(|t| [t.x, t.y, t.z]))?;
             self.from_tip.push_f64(shape.from_tip_mm.iter().copied())?;
+            let contacts = &report.contacts;
+            self.contact_points.push_f64(contacts.iter().flat_map(|c| <[f64; 3]>::from(c.position_mm)))?;
+            self.contact_forces
+                .push_f64(contacts.iter().flat_map(|c| <[f64; 3]>::from(c.normal * c.force_n)))?;
+            self.contact_offsets.push_i64(self.contacts + contacts.len() as i64)?;
             self.offsets.push_i64(self.nodes + shape.len() as i64)
         };
         match write() {
             Ok(()) => {
                 self.steps += 1;
                 self.nodes += shape.len() as i64;
+                self.contacts += report.contacts.len() as i64;
                 Ok(())
             }
             Err(error) => {
-                let arrays = [&mut self.positions, &mut self.tangents, &mut self.from_tip, &mut self.offsets];
-                arrays.into_iter().zip(whole).for_each(|(array, numbers)| array.truncate(numbers));
+                self.arrays().into_iter().zip(whole).for_each(|(array, numbers)| array.truncate(numbers));
                 Err(Failure::write(&self.folder, &error))
             }
         }
+    }
+
+    fn arrays(&mut self) -> [&mut ArrayStream; 7] {
+        [
+            &mut self.positions,
+            &mut self.tangents,
+            &mut self.from_tip,
+            &mut self.offsets,
+            &mut self.contact_points,
+            &mut self.contact_forces,
+            &mut self.contact_offsets,
+        ]
     }
 
     /// Writes a frame of the current step with `write`, and notes it for the summary.
@@ -215,7 +244,15 @@ impl Recorder {
     /// Writes shapes.npz and summary.json; the second also where the first cannot be written.
     pub(crate) fn finish(self, summary: &Summary) -> Result<(), Failure> {
         let folder = &self.folder;
-        let arrays = vec![self.positions, self.tangents, self.from_tip, self.offsets];
+        let arrays = vec![
+            self.positions,
+            self.tangents,
+            self.from_tip,
+            self.offsets,
+            self.contact_points,
+            self.contact_forces,
+            self.contact_offsets,
+        ];
         let shapes = npz::write(&folder.join("shapes.npz"), arrays)
             .map_err(|e| Failure::write(&folder.join("shapes.npz"), &e));
         let path = folder.join("summary.json");

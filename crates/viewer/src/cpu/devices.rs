@@ -7,12 +7,16 @@ use endowire_core::Vec3;
 use crate::c_arm::CArm;
 use crate::cpu::piece::chord;
 use crate::cpu::raster::span;
-use crate::device::{DevicePoint, Piece, pieces};
+use crate::device::{DevicePoint, Layer, Piece, RefinedDevice, pieces};
 
-/// The pieces of a refined centre line in beam coordinates (columns, rows, depth from the isocentre). Those that are not
-/// between source and detector throw no shadow: a device may go where the C-arm does not look.
-pub(crate) fn pieces_in_beam(c_arm: &CArm, points: &[DevicePoint]) -> Vec<Piece> {
-    let turned: Vec<DevicePoint> = points
+/// The frusta of each layer of a device in beam coordinates (columns, rows, depth from the isocentre), with the signs of their
+/// lengths. Those that are not between source and detector throw no shadow: a device may go where the C-arm does not look.
+pub(crate) fn layers_in_beam<'a>(
+    c_arm: &CArm,
+    device: &'a RefinedDevice,
+) -> Vec<(&'a Layer, Vec<(Piece, f64)>)> {
+    let turned: Vec<DevicePoint> = device
+        .points
         .iter()
         .map(|p| DevicePoint {
             position_mm: c_arm.in_beam(&p.position_mm),
@@ -20,20 +24,26 @@ pub(crate) fn pieces_in_beam(c_arm: &CArm, points: &[DevicePoint]) -> Vec<Piece>
             radius_mm: p.radius_mm,
         })
         .collect();
-    let mut pieces = pieces(&turned);
-    pieces.retain(|piece| c_arm.is_between(&piece.start) && c_arm.is_between(&piece.end));
-    pieces
+    let pieces = pieces(&turned);
+    let seen = |piece: &Piece| c_arm.is_between(&piece.start) && c_arm.is_between(&piece.end);
+    let layer = |layer: &'a Layer| {
+        let mut signed = layer.signed(&pieces);
+        signed.retain(|(piece, _)| seen(piece));
+        (layer, signed)
+    };
+    device.layers.iter().map(layer).collect()
 }
 
 /// Columns and rows of the pixels that `piece` may touch: those of the two spheres that enclose it.
 pub(crate) fn pixels_of(c_arm: &CArm, piece: &Piece) -> [Range<usize>; 2] {
     let size = c_arm.size_px();
+    let reach = piece.reach();
     let ends = [piece.start, piece.end];
     [0, 1].map(|k| {
         let (mut low, mut high) = (f64::MAX, f64::MIN);
         for end in ends {
-            for side in [-piece.reach, piece.reach] {
-                for depth in [-piece.reach, piece.reach] {
+            for side in [-reach, reach] {
+                for depth in [-reach, reach] {
                     // A sphere that reaches behind the source may be seen anywhere.
                     if c_arm.sod_mm() + end.z + depth <= 0.0 {
                         return 0..size[k] as usize;

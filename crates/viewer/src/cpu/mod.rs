@@ -7,24 +7,19 @@ mod raster;
 mod view3d;
 mod wall;
 
-use std::sync::Arc;
-
-pub(crate) use devices::{pieces_in_beam, pixels_of};
-pub(crate) use wall::{check_closed, check_drawable, wall_path_mm};
+pub(crate) use devices::{layers_in_beam, pixels_of};
+pub(crate) use fluoro::CpuPaths;
+pub(crate) use wall::{check_closed, check_drawable, wall_crossings};
 
 use crate::renderer::Engines;
 use crate::scene::Setup;
-use fluoro::CpuFluoro;
 use view3d::CpuView3d;
+
+/// What the CPU is called for people.
+pub(crate) const NAME: &str = "CPU reference";
 
 /// Prepares the views of `setup`.
 pub(crate) fn engines(setup: &Setup) -> Engines {
-    let mut engines = Engines { fluoro: None, three_d: None, name: "CPU reference".into() };
-    if let Some(fluoro) = &setup.fluoro {
-        engines.fluoro = Some(Box::new(CpuFluoro::new(fluoro, Arc::clone(&setup.wall))));
-    }
-    if let Some(camera) = &setup.camera {
-        engines.three_d = Some(Box::new(CpuView3d::new(camera, &setup.wall)));
-    }
-    engines
+    let three_d = setup.camera.as_ref().map(|camera| Box::new(CpuView3d::new(camera, &setup.wall)) as _);
+    Engines { paths: setup.c_arm.is_some().then(|| Box::new(CpuPaths) as _), three_d, name: NAME.into() }
 }

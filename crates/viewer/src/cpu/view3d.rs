@@ -8,10 +8,9 @@ use endowire_core::vessel::SurfaceMesh;
 use glam::{Vec3, Vec4};
 
 use crate::cpu::raster::ScreenTriangle;
-use crate::image::{Image, PixelFormat};
+use crate::output::{Image, PixelFormat};
 use crate::renderer::ThreeDEngine;
-use crate::scene::RefinedDevice;
-use crate::three_d::{Camera, Style, Vertex, device_triangles, wall_triangles};
+use crate::three_d::{Camera, Solids, Style, Vertex, solid_triangles, wall_triangles};
 
 /// Samples across a pixel: nine levels of edge smoothing.
 const SAMPLES: u32 = 3;
@@ -116,21 +115,21 @@ impl CpuView3d {
 }
 
 impl ThreeDEngine for CpuView3d {
-    fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image> {
+    fn frame(&mut self, solids: &Solids) -> Result<Image> {
         let [width, height] = self.camera.size_px;
         let (row, sub) = ((width * self.sub) as usize, self.sub as usize);
         let mut touched = Vec::new();
-        for device in devices {
-            for corners in device_triangles(&self.camera, &device.points).chunks_exact(3) {
-                draw(&self.camera, self.sub, corners, Faces::Front, |sample, position, normal| {
-                    if -position.z < self.distance[sample] {
-                        self.distance[sample] = -position.z;
-                        self.colour[sample] =
-                            self.style.shade_device(position, normal).to_array().map(to_byte);
-                        touched.push(sample / row / sub * width as usize + sample % row / sub);
-                    }
-                });
-            }
+        for corners in solid_triangles(&self.camera, solids).chunks_exact(3) {
+            let [r, g, b, _] = corners[0].colour;
+            let colour = Vec3::from_array([r, g, b].map(from_byte));
+            draw(&self.camera, self.sub, corners, Faces::Front, |sample, position, normal| {
+                if -position.z < self.distance[sample] {
+                    self.distance[sample] = -position.z;
+                    self.colour[sample] =
+                        self.style.shade_solid(position, normal, colour).to_array().map(to_byte);
+                    touched.push(sample / row / sub * width as usize + sample % row / sub);
+                }
+            });
         }
         touched.sort_unstable();
         touched.dedup();

@@ -14,8 +14,9 @@ use endowire_core::{Error, Result, Vec3};
 use crate::c_arm::CArm;
 use crate::cpu::raster::ScreenTriangle;
 
-/// Length inside `wall` of the central ray of each pixel, row by row.
-pub(crate) fn wall_path_mm(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<f64> {
+/// Calls `visit(pixel, sign, depth)` for each meeting of a pixel's central ray with `wall`: −1 where it enters and +1 where it
+/// leaves, at a depth in front of the source.
+fn meetings(c_arm: &CArm, wall: &SurfaceMesh, mut visit: impl FnMut(usize, f64, f64)) {
     let [width, height] = c_arm.size_px();
     let seen: Vec<([f64; 2], f64)> = (wall.vertices_mm.iter())
         .map(|v| {
@@ -23,7 +24,6 @@ pub(crate) fn wall_path_mm(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<f64> {
             (c_arm.pixel_of(&beam), 1.0 / (c_arm.sod_mm() + beam.z))
         })
         .collect();
-    let mut path = vec![0.0; width as usize * height as usize];
     for corners in &wall.triangles {
         let corners = corners.map(|v| seen[v as usize]);
         let Some(triangle) = ScreenTriangle::new(corners.map(|c| c.0)) else { continue };
@@ -32,13 +32,27 @@ pub(crate) fn wall_path_mm(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<f64> {
         let sign = -triangle.area2().signum();
         let [i0, i1, i2] = corners.map(|c| c.1);
         triangle.scan([width, height], |x, y, [w0, w1, w2]| {
-            path[y * width as usize + x] += sign / (w0 * i0 + w1 * i1 + w2 * i2);
+            visit(y * width as usize + x, sign, 1.0 / (w0 * i0 + w1 * i1 + w2 * i2));
         });
     }
-    for (i, length) in path.iter_mut().enumerate() {
-        *length *= c_arm.obliquity_at(i);
-    }
+}
+
+/// Length inside `wall` of the central ray of each pixel, row by row.
+pub(crate) fn wall_path_mm(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<f64> {
+    let [width, height] = c_arm.size_px();
+    let mut path = vec![0.0; width as usize * height as usize];
+    meetings(c_arm, wall, |pixel, sign, depth| path[pixel] += sign * depth);
+    path.iter_mut().zip(c_arm.obliquities()).for_each(|(length, obliquity)| *length *= obliquity);
     path
+}
+
+/// Every meeting of a pixel's central ray with `wall`: the pixel, the distance from the source, and whether it enters.
+pub(crate) fn wall_crossings(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<(u32, f32, bool)> {
+    let mut crossings = Vec::new();
+    meetings(c_arm, wall, |pixel, sign, depth| {
+        crossings.push((pixel as u32, (depth * c_arm.obliquity_at(pixel)) as f32, sign < 0.0));
+    });
+    crossings
 }
 
 /// Checks that a wall can be drawn at all: it has triangles, they name vertices that exist, and these are

@@ -9,18 +9,17 @@
 //!
 //! Devices are rectangles, one for each mitred piece, whose pixels solve the cone of `cpu/piece.rs`.
 
+use std::collections::HashMap;
+
 use bytemuck::{Pod, Zeroable};
 use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 
 use crate::c_arm::CArm;
-use crate::cpu::{pieces_in_beam, pixels_of};
+use crate::cpu::pixels_of;
 use crate::device::Piece;
+use crate::fluoro::PathEngine;
 use crate::gpu::context::{Gpu, color_pass};
-use crate::image::{Image, PixelFormat};
-use crate::renderer::FluoroEngine;
-use crate::scene::{FluoroSetup, RefinedDevice};
-use crate::xray::SUBRAYS;
 
 const PATH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
 
@@ -68,41 +67,17 @@ impl ViewUniform {
     }
 }
 
-/// The shader's view of a beam.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct BeamUniform {
-    mu_tissue: f32,
-    mu_lumen: f32,
-    tissue_mm: f32,
-    white: f32,
-    span: f32,
-    subrays: u32,
-    padding: [f32; 2],
-}
-
-/// Pipelines, the vessel and the targets of the fluoroscopic view.
+/// Pipelines, and a target for each size of picture.
 #[derive(Debug)]
-pub(crate) struct GpuFluoro {
+pub(crate) struct GpuPaths {
     gpu: Gpu,
-    setup: FluoroSetup,
-    /// The C-arm with one pixel a ray.
-    rays: CArm,
-    wall: wgpu::Buffer,
     draw_wall: wgpu::RenderPipeline,
     draw_pieces: wgpu::RenderPipeline,
-    resolve: wgpu::RenderPipeline,
-    view: wgpu::Buffer,
-    resolve_group: wgpu::BindGroup,
-    excess: wgpu::TextureView,
-    picture: wgpu::Texture,
+    targets: HashMap<[u32; 2], wgpu::Texture>,
 }
 
-impl GpuFluoro {
-    pub(crate) fn new(gpu: &Gpu, setup: &FluoroSetup, wall: &SurfaceMesh) -> Self {
-        let rays = setup.c_arm.refined(SUBRAYS);
-        let vertices = wall_vertices(&rays, wall);
-        let wall = gpu.buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX);
+impl GpuPaths {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
         let draw_wall = path_pipeline(
             gpu,
             include_str!("wall.wgsl"),
@@ -123,143 +98,67 @@ impl GpuFluoro {
                 ],
             },
         );
-        let shader = gpu.shader(include_str!("resolve.wgsl"));
-        let resolve = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("resolve"),
-            layout: None,
-            vertex: vertex_state(&shader, &[]),
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: None,
-            multisample: wgpu::MultisampleState::default(),
-            fragment: Some(fragment_state(&shader, &[Some(wgpu::TextureFormat::R8Unorm.into())])),
-            multiview_mask: None,
-            cache: None,
-        });
-        let view = gpu.buffer(bytemuck::bytes_of(&ViewUniform::new(&rays)), wgpu::BufferUsages::UNIFORM);
-        let [white, black] = setup.beam.window;
-        let beam = BeamUniform {
-            mu_tissue: setup.beam.mu_tissue as f32,
-            mu_lumen: setup.beam.mu_lumen as f32,
-            tissue_mm: setup.beam.tissue_mm as f32,
-            white: white as f32,
-            span: (black - white) as f32,
-            subrays: SUBRAYS,
-            padding: [0.0; 2],
-        };
-        let beam = gpu.buffer(bytemuck::bytes_of(&beam), wgpu::BufferUsages::UNIFORM);
-        let [lumen, excess] =
-            [0, 1].map(|_| gpu.target(rays.size_px(), PATH_FORMAT, 1).create_view(&Default::default()));
-        let resolve_group = gpu.bind(
-            &resolve,
-            &[
-                view.as_entire_binding(),
-                beam.as_entire_binding(),
-                wgpu::BindingResource::TextureView(&lumen),
-                wgpu::BindingResource::TextureView(&excess),
-            ],
-        );
-        let picture = gpu.target(setup.c_arm.size_px(), wgpu::TextureFormat::R8Unorm, 1);
-        let fluoro = Self {
-            gpu: gpu.clone(),
-            setup: setup.clone(),
-            rays,
-            wall,
-            draw_wall,
-            draw_pieces,
-            resolve,
-            view,
-            resolve_group,
-            excess,
-            picture,
-        };
-        // The vessel does not move: its path lengths are drawn once.
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        fluoro.encode_wall(&mut encoder, &lumen, &fluoro.view);
-        gpu.queue.submit([encoder.finish()]);
-        fluoro
+        Self { gpu: gpu.clone(), draw_wall, draw_pieces, targets: HashMap::new() }
     }
 
-    fn encode_wall(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        target: &wgpu::TextureView,
-        view: &wgpu::Buffer,
-    ) {
-        let group = self.gpu.bind(&self.draw_wall, &[view.as_entire_binding()]);
-        let mut pass = color_pass(encoder, target, wgpu::Color::TRANSPARENT);
-        pass.set_pipeline(&self.draw_wall);
-        pass.set_bind_group(0, &group, &[]);
-        pass.set_vertex_buffer(0, self.wall.slice(..));
-        pass.draw(0..(self.wall.size() / size_of::<WallVertex>() as u64) as u32, 0..1);
-    }
-
-    fn encode_pieces(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        target: &wgpu::TextureView,
-        view: &wgpu::Buffer,
-        pieces: &[PieceInstance],
-    ) {
-        let group = self.gpu.bind(&self.draw_pieces, &[view.as_entire_binding()]);
-        let instances = (!pieces.is_empty())
-            .then(|| self.gpu.buffer(bytemuck::cast_slice(pieces), wgpu::BufferUsages::VERTEX));
-        let mut pass = color_pass(encoder, target, wgpu::Color::TRANSPARENT);
-        if let Some(instances) = &instances {
-            pass.set_pipeline(&self.draw_pieces);
-            pass.set_bind_group(0, &group, &[]);
-            pass.set_vertex_buffer(0, instances.slice(..));
-            pass.draw(0..6, 0..pieces.len() as u32);
-        }
-    }
-
-    /// Reads back what `encode` draws with one ray a pixel.
-    fn path(
-        &self,
-        encode: impl Fn(&mut wgpu::CommandEncoder, &wgpu::TextureView, &wgpu::Buffer),
+    /// Draws `vertices` corners of `instances` into a target of the size of `view`, and reads it.
+    fn lengths(
+        &mut self,
+        view: &CArm,
+        pipeline: &wgpu::RenderPipeline,
+        data: &[u8],
+        [vertices, instances]: [u32; 2],
     ) -> Result<Vec<f32>> {
-        let Self { gpu, setup, .. } = self;
-        let target = gpu.target(setup.c_arm.size_px(), PATH_FORMAT, 1);
-        let uniform = ViewUniform::new(&setup.c_arm);
-        let view = gpu.buffer(bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM);
+        let gpu = &self.gpu;
+        let target =
+            self.targets.entry(view.size_px()).or_insert_with_key(|size| gpu.target(*size, PATH_FORMAT, 1));
+        let uniform = gpu.buffer(bytemuck::bytes_of(&ViewUniform::new(view)), wgpu::BufferUsages::UNIFORM);
+        let group = gpu.bind(pipeline, &[uniform.as_entire_binding()]);
+        let buffer = gpu.buffer(data, wgpu::BufferUsages::VERTEX);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encode(&mut encoder, &target.create_view(&Default::default()), &view);
-        let data = gpu.read_back(encoder, &target)?;
-        Ok(bytemuck::pod_collect_to_vec(&data))
+        {
+            let texture = target.create_view(&Default::default());
+            let mut pass = color_pass(&mut encoder, &texture, wgpu::Color::TRANSPARENT);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.set_vertex_buffer(0, buffer.slice(..));
+            pass.draw(0..vertices, 0..instances);
+        }
+        let bytes = gpu.read_back(encoder, target)?;
+        Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
     }
 }
 
-impl FluoroEngine for GpuFluoro {
-    fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image> {
-        let Self { gpu, setup, .. } = &*self;
-        let mut instances = Vec::new();
-        for device in devices {
-            let weight = setup.beam.device_excess_per_mm(device.material)?;
-            let pieces = pieces_in_beam(&self.rays, &device.points);
-            instances.extend(pieces.iter().map(|piece| instance(&self.rays, piece, weight)));
-        }
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        self.encode_pieces(&mut encoder, &self.excess, &self.view, &instances);
-        {
-            let target = self.picture.create_view(&Default::default());
-            let mut pass = color_pass(&mut encoder, &target, wgpu::Color::BLACK);
-            pass.set_pipeline(&self.resolve);
-            pass.set_bind_group(0, &self.resolve_group, &[]);
-            pass.draw(0..3, 0..1);
-        }
-        let data = gpu.read_back(encoder, &self.picture)?;
-        let [width, height] = setup.c_arm.size_px();
-        Ok(Image::new(width, height, PixelFormat::Gray8, data))
+impl PathEngine for GpuPaths {
+    fn mesh(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Vec<f32>> {
+        let vertices = wall_vertices(view, mesh);
+        let count = vertices.len() as u32;
+        let pipeline = self.draw_wall.clone();
+        self.lengths(view, &pipeline, bytemuck::cast_slice(&vertices), [count, 1])
     }
 
-    fn lumen_path(&mut self) -> Result<Vec<f32>> {
-        self.path(|encoder, target, view| self.encode_wall(encoder, target, view))
-    }
-
-    fn device_path(&mut self, device: &RefinedDevice) -> Result<Vec<f32>> {
-        let c_arm = &self.setup.c_arm;
-        let pieces = pieces_in_beam(c_arm, &device.points);
-        let instances: Vec<PieceInstance> = pieces.iter().map(|piece| instance(c_arm, piece, 1.0)).collect();
-        self.path(|encoder, target, view| self.encode_pieces(encoder, target, view, &instances))
+    fn pieces(
+        &mut self,
+        view: &CArm,
+        pieces: &[(Piece, f64)],
+        lengths: &mut [f32],
+        touched: &mut Vec<u32>,
+    ) -> Result<()> {
+        if pieces.is_empty() {
+            return Ok(());
+        }
+        let instances: Vec<PieceInstance> =
+            pieces.iter().map(|(piece, sign)| instance(view, piece, *sign)).collect();
+        let pipeline = self.draw_pieces.clone();
+        let drawn =
+            self.lengths(view, &pipeline, bytemuck::cast_slice(&instances), [6, instances.len() as u32])?;
+        for (ray, (sum, length)) in (0..).zip(lengths.iter_mut().zip(drawn)) {
+            if length != 0.0 {
+                *sum += length;
+                touched.push(ray);
+            }
+        }
+        Ok(())
     }
 }
 

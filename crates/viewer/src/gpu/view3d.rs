@@ -4,10 +4,9 @@ use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 
 use crate::gpu::context::{Gpu, attachment, color_pass};
-use crate::image::{Image, PixelFormat};
+use crate::output::{Image, PixelFormat};
 use crate::renderer::ThreeDEngine;
-use crate::scene::RefinedDevice;
-use crate::three_d::{Camera, Style, Vertex, device_triangles, wall_triangles};
+use crate::three_d::{Camera, Solids, Style, Vertex, solid_triangles, wall_triangles};
 
 /// The only count every adapter has.
 const SAMPLES: u32 = 4;
@@ -83,10 +82,9 @@ impl GpuView3d {
 }
 
 impl ThreeDEngine for GpuView3d {
-    fn frame(&mut self, devices: &[RefinedDevice]) -> Result<Image> {
+    fn frame(&mut self, solids: &Solids) -> Result<Image> {
         let Self { gpu, camera, .. } = self;
-        let vertices: Vec<Vertex> =
-            devices.iter().flat_map(|device| device_triangles(camera, &device.points)).collect();
+        let vertices = solid_triangles(camera, solids);
         let buffer = (!vertices.is_empty())
             .then(|| gpu.buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX));
         let [colour, depth, sum, through] = &self.sampled;
@@ -174,7 +172,7 @@ fn pipeline(gpu: &Gpu, shader: &wgpu::ShaderModule, stage: Stage) -> wgpu::Rende
     let layout = wgpu::VertexBufferLayout {
         array_stride: size_of::<Vertex>() as u64,
         step_mode: wgpu::VertexStepMode::Vertex,
-        attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
+        attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4],
     };
     let surface = stage != Stage::Compose;
     let buffers = [Some(layout)];

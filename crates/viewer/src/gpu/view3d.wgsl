@@ -19,15 +19,16 @@ struct Surface {
     @builtin(position) clip: vec4f,
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
+    @location(2) colour: vec4f,
 }
 
 @vertex
-fn surface(@location(0) position: vec3f, @location(1) normal: vec3f) -> Surface {
+fn surface(@location(0) position: vec3f, @location(1) normal: vec3f, @location(2) colour: vec4f) -> Surface {
     let distance = -position.z;
     let near = style.planes.x;
     let far = style.planes.y;
     let depth = far * (distance - near) / (far - near);
-    return Surface(vec4f(position.xy / style.frustum.xy, depth, distance), position, normal);
+    return Surface(vec4f(position.xy / style.frustum.xy, depth, distance), position, normal, colour);
 }
 
 @vertex
@@ -49,7 +50,7 @@ fn device(in: Surface) -> @location(0) vec4f {
     let half_way = normalize(lamp + to_eye);
     let light = 0.40 + 0.55 * max(dot(n, lamp), 0.0) + 0.25 * max(dot(n, to_eye), 0.0);
     let shine = style.device.w * pow(max(dot(n, half_way), 0.0), 24.0);
-    return vec4f(saturate(style.device.xyz * light + shine), 1.0);
+    return vec4f(saturate(in.colour.xyz * light + shine), 1.0);
 }
 
 struct Sheet {

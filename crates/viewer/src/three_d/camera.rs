@@ -33,8 +33,8 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// Fits a camera to a wall with at least one vertex.
-    pub(crate) fn new(spec: &CameraSpec, size_px: [u32; 2], wall: &SurfaceMesh) -> Self {
+    /// Fits a camera to a wall with at least one vertex, and to points beside it.
+    pub(crate) fn new(spec: &CameraSpec, size_px: [u32; 2], wall: &SurfaceMesh, beside: &[Vec3]) -> Self {
         let back = match (spec.azimuth_deg, spec.elevation_deg) {
             (None, None) => natural_direction(wall),
             (azimuth, elevation) => from_angles(azimuth.unwrap_or(0.0), elevation.unwrap_or(0.0)),
@@ -50,9 +50,11 @@ impl Camera {
         // extremes of x + kz and −x + kz give the tightest D and the centre that goes with it, for each
         // direction alone.
         let local: Vec<[f64; 3]> = wall.vertices_mm.iter().map(|v| axes.map(|axis| v.dot(&axis))).collect();
+        let all: Vec<[f64; 3]> =
+            local.iter().copied().chain(beside.iter().map(|v| axes.map(|axis| v.dot(&axis)))).collect();
         let fit = |side: usize| {
             let k = tangents[side] * FILL;
-            let (plus, minus) = local.iter().fold((f64::MIN, f64::MIN), |(plus, minus), p| {
+            let (plus, minus) = all.iter().fold((f64::MIN, f64::MIN), |(plus, minus), p| {
                 (plus.max(p[side] + k * p[2]), minus.max(k * p[2] - p[side]))
             });
             ((plus - minus) / 2.0, (plus + minus) / (2.0 * k))
@@ -149,7 +151,7 @@ mod tests {
     fn the_whole_vessel_is_in_the_frame_and_fills_it() {
         for size in [[640, 640], [800, 300], [200, 900]] {
             let wall = cloud(80.0, 20.0, 50.0);
-            let camera = Camera::new(&CameraSpec::default(), size, &wall);
+            let camera = Camera::new(&CameraSpec::default(), size, &wall, &[]);
             let mut widest: f64 = 0.0;
             for v in &wall.vertices_mm {
                 let view = camera.in_view(v);
@@ -166,8 +168,8 @@ mod tests {
 
     #[test]
     fn the_front_is_seen_with_the_head_up_and_the_left_on_the_right() {
-        let spec = CameraSpec { azimuth_deg: Some(0.0), elevation_deg: Some(0.0) };
-        let camera = Camera::new(&spec, [400, 400], &cloud(80.0, 20.0, 50.0));
+        let spec = CameraSpec { azimuth_deg: Some(0.0), elevation_deg: Some(0.0), ..CameraSpec::default() };
+        let camera = Camera::new(&spec, [400, 400], &cloud(80.0, 20.0, 50.0), &[]);
         let at = |p: Vec3| camera.pixel_of(camera.in_view(&p), 1);
         let centre = at(Vec3::new(90.0, 0.0, -40.0));
         assert!(at(Vec3::new(95.0, 0.0, -40.0))[0] > centre[0]);
@@ -184,8 +186,8 @@ mod tests {
 
     #[test]
     fn looking_along_the_body_works() {
-        let spec = CameraSpec { azimuth_deg: None, elevation_deg: Some(90.0) };
-        let camera = Camera::new(&spec, [100, 100], &cloud(10.0, 20.0, 30.0));
+        let spec = CameraSpec { elevation_deg: Some(90.0), ..CameraSpec::default() };
+        let camera = Camera::new(&spec, [100, 100], &cloud(10.0, 20.0, 30.0), &[]);
         assert!(camera.eye_mm.iter().all(|x| x.is_finite()));
     }
 }

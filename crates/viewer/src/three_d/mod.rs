@@ -2,8 +2,13 @@
 
 mod camera;
 mod mesh;
+mod scale_bar;
+mod solids;
 mod style;
 
 pub(crate) use camera::Camera;
-pub(crate) use mesh::{Vertex, device_triangles, wall_triangles};
+pub(crate) use mesh::{Vertex, wall_triangles};
+pub(crate) use scale_bar::draw as draw_scale_bar;
+pub use solids::ContactView;
+pub(crate) use solids::{Solids, solid_triangles};
 pub(crate) use style::Style;

@@ -20,7 +20,7 @@ pub(crate) struct Style {
     background: Vec4,
     /// rgb of the wall; w: how much darker its silhouettes are.
     wall: Vec4,
-    /// rgb of devices; w: strength of their highlight.
+    /// w: strength of the highlight of solids.
     device: Vec4,
     /// Unit direction to the lamp; w: strength of the wall's highlight.
     lamp: Vec4,
@@ -39,7 +39,7 @@ impl Style {
         Self {
             background: Vec4::new(0.965, 0.972, 0.980, 0.45),
             wall: Vec4::new(0.88, 0.35, 0.30, 0.50),
-            device: Vec4::new(0.10, 0.16, 0.30, 0.55),
+            device: Vec4::new(0.0, 0.0, 0.0, 0.45),
             lamp: Vec3::new(-0.45, 0.62, 0.64).normalize().extend(0.35),
             sheet: Vec4::new(0.22, 0.85, 2.0, 0.72),
             frustum: Vec4::new(tx, ty, front, rear),
@@ -57,15 +57,15 @@ impl Style {
         self.background.truncate()
     }
 
-    /// Colour of a device's surface at a point in view coordinates.
-    pub(crate) fn shade_device(&self, position: Vec3, normal: Vec3) -> Vec3 {
+    /// Colour of a solid's surface at a point in view coordinates.
+    pub(crate) fn shade_solid(&self, position: Vec3, normal: Vec3, colour: Vec3) -> Vec3 {
         let to_eye = -position.normalize();
         let n = normal.normalize_or(to_eye);
         let lamp = self.lamp.truncate();
         let half = (lamp + to_eye).normalize();
         let light = 0.40 + 0.55 * n.dot(lamp).max(0.0) + 0.25 * n.dot(to_eye).max(0.0);
         let shine = self.device.w * n.dot(half).max(0.0).powf(24.0);
-        (self.device.truncate() * light + shine).clamp(Vec3::ZERO, Vec3::ONE)
+        (colour * light + shine).clamp(Vec3::ZERO, Vec3::ONE)
     }
 
     /// Colour and opacity of the wall at a point in view coordinates.

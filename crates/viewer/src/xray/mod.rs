@@ -1,9 +1,17 @@
-//! X-ray physics: what attenuates how much, and how path lengths become a picture.
+//! X-ray physics: what attenuates how much, what the detector absorbs, and how noisy that is.
 
 mod beam;
+mod detector;
+mod exp;
 mod material;
+mod noise;
 mod path;
+mod quadrature;
+mod spectrum;
+mod table;
 
-pub(crate) use beam::{Beam, SUBRAYS};
+pub(crate) use beam::{Beam, Lanes};
+pub(crate) use detector::Detector;
+pub(crate) use exp::{LANES, ln_lanes};
 pub use material::Material;
 pub use path::PathLengths;

@@ -4,17 +4,20 @@ use crate::xray::Material;
 
 /// Length of each pixel's central ray inside each thing, in millimetres, row by row from the top left.
 ///
-/// Lengths are geometric, before nesting: `lumen_mm` is the length inside the closed wall whatever device
-/// lies there. A device displaces what fills the lumen, so the length through blood is `lumen_mm` minus those
-/// of the devices.
+/// Lengths are geometric, before nesting: `lumen_mm` is the length inside the closed wall whatever device lies there. A device
+/// displaces what fills the lumen, so the length through blood is `lumen_mm` minus those of the devices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathLengths {
     /// Pixels a row.
     pub width: u32,
     /// Number of rows.
     pub height: u32,
-    /// Length inside the body (a slab, see [`crate::XRaySpec::tissue_mm`]).
+    /// Length inside the body: soft tissue and all that lies in it; for a CT volume, its equivalent of soft tissue and bone.
     pub body_mm: Vec<f32>,
+    /// Length inside bone, in cortical bone of the same mass; empty where the patient has none.
+    pub bone_mm: Vec<f32>,
+    /// Length inside the lungs; empty where the patient has none.
+    pub lung_mm: Vec<f32>,
     /// Length inside the closed wall.
     pub lumen_mm: Vec<f32>,
     /// Length inside devices, one map per material, in order of first appearance.

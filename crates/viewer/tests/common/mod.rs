@@ -6,7 +6,9 @@ use std::f64::consts::TAU;
 
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
-use endowire_viewer::{Backend, CArmSpec, DevicePoint, DeviceView, Renderer, View, ViewSpec};
+use endowire_viewer::{
+    Backend, CArmSpec, DetectorSpec, DevicePoint, DeviceView, Renderer, View, ViewSpec, XRaySpec,
+};
 
 /// A surface of revolution about z through the given (radius, height) profile from the bottom pole to the top
 /// pole.
@@ -77,15 +79,17 @@ pub fn device(points: usize, radius_mm: f64, at: impl Fn(f64) -> Vec3) -> Device
             DevicePoint { position_mm: at(w), tangent: at(w + 1e-6) - at(w - 1e-6), radius_mm }
         })
         .collect();
-    DeviceView { points, material: None }
+    DeviceView { points, ..DeviceView::default() }
 }
 
-/// A fluoroscopic view with the isocentre at the origin.
+/// A fluoroscopic view with the isocentre at the origin, at 60 keV on an ideal detector.
 pub fn spec(backend: Backend, size: u32, pixel_mm: f64) -> ViewSpec {
     ViewSpec {
         size_px: [size, size],
         views: vec![View::Fluoro],
         backend,
+        xray: XRaySpec { energy_kev: Some(60.0), harmonised: 0.0, ..XRaySpec::default() },
+        detector: DetectorSpec::ideal(),
         c_arm: CArmSpec { pixel_mm: Some(pixel_mm), isocentre_mm: Some([0.0; 3]), ..CArmSpec::default() },
         ..ViewSpec::default()
     }

@@ -252,9 +252,11 @@ impl<const C: usize> Method for Kirchhoff<C> {
         self.report.converged = true;
         self.write_report(surroundings);
         self.write_shape();
-        // What the hand put in and the rod did not keep.
-        let work = 0.5 * (push + self.report.push_force_n) * (target - start)
-            + 0.5 * (torque + self.report.torque_nmm) * command.rotate_rad;
+        // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between
+        // what it is at the ends.
+        let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
+        let work = least(push, self.report.push_force_n, target - start)
+            + least(torque, self.report.torque_nmm, command.rotate_rad);
         let lost = work - self.report.dissipated_mj - (self.report.energy.total() - energy);
         self.report.jumped = lost > JUMP * energy.max(self.report.energy.total()).max(JUMP_FLOOR_MJ);
         Ok(())

@@ -28,6 +28,8 @@ pub(super) struct Extension {
 const PIECE: f64 = 0.4;
 /// Cosine between the tip's direction and the wall's inward normal below which it stands head-on and cannot slide.
 const HEAD_ON: f64 = -0.995;
+/// Part of its radius that the axis of a tip keeps from a soft wall at least, where it is pushed on.
+const SUNK: f64 = 0.6;
 /// Part of its radius that the axis keeps from the wall on its way.
 const CLEAR: f64 = 0.5;
 /// Length over which the device bends to the wall, in advances …
@@ -56,7 +58,10 @@ impl Extension {
                 (d.value_mm, d.gradient.try_normalize(0.0).unwrap_or(near.normal))
             }))
         };
-        let touch = distance(&tip, 2.0 * radius_mm).map_or(radius_mm, |(d, _)| d.min(radius_mm));
+        let at_tip = distance(&tip, 2.0 * radius_mm).map_or(radius_mm, |(d, _)| d);
+        let touch = at_tip.clamp(SUNK * radius_mm, radius_mm);
+        // Out of a soft wall that it has sunk into the tip may come in more than one piece.
+        let clear = at_tip.min(CLEAR * radius_mm);
         let count = (wanted_mm / (PIECE * radius_mm)).ceil().max(1.0);
         let piece_mm = wanted_mm / count;
         let (mut x, mut t) = (tip, tangent);
@@ -75,7 +80,7 @@ impl Extension {
                 t = (along + normal * lift).normalize();
                 next = x + t * piece_mm;
                 if let Some((d, normal)) = distance(&next, 2.0 * radius_mm) {
-                    if d < CLEAR * radius_mm {
+                    if d < clear {
                         break;
                     }
                     next += normal * (touch - d).max(0.0);

@@ -1,9 +1,19 @@
 //! What a scene file says about frames: its `[view]` table, with units in the names.
 
+mod anatomy;
+mod c_arm;
+mod xray;
+
+use std::path::Path;
+
 use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-use crate::xray::Material;
+pub use anatomy::{CtSpec, FlowSpec, InjectionSpec, PatientSpec, TorsoSpec};
+pub use c_arm::{CArmSpec, Pose};
+pub use xray::{DetectorSpec, Mode, XRaySpec};
+
+use crate::device::DevicePart;
 
 /// Largest side of a frame. Flat detectors have up to about 3000 pixels a side, and with two rays across a
 /// pixel this is the texture size that every adapter offers.
@@ -57,6 +67,20 @@ pub struct ViewSpec {
     pub c_arm: CArmSpec,
     /// X-ray physics.
     pub xray: XRaySpec,
+    /// The detector.
+    pub detector: DetectorSpec,
+    /// Who lies in the beam.
+    pub patient: PatientSpec,
+    /// Blood flow.
+    pub flow: FlowSpec,
+    /// Contrast medium, by script.
+    pub injection: Vec<InjectionSpec>,
+    /// What the device is made of, part by part; without any, it is a solid rod of `xray.device_material`.
+    pub device: Vec<DevicePart>,
+    /// Frames a second: recorded steps become moments by it.
+    pub frames_per_s: f64,
+    /// Bits a pixel of the fluoroscopic frames, 8 or 16.
+    pub bits: u32,
     /// Direction from which the 3D view looks.
     pub camera: CameraSpec,
 }
@@ -70,86 +94,47 @@ impl Default for ViewSpec {
             backend: Backend::Auto,
             c_arm: CArmSpec::default(),
             xray: XRaySpec::default(),
+            detector: DetectorSpec::default(),
+            patient: PatientSpec::default(),
+            flow: FlowSpec::default(),
+            injection: Vec::new(),
+            device: Vec::new(),
+            frames_per_s: 15.0,
+            bits: 8,
             camera: CameraSpec::default(),
-        }
-    }
-}
-
-/// The `[view.c_arm]` table; conventions are those of [`crate::CArm`].
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CArmSpec {
-    /// Positioner primary angle, LAO positive (DICOM 0018,1510).
-    pub primary_deg: f64,
-    /// Positioner secondary angle, cranial positive (DICOM 0018,1511).
-    pub secondary_deg: f64,
-    /// Source to detector.
-    pub sid_mm: f64,
-    /// Source to isocentre.
-    pub sod_mm: f64,
-    /// Pixel pitch at the detector; absent: the vessel fills the frame.
-    pub pixel_mm: Option<f64>,
-    /// Centre of rotation, seen in the middle of the frame; absent: the centre of the vessel's bounding box.
-    pub isocentre_mm: Option<[f64; 3]>,
-}
-
-impl Default for CArmSpec {
-    fn default() -> Self {
-        // Middle of the usual ranges: SID 1000–1200 mm, SOD 700–800 mm.
-        Self {
-            primary_deg: 0.0,
-            secondary_deg: 0.0,
-            sid_mm: 1100.0,
-            sod_mm: 750.0,
-            pixel_mm: None,
-            isocentre_mm: None,
-        }
-    }
-}
-
-/// The `[view.xray]` table.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct XRaySpec {
-    /// Photon energy, 40 to 80 keV: one line in place of a spectrum. 60 keV is near the mean of 80 kVp with
-    /// 0.2 mm Cu behind 20 cm of water (57.8 keV).
-    pub energy_kev: f64,
-    /// Volume fraction of contrast medium (370 mg iodine per ml) in the blood, 0 to 1.
-    pub contrast_fraction: f64,
-    /// Thickness of soft tissue along the central ray. The body is a slab across the beam, as the 20 cm water
-    /// phantom of acceptance tests is: an even background from every angle, whose path lengths are known
-    /// exactly. 0 is air.
-    pub tissue_mm: f64,
-    /// Material of devices that do not name their own.
-    pub device_material: Material,
-    /// Line integrals shown white and black; absent: fitted to the anatomy, the same for all frames of a run.
-    pub window: Option<[f64; 2]>,
-}
-
-impl Default for XRaySpec {
-    fn default() -> Self {
-        Self {
-            energy_kev: 60.0,
-            contrast_fraction: 0.0,
-            tissue_mm: 200.0,
-            device_material: Material::Steel316L,
-            window: None,
         }
     }
 }
 
 /// The `[view.camera]` table of the 3D view. With neither angle given, the camera looks from the front,
 /// slightly from the left and above, or across the plane of a vessel that lies in one.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CameraSpec {
     /// Around the long axis of the patient: 0 is anterior, 90 the patient's left.
     pub azimuth_deg: Option<f64>,
     /// Above the transverse plane, towards the head.
     pub elevation_deg: Option<f64>,
+    /// Whether a scale bar is drawn.
+    pub scale_bar: bool,
+    /// Whether the beam of the C-arm is drawn, if there is a fluoroscopic view; the camera then steps back to show it.
+    pub c_arm: bool,
+}
+
+impl Default for CameraSpec {
+    fn default() -> Self {
+        Self { azimuth_deg: None, elevation_deg: None, scale_bar: true, c_arm: false }
+    }
 }
 
 impl ViewSpec {
+    /// Lets the files it names start from `folder`, that of the scene.
+    pub fn in_folder(mut self, folder: &Path) -> Self {
+        let named = [self.flow.tree.as_mut(), self.patient.ct.as_mut().map(|ct| &mut ct.file)];
+        named.into_iter().flatten().for_each(|path| *path = folder.join(&*path));
+        self
+    }
+
     /// Whether frames of this kind are wanted.
     pub fn wants(&self, view: View) -> bool {
         self.views.contains(&view)
@@ -171,52 +156,19 @@ impl ViewSpec {
         }
         self.c_arm.validate()?;
         self.xray.validate()?;
+        self.detector.validate()?;
+        self.patient.validate()?;
+        self.flow.validate()?;
+        self.injection.iter().enumerate().try_for_each(|(i, injection)| injection.validate(i))?;
+        anatomy::validate_parts(&self.device)?;
+        finite_within("view.frames_per_s", self.frames_per_s, [0.01, 1000.0])?;
+        if ![8, 16].contains(&self.bits) {
+            return Err(Error::parameter("view.bits", self.bits, "must be 8 or 16"));
+        }
         for (key, angle) in
             [("azimuth_deg", self.camera.azimuth_deg), ("elevation_deg", self.camera.elevation_deg)]
         {
             finite_within(&format!("view.camera.{key}"), angle.unwrap_or(0.0), [-360.0, 360.0])?;
-        }
-        Ok(())
-    }
-}
-
-impl CArmSpec {
-    fn validate(&self) -> Result<()> {
-        finite_within("view.c_arm.primary_deg", self.primary_deg, [-360.0, 360.0])?;
-        finite_within("view.c_arm.secondary_deg", self.secondary_deg, [-90.0, 90.0])?;
-        positive("view.c_arm.sid_mm", self.sid_mm)?;
-        positive("view.c_arm.sod_mm", self.sod_mm)?;
-        if self.sod_mm >= self.sid_mm {
-            let mend =
-                format!("must be less than sid_mm = {}: the isocentre is before the detector", self.sid_mm);
-            return Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, mend));
-        }
-        if let Some(pitch) = self.pixel_mm {
-            positive("view.c_arm.pixel_mm", pitch)?;
-        }
-        if let Some(isocentre) = self.isocentre_mm
-            && !isocentre.iter().all(|x| x.is_finite())
-        {
-            let value = format!("{isocentre:?}");
-            return Err(Error::parameter("view.c_arm.isocentre_mm", value, "must be finite"));
-        }
-        Ok(())
-    }
-}
-
-impl XRaySpec {
-    fn validate(&self) -> Result<()> {
-        for material in [Material::Blood, self.device_material] {
-            material.attenuation_per_mm(self.energy_kev)?;
-        }
-        finite_within("view.xray.contrast_fraction", self.contrast_fraction, [0.0, 1.0])?;
-        finite_within("view.xray.tissue_mm", self.tissue_mm, [0.0, 1000.0])?;
-        if let Some([white, black]) = self.window
-            && !(white.is_finite() && black.is_finite() && white < black)
-        {
-            let value = format!("[{white}, {black}]");
-            let mend = "must be two finite line integrals, the white one less than the black one";
-            return Err(Error::parameter("view.xray.window", value, mend));
         }
         Ok(())
     }
@@ -239,6 +191,7 @@ fn positive(key: &str, value: f64) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::xray::Material;
 
     fn parse(text: &str) -> std::result::Result<ViewSpec, String> {
         toml::from_str(text).map_err(|e: toml::de::Error| e.to_string())
@@ -292,7 +245,7 @@ mod tests {
     #[test]
     fn each_bad_value_names_its_key() {
         type Spoil = fn(&mut ViewSpec);
-        let cases: [(&str, Spoil); 14] = [
+        let cases: [(&str, Spoil); 24] = [
             ("size_px", |s| s.size_px = [0, 10]),
             ("size_px", |s| s.size_px = [10, 9000]),
             ("every", |s| s.every = 0),
@@ -302,10 +255,22 @@ mod tests {
             ("sod_mm", |s| s.c_arm.sod_mm = 1100.0),
             ("pixel_mm", |s| s.c_arm.pixel_mm = Some(-0.1)),
             ("isocentre_mm", |s| s.c_arm.isocentre_mm = Some([0.0, f64::INFINITY, 0.0])),
-            ("energy_kev", |s| s.xray.energy_kev = 30.0),
+            ("energy_kev", |s| s.xray.energy_kev = Some(10.0)),
             ("contrast_fraction", |s| s.xray.contrast_fraction = 1.5),
             ("tissue_mm", |s| s.xray.tissue_mm = f64::NAN),
             ("window", |s| s.xray.window = Some([2.0, 1.0])),
+            ("kvp", |s| s.xray.kvp = 30.0),
+            ("energy_bins", |s| s.xray.energy_bins = 0),
+            ("dose_ngy", |s| s.detector.dose_ngy = Some(0.0)),
+            ("lag", |s| s.detector.lag = 1.0),
+            ("rotation_deg", |s| s.c_arm.rotation_deg = f64::NAN),
+            ("magnification", |s| s.c_arm.magnification = 0.0),
+            ("field_mm", |s| (s.c_arm.field_mm, s.c_arm.pixel_mm) = (Some(200.0), Some(0.2))),
+            ("inflow_ml_per_s", |s| s.flow.inflow_ml_per_s = -1.0),
+            ("torso.width_mm", |s| {
+                s.patient.torso = Some(TorsoSpec { width_mm: f64::NAN, ..TorsoSpec::default() });
+            }),
+            ("bits", |s| s.bits = 12),
             ("azimuth_deg", |s| s.camera.azimuth_deg = Some(f64::NAN)),
         ];
         for (key, spoil) in cases {

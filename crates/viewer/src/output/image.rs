@@ -1,4 +1,4 @@
-//! Finished frames: 8-bit pictures, row by row from the top left.
+//! Finished frames: pictures, row by row from the top left.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -11,6 +11,8 @@ use endowire_core::{Error, Result};
 pub enum PixelFormat {
     /// One byte a pixel, 0 = black.
     Gray8,
+    /// Two bytes a pixel, the more significant first, 0 = black.
+    Gray16,
     /// Red, green, blue, alpha; one byte each, display (sRGB) values.
     Rgba8,
 }
@@ -20,6 +22,7 @@ impl PixelFormat {
     pub fn bytes(self) -> usize {
         match self {
             Self::Gray8 => 1,
+            Self::Gray16 => 2,
             Self::Rgba8 => 4,
         }
     }
@@ -70,23 +73,57 @@ impl Image {
         self.data.get(start..start + self.format.bytes())
     }
 
+    /// Changes the pixel of an RGBA picture; nothing outside.
+    pub(crate) fn set(&mut self, x: u32, y: u32, rgba: [u8; 4]) {
+        if x < self.width && y < self.height && self.format == PixelFormat::Rgba8 {
+            let start = 4 * (y as usize * self.width as usize + x as usize);
+            self.data[start..start + 4].copy_from_slice(&rgba);
+        }
+    }
+
+    /// Both pictures side by side as RGBA, the lower one filled up with white.
+    pub fn beside(&self, right: &Self) -> Self {
+        let (width, height) = (self.width + right.width, self.height.max(right.height));
+        let mut data = Vec::with_capacity(4 * width as usize * height as usize);
+        for y in 0..height {
+            for image in [self, right] {
+                for x in 0..image.width {
+                    let rgba = match (image.format, image.pixel(x, y)) {
+                        (PixelFormat::Rgba8, Some(p)) => [p[0], p[1], p[2], p[3]],
+                        (_, Some(p)) => [p[0], p[0], p[0], 255],
+                        (_, None) => [255; 4],
+                    };
+                    data.extend(rgba);
+                }
+            }
+        }
+        Self { width, height, format: PixelFormat::Rgba8, data }
+    }
+
     /// Writes the picture as a PNG file.
     ///
     /// # Errors
     /// [`Error::File`] naming `path` when the file cannot be written.
     pub fn write_png(&self, path: impl AsRef<Path>) -> Result<()> {
         let path = path.as_ref();
-        let file = File::create(path).map_err(|source| Error::file(path, source))?;
-        let mut encoder = png::Encoder::new(BufWriter::new(file), self.width, self.height);
-        encoder.set_color(match self.format {
-            PixelFormat::Gray8 => png::ColorType::Grayscale,
-            PixelFormat::Rgba8 => png::ColorType::Rgba,
-        });
-        encoder.set_depth(png::BitDepth::Eight);
         let failed = |error| Error::file(path, std::io::Error::other(error));
-        let mut writer = encoder.write_header().map_err(failed)?;
+        let mut writer = self.png_encoder(path)?.write_header().map_err(failed)?;
         writer.write_image_data(&self.data).map_err(failed)?;
         writer.finish().map_err(failed)
+    }
+
+    /// An encoder for pictures like this one.
+    pub(super) fn png_encoder(&self, path: &Path) -> Result<png::Encoder<'static, BufWriter<File>>> {
+        let file = File::create(path).map_err(|source| Error::file(path, source))?;
+        let mut encoder = png::Encoder::new(BufWriter::new(file), self.width, self.height);
+        let (colour, depth) = match self.format {
+            PixelFormat::Gray8 => (png::ColorType::Grayscale, png::BitDepth::Eight),
+            PixelFormat::Gray16 => (png::ColorType::Grayscale, png::BitDepth::Sixteen),
+            PixelFormat::Rgba8 => (png::ColorType::Rgba, png::BitDepth::Eight),
+        };
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        Ok(encoder)
     }
 }
 

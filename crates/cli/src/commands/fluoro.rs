@@ -1,0 +1,63 @@
+//! `endowire fluoro`: frames of a scene, without a recording.
+
+use std::path::Path;
+
+use endowire_core::scene::Scene;
+use endowire_viewer::{ContactView, Moment};
+
+use crate::args::{FluoroArgs, ViewChoice};
+use crate::failure::Failure;
+use crate::output::frames::{Still, Studio};
+use crate::output::{print_json, progress, tell};
+
+/// Carries out the script, then draws.
+pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
+    let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
+    if args.count == 0 {
+        return Err(Failure::Input("--count 0: draw at least one frame".to_owned()));
+    }
+    if !args.time.is_finite() {
+        return Err(Failure::Input(format!("--time {}: must be finite", args.time)));
+    }
+    let scene = Scene::read(&args.scene)?;
+    let commands = scene.commands(&scene.device().map_err(in_scene)?).map_err(in_scene)?;
+    let steps = args.steps.unwrap_or(commands.len());
+    if steps > commands.len() {
+        return Err(Failure::Input(format!("--steps {steps}: the script has {} steps", commands.len())));
+    }
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
+    let frames = args.count as usize;
+    let mut studio = Studio::new(&args.frames, &args.scene, &scene, ViewChoice::Fluoro, folder, frames)?;
+    let mut simulation = scene.simulation().map_err(in_scene)?;
+    let bar = progress::bar(steps, "step");
+    for (index, command) in commands[..steps].iter().enumerate() {
+        simulation.step(*command).map_err(|e| {
+            Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), index + 1))
+        })?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let contacts: Vec<ContactView> = simulation
+        .report()
+        .contacts
+        .iter()
+        .map(|c| ContactView { position_mm: c.position_mm, force_n: c.normal * c.force_n })
+        .collect();
+    for k in 0..args.count {
+        let time_s = args.time + f64::from(k) / studio.frames_per_s();
+        let moment = Moment { frame: u64::from(k), time_s };
+        let name = format!("frame_{k:06}");
+        studio.draw(&Still { name, moment, shape: simulation.shape(), contacts: &contacts })?;
+    }
+    let written = studio.finish()?;
+    if args.frames.json {
+        return print_json(&written);
+    }
+    tell(format_args!(
+        "{} files by {} in {}",
+        written.files.len(),
+        written.renderer,
+        written.folder.display()
+    ));
+    Ok(())
+}

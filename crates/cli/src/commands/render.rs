@@ -1,0 +1,74 @@
+//! `endowire render`: frames of a recorded run.
+
+use endowire_core::scene::Scene;
+use endowire_viewer::{ContactView, Moment};
+
+use crate::args::{RenderArgs, ViewChoice};
+use crate::failure::Failure;
+use crate::output::frames::{Still, Studio};
+use crate::output::provenance::{Provenance, read_input};
+use crate::output::recording::Recording;
+use crate::output::{print_json, progress, tell};
+
+/// Draws the wanted steps.
+pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
+    let recording = Recording::read(&args.dir)?;
+    let path = args.scene.as_ref().unwrap_or(&recording.summary.scene_file);
+    let scene = Scene::read(path)?;
+    let mut inputs = vec![scene.text().as_bytes().to_vec()];
+    for path in scene.input_paths() {
+        inputs.push(read_input(&path)?);
+    }
+    if Provenance::new(&inputs, scene.seed).scene_hash() != recording.summary.scene_hash {
+        tell(format_args!(
+            "endowire: {} or a file it names has changed since the run in {} was recorded",
+            path.display(),
+            args.dir.display()
+        ));
+    }
+    let last = args.to.unwrap_or(recording.steps()).min(recording.steps());
+    if args.every == 0 || args.from == 0 || args.from > last {
+        return Err(Failure::Input(format!(
+            "steps {} to {last} by {}: {} has steps 1 to {}",
+            args.from,
+            args.every,
+            args.dir.display(),
+            recording.steps()
+        )));
+    }
+    let mut steps: Vec<usize> = (args.from..=last).step_by(args.every).collect();
+    if steps.last() != Some(&last) {
+        steps.push(last);
+    }
+    let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
+    let mut studio = Studio::new(&args.frames, path, &scene, ViewChoice::Both, folder, steps.len())?;
+    let bar = progress::bar(steps.len(), "frame");
+    for &step in &steps {
+        let contacts: Vec<ContactView> = recording
+            .contacts(step)
+            .iter()
+            .map(|c| ContactView { position_mm: c.position_mm, force_n: c.force_n })
+            .collect();
+        let moment = Moment { frame: step as u64, time_s: step as f64 / studio.frames_per_s() };
+        let shape = recording.shape(step);
+        studio.draw(&Still {
+            name: format!("step_{step:06}"),
+            moment,
+            shape: &shape,
+            contacts: &contacts,
+        })?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let written = studio.finish()?;
+    if args.frames.json {
+        return print_json(&written);
+    }
+    tell(format_args!(
+        "{} files by {} in {}",
+        written.files.len(),
+        written.renderer,
+        written.folder.display()
+    ));
+    Ok(())
+}

@@ -1,0 +1,168 @@
+//! Frames of a recorded run and of a scene, as a user gets them.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use npyz::NpyFile;
+use serde_json::Value;
+
+fn endowire(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_endowire")).args(args).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A short run in the curved tube, recorded without frames.
+fn recorded(folder: &Path) -> (PathBuf, PathBuf) {
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap();
+    let scene = std::fs::read_to_string(assets.join("scenes/curved_tube.toml"))
+        .unwrap()
+        .replace("\"../", &format!("\"{}/", assets.display()))
+        .replace("advance_mm = 220.0", "advance_mm = 30.0")
+        .replace("size_px = [640, 640]", "size_px = [96, 64]")
+        .replace("views = [\"3d\", \"fluoro\"]", "views = []");
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, scene).unwrap();
+    let run = folder.join("run");
+    assert!(endowire(&["run", text(&path), "--out", text(&run)]).status.success());
+    (path, run)
+}
+
+fn written(output: &Output) -> Value {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn png_size(path: &Path) -> (u32, u32) {
+    let reader = png::Decoder::new(BufReader::new(File::open(path).unwrap())).read_info().unwrap();
+    (reader.info().width, reader.info().height)
+}
+
+#[test]
+fn a_recorded_run_is_drawn_from_any_angle_with_all_that_belongs_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, run) = recorded(folder.path());
+    let [out, animation, dicom] = ["out", "turn.png", "run.dcm"].map(|name| folder.path().join(name));
+    let output = endowire(&[
+        "render",
+        text(&run),
+        "--from",
+        "40",
+        "--every",
+        "40",
+        "--pose",
+        "RAO 30 CAU 20",
+        "--view",
+        "both",
+        "--set",
+        "c_arm.sid_mm=1000",
+        "--labels",
+        "--raw",
+        "--orbit",
+        "30",
+        "--animate",
+        text(&animation),
+        "--dicom",
+        text(&dicom),
+        "--out",
+        text(&out),
+        "--json",
+    ]);
+    let document = written(&output);
+    let files: Vec<&str> =
+        document["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
+    // Steps 40 and 80, and the last one.
+    for step in ["step_000040", "step_000080", "step_000106"] {
+        for rest in [
+            "3d.png",
+            "fluoro.png",
+            "both.png",
+            "mask.png",
+            "labels.json",
+            "line_integral.npy",
+            "lumen_mm.npy",
+        ] {
+            let name = format!("{step}_{rest}");
+            assert!(files.contains(&name.as_str()) && out.join(&name).exists(), "{name}");
+        }
+    }
+    assert_eq!(png_size(&out.join("step_000040_both.png")), (192, 64));
+    let mut animated =
+        png::Decoder::new(BufReader::new(File::open(&animation).unwrap())).read_info().unwrap();
+    assert_eq!(animated.info().animation_control.unwrap().num_frames, 3);
+    let mut data = vec![0; animated.output_buffer_size().unwrap()];
+    animated.next_frame(&mut data).unwrap();
+
+    // The tip of the labels is the recorded one, seen by a pinhole at 1000 mm; the device attenuates there.
+    let labels: Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("step_000106_labels.json")).unwrap()).unwrap();
+    let tip: Vec<f64> =
+        labels["devices"][0]["tip_px"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+    assert!(labels["devices"][0]["tip_visible"].as_bool().unwrap(), "{tip:?}");
+    let map = |name: &str| {
+        let file = NpyFile::new(BufReader::new(File::open(out.join(name)).unwrap())).unwrap();
+        assert_eq!(file.shape(), [64, 96]);
+        file.into_vec::<f32>().unwrap()
+    };
+    let steel = map("step_000106_steel_316l_mm.npy");
+    let near = (0..steel.len())
+        .filter(|&i| steel[i] > 0.0)
+        .map(|i| (((i % 96) as f64 + 0.5 - tip[0]).powi(2) + ((i / 96) as f64 + 0.5 - tip[1]).powi(2)).sqrt())
+        .fold(f64::MAX, f64::min);
+    assert!(near < 2.0, "{near}");
+    let line = map("step_000106_line_integral.npy");
+    assert!(line.iter().all(|p| p.is_finite() && *p > 0.5));
+    let bytes = std::fs::read(&dicom).unwrap();
+    assert_eq!(&bytes[128..132], b"DICM");
+}
+
+#[test]
+fn a_scene_is_drawn_without_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, _) = recorded(folder.path());
+    let out = folder.path().join("out");
+    let draw = |more: &[&str]| {
+        let mut args = vec!["fluoro", text(&scene), "--out", text(&out), "--json", "--size", "48x32"];
+        args.extend(more);
+        written(&endowire(&args))
+    };
+    assert_eq!(draw(&["--steps", "0"])["files"].as_array().unwrap().len(), 1);
+    let bare = std::fs::read(out.join("frame_000000_fluoro.png")).unwrap();
+    assert_eq!(png_size(&out.join("frame_000000_fluoro.png")), (48, 32));
+    assert_eq!(draw(&["--count", "2", "--bits", "16"])["files"].as_array().unwrap().len(), 2);
+    assert_ne!(std::fs::read(out.join("frame_000000_fluoro.png")).unwrap(), bare);
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_with_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, run) = recorded(folder.path());
+    let nothing = folder.path().join("nothing");
+    let far = folder.path().join("no/such/folder/labels.png");
+    let cases: [(&[&str], &str); 9] = [
+        (&["render", text(&nothing)], "recorded run"),
+        (&["render", text(&run), "--pose", "north 3"], "LAO"),
+        (&["render", text(&run), "--set", "c_arm.sid_mm=0"], "sid_mm"),
+        (&["render", text(&run), "--set", "c_arm.nothing=0"], "nothing"),
+        (&["render", text(&run), "--from", "900"], "steps 1 to 106"),
+        (&["render", text(&run), "--view", "3d", "--labels"], "fluoroscopy"),
+        (&["render", text(&run), "--view", "fluoro", "--animate", text(&far)], "no/such/folder"),
+        (
+            &["fluoro", text(&scene), "--steps", "0", "--set", "patient.ct={\"file\":\"none.nii\"}"],
+            "none.nii",
+        ),
+        (&["fluoro", text(&scene), "--steps", "0", "--mode", "roadmap"], "injection"),
+    ];
+    for (args, word) in cases {
+        let output = endowire(args);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+        assert!(said.contains(word) && !said.contains("panicked"), "{args:?}: {said}");
+    }
+}

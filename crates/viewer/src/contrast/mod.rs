@@ -1,0 +1,6 @@
+//! Contrast medium: where the blood carries it, and what of it a ray meets.
+
+mod flow;
+mod map;
+
+pub(crate) use map::ContrastMap;

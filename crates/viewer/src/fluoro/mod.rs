@@ -1,0 +1,280 @@
+//! The fluoroscopic view: what stays is computed once for a pose of the C-arm, what moves for each frame.
+//!
+//! Materials nest by what they displace. With the geometric lengths B (body), O (bone), L (lungs), V (inside the wall) and Dⱼ
+//! (device j) along a ray,
+//!
+//! ```text
+//! p = µ_tissue · max(B − O − L − V, 0) + µ_bone · O + µ_lung · L + µ_lumen · V + Σⱼ (µⱼ − µ_lumen) · Dⱼ
+//! ```
+//!
+//! with µ_lumen = (1 − f) µ_blood + f µ_contrast at the local fraction f of contrast medium. The max covers a vessel that
+//! reaches out of the body, and a phantom in air (B = 0). Devices are taken to lie inside the lumen: a part outside the wall
+//! displaces lumen filling all the same.
+//!
+//! Pixels collect energy over their area, so signals, not line integrals, are averaged over [`SUBRAYS`]² rays a pixel.
+
+mod anatomy;
+mod display;
+mod scatter;
+mod sequence;
+
+use endowire_core::vessel::SurfaceMesh;
+use endowire_core::{Error, Result};
+
+pub(crate) use anatomy::Anatomy;
+pub use sequence::Moment;
+pub(crate) use sequence::Sequence;
+
+use crate::c_arm::CArm;
+use crate::contrast::ContrastMap;
+use crate::cpu::layers_in_beam;
+use crate::device::{Piece, RefinedDevice};
+use crate::scene::Setup;
+use crate::spec::ViewSpec;
+use crate::xray::{Beam, LANES, Lanes, Material};
+
+/// Rays across a pixel in each direction. Two give four grey levels of edge smoothing, enough beside a real
+/// detector's blur, at four times the cost of one.
+pub(crate) const SUBRAYS: u32 = 2;
+
+/// Fractions of contrast medium below this are blood.
+const LEAST_FRACTION: f32 = 1e-4;
+
+/// Computes lengths of rays inside things: the one task that processors differ in.
+pub(crate) trait PathEngine: Send {
+    /// Length inside a closed mesh of the central ray of each pixel of `view`, row by row.
+    fn mesh(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Vec<f32>>;
+
+    /// Adds the signed lengths inside frusta in beam coordinates to those of the pixels of `view`, and tells which it touched,
+    /// some perhaps repeatedly.
+    fn pieces(
+        &mut self,
+        view: &CArm,
+        pieces: &[(Piece, f64)],
+        lengths: &mut [f32],
+        touched: &mut Vec<u32>,
+    ) -> Result<()>;
+}
+
+/// Signal of each pixel, and signal times energy of a quantum.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Signal {
+    pub(crate) signal: Vec<f32>,
+    pub(crate) energy: Vec<f32>,
+}
+
+/// Everything about a fluoroscopic view that stays from frame to frame, and the buffers of the next.
+#[derive(Debug)]
+pub(crate) struct Fluoroscope {
+    pub(crate) c_arm: CArm,
+    /// The same view with one pixel a ray.
+    rays: CArm,
+    pub(crate) beam: Beam,
+    anatomy: Anatomy,
+    /// Attenuation of tissue, bone, lung, blood and contrast medium less blood.
+    lanes: [Lanes; 5],
+    start: Lanes,
+    fraction: f32,
+    contrast: Option<ContrastMap>,
+    /// Material of devices that name none.
+    default_material: Material,
+    /// Scattered signal.
+    scatter: Signal,
+    /// Signal of the anatomy without devices and injections.
+    pub(crate) still: Signal,
+    /// Lengths inside devices by material, all zero between frames.
+    devices: Vec<(Material, Lanes, Vec<f32>)>,
+    /// Rays and pixels that devices touch in this frame.
+    touched: Vec<u32>,
+    pixels: Vec<u32>,
+    listed: Vec<bool>,
+}
+
+impl Fluoroscope {
+    pub(crate) fn new(setup: &Setup, c_arm: &CArm, engine: &mut dyn PathEngine) -> Result<Self> {
+        let spec: &ViewSpec = &setup.spec;
+        let rays = c_arm.refined(SUBRAYS);
+        let anatomy = Anatomy::new(setup, &rays, engine)?;
+        let beam = Beam::new(&spec.xray, anatomy.reference_mm(&rays))?;
+        let lanes = [
+            beam.excess(Material::SoftTissue, None)?,
+            beam.excess(Material::CorticalBone, None)?,
+            beam.excess(Material::Lung, None)?,
+            beam.excess(Material::Blood, None)?,
+            beam.excess(Material::Contrast370, Some(Material::Blood))?,
+        ];
+        let contrast = match spec.injection.is_empty() {
+            true => None,
+            false => Some(ContrastMap::new(spec, c_arm, &setup.wall)?),
+        };
+        let pixels = c_arm.size_px().map(|n| n as usize).iter().product();
+        let mut fluoroscope = Self {
+            c_arm: c_arm.clone(),
+            start: beam.start(),
+            rays,
+            beam,
+            anatomy,
+            lanes,
+            fraction: spec.xray.contrast_fraction as f32,
+            contrast,
+            default_material: spec.xray.device_material,
+            scatter: Signal::default(),
+            still: Signal { signal: vec![0.0; pixels], energy: vec![0.0; pixels] },
+            devices: vec![],
+            touched: vec![],
+            pixels: vec![],
+            listed: vec![false; pixels],
+        };
+        for pixel in 0..pixels {
+            let [signal, energy] = fluoroscope.primary(pixel, fluoroscope.fraction);
+            fluoroscope.still.signal[pixel] = signal;
+            fluoroscope.still.energy[pixel] = energy;
+        }
+        let share = spec.detector.scatter_fraction;
+        if share > 0.0 {
+            fluoroscope.scatter = scatter::scattered(&fluoroscope.still, c_arm, share);
+            for (still, scatter) in [
+                (&mut fluoroscope.still.signal, &fluoroscope.scatter.signal),
+                (&mut fluoroscope.still.energy, &fluoroscope.scatter.energy),
+            ] {
+                still.iter_mut().zip(scatter).for_each(|(a, b)| *a += b);
+            }
+        }
+        Ok(fluoroscope)
+    }
+
+    /// First ray of a pixel, and rays a row.
+    fn first_ray(&self, pixel: usize) -> (usize, usize) {
+        let (width, sub) = (self.c_arm.size_px()[0] as usize, SUBRAYS as usize);
+        (pixel / width * sub * width * sub + pixel % width * sub, width * sub)
+    }
+
+    /// Signal and energy of the unscattered quanta of a pixel whose lumen has the given fraction of contrast medium.
+    fn primary(&self, pixel: usize, fraction: f32) -> [f32; 2] {
+        let open = self.c_arm.openness(pixel) as f32;
+        if open == 0.0 {
+            return [0.0; 2];
+        }
+        let (first, stride) = self.first_ray(pixel);
+        let mut sum = [0.0; 2];
+        for row in 0..SUBRAYS as usize {
+            for ray in first + row * stride..first + row * stride + SUBRAYS as usize {
+                self.ray(ray, fraction, &mut sum);
+            }
+        }
+        sum.map(|s| s * open / (SUBRAYS * SUBRAYS) as f32)
+    }
+
+    #[inline]
+    fn ray(&self, ray: usize, fraction: f32, sum: &mut [f32; 2]) {
+        let [tissue, bone, lung, lumen] = self.anatomy.at(ray);
+        let devices: f32 = self.devices.iter().map(|(_, _, lengths)| lengths[ray]).sum();
+        // What devices leave of the lumen's filling.
+        let filling = lumen - devices;
+        let lengths = [tissue, bone, lung, filling, filling * fraction];
+        self.beam.add(
+            |lane| {
+                let mut p = self.start[lane];
+                for (mu, length) in self.lanes.iter().zip(lengths) {
+                    for i in 0..LANES {
+                        p[i] += mu[lane][i] * length;
+                    }
+                }
+                if devices != 0.0 {
+                    for (_, mu, lengths) in &self.devices {
+                        for i in 0..LANES {
+                            p[i] += mu[lane][i] * lengths[ray];
+                        }
+                    }
+                }
+                p
+            },
+            sum,
+        );
+    }
+
+    /// Signal with devices and the contrast medium of a time; without a time, before any injection.
+    pub(crate) fn signal(
+        &mut self,
+        engine: &mut dyn PathEngine,
+        devices: &[RefinedDevice],
+        time_s: Option<f64>,
+    ) -> Result<Signal> {
+        let cast = self.cast(engine, devices);
+        let mut now = self.still.clone();
+        if cast.is_ok() {
+            let fractions = match (&self.contrast, time_s) {
+                (Some(contrast), Some(time)) => contrast.fractions(time),
+                _ => vec![],
+            };
+            for &(pixel, _) in fractions.iter().filter(|f| f.1 > LEAST_FRACTION) {
+                if !self.listed[pixel as usize] {
+                    self.pixels.push(pixel);
+                }
+            }
+            let mut injected = fractions.iter().peekable();
+            // Both lists rise with the pixel.
+            self.pixels.sort_unstable();
+            for &pixel in &self.pixels {
+                while injected.next_if(|f| f.0 < pixel).is_some() {}
+                let more = injected.next_if(|f| f.0 == pixel).map_or(0.0, |f| f.1);
+                let pixel = pixel as usize;
+                let [signal, energy] = self.primary(pixel, (self.fraction + more).min(1.0));
+                let scattered = |map: &[f32]| map.get(pixel).copied().unwrap_or(0.0);
+                now.signal[pixel] = signal + scattered(&self.scatter.signal);
+                now.energy[pixel] = energy + scattered(&self.scatter.energy);
+            }
+        }
+        for (_, _, lengths) in &mut self.devices {
+            self.touched.iter().for_each(|&ray| lengths[ray as usize] = 0.0);
+        }
+        self.pixels.iter().for_each(|&pixel| self.listed[pixel as usize] = false);
+        self.touched.clear();
+        self.pixels.clear();
+        cast.map(|()| now)
+    }
+
+    /// Adds up the lengths inside devices, and lists the pixels that they touch.
+    fn cast(&mut self, engine: &mut dyn PathEngine, devices: &[RefinedDevice]) -> Result<()> {
+        for device in devices {
+            for (layer, pieces) in layers_in_beam(&self.rays, device) {
+                let material = layer.material.unwrap_or(self.default_material);
+                let place = match self.devices.iter().position(|d| d.0 == material) {
+                    Some(place) => place,
+                    None => {
+                        let rays = self.anatomy.rays();
+                        self.devices.push((material, self.beam.excess(material, None)?, vec![0.0; rays]));
+                        self.devices.len() - 1
+                    }
+                };
+                engine.pieces(&self.rays, &pieces, &mut self.devices[place].2, &mut self.touched)?;
+            }
+        }
+        let width = self.c_arm.size_px()[0];
+        let row = width * SUBRAYS;
+        for &ray in &self.touched {
+            let pixel = ray / row / SUBRAYS * width + ray % row / SUBRAYS;
+            if !std::mem::replace(&mut self.listed[pixel as usize], true) {
+                self.pixels.push(pixel);
+            }
+        }
+        Ok(())
+    }
+
+    /// Largest fraction of contrast medium at any time and place shown together: what a roadmap is made of.
+    pub(crate) fn opacified(&self) -> Result<Signal> {
+        let contrast = self.contrast.as_ref().ok_or_else(|| {
+            let mend = "a roadmap shows an angiogram; give a [[view.injection]]";
+            Error::parameter("view.xray.mode", "roadmap", mend)
+        })?;
+        let mut full = self.still.clone();
+        for (pixel, fraction) in contrast.largest() {
+            let pixel = pixel as usize;
+            let [signal, energy] = self.primary(pixel, (self.fraction + fraction).min(1.0));
+            let scattered = |map: &[f32]| map.get(pixel).copied().unwrap_or(0.0);
+            full.signal[pixel] = signal + scattered(&self.scatter.signal);
+            full.energy[pixel] = energy + scattered(&self.scatter.energy);
+        }
+        Ok(full)
+    }
+}

@@ -1,0 +1,184 @@
+//! Frames in time: what the detector, the mask, the roadmap and the last image hold remember.
+
+use endowire_core::Result;
+
+use super::display::{Window, fitted, logarithm, picture};
+use super::scatter::shading;
+use super::{Fluoroscope, PathEngine, Signal};
+use crate::device::RefinedDevice;
+use crate::output::Image;
+use crate::spec::{Mode, ViewSpec};
+use crate::xray::Detector;
+
+/// Frames that make a mask or a stored angiogram.
+const MASK_FRAMES: u64 = 4;
+/// Numbers from here on belong to the noise of masks and angiograms, not of frames.
+const MASK_NUMBERS: u64 = 1 << 63;
+/// Weight of the newest frame in the last image hold.
+const HOLD_WEIGHT: f32 = 0.4;
+/// Subtracted values as parts of the vessels' strongest: what is shown white, and black.
+const DSA_SHARES: Window = [-0.15, 1.05];
+/// Share of the pixels with contrast medium that may be darker than black.
+const DSA_OUTLIERS: f64 = 0.02;
+/// Strongest opacification that a window assumes where nothing is ever injected.
+const FAINTEST: f32 = 0.3;
+/// Roadmap values shown white and black, around a grey background, and that of the strongest vessel.
+const ROADMAP_WINDOW: Window = [-0.55, 0.55];
+const ROADMAP_VESSEL: f32 = -0.4;
+
+/// Number and time of a frame. The number seeds its noise.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Moment {
+    /// Number of the frame.
+    pub frame: u64,
+    /// Time since the start of the scene, for injections.
+    pub time_s: f64,
+}
+
+/// What a sequence of frames remembers.
+#[derive(Debug)]
+pub(crate) struct Sequence {
+    detector: Detector,
+    mode: Mode,
+    /// Absorbed energy of a pixel at a signal of one, keV.
+    kev: f64,
+    window: Window,
+    bits: u32,
+    noisy: bool,
+    /// What is subtracted from −ln of each frame: the stored mask or angiogram, or shading.
+    mask: Option<Vec<f32>>,
+    /// Values of the last frames, the newest weighing most.
+    held: Vec<f32>,
+}
+
+impl Sequence {
+    pub(crate) fn new(spec: &ViewSpec, fluoroscope: &Fluoroscope) -> Self {
+        let c_arm = &fluoroscope.c_arm;
+        let mode = spec.xray.mode;
+        let dose = spec.detector.dose_ngy.unwrap_or_else(|| mode.dose_ngy());
+        let offset = fluoroscope.beam.ln_reference();
+        let share = spec.xray.harmonised as f32;
+        let mask: Option<Vec<f32>> = (matches!(mode, Mode::Fluoro | Mode::Cine) && share > 0.0).then(|| {
+            // Relative to the reference, whose logarithm is zero: the middle keeps its grey.
+            let values = logarithm(&fluoroscope.still.signal);
+            shading(&values, c_arm).iter().map(|v| share * v).collect()
+        });
+        let window = match (mode, spec.xray.window) {
+            // Line integrals against the open beam, where signals are told against the reference.
+            (Mode::Fluoro | Mode::Cine, Some(window)) => window.map(|p| (p + offset) as f32),
+            (Mode::Fluoro | Mode::Cine, None) => {
+                let mut values = logarithm(&fluoroscope.still.signal);
+                if let Some(mask) = &mask {
+                    values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
+                }
+                fitted(&values, c_arm.size_px(), |pixel| c_arm.openness(pixel) == 1.0)
+            }
+            (_, Some(window)) => window.map(|p| p as f32),
+            (Mode::Dsa, None) => {
+                let strongest = strongest(fluoroscope);
+                DSA_SHARES.map(|share| share * strongest)
+            }
+            (Mode::Roadmap, None) => ROADMAP_WINDOW,
+        };
+        Self {
+            detector: Detector::new(&spec.detector, spec.detector.seed, c_arm.size_px(), c_arm.pixel_mm()),
+            mode,
+            kev: fluoroscope.beam.kev(c_arm.pixel_mm(), dose),
+            window,
+            bits: spec.bits,
+            noisy: spec.detector.noise,
+            mask,
+            held: vec![],
+        }
+    }
+
+    /// Reads the next frame and shows it in the scene's mode. The first one of a subtraction takes its mask itself.
+    pub(crate) fn next(
+        &mut self,
+        fluoroscope: &mut Fluoroscope,
+        engine: &mut dyn PathEngine,
+        devices: &[RefinedDevice],
+        moment: Moment,
+    ) -> Result<Image> {
+        if self.mask.is_none() {
+            match self.mode {
+                Mode::Fluoro | Mode::Cine => {}
+                Mode::Dsa => self.take_mask(fluoroscope, engine, devices)?,
+                Mode::Roadmap => self.store_roadmap(fluoroscope)?,
+            }
+        }
+        // The injections of a roadmap are those of its angiogram.
+        let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
+        let signal = fluoroscope.signal(engine, devices, time)?;
+        let read = self.detector.read(&signal.signal, &signal.energy, self.kev, moment.frame);
+        let mut values = logarithm(&read);
+        if let Some(mask) = &self.mask {
+            values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
+        }
+        if self.held.len() == values.len() {
+            self.held.iter_mut().zip(&values).for_each(|(held, v)| *held += HOLD_WEIGHT * (v - *held));
+        } else {
+            self.held.clone_from(&values);
+        }
+        Ok(self.shown(&values, fluoroscope))
+    }
+
+    /// The mean of the last frames, the newest weighing most; `None` before the first.
+    pub(crate) fn hold(&self, fluoroscope: &Fluoroscope) -> Option<Image> {
+        (!self.held.is_empty()).then(|| self.shown(&self.held, fluoroscope))
+    }
+
+    fn shown(&self, values: &[f32], fluoroscope: &Fluoroscope) -> Image {
+        picture(values, self.window, fluoroscope.c_arm.size_px(), self.bits, !self.noisy)
+    }
+
+    /// Stores what is there now, without injections, as the mask.
+    pub(crate) fn take_mask(
+        &mut self,
+        fluoroscope: &mut Fluoroscope,
+        engine: &mut dyn PathEngine,
+        devices: &[RefinedDevice],
+    ) -> Result<()> {
+        let signal = fluoroscope.signal(engine, devices, None)?;
+        self.mask = Some(self.stored(&signal, self.kev));
+        Ok(())
+    }
+
+    /// Stores the anatomy, with the vessels of the angiogram as bright as they are to be shown.
+    fn store_roadmap(&mut self, fluoroscope: &Fluoroscope) -> Result<()> {
+        let full = fluoroscope.opacified()?;
+        let kev = self.kev * Mode::Dsa.dose_ngy() / self.mode.dose_ngy();
+        let scale = ROADMAP_VESSEL / strongest(fluoroscope);
+        let mut map = self.stored(&fluoroscope.still, kev);
+        let full = self.stored(&full, kev);
+        // A frame less this is −scale in the vessel.
+        map.iter_mut().zip(full).for_each(|(map, full)| *map -= scale * (full - *map));
+        self.mask = Some(map);
+        Ok(())
+    }
+
+    /// −ln of a signal's mean over a few frames.
+    fn stored(&mut self, signal: &Signal, kev: f64) -> Vec<f32> {
+        let mut mean = vec![0.0; signal.signal.len()];
+        for k in 0..MASK_FRAMES {
+            self.detector.reset();
+            let read = self.detector.read(&signal.signal, &signal.energy, kev, MASK_NUMBERS + k);
+            mean.iter_mut().zip(read).for_each(|(mean, v)| *mean += v / MASK_FRAMES as f32);
+        }
+        self.detector.reset();
+        logarithm(&mean)
+    }
+}
+
+/// Strongest subtracted value that contrast medium ever brings, but for the darkest few pixels.
+fn strongest(fluoroscope: &Fluoroscope) -> f32 {
+    let Ok(full) = fluoroscope.opacified() else { return FAINTEST };
+    let still = logarithm(&fluoroscope.still.signal);
+    let mut values: Vec<f32> =
+        logarithm(&full.signal).iter().zip(still).map(|(v, still)| v - still).filter(|v| *v > 0.02).collect();
+    if values.is_empty() {
+        return FAINTEST;
+    }
+    let place = ((values.len() - 1) as f64 * (1.0 - DSA_OUTLIERS)).round() as usize;
+    values.select_nth_unstable_by(place, f32::total_cmp).1.max(FAINTEST)
+}

@@ -1,0 +1,11 @@
+//! What leaves the viewer: pictures, animations, DICOM files, labels for learning.
+
+mod animation;
+mod dicom;
+mod image;
+mod labels;
+
+pub use animation::Animation;
+pub use dicom::Angiogram;
+pub use image::{Image, PixelFormat};
+pub use labels::{ContactLabel, DeviceLabel, Labels};

@@ -1,0 +1,39 @@
+//! The body around the vessel: a slab, a generated trunk, or a tomogram.
+
+mod tomogram;
+mod torso;
+
+use endowire_core::vessel::SurfaceMesh;
+use endowire_core::{Error, Result};
+
+pub(crate) use tomogram::Volume;
+pub(crate) use torso::Body;
+
+use crate::spec::ViewSpec;
+
+/// Who lies in the beam.
+#[derive(Debug)]
+pub(crate) enum Patient {
+    /// A slab of soft tissue across the beam.
+    Slab {
+        /// Its thickness along the central ray.
+        tissue_mm: f64,
+    },
+    /// A trunk of closed surfaces.
+    Torso(Body),
+    /// A computed tomogram.
+    Tomogram(Box<Volume>),
+}
+
+impl Patient {
+    pub(crate) fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
+        if let Some(torso) = &spec.patient.torso {
+            let bounds = wall.bounds_mm().ok_or_else(|| Error::Mesh("the wall has no vertices".into()))?;
+            return Ok(Self::Torso(Body::new(torso, bounds)));
+        }
+        if let Some(ct) = &spec.patient.ct {
+            return Ok(Self::Tomogram(Box::new(Volume::read(ct)?)));
+        }
+        Ok(Self::Slab { tissue_mm: spec.xray.tissue_mm })
+    }
+}

@@ -1,0 +1,151 @@
+//! `[view.patient]`, `[view.flow]`, `[[view.injection]]` and `[[view.device]]`: what else is in the beam.
+
+use std::path::PathBuf;
+
+use endowire_core::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+use super::{finite_within, positive};
+use crate::device::DevicePart;
+
+/// The `[view.patient]` table: who lies on the table. Without it the body is a slab ([`crate::XRaySpec::tissue_mm`]).
+#[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PatientSpec {
+    /// A generated trunk.
+    pub torso: Option<TorsoSpec>,
+    /// A computed tomogram.
+    pub ct: Option<CtSpec>,
+}
+
+/// The `[view.patient.torso]` table: a trunk of soft tissue with simple bones and lungs, in patient axes.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TorsoSpec {
+    /// Left to right.
+    pub width_mm: f64,
+    /// Front to back.
+    pub depth_mm: f64,
+    /// Middle of the vertebral bodies, left and posterior; absent: behind the vessel's centre.
+    pub spine_mm: Option<[f64; 2]>,
+    /// Height of the diaphragm's domes; absent: a third of the way up the vessel. Lungs and ribs are above it.
+    pub diaphragm_mm: Option<f64>,
+    /// Vertebrae.
+    pub spine: bool,
+    /// Ribs.
+    pub ribs: bool,
+    /// Lungs.
+    pub lungs: bool,
+}
+
+impl Default for TorsoSpec {
+    fn default() -> Self {
+        Self {
+            width_mm: 330.0,
+            depth_mm: 215.0,
+            spine_mm: None,
+            diaphragm_mm: None,
+            spine: true,
+            ribs: true,
+            lungs: true,
+        }
+    }
+}
+
+/// The `[view.patient.ct]` table.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct CtSpec {
+    /// NIfTI volume (.nii or .nii.gz) of Hounsfield units.
+    pub file: PathBuf,
+    /// Where the volume's origin lies in the scene's axes.
+    #[serde(default)]
+    pub offset_mm: [f64; 3],
+}
+
+impl PatientSpec {
+    pub(super) fn validate(&self) -> Result<()> {
+        if let Some(torso) = &self.torso {
+            finite_within("view.patient.torso.width_mm", torso.width_mm, [100.0, 800.0])?;
+            finite_within("view.patient.torso.depth_mm", torso.depth_mm, [80.0, 600.0])?;
+            for x in torso.spine_mm.into_iter().flatten().chain(torso.diaphragm_mm) {
+                finite_within("view.patient.torso", x, [-1e5, 1e5])?;
+            }
+            if let Some(ct) = &self.ct {
+                let mend = "view.patient.torso is given too: keep one of the two";
+                return Err(Error::parameter("view.patient.ct.file", ct.file.display(), mend));
+            }
+        }
+        for x in self.ct.iter().flat_map(|ct| ct.offset_mm) {
+            finite_within("view.patient.ct.offset_mm", x, [-1e5, 1e5])?;
+        }
+        Ok(())
+    }
+}
+
+/// The `[view.flow]` table: the blood that carries contrast medium.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FlowSpec {
+    /// Centre-line table of the vessel (x y z radius parent, mm).
+    pub tree: Option<PathBuf>,
+    /// A point near the end of the tree where the blood comes in; absent: the root.
+    pub inlet_mm: Option<[f64; 3]>,
+    /// Blood flow there.
+    pub inflow_ml_per_s: f64,
+    /// At a bifurcation the flow divides as radiusⁿ: 2 for large arteries, 3 (Murray's law) for small ones.
+    pub split_exponent: f64,
+    /// How fast a bolus spreads: its standard deviation in time grows as this times the square root of the transit time, s^½.
+    pub dispersion: f64,
+}
+
+impl Default for FlowSpec {
+    fn default() -> Self {
+        // A resting heart pumps 5 l/min.
+        Self { tree: None, inlet_mm: None, inflow_ml_per_s: 80.0, split_exponent: 2.0, dispersion: 0.12 }
+    }
+}
+
+impl FlowSpec {
+    pub(super) fn validate(&self) -> Result<()> {
+        positive("view.flow.inflow_ml_per_s", self.inflow_ml_per_s)?;
+        finite_within("view.flow.split_exponent", self.split_exponent, [0.0, 10.0])?;
+        finite_within("view.flow.dispersion", self.dispersion, [0.0, 10.0])?;
+        for x in self.inlet_mm.into_iter().flatten() {
+            finite_within("view.flow.inlet_mm", x, [-1e5, 1e5])?;
+        }
+        Ok(())
+    }
+}
+
+/// One `[[view.injection]]` table: contrast medium (370 mg iodine per ml) through a catheter or the inlet.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct InjectionSpec {
+    /// When it begins, in the time of the frames.
+    pub start_s: f64,
+    /// How long it takes.
+    pub duration_s: f64,
+    /// How fast.
+    pub rate_ml_per_s: f64,
+    /// Where: the nearest point of the centre line; absent: the inlet.
+    pub at_mm: Option<[f64; 3]>,
+}
+
+impl InjectionSpec {
+    pub(super) fn validate(&self, index: usize) -> Result<()> {
+        let key = |name: &str| format!("view.injection[{index}].{name}");
+        finite_within(&key("start_s"), self.start_s, [-1e4, 1e4])?;
+        positive(&key("duration_s"), self.duration_s)?;
+        positive(&key("rate_ml_per_s"), self.rate_ml_per_s)?;
+        for x in self.at_mm.into_iter().flatten() {
+            finite_within(&key("at_mm"), x, [-1e5, 1e5])?;
+        }
+        Ok(())
+    }
+}
+
+/// Checks the `[[view.device]]` tables.
+pub(super) fn validate_parts(parts: &[DevicePart]) -> Result<()> {
+    parts.iter().enumerate().try_for_each(|(i, part)| part.validate(&format!("view.device[{i}]")))
+}

@@ -1,0 +1,210 @@
+//! `[view.c_arm]`: where the C-arm stands.
+
+use std::str::FromStr;
+
+use endowire_core::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+use super::{finite_within, positive};
+
+/// The `[view.c_arm]` table; conventions are those of [`crate::CArm`].
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CArmSpec {
+    /// Angles as they are said: "LAO 40 CRA 20". In place of the two below.
+    pub pose: Option<Pose>,
+    /// Positioner primary angle, LAO positive (DICOM 0018,1510).
+    pub primary_deg: f64,
+    /// Positioner secondary angle, cranial positive (DICOM 0018,1511).
+    pub secondary_deg: f64,
+    /// Source to detector.
+    pub sid_mm: f64,
+    /// Source to isocentre: the height of the table decides it.
+    pub sod_mm: f64,
+    /// Pixel pitch at the detector; absent: from `field_mm`, or else the vessel fills the frame.
+    pub pixel_mm: Option<f64>,
+    /// Longer side of the detector's field of view. In place of `pixel_mm`.
+    pub field_mm: Option<f64>,
+    /// Magnification mode: the field of view is the detector's over this factor.
+    pub magnification: f64,
+    /// Turn of the picture about its centre, clockwise on the screen.
+    pub rotation_deg: f64,
+    /// Blades: width and height of what they leave open, at the detector. Absent: the whole field.
+    pub collimation_mm: Option<[f64; 2]>,
+    /// Centre of rotation, seen in the middle of the frame; absent: the centre of the vessel's bounding box.
+    pub isocentre_mm: Option<[f64; 3]>,
+}
+
+impl Default for CArmSpec {
+    fn default() -> Self {
+        // Middle of the usual ranges: SID 1000–1200 mm, SOD 700–800 mm.
+        Self {
+            pose: None,
+            primary_deg: 0.0,
+            secondary_deg: 0.0,
+            sid_mm: 1100.0,
+            sod_mm: 750.0,
+            pixel_mm: None,
+            field_mm: None,
+            magnification: 1.0,
+            rotation_deg: 0.0,
+            collimation_mm: None,
+            isocentre_mm: None,
+        }
+    }
+}
+
+/// Angles of a C-arm in clinical words: LAO or RAO with an angle, CRA or CAU with an angle, or AP.
+///
+/// ```
+/// let pose: endowire_viewer::Pose = "RAO 30, CAU 20".parse()?;
+/// assert_eq!((pose.primary_deg(), pose.secondary_deg()), (-30.0, -20.0));
+/// # Ok::<(), endowire_core::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Pose {
+    primary_deg: f64,
+    secondary_deg: f64,
+}
+
+impl Pose {
+    /// LAO positive.
+    pub fn primary_deg(&self) -> f64 {
+        self.primary_deg
+    }
+
+    /// Cranial positive.
+    pub fn secondary_deg(&self) -> f64 {
+        self.secondary_deg
+    }
+}
+
+impl FromStr for Pose {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let bad = || {
+            let mend = "say angles as in \"LAO 40\", \"RAO 30 CAU 20\" or \"AP\", each direction once, 0 to 180 degrees \
+                        (CRA and CAU 0 to 90)";
+            Error::parameter("view.c_arm.pose", format!("{text:?}"), mend)
+        };
+        let words: Vec<String> = text
+            .split(|c: char| c.is_whitespace() || matches!(c, ',' | '/' | '°'))
+            .filter(|word| !word.is_empty())
+            .map(str::to_uppercase)
+            .collect();
+        if words == ["AP"] {
+            return Ok(Self::default());
+        }
+        let (mut primary, mut secondary) = (None, None);
+        for pair in words.chunks(2) {
+            let [name, angle] = pair else { return Err(bad()) };
+            let angle: f64 = angle.parse().map_err(|_| bad())?;
+            let (place, sign, most) = match name.as_str() {
+                "LAO" => (&mut primary, 1.0, 180.0),
+                "RAO" => (&mut primary, -1.0, 180.0),
+                "CRA" | "CRAN" => (&mut secondary, 1.0, 90.0),
+                "CAU" | "CAUD" => (&mut secondary, -1.0, 90.0),
+                _ => return Err(bad()),
+            };
+            if place.is_some() || !(0.0..=most).contains(&angle) {
+                return Err(bad());
+            }
+            *place = Some(sign * angle);
+        }
+        if primary.or(secondary).is_none() {
+            return Err(bad());
+        }
+        Ok(Self { primary_deg: primary.unwrap_or(0.0), secondary_deg: secondary.unwrap_or(0.0) })
+    }
+}
+
+impl TryFrom<String> for Pose {
+    type Error = Error;
+
+    fn try_from(text: String) -> Result<Self> {
+        text.parse()
+    }
+}
+
+impl From<Pose> for String {
+    fn from(pose: Pose) -> Self {
+        let [lao, cra] = [("LAO", "RAO", pose.primary_deg), ("CRA", "CAU", pose.secondary_deg)].map(
+            |(plus, minus, angle)| format!("{} {}", if angle < 0.0 { minus } else { plus }, angle.abs()),
+        );
+        format!("{lao} {cra}")
+    }
+}
+
+impl CArmSpec {
+    /// Primary and secondary angle, from `pose` where that is given.
+    pub fn angles_deg(&self) -> [f64; 2] {
+        self.pose.map_or([self.primary_deg, self.secondary_deg], |p| [p.primary_deg, p.secondary_deg])
+    }
+
+    pub(super) fn validate(&self) -> Result<()> {
+        finite_within("view.c_arm.primary_deg", self.primary_deg, [-360.0, 360.0])?;
+        finite_within("view.c_arm.secondary_deg", self.secondary_deg, [-90.0, 90.0])?;
+        for (key, angle) in [("primary_deg", self.primary_deg), ("secondary_deg", self.secondary_deg)] {
+            if self.pose.is_some() && angle != 0.0 {
+                let key = format!("view.c_arm.{key}");
+                return Err(Error::parameter(
+                    key,
+                    angle,
+                    "view.c_arm.pose is given too: keep one of the two",
+                ));
+            }
+        }
+        positive("view.c_arm.sid_mm", self.sid_mm)?;
+        positive("view.c_arm.sod_mm", self.sod_mm)?;
+        if self.sod_mm >= self.sid_mm {
+            let mend =
+                format!("must be less than sid_mm = {}: the isocentre is before the detector", self.sid_mm);
+            return Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, mend));
+        }
+        for (key, value) in [("pixel_mm", self.pixel_mm), ("field_mm", self.field_mm)] {
+            if let Some(value) = value {
+                positive(&format!("view.c_arm.{key}"), value)?;
+            }
+        }
+        if let (Some(field), Some(_)) = (self.field_mm, self.pixel_mm) {
+            let mend = "view.c_arm.pixel_mm is given too: keep one of the two";
+            return Err(Error::parameter("view.c_arm.field_mm", field, mend));
+        }
+        finite_within("view.c_arm.magnification", self.magnification, [0.1, 100.0])?;
+        finite_within("view.c_arm.rotation_deg", self.rotation_deg, [-360.0, 360.0])?;
+        for side in self.collimation_mm.into_iter().flatten() {
+            positive("view.c_arm.collimation_mm", side)?;
+        }
+        if let Some(isocentre) = self.isocentre_mm
+            && !isocentre.iter().all(|x| x.is_finite())
+        {
+            let value = format!("{isocentre:?}");
+            return Err(Error::parameter("view.c_arm.isocentre_mm", value, "must be finite"));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poses_have_the_signs_of_dicom() {
+        for (text, angles) in [
+            ("AP", [0.0, 0.0]),
+            ("lao 40", [40.0, 0.0]),
+            ("RAO 30 CAU 20", [-30.0, -20.0]),
+            ("CRA 25.5, LAO 90", [90.0, 25.5]),
+        ] {
+            let pose: Pose = text.parse().unwrap();
+            assert_eq!([pose.primary_deg, pose.secondary_deg], angles, "{text}");
+            assert_eq!(String::from(pose).parse::<Pose>().unwrap(), pose);
+        }
+        for bad in ["", "LAO", "LAO -3", "LAO 3 RAO 4", "left 40", "CRA 91", "LAO nan"] {
+            assert!(bad.parse::<Pose>().unwrap_err().to_string().contains("LAO 40"), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! `[view.xray]` and `[view.detector]`: the beam, the mode, the detector.
+
+use endowire_core::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+use super::{finite_within, positive};
+use crate::xray::Material;
+
+/// What the fluoroscopic view shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// Live fluoroscopy: little dose, the log-transformed signal.
+    #[default]
+    Fluoro,
+    /// Cine: the same with ten times the dose.
+    Cine,
+    /// Digital subtraction angiography, ln(mask) − ln(frame): what has come since the mask is dark.
+    Dsa,
+    /// The device, dark, over the white vessels of a stored angiogram.
+    Roadmap,
+}
+
+impl Mode {
+    /// Usual air kerma at the detector, nGy a frame.
+    pub fn dose_ngy(self) -> f64 {
+        match self {
+            Self::Fluoro | Self::Roadmap => 30.0,
+            Self::Cine => 300.0,
+            Self::Dsa => 1500.0,
+        }
+    }
+}
+
+/// The `[view.xray]` table.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct XRaySpec {
+    /// What is shown.
+    pub mode: Mode,
+    /// Peak voltage of the tube in kV, 50 to 125 in steps of 5.
+    pub kvp: f64,
+    /// Filtration, aluminium.
+    pub aluminium_mm: f64,
+    /// Filtration, copper.
+    pub copper_mm: f64,
+    /// Energies that stand for the spectrum; as many as the spectrum has lines, or more, take all of them.
+    pub energy_bins: u32,
+    /// One energy in place of the spectrum, 15 to 125 keV.
+    pub energy_kev: Option<f64>,
+    /// Volume fraction of contrast medium (370 mg iodine per ml) that is in the blood all the time, 0 to 1.
+    pub contrast_fraction: f64,
+    /// Thickness of soft tissue along the central ray. This body is a slab across the beam, as the 20 cm water phantom of
+    /// acceptance tests is: an even background from every angle, whose path lengths are known exactly. 0 is air. A patient
+    /// (`[view.patient]`) takes its place.
+    pub tissue_mm: f64,
+    /// Scintillator: solid caesium iodide.
+    pub csi_mm: f64,
+    /// Material of devices that do not name their own.
+    pub device_material: Material,
+    /// Share of the anatomy's coarse shading that the display takes out in fluoroscopy and cine, so that lungs and spine are both
+    /// seen; 0 shows the logarithm of the signal as it is.
+    pub harmonised: f64,
+    /// Line integrals shown white and black in fluoroscopy and cine; absent: fitted to the anatomy, the same for all frames of
+    /// a run.
+    pub window: Option<[f64; 2]>,
+}
+
+impl Default for XRaySpec {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Fluoro,
+            kvp: 80.0,
+            aluminium_mm: 2.5,
+            copper_mm: 0.2,
+            energy_bins: 8,
+            energy_kev: None,
+            contrast_fraction: 0.0,
+            tissue_mm: 200.0,
+            // Absorbs 88 % at 57.8 keV.
+            csi_mm: 0.6,
+            device_material: Material::Steel316L,
+            harmonised: 0.55,
+            window: None,
+        }
+    }
+}
+
+impl XRaySpec {
+    pub(super) fn validate(&self) -> Result<()> {
+        if let Some(energy) = self.energy_kev {
+            Material::SoftTissue.attenuation_per_mm(energy)?;
+        }
+        finite_within("view.xray.kvp", self.kvp, [50.0, 125.0])?;
+        finite_within("view.xray.aluminium_mm", self.aluminium_mm, [0.0, 20.0])?;
+        finite_within("view.xray.copper_mm", self.copper_mm, [0.0, 5.0])?;
+        if !(1..=1000).contains(&self.energy_bins) {
+            return Err(Error::parameter("view.xray.energy_bins", self.energy_bins, "must be 1 to 1000"));
+        }
+        finite_within("view.xray.contrast_fraction", self.contrast_fraction, [0.0, 1.0])?;
+        finite_within("view.xray.tissue_mm", self.tissue_mm, [0.0, 1000.0])?;
+        positive("view.xray.csi_mm", self.csi_mm)?;
+        finite_within("view.xray.harmonised", self.harmonised, [0.0, 1.0])?;
+        if let Some([white, black]) = self.window
+            && !(white.is_finite() && black.is_finite() && white < black)
+        {
+            let value = format!("[{white}, {black}]");
+            let mend = "must be two finite line integrals, the white one less than the black one";
+            return Err(Error::parameter("view.xray.window", value, mend));
+        }
+        Ok(())
+    }
+}
+
+/// The `[view.detector]` table.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DetectorSpec {
+    /// Air kerma at the detector behind the patient, a frame; absent: usual for the mode.
+    pub dose_ngy: Option<f64>,
+    /// Whether quanta are counted; without, frames are smooth.
+    pub noise: bool,
+    /// Seed of the noise: the same seed, the same frames.
+    pub seed: u64,
+    /// Spread of the scintillator's light: standard deviation of a Gaussian at the detector.
+    pub blur_mm: f64,
+    /// Share of the last frame that is read again, below 1.
+    pub lag: f64,
+    /// Share of scattered quanta in all, behind the grid, below 1.
+    pub scatter_fraction: f64,
+}
+
+impl Default for DetectorSpec {
+    fn default() -> Self {
+        Self { dose_ngy: None, noise: true, seed: 1, blur_mm: 0.15, lag: 0.04, scatter_fraction: 0.15 }
+    }
+}
+
+impl DetectorSpec {
+    /// A detector that shows what it gets: no noise, blur, lag or scatter.
+    pub fn ideal() -> Self {
+        Self { noise: false, blur_mm: 0.0, lag: 0.0, scatter_fraction: 0.0, ..Self::default() }
+    }
+
+    pub(super) fn validate(&self) -> Result<()> {
+        if let Some(dose) = self.dose_ngy {
+            positive("view.detector.dose_ngy", dose)?;
+        }
+        finite_within("view.detector.blur_mm", self.blur_mm, [0.0, 10.0])?;
+        finite_within("view.detector.lag", self.lag, [0.0, 0.99])?;
+        finite_within("view.detector.scatter_fraction", self.scatter_fraction, [0.0, 0.95])
+    }
+}

@@ -1,0 +1,222 @@
+//! Fluoroscopy, subtraction, roadmap and hold as sequences show them.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use common::*;
+use endowire_core::Vec3;
+use endowire_core::vessel::{CentrelineNode, CentrelineTree};
+use endowire_viewer::{
+    Backend, DetectorSpec, DeviceView, Image, InjectionSpec, Mode, Moment, Renderer, ViewSpec,
+};
+
+/// A straight vessel along z with its centre line, blood rising; contrast medium from 1 s to 2 s.
+fn scene(folder: &std::path::Path, mode: Mode) -> (ViewSpec, endowire_core::vessel::SurfaceMesh) {
+    let node =
+        |z: f64, parent| CentrelineNode { position_mm: Vec3::new(0.0, 0.0, z), radius_mm: 6.0, parent };
+    let tree = CentrelineTree::new(vec![node(-50.0, None), node(0.0, Some(0)), node(50.0, Some(1))]).unwrap();
+    let path = folder.join("tree.csv");
+    tree.write(&path, "a straight vessel").unwrap();
+    let mut view = spec(Backend::Cpu, 160, 0.8);
+    view.xray.energy_kev = None;
+    view.xray.mode = mode;
+    view.detector = DetectorSpec { seed: 3, lag: 0.0, ..DetectorSpec::default() };
+    view.flow.tree = Some(path);
+    view.flow.inflow_ml_per_s = 20.0;
+    view.injection = vec![InjectionSpec { start_s: 1.0, duration_s: 1.0, rate_ml_per_s: 8.0, at_mm: None }];
+    (view, cylinder(6.0, 50.0, 64, Vec3::zeros()))
+}
+
+fn wire() -> DeviceView {
+    device(9, 0.45, |w| Vec3::new(2.0, 0.0, 60.0 * w - 48.0))
+}
+
+fn folder(name: &str) -> std::path::PathBuf {
+    let path = std::env::temp_dir().join(format!("endowire-modes-{name}-{}", std::process::id()));
+    std::fs::create_dir_all(&path).unwrap();
+    path
+}
+
+/// Mean grey value over a rectangle of pixels.
+fn grey(image: &Image, x: std::ops::Range<u32>, y: std::ops::Range<u32>) -> f64 {
+    let pixels = x.flat_map(|x| y.clone().map(move |y| (x, y)));
+    let values: Vec<f64> = pixels.map(|(x, y)| f64::from(image.pixel(x, y).unwrap()[0])).collect();
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn at(frame: u64, time_s: f64) -> Moment {
+    Moment { frame, time_s }
+}
+
+#[test]
+fn subtracting_an_unchanged_scene_leaves_noise_around_zero() {
+    let folder = folder("zero");
+    let (mut view, wall) = scene(&folder, Mode::Dsa);
+    view.xray.window = Some([-0.5, 0.5]);
+    view.bits = 16;
+    let wires = [wire()];
+    let mean = |view: &ViewSpec, then: &[DeviceView], now: &[DeviceView]| {
+        let mut renderer = Renderer::new(view, &wall).unwrap();
+        renderer.take_mask(then).unwrap();
+        let mut sum = 0.0;
+        for k in 0..8 {
+            let image = renderer.render_at(now, at(k, 0.0)).unwrap().fluoro.unwrap();
+            let words = image.data().chunks_exact(2).map(|b| f64::from(u16::from_be_bytes([b[0], b[1]])));
+            sum += words.map(|v| 0.5 - v / 65_535.0).sum::<f64>() / 8.0;
+        }
+        sum / f64::from(160 * 160)
+    };
+    // Noise of 1500 nGy is about 0.6 % a pixel: the mean of 25,600 pixels over the frames is known to 2e-5 beside the mask's own
+    // noise, and the logarithm of noisy signals adds half their relative variance.
+    let unchanged = mean(&view, &wires, &wires);
+    assert!(unchanged.abs() < 2e-4, "{unchanged}");
+    // The twin: a wire that was not there when the mask was taken.
+    let changed = mean(&view, &[], &wires);
+    assert!(changed > 1e-3, "{changed}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn contrast_medium_fills_the_vessel_from_the_inlet_and_washes_out() {
+    let folder = folder("bolus");
+    let (view, wall) = scene(&folder, Mode::Dsa);
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    // 50 ml/s… 11.3 ml of vessel at 28 ml/s: 0.4 s from end to end. The inlet is at the foot, low on the screen.
+    let low_and_high = |renderer: &mut Renderer, frame, time| {
+        let image = renderer.render_at(&[], at(frame, time)).unwrap().fluoro.unwrap();
+        let outside = grey(&image, 10..20, 40..120);
+        [grey(&image, 76..84, 118..128), grey(&image, 76..84, 32..42)].map(|v| outside - v)
+    };
+    let [low, high] = low_and_high(&mut renderer, 0, 0.5);
+    assert!(low.abs() < 3.0 && high.abs() < 3.0, "before: {low} {high}");
+    let [low, high] = low_and_high(&mut renderer, 1, 1.15);
+    assert!(low > 30.0 && high < 0.5 * low, "arriving: {low} {high}");
+    let [low, high] = low_and_high(&mut renderer, 2, 1.8);
+    assert!(low > 40.0 && high > 40.0, "filled: {low} {high}");
+    let [low, high] = low_and_high(&mut renderer, 3, 2.25);
+    assert!(low < 0.5 * high, "washing out: {low} {high}");
+    let [low, high] = low_and_high(&mut renderer, 4, 4.0);
+    assert!(low.abs() < 3.0 && high.abs() < 3.0, "after: {low} {high}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn a_roadmap_has_white_vessels_and_a_dark_device() {
+    let folder = folder("roadmap");
+    let (view, wall) = scene(&folder, Mode::Roadmap);
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    let image = renderer.render_at(&[wire()], at(0, 0.0)).unwrap().fluoro.unwrap();
+    let outside = grey(&image, 10..40, 40..120);
+    let vessel = grey(&image, 72..78, 40..120);
+    assert!(vessel > outside + 40.0, "{vessel} {outside}");
+    let [u, _] = renderer.c_arm().unwrap().project(&Vec3::new(2.0, 0.0, -10.0));
+    let wire = grey(&image, u as u32..u as u32 + 1, 90..120);
+    assert!(wire < vessel - 25.0, "{wire} {vessel}");
+    // Without an injection there is no map.
+    let mut bare = view.clone();
+    bare.injection.clear();
+    let error = Renderer::new(&bare, &wall).unwrap().render(&[]).unwrap_err().to_string();
+    assert!(error.contains("injection"), "{error}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn more_dose_is_less_noise_and_the_hold_is_calmer_than_its_frames() {
+    let folder = folder("dose");
+    let noise = |image: &Image| {
+        let mean = grey(image, 5..45, 20..140);
+        let squares = (5..45).flat_map(|x| (20..140).map(move |y| (x, y)));
+        let sum: f64 = squares.map(|(x, y)| (f64::from(image.pixel(x, y).unwrap()[0]) - mean).powi(2)).sum();
+        (sum / 4800.0).sqrt()
+    };
+    let deviation = |mode: Mode| {
+        let (mut view, wall) = scene(&folder, mode);
+        view.injection.clear();
+        view.xray.window = Some([4.0, 5.5]);
+        view.xray.tissue_mm = 200.0;
+        let mut renderer = Renderer::new(&view, &wall).unwrap();
+        let mut last = None;
+        for k in 0..12 {
+            last = renderer.render_at(&[], at(k, 0.0)).unwrap().fluoro;
+        }
+        (noise(&last.unwrap()), noise(&renderer.last_image_hold().unwrap()))
+    };
+    let (fluoro, hold) = deviation(Mode::Fluoro);
+    let (cine, _) = deviation(Mode::Cine);
+    // Ten times the dose: a third of the noise, beside the steps of eight bits and the background's shading.
+    assert!(cine < 0.5 * fluoro && hold < 0.7 * fluoro, "fluoro {fluoro}, hold {hold}, cine {cine}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn the_same_seed_is_the_same_frame_whatever_came_before() {
+    let folder = folder("seed");
+    let (mut view, wall) = scene(&folder, Mode::Fluoro);
+    view.detector.lag = 0.0;
+    let draw = |view: &ViewSpec, frames: &[u64]| {
+        let mut renderer = Renderer::new(view, &wall).unwrap();
+        let mut last = None;
+        for &k in frames {
+            last = renderer.render_at(&[wire()], at(k, 1.5)).unwrap().fluoro;
+        }
+        last.unwrap()
+    };
+    assert_eq!(draw(&view, &[7]), draw(&view, &[1, 2, 7]));
+    assert_ne!(draw(&view, &[7]), draw(&view, &[8]));
+    let mut other = view.clone();
+    other.detector.seed = 4;
+    assert_ne!(draw(&view, &[7]), draw(&other, &[7]));
+    // On an adapter the lengths differ in the seventh digit, the noise does not.
+    if let Some(mut gpu) = on_gpu(&view, &wall) {
+        let a = draw(&view, &[7]);
+        let b = gpu.render_at(&[wire()], at(7, 1.5)).unwrap().fluoro.unwrap();
+        let off = a.data().iter().zip(b.data()).filter(|(a, b)| a.abs_diff(**b) > 2).count();
+        assert!(off * 500 < a.data().len(), "{off} pixels differ by more than two levels");
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn an_injection_without_a_centre_line_and_a_missing_tomogram_are_refused_by_key() {
+    let folder = folder("refused");
+    let (mut view, wall) = scene(&folder, Mode::Fluoro);
+    view.flow.tree = None;
+    let error = Renderer::new(&view, &wall).unwrap_err().to_string();
+    assert!(error.contains("view.flow.tree"), "{error}");
+    view.flow.tree = Some(folder.join("nothing.csv"));
+    let error = Renderer::new(&view, &wall).unwrap_err().to_string();
+    assert!(error.contains("view.flow.tree") && error.contains("nothing.csv"), "{error}");
+    view.injection.clear();
+    view.patient.ct = Some(endowire_viewer::CtSpec { file: folder.join("nothing.nii"), offset_mm: [0.0; 3] });
+    let error = Renderer::new(&view, &wall).unwrap_err().to_string();
+    assert!(error.contains("view.patient.ct.file"), "{error}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn labels_say_where_the_device_is_in_the_frame() {
+    let folder = folder("labels");
+    let (mut view, wall) = scene(&folder, Mode::Fluoro);
+    view.c_arm.collimation_mm = Some([128.0, 60.0]);
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    let places = [Vec3::new(2.0, 0.0, 0.0), Vec3::new(2.0, 0.0, 45.0)];
+    let labels = renderer.labels(&[wire()], &places).unwrap();
+    let tip = renderer.c_arm().unwrap().project(&Vec3::new(2.0, 0.0, 12.0));
+    let label = &labels.devices[0];
+    let off = |a: [f64; 2], b: [f64; 2]| ((a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)).sqrt();
+    assert!(off(label.tip_px.unwrap(), tip) < 1e-9 && label.tip_visible);
+    assert!(labels.contacts[0].visible && !labels.contacts[1].visible, "the blades hide the second");
+    // The mask is the wire: its columns are within the wire's width of the centre line.
+    let marked: Vec<usize> = (0..labels.mask.data().len()).filter(|&i| labels.mask.data()[i] == 1).collect();
+    assert!(marked.len() > 60);
+    for i in marked {
+        let pixel = pixel_centre(i, 160);
+        let nearest = label.centre_line_px.windows(2).map(|p| {
+            let w = ((pixel[1] - p[0][1]) / (p[1][1] - p[0][1])).clamp(0.0, 1.0);
+            off(pixel, [p[0][0] + w * (p[1][0] - p[0][0]), p[0][1] + w * (p[1][1] - p[0][1])])
+        });
+        assert!(nearest.fold(f64::MAX, f64::min) < 1.8, "{pixel:?}");
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
