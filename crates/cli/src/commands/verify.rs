@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use endowire_core::reference::insertion_stress::{InsertionRow, InsertionStress};
 use endowire_core::reference::{FAMILIES, Row, stress};
 use serde::Serialize;
 
@@ -20,6 +21,8 @@ struct Document {
     failed: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     stress: Option<Vec<Stress>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    insertion_stress: Option<Vec<InsertionRow>>,
 }
 
 /// A stressed case and the time it took.
@@ -33,7 +36,9 @@ struct Stress {
 /// Runs every reference case and prints the table.
 pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
     let stressed = if args.stress { stress::cases() } else { Vec::new() };
-    let bar = progress::bar(FAMILIES.len() + stressed.len(), "case");
+    let insertion = args.stress.then(InsertionStress::new).transpose()?;
+    let combinations = insertion.as_ref().map_or_else(Vec::new, InsertionStress::cases);
+    let bar = progress::bar(FAMILIES.len() + stressed.len() + combinations.len(), "case");
     let mut cases = Vec::new();
     for family in FAMILIES {
         bar.set_message(family.id);
@@ -48,6 +53,15 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
         rows.push(Stress { row, time_s: clock.elapsed().as_secs_f64() });
         bar.inc(1);
     }
+    let insertions = insertion.map(|stress| {
+        bar.set_message("insertions");
+        let run = |case| {
+            let row = stress.run(case);
+            bar.inc(1);
+            row
+        };
+        combinations.iter().map(run).collect::<Vec<InsertionRow>>()
+    });
     bar.finish_and_clear();
 
     let passed = cases.iter().filter(|row| row.pass).count();
@@ -57,13 +71,15 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
         failed: cases.len() - passed,
         cases,
         stress: args.stress.then_some(rows),
+        insertion_stress: insertions,
     };
     if args.json {
         print_json(&document)?;
     } else {
         print_cases(&document);
     }
-    let unexplained = document.stress.iter().flatten().filter(|s| !s.row.pass).count();
+    let unexplained = document.stress.iter().flatten().filter(|s| !s.row.pass).count()
+        + document.insertion_stress.iter().flatten().filter(|row| !row.pass).count();
     if document.failed > 0 || unexplained > 0 {
         return Err(Failure::Computation(format!(
             "{} of {} reference rows and {unexplained} stressed cases fail",
@@ -98,6 +114,43 @@ fn print_cases(document: &Document) {
     if let Some(rows) = &document.stress {
         print_stress(rows);
     }
+    if let Some(rows) = &document.insertion_stress {
+        print_insertions(rows);
+    }
+}
+
+/// Combinations that stopped, and counts of all.
+fn print_insertions(rows: &[InsertionRow]) {
+    println!();
+    println!(
+        "{:>10} {:>10} {:>10} {:>10} {:>9} {:>6} {:>6} {:>6}  insertion that stopped",
+        "wall N/mm²", "EI N·mm²", "element mm", "step mm", "friction", "steps", "iter.", "parts"
+    );
+    let mut outcomes: Vec<(&str, usize)> = Vec::new();
+    for row in rows {
+        let case = &row.case;
+        if !row.converged {
+            println!(
+                "{:>10.0e} {:>10.0e} {:>10} {:>10} {:>9} {:>6} {:>6} {:>6}  {}{}",
+                case.modulus_n_per_mm2,
+                case.bending_stiffness_nmm2,
+                case.element_mm,
+                case.increment_mm,
+                case.friction,
+                row.steps,
+                row.most_iterations,
+                row.most_substeps,
+                row.outcome,
+                if row.pass { "" } else { ", and cannot be pulled back" }
+            );
+        }
+        match outcomes.iter_mut().find(|(known, _)| *known == row.outcome) {
+            Some((_, count)) => *count += 1,
+            None => outcomes.push((&row.outcome, 1)),
+        }
+    }
+    let counts: Vec<String> = outcomes.iter().map(|(outcome, count)| format!("{count} {outcome}")).collect();
+    println!("{} insertions: {}", rows.len(), counts.join(", "));
 }
 
 fn print_stress(rows: &[Stress]) {

@@ -139,6 +139,8 @@ impl Reading {
 
 /// Beyond its radius, a point is followed within this part of it.
 const FOLLOW: f64 = 0.5;
+/// How much farther than it must a point looks for the wall, mm: while it moves less it need not ask again.
+const LOOK_MM: f64 = 1.0;
 /// A point looks for other walls again when it has moved by this part of its radius.
 const LOOK_AGAIN: f64 = 0.5;
 /// Radius of the gentlest bend worth a number, mm.
@@ -150,8 +152,6 @@ const SAFE: f64 = 0.9;
 pub struct WallContact<'a> {
     wall: &'a SmoothWall,
     query: &'a WallQuery,
-    /// How far a point looks for the wall, mm.
-    reach_mm: f64,
     /// Whether clearances and the last triangle may replace queries.
     skip: bool,
     points: &'a [ContactPoint],
@@ -178,14 +178,12 @@ impl<'a> WallContact<'a> {
         known: &'a mut Vec<KnownPoint>,
         friction: &'a mut Friction,
         softest_nmm2: f64,
-        reach_mm: f64,
         skip: bool,
     ) -> Self {
         known.resize(points.len(), KnownPoint::default());
         Self {
             wall: &felt.smooth,
             query: &felt.query,
-            reach_mm,
             skip,
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
@@ -219,9 +217,12 @@ impl<'a> WallContact<'a> {
         self.counters.queries += 1;
         known.looked_at = *x;
         known.triangle = None;
-        let Some(nearest) = self.query.nearest(x, self.reach_mm) else {
-            known.clearance_mm = self.reach_mm;
-            return Reading::Free(self.reach_mm);
+        // A point on the axis of a tube has all of its triangles at one distance, and a question that reaches them looks at all:
+        // asking a little farther than is needed is enough.
+        let reach_mm = near + self.wall.deepest_inset_mm() + LOOK_MM;
+        let Some(nearest) = self.query.nearest(x, reach_mm) else {
+            known.clearance_mm = reach_mm;
+            return Reading::Free(reach_mm);
         };
         known.clearance_mm = nearest.distance_mm.abs();
         // Past an opening there is no wall.

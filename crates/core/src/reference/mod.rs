@@ -2,6 +2,7 @@
 //!
 //! Each case is data and a function; nothing here knows what the solver returns.
 
+pub mod insertion_stress;
 mod planar;
 mod quadratic;
 mod spatial;

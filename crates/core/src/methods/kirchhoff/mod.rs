@@ -57,8 +57,6 @@ const ELEMENT_LIMIT: f64 = 100_000.0;
 const ZERO_LENGTH_MM: f64 = 1e-9;
 /// Most sub-steps that one command may be cut into.
 const SUBSTEP_LIMIT: usize = 4096;
-/// How far beyond its radius and the step a point looks for the wall, mm: what it sees it need not ask for again.
-const LOOK_MM: f64 = 3.0;
 /// Part of the tip's radius by which a device is pushed on at least, where its tip stands head-on against the wall.
 const LEAST_WAY: f64 = 0.05;
 /// A step is a jump if more than this part of the stored energy was set free.

@@ -1,6 +1,6 @@
 //! What a step tells: energies, contacts, and what the hand feels.
 
-use super::{Kirchhoff, LOOK_MM, softest};
+use super::{Kirchhoff, softest};
 use crate::contact::WallContact;
 use crate::contact::extension::left_through;
 use crate::insertion::{Energy, Surroundings};
@@ -28,14 +28,12 @@ impl<const C: usize> Kirchhoff<C> {
             (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
             return;
         }
-        let reach = surroundings.device.max_radius_mm() + LOOK_MM;
         let mut contact = WallContact::new(
             &self.felt,
             &self.current.mesh.points,
             &mut self.known,
             &mut self.current.friction,
             softest(surroundings.device),
-            reach,
             self.options.skip,
         );
         let stored = self.newton.assembly.energy;

@@ -1,7 +1,7 @@
 //! One sub-step: a guess of where the device will be, and Newton's method from there.
 
 use super::slide::{carry, slide};
-use super::{Kirchhoff, LOOK_MM, softest};
+use super::{Kirchhoff, softest};
 use crate::contact::{HandMotion, WallContact};
 use crate::insertion::Surroundings;
 use crate::rod::Supports;
@@ -53,15 +53,12 @@ impl<const C: usize> Kirchhoff<C> {
         next.state.angles[0] = tail_rad;
         let elements = next.mesh.elements.len();
         self.newton.resize(elements);
-        let travel = (inserted_mm - now.inserted_mm()).abs();
-        let reach = surroundings.device.max_radius_mm() + travel + LOOK_MM;
         let mut contact = WallContact::new(
             &self.felt,
             &next.mesh.points,
             &mut self.known,
             &mut next.friction,
             softest(surroundings.device),
-            reach,
             self.options.skip,
         );
         let mut outside = contact.is_outside(&next.mesh.elements, &next.state);
