@@ -2,6 +2,8 @@
 //!
 //! Each case is data and a function; nothing here knows what the solver returns.
 
+mod channel;
+mod contact;
 mod planar;
 mod quadratic;
 mod spatial;
@@ -150,6 +152,12 @@ pub const FAMILIES: &[Family] = &[
         title: "Localised buckle of a long twisted rod (Coyne 1990)",
         run: spatial::localised,
     },
+    Family {
+        id: "C2",
+        title: "Clamped-clamped elastica in a channel (Domokos, Holmes and Royce 1997)",
+        run: contact::elastica,
+    },
+    Family { id: "C6", title: "Compliant wall (Winkler, Hetényi 1946)", run: contact::compliant },
 ];
 
 /// A straight inextensible rod of length 1 and EI 1 along x, clamped at the origin, free at its end.

@@ -10,9 +10,9 @@
 //! ```
 //!
 //! of which the terms after the first are configurational: the energy that the next piece takes up as it leaves the
-//! straight sheath. F is the derivative of the stored energy with respect to the inserted length.
+//! straight sheath ([`Clamp::push_force`]). F is the derivative of the stored energy with respect to the inserted length.
 
-mod mesh;
+pub(crate) mod mesh;
 mod slide;
 
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ use crate::contact::{KnownPoint, SmoothWall, WallContact};
 use crate::device::Device;
 use crate::insertion::{Command, Contact, Energy, StepReport, Surroundings};
 use crate::methods::Method;
-use crate::rod::{Frame, Layout, RodState, Supports};
+use crate::rod::{Clamp, Frame, Layout, RodState, Supports};
 use crate::shape::Shape;
 use crate::solve::{External, Newton, NewtonOptions};
 use crate::vessel::{Wall, WallQuery};
@@ -256,24 +256,12 @@ impl<const C: usize> Kirchhoff<C> {
             }
         }
 
-        let l = Layout::<C>;
-        let held = &self.newton.start_residual;
-        let at = l.position(0);
+        let clamp = Clamp::new::<C>(&self.newton.start_residual, &self.state);
         let frame = self.state.material_frame(0);
         let data = &self.mesh.elements[0];
-        let support = crate::Vec3::new(held[at], held[at + 1], held[at + 2]);
-        // −EI (t′ − κ⁰) is what the clamp's moment balances: t′ from it is more exact than from the cubic.
-        let reference = &self.state.frames[0];
-        let at = l.tangent(0);
-        let moment = reference.u * held[at] + reference.v * held[at + 1];
         let rest = frame.u * data.rest_curvature[0][0] + frame.v * data.rest_curvature[0][1];
-        let bend = rest - moment / data.bending[0];
-        report.push_force_n = support.dot(&frame.t) - 0.5 * data.bending[0] * bend.norm_squared();
-        report.torque_nmm = 0.0;
-        if Layout::<C>::TWIST {
-            report.torque_nmm = held[l.angle(0)];
-            report.push_force_n -= 0.5 * report.torque_nmm * report.torque_nmm / data.torsion[0];
-        }
+        report.push_force_n = clamp.push_force(&frame.t, data.bending[0], data.torsion[0], &rest);
+        report.torque_nmm = clamp.torque;
     }
 }
 
