@@ -114,8 +114,7 @@ impl Channel {
         let device = Device::uniform(length, radius, bending)?;
         let mut mesh = Mesh::default();
         mesh.build(&device, length, length / elements as f64, modulus);
-        let state =
-            RodState::straight(&mesh.elements, Vec3::zeros(), Frame::new(Vec3::x(), Some(Vec3::y())));
+        let state = RodState::straight(&mesh.elements, Vec3::zeros(), Frame::new(Vec3::x(), Some(Vec3::y())));
         let h = mesh.elements[0].length;
         let walls = Walls {
             smooth: SmoothWall::new(&wall, radius),

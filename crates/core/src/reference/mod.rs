@@ -4,6 +4,7 @@
 
 mod channel;
 mod contact;
+mod insertion;
 mod planar;
 mod quadratic;
 mod spatial;
@@ -157,6 +158,13 @@ pub const FAMILIES: &[Family] = &[
         title: "Clamped-clamped elastica in a channel (Domokos, Holmes and Royce 1997)",
         run: contact::elastica,
     },
+    Family { id: "C3", title: "Wire pushed into a circular bend", run: insertion::bend },
+    Family {
+        id: "C4",
+        title: "Frictionless sleeve under a transverse load at the tip (Bigoni et al. 2015)",
+        run: insertion::sleeve,
+    },
+    Family { id: "C5", title: "Soft-walled tube", run: insertion::soft_tube },
     Family { id: "C6", title: "Compliant wall (Winkler, Hetényi 1946)", run: contact::compliant },
 ];
 

@@ -39,6 +39,8 @@ impl Clamp {
     pub fn push_force(&self, tangent: &Vec3, bending: f64, torsion: f64, rest_curvature: &Vec3) -> f64 {
         // The clamp balances −EI(t′ − κ⁰): t′ from its moment is more exact than from the cubic.
         let bend = rest_curvature - self.moment.cross(tangent) / bending;
-        self.force.dot(tangent) - 0.5 * bending * bend.norm_squared() - 0.5 * self.torque * self.torque / torsion
+        self.force.dot(tangent)
+            - 0.5 * bending * bend.norm_squared()
+            - 0.5 * self.torque * self.torque / torsion
     }
 }
