@@ -22,8 +22,14 @@ fn curved_tube() -> (Wall, Sheath) {
 fn in_curved_tube(modulus_n_per_mm2: f64) -> Simulation {
     let (wall, sheath) = curved_tube();
     let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
-    Simulation::with_properties(wall, WallProperties { modulus_n_per_mm2 }, wire, sheath, &kirchhoff(2.0))
-        .unwrap()
+    Simulation::with_properties(
+        wall,
+        WallProperties { modulus_n_per_mm2, ..Default::default() },
+        wire,
+        sheath,
+        &kirchhoff(2.0),
+    )
+    .unwrap()
 }
 
 /// Whether any piece of the device's polyline passes through a triangle of the wall.

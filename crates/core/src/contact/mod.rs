@@ -2,9 +2,11 @@
 
 pub mod distance;
 pub mod extension;
+pub mod friction;
 pub mod potential;
 pub mod wall;
 
 pub use distance::{Distance, SmoothWall};
+pub use friction::{Friction, HandMotion};
 pub use potential::WallPotential;
 pub use wall::{ContactPoint, Counters, KnownPoint, WallContact};

@@ -9,8 +9,9 @@
 //! its last clearance, nothing can touch it.
 
 use crate::Vec3;
-use crate::contact::{Distance, SmoothWall, WallPotential};
-use crate::rod::quadrature::hermite;
+use crate::contact::{Distance, Friction, SmoothWall, WallPotential, friction};
+use crate::insertion::Contact;
+use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{Assembly, ElementData, RodState};
 use crate::solve::External;
 use crate::vessel::WallQuery;
@@ -23,10 +24,41 @@ pub struct ContactPoint {
     pub element: usize,
     /// Local coordinate in the element.
     pub xi: f64,
+    /// Arc length from the tip, mm.
+    pub from_tip_mm: f64,
     /// Length of device that the point stands for, mm.
     pub weight_mm: f64,
     /// Energy per length.
     pub potential: WallPotential,
+}
+
+impl ContactPoint {
+    /// Position on the device's axis, mm.
+    pub fn position(&self, elements: &[ElementData], state: &RodState) -> Vec3 {
+        let (e, xi) = (self.element, self.xi);
+        if xi == 1.0 {
+            return state.positions[e + 1];
+        }
+        let [w0, s0, w1, s1] = hermite(xi);
+        let h = elements[e].length;
+        state.positions[e] * w0
+            + state.positions[e + 1] * w1
+            + (state.frames[e].t * s0 + state.frames[e + 1].t * s1) * h
+    }
+
+    /// Normal of the wall and force on it at a distance, N; `softness` as in [`WallContact`].
+    fn pressed(&self, d: &Distance, softness: f64) -> (Vec3, f64) {
+        // The smooth distance has a gradient of nearly unit length; the normal has one.
+        let size = d.gradient.norm();
+        (d.gradient / size, -softness * self.weight_mm * self.potential.derivatives(d.value_mm).0 * size)
+    }
+
+    /// Material angle, rad.
+    pub fn angle(&self, state: &RodState) -> f64 {
+        let [w0, w1, wb] = Point::at(self.xi, 0.0).phi;
+        let e = self.element;
+        w0 * state.angles[e] + w1 * state.angles[e + 1] + wb * state.bubbles[e]
+    }
 }
 
 /// What a point knows of its surroundings.
@@ -42,6 +74,8 @@ struct Known {
     base: Vec3,
     /// No wall is nearer to it than this, mm.
     base_clearance_mm: f64,
+    /// Distance there, if the wall is near.
+    near: Option<Distance>,
 }
 
 impl Default for Known {
@@ -52,8 +86,18 @@ impl Default for Known {
             triangle: None,
             base: Vec3::zeros(),
             base_clearance_mm: 0.0,
+            near: None,
         }
     }
+}
+
+/// A contact point that presses on the wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// Energy stored in the wall there, mJ.
+    pub energy_mj: f64,
+    /// Place and forces.
+    pub contact: Contact,
 }
 
 /// Work done and avoided.
@@ -119,6 +163,7 @@ pub struct WallContact<'a> {
     /// Part of the modulus that acts: a rigid wall is approached from a softer one.
     pub softness: f64,
     known: &'a mut Vec<KnownPoint>,
+    friction: &'a mut Friction,
     /// Work done and avoided.
     pub counters: Counters,
 }
@@ -135,6 +180,7 @@ impl<'a> WallContact<'a> {
         query: &'a WallQuery,
         points: &'a [ContactPoint],
         known: &'a mut Vec<KnownPoint>,
+        friction: &'a mut Friction,
         softest_nmm2: f64,
         reach_mm: f64,
         skip: bool,
@@ -149,18 +195,9 @@ impl<'a> WallContact<'a> {
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
             softness: 1.0,
             known,
+            friction,
             counters: Counters::default(),
         }
-    }
-
-    /// Position of point `index`, mm.
-    pub fn position(&self, elements: &[ElementData], state: &RodState, index: usize) -> Vec3 {
-        let ContactPoint { element: e, xi, .. } = self.points[index];
-        let [w0, s0, w1, s1] = hermite(xi);
-        let h = elements[e].length;
-        state.positions[e] * w0
-            + state.positions[e + 1] * w1
-            + (state.frames[e].t * s0 + state.frames[e + 1].t * s1) * h
     }
 
     /// How near the wall point `index` would be at `x`.
@@ -210,24 +247,65 @@ impl<'a> WallContact<'a> {
         )
     }
 
-    /// Distance of point `index` at the given state, where the wall is near, and its triangle.
-    pub fn distance_at(
-        &mut self,
+    /// Friction of point `index` at `x`.
+    fn add_friction<const C: usize>(
+        &self,
         elements: &[ElementData],
         state: &RodState,
+        assembly: &mut Assembly<C>,
         index: usize,
-    ) -> Option<(Distance, u32)> {
-        let x = self.position(elements, state, index);
-        match self.read(index, &x) {
-            Reading::Near(distance) => Some((distance, self.known[index].0.triangle.unwrap_or(0))),
-            Reading::Free(_) | Reading::Outside => None,
+        x: &Vec3,
+    ) {
+        let point = &self.points[index];
+        let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
+        let Some(f) = self.friction.derivatives(index, x, angle, radius_mm) else { return };
+        assembly.external_energy += self.friction.value(index, x, angle, radius_mm);
+        let e = point.element;
+        assembly.add_point(state, &elements[e], e, point.xi, &f.gradient, &f.hessian);
+        assembly.add_turn(state, &elements[e], e, point.xi, &f.mixed, (f.turn, f.turn2));
+    }
+
+    /// Whether friction knows the normal forces of the equilibrium that was found. If not, it may renew them again.
+    pub fn friction_settled(&mut self) -> bool {
+        let settled = self.friction.unsettled(self.least_force_n()) < friction::SETTLED;
+        self.friction.unsettle();
+        settled
+    }
+
+    /// A device bent to a radius of 100 mm carries this.
+    fn least_force_n(&self) -> f64 {
+        self.least_moment_nmm / LEAST_BEND_MM
+    }
+
+    /// What happens at point `index` at the given state, where the wall is pressed.
+    pub fn touch(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<Touch> {
+        let point = self.points[index];
+        let x = point.position(elements, state);
+        let Reading::Near(distance) = self.read(index, &x) else { return None };
+        let penetration_mm = point.potential.penetration_mm(distance.value_mm);
+        if penetration_mm == 0.0 {
+            return None;
         }
+        let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
+        let (normal, force_n) = point.pressed(&distance, 1.0);
+        let rub = self.friction.derivatives(index, &x, angle, radius_mm);
+        Some(Touch {
+            energy_mj: point.weight_mm * point.potential.value(distance.value_mm),
+            contact: Contact {
+                position_mm: x,
+                normal,
+                force_n,
+                friction_n: rub.map_or_else(Vec3::zeros, |f| -f.gradient),
+                penetration_mm,
+                triangle: self.known[index].0.triangle.unwrap_or(0),
+            },
+        })
     }
 
     /// Whether a point is beyond the wall.
     pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         (0..self.points.len()).any(|index| {
-            let x = self.position(elements, state, index);
+            let x = self.points[index].position(elements, state);
             matches!(self.read(index, &x), Reading::Outside)
         })
     }
@@ -237,7 +315,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
     fn energy(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         let mut sum = 0.0;
         for index in 0..self.points.len() {
-            let x = self.position(elements, state, index);
+            let x = self.points[index].position(elements, state);
             let point = self.points[index];
             match self.read(index, &x) {
                 Reading::Free(_) => {}
@@ -246,29 +324,41 @@ impl<const C: usize> External<C> for WallContact<'_> {
                 }
                 Reading::Outside => return f64::INFINITY,
             }
+            if self.friction.acts() {
+                sum += self.friction.value(index, &x, point.angle(state), point.potential.radius_mm);
+            }
         }
         sum
     }
 
     fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
         for index in 0..self.points.len() {
-            let x = self.position(elements, state, index);
-            let point = self.points[index];
+            let x = self.points[index].position(elements, state);
             let reading = self.read(index, &x);
             let KnownPoint(known) = &mut self.known[index];
             known.base = x;
-            known.base_clearance_mm = match reading {
-                Reading::Free(clearance) => clearance,
-                Reading::Near(d) => d.value_mm,
+            (known.base_clearance_mm, known.near) = match reading {
+                Reading::Free(clearance) => (clearance, None),
+                Reading::Near(d) => (d.value_mm, Some(d)),
                 Reading::Outside => {
                     assembly.external_energy = f64::INFINITY;
                     return;
                 }
             };
-            let Reading::Near(d) = reading else { continue };
-            if d.value_mm >= point.potential.radius_mm {
-                continue;
+        }
+        if self.friction.acts() {
+            let pressed = self.points.iter().zip(self.known.iter()).map(|(point, KnownPoint(known))| {
+                known.near.map_or((Vec3::zeros(), 0.0), |d| point.pressed(&d, self.softness))
+            });
+            self.friction.follow(pressed, self.least_moment_nmm / LEAST_BEND_MM);
+        }
+        for index in 0..self.points.len() {
+            let point = self.points[index];
+            let KnownPoint(known) = self.known[index];
+            if self.friction.acts() {
+                self.add_friction(elements, state, assembly, index, &known.base);
             }
+            let Some(d) = known.near.filter(|d| d.value_mm < point.potential.radius_mm) else { continue };
             let w = self.softness * point.weight_mm;
             assembly.external_energy += w * point.potential.value(d.value_mm);
             let (first, second) = point.potential.derivatives(d.value_mm);
@@ -283,10 +373,9 @@ impl<const C: usize> External<C> for WallContact<'_> {
         }
     }
 
-    /// A device bent to a radius of 100 mm carries this; in a device that carries less, force and moment have no scale of
-    /// their own to be compared with.
+    /// In a device that carries less, force and moment have no scale of their own to be compared with.
     fn scale(&self) -> [f64; 2] {
-        [self.least_moment_nmm / LEAST_BEND_MM, self.least_moment_nmm]
+        [self.least_force_n(), self.least_moment_nmm]
     }
 
     fn obstructs(&self) -> bool {
@@ -297,7 +386,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         let mut fraction: f64 = 1.0;
         for index in 0..self.points.len() {
-            let x = self.position(elements, to, index);
+            let x = self.points[index].position(elements, to);
             let KnownPoint(known) = &self.known[index];
             let (base, mut clearance) = (known.base, known.base_clearance_mm);
             let moved = (x - base).norm();

@@ -32,6 +32,8 @@ pub struct Contact {
     pub normal: Vec3,
     /// Normal force, N.
     pub force_n: f64,
+    /// Friction force on the device, along the wall and against its slip, N.
+    pub friction_n: Vec3,
     /// Depth to which the device's surface is beyond the wall, mm.
     pub penetration_mm: f64,
     /// Triangle of the wall mesh.
@@ -56,6 +58,8 @@ pub struct StepReport {
     pub torque_nmm: f64,
     /// Deepest penetration of the device's surface into the wall at any node, mm; 0 without contact.
     pub max_penetration_mm: f64,
+    /// Energy that friction took in this step, mJ.
+    pub dissipated_mj: f64,
     /// Where the wall holds the device.
     pub contacts: Vec<Contact>,
     /// The opening through which the tip has left the vessel, while it is beyond it.

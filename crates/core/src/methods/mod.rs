@@ -66,7 +66,10 @@ impl MethodChoice {
     /// Options out of range.
     pub fn start(&self, surroundings: &Surroundings<'_>) -> Result<Box<dyn Method>> {
         Ok(match self {
-            Self::Kirchhoff(options) if surroundings.device.is_shaped() => {
+            // A shape turns with the device, and friction twists it.
+            Self::Kirchhoff(options)
+                if surroundings.device.is_shaped() || surroundings.properties.friction > 0.0 =>
+            {
                 Box::new(Kirchhoff::<TWISTED>::new(*options, surroundings)?)
             }
             Self::Kirchhoff(options) => Box::new(Kirchhoff::<PLAIN>::new(*options, surroundings)?),

@@ -1,6 +1,6 @@
 //! A rod between flat walls: the bench of the contact cases.
 
-use crate::contact::{KnownPoint, SmoothWall, WallContact};
+use crate::contact::{Friction, KnownPoint, SmoothWall, WallContact};
 use crate::device::Device;
 use crate::methods::kirchhoff::mesh::Mesh;
 use crate::rod::{Assembly, Clamp, ElementData, Frame, PLAIN, RodState, Supports};
@@ -17,7 +17,7 @@ use nalgebra::Matrix3;
 pub(super) struct Channel {
     walls: Walls,
     mesh: Mesh,
-    known: Vec<KnownPoint>,
+    memory: Memory,
     newton: Newton<PLAIN>,
     /// Loads on the nodes.
     pub(super) loads: Loads,
@@ -36,9 +36,18 @@ struct Walls {
 }
 
 /// The walls' energy at the points of `mesh`.
-fn contact<'a>(walls: &'a Walls, mesh: &'a Mesh, known: &'a mut Vec<KnownPoint>) -> WallContact<'a> {
+fn contact<'a>(walls: &'a Walls, mesh: &'a Mesh, memory: &'a mut Memory) -> WallContact<'a> {
     let Setup { bending, radius, .. } = walls.setup;
-    WallContact::new(&walls.smooth, &walls.query, &mesh.points, known, bending, REACH_RADII * radius, true)
+    let (known, friction) = (&mut memory.known, &mut memory.friction);
+    let reach = REACH_RADII * radius;
+    WallContact::new(&walls.smooth, &walls.query, &mesh.points, known, friction, bending, reach, true)
+}
+
+/// What contact remembers; there is no friction here.
+#[derive(Default)]
+struct Memory {
+    known: Vec<KnownPoint>,
+    friction: Friction,
 }
 
 /// What a channel is made of.
@@ -126,7 +135,7 @@ impl Channel {
             walls,
             newton: Newton::new(mesh.elements.len()),
             mesh,
-            known: Vec::new(),
+            memory: Memory::default(),
             loads: Loads::default(),
             supports: Supports { start_tangent: true, start_angle: true, ..Supports::default() },
             state,
@@ -141,7 +150,7 @@ impl Channel {
     /// Moves the rod to a minimum of the energy.
     pub(super) fn solve(&mut self) -> Result<()> {
         let mut outside = Outside {
-            contact: contact(&self.walls, &self.mesh, &mut self.known),
+            contact: contact(&self.walls, &self.mesh, &mut self.memory),
             loads: &mut self.loads,
             plates: self.walls.plates,
         };
@@ -157,7 +166,7 @@ impl Channel {
     /// Whether the state as it is, taken for an equilibrium, is a minimum.
     pub(super) fn is_stable(&mut self) -> bool {
         let mut outside = Outside {
-            contact: contact(&self.walls, &self.mesh, &mut self.known),
+            contact: contact(&self.walls, &self.mesh, &mut self.memory),
             loads: &mut self.loads,
             plates: self.walls.plates,
         };
@@ -174,12 +183,11 @@ impl Channel {
 
     /// Sum of the wall's forces on the rod.
     pub(super) fn wall_force(&mut self) -> Vec3 {
-        let mut contact = contact(&self.walls, &self.mesh, &mut self.known);
+        let mut contact = contact(&self.walls, &self.mesh, &mut self.memory);
         let mut force = Vec3::zeros();
-        for (index, point) in self.mesh.points.iter().enumerate() {
-            if let Some((distance, _)) = contact.distance_at(&self.mesh.elements, &self.state, index) {
-                let press = point.weight_mm * point.potential.derivatives(distance.value_mm).0;
-                force -= distance.gradient * press;
+        for index in 0..self.mesh.points.len() {
+            if let Some(touch) = contact.touch(&self.mesh.elements, &self.state, index) {
+                force += touch.contact.normal * touch.contact.force_n;
             }
         }
         force

@@ -15,7 +15,7 @@
 
 use super::element::{ElementData, ElementSystem, Energy, element_system};
 use super::layout::Layout;
-use super::quadrature::hermite;
+use super::quadrature::{Point, hermite};
 use super::state::RodState;
 use crate::Vec3;
 use crate::solve::BandMatrix;
@@ -152,22 +152,14 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    /// Adds an energy of the point at ξ of element `e`, whose gradient and Hessian in that point's position are given.
-    pub fn add_point(
-        &mut self,
-        state: &RodState,
-        element: &ElementData,
-        e: usize,
-        xi: f64,
-        gradient: &Vec3,
-        hessian: &Matrix3<f64>,
-    ) {
+    /// How the point at ξ of element `e` moves with the unknowns: rows and displacements,
+    /// w₀ dx₀ + s₀(u a + v b) + ….
+    fn point_columns(state: &RodState, element: &ElementData, e: usize, xi: f64) -> [(usize, Vec3); 10] {
         let l = Layout::<C>;
         let [w0, s0, w1, s1] = hermite(xi);
         let (s0, s1) = (s0 * element.length, s1 * element.length);
         let (f0, f1) = (&state.frames[e], &state.frames[e + 1]);
-        // The point moves by w₀ dx₀ + s₀(u a + v b) + …, and by −½ s |δ|² t at second order.
-        let columns = [
+        [
             (l.position(e), Vec3::x() * w0),
             (l.position(e) + 1, Vec3::y() * w0),
             (l.position(e) + 2, Vec3::z() * w0),
@@ -178,7 +170,20 @@ impl<const C: usize> Assembly<C> {
             (l.position(e + 1) + 2, Vec3::z() * w1),
             (l.tangent(e + 1), f1.u * s1),
             (l.tangent(e + 1) + 1, f1.v * s1),
-        ];
+        ]
+    }
+
+    /// Adds an energy of the point at ξ of element `e`, whose gradient and Hessian in that point's position are given.
+    pub fn add_point(
+        &mut self,
+        state: &RodState,
+        element: &ElementData,
+        e: usize,
+        xi: f64,
+        gradient: &Vec3,
+        hessian: &Matrix3<f64>,
+    ) {
+        let columns = Self::point_columns(state, element, e, xi);
         for (i, (row, p)) in columns.iter().enumerate() {
             self.residual[*row] += gradient.dot(p);
             let hp = hessian * p;
@@ -186,10 +191,43 @@ impl<const C: usize> Assembly<C> {
                 self.matrix.add(*row, *column, hp.dot(q));
             }
         }
-        for (at, s, t) in [(l.tangent(e), s0, &f0.t), (l.tangent(e + 1), s1, &f1.t)] {
-            let curve = s * gradient.dot(t);
+        // At second order the point moves by −½ s |δ|² t.
+        let l = Layout::<C>;
+        let [_, s0, _, s1] = hermite(xi);
+        for (node, s) in [(e, s0), (e + 1, s1)] {
+            let at = l.tangent(node);
+            let curve = s * element.length * gradient.dot(&state.frames[node].t);
             self.matrix.add(at, at, -curve);
             self.matrix.add(at + 1, at + 1, -curve);
+        }
+    }
+
+    /// Adds the part of an energy of the point at ξ of element `e` that depends on the material angle there: its derivatives
+    /// `first`, `second` in the angle and `mixed` in angle and position; nothing where the rod carries no angles.
+    pub fn add_turn(
+        &mut self,
+        state: &RodState,
+        element: &ElementData,
+        e: usize,
+        xi: f64,
+        mixed: &Vec3,
+        (first, second): (f64, f64),
+    ) {
+        if !Layout::<C>::TWIST {
+            return;
+        }
+        let l = Layout::<C>;
+        let [w0, w1, wb] = Point::at(xi, 0.0).phi;
+        let angles = [(l.angle(e), w0), (l.bubble(e), wb), (l.angle(e + 1), w1)];
+        let columns = Self::point_columns(state, element, e, xi);
+        for (i, &(row, p)) in angles.iter().enumerate() {
+            self.residual[row] += first * p;
+            for &(column, q) in &angles[i..] {
+                self.matrix.add(row, column, second * p * q);
+            }
+            for (column, way) in &columns {
+                self.matrix.add(row, *column, p * mixed.dot(way));
+            }
         }
     }
 

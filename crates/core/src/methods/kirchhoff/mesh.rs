@@ -72,6 +72,7 @@ impl Mesh {
                 self.points.push(ContactPoint {
                     element: e,
                     xi: 1.0 - at / data.length,
+                    from_tip_mm: self.from_tip_mm[e + 1] + at,
                     weight_mm: half_beyond + 0.5 * step,
                     potential: WallPotential { modulus_n_per_mm2, radius_mm },
                 });

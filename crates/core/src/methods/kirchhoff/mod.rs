@@ -18,13 +18,13 @@ mod slide;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::extension::{EXTENSION_MM, extended, left_through};
-use crate::contact::{KnownPoint, SmoothWall, WallContact};
+use crate::contact::{Friction, HandMotion, KnownPoint, SmoothWall, WallContact};
 use crate::device::Device;
-use crate::insertion::{Command, Contact, Energy, StepReport, Surroundings};
+use crate::insertion::{Command, Energy, StepReport, Surroundings};
 use crate::methods::Method;
 use crate::rod::{Clamp, Frame, Layout, RodState, Supports};
 use crate::shape::Shape;
-use crate::solve::{External, Newton, NewtonOptions};
+use crate::solve::{Newton, NewtonOptions};
 use crate::vessel::{Wall, WallQuery};
 use crate::{Error, Result};
 use mesh::Mesh;
@@ -62,6 +62,8 @@ const LOOK_MM: f64 = 3.0;
 const SOFTEST: f64 = 30.0;
 /// … each solved to this residual.
 const LOOSE: f64 = 1e-3;
+/// Equilibria that may be found before friction and the forces it follows from have settled.
+const RENEWALS: usize = 100;
 /// Part of the tip's radius by which a device is pushed on at least, where its tip stands head-on against the wall.
 const LEAST_WAY: f64 = 0.05;
 /// A step is a jump if more than this part of the stored energy was set free.
@@ -78,8 +80,10 @@ pub struct Kirchhoff<const C: usize> {
     newton: Newton<C>,
     mesh: Mesh,
     state: RodState,
+    friction: Friction,
     next_mesh: Mesh,
     next: RodState,
+    next_friction: Friction,
     extension: Extension,
     known: Vec<KnownPoint>,
     shape: Shape,
@@ -125,7 +129,9 @@ impl<const C: usize> Kirchhoff<C> {
             mesh,
             state,
             next_mesh: Mesh::default(),
+            friction: Friction::new(surroundings.properties.friction),
             next: RodState::default(),
+            next_friction: Friction::new(surroundings.properties.friction),
             extension: Extension::default(),
             known: Vec::new(),
             shape: Shape::default(),
@@ -148,10 +154,23 @@ impl<const C: usize> Kirchhoff<C> {
         surroundings: &Surroundings<'_>,
         inserted_mm: f64,
         tail_rad: f64,
-    ) -> std::result::Result<usize, String> {
+    ) -> std::result::Result<(usize, f64), String> {
         let modulus = surroundings.properties.modulus_n_per_mm2;
         self.next_mesh.build(surroundings.device, inserted_mm, self.options.element_mm, modulus);
-        slide(&self.mesh, &self.state, &self.extension, &self.next_mesh, tail_rad, &mut self.next);
+        slide(&self.mesh, &self.state, &self.extension, &self.next_mesh, &mut self.next);
+        let hand = HandMotion {
+            from_mm: self.mesh.from_tip_mm[0],
+            to_mm: inserted_mm,
+            turn_rad: tail_rad - self.state.angles[0],
+        };
+        self.next_friction.begin(
+            &self.next_mesh.elements,
+            &self.next,
+            &self.next_mesh.points,
+            (&self.mesh.points, &self.friction),
+            hand,
+        );
+        self.next.angles[0] = tail_rad;
         let elements = self.next_mesh.elements.len();
         if self.newton.assembly.residual.len() != Layout::<C>::dimension(elements) {
             self.newton = Newton::new(elements);
@@ -163,6 +182,7 @@ impl<const C: usize> Kirchhoff<C> {
             &self.query,
             &self.next_mesh.points,
             &mut self.known,
+            &mut self.next_friction,
             softest(surroundings.device),
             reach,
             self.options.skip,
@@ -176,6 +196,7 @@ impl<const C: usize> Kirchhoff<C> {
         let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
         let mut softness = (SOFTEST * element_stiffness / modulus).min(1.0);
         let mut iterations = 0;
+        let mut renewals = 0;
         let found = loop {
             contact.softness = softness;
             let options = NewtonOptions {
@@ -191,22 +212,36 @@ impl<const C: usize> Kirchhoff<C> {
                 &options,
             );
             iterations += found.iterations;
-            if softness == 1.0 || !found.converged {
+            if !found.converged {
                 break found;
             }
-            softness = (10.0 * softness).min(1.0);
+            if softness < 1.0 {
+                softness = (10.0 * softness).min(1.0);
+                continue;
+            }
+            if surroundings.properties.friction == 0.0 || contact.friction_settled() {
+                break found;
+            }
+            renewals += 1;
+            if renewals > RENEWALS {
+                return Err("friction and wall forces do not settle".to_owned());
+            }
         };
         self.report.counters.add(&contact.counters);
         if !found.converged {
             return Err(format!("{} (residual {:.1e})", found.reason, found.residual));
         }
-        Ok(iterations)
+        Ok((
+            iterations,
+            self.next_friction.dissipated_mj(&self.next_mesh.elements, &self.next, &self.next_mesh.points),
+        ))
     }
 
     /// Takes over the solved sub-step.
     fn accept(&mut self) {
         std::mem::swap(&mut self.mesh, &mut self.next_mesh);
         std::mem::swap(&mut self.state, &mut self.next);
+        std::mem::swap(&mut self.friction, &mut self.next_friction);
     }
 
     /// Read-outs at the current state.
@@ -228,32 +263,18 @@ impl<const C: usize> Kirchhoff<C> {
             &self.query,
             &self.mesh.points,
             &mut self.known,
+            &mut self.friction,
             softest(surroundings.device),
             reach,
             self.options.skip,
         );
         let stored = self.newton.assembly.energy;
-        report.energy = Energy {
-            bend: stored.bend,
-            twist: stored.twist,
-            wall: External::<C>::energy(&mut contact, &self.mesh.elements, &self.state),
-        };
-        for (index, point) in self.mesh.points.iter().enumerate() {
-            let Some((distance, triangle)) = contact.distance_at(&self.mesh.elements, &self.state, index)
-            else {
-                continue;
-            };
-            let penetration_mm = point.potential.penetration_mm(distance.value_mm);
-            if penetration_mm > 0.0 {
-                report.max_penetration_mm = report.max_penetration_mm.max(penetration_mm);
-                report.contacts.push(Contact {
-                    position_mm: contact.position(&self.mesh.elements, &self.state, index),
-                    normal: distance.gradient,
-                    force_n: -point.weight_mm * point.potential.derivatives(distance.value_mm).0,
-                    penetration_mm,
-                    triangle,
-                });
-            }
+        report.energy = Energy { bend: stored.bend, twist: stored.twist, wall: 0.0 };
+        for index in 0..self.mesh.points.len() {
+            let Some(touch) = contact.touch(&self.mesh.elements, &self.state, index) else { continue };
+            report.energy.wall += touch.energy_mj;
+            report.max_penetration_mm = report.max_penetration_mm.max(touch.contact.penetration_mm);
+            report.contacts.push(touch.contact);
         }
 
         let clamp = Clamp::new::<C>(&self.newton.start_residual, &self.state);
@@ -283,6 +304,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let before = self.report.clone();
         self.report.iterations = 0;
         self.report.substeps = 0;
+        self.report.dissipated_mj = 0.0;
         self.report.jumped = false;
         let saved = (self.mesh.clone(), self.state.clone());
         // Progress of the command, 0 to 1: advance and turn go together.
@@ -297,7 +319,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 let last = self.state.elements();
                 let (tip, tangent) = (self.state.positions[last], self.state.frames[last].t);
                 let radius = surroundings.device.section_at(0.0).radius_mm;
-                let way = self.extension.trace(&self.query, tip, tangent, radius, wanted);
+                let way = self.extension.trace((&self.smooth, &self.query), tip, tangent, radius, wanted);
                 part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
             }
             let next = if part >= rest { 1.0 } else { done + part };
@@ -319,8 +341,9 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 continue;
             }
             match self.try_step(surroundings, inserted, tail) {
-                Ok(iterations) => {
+                Ok((iterations, dissipated_mj)) => {
                     self.report.iterations += iterations as u32;
+                    self.report.dissipated_mj += dissipated_mj;
                     self.accept();
                     done = next;
                     share = (2.0 * part).min(1.0);
@@ -345,7 +368,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         // What the hand put in and the rod did not keep.
         let work = 0.5 * (before.push_force_n + self.report.push_force_n) * (target - start)
             + 0.5 * (before.torque_nmm + self.report.torque_nmm) * command.rotate_rad;
-        let lost = work - (self.report.energy.total() - before.energy.total());
+        let lost = work - self.report.dissipated_mj - (self.report.energy.total() - before.energy.total());
         self.report.jumped =
             lost > JUMP * before.energy.total().max(self.report.energy.total()).max(JUMP_FLOOR_MJ);
         Ok(())

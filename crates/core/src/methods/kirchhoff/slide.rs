@@ -1,98 +1,115 @@
 //! The warm start: the rod slides along its own curve, and beyond its tip goes on straight, or along the wall it meets.
 
+use nalgebra::Rotation3;
+
 use crate::Vec3;
-use crate::rod::quadrature::{Point, hermite};
+use crate::contact::SmoothWall;
+use crate::rod::quadrature::Point;
 use crate::rod::{Frame, RodState};
 use crate::vessel::WallQuery;
 
 use super::mesh::Mesh;
 
-/// The way in front of the tip, in small straight pieces.
+/// The way in front of the tip.
+///
+/// A tip is free of moment, so its curve goes on straight. Where that leads into the wall, the way along the wall says
+/// where the tip should come to lie, and the device is bent towards it evenly over some length: a kink at the tip
+/// would store more energy than the whole device.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Extension {
-    /// Ends of the pieces, and their directions.
-    pieces: Vec<(Vec3, Vec3)>,
-    piece_mm: f64,
+    /// Axis of the bend times its curvature, 1/mm.
+    curvature: Vec3,
+    /// Length of device from the tip that bends, mm.
+    bent_mm: f64,
 }
 
 /// Longest piece of the way in front of the tip, as a part of the tip's radius.
 const PIECE: f64 = 0.4;
 /// Cosine between the tip's direction and the wall's inward normal below which it stands head-on and cannot slide.
 const HEAD_ON: f64 = -0.995;
+/// Part of its radius that the axis keeps from the wall on its way.
+const CLEAR: f64 = 0.5;
+/// Length over which the device bends to the wall, in advances …
+const BENT_ADVANCES: f64 = 8.0;
+/// … and at least in radii.
+const BENT_RADII: f64 = 20.0;
 
 impl Extension {
     /// Traces up to `wanted_mm` in front of the tip: straight on while the wall is farther than the tip's radius, then
     /// along it. Returns how far it came.
+    ///
+    /// A tip that presses on the wall goes on pressing as much: seen from a guess that has let go of the wall, the next
+    /// equilibrium would be that of a free tip.
     pub(super) fn trace(
         &mut self,
-        query: &WallQuery,
+        (wall, query): (&SmoothWall, &WallQuery),
         tip: Vec3,
         tangent: Vec3,
         radius_mm: f64,
         wanted_mm: f64,
     ) -> f64 {
-        self.pieces.clear();
+        self.curvature = Vec3::zeros();
+        let distance = |x: &Vec3, reach_mm: f64| {
+            let near = query.nearest(x, reach_mm).filter(|near| !near.rim)?;
+            let smooth = wall
+                .distance(x, near.triangle)
+                .filter(|d| (d.value_mm - near.distance_mm).abs() < 0.5 * radius_mm);
+            Some(smooth.map_or((near.distance_mm, near.normal), |d| (d.value_mm, d.gradient.normalize())))
+        };
+        let touch = distance(&tip, 2.0 * radius_mm).map_or(radius_mm, |(d, _)| d.min(radius_mm));
         let count = (wanted_mm / (PIECE * radius_mm)).ceil().max(1.0);
-        self.piece_mm = wanted_mm / count;
+        let piece_mm = wanted_mm / count;
         let (mut x, mut t) = (tip, tangent);
+        let mut way = 0.0;
         for _ in 0..count as usize {
-            let ahead = x + t * self.piece_mm;
-            if let Some(near) = query.nearest(&ahead, radius_mm + self.piece_mm)
-                && !near.rim
-                && near.distance_mm < radius_mm
+            let mut next = x + t * piece_mm;
+            if let Some((d, normal)) = distance(&next, radius_mm + piece_mm)
+                && d < touch
             {
-                if t.dot(&near.normal) < HEAD_ON {
+                if t.dot(&normal) < HEAD_ON {
                     break;
                 }
-                // The piece ends where its surface would just touch, as far as one piece can turn.
-                let along = t - near.normal * t.dot(&near.normal);
-                let lift =
-                    (t.dot(&near.normal) + (radius_mm - near.distance_mm) / self.piece_mm).clamp(-0.5, 0.5);
-                t = (along.normalize() + near.normal * lift).normalize();
-            }
-            let next = x + t * self.piece_mm;
-            if query
-                .nearest(&next, radius_mm)
-                .is_some_and(|near| !near.rim && near.distance_mm < CLEAR * radius_mm)
-            {
-                break;
+                // The piece ends where it presses as the tip does, as far as one piece can turn.
+                let along = (t - normal * t.dot(&normal)).normalize();
+                let lift = (t.dot(&normal) + (touch - d) / piece_mm).clamp(-0.5, 0.5);
+                t = (along + normal * lift).normalize();
+                next = x + t * piece_mm;
+                if let Some((d, normal)) = distance(&next, 2.0 * radius_mm) {
+                    if d < CLEAR * radius_mm {
+                        break;
+                    }
+                    next += normal * (touch - d).max(0.0);
+                }
             }
             x = next;
-            self.pieces.push((x, t));
+            way += piece_mm;
         }
-        self.pieces.len() as f64 * self.piece_mm
+        self.bent_mm = (BENT_ADVANCES * way).max(BENT_RADII * radius_mm);
+        // An even bend over a length l moves its end aside by ½κl².
+        let aside = x - tip;
+        self.curvature = tangent.cross(&aside) * (2.0 / (self.bent_mm * self.bent_mm));
+        way
     }
 
-    /// Position and direction at `beyond_mm` in front of the tip; straight on beyond what was traced.
-    fn at(&self, tip: Vec3, tangent: Vec3, beyond_mm: f64) -> (Vec3, Vec3) {
-        if self.pieces.is_empty() {
-            return (tip + tangent * beyond_mm, tangent);
+    /// A direction at `from_tip_mm` of the device that has moved on, bent to the wall.
+    fn bend(&self, from_tip_mm: f64, t: Vec3) -> Vec3 {
+        let length = self.bent_mm - from_tip_mm;
+        if length <= 0.0 || self.curvature == Vec3::zeros() {
+            return t;
         }
-        let index = ((beyond_mm / self.piece_mm).ceil() as usize).clamp(1, self.pieces.len()) - 1;
-        let (end, t) = self.pieces[index];
-        (end + t * (beyond_mm - (index + 1) as f64 * self.piece_mm), t)
+        Rotation3::new(self.curvature * length) * t
     }
 }
 
-/// Part of its radius that the axis keeps from the wall while it is traced.
-const CLEAR: f64 = 0.5;
-
-/// Position and unit tangent at an arc length from the sheath on the curve of `state`.
+/// Unit tangent at an arc length from the sheath on the curve of `state`.
 ///
 /// `element` is where to start looking, updated to where it was found: calls go from the sheath to the tip.
-fn on_curve(
-    mesh: &Mesh,
-    state: &RodState,
-    extension: &Extension,
-    from_sheath_mm: f64,
-    element: &mut usize,
-) -> (Vec3, Vec3) {
+fn on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64, element: &mut usize) -> Vec3 {
     let inserted = mesh.from_tip_mm[0];
     let last = state.elements();
     let beyond = from_sheath_mm - inserted;
     if last == 0 || beyond >= 0.0 {
-        let t = state.frames[last].t;
-        return extension.at(state.positions[last], t, beyond);
+        return state.frames[last].t;
     }
     let s = inserted - from_sheath_mm;
     while *element + 1 < last && mesh.from_tip_mm[*element + 1] > s {
@@ -101,24 +118,15 @@ fn on_curve(
     let e = *element;
     let h = mesh.elements[e].length;
     let xi = ((mesh.from_tip_mm[e] - s) / h).clamp(0.0, 1.0);
-    let [w0, s0, w1, s1] = hermite(xi);
     let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
-    let x = state.positions[e] * w0 + state.positions[e + 1] * w1 + (t0 * s0 + t1 * s1) * h;
     let slope = Point::at(xi, 0.0).derivatives(&state.chords[e], &t0, &t1).0;
-    (x, slope / slope.norm())
+    slope / slope.norm()
 }
 
 /// The state on the mesh `to` of the rod that was in `state` on the mesh `from`, slid along its curve.
 ///
-/// Material angles stay with the device; what enters from the sheath has the sheath's angle `tail_rad`.
-pub(super) fn slide(
-    from: &Mesh,
-    state: &RodState,
-    extension: &Extension,
-    to: &Mesh,
-    tail_rad: f64,
-    out: &mut RodState,
-) {
+/// Material angles stay with the device; what enters from the sheath has the angle that the tail has had.
+pub(super) fn slide(from: &Mesh, state: &RodState, extension: &Extension, to: &Mesh, out: &mut RodState) {
     let inserted = to.from_tip_mm[0];
     let first = state.frames[0];
     let n = to.elements.len();
@@ -127,9 +135,12 @@ pub(super) fn slide(
     out.chords.clear();
     out.frames.push(first);
     for e in 0..n {
-        let middle = inserted - 0.5 * (to.from_tip_mm[e] + to.from_tip_mm[e + 1]);
-        let m = on_curve(from, state, extension, middle, &mut element).1;
-        let t = on_curve(from, state, extension, inserted - to.from_tip_mm[e + 1], &mut element).1;
+        let mut direction = |from_tip_mm: f64| {
+            let t = on_curve(from, state, inserted - from_tip_mm, &mut element);
+            extension.bend(from_tip_mm, t)
+        };
+        let m = direction(0.5 * (to.from_tip_mm[e] + to.from_tip_mm[e + 1]));
+        let t = direction(to.from_tip_mm[e + 1]);
         let frame: Frame = out.frames[e].transported_to(&t);
         out.chords.push((m + (out.frames[e].t + frame.t) * 0.25) / 1.5);
         out.frames.push(frame);
@@ -146,12 +157,13 @@ pub(super) fn slide(
         out.bubbles.push(known.filter(|k| *k > 0).map_or(0.0, |k| state.bubbles[k]));
     }
     // Against triads carried along the rod without twist, which is what the new ones are.
+    let tail = state.angles[0];
     let mut carried = 0.0;
     let mut k = 1;
     for i in 0..=n {
         let known = old.checked_sub(n - i).filter(|k| *k > 0);
         let Some(known) = known else {
-            out.angles.push(tail_rad);
+            out.angles.push(tail);
             continue;
         };
         while k <= known {
@@ -160,7 +172,7 @@ pub(super) fn slide(
         }
         out.angles.push(state.angles[known] + carried);
     }
-    out.angles[0] = tail_rad;
+    out.angles[0] = tail;
     out.reference_twists.clear();
     out.reference_twists.resize(n, 0.0);
     out.positions.clear();

@@ -107,7 +107,7 @@ impl Li2011 {
     /// The method with nothing inserted.
     ///
     /// # Errors
-    /// An element length or wall stiffness that is not positive, or a number of nodes beyond memory.
+    /// An element length or wall stiffness that is not positive, a number of nodes beyond memory, or a wall with friction.
     pub fn new(
         options: Li2011Options,
         solver: LinearSolver,
@@ -116,6 +116,13 @@ impl Li2011 {
         let length_mm = surroundings.device.length_mm();
         crate::error::in_range("method.element_mm", options.element_mm, length_mm)?;
         crate::error::in_range("method.wall_stiffness_n_per_mm", options.wall_stiffness_n_per_mm, 1e9)?;
+        if surroundings.properties.friction > 0.0 {
+            return Err(Error::parameter(
+                "vessel.wall.friction",
+                surroundings.properties.friction,
+                "the paper's method has no friction: set it to 0 or use the method kirchhoff",
+            ));
+        }
         let limit = match solver {
             LinearSolver::Dense => ELEMENT_LIMIT_DENSE,
             LinearSolver::Banded => ELEMENT_LIMIT_BANDED,
@@ -261,6 +268,7 @@ impl Li2011 {
                 position_mm,
                 normal: contact.normal,
                 force_n,
+                friction_n: crate::Vec3::zeros(),
                 penetration_mm: self.beyond[nodes - contact.node].map_or(0.0, |plane| plane.depth_mm),
                 triangle: contact.triangle,
             });

@@ -1,0 +1,321 @@
+//! Coulomb friction of the device on the wall, as an incremental potential.
+//!
+//! In a step every contact point of the device slips along the wall by
+//!
+//! ```text
+//! u = P (x − a) + r (θ − θₐ) n × t,    P = I − n nᵀ,    a = x̄ − Δ t̄
+//! ```
+//!
+//! where x̄ and t̄ are its place and direction after the device has slid by the advance Δ along its own curve, so that a
+//! device that follows its curve slips by Δ t̄ exactly, whatever the length of the step; θ is the material angle, θₐ that
+//! before the step, and n × t the direction in which a surface that touches the wall with normal n moves when the
+//! device spins. Friction is then
+//!
+//! ```text
+//! D = Σ μ Nᵢ φ(|uᵢ|),    φ(y) = y  for y ≥ ε,    y²/ε − y³/3ε² + ε/3  for less
+//! ```
+//!
+//! of Li et al., *Incremental potential contact*, SIGGRAPH 2020 (eq. 14): twice continuously differentiable, with a force
+//! μN against the slip wherever the point slips farther than ε, and less where it sticks. A stuck point creeps
+//! by less than ε a step, and ε is a thousandth of what the hand moved in it.
+//!
+//! The normal force N and the normal n are lagged: within one step of Newton's method D has fixed ones, so the energy keeps
+//! a symmetric Hessian and steps that descend; between steps they are renewed until they no longer change
+//! ([`Friction::follow`]). What is left at the end is Coulomb's law of the final state.
+
+use nalgebra::Matrix3;
+
+use super::wall::ContactPoint;
+use crate::Vec3;
+use crate::rod::quadrature::Point;
+use crate::rod::{ElementData, RodState};
+
+/// Slip below which a point sticks, as a part of the motion of the hand: what the regularisation gives away.
+const STICK: f64 = 1e-3;
+/// Least slip length, mm: below it steps are lost in the rounding of positions.
+const LEAST_STICK_MM: f64 = 1e-8;
+/// Points nearer to the tip than this many radii (beside the advance) bring their normal force along; the others find the
+/// one that was felt where they come to lie, since the wall does not move.
+const TIP_RADII: f64 = 10.0;
+
+/// Normal forces are renewed once the last step of Newton's method has changed them by no more than this part; before, they
+/// have little to do with those of the equilibrium …
+const STEADY: f64 = 0.3;
+/// … and no more once they differ from the lagged ones by less than this part.
+pub(super) const SETTLED: f64 = 1e-4;
+
+/// A contact point in a step with friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Slider {
+    /// a: where the point comes from.
+    from_mm: Vec3,
+    /// θₐ: its material angle before the step.
+    from_rad: f64,
+    /// Direction of the device.
+    along: Vec3,
+    /// Normal of the wall, into the lumen.
+    normal: Vec3,
+    /// Normal force N.
+    force_n: f64,
+    /// Normal and force at the state seen last.
+    seen: (Vec3, f64),
+}
+
+/// Derivatives of a point's friction energy in its position and its angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrictionDerivatives {
+    /// In the position, N: minus the friction force on the device.
+    pub gradient: Vec3,
+    /// Second derivative in the position, N/mm.
+    pub hessian: Matrix3<f64>,
+    /// In the angle, N·mm.
+    pub turn: f64,
+    /// Second derivative in the angle, N·mm.
+    pub turn2: f64,
+    /// Mixed derivative, N.
+    pub mixed: Vec3,
+}
+
+/// Friction at all contact points of a device in one step.
+#[derive(Debug, Clone, Default)]
+pub struct Friction {
+    coefficient: f64,
+    /// ε, mm.
+    stick_mm: f64,
+    /// Whether normal forces are no longer renewed in this step.
+    settled: bool,
+    sliders: Vec<Slider>,
+}
+
+/// What the hand does in a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HandMotion {
+    /// Length inserted before, mm.
+    pub from_mm: f64,
+    /// Length inserted after, mm.
+    pub to_mm: f64,
+    /// Turn, rad.
+    pub turn_rad: f64,
+}
+
+impl Friction {
+    /// Friction of coefficient μ ≥ 0; none at all for 0.
+    pub fn new(coefficient: f64) -> Self {
+        Self { coefficient, ..Self::default() }
+    }
+
+    /// Whether there is any.
+    pub fn acts(&self) -> bool {
+        self.coefficient > 0.0
+    }
+
+    /// Begins a step: `state` is the device after it has slid along its own curve, with the angles it had before.
+    ///
+    /// `before` are the points and friction of the last state, from which the first normal forces come.
+    pub fn begin(
+        &mut self,
+        elements: &[ElementData],
+        state: &RodState,
+        points: &[ContactPoint],
+        before: (&[ContactPoint], &Self),
+        hand: HandMotion,
+    ) {
+        self.sliders.clear();
+        self.settled = false;
+        if !self.acts() {
+            return;
+        }
+        let advance = hand.to_mm - hand.from_mm;
+        let radius = points.first().map_or(0.0, |p| p.potential.radius_mm);
+        self.stick_mm = (STICK * (advance.abs() + radius * hand.turn_rad.abs())).max(LEAST_STICK_MM);
+        let (old_points, old) = before;
+        let count = old_points.len().min(old.sliders.len());
+        let near_tip = TIP_RADII * radius + advance.abs();
+        let mut k = 0;
+        for (index, point) in points.iter().enumerate() {
+            let e = point.element;
+            let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
+            let slope = Point::at(point.xi, 0.0).derivatives(&state.chords[e], &t0, &t1).0;
+            let along = slope / slope.norm();
+            let mut slider = Slider {
+                from_mm: point.position(elements, state) - along * advance,
+                from_rad: point.angle(state),
+                along,
+                normal: Vec3::zeros(),
+                force_n: 0.0,
+                seen: (Vec3::zeros(), 0.0),
+            };
+            if point.from_tip_mm < near_tip {
+                if index < count {
+                    (slider.normal, slider.force_n) = (old.sliders[index].normal, old.sliders[index].force_n);
+                }
+            } else {
+                // Label of the piece of device that was here before.
+                let label = point.from_tip_mm - advance;
+                while k + 1 < count && old_points[k + 1].from_tip_mm < label {
+                    k += 1;
+                }
+                if k + 1 < count {
+                    let (a, b) = (&old_points[k], &old_points[k + 1]);
+                    let share = ((label - a.from_tip_mm) / (b.from_tip_mm - a.from_tip_mm)).clamp(0.0, 1.0);
+                    let (p, q) = (&old.sliders[k], &old.sliders[k + 1]);
+                    let pressure = (1.0 - share) * p.force_n / a.weight_mm + share * q.force_n / b.weight_mm;
+                    slider.normal = if share < 0.5 { p.normal } else { q.normal };
+                    slider.force_n = point.weight_mm * pressure;
+                }
+            }
+            self.sliders.push(slider);
+        }
+    }
+
+    /// Slip vector of a point and the direction its surface takes when it spins.
+    fn slip(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> (Vec3, Vec3) {
+        let s = &self.sliders[index];
+        let spin = s.normal.cross(&s.along) * radius_mm;
+        let way = x - s.from_mm;
+        (way - s.normal * s.normal.dot(&way) + spin * (angle - s.from_rad), spin)
+    }
+
+    /// Friction energy of a point.
+    pub fn value(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> f64 {
+        let force = self.sliders.get(index).map_or(0.0, |s| self.coefficient * s.force_n);
+        if force == 0.0 {
+            return 0.0;
+        }
+        let (y, e) = (self.slip(index, x, angle, radius_mm).0.norm(), self.stick_mm);
+        force * if y >= e { y } else { y * y / e - y * y * y / (3.0 * e * e) + e / 3.0 }
+    }
+
+    /// Energy that friction has taken in the step, mJ.
+    pub fn dissipated_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> f64 {
+        let each = points.iter().enumerate().take(self.sliders.len());
+        each.map(|(index, point)| {
+            let x = point.position(elements, state);
+            self.value(index, &x, point.angle(state), point.potential.radius_mm)
+        })
+        .sum()
+    }
+
+    /// Derivatives of a point's friction energy; `None` where nothing presses.
+    pub fn derivatives(
+        &self,
+        index: usize,
+        x: &Vec3,
+        angle: f64,
+        radius_mm: f64,
+    ) -> Option<FrictionDerivatives> {
+        let slider = self.sliders.get(index).filter(|s| s.force_n > 0.0)?;
+        let force = self.coefficient * slider.force_n;
+        let (slip, spin) = self.slip(index, x, angle, radius_mm);
+        let (y, e) = (slip.norm(), self.stick_mm);
+        // φ′/y and φ″.
+        let (over, second) =
+            if y >= e { (1.0 / y, 0.0) } else { (2.0 / e - y / (e * e), 2.0 / e - 2.0 * y / (e * e)) };
+        let gradient = slip * (force * over);
+        let unit = if y > 0.0 { slip / y } else { Vec3::zeros() };
+        let plane = Matrix3::identity() - slider.normal * slider.normal.transpose();
+        let hessian = (plane * over + unit * unit.transpose() * (second - over)) * force;
+        let mixed = hessian * spin;
+        Some(FrictionDerivatives {
+            gradient,
+            hessian,
+            turn: gradient.dot(&spin),
+            turn2: mixed.dot(&spin),
+            mixed,
+        })
+    }
+
+    /// Looks at what presses at the state that Newton's method has come to, a normal and a force for every point, and
+    /// renews the lagged ones unless they are still on their way or have settled. `least_n` is a force not worth settling.
+    pub fn follow(&mut self, pressed: impl Iterator<Item = (Vec3, f64)>, least_n: f64) {
+        let (mut moved, mut sum) = (0.0, least_n);
+        for (slider, now) in self.sliders.iter_mut().zip(pressed) {
+            moved += (slider.seen.0 * slider.seen.1 - now.0 * now.1).norm();
+            sum += now.1;
+            slider.seen = now;
+        }
+        if self.settled || moved > STEADY * sum {
+            return;
+        }
+        self.settled = self.unsettled(least_n) < SETTLED;
+        for slider in &mut self.sliders {
+            (slider.normal, slider.force_n) = slider.seen;
+        }
+    }
+
+    /// How much of the normal force has changed since it was last renewed.
+    pub fn unsettled(&self, least_n: f64) -> f64 {
+        let (mut change, mut sum) = (0.0, least_n);
+        for slider in &self.sliders {
+            change += (slider.normal * slider.force_n - slider.seen.0 * slider.seen.1).norm();
+            sum += slider.seen.1;
+        }
+        change / sum
+    }
+
+    /// Lets the normal forces be renewed again.
+    pub fn unsettle(&mut self) {
+        self.settled = false;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RADIUS_MM: f64 = 0.4;
+
+    fn friction(slip: Vec3) -> (Friction, Vec3) {
+        let normal = Vec3::new(0.3, -0.5, 0.8).normalize();
+        let along = normal.cross(&Vec3::new(0.9, 0.1, 0.2)).normalize();
+        let slider = Slider {
+            from_mm: Vec3::new(1.0, 2.0, 3.0),
+            from_rad: 0.7,
+            along,
+            normal,
+            force_n: 2.0,
+            seen: (normal, 2.0),
+        };
+        let at = slider.from_mm + (slip - normal * normal.dot(&slip));
+        (Friction { coefficient: 0.25, stick_mm: 0.01, settled: false, sliders: vec![slider] }, at)
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_value() {
+        // Slipping, sticking, and across the change from one to the other.
+        for slip in [Vec3::new(0.3, 0.2, -0.1), Vec3::new(0.003, -0.002, 0.001), Vec3::new(0.0, 0.01, 0.002)]
+        {
+            let (friction, x) = friction(slip);
+            let (angle, h) = (0.705, 1e-6);
+            let here = friction.derivatives(0, &x, angle, RADIUS_MM).unwrap();
+            let at = |x: &Vec3, angle: f64| {
+                (
+                    friction.value(0, x, angle, RADIUS_MM),
+                    friction.derivatives(0, x, angle, RADIUS_MM).unwrap(),
+                )
+            };
+            for k in 0..3 {
+                let e = Vec3::ith(k, h);
+                let (plus, minus) = (at(&(x + e), angle), at(&(x - e), angle));
+                assert!(((plus.0 - minus.0) / (2.0 * h) - here.gradient[k]).abs() < 1e-8);
+                let column = (plus.1.gradient - minus.1.gradient) / (2.0 * h);
+                assert!((column - here.hessian.column(k)).norm() < 1e-4 * (1.0 + column.norm()));
+                assert!(((plus.1.turn - minus.1.turn) / (2.0 * h) - here.mixed[k]).abs() < 1e-3);
+            }
+            let (plus, minus) = (at(&x, angle + h), at(&x, angle - h));
+            assert!(((plus.0 - minus.0) / (2.0 * h) - here.turn).abs() < 1e-8);
+            assert!(
+                ((plus.1.turn - minus.1.turn) / (2.0 * h) - here.turn2).abs() < 1e-4 * (1.0 + here.turn2)
+            );
+        }
+    }
+
+    #[test]
+    fn a_slipping_point_is_held_by_mu_times_its_normal_force_and_a_stuck_one_by_less() {
+        let (sliding, x) = friction(Vec3::new(0.3, 0.2, -0.1));
+        let force = sliding.derivatives(0, &x, 0.7, RADIUS_MM).unwrap().gradient;
+        assert!((force.norm() - 0.5).abs() < 1e-12 && force.dot(&(x - Vec3::new(1.0, 2.0, 3.0))) > 0.0);
+        let (stuck, x) = friction(Vec3::new(0.002, 0.0, 0.0));
+        assert!(stuck.derivatives(0, &x, 0.7, RADIUS_MM).unwrap().gradient.norm() < 0.4);
+    }
+}
