@@ -9,6 +9,7 @@ mod planar;
 mod quadratic;
 mod spatial;
 pub mod stress;
+mod whip;
 
 use crate::statics::{End, EndKind, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase};
 use crate::{Result, Vec3};
@@ -116,7 +117,7 @@ impl Family {
     }
 }
 
-/// All families of parts A and B.
+/// All families.
 pub const FAMILIES: &[Family] = &[
     Family {
         id: "A1",
@@ -153,6 +154,7 @@ pub const FAMILIES: &[Family] = &[
         title: "Localised buckle of a long twisted rod (Coyne 1990)",
         run: spatial::localised,
     },
+    Family { id: "B5", title: "Whip of a pre-curved wire in a curved tube", run: whip::whip },
     Family {
         id: "C2",
         title: "Clamped-clamped elastica in a channel (Domokos, Holmes and Royce 1997)",

@@ -269,7 +269,6 @@ impl StaticProblem {
             arc += e.length;
             arc_lengths.push(arc);
         }
-        let twist = state.angles[n] - state.angles[0] + state.reference_twists.iter().sum::<f64>();
         let report = &solved.report;
         let (a, b) = (&state.frames[0].t, &frame.t);
         StaticSolution {
@@ -280,7 +279,7 @@ impl StaticProblem {
             nodes: state.positions.iter().map(|p| (*p).into()).collect(),
             tangents: state.frames.iter().map(|f| f.t.into()).collect(),
             normals: (0..=n).map(|i| state.material_frame(i).u.into()).collect(),
-            twist: if self.twisted { twist } else { 0.0 },
+            twist: if self.twisted { state.twist() } else { 0.0 },
             tensions: state.tensions.clone(),
             energy: solved.energy,
             reactions: Reactions {

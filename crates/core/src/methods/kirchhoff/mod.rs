@@ -250,6 +250,7 @@ impl<const C: usize> Kirchhoff<C> {
         report.contacts.clear();
         report.max_penetration_mm = 0.0;
         report.inserted_mm = self.mesh.from_tip_mm[0];
+        report.tip_rotation_rad = report.rotation_rad;
         let tip = self.state.positions[self.state.elements()];
         report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening);
         if self.mesh.elements.is_empty() {
@@ -283,6 +284,9 @@ impl<const C: usize> Kirchhoff<C> {
         let rest = frame.u * data.rest_curvature[0][0] + frame.v * data.rest_curvature[0][1];
         report.push_force_n = clamp.push_force(&frame.t, data.bending[0], data.torsion[0], &rest);
         report.torque_nmm = clamp.torque;
+        if Layout::<C>::TWIST {
+            report.tip_rotation_rad += self.state.twist();
+        }
     }
 }
 
