@@ -52,7 +52,7 @@ fn element(c: &mut Criterion) {
         energy: Energy::default(),
     };
     group.bench_function("system", |b| {
-        b.iter(|| element_system(&elements[1], black_box(&s), &mut plain));
+        b.iter(|| element_system::<_, true>(&elements[1], black_box(&s), &mut plain));
     });
     let mut full = ElementSystem::<14> {
         gradient: [0.0; 14],
@@ -61,7 +61,7 @@ fn element(c: &mut Criterion) {
         energy: Energy::default(),
     };
     group.bench_function("system twisted", |b| {
-        b.iter(|| element_system(&elements[1], black_box(&s), &mut full));
+        b.iter(|| element_system::<_, true>(&elements[1], black_box(&s), &mut full));
     });
     group.finish();
 }

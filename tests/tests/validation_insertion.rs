@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::vessel::{GeneratedWall, Resolution, SurfaceMesh, Wall, anatomy};
+use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
+use endowire_tests::crossing::CrossingTest;
 
 fn kirchhoff(element_mm: f64) -> MethodChoice {
     MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..Default::default() })
@@ -32,41 +32,6 @@ fn in_curved_tube(modulus_n_per_mm2: f64) -> Simulation {
     .unwrap()
 }
 
-/// Whether any piece of the device's polyline passes through a triangle of the wall.
-fn crosses(mesh: &SurfaceMesh, line: &[Vec3]) -> bool {
-    let (mut low, mut high) = (line[0], line[0]);
-    for x in line {
-        (low, high) = (low.inf(x), high.sup(x));
-    }
-    (0..mesh.triangles.len()).any(|i| {
-        let [a, b, c] = mesh.corners(i);
-        if a.sup(&b).sup(&c).iter().zip(low.iter()).any(|(t, l)| t < l)
-            || a.inf(&b).inf(&c).iter().zip(high.iter()).any(|(t, h)| t > h)
-        {
-            return false;
-        }
-        line.windows(2).any(|ends| {
-            let (way, e, f) = (ends[1] - ends[0], b - a, c - a);
-            let p = way.cross(&f);
-            let det = e.dot(&p);
-            if det.abs() < 1e-14 {
-                return false;
-            }
-            let s = ends[0] - a;
-            let q = s.cross(&e);
-            let (u, v, t) = (s.dot(&p) / det, way.dot(&q) / det, f.dot(&q) / det);
-            u >= 0.0 && v >= 0.0 && u + v <= 1.0 && (0.0..=1.0).contains(&t)
-        })
-    })
-}
-
-#[test]
-fn the_crossing_test_can_find_a_crossing() {
-    let (wall, _) = curved_tube();
-    assert!(crosses(wall.mesh(), &[Vec3::new(0.0, 0.0, 50.0), Vec3::new(9.0, 0.0, 50.0)]));
-    assert!(!crosses(wall.mesh(), &[Vec3::new(0.0, 0.0, 10.0), Vec3::new(0.0, 0.0, 50.0)]));
-}
-
 #[test]
 fn the_result_does_not_depend_on_the_increment() {
     let run = |step_mm: f64| {
@@ -74,7 +39,7 @@ fn the_result_does_not_depend_on_the_increment() {
         for _ in 0..(200.0 / step_mm).round() as usize {
             simulation.step(Command::advance(step_mm)).unwrap();
         }
-        assert!(!crosses(simulation.wall().mesh(), &simulation.shape().positions_mm));
+        assert!(!CrossingTest::new(simulation.wall().mesh()).crosses_curve(simulation.shape()));
         (simulation.shape().tip_mm().unwrap(), simulation.report().push_force_n)
     };
     let (tip, force) = run(1.0);
@@ -126,9 +91,10 @@ fn in_and_out_returns_to_the_same_energy() {
 fn walls_of_any_stiffness_are_met_and_never_crossed() {
     for modulus in [1e-3, 1e-1, 1e2, 1e4] {
         let mut simulation = in_curved_tube(modulus);
+        let crossing = CrossingTest::new(simulation.wall().mesh());
         for _ in 0..50 {
             simulation.step(Command::advance(4.0)).unwrap_or_else(|e| panic!("{modulus} N/mm²: {e}"));
-            assert!(!crosses(simulation.wall().mesh(), &simulation.shape().positions_mm), "{modulus} N/mm²");
+            assert!(!crossing.crosses_curve(simulation.shape()), "{modulus} N/mm²");
         }
         let deepest = simulation.report().max_penetration_mm;
         assert!(deepest < 0.445, "{modulus} N/mm²: {deepest} mm");
@@ -163,10 +129,11 @@ fn a_shaped_tip_turns_with_the_tail_and_finds_its_way_through_the_arch() {
     let tip = Section { rest_curvature_per_mm: [0.05, 0.0], ..Section::straight(30.0, 0.445, 5.0) };
     let wire = Device::new(vec![tip, Section::straight(400.0, 0.445, 15.0)]).unwrap();
     let mut simulation = Simulation::new(arch.wall, wire, sheath, &kirchhoff(4.0)).unwrap();
+    let crossing = CrossingTest::new(simulation.wall().mesh());
     for _ in 0..50 {
         let report = simulation.step(Command { advance_mm: 5.0, rotate_rad: 0.1 }).unwrap();
         assert!(report.converged);
-        assert!(!crosses(simulation.wall().mesh(), &simulation.shape().positions_mm));
+        assert!(!crossing.crosses_curve(simulation.shape()));
     }
     // The free tip of a wire in air would have turned with the hand: the torque is the wall's doing.
     assert!(simulation.report().torque_nmm.abs() > 1e-6);

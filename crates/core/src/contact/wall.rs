@@ -137,15 +137,12 @@ impl Reading {
     }
 }
 
-/// Beyond its radius, a point is followed within this part of it: the smooth wall and the flat
-/// one differ by less.
+/// Beyond its radius, a point is followed within this part of it.
 const FOLLOW: f64 = 0.5;
 /// A point looks for other walls again when it has moved by this part of its radius.
 const LOOK_AGAIN: f64 = 0.5;
 /// Radius of the gentlest bend worth a number, mm.
 const LEAST_BEND_MM: f64 = 100.0;
-/// Smooth and flat distance differ by less than this part of the radius, or the flat one is taken.
-const DISAGREE: f64 = 0.8;
 /// Part of its clearance that a point may move in one step of Newton's method.
 const SAFE: f64 = 0.9;
 
@@ -209,7 +206,7 @@ impl<'a> WallContact<'a> {
         if self.skip {
             let moved = (x - known.looked_at).norm();
             let clearance = known.clearance_mm - moved;
-            if clearance > near {
+            if clearance > near + self.wall.deepest_inset_mm() {
                 self.counters.avoided += 1;
                 return Reading::Free(clearance);
             }
@@ -229,22 +226,17 @@ impl<'a> WallContact<'a> {
         };
         known.clearance_mm = nearest.distance_mm.abs();
         // Past an opening there is no wall.
-        if nearest.rim || nearest.distance_mm > near {
+        if nearest.rim || nearest.distance_mm > near + self.wall.inset_mm(nearest.triangle) {
             return Reading::Free(known.clearance_mm);
         }
         known.triangle = Some(nearest.triangle);
-        // Where the surface is folded or torn the quadrics contradict the triangles, and the triangles are right.
-        let smooth = self.wall.distance(x, nearest.triangle);
-        Reading::of(
-            smooth.filter(|d| (d.value_mm - nearest.distance_mm).abs() < DISAGREE * radius).unwrap_or(
-                Distance {
-                    value_mm: nearest.distance_mm,
-                    gradient: nearest.normal,
-                    hessian: Matrix3::zeros(),
-                },
-            ),
-            &potential,
-        )
+        // Where no quadric reaches, a surface is torn, and its triangles are what there is.
+        let distance = self.wall.distance(x, nearest.triangle).unwrap_or(Distance {
+            value_mm: nearest.distance_mm,
+            gradient: nearest.normal,
+            hessian: Matrix3::zeros(),
+        });
+        Reading::of(distance, &potential)
     }
 
     /// Friction of point `index` at `x`.

@@ -125,6 +125,24 @@ impl Device {
         self.sections.iter().any(|s| s.rest_curvature_per_mm != [0.0; 2])
     }
 
+    /// Length from the tip within which the device has a shape of its own, mm.
+    pub fn shaped_mm(&self) -> f64 {
+        let mut end_mm = 0.0;
+        let mut shaped_mm = 0.0;
+        for section in &self.sections {
+            end_mm += section.length_mm;
+            if section.rest_curvature_per_mm != [0.0; 2] {
+                shaped_mm = end_mm;
+            }
+        }
+        shaped_mm
+    }
+
+    /// Smallest outer radius, mm.
+    pub fn min_radius_mm(&self) -> f64 {
+        self.sections.iter().map(|s| s.radius_mm).fold(f64::MAX, f64::min)
+    }
+
     /// Largest outer radius, mm.
     pub fn max_radius_mm(&self) -> f64 {
         self.sections.iter().map(|s| s.radius_mm).fold(0.0, f64::max)

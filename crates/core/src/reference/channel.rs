@@ -74,10 +74,11 @@ const PLATES: f64 = 1e3;
 const REACH_RADII: f64 = 3.0;
 
 /// The walls, the plates and the loads as one energy.
-struct Outside<'a> {
-    contact: WallContact<'a>,
-    loads: &'a mut Loads,
-    plates: f64,
+pub(super) struct Outside<'a> {
+    pub(super) contact: WallContact<'a>,
+    pub(super) loads: &'a mut Loads,
+    /// Stiffness of the plates at a node.
+    pub(super) plates: f64,
 }
 
 impl External<PLAIN> for Outside<'_> {
@@ -116,9 +117,11 @@ impl Channel {
     pub(super) fn new(setup: &Setup) -> Result<Self> {
         let Setup { length, bending, radius, elements, walls, modulus } = *setup;
         let cell = 0.25 * length;
-        // Far enough that no edge of the box is felt: a vertex reaches one diagonal of a cell.
-        let low = Vec3::new(-3.0 * cell, walls[0], -3.0 * cell);
-        let high = Vec3::new(length + 3.0 * cell, walls[1], 3.0 * cell);
+        // So far away that no edge of the box is felt: each of three steps (the edge is drawn in, vertices reach there, points
+        // feel these vertices) reaches at most a diagonal and a half of a cell.
+        let aside = 6.0 * cell;
+        let low = Vec3::new(-aside, walls[0], -aside);
+        let high = Vec3::new(length + aside, walls[1], aside);
         let wall = Wall::from_surface(&cuboid(low, high, cell))?;
         let device = Device::uniform(length, radius, bending)?;
         let mut mesh = Mesh::default();
@@ -126,7 +129,7 @@ impl Channel {
         let state = RodState::straight(&mesh.elements, Vec3::zeros(), Frame::new(Vec3::x(), Some(Vec3::y())));
         let h = mesh.elements[0].length;
         let walls = Walls {
-            smooth: SmoothWall::new(&wall, radius),
+            smooth: SmoothWall::new(&wall, radius, radius),
             query: WallQuery::new(&wall)?,
             setup: *setup,
             plates: PLATES * bending / (h * h * h),

@@ -2,6 +2,7 @@
 //!
 //! Each case is data and a function; nothing here knows what the solver returns.
 
+mod capstan;
 mod channel;
 mod contact;
 mod insertion;
@@ -155,6 +156,7 @@ pub const FAMILIES: &[Family] = &[
         run: spatial::localised,
     },
     Family { id: "B5", title: "Whip of a pre-curved wire in a curved tube", run: whip::whip },
+    Family { id: "B5", title: "Whip: where the tip jumps", run: whip::jumps },
     Family {
         id: "C2",
         title: "Clamped-clamped elastica in a channel (Domokos, Holmes and Royce 1997)",
@@ -167,6 +169,7 @@ pub const FAMILIES: &[Family] = &[
         run: insertion::sleeve,
     },
     Family { id: "C5", title: "Soft-walled tube", run: insertion::soft_tube },
+    Family { id: "C6", title: "Capstan (Euler 1769, Eytelwein)", run: capstan::capstan },
     Family { id: "C6", title: "Compliant wall (Winkler, Hetényi 1946)", run: contact::compliant },
 ];
 

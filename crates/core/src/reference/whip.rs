@@ -70,21 +70,20 @@ fn slow_turn(play_mm: f64) -> Result<([f64; 2], usize)> {
     Ok((hands, turn_to(&mut simulation, 360.0, 5.0)?))
 }
 
-/// Angle of the hand, within a quarter of a degree, at which the tip jumps with λ = 2, and jumps in a whole turn.
+/// Angle of the hand, within a quarter of a degree, at which the tip jumps with λ = 2, and jumps up to there.
 fn jump(play_mm: f64) -> Result<(f64, usize)> {
     let mut simulation = in_tube(2.0, play_mm)?;
     let mut jumps = turn_to(&mut simulation, 185.0, 5.0)?;
-    let mut at = f64::NAN;
     let mut hand = 185.0;
-    while at.is_nan() && hand < 205.0 {
+    while hand < 205.0 {
         hand += 0.5;
         let here = turn_to(&mut simulation, hand, 0.5)?;
         jumps += here;
         if here > 0 {
-            at = hand - 0.25;
+            return Ok((hand - 0.25, jumps));
         }
     }
-    Ok((at, jumps + turn_to(&mut simulation, 360.0, 5.0)?))
+    Err(Error::Computation("B5: no jump up to 205°".to_owned()))
 }
 
 /// What a value comes to without play, from those at some play and half of it: near the ends the wire straightens over a length
@@ -93,48 +92,39 @@ fn without_play(with: f64, with_half: f64) -> f64 {
     (SQRT_2 * with_half - with) / (SQRT_2 - 1.0)
 }
 
+/// λ = 1: the tip follows the hand.
 pub(super) fn whip() -> Result<Vec<Row>> {
     const HANDS: [f64; 2] = [45.35271903, 118.41209714];
-    const JUMP: f64 = 197.78561425;
     let mut rows = Vec::new();
-
-    let slow = [slow_turn(0.2)?, slow_turn(0.1)?, slow_turn(0.05)?];
+    let turns = [slow_turn(0.4)?, slow_turn(0.2)?, slow_turn(0.1)?];
     for (k, tip) in [30, 90].into_iter().enumerate() {
-        let hand = slow.map(|(hands, _)| hands[k]);
+        let hand = turns.map(|(hands, _)| hands[k]);
         let errors = hand.map(|found| (found / HANDS[k] - 1.0).abs());
         let found = without_play(hand[1], hand[2]);
-        rows.push(Row::relative(
-            "B5 λ=1, play to 0",
-            &format!("hand for a tip at {tip}°"),
-            found,
-            HANDS[k],
-            1e-2,
-        ));
-        rows.push(falling(
-            "B5 λ=1, play 0.2, 0.1, 0.05 mm",
-            &format!("error for a tip at {tip}°"),
-            &errors,
-            0.75,
-        ));
+        let quantity = format!("hand for a tip at {tip}°");
+        rows.push(Row::relative("B5 λ=1, play to 0", &quantity, found, HANDS[k], 2e-2));
+        let quantity = format!("error for a tip at {tip}°");
+        rows.push(falling("B5 λ=1, play 0.4, 0.2, 0.1 mm", &quantity, &errors, 0.75));
     }
-    let jumps: usize = slow.iter().map(|(_, jumps)| jumps).sum();
+    let jumps: usize = turns.iter().map(|(_, jumps)| jumps).sum();
     rows.push(Row::with_error("B5 λ=1, all plays", "jumps in a turn", jumps as f64, 0.0, jumps as f64, 0.0));
+    Ok(rows)
+}
 
-    let fast = [jump(0.2)?, jump(0.1)?];
-    let found = without_play(fast[0].0, fast[1].0);
-    rows.push(Row::relative("B5 λ=2, play to 0", "hand where the tip jumps", found, JUMP, 1e-2));
-    let errors = fast.map(|(hand, _)| (hand / JUMP - 1.0).abs());
-    rows.push(falling("B5 λ=2, play 0.2, 0.1 mm", "error of the jump", &errors, 0.75));
-    for (play, (_, jumps)) in [0.2, 0.1].into_iter().zip(fast) {
+/// λ = 2: the tip jumps.
+pub(super) fn jumps() -> Result<Vec<Row>> {
+    const JUMP: f64 = 197.78561425;
+    let turns = [jump(0.2)?, jump(0.1)?];
+    let found = without_play(turns[0].0, turns[1].0);
+    let errors = turns.map(|(hand, _)| (hand / JUMP - 1.0).abs());
+    let mut rows = vec![
+        Row::relative("B5 λ=2, play to 0", "hand where the tip jumps", found, JUMP, 1e-2),
+        falling("B5 λ=2, play 0.2, 0.1 mm", "error of the jump", &errors, 0.75),
+    ];
+    for (play, (_, jumps)) in [0.2, 0.1].into_iter().zip(turns) {
         let name = format!("B5 λ=2, play {play} mm");
-        rows.push(Row::with_error(
-            &name,
-            "jumps in a turn",
-            jumps as f64,
-            1.0,
-            (jumps as f64 - 1.0).abs(),
-            0.0,
-        ));
+        let off = (jumps as f64 - 1.0).abs();
+        rows.push(Row::with_error(&name, "jumps up to there", jumps as f64, 1.0, off, 0.0));
     }
     Ok(rows)
 }

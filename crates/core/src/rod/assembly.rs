@@ -51,6 +51,8 @@ pub struct Assembly<const C: usize> {
     pub rank_ones: Vec<RankOne>,
     /// Largest force and moment an element exerts on a node: the scale of the residual.
     pub scale: [f64; 2],
+    /// Whether the matrix is wanted beside the residual. Where it is not, it is left empty.
+    pub hessian: bool,
 }
 
 impl<const C: usize> Assembly<C> {
@@ -65,22 +67,37 @@ impl<const C: usize> Assembly<C> {
             external_energy: 0.0,
             rank_ones: Vec::with_capacity(32),
             scale: [0.0; 2],
+            hessian: true,
         }
+    }
+
+    /// Changes the size; keeps the memory.
+    pub fn resize(&mut self, elements: usize) {
+        let n = Layout::<C>::dimension(elements);
+        self.matrix.resize(n);
+        self.residual.resize(n, 0.0);
+        self.correction.resize(n, 0.0);
     }
 
     /// Clears everything and adds the rod's elements.
     pub fn assemble(&mut self, elements: &[ElementData], state: &RodState) {
-        self.matrix.clear();
+        if self.hessian {
+            self.matrix.clear();
+        }
         self.residual.fill(0.0);
         self.correction.fill(0.0);
         self.energy = Energy::default();
         self.external_energy = 0.0;
         self.rank_ones.clear();
         self.scale = [0.0; 2];
-        if Layout::<C>::TWIST {
-            self.add_elements::<14>(elements, state);
-        } else {
-            self.add_elements::<11>(elements, state);
+        match (Layout::<C>::TWIST, self.hessian) {
+            (true, true) => self.add_elements::<14, true>(elements, state),
+            (true, false) => self.add_elements::<14, false>(elements, state),
+            (false, true) => self.add_elements::<11, true>(elements, state),
+            (false, false) => self.add_elements::<11, false>(elements, state),
+        }
+        if !self.hessian {
+            return;
         }
         let l = Layout::<C>;
         // Rows without meaning.
@@ -94,7 +111,11 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    fn add_elements<const M: usize>(&mut self, elements: &[ElementData], state: &RodState) {
+    fn add_elements<const M: usize, const HESSIAN: bool>(
+        &mut self,
+        elements: &[ElementData],
+        state: &RodState,
+    ) {
         let l = Layout::<C>;
         let n_at = M - 1;
         let mut rows = [0; M];
@@ -108,7 +129,7 @@ impl<const C: usize> Assembly<C> {
             energy: Energy::default(),
         };
         for (e, data) in elements.iter().enumerate() {
-            element_system(data, &state.element(e), &mut system);
+            element_system::<M, HESSIAN>(data, &state.element(e), &mut system);
             self.energy.add(&system.energy);
             let g = &system.gradient;
             let force = g[0].abs().max(g[1].abs()).max(g[2].abs());
@@ -121,10 +142,16 @@ impl<const C: usize> Assembly<C> {
                 self.residual[base + rows[i]] += g[i];
                 let weight = gamma * system.stretch[i];
                 self.correction[base + rows[i]] += weight * gap;
+                if !HESSIAN {
+                    continue;
+                }
                 let row = self.matrix.row_mut(base + rows[i]);
                 for j in i..M {
                     row[rows[j] - rows[i]] += system.hessian[i][j] + weight * system.stretch[j];
                 }
+            }
+            if !HESSIAN {
+                continue;
             }
             // Now the flexibility of the transformed multiplier.
             let extra = data.flexibility - data.flexibility / (1.0 - gamma * data.flexibility);
@@ -137,6 +164,9 @@ impl<const C: usize> Assembly<C> {
         let at = Layout::<C>.position(i);
         for a in 0..3 {
             self.residual[at + a] += gradient[a];
+            if !self.hessian {
+                continue;
+            }
             for b in a..3 {
                 self.matrix.add(at + a, at + b, hessian[(a, b)]);
             }
@@ -148,7 +178,9 @@ impl<const C: usize> Assembly<C> {
         if Layout::<C>::TWIST {
             let at = Layout::<C>.angle(i);
             self.residual[at] += gradient;
-            self.matrix.add(at, at, hessian);
+            if self.hessian {
+                self.matrix.add(at, at, hessian);
+            }
         }
     }
 
@@ -186,10 +218,16 @@ impl<const C: usize> Assembly<C> {
         let columns = Self::point_columns(state, element, e, xi);
         for (i, (row, p)) in columns.iter().enumerate() {
             self.residual[*row] += gradient.dot(p);
+            if !self.hessian {
+                continue;
+            }
             let hp = hessian * p;
             for (column, q) in &columns[i..] {
                 self.matrix.add(*row, *column, hp.dot(q));
             }
+        }
+        if !self.hessian {
+            return;
         }
         // At second order the point moves by −½ s |δ|² t.
         let l = Layout::<C>;
@@ -222,6 +260,9 @@ impl<const C: usize> Assembly<C> {
         let columns = Self::point_columns(state, element, e, xi);
         for (i, &(row, p)) in angles.iter().enumerate() {
             self.residual[row] += first * p;
+            if !self.hessian {
+                continue;
+            }
             for &(column, q) in &angles[i..] {
                 self.matrix.add(row, column, second * p * q);
             }

@@ -73,7 +73,7 @@ fn errors(data: &ElementData, s: &ElementState, spoil: f64) -> (f64, f64) {
         stretch: [0.0; 14],
         energy: Default::default(),
     };
-    element_system(data, s, &mut out);
+    element_system::<_, true>(data, s, &mut out);
     out.gradient[4] += spoil;
     out.hessian[3][11] += spoil;
     let at = |i: usize, a: f64, j: usize, b: f64| {
@@ -146,8 +146,8 @@ fn elements_with_and_without_twist_agree_where_nothing_twists() {
         stretch: [0.0; 11],
         energy: Default::default(),
     };
-    element_system(&d, &q, &mut full);
-    element_system(&d, &q, &mut plain);
+    element_system::<_, true>(&d, &q, &mut full);
+    element_system::<_, true>(&d, &q, &mut plain);
     let map = [0, 1, 2, 3, 4, 7, 8, 9, 10, 11, 13];
     for i in 0..11 {
         assert_eq!(plain.gradient[i], full.gradient[map[i]]);

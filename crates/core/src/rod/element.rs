@@ -190,9 +190,13 @@ pub(super) const fn places(m: usize) -> [usize; 7] {
     if m == 14 { [3, 5, 6, 7, 10, 12, 13] } else { [3, 0, 0, 5, 8, 0, 10] }
 }
 
-/// The element's Lagrangian with derivatives, without augmentation.
+/// The element's Lagrangian with derivatives, without augmentation; the Hessian only where `HESSIAN` is set.
 #[inline]
-pub fn element_system<const M: usize>(data: &ElementData, s: &ElementState, out: &mut ElementSystem<M>) {
+pub fn element_system<const M: usize, const HESSIAN: bool>(
+    data: &ElementData,
+    s: &ElementState,
+    out: &mut ElementSystem<M>,
+) {
     let [t0_at, _, _, x1_at, t1_at, _, n_at] = places(M);
     let h = data.length;
     let ih = 1.0 / h;
@@ -275,60 +279,68 @@ pub fn element_system<const M: usize>(data: &ElementData, s: &ElementState, out:
     h01 += across * 0.0625;
     h11 += across * 0.0625;
 
-    out.hessian = [[0.0; M]; M];
     let (d0, d1) = ([s.first.u, s.first.v], [s.second.u, s.second.v]);
-    let (gx, hxx) = (ge * ih, hee * (ih * ih));
+    let gx = ge * ih;
     for i in 0..3 {
         out.gradient[i] = -gx[i];
         out.gradient[x1_at + i] = gx[i];
         out.stretch[i] = -m[i];
         out.stretch[x1_at + i] = m[i];
-        for j in i..3 {
-            out.hessian[i][j] = hxx[(i, j)];
-            out.hessian[x1_at + i][x1_at + j] = hxx[(i, j)];
-        }
-        for j in 0..3 {
-            out.hessian[i][x1_at + j] = -hxx[(i, j)];
-        }
     }
-    let (curve0, curve1) = (g0.dot(&t0), g1.dot(&t1));
     for a in 0..2 {
         out.gradient[t0_at + a] = g0.dot(&d0[a]);
         out.gradient[t1_at + a] = g1.dot(&d1[a]);
         out.stretch[t0_at + a] = ct.dot(&d0[a]);
         out.stretch[t1_at + a] = ct.dot(&d1[a]);
-        let (column0, column1) = (he0 * d0[a] * ih, he1 * d1[a] * ih);
-        for i in 0..3 {
-            out.hessian[i][t0_at + a] = -column0[i];
-            out.hessian[t0_at + a][x1_at + i] = column0[i];
-            out.hessian[i][t1_at + a] = -column1[i];
-            out.hessian[x1_at + i][t1_at + a] = column1[i];
-        }
-        let (h00a, h10a, h11a) = (h00 * d0[a], h01.tr_mul(&d0[a]), h11 * d1[a]);
-        for b in 0..2 {
-            out.hessian[t0_at + a][t1_at + b] = h10a.dot(&d1[b]);
-            if b >= a {
-                out.hessian[t0_at + a][t0_at + b] = h00a.dot(&d0[b]);
-                out.hessian[t1_at + a][t1_at + b] = h11a.dot(&d1[b]);
-            }
-        }
-        out.hessian[t0_at + a][t0_at + a] -= curve0;
-        out.hessian[t1_at + a][t1_at + a] -= curve1;
     }
     out.gradient[n_at] = c - data.flexibility * s.tension;
-    out.hessian[n_at][n_at] = -data.flexibility;
     out.stretch[n_at] = 0.0;
-    for i in 0..n_at {
-        out.hessian[i][n_at] = out.stretch[i];
-    }
     if M == 14 {
         let [_, th0, b, _, _, th1, _] = places(M);
         for i in [th0, b, th1] {
             out.gradient[i] = 0.0;
             out.stretch[i] = 0.0;
-            out.hessian[i][n_at] = 0.0;
         }
-        add_torsion(data, s, out, &mut energy);
+    }
+    if HESSIAN {
+        out.hessian = [[0.0; M]; M];
+        let hxx = hee * (ih * ih);
+        for i in 0..3 {
+            for j in i..3 {
+                out.hessian[i][j] = hxx[(i, j)];
+                out.hessian[x1_at + i][x1_at + j] = hxx[(i, j)];
+            }
+            for j in 0..3 {
+                out.hessian[i][x1_at + j] = -hxx[(i, j)];
+            }
+        }
+        let (curve0, curve1) = (g0.dot(&t0), g1.dot(&t1));
+        for a in 0..2 {
+            let (column0, column1) = (he0 * d0[a] * ih, he1 * d1[a] * ih);
+            for i in 0..3 {
+                out.hessian[i][t0_at + a] = -column0[i];
+                out.hessian[t0_at + a][x1_at + i] = column0[i];
+                out.hessian[i][t1_at + a] = -column1[i];
+                out.hessian[x1_at + i][t1_at + a] = column1[i];
+            }
+            let (h00a, h10a, h11a) = (h00 * d0[a], h01.tr_mul(&d0[a]), h11 * d1[a]);
+            for b in 0..2 {
+                out.hessian[t0_at + a][t1_at + b] = h10a.dot(&d1[b]);
+                if b >= a {
+                    out.hessian[t0_at + a][t0_at + b] = h00a.dot(&d0[b]);
+                    out.hessian[t1_at + a][t1_at + b] = h11a.dot(&d1[b]);
+                }
+            }
+            out.hessian[t0_at + a][t0_at + a] -= curve0;
+            out.hessian[t1_at + a][t1_at + a] -= curve1;
+        }
+        out.hessian[n_at][n_at] = -data.flexibility;
+        for i in 0..n_at {
+            out.hessian[i][n_at] = out.stretch[i];
+        }
+    }
+    if M == 14 {
+        add_torsion::<M, HESSIAN>(data, s, out, &mut energy);
     }
     out.energy = energy;
 }

@@ -4,10 +4,22 @@ use super::element::{ElementData, ElementState, ElementSystem, Energy, angles};
 use super::quadrature::GAUSS;
 use super::torsion::torsion;
 use crate::Vec3;
+use nalgebra::Matrix3;
 
-/// Adds twist and rest curvature: 9 local unknowns (e, t₁ in the first triad, φ₀, φ₁, b), then the chain rule.
+/// A derivative of the local unknowns: of the chord and the far tangent, both in the first triad, and of (φ₀, φ₁, b).
+#[derive(Clone, Copy)]
+struct Local {
+    chord: Vec3,
+    end: Vec3,
+    angles: Vec3,
+}
+
+/// Adds twist and rest curvature: 9 local unknowns (chord, far tangent, φ₀, φ₁, b), then the chain rule.
+///
+/// Turns of either tangent move all local unknowns; displacements move the chord alone and angles themselves, so the
+/// chain rule needs products with four columns, not thirteen.
 #[inline]
-pub(super) fn add_torsion<const M: usize>(
+pub(super) fn add_torsion<const M: usize, const HESSIAN: bool>(
     data: &ElementData,
     s: &ElementState,
     out: &mut ElementSystem<M>,
@@ -15,109 +27,130 @@ pub(super) fn add_torsion<const M: usize>(
 ) {
     let (f0, f1) = (&s.first, &s.second);
     let (chord, end) = (f0.local(&s.chord), f0.local(&f1.t));
-    let mut g = [0.0; 9];
-    let mut hess = [[0.0; 9]; 9];
+    let zero = Matrix3::zeros();
+    let (mut gc, mut gt, mut ga) = (Vec3::zeros(), Vec3::zeros(), Vec3::zeros());
+    // Blocks of the local Hessian: rows and columns chord, end, angles.
+    let (mut hcc, mut hce, mut hee, mut hca, mut hea, mut haa) = (zero, zero, zero, zero, zero, zero);
     for (k, point) in GAUSS.iter().enumerate() {
         let (y, z) = point.derivatives(&chord, &Vec3::x(), &end);
         let (phi, dphi) = angles(&s.angles, point);
         let f = torsion(&y, &z, phi, dphi, &data.torsion_input(k));
         energy.bend += f.bend;
         energy.twist += f.twist;
-        let (y_of, z_of) = ([point.y[0], point.y[2]], [point.z[0], point.z[2]]);
-        for a in 0..2 {
-            for i in 0..3 {
-                g[3 * a + i] += y_of[a] * f.gy[i] + z_of[a] * f.gz[i];
-            }
-            for b in a..2 {
-                let (yy, yz, zy, zz) =
-                    (y_of[a] * y_of[b], y_of[a] * z_of[b], z_of[a] * y_of[b], z_of[a] * z_of[b]);
-                for i in 0..3 {
-                    for j in 0..3 {
-                        hess[3 * a + i][3 * b + j] +=
-                            yy * f.hyy[(i, j)] + yz * f.hyz[(i, j)] + zy * f.hyz[(j, i)] + zz * f.hzz[(i, j)];
-                    }
-                }
-            }
-            for p in 0..3 {
-                for i in 0..3 {
-                    hess[3 * a + i][6 + p] += point.phi[p] * (y_of[a] * f.hyp[0][i] + z_of[a] * f.hzp[0][i])
-                        + point.dphi[p] * (y_of[a] * f.hyp[1][i] + z_of[a] * f.hzp[1][i]);
-                }
-            }
-        }
-        for p in 0..3 {
-            g[6 + p] += point.phi[p] * f.gp[0] + point.dphi[p] * f.gp[1];
-            for q in p..3 {
-                hess[6 + p][6 + q] +=
-                    point.phi[p] * point.phi[q] * f.hpp[0] + point.dphi[p] * point.dphi[q] * f.hpp[1];
-            }
-        }
+        let ([yc, _, ye], [zc, _, ze]) = (point.y, point.z);
+        gc += f.gy * yc + f.gz * zc;
+        gt += f.gy * ye + f.gz * ze;
+        let hzy = f.hyz.transpose();
+        // Half products: derivative along y and z of the gradient in each vector.
+        let (cy, cz) = (f.hyy * yc + hzy * zc, f.hyz * yc + f.hzz * zc);
+        hcc += cy * yc + cz * zc;
+        hce += cy * ye + cz * ze;
+        hee += f.hyy * (ye * ye) + (f.hyz + hzy) * (ye * ze) + f.hzz * (ze * ze);
+        let (weight, slope) = (Vec3::from(point.phi), Vec3::from(point.dphi));
+        let both = |p: &[Vec3; 2]| p[0] * weight.transpose() + p[1] * slope.transpose();
+        let (hya, hza) = (both(&f.hyp), both(&f.hzp));
+        hca += hya * yc + hza * zc;
+        hea += hya * ye + hza * ze;
+        ga += weight * f.gp[0] + slope * f.gp[1];
+        haa += weight * weight.transpose() * f.hpp[0] + slope * slope.transpose() * f.hpp[1];
     }
     energy.bend += data.rest_energy();
-    for i in 1..9 {
-        for j in 0..i {
-            hess[i][j] = hess[j][i];
-        }
-    }
 
-    // First derivatives of the local unknowns in the element's 13: rows local, columns x₀ t₀ θ₀ b x₁ t₁ θ₁.
     let ih = 1.0 / data.length;
-    let rows = [f0.t, f0.u, f0.v];
     let (u1, v1) = (f0.local(&f1.u), f0.local(&f1.v));
     let c = 1.0 / (1.0 + end.x);
-    // K = t₀ × t₁/(1 + t₀·t₁), in the first triad.
+    // K = t₀ × t₁/(1 + t₀·t₁), in the first triad: the reference twist turns by K·(turn of either tangent).
     let k = Vec3::new(0.0, -end.z * c, end.y * c);
     let k0 = [k.y, k.z];
     let k1 = [k.dot(&u1), k.dot(&v1)];
-    let mut jac = [[0.0; 13]; 9];
+    let swing = |w: &Vec3, a: usize| {
+        if a == 0 { Vec3::new(w.y, -w.x, 0.0) } else { Vec3::new(w.z, 0.0, -w.x) }
+    };
+    let spin = |rate: f64| Vec3::new(0.0, rate, 0.0);
+    let turns = [
+        Local { chord: swing(&chord, 0), end: swing(&end, 0), angles: spin(k0[0]) },
+        Local { chord: swing(&chord, 1), end: swing(&end, 1), angles: spin(k0[1]) },
+        Local { chord: Vec3::zeros(), end: u1, angles: spin(k1[0]) },
+        Local { chord: Vec3::zeros(), end: v1, angles: spin(k1[1]) },
+    ];
+    const TURNS: [usize; 4] = [3, 4, 10, 11];
+    // θ₀, θ₁ and b.
+    const ANGLES: [usize; 3] = [5, 12, 6];
+    // From the first triad back to space.
+    let axes = Matrix3::from_columns(&[f0.t, f0.u, f0.v]);
+    let force = axes * gc * ih;
+    for i in 0..3 {
+        out.gradient[i] -= force[i];
+        out.gradient[7 + i] += force[i];
+        out.gradient[ANGLES[i]] += ga[i];
+    }
+    for (d, row) in turns.iter().zip(TURNS) {
+        out.gradient[row] += gc.dot(&d.chord) + gt.dot(&d.end) + ga.dot(&d.angles);
+    }
+    if !HESSIAN {
+        return;
+    }
+
+    let products = turns.map(|d| Local {
+        chord: hcc * d.chord + hce * d.end + hca * d.angles,
+        end: hce.tr_mul(&d.chord) + hee * d.end + hea * d.angles,
+        angles: hca.tr_mul(&d.chord) + hea.tr_mul(&d.end) + haa * d.angles,
+    });
+
+    let stiffness = axes * hcc * axes.transpose() * (ih * ih);
+    let crossed = axes * hca * ih;
     for i in 0..3 {
         for j in 0..3 {
-            jac[i][j] = -rows[i][j] * ih;
-            jac[i][7 + j] = rows[i][j] * ih;
-        }
-        jac[3 + i][10] = u1[i];
-        jac[3 + i][11] = v1[i];
-    }
-    for (at, w) in [(0, &chord), (3, &end)] {
-        (jac[at][3], jac[at + 1][3]) = (w.y, -w.x);
-        (jac[at][4], jac[at + 2][4]) = (w.z, -w.x);
-    }
-    jac[6][5] = 1.0;
-    jac[7][12] = 1.0;
-    jac[8][6] = 1.0;
-    jac[7][3..5].copy_from_slice(&k0);
-    jac[7][10..12].copy_from_slice(&k1);
-    for j in 0..13 {
-        let mut column = [0.0; 9];
-        for l in 0..9 {
-            let value = jac[l][j];
-            if value != 0.0 {
-                out.gradient[j] += g[l] * value;
-                for i in 0..9 {
-                    column[i] += hess[l][i] * value;
-                }
+            out.hessian[i][7 + j] -= stiffness[(i, j)];
+            if j >= i {
+                out.hessian[i][j] += stiffness[(i, j)];
+                out.hessian[7 + i][7 + j] += stiffness[(i, j)];
             }
+            out.hessian[i][ANGLES[j]] -= crossed[(i, j)];
         }
-        for i in 0..=j {
-            let mut sum = 0.0;
-            for l in 0..9 {
-                sum += jac[l][i] * column[l];
-            }
-            out.hessian[i][j] += sum;
+        // θ₀ and b stand before x₁, θ₁ behind it.
+        out.hessian[5][7 + i] += crossed[(i, 0)];
+        out.hessian[7 + i][12] += crossed[(i, 1)];
+        out.hessian[6][7 + i] += crossed[(i, 2)];
+    }
+    for (i, j, value) in [
+        (5, 5, haa[(0, 0)]),
+        (5, 12, haa[(0, 1)]),
+        (5, 6, haa[(0, 2)]),
+        (12, 12, haa[(1, 1)]),
+        (6, 12, haa[(1, 2)]),
+        (6, 6, haa[(2, 2)]),
+    ] {
+        out.hessian[i][j] += value;
+    }
+    for (a, &row) in TURNS.iter().enumerate() {
+        let product = axes * products[a].chord * ih;
+        for i in 0..3 {
+            out.hessian[i][row] -= product[i];
+            let (first, last) = if row < 7 { (row, 7 + i) } else { (7 + i, row) };
+            out.hessian[first][last] += product[i];
+            let (first, last) = if row < ANGLES[i] { (row, ANGLES[i]) } else { (ANGLES[i], row) };
+            out.hessian[first][last] += products[a].angles[i];
+        }
+        for b in a..4 {
+            let q = &turns[b];
+            out.hessian[row][TURNS[b]] += products[a].chord.dot(&q.chord)
+                + products[a].end.dot(&q.end)
+                + products[a].angles.dot(&q.angles);
         }
     }
 
     // Second derivatives of the local unknowns.
-    let (ge, gt, gp) = (Vec3::new(g[0], g[1], g[2]), Vec3::new(g[3], g[4], g[5]), g[7]);
-    for (w, gw) in [(&chord, &ge), (&end, &gt)] {
+    let gp = ga[1];
+    for (w, gw) in [(&chord, &gc), (&end, &gt)] {
         let along = gw.dot(w);
         out.hessian[3][3] += gw.z * w.z - along;
         out.hessian[4][4] += gw.y * w.y - along;
         out.hessian[3][4] -= 0.5 * (gw.y * w.z + gw.z * w.y);
     }
     let turn = [
-        (f0.u * ge.x - f0.t * ge.y) * ih, // along u
-        (f0.v * ge.x - f0.t * ge.z) * ih, // along v
+        (f0.u * gc.x - f0.t * gc.y) * ih, // along u
+        (f0.v * gc.x - f0.t * gc.z) * ih, // along v
     ];
     let ends = [u1, v1];
     let bends = gt.dot(&end);

@@ -34,6 +34,13 @@ impl<const C: usize> BandMatrix<C> {
         self.dimension
     }
 
+    /// Changes the dimension; keeps the memory, and no entry that means anything.
+    pub fn resize(&mut self, dimension: usize) {
+        self.rows.resize(dimension + C - 1, [0.0; C]);
+        self.rows[dimension..].fill([0.0; C]);
+        self.dimension = dimension;
+    }
+
     /// Sets every entry to zero and keeps the memory.
     pub fn clear(&mut self) {
         self.rows.fill([0.0; C]);
@@ -130,6 +137,12 @@ impl<const C: usize> Factor<C> {
     /// Room for matrices of this dimension.
     pub fn new(dimension: usize) -> Self {
         Self { rows: vec![[0.0; C]; dimension + C - 1], dimension, inertia: Inertia::default() }
+    }
+
+    /// Changes the dimension; keeps the memory.
+    pub fn resize(&mut self, dimension: usize) {
+        self.rows.resize(dimension + C - 1, [0.0; C]);
+        self.dimension = dimension;
     }
 
     /// Inertia of the last matrix factored.

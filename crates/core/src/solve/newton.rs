@@ -50,6 +50,15 @@ const WHISPER: f64 = 1e-8;
 const SHIFTS: usize = 60;
 /// Changes of energy below this part of the energies' size are rounding.
 pub(super) const ENERGY_ROUNDING: f64 = 1e-13;
+/// Steps of a solution that are remembered without new memory.
+const STEPS: usize = 1024;
+/// A whole Newton step that turned no node by more than this, in radians, ends so near to the equilibrium that the residual alone is
+/// looked at, …
+const SHORT: f64 = 1e-5;
+/// … where axial forces changed by less than 1 / STIFFENING of that times EI/L², …
+const STIFFENING: f64 = 1e-2;
+/// … and another step with the same factors leaves a residual smaller by the last turn times no more than this.
+const CHORD: f64 = 10.0;
 
 /// Newton's method with its memory, for rods of one size. Nothing is allocated per iteration.
 #[derive(Debug, Clone)]
@@ -65,6 +74,8 @@ pub struct Newton<const C: usize> {
     pub(super) columns: Vec<Vec<f64>>,
     pub(super) trial: RodState,
     pub(super) other: RodState,
+    /// The steps that the last solution took.
+    pub steps: Vec<StepRecord>,
 }
 
 impl<const C: usize> Newton<C> {
@@ -81,11 +92,38 @@ impl<const C: usize> Newton<C> {
             columns: Vec::new(),
             trial: RodState::default(),
             other: RodState::default(),
+            steps: Vec::with_capacity(STEPS),
+        }
+    }
+
+    /// Changes the size; keeps the memory.
+    pub fn resize(&mut self, elements: usize) {
+        let n = Layout::<C>::dimension(elements);
+        if self.step.len() == n {
+            return;
+        }
+        self.assembly.resize(elements);
+        self.shifted.resize(n);
+        self.factor.resize(n);
+        for list in [&mut self.step, &mut self.spare].into_iter().chain(&mut self.columns) {
+            list.resize(n, 0.0);
         }
     }
 
     /// Assembles the whole system at `state`.
     pub fn assemble(
+        &mut self,
+        elements: &[ElementData],
+        supports: &Supports,
+        external: &mut dyn External<C>,
+        state: &RodState,
+    ) {
+        self.assembly.hessian = true;
+        self.assemble_parts(elements, supports, external, state);
+    }
+
+    /// Assembles the system at `state`, without the matrix where the assembly wants none.
+    fn assemble_parts(
         &mut self,
         elements: &[ElementData],
         supports: &Supports,
@@ -180,7 +218,7 @@ impl<const C: usize> Newton<C> {
         Err(StopReason::Singular)
     }
 
-    /// Moves `state` to an equilibrium, and leaves the system assembled there.
+    /// Moves `state` to an equilibrium, and leaves residual, energies and reactions assembled there.
     pub fn solve(
         &mut self,
         elements: &[ElementData],
@@ -199,10 +237,11 @@ impl<const C: usize> Newton<C> {
             stable: false,
             converged: false,
             reason: StopReason::MaxIterations,
-            steps: Vec::with_capacity(options.max_iterations.min(1024)),
         };
         self.trial.copy_from(state);
         self.other.copy_from(state);
+        self.steps.clear();
+        let mut last_turn = f64::INFINITY;
         let mut shift = 0.0f64;
         let mut penalty = [0.0f64; 2];
         let mut best = f64::INFINITY;
@@ -210,9 +249,16 @@ impl<const C: usize> Newton<C> {
         let mut assembled = false;
         loop {
             if !std::mem::take(&mut assembled) {
-                self.assemble(elements, supports, external, state);
+                self.assembly.hessian = last_turn > SHORT;
+                self.assemble_parts(elements, supports, external, state);
             }
-            let size = self.residual(elements, external, supports, options.tolerance);
+            let mut size = self.residual(elements, external, supports, options.tolerance);
+            // Where steps no longer shrink a residual, it takes the matrix of the state itself to say so.
+            let enough = CHORD * last_turn * size.relative <= options.tolerance;
+            if !self.assembly.hessian && !size.small && !enough {
+                self.assemble(elements, supports, external, state);
+                size = self.residual(elements, external, supports, options.tolerance);
+            }
             let residual = size.relative;
             report.residual = residual;
             if !residual.is_finite() {
@@ -221,8 +267,8 @@ impl<const C: usize> Newton<C> {
             }
             stalled = if residual < 0.5 * best { 0 } else { stalled + 1 };
             best = best.min(residual);
-            let tiny_steps = report.steps.len() >= 3
-                && report
+            let tiny_steps = self.steps.len() >= 3
+                && self
                     .steps
                     .iter()
                     .rev()
@@ -235,12 +281,18 @@ impl<const C: usize> Newton<C> {
             let follows = !external.conservative();
             let minimum = options.minimum && !follows;
             let wanted = minimum.then_some(multipliers);
-            let (sigma, natural) = match self.factor_shifted(elements, supports, shift, arrived, wanted) {
-                Ok(found) => found,
-                Err(reason) => {
-                    report.reason = reason;
-                    return report;
+            let (sigma, natural) = if self.assembly.hessian {
+                match self.factor_shifted(elements, supports, shift, arrived, wanted) {
+                    Ok(found) => found,
+                    Err(reason) => {
+                        report.reason = reason;
+                        return report;
+                    }
                 }
+            } else {
+                self.right_hand_side();
+                self.factor.solve(&mut self.step);
+                (0.0, Some(self.factor.inertia()))
             };
             shift = sigma;
             if arrived {
@@ -272,7 +324,10 @@ impl<const C: usize> Newton<C> {
                 self.negative_curvature(elements, supports, state);
                 let record = self.leave(elements, supports, external, state);
                 match record {
-                    Some(step) => report.steps.push(StepRecord { residual, shift, ..step }),
+                    Some(step) => {
+                        last_turn = f64::INFINITY;
+                        self.steps.push(StepRecord { residual, shift, ..step });
+                    }
                     None => {
                         // A negative curvature that gains nothing: as good as neutral, but no minimum.
                         report.iterations -= 1;
@@ -325,6 +380,17 @@ impl<const C: usize> Newton<C> {
             let energy_scale =
                 stored.total().abs() + self.assembly.external_energy.abs() + weighed + slope.abs();
             let rounding = ENERGY_ROUNDING * energy_scale;
+            let record = |energy_change: f64, merit_change: f64, fraction: f64| StepRecord {
+                energy_change,
+                merit_change,
+                energy_scale,
+                residual,
+                fraction,
+                shift,
+            };
+            // What a step gains that is less than rounding, the energies need not be asked for.
+            let blind =
+                minimum && supports.conditions() == 0 && turn <= SHORT && slope <= 0.0 && -slope <= rounding;
             let mut accepted = None;
             let mut refused = None;
             let old_multipliers = supports.multipliers;
@@ -346,19 +412,17 @@ impl<const C: usize> Newton<C> {
                     self.correct(elements, supports, first);
                 }
                 self.tensions(elements, state);
+                if blind {
+                    let change = alpha * (1.0 - 0.5 * alpha) * slope;
+                    accepted = Some(record(change, change, alpha));
+                    break;
+                }
                 let energy_change = self.energy(elements, external, state) - before;
                 let change = energy_change + weigh(&supports.gaps(&self.trial)) - weighed;
                 let enough = change <= 1e-4 * alpha * slope.min(0.0) + rounding;
                 // On a path of unstable states the energy says nothing; steps there are short and Newton's own.
                 if !options.minimum && change.is_finite() {
-                    accepted = Some(StepRecord {
-                        energy_change,
-                        merit_change: change,
-                        energy_scale,
-                        residual,
-                        fraction: alpha,
-                        shift,
-                    });
+                    accepted = Some(record(energy_change, change, alpha));
                     break;
                 }
                 // Where loads have no potential a smaller residual is as good; it costs an assembly, so it is asked last.
@@ -385,14 +449,7 @@ impl<const C: usize> Newton<C> {
                         );
                         (change, assembled) = (energy_change, false);
                     }
-                    accepted = Some(StepRecord {
-                        energy_change,
-                        merit_change: change,
-                        energy_scale,
-                        residual,
-                        fraction: alpha,
-                        shift,
-                    });
+                    accepted = Some(record(energy_change, change, alpha));
                     break;
                 }
                 if external.obstructs() {
@@ -416,7 +473,16 @@ impl<const C: usize> Newton<C> {
                 }
                 return report;
             };
-            report.steps.push(record);
+            // Only where Newton's own step was taken, and the matrix says that it leads to a minimum. Axial forces stiffen the
+            // rod against bending over its length.
+            last_turn = if minimum && shift == 0.0 && record.fraction == 1.0 && supports.conditions() == 0 {
+                let pulled =
+                    (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
+                turn.max(STIFFENING * pulled * WHISPER / Self::whisper(elements))
+            } else {
+                f64::INFINITY
+            };
+            self.steps.push(record);
             std::mem::swap(state, &mut self.trial);
             supports.follow(state);
         }

@@ -1,6 +1,6 @@
 //! The bare solver on cantilevers.
 
-use super::{External, Newton, NewtonOptions, NewtonReport};
+use super::{External, Newton, NewtonOptions, NewtonReport, StepRecord};
 use crate::Vec3;
 use crate::rod::{Assembly, ElementData, Frame, PLAIN, RodState, Supports};
 
@@ -40,7 +40,20 @@ impl Spring {
     }
 }
 
-fn cantilever(n: usize, outside: &mut dyn External<PLAIN>) -> (RodState, NewtonReport) {
+/// A report and the steps to it.
+struct Solution {
+    report: NewtonReport,
+    steps: Vec<StepRecord>,
+}
+
+impl std::ops::Deref for Solution {
+    type Target = NewtonReport;
+    fn deref(&self) -> &NewtonReport {
+        &self.report
+    }
+}
+
+fn cantilever(n: usize, outside: &mut dyn External<PLAIN>) -> (RodState, Solution) {
     let data = ElementData {
         length: 1.0 / n as f64,
         bending: [1.0; 3],
@@ -54,7 +67,7 @@ fn cantilever(n: usize, outside: &mut dyn External<PLAIN>) -> (RodState, NewtonR
     let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
     let mut newton = Newton::<PLAIN>::new(n);
     let report = newton.solve(&elements, &mut supports, outside, &mut state, &NewtonOptions::default());
-    (state, report)
+    (state, Solution { report, steps: newton.steps })
 }
 
 #[test]

@@ -85,6 +85,4 @@ pub struct NewtonReport {
     pub converged: bool,
     /// Why the method stopped.
     pub reason: StopReason,
-    /// The accepted steps.
-    pub steps: Vec<StepRecord>,
 }

@@ -32,11 +32,21 @@ impl<const C: usize> Newton<C> {
         external: &mut dyn External<C>,
         state: &RodState,
     ) -> f64 {
+        self.energy_at(elements, external, &self.trial) - external.work(state, &self.trial)
+    }
+
+    /// Potential energy of any state.
+    pub fn energy_at(
+        &self,
+        elements: &[ElementData],
+        external: &mut dyn External<C>,
+        state: &RodState,
+    ) -> f64 {
         let mut stored = 0.0;
         for (e, data) in elements.iter().enumerate() {
-            stored += element_energy(data, &self.trial.element(e), Layout::<C>::TWIST).total();
+            stored += element_energy(data, &state.element(e), Layout::<C>::TWIST).total();
         }
-        stored + external.energy(elements, &self.trial) - external.work(state, &self.trial)
+        stored + external.energy(elements, state)
     }
 
     /// Second-order corrections of the end conditions with the factorisation at hand.

@@ -217,7 +217,7 @@ impl StaticProblem {
             let report = newton.solve(&self.elements, &mut supports, &mut loads, &mut state, &self.options);
             iterations += report.iterations;
             monotone &= !External::<C>::conservative(&loads)
-                || report.steps.iter().all(|s| s.merit_change <= 1e-12 * s.energy_scale);
+                || newton.steps.iter().all(|s| s.merit_change <= 1e-12 * s.energy_scale);
             let failed = !report.converged;
             last = Some(report);
             if failed {

@@ -17,7 +17,7 @@ mod slide;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::extension::{EXTENSION_MM, extended, left_through};
+use crate::contact::extension::{LEAVE_MM, extended, left_through};
 use crate::contact::{Friction, HandMotion, KnownPoint, SmoothWall, WallContact};
 use crate::device::Device;
 use crate::insertion::{Command, Energy, StepReport, Surroundings};
@@ -28,7 +28,7 @@ use crate::solve::{Newton, NewtonOptions};
 use crate::vessel::{Wall, WallQuery};
 use crate::{Error, Result};
 use mesh::Mesh;
-use slide::{Extension, slide};
+use slide::{Extension, carry, slide};
 
 /// Options of the exact rod.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -83,6 +83,10 @@ pub struct Kirchhoff<const C: usize> {
     friction: Friction,
     next_mesh: Mesh,
     next: RodState,
+    /// The other guess at it.
+    carried: RodState,
+    /// Length from the tip within which the device has a shape of its own, mm.
+    shaped_mm: f64,
     next_friction: Friction,
     extension: Extension,
     known: Vec<KnownPoint>,
@@ -123,7 +127,7 @@ impl<const C: usize> Kirchhoff<C> {
         let felt = Wall::from_surface(&extended(surroundings.wall, radius_mm))?;
         let mut method = Self {
             options,
-            smooth: SmoothWall::new(&felt, radius_mm),
+            smooth: SmoothWall::new(&felt, surroundings.device.min_radius_mm(), radius_mm),
             query: WallQuery::new(&felt)?,
             newton: Newton::new(1),
             mesh,
@@ -131,6 +135,8 @@ impl<const C: usize> Kirchhoff<C> {
             next_mesh: Mesh::default(),
             friction: Friction::new(surroundings.properties.friction),
             next: RodState::default(),
+            carried: RodState::default(),
+            shaped_mm: surroundings.device.shaped_mm(),
             next_friction: Friction::new(surroundings.properties.friction),
             extension: Extension::default(),
             known: Vec::new(),
@@ -148,12 +154,14 @@ impl<const C: usize> Kirchhoff<C> {
         self.shape.from_tip_mm.clone_from(&self.mesh.from_tip_mm);
     }
 
-    /// One sub-step: slides and solves on `self.next`; the current state is not touched.
+    /// One sub-step: slides and solves on `self.next`; the current state is not touched. Where the tip's way is blocked,
+    /// the guess that slides is none: the one that carries the tip's shape must do.
     fn try_step(
         &mut self,
         surroundings: &Surroundings<'_>,
         inserted_mm: f64,
         tail_rad: f64,
+        blocked: bool,
     ) -> std::result::Result<(usize, f64), String> {
         let modulus = surroundings.properties.modulus_n_per_mm2;
         self.next_mesh.build(surroundings.device, inserted_mm, self.options.element_mm, modulus);
@@ -172,9 +180,7 @@ impl<const C: usize> Kirchhoff<C> {
         );
         self.next.angles[0] = tail_rad;
         let elements = self.next_mesh.elements.len();
-        if self.newton.assembly.residual.len() != Layout::<C>::dimension(elements) {
-            self.newton = Newton::new(elements);
-        }
+        self.newton.resize(elements);
         let travel = (inserted_mm - self.mesh.from_tip_mm[0]).abs();
         let reach = surroundings.device.max_radius_mm() + travel + LOOK_MM;
         let mut contact = WallContact::new(
@@ -187,7 +193,31 @@ impl<const C: usize> Kirchhoff<C> {
             reach,
             self.options.skip,
         );
-        if contact.is_outside(&self.next_mesh.elements, &self.next) {
+        let mut outside = contact.is_outside(&self.next_mesh.elements, &self.next);
+        if self.shaped_mm > 0.0 {
+            self.carried.clone_from(&self.next);
+            self.carried.angles[0] = tail_rad;
+            carry(
+                (&self.mesh, &self.state),
+                &self.next_mesh,
+                self.shaped_mm,
+                hand.turn_rad,
+                &mut self.carried,
+            );
+            let elements = &self.next_mesh.elements;
+            if !contact.is_outside(elements, &self.carried)
+                && (outside
+                    || blocked
+                    || self.newton.energy_at(elements, &mut contact, &self.carried)
+                        < self.newton.energy_at(elements, &mut contact, &self.next))
+            {
+                std::mem::swap(&mut self.next, &mut self.carried);
+                outside = false;
+            } else {
+                outside |= blocked;
+            }
+        }
+        if outside {
             return Err("the slid rod is beyond the wall".to_owned());
         }
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
@@ -244,6 +274,12 @@ impl<const C: usize> Kirchhoff<C> {
         std::mem::swap(&mut self.friction, &mut self.next_friction);
     }
 
+    /// Goes back to where a command began.
+    fn restore(&mut self, saved: (Mesh, RodState, Friction), report: StepReport) {
+        (self.mesh, self.state, self.friction) = saved;
+        self.report = report;
+    }
+
     /// Read-outs at the current state.
     fn write_report(&mut self, surroundings: &Surroundings<'_>) {
         let report = &mut self.report;
@@ -295,12 +331,9 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let tip = self.state.positions[self.state.elements()];
         if command.advance_mm > 0.0
             && let Some((opening, beyond)) = left_through(surroundings.wall, &tip)
-            && beyond + command.advance_mm > EXTENSION_MM
+            && beyond + command.advance_mm > LEAVE_MM
         {
-            return Err(Error::Computation(format!(
-                "the tip has left the vessel through opening {opening} by {beyond:.1} mm, and beyond {EXTENSION_MM} mm nothing \
-                 is known: stop the script earlier or use a vessel that goes on"
-            )));
+            return Err(left(opening, beyond));
         }
         let start = self.report.inserted_mm;
         let target = (start + command.advance_mm).min(surroundings.device.length_mm());
@@ -310,23 +343,29 @@ impl<const C: usize> Method for Kirchhoff<C> {
         self.report.substeps = 0;
         self.report.dissipated_mj = 0.0;
         self.report.jumped = false;
-        let saved = (self.mesh.clone(), self.state.clone());
+        let saved = (self.mesh.clone(), self.state.clone(), self.friction.clone());
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
         let mut share = 1.0f64;
         let mut failure = String::new();
+        let mut may_carry = self.shaped_mm > 0.0;
         while done < 1.0 {
             let rest = 1.0 - done;
             let mut part = rest.min(share);
             let wanted = (target - start) * part;
+            let mut blocked = false;
             if wanted > 0.0 {
                 let last = self.state.elements();
                 let (tip, tangent) = (self.state.positions[last], self.state.frames[last].t);
                 let radius = surroundings.device.section_at(0.0).radius_mm;
                 let way = self.extension.trace((&self.smooth, &self.query), tip, tangent, radius, wanted);
-                part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
+                blocked = may_carry && way < (1.0 - 1e-9) * wanted;
+                if !blocked {
+                    part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
+                }
             }
-            let next = if part >= rest { 1.0 } else { done + part };
+            // A rest that is rounding is none.
+            let next = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
             let inserted = if next == 1.0 { target } else { start + (target - start) * next };
             let tail = before.rotation_rad + command.rotate_rad * next;
             self.report.substeps += 1;
@@ -344,22 +383,30 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 done = next;
                 continue;
             }
-            match self.try_step(surroundings, inserted, tail) {
+            match self.try_step(surroundings, inserted, tail, blocked) {
                 Ok((iterations, dissipated_mj)) => {
                     self.report.iterations += iterations as u32;
                     self.report.dissipated_mj += dissipated_mj;
+                    let tip = self.next.positions[self.next.elements()];
+                    if let Some((opening, beyond)) = left_through(surroundings.wall, &tip)
+                        && beyond > LEAVE_MM
+                    {
+                        self.restore(saved, before);
+                        return Err(left(opening, beyond));
+                    }
                     self.accept();
                     done = next;
                     share = (2.0 * part).min(1.0);
+                    may_carry = self.shaped_mm > 0.0;
                 }
                 Err(reason) => {
                     failure = reason;
-                    share = 0.25 * part;
+                    share = if blocked { part } else { 0.25 * part };
+                    may_carry = false;
                 }
             }
             if share < 1e-7 || self.report.substeps as usize > SUBSTEP_LIMIT {
-                (self.mesh, self.state) = saved;
-                self.report = before;
+                self.restore(saved, before);
                 return Err(Error::Computation(format!(
                     "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
                 )));
@@ -370,8 +417,10 @@ impl<const C: usize> Method for Kirchhoff<C> {
         self.write_report(surroundings);
         self.write_shape();
         // What the hand put in and the rod did not keep.
-        let work = 0.5 * (before.push_force_n + self.report.push_force_n) * (target - start)
-            + 0.5 * (before.torque_nmm + self.report.torque_nmm) * command.rotate_rad;
+        // At the least: forces lie between those of the step's ends, unless it jumps.
+        let least = |first: f64, last: f64, by: f64| (first * by).min(last * by);
+        let work = least(before.push_force_n, self.report.push_force_n, target - start)
+            + least(before.torque_nmm, self.report.torque_nmm, command.rotate_rad);
         let lost = work - self.report.dissipated_mj - (self.report.energy.total() - before.energy.total());
         self.report.jumped =
             lost > JUMP * before.energy.total().max(self.report.energy.total()).max(JUMP_FLOOR_MJ);
@@ -385,6 +434,14 @@ impl<const C: usize> Method for Kirchhoff<C> {
     fn report(&self) -> &StepReport {
         &self.report
     }
+}
+
+/// The tip would be farther beyond an opening than anything is known.
+fn left(opening: usize, beyond_mm: f64) -> Error {
+    Error::Computation(format!(
+        "the tip has left the vessel through opening {opening} by {beyond_mm:.1} mm, and beyond {LEAVE_MM} mm nothing is \
+         known: stop the script earlier or use a vessel that goes on"
+    ))
 }
 
 /// Least bending stiffness of a device, N·mm².

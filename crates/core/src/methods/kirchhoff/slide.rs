@@ -1,4 +1,5 @@
 //! The warm start: the rod slides along its own curve, and beyond its tip goes on straight, or along the wall it meets.
+//! A tip with a shape of its own does not follow its curve through free space: it is carried by what is behind it.
 
 use nalgebra::Rotation3;
 
@@ -51,17 +52,16 @@ impl Extension {
         self.curvature = Vec3::zeros();
         let distance = |x: &Vec3, reach_mm: f64| {
             let near = query.nearest(x, reach_mm).filter(|near| !near.rim)?;
-            let smooth = wall
-                .distance(x, near.triangle)
-                .filter(|d| (d.value_mm - near.distance_mm).abs() < 0.5 * radius_mm);
-            Some(smooth.map_or((near.distance_mm, near.normal), |d| (d.value_mm, d.gradient.normalize())))
+            Some(wall.distance(x, near.triangle).map_or((near.distance_mm, near.normal), |d| {
+                (d.value_mm, d.gradient.try_normalize(0.0).unwrap_or(near.normal))
+            }))
         };
         let touch = distance(&tip, 2.0 * radius_mm).map_or(radius_mm, |(d, _)| d.min(radius_mm));
         let count = (wanted_mm / (PIECE * radius_mm)).ceil().max(1.0);
         let piece_mm = wanted_mm / count;
         let (mut x, mut t) = (tip, tangent);
-        let mut way = 0.0;
-        for _ in 0..count as usize {
+        let mut pieces = 0.0;
+        while pieces < count {
             let mut next = x + t * piece_mm;
             if let Some((d, normal)) = distance(&next, radius_mm + piece_mm)
                 && d < touch
@@ -82,8 +82,9 @@ impl Extension {
                 }
             }
             x = next;
-            way += piece_mm;
+            pieces += 1.0;
         }
+        let way = wanted_mm * (pieces / count);
         self.bent_mm = (BENT_ADVANCES * way).max(BENT_RADII * radius_mm);
         // An even bend over a length l moves its end aside by ½κl².
         let aside = x - tip;
@@ -177,5 +178,48 @@ pub(super) fn slide(from: &Mesh, state: &RodState, extension: &Extension, to: &M
     out.reference_twists.resize(n, 0.0);
     out.positions.clear();
     out.positions.resize(n + 1, state.positions[0]);
+    out.place(&to.elements);
+}
+
+/// Changes a guess of [`slide`] so that the last `shaped_mm` of the device keep the shape they had, carried along by the
+/// device behind them and turned with it by `turn_rad`.
+pub(super) fn carry(
+    (from, state): (&Mesh, &RodState),
+    to: &Mesh,
+    shaped_mm: f64,
+    turn_rad: f64,
+    out: &mut RodState,
+) {
+    let (n, old) = (to.elements.len(), state.elements());
+    for angle in &mut out.angles[1..] {
+        *angle += turn_rad;
+    }
+    // The first node of the shape that is inside the vessel before and after.
+    let first = (1..=n).find(|&i| i + old > n && to.from_tip_mm[i] <= shaped_mm * (1.0 + 1e-9));
+    let Some(first) = first else { return };
+    let known = |i: usize| i + old - n;
+    // What comes to lie where the shape began goes on straight, not along the shape.
+    let was = state.material_frame(known(first));
+    let begins = from.from_tip_mm[0] - from.from_tip_mm[known(first)];
+    for e in 0..first {
+        let straight = |from_tip_mm: f64| to.from_tip_mm[0] - from_tip_mm > begins;
+        let m = if straight(0.5 * (to.from_tip_mm[e] + to.from_tip_mm[e + 1])) {
+            was.t
+        } else {
+            out.chords[e] * 1.5 - (out.frames[e].t + out.frames[e + 1].t) * 0.25
+        };
+        let t = if straight(to.from_tip_mm[e + 1]) { was.t } else { out.frames[e + 1].t };
+        out.frames[e + 1] = out.frames[e].transported_to(&t);
+        out.chords[e] = (m + (out.frames[e].t + t) * 0.25) / 1.5;
+    }
+    let is = out.material_frame(first);
+    let moved = |w: &Vec3| {
+        let c = was.local(w);
+        is.t * c.x + is.u * c.y + is.v * c.z
+    };
+    for e in first..n {
+        out.frames[e + 1] = out.frames[e].transported_to(&moved(&state.frames[known(e + 1)].t));
+        out.chords[e] = moved(&state.chords[known(e)]);
+    }
     out.place(&to.elements);
 }
