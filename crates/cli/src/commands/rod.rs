@@ -56,6 +56,9 @@ fn print_solution(document: &Document) {
     );
     print_reaction("start", &s.reactions.start);
     print_reaction("end", &s.reactions.end);
+    if let Some(force) = s.push_force {
+        println!("  push force    {force:.9} if the clamped start is a sleeve without friction");
+    }
 }
 
 fn print_reaction(end: &str, r: &Reaction) {

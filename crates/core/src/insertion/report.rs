@@ -47,6 +47,9 @@ pub struct StepReport {
     pub inserted_mm: f64,
     /// Turn of the tail since the start, rad.
     pub rotation_rad: f64,
+    /// Turn of the tip about the device's axis since the start, carried along the axis without twist, rad: what is left of the
+    /// hand's turn, or what a whip adds to it.
+    pub tip_rotation_rad: f64,
     /// Energy terms, mJ.
     pub energy: Energy,
     /// Force with which the hand must push to hold the device, N; negative where it must pull.

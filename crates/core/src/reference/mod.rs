@@ -2,11 +2,16 @@
 //!
 //! Each case is data and a function; nothing here knows what the solver returns.
 
+mod capstan;
+mod channel;
+mod contact;
+mod insertion;
 pub mod insertion_stress;
 mod planar;
 mod quadratic;
 mod spatial;
 pub mod stress;
+mod whip;
 
 use crate::statics::{End, EndKind, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase};
 use crate::{Result, Vec3};
@@ -114,7 +119,7 @@ impl Family {
     }
 }
 
-/// All families of parts A and B.
+/// All families.
 pub const FAMILIES: &[Family] = &[
     Family {
         id: "A1",
@@ -151,6 +156,22 @@ pub const FAMILIES: &[Family] = &[
         title: "Localised buckle of a long twisted rod (Coyne 1990)",
         run: spatial::localised,
     },
+    Family { id: "B5", title: "Whip of a pre-curved wire in a curved tube", run: whip::whip },
+    Family { id: "B5", title: "Whip: where the tip jumps", run: whip::jumps },
+    Family {
+        id: "C2",
+        title: "Clamped-clamped elastica in a channel (Domokos, Holmes and Royce 1997)",
+        run: contact::elastica,
+    },
+    Family { id: "C3", title: "Wire pushed into a circular bend", run: insertion::bend },
+    Family {
+        id: "C4",
+        title: "Frictionless sleeve under a transverse load at the tip (Bigoni et al. 2015)",
+        run: insertion::sleeve,
+    },
+    Family { id: "C5", title: "Soft-walled tube", run: insertion::soft_tube },
+    Family { id: "C6", title: "Capstan (Euler 1769, Eytelwein)", run: capstan::capstan },
+    Family { id: "C6", title: "Compliant wall (Winkler, Hetényi 1946)", run: contact::compliant },
 ];
 
 /// A straight inextensible rod of length 1 and EI 1 along x, clamped at the origin, free at its end.

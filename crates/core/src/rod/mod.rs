@@ -18,6 +18,7 @@
 
 pub mod assembly;
 pub mod bending;
+pub mod clamp;
 pub mod element;
 mod element_torsion;
 pub mod frame;
@@ -28,6 +29,7 @@ pub mod supports;
 pub mod torsion;
 
 pub use assembly::Assembly;
+pub use clamp::Clamp;
 pub use element::{ElementData, Energy};
 pub use frame::Frame;
 pub use layout::{Layout, PLAIN, TWISTED};

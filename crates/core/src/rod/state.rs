@@ -80,6 +80,11 @@ impl RodState {
         }
     }
 
+    /// Twist of the whole rod, rad, any number of turns.
+    pub fn twist(&self) -> f64 {
+        self.angles[self.elements()] - self.angles[0] + self.reference_twists.iter().sum::<f64>()
+    }
+
     /// The material triad (t, d₁, d₂) of node `i`.
     pub fn material_frame(&self, i: usize) -> Frame {
         self.frames[i].turned(self.angles[i])

@@ -5,7 +5,7 @@ use super::guess;
 use super::loads::Loads;
 use super::solution::{Energies, Reaction, Reactions, StaticSolution};
 use crate::rod::quadrature::GAUSS;
-use crate::rod::{ElementData, EndAngle, Frame, Layout, PLAIN, RodState, Supports, TWISTED};
+use crate::rod::{Clamp, ElementData, EndAngle, Frame, PLAIN, RodState, Supports, TWISTED};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport};
 use crate::{Error, Result, Vec3};
 
@@ -32,6 +32,7 @@ pub struct StaticProblem {
     /// Number of load steps.
     pub load_steps: usize,
     gj_given: bool,
+    first: Section,
 }
 
 /// Result of the solver before it is written out.
@@ -49,6 +50,8 @@ pub struct Solved {
     pub energy: Energies,
     /// What the start exerts on the rod.
     pub start: Reaction,
+    /// As in [`StaticSolution::push_force`].
+    pub push_force: Option<f64>,
 }
 
 impl StaticProblem {
@@ -138,7 +141,8 @@ impl StaticProblem {
         let options =
             NewtonOptions { max_iterations: case.solver.max_iterations, ..NewtonOptions::default() };
         let load_steps = case.solver.load_steps;
-        Ok(Self { elements, supports, loads, initial, twisted, options, load_steps, gj_given })
+        let first = case.rod.section[0].clone();
+        Ok(Self { elements, supports, loads, initial, twisted, options, load_steps, gj_given, first })
     }
 
     /// Adds a constant force along the end's tangent that load factors leave alone.
@@ -232,19 +236,20 @@ impl StaticProblem {
             total: stored.total(),
             load: External::<C>::energy(&mut loads, &self.elements, &state),
         };
-        let l = Layout::<C>;
-        let r = &newton.start_residual;
-        let x = l.position(0);
-        let t = l.tangent(0);
-        let frame = &state.frames[0];
-        let torque = if Layout::<C>::TWIST { r[l.angle(0)] } else { 0.0 };
-        let moment = frame.v * r[t] - frame.u * r[t + 1] + frame.t * torque;
+        let clamp = Clamp::new::<C>(&newton.start_residual, &state);
+        let held = supports.start_tangent;
+        let moment = clamp.moment + state.frames[0].t * clamp.torque;
         let start = Reaction {
-            force: [r[x], r[x + 1], r[x + 2]],
-            moment: if supports.start_tangent { moment.into() } else { [0.0; 3] },
-            torque: if supports.start_tangent { torque } else { 0.0 },
+            force: clamp.force.into(),
+            moment: if held { moment.into() } else { [0.0; 3] },
+            torque: if held { clamp.torque } else { 0.0 },
         };
-        Solved { state, supports, report, monotone, energy, start }
+        let push_force = held.then(|| {
+            let (first, frame) = (&self.first, state.material_frame(0));
+            let rest = frame.u * first.rest_curvature[0] + frame.v * first.rest_curvature[1];
+            clamp.push_force(&frame.t, first.ei, first.gj.unwrap_or(ASSUMED_GJ_RATIO * first.ei), &rest)
+        });
+        Solved { state, supports, report, monotone, energy, start, push_force }
     }
 
     /// Writes a solved state out.
@@ -264,7 +269,6 @@ impl StaticProblem {
             arc += e.length;
             arc_lengths.push(arc);
         }
-        let twist = state.angles[n] - state.angles[0] + state.reference_twists.iter().sum::<f64>();
         let report = &solved.report;
         let (a, b) = (&state.frames[0].t, &frame.t);
         StaticSolution {
@@ -275,13 +279,14 @@ impl StaticProblem {
             nodes: state.positions.iter().map(|p| (*p).into()).collect(),
             tangents: state.frames.iter().map(|f| f.t.into()).collect(),
             normals: (0..=n).map(|i| state.material_frame(i).u.into()).collect(),
-            twist: if self.twisted { twist } else { 0.0 },
+            twist: if self.twisted { state.twist() } else { 0.0 },
             tensions: state.tensions.clone(),
             energy: solved.energy,
             reactions: Reactions {
                 start: solved.start,
                 end: Reaction { force: force.into(), moment: moment.into(), torque: -m[5] },
             },
+            push_force: solved.push_force,
             iterations: report.iterations,
             residual: report.residual,
             inertia: [report.inertia.positive, report.inertia.negative],

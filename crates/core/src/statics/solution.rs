@@ -62,6 +62,9 @@ pub struct StaticSolution {
     pub energy: Energies,
     /// Reactions.
     pub reactions: Reactions,
+    /// Force with which the rod must be pushed to stay where it is, if the clamp at its start is a frictionless sleeve that it
+    /// slides through; `None` where the start is not clamped. See [`Clamp::push_force`](crate::rod::Clamp::push_force).
+    pub push_force: Option<f64>,
     /// Newton iterations, all load steps together.
     pub iterations: usize,
     /// Largest residual over the force scale.

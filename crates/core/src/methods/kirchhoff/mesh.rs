@@ -17,13 +17,13 @@ pub(super) const MOST_POINTS: usize = 64;
 
 /// Elements and contact points of an inserted length.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Mesh {
+pub(crate) struct Mesh {
     /// Arc length from the tip of every node, mm, sheath first.
-    pub(super) from_tip_mm: Vec<f64>,
+    pub(crate) from_tip_mm: Vec<f64>,
     /// Elements, sheath first.
-    pub(super) elements: Vec<ElementData>,
+    pub(crate) elements: Vec<ElementData>,
     /// Contact points, tip first.
-    pub(super) points: Vec<ContactPoint>,
+    pub(crate) points: Vec<ContactPoint>,
 }
 
 impl Mesh {
@@ -46,7 +46,7 @@ impl Mesh {
     ///
     /// Nodes are marks on the device, at whole element lengths from the tip; the first element is between half and one
     /// and a half elements long, shorter only where that is all there is.
-    pub(super) fn build(
+    pub(crate) fn build(
         &mut self,
         device: &Device,
         inserted_mm: f64,

@@ -10,10 +10,10 @@
 //! ```
 //!
 //! of which the terms after the first are configurational: the energy that the next piece takes up as it leaves the
-//! straight sheath. F is the derivative of the stored energy with respect to the inserted length.
+//! straight sheath ([`Clamp::push_force`]). F is the derivative of the stored energy with respect to the inserted length.
 
 mod configuration;
-mod mesh;
+pub(crate) mod mesh;
 mod readout;
 mod slide;
 mod substep;

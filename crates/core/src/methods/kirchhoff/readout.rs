@@ -4,7 +4,7 @@ use super::{Kirchhoff, softest};
 use crate::contact::WallContact;
 use crate::contact::extension::left_through;
 use crate::insertion::{Energy, Surroundings};
-use crate::rod::Layout;
+use crate::rod::{Clamp, Layout};
 
 impl<const C: usize> Kirchhoff<C> {
     /// The centre line at the current state.
@@ -21,6 +21,7 @@ impl<const C: usize> Kirchhoff<C> {
         report.contacts.clear();
         report.max_penetration_mm = 0.0;
         report.inserted_mm = self.current.mesh.from_tip_mm[0];
+        report.tip_rotation_rad = report.rotation_rad;
         let tip = self.current.state.positions[self.current.state.elements()];
         report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening);
         if self.current.mesh.elements.is_empty() {
@@ -47,23 +48,14 @@ impl<const C: usize> Kirchhoff<C> {
             report.contacts.push(touch.contact);
         }
 
-        let l = Layout::<C>;
-        let held = &self.newton.start_residual;
-        let at = l.position(0);
+        let clamp = Clamp::new::<C>(&self.newton.start_residual, &self.current.state);
         let frame = self.current.state.material_frame(0);
         let data = &self.current.mesh.elements[0];
-        let support = crate::Vec3::new(held[at], held[at + 1], held[at + 2]);
-        // −EI (t′ − κ⁰) is what the clamp's moment balances: t′ from it is more exact than from the cubic.
-        let reference = &self.current.state.frames[0];
-        let at = l.tangent(0);
-        let moment = reference.u * held[at] + reference.v * held[at + 1];
         let rest = frame.u * data.rest_curvature[0][0] + frame.v * data.rest_curvature[0][1];
-        let bend = rest - moment / data.bending[0];
-        report.push_force_n = support.dot(&frame.t) - 0.5 * data.bending[0] * bend.norm_squared();
-        report.torque_nmm = 0.0;
+        report.push_force_n = clamp.push_force(&frame.t, data.bending[0], data.torsion[0], &rest);
+        report.torque_nmm = clamp.torque;
         if Layout::<C>::TWIST {
-            report.torque_nmm = held[l.angle(0)];
-            report.push_force_n -= 0.5 * report.torque_nmm * report.torque_nmm / data.torsion[0];
+            report.tip_rotation_rad += self.current.state.twist();
         }
     }
 }

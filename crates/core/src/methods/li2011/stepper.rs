@@ -240,6 +240,8 @@ impl Li2011 {
         let report = &mut self.report;
         report.inserted_mm = self.from_tip_mm[0];
         report.rotation_rad += command.rotate_rad;
+        // Without twist the tip turns with the hand.
+        report.tip_rotation_rad = report.rotation_rad;
         report.energy = Energy {
             bend: self.chain.bending_energy_mj(&self.tangents),
             twist: 0.0,

@@ -1,0 +1,46 @@
+//! What a clamp at the start of a rod exerts, and with what force a rod is driven through it.
+
+use super::layout::Layout;
+use super::state::RodState;
+use crate::Vec3;
+
+/// What the clamp at the first node exerts on the rod.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clamp {
+    /// Force.
+    pub force: Vec3,
+    /// Moment across the tangent.
+    pub moment: Vec3,
+    /// Moment along the tangent; 0 without angles.
+    pub torque: f64,
+}
+
+impl Clamp {
+    /// From the residual rows of the first node before they were held
+    /// ([`Newton::start_residual`](crate::solve::Newton::start_residual)).
+    pub fn new<const C: usize>(rows: &[f64; 8], state: &RodState) -> Self {
+        let l = Layout::<C>;
+        let (x, t) = (l.position(0), l.tangent(0));
+        let frame = &state.frames[0];
+        Self {
+            force: Vec3::new(rows[x], rows[x + 1], rows[x + 2]),
+            moment: frame.v * rows[t] - frame.u * rows[t + 1],
+            torque: if Layout::<C>::TWIST { rows[l.angle(0)] } else { 0.0 },
+        }
+    }
+
+    /// Force with which the rod must be pushed through the clamp, a rigid straight sleeve without friction, to stay where it
+    /// is; negative where it must be pulled.
+    ///
+    /// F = −n·t − ½EI|t′|² − ½GJτ² with n the internal force. The terms after the first are configurational: what the
+    /// next piece takes up as it leaves the sleeve. F is the derivative of the total potential energy, sleeve included, by the
+    /// length outside. `bending`, `torsion` and `rest_curvature` (as a vector across the tangent) are the rod's in the
+    /// clamp.
+    pub fn push_force(&self, tangent: &Vec3, bending: f64, torsion: f64, rest_curvature: &Vec3) -> f64 {
+        // The clamp balances −EI(t′ − κ⁰): t′ from its moment is more exact than from the cubic.
+        let bend = rest_curvature - self.moment.cross(tangent) / bending;
+        self.force.dot(tangent)
+            - 0.5 * bending * bend.norm_squared()
+            - 0.5 * self.torque * self.torque / torsion
+    }
+}
