@@ -13,13 +13,13 @@ use crate::{Result, Vec3};
 use serde::Serialize;
 
 /// Wall moduli, N/mm².
-const MODULI: [f64; 4] = [1e-3, 1.0, 1e2, 1e4];
+const MODULI: [f64; 3] = [1e-3, 1.0, 1e4];
 /// Bending stiffnesses, N·mm².
-const STIFFNESSES: [f64; 4] = [1e-2, 1.0, 1e2, 1e4];
+const STIFFNESSES: [f64; 3] = [1e-2, 10.0, 1e4];
 /// Element lengths, mm.
 const ELEMENTS: [f64; 3] = [0.2, 2.0, 10.0];
 /// Increments, mm.
-const INCREMENTS: [f64; 4] = [0.01, 0.3, 3.0, 20.0];
+const INCREMENTS: [f64; 3] = [0.01, 1.0, 20.0];
 /// Coefficients of friction.
 const FRICTIONS: [f64; 3] = [0.0, 0.1, 0.5];
 /// Steps of the increment that is tried, …
