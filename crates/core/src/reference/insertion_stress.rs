@@ -13,21 +13,21 @@ use crate::{Result, Vec3};
 use serde::Serialize;
 
 /// Wall moduli, N/mm².
-const MODULI: [f64; 4] = [1e-3, 1.0, 1e2, 1e4];
+const MODULI: [f64; 3] = [1e-3, 1.0, 1e4];
 /// Bending stiffnesses, N·mm².
-const STIFFNESSES: [f64; 4] = [1e-2, 1.0, 1e2, 1e4];
+const STIFFNESSES: [f64; 3] = [1e-2, 10.0, 1e4];
 /// Element lengths, mm.
-const ELEMENTS: [f64; 4] = [0.2, 1.0, 3.0, 10.0];
+const ELEMENTS: [f64; 3] = [0.2, 2.0, 10.0];
 /// Increments, mm.
-const INCREMENTS: [f64; 4] = [0.01, 0.3, 3.0, 20.0];
+const INCREMENTS: [f64; 3] = [0.01, 1.0, 20.0];
 /// Coefficients of friction.
 const FRICTIONS: [f64; 3] = [0.0, 0.1, 0.5];
 /// Steps of the increment that is tried, …
-const STEPS: usize = 10;
+const STEPS: usize = 5;
 /// … and the largest way they may take, mm.
 const MOST_MM: f64 = 40.0;
-/// The wire is first brought to the wall in steps of 2 mm.
-const APPROACH: usize = 12;
+/// Steps of 2 mm in which the wire is first brought to the wall.
+const APPROACH: usize = 9;
 
 /// One combination and what became of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -200,7 +200,7 @@ mod tests {
             friction: 0.0,
         };
         let row = stress.run(&ordinary);
-        assert!(row.pass && row.converged && row.steps == 22 && row.max_penetration_mm > 0.0, "{row:?}");
+        assert!(row.pass && row.converged && row.steps == 14 && row.max_penetration_mm > 0.0, "{row:?}");
         assert!(!stress.run(&InsertionCase { element_mm: -1.0, ..ordinary }).pass);
         assert_eq!(
             reason(

@@ -32,6 +32,12 @@ pub struct ElementData {
 }
 
 impl ElementData {
+    /// Energy that it takes to straighten the element, mJ: the size of the terms that bending energy is a difference of.
+    pub fn straightening_energy(&self) -> f64 {
+        let [u, v] = self.rest_curvature[1];
+        0.5 * self.length * self.bending[1] * (u * u + v * v)
+    }
+
     /// Factor γ of the augmentation γ·CᵀC (see [`super::assembly`]): as stiff along the rod as the element is across it,
     /// and below half the element's true axial stiffness, which keeps the transformed flexibility positive.
     #[inline]

@@ -254,6 +254,8 @@ impl<const C: usize> Newton<C> {
         let mut shift = 0.0f64;
         let mut penalty = [0.0f64; 2];
         let mut best = f64::INFINITY;
+        // A device in its own shape stores nothing, as the difference of terms of this size.
+        let straightening: f64 = elements.iter().map(ElementData::straightening_energy).sum();
         let mut stalled = 0;
         let mut assembled = false;
         loop {
@@ -386,8 +388,11 @@ impl<const C: usize> Newton<C> {
             let mut alpha = if turn > options.max_turn { options.max_turn / turn } else { 1.0 };
             let stored = self.assembly.energy;
             let before = stored.total() + self.assembly.external_energy;
-            let energy_scale =
-                stored.total().abs() + self.assembly.external_energy.abs() + weighed + slope.abs();
+            let energy_scale = stored.total().abs()
+                + self.assembly.external_energy.abs()
+                + weighed
+                + slope.abs()
+                + straightening;
             let rounding = ENERGY_ROUNDING * energy_scale;
             let record = |energy_change: f64, merit_change: f64, fraction: f64| StepRecord {
                 energy_change,
