@@ -106,17 +106,23 @@ pub struct Counters {
     /// Questions to the bounding volume hierarchy.
     pub queries: u64,
     /// Questions that the quadrics about the last triangle answered.
-    pub walked: u64,
+    pub near: u64,
     /// Questions that the last clearance answered.
     pub avoided: u64,
+    /// Nodes of sub-steps in which the device moved to a new equilibrium.
+    pub nodes_solved: u64,
+    /// Nodes of sub-steps in which the slid device was in equilibrium as it was.
+    pub nodes_frozen: u64,
 }
 
 impl Counters {
     /// Adds another count.
     pub fn add(&mut self, other: &Self) {
         self.queries += other.queries;
-        self.walked += other.walked;
+        self.near += other.near;
         self.avoided += other.avoided;
+        self.nodes_solved += other.nodes_solved;
+        self.nodes_frozen += other.nodes_frozen;
     }
 }
 
@@ -210,7 +216,7 @@ impl<'a> WallContact<'a> {
             if let Some(triangle) = known.triangle.filter(|_| moved < LOOK_AGAIN * radius)
                 && let Some(distance) = self.wall.distance(x, triangle).filter(|d| d.value_mm > 0.0)
             {
-                self.counters.walked += 1;
+                self.counters.near += 1;
                 return Reading::of(distance, &potential);
             }
         }

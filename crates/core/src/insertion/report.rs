@@ -73,7 +73,9 @@ pub struct StepReport {
     pub substeps: u32,
     /// Whether the device jumped to a lower minimum: it set free energy that the hand had put in.
     pub jumped: bool,
-    /// Wall queries made and avoided since the start.
+    /// Whether the device carries material angles: only with a shape or friction.
+    pub angles: bool,
+    /// Work done and avoided since the start.
     pub counters: Counters,
     /// Whether the step met the method's own convergence test.
     pub converged: bool,

@@ -25,7 +25,7 @@ use crate::contact::{FeltWall, KnownPoint};
 use crate::device::Device;
 use crate::insertion::{Command, StepReport, Surroundings};
 use crate::methods::Method;
-use crate::rod::RodState;
+use crate::rod::{Layout, RodState};
 use crate::shape::Shape;
 use crate::solve::Newton;
 use crate::{Error, Result};
@@ -118,7 +118,7 @@ impl<const C: usize> Kirchhoff<C> {
             extension: Extension::default(),
             known: Vec::new(),
             shape: Shape::default(),
-            report: StepReport { converged: true, ..Default::default() },
+            report: StepReport { converged: true, angles: Layout::<C>::TWIST, ..Default::default() },
         };
         method.reserve(surroundings);
         method.write_shape();

@@ -119,6 +119,12 @@ impl<const C: usize> Kirchhoff<C> {
                 return Err("friction and wall forces do not settle".to_owned());
             }
         };
+        let nodes = elements as u64 + 1;
+        *if iterations > 0 {
+            &mut contact.counters.nodes_solved
+        } else {
+            &mut contact.counters.nodes_frozen
+        } += nodes;
         self.report.counters.add(&contact.counters);
         if !found.converged {
             return Err(format!("{} (residual {:.1e})", found.reason, found.residual));
