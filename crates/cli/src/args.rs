@@ -92,6 +92,9 @@ pub(crate) struct FrameArgs {
     /// Write path lengths and line integrals as float arrays (npy) beside each fluoroscopic frame
     #[arg(long)]
     pub(crate) raw: bool,
+    /// Write the last image hold, the mean of the last fluoroscopic frames
+    #[arg(long)]
+    pub(crate) hold: bool,
     /// Print what was written as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
