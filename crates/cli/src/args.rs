@@ -74,7 +74,7 @@ pub(crate) struct FrameArgs {
     /// Bits a pixel of fluoroscopic frames, 8 or 16
     #[arg(long)]
     pub(crate) bits: Option<u32>,
-    /// Set any other key of the scene's [view] table, as in c_arm.sid_mm=1000 (repeatable)
+    /// Set any other key of the scene's view table, as in c_arm.sid_mm=1000 (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
     /// Turn the camera of the 3D view by so many degrees from the first frame to the last
