@@ -76,7 +76,7 @@ pub(crate) struct FrameArgs {
     /// Bits a pixel of fluoroscopic frames, 8 or 16
     #[arg(long)]
     pub(crate) bits: Option<u32>,
-    /// Set any other key of the scene's [view] table, as in c_arm.sid_mm=1000 (repeatable)
+    /// Set any other key of the scene's view table, as in c_arm.sid_mm=1000 (repeatable)
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
     /// Turn the camera of the 3D view by so many degrees from the first frame to the last
@@ -94,6 +94,9 @@ pub(crate) struct FrameArgs {
     /// Write path lengths and line integrals as float arrays (npy) beside each fluoroscopic frame
     #[arg(long)]
     pub(crate) raw: bool,
+    /// Write the last image hold, the mean of the last fluoroscopic frames
+    #[arg(long)]
+    pub(crate) hold: bool,
     /// Print what was written as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

@@ -135,7 +135,8 @@ fn a_scene_is_drawn_without_a_recording() {
     assert_eq!(draw(&["--steps", "0"])["files"].as_array().unwrap().len(), 1);
     let bare = std::fs::read(out.join("frame_000000_fluoro.png")).unwrap();
     assert_eq!(png_size(&out.join("frame_000000_fluoro.png")), (48, 32));
-    assert_eq!(draw(&["--count", "2", "--bits", "16"])["files"].as_array().unwrap().len(), 2);
+    assert_eq!(draw(&["--count", "2", "--bits", "16", "--hold"])["files"].as_array().unwrap().len(), 3);
+    assert_eq!(png_size(&out.join("hold.png")), (48, 32));
     assert_ne!(std::fs::read(out.join("frame_000000_fluoro.png")).unwrap(), bare);
 }
 

@@ -143,8 +143,9 @@ impl<'a> Studio<'a> {
         let wall = scene.wall().map_err(in_scene)?.closed_mesh();
         let device = scene.device().map_err(in_scene)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
-        if !spec.wants(View::Fluoro) && (args.dicom.is_some() || args.labels || args.raw) {
-            let text = "--dicom, --labels and --raw belong to fluoroscopy: use --view fluoro or --view both";
+        if !spec.wants(View::Fluoro) && (args.dicom.is_some() || args.labels || args.raw || args.hold) {
+            let text =
+                "--dicom, --labels, --raw and --hold belong to fluoroscopy: use --view fluoro or --view both";
             return Err(Failure::Input(text.to_owned()));
         }
         std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
@@ -270,6 +271,10 @@ impl<'a> Studio<'a> {
         if let (Some(animation), Some(path)) = (self.animation.take(), &self.args.animate) {
             animation.finish()?;
             self.files.push(path.clone());
+        }
+        if let (Some(image), true) = (self.renderer.last_image_hold(), self.args.hold) {
+            let path = self.file("hold.png");
+            image.write_png(&path)?;
         }
         if let (Some(path), Some(c_arm)) = (&self.args.dicom, self.renderer.c_arm()) {
             let angiogram = Angiogram {

@@ -97,7 +97,7 @@ pub(crate) fn write_map(path: &Path, width: usize, values: &[f32]) -> io::Result
     file.flush()
 }
 
-/// The numbers of an array of 8-byte numbers that [`write`] has packed, as little-endian bytes.
+/// The numbers of an array of 8-byte numbers that [`write()`] has packed, as little-endian bytes.
 pub(crate) fn read(path: &Path, name: &str) -> io::Result<Vec<[u8; 8]>> {
     let bad = |what: String| io::Error::new(io::ErrorKind::InvalidData, what);
     let mut archive = ZipArchive::new(File::open(path)?)?;

@@ -14,7 +14,7 @@ const WINDOW_ABOVE: f32 = 0.4;
 /// Shares of the pixels that may be brighter or darker than the anatomy's range.
 const OUTLIERS: f64 = 0.01;
 /// The window is fitted to this part of the frame's width and height, around its middle: beyond the skin all may be white.
-const FITTED: f64 = 0.7;
+const FITTED: f64 = 0.8;
 /// Signals below this are told apart no more.
 const DARKEST: f32 = 1e-6;
 

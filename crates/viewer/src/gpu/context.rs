@@ -33,7 +33,12 @@ impl Gpu {
         };
         let instance = wgpu::Instance::new(descriptor);
         let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
-        adapters.retain(|a| software || a.get_info().device_type != wgpu::DeviceType::Cpu);
+        let is_software = |a: &wgpu::Adapter| a.get_info().device_type == wgpu::DeviceType::Cpu;
+        if !software && !adapters.is_empty() && adapters.iter().all(is_software) {
+            let name = adapters[0].get_info().name;
+            return Err(format!("{name} draws on the processor too, and slower"));
+        }
+        adapters.retain(|a| software || !is_software(a));
         if adapters.is_empty() {
             return Err("no graphics adapter was found".into());
         }

@@ -290,6 +290,51 @@ mod tests {
         );
     }
 
+    /// A NIfTI-1 file of 2 × 2 × 2 voxels of 10 mm from (0, 0, 0) in RAS, with a slope of 2 and an intercept of −1000.
+    fn file(data_type: i16, voxels: &[u8]) -> Vec<u8> {
+        let mut bytes = vec![0; 352];
+        let mut put = |at: usize, data: &[u8]| bytes[at..at + data.len()].copy_from_slice(data);
+        put(0, &348_i32.to_le_bytes());
+        for (k, n) in [3_i16, 2, 2, 2, 1, 1, 1, 1].into_iter().enumerate() {
+            put(40 + 2 * k, &n.to_le_bytes());
+        }
+        put(70, &data_type.to_le_bytes());
+        put(72, &(voxels.len() as i16).to_le_bytes());
+        (0..4).for_each(|k| put(76 + 4 * k, &10_f32.to_le_bytes()));
+        put(108, &352_f32.to_le_bytes());
+        put(112, &2_f32.to_le_bytes());
+        put(116, &(-1000_f32).to_le_bytes());
+        put(123, &[2]);
+        put(254, &1_i16.to_le_bytes());
+        (0..3).for_each(|k| put(280 + 20 * k, &10_f32.to_le_bytes()));
+        put(344, b"n+1\0");
+        bytes.extend(voxels);
+        bytes
+    }
+
+    #[test]
+    fn integers_and_floats_are_read_with_their_slope_and_what_is_no_volume_is_refused() {
+        let path = std::env::temp_dir().join(format!("endowire-{}.nii", std::process::id()));
+        let spec = CtSpec { file: path.clone(), offset_mm: [1.0, 0.0, 0.0] };
+        let short: Vec<u8> = (0..8_i16).flat_map(|k| (400 + 25 * k).to_le_bytes()).collect();
+        let float: Vec<u8> = (0..8_i16).flat_map(|k| f32::from(400 + 25 * k).to_le_bytes()).collect();
+        for (data_type, voxels) in [(4, &short), (16, &float)] {
+            std::fs::write(&path, file(data_type, voxels)).unwrap();
+            let volume = Volume::read(&spec).unwrap();
+            assert_eq!(volume.size, [2, 2, 2]);
+            assert_eq!(volume.origin_mm, Vec3::new(1.0, 0.0, 0.0));
+            // 2 · 400 − 1000 = −200 HU is 0.8 of tissue; the third index is slowest.
+            assert!((volume.voxels[0][0] - 0.8).abs() < 1e-6 && (volume.voxels[4][0] - 1.0).abs() < 1e-6);
+            assert!((volume.value([0.0, 0.0, 0.5])[0] - 0.9).abs() < 1e-6);
+        }
+        std::fs::write(&path, &file(4, &short)[..200]).unwrap();
+        assert!(Volume::read(&spec).unwrap_err().to_string().contains("NIfTI"));
+        let poisoned: Vec<u8> = (0..8).flat_map(|_| f32::NAN.to_le_bytes()).collect();
+        std::fs::write(&path, file(16, &poisoned)).unwrap();
+        assert!(Volume::read(&spec).unwrap_err().to_string().contains("NaN"));
+        std::fs::remove_file(&path).unwrap();
+    }
+
     #[test]
     fn a_missing_file_is_named_by_its_key() {
         let spec = CtSpec { file: "no-such.nii".into(), offset_mm: [0.0; 3] };

@@ -134,19 +134,29 @@ impl Trunk {
         for z in self.vertebrae() {
             let [wide, deep] = VERTEBRA_HALF_MM.map(|half| half - inset);
             let half = VERTEBRA_MM[0] / 2.0 - inset;
-            // Wider at the end plates than between them.
-            let rings: Vec<Vec<Vec3>> =
-                [(-1.0, 0.96), (-0.85, 1.0), (-0.4, 0.9), (0.4, 0.9), (0.85, 1.0), (1.0, 0.96)]
-                    .into_iter()
-                    .map(|(h, waist): (f64, f64)| {
-                        (0..24)
-                            .map(|k| {
-                                let (s, c) = (TAU * f64::from(k) / 24.0).sin_cos();
-                                Vec3::new(x + wide * waist * c, y + deep * waist * s, z + half * h)
-                            })
-                            .collect()
+            // Wider at the end plates than between them, and the plates hollow.
+            let rings: Vec<Vec<Vec3>> = [
+                (-0.82, 0.3),
+                (-0.88, 0.7),
+                (-1.0, 0.96),
+                (-0.85, 1.0),
+                (-0.4, 0.9),
+                (0.4, 0.9),
+                (0.85, 1.0),
+                (1.0, 0.96),
+                (0.88, 0.7),
+                (0.82, 0.3),
+            ]
+            .into_iter()
+            .map(|(h, waist): (f64, f64)| {
+                (0..24)
+                    .map(|k| {
+                        let (s, c) = (TAU * f64::from(k) / 24.0).sin_cos();
+                        Vec3::new(x + wide * waist * c, y + deep * waist * s, z + half * h)
                     })
-                    .collect();
+                    .collect()
+            })
+            .collect();
             loft(mesh, &rings);
             let at = |side: f64, back: f64, up: f64| Vec3::new(x + side, y + back, z + up);
             for side in [-1.0, 1.0] {
