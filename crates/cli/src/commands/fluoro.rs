@@ -41,7 +41,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         .report()
         .contacts
         .iter()
-        .map(|c| ContactView { position_mm: c.position_mm, force_n: c.normal * c.force_n })
+        .map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() })
         .collect();
     for k in 0..args.count {
         let time_s = args.time + f64::from(k) / studio.frames_per_s();

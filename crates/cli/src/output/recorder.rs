@@ -76,6 +76,7 @@ struct Row {
     rotate_rad: f64,
     inserted_mm: f64,
     rotation_rad: f64,
+    tip_rotation_rad: f64,
     nodes: usize,
     tip_x_mm: f64,
     tip_y_mm: f64,
@@ -85,12 +86,18 @@ struct Row {
     bend_mj: f64,
     twist_mj: f64,
     wall_mj: f64,
+    dissipated_mj: f64,
     contacts: usize,
     max_penetration_mm: f64,
     iterations: u32,
     substeps: u32,
     jumped: bool,
     left_through: Option<usize>,
+    queries: u64,
+    queries_avoided: u64,
+    nodes_solved: u64,
+    nodes_frozen: u64,
+    angles: bool,
     converged: bool,
 }
 
@@ -165,6 +172,7 @@ impl Recorder {
             rotate_rad: command.rotate_rad,
             inserted_mm: report.inserted_mm,
             rotation_rad: report.rotation_rad,
+            tip_rotation_rad: report.tip_rotation_rad,
             nodes: shape.len(),
             tip_x_mm: tip.x,
             tip_y_mm: tip.y,
@@ -174,12 +182,18 @@ impl Recorder {
             bend_mj: report.energy.bend,
             twist_mj: report.energy.twist,
             wall_mj: report.energy.wall,
+            dissipated_mj: report.dissipated_mj,
             contacts: report.contacts.len(),
             max_penetration_mm: report.max_penetration_mm,
             iterations: report.iterations,
             substeps: report.substeps,
             jumped: report.jumped,
             left_through: report.left_through,
+            queries: report.counters.queries,
+            queries_avoided: report.counters.near + report.counters.avoided,
+            nodes_solved: report.counters.nodes_solved,
+            nodes_frozen: report.counters.nodes_frozen,
+            angles: report.angles,
             converged: report.converged,
         };
         let whole = self.arrays().map(|array| array.len());
@@ -192,7 +206,7 @@ impl Recorder {
             let contacts = &report.contacts;
             self.contact_points.push_f64(contacts.iter().flat_map(|c| <[f64; 3]>::from(c.position_mm)))?;
             self.contact_forces
-                .push_f64(contacts.iter().flat_map(|c| <[f64; 3]>::from(c.normal * c.force_n)))?;
+                .push_f64(contacts.iter().flat_map(|c| <[f64; 3]>::from(c.total_n())))?;
             self.contact_offsets.push_i64(self.contacts + contacts.len() as i64)?;
             self.offsets.push_i64(self.nodes + shape.len() as i64)
         };

@@ -40,6 +40,13 @@ pub struct Contact {
     pub triangle: u32,
 }
 
+impl Contact {
+    /// Force of the wall on the device, normal and friction together, N.
+    pub fn total_n(&self) -> Vec3 {
+        self.normal * self.force_n + self.friction_n
+    }
+}
+
 /// State of an insertion after a step.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepReport {
