@@ -8,7 +8,7 @@ mkdir -p "$out"
 cargo build --release --quiet
 endowire=target/release/endowire
 "$endowire" compare --out "$out/compare" > "$out/compare.txt"
-"$endowire" experiment timing --methods all --nodes 50,100,150,200,300,500,1000,2000 > "$out/timing.txt"
+"$endowire" experiment timing --methods all --nodes 50,100,150,200,300,500,1000,2000 --limit-s 2 > "$out/timing.txt"
 "$endowire" experiment deformation > "$out/deformation.txt"
 "$endowire" experiment navigation > "$out/navigation.txt"
 cp "$out/compare/compare.png" assets/pictures/compare.png
@@ -26,7 +26,7 @@ block() { printf '```sh\n%s\n```\n```text\n' "$1"; cat "$2"; printf '```\n\n'; }
   echo
   block "endowire compare" "$out/compare.txt"
   echo "## Table 1 of Li et al. 2011, for every method"
-  block "endowire experiment timing --methods all --nodes 50,100,150,200,300,500,1000,2000" "$out/timing.txt"
+  block "endowire experiment timing --methods all --nodes 50,100,150,200,300,500,1000,2000 --limit-s 2" "$out/timing.txt"
   echo "## Table 2 of Li et al. 2011"
   block "endowire experiment deformation" "$out/deformation.txt"
   echo "## Navigation"

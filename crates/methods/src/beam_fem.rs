@@ -46,7 +46,13 @@ pub struct BeamFem {
 impl Default for BeamFem {
     /// As the papers have it: without damping.
     fn default() -> Self {
-        Self { increments: 1, axial_ratio: 100.0, damping: 0.0, largest_turn_rad: 1.0, max_iterations: 1_000 }
+        Self {
+            increments: 1,
+            axial_ratio: 1000.0,
+            damping: 0.0,
+            largest_turn_rad: 1.0,
+            max_iterations: 1_000,
+        }
     }
 }
 

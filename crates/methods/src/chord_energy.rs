@@ -92,7 +92,8 @@ fn round(chain: &Chain, joints: &[f64], bends: &[Vec3], pushes: &[Push], links: 
         let before = if i == 0 { chain.direction } else { links[i - 1] };
         let mut pull = (before + bends[i]) * joints[i] + force * l;
         if i + 1 < n {
-            pull += (links[i + 1] - bends[i + 1]) * joints[i + 1];
+            // The next joint's bend turns with this segment, hence the cosine.
+            pull += (links[i + 1] - bends[i + 1] * links[i + 1].dot(&d)) * joints[i + 1];
         }
         largest = largest.max((pull - d * pull.dot(&d)).norm());
         let moved = if push.stiffness_n_per_mm == 0.0 && yielding == Matrix3::zeros() {

@@ -89,24 +89,24 @@ pub fn by_name(name: &str, task: Task) -> Option<Box<dyn RodModel>> {
     let insertion = task == Task::Insertion;
     Some(match name {
         "rigid-links" if insertion => {
-            Box::new(RigidLinks { time_step: 0.015, damping: 0.015, ..RigidLinks::default() })
+            Box::new(RigidLinks { time_step: 0.015, damping: 0.05, ..RigidLinks::default() })
         }
         "rigid-links" => Box::new(RigidLinks::default()),
-        "mass-spring" if insertion => Box::new(MassSpring {
-            axial_ratio: 16.0,
-            damping: 10.0,
-            max_iterations: 200_000,
-            ..MassSpring::default()
-        }),
+        "mass-spring" if insertion => {
+            Box::new(MassSpring { damping: 10.0, max_iterations: 200_000, ..MassSpring::default() })
+        }
         "mass-spring" => Box::new(MassSpring::default()),
         "beam-fem" => Box::new(BeamFem::default()),
-        "beam-fem-damped" if insertion => Box::new(BeamFem { damping: 3e4, ..BeamFem::default() }),
+        "beam-fem-damped" if insertion => Box::new(BeamFem { damping: 1e4, ..BeamFem::default() }),
         "beam-fem-damped" => Box::new(BeamFem::damped()),
         "chord-energy" if insertion => Box::new(ChordEnergy { max_iterations: 20_000 }),
         "chord-energy" => Box::new(ChordEnergy::default()),
-        "discrete-rod" if insertion => {
-            Box::new(DiscreteRod { damping: 10.0, max_iterations: 200_000, ..DiscreteRod::default() })
-        }
+        "discrete-rod" if insertion => Box::new(DiscreteRod {
+            time_step: 0.3,
+            damping: 10.0,
+            max_iterations: 200_000,
+            ..DiscreteRod::default()
+        }),
         "discrete-rod" => Box::new(DiscreteRod::default()),
         _ => return None,
     })

@@ -36,7 +36,7 @@ pub struct MassSpring {
 
 impl Default for MassSpring {
     fn default() -> Self {
-        Self { axial_ratio: 4.0, damping: 1.5, time_step: 0.9, max_iterations: 1_000_000 }
+        Self { axial_ratio: 16.0, damping: 1.5, time_step: 0.9, max_iterations: 1_000_000 }
     }
 }
 

@@ -238,10 +238,10 @@ impl chart::Chart for Growth<'_> {
             .label_style(chart::font(15))
             .axis_desc_style(chart::font(17))
             .draw()?;
-        let series: [(&str, fn(&Row) -> f64, RGBColor); 2] = [
-            ("depth", |row| row.loop_depth_mm, chart::COLOURS[0]),
-            ("width", |row| row.loop_width_mm, chart::COLOURS[3]),
-        ];
+        type Value = fn(&Row) -> f64;
+        let depth: Value = |row| row.loop_depth_mm;
+        let width: Value = |row| row.loop_width_mm;
+        let series = [("depth", depth, chart::COLOURS[0]), ("width", width, chart::COLOURS[3])];
         for (name, value, colour) in series {
             let line = rows.iter().filter(|r| r.advance_mm > 0.0).map(|r| (r.advance_mm, value(r)));
             plot.draw_series(LineSeries::new(line, colour.stroke_width(3)))?;

@@ -47,21 +47,24 @@ const ANATOMIES: [Anatomy; 2] = [
         targets: &["aorta", "splenic", "gastroduodenal", "right hepatic", "left hepatic"],
         edge_mm: 1.1,
         radius_mm: 0.25,
-        tip_curvature_per_mm: 0.1,
-        tip_mm: 12.0,
+        tip_curvature_per_mm: 0.07,
+        tip_mm: 22.0,
         primary_deg: 0.0,
     },
 ];
 /// Most commands for one target.
-const COMMANDS: usize = 500;
+const COMMANDS: usize = 800;
 /// Advance of one command, mm.
 const STEP_MM: f64 = 2.0;
 /// How far ahead on the way the hand aims, in radii of the vessel.
 const AHEAD_RADII: f64 = 1.5;
+const LEAST_AHEAD_MM: f64 = 15.0;
 /// How far before the way's end the tip has arrived, mm.
 const ARRIVED_MM: f64 = 6.0;
 /// Largest turn of one command, rad.
 const TURN_RAD: f64 = 0.35;
+/// Most turns between two pushes.
+const TURNS: usize = 12;
 /// Pulled back after going astray, mm.
 const BACK_MM: f64 = 30.0;
 /// Pushed in without getting farther, mm, before the hand tries something else.
@@ -151,7 +154,7 @@ fn nearest(way: &[(Vec3, f64)], x: &Vec3) -> (f64, f64, f64) {
         let u = ((x - pair[0].0).dot(&piece) / (length * length)).clamp(0.0, 1.0);
         let distance = (x - pair[0].0 - piece * u).norm();
         if distance < best.1 {
-            best = (before + u * length, distance, pair[0].1 + u * (pair[1].1 - pair[0].1));
+            best = (before + u * length, distance, pair[0].1.max(pair[1].1));
         }
         before += length;
     }
@@ -253,6 +256,8 @@ struct Hand {
     retries: usize,
     /// Until so much is inserted again, mm, the other turn is kept.
     keep_until_mm: f64,
+    /// Turns since the last push.
+    turns: usize,
 }
 
 impl Hand {
@@ -282,8 +287,14 @@ impl Hand {
             return Command::rotate(0.0);
         }
         let kept = inserted < self.keep_until_mm;
-        let rotate_rad = if kept { 0.0 } else { self.aim(simulation, way, reached, tip, tip_mm) };
-        Command { advance_mm: STEP_MM, rotate_rad }
+        let turn = if kept { 0.0 } else { self.aim(simulation, way, reached, tip, tip_mm) };
+        // Far off the mark, the hand turns before it pushes on.
+        if turn.abs() > 0.5 * TURN_RAD && self.turns < TURNS {
+            self.turns += 1;
+            return Command::rotate(turn);
+        }
+        self.turns = 0;
+        Command { advance_mm: STEP_MM, rotate_rad: turn }
     }
 
     /// Turn of the tail that brings the bend of the tip towards the way ahead.
@@ -296,7 +307,7 @@ impl Hand {
         let root = point_at(shape, tip_mm);
         let axis = (root - point_at(shape, tip_mm + 2.0)).normalize();
         let across = |v: Vec3| v - axis * axis.dot(&v);
-        let ahead = AHEAD_RADII * nearest(way, &tip).2;
+        let ahead = (AHEAD_RADII * nearest(way, &tip).2).max(LEAST_AHEAD_MM);
         let (bend, wish) = (across(tip - root), across(along(way, reached + ahead) - root));
         // A way that goes straight on needs no turn.
         if wish.norm() < 0.15 * (ahead + tip_mm) || bend.norm() < 1e-3 {
