@@ -205,8 +205,7 @@ impl Recorder {
             self.from_tip.push_f64(shape.from_tip_mm.iter().copied())?;
             let contacts = &report.contacts;
             self.contact_points.push_f64(contacts.iter().flat_map(|c| <[f64; 3]>::from(c.position_mm)))?;
-            self.contact_forces
-                .push_f64(contacts.iter().flat_map(|c| <[f64; 3]>::from(c.total_n())))?;
+            self.contact_forces.push_f64(contacts.iter().flat_map(|c| <[f64; 3]>::from(c.total_n())))?;
             self.contact_offsets.push_i64(self.contacts + contacts.len() as i64)?;
             self.offsets.push_i64(self.nodes + shape.len() as i64)
         };

@@ -120,11 +120,9 @@ impl<const C: usize> Kirchhoff<C> {
             }
         };
         let nodes = elements as u64 + 1;
-        *if iterations > 0 {
-            &mut contact.counters.nodes_solved
-        } else {
-            &mut contact.counters.nodes_frozen
-        } += nodes;
+        let (solved, frozen) = if iterations > 0 { (nodes, 0) } else { (0, nodes) };
+        contact.counters.nodes_solved += solved;
+        contact.counters.nodes_frozen += frozen;
         self.report.counters.add(&contact.counters);
         if !found.converged {
             return Err(format!("{} (residual {:.1e})", found.reason, found.residual));
