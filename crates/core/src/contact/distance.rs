@@ -32,27 +32,24 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2};
+use nalgebra::Matrix3;
 
+use super::fit::{fit, vertex_neighbours, vertex_normals};
+use super::quadric::Quadric;
 use crate::Vec3;
 use crate::vessel::{SurfaceMesh, Wall};
 
-/// Support of a vertex over its edges: every point of a triangle lies well inside that of its three corners.
-const SUPPORT: f64 = 1.1;
-/// Largest curvature times support: beyond it a corner is a corner, and a quadric would fold over.
-const LARGEST_BEND: f64 = 0.8;
-/// Height times curvature is taken as it is up to this, …
-const STEEP: f64 = 0.7;
-/// … and beyond levels off within this, so that feet stay finite at the centre of curvature.
-const LEVEL: f64 = 0.4;
-/// Square of the thinnest ellipse's ratio of axes, about.
-const THINNEST: f64 = 0.01;
-/// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.
-const REGULAR: f64 = 1e-6;
 /// Sum of weights below which no vertex reaches a point.
 const LEAST_WEIGHT: f64 = 1e-9;
 /// Height above the surface up to which the lists of vertices are complete, in radii of the thickest device and in supports.
 const HEIGHT: (f64, f64) = (1.5, 0.5);
+/// The smooth wall lies no farther than this part of the thinnest device's radius beyond a triangle: the barrier of
+/// [`crate::contact::WallPotential`] stands at three tenths.
+const BEYOND: f64 = 0.2;
+/// Intervals along each side of a triangle at whose ends that is checked, …
+const CHECKED: u32 = 4;
+/// … unless few points differ by less than this part of what is allowed.
+const ENOUGH: f64 = 0.25;
 
 /// Signed distance with derivatives; positive in the lumen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,169 +60,6 @@ pub struct Distance {
     pub gradient: Vec3,
     /// Its Hessian, 1/mm.
     pub hessian: Matrix3<f64>,
-}
-
-/// The quadric of one vertex.
-#[derive(Debug, Clone, Copy)]
-struct Quadric {
-    position: Vec3,
-    normal: Vec3,
-    /// Principal directions, across the normal.
-    axes: [Vec3; 2],
-    /// S along them, 1/mm; positive where the wall bends around the lumen.
-    curvature: [f64; 2],
-    /// M in them, 1/mm².
-    support: Matrix2<f64>,
-    /// Half axes of the support, shortest and longest, mm.
-    half_axes_mm: (f64, f64),
-    /// cᵢ, mm.
-    offset_mm: f64,
-    /// The window falls from 1 at the first to 0 at the second, above and below the surface, mm.
-    above_mm: (f64, f64),
-    below_mm: (f64, f64),
-}
-
-/// Window over the radius of the device, and over the support of a vertex: what a fit may be off by on a coarse mesh.
-const WINDOW: (f64, f64) = (1.25, 0.3);
-/// In heights of the window: it falls from 1 at the first to 0 at the second, above and below the surface.
-const ABOVE: (f64, f64) = (1.0, 1.8);
-const BELOW: (f64, f64) = (-0.3, -0.8);
-/// In heights of the window: a wall that is farther than another by this much counts e times less. In a lumen narrower than
-/// the device both sides are near, and their mean would hold nothing.
-const NEARER: f64 = 0.3;
-/// Beyond its centre of curvature a vertex is not the nearest: there, or this far above the thickest device in radii, its window
-/// begins to fall, …
-const CENTRE: f64 = 1.05;
-/// … and is closed at this many times that height.
-const BEYOND_CENTRE: f64 = 1.15;
-/// The smooth wall lies no farther than this part of the thinnest device's radius beyond a triangle: the barrier of
-/// [`crate::contact::WallPotential`] stands at three tenths.
-const BEYOND: f64 = 0.2;
-/// Intervals along each side of a triangle at whose ends that is checked, …
-const CHECKED: u32 = 4;
-/// … unless few points differ by less than this part of what is allowed.
-const ENOUGH: f64 = 0.25;
-
-/// A window and its derivatives: 1 up to `from`, 0 from `to` on, in between 1 − t³(10 − 15t + 6t²).
-#[inline]
-fn fall(at: f64, from: f64, to: f64) -> [f64; 3] {
-    let inverse = 1.0 / (to - from);
-    let t = (at - from) * inverse;
-    if t <= 0.0 {
-        return [1.0, 0.0, 0.0];
-    }
-    if t >= 1.0 {
-        return [0.0; 3];
-    }
-    let (s, tt) = (1.0 - t, t * t);
-    [
-        1.0 - tt * t * (10.0 + t * (6.0 * t - 15.0)),
-        -30.0 * tt * s * s * inverse,
-        -60.0 * t * s * (s - t) * inverse * inverse,
-    ]
-}
-
-/// 1/(1 − hκ), by which feet are farther than offsets, with its derivatives in h. It levels off before hκ comes to 1.
-#[derive(Debug, Clone, Copy)]
-struct Spread {
-    value: f64,
-    first: f64,
-    second: f64,
-}
-
-impl Spread {
-    #[inline]
-    fn at(height: f64, curvature: f64) -> Self {
-        let t = height * curvature;
-        let x = ((t - STEEP) / LEVEL).clamp(0.0, 1.0);
-        // Slope 1 − 3x² + 2x³ where it levels off.
-        let s = if t <= STEEP { t } else { STEEP + LEVEL * (x - x * x * x + 0.5 * x * x * x * x) };
-        let slope = (1.0 - 3.0 * x * x + 2.0 * x * x * x) * curvature;
-        let bend = 6.0 * (x * x - x) / LEVEL * curvature * curvature;
-        let value = 1.0 / (1.0 - s);
-        let square = value * value;
-        Self { value, first: square * slope, second: square * (2.0 * value * slope * slope + bend) }
-    }
-}
-
-/// A point seen from a vertex, along its principal directions.
-struct Local {
-    tau: Vector2<f64>,
-    spread: [Spread; 2],
-    /// Mσ.
-    across: Vector2<f64>,
-    /// u = σᵀMσ.
-    u: f64,
-    /// Q.
-    value: f64,
-}
-
-impl Quadric {
-    /// What is seen of `x`; `None` beyond the support.
-    #[inline]
-    fn local(&self, x: &Vec3) -> Option<Local> {
-        let y = x - self.position;
-        let rise = self.normal.dot(&y);
-        let height = rise - self.offset_mm;
-        let [k, l] = self.curvature;
-        // The least that feet can be nearer than offsets: most vertices are too far, and this is soon said.
-        let nearer = (1.0 - (height * k).min(height * l).min(0.0)) * self.half_axes_mm.1;
-        if y.norm_squared() - rise * rise >= nearer * nearer {
-            return None;
-        }
-        let tau = Vector2::new(self.axes[0].dot(&y), self.axes[1].dot(&y));
-        let spread = [Spread::at(height, k), Spread::at(height, l)];
-        let sigma = Vector2::new(spread[0].value * tau.x, spread[1].value * tau.y);
-        let across = self.support * sigma;
-        let u = sigma.dot(&across);
-        let value = height - 0.5 * (k * sigma.x * tau.x + l * sigma.y * tau.y);
-        (u < 1.0).then_some(Local { tau, spread, across, u, value })
-    }
-
-    /// Derivatives of Q and of u along the principal directions and the normal.
-    #[inline]
-    fn derivatives(&self, local: &Local) -> [(Vec3, Matrix3<f64>); 2] {
-        let Local { tau, spread, across, .. } = local;
-        let (mut f1, mut u1) = (Vec3::z(), Vec3::zeros());
-        let (mut f2, mut u2) = (Matrix3::zeros(), Matrix3::zeros());
-        for i in 0..2 {
-            let (t, k, v, Spread { value, first, second }) =
-                (tau[i], self.curvature[i], across[i], spread[i]);
-            f1[i] = -k * value * t;
-            f1[2] -= 0.5 * k * first * t * t;
-            f2[(i, i)] = -k * value;
-            f2[(i, 2)] = -k * first * t;
-            f2[(2, 2)] -= 0.5 * k * second * t * t;
-            u1[i] = 2.0 * value * v;
-            u1[2] += 2.0 * first * t * v;
-            u2[(i, 2)] = 2.0 * first * v;
-            u2[(2, 2)] += 2.0 * second * t * v;
-            for j in 0..2 {
-                let m = 2.0 * self.support[(i, j)];
-                let other = spread[j].first * tau[j];
-                u2[(i, j)] = m * value * spread[j].value;
-                u2[(i, 2)] += m * value * other;
-                u2[(2, 2)] += m * first * t * other;
-            }
-        }
-        for second in [&mut f2, &mut u2] {
-            (second[(2, 0)], second[(2, 1)]) = (second[(0, 2)], second[(1, 2)]);
-        }
-        [(f1, f2), (u1, u2)]
-    }
-
-    /// b(Q) and its derivatives.
-    #[inline]
-    fn window(&self, value: f64) -> [f64; 3] {
-        let (from, to) = if value > 0.0 { self.above_mm } else { self.below_mm };
-        let [b, b1, b2] = fall(value, from, to);
-        if b == 0.0 {
-            return [0.0; 3];
-        }
-        let rate = BELOW.0 / (NEARER * self.below_mm.0);
-        let e = (-rate * value).exp();
-        [b * e, (b1 - rate * b) * e, (b2 - 2.0 * rate * b1 + rate * rate * b) * e]
-    }
 }
 
 /// The smooth wall.
@@ -251,17 +85,7 @@ impl SmoothWall {
         let normals = vertex_normals(mesh);
         let mut quadrics: Vec<Quadric> =
             (0..count).map(|v| fit(v, &mesh.vertices_mm, &normals, &neighbours)).collect();
-        for q in &mut quadrics {
-            let size = (WINDOW.0 * thickest_mm).max(WINDOW.1 * q.half_axes_mm.0);
-            // The first curvature is the larger one.
-            let centre = if q.curvature[0] > 0.0 {
-                (CENTRE * thickest_mm).max(q.curvature[0].recip())
-            } else {
-                f64::MAX
-            };
-            q.above_mm = ((ABOVE.0 * size).min(centre), (ABOVE.1 * size).min(BEYOND_CENTRE * centre));
-            q.below_mm = (BELOW.0 * size, BELOW.1 * size);
-        }
+        quadrics.iter_mut().for_each(|q| q.open_window(thickest_mm));
 
         let mut starts = Vec::with_capacity(mesh.triangles.len() + 1);
         let mut lists = Vec::new();
@@ -419,134 +243,6 @@ fn few([a, b, c]: &[Vec3; 3]) -> [Vec3; 4] {
 fn grid([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
     let part = |k: u32| f64::from(k) / f64::from(CHECKED);
     (0..=CHECKED).flat_map(move |i| (0..=CHECKED - i).map(move |j| a + (b - a) * part(i) + (c - a) * part(j)))
-}
-
-/// Vertices that share an edge with each vertex, ascending.
-fn vertex_neighbours(triangles: &[[u32; 3]], count: usize) -> Vec<Vec<u32>> {
-    let mut neighbours = vec![Vec::new(); count];
-    for t in triangles {
-        for k in 0..3 {
-            neighbours[t[k] as usize].extend([t[(k + 1) % 3], t[(k + 2) % 3]]);
-        }
-    }
-    for list in &mut neighbours {
-        list.sort_unstable();
-        list.dedup();
-    }
-    neighbours
-}
-
-/// Angle-weighted inward normals.
-fn vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
-    let mut normals = vec![Vec3::zeros(); mesh.vertices_mm.len()];
-    for (index, triangle) in mesh.triangles.iter().enumerate() {
-        let corner = mesh.corners(index);
-        let Some(outward) = (corner[1] - corner[0]).cross(&(corner[2] - corner[0])).try_normalize(0.0) else {
-            continue;
-        };
-        for k in 0..3 {
-            let (e, f) = (corner[(k + 1) % 3] - corner[k], corner[(k + 2) % 3] - corner[k]);
-            normals[triangle[k] as usize] -= outward * e.cross(&f).norm().atan2(e.dot(&f));
-        }
-    }
-    for normal in &mut normals {
-        *normal = normal.try_normalize(1e-12).unwrap_or_else(Vec3::x);
-    }
-    normals
-}
-
-/// The smallest ellipse of its shape that holds points of a plane, as a matrix: Σ y yᵀ gives the shape.
-fn ellipse(points: impl Iterator<Item = (f64, f64)> + Clone) -> Matrix2<f64> {
-    let mut spread = Matrix2::zeros();
-    for (p, q) in points.clone() {
-        let y = Vector2::new(p, q);
-        spread += y * y.transpose();
-    }
-    // Neighbours on a line, or none: no needles.
-    spread += Matrix2::identity() * (THINNEST * spread.trace()).max(f64::MIN_POSITIVE);
-    let shape = spread.try_inverse().unwrap_or_else(Matrix2::identity);
-    let farthest =
-        points.map(|(p, q)| Vector2::new(p, q).dot(&(shape * Vector2::new(p, q)))).fold(0.0, f64::max);
-    shape / farthest.max(f64::MIN_POSITIVE)
-}
-
-/// The quadric of vertex `v`: heights of its neighbours and theirs, g·τ + ½ τᵀSτ in its tangent plane, least squares.
-fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[Vec<u32>]) -> Quadric {
-    let (origin, normal) = (vertices[v], normals[v]);
-    let a = {
-        let axis = Vec3::ith(normal.iamin(), 1.0);
-        (axis - normal * normal.dot(&axis)).normalize()
-    };
-    let b = normal.cross(&a);
-    let flat = |w: u32| {
-        let y = vertices[w as usize] - origin;
-        (y.dot(&a), y.dot(&b), y.dot(&normal))
-    };
-    let plane = ellipse(neighbours[v].iter().map(|&w| flat(w)).map(|(p, q, _)| (p, q))) / (SUPPORT * SUPPORT);
-    let axes = plane.symmetric_eigenvalues();
-    let half_axes_mm = (axes.max().sqrt().recip(), axes.min().sqrt().recip());
-    let mut ring: Vec<u32> = neighbours[v].clone();
-    for &w in &neighbours[v] {
-        ring.extend(neighbours[w as usize].iter().copied());
-    }
-    ring.sort_unstable();
-    ring.dedup();
-    let long = half_axes_mm.1;
-    let mut matrix = SMatrix::<f64, 5, 5>::identity() * REGULAR;
-    let mut right = SVector::<f64, 5>::zeros();
-    for &w in &ring {
-        // Beyond a crease or far away there is another surface.
-        if w as usize == v || normals[w as usize].dot(&normal) < 0.3 {
-            continue;
-        }
-        let (p, q, h) = flat(w);
-        let weight = 1.0 / (1.0 + Vector2::new(p, q).dot(&(plane * Vector2::new(p, q))));
-        let (p, q, h) = (p / long, q / long, h / long);
-        let row = SVector::<f64, 5>::new(p, q, 0.5 * p * p, p * q, 0.5 * q * q);
-        matrix += row * row.transpose() * weight;
-        right += row * (h * weight);
-    }
-    let found = matrix.cholesky().map_or_else(SVector::zeros, |c| c.solve(&right));
-    // A fit that leans over is none; neither is one that is not a number.
-    let usable = found[0].hypot(found[1]) <= 0.5;
-    let (tilt, bend) = if usable {
-        (Vector2::new(found[0], found[1]), Matrix2::new(found[2], found[3], found[3], found[4]) / long)
-    } else {
-        (Vector2::zeros(), Matrix2::zeros())
-    };
-    // Sag over the support against its half axes, direction by direction.
-    let size = (0..2)
-        .map(|i| {
-            (0..2)
-                .map(|j| (bend[(i, j)] / plane[(i, i)].sqrt().sqrt() / plane[(j, j)].sqrt().sqrt()).abs())
-                .sum::<f64>()
-        })
-        .fold(0.0, f64::max);
-    let bend = bend * (LARGEST_BEND / size.max(1e-300)).min(1.0);
-    // The plane of the fit, and curvature and support seen from it.
-    let normal = (normal - a * tilt.x - b * tilt.y).normalize();
-    let seen = |m: &Matrix2<f64>, v: &Vec3, w: &Vec3| {
-        let (v, w) = (Vector2::new(v.dot(&a), v.dot(&b)), Vector2::new(w.dot(&a), w.dot(&b)));
-        v.dot(&(m * w))
-    };
-    let p = (a - normal * normal.dot(&a)).normalize();
-    let q = normal.cross(&p);
-    let (pp, pq, qq) = (seen(&bend, &p, &p), seen(&bend, &p, &q), seen(&bend, &q, &q));
-    let (mean, half) = (0.5 * (pp + qq), 0.5 * (pp - qq));
-    let apart = half.hypot(pq);
-    let (sin, cos) = (0.5 * pq.atan2(half)).sin_cos();
-    let axes = [p * cos + q * sin, q * cos - p * sin];
-    Quadric {
-        position: origin,
-        normal,
-        curvature: [mean + apart, mean - apart],
-        support: Matrix2::from_fn(|i, j| seen(&plane, &axes[i], &axes[j])),
-        axes,
-        half_axes_mm,
-        offset_mm: 0.0,
-        above_mm: (0.0, 0.0),
-        below_mm: (0.0, 0.0),
-    }
 }
 
 #[cfg(test)]

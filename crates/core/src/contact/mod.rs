@@ -3,8 +3,10 @@
 pub mod distance;
 pub mod extension;
 pub mod felt;
+mod fit;
 pub mod friction;
 pub mod potential;
+mod quadric;
 pub mod wall;
 
 pub use distance::{Distance, SmoothWall};

@@ -63,7 +63,7 @@ impl ContactPoint {
 
 /// What a point knows of its surroundings.
 #[derive(Debug, Clone, Copy)]
-struct Known {
+pub struct KnownPoint {
     /// Where the wall was last looked for.
     looked_at: Vec3,
     /// No wall is nearer to that place than this, mm.
@@ -78,7 +78,7 @@ struct Known {
     near: Option<Distance>,
 }
 
-impl Default for Known {
+impl Default for KnownPoint {
     fn default() -> Self {
         Self {
             looked_at: Vec3::zeros(),
@@ -171,10 +171,6 @@ pub struct WallContact<'a> {
     pub counters: Counters,
 }
 
-/// Opaque memory of one point, kept between steps.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct KnownPoint(Known);
-
 impl<'a> WallContact<'a> {
     /// The wall's energy at `points` (tip first), with what is known from earlier steps. `softest_nmm2` is the device's
     /// least bending stiffness.
@@ -205,7 +201,7 @@ impl<'a> WallContact<'a> {
         let potential = self.points[index].potential;
         let radius = potential.radius_mm;
         let near = radius * (1.0 + FOLLOW);
-        let KnownPoint(known) = &mut self.known[index];
+        let known = &mut self.known[index];
         if self.skip {
             let moved = (x - known.looked_at).norm();
             let clearance = known.clearance_mm - moved;
@@ -295,7 +291,7 @@ impl<'a> WallContact<'a> {
                 force_n,
                 friction_n: rub.map_or_else(Vec3::zeros, |f| -f.gradient),
                 penetration_mm,
-                triangle: self.known[index].0.triangle.unwrap_or(0),
+                triangle: self.known[index].triangle.unwrap_or(0),
             },
         })
     }
@@ -333,7 +329,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, state);
             let reading = self.read(index, &x);
-            let KnownPoint(known) = &mut self.known[index];
+            let known = &mut self.known[index];
             known.base = x;
             (known.base_clearance_mm, known.near) = match reading {
                 Reading::Free(clearance) => (clearance, None),
@@ -345,14 +341,14 @@ impl<const C: usize> External<C> for WallContact<'_> {
             };
         }
         if self.friction.acts() {
-            let pressed = self.points.iter().zip(self.known.iter()).map(|(point, KnownPoint(known))| {
+            let pressed = self.points.iter().zip(self.known.iter()).map(|(point, known)| {
                 known.near.map_or((Vec3::zeros(), 0.0), |d| point.pressed(&d, self.softness))
             });
             self.friction.follow(pressed, self.least_moment_nmm / LEAST_BEND_MM);
         }
         for index in 0..self.points.len() {
             let point = self.points[index];
-            let KnownPoint(known) = self.known[index];
+            let known = self.known[index];
             if self.friction.acts() {
                 self.add_friction(elements, state, assembly, index, &known.base);
             }
@@ -385,7 +381,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
         let mut fraction: f64 = 1.0;
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, to);
-            let KnownPoint(known) = &self.known[index];
+            let known = &self.known[index];
             let (base, mut clearance) = (known.base, known.base_clearance_mm);
             let moved = (x - base).norm();
             if moved <= SAFE * clearance * fraction.min(1.0) || moved == 0.0 {

@@ -1,0 +1,144 @@
+//! Quadrics fitted to the vertices of a mesh: normals, curvatures and the ellipses that hold a vertex's neighbours.
+
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+
+use super::quadric::Quadric;
+use crate::Vec3;
+use crate::vessel::SurfaceMesh;
+
+/// Support of a vertex over its edges: every point of a triangle lies well inside that of its three corners.
+const SUPPORT: f64 = 1.1;
+/// Largest curvature times support: beyond it a corner is a corner, and a quadric would fold over.
+const LARGEST_BEND: f64 = 0.8;
+/// Square of the thinnest ellipse's ratio of axes, about.
+const THINNEST: f64 = 0.01;
+/// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.
+const REGULAR: f64 = 1e-6;
+
+/// Vertices that share an edge with each vertex, ascending.
+pub(super) fn vertex_neighbours(triangles: &[[u32; 3]], count: usize) -> Vec<Vec<u32>> {
+    let mut neighbours = vec![Vec::new(); count];
+    for t in triangles {
+        for k in 0..3 {
+            neighbours[t[k] as usize].extend([t[(k + 1) % 3], t[(k + 2) % 3]]);
+        }
+    }
+    for list in &mut neighbours {
+        list.sort_unstable();
+        list.dedup();
+    }
+    neighbours
+}
+
+/// Angle-weighted inward normals.
+pub(super) fn vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::zeros(); mesh.vertices_mm.len()];
+    for (index, triangle) in mesh.triangles.iter().enumerate() {
+        let corner = mesh.corners(index);
+        let Some(outward) = (corner[1] - corner[0]).cross(&(corner[2] - corner[0])).try_normalize(0.0) else {
+            continue;
+        };
+        for k in 0..3 {
+            let (e, f) = (corner[(k + 1) % 3] - corner[k], corner[(k + 2) % 3] - corner[k]);
+            normals[triangle[k] as usize] -= outward * e.cross(&f).norm().atan2(e.dot(&f));
+        }
+    }
+    for normal in &mut normals {
+        *normal = normal.try_normalize(1e-12).unwrap_or_else(Vec3::x);
+    }
+    normals
+}
+
+/// The smallest ellipse of its shape that holds points of a plane, as a matrix: Σ y yᵀ gives the shape.
+fn ellipse(points: impl Iterator<Item = (f64, f64)> + Clone) -> Matrix2<f64> {
+    let mut spread = Matrix2::zeros();
+    for (p, q) in points.clone() {
+        let y = Vector2::new(p, q);
+        spread += y * y.transpose();
+    }
+    // Neighbours on a line, or none: no needles.
+    spread += Matrix2::identity() * (THINNEST * spread.trace()).max(f64::MIN_POSITIVE);
+    let shape = spread.try_inverse().unwrap_or_else(Matrix2::identity);
+    let farthest =
+        points.map(|(p, q)| Vector2::new(p, q).dot(&(shape * Vector2::new(p, q)))).fold(0.0, f64::max);
+    shape / farthest.max(f64::MIN_POSITIVE)
+}
+
+/// The quadric of vertex `v`: heights of its neighbours and theirs, g·τ + ½ τᵀSτ in its tangent plane, least squares.
+pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[Vec<u32>]) -> Quadric {
+    let (origin, normal) = (vertices[v], normals[v]);
+    let a = {
+        let axis = Vec3::ith(normal.iamin(), 1.0);
+        (axis - normal * normal.dot(&axis)).normalize()
+    };
+    let b = normal.cross(&a);
+    let flat = |w: u32| {
+        let y = vertices[w as usize] - origin;
+        (y.dot(&a), y.dot(&b), y.dot(&normal))
+    };
+    let plane = ellipse(neighbours[v].iter().map(|&w| flat(w)).map(|(p, q, _)| (p, q))) / (SUPPORT * SUPPORT);
+    let axes = plane.symmetric_eigenvalues();
+    let half_axes_mm = (axes.max().sqrt().recip(), axes.min().sqrt().recip());
+    let mut ring: Vec<u32> = neighbours[v].clone();
+    for &w in &neighbours[v] {
+        ring.extend(neighbours[w as usize].iter().copied());
+    }
+    ring.sort_unstable();
+    ring.dedup();
+    let long = half_axes_mm.1;
+    let mut matrix = SMatrix::<f64, 5, 5>::identity() * REGULAR;
+    let mut right = SVector::<f64, 5>::zeros();
+    for &w in &ring {
+        // Beyond a crease or far away there is another surface.
+        if w as usize == v || normals[w as usize].dot(&normal) < 0.3 {
+            continue;
+        }
+        let (p, q, h) = flat(w);
+        let weight = 1.0 / (1.0 + Vector2::new(p, q).dot(&(plane * Vector2::new(p, q))));
+        let (p, q, h) = (p / long, q / long, h / long);
+        let row = SVector::<f64, 5>::new(p, q, 0.5 * p * p, p * q, 0.5 * q * q);
+        matrix += row * row.transpose() * weight;
+        right += row * (h * weight);
+    }
+    let found = matrix.cholesky().map_or_else(SVector::zeros, |c| c.solve(&right));
+    // A fit that leans over is none; neither is one that is not a number.
+    let usable = found[0].hypot(found[1]) <= 0.5;
+    let (tilt, bend) = if usable {
+        (Vector2::new(found[0], found[1]), Matrix2::new(found[2], found[3], found[3], found[4]) / long)
+    } else {
+        (Vector2::zeros(), Matrix2::zeros())
+    };
+    // Sag over the support against its half axes, direction by direction.
+    let size = (0..2)
+        .map(|i| {
+            (0..2)
+                .map(|j| (bend[(i, j)] / plane[(i, i)].sqrt().sqrt() / plane[(j, j)].sqrt().sqrt()).abs())
+                .sum::<f64>()
+        })
+        .fold(0.0, f64::max);
+    let bend = bend * (LARGEST_BEND / size.max(1e-300)).min(1.0);
+    // The plane of the fit, and curvature and support seen from it.
+    let normal = (normal - a * tilt.x - b * tilt.y).normalize();
+    let seen = |m: &Matrix2<f64>, v: &Vec3, w: &Vec3| {
+        let (v, w) = (Vector2::new(v.dot(&a), v.dot(&b)), Vector2::new(w.dot(&a), w.dot(&b)));
+        v.dot(&(m * w))
+    };
+    let p = (a - normal * normal.dot(&a)).normalize();
+    let q = normal.cross(&p);
+    let (pp, pq, qq) = (seen(&bend, &p, &p), seen(&bend, &p, &q), seen(&bend, &q, &q));
+    let (mean, half) = (0.5 * (pp + qq), 0.5 * (pp - qq));
+    let apart = half.hypot(pq);
+    let (sin, cos) = (0.5 * pq.atan2(half)).sin_cos();
+    let axes = [p * cos + q * sin, q * cos - p * sin];
+    Quadric {
+        position: origin,
+        normal,
+        curvature: [mean + apart, mean - apart],
+        support: Matrix2::from_fn(|i, j| seen(&plane, &axes[i], &axes[j])),
+        axes,
+        half_axes_mm,
+        offset_mm: 0.0,
+        above_mm: (0.0, 0.0),
+        below_mm: (0.0, 0.0),
+    }
+}

@@ -1,0 +1,179 @@
+//! The quadric of one vertex of the smooth wall: value, foot and window. See [`super::distance`] for the formulas.
+
+use nalgebra::{Matrix2, Matrix3, Vector2};
+
+use crate::Vec3;
+
+/// Height times curvature is taken as it is up to this, …
+const STEEP: f64 = 0.7;
+/// … and beyond levels off within this, so that feet stay finite at the centre of curvature.
+const LEVEL: f64 = 0.4;
+
+/// The quadric of one vertex.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Quadric {
+    pub(super) position: Vec3,
+    pub(super) normal: Vec3,
+    /// Principal directions, across the normal.
+    pub(super) axes: [Vec3; 2],
+    /// S along them, 1/mm; positive where the wall bends around the lumen.
+    pub(super) curvature: [f64; 2],
+    /// M in them, 1/mm².
+    pub(super) support: Matrix2<f64>,
+    /// Half axes of the support, shortest and longest, mm.
+    pub(super) half_axes_mm: (f64, f64),
+    /// cᵢ, mm.
+    pub(super) offset_mm: f64,
+    /// The window falls from 1 at the first to 0 at the second, above and below the surface, mm.
+    pub(super) above_mm: (f64, f64),
+    pub(super) below_mm: (f64, f64),
+}
+
+/// Window over the radius of the device, and over the support of a vertex: what a fit may be off by on a coarse mesh.
+const WINDOW: (f64, f64) = (1.25, 0.3);
+/// In heights of the window: it falls from 1 at the first to 0 at the second, above and below the surface.
+const ABOVE: (f64, f64) = (1.0, 1.8);
+const BELOW: (f64, f64) = (-0.3, -0.8);
+/// In heights of the window: a wall that is farther than another by this much counts e times less. In a lumen narrower than
+/// the device both sides are near, and their mean would hold nothing.
+const NEARER: f64 = 0.3;
+/// Beyond its centre of curvature a vertex is not the nearest: there, or this far above the thickest device in radii, its window
+/// begins to fall, …
+const CENTRE: f64 = 1.05;
+/// … and is closed at this many times that height.
+const BEYOND_CENTRE: f64 = 1.15;
+
+/// A window and its derivatives: 1 up to `from`, 0 from `to` on, in between 1 − t³(10 − 15t + 6t²).
+#[inline]
+fn fall(at: f64, from: f64, to: f64) -> [f64; 3] {
+    let inverse = 1.0 / (to - from);
+    let t = (at - from) * inverse;
+    if t <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    if t >= 1.0 {
+        return [0.0; 3];
+    }
+    let (s, tt) = (1.0 - t, t * t);
+    [
+        1.0 - tt * t * (10.0 + t * (6.0 * t - 15.0)),
+        -30.0 * tt * s * s * inverse,
+        -60.0 * t * s * (s - t) * inverse * inverse,
+    ]
+}
+
+/// 1/(1 − hκ), by which feet are farther than offsets, with its derivatives in h. It levels off before hκ comes to 1.
+#[derive(Debug, Clone, Copy)]
+struct Spread {
+    value: f64,
+    first: f64,
+    second: f64,
+}
+
+impl Spread {
+    #[inline]
+    fn at(height: f64, curvature: f64) -> Self {
+        let t = height * curvature;
+        let x = ((t - STEEP) / LEVEL).clamp(0.0, 1.0);
+        // Slope 1 − 3x² + 2x³ where it levels off.
+        let s = if t <= STEEP { t } else { STEEP + LEVEL * (x - x * x * x + 0.5 * x * x * x * x) };
+        let slope = (1.0 - 3.0 * x * x + 2.0 * x * x * x) * curvature;
+        let bend = 6.0 * (x * x - x) / LEVEL * curvature * curvature;
+        let value = 1.0 / (1.0 - s);
+        let square = value * value;
+        Self { value, first: square * slope, second: square * (2.0 * value * slope * slope + bend) }
+    }
+}
+
+/// A point seen from a vertex, along its principal directions.
+pub(super) struct Local {
+    pub(super) tau: Vector2<f64>,
+    spread: [Spread; 2],
+    /// Mσ.
+    pub(super) across: Vector2<f64>,
+    /// u = σᵀMσ.
+    pub(super) u: f64,
+    /// Q.
+    pub(super) value: f64,
+}
+
+impl Quadric {
+    /// What is seen of `x`; `None` beyond the support.
+    #[inline]
+    pub(super) fn local(&self, x: &Vec3) -> Option<Local> {
+        let y = x - self.position;
+        let rise = self.normal.dot(&y);
+        let height = rise - self.offset_mm;
+        let [k, l] = self.curvature;
+        // The least that feet can be nearer than offsets: most vertices are too far, and this is soon said.
+        let nearer = (1.0 - (height * k).min(height * l).min(0.0)) * self.half_axes_mm.1;
+        if y.norm_squared() - rise * rise >= nearer * nearer {
+            return None;
+        }
+        let tau = Vector2::new(self.axes[0].dot(&y), self.axes[1].dot(&y));
+        let spread = [Spread::at(height, k), Spread::at(height, l)];
+        let sigma = Vector2::new(spread[0].value * tau.x, spread[1].value * tau.y);
+        let across = self.support * sigma;
+        let u = sigma.dot(&across);
+        let value = height - 0.5 * (k * sigma.x * tau.x + l * sigma.y * tau.y);
+        (u < 1.0).then_some(Local { tau, spread, across, u, value })
+    }
+
+    /// Derivatives of Q and of u along the principal directions and the normal.
+    #[inline]
+    pub(super) fn derivatives(&self, local: &Local) -> [(Vec3, Matrix3<f64>); 2] {
+        let Local { tau, spread, across, .. } = local;
+        let (mut f1, mut u1) = (Vec3::z(), Vec3::zeros());
+        let (mut f2, mut u2) = (Matrix3::zeros(), Matrix3::zeros());
+        for i in 0..2 {
+            let (t, k, v, Spread { value, first, second }) =
+                (tau[i], self.curvature[i], across[i], spread[i]);
+            f1[i] = -k * value * t;
+            f1[2] -= 0.5 * k * first * t * t;
+            f2[(i, i)] = -k * value;
+            f2[(i, 2)] = -k * first * t;
+            f2[(2, 2)] -= 0.5 * k * second * t * t;
+            u1[i] = 2.0 * value * v;
+            u1[2] += 2.0 * first * t * v;
+            u2[(i, 2)] = 2.0 * first * v;
+            u2[(2, 2)] += 2.0 * second * t * v;
+            for j in 0..2 {
+                let m = 2.0 * self.support[(i, j)];
+                let other = spread[j].first * tau[j];
+                u2[(i, j)] = m * value * spread[j].value;
+                u2[(i, 2)] += m * value * other;
+                u2[(2, 2)] += m * first * t * other;
+            }
+        }
+        for second in [&mut f2, &mut u2] {
+            (second[(2, 0)], second[(2, 1)]) = (second[(0, 2)], second[(1, 2)]);
+        }
+        [(f1, f2), (u1, u2)]
+    }
+
+    /// Sets the window for devices up to `thickest_mm` in radius.
+    pub(super) fn open_window(&mut self, thickest_mm: f64) {
+        let size = (WINDOW.0 * thickest_mm).max(WINDOW.1 * self.half_axes_mm.0);
+        // The first curvature is the larger one.
+        let centre = if self.curvature[0] > 0.0 {
+            (CENTRE * thickest_mm).max(self.curvature[0].recip())
+        } else {
+            f64::MAX
+        };
+        self.above_mm = ((ABOVE.0 * size).min(centre), (ABOVE.1 * size).min(BEYOND_CENTRE * centre));
+        self.below_mm = (BELOW.0 * size, BELOW.1 * size);
+    }
+
+    /// b(Q) and its derivatives.
+    #[inline]
+    pub(super) fn window(&self, value: f64) -> [f64; 3] {
+        let (from, to) = if value > 0.0 { self.above_mm } else { self.below_mm };
+        let [b, b1, b2] = fall(value, from, to);
+        if b == 0.0 {
+            return [0.0; 3];
+        }
+        let rate = BELOW.0 / (NEARER * self.below_mm.0);
+        let e = (-rate * value).exp();
+        [b * e, (b1 - rate * b) * e, (b2 - 2.0 * rate * b1 + rate * rate * b) * e]
+    }
+}
