@@ -13,8 +13,9 @@
 //! f(x)  = Σ wᵢQᵢ / Σ wᵢ
 //! ```
 //!
-//! with Nᵢ the inward normal, Sᵢ the curvature and Mᵢ an ellipse that holds the neighbours of the vertex. The window b, 1 for
-//! small |Qᵢ| and 0 far away, leaves out the other side of a narrow lumen and the back of a thin septum. Feet, not offsets,
+//! with Nᵢ the inward normal, Sᵢ the curvature and Mᵢ an ellipse that holds the neighbours of the vertex. The window b, e^{−Qᵢ/0.3w} for
+//! small |Qᵢ| and 0 beyond a width w, leaves out the other side of a narrow lumen and the back of a thin septum; where a device
+//! touches two sides at once, the nearer holds it. Feet, not offsets,
 //! say which vertices are near: at height h in a tube of radius R offsets shrink by 1 − h/R, and a device that nearly fills the
 //! tube would blend walls all around it, and find a play too large by a tenth of the radius. f is twice continuously
 //! differentiable, so a device feels an energy with an exact gradient and Hessian; from the distance to the sampled surface it
