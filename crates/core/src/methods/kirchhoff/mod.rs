@@ -10,7 +10,7 @@
 //! ```
 //!
 //! of which the terms after the first are configurational: the energy that the next piece takes up as it leaves the
-//! straight sheath ([`Clamp::push_force`]). F is the derivative of the stored energy with respect to the inserted length.
+//! straight sheath ([`Clamp::push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with respect to the inserted length.
 
 mod configuration;
 pub(crate) mod mesh;
