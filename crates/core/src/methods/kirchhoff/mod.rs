@@ -39,7 +39,7 @@ use slide::Extension;
 pub struct KirchhoffOptions {
     /// Element length, mm.
     pub element_mm: f64,
-    /// Most Newton iterations of one sub-step.
+    /// Most Newton iterations of one solution; a command may take ten times as many.
     pub max_iterations: usize,
     /// Whether work that cannot change the result is skipped; off only to show that it does not.
     pub skip: bool,
@@ -57,6 +57,9 @@ const ELEMENT_LIMIT: f64 = 100_000.0;
 const ZERO_LENGTH_MM: f64 = 1e-9;
 /// Most sub-steps that one command may be cut into.
 const SUBSTEP_LIMIT: usize = 4096;
+/// Newton iterations that a command may take in all its sub-steps, those in vain included, as a multiple of those that one
+/// solution may take: a command that gets nowhere comes to an end.
+const WORK: usize = 10;
 /// Part of the tip's radius by which a device is pushed on at least, where its tip stands head-on against the wall.
 const LEAST_WAY: f64 = 0.05;
 /// A step is a jump if more than this part of the stored energy was set free.
@@ -179,6 +182,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
             (r.rotation_rad, r.push_force_n, r.torque_nmm, r.energy.total())
         };
         let (mut iterations, mut substeps, mut dissipated_mj) = (0, 0, 0.0);
+        let work = WORK.saturating_mul(self.options.max_iterations);
+        let mut budget = work;
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
@@ -211,7 +216,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 self.current.withdraw(tail);
                 break;
             }
-            match self.try_step(surroundings, inserted, tail, blocked) {
+            match self.try_step(surroundings, (inserted, tail), blocked, &mut budget) {
                 Ok(found) => {
                     iterations += found.iterations;
                     dissipated_mj += found.dissipated_mj;
@@ -238,7 +243,10 @@ impl<const C: usize> Method for Kirchhoff<C> {
                     may_carry = false;
                 }
             }
-            if share < 1e-7 || substeps > SUBSTEP_LIMIT {
+            if done < 1.0 && budget == 0 {
+                failure = format!("{work} Newton iterations used up");
+            }
+            if done < 1.0 && (share < 1e-7 || substeps > SUBSTEP_LIMIT || budget == 0) {
                 self.go_back(moved);
                 return Err(Error::Computation(format!(
                     "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"

@@ -26,13 +26,14 @@ pub(super) struct Found {
 
 impl<const C: usize> Kirchhoff<C> {
     /// One sub-step: slides and solves on `self.next`; the current state is not touched. Where the tip's way is blocked,
-    /// the guess that slides is none: the one that carries the tip's shape must do.
+    /// the guess that slides is none: the one that carries the tip's shape must do. Newton iterations are taken from
+    /// `budget`.
     pub(super) fn try_step(
         &mut self,
         surroundings: &Surroundings<'_>,
-        inserted_mm: f64,
-        tail_rad: f64,
+        (inserted_mm, tail_rad): (f64, f64),
         blocked: bool,
+        budget: &mut usize,
     ) -> std::result::Result<Found, String> {
         let modulus = surroundings.properties.modulus_n_per_mm2;
         let (now, next) = (&self.current, &mut self.next);
@@ -92,7 +93,7 @@ impl<const C: usize> Kirchhoff<C> {
         let found = loop {
             contact.softness = softness;
             let options = NewtonOptions {
-                max_iterations: self.options.max_iterations,
+                max_iterations: self.options.max_iterations.min(*budget),
                 tolerance: if softness < 1.0 { LOOSE } else { TOLERANCE },
                 ..NewtonOptions::default()
             };
@@ -104,6 +105,7 @@ impl<const C: usize> Kirchhoff<C> {
                 &options,
             );
             iterations += found.iterations;
+            *budget -= found.iterations;
             if !found.converged {
                 break found;
             }
