@@ -10,7 +10,8 @@
 //! ```
 //!
 //! of which the terms after the first are configurational: the energy that the next piece takes up as it leaves the
-//! straight sheath ([`Clamp::push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with respect to the inserted length.
+//! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with respect
+//! to the inserted length.
 
 mod configuration;
 pub(crate) mod mesh;
@@ -188,7 +189,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
         let mut share = 1.0f64;
-        let mut failure = String::new();
+        let mut failure = String::from("the way is too long for one step");
         let mut may_carry = self.shaped_mm > 0.0;
         while done < 1.0 {
             let rest = 1.0 - done;
@@ -243,13 +244,12 @@ impl<const C: usize> Method for Kirchhoff<C> {
                     may_carry = false;
                 }
             }
-            if done < 1.0 && budget == 0 {
-                failure = format!("{work} Newton iterations used up");
-            }
             if done < 1.0 && (share < 1e-7 || substeps > SUBSTEP_LIMIT || budget == 0) {
                 self.go_back(moved);
+                let within =
+                    if budget == 0 { format!(" within {work} Newton iterations") } else { String::new() };
                 return Err(Error::Computation(format!(
-                    "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
+                    "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted{within}: {failure}"
                 )));
             }
         }

@@ -15,6 +15,8 @@ const SOFTEST: f64 = 30.0;
 const LOOSE: f64 = 1e-3;
 /// Equilibria that may be found before friction and the forces it follows from have settled.
 const RENEWALS: usize = 100;
+/// What is the matter where they do not.
+const UNSETTLED: &str = "friction and wall forces do not settle";
 
 /// How an equilibrium was found.
 pub(super) struct Found {
@@ -118,7 +120,7 @@ impl<const C: usize> Kirchhoff<C> {
             }
             renewals += 1;
             if renewals > RENEWALS {
-                return Err("friction and wall forces do not settle".to_owned());
+                return Err(UNSETTLED.to_owned());
             }
         };
         let nodes = elements as u64 + 1;
@@ -127,7 +129,10 @@ impl<const C: usize> Kirchhoff<C> {
         contact.counters.nodes_frozen += frozen;
         self.report.counters.add(&contact.counters);
         if !found.converged {
-            return Err(format!("{} (residual {:.1e})", found.reason, found.residual));
+            // Each renewal of the lagged forces gave Newton's method another energy to lower.
+            let unsettled = surroundings.properties.friction > 0.0 && !contact.friction_settled();
+            let reason = if unsettled { UNSETTLED.to_owned() } else { found.reason.to_string() };
+            return Err(format!("{reason} (residual {:.1e})", found.residual));
         }
         let dissipated_mj = next.friction.dissipated_mj(&next.mesh.elements, &next.state, &next.mesh.points);
         Ok(Found { iterations, dissipated_mj })
