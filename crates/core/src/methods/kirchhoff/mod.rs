@@ -19,6 +19,8 @@ mod readout;
 mod slide;
 mod substep;
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use crate::contact::extension::{LEAVE_MM, left_through};
@@ -189,7 +191,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
         let mut share = 1.0f64;
-        let mut failure = String::from("the way is too long for one step");
+        let mut failure = Cow::from("the way is too long for one step");
         let mut may_carry = self.shaped_mm > 0.0;
         while done < 1.0 {
             let rest = 1.0 - done;

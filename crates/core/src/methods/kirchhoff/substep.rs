@@ -1,5 +1,7 @@
 //! One sub-step: a guess of where the device will be, and Newton's method from there.
 
+use std::borrow::Cow;
+
 use super::slide::{carry, slide};
 use super::{Kirchhoff, softest};
 use crate::contact::{HandMotion, WallContact};
@@ -36,7 +38,7 @@ impl<const C: usize> Kirchhoff<C> {
         (inserted_mm, tail_rad): (f64, f64),
         blocked: bool,
         budget: &mut usize,
-    ) -> std::result::Result<Found, String> {
+    ) -> std::result::Result<Found, Cow<'static, str>> {
         let modulus = surroundings.properties.modulus_n_per_mm2;
         let (now, next) = (&self.current, &mut self.next);
         next.mesh.build(surroundings.device, inserted_mm, self.options.element_mm, modulus);
@@ -83,7 +85,7 @@ impl<const C: usize> Kirchhoff<C> {
             }
         }
         if outside {
-            return Err("the slid rod is beyond the wall".to_owned());
+            return Err("the slid rod is beyond the wall".into());
         }
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
@@ -120,7 +122,7 @@ impl<const C: usize> Kirchhoff<C> {
             }
             renewals += 1;
             if renewals > RENEWALS {
-                return Err(UNSETTLED.to_owned());
+                return Err(UNSETTLED.into());
             }
         };
         let nodes = elements as u64 + 1;
@@ -132,7 +134,7 @@ impl<const C: usize> Kirchhoff<C> {
             // Each renewal of the lagged forces gave Newton's method another energy to lower.
             let unsettled = surroundings.properties.friction > 0.0 && !contact.friction_settled();
             let reason = if unsettled { UNSETTLED.to_owned() } else { found.reason.to_string() };
-            return Err(format!("{reason} (residual {:.1e})", found.residual));
+            return Err(format!("{reason} (residual {:.1e})", found.residual).into());
         }
         let dissipated_mj = next.friction.dissipated_mj(&next.mesh.elements, &next.state, &next.mesh.points);
         Ok(Found { iterations, dissipated_mj })
