@@ -142,20 +142,21 @@ impl<const C: usize> Kirchhoff<C> {
     fn reserve(&mut self, surroundings: &Surroundings<'_>) {
         let device = surroundings.device;
         let modulus = surroundings.properties.modulus_n_per_mm2;
+        let (mut elements, mut points) = (0, 0);
         for configuration in [&mut self.current, &mut self.next, &mut self.before] {
             let mesh = &mut configuration.mesh;
             // The first element may have more contact points than any other.
             mesh.build(device, device.length_mm(), self.options.element_mm, modulus);
-            let (elements, points) = (mesh.elements.len() + 1, mesh.points.len() + MOST_POINTS);
+            (elements, points) = (mesh.elements.len() + 1, mesh.points.len() + MOST_POINTS);
             mesh.reserve(1, MOST_POINTS);
             mesh.clear();
             configuration.state.reserve(elements);
             configuration.friction.reserve(points);
-            self.known.reserve(points);
-            self.report.contacts.reserve(points);
-            self.newton.reserve(elements);
-            self.carried.reserve(elements);
         }
+        self.known.reserve(points);
+        self.report.contacts.reserve(points);
+        self.newton.reserve(elements);
+        self.carried.reserve(elements);
         let nodes = self.current.mesh.from_tip_mm.capacity();
         self.shape.positions_mm.reserve(nodes);
         self.shape.tangents.reserve(nodes);
