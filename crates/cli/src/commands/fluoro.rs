@@ -8,7 +8,7 @@ use endowire_viewer::{ContactView, Moment};
 use crate::args::{FluoroArgs, ViewChoice};
 use crate::failure::Failure;
 use crate::output::frames::{Still, Studio};
-use crate::output::{print_json, progress, tell};
+use crate::output::progress;
 
 /// Carries out the script, then draws.
 pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
@@ -49,15 +49,5 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         let name = format!("frame_{k:06}");
         studio.draw(&Still { name, moment, shape: simulation.shape(), contacts: &contacts })?;
     }
-    let written = studio.finish()?;
-    if args.frames.json {
-        return print_json(&written);
-    }
-    tell(format_args!(
-        "{} files by {} in {}",
-        written.files.len(),
-        written.renderer,
-        written.folder.display()
-    ));
-    Ok(())
+    studio.finish()?.tell(args.frames.json)
 }

@@ -8,7 +8,7 @@ use crate::failure::Failure;
 use crate::output::frames::{Still, Studio};
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::recording::Recording;
-use crate::output::{print_json, progress, tell};
+use crate::output::{progress, tell};
 
 /// Draws the wanted steps.
 pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
@@ -60,15 +60,5 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let written = studio.finish()?;
-    if args.frames.json {
-        return print_json(&written);
-    }
-    tell(format_args!(
-        "{} files by {} in {}",
-        written.files.len(),
-        written.renderer,
-        written.folder.display()
-    ));
-    Ok(())
+    studio.finish()?.tell(args.frames.json)
 }

@@ -16,7 +16,7 @@ use serde_json::Value;
 
 use super::npz::write_map;
 use super::recorder::Recorder;
-use super::to_json;
+use super::{print_json, tell, to_json};
 use crate::args::{FrameArgs, ViewChoice};
 use crate::failure::Failure;
 
@@ -111,6 +111,17 @@ pub(crate) struct Written {
     pub(crate) folder: PathBuf,
     /// Every file, relative to the folder where it lies there.
     pub(crate) files: Vec<PathBuf>,
+}
+
+impl Written {
+    /// Says what was written: the document on stdout, or a line beside it.
+    pub(crate) fn tell(&self, json: bool) -> Result<(), Failure> {
+        if json {
+            return print_json(self);
+        }
+        tell(format_args!("{} files by {} in {}", self.files.len(), self.renderer, self.folder.display()));
+        Ok(())
+    }
 }
 
 /// Draws frames with the wishes of the command line.
