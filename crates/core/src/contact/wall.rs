@@ -9,6 +9,7 @@
 //! its last clearance, nothing can touch it.
 
 use crate::Vec3;
+use super::memory::WallMemory;
 use crate::contact::{Distance, FeltWall, Friction, SmoothWall, WallPotential, friction};
 use crate::insertion::Contact;
 use crate::rod::quadrature::{Point, hermite};
@@ -61,36 +62,6 @@ impl ContactPoint {
     }
 }
 
-/// What a point knows of its surroundings.
-#[derive(Debug, Clone, Copy)]
-pub struct KnownPoint {
-    /// Where the wall was last looked for.
-    looked_at: Vec3,
-    /// No wall is nearer to that place than this, mm.
-    clearance_mm: f64,
-    /// The nearest triangle then, if the wall was near.
-    triangle: Option<u32>,
-    /// Position at the state that Newton's method is leaving.
-    base: Vec3,
-    /// No wall is nearer to it than this, mm.
-    base_clearance_mm: f64,
-    /// Distance there, if the wall is near.
-    near: Option<Distance>,
-}
-
-impl Default for KnownPoint {
-    fn default() -> Self {
-        Self {
-            looked_at: Vec3::zeros(),
-            clearance_mm: -1.0,
-            triangle: None,
-            base: Vec3::zeros(),
-            base_clearance_mm: 0.0,
-            near: None,
-        }
-    }
-}
-
 /// A contact point that presses on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
@@ -107,7 +78,7 @@ pub struct Counters {
     pub queries: u64,
     /// Questions that the quadrics about the last triangle answered.
     pub near: u64,
-    /// Questions that the last clearance answered.
+    /// Questions that the last clearance answered, or the same question before.
     pub avoided: u64,
     /// Nodes of sub-steps in which the device moved to a new equilibrium.
     pub nodes_solved: u64,
@@ -165,7 +136,7 @@ pub struct WallContact<'a> {
     least_moment_nmm: f64,
     /// Part of the modulus that acts: a rigid wall is approached from a softer one.
     pub softness: f64,
-    known: &'a mut Vec<KnownPoint>,
+    memory: &'a mut WallMemory,
     friction: &'a mut Friction,
     /// Work done and avoided.
     pub counters: Counters,
@@ -177,12 +148,12 @@ impl<'a> WallContact<'a> {
     pub fn new(
         felt: &'a FeltWall,
         points: &'a [ContactPoint],
-        known: &'a mut Vec<KnownPoint>,
+        memory: &'a mut WallMemory,
         friction: &'a mut Friction,
         softest_nmm2: f64,
         skip: bool,
     ) -> Self {
-        known.resize(points.len(), KnownPoint::default());
+        memory.resize(points.len());
         Self {
             wall: &felt.smooth,
             query: &felt.query,
@@ -190,7 +161,7 @@ impl<'a> WallContact<'a> {
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
             softness: 1.0,
-            known,
+            memory,
             friction,
             counters: Counters::default(),
         }
@@ -201,7 +172,7 @@ impl<'a> WallContact<'a> {
         let potential = self.points[index].potential;
         let radius = potential.radius_mm;
         let near = radius * (1.0 + FOLLOW);
-        let known = &mut self.known[index];
+        let known = &mut self.memory.points[index];
         if self.skip {
             let moved = (x - known.looked_at).norm();
             let clearance = known.clearance_mm - moved;
@@ -209,10 +180,15 @@ impl<'a> WallContact<'a> {
                 self.counters.avoided += 1;
                 return Reading::Free(clearance);
             }
+            if known.triangle.is_some() && self.memory.readings[index].0 == *x {
+                self.counters.avoided += 1;
+                return Reading::of(self.memory.readings[index].1, &potential);
+            }
             if let Some(triangle) = known.triangle.filter(|_| moved < LOOK_AGAIN * radius)
                 && let Some(distance) = self.wall.distance(x, triangle).filter(|d| d.value_mm > 0.0)
             {
                 self.counters.near += 1;
+                self.memory.readings[index] = (*x, distance);
                 return Reading::of(distance, &potential);
             }
         }
@@ -238,6 +214,7 @@ impl<'a> WallContact<'a> {
             gradient: nearest.normal,
             hessian: Matrix3::zeros(),
         });
+        self.memory.readings[index] = (*x, distance);
         Reading::of(distance, &potential)
     }
 
@@ -291,7 +268,7 @@ impl<'a> WallContact<'a> {
                 force_n,
                 friction_n: rub.map_or_else(Vec3::zeros, |f| -f.gradient),
                 penetration_mm,
-                triangle: self.known[index].triangle.unwrap_or(0),
+                triangle: self.memory.points[index].triangle.unwrap_or(0),
             },
         })
     }
@@ -329,11 +306,11 @@ impl<const C: usize> External<C> for WallContact<'_> {
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, state);
             let reading = self.read(index, &x);
-            let known = &mut self.known[index];
+            let known = &mut self.memory.points[index];
             known.base = x;
             (known.base_clearance_mm, known.near) = match reading {
-                Reading::Free(clearance) => (clearance, None),
-                Reading::Near(d) => (d.value_mm, Some(d)),
+                Reading::Free(clearance) => (clearance, false),
+                Reading::Near(d) => (d.value_mm, true),
                 Reading::Outside => {
                     assembly.external_energy = f64::INFINITY;
                     return;
@@ -341,18 +318,20 @@ impl<const C: usize> External<C> for WallContact<'_> {
             };
         }
         if self.friction.acts() {
-            let pressed = self.points.iter().zip(self.known.iter()).map(|(point, known)| {
-                known.near.map_or((Vec3::zeros(), 0.0), |d| point.pressed(&d, self.softness))
+            let pressed = self.points.iter().enumerate().map(|(index, point)| {
+                self.memory.near(index).map_or((Vec3::zeros(), 0.0), |d| point.pressed(d, self.softness))
             });
             self.friction.follow(pressed, self.least_moment_nmm / LEAST_BEND_MM);
         }
         for index in 0..self.points.len() {
             let point = self.points[index];
-            let known = self.known[index];
+            let known = self.memory.points[index];
             if self.friction.acts() {
                 self.add_friction(elements, state, assembly, index, &known.base);
             }
-            let Some(d) = known.near.filter(|d| d.value_mm < point.potential.radius_mm) else { continue };
+            let Some(d) = self.memory.near(index).filter(|d| d.value_mm < point.potential.radius_mm) else {
+                continue;
+            };
             let w = self.softness * point.weight_mm;
             assembly.external_energy += w * point.potential.value(d.value_mm);
             let (first, second) = point.potential.derivatives(d.value_mm);
@@ -381,7 +360,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
         let mut fraction: f64 = 1.0;
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, to);
-            let known = &self.known[index];
+            let known = &self.memory.points[index];
             let (base, mut clearance) = (known.base, known.base_clearance_mm);
             let moved = (x - base).norm();
             if moved <= SAFE * clearance * fraction.min(1.0) || moved == 0.0 {

@@ -3,7 +3,7 @@
 use super::Row;
 use super::channel::Outside;
 use super::insertion::Tube;
-use crate::contact::{FeltWall, Friction, HandMotion, WallContact};
+use crate::contact::{FeltWall, Friction, HandMotion, WallContact, WallMemory};
 use crate::device::Device;
 use crate::methods::kirchhoff::mesh::Mesh;
 use crate::rod::{Clamp, Frame, PLAIN, RodState, Supports};
@@ -48,7 +48,7 @@ fn drawn(friction: f64, edge_mm: f64) -> Result<(f64, f64)> {
     let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
     let mut loads = Loads { forces: vec![(mesh.elements.len(), Vec3::x() * -PULL)], ..Loads::default() };
     let mut newton = Newton::<PLAIN>::new(mesh.elements.len());
-    let mut known = Vec::new();
+    let mut known = WallMemory::default();
     // First at rest without friction, on walls that become harder; then drawn.
     let (mut none, mut rubbing) = (Friction::default(), Friction::new(friction));
     for (softness, moves) in [(1e-3, false), (1e-2, false), (0.1, false), (1.0, false), (1.0, true)] {

@@ -1,6 +1,6 @@
 //! A rod between flat walls: the bench of the contact cases.
 
-use crate::contact::{FeltWall, Friction, KnownPoint, WallContact};
+use crate::contact::{FeltWall, Friction, WallMemory, WallContact};
 use crate::device::Device;
 use crate::methods::kirchhoff::mesh::Mesh;
 use crate::rod::{Assembly, Clamp, ElementData, Frame, PLAIN, RodState, Supports};
@@ -43,7 +43,7 @@ fn contact<'a>(walls: &'a Walls, mesh: &'a Mesh, memory: &'a mut Memory) -> Wall
 /// What contact remembers; there is no friction here.
 #[derive(Default)]
 struct Memory {
-    known: Vec<KnownPoint>,
+    known: WallMemory,
     friction: Friction,
 }
 
