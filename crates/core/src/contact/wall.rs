@@ -8,8 +8,8 @@
 //! A point asks the bounding volume hierarchy only when it may have come near something new: while it has moved less than
 //! its last clearance, nothing can touch it.
 
-use crate::Vec3;
 use super::memory::WallMemory;
+use crate::Vec3;
 use crate::contact::{Distance, FeltWall, Friction, SmoothWall, WallPotential, friction};
 use crate::insertion::Contact;
 use crate::rod::quadrature::{Point, hermite};

@@ -1,6 +1,6 @@
 //! A rod between flat walls: the bench of the contact cases.
 
-use crate::contact::{FeltWall, Friction, WallMemory, WallContact};
+use crate::contact::{FeltWall, Friction, WallContact, WallMemory};
 use crate::device::Device;
 use crate::methods::kirchhoff::mesh::Mesh;
 use crate::rod::{Assembly, Clamp, ElementData, Frame, PLAIN, RodState, Supports};

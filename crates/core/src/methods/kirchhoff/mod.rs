@@ -16,6 +16,7 @@
 mod configuration;
 pub(crate) mod mesh;
 mod readout;
+mod repeat;
 mod slide;
 mod substep;
 
@@ -34,6 +35,7 @@ use crate::solve::Newton;
 use crate::{Error, Result};
 use configuration::Configuration;
 use mesh::MOST_POINTS;
+use repeat::Correction;
 use slide::Extension;
 
 /// Options of the exact rod.
@@ -82,6 +84,10 @@ pub struct Kirchhoff<const C: usize> {
     before: Configuration,
     /// The other guess at it.
     carried: RodState,
+    /// The device slid along its own curve, …
+    slid: RodState,
+    /// … and how the last equilibrium differed from that.
+    correction: Correction,
     /// Length from the tip within which the device has a shape of its own, mm.
     shaped_mm: f64,
     extension: Extension,
@@ -120,6 +126,8 @@ impl<const C: usize> Kirchhoff<C> {
             next: nothing.clone(),
             before: nothing,
             carried: RodState::default(),
+            slid: RodState::default(),
+            correction: Correction::default(),
             shaped_mm: surroundings.device.shaped_mm(),
             extension: Extension::default(),
             memory: WallMemory::default(),
@@ -157,6 +165,8 @@ impl<const C: usize> Kirchhoff<C> {
         self.report.contacts.reserve(points);
         self.newton.reserve(elements);
         self.carried.reserve(elements);
+        self.slid.reserve(elements);
+        self.correction.reserve(elements);
         let nodes = self.current.mesh.from_tip_mm.capacity();
         self.shape.positions_mm.reserve(nodes);
         self.shape.tangents.reserve(nodes);

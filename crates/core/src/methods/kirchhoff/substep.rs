@@ -56,6 +56,7 @@ impl<const C: usize> Kirchhoff<C> {
             hand,
         );
         next.state.angles[0] = tail_rad;
+        self.slid.copy_from(&next.state);
         let elements = next.mesh.elements.len();
         self.newton.resize(elements);
         let advance = inserted_mm - now.inserted_mm();
@@ -68,26 +69,37 @@ impl<const C: usize> Kirchhoff<C> {
             softest(surroundings.device),
             self.options.skip,
         );
-        let mut outside = contact.is_outside(&next.mesh.elements, &next.state);
-        if self.shaped_mm > 0.0 {
+        let elements_of = &next.mesh.elements;
+        let mut found = false;
+        if let Some(factor) = self.correction.repeats(hand) {
             self.carried.copy_from(&next.state);
-            self.carried.angles[0] = tail_rad;
-            carry((&now.mesh, &now.state), &next.mesh, self.shaped_mm, hand.turn_rad, &mut self.carried);
-            let elements = &next.mesh.elements;
-            if !contact.is_outside(elements, &self.carried)
-                && (outside
-                    || blocked
-                    || self.newton.energy_at(elements, &mut contact, &self.carried)
-                        < self.newton.energy_at(elements, &mut contact, &next.state))
-            {
+            self.correction.apply(factor, elements_of, &mut next.state);
+            found = !contact.is_outside(elements_of, &next.state);
+            if !found {
                 std::mem::swap(&mut next.state, &mut self.carried);
-                outside = false;
-            } else {
-                outside |= blocked;
             }
         }
-        if outside {
-            return Err("the slid rod is beyond the wall".into());
+        if !found {
+            let mut outside = contact.is_outside(elements_of, &next.state);
+            if self.shaped_mm > 0.0 {
+                self.carried.copy_from(&next.state);
+                self.carried.angles[0] = tail_rad;
+                carry((&now.mesh, &now.state), &next.mesh, self.shaped_mm, hand.turn_rad, &mut self.carried);
+                if !contact.is_outside(elements_of, &self.carried)
+                    && (outside
+                        || blocked
+                        || self.newton.energy_at(elements_of, &mut contact, &self.carried)
+                            < self.newton.energy_at(elements_of, &mut contact, &next.state))
+                {
+                    std::mem::swap(&mut next.state, &mut self.carried);
+                    outside = false;
+                } else {
+                    outside |= blocked;
+                }
+            }
+            if outside {
+                return Err("the slid rod is beyond the wall".into());
+            }
         }
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
@@ -111,7 +123,6 @@ impl<const C: usize> Kirchhoff<C> {
                 &options,
             );
             iterations += found.iterations;
-            if std::env::var("TRACE").is_ok() { eprintln!("soft {softness:.3} it {} : {} -> {:.1e}", found.iterations, self.newton.steps.iter().map(|s| format!("{:.1e}({:.2},{:.0e}) ", s.residual, s.fraction, s.shift)).collect::<String>(), found.residual); }
             *budget -= found.iterations;
             if !found.converged {
                 break found;
@@ -139,6 +150,7 @@ impl<const C: usize> Kirchhoff<C> {
             let reason = if unsettled { UNSETTLED.to_owned() } else { found.reason.to_string() };
             return Err(format!("{reason} (residual {:.1e})", found.residual).into());
         }
+        self.correction.learn(hand, &self.slid, &next.state);
         let dissipated_mj = next.friction.dissipated_mj(&next.mesh.elements, &next.state, &next.mesh.points);
         Ok(Found { iterations, dissipated_mj })
     }
