@@ -50,7 +50,8 @@ fn run_scene(
     let device = scene.device().unwrap();
     let commands = scene.commands(&device).unwrap();
     let mut simulation =
-        Simulation::with_properties(wall.clone(), scene.vessel.wall, device, sheath, &scene.method).unwrap();
+        Simulation::with_properties(wall.clone(), scene.vessel.wall.clone(), device, sheath, &scene.method)
+            .unwrap();
     let mut tally = Tally::default();
     tally.drive(&mut simulation, crossing, &commands);
     (simulation, tally)
