@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{in_range, vector};
+use crate::error::{in_range, number, vector};
 use crate::vessel::SurfaceMesh;
 use crate::{Error, Result, Vec3};
 
@@ -154,7 +154,8 @@ impl WallProperties {
             if let Some(transition_mm) = region.transition_mm
                 && !(0.0..=2.0 * region.radius_mm).contains(&transition_mm)
             {
-                let mend = format!("must be from 0 to twice the region's radius of {} mm", region.radius_mm);
+                let radius = number(region.radius_mm);
+                let mend = format!("must be from 0 to twice the region's radius of {radius} mm");
                 return Err(Error::parameter(key("transition_mm"), transition_mm, mend));
             }
             if let Some(modulus) = region.modulus_n_per_mm2 {
