@@ -80,7 +80,7 @@ fn two_moduli() -> Result<Vec<Row>> {
         Row::relative(name, "depth on the stiff side", fine.depths[2], right, bound),
         Row::relative(name, "depth at the edge", at_edge(&|found| found.depths[1]), right + rise, bound),
         Row::relative(name, "slope at the edge", at_edge(&|found| found.slope), slope, bound),
-        falling(name, "error there, transition 1 … 0.25 mm", &[&coarse, &middle, &fine].map(error), 0.6),
+        falling(name, "error there, width 1 … 0.25 mm", &[&coarse, &middle, &fine].map(error), 0.6),
     ])
 }
 
@@ -105,7 +105,7 @@ pub(super) fn regions() -> Result<Vec<Row>> {
     for (outside, inside) in [(0.0, 0.3), (0.3, 0.1)] {
         let (properties, part) = rough_part(outside, inside, 20.0);
         let (ratio, angle) = drawn(&properties, 0.4)?;
-        let name = format!("C7 capstan, μ={inside} over {:.0}° of 180°, else {outside}", part.to_degrees());
+        let name = format!("C7 capstan, μ={inside} on {:.0}°, else {outside}", part.to_degrees());
         let expected = (inside * part + outside * (angle - part)).exp();
         rows.push(Row::relative(&name, "ratio of forces", ratio, expected, 1e-2));
     }
