@@ -10,6 +10,7 @@
 //! A point asks the bounding volume hierarchy only when it may have come near something new: while it has moved less than
 //! its last clearance, nothing can touch it.
 
+use super::memory::WallMemory;
 use crate::Vec3;
 use crate::contact::{Distance, FeltWall, Friction, WallPotential, friction};
 use crate::insertion::Contact;
@@ -67,36 +68,6 @@ impl ContactPoint {
     }
 }
 
-/// What a point knows of its surroundings.
-#[derive(Debug, Clone, Copy)]
-pub struct KnownPoint {
-    /// Where the wall was last looked for.
-    looked_at: Vec3,
-    /// No wall is nearer to that place than this, mm.
-    clearance_mm: f64,
-    /// The nearest triangle then, if the wall was near.
-    triangle: Option<u32>,
-    /// Position at the state that Newton's method is leaving.
-    base: Vec3,
-    /// No wall is nearer to it than this, mm.
-    base_clearance_mm: f64,
-    /// Distance there, if the wall is near.
-    near: Option<Distance>,
-}
-
-impl Default for KnownPoint {
-    fn default() -> Self {
-        Self {
-            looked_at: Vec3::zeros(),
-            clearance_mm: -1.0,
-            triangle: None,
-            base: Vec3::zeros(),
-            base_clearance_mm: 0.0,
-            near: None,
-        }
-    }
-}
-
 /// A contact point that presses on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
@@ -113,7 +84,7 @@ pub struct Counters {
     pub queries: u64,
     /// Questions that the quadrics about the last triangle answered.
     pub near: u64,
-    /// Questions that the last clearance answered.
+    /// Questions that the last clearance answered, or the same question before.
     pub avoided: u64,
     /// Nodes of sub-steps in which the device moved to a new equilibrium.
     pub nodes_solved: u64,
@@ -170,7 +141,7 @@ pub struct WallContact<'a> {
     least_moment_nmm: f64,
     /// Part of the (stiffest) modulus that acts: a rigid wall is approached from a softer one.
     pub softness: f64,
-    known: &'a mut Vec<KnownPoint>,
+    memory: &'a mut WallMemory,
     friction: &'a mut Friction,
     /// Work done and avoided.
     pub counters: Counters,
@@ -182,19 +153,19 @@ impl<'a> WallContact<'a> {
     pub fn new(
         felt: &'a FeltWall,
         points: &'a [ContactPoint],
-        known: &'a mut Vec<KnownPoint>,
+        memory: &'a mut WallMemory,
         friction: &'a mut Friction,
         softest_nmm2: f64,
         skip: bool,
     ) -> Self {
-        known.resize(points.len(), KnownPoint::default());
+        memory.resize(points.len());
         Self {
             felt,
             skip,
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
             softness: 1.0,
-            known,
+            memory,
             friction,
             counters: Counters::default(),
         }
@@ -205,7 +176,7 @@ impl<'a> WallContact<'a> {
         let potential = self.points[index].potential;
         let radius = potential.radius_mm;
         let near = radius * (1.0 + FOLLOW);
-        let known = &mut self.known[index];
+        let known = &mut self.memory.points[index];
         if self.skip {
             let moved = (x - known.looked_at).norm();
             let clearance = known.clearance_mm - moved;
@@ -213,10 +184,15 @@ impl<'a> WallContact<'a> {
                 self.counters.avoided += 1;
                 return Reading::Free(clearance);
             }
+            if known.triangle.is_some() && self.memory.readings[index].0 == *x {
+                self.counters.avoided += 1;
+                return Reading::of(self.memory.readings[index].1, &potential);
+            }
             if let Some(triangle) = known.triangle.filter(|_| moved < LOOK_AGAIN * radius)
                 && let Some(distance) = self.felt.smooth.distance(x, triangle).filter(|d| d.value_mm > 0.0)
             {
                 self.counters.near += 1;
+                self.memory.readings[index] = (*x, distance);
                 return Reading::of(distance, &potential);
             }
         }
@@ -242,6 +218,7 @@ impl<'a> WallContact<'a> {
             gradient: nearest.normal,
             hessian: Matrix3::zeros(),
         });
+        self.memory.readings[index] = (*x, distance);
         Reading::of(distance, &potential)
     }
 
@@ -285,7 +262,7 @@ impl<'a> WallContact<'a> {
             return None;
         }
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
-        let stiffness = self.felt.stiffness(&x, self.known[index].triangle, 1.0);
+        let stiffness = self.felt.stiffness(&x, self.memory.points[index].triangle, 1.0);
         let (mut normal, mut force_n) = point.pressed(&distance, stiffness.factor);
         if stiffness.slope.is_some() {
             let force = -stiffness.derivatives(&point.potential, &distance, point.weight_mm).0;
@@ -301,7 +278,7 @@ impl<'a> WallContact<'a> {
                 force_n,
                 friction_n: rub.map_or_else(Vec3::zeros, |f| -f.gradient),
                 penetration_mm,
-                triangle: self.known[index].triangle.unwrap_or(0),
+                triangle: self.memory.points[index].triangle.unwrap_or(0),
             },
         })
     }
@@ -324,7 +301,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
             match self.read(index, &x) {
                 Reading::Free(_) => {}
                 Reading::Near(d) if point.presses(&d) => {
-                    let triangle = self.known[index].triangle;
+                    let triangle = self.memory.points[index].triangle;
                     let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
                     sum += factor * point.weight_mm * point.potential.value(d.value_mm);
                 }
@@ -342,11 +319,11 @@ impl<const C: usize> External<C> for WallContact<'_> {
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, state);
             let reading = self.read(index, &x);
-            let known = &mut self.known[index];
+            let known = &mut self.memory.points[index];
             known.base = x;
             (known.base_clearance_mm, known.near) = match reading {
-                Reading::Free(clearance) => (clearance, None),
-                Reading::Near(d) => (d.value_mm, Some(d)),
+                Reading::Free(clearance) => (clearance, false),
+                Reading::Near(d) => (d.value_mm, true),
                 Reading::Outside => {
                     assembly.external_energy = f64::INFINITY;
                     return;
@@ -354,29 +331,30 @@ impl<const C: usize> External<C> for WallContact<'_> {
             };
         }
         if self.friction.acts() {
-            let (felt, softness) = (self.felt, self.softness);
-            let pressed = self.points.iter().zip(self.known.iter()).map(|(point, known)| {
-                let Some(d) = known.near else { return (Vec3::zeros(), 0.0) };
-                if !point.presses(&d) {
-                    return point.pressed(&d, 0.0);
+            let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
+            let pressed = self.points.iter().enumerate().map(|(index, point)| {
+                let Some(d) = memory.near(index) else { return (Vec3::zeros(), 0.0) };
+                if !point.presses(d) {
+                    return point.pressed(d, 0.0);
                 }
+                let known = &memory.points[index];
                 let factor = felt.stiffness(&known.base, known.triangle, softness).factor;
-                let (normal, force) = point.pressed(&d, factor);
+                let (normal, force) = point.pressed(d, factor);
                 (normal, force * felt.rough(&known.base, known.triangle))
             });
             self.friction.follow(pressed, self.least_moment_nmm / LEAST_BEND_MM);
         }
         for index in 0..self.points.len() {
             let point = self.points[index];
-            let known = self.known[index];
+            let known = self.memory.points[index];
             if self.friction.acts() {
                 self.add_friction(elements, state, assembly, index, &known.base);
             }
-            let Some(d) = known.near.filter(|d| point.presses(d)) else { continue };
+            let Some(d) = self.memory.near(index).filter(|d| point.presses(d)) else { continue };
             let stiffness = self.felt.stiffness(&known.base, known.triangle, self.softness);
             let w = point.weight_mm;
             assembly.external_energy += stiffness.factor * w * point.potential.value(d.value_mm);
-            let (gradient, hessian) = stiffness.derivatives(&point.potential, &d, w);
+            let (gradient, hessian) = stiffness.derivatives(&point.potential, d, w);
             let e = point.element;
             if point.xi == 1.0 {
                 assembly.add_node(e + 1, &gradient, &hessian);
@@ -400,7 +378,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
         let mut fraction: f64 = 1.0;
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, to);
-            let known = &self.known[index];
+            let known = &self.memory.points[index];
             let (base, mut clearance) = (known.base, known.base_clearance_mm);
             let moved = (x - base).norm();
             if moved <= SAFE * clearance * fraction.min(1.0) || moved == 0.0 {

@@ -3,7 +3,7 @@
 use super::Row;
 use super::channel::Outside;
 use super::insertion::Tube;
-use crate::contact::{FeltWall, Friction, HandMotion, WallContact};
+use crate::contact::{FeltWall, Friction, HandMotion, WallContact, WallMemory};
 use crate::device::Device;
 use crate::insertion::WallProperties;
 use crate::methods::kirchhoff::mesh::Mesh;
@@ -54,7 +54,7 @@ pub(super) fn drawn(properties: &WallProperties, edge_mm: f64) -> Result<(f64, f
     let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
     let mut loads = Loads { forces: vec![(mesh.elements.len(), Vec3::x() * -PULL)], ..Loads::default() };
     let mut newton = Newton::<PLAIN>::new(mesh.elements.len());
-    let mut known = Vec::new();
+    let mut known = WallMemory::default();
     // First at rest without friction, on walls that become harder; then drawn.
     let (mut none, mut rubbing) = (Friction::default(), Friction::new(properties.largest_friction()));
     for (softness, moves) in [(1e-3, false), (1e-2, false), (0.1, false), (1.0, false), (1.0, true)] {

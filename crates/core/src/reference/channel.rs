@@ -1,6 +1,6 @@
 //! A rod between flat walls: the bench of the contact cases.
 
-use crate::contact::{FeltWall, Friction, KnownPoint, WallContact};
+use crate::contact::{FeltWall, Friction, WallContact, WallMemory};
 use crate::device::Device;
 use crate::insertion::{WallProperties, WallRegion};
 use crate::methods::kirchhoff::mesh::Mesh;
@@ -44,7 +44,7 @@ fn contact<'a>(walls: &'a Walls, mesh: &'a Mesh, memory: &'a mut Memory) -> Wall
 /// What contact remembers; there is no friction here.
 #[derive(Default)]
 struct Memory {
-    known: Vec<KnownPoint>,
+    known: WallMemory,
     friction: Friction,
 }
 

@@ -1,7 +1,7 @@
 //! Where the rod is, and how a Newton step moves it.
 
 use super::element::{ElementData, ElementState, mid_slope};
-use super::frame::{Frame, reference_twist};
+use super::frame::{Frame, normalised, reference_twist, turn_parts};
 use super::layout::Layout;
 use crate::Vec3;
 
@@ -147,13 +147,9 @@ impl RodState {
             let m = before / size;
             let along = m.dot(&rate);
             let turn = (rate - m * along) * (alpha / size);
-            let angle = turn.norm();
-            let direction = if angle > 0.0 {
-                let (sin, cos) = angle.sin_cos();
-                m * cos + turn * (sin / angle)
-            } else {
-                m
-            };
+            let square = turn.norm_squared();
+            let (first, second) = turn_parts(square);
+            let direction = normalised(&(m * (1.0 - square * second) + turn * first));
             // c = D N exactly: the strain follows from the force, not the force from a strain that rounding has spoilt.
             let length = if data.flexibility > 0.0 {
                 self.tensions[e] = base.tensions[e] + alpha * d[l.tension(e)];
@@ -162,7 +158,7 @@ impl RodState {
                 1.0
             };
             let ends = self.frames[e].t + self.frames[e + 1].t;
-            self.chords[e] = (direction * (length / direction.norm()) + ends * 0.25) / 1.5;
+            self.chords[e] = (direction * length + ends * 0.25) / 1.5;
             self.positions[e + 1] = self.positions[e] + self.chords[e] * data.length;
             if Layout::<C>::TWIST {
                 self.bubbles[e] = base.bubbles[e] + alpha * d[l.bubble(e)];
@@ -176,20 +172,20 @@ impl RodState {
     /// The largest rotation a step holds, at nodes and in the middle of elements, and the largest change of angle.
     pub fn largest_turn<const C: usize>(elements: &[ElementData], base: &Self, d: &[f64]) -> (f64, f64) {
         let l = Layout::<C>;
-        let (mut turn, mut twist) = (0.0f64, 0.0f64);
+        let (mut square, mut twist) = (0.0f64, 0.0f64);
         for i in 0..base.frames.len() {
             let t = l.tangent(i);
-            turn = turn.max(d[t].hypot(d[t + 1]));
+            square = square.max(d[t] * d[t] + d[t + 1] * d[t + 1]);
             if Layout::<C>::TWIST {
                 twist = twist.max(d[l.angle(i)].abs());
             }
         }
         for e in 0..elements.len() {
             let (mid, rate) = mid_rate::<C>(elements, base, d, e);
-            let m = mid / mid.norm();
-            turn = turn.max((rate - m * m.dot(&rate)).norm() / mid.norm());
+            let (size, along) = (mid.norm_squared(), mid.dot(&rate));
+            square = square.max((rate.norm_squared() - along * along / size) / size);
         }
-        (turn, twist)
+        (square.sqrt(), twist)
     }
 }
 

@@ -24,7 +24,7 @@ use std::borrow::Cow;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::extension::{LEAVE_MM, left_through};
-use crate::contact::{FeltWall, KnownPoint};
+use crate::contact::{FeltWall, WallMemory};
 use crate::device::Device;
 use crate::insertion::{Command, StepReport, Surroundings};
 use crate::methods::Method;
@@ -85,7 +85,7 @@ pub struct Kirchhoff<const C: usize> {
     /// Length from the tip within which the device has a shape of its own, mm.
     shaped_mm: f64,
     extension: Extension,
-    known: Vec<KnownPoint>,
+    memory: WallMemory,
     shape: Shape,
     report: StepReport,
 }
@@ -122,7 +122,7 @@ impl<const C: usize> Kirchhoff<C> {
             carried: RodState::default(),
             shaped_mm: surroundings.device.shaped_mm(),
             extension: Extension::default(),
-            known: Vec::new(),
+            memory: WallMemory::default(),
             shape: Shape::default(),
             report: StepReport { converged: true, angles: Layout::<C>::TWIST, ..Default::default() },
         };
@@ -153,7 +153,7 @@ impl<const C: usize> Kirchhoff<C> {
             configuration.state.reserve(elements);
             configuration.friction.reserve(points);
         }
-        self.known.reserve(points);
+        self.memory.reserve(points);
         self.report.contacts.reserve(points);
         self.newton.reserve(elements);
         self.carried.reserve(elements);

@@ -32,7 +32,7 @@ impl<const C: usize> Kirchhoff<C> {
         let mut contact = WallContact::new(
             &self.felt,
             &self.current.mesh.points,
-            &mut self.known,
+            &mut self.memory,
             &mut self.current.friction,
             softest(surroundings.device),
             self.options.skip,

@@ -58,10 +58,12 @@ impl<const C: usize> Kirchhoff<C> {
         next.state.angles[0] = tail_rad;
         let elements = next.mesh.elements.len();
         self.newton.resize(elements);
+        let advance = inserted_mm - now.inserted_mm();
+        self.memory.slide(&now.mesh.points, &next.mesh.points, advance);
         let mut contact = WallContact::new(
             &self.felt,
             &next.mesh.points,
-            &mut self.known,
+            &mut self.memory,
             &mut next.friction,
             softest(surroundings.device),
             self.options.skip,
@@ -110,6 +112,18 @@ impl<const C: usize> Kirchhoff<C> {
                 &options,
             );
             iterations += found.iterations;
+            if std::env::var("TRACE").is_ok() {
+                eprintln!(
+                    "soft {softness:.3} it {} : {} -> {:.1e}",
+                    found.iterations,
+                    self.newton
+                        .steps
+                        .iter()
+                        .map(|s| format!("{:.1e}({:.2},{:.0e}) ", s.residual, s.fraction, s.shift))
+                        .collect::<String>(),
+                    found.residual
+                );
+            }
             *budget -= found.iterations;
             if !found.converged {
                 break found;

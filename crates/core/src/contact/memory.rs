@@ -1,0 +1,81 @@
+//! What the contact points of a device know of the wall about them, from one question to the next.
+
+use super::{ContactPoint, Distance};
+use crate::Vec3;
+use nalgebra::Matrix3;
+
+/// What a point knows of its surroundings.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct KnownPoint {
+    /// Where the wall was last looked for.
+    pub(super) looked_at: Vec3,
+    /// No wall is nearer to that place than this, mm.
+    pub(super) clearance_mm: f64,
+    /// The nearest triangle then, if the wall was near.
+    pub(super) triangle: Option<u32>,
+    /// Position at the state that Newton's method is leaving.
+    pub(super) base: Vec3,
+    /// No wall is nearer to it than this, mm.
+    pub(super) base_clearance_mm: f64,
+    /// Whether the wall is near it: the reading of the point is the one taken there.
+    pub(super) near: bool,
+}
+
+const NOTHING: KnownPoint = KnownPoint {
+    looked_at: Vec3::new(0.0, 0.0, 0.0),
+    clearance_mm: -1.0,
+    triangle: None,
+    base: Vec3::new(0.0, 0.0, 0.0),
+    base_clearance_mm: 0.0,
+    near: false,
+};
+
+/// The memory of all contact points of a device.
+#[derive(Debug, Clone, Default)]
+pub struct WallMemory {
+    pub(super) points: Vec<KnownPoint>,
+    /// Where each point last read the distance of a near wall, and what it read. Apart from `points`: most points are free, and
+    /// all of them are looked at many times a step.
+    pub(super) readings: Vec<(Vec3, Distance)>,
+    spare: Vec<KnownPoint>,
+}
+
+impl WallMemory {
+    /// Takes memory for `points` points.
+    pub fn reserve(&mut self, points: usize) {
+        for list in [&mut self.points, &mut self.spare] {
+            list.reserve(points.saturating_sub(list.len()));
+        }
+        self.readings.reserve(points.saturating_sub(self.readings.len()));
+    }
+
+    pub(super) fn resize(&mut self, points: usize) {
+        let nowhere = Vec3::repeat(f64::NAN);
+        let none = Distance { value_mm: 0.0, gradient: Vec3::zeros(), hessian: Matrix3::zeros() };
+        self.points.resize(points, NOTHING);
+        self.readings.resize(points, (nowhere, none));
+    }
+
+    /// The distance that point `index` read at its base, if the wall is near.
+    pub(super) fn near(&self, index: usize) -> Option<&Distance> {
+        self.points[index].near.then(|| &self.readings[index].1)
+    }
+
+    /// The device has advanced along its own curve: what was known to the points `before`, the points `after` that come to lie in
+    /// their places know, since the wall does not move. Beyond the tip each keeps its own.
+    pub fn slide(&mut self, before: &[ContactPoint], after: &[ContactPoint], advance_mm: f64) {
+        self.spare.clear();
+        let count = before.len().min(self.points.len());
+        let mut k = 0;
+        for (index, point) in after.iter().enumerate() {
+            let label = point.from_tip_mm - advance_mm;
+            let off = |k: usize| (before[k].from_tip_mm - label).abs();
+            while k + 1 < count && off(k + 1) <= off(k) {
+                k += 1;
+            }
+            let from = if label < 0.0 { index } else { k };
+            self.spare.push(self.points.get(from).copied().unwrap_or(NOTHING));
+        }
+        std::mem::swap(&mut self.points, &mut self.spare);
+    }
+}
