@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use endowire_core::device::{Device, Section};
-use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
+use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties, WallRegion};
 use endowire_core::methods::MethodChoice;
 use endowire_core::rod::{PLAIN, TWISTED};
 use endowire_core::solve::{Newton, NewtonOptions};
@@ -49,7 +49,9 @@ fn nothing_is_allocated_per_iteration() {
 
 #[test]
 fn nothing_is_allocated_in_a_step_of_an_insertion() {
-    for (friction, shaped) in [(0.0, false), (0.1, false), (0.0, true)] {
+    for (friction, shaped, regions) in
+        [(0.0, false, false), (0.1, false, false), (0.0, true, false), (0.0, false, true)]
+    {
         let made =
             GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(1.2)).unwrap();
         let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
@@ -58,7 +60,15 @@ fn nothing_is_allocated_in_a_step_of_an_insertion() {
             tip.rest_curvature_per_mm = [0.02, 0.0];
         }
         let wire = Device::new(vec![tip, Section::straight(380.0, 0.445, 10.0)]).unwrap();
-        let properties = WallProperties { friction, ..Default::default() };
+        let patch = WallRegion {
+            centre_mm: [41.0, 0.0, 146.0],
+            radius_mm: 10.0,
+            transition_mm: None,
+            modulus_n_per_mm2: Some(30.0),
+            friction: Some(0.1),
+        };
+        let region = if regions { vec![patch] } else { Vec::new() };
+        let properties = WallProperties { friction, region, ..Default::default() };
         let method = MethodChoice::default();
         let mut simulation =
             Simulation::with_properties(made.wall, properties, wire, sheath, &method).unwrap();
@@ -74,7 +84,7 @@ fn nothing_is_allocated_in_a_step_of_an_insertion() {
             }
         });
         assert!(iterations > 80, "{iterations}");
-        assert_eq!(counted.count_total, 0, "friction {friction}, shaped {shaped}");
+        assert_eq!(counted.count_total, 0, "friction {friction}, shaped {shaped}, regions {regions}");
     }
 }
 

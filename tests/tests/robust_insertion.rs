@@ -50,14 +50,15 @@ fn run_scene(
     let device = scene.device().unwrap();
     let commands = scene.commands(&device).unwrap();
     let mut simulation =
-        Simulation::with_properties(wall.clone(), scene.vessel.wall, device, sheath, &scene.method).unwrap();
+        Simulation::with_properties(wall.clone(), scene.vessel.wall.clone(), device, sheath, &scene.method)
+            .unwrap();
     let mut tally = Tally::default();
     tally.drive(&mut simulation, crossing, &commands);
     (simulation, tally)
 }
 
 /// Scenes, and where their tips come to lie: a point and how near, mm.
-const NAVIGATION: [(&str, [f64; 3], f64); 6] = [
+const NAVIGATION: [(&str, [f64; 3], f64); 7] = [
     ("curved_tube_exact", [81.2, 0.0, 127.4], 1.0),
     ("arch_subclavian", [13.0, -9.5, 267.5], 5.0),
     ("arch_carotid", [-11.0, -26.5, 280.7], 5.0),
@@ -65,6 +66,7 @@ const NAVIGATION: [(&str, [f64; 3], f64); 6] = [
     // Into the left or the right hepatic artery, from the artery of both.
     ("hepatic", [-54.5, -37.5, 87.0], 8.0),
     ("loop", [-8.1, -0.3, 25.7], 2.0),
+    ("arch_plaque", [-11.0, -26.5, 280.7], 5.0),
 ];
 
 fn navigate(which: usize, triangles: &[usize], steps_mm: &[f64]) {
@@ -136,6 +138,12 @@ fn table_of_the_liver() {
 #[ignore = "a minute"]
 fn table_of_the_loop() {
     table(5);
+}
+
+#[test]
+#[ignore = "a minute"]
+fn table_of_the_arch_with_plaque() {
+    table(6);
 }
 
 /// Equally distributed numbers from −1 to 1, the same in every run.

@@ -368,3 +368,43 @@ fn devices_and_pipes_are_no_input_files() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("regular file"));
 }
+
+#[test]
+fn a_region_of_the_wall_that_cannot_be_is_refused_by_its_key() {
+    let scene = |region: &str| {
+        let regions = "[[vessel.wall.region]]\ncentre_mm = [20, 4, 0]\nradius_mm = 5.0\nfriction = 0.1\n";
+        Scene::good().with("[[device", &format!("{regions}[[vessel.wall.region]]\n{region}\n[[device"))
+    };
+    let good = "centre_mm = [40, 4, 0]\nradius_mm = 5.0\nmodulus_n_per_mm2 = 20.0\nfriction = 0.3\ntransition_mm = 1.0";
+    let output = scene(good).run();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    for (from, to, words) in [
+        ("[40, 4, 0]", "[40, nan, 0]", &["region[1].centre_mm = [40, NaN, 0]"][..]),
+        ("[40, 4, 0]", "[40, 4]", &["line 11", "centre_mm"]),
+        ("[40, 4, 0]", "[40, 20, 0]", &["region[1].radius_mm = 5", "no vertex", "16.", "[40, 20, 0]"]),
+        ("radius_mm = 5.0", "radius_mm = 0.0", &["region[1].radius_mm = 0", "above 0"]),
+        ("radius_mm = 5.0", "radius_mm = -5.0", &["region[1].radius_mm = -5"]),
+        ("radius_mm = 5.0", "radius_mm = 1e-9", &["region[1].transition_mm = 1", "1e-9 mm"]),
+        ("radius_mm = 5.0\n", "", &["line 10", "radius_mm"]),
+        ("= 20.0", "= -20.0", &["vessel.wall.region[1].modulus_n_per_mm2 = -20"]),
+        ("= 20.0", "= 0.0", &["vessel.wall.region[1].modulus_n_per_mm2 = 0"]),
+        ("= 20.0", "= 1e300", &["vessel.wall.region[1].modulus_n_per_mm2 = 1e300"]),
+        ("= 0.3", "= -0.3", &["vessel.wall.region[1].friction = -0.3"]),
+        ("= 0.3", "= nan", &["vessel.wall.region[1].friction = NaN"]),
+        ("= 1.0", "= 11.0", &["region[1].transition_mm = 11", "twice", "5 mm"]),
+        ("= 1.0", "= -1.0", &["region[1].transition_mm = -1"]),
+        ("friction = 0.3", "frction = 0.3", &["line 14", "frction", "friction"]),
+        (
+            "modulus_n_per_mm2 = 20.0\nfriction = 0.3\n",
+            "",
+            &["vessel.wall.region[1]", "give modulus_n_per_mm2"],
+        ),
+    ] {
+        assert!(good.contains(from), "{from}");
+        scene(&good.replace(from, to)).is_refused(words);
+    }
+    for method in ["li2011-banded", "li2011-dense"] {
+        scene(&format!("{good}\n[method]\nname = \"{method}\""))
+            .is_refused(&["vessel.wall.region = 2 given", "kirchhoff"]);
+    }
+}

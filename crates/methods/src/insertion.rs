@@ -57,6 +57,7 @@ impl Insertion {
         surroundings: &Surroundings<'_>,
     ) -> Result<Self> {
         model.check(surroundings.device)?;
+        surroundings.properties.refuse_regions(model.name())?;
         let friction = surroundings.properties.friction;
         if friction != 0.0 {
             return Err(Error::parameter(

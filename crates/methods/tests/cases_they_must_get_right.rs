@@ -6,7 +6,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
-use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
+use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties, WallRegion};
 use endowire_core::methods::MethodChoice;
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 use endowire_methods::{
@@ -90,7 +90,15 @@ fn tube() -> Tube {
 
 impl Tube {
     fn start(&self, name: &str, wire: Device, friction: f64) -> endowire_core::Result<Simulation> {
-        let properties = WallProperties { friction, ..WallProperties::default() };
+        self.start_on(WallProperties { friction, ..WallProperties::default() }, name, wire)
+    }
+
+    fn start_on(
+        &self,
+        properties: WallProperties,
+        name: &str,
+        wire: Device,
+    ) -> endowire_core::Result<Simulation> {
         Simulation::with_method(self.made.wall.clone(), properties, wire, self.sheath, |surroundings| {
             if name == "kirchhoff" {
                 return MethodChoice::default().start(surroundings);
@@ -103,7 +111,7 @@ impl Tube {
 }
 
 #[test]
-fn shapes_and_friction_are_refused_by_name() {
+fn shapes_friction_and_regions_are_refused_by_name() {
     let tube = tube();
     let bent = Section { rest_curvature_per_mm: [0.02, 0.0], ..Section::straight(30.0, 0.445, 10.0) };
     for name in NAMES {
@@ -118,8 +126,18 @@ fn shapes_and_friction_are_refused_by_name() {
             }
         }
         let wire = Device::uniform(30.0, 0.445, 10.0).unwrap();
-        let error = tube.start(name, wire, 0.1).err().unwrap();
+        let error = tube.start(name, wire.clone(), 0.1).err().unwrap();
         assert!(error.to_string().starts_with("vessel.wall.friction = 0.1"), "{error}");
+        let patch = WallRegion {
+            centre_mm: [0.0, 0.0, 50.0],
+            radius_mm: 10.0,
+            transition_mm: None,
+            modulus_n_per_mm2: Some(5.0),
+            friction: None,
+        };
+        let patched = WallProperties { region: vec![patch], ..WallProperties::default() };
+        let error = tube.start_on(patched, name, wire).err().unwrap().to_string();
+        assert!(error.starts_with("vessel.wall.region = 1 given") && error.contains(name), "{error}");
     }
 }
 

@@ -174,8 +174,14 @@ impl SmoothWall {
         self.deepest_inset_mm
     }
 
-    fn list(&self, triangle: usize) -> &[u32] {
+    /// Vertices whose support may reach a point over a triangle; the first are its corners.
+    pub(super) fn list(&self, triangle: usize) -> &[u32] {
         &self.lists[self.starts[triangle] as usize..self.starts[triangle + 1] as usize]
+    }
+
+    /// All vertices.
+    pub(super) fn vertices_mm(&self) -> impl Iterator<Item = &Vec3> {
+        self.quadrics.iter().map(|q| &q.position)
     }
 
     /// f alone.
@@ -193,6 +199,17 @@ impl SmoothWall {
 
     /// The distance of `x`, whose nearest triangle is `triangle` or close to it. `None` where no vertex reaches.
     pub fn distance(&self, x: &Vec3, triangle: u32) -> Option<Distance> {
+        self.weigh(x, triangle, |_, _, _, _| {})
+    }
+
+    /// As [`SmoothWall::distance`]; `also` sees every vertex that reaches `x` with its weight and the weight's derivatives.
+    #[inline]
+    pub(super) fn weigh(
+        &self,
+        x: &Vec3,
+        triangle: u32,
+        mut also: impl FnMut(u32, f64, &Vec3, &Matrix3<f64>),
+    ) -> Option<Distance> {
         let (mut weight, mut value) = (0.0, 0.0);
         let (mut weight1, mut value1) = (Vec3::zeros(), Vec3::zeros());
         let (mut weight2, mut value2) = (Matrix3::zeros(), Matrix3::zeros());
@@ -216,9 +233,11 @@ impl SmoothWall {
             let mixed = w1 * f1.transpose();
             let both = w2 * f + mixed + mixed.transpose() + f2 * w;
             let frame = Matrix3::from_columns(&[q.axes[0], q.axes[1], q.normal]);
+            let (turned1, turned2) = (frame * w1, frame * w2 * frame.transpose());
+            also(v, w, &turned1, &turned2);
             weight += w;
-            weight1 += frame * w1;
-            weight2 += frame * w2 * frame.transpose();
+            weight1 += turned1;
+            weight2 += turned2;
             value += w * f;
             value1 += frame * (w1 * f + f1 * w);
             value2 += frame * both * frame.transpose();

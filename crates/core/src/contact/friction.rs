@@ -22,6 +22,9 @@
 //! The normal force N and the normal n are lagged: within one step of Newton's method D has fixed ones, so the energy keeps
 //! a symmetric Hessian and steps that descend; between steps they are renewed until they no longer change
 //! ([`Friction::follow`]). What is left at the end is Coulomb's law of the final state.
+//!
+//! Where a wall is smoother in some places than in others μ is the largest coefficient, and N the normal force times the
+//! part of it that acts where the point is: the coefficient of a place is lagged with its force.
 
 use nalgebra::Matrix3;
 
@@ -59,7 +62,7 @@ struct Slider {
     along: Vec3,
     /// Normal of the wall, into the lumen.
     normal: Vec3,
-    /// Normal force N.
+    /// N: normal force, less where the wall is smoother.
     force_n: f64,
     /// Normal and force at the state seen last.
     seen: (Vec3, f64),

@@ -5,17 +5,18 @@
 //! the tip gathers in a layer that no mesh resolves). Points are labelled from the tip, like everything on a device, so
 //! what is known of their surroundings stays with them while the device slides.
 //!
+//! On a wall with regions ψ is multiplied by eˢ, s of the place ([`super::grading`]), and so is the cap's.
+//!
 //! A point asks the bounding volume hierarchy only when it may have come near something new: while it has moved less than
 //! its last clearance, nothing can touch it.
 
 use super::memory::WallMemory;
 use crate::Vec3;
-use crate::contact::{Distance, FeltWall, Friction, SmoothWall, WallPotential, friction};
+use crate::contact::{Distance, FeltWall, Friction, WallPotential, friction};
 use crate::insertion::Contact;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{Assembly, ElementData, RodState};
 use crate::solve::External;
-use crate::vessel::WallQuery;
 use nalgebra::Matrix3;
 
 /// A place on the device where the wall is felt.
@@ -47,11 +48,16 @@ impl ContactPoint {
             + (state.frames[e].t * s0 + state.frames[e + 1].t * s1) * h
     }
 
-    /// Normal of the wall and force on it at a distance, N; `softness` as in [`WallContact`].
-    fn pressed(&self, d: &Distance, softness: f64) -> (Vec3, f64) {
+    /// Whether it presses on a wall at this distance.
+    fn presses(&self, d: &Distance) -> bool {
+        d.value_mm < self.potential.radius_mm
+    }
+
+    /// Normal of the wall and force on it at a distance, N; `factor` as in [`Stiffness`](super::grading::Stiffness).
+    fn pressed(&self, d: &Distance, factor: f64) -> (Vec3, f64) {
         // The smooth distance has a gradient of nearly unit length; the normal has one.
         let size = d.gradient.norm();
-        (d.gradient / size, -softness * self.weight_mm * self.potential.derivatives(d.value_mm).0 * size)
+        (d.gradient / size, -factor * self.weight_mm * self.potential.derivatives(d.value_mm).0 * size)
     }
 
     /// Material angle, rad.
@@ -127,14 +133,13 @@ const SAFE: f64 = 0.9;
 
 /// The wall's energy along a device.
 pub struct WallContact<'a> {
-    wall: &'a SmoothWall,
-    query: &'a WallQuery,
+    felt: &'a FeltWall,
     /// Whether clearances and the last triangle may replace queries.
     skip: bool,
     points: &'a [ContactPoint],
     /// Moment of the softest piece at a radius of 100 mm, N·mm.
     least_moment_nmm: f64,
-    /// Part of the modulus that acts: a rigid wall is approached from a softer one.
+    /// Part of the (stiffest) modulus that acts: a rigid wall is approached from a softer one.
     pub softness: f64,
     memory: &'a mut WallMemory,
     friction: &'a mut Friction,
@@ -155,8 +160,7 @@ impl<'a> WallContact<'a> {
     ) -> Self {
         memory.resize(points.len());
         Self {
-            wall: &felt.smooth,
-            query: &felt.query,
+            felt,
             skip,
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
@@ -176,7 +180,7 @@ impl<'a> WallContact<'a> {
         if self.skip {
             let moved = (x - known.looked_at).norm();
             let clearance = known.clearance_mm - moved;
-            if clearance > near + self.wall.deepest_inset_mm() {
+            if clearance > near + self.felt.smooth.deepest_inset_mm() {
                 self.counters.avoided += 1;
                 return Reading::Free(clearance);
             }
@@ -185,7 +189,7 @@ impl<'a> WallContact<'a> {
                 return Reading::of(self.memory.readings[index].1, &potential);
             }
             if let Some(triangle) = known.triangle.filter(|_| moved < LOOK_AGAIN * radius)
-                && let Some(distance) = self.wall.distance(x, triangle).filter(|d| d.value_mm > 0.0)
+                && let Some(distance) = self.felt.smooth.distance(x, triangle).filter(|d| d.value_mm > 0.0)
             {
                 self.counters.near += 1;
                 self.memory.readings[index] = (*x, distance);
@@ -197,19 +201,19 @@ impl<'a> WallContact<'a> {
         known.triangle = None;
         // A point on the axis of a tube has all of its triangles at one distance, and a question that reaches them looks at all:
         // asking a little farther than is needed is enough.
-        let reach_mm = near + self.wall.deepest_inset_mm() + LOOK_MM;
-        let Some(nearest) = self.query.nearest(x, reach_mm) else {
+        let reach_mm = near + self.felt.smooth.deepest_inset_mm() + LOOK_MM;
+        let Some(nearest) = self.felt.query.nearest(x, reach_mm) else {
             known.clearance_mm = reach_mm;
             return Reading::Free(reach_mm);
         };
         known.clearance_mm = nearest.distance_mm.abs();
         // Past an opening there is no wall.
-        if nearest.rim || nearest.distance_mm > near + self.wall.inset_mm(nearest.triangle) {
+        if nearest.rim || nearest.distance_mm > near + self.felt.smooth.inset_mm(nearest.triangle) {
             return Reading::Free(known.clearance_mm);
         }
         known.triangle = Some(nearest.triangle);
         // Where no quadric reaches, a surface is torn, and its triangles are what there is.
-        let distance = self.wall.distance(x, nearest.triangle).unwrap_or(Distance {
+        let distance = self.felt.smooth.distance(x, nearest.triangle).unwrap_or(Distance {
             value_mm: nearest.distance_mm,
             gradient: nearest.normal,
             hessian: Matrix3::zeros(),
@@ -258,10 +262,16 @@ impl<'a> WallContact<'a> {
             return None;
         }
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
-        let (normal, force_n) = point.pressed(&distance, 1.0);
+        let stiffness = self.felt.stiffness(&x, self.memory.points[index].triangle, 1.0);
+        let (mut normal, mut force_n) = point.pressed(&distance, stiffness.factor);
+        if stiffness.slope.is_some() {
+            let force = -stiffness.derivatives(&point.potential, &distance, point.weight_mm).0;
+            force_n = force.norm();
+            normal = force / force_n;
+        }
         let rub = self.friction.derivatives(index, &x, angle, radius_mm);
         Some(Touch {
-            energy_mj: point.weight_mm * point.potential.value(distance.value_mm),
+            energy_mj: stiffness.factor * point.weight_mm * point.potential.value(distance.value_mm),
             contact: Contact {
                 position_mm: x,
                 normal,
@@ -290,9 +300,12 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let point = self.points[index];
             match self.read(index, &x) {
                 Reading::Free(_) => {}
-                Reading::Near(d) => {
-                    sum += self.softness * point.weight_mm * point.potential.value(d.value_mm);
+                Reading::Near(d) if point.presses(&d) => {
+                    let triangle = self.memory.points[index].triangle;
+                    let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
+                    sum += factor * point.weight_mm * point.potential.value(d.value_mm);
                 }
+                Reading::Near(_) => {}
                 Reading::Outside => return f64::INFINITY,
             }
             if self.friction.acts() {
@@ -318,8 +331,16 @@ impl<const C: usize> External<C> for WallContact<'_> {
             };
         }
         if self.friction.acts() {
+            let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
             let pressed = self.points.iter().enumerate().map(|(index, point)| {
-                self.memory.near(index).map_or((Vec3::zeros(), 0.0), |d| point.pressed(d, self.softness))
+                let Some(d) = memory.near(index) else { return (Vec3::zeros(), 0.0) };
+                if !point.presses(d) {
+                    return point.pressed(d, 0.0);
+                }
+                let known = &memory.points[index];
+                let factor = felt.stiffness(&known.base, known.triangle, softness).factor;
+                let (normal, force) = point.pressed(d, factor);
+                (normal, force * felt.rough(&known.base, known.triangle))
             });
             self.friction.follow(pressed, self.least_moment_nmm / LEAST_BEND_MM);
         }
@@ -329,14 +350,11 @@ impl<const C: usize> External<C> for WallContact<'_> {
             if self.friction.acts() {
                 self.add_friction(elements, state, assembly, index, &known.base);
             }
-            let Some(d) = self.memory.near(index).filter(|d| d.value_mm < point.potential.radius_mm) else {
-                continue;
-            };
-            let w = self.softness * point.weight_mm;
-            assembly.external_energy += w * point.potential.value(d.value_mm);
-            let (first, second) = point.potential.derivatives(d.value_mm);
-            let gradient = d.gradient * (w * first);
-            let hessian = d.gradient * d.gradient.transpose() * (w * second) + d.hessian * (w * first);
+            let Some(d) = self.memory.near(index).filter(|d| point.presses(d)) else { continue };
+            let stiffness = self.felt.stiffness(&known.base, known.triangle, self.softness);
+            let w = point.weight_mm;
+            assembly.external_energy += stiffness.factor * w * point.potential.value(d.value_mm);
+            let (gradient, hessian) = stiffness.derivatives(&point.potential, d, w);
             let e = point.element;
             if point.xi == 1.0 {
                 assembly.add_node(e + 1, &gradient, &hessian);
@@ -366,7 +384,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
             if moved <= SAFE * clearance * fraction.min(1.0) || moved == 0.0 {
                 continue;
             }
-            if let Some(nearest) = self.query.nearest(&base, moved.min(1e6) / SAFE) {
+            if let Some(nearest) = self.felt.query.nearest(&base, moved.min(1e6) / SAFE) {
                 self.counters.queries += 1;
                 clearance = clearance.max(nearest.distance_mm.abs());
             } else {

@@ -5,9 +5,11 @@ mod nodes;
 mod report;
 mod sheath;
 mod simulation;
+mod wall_properties;
 
 pub use command::{Command, ScriptLine, commands};
 pub use nodes::nodes_from_tip;
 pub use report::{Contact, Energy, StepReport};
 pub use sheath::Sheath;
-pub use simulation::{Simulation, Surroundings, WallProperties, check_commands, script_commands};
+pub use simulation::{Simulation, Surroundings, check_commands, script_commands};
+pub use wall_properties::{WallProperties, WallRegion};

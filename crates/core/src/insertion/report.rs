@@ -28,9 +28,10 @@ impl Energy {
 pub struct Contact {
     /// Position on the device's axis, mm.
     pub position_mm: Vec3,
-    /// Direction of the wall's normal force on the device: into the lumen, unit length.
+    /// Direction of the wall's elastic force on the device: its normal into the lumen, unit length. At the edge of a region it
+    /// leans to the softer side.
     pub normal: Vec3,
-    /// Normal force, N.
+    /// Elastic force, N: that by which the wall presses.
     pub force_n: f64,
     /// Friction force on the device, along the wall and against its slip, N.
     pub friction_n: Vec3,

@@ -2,7 +2,7 @@
 
 use crate::device::Device;
 use crate::error::vector;
-use crate::insertion::{Command, ScriptLine, Sheath, StepReport, commands};
+use crate::insertion::{Command, ScriptLine, Sheath, StepReport, WallProperties, commands};
 use crate::methods::{Method, MethodChoice};
 use crate::shape::Shape;
 use crate::vessel::{Wall, WallQuery};
@@ -23,23 +23,6 @@ pub struct Surroundings<'a> {
     pub device: &'a Device,
 }
 
-/// How a vessel's wall answers a device that presses on it.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct WallProperties {
-    /// Foundation modulus k, N/mm²: force per length per depth.
-    pub modulus_n_per_mm2: f64,
-    /// Coulomb coefficient μ of friction between device and wall; 0 is frictionless and costs nothing.
-    pub friction: f64,
-}
-
-impl Default for WallProperties {
-    /// An artery's modulus in order of magnitude, frictionless.
-    fn default() -> Self {
-        Self { modulus_n_per_mm2: 1.0, friction: 0.0 }
-    }
-}
-
 /// An insertion under way.
 pub struct Simulation {
     wall: Wall,
@@ -49,9 +32,6 @@ pub struct Simulation {
     device: Device,
     method: Box<dyn Method>,
 }
-
-/// Largest coefficient of friction: nothing in a vessel is rougher.
-const LARGEST_FRICTION: f64 = 2.0;
 
 /// How far in front of the sheath's mouth, mm, the inside test looks: the mouth itself may lie in the plane of an
 /// opening, where inside and outside meet.
@@ -92,14 +72,7 @@ impl Simulation {
         sheath: Sheath,
         start: impl FnOnce(&Surroundings<'_>) -> Result<Box<dyn Method>>,
     ) -> Result<Self> {
-        crate::error::in_range("vessel.wall.modulus_n_per_mm2", properties.modulus_n_per_mm2, 1e9)?;
-        if !(0.0..=LARGEST_FRICTION).contains(&properties.friction) {
-            return Err(Error::parameter(
-                "vessel.wall.friction",
-                properties.friction,
-                format!("must be a Coulomb coefficient from 0 (none) to {LARGEST_FRICTION}"),
-            ));
-        }
+        properties.check(wall.mesh())?;
         if !wall.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
             let p = sheath.position_mm;
             let openings: Vec<String> = wall

@@ -67,9 +67,7 @@ impl MethodChoice {
     pub fn start(&self, surroundings: &Surroundings<'_>) -> Result<Box<dyn Method>> {
         Ok(match self {
             // A shape turns with the device, and friction twists it.
-            Self::Kirchhoff(options)
-                if surroundings.device.is_shaped() || surroundings.properties.friction > 0.0 =>
-            {
+            Self::Kirchhoff(options) if surroundings.device.is_shaped() || surroundings.properties.rubs() => {
                 Box::new(Kirchhoff::<TWISTED>::new(*options, surroundings)?)
             }
             Self::Kirchhoff(options) => Box::new(Kirchhoff::<PLAIN>::new(*options, surroundings)?),

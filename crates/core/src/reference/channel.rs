@@ -2,6 +2,7 @@
 
 use crate::contact::{FeltWall, Friction, WallContact, WallMemory};
 use crate::device::Device;
+use crate::insertion::{WallProperties, WallRegion};
 use crate::methods::kirchhoff::mesh::Mesh;
 use crate::rod::{Assembly, Clamp, ElementData, Frame, PLAIN, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions};
@@ -109,11 +110,15 @@ impl External<PLAIN> for Outside<'_> {
 impl Channel {
     /// The channel with a straight rod in it, clamped at the origin.
     pub(super) fn new(setup: &Setup) -> Result<Self> {
+        Self::with_regions(setup, 0.25 * setup.length, Vec::new())
+    }
+
+    /// The same with `region`s in walls whose triangles have sides of about `cell`.
+    pub(super) fn with_regions(setup: &Setup, cell: f64, region: Vec<WallRegion>) -> Result<Self> {
         let Setup { length, bending, radius, elements, walls, modulus } = *setup;
-        let cell = 0.25 * length;
         // So far away that no edge of the box is felt: each of three steps (the edge is drawn in, vertices reach there, points
         // feel these vertices) reaches at most a diagonal and a half of a cell.
-        let aside = 6.0 * cell;
+        let aside = cell * (6.0 * (radius / cell).max(1.0)).ceil();
         let low = Vec3::new(-aside, walls[0], -aside);
         let high = Vec3::new(length + aside, walls[1], aside);
         let wall = Wall::from_surface(&cuboid(low, high, cell))?;
@@ -122,8 +127,9 @@ impl Channel {
         mesh.build(&device, length, length / elements as f64, modulus);
         let state = RodState::straight(&mesh.elements, Vec3::zeros(), Frame::new(Vec3::x(), Some(Vec3::y())));
         let h = mesh.elements[0].length;
+        let properties = WallProperties { modulus_n_per_mm2: modulus, friction: 0.0, region };
         let walls = Walls {
-            felt: FeltWall::new(&wall, &device)?,
+            felt: FeltWall::new(&wall, &device, &properties)?,
             setup: *setup,
             plates: PLATES * bending / (h * h * h),
         };

@@ -63,7 +63,7 @@ fn at_origin(wall: Wall, wire: Device, fine: Fineness, friction: f64) -> Result<
     let Fineness { element_mm, modulus_n_per_mm2, .. } = fine;
     let sheath = Sheath::new(Vec3::zeros(), Vec3::x())?;
     let method = MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..KirchhoffOptions::default() });
-    let properties = WallProperties { modulus_n_per_mm2, friction };
+    let properties = WallProperties { modulus_n_per_mm2, friction, ..WallProperties::default() };
     Simulation::with_properties(wall, properties, wire, sheath, &method)
 }
 

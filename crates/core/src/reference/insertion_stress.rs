@@ -167,8 +167,11 @@ impl InsertionStress {
     }
 
     fn start(&self, case: &InsertionCase) -> Result<Simulation> {
-        let properties =
-            WallProperties { modulus_n_per_mm2: case.modulus_n_per_mm2, friction: case.friction };
+        let properties = WallProperties {
+            modulus_n_per_mm2: case.modulus_n_per_mm2,
+            friction: case.friction,
+            ..WallProperties::default()
+        };
         let device = Device::uniform(100.0, 0.45, case.bending_stiffness_nmm2)?;
         let method = MethodChoice::Kirchhoff(KirchhoffOptions {
             element_mm: case.element_mm,

@@ -9,6 +9,7 @@ mod insertion;
 pub mod insertion_stress;
 mod planar;
 mod quadratic;
+mod regions;
 mod spatial;
 pub mod stress;
 mod whip;
@@ -172,6 +173,11 @@ pub const FAMILIES: &[Family] = &[
     Family { id: "C5", title: "Soft-walled tube", run: insertion::soft_tube },
     Family { id: "C6", title: "Capstan (Euler 1769, Eytelwein)", run: capstan::capstan },
     Family { id: "C6", title: "Compliant wall (Winkler, Hetényi 1946)", run: contact::compliant },
+    Family {
+        id: "C7",
+        title: "Wall with regions: two moduli (Hetényi 1946), friction over a part of a bend",
+        run: regions::regions,
+    },
 ];
 
 /// A straight inextensible rod of length 1 and EI 1 along x, clamped at the origin, free at its end.

@@ -298,8 +298,8 @@ impl Scene {
     pub fn simulation(&self) -> Result<Simulation> {
         let wall = self.wall()?;
         let sheath = self.sheath(&wall)?;
-        Simulation::with_properties(wall, self.vessel.wall, self.device()?, sheath, &self.method).map_err(
-            |error| match error {
+        Simulation::with_properties(wall, self.vessel.wall.clone(), self.device()?, sheath, &self.method)
+            .map_err(|error| match error {
                 // What is wrong with a surface is wrong with its file.
                 Error::Mesh(reason) => {
                     self.vessel_path().map_or_else(|e| e, |path| Error::content(&path, reason))
@@ -316,7 +316,6 @@ impl Scene {
                     }
                 }
                 other => other,
-            },
-        )
+            })
     }
 }

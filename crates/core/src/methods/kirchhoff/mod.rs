@@ -116,11 +116,11 @@ impl<const C: usize> Kirchhoff<C> {
         if options.max_iterations == 0 {
             return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
         }
-        let friction = surroundings.properties.friction;
+        let friction = surroundings.properties.largest_friction();
         let nothing = Configuration::at(surroundings.sheath, friction);
         let mut method = Self {
             options,
-            felt: FeltWall::new(surroundings.wall, surroundings.device)?,
+            felt: FeltWall::new(surroundings.wall, surroundings.device, surroundings.properties)?,
             newton: Newton::new(1),
             current: nothing.clone(),
             next: nothing.clone(),

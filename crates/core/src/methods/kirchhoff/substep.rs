@@ -105,7 +105,8 @@ impl<const C: usize> Kirchhoff<C> {
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
         let data = &next.mesh.elements[elements - 1];
         let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
-        let mut softness = (SOFTEST * element_stiffness / modulus).min(1.0);
+        let stiffest = surroundings.properties.stiffest_n_per_mm2();
+        let mut softness = (SOFTEST * element_stiffness / stiffest).min(1.0);
         let mut iterations = 0;
         let mut renewals = 0;
         let found = loop {
@@ -131,7 +132,7 @@ impl<const C: usize> Kirchhoff<C> {
                 softness = (10.0 * softness).min(1.0);
                 continue;
             }
-            if surroundings.properties.friction == 0.0 || contact.friction_settled() {
+            if !surroundings.properties.rubs() || contact.friction_settled() {
                 break found;
             }
             renewals += 1;
@@ -146,7 +147,7 @@ impl<const C: usize> Kirchhoff<C> {
         self.report.counters.add(&contact.counters);
         if !found.converged {
             // Each renewal of the lagged forces gave Newton's method another energy to lower.
-            let unsettled = surroundings.properties.friction > 0.0 && !contact.friction_settled();
+            let unsettled = surroundings.properties.rubs() && !contact.friction_settled();
             let reason = if unsettled { UNSETTLED.to_owned() } else { found.reason.to_string() };
             return Err(format!("{reason} (residual {:.1e})", found.residual).into());
         }

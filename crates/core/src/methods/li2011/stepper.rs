@@ -107,7 +107,8 @@ impl Li2011 {
     /// The method with nothing inserted.
     ///
     /// # Errors
-    /// An element length or wall stiffness that is not positive, a number of nodes beyond memory, or a wall with friction.
+    /// An element length or wall stiffness that is not positive, a number of nodes beyond memory, or a wall with friction or
+    /// regions.
     pub fn new(
         options: Li2011Options,
         solver: LinearSolver,
@@ -116,6 +117,7 @@ impl Li2011 {
         let length_mm = surroundings.device.length_mm();
         crate::error::in_range("method.element_mm", options.element_mm, length_mm)?;
         crate::error::in_range("method.wall_stiffness_n_per_mm", options.wall_stiffness_n_per_mm, 1e9)?;
+        surroundings.properties.refuse_regions("the paper's method")?;
         if surroundings.properties.friction > 0.0 {
             return Err(Error::parameter(
                 "vessel.wall.friction",

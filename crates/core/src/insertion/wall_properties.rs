@@ -1,0 +1,197 @@
+//! How a vessel's wall answers a device that presses on it, the same everywhere or region by region.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{in_range, number, vector};
+use crate::vessel::SurfaceMesh;
+use crate::{Error, Result, Vec3};
+
+/// Largest foundation modulus, N/mm².
+const LARGEST_MODULUS: f64 = 1e9;
+/// Largest coefficient of friction: nothing in a vessel is rougher.
+const LARGEST_FRICTION: f64 = 2.0;
+/// Largest radius of a region, mm: it holds any vessel.
+const LARGEST_RADIUS_MM: f64 = 1e6;
+/// Width over which the wall changes at the edge of a region, mm, unless the scene says otherwise. A device feels its wall at
+/// points about a diameter apart, and a change much narrower than that lies between two of them.
+const TRANSITION_MM: f64 = 2.0;
+
+/// The wall of a vessel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WallProperties {
+    /// Foundation modulus k, N/mm²: force per length per depth.
+    pub modulus_n_per_mm2: f64,
+    /// Coulomb coefficient μ of friction between device and wall; 0 is frictionless and costs nothing.
+    pub friction: f64,
+    /// Where the wall is another, each laid over those before it.
+    pub region: Vec<WallRegion>,
+}
+
+impl Default for WallProperties {
+    /// An artery's modulus in order of magnitude, frictionless.
+    fn default() -> Self {
+        Self { modulus_n_per_mm2: 1.0, friction: 0.0, region: Vec::new() }
+    }
+}
+
+/// The wall inside a sphere: plaque, a stent, an aneurysm. What it does not give stays as it is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WallRegion {
+    /// Centre of the sphere, mm.
+    pub centre_mm: [f64; 3],
+    /// Radius of the sphere, mm.
+    pub radius_mm: f64,
+    /// Width, half of it on each side of the sphere, over which the wall changes, mm; 2 or the radius, if that is less, if
+    /// absent. It changes over an edge of the mesh at least.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transition_mm: Option<f64>,
+    /// Foundation modulus, N/mm².
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub modulus_n_per_mm2: Option<f64>,
+    /// Coefficient of friction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<f64>,
+}
+
+impl WallRegion {
+    fn centre(&self) -> Vec3 {
+        Vec3::from(self.centre_mm)
+    }
+
+    fn width_mm(&self) -> f64 {
+        self.transition_mm.unwrap_or(TRANSITION_MM.min(self.radius_mm))
+    }
+
+    /// Farther than this from its centre nothing is changed, mm.
+    fn reach_mm(&self) -> f64 {
+        self.radius_mm + 0.5 * self.width_mm()
+    }
+
+    /// 1 where the wall is that of the region, 0 where the region is not, smooth between.
+    fn share(&self, x: &Vec3) -> f64 {
+        let inside = self.reach_mm() - (x - self.centre()).norm();
+        let t = if inside >= self.width_mm() { 1.0 } else { (inside / self.width_mm()).max(0.0) };
+        t * t * (3.0 - 2.0 * t)
+    }
+}
+
+impl WallProperties {
+    /// Whether there is friction anywhere.
+    pub fn rubs(&self) -> bool {
+        self.largest_friction() > 0.0
+    }
+
+    /// Largest coefficient of friction of all regions.
+    pub fn largest_friction(&self) -> f64 {
+        self.region.iter().filter_map(|r| r.friction).fold(self.friction, f64::max)
+    }
+
+    /// Modulus of the stiffest region, N/mm².
+    pub fn stiffest_n_per_mm2(&self) -> f64 {
+        self.region.iter().filter_map(|r| r.modulus_n_per_mm2).fold(self.modulus_n_per_mm2, f64::max)
+    }
+
+    /// ln(k/k₀), with k₀ the modulus outside all regions, and coefficient of friction at a place of the wall.
+    ///
+    /// The logarithm, since moduli differ by powers of ten: between walls of 10⁻³ and 10⁴ N/mm² each decade gets the same part
+    /// of the way. Blended as it is, the modulus would rise a thousandfold within the first ten-thousandth of the way, and
+    /// what a step of Newton's method may trust, k/|∇k|, would be least where the wall is softest.
+    pub fn at(&self, x: &Vec3) -> (f64, f64) {
+        let (mut ln_modulus, mut friction) = (0.0, self.friction);
+        for region in &self.region {
+            let share = region.share(x);
+            if share == 0.0 {
+                continue;
+            }
+            if let Some(modulus) = region.modulus_n_per_mm2 {
+                let own = (modulus / self.modulus_n_per_mm2).ln();
+                ln_modulus = if share == 1.0 { own } else { ln_modulus + (own - ln_modulus) * share };
+            }
+            if let Some(own) = region.friction {
+                friction = if share == 1.0 { own } else { friction + (own - friction) * share };
+            }
+        }
+        (ln_modulus, friction)
+    }
+
+    /// Refuses regions on behalf of a method that knows one wall for the whole vessel.
+    ///
+    /// # Errors
+    /// Any region.
+    pub fn refuse_regions(&self, method: &str) -> Result<()> {
+        if self.region.is_empty() {
+            return Ok(());
+        }
+        Err(Error::parameter(
+            "vessel.wall.region",
+            format!("{} given", self.region.len()),
+            format!(
+                "{method} knows one wall for the whole vessel: leave regions out or use the method kirchhoff"
+            ),
+        ))
+    }
+
+    /// Checks all values, and that every region has a place on `mesh`.
+    ///
+    /// # Errors
+    /// Values out of range, a region that changes nothing or reaches no vertex.
+    pub(crate) fn check(&self, mesh: &SurfaceMesh) -> Result<()> {
+        in_range("vessel.wall.modulus_n_per_mm2", self.modulus_n_per_mm2, LARGEST_MODULUS)?;
+        check_friction("vessel.wall.friction", self.friction)?;
+        for (index, region) in self.region.iter().enumerate() {
+            let name = format!("vessel.wall.region[{index}]");
+            let key = |key: &str| format!("{name}.{key}");
+            if region.centre_mm.iter().any(|c| !c.is_finite()) {
+                return Err(Error::parameter(
+                    key("centre_mm"),
+                    vector(&region.centre()),
+                    "must be finite numbers",
+                ));
+            }
+            in_range(&key("radius_mm"), region.radius_mm, LARGEST_RADIUS_MM)?;
+            if let Some(transition_mm) = region.transition_mm
+                && !(0.0..=2.0 * region.radius_mm).contains(&transition_mm)
+            {
+                let radius = number(region.radius_mm);
+                let mend = format!("must be from 0 to twice the region's radius of {radius} mm");
+                return Err(Error::parameter(key("transition_mm"), transition_mm, mend));
+            }
+            if let Some(modulus) = region.modulus_n_per_mm2 {
+                in_range(&key("modulus_n_per_mm2"), modulus, LARGEST_MODULUS)?;
+            }
+            if let Some(friction) = region.friction {
+                check_friction(&key("friction"), friction)?;
+            }
+            if region.modulus_n_per_mm2.is_none() && region.friction.is_none() {
+                return Err(Error::parameter(name, "{}", "give modulus_n_per_mm2, friction or both"));
+            }
+            let away = |v: &Vec3| (v - region.centre()).norm();
+            let nearest = mesh.vertices_mm.iter().map(away).fold(f64::MAX, f64::min);
+            if nearest > region.radius_mm {
+                return Err(Error::parameter(
+                    key("radius_mm"),
+                    region.radius_mm,
+                    format!(
+                        "reaches no vertex of the wall: the nearest is {nearest:.3} mm from centre_mm = {}; move the centre \
+                         or enlarge the radius",
+                        vector(&region.centre())
+                    ),
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_friction(name: &str, friction: f64) -> Result<()> {
+    if (0.0..=LARGEST_FRICTION).contains(&friction) {
+        return Ok(());
+    }
+    Err(Error::parameter(
+        name,
+        friction,
+        format!("must be a Coulomb coefficient from 0 (none) to {LARGEST_FRICTION}"),
+    ))
+}
