@@ -53,7 +53,7 @@ fn hand_for(simulation: &mut Simulation, tip: f64) -> Result<f64> {
     let (mut hand, mut slope) = (tip, 1.0);
     let mut last = None;
     for _ in 0..20 {
-        turn_to(simulation, hand, 5.0)?;
+        turn_to(simulation, hand, 15.0)?;
         let off = tip - simulation.report().tip_rotation_rad.to_degrees();
         if off.abs() < 1e-6 {
             return Ok(hand);
@@ -72,8 +72,8 @@ fn hand_for(simulation: &mut Simulation, tip: f64) -> Result<f64> {
 /// Before it jumps the tip runs ahead of the hand, and the hand's angle over the tip's is a parabola with its top at the jump.
 fn jump(play_mm: f64) -> Result<(f64, usize)> {
     let mut simulation = in_tube(2.0, play_mm)?;
-    let mut hand = 188.0;
-    let mut jumps = turn_to(&mut simulation, hand, 5.0)?;
+    let mut hand = 190.0;
+    let mut jumps = turn_to(&mut simulation, hand, 10.0)?;
     let mut way = Vec::new();
     while hand < 205.0 {
         way.push((simulation.report().tip_rotation_rad.to_degrees(), hand));
@@ -84,11 +84,6 @@ fn jump(play_mm: f64) -> Result<(f64, usize)> {
             let (first, second) = ((fb - fa) / (b - a), (fc - fb) / (c - b));
             let bend = (second - first) / (c - a);
             let slope = second + bend * (c - b);
-            println!(
-                "hand {hand} vertex {} way {:?}",
-                fc - 0.25 * slope * slope / bend,
-                &way[way.len() - 4..]
-            );
             return Ok((fc - 0.25 * slope * slope / bend, jumps));
         }
     }
