@@ -1,16 +1,11 @@
 //! C6: a wire drawn over the inner wall of a 180° bend, as over a capstan (Euler, Eytelwein).
 
 use super::Row;
-use super::channel::Outside;
+use super::bench::{Bench, Setup};
 use super::insertion::Tube;
-use crate::contact::{FeltWall, Friction, HandMotion, WallContact, WallMemory};
-use crate::device::Device;
 use crate::insertion::WallProperties;
-use crate::methods::kirchhoff::mesh::Mesh;
-use crate::rod::{Clamp, Frame, PLAIN, RodState, Supports};
-use crate::solve::{Newton, NewtonOptions};
-use crate::statics::Loads;
-use crate::{Error, Result, Vec3};
+use crate::rod::Frame;
+use crate::{Result, Vec3};
 use std::f64::consts::PI;
 
 /// Straight parts and radius of the bend, radius and play of the wire, mm.
@@ -43,44 +38,25 @@ pub(super) fn drawn(properties: &WallProperties, edge_mm: f64) -> Result<(f64, f
     };
     let wall = tube.wall(0.5, edge_mm)?;
     let length = 2.0 * STRAIGHT + PI * BEND - 5.0;
-    let mut mesh = Mesh::default();
-    let device = Device::uniform(length, RADIUS, BENDING)?;
-    let felt = FeltWall::new(&wall, &device, properties)?;
-    mesh.build(&device, length, 1.0, properties.modulus_n_per_mm2);
+    let setup = Setup {
+        length,
+        bending: BENDING,
+        radius: RADIUS,
+        elements: length.round() as usize,
+        modulus: properties.modulus_n_per_mm2,
+    };
     let first = Frame::new(Vec3::x(), Some(Vec3::y()));
-    let along = |from_tip: &f64| ((length - from_tip - STRAIGHT) / BEND).clamp(0.0, PI);
-    let frames = mesh.from_tip_mm.iter().map(|s| first.transported(along(s), 0.0)).collect();
-    let mut state = RodState::from_frames(&mesh.elements, Vec3::zeros(), frames);
-    let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
-    let mut loads = Loads { forces: vec![(mesh.elements.len(), Vec3::x() * -PULL)], ..Loads::default() };
-    let mut newton = Newton::<PLAIN>::new(mesh.elements.len());
-    let mut known = WallMemory::default();
+    let along = |s: f64| first.transported(((s - STRAIGHT) / BEND).clamp(0.0, PI), 0.0);
+    let mut bench = Bench::on_wall(&wall, properties, &setup, Vec3::zeros(), along)?;
+    bench.tolerance = 1e-8;
+    bench.loads.forces = vec![(bench.elements().len(), Vec3::x() * -PULL)];
     // First at rest without friction, on walls that become harder; then drawn.
-    let (mut none, mut rubbing) = (Friction::default(), Friction::new(properties.largest_friction()));
-    for (softness, moves) in [(1e-3, false), (1e-2, false), (0.1, false), (1.0, false), (1.0, true)] {
-        let force = if moves { &mut rubbing } else { &mut none };
-        if moves {
-            let hand = HandMotion { from_mm: length, to_mm: length - DRAWN, turn_rad: 0.0 };
-            force.begin(&mesh.elements, &state, &mesh.points, (&[], &Friction::default()), hand);
-        }
-        let mut contact = WallContact::new(&felt, &mesh.points, &mut known, force, BENDING, true);
-        contact.softness = softness;
-        let mut outside = Outside { contact, loads: &mut loads, plates: 0.0 };
-        for renewal in 0.. {
-            let options = NewtonOptions { tolerance: 1e-8, ..NewtonOptions::default() };
-            let found = newton.solve(&mesh.elements, &mut supports, &mut outside, &mut state, &options);
-            if !found.converged || renewal > 100 {
-                return Err(Error::Computation(format!(
-                    "capstan: {} ({:.1e})",
-                    found.reason, found.residual
-                )));
-            }
-            if !moves || outside.contact.friction_settled() {
-                break;
-            }
-        }
+    for softness in [1e-3, 1e-2, 0.1, 1.0] {
+        bench.softness = softness;
+        bench.solve()?;
     }
-    let clamp = Clamp::new::<PLAIN>(&newton.start_residual, &state);
+    bench.slide(properties.largest_friction(), -DRAWN)?;
+    let clamp = bench.clamp();
     let force = clamp.force.norm();
     // The wire is pulled one way at the clamp and the same way at the tip: it has turned by 180° less the angle between.
     let angle = PI - (clamp.force / force).dot(&-Vec3::x()).clamp(-1.0, 1.0).acos();

@@ -1,6 +1,7 @@
 //! Part C on flat walls: the elastica in a channel, and the compliant wall.
 
-use super::channel::{Channel, Setup};
+use super::bench::{Bench, Setup};
+use super::channel::channel;
 use super::{Row, observed_order};
 use crate::rod::RodState;
 use crate::{Error, Result, Vec3};
@@ -26,20 +27,14 @@ struct Squeezed {
 
 /// C2: a clamped-clamped rod of length and stiffness 1 under an axial load between walls. It is symmetric, so this is its first
 /// half: clamped at one end, guided at the other, which stands for the middle.
-struct Elastica(Channel);
+struct Elastica(Bench);
 
 impl Elastica {
     /// `elements` to the whole length.
     fn new(elements: usize, modulus: f64) -> Result<Self> {
         let (half, wall) = (elements / 2, HEIGHT + RADIUS);
-        let mut channel = Channel::new(&Setup {
-            length: 0.5,
-            bending: 1.0,
-            radius: RADIUS,
-            elements: half,
-            walls: [-wall, wall],
-            modulus,
-        })?;
+        let setup = Setup { length: 0.5, bending: 1.0, radius: RADIUS, elements: half, modulus };
+        let mut channel = channel(&setup, [-wall, wall])?;
         channel.supports.end_tangent = Some(Vec3::x());
         // The first buckling mode, nearly as high as the channel.
         let first = channel.state.frames[0];
@@ -56,7 +51,7 @@ impl Elastica {
         channel.loads.forces = vec![(half, Vec3::x() * -load)];
         channel.solve()?;
         let clamp = channel.clamp();
-        let wall_force = 2.0 * channel.wall_force().norm();
+        let wall_force = 2.0 * wall_force(channel).norm();
         let middle = channel.state.positions[half];
         Ok(Squeezed {
             shortening: 1.0 - 2.0 * middle.x,
@@ -107,6 +102,11 @@ impl Elastica {
         let root = (slope * slope - 2.0 * curve * b).sqrt();
         Ok(150.0 + 5.0 * 2.0 * b / (-slope + root))
     }
+}
+
+/// Sum of the wall's forces on the rod.
+fn wall_force(bench: &mut Bench) -> Vec3 {
+    bench.touches().iter().map(|(_, touch)| touch.contact.normal * touch.contact.force_n).sum()
 }
 
 pub(super) fn elastica() -> Result<Vec<Row>> {
@@ -160,15 +160,9 @@ const MODULUS: f64 = 1.0;
 const PRESSED: f64 = 0.02;
 
 /// C6: a rod pressed into a soft floor by its weight, `elements` of them in `length` mm.
-fn pressed(elements: usize, length: f64) -> Result<Channel> {
-    let mut channel = Channel::new(&Setup {
-        length,
-        bending: BENDING,
-        radius: WIRE_RADIUS,
-        elements,
-        walls: [PRESSED - WIRE_RADIUS, 10.0],
-        modulus: MODULUS,
-    })?;
+fn pressed(elements: usize, length: f64) -> Result<Bench> {
+    let setup = Setup { length, bending: BENDING, radius: WIRE_RADIUS, elements, modulus: MODULUS };
+    let mut channel = channel(&setup, [PRESSED - WIRE_RADIUS, 10.0])?;
     channel.loads.distributed = vec![(0, elements, Vec3::y() * -(MODULUS * PRESSED))];
     Ok(channel)
 }

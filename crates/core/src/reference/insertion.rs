@@ -190,8 +190,13 @@ struct InSoftTube {
     slope: f64,
 }
 
-/// Tip of C5, mm.
-const SOFT_TIP: Vec3 = Vec3::new(39.744407, 4.116002, 0.0);
+/// Tip of C5, mm, by shooting to 10⁻¹³.
+const SOFT_TIP: Vec3 = Vec3::new(39.74440707407, 4.11600170316, 0.0);
+/// Bending energy there, mJ.
+const SOFT_BENDING: f64 = 3.992828408e-3;
+/// Wall energy, mJ, of which the line holds 4.175e-8 beside the tip's cap. The two-point solution of the list, with a residual of
+/// 10⁻⁷ and contact over the last 0.0103 mm alone, gives it as 5.51e-6.
+const SOFT_WALL: f64 = 5.493707955e-6;
 
 /// C5: a wire in a soft-walled tube, 40 mm inserted.
 fn in_soft_tube(fine: Fineness) -> Result<InSoftTube> {
@@ -229,16 +234,16 @@ pub(super) fn soft_tube() -> Result<Vec<Row>> {
     let mut rows = vec![
         Row::with_error(name, "tip, mm", found.tip.norm(), SOFT_TIP.norm(), off(&found), 0.01),
         Row::with_error(name, "triangles", count, 40_000.0, count, 40_000.0),
-        Row::relative(name, "direction of the tip", way, 0.154633f64.atan2(0.987972), 0.01),
-        Row::relative(name, "bending energy", report.energy.bend, 0.00399283, 0.01),
-        Row::relative(name, "wall energy", report.energy.wall, 0.00000551, 0.01),
-        Row::relative(name, "wall force", force, 0.002241, 0.01),
-        Row::relative(name, "penetration of the tip", deepest, 0.004922, 0.01),
-        Row::relative(name, "push force", report.push_force_n, 0.00106708, 0.01),
+        Row::relative(name, "direction of the tip", way, 0.154632772957f64.atan2(0.987972016571), 0.01),
+        Row::relative(name, "bending energy", report.energy.bend, SOFT_BENDING, 0.01),
+        Row::relative(name, "wall energy", report.energy.wall, SOFT_WALL, 0.01),
+        Row::relative(name, "wall force", force, 2.240565406e-3, 0.01),
+        Row::relative(name, "penetration of the tip", deepest, 4.922493184e-3, 0.01),
+        Row::relative(name, "push force", report.push_force_n, 1.067075823e-3, 0.01),
         Row::relative(name, "push force is dU/dl", report.push_force_n, found.slope, 1e-3),
     ];
     let (coarse, middle) = (at(1.0, 1.2)?, at(1.0, 0.6)?);
-    let bend = |found: &InSoftTube| (found.report.energy.bend / 0.00399283 - 1.0).abs();
+    let bend = |found: &InSoftTube| (found.report.energy.bend / SOFT_BENDING - 1.0).abs();
     let errors = [&coarse, &middle, &found].map(bend);
     rows.push(falling("C5 h = 1 mm", "error of bending, 1.2 … 0.3 mm", &errors, 0.5));
     // Shorter elements than 10 mm change less than the wall's mesh does.
@@ -256,7 +261,7 @@ mod tests {
     fn another_wall_another_length_and_another_load_are_seen() {
         let off = |found: f64, expected: f64, bound: f64| !Row::relative("", "", found, expected, bound).pass;
         let fine = Fineness { element_mm: 1.0, edge_mm: 0.6, modulus_n_per_mm2: 1.1 };
-        assert!(off(in_soft_tube(fine).unwrap().report.energy.wall, 0.00000551, 0.01));
+        assert!(off(in_soft_tube(fine).unwrap().report.energy.wall, SOFT_WALL, 0.01));
         let soft = in_bend(Fineness { modulus_n_per_mm2: 1e2, ..fine }, 0.0).unwrap();
         assert!(off(soft.wall_force, 1.3982735603, 1e-3) && off(soft.tip_angle, 0.4046217443, 1e-3));
         let longer = from_sleeve(1.001, 40, 1.0).unwrap();

@@ -2,9 +2,11 @@
 //!
 //! Each case is data and a function; nothing here knows what the solver returns.
 
+mod bench;
 mod capstan;
 mod channel;
 mod contact;
+mod cylinder;
 mod insertion;
 pub mod insertion_stress;
 mod planar;
@@ -159,6 +161,17 @@ pub const FAMILIES: &[Family] = &[
     },
     Family { id: "B5", title: "Whip of a pre-curved wire in a curved tube", run: whip::whip },
     Family { id: "B5", title: "Whip: where the tip jumps", run: whip::jumps },
+    Family {
+        id: "C1",
+        title: "Helix of a compressed rod in a cylinder (Lubinski et al. 1962)",
+        run: cylinder::helix,
+    },
+    Family {
+        id: "C1",
+        title: "Rod that lies in a horizontal cylinder (Dawson and Paslay 1984, Chen et al. 1990)",
+        run: cylinder::weight,
+    },
+    Family { id: "C1", title: "Rod pushed through its helix with friction", run: cylinder::rubbed },
     Family {
         id: "C2",
         title: "Clamped-clamped elastica in a channel (Domokos, Holmes and Royce 1997)",

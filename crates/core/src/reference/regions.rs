@@ -11,8 +11,9 @@
 //! needs e^{μφ} times the force.
 
 use super::Row;
+use super::bench::Setup;
 use super::capstan::{BEND, PLAY, RADIUS, STRAIGHT, drawn, rigid};
-use super::channel::{Channel, Setup};
+use super::channel::with_regions;
 use super::contact::falling;
 use crate::insertion::{WallProperties, WallRegion};
 use crate::{Result, Vec3};
@@ -49,10 +50,9 @@ fn on_two(moduli: [f64; 2], transition_mm: f64) -> Result<OnTwo> {
         bending: BENDING,
         radius: WIRE_RADIUS,
         elements: ELEMENTS,
-        walls: [DEEP - WIRE_RADIUS, 2.0],
         modulus: moduli[0],
     };
-    let mut channel = Channel::with_regions(&setup, transition_mm, vec![right])?;
+    let mut channel = with_regions(&setup, [DEEP - WIRE_RADIUS, 2.0], transition_mm, vec![right])?;
     channel.loads.distributed = vec![(0, ELEMENTS, Vec3::y() * -(moduli[0] * DEEP))];
     channel.solve()?;
     let depth = |node: usize| DEEP - channel.state.positions[node].y;

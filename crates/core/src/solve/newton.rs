@@ -264,8 +264,10 @@ impl<const C: usize> Newton<C> {
                 self.assemble_parts(elements, supports, external, state);
             }
             let mut size = self.residual(elements, external, supports, options.tolerance);
-            // Where steps no longer shrink a residual, it takes the matrix of the state itself to say so.
-            let enough = CHORD * last_turn * size.relative <= options.tolerance;
+            // Where steps no longer shrink a residual, it takes the matrix of the state itself to say so: with factors from
+            // before a contact opened or closed, steps may lead to and fro for ever.
+            let shrinks = size.relative < 0.5 * best;
+            let enough = shrinks && CHORD * last_turn * size.relative <= options.tolerance;
             if !self.assembly.hessian && !size.small && !enough {
                 self.assemble(elements, supports, external, state);
                 size = self.residual(elements, external, supports, options.tolerance);
