@@ -17,6 +17,10 @@ const SOFTEST: f64 = 30.0;
 const LOOSE: f64 = 1e-3;
 /// Equilibria that may be found before friction and the forces it follows from have settled.
 const RENEWALS: usize = 100;
+/// Newton iterations in which a guess that has learnt must come to its end, or the wall is approached from softer ones.
+const HURRIED: usize = 15;
+/// What is the matter where there is no guess.
+const BEYOND: &str = "the slid rod is beyond the wall";
 /// What is the matter where they do not.
 const UNSETTLED: &str = "friction and wall forces do not settle";
 
@@ -98,7 +102,7 @@ impl<const C: usize> Kirchhoff<C> {
                 }
             }
             if outside {
-                return Err("the slid rod is beyond the wall".into());
+                return Err(BEYOND.into());
             }
         }
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
@@ -106,13 +110,16 @@ impl<const C: usize> Kirchhoff<C> {
         let data = &next.mesh.elements[elements - 1];
         let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
         let stiffest = surroundings.properties.stiffest_n_per_mm2();
-        let mut softness = (SOFTEST * element_stiffness / stiffest).min(1.0);
+        let softest_first = (SOFTEST * element_stiffness / stiffest).min(1.0);
+        // A guess that has learnt from the last step is so near that the wall may be met as it is.
+        let mut hurried = found && softest_first < 1.0;
+        let mut softness = if hurried { 1.0 } else { softest_first };
         let mut iterations = 0;
         let mut renewals = 0;
         let found = loop {
             contact.softness = softness;
             let options = NewtonOptions {
-                max_iterations: self.options.max_iterations.min(*budget),
+                max_iterations: if hurried { HURRIED } else { self.options.max_iterations }.min(*budget),
                 tolerance: if softness < 1.0 { LOOSE } else { TOLERANCE },
                 ..NewtonOptions::default()
             };
@@ -125,6 +132,14 @@ impl<const C: usize> Kirchhoff<C> {
             );
             iterations += found.iterations;
             *budget -= found.iterations;
+            if !found.converged && hurried {
+                next.state.copy_from(&self.slid);
+                if contact.is_outside(&next.mesh.elements, &next.state) {
+                    return Err(BEYOND.into());
+                }
+                (hurried, softness) = (false, softest_first);
+                continue;
+            }
             if !found.converged {
                 break found;
             }
