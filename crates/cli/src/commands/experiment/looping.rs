@@ -19,7 +19,7 @@ use crate::args::LoopArgs;
 use crate::commands::compare::contender;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::{chart, print, print_json, progress};
+use crate::output::{answer, chart, progress};
 
 /// The tube: inner radius and length of its straight part, edge of its triangles; mm.
 const TUBE_RADIUS_MM: f64 = 15.0;
@@ -100,11 +100,7 @@ pub(super) fn looping(args: &LoopArgs) -> Result<(), Failure> {
     if let Some(folder) = &args.out {
         super::write(folder, "loop", &document.rows, &document)?;
     }
-    if args.json {
-        print_json(&document)?;
-    } else {
-        print(table(&document))?;
-    }
+    answer(&document, args.json, || table(&document))?;
     match document.failure {
         Some(reason) => Err(Failure::Computation(reason)),
         None => Ok(()),

@@ -2,7 +2,7 @@
 
 mod deformation;
 mod looping;
-mod navigation;
+pub(crate) mod navigation;
 mod timing;
 
 use std::path::Path;

@@ -19,7 +19,7 @@ use crate::args::NavigationArgs;
 use crate::commands::compare::{case::point_at, contender};
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::{print, print_json, progress};
+use crate::output::{answer, progress};
 
 /// An anatomy, its targets in the order of their rows in the centre-line table, and how its wall and wire are made.
 struct Anatomy {
@@ -67,6 +67,9 @@ const TURN_RAD: f64 = 0.35;
 const TURNS: usize = 12;
 /// Pulled back after going astray, mm.
 const BACK_MM: f64 = 30.0;
+/// How far beyond the vessel's wall the tip has gone astray, mm. The axis is a polyline, outside of whose corners the wall bulges, and
+/// a tip that dips into the mouth of a branch slides on past it.
+const ASTRAY_MM: f64 = 3.0;
 /// Pushed in without getting farther, mm, before the hand tries something else.
 const PATIENCE_MM: f64 = 24.0;
 /// Every so many commands there is a frame.
@@ -104,15 +107,17 @@ struct Document {
 
 /// Steers to every target.
 pub(super) fn navigation(args: &NavigationArgs) -> Result<(), Failure> {
-    let bar = progress::bar(ANATOMIES.iter().map(|a| a.targets.len()).sum(), "target");
+    let wanted = |target: &str| args.targets.is_empty() || args.targets.iter().any(|name| name == target);
+    let asked = targets().into_iter().filter(|name| wanted(name)).count();
+    let bar = progress::bar(asked, "target");
     let (mut rows, mut frames) = (Vec::new(), Vec::new());
-    for anatomy in &ANATOMIES {
+    for anatomy in ANATOMIES.iter().filter(|anatomy| anatomy.targets.iter().any(|name| wanted(name))) {
         let tree = anatomy::tree(anatomy.name)
             .ok_or_else(|| Failure::Input(format!("{} is not built in", anatomy.name)))?;
         let made = GeneratedWall::new(&tree, Resolution::EdgeMm(anatomy.edge_mm))?;
         let mut ends: Vec<usize> = made.ends.iter().skip(1).map(|end| end.0).collect();
         ends.sort_unstable();
-        for (target, end) in anatomy.targets.iter().zip(ends) {
+        for (target, end) in anatomy.targets.iter().zip(ends).filter(|(name, _)| wanted(name)) {
             bar.set_message(format!("{}: {target}", anatomy.name));
             let mut camera = match &args.out {
                 Some(folder) => Some(Camera::new(folder, anatomy, target, &made)?),
@@ -124,11 +129,20 @@ pub(super) fn navigation(args: &NavigationArgs) -> Result<(), Failure> {
         }
     }
     bar.finish_and_clear();
-    let document = Document { provenance: Provenance::of_program("experiment navigation"), rows, frames };
+    let document = Document {
+        provenance: Provenance::of_program(&format!("experiment navigation {:?}", args.targets)),
+        rows,
+        frames,
+    };
     if let Some(folder) = &args.out {
         super::write(folder, "navigation", &document.rows, &document)?;
     }
-    if args.json { print_json(&document) } else { print(table(&document.rows)) }
+    answer(&document, args.json, || table(&document.rows))
+}
+
+/// Names of all targets.
+pub(crate) fn targets() -> Vec<&'static str> {
+    ANATOMIES.iter().flat_map(|anatomy| anatomy.targets.iter().copied()).collect()
 }
 
 /// The way from the inlet to a row of the table: points, and the vessel's radius there.
@@ -277,7 +291,7 @@ impl Hand {
         if reached > self.best_mm + 1.0 {
             (self.best_mm, self.best_inserted_mm) = (reached, inserted);
         }
-        let astray = off > radius + 1.0 && inserted > BACK_MM;
+        let astray = off > radius + ASTRAY_MM && inserted > BACK_MM;
         if astray || inserted - self.best_inserted_mm > PATIENCE_MM {
             self.retries += 1;
             self.keep_until_mm = inserted + STEP_MM;
