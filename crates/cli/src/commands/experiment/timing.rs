@@ -215,22 +215,32 @@ fn time_paper(
     surroundings: &Surroundings<'_>,
 ) -> Result<Vec<Row>, Failure> {
     let repeats = args.repeats;
-    let follows = dense && nodes <= MOST_FOLLOWED;
     let options = Li2011Options { element_mm: element_mm(nodes, repeats), ..Default::default() };
-    let mut dense_method = Li2011::new(options, LinearSolver::Dense, surroundings)?;
+    let mut refusal = None;
+    let mut dense_method = match Li2011::new(options, LinearSolver::Dense, surroundings) {
+        Ok(method) => Some(method).filter(|_| dense),
+        Err(reason) => {
+            refusal = Some(reason.to_string()).filter(|_| dense);
+            None
+        }
+    };
+    let dense = dense_method.is_some();
+    let follows = dense && nodes <= MOST_FOLLOWED;
     let mut banded_method = Li2011::new(options, LinearSolver::Banded, surroundings)?;
     let mut max_difference_mm: f64 = 0.0;
     let mut step_both = |command: Command| -> Result<[f64; 2], Failure> {
         let clock = Instant::now();
-        if follows {
-            dense_method.step(surroundings, command)?;
+        if let Some(method) = dense_method.as_mut().filter(|_| follows) {
+            method.step(surroundings, command)?;
         }
         let dense_ms = milliseconds(clock);
         let clock = Instant::now();
         banded_method.step(surroundings, command)?;
         let banded_ms = milliseconds(clock);
-        let (a, b) = (dense_method.shape(), banded_method.shape());
-        max_difference_mm = max_difference_mm.max(largest_distance(&a.positions_mm, &b.positions_mm));
+        if let Some(method) = &dense_method {
+            let (a, b) = (method.shape(), banded_method.shape());
+            max_difference_mm = max_difference_mm.max(largest_distance(&a.positions_mm, &b.positions_mm));
+        }
         Ok([dense_ms, banded_ms])
     };
     for _ in 0..(INSERTED_MM / APPROACH_MM).round() as usize {
@@ -245,6 +255,7 @@ fn time_paper(
     let solves = time_solves(banded_method.chain(), repeats, dense, args.limit_s);
     let [dense_steps, banded_steps] = steps;
     let mut rows = Vec::new();
+    rows.extend(refusal.map(|reason| Row::untimed("li2011-dense", nodes, reason)));
     if dense {
         let note = if follows {
             String::new()
