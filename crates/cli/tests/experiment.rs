@@ -77,7 +77,7 @@ fn a_target_is_reached_and_drawn() {
     assert!(row["from_target_mm"].as_f64().unwrap() < row["path_mm"].as_f64().unwrap() / 4.0, "{row}");
     assert!(row["largest_wall_force_n"].as_f64().unwrap() > 0.0, "{row}");
     let frames = found["frames"].as_array().unwrap();
-    assert!(frames.len() >= 2 && frames.len() % 2 == 0, "both views: {frames:?}");
+    assert!(frames.len() >= 2 && frames.len().is_multiple_of(2), "both views: {frames:?}");
     for frame in frames {
         let png = std::fs::read(frame.as_str().unwrap()).unwrap();
         assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
