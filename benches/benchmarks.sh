@@ -2,7 +2,7 @@
 # Measures all methods on this machine and writes what was measured: BENCHMARKS.md, assets/pictures/compare.png and the tables
 # at the ends of docs/methods/*.md. No figure in them is typed.
 #
-#     benches/benchmarks.sh [--quick] [FOLDER]
+#     benches/benchmarks.sh [--quick] [FOLDER]      (FOLDER relative to the repository)
 #
 # FOLDER (out/benchmarks/COMMIT if absent) keeps what was measured; a second run goes on from there. --quick runs the smallest
 # part of everything and writes FOLDER/BENCHMARKS.md and FOLDER/methods instead, to see that all works.
@@ -11,9 +11,12 @@ cd "$(dirname "$0")/.."
 quick=
 if [ "${1:-}" = --quick ]; then quick=1; shift; fi
 commit=$(git rev-parse --short HEAD)
-# Changes that are not committed are measured too, so they must be told.
-git diff --quiet HEAD -- crates || commit="$commit with changes"
-out=${1:-out/benchmarks/${commit// /-}}
+out=${1:-out/benchmarks/$commit}
+# Changes that are not committed are measured too, so they must be told, and kept apart.
+if ! git diff --quiet HEAD -- crates; then
+  out=${1:-$out-$(git diff HEAD -- crates | git hash-object --stdin | cut -c1-8)}
+  commit="$commit with changes"
+fi
 mkdir -p "$out"
 cargo build --release
 endowire=target/release/endowire
@@ -35,8 +38,9 @@ fi
 # A command, and what it says, kept once it has come to its end.
 measure() {
   local name=$1; shift
+  if [ -s "$out/$name.txt" ] && [ "$(cat "$out/$name.cmd")" = "endowire $*" ]; then return; fi
+  rm -f "$out/$name.txt"
   echo "endowire $*" > "$out/$name.cmd"
-  [ -s "$out/$name.txt" ] && return
   echo "measuring: $name" >&2
   "$endowire" "$@" > "$out/$name.part"
   mv "$out/$name.part" "$out/$name.txt"
@@ -84,8 +88,9 @@ for page in "$pages"/*.md; do
   names=$(sed -n 's/^<!-- measured: \(.*\) -->$/\1/p' "$page")
   {
     sed '/^<!-- measured: /q' "$page"
-    printf '## As measured\n%s `endowire compare %s`\n' "$origin" "${compare[*]}"
+    printf '## As measured\n%s\nThe command: `endowire compare %s`.\n' "$origin" "${compare[*]}"
     for name in $names; do
+      [ -n "$(rows_of "$name")" ] || continue
       printf '\n| %s | elements | error | time, ms | iterations | |\n|---|---|---|---|---|---|\n' "\`$name\`"
       rows_of "$name"
     done

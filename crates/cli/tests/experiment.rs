@@ -86,7 +86,13 @@ fn a_target_is_reached_and_drawn() {
 
 #[test]
 fn the_loop_grows_with_the_advance() {
-    let found = document(&experiment(&["loop", "--json"]));
+    let folder = tempfile::tempdir().unwrap();
+    let found = document(&experiment(&["loop", "--out", folder.path().to_str().unwrap(), "--json"]));
+    assert_written(folder.path(), "loop", &found);
+    // The paper's four pictures in two views, and the chart as SVG and PNG.
+    let frames = found["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 4 * 2 + 2, "{frames:?}");
+    assert!(frames.iter().all(|frame| Path::new(frame.as_str().unwrap()).exists()), "{frames:?}");
     assert!(found["failure"].is_null(), "{}", found["failure"]);
     let value = |row: &Value, key: &str| row[key].as_f64().unwrap();
     let stopped: Vec<&Value> = rows(&found).iter().filter(|row| value(row, "advance_mm") > 0.0).collect();

@@ -1,5 +1,6 @@
 //! `endowire experiment`: the four experiments of Li et al. 2011.
 
+mod camera;
 mod deformation;
 mod looping;
 pub(crate) mod navigation;

@@ -12,9 +12,10 @@ use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::vessel::{CentrelineTree, GeneratedWall, Resolution, anatomy};
-use endowire_viewer::{CArmSpec, DeviceView, Renderer, View, ViewSpec, XRaySpec};
+use endowire_viewer::{CArmSpec, ViewSpec, XRaySpec};
 use serde::Serialize;
 
+use super::camera::Camera;
 use crate::args::NavigationArgs;
 use crate::commands::compare::{case::point_at, contender};
 use crate::failure::Failure;
@@ -120,7 +121,7 @@ pub(super) fn navigation(args: &NavigationArgs) -> Result<(), Failure> {
         for (target, end) in anatomy.targets.iter().zip(ends).filter(|(name, _)| wanted(name)) {
             bar.set_message(format!("{}: {target}", anatomy.name));
             let mut camera = match &args.out {
-                Some(folder) => Some(Camera::new(folder, anatomy, target, &made)?),
+                Some(folder) => Some(camera(folder, anatomy, target, &made)?),
                 None => None,
             };
             rows.push(steer(anatomy, target, &way(&tree, end), &made, camera.as_mut())?);
@@ -332,44 +333,16 @@ impl Hand {
     }
 }
 
-/// Frames of both views.
-struct Camera {
-    renderer: Renderer,
-    stem: PathBuf,
-    frames: Vec<PathBuf>,
-}
-
-impl Camera {
-    fn new(folder: &Path, anatomy: &Anatomy, target: &str, made: &GeneratedWall) -> Result<Self, Failure> {
-        let folder = folder.join("frames");
-        std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
-        let spec = ViewSpec {
-            size_px: [512, 512],
-            views: vec![View::ThreeD, View::Fluoro],
-            c_arm: CArmSpec { primary_deg: anatomy.primary_deg, ..CArmSpec::default() },
-            xray: XRaySpec { contrast_fraction: 0.04, ..XRaySpec::default() },
-            ..ViewSpec::default()
-        };
-        let renderer = Renderer::new(&spec, &made.wall.closed_mesh())?;
-        let stem = folder.join(format!("{}_{}", anatomy.name, target.replace(' ', "_")));
-        Ok(Self { renderer, stem, frames: Vec::new() })
-    }
-
-    fn take(&mut self, simulation: &Simulation) -> Result<(), Failure> {
-        let device = simulation.device();
-        let view =
-            DeviceView::from_shape(simulation.shape(), |from_tip| device.section_at(from_tip).radius_mm);
-        let frames = self.renderer.render(&[view])?;
-        let number = self.frames.len() / 2 + 1;
-        for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
-            if let Some(image) = image {
-                let path = PathBuf::from(format!("{}_{number:02}_{name}.png", self.stem.display()));
-                image.write_png(&path)?;
-                self.frames.push(path);
-            }
-        }
-        Ok(())
-    }
+/// A camera for one target.
+fn camera(folder: &Path, anatomy: &Anatomy, target: &str, made: &GeneratedWall) -> Result<Camera, Failure> {
+    let spec = ViewSpec {
+        size_px: [512, 512],
+        c_arm: CArmSpec { primary_deg: anatomy.primary_deg, ..CArmSpec::default() },
+        xray: XRaySpec { contrast_fraction: 0.04, ..XRaySpec::default() },
+        ..ViewSpec::default()
+    };
+    let stem = format!("{}_{}", anatomy.name, target.replace(' ', "_"));
+    Camera::new(&folder.join("frames"), &stem, spec, &made.wall.closed_mesh())
 }
 
 fn table(rows: &[Row]) -> String {
