@@ -143,7 +143,7 @@ fn a_method_that_cannot_says_so_in_its_row() {
 #[test]
 fn an_insertion_is_compared_and_stops_at_the_limit() {
     let folder = tempfile::tempdir().unwrap();
-    let args = ["--case", "soft-tube", "--method", "kirchhoff,mass-spring", "--elements", "10,20", "--json"];
+    let args = ["--case", "soft-tube", "--method", "kirchhoff,rigid-links", "--elements", "10,20", "--json"];
     let found = document(&compare(folder.path(), &[&args[..], &["--limit-s", "1e-6"]].concat()));
     for row in rows(&found) {
         assert!(row["error"].is_null() && row["note"].as_str().unwrap().contains("limit of"), "{row}");

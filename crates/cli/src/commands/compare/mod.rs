@@ -9,7 +9,7 @@ mod front;
 mod picture;
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,8 @@ struct Document {
 /// Least time spent on the repeats of a fast cell, s, and their most.
 const REPEAT_FOR_S: f64 = 0.2;
 const REPEATS: std::ops::RangeInclusive<usize> = 3..=101;
+/// Longest time for the repeats of a cell with all that goes before each, which is not timed, s.
+const REPEAT_WITHIN_S: f64 = 1.0;
 /// A cell that takes longer than this part of the limit is not repeated.
 const ONCE: f64 = 0.1;
 /// Growth of time with a doubled resolution that is taken for granted: a cell that would pass the limit is not begun.
@@ -184,6 +186,7 @@ fn measure(
         }
     }
     let mut times = Vec::new();
+    let begun = Instant::now();
     loop {
         match case.run(method, resolution, Duration::from_secs_f64(limit_s)) {
             Err(error) => {
@@ -203,7 +206,8 @@ fn measure(
             }
         }
         let spent: f64 = times.iter().sum();
-        let enough = times.len() >= *REPEATS.start() && spent > REPEAT_FOR_S;
+        let enough = times.len() >= *REPEATS.start()
+            && (spent > REPEAT_FOR_S || begun.elapsed().as_secs_f64() > REPEAT_WITHIN_S);
         if enough || times.len() == *REPEATS.end() || spent > ONCE * limit_s {
             break;
         }
@@ -314,6 +318,7 @@ fn text(document: &Document, cases: &[(&'static str, &'static str, f64)]) -> Str
                     "Pareto front: {first}, alone below {error:.1e} {unit}; above also {}",
                     others.join(", ")
                 ),
+                (None, _) => "Pareto front: nobody".to_owned(),
                 _ => format!("Pareto front: {}", front.methods.join(", ")),
             });
             let fastest = front.time_s.first().map_or(1.0, |f| f.1);
