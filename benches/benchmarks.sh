@@ -1,34 +1,99 @@
 #!/usr/bin/env bash
-# Writes BENCHMARKS.md and assets/pictures/compare.png from measurements on this machine: no figure in it is typed.
-# A folder as argument keeps what was measured; a second run goes on from there.
+# Measures all methods on this machine and writes what was measured: BENCHMARKS.md, assets/pictures/compare.png and the tables
+# at the ends of docs/methods/*.md. No figure in them is typed.
+#
+#     benches/benchmarks.sh [--quick] [FOLDER]      (FOLDER relative to the repository)
+#
+# FOLDER (out/benchmarks/COMMIT if absent) keeps what was measured; a second run goes on from there. --quick runs the smallest
+# part of everything and writes FOLDER/BENCHMARKS.md and FOLDER/methods instead, to see that all works.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-out=${1:-out/benchmarks}
+quick=
+if [ "${1:-}" = --quick ]; then quick=1; shift; fi
+commit=$(git rev-parse --short HEAD)
+out=${1:-out/benchmarks/$commit}
+# Changes that are not committed are measured too, so they must be told, and kept apart.
+if ! git diff --quiet HEAD -- crates; then
+  out=${1:-$out-$(git diff HEAD -- crates | git hash-object --stdin | cut -c1-8)}
+  commit="$commit with changes"
+fi
 mkdir -p "$out"
-cargo build --release --quiet
+cargo build --release
 endowire=target/release/endowire
-"$endowire" compare --out "$out/compare" > "$out/compare.txt"
-"$endowire" experiment timing --methods all --nodes 50,100,150,200,300,500,1000,2000 --limit-s 2 > "$out/timing.txt"
-"$endowire" experiment deformation > "$out/deformation.txt"
-"$endowire" experiment navigation > "$out/navigation.txt"
-cp "$out/compare/compare.png" assets/pictures/compare.png
+target=$out
+compare=() timing=(--methods all --nodes 50,100,150,200,300,500,1000,2000 --limit-s 10) deformation=() navigation=()
+if [ -n "$quick" ]; then
+  compare=(--cases cantilever-1,soft-tube --methods kirchhoff,li2011-banded,discrete-rod --elements 8,16 --limit-s 2)
+  timing=(--methods all --nodes 20,50 --repeats 3 --limit-s 0.5)
+  deformation=(--l-mm 3 --l-over-h 3)
+  navigation=(--targets aorta)
+  pages=$out/methods picture=compare/compare.png methods=methods/README.md
+  mkdir -p "$pages"
+  cp docs/methods/*.md "$pages"
+else
+  compare=(--limit-s 15)
+  target=. pages=docs/methods picture=assets/pictures/compare.png methods=docs/methods/README.md
+fi
+
+# A command, and what it says, kept once it has come to its end.
+measure() {
+  local name=$1; shift
+  if [ -s "$out/$name.txt" ] && [ "$(cat "$out/$name.cmd")" = "endowire $*" ]; then return; fi
+  rm -f "$out/$name.txt"
+  echo "endowire $*" > "$out/$name.cmd"
+  echo "measuring: $name" >&2
+  "$endowire" "$@" > "$out/$name.part"
+  mv "$out/$name.part" "$out/$name.txt"
+}
+# compare goes on by itself, cell by cell; its folder is no part of the command to repeat.
+echo "endowire compare ${compare[*]}" > "$out/compare.cmd"
+echo "measuring: compare" >&2
+"$endowire" compare "${compare[@]}" --out "$out/compare" > "$out/compare.txt"
+measure timing experiment timing "${timing[@]}"
+measure deformation experiment deformation "${deformation[@]}"
+measure navigation experiment navigation "${navigation[@]}"
+measure loop experiment loop
+[ -n "$quick" ] || cp "$out/compare/compare.png" "$picture"
 
 processor=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -1)
-block() { printf '```sh\n%s\n```\n```text\n' "$1"; cat "$2"; printf '```\n\n'; }
+origin="Written by \`benches/benchmarks.sh\` on $(date -u +%Y-%m-%d) from commit $commit, on ${processor:-an unknown processor}, $(nproc) cores, $(uname -s), $(rustc --version | cut -d' ' -f1,2)."
+block() {
+  printf '## %s\n```sh\n' "$1"; cat "$out/$2.cmd"; printf '```\n```text\n'; cat "$out/$2.txt"; printf '```\n\n'
+}
 {
-  echo "# Measured"
-  echo
-  echo "Written by \`benches/benchmarks.sh\` on $(date -u +%Y-%m-%d) from commit $(git rev-parse --short HEAD), on ${processor:-an unknown processor}, $(nproc) cores, $(rustc --version | cut -d' ' -f1,2)."
-  echo "The methods are described in [docs/methods](docs/methods/README.md)."
-  echo
-  echo "## Error against time"
-  echo "![Error against time of every method, five scenes](assets/pictures/compare.png)"
-  echo
-  block "endowire compare" "$out/compare.txt"
-  echo "## Table 1 of Li et al. 2011, for every method"
-  block "endowire experiment timing --methods all --nodes 50,100,150,200,300,500,1000,2000 --limit-s 2" "$out/timing.txt"
-  echo "## Table 2 of Li et al. 2011"
-  block "endowire experiment deformation" "$out/deformation.txt"
-  echo "## Navigation"
-  block "endowire experiment navigation" "$out/navigation.txt"
-} > BENCHMARKS.md
+  printf '# Measured\n\n%s\nThe methods are described in [docs/methods](%s).\n\n' "$origin" "$methods"
+  printf '![Error against time of every method, five scenes](%s)\n\n' "$picture"
+  block "Error against time" compare
+  block "Table 1 of Li et al. 2011, for every method" timing
+  block "Table 2 of Li et al. 2011" deformation
+  block "Navigation" navigation
+  block "The loop" loop
+} > "$target/BENCHMARKS.md"
+
+# The rows of a method, as a table: what lies behind the comment in each page is written anew. The note is the last column and may hold
+# commas; those before it hold none.
+rows_of() {
+  awk -F, -v method="$1" '
+    function number(text, format) { return text == "" ? "–" : sprintf(format, text) }
+    NR > 1 && $2 == method {
+      note = $7; for (i = 8; i <= NF; i++) note = note "," $i
+      gsub(/^"|"$/, "", note); gsub(/""/, "\"", note); gsub(/\|/, "/", note)
+      unit = $1 ~ /^cantilever/ ? " L" : " mm"
+      printf "| %s | %s | %s | %s | %s | %s |\n", $1, $3, $4 == "" ? "–" : number($4, "%.1e") unit,
+        $5 == "" ? "–" : sprintf("%.3f", 1000 * $5), number($6, "%d"), note
+    }' "$out/compare/compare.csv"
+}
+for page in "$pages"/*.md; do
+  grep -q '^<!-- measured: ' "$page" || continue
+  names=$(sed -n 's/^<!-- measured: \(.*\) -->$/\1/p' "$page")
+  {
+    sed '/^<!-- measured: /q' "$page"
+    printf '## As measured\n%s\nThe command: `endowire compare %s`.\n' "$origin" "${compare[*]}"
+    for name in $names; do
+      [ -n "$(rows_of "$name")" ] || continue
+      printf '\n| %s | elements | error | time, ms | iterations | |\n|---|---|---|---|---|---|\n' "\`$name\`"
+      rows_of "$name"
+    done
+  } > "$page.part"
+  mv "$page.part" "$page"
+done

@@ -11,7 +11,7 @@ use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 use endowire_methods::{Insertion, InsertionOptions, Task, by_name, cantilever};
 
 /// Those that take less than a second for what is asked here.
-const FAST: [&str; 4] = ["rigid-links", "mass-spring", "beam-fem-damped", "chord-energy"];
+const FAST: [&str; 5] = ["rigid-links", "mass-spring", "beam-fem-damped", "chord-energy", "discrete-rod"];
 
 fn cantilevers(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("cantilever, 32 elements");
@@ -47,7 +47,7 @@ fn inserted(name: &str) -> endowire_core::Result<Simulation> {
 fn increments(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("1 mm in and out of the curved tube");
     group.sample_size(10);
-    for name in ["kirchhoff", "rigid-links", "beam-fem-damped"] {
+    for name in ["kirchhoff", "rigid-links", "beam-fem-damped", "discrete-rod"] {
         let Ok(mut simulation) = inserted(name) else { continue };
         group.bench_function(name, |b| {
             b.iter(|| {

@@ -5,42 +5,15 @@
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use endowire_core::Vec3;
 use endowire_core::rod::element::{ElementSystem, element_energy, element_system};
-use endowire_core::rod::{Assembly, ElementData, Energy, Frame, Layout, PLAIN, RodState, Supports, TWISTED};
+use endowire_core::rod::{Energy, Frame, Layout, PLAIN, RodState, TWISTED};
 use endowire_core::solve::{BandMatrix, Factor, Newton, NewtonOptions};
-use endowire_core::statics::Loads;
+use endowire_tests::bent_rod::{bent, clamp, elements, system, tip_load};
 use std::hint::black_box;
 
 const SIZES: [usize; 6] = [8, 32, 128, 300, 512, 1024];
 
-fn rod(n: usize, twisted: bool) -> (Vec<ElementData>, RodState) {
-    let data = ElementData {
-        length: 1.0 / n as f64,
-        bending: [1.0; 3],
-        torsion: [0.77; 3],
-        rest_curvature: [[if twisted { 1.0 } else { 0.0 }, 0.0]; 3],
-        rest_twist: [0.0; 3],
-        flexibility: 0.0,
-    };
-    let elements = vec![data; n];
-    let mut frames = vec![Frame::new(Vec3::x(), Some(Vec3::y()))];
-    for i in 0..n {
-        let last = frames[i];
-        frames.push(last.transported(1.5 / n as f64, 0.4 / n as f64));
-    }
-    let state = RodState::from_frames(&elements, Vec3::zeros(), frames);
-    (elements, state)
-}
-
-fn supports() -> Supports {
-    Supports { start_tangent: true, start_angle: true, ..Supports::default() }
-}
-
-fn tip_load(n: usize) -> Loads {
-    Loads { forces: vec![(n, Vec3::new(0.0, -10.0, 0.0))], ..Loads::default() }
-}
-
 fn element(c: &mut Criterion) {
-    let (elements, state) = rod(4, true);
+    let (elements, state) = bent(4, true);
     let s = state.element(1);
     let mut group = c.benchmark_group("element");
     group.bench_function("energy", |b| b.iter(|| element_energy(&elements[1], black_box(&s), false)));
@@ -66,22 +39,13 @@ fn element(c: &mut Criterion) {
     group.finish();
 }
 
-fn system<const C: usize>(n: usize) -> (Vec<ElementData>, RodState, Newton<C>) {
-    let (elements, state) = rod(n, Layout::<C>::TWIST);
-    let mut newton = Newton::<C>::new(n);
-    newton.assemble(&elements, &supports(), &mut tip_load(n), &state);
-    Assembly::add_shift(&mut newton.assembly.matrix, &elements, 50.0);
-    supports().hold(&mut newton.assembly);
-    (elements, state, newton)
-}
-
 fn assembly<const C: usize>(c: &mut Criterion, name: &str) {
     let mut group = c.benchmark_group(format!("assembly{name}"));
     for n in SIZES {
         let (elements, state, mut newton) = system::<C>(n);
         let mut loads = tip_load(n);
         group.bench_function(BenchmarkId::from_parameter(n), |b| {
-            b.iter(|| newton.assemble(&elements, &supports(), &mut loads, black_box(&state)));
+            b.iter(|| newton.assemble(&elements, &clamp(), &mut loads, black_box(&state)));
         });
     }
     group.finish();
@@ -104,13 +68,13 @@ fn assembly<const C: usize>(c: &mut Criterion, name: &str) {
 fn solve<const C: usize>(c: &mut Criterion, name: &str) {
     let mut group = c.benchmark_group(format!("newton iteration{name}"));
     for n in SIZES {
-        let (elements, _) = rod(n, Layout::<C>::TWIST);
+        let elements = elements(n, Layout::<C>::TWIST);
         let frame = Frame::new(Vec3::x(), Some(Vec3::y()));
         let start = RodState::straight(&elements, Vec3::zeros(), frame);
         let mut newton = Newton::<C>::new(n);
         let mut state = start.clone();
         let options = NewtonOptions::default();
-        let report = newton.solve(&elements, &mut supports(), &mut tip_load(n), &mut state, &options);
+        let report = newton.solve(&elements, &mut clamp(), &mut tip_load(n), &mut state, &options);
         if !Layout::<C>::TWIST {
             let error = (state.positions[n] - Vec3::new(1.0 - 0.554995597754, -0.810609024880, 0.0)).norm();
             println!("{n} elements: tip error {error:.1e}, {} iterations", report.iterations);
@@ -123,13 +87,7 @@ fn solve<const C: usize>(c: &mut Criterion, name: &str) {
                 for _ in 0..rounds {
                     state.copy_from(&start);
                     let clock = std::time::Instant::now();
-                    black_box(newton.solve(
-                        &elements,
-                        &mut supports(),
-                        &mut tip_load(n),
-                        &mut state,
-                        &options,
-                    ));
+                    black_box(newton.solve(&elements, &mut clamp(), &mut tip_load(n), &mut state, &options));
                     sum += clock.elapsed();
                 }
                 sum / count

@@ -3,13 +3,13 @@
 use std::process::Command;
 
 fn main() {
-    // Where git keeps what a commit changes: elsewhere in a second worktree.
-    for name in ["HEAD", "refs/heads"] {
-        if let Some(path) = git(&["rev-parse", "--git-path", name]) {
-            println!("cargo:rerun-if-changed={path}");
-        }
+    // Where git keeps what a commit changes: elsewhere in a second worktree, and there the commits of others are none of ours, so the
+    // log of this worktree's head is watched and not all branches. A path that is not there would rebuild always.
+    let watched = ["HEAD", "logs/HEAD"].map(|name| git(&["rev-parse", "--git-path", name]));
+    for path in watched.into_iter().flatten().filter(|path| std::path::Path::new(path).exists()) {
+        println!("cargo:rerun-if-changed={path}");
     }
-    for path in ["src", "../core/src", "../viewer/src", "build.rs"] {
+    for path in ["src", "../core/src", "../methods/src", "../viewer/src", "build.rs"] {
         println!("cargo:rerun-if-changed={path}");
     }
     println!("cargo:rustc-env=ENDOWIRE_GIT_REVISION={}", revision().unwrap_or_else(|| "unknown".to_owned()));

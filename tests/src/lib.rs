@@ -1,4 +1,5 @@
 //! Shared helpers of the workspace tests.
 
+pub mod bent_rod;
 pub mod crossing;
 pub mod sweep;

@@ -11,32 +11,14 @@ use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::rod::{Assembly, ElementData, Frame, Layout, PLAIN, RodState, Supports, TWISTED};
-use endowire_core::solve::{Factor, Newton};
-use endowire_core::statics::Loads;
+use endowire_core::rod::{Layout, PLAIN, TWISTED};
+use endowire_core::solve::Factor;
 use endowire_core::vessel::{GeneratedWall, Resolution, WallQuery, anatomy};
+use endowire_tests::bent_rod::system;
 
 /// Seconds of one banded factorisation and solve of `n` elements, median of many.
 fn factor_and_solve<const C: usize>(n: usize) -> f64 {
-    let element = ElementData {
-        length: 1.0,
-        bending: [10.0; 3],
-        torsion: [7.7; 3],
-        rest_curvature: [[0.0; 2]; 3],
-        rest_twist: [0.0; 3],
-        flexibility: 0.0,
-    };
-    let elements = vec![element; n];
-    let mut frames = vec![Frame::new(Vec3::x(), Some(Vec3::y()))];
-    for i in 0..n {
-        frames.push(frames[i].transported(0.004, 0.001));
-    }
-    let state = RodState::from_frames(&elements, Vec3::zeros(), frames);
-    let supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
-    let mut newton = Newton::<C>::new(n);
-    newton.assemble(&elements, &supports, &mut Loads::default(), &state);
-    Assembly::add_shift(&mut newton.assembly.matrix, &elements, 1.0);
-    supports.hold(&mut newton.assembly);
+    let (_, _, newton) = system::<C>(n);
     let mut factor = Factor::new(Layout::<C>::dimension(n));
     let mut b = newton.assembly.residual.clone();
     median((0..301).map(|_| {

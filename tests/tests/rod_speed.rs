@@ -1,40 +1,15 @@
 //! The speed bars of the rod, least of many runs. Timing: run by hand, alone, with `--release -- --ignored --nocapture`.
 
 use endowire_core::Vec3;
-use endowire_core::rod::{Assembly, ElementData, Frame, Layout, PLAIN, RodState, Supports, TWISTED};
+use endowire_core::rod::{Frame, Layout, PLAIN, RodState, TWISTED};
 use endowire_core::solve::{Factor, Newton, NewtonOptions};
-use endowire_core::statics::Loads;
+use endowire_tests::bent_rod::{bent, clamp, elements, make_regular, tip_load};
 use std::time::Instant;
-
-fn element(n: usize, twisted: bool) -> ElementData {
-    ElementData {
-        length: 1.0 / n as f64,
-        bending: [1.0; 3],
-        torsion: [0.77; 3],
-        rest_curvature: [[if twisted { 1.0 } else { 0.0 }, 0.0]; 3],
-        rest_twist: [0.0; 3],
-        flexibility: 0.0,
-    }
-}
-
-fn supports() -> Supports {
-    Supports { start_tangent: true, start_angle: true, ..Supports::default() }
-}
-
-fn tip_load(n: usize) -> Loads {
-    Loads { forces: vec![(n, Vec3::new(0.0, -10.0, 0.0))], ..Loads::default() }
-}
 
 /// Seconds of (assembly, factor and solve) for `n` elements.
 fn measure<const C: usize>(n: usize, rounds: usize) -> (f64, f64) {
-    let elements = vec![element(n, Layout::<C>::TWIST); n];
-    let mut frames = vec![Frame::new(Vec3::x(), Some(Vec3::y()))];
-    for i in 0..n {
-        let last = frames[i];
-        frames.push(last.transported(1.5 / n as f64, 0.4 / n as f64));
-    }
-    let state = RodState::from_frames(&elements, Vec3::zeros(), frames);
-    let supports = supports();
+    let (elements, state) = bent(n, Layout::<C>::TWIST);
+    let supports = clamp();
     let mut loads = tip_load(n);
     let mut newton = Newton::<C>::new(n);
     let mut factor = Factor::new(Layout::<C>::dimension(n));
@@ -44,8 +19,7 @@ fn measure<const C: usize>(n: usize, rounds: usize) -> (f64, f64) {
         let clock = Instant::now();
         newton.assemble(&elements, &supports, &mut loads, &state);
         first = first.min(clock.elapsed().as_secs_f64());
-        Assembly::add_shift(&mut newton.assembly.matrix, &elements, 50.0);
-        supports.hold(&mut newton.assembly);
+        make_regular(&elements, &mut newton);
         b.copy_from_slice(&newton.assembly.residual);
         let clock = Instant::now();
         factor
@@ -58,13 +32,13 @@ fn measure<const C: usize>(n: usize, rounds: usize) -> (f64, f64) {
 
 /// Seconds an iteration of a whole solve: the cantilever under PL²/EI = 10 from straight, everything included.
 fn whole<const C: usize>(n: usize, rounds: usize) -> f64 {
-    let elements = vec![element(n, Layout::<C>::TWIST); n];
+    let elements = elements(n, Layout::<C>::TWIST);
     let start = RodState::straight(&elements, Vec3::zeros(), Frame::new(Vec3::x(), Some(Vec3::y())));
     let mut newton = Newton::<C>::new(n);
     let mut best = f64::INFINITY;
     for _ in 0..rounds {
         let mut state = start.clone();
-        let mut supports = supports();
+        let mut supports = clamp();
         let mut loads = tip_load(n);
         let clock = Instant::now();
         let report =

@@ -2,8 +2,12 @@
 
 use std::path::PathBuf;
 
+use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
 use endowire_viewer::{Mode, Pose};
+
+use crate::commands::compare::{case::CASES, contender};
+use crate::commands::experiment::navigation::targets;
 
 /// Simulates catheters and guidewires in blood vessels: scripted insertions, experiments, 3D and fluoroscopic frames.
 ///
@@ -100,6 +104,19 @@ pub(crate) struct FrameArgs {
     /// Print what was written as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// The methods that are compared. A wrong name is answered with the nearest right one.
+fn method_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(contender::names())
+}
+
+fn all_or_method_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(std::iter::once("all").chain(contender::names()))
+}
+
+fn case_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(CASES.map(|case| case.0))
 }
 
 fn mode(text: &str) -> Result<Mode, String> {
@@ -209,11 +226,14 @@ pub(crate) struct CompareArgs {
     #[arg(long, default_value = "out/compare", value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Cases to run; all if absent
-    #[arg(long, value_delimiter = ',', value_name = "CASE,…")]
+    #[arg(long, visible_alias = "case", value_delimiter = ',', value_name = "CASE,…", value_parser = case_names())]
     pub(crate) cases: Vec<String>,
     /// Methods to run; all if absent
-    #[arg(long, value_delimiter = ',', value_name = "METHOD,…")]
+    #[arg(long, visible_alias = "method", value_delimiter = ',', value_name = "METHOD,…", value_parser = method_names())]
     pub(crate) methods: Vec<String>,
+    /// Numbers of elements to run, as 8,16,32; those that show each method best if absent
+    #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    pub(crate) elements: Vec<usize>,
     /// Longest time of one solve or insertion
     #[arg(long, default_value_t = 30.0, value_name = "S", allow_negative_numbers = true)]
     pub(crate) limit_s: f64,
@@ -236,6 +256,9 @@ pub(crate) enum ExperimentCommand {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct NavigationArgs {
+    /// Targets to steer to; all if absent
+    #[arg(long, visible_alias = "target", value_delimiter = ',', value_name = "TARGET,…", value_parser = PossibleValuesParser::new(targets()))]
+    pub(crate) targets: Vec<String>,
     /// Folder for navigation.csv, navigation.json and frames of both views
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -260,8 +283,14 @@ pub(crate) struct DeformationArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) measured: Option<PathBuf>,
     /// Method
-    #[arg(long, default_value = "kirchhoff", value_name = "METHOD")]
+    #[arg(long, default_value = "kirchhoff", value_name = "METHOD", value_parser = method_names())]
     pub(crate) method: String,
+    /// Segment lengths of Table 2 to run (1, 2, 3); all if absent
+    #[arg(long, value_delimiter = ',', value_name = "L,…")]
+    pub(crate) l_mm: Vec<f64>,
+    /// Increments a segment of Table 2 to run (40, 20, 10, 5, 3); all if absent
+    #[arg(long, value_delimiter = ',', value_name = "COUNT,…")]
+    pub(crate) l_over_h: Vec<u32>,
     /// Folder for deformation.csv and deformation.json
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -279,9 +308,9 @@ pub(crate) struct TimingArgs {
     #[arg(long, default_value_t = 15, value_name = "COUNT")]
     pub(crate) repeats: usize,
     /// Methods: all, or some of them
-    #[arg(long, value_delimiter = ',', default_values_t = ["li2011-dense", "li2011-banded", "kirchhoff"].map(String::from), value_name = "METHOD,…")]
+    #[arg(long, visible_alias = "method", value_delimiter = ',', default_values_t = ["li2011-dense", "li2011-banded", "kirchhoff"].map(String::from), value_name = "METHOD,…", value_parser = all_or_method_names())]
     pub(crate) methods: Vec<String>,
-    /// Longest time for a method of the others to be brought in position
+    /// Longest time for a method to be brought in position; one that takes longer is told in a note
     #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true)]
     pub(crate) limit_s: f64,
     /// Folder for timing.csv and timing.json

@@ -1,7 +1,7 @@
 //! Searches the parameters that the papers leave open: least time to equilibrium, on the cantilever of the reference cases and
 //! on an insertion into the curved tube. Prints, for every method and task, the best sets of a grid and the defaults among them.
 //!
-//! `cargo run --release -p endowire-methods --example tune`
+//! `cargo run --release -p endowire-methods --example tune [METHOD …]`
 
 use std::time::{Duration, Instant};
 
@@ -97,7 +97,11 @@ fn main() -> endowire_core::Result<()> {
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.8))?;
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0)?;
     let wire = Device::uniform(200.0, 0.445, 10.0)?;
+    let asked: Vec<String> = std::env::args().skip(1).collect();
     for method in ["rigid-links", "mass-spring", "beam-fem", "discrete-rod"] {
+        if !asked.is_empty() && !asked.iter().any(|name| name == method) {
+            continue;
+        }
         let own: Vec<&Candidate> = list.iter().filter(|c| c.method == method).collect();
         let show = |task: &str, quantity: &str, run: &dyn Fn(&Candidate) -> Option<(f64, f64)>| {
             let mut found: Vec<(f64, f64, &str)> =

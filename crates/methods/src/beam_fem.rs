@@ -19,8 +19,7 @@
 //! the nodes for the duration of an increment, as later dynamic codes with the same element have; it settles then, and is
 //! compared beside the published method as `beam-fem-damped`. The elements stretch (EA = ratio·EI/h²).
 
-use endowire_core::device::Device;
-use endowire_core::{Result, Vec3};
+use endowire_core::Vec3;
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector};
 
 use crate::{Chain, NodalLoad, Outcome, Posture, RodModel};
@@ -66,10 +65,6 @@ impl BeamFem {
 impl RodModel for BeamFem {
     fn name(&self) -> &'static str {
         if self.damping > 0.0 { "beam-fem-damped" } else { "beam-fem" }
-    }
-
-    fn check(&self, _: &Device) -> Result<()> {
-        Ok(())
     }
 
     fn relax(

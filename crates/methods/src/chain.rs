@@ -130,17 +130,6 @@ pub struct Push {
     pub stiffness_n_per_mm: f64,
 }
 
-impl Push {
-    /// The velocity after Δt of a mass m that moves at v, and c a drag per mass: (m(1 + cΔt) + Δt² k n nᵀ) v⁺ = m v + Δt f.
-    ///
-    /// The stiffness of a push is implicit at its own node, so that it does not limit the time step.
-    pub fn velocity(&self, mass: f64, drag: f64, velocity: &Vec3, force_n: &Vec3, dt: f64) -> Vec3 {
-        let free = (velocity * mass + force_n * dt) / (mass * (1.0 + drag * dt));
-        let held = dt * dt * self.stiffness_n_per_mm;
-        free - self.normal * (self.normal.dot(&free) * held / (mass * (1.0 + drag * dt) + held))
-    }
-}
-
 /// What acts on the nodes of a chain.
 pub trait NodalLoad {
     /// What acts on `node` (1 to the number of segments) at `x`.

@@ -20,10 +20,10 @@
 //! infinite), so there is no torque to feel and no whip. The number of rounds grows with the square of the number of segments. The
 //! papers' friction is left out: no scene of the comparison has any.
 
-use endowire_core::device::Device;
-use endowire_core::{Result, Vec3};
+use endowire_core::Vec3;
 use nalgebra::Matrix3;
 
+use crate::links::Links;
 use crate::{Chain, NodalLoad, Outcome, Posture, Push, RodModel};
 
 /// The method's parameters.
@@ -44,10 +44,6 @@ impl RodModel for ChordEnergy {
         "chord-energy"
     }
 
-    fn check(&self, _: &Device) -> Result<()> {
-        Ok(())
-    }
-
     fn relax(
         &self,
         chain: &Chain,
@@ -56,25 +52,19 @@ impl RodModel for ChordEnergy {
         tolerance: f64,
     ) -> Outcome {
         let n = chain.segments();
-        let mut links: Vec<Vec3> = (0..n).map(|i| posture.chord(i).normalize()).collect();
+        let mut links = Links::new(chain, posture, tolerance);
         let joints: Vec<f64> = (0..n).map(|i| chain.joint_stiffness(i)).collect();
         let shaped = chain.rest_curvature_per_mm.iter().any(|k| *k != [0.0; 2]);
         let mut bends = vec![Vec3::zeros(); n];
-        let mut pushes = vec![Push::default(); n];
-        let allowed = tolerance * chain.force_unit() * chain.length_mm() / n as f64;
         for iteration in 1..=self.max_iterations {
-            let mut x = chain.start_mm;
-            for i in 0..n {
-                x += links[i] * chain.lengths_mm[i];
-                posture.positions_mm[i + 1] = x;
-                pushes[i] = load.on(i + 1, &x);
-            }
+            links.place(chain, load, posture);
             if shaped {
-                intrinsic_bends(chain, &links, &mut bends);
+                intrinsic_bends(chain, &links.directions, &mut bends);
             }
-            let largest = round(chain, &joints, &bends, &pushes, &mut links);
-            if largest <= allowed || !largest.is_finite() {
-                return Outcome { iterations: iteration, converged: largest <= allowed };
+            let largest = round(chain, &joints, &bends, &links.pushes, &mut links.directions);
+            let converged = largest <= links.allowed;
+            if converged || !largest.is_finite() {
+                return Outcome { iterations: iteration, converged };
             }
         }
         Outcome { iterations: self.max_iterations, converged: false }

@@ -21,7 +21,9 @@ pub mod cantilever;
 pub mod chain;
 pub mod chord_energy;
 pub mod discrete_rod;
+mod explicit;
 pub mod insertion;
+mod links;
 pub mod mass_spring;
 pub mod rigid_links;
 mod wall_load;
@@ -52,11 +54,13 @@ pub trait RodModel: Send {
     /// The name used in tables and scenes.
     fn name(&self) -> &'static str;
 
-    /// Refuses a device that the method cannot represent.
+    /// Refuses a device that the method cannot represent; one that can represent all refuses none.
     ///
     /// # Errors
     /// [`Error::Parameter`] naming what the method does not have.
-    fn check(&self, device: &Device) -> Result<()>;
+    fn check(&self, _device: &Device) -> Result<()> {
+        Ok(())
+    }
 
     /// Moves `posture` to equilibrium under `load`.
     ///
@@ -101,12 +105,9 @@ pub fn by_name(name: &str, task: Task) -> Option<Box<dyn RodModel>> {
         "beam-fem-damped" => Box::new(BeamFem::damped()),
         "chord-energy" if insertion => Box::new(ChordEnergy { max_iterations: 20_000 }),
         "chord-energy" => Box::new(ChordEnergy::default()),
-        "discrete-rod" if insertion => Box::new(DiscreteRod {
-            time_step: 0.3,
-            damping: 10.0,
-            max_iterations: 200_000,
-            ..DiscreteRod::default()
-        }),
+        "discrete-rod" if insertion => {
+            Box::new(DiscreteRod { damping: 10.0, max_iterations: 200_000, ..DiscreteRod::default() })
+        }
         "discrete-rod" => Box::new(DiscreteRod::default()),
         _ => return None,
     })

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Length is kept by stiff springs, EA = ratio·EI/h², so it is met as the segments get shorter. Masses are free in a search for
-//! equilibrium: each is set in proportion to the stiffness at its node, with which one time step suits all. The damping c is
+//! equilibrium: each is set in proportion to the stiffness at its node, with which one time step suits all, and the drag c to
 //! that which is critical for the slowest mode of a cantilever, times a factor.
 //!
 //! # What it cannot do
@@ -19,7 +19,8 @@
 use endowire_core::device::Device;
 use endowire_core::{Result, Vec3};
 
-use crate::{Chain, NodalLoad, Outcome, Posture, Push, RodModel, refuse_shape};
+use crate::explicit::Integration;
+use crate::{Chain, NodalLoad, Outcome, Posture, RodModel, refuse_shape};
 
 /// The method's parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,11 +41,6 @@ impl Default for MassSpring {
     }
 }
 
-/// Lowest frequency of a cantilever, squared: ω² = 12.36 EI/(ρ L⁴).
-const SLOWEST: f64 = 12.362;
-/// Time steps between two looks at what is out of balance.
-pub(crate) const CHECK_EVERY: usize = 20;
-
 impl RodModel for MassSpring {
     fn name(&self) -> &'static str {
         "mass-spring"
@@ -61,52 +57,26 @@ impl RodModel for MassSpring {
         posture: &mut Posture,
         tolerance: f64,
     ) -> Outcome {
-        let n = chain.segments();
-        let masses = node_stiffness(chain, self.axial_ratio);
-        // Masses equal to stiffnesses: no frequency is above 1, so that steps up to 2 are stable.
-        let dt = 2.0 * self.time_step;
-        let c = 2.0 * self.damping * slowest_frequency(chain, &masses);
-        let allowed = tolerance * chain.force_unit() / n as f64;
-        let mut velocity = vec![Vec3::zeros(); n + 1];
-        let mut force = vec![Vec3::zeros(); n + 1];
-        let mut pushes = vec![Push::default(); n + 1];
-        for iteration in 1..=self.max_iterations {
-            self.forces(chain, load, posture, &mut pushes, &mut force);
+        let mut run = Integration::new(chain, self.axial_ratio, self.time_step, self.damping, tolerance);
+        run.run(self.max_iterations, |run| {
+            run.load(load, posture);
+            self.springs(chain, posture, &mut run.force);
             let mut out_of_balance: f64 = 0.0;
-            for i in 1..=n {
-                out_of_balance = out_of_balance.max(force[i].amax()).max(c * masses[i] * velocity[i].amax());
-                velocity[i] = pushes[i].velocity(masses[i], c, &velocity[i], &force[i], dt);
-                posture.positions_mm[i] += velocity[i] * dt;
+            for i in 1..=chain.segments() {
+                let held = run.drag * run.masses[i] * run.velocity[i].amax();
+                out_of_balance = out_of_balance.max(run.force[i].amax()).max(held);
+                run.velocity[i] = run.mobility(i).of(&run.impulse(i));
+                posture.positions_mm[i] += run.velocity[i] * run.dt;
             }
-            if iteration % CHECK_EVERY == 0 {
-                if out_of_balance <= allowed {
-                    return Outcome { iterations: iteration, converged: true };
-                }
-                if !out_of_balance.is_finite() {
-                    return Outcome { iterations: iteration, converged: false };
-                }
-            }
-        }
-        Outcome { iterations: self.max_iterations, converged: false }
+            out_of_balance
+        })
     }
 }
 
 impl MassSpring {
-    fn forces(
-        &self,
-        chain: &Chain,
-        load: &mut dyn NodalLoad,
-        posture: &Posture,
-        pushes: &mut [Push],
-        force: &mut [Vec3],
-    ) {
-        let n = chain.segments();
-        for i in 1..=n {
-            pushes[i] = load.on(i, &posture.positions_mm[i]);
-            force[i] = pushes[i].force_n;
-        }
+    fn springs(&self, chain: &Chain, posture: &Posture, force: &mut [Vec3]) {
         let mut before = chain.direction;
-        for i in 0..n {
+        for i in 0..chain.segments() {
             let h = chain.lengths_mm[i];
             let edge = posture.chord(i);
             let length = edge.norm();
@@ -126,38 +96,4 @@ impl MassSpring {
             before = d;
         }
     }
-}
-
-/// A bound on the stiffness that a node sees: the sum of the magnitudes of its row.
-pub(crate) fn node_stiffness(chain: &Chain, axial_ratio: f64) -> Vec<f64> {
-    let n = chain.segments();
-    let mut rows = vec![0.0; n + 1];
-    for i in 0..n {
-        let h = chain.lengths_mm[i];
-        let axial = 2.0 * axial_ratio * chain.bending_nmm2[i] / (h * h * h);
-        rows[i] += axial;
-        rows[i + 1] += axial;
-        let k = chain.joint_stiffness(i);
-        let inverse = |j: usize| 1.0 / chain.lengths_mm[j];
-        let weights = if i == 0 {
-            [0.0, inverse(0), inverse(0)]
-        } else {
-            [inverse(i - 1), inverse(i - 1) + inverse(i), inverse(i)]
-        };
-        let sum: f64 = weights.iter().sum();
-        for (offset, weight) in weights.iter().enumerate() {
-            if let Some(row) = (i + offset).checked_sub(1) {
-                rows[row] += k * weight * sum;
-            }
-        }
-    }
-    rows
-}
-
-/// Lowest frequency of the chain as a cantilever with these masses.
-pub(crate) fn slowest_frequency(chain: &Chain, masses: &[f64]) -> f64 {
-    let length = chain.length_mm();
-    let mass: f64 = masses[1..].iter().sum();
-    let softest = chain.bending_nmm2.iter().fold(f64::MAX, |a: f64, b| a.min(*b));
-    (SLOWEST * softest / (mass * length.powi(3))).sqrt()
 }

@@ -21,7 +21,8 @@ use endowire_core::device::Device;
 use endowire_core::{Result, Vec3};
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use crate::{Chain, NodalLoad, Outcome, Posture, Push, RodModel, refuse_shape};
+use crate::links::Links;
+use crate::{Chain, NodalLoad, Outcome, Posture, RodModel, refuse_shape};
 
 /// The method's parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,18 +60,17 @@ impl RodModel for RigidLinks {
         tolerance: f64,
     ) -> Outcome {
         let n = chain.segments();
-        let mut links: Vec<Vec3> = (0..n).map(|i| posture.chord(i).normalize()).collect();
+        let mut links = Links::new(chain, posture, tolerance);
         let mut velocity = vec![Vec3::zeros(); n];
-        let allowed = tolerance * chain.force_unit() * chain.length_mm() / n as f64;
         let mut system = System::new(n);
         for iteration in 0..=self.max_iterations {
-            place(chain, &links, posture);
-            system.assemble(chain, &links, load, posture);
-            if iteration > 0 && system.torque.amax() <= allowed {
+            links.place(chain, load, posture);
+            system.assemble(chain, &links);
+            if iteration > 0 && system.torque.amax() <= links.allowed {
                 return Outcome { iterations: iteration, converged: true };
             }
             if iteration == self.max_iterations
-                || !self.step(chain, load.trusted_mm(), &mut system, &mut links, &mut velocity)
+                || !self.step(chain, load.trusted_mm(), &mut system, &mut links.directions, &mut velocity)
             {
                 break;
             }
@@ -118,14 +118,6 @@ impl RigidLinks {
     }
 }
 
-fn place(chain: &Chain, links: &[Vec3], posture: &mut Posture) {
-    let mut x = chain.start_mm;
-    for (i, d) in links.iter().enumerate() {
-        x += d * chain.lengths_mm[i];
-        posture.positions_mm[i + 1] = x;
-    }
-}
-
 /// Torques on the links and the matrices of the motion, in two directions across each link.
 struct System {
     basis: Vec<[Vec3; 2]>,
@@ -133,7 +125,6 @@ struct System {
     mass: DMatrix<f64>,
     joints: DMatrix<f64>,
     contacts: DMatrix<f64>,
-    pushes: Vec<Push>,
 }
 
 impl System {
@@ -145,16 +136,14 @@ impl System {
             mass: square.clone(),
             joints: square.clone(),
             contacts: square,
-            pushes: vec![Push::default(); n],
         }
     }
 
-    fn assemble(&mut self, chain: &Chain, links: &[Vec3], load: &mut dyn NodalLoad, posture: &Posture) {
+    fn assemble(&mut self, chain: &Chain, Links { directions: links, pushes, .. }: &Links) {
         let n = links.len();
         for (i, d) in links.iter().enumerate() {
             let u = d.cross(&if d.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() }).normalize();
             self.basis[i] = [u, d.cross(&u)];
-            self.pushes[i] = load.on(i + 1, &posture.positions_mm[i + 1]);
         }
         let density = chain.force_unit() / chain.length_mm().powi(2);
         self.joints.fill(0.0);
@@ -162,7 +151,7 @@ impl System {
         // Force, mass and stiffness of everything beyond a link: it moves all of that.
         let (mut force, mut mass, mut yielding) = (Vec3::zeros(), 0.0, Matrix3::zeros());
         for i in (0..n).rev() {
-            let (l, push) = (chain.lengths_mm[i], self.pushes[i]);
+            let (l, push) = (chain.lengths_mm[i], pushes[i]);
             force += push.force_n;
             yielding += push.normal * push.normal.transpose() * push.stiffness_n_per_mm;
             mass += 0.5 * density * (l + chain.lengths_mm.get(i + 1).unwrap_or(&0.0));

@@ -154,8 +154,9 @@ fn in_a_bend_they_come_to_where_the_exact_rod_does() {
     };
     let (exact, _) = push("kirchhoff");
     assert!(exact.x > 10.0, "the wire must have gone round the bend: {exact}");
-    for name in ["rigid-links", "mass-spring", "beam-fem-damped"] {
+    for name in ["rigid-links", "mass-spring", "beam-fem-damped", "discrete-rod"] {
         let (tip, report) = push(name);
+        assert!(report.converged, "{name} must come to rest where it touches");
         assert!((tip - exact).norm() < 1.0, "{name}: {tip} instead of {exact}");
         assert!(!report.contacts.is_empty() && report.max_penetration_mm < 0.445, "{name}");
     }

@@ -1,7 +1,7 @@
 //! One file a command.
 
-mod compare;
-mod experiment;
+pub(crate) mod compare;
+pub(crate) mod experiment;
 mod fluoro;
 mod render;
 mod rod;

@@ -10,8 +10,8 @@ use serde::Serialize;
 
 use crate::args::GenerateArgs;
 use crate::failure::Failure;
+use crate::output::answer;
 use crate::output::provenance::{Provenance, read_input};
-use crate::output::{print, print_json};
 
 #[derive(Serialize)]
 struct Document {
@@ -26,7 +26,7 @@ struct Document {
 /// Reports on a surface file.
 pub(crate) fn check_file(file: &Path, unit_mm: f64, json: bool) -> Result<(), Failure> {
     let provenance = Provenance::new(&[&read_input(file)?], 0);
-    tell(file, unit_mm, provenance, json)
+    report_on(file, unit_mm, provenance, json)
 }
 
 /// Builds a wall from a tree, writes it, and reports on what was written.
@@ -46,7 +46,7 @@ pub(crate) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     };
     let generated = GeneratedWall::new(&tree, resolution).map_err(|e| as_flag(e).at(args.tree.display()))?;
     generated.wall.mesh().write(&args.out)?;
-    tell(&args.out, 1.0, provenance, args.json)
+    report_on(&args.out, 1.0, provenance, args.json)
 }
 
 /// Calls what the core calls by its field by the flag of the command line.
@@ -69,15 +69,12 @@ fn built_ins(failure: Failure) -> Failure {
     }
 }
 
-fn tell(file: &Path, unit_mm: f64, provenance: Provenance, json: bool) -> Result<(), Failure> {
+fn report_on(file: &Path, unit_mm: f64, provenance: Provenance, json: bool) -> Result<(), Failure> {
     let surface = SurfaceMesh::read(file, unit_mm)?;
     let report = check(&surface).map_err(|e| Failure::from(e).at(file.display()))?;
     let document =
         Document { provenance, file: file.display().to_string(), sound: report.is_sound(), report };
-    if json {
-        return print_json(&document);
-    }
-    print(text(&document))
+    answer(&document, json, || text(&document))
 }
 
 /// Openings that the report for a person lists.

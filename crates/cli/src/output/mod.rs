@@ -36,6 +36,15 @@ pub(crate) fn print_json(document: &impl Serialize) -> Result<(), Failure> {
     print(to_json(document)?)
 }
 
+/// Prints what a command found: one JSON document, or text for a person.
+pub(crate) fn answer(
+    document: &impl Serialize,
+    json: bool,
+    text: impl FnOnce() -> String,
+) -> Result<(), Failure> {
+    if json { print_json(document) } else { print(text()) }
+}
+
 /// A document as indented JSON.
 pub(crate) fn to_json(document: &impl Serialize) -> Result<String, Failure> {
     serde_json::to_string_pretty(document)

@@ -194,7 +194,7 @@ pub const FAMILIES: &[Family] = &[
 ];
 
 /// A straight inextensible rod of length 1 and EI 1 along x, clamped at the origin, free at its end.
-pub(crate) fn unit_rod(elements: usize) -> StaticCase {
+pub fn unit_rod(elements: usize) -> StaticCase {
     StaticCase {
         rod: Rod { length: 1.0, elements, section: vec![section(1.0, 1.0)] },
         start: Start {
@@ -227,7 +227,7 @@ pub(crate) fn section(until: f64, ei: f64) -> Section {
 }
 
 /// A load at the end.
-pub(crate) fn at_end(kind: LoadKind, value: [f64; 3]) -> Load {
+pub fn at_end(kind: LoadKind, value: [f64; 3]) -> Load {
     Load { kind, at: None, from: None, to: None, value }
 }
 

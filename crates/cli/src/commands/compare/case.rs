@@ -56,10 +56,10 @@ enum Truth {
 }
 
 /// How the truth of a case was found.
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct TruthNote {
     /// The case.
-    pub(crate) case: &'static str,
+    pub(crate) case: String,
     /// What it is.
     pub(crate) truth: String,
     /// Root mean square change in mm when its elements were halved for the last time.
@@ -81,7 +81,11 @@ const TRUTH_ELEMENTS: usize = 400;
 impl Case {
     /// Builds a case, its truth included.
     pub(crate) fn new(name: &'static str) -> Result<(Self, TruthNote)> {
-        let exact = |case, text: &str| TruthNote { case, truth: text.to_owned(), last_change_mm: None };
+        let exact = |case: &str, text: &str| TruthNote {
+            case: case.to_owned(),
+            truth: text.to_owned(),
+            last_change_mm: None,
+        };
         let a1 = "exact (Bisshopp and Drucker 1945)";
         match name {
             "cantilever-1" => {
@@ -108,7 +112,7 @@ impl Case {
             }
             "curved-tube" => Self::anatomy(name, "curved_tube", 1.0, 0.8, 10.0, 200.0),
             "arch" => Self::anatomy(name, "aortic_arch", 2.0, 2.0, 15.0, 250.0),
-            _ => Err(Error::parameter("--cases", name, "no such case")),
+            _ => Err(Error::parameter("--cases", name, "is no case")),
         }
     }
 
@@ -141,7 +145,7 @@ impl Case {
         };
         let (coarse, fine) = (shape(TRUTH_ELEMENTS / 2)?, shape(TRUTH_ELEMENTS)?);
         let note = TruthNote {
-            case: name,
+            case: name.to_owned(),
             truth: format!("kirchhoff with {TRUTH_ELEMENTS} elements"),
             last_change_mm: Some(rms_distance(&coarse, &fine).0),
         };

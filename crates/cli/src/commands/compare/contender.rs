@@ -5,7 +5,8 @@ use endowire_core::insertion::{Sheath, Simulation, WallProperties};
 use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::methods::li2011::{Chain, Li2011Options, banded, dense};
-use endowire_core::statics::{End, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase};
+use endowire_core::reference::{at_end, unit_rod};
+use endowire_core::statics::LoadKind;
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result, Vec3};
 use endowire_methods::{Insertion, InsertionOptions, Task, by_name};
@@ -61,7 +62,9 @@ const STATIC_TOLERANCE: f64 = 0.5;
 pub(crate) fn cantilever(method: &str, elements: usize, a: f64) -> Result<(Vec3, usize)> {
     match method {
         "kirchhoff" => {
-            let solution = tip_load(elements, a).solve()?.checked()?;
+            let mut case = unit_rod(elements);
+            case.load = vec![at_end(LoadKind::Force, [0.0, -a, 0.0])];
+            let solution = case.solve()?.checked()?;
             Ok((Vec3::from(solution.tip), solution.iterations))
         }
         "li2011-dense" | "li2011-banded" => {
@@ -88,28 +91,5 @@ pub(crate) fn cantilever(method: &str, elements: usize, a: f64) -> Result<(Vec3,
             }
             Ok((solution.nodes[elements], solution.iterations))
         }
-    }
-}
-
-fn tip_load(elements: usize, a: f64) -> StaticCase {
-    let section = Section {
-        until: 1.0,
-        ei: 1.0,
-        ei_end: None,
-        gj: None,
-        gj_end: None,
-        ea: None,
-        ea_end: None,
-        rest_curvature: [0.0; 2],
-        rest_curvature_end: None,
-        rest_twist: 0.0,
-    };
-    StaticCase {
-        rod: Rod { length: 1.0, elements, section: vec![section] },
-        start: Start { kind: StartKind::Clamped, position: [0.0; 3], tangent: [1.0, 0.0, 0.0], normal: None },
-        end: End::default(),
-        load: vec![Load { kind: LoadKind::Force, at: None, from: None, to: None, value: [0.0, -a, 0.0] }],
-        initial: None,
-        solver: Solver::default(),
     }
 }

@@ -1,7 +1,7 @@
 //! `endowire compare`: run time against error, method by method, on the same scenes.
 //!
 //! Every case runs with every method at several resolutions. Rows are written as they are found, and those already in the folder
-//! are not run again.
+//! are not run again; nor is the truth of a case that has all its rows.
 
 pub(crate) mod case;
 pub(crate) mod contender;
@@ -9,14 +9,15 @@ mod front;
 mod picture;
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::args::CompareArgs;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::{print, print_json, progress, to_json};
+use crate::output::{answer, progress, to_json};
 use case::{CASES, Case, TruthNote};
 use front::Front;
 
@@ -53,68 +54,72 @@ struct Document {
 /// Least time spent on the repeats of a fast cell, s, and their most.
 const REPEAT_FOR_S: f64 = 0.2;
 const REPEATS: std::ops::RangeInclusive<usize> = 3..=101;
+/// Longest time for the repeats of a cell with all that goes before each, which is not timed, s.
+const REPEAT_WITHIN_S: f64 = 1.0;
 /// A cell that takes longer than this part of the limit is not repeated.
 const ONCE: f64 = 0.1;
 /// Growth of time with a doubled resolution that is taken for granted: a cell that would pass the limit is not begun.
 const GROWTH: f64 = 8.0;
+/// Words by which a note tells that there was not enough time.
+const LIMIT: &str = "limit of";
+/// Most elements.
+const MOST_ELEMENTS: usize = 1000;
 
 /// Runs what is missing and writes tables and picture.
 pub(crate) fn compare(args: &CompareArgs) -> Result<(), Failure> {
-    let known: Vec<&str> = CASES.iter().map(|case| case.0).collect();
-    check_names("--cases", &args.cases, &known)?;
-    check_names("--methods", &args.methods, &contender::names())?;
     if !(args.limit_s.is_finite() && args.limit_s > 0.0) {
         return Err(Failure::Input(format!("--limit-s {}: give a time above 0", args.limit_s)));
     }
+    if let Some(elements) = args.elements.iter().find(|n| !(2..=MOST_ELEMENTS).contains(*n)) {
+        return Err(Failure::Input(format!("--elements {elements}: give 2 to {MOST_ELEMENTS}")));
+    }
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::write(&args.out, &e))?;
-    let table = args.out.join("compare.csv");
-    let mut rows = read_rows(&table)?;
     let wanted = |list: &[String], name: &str| list.is_empty() || list.iter().any(|w| w == name);
     let methods: Vec<&str> =
         contender::names().into_iter().filter(|name| wanted(&args.methods, name)).collect();
     let cases: Vec<_> = CASES.into_iter().filter(|case| wanted(&args.cases, case.0)).collect();
-    let cells = |case: &str| methods.iter().map(|m| resolutions(case, m).len()).sum::<usize>();
-    let bar = progress::bar(cases.iter().map(|case| cells(case.0)).sum(), "cell");
-    let mut truths = Vec::new();
+    let cells: Vec<(&str, &str, usize)> = cases
+        .iter()
+        .flat_map(|case| methods.iter().map(|method| (case.0, *method)))
+        .flat_map(|(case, method)| {
+            resolutions(case, method, &args.elements).into_iter().map(move |n| (case, method, n))
+        })
+        .collect();
+    let mut found = Found::read(&args.out)?;
+    let bar = progress::bar(cells.len(), "cell");
     for (name, ..) in &cases {
-        bar.set_message(format!("{name}: truth"));
-        let (case, note) = Case::new(name)?;
-        truths.push(note);
-        for method in &methods {
-            let mut last: Option<(usize, f64)> = None;
-            for resolution in resolutions(name, method) {
-                bar.set_message(format!("{name}, {method}, {resolution}"));
-                let found = rows
-                    .iter()
-                    .find(|row| row.case == *name && row.method == *method && row.resolution == resolution);
-                let time_s = if let Some(row) = found {
-                    row.time_s
-                } else {
-                    let row = measure(&case, name, method, resolution, last, args.limit_s);
-                    let time_s = row.time_s;
-                    rows.push(row);
-                    write_rows(&table, &rows)?;
-                    time_s
-                };
-                if let Some(time_s) = time_s {
-                    last = Some((resolution, time_s));
+        let own: Vec<_> = cells.iter().filter(|cell| cell.0 == *name).collect();
+        let missing = own.iter().any(|(case, method, n)| found.row(case, method, *n).is_none());
+        if missing || found.truth(name).is_none() {
+            bar.set_message(format!("{name}: truth"));
+            let (case, note) = Case::new(name)?;
+            found.add_truth(note)?;
+            for (_, method, n) in own {
+                bar.set_message(format!("{name}, {method}, {n}"));
+                if found.row(name, method, *n).is_none() {
+                    let row = measure(&case, name, method, *n, found.coarser(name, method, *n), args.limit_s);
+                    found.add(row)?;
                 }
                 bar.inc(1);
             }
+        } else {
+            bar.inc(own.len() as u64);
         }
     }
     bar.finish_and_clear();
-    finish(args, &cases, truths, rows, table)
+    finish(args, &cases, found)
 }
 
 /// Fronts, picture and document.
 fn finish(
     args: &CompareArgs,
     cases: &[(&'static str, &'static str, f64)],
-    truths: Vec<TruthNote>,
-    rows: Vec<Row>,
-    table: PathBuf,
+    found: Found,
 ) -> Result<(), Failure> {
+    let Found { mut rows, truths, table, .. } = found;
+    let order = |names: &[&str], name: &str| names.iter().position(|known| *known == name);
+    let (case_names, methods) = (CASES.map(|case| case.0), contender::names());
+    rows.sort_by_key(|row| (order(&case_names, &row.case), order(&methods, &row.method), row.resolution));
     let fronts: Vec<Front> = cases
         .iter()
         .map(|(name, _, at_error)| {
@@ -124,22 +129,22 @@ fn finish(
         .collect();
     let mut files = vec![table, args.out.join("compare.json")];
     files.extend(picture::write(&args.out, &rows, cases)?);
-    let arguments = format!("compare {:?} {:?} {}", args.cases, args.methods, args.limit_s);
+    let arguments =
+        format!("compare {:?} {:?} {:?} {}", args.cases, args.methods, args.elements, args.limit_s);
     let document = Document { provenance: Provenance::of_program(&arguments), truths, rows, fronts, files };
     let path = args.out.join("compare.json");
     std::fs::write(&path, to_json(&document)? + "\n").map_err(|e| Failure::write(&path, &e))?;
-    if args.json { print_json(&document) } else { print(text(&document, cases)) }
+    answer(&document, args.json, || text(&document, cases))
 }
 
-fn check_names(flag: &str, given: &[String], known: &[&str]) -> Result<(), Failure> {
-    match given.iter().find(|name| !known.contains(&name.as_str())) {
-        None => Ok(()),
-        Some(name) => Err(Failure::Input(format!("{flag} {name}: choose from {}", known.join(", ")))),
+/// Numbers of elements at which a method runs a case: those asked for, by rising number, or its own.
+fn resolutions(case: &str, method: &str, asked: &[usize]) -> Vec<usize> {
+    if !asked.is_empty() {
+        let mut asked = asked.to_vec();
+        asked.sort_unstable();
+        asked.dedup();
+        return asked;
     }
-}
-
-/// Numbers of elements at which a method runs a case.
-fn resolutions(case: &str, method: &str) -> Vec<usize> {
     let is_static = case.starts_with("cantilever");
     match (is_static, method) {
         (true, "kirchhoff") => vec![2, 3, 4, 5, 6, 8, 12, 16, 32, 64],
@@ -156,7 +161,7 @@ fn measure(
     name: &str,
     method: &str,
     resolution: usize,
-    last: Option<(usize, f64)>,
+    coarser: Option<&Row>,
     limit_s: f64,
 ) -> Row {
     let mut row = Row {
@@ -168,14 +173,20 @@ fn measure(
         iterations: None,
         note: String::new(),
     };
-    if let Some((coarser, time_s)) = last {
-        let doublings = (resolution as f64 / coarser as f64).log2();
-        if time_s * GROWTH.powf(doublings) > limit_s {
-            row.note = format!("not begun: {coarser} elements took {time_s:.1} s, the limit is {limit_s} s");
+    if let Some(coarser) = coarser {
+        let n = coarser.resolution;
+        if coarser.note.contains(LIMIT) {
+            row.note = format!("not begun: {n} elements already passed the {LIMIT} {limit_s} s");
+            return row;
+        }
+        let doublings = (resolution as f64 / n as f64).log2();
+        if let Some(time_s) = coarser.time_s.filter(|t| t * GROWTH.powf(doublings) > limit_s) {
+            row.note = format!("not begun: {n} elements took {time_s:.1} s, the {LIMIT} {limit_s} s");
             return row;
         }
     }
     let mut times = Vec::new();
+    let begun = Instant::now();
     loop {
         match case.run(method, resolution, Duration::from_secs_f64(limit_s)) {
             Err(error) => {
@@ -183,7 +194,7 @@ fn measure(
                 return row;
             }
             Ok(None) => {
-                row.note = format!("stopped at the limit of {limit_s} s");
+                row.note = format!("stopped: passed the {LIMIT} {limit_s} s");
                 return row;
             }
             Ok(Some(run)) => {
@@ -195,7 +206,8 @@ fn measure(
             }
         }
         let spent: f64 = times.iter().sum();
-        let enough = times.len() >= *REPEATS.start() && spent > REPEAT_FOR_S;
+        let enough = times.len() >= *REPEATS.start()
+            && (spent > REPEAT_FOR_S || begun.elapsed().as_secs_f64() > REPEAT_WITHIN_S);
         if enough || times.len() == *REPEATS.end() || spent > ONCE * limit_s {
             break;
         }
@@ -205,7 +217,50 @@ fn measure(
     row
 }
 
-fn read_rows(table: &Path) -> Result<Vec<Row>, Failure> {
+/// What is in the folder, and grows.
+struct Found {
+    table: PathBuf,
+    rows: Vec<Row>,
+    truth_table: PathBuf,
+    truths: Vec<TruthNote>,
+}
+
+impl Found {
+    fn read(folder: &Path) -> Result<Self, Failure> {
+        let (table, truth_table) = (folder.join("compare.csv"), folder.join("truths.csv"));
+        Ok(Self { rows: read(&table)?, truths: read(&truth_table)?, table, truth_table })
+    }
+
+    fn row(&self, case: &str, method: &str, resolution: usize) -> Option<&Row> {
+        self.of(case, method).find(|row| row.resolution == resolution)
+    }
+
+    fn of(&self, case: &str, method: &str) -> impl Iterator<Item = &Row> {
+        self.rows.iter().filter(move |row| row.case == case && row.method == method)
+    }
+
+    /// The row before a resolution.
+    fn coarser(&self, case: &str, method: &str, resolution: usize) -> Option<&Row> {
+        self.of(case, method).filter(|row| row.resolution < resolution).max_by_key(|row| row.resolution)
+    }
+
+    fn truth(&self, case: &str) -> Option<&TruthNote> {
+        self.truths.iter().find(|truth| truth.case == case)
+    }
+
+    fn add(&mut self, row: Row) -> Result<(), Failure> {
+        self.rows.push(row);
+        write(&self.table, &self.rows)
+    }
+
+    fn add_truth(&mut self, truth: TruthNote) -> Result<(), Failure> {
+        self.truths.retain(|known| known.case != truth.case);
+        self.truths.push(truth);
+        write(&self.truth_table, &self.truths)
+    }
+}
+
+fn read<T: DeserializeOwned>(table: &Path) -> Result<Vec<T>, Failure> {
     if !table.exists() {
         return Ok(Vec::new());
     }
@@ -215,7 +270,7 @@ fn read_rows(table: &Path) -> Result<Vec<Row>, Failure> {
     csv::Reader::from_path(table).map_err(unusable)?.deserialize().map(|row| row.map_err(unusable)).collect()
 }
 
-fn write_rows(table: &Path, rows: &[Row]) -> Result<(), Failure> {
+fn write<T: Serialize>(table: &Path, rows: &[T]) -> Result<(), Failure> {
     let save = || -> std::io::Result<()> {
         // Whole or not at all, so that an interrupt leaves a table to go on from.
         let part = table.with_extension("part");
@@ -263,6 +318,7 @@ fn text(document: &Document, cases: &[(&'static str, &'static str, f64)]) -> Str
                     "Pareto front: {first}, alone below {error:.1e} {unit}; above also {}",
                     others.join(", ")
                 ),
+                (None, _) => "Pareto front: nobody".to_owned(),
                 _ => format!("Pareto front: {}", front.methods.join(", ")),
             });
             let fastest = front.time_s.first().map_or(1.0, |f| f.1);

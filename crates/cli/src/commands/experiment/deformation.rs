@@ -19,10 +19,12 @@ use crate::commands::compare::case::rms_distance;
 use crate::commands::compare::contender;
 use crate::failure::Failure;
 use crate::output::provenance::{Provenance, read_input};
-use crate::output::{print, print_json, progress};
+use crate::output::{answer, progress};
 
-/// The paper's Table 2: segment length l in mm, h/l as 1 over, RMS mm, maximum mm, run time s.
-const PAPER: [(f64, u32, f64, f64, f64); 15] = [
+/// A cell of the paper's Table 2: segment length l in mm, h/l as 1 over, RMS mm, maximum mm, run time s.
+type Cell = (f64, u32, f64, f64, f64);
+/// The whole table.
+const PAPER: [Cell; 15] = [
     (1.0, 40, 1.38, 2.32, 180.7),
     (2.0, 40, 1.54, 2.42, 49.7),
     (3.0, 40, 1.76, 2.74, 29.5),
@@ -117,13 +119,16 @@ impl Tube {
 
 /// Runs the grid and prints it beside the paper's.
 pub(super) fn deformation(args: &DeformationArgs) -> Result<(), Failure> {
+    let cells = cells(args)?;
     let tree = anatomy::tree("curved_tube").ok_or_else(|| Failure::Input("no curved_tube".to_owned()))?;
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(EDGE_MM))?;
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0)?;
     let tube = Tube { made, sheath, wire: Device::uniform(INSERTED_MM + 1.0, RADIUS_MM, STIFFNESS_NMM2)? };
-    let bar = progress::bar(PAPER.len() + TRUTH_MM.len(), "cell");
+    let bar = progress::bar(cells.len() + TRUTH_MM.len(), "cell");
 
-    let mut inputs = vec![format!("experiment deformation {}", args.method).into_bytes()];
+    let mut inputs = vec![
+        format!("experiment deformation {} {:?} {:?}", args.method, args.l_mm, args.l_over_h).into_bytes(),
+    ];
     let mut convergence = Vec::new();
     let (truth, ground_truth) = if let Some(path) = &args.measured {
         inputs.push(read_input(path)?);
@@ -147,7 +152,7 @@ pub(super) fn deformation(args: &DeformationArgs) -> Result<(), Failure> {
     };
 
     let mut rows = Vec::new();
-    for (l_mm, l_over_h, paper_rms_mm, paper_max_mm, paper_time_s) in PAPER {
+    for (l_mm, l_over_h, paper_rms_mm, paper_max_mm, paper_time_s) in cells {
         bar.set_message(format!("l = {l_mm} mm, h = l/{l_over_h}"));
         let (shape, time_s) = tube.insert(&args.method, l_mm, l_mm / f64::from(l_over_h))?;
         let (rms_mm, max_mm) = rms_distance(&shape, &truth);
@@ -177,7 +182,22 @@ pub(super) fn deformation(args: &DeformationArgs) -> Result<(), Failure> {
     if let Some(folder) = &args.out {
         super::write(folder, "deformation", &document.rows, &document)?;
     }
-    if args.json { print_json(&document) } else { print(table(&document)) }
+    answer(&document, args.json, || table(&document))
+}
+
+/// The cells of Table 2 that are asked for.
+fn cells(args: &DeformationArgs) -> Result<Vec<Cell>, Failure> {
+    if let Some(l) = args.l_mm.iter().find(|l| PAPER.iter().all(|cell| cell.0 != **l)) {
+        return Err(Failure::Input(format!("--l-mm {l}: the paper has 1, 2 and 3")));
+    }
+    if let Some(parts) = args.l_over_h.iter().find(|parts| PAPER.iter().all(|cell| cell.1 != **parts)) {
+        return Err(Failure::Input(format!("--l-over-h {parts}: the paper has 40, 20, 10, 5 and 3")));
+    }
+    let wanted = |cell: &Cell| {
+        (args.l_mm.is_empty() || args.l_mm.contains(&cell.0))
+            && (args.l_over_h.is_empty() || args.l_over_h.contains(&cell.1))
+    };
+    Ok(PAPER.into_iter().filter(wanted).collect())
 }
 
 /// One measured point, mm, in the tube's coordinates.

@@ -4,22 +4,23 @@
 //! tube is closed by a half sphere, in which the tip is stopped; the paper does not say what stopped its catheter.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::vessel::{SurfaceMesh, Wall};
-use endowire_viewer::{CArmSpec, DeviceView, Renderer, View, ViewSpec};
+use endowire_viewer::ViewSpec;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use serde::Serialize;
 
+use super::camera::Camera;
 use crate::args::LoopArgs;
 use crate::commands::compare::contender;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::{chart, print, print_json, progress};
+use crate::output::{answer, chart, progress};
 
 /// The tube: inner radius and length of its straight part, edge of its triangles; mm.
 const TUBE_RADIUS_MM: f64 = 15.0;
@@ -70,8 +71,11 @@ pub(super) fn looping(args: &LoopArgs) -> Result<(), Failure> {
     ])?;
     let mut simulation =
         contender::insertion("kirchhoff", ELEMENT_MM, wall, WallProperties::default(), device, sheath)?;
-    let mut painter = match &args.out {
-        Some(folder) => Some(Painter::new(folder, &simulation)?),
+    let mut camera = match &args.out {
+        Some(folder) => {
+            let spec = ViewSpec { size_px: [480, 720], ..ViewSpec::default() };
+            Some(Camera::new(folder, "loop", spec, &simulation.wall().closed_mesh())?)
+        }
         None => None,
     };
     let steps = (INSERTED_MM / STEP_MM) as usize;
@@ -84,27 +88,25 @@ pub(super) fn looping(args: &LoopArgs) -> Result<(), Failure> {
             break;
         }
         let row = measure(&simulation, &mut stopped_at);
-        if let Some(painter) = painter.as_mut() {
-            painter.take(row.advance_mm, &simulation)?;
+        let due =
+            |camera: &&mut Camera| PICTURES_MM.get(camera.taken()).is_some_and(|mm| row.advance_mm >= *mm);
+        if let Some(camera) = camera.as_mut().filter(due) {
+            camera.take(&simulation)?;
         }
         rows.push(row);
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let frames = match (painter, &args.out) {
-        (Some(painter), Some(folder)) => painter.finish(folder, &rows)?,
-        _ => Vec::new(),
-    };
+    let mut frames = camera.map_or_else(Vec::new, |camera| camera.frames);
+    if let Some(folder) = &args.out {
+        frames.extend(chart::write(folder, "loop", (900, 560), &Growth(&rows))?);
+    }
     let provenance = Provenance::of_program("experiment loop");
     let document = Document { provenance, rows, frames, failure };
     if let Some(folder) = &args.out {
         super::write(folder, "loop", &document.rows, &document)?;
     }
-    if args.json {
-        print_json(&document)?;
-    } else {
-        print(table(&document))?;
-    }
+    answer(&document, args.json, || table(&document))?;
     match document.failure {
         Some(reason) => Err(Failure::Computation(reason)),
         None => Ok(()),
@@ -168,52 +170,6 @@ fn closed_tube() -> SurfaceMesh {
     let last = pole - around;
     mesh.triangles.extend((0..around).map(|j| [last + j, last + (j + 1) % around, pole]));
     mesh
-}
-
-/// Takes the pictures.
-struct Painter {
-    renderer: Renderer,
-    folder: PathBuf,
-    frames: Vec<PathBuf>,
-}
-
-impl Painter {
-    fn new(folder: &Path, simulation: &Simulation) -> Result<Self, Failure> {
-        std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
-        let spec = ViewSpec {
-            size_px: [480, 720],
-            views: vec![View::ThreeD, View::Fluoro],
-            c_arm: CArmSpec::default(),
-            ..ViewSpec::default()
-        };
-        let renderer = Renderer::new(&spec, &simulation.wall().closed_mesh())?;
-        Ok(Self { renderer, folder: folder.to_path_buf(), frames: Vec::new() })
-    }
-
-    /// Takes the next picture if its advance is reached.
-    fn take(&mut self, advance_mm: f64, simulation: &Simulation) -> Result<(), Failure> {
-        let number = self.frames.len() / 2;
-        if PICTURES_MM.get(number).is_none_or(|due| advance_mm < *due) {
-            return Ok(());
-        }
-        let device = simulation.device();
-        let view =
-            DeviceView::from_shape(simulation.shape(), |from_tip| device.section_at(from_tip).radius_mm);
-        let frames = self.renderer.render(&[view])?;
-        for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
-            if let Some(image) = image {
-                let path = self.folder.join(format!("loop_{}_{name}.png", number + 1));
-                image.write_png(&path)?;
-                self.frames.push(path);
-            }
-        }
-        Ok(())
-    }
-
-    fn finish(mut self, folder: &Path, rows: &[Row]) -> Result<Vec<PathBuf>, Failure> {
-        self.frames.extend(chart::write(folder, "loop", (900, 560), &Growth(rows))?);
-        Ok(self.frames)
-    }
 }
 
 /// Loop size against advance.

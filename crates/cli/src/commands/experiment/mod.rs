@@ -1,8 +1,9 @@
 //! `endowire experiment`: the four experiments of Li et al. 2011.
 
+mod camera;
 mod deformation;
 mod looping;
-mod navigation;
+pub(crate) mod navigation;
 mod timing;
 
 use std::path::Path;

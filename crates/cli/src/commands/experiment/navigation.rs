@@ -12,14 +12,15 @@ use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::vessel::{CentrelineTree, GeneratedWall, Resolution, anatomy};
-use endowire_viewer::{CArmSpec, DeviceView, Renderer, View, ViewSpec, XRaySpec};
+use endowire_viewer::{CArmSpec, ViewSpec, XRaySpec};
 use serde::Serialize;
 
+use super::camera::Camera;
 use crate::args::NavigationArgs;
 use crate::commands::compare::{case::point_at, contender};
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::{print, print_json, progress};
+use crate::output::{answer, progress};
 
 /// An anatomy, its targets in the order of their rows in the centre-line table, and how its wall and wire are made.
 struct Anatomy {
@@ -67,6 +68,9 @@ const TURN_RAD: f64 = 0.35;
 const TURNS: usize = 12;
 /// Pulled back after going astray, mm.
 const BACK_MM: f64 = 30.0;
+/// How far beyond the vessel's wall the tip has gone astray, mm. The axis is a polyline, outside of whose corners the wall bulges, and
+/// a tip that dips into the mouth of a branch slides on past it.
+const ASTRAY_MM: f64 = 3.0;
 /// Pushed in without getting farther, mm, before the hand tries something else.
 const PATIENCE_MM: f64 = 24.0;
 /// Every so many commands there is a frame.
@@ -104,18 +108,20 @@ struct Document {
 
 /// Steers to every target.
 pub(super) fn navigation(args: &NavigationArgs) -> Result<(), Failure> {
-    let bar = progress::bar(ANATOMIES.iter().map(|a| a.targets.len()).sum(), "target");
+    let wanted = |target: &str| args.targets.is_empty() || args.targets.iter().any(|name| name == target);
+    let asked = targets().into_iter().filter(|name| wanted(name)).count();
+    let bar = progress::bar(asked, "target");
     let (mut rows, mut frames) = (Vec::new(), Vec::new());
-    for anatomy in &ANATOMIES {
+    for anatomy in ANATOMIES.iter().filter(|anatomy| anatomy.targets.iter().any(|name| wanted(name))) {
         let tree = anatomy::tree(anatomy.name)
             .ok_or_else(|| Failure::Input(format!("{} is not built in", anatomy.name)))?;
         let made = GeneratedWall::new(&tree, Resolution::EdgeMm(anatomy.edge_mm))?;
         let mut ends: Vec<usize> = made.ends.iter().skip(1).map(|end| end.0).collect();
         ends.sort_unstable();
-        for (target, end) in anatomy.targets.iter().zip(ends) {
+        for (target, end) in anatomy.targets.iter().zip(ends).filter(|(name, _)| wanted(name)) {
             bar.set_message(format!("{}: {target}", anatomy.name));
             let mut camera = match &args.out {
-                Some(folder) => Some(Camera::new(folder, anatomy, target, &made)?),
+                Some(folder) => Some(camera(folder, anatomy, target, &made)?),
                 None => None,
             };
             rows.push(steer(anatomy, target, &way(&tree, end), &made, camera.as_mut())?);
@@ -124,11 +130,20 @@ pub(super) fn navigation(args: &NavigationArgs) -> Result<(), Failure> {
         }
     }
     bar.finish_and_clear();
-    let document = Document { provenance: Provenance::of_program("experiment navigation"), rows, frames };
+    let document = Document {
+        provenance: Provenance::of_program(&format!("experiment navigation {:?}", args.targets)),
+        rows,
+        frames,
+    };
     if let Some(folder) = &args.out {
         super::write(folder, "navigation", &document.rows, &document)?;
     }
-    if args.json { print_json(&document) } else { print(table(&document.rows)) }
+    answer(&document, args.json, || table(&document.rows))
+}
+
+/// Names of all targets.
+pub(crate) fn targets() -> Vec<&'static str> {
+    ANATOMIES.iter().flat_map(|anatomy| anatomy.targets.iter().copied()).collect()
 }
 
 /// The way from the inlet to a row of the table: points, and the vessel's radius there.
@@ -277,7 +292,7 @@ impl Hand {
         if reached > self.best_mm + 1.0 {
             (self.best_mm, self.best_inserted_mm) = (reached, inserted);
         }
-        let astray = off > radius + 1.0 && inserted > BACK_MM;
+        let astray = off > radius + ASTRAY_MM && inserted > BACK_MM;
         if astray || inserted - self.best_inserted_mm > PATIENCE_MM {
             self.retries += 1;
             self.keep_until_mm = inserted + STEP_MM;
@@ -318,44 +333,16 @@ impl Hand {
     }
 }
 
-/// Frames of both views.
-struct Camera {
-    renderer: Renderer,
-    stem: PathBuf,
-    frames: Vec<PathBuf>,
-}
-
-impl Camera {
-    fn new(folder: &Path, anatomy: &Anatomy, target: &str, made: &GeneratedWall) -> Result<Self, Failure> {
-        let folder = folder.join("frames");
-        std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
-        let spec = ViewSpec {
-            size_px: [512, 512],
-            views: vec![View::ThreeD, View::Fluoro],
-            c_arm: CArmSpec { primary_deg: anatomy.primary_deg, ..CArmSpec::default() },
-            xray: XRaySpec { contrast_fraction: 0.04, ..XRaySpec::default() },
-            ..ViewSpec::default()
-        };
-        let renderer = Renderer::new(&spec, &made.wall.closed_mesh())?;
-        let stem = folder.join(format!("{}_{}", anatomy.name, target.replace(' ', "_")));
-        Ok(Self { renderer, stem, frames: Vec::new() })
-    }
-
-    fn take(&mut self, simulation: &Simulation) -> Result<(), Failure> {
-        let device = simulation.device();
-        let view =
-            DeviceView::from_shape(simulation.shape(), |from_tip| device.section_at(from_tip).radius_mm);
-        let frames = self.renderer.render(&[view])?;
-        let number = self.frames.len() / 2 + 1;
-        for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
-            if let Some(image) = image {
-                let path = PathBuf::from(format!("{}_{number:02}_{name}.png", self.stem.display()));
-                image.write_png(&path)?;
-                self.frames.push(path);
-            }
-        }
-        Ok(())
-    }
+/// A camera for one target.
+fn camera(folder: &Path, anatomy: &Anatomy, target: &str, made: &GeneratedWall) -> Result<Camera, Failure> {
+    let spec = ViewSpec {
+        size_px: [512, 512],
+        c_arm: CArmSpec { primary_deg: anatomy.primary_deg, ..CArmSpec::default() },
+        xray: XRaySpec { contrast_fraction: 0.04, ..XRaySpec::default() },
+        ..ViewSpec::default()
+    };
+    let stem = format!("{}_{}", anatomy.name, target.replace(' ', "_"));
+    Camera::new(&folder.join("frames"), &stem, spec, &made.wall.closed_mesh())
 }
 
 fn table(rows: &[Row]) -> String {

@@ -4,9 +4,12 @@
 //! length, each the median over the timed increments: building and solving the linear system (steps 4 and 5 of
 //! Algorithm 1), which is where dense and banded differ, and one whole calculation (steps 2 to 6, with collision
 //! detection and read-outs), which is what the paper's column counts.
+//!
+//! A method that cannot be brought into position within the time limit says so in its row, and larger numbers of nodes are not begun.
 
 use std::time::Instant;
 
+use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Surroundings, WallProperties};
 use endowire_core::methods::Method;
@@ -18,7 +21,7 @@ use crate::args::TimingArgs;
 use crate::commands::compare::contender;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::{print, print_json, progress};
+use crate::output::{answer, progress};
 
 /// The paper's Table 1: nodes, milliseconds, on an Intel Core2 6700 with a GeForce 8800.
 const PAPER_MS: [(usize, f64); 5] = [(50, 9.2), (100, 15.4), (150, 24.8), (200, 36.7), (300, 58.4)];
@@ -32,10 +35,11 @@ const RADIUS_MM: f64 = 0.445;
 const STIFFNESS_NMM2: f64 = 20.0;
 /// Largest distance between the nodes of the two solves, mm.
 const AGREEMENT_MM: f64 = 1e-8;
-/// Most nodes, …
+/// Most nodes.
 const MOST_NODES: usize = 10_000;
-/// … and of the dense solve: bringing 1,000 nodes into position takes minutes.
-const MOST_DENSE: usize = 500;
+/// Up to so many nodes the dense solve takes the whole way by itself; bringing 1,000 nodes into position would take minutes, so
+/// that beyond it solves what the banded one has come to.
+const MOST_FOLLOWED: usize = 500;
 /// The paper's frames a second with 300 nodes.
 const PAPER_FPS: f64 = 17.0;
 /// Most timed calculations: those that the tube has room for.
@@ -96,28 +100,25 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
         device: &device,
     };
 
-    let methods = methods(&args.methods)?;
+    let methods = methods(&args.methods);
     let (paper, others): (Vec<&str>, Vec<&str>) = methods.iter().partition(|m| m.starts_with("li2011"));
     let bar = progress::bar(args.nodes.len() * (usize::from(!paper.is_empty()) + others.len()), "row");
-    let mut rows = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
     for &nodes in &args.nodes {
         if !paper.is_empty() {
             bar.set_message(format!("{nodes} nodes, li2011"));
-            let dense = paper.contains(&"li2011-dense") && nodes <= MOST_DENSE;
-            let timed = time_paper(nodes, args.repeats, dense, &surroundings)?;
+            let dense = paper.contains(&"li2011-dense");
+            let timed = time_paper(nodes, args, dense, &surroundings)?;
             rows.extend(timed.into_iter().filter(|row| paper.contains(&row.method)));
-            if paper.contains(&"li2011-dense") && !dense {
-                rows.push(Row::untimed(
-                    "li2011-dense",
-                    nodes,
-                    format!("not timed beyond {MOST_DENSE} nodes"),
-                ));
-            }
             bar.inc(1);
         }
         for method in &others {
             bar.set_message(format!("{nodes} nodes, {method}"));
-            rows.push(time_other(method, nodes, args, &generated.wall, sheath, &device)?);
+            let stopped = |row: &&Row| row.method == *method && row.median_ms.is_none() && row.nodes <= nodes;
+            rows.push(match rows.iter().find(stopped) {
+                Some(row) => Row::untimed(method, nodes, format!("not begun: see {} nodes", row.nodes)),
+                None => time_other(method, nodes, args, &generated.wall, sheath, &device)?,
+            });
             bar.inc(1);
         }
     }
@@ -128,11 +129,7 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
     if let Some(folder) = &args.out {
         super::write(folder, "timing", &document.rows, &document)?;
     }
-    if args.json {
-        print_json(&document)?;
-    } else {
-        print(table(&document.rows))?;
-    }
+    answer(&document, args.json, || table(&document.rows))?;
     check_agreement(&document.rows)
 }
 
@@ -156,17 +153,10 @@ fn paper_ms(nodes: usize) -> Option<f64> {
 }
 
 /// The methods asked for, in the order of the table.
-fn methods(asked: &[String]) -> Result<Vec<&'static str>, Failure> {
-    let mut known = vec!["li2011-dense", "li2011-banded", "kirchhoff"];
-    known.extend(endowire_methods::NAMES);
-    if asked.iter().any(|name| name == "all") {
-        return Ok(known);
-    }
-    if let Some(name) = asked.iter().find(|name| !known.contains(&name.as_str())) {
-        return Err(Failure::Input(format!("--methods {name}: choose from all, {}", known.join(", "))));
-    }
-    known.retain(|name| asked.iter().any(|wanted| wanted == name));
-    Ok(known)
+fn methods(asked: &[String]) -> Vec<&'static str> {
+    let mut known = contender::names();
+    known.retain(|name| asked.iter().any(|wanted| wanted == "all" || wanted == name));
+    known
 }
 
 /// Element length with which `nodes` nodes, the sheath's too, are inserted; the timed increments stay within one element.
@@ -186,7 +176,10 @@ fn time_other(
     let element = element_mm(nodes, args.repeats);
     let properties = WallProperties::default();
     let mut simulation =
-        contender::insertion(method, element, wall.clone(), properties, device.clone(), sheath)?;
+        match contender::insertion(method, element, wall.clone(), properties, device.clone(), sheath) {
+            Ok(simulation) => simulation,
+            Err(refusal) => return Ok(Row::untimed(method, nodes, refusal.to_string())),
+        };
     let begun = Instant::now();
     let mut steps = Vec::new();
     let mut unconverged = 0;
@@ -217,26 +210,36 @@ fn time_other(
 /// Both solves of the paper's method over the same insertion, timed at its end; the dense one only if asked for.
 fn time_paper(
     nodes: usize,
-    repeats: usize,
+    args: &TimingArgs,
     dense: bool,
     surroundings: &Surroundings<'_>,
 ) -> Result<Vec<Row>, Failure> {
+    let repeats = args.repeats;
     let options = Li2011Options { element_mm: element_mm(nodes, repeats), ..Default::default() };
-    let mut dense_method = Li2011::new(options, LinearSolver::Dense, surroundings)?;
+    let mut refusal = None;
+    let mut dense_method = match Li2011::new(options, LinearSolver::Dense, surroundings) {
+        Ok(method) => Some(method).filter(|_| dense),
+        Err(reason) => {
+            refusal = Some(reason.to_string()).filter(|_| dense);
+            None
+        }
+    };
+    let dense = dense_method.is_some();
+    let follows = dense && nodes <= MOST_FOLLOWED;
     let mut banded_method = Li2011::new(options, LinearSolver::Banded, surroundings)?;
     let mut max_difference_mm: f64 = 0.0;
     let mut step_both = |command: Command| -> Result<[f64; 2], Failure> {
         let clock = Instant::now();
-        if dense {
-            dense_method.step(surroundings, command)?;
+        if let Some(method) = dense_method.as_mut().filter(|_| follows) {
+            method.step(surroundings, command)?;
         }
         let dense_ms = milliseconds(clock);
         let clock = Instant::now();
         banded_method.step(surroundings, command)?;
         let banded_ms = milliseconds(clock);
-        let (a, b) = (dense_method.shape(), banded_method.shape());
-        for (a, b) in a.positions_mm.iter().zip(&b.positions_mm) {
-            max_difference_mm = max_difference_mm.max((a - b).norm());
+        if let Some(method) = &dense_method {
+            let (a, b) = (method.shape(), banded_method.shape());
+            max_difference_mm = max_difference_mm.max(largest_distance(&a.positions_mm, &b.positions_mm));
         }
         Ok([dense_ms, banded_ms])
     };
@@ -249,38 +252,65 @@ fn time_paper(
         steps[0].push(times[0]);
         steps[1].push(times[1]);
     }
-    let [dense_solves, banded_solves] = time_solves(banded_method.chain(), repeats, dense);
+    let solves = time_solves(banded_method.chain(), repeats, dense, args.limit_s);
     let [dense_steps, banded_steps] = steps;
-    let row = |method, solves, steps, difference| Row {
-        median_ms: Some(median(solves)),
-        step_ms: Some(median(steps)),
-        max_difference_mm: Some(difference),
-        ..Row::untimed(method, nodes, String::new())
-    };
     let mut rows = Vec::new();
+    rows.extend(refusal.map(|reason| Row::untimed("li2011-dense", nodes, reason)));
     if dense {
-        rows.push(row("li2011-dense", dense_solves, dense_steps, max_difference_mm));
+        let note = if follows {
+            String::new()
+        } else {
+            format!("{} solves where li2011-banded has come to", solves.dense_ms.len())
+        };
+        rows.push(Row {
+            median_ms: Some(median(solves.dense_ms)),
+            step_ms: follows.then(|| median(dense_steps)),
+            max_difference_mm: Some(max_difference_mm.max(solves.difference_mm)),
+            ..Row::untimed("li2011-dense", nodes, note)
+        });
     }
-    rows.push(row("li2011-banded", banded_solves, banded_steps, 0.0));
+    rows.push(Row {
+        median_ms: Some(median(solves.banded_ms)),
+        step_ms: Some(median(banded_steps)),
+        max_difference_mm: Some(0.0),
+        ..Row::untimed("li2011-banded", nodes, String::new())
+    });
     Ok(rows)
 }
 
-/// Times of the linear system alone, both solves of the same chain.
-fn time_solves(chain: &Chain, repeats: usize, dense: bool) -> [Vec<f64>; 2] {
-    let (mut x, mut t) = (Vec::new(), Vec::new());
+/// Times of the linear system alone, and how far the nodes of the two solves are apart.
+#[derive(Default)]
+struct Solves {
+    dense_ms: Vec<f64>,
+    banded_ms: Vec<f64>,
+    difference_mm: f64,
+}
+
+/// Both solves of the same chain, at least once and not longer than the limit.
+fn time_solves(chain: &Chain, repeats: usize, dense: bool, limit_s: f64) -> Solves {
+    let (mut x, mut dense_x, mut t) = (Vec::new(), Vec::new(), Vec::new());
     let mut workspace = banded::Workspace::default();
-    let mut times = [Vec::new(), Vec::new()];
-    for _ in 0..repeats {
-        if dense {
-            let clock = Instant::now();
-            dense::solve(chain, &mut x, &mut t);
-            times[0].push(milliseconds(clock));
-        }
+    let mut solves = Solves::default();
+    let begun = Instant::now();
+    while solves.banded_ms.len() < repeats
+        && (solves.banded_ms.is_empty() || begun.elapsed().as_secs_f64() < limit_s)
+    {
         let clock = Instant::now();
         banded::solve(chain, &mut workspace, &mut x, &mut t);
-        times[1].push(milliseconds(clock));
+        solves.banded_ms.push(milliseconds(clock));
+        if dense {
+            let clock = Instant::now();
+            dense::solve(chain, &mut dense_x, &mut t);
+            solves.dense_ms.push(milliseconds(clock));
+        }
     }
-    times
+    solves.difference_mm = largest_distance(&dense_x, &x);
+    solves
+}
+
+/// Largest distance of a point from the same point of another chain; 0 where one is empty.
+fn largest_distance(a: &[Vec3], b: &[Vec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
 }
 
 fn milliseconds(since: Instant) -> f64 {
