@@ -73,7 +73,6 @@ pub(crate) struct Fluoroscope {
     anatomy: Anatomy,
     /// Attenuation of tissue, bone, lung, blood and contrast medium less blood.
     lanes: [Lanes; 5],
-    start: Lanes,
     fraction: f32,
     contrast: Option<ContrastMap>,
     /// Material of devices that name none.
@@ -110,7 +109,6 @@ impl Fluoroscope {
         let pixels = c_arm.size_px().map(|n| n as usize).iter().product();
         let mut fluoroscope = Self {
             c_arm: c_arm.clone(),
-            start: beam.start(),
             rays,
             beam,
             anatomy,
@@ -125,8 +123,9 @@ impl Fluoroscope {
             pixels: vec![],
             listed: vec![false; pixels],
         };
+        let mut room = Lanes::new();
         for pixel in 0..pixels {
-            let [signal, energy] = fluoroscope.primary(pixel, fluoroscope.fraction);
+            let [signal, energy] = fluoroscope.primary(pixel, fluoroscope.fraction, &mut room);
             fluoroscope.still.signal[pixel] = signal;
             fluoroscope.still.energy[pixel] = energy;
         }
@@ -149,48 +148,33 @@ impl Fluoroscope {
         (pixel / width * sub * width * sub + pixel % width * sub, width * sub)
     }
 
-    /// Signal and energy of the unscattered quanta of a pixel whose lumen has the given fraction of contrast medium.
-    fn primary(&self, pixel: usize, fraction: f32) -> [f32; 2] {
+    /// Signal and energy of the unscattered quanta of a pixel whose lumen has the given fraction of contrast medium; `room` is to
+    /// work in.
+    fn primary(&self, pixel: usize, fraction: f32, room: &mut Lanes) -> [f32; 2] {
         let open = self.c_arm.openness(pixel) as f32;
         if open == 0.0 {
             return [0.0; 2];
         }
         let (first, stride) = self.first_ray(pixel);
-        let mut sum = [0.0; 2];
+        let mut sum = [[0.0; LANES]; 2];
         for row in 0..SUBRAYS as usize {
             for ray in first + row * stride..first + row * stride + SUBRAYS as usize {
-                self.ray(ray, fraction, &mut sum);
+                self.ray(ray, fraction, room, &mut sum);
             }
         }
-        sum.map(|s| s * open / (SUBRAYS * SUBRAYS) as f32)
+        sum.map(|lanes| lanes.iter().sum::<f32>() * open / (SUBRAYS * SUBRAYS) as f32)
     }
 
     #[inline]
-    fn ray(&self, ray: usize, fraction: f32, sum: &mut [f32; 2]) {
+    fn ray(&self, ray: usize, fraction: f32, room: &mut Lanes, sum: &mut [[f32; LANES]; 2]) {
         let [tissue, bone, lung, lumen] = self.anatomy.at(ray);
         let devices: f32 = self.devices.iter().map(|(_, _, lengths)| lengths[ray]).sum();
         // What devices leave of the lumen's filling.
         let filling = lumen - devices;
-        let lengths = [tissue, bone, lung, filling, filling * fraction];
-        self.beam.add(
-            |lane| {
-                let mut p = self.start[lane];
-                for (mu, length) in self.lanes.iter().zip(lengths) {
-                    for i in 0..LANES {
-                        p[i] += mu[lane][i] * length;
-                    }
-                }
-                if devices != 0.0 {
-                    for (_, mu, lengths) in &self.devices {
-                        for i in 0..LANES {
-                            p[i] += mu[lane][i] * lengths[ray];
-                        }
-                    }
-                }
-                p
-            },
-            sum,
-        );
+        let lengths = [tissue - self.beam.reference_mm(), bone, lung, filling, filling * fraction];
+        let still = self.lanes.iter().zip(lengths);
+        let moving = self.devices.iter().map(|(_, mu, lengths)| (mu, lengths[ray]));
+        self.beam.add(still.chain(moving).filter(|layer| layer.1 != 0.0), room, sum);
     }
 
     /// Signal with devices and the contrast medium of a time; without a time, before any injection.
@@ -212,6 +196,7 @@ impl Fluoroscope {
                     self.pixels.push(pixel);
                 }
             }
+            let mut room = Lanes::new();
             let mut injected = fractions.iter().peekable();
             // Both lists rise with the pixel.
             self.pixels.sort_unstable();
@@ -219,7 +204,7 @@ impl Fluoroscope {
                 while injected.next_if(|f| f.0 < pixel).is_some() {}
                 let more = injected.next_if(|f| f.0 == pixel).map_or(0.0, |f| f.1);
                 let pixel = pixel as usize;
-                let [signal, energy] = self.primary(pixel, (self.fraction + more).min(1.0));
+                let [signal, energy] = self.primary(pixel, (self.fraction + more).min(1.0), &mut room);
                 let scattered = |map: &[f32]| map.get(pixel).copied().unwrap_or(0.0);
                 now.signal[pixel] = signal + scattered(&self.scatter.signal);
                 now.energy[pixel] = energy + scattered(&self.scatter.energy);
@@ -268,9 +253,10 @@ impl Fluoroscope {
             Error::parameter("view.xray.mode", "roadmap", mend)
         })?;
         let mut full = self.still.clone();
+        let mut room = Lanes::new();
         for (pixel, fraction) in contrast.largest() {
             let pixel = pixel as usize;
-            let [signal, energy] = self.primary(pixel, (self.fraction + fraction).min(1.0));
+            let [signal, energy] = self.primary(pixel, (self.fraction + fraction).min(1.0), &mut room);
             let scattered = |map: &[f32]| map.get(pixel).copied().unwrap_or(0.0);
             full.signal[pixel] = signal + scattered(&self.scatter.signal);
             full.energy[pixel] = energy + scattered(&self.scatter.energy);
