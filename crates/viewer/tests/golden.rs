@@ -129,23 +129,30 @@ fn frames_are_the_stored_ones_and_a_wire_a_millimetre_aside_is_not() {
     assert!(differing(image.data(), pictures[0].1.data()) > SHARE, "the comparison must be able to fail");
 }
 
-/// Grey levels that drivers may differ by: in the mean, and at all but a two-hundredth of the bytes. Edges fall on other samples
-/// with other drivers; areas do not.
-const MEAN_LEVELS: f64 = 0.25;
-const MOST_LEVELS: u8 = 6;
-const EDGES: f64 = 5e-3;
-
-/// Mean difference in grey levels, and that which all but [`EDGES`] stay within.
-fn apart(a: &[u8], b: &[u8]) -> (f64, u8) {
-    assert_eq!(a.len(), b.len());
-    let mut off: Vec<u8> = a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).collect();
-    off.sort_unstable();
-    let mean = off.iter().map(|&v| f64::from(v)).sum::<f64>() / off.len() as f64;
-    (mean, off[((off.len() - 1) as f64 * (1.0 - EDGES)) as usize])
+/// What pictures of different drivers may differ by: grey levels in the mean, and levels that all but a share of the bytes stay
+/// within.
+struct Tolerance {
+    mean: f64,
+    levels: u8,
+    share: f64,
 }
 
-fn alike((mean, most): (f64, u8)) -> bool {
-    mean <= MEAN_LEVELS && most <= MOST_LEVELS
+/// Adapters give path lengths, which agree to the seventh digit; the rest of the picture is plain Rust.
+const FLUORO: Tolerance = Tolerance { mean: 0.02, levels: 2, share: 1e-3 };
+/// Silhouettes fall on other samples with other drivers, areas do not.
+const THREE_D: Tolerance = Tolerance { mean: 0.15, levels: 6, share: 5e-3 };
+
+impl Tolerance {
+    /// What `a` and `b` differ by, and whether that is too much.
+    fn compare(&self, a: &[u8], b: &[u8]) -> (String, bool) {
+        assert_eq!(a.len(), b.len());
+        let mut off: Vec<u8> = a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).collect();
+        off.sort_unstable();
+        let mean = off.iter().map(|&v| f64::from(v)).sum::<f64>() / off.len() as f64;
+        let levels = off[((off.len() - 1) as f64 * (1.0 - self.share)) as usize];
+        let said = format!("{mean:.3} levels in the mean, {levels} for all but {} of the bytes", self.share);
+        (said, mean > self.mean || levels > self.levels)
+    }
 }
 
 #[test]
@@ -160,21 +167,23 @@ fn frames_of_the_adapter_are_the_stored_pictures_and_a_wire_a_millimetre_aside_i
     let pictures = pictures.map(|(name, image)| (format!("wgpu_{name}.png"), image));
     bless(&pictures);
     let references = [0, 1, 2].map(|i| stored(&folder().join(&pictures[i].0)));
-    for ((file, image), reference) in pictures.iter().zip(&references) {
-        let off = apart(image.data(), reference);
-        eprintln!("{name}: {file}: {:.3} levels in the mean, {} at the edges", off.0, off.1);
-        assert!(alike(off), "{name}: {file}: {off:?}");
+    let tolerances = [FLUORO, THREE_D, FLUORO];
+    for (((file, image), reference), tolerance) in pictures.iter().zip(&references).zip(&tolerances) {
+        let (said, differ) = tolerance.compare(image.data(), reference);
+        eprintln!("{name}: {file}: {said}");
+        assert!(!differ, "{name}: {file}: {said}");
+        // A twin: a picture a column aside.
+        let mut shifted = image.data().to_vec();
+        shifted.rotate_right(image.data().len() / (200 * 200));
+        let (said, differ) = tolerance.compare(&shifted, reference);
+        assert!(differ, "{file} a column aside: {said}");
     }
-    // The twins: the same comparison sees a wire a millimetre aside, and a picture a column aside.
+    // Another: a wire a millimetre aside, half a pixel.
     let Some(renderer) = on_gpu(&view(Mode::Fluoro), &arch()) else { return };
     let aside = draw(renderer, moved(1.0));
-    for (image, reference) in aside.iter().zip(&references) {
-        assert!(!alike(apart(image.data(), reference)), "{:?}", apart(image.data(), reference));
-    }
-    for ((file, image), reference) in pictures.iter().zip(&references) {
-        let channels = image.data().len() / (200 * 200);
-        let mut shifted = image.data().to_vec();
-        shifted.rotate_right(channels);
-        assert!(!alike(apart(&shifted, reference)), "{file}: {:?}", apart(&shifted, reference));
+    for ((image, reference), tolerance) in aside.iter().zip(&references).zip(&tolerances) {
+        let (said, differ) = tolerance.compare(image.data(), reference);
+        eprintln!("aside: {said}");
+        assert!(differ, "{said}");
     }
 }
