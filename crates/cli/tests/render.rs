@@ -164,7 +164,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
             vec!["render", text(&run), "--set", "c_arm.nothing=0"],
             &["c_arm.nothing=0", "expected one of", "sid_mm"],
         ),
-        (vec!["render", text(&run), "--from", "900"], &["--from", "900", "steps 1 to 106"]),
+        (vec!["render", text(&run), "--from", "900"], &["--from 900", "steps 1 to 106"]),
         (vec!["render", text(&run), "--view", "3d", "--labels"], &["--labels", "use --view fluoro"]),
         (vec!["render", text(&run), "--view", "fluoro", "--animate", text(&far)], &["no/such/folder"]),
         (
