@@ -42,7 +42,9 @@ impl ContrastMap {
         let mut map = Self { flow, pixels: vec![], shares: vec![] };
         let mut near = Nearest { nodes: &map.flow.nodes, cells: HashMap::new() };
         let mut crossings = wall_crossings(c_arm, wall);
-        crossings.sort_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal));
+        crossings.sort_unstable_by(|a, b| {
+            (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
+        });
         let source = c_arm.source_mm();
         let mut own: Vec<(u32, f32)> = Vec::new();
         for of_pixel in crossings.chunk_by(|a, b| a.0 == b.0) {
@@ -74,6 +76,8 @@ impl ContrastMap {
                 map.pixels.push((pixel, map.shares.len() as u32));
             }
         }
+        map.shares.shrink_to_fit();
+        map.pixels.shrink_to_fit();
         Ok(map)
     }
 
