@@ -6,12 +6,12 @@
 //!
 //! **Single precision.** Everything is told relative to a *reference*, a thickness of soft tissue such as the scene's, behind which
 //! S = 1. Its length is taken off that of the tissue before µ comes in, so p is small where signals are not, and sums run over
-//! eight lanes: over every line of the table the signal is the tabulated integral within 10⁻⁶, relatively, down to 10⁻⁹ of the
-//! open beam.
+//! eight lanes: over every line of the table the signal is the tabulated integral within 10⁻⁶, relatively, down to 5·10⁻⁷ of
+//! the open beam.
 //!
 //! **Fewer energies**, where [`XRaySpec::energy_bins`] asks for them: with the weights of the spectrum behind the reference the
 //! integrand is e^{−(p − p_ref)}, smooth in E between K-edges and near one, and a Gauss rule, separate between the edges of iodine,
-//! tungsten and platinum, replaces the table. No rule reaches 10⁻⁶: the table itself is kinked at its entries, and the transmissions
+//! tungsten and platinum, replaces the table. None of far fewer nodes reaches 10⁻⁶: the table is kinked at its entries, and the transmissions
 //! of the [`Material`]s span 34 dimensions of 65 to that accuracy (80 kV).
 //!
 //! **Quanta.** Each absorbed photon gives its energy, so var S ∝ ∫ N η E² e^{−p}: as if S/ε quanta of the energy
