@@ -141,29 +141,63 @@ fn a_scene_is_drawn_without_a_recording() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused_with_one_line() {
+fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, run) = recorded(folder.path());
     let nothing = folder.path().join("nothing");
     let far = folder.path().join("no/such/folder/labels.png");
-    let cases: [(&[&str], &str); 9] = [
-        (&["render", text(&nothing)], "recorded run"),
-        (&["render", text(&run), "--pose", "north 3"], "LAO"),
-        (&["render", text(&run), "--set", "c_arm.sid_mm=0"], "sid_mm"),
-        (&["render", text(&run), "--set", "c_arm.nothing=0"], "nothing"),
-        (&["render", text(&run), "--from", "900"], "steps 1 to 106"),
-        (&["render", text(&run), "--view", "3d", "--labels"], "fluoroscopy"),
-        (&["render", text(&run), "--view", "fluoro", "--animate", text(&far)], "no/such/folder"),
+    let labels = folder.path().join("labels");
+    std::fs::create_dir_all(labels.join("frame_000000_labels.json")).unwrap();
+    let nan = folder.path().join("nan.toml");
+    let pose = std::fs::read_to_string(&scene).unwrap().replace("[view]", "[view]\nc_arm.primary_deg = nan");
+    std::fs::write(&nan, pose).unwrap();
+    let still = |more: &[&'static str]| [&["fluoro", text(&scene), "--steps", "0"], more].concat();
+    // Each message names key, value and mend.
+    let cases: [(Vec<&str>, &[&str]); 15] = [
+        (vec!["render", text(&nothing)], &["nothing", "recorded run"]),
+        (vec!["render", text(&run), "--pose", "north 3"], &["north 3", "say angles as in \"LAO 40\""]),
         (
-            &["fluoro", text(&scene), "--steps", "0", "--set", "patient.ct={\"file\":\"none.nii\"}"],
-            "none.nii",
+            vec!["render", text(&run), "--set", "c_arm.sid_mm=0"],
+            &["view.c_arm.sid_mm = 0: must be a finite number above 0"],
         ),
-        (&["fluoro", text(&scene), "--steps", "0", "--mode", "roadmap"], "injection"),
+        (
+            vec!["render", text(&run), "--set", "c_arm.nothing=0"],
+            &["c_arm.nothing=0", "expected one of", "sid_mm"],
+        ),
+        (vec!["render", text(&run), "--from", "900"], &["--from 900", "steps 1 to 106"]),
+        (vec!["render", text(&run), "--view", "3d", "--labels"], &["--labels", "use --view fluoro"]),
+        (vec!["render", text(&run), "--view", "fluoro", "--animate", text(&far)], &["no/such/folder"]),
+        (
+            still(&["--set", "c_arm.primary_deg=nan"]),
+            &["view.c_arm.primary_deg = nan: must be a finite number"],
+        ),
+        (
+            vec!["fluoro", text(&nan), "--steps", "0"],
+            &["view.c_arm.primary_deg = NaN: must be a number from"],
+        ),
+        (still(&["--set", "c_arm.sid_mm=0"]), &["view.c_arm.sid_mm = 0: must be a finite number above 0"]),
+        (
+            still(&["--set", "patient.ct={\"file\":\"none.nii\"}"]),
+            &["view.patient.ct.file = ", "none.nii", "No such file"],
+        ),
+        (still(&["--size", "5000"]), &["view.size_px = [5000, 5000]: each side must be 1 to 4096 pixels"]),
+        (
+            [&still(&["--labels", "--out"])[..], &[text(&nan)]].concat(),
+            &["--out", "nan.toml", "name a folder that can be made"],
+        ),
+        (
+            [&still(&["--labels", "--out"])[..], &[text(&labels)]].concat(),
+            &["cannot write", "frame_000000_labels.json", "directory"],
+        ),
+        (still(&["--mode", "roadmap"]), &["view.xray.mode = roadmap", "give a [[view.injection]]"]),
     ];
-    for (args, word) in cases {
-        let output = endowire(args);
+    for (args, words) in cases {
+        let output = endowire(&args);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
-        assert!(said.contains(word) && !said.contains("panicked"), "{args:?}: {said}");
+        assert!(!said.contains("panicked"), "{args:?}: {said}");
+        for word in words {
+            assert!(said.contains(word), "{args:?}: `{word}` is missing in: {said}");
+        }
     }
 }

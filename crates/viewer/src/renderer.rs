@@ -245,7 +245,7 @@ impl Renderer {
             }
             Ok((Anatomy::new(setup, &c_arm, engine.as_mut())?, maps))
         })?;
-        let Anatomy { body, bone, lung, lumen, .. } = anatomy;
+        let Anatomy { body, bone, lung, lumen } = anatomy;
         Ok(PathLengths {
             width,
             height,

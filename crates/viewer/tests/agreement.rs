@@ -58,6 +58,32 @@ fn path_lengths_agree_to_a_micrometre_in_the_mean_and_a_shift_of_a_tenth_of_a_mi
 }
 
 #[test]
+fn what_the_adapter_transmits_is_off_by_its_path_lengths_and_nothing_else() {
+    let (mut spec, wall, devices) = scene();
+    // The whole spectrum, and contrast medium: what errors of length matter most for.
+    spec.xray.energy_kev = None;
+    spec.xray.contrast_fraction = 0.3;
+    let Some(mut gpu) = on_gpu(&spec, &wall) else { return };
+    let mut cpu = Renderer::new(&spec, &wall).unwrap();
+    let logarithm = |renderer: &mut Renderer, devices: &[DeviceView]| -> Vec<f32> {
+        let paths = renderer.path_lengths(devices).unwrap();
+        renderer.transmission(&paths).unwrap().into_iter().map(f32::ln).collect()
+    };
+    let [a, b] = [&mut cpu, &mut gpu].map(|r| logarithm(r, &devices));
+    let mean = mean_difference(&a, &b);
+    let mut off: Vec<f32> = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).collect();
+    off.sort_by(f32::total_cmp);
+    let most = off[off.len() - 1 - off.len() / 1000];
+    eprintln!("{}: transmission off by {mean:.1e} in the mean, {most:.1e} in a thousandth", gpu.backend());
+    assert!(mean <= 1e-6 && most <= 1e-4, "{mean} {most}");
+    // The twin: a wall a micrometre aside is more.
+    let mut shifted = wall.clone();
+    shifted.vertices_mm.iter_mut().for_each(|v| v.x += 1e-3);
+    let shifted = logarithm(&mut Renderer::new(&spec, &shifted).unwrap(), &devices);
+    assert!(mean_difference(&shifted, &b) > 1e-6);
+}
+
+#[test]
 fn devices_seen_end_on_agree_too() {
     let wall = sphere(40.0, 24, Vec3::zeros());
     let spec = spec(Backend::Cpu, 200, 0.1);

@@ -8,7 +8,7 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree};
 use endowire_viewer::{
-    Backend, DetectorSpec, DeviceView, Image, InjectionSpec, Mode, Moment, Renderer, ViewSpec,
+    Backend, DetectorSpec, DeviceView, Image, InjectionSpec, Mode, Moment, Renderer, TorsoSpec, ViewSpec,
 };
 
 /// A straight vessel along z with its centre line, blood rising; contrast medium from 1 s to 2 s.
@@ -98,6 +98,46 @@ fn contrast_medium_fills_the_vessel_from_the_inlet_and_washes_out() {
     assert!(low < 0.5 * high, "washing out: {low} {high}");
     let [low, high] = low_and_high(&mut renderer, 4, 4.0);
     assert!(low.abs() < 3.0 && high.abs() < 3.0, "after: {low} {high}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn bones_vanish_from_a_subtraction_of_one_energy_and_scatter_brings_them_back() {
+    let folder = folder("bones");
+    let (mut view, wall) = scene(&folder, Mode::Dsa);
+    view.size_px = [96, 96];
+    view.bits = 16;
+    view.detector = DetectorSpec::ideal();
+    view.xray.window = Some([-0.5, 1.5]);
+    // Values along the filled vessel, in the body and in air.
+    let values = |torso: Option<TorsoSpec>, energy: Option<f64>, scatter: f64| -> Vec<f64> {
+        let mut view = view.clone();
+        view.patient.torso = torso;
+        view.xray.tissue_mm = 0.0;
+        view.xray.energy_kev = energy;
+        view.detector.scatter_fraction = scatter;
+        let mut renderer = Renderer::new(&view, &wall).unwrap();
+        let image = renderer.render_at(&[], at(0, 1.9)).unwrap().fluoro.unwrap();
+        let value = |x, y| {
+            let level = image.pixel(x, y).unwrap();
+            1.5 - 2.0 * f64::from(u16::from_be_bytes([level[0], level[1]])) / 65_535.0
+        };
+        (45..51).flat_map(|x| (10..80).map(move |y| (x, y))).map(|(x, y)| value(x, y)).collect()
+    };
+    // Spine and ribs change the opacity of the vessel by so much of it.
+    let left = |energy: Option<f64>, scatter: f64| {
+        let [body, air] = [Some(TorsoSpec::default()), None].map(|torso| values(torso, energy, scatter));
+        let ratios: Vec<f64> = body.iter().zip(&air).map(|(body, air)| body / air).collect();
+        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        (ratios.iter().map(|r| (r / mean - 1.0).powi(2)).sum::<f64>() / ratios.len() as f64).sqrt()
+    };
+    let [alone, hardened, scattered] =
+        [(Some(60.0), 0.0), (None, 0.0), (Some(60.0), 0.3)].map(|(e, s)| left(e, s));
+    eprintln!(
+        "bones left of the opacity: {alone:.4} by one energy, {hardened:.4} by the spectrum, {scattered:.4} by scatter"
+    );
+    assert!(alone < 1e-3, "{alone}");
+    assert!(hardened > 2.0 * alone && scattered > 5.0 * alone, "{alone} {hardened} {scattered}");
     std::fs::remove_dir_all(folder).unwrap();
 }
 

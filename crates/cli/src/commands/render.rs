@@ -29,7 +29,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let last = args.to.unwrap_or(recording.steps()).min(recording.steps());
     if args.every == 0 || args.from == 0 || args.from > last {
         return Err(Failure::Input(format!(
-            "steps {} to {last} by {}: {} has steps 1 to {}",
+            "--from {} --to {last} --every {}: {} has steps 1 to {}",
             args.from,
             args.every,
             args.dir.display(),

@@ -159,7 +159,9 @@ impl<'a> Studio<'a> {
                 "--dicom, --labels, --raw and --hold belong to fluoroscopy: use --view fluoro or --view both";
             return Err(Failure::Input(text.to_owned()));
         }
-        std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
+        std::fs::create_dir_all(&folder).map_err(|e| {
+            Failure::Input(format!("--out {}: {e}; name a folder that can be made", folder.display()))
+        })?;
         Ok(Self {
             args,
             spec,
@@ -330,6 +332,10 @@ fn wished(mut spec: ViewSpec, args: &FrameArgs, default: ViewChoice) -> Result<V
     let mut table = serde_json::to_value(&spec).map_err(|e| failed(e.to_string()))?;
     for set in &args.set {
         let (key, value) = set.split_once('=').ok_or_else(|| failed(format!("{set}: say KEY=VALUE")))?;
+        // The document that the table is kept in has no such numbers, and no key takes them.
+        if value.trim().parse::<f64>().is_ok_and(|v| !v.is_finite()) {
+            return Err(failed(format!("view.{} = {}: must be a finite number", key.trim(), value.trim())));
+        }
         let value = serde_json::from_str(value).unwrap_or_else(|_| Value::from(value));
         let mut place = &mut table;
         for part in key.trim().split('.') {

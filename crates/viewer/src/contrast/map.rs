@@ -1,8 +1,9 @@
 //! What of a bolus each pixel sees: its lumen's length, shared out to the nodes of the tree.
 //!
 //! The stretches of a ray inside the wall are cut into short steps, and each step belongs to the node whose ball it is deepest
-//! in (the least |x − c|² − r², so that the trunk keeps what is inside it beside the origin of a small branch). A frame then needs one
-//! sparse product of these shares with the nodes' fractions.
+//! in (the least |x − c|² − r², so that the trunk keeps what is inside it beside the origin of a small branch) and, by its place along
+//! the centre line, to that node's neighbour on its side: a bolus has no steps. A frame then needs one sparse product of these shares
+//! with the nodes' fractions.
 
 use std::collections::HashMap;
 
@@ -40,9 +41,11 @@ impl ContrastMap {
         })?;
         let flow = Flow::new(&tree, &spec.flow, &spec.injection)?;
         let mut map = Self { flow, pixels: vec![], shares: vec![] };
-        let mut near = Nearest { nodes: &map.flow.nodes, cells: HashMap::new() };
+        let mut near = Nearest::new(&map.flow.nodes);
         let mut crossings = wall_crossings(c_arm, wall);
-        crossings.sort_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal));
+        crossings.sort_unstable_by(|a, b| {
+            (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
+        });
         let source = c_arm.source_mm();
         let mut own: Vec<(u32, f32)> = Vec::new();
         for of_pixel in crossings.chunk_by(|a, b| a.0 == b.0) {
@@ -61,10 +64,13 @@ impl ContrastMap {
                 let steps = (length / STEP_MM).ceil();
                 for k in 0..steps as usize {
                     let at = f64::from(pair[0].1) + (k as f64 + 0.5) * length / steps;
-                    let node = near.node(&(source + direction * at));
-                    match own.iter_mut().find(|share| share.0 == node) {
-                        Some(share) => share.1 += (length / steps) as f32,
-                        None => own.push((node, (length / steps) as f32)),
+                    let shares = near.shares(&(source + direction * at));
+                    for (node, share) in shares.into_iter().filter(|share| share.1 > 0.0) {
+                        let length = share * (length / steps) as f32;
+                        match own.iter_mut().find(|share| share.0 == node) {
+                            Some(share) => share.1 += length,
+                            None => own.push((node, length)),
+                        }
                     }
                 }
             }
@@ -74,6 +80,8 @@ impl ContrastMap {
                 map.pixels.push((pixel, map.shares.len() as u32));
             }
         }
+        map.shares.shrink_to_fit();
+        map.pixels.shrink_to_fit();
         Ok(map)
     }
 
@@ -101,10 +109,40 @@ impl ContrastMap {
 /// Nearest nodes by cells, found where they are first asked for.
 struct Nearest<'a> {
     nodes: &'a [Node],
+    /// The node after each, in its widest branch.
+    downstream: Vec<Option<usize>>,
     cells: HashMap<[i32; 3], u32>,
 }
 
-impl Nearest<'_> {
+impl<'a> Nearest<'a> {
+    fn new(nodes: &'a [Node]) -> Self {
+        let mut downstream: Vec<Option<usize>> = vec![None; nodes.len()];
+        for (i, node) in nodes.iter().enumerate() {
+            if let Some(before) = node.upstream {
+                let wider = |other: usize| nodes[other].radius_mm >= node.radius_mm;
+                if !downstream[before].is_some_and(wider) {
+                    downstream[before] = Some(i);
+                }
+            }
+        }
+        Self { nodes, downstream, cells: HashMap::new() }
+    }
+
+    /// The nearest node and the neighbour towards which a point lies along the centre line, with their shares of it.
+    fn shares(&mut self, point: &Vec3) -> [(u32, f32); 2] {
+        let node = self.node(point);
+        let at = self.nodes[node as usize].position_mm;
+        let neighbours = [self.nodes[node as usize].upstream, self.downstream[node as usize]];
+        let along = |neighbour: usize| {
+            let way = self.nodes[neighbour].position_mm - at;
+            let share = (point - at).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE);
+            (neighbour as u32, share.clamp(0.0, 1.0) as f32)
+        };
+        let most = neighbours.into_iter().flatten().map(along).max_by(|a, b| a.1.total_cmp(&b.1));
+        let (neighbour, share) = most.unwrap_or((node, 0.0));
+        [(node, 1.0 - share), (neighbour, share)]
+    }
+
     fn node(&mut self, point: &Vec3) -> u32 {
         let cell = [point.x, point.y, point.z].map(|x| (x / STEP_MM).floor() as i32);
         *self.cells.entry(cell).or_insert_with(|| {

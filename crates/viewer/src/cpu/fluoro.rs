@@ -15,7 +15,7 @@ pub(crate) struct CpuPaths;
 
 impl PathEngine for CpuPaths {
     fn mesh(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Vec<f32>> {
-        Ok(wall_path_mm(view, mesh).into_iter().map(|v| v as f32).collect())
+        Ok(wall_path_mm(view, mesh))
     }
 
     fn pieces(

@@ -38,8 +38,20 @@ impl ScreenTriangle {
 
     /// Calls `visit(x, y, weights)` for every pixel of a `size` picture whose centre is covered. The weights
     /// belong to the corners, are not negative and sum to one.
-    pub(crate) fn scan(&self, size: [u32; 2], mut visit: impl FnMut(usize, usize, [f64; 3])) {
-        let [xs, ys] = [0, 1].map(|k| pixel_range(self.corners.map(|c| c[k]), size[k]));
+    pub(crate) fn scan(&self, size: [u32; 2], visit: impl FnMut(usize, usize, [f64; 3])) {
+        self.scan_rows(size[0], 0..size[1], visit);
+    }
+
+    /// The same for some rows of a picture of the given width.
+    pub(crate) fn scan_rows(
+        &self,
+        width: u32,
+        rows: std::ops::Range<u32>,
+        mut visit: impl FnMut(usize, usize, [f64; 3]),
+    ) {
+        let xs = pixel_range(self.corners.map(|c| c[0]), width);
+        let ys = pixel_range(self.corners.map(|c| c[1]), rows.end);
+        let ys = ys.start.max(rows.start as usize)..ys.end;
         let turn = self.area2.signum();
         let edges = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| {
             let (a, b) = (self.corners[i], self.corners[j]);

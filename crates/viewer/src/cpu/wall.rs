@@ -7,6 +7,7 @@
 //! their shared edge, so a silhouette contributes nothing rather than a spike.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result, Vec3};
@@ -14,16 +15,27 @@ use endowire_core::{Error, Result, Vec3};
 use crate::c_arm::CArm;
 use crate::cpu::raster::ScreenTriangle;
 
-/// Calls `visit(pixel, sign, depth)` for each meeting of a pixel's central ray with `wall`: −1 where it enters and +1 where it
-/// leaves, at a depth in front of the source.
-fn meetings(c_arm: &CArm, wall: &SurfaceMesh, mut visit: impl FnMut(usize, f64, f64)) {
-    let [width, height] = c_arm.size_px();
-    let seen: Vec<([f64; 2], f64)> = (wall.vertices_mm.iter())
-        .map(|v| {
-            let beam = c_arm.in_beam(v);
-            (c_arm.pixel_of(&beam), 1.0 / (c_arm.sod_mm() + beam.z))
-        })
-        .collect();
+/// Pixels that are summed up together: what double precision of a whole large picture would take is not to be had.
+const BAND_PX: u32 = 1 << 22;
+
+/// Pixel and inverse depth of each vertex.
+fn seen(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<([f64; 2], f64)> {
+    let vertex = |v: &Vec3| {
+        let beam = c_arm.in_beam(v);
+        (c_arm.pixel_of(&beam), 1.0 / (c_arm.sod_mm() + beam.z))
+    };
+    wall.vertices_mm.iter().map(vertex).collect()
+}
+
+/// Calls `visit(pixel, sign, depth)` for each meeting of a pixel's central ray with `wall` in some rows of the picture: −1 where it
+/// enters and +1 where it leaves, at a depth in front of the source.
+fn meetings(
+    width: u32,
+    rows: Range<u32>,
+    wall: &SurfaceMesh,
+    seen: &[([f64; 2], f64)],
+    mut visit: impl FnMut(usize, f64, f64),
+) {
     for corners in &wall.triangles {
         let corners = corners.map(|v| seen[v as usize]);
         let Some(triangle) = ScreenTriangle::new(corners.map(|c| c.0)) else { continue };
@@ -31,25 +43,36 @@ fn meetings(c_arm: &CArm, wall: &SurfaceMesh, mut visit: impl FnMut(usize, f64, 
         // source.
         let sign = -triangle.area2().signum();
         let [i0, i1, i2] = corners.map(|c| c.1);
-        triangle.scan([width, height], |x, y, [w0, w1, w2]| {
+        triangle.scan_rows(width, rows.clone(), |x, y, [w0, w1, w2]| {
             visit(y * width as usize + x, sign, 1.0 / (w0 * i0 + w1 * i1 + w2 * i2));
         });
     }
 }
 
 /// Length inside `wall` of the central ray of each pixel, row by row.
-pub(crate) fn wall_path_mm(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<f64> {
+pub(crate) fn wall_path_mm(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<f32> {
     let [width, height] = c_arm.size_px();
-    let mut path = vec![0.0; width as usize * height as usize];
-    meetings(c_arm, wall, |pixel, sign, depth| path[pixel] += sign * depth);
-    path.iter_mut().zip(c_arm.obliquities()).for_each(|(length, obliquity)| *length *= obliquity);
+    let seen = seen(c_arm, wall);
+    let mut path = Vec::with_capacity(width as usize * height as usize);
+    let rows = (BAND_PX / width).max(1);
+    let mut band = vec![0.0; (rows.min(height) * width) as usize];
+    let mut obliquities = c_arm.obliquities();
+    for top in (0..height).step_by(rows as usize) {
+        let bottom = (top + rows).min(height);
+        let first = (top * width) as usize;
+        band.fill(0.0);
+        meetings(width, top..bottom, wall, &seen, |pixel, sign, depth| band[pixel - first] += sign * depth);
+        let lengths = &band[..((bottom - top) * width) as usize];
+        path.extend(lengths.iter().zip(&mut obliquities).map(|(length, oblique)| (length * oblique) as f32));
+    }
     path
 }
 
 /// Every meeting of a pixel's central ray with `wall`: the pixel, the distance from the source, and whether it enters.
 pub(crate) fn wall_crossings(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<(u32, f32, bool)> {
     let mut crossings = Vec::new();
-    meetings(c_arm, wall, |pixel, sign, depth| {
+    let [width, height] = c_arm.size_px();
+    meetings(width, 0..height, wall, &seen(c_arm, wall), |pixel, sign, depth| {
         crossings.push((pixel as u32, (depth * c_arm.obliquity_at(pixel)) as f32, sign < 0.0));
     });
     crossings

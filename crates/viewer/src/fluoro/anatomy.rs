@@ -13,8 +13,6 @@ use crate::xray::Material;
 pub(crate) struct Anatomy {
     /// Soft tissue and all that lies in it.
     pub(crate) body: Vec<f32>,
-    /// Soft tissue alone.
-    tissue: Vec<f32>,
     pub(crate) bone: Vec<f32>,
     pub(crate) lung: Vec<f32>,
     pub(crate) lumen: Vec<f32>,
@@ -46,23 +44,20 @@ impl Anatomy {
                 maps.bone = bone;
             }
         }
-        let at = |map: &[f32], i: usize| map.get(i).copied().unwrap_or(0.0);
-        maps.tissue = (0..maps.lumen.len())
-            .map(|i| (maps.body[i] - at(&maps.bone, i) - at(&maps.lung, i) - maps.lumen[i]).max(0.0))
-            .collect();
         Ok(maps)
     }
 
     /// Number of rays.
     pub(crate) fn rays(&self) -> usize {
-        self.tissue.len()
+        self.lumen.len()
     }
 
     /// Lengths in tissue, bone, lung and lumen.
     #[inline]
     pub(crate) fn at(&self, ray: usize) -> [f32; 4] {
         let at = |map: &[f32]| if map.is_empty() { 0.0 } else { map[ray] };
-        [self.tissue[ray], at(&self.bone), at(&self.lung), self.lumen[ray]]
+        let [bone, lung, lumen] = [at(&self.bone), at(&self.lung), self.lumen[ray]];
+        [(self.body[ray] - bone - lung - lumen).max(0.0), bone, lung, lumen]
     }
 
     /// Thickness of soft tissue that stands for the middle of the picture: the median over its middle ninth, where exposure

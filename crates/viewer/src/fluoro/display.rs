@@ -22,11 +22,11 @@ const DARKEST: f32 = 1e-6;
 pub(super) type Window = [f32; 2];
 
 /// −ln S of each pixel.
-pub(super) fn logarithm(signal: &[f32]) -> Vec<f32> {
-    let mut out: Vec<f32> = signal.iter().map(|s| s.max(DARKEST)).collect();
-    ln_lanes(&mut out);
-    out.iter_mut().for_each(|v| *v = -*v);
-    out
+pub(super) fn logarithm(mut signal: Vec<f32>) -> Vec<f32> {
+    signal.iter_mut().for_each(|s| *s = s.max(DARKEST));
+    ln_lanes(&mut signal);
+    signal.iter_mut().for_each(|v| *v = -*v);
+    signal
 }
 
 /// The window that shows the middle of an anatomy: `values` where `seen`.

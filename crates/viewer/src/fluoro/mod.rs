@@ -22,6 +22,7 @@ use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result};
 
 pub(crate) use anatomy::Anatomy;
+use scatter::Scatter;
 pub use sequence::Moment;
 pub(crate) use sequence::Sequence;
 
@@ -73,13 +74,11 @@ pub(crate) struct Fluoroscope {
     anatomy: Anatomy,
     /// Attenuation of tissue, bone, lung, blood and contrast medium less blood.
     lanes: [Lanes; 5],
-    start: Lanes,
     fraction: f32,
     contrast: Option<ContrastMap>,
     /// Material of devices that name none.
     default_material: Material,
-    /// Scattered signal.
-    scatter: Signal,
+    scatter: Scatter,
     /// Signal of the anatomy without devices and injections.
     pub(crate) still: Signal,
     /// Lengths inside devices by material, all zero between frames.
@@ -108,9 +107,9 @@ impl Fluoroscope {
             false => Some(ContrastMap::new(spec, c_arm, &setup.wall)?),
         };
         let pixels = c_arm.size_px().map(|n| n as usize).iter().product();
+        let still = Signal { signal: vec![0.0; pixels], energy: vec![0.0; pixels] };
         let mut fluoroscope = Self {
             c_arm: c_arm.clone(),
-            start: beam.start(),
             rays,
             beam,
             anatomy,
@@ -118,28 +117,21 @@ impl Fluoroscope {
             fraction: spec.xray.contrast_fraction as f32,
             contrast,
             default_material: spec.xray.device_material,
-            scatter: Signal::default(),
-            still: Signal { signal: vec![0.0; pixels], energy: vec![0.0; pixels] },
+            scatter: Scatter::new(&still, c_arm, spec.detector.scatter_fraction),
+            still,
             devices: vec![],
             touched: vec![],
             pixels: vec![],
             listed: vec![false; pixels],
         };
+        let mut room = Lanes::new();
         for pixel in 0..pixels {
-            let [signal, energy] = fluoroscope.primary(pixel, fluoroscope.fraction);
+            let [signal, energy] = fluoroscope.primary(pixel, fluoroscope.fraction, &mut room);
             fluoroscope.still.signal[pixel] = signal;
             fluoroscope.still.energy[pixel] = energy;
         }
-        let share = spec.detector.scatter_fraction;
-        if share > 0.0 {
-            fluoroscope.scatter = scatter::scattered(&fluoroscope.still, c_arm, share);
-            for (still, scatter) in [
-                (&mut fluoroscope.still.signal, &fluoroscope.scatter.signal),
-                (&mut fluoroscope.still.energy, &fluoroscope.scatter.energy),
-            ] {
-                still.iter_mut().zip(scatter).for_each(|(a, b)| *a += b);
-            }
-        }
+        fluoroscope.scatter = Scatter::new(&fluoroscope.still, c_arm, spec.detector.scatter_fraction);
+        fluoroscope.scatter.add_still(&mut fluoroscope.still);
         Ok(fluoroscope)
     }
 
@@ -149,48 +141,33 @@ impl Fluoroscope {
         (pixel / width * sub * width * sub + pixel % width * sub, width * sub)
     }
 
-    /// Signal and energy of the unscattered quanta of a pixel whose lumen has the given fraction of contrast medium.
-    fn primary(&self, pixel: usize, fraction: f32) -> [f32; 2] {
+    /// Signal and energy of the unscattered quanta of a pixel whose lumen has the given fraction of contrast medium; `room` is to
+    /// work in.
+    fn primary(&self, pixel: usize, fraction: f32, room: &mut Lanes) -> [f32; 2] {
         let open = self.c_arm.openness(pixel) as f32;
         if open == 0.0 {
             return [0.0; 2];
         }
         let (first, stride) = self.first_ray(pixel);
-        let mut sum = [0.0; 2];
+        let mut sum = [[0.0; LANES]; 2];
         for row in 0..SUBRAYS as usize {
             for ray in first + row * stride..first + row * stride + SUBRAYS as usize {
-                self.ray(ray, fraction, &mut sum);
+                self.ray(ray, fraction, room, &mut sum);
             }
         }
-        sum.map(|s| s * open / (SUBRAYS * SUBRAYS) as f32)
+        sum.map(|lanes| lanes.iter().sum::<f32>() * open / (SUBRAYS * SUBRAYS) as f32)
     }
 
     #[inline]
-    fn ray(&self, ray: usize, fraction: f32, sum: &mut [f32; 2]) {
+    fn ray(&self, ray: usize, fraction: f32, room: &mut Lanes, sum: &mut [[f32; LANES]; 2]) {
         let [tissue, bone, lung, lumen] = self.anatomy.at(ray);
         let devices: f32 = self.devices.iter().map(|(_, _, lengths)| lengths[ray]).sum();
         // What devices leave of the lumen's filling.
         let filling = lumen - devices;
-        let lengths = [tissue, bone, lung, filling, filling * fraction];
-        self.beam.add(
-            |lane| {
-                let mut p = self.start[lane];
-                for (mu, length) in self.lanes.iter().zip(lengths) {
-                    for i in 0..LANES {
-                        p[i] += mu[lane][i] * length;
-                    }
-                }
-                if devices != 0.0 {
-                    for (_, mu, lengths) in &self.devices {
-                        for i in 0..LANES {
-                            p[i] += mu[lane][i] * lengths[ray];
-                        }
-                    }
-                }
-                p
-            },
-            sum,
-        );
+        let lengths = [tissue - self.beam.reference_mm(), bone, lung, filling, filling * fraction];
+        let still = self.lanes.iter().zip(lengths);
+        let moving = self.devices.iter().map(|(_, mu, lengths)| (mu, lengths[ray]));
+        self.beam.add(still.chain(moving).filter(|layer| layer.1 != 0.0), room, sum);
     }
 
     /// Signal with devices and the contrast medium of a time; without a time, before any injection.
@@ -203,27 +180,13 @@ impl Fluoroscope {
         let cast = self.cast(engine, devices);
         let mut now = self.still.clone();
         if cast.is_ok() {
-            let fractions = match (&self.contrast, time_s) {
+            let mut fractions = match (&self.contrast, time_s) {
                 (Some(contrast), Some(time)) => contrast.fractions(time),
                 _ => vec![],
             };
-            for &(pixel, _) in fractions.iter().filter(|f| f.1 > LEAST_FRACTION) {
-                if !self.listed[pixel as usize] {
-                    self.pixels.push(pixel);
-                }
-            }
-            let mut injected = fractions.iter().peekable();
-            // Both lists rise with the pixel.
+            fractions.retain(|fraction| fraction.1 > LEAST_FRACTION);
             self.pixels.sort_unstable();
-            for &pixel in &self.pixels {
-                while injected.next_if(|f| f.0 < pixel).is_some() {}
-                let more = injected.next_if(|f| f.0 == pixel).map_or(0.0, |f| f.1);
-                let pixel = pixel as usize;
-                let [signal, energy] = self.primary(pixel, (self.fraction + more).min(1.0));
-                let scattered = |map: &[f32]| map.get(pixel).copied().unwrap_or(0.0);
-                now.signal[pixel] = signal + scattered(&self.scatter.signal);
-                now.energy[pixel] = energy + scattered(&self.scatter.energy);
-            }
+            self.draw(&self.pixels, &fractions, &mut now);
         }
         for (_, _, lengths) in &mut self.devices {
             self.touched.iter().for_each(|&ray| lengths[ray as usize] = 0.0);
@@ -268,13 +231,31 @@ impl Fluoroscope {
             Error::parameter("view.xray.mode", "roadmap", mend)
         })?;
         let mut full = self.still.clone();
-        for (pixel, fraction) in contrast.largest() {
-            let pixel = pixel as usize;
-            let [signal, energy] = self.primary(pixel, (self.fraction + fraction).min(1.0));
-            let scattered = |map: &[f32]| map.get(pixel).copied().unwrap_or(0.0);
-            full.signal[pixel] = signal + scattered(&self.scatter.signal);
-            full.energy[pixel] = energy + scattered(&self.scatter.energy);
-        }
+        self.draw(&[], &contrast.largest(), &mut full);
         Ok(full)
+    }
+
+    /// Draws pixels that devices touch and those with contrast medium, both rising, over the still picture.
+    fn draw(&self, pixels: &[u32], fractions: &[(u32, f32)], now: &mut Signal) {
+        let mut room = Lanes::new();
+        let mut lost = Vec::with_capacity(fractions.len());
+        let (mut pixels, mut fractions) = (pixels.iter().peekable(), fractions.iter().peekable());
+        while let Some(pixel) = pixels.peek().copied().into_iter().chain(fractions.peek().map(|f| &f.0)).min()
+        {
+            pixels.next_if_eq(&pixel);
+            let more = fractions.next_if(|f| f.0 == *pixel).map(|f| f.1);
+            let pixel = *pixel as usize;
+            let primary = self.primary(pixel, (self.fraction + more.unwrap_or(0.0)).min(1.0), &mut room);
+            let scattered = self.scatter.still(pixel);
+            if more.is_some() {
+                let still = [self.still.signal[pixel], self.still.energy[pixel]];
+                lost.push((pixel, std::array::from_fn(|i| primary[i] + scattered[i] - still[i])));
+            }
+            now.signal[pixel] = primary[0] + scattered[0];
+            now.energy[pixel] = primary[1] + scattered[1];
+        }
+        if !lost.is_empty() {
+            self.scatter.add_change(lost.into_iter(), now);
+        }
     }
 }

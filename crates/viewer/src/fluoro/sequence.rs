@@ -60,14 +60,14 @@ impl Sequence {
         let share = spec.xray.harmonised as f32;
         let mask: Option<Vec<f32>> = (matches!(mode, Mode::Fluoro | Mode::Cine) && share > 0.0).then(|| {
             // Relative to the reference, whose logarithm is zero: the middle keeps its grey.
-            let values = logarithm(&fluoroscope.still.signal);
+            let values = logarithm(fluoroscope.still.signal.clone());
             shading(&values, c_arm).iter().map(|v| share * v).collect()
         });
         let window = match (mode, spec.xray.window) {
             // Line integrals against the open beam, where signals are told against the reference.
             (Mode::Fluoro | Mode::Cine, Some(window)) => window.map(|p| (p + offset) as f32),
             (Mode::Fluoro | Mode::Cine, None) => {
-                let mut values = logarithm(&fluoroscope.still.signal);
+                let mut values = logarithm(fluoroscope.still.signal.clone());
                 if let Some(mask) = &mask {
                     values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
                 }
@@ -111,7 +111,8 @@ impl Sequence {
         let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
         let signal = fluoroscope.signal(engine, devices, time)?;
         let read = self.detector.read(&signal.signal, &signal.energy, self.kev, moment.frame);
-        let mut values = logarithm(&read);
+        drop(signal);
+        let mut values = logarithm(read);
         if let Some(mask) = &self.mask {
             values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
         }
@@ -166,16 +167,16 @@ impl Sequence {
             mean.iter_mut().zip(read).for_each(|(mean, v)| *mean += v / MASK_FRAMES as f32);
         }
         self.detector.reset();
-        logarithm(&mean)
+        logarithm(mean)
     }
 }
 
 /// Strongest subtracted value that contrast medium ever brings, but for the darkest few pixels.
 fn strongest(fluoroscope: &Fluoroscope) -> f32 {
     let Ok(full) = fluoroscope.opacified() else { return FAINTEST };
-    let still = logarithm(&fluoroscope.still.signal);
+    let still = logarithm(fluoroscope.still.signal.clone());
     let mut values: Vec<f32> =
-        logarithm(&full.signal).iter().zip(still).map(|(v, still)| v - still).filter(|v| *v > 0.02).collect();
+        logarithm(full.signal).iter().zip(still).map(|(v, still)| v - still).filter(|v| *v > 0.02).collect();
     if values.is_empty() {
         return FAINTEST;
     }

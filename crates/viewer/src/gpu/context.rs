@@ -16,6 +16,8 @@ type Failure = Arc<Mutex<Option<String>>>;
 pub(crate) struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
+    /// Most pixels a side that it draws.
+    pub(crate) largest_side: u32,
     name: String,
     failure: Failure,
 }
@@ -70,7 +72,8 @@ impl Gpu {
         device.set_device_lost_callback(move |reason, text| {
             report(&heard, format!("the device was lost ({reason:?}) {text}"));
         });
-        Ok(Self { device, queue, name: format!("{:?} {}", info.backend, info.name), failure })
+        let largest_side = device.limits().max_texture_dimension_2d;
+        Ok(Self { device, queue, largest_side, name: format!("{:?} {}", info.backend, info.name), failure })
     }
 
     /// Graphics interface and adapter.
@@ -199,20 +202,25 @@ pub(crate) fn attachment<'a>(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    #[test]
-    fn a_destroyed_device_gives_an_error_and_no_panic() {
-        let gpu = match Gpu::open(wgpu::Features::empty(), true) {
-            Ok(gpu) => gpu,
+    /// An adapter. Without one: a failure where ENDOWIRE_REQUIRE_GPU=1 asks for it, else `None` and a message.
+    pub(crate) fn opened() -> Option<Gpu> {
+        match Gpu::open(wgpu::Features::FLOAT32_BLENDABLE, true) {
+            Ok(gpu) => Some(gpu),
             Err(reason) => {
                 let required = std::env::var("ENDOWIRE_REQUIRE_GPU").is_ok_and(|v| v == "1");
                 assert!(!required, "ENDOWIRE_REQUIRE_GPU=1, but {reason}");
                 eprintln!("skipped: {reason}");
-                return;
+                None
             }
-        };
+        }
+    }
+
+    #[test]
+    fn a_destroyed_device_gives_an_error_and_no_panic() {
+        let Some(gpu) = opened() else { return };
         let read = || {
             let texture = gpu.target([8, 8], wgpu::TextureFormat::R8Unorm, 1);
             let mut encoder = gpu.device.create_command_encoder(&Default::default());

@@ -260,7 +260,7 @@ mod tests {
             ("tissue_mm", |s| s.xray.tissue_mm = f64::NAN),
             ("window", |s| s.xray.window = Some([2.0, 1.0])),
             ("kvp", |s| s.xray.kvp = 30.0),
-            ("energy_bins", |s| s.xray.energy_bins = 0),
+            ("energy_bins", |s| s.xray.energy_bins = Some(0)),
             ("dose_ngy", |s| s.detector.dose_ngy = Some(0.0)),
             ("lag", |s| s.detector.lag = 1.0),
             ("rotation_deg", |s| s.c_arm.rotation_deg = f64::NAN),

@@ -44,8 +44,9 @@ pub struct XRaySpec {
     pub aluminium_mm: f64,
     /// Filtration, copper.
     pub copper_mm: f64,
-    /// Energies that stand for the spectrum; as many as the spectrum has lines, or more, take all of them.
-    pub energy_bins: u32,
+    /// Energies that stand for the spectrum. Absent: every line of its table, exact to a millionth. Eight are within a
+    /// ten-thousandth of it for most scenes, and an eighth of the work.
+    pub energy_bins: Option<u32>,
     /// One energy in place of the spectrum, 15 to 125 keV.
     pub energy_kev: Option<f64>,
     /// Volume fraction of contrast medium (370 mg iodine per ml) that is in the blood all the time, 0 to 1.
@@ -73,7 +74,7 @@ impl Default for XRaySpec {
             kvp: 80.0,
             aluminium_mm: 2.5,
             copper_mm: 0.2,
-            energy_bins: 8,
+            energy_bins: None,
             energy_kev: None,
             contrast_fraction: 0.0,
             tissue_mm: 200.0,
@@ -94,8 +95,8 @@ impl XRaySpec {
         finite_within("view.xray.kvp", self.kvp, [50.0, 125.0])?;
         finite_within("view.xray.aluminium_mm", self.aluminium_mm, [0.0, 20.0])?;
         finite_within("view.xray.copper_mm", self.copper_mm, [0.0, 5.0])?;
-        if !(1..=1000).contains(&self.energy_bins) {
-            return Err(Error::parameter("view.xray.energy_bins", self.energy_bins, "must be 1 to 1000"));
+        if let Some(count) = self.energy_bins.filter(|count| !(1..=1000).contains(count)) {
+            return Err(Error::parameter("view.xray.energy_bins", count, "must be 1 to 1000"));
         }
         finite_within("view.xray.contrast_fraction", self.contrast_fraction, [0.0, 1.0])?;
         finite_within("view.xray.tissue_mm", self.tissue_mm, [0.0, 1000.0])?;
