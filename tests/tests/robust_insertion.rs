@@ -229,8 +229,8 @@ fn random_commands_leave_the_vessel_and_the_rod_sound() {
 
 #[test]
 #[ignore = "minutes"]
-fn thirty_thousand_random_commands() {
-    let tally = wander(30_000);
+fn a_hundred_thousand_random_commands() {
+    let tally = wander(100_000);
     assert!(tally.is_safe(), "{tally}");
 }
 
