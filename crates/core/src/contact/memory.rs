@@ -9,6 +9,8 @@ use nalgebra::Matrix3;
 pub(super) struct KnownPoint {
     /// Where the wall was last looked for.
     pub(super) looked_at: Vec3,
+    /// Arc length from the tip of the piece of device that lies there now, mm.
+    pub(super) from_tip_mm: f64,
     /// No wall is nearer to that place than this, mm.
     pub(super) clearance_mm: f64,
     /// The nearest triangle then, if the wall was near.
@@ -23,6 +25,7 @@ pub(super) struct KnownPoint {
 
 const NOTHING: KnownPoint = KnownPoint {
     looked_at: Vec3::new(0.0, 0.0, 0.0),
+    from_tip_mm: 0.0,
     clearance_mm: -1.0,
     triangle: None,
     base: Vec3::new(0.0, 0.0, 0.0),
@@ -61,20 +64,23 @@ impl WallMemory {
         self.points[index].near.then(|| &self.readings[index].1)
     }
 
-    /// The device has advanced along its own curve: what was known to the points `before`, the points `after` that come to lie in
-    /// their places know, since the wall does not move. Beyond the tip each keeps its own.
+    /// The device has advanced along its own curve: what was known of a place, the point of `after` that comes to lie nearest to it
+    /// knows, since the wall does not move. Beyond the tip each of the points `before` keeps its own.
     pub fn slide(&mut self, before: &[ContactPoint], after: &[ContactPoint], advance_mm: f64) {
+        self.points.iter_mut().for_each(|known| known.from_tip_mm += advance_mm);
         self.spare.clear();
         let count = before.len().min(self.points.len());
         let mut k = 0;
         for (index, point) in after.iter().enumerate() {
-            let label = point.from_tip_mm - advance_mm;
-            let off = |k: usize| (before[k].from_tip_mm - label).abs();
-            while k + 1 < count && off(k + 1) <= off(k) {
+            let was = point.from_tip_mm - advance_mm;
+            while k + 1 < count && before[k + 1].from_tip_mm <= was {
                 k += 1;
             }
-            let from = if label < 0.0 { index } else { k };
-            self.spare.push(self.points.get(from).copied().unwrap_or(NOTHING));
+            let off = |known: &&KnownPoint| (known.from_tip_mm - point.from_tip_mm).abs();
+            let places = if was < 0.0 { index..index + 1 } else { k.saturating_sub(1)..(k + 3).min(count) };
+            let known = self.points.get(places).unwrap_or_default();
+            let nearest = known.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+            self.spare.push(nearest.copied().unwrap_or(NOTHING));
         }
         std::mem::swap(&mut self.points, &mut self.spare);
     }

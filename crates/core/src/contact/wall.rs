@@ -197,7 +197,7 @@ impl<'a> WallContact<'a> {
             }
         }
         self.counters.queries += 1;
-        known.looked_at = *x;
+        (known.looked_at, known.from_tip_mm) = (*x, self.points[index].from_tip_mm);
         known.triangle = None;
         // A point on the axis of a tube has all of its triangles at one distance, and a question that reaches them looks at all:
         // asking a little farther than is needed is enough.
