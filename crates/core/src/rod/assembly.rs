@@ -118,10 +118,6 @@ impl<const C: usize> Assembly<C> {
     ) {
         let l = Layout::<C>;
         let n_at = M - 1;
-        let mut rows = [0; M];
-        for (k, row) in rows.iter_mut().enumerate() {
-            *row = l.row(0, k);
-        }
         let mut system = ElementSystem::<M> {
             gradient: [0.0; M],
             hessian: [[0.0; M]; M],
@@ -136,26 +132,32 @@ impl<const C: usize> Assembly<C> {
             let moment = g[3].abs().max(g[4].abs());
             self.scale = [self.scale[0].max(force), self.scale[1].max(moment)];
             let gamma = data.augmentation();
-            let base = Layout::<C>::BLOCK * e;
             let gap = g[n_at];
             for i in 0..M {
-                self.residual[base + rows[i]] += g[i];
+                let at = l.row(e, i);
+                self.residual[at] += g[i];
                 let weight = gamma * system.stretch[i];
-                self.correction[base + rows[i]] += weight * gap;
+                self.correction[at] += weight * gap;
                 if !HESSIAN {
                     continue;
                 }
-                let row = self.matrix.row_mut(base + rows[i]);
-                for j in i..M {
-                    row[rows[j] - rows[i]] += system.hessian[i][j] + weight * system.stretch[j];
-                }
+                // Unknowns follow each other but for one place, that of the N before.
+                let (row, split) = (self.matrix.row_mut(at), Layout::<C>::BEFORE.max(i));
+                let skipped = usize::from(i < split);
+                let (near, far) = row.split_at_mut(split - i);
+                let add = |row: &mut [f64], columns: std::ops::Range<usize>| {
+                    let entries = system.hessian[i][columns.clone()].iter().zip(&system.stretch[columns]);
+                    row.iter_mut().zip(entries).for_each(|(r, (h, s))| *r += h + weight * s);
+                };
+                add(near, i..split);
+                add(&mut far[skipped..], split..M);
             }
             if !HESSIAN {
                 continue;
             }
             // Now the flexibility of the transformed multiplier.
             let extra = data.flexibility - data.flexibility / (1.0 - gamma * data.flexibility);
-            self.matrix.row_mut(base + rows[n_at])[0] += extra;
+            self.matrix.row_mut(l.row(e, n_at))[0] += extra;
         }
     }
 

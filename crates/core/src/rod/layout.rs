@@ -21,6 +21,8 @@ impl<const C: usize> Layout<C> {
     pub const TWIST: bool = C > PLAIN;
     /// Unknowns a node.
     pub const BLOCK: usize = if Self::TWIST { 8 } else { 6 };
+    /// Local unknowns of an element before the place of the N of the element before.
+    pub(super) const BEFORE: usize = if Self::TWIST { 6 } else { 5 };
     const X: usize = if Self::TWIST { 1 } else { 0 };
 
     /// Number of unknowns of a rod with `elements` elements, with the rows of end supports.
@@ -70,9 +72,9 @@ impl<const C: usize> Layout<C> {
         let base = Self::BLOCK * e;
         if Self::TWIST {
             // x₀ t₀ θ₀ are 1..7, the N of the element before is 7, b x₁ t₁ θ₁ N are 8..16.
-            base + if k < 6 { k + 1 } else { k + 2 }
+            base + if k < Self::BEFORE { k + 1 } else { k + 2 }
         } else {
-            base + if k < 5 { k } else { k + 1 }
+            base + if k < Self::BEFORE { k } else { k + 1 }
         }
     }
 }
