@@ -14,6 +14,7 @@
 //! to the inserted length.
 
 mod configuration;
+mod guess;
 pub(crate) mod mesh;
 mod readout;
 mod repeat;
@@ -29,13 +30,13 @@ use crate::contact::{FeltWall, WallMemory};
 use crate::device::Device;
 use crate::insertion::{Command, StepReport, Surroundings};
 use crate::methods::Method;
-use crate::rod::{Layout, RodState};
+use crate::rod::Layout;
 use crate::shape::Shape;
 use crate::solve::Newton;
 use crate::{Error, Result};
 use configuration::Configuration;
+use guess::Guess;
 use mesh::MOST_POINTS;
-use repeat::Correction;
 use slide::Extension;
 
 /// Options of the exact rod.
@@ -82,14 +83,7 @@ pub struct Kirchhoff<const C: usize> {
     next: Configuration,
     /// Where the command began, once its first sub-step is taken.
     before: Configuration,
-    /// The other guess at it.
-    carried: RodState,
-    /// The device slid along its own curve, …
-    slid: RodState,
-    /// … and how the last equilibrium differed from that.
-    correction: Correction,
-    /// Length from the tip within which the device has a shape of its own, mm.
-    shaped_mm: f64,
+    guess: Guess,
     extension: Extension,
     memory: WallMemory,
     shape: Shape,
@@ -125,10 +119,7 @@ impl<const C: usize> Kirchhoff<C> {
             current: nothing.clone(),
             next: nothing.clone(),
             before: nothing,
-            carried: RodState::default(),
-            slid: RodState::default(),
-            correction: Correction::default(),
-            shaped_mm: surroundings.device.shaped_mm(),
+            guess: Guess::new(surroundings.device.shaped_mm()),
             extension: Extension::default(),
             memory: WallMemory::default(),
             shape: Shape::default(),
@@ -164,9 +155,7 @@ impl<const C: usize> Kirchhoff<C> {
         self.memory.reserve(points);
         self.report.contacts.reserve(points);
         self.newton.reserve(elements);
-        self.carried.reserve(elements);
-        self.slid.reserve(elements);
-        self.correction.reserve(elements);
+        self.guess.reserve(elements);
         let nodes = self.current.mesh.from_tip_mm.capacity();
         self.shape.positions_mm.reserve(nodes);
         self.shape.tangents.reserve(nodes);
@@ -203,7 +192,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let mut done = 0.0f64;
         let mut share = 1.0f64;
         let mut failure = Cow::from("the way is too long for one step");
-        let mut may_carry = self.shaped_mm > 0.0;
+        let mut may_carry = self.guess.shaped_mm > 0.0;
         while done < 1.0 {
             let rest = 1.0 - done;
             let mut part = rest.min(share);
@@ -249,7 +238,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                     }
                     done = next;
                     share = (2.0 * part).min(1.0);
-                    may_carry = self.shaped_mm > 0.0;
+                    may_carry = self.guess.shaped_mm > 0.0;
                 }
                 Err(reason) => {
                     failure = reason;

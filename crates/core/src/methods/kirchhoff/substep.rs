@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::slide::{carry, slide};
+use super::slide::slide;
 use super::{Kirchhoff, softest};
 use crate::contact::{HandMotion, WallContact};
 use crate::insertion::Surroundings;
@@ -60,7 +60,6 @@ impl<const C: usize> Kirchhoff<C> {
             hand,
         );
         next.state.angles[0] = tail_rad;
-        self.slid.copy_from(&next.state);
         let elements = next.mesh.elements.len();
         self.newton.resize(elements);
         let advance = inserted_mm - now.inserted_mm();
@@ -73,38 +72,9 @@ impl<const C: usize> Kirchhoff<C> {
             softest(surroundings.device),
             self.options.skip,
         );
-        let elements_of = &next.mesh.elements;
-        let mut found = false;
-        if let Some(factor) = self.correction.repeats(hand) {
-            self.carried.copy_from(&next.state);
-            self.correction.apply(factor, elements_of, &mut next.state);
-            found = !contact.is_outside(elements_of, &next.state);
-            if !found {
-                std::mem::swap(&mut next.state, &mut self.carried);
-            }
-        }
-        if !found {
-            let mut outside = contact.is_outside(elements_of, &next.state);
-            if self.shaped_mm > 0.0 {
-                self.carried.copy_from(&next.state);
-                self.carried.angles[0] = tail_rad;
-                carry((&now.mesh, &now.state), &next.mesh, self.shaped_mm, hand.turn_rad, &mut self.carried);
-                if !contact.is_outside(elements_of, &self.carried)
-                    && (outside
-                        || blocked
-                        || self.newton.energy_at(elements_of, &mut contact, &self.carried)
-                            < self.newton.energy_at(elements_of, &mut contact, &next.state))
-                {
-                    std::mem::swap(&mut next.state, &mut self.carried);
-                    outside = false;
-                } else {
-                    outside |= blocked;
-                }
-            }
-            if outside {
-                return Err(BEYOND.into());
-            }
-        }
+        let candidates = (now, &next.mesh, &mut next.state);
+        let learnt =
+            self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked).ok_or(BEYOND)?;
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
         let data = &next.mesh.elements[elements - 1];
@@ -112,7 +82,7 @@ impl<const C: usize> Kirchhoff<C> {
         let stiffest = surroundings.properties.stiffest_n_per_mm2();
         let softest_first = (SOFTEST * element_stiffness / stiffest).min(1.0);
         // A guess that has learnt from the last step is so near that the wall may be met as it is.
-        let mut hurried = found && softest_first < 1.0;
+        let mut hurried = learnt && softest_first < 1.0;
         let mut softness = if hurried { 1.0 } else { softest_first };
         let mut iterations = 0;
         let mut renewals = 0;
@@ -133,10 +103,7 @@ impl<const C: usize> Kirchhoff<C> {
             iterations += found.iterations;
             *budget -= found.iterations;
             if !found.converged && hurried {
-                next.state.copy_from(&self.slid);
-                if contact.is_outside(&next.mesh.elements, &next.state) {
-                    return Err(BEYOND.into());
-                }
+                self.guess.plain(&mut contact, &next.mesh, &mut next.state).ok_or(BEYOND)?;
                 (hurried, softness) = (false, softest_first);
                 continue;
             }
@@ -166,7 +133,7 @@ impl<const C: usize> Kirchhoff<C> {
             let reason = if unsettled { UNSETTLED.to_owned() } else { found.reason.to_string() };
             return Err(format!("{reason} (residual {:.1e})", found.residual).into());
         }
-        self.correction.learn(hand, &self.slid, &next.state);
+        self.guess.learn(hand, &next.state);
         let dissipated_mj = next.friction.dissipated_mj(&next.mesh.elements, &next.state, &next.mesh.points);
         Ok(Found { iterations, dissipated_mj })
     }

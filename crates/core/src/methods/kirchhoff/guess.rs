@@ -1,0 +1,89 @@
+//! Where a sub-step looks for the next equilibrium first.
+//!
+//! The device slid along its own curve is the plain guess. Where the hand repeats its motion, what the last step changed on it is
+//! repeated too ([`Correction`]); a tip with a shape of its own may instead be carried by the device behind it.
+
+use super::configuration::Configuration;
+use super::mesh::Mesh;
+use super::repeat::Correction;
+use super::slide::carry;
+use crate::contact::{HandMotion, WallContact};
+use crate::rod::RodState;
+use crate::solve::Newton;
+
+/// The candidates.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Guess {
+    /// Length from the tip within which the device has a shape of its own, mm.
+    pub(super) shaped_mm: f64,
+    slid: RodState,
+    other: RodState,
+    correction: Correction,
+}
+
+impl Guess {
+    /// For a device with a shape of its own within `shaped_mm` of its tip.
+    pub(super) fn new(shaped_mm: f64) -> Self {
+        Self { shaped_mm, ..Self::default() }
+    }
+
+    /// Takes memory for `elements` elements.
+    pub(super) fn reserve(&mut self, elements: usize) {
+        self.slid.reserve(elements);
+        self.other.reserve(elements);
+        self.correction.reserve(elements);
+    }
+
+    /// Replaces the slid device in `state` by the best candidate; returns whether that has learnt from the last step. Where the
+    /// tip's way is `blocked`, sliding is none. `None` if all candidates are beyond the wall.
+    pub(super) fn choose<const C: usize>(
+        &mut self,
+        newton: &Newton<C>,
+        contact: &mut WallContact<'_>,
+        (now, mesh, state): (&Configuration, &Mesh, &mut RodState),
+        hand: HandMotion,
+        blocked: bool,
+    ) -> Option<bool> {
+        self.slid.copy_from(state);
+        let elements = &mesh.elements;
+        if let Some(factor) = self.correction.repeats(hand) {
+            self.correction.apply(factor, elements, state);
+            if !contact.is_outside(elements, state) {
+                return Some(true);
+            }
+            state.copy_from(&self.slid);
+        }
+        let outside = contact.is_outside(elements, state);
+        if self.shaped_mm > 0.0 {
+            self.other.copy_from(state);
+            carry((&now.mesh, &now.state), mesh, self.shaped_mm, hand.turn_rad, &mut self.other);
+            if !contact.is_outside(elements, &self.other)
+                && (outside
+                    || blocked
+                    || newton.energy_at(elements, contact, &self.other)
+                        < newton.energy_at(elements, contact, state))
+            {
+                std::mem::swap(state, &mut self.other);
+                return Some(false);
+            }
+        }
+        let none = outside || (blocked && self.shaped_mm > 0.0);
+        (!none).then_some(false)
+    }
+
+    /// Goes back to the slid device; `None` if it is beyond the wall.
+    pub(super) fn plain(
+        &self,
+        contact: &mut WallContact<'_>,
+        mesh: &Mesh,
+        state: &mut RodState,
+    ) -> Option<()> {
+        state.copy_from(&self.slid);
+        (!contact.is_outside(&mesh.elements, state)).then_some(())
+    }
+
+    /// Learns from the equilibrium that was found.
+    pub(super) fn learn(&mut self, hand: HandMotion, found: &RodState) {
+        self.correction.learn(hand, &self.slid, found);
+    }
+}
