@@ -126,6 +126,8 @@ const FOLLOW: f64 = 0.5;
 const LOOK_MM: f64 = 1.0;
 /// A point looks for other walls again when it has moved by this part of its radius.
 const LOOK_AGAIN: f64 = 0.5;
+/// The smooth distance changes by less than this part of the way.
+const STEEPEST: f64 = 2.0;
 /// Radius of the gentlest bend worth a number, mm.
 const LEAST_BEND_MM: f64 = 100.0;
 /// Part of its clearance that a point may move in one step of Newton's method.
@@ -183,6 +185,13 @@ impl<'a> WallContact<'a> {
             if clearance > near + self.felt.smooth.deepest_inset_mm() {
                 self.counters.avoided += 1;
                 return Reading::Free(clearance);
+            }
+            // Most points that are near a wall do not touch it, and are moved little.
+            let (place, reading) = &self.memory.readings[index];
+            let spare_mm = reading.value_mm - radius - STEEPEST * (x - place).norm();
+            if known.triangle.is_some() && spare_mm > 0.0 {
+                self.counters.avoided += 1;
+                return Reading::Free(radius + spare_mm);
             }
             if known.triangle.is_some() && self.memory.readings[index].0 == *x {
                 self.counters.avoided += 1;
