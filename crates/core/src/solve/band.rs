@@ -152,13 +152,29 @@ impl<const C: usize> Factor<C> {
 
     /// Factors `matrix` and returns its inertia.
     pub fn factor(&mut self, matrix: &BandMatrix<C>) -> Result<Inertia, FactorError> {
-        self.eliminate::<false>(matrix, &mut [])
+        self.rows.copy_from_slice(&matrix.rows);
+        self.eliminate::<false>(&mut [])
     }
 
     /// Factors `matrix` and replaces `b` by the solution of `A x = b`; the forward solve is fused with the
     /// factorisation. On an error `b` is spoilt.
     pub fn factor_solve(&mut self, matrix: &BandMatrix<C>, b: &mut [f64]) -> Result<Inertia, FactorError> {
-        let inertia = self.eliminate::<true>(matrix, b)?;
+        self.rows.copy_from_slice(&matrix.rows);
+        self.finish(b)
+    }
+
+    /// As [`Self::factor_solve`] without a copy: takes the rows of `matrix` and leaves it with no entry that means anything.
+    pub fn consume_solve(
+        &mut self,
+        matrix: &mut BandMatrix<C>,
+        b: &mut [f64],
+    ) -> Result<Inertia, FactorError> {
+        std::mem::swap(&mut self.rows, &mut matrix.rows);
+        self.finish(b)
+    }
+
+    fn finish(&mut self, b: &mut [f64]) -> Result<Inertia, FactorError> {
+        let inertia = self.eliminate::<true>(b)?;
         self.backward(b);
         Ok(inertia)
     }
@@ -206,13 +222,9 @@ impl<const C: usize> Factor<C> {
         }
     }
 
-    fn eliminate<const SOLVE: bool>(
-        &mut self,
-        matrix: &BandMatrix<C>,
-        b: &mut [f64],
-    ) -> Result<Inertia, FactorError> {
-        let n = self.dimension.min(matrix.dimension);
-        self.rows.copy_from_slice(&matrix.rows);
+    /// Replaces the rows of a matrix by those of its factor.
+    fn eliminate<const SOLVE: bool>(&mut self, b: &mut [f64]) -> Result<Inertia, FactorError> {
+        let n = self.dimension;
         let mut negative = 0;
         for k in 0..n {
             let (head, tail) = self.rows.split_at_mut(k + 1);

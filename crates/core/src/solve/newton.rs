@@ -211,7 +211,7 @@ impl<const C: usize> Newton<C> {
             self.shifted.copy_from(&self.assembly.matrix);
             Assembly::add_shift(&mut self.shifted, elements, whisper + sigma);
             supports.hold_rows(&mut self.shifted);
-            let found = self.factor.factor_solve(&self.shifted, &mut self.step);
+            let found = self.factor.consume_solve(&mut self.shifted, &mut self.step);
             if sigma == 0.0 {
                 natural = found.ok();
             }
