@@ -245,13 +245,23 @@ impl SmoothWall {
         if weight < LEAST_WEIGHT {
             return None;
         }
-        let inv = 1.0 / weight;
-        let f = value * inv;
-        let gradient = (value1 - weight1 * f) * inv;
-        let mixed = weight1 * gradient.transpose();
-        let hessian = (value2 - weight2 * f - mixed - mixed.transpose()) * inv;
-        Some(Distance { value_mm: f, gradient, hessian })
+        let (value_mm, gradient, hessian) = mean((weight, weight1, weight2), (value, value1, value2));
+        Some(Distance { value_mm, gradient, hessian })
     }
+}
+
+/// A weighted mean with derivatives: the sum of weighted values over that of the weights.
+#[inline]
+pub(super) fn mean(
+    (weight, weight1, weight2): (f64, Vec3, Matrix3<f64>),
+    (value, value1, value2): (f64, Vec3, Matrix3<f64>),
+) -> (f64, Vec3, Matrix3<f64>) {
+    let inv = 1.0 / weight;
+    let f = value * inv;
+    let gradient = (value1 - weight1 * f) * inv;
+    let mixed = weight1 * gradient.transpose();
+    let hessian = (value2 - weight2 * f - mixed - mixed.transpose()) * inv;
+    (f, gradient, hessian)
 }
 
 /// The middles of a triangle and its sides.

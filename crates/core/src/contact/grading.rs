@@ -26,6 +26,7 @@
 
 use nalgebra::Matrix3;
 
+use super::distance::mean;
 use super::{Distance, SmoothWall, WallPotential};
 use crate::Vec3;
 use crate::insertion::WallProperties;
@@ -145,12 +146,8 @@ fn blend(wall: &SmoothWall, x: &Vec3, triangle: u32, of: impl Fn(u32) -> f64) ->
         let corners = &list[..list.len().min(3)];
         return Blend::constant(corners.iter().map(|&v| of(v)).sum::<f64>() / corners.len() as f64);
     }
-    let inv = 1.0 / weight;
-    let s = value * inv;
-    let gradient = (value1 - weight1 * s) * inv;
-    let mixed = weight1 * gradient.transpose();
-    let hessian = (value2 - weight2 * s - mixed - mixed.transpose()) * inv;
-    Blend { value: s, gradient, hessian }
+    let (value, gradient, hessian) = mean((weight, weight1, weight2), (value, value1, value2));
+    Blend { value, gradient, hessian }
 }
 
 #[cfg(test)]

@@ -186,23 +186,26 @@ impl<'a> WallContact<'a> {
                 self.counters.avoided += 1;
                 return Reading::Free(clearance);
             }
-            // Most points that are near a wall do not touch it, and are moved little.
-            let (place, reading) = &self.memory.readings[index];
-            let spare_mm = reading.value_mm - radius - STEEPEST * (x - place).norm();
-            if known.triangle.is_some() && spare_mm > 0.0 {
-                self.counters.avoided += 1;
-                return Reading::Free(radius + spare_mm);
-            }
-            if known.triangle.is_some() && self.memory.readings[index].0 == *x {
-                self.counters.avoided += 1;
-                return Reading::of(self.memory.readings[index].1, &potential);
-            }
-            if let Some(triangle) = known.triangle.filter(|_| moved < LOOK_AGAIN * radius)
-                && let Some(distance) = self.felt.smooth.distance(x, triangle).filter(|d| d.value_mm > 0.0)
-            {
-                self.counters.near += 1;
-                self.memory.readings[index] = (*x, distance);
-                return Reading::of(distance, &potential);
+            if let Some(triangle) = known.triangle {
+                let (place, reading) = self.memory.readings[index];
+                // Most points that are near a wall do not touch it, and are moved little.
+                let spare_mm = reading.value_mm - radius - STEEPEST * (x - place).norm();
+                if spare_mm > 0.0 {
+                    self.counters.avoided += 1;
+                    return Reading::Free(radius + spare_mm);
+                }
+                if place == *x {
+                    self.counters.avoided += 1;
+                    return Reading::of(reading, &potential);
+                }
+                if moved < LOOK_AGAIN * radius
+                    && let Some(distance) =
+                        self.felt.smooth.distance(x, triangle).filter(|d| d.value_mm > 0.0)
+                {
+                    self.counters.near += 1;
+                    self.memory.readings[index] = (*x, distance);
+                    return Reading::of(distance, &potential);
+                }
             }
         }
         self.counters.queries += 1;
@@ -340,6 +343,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
             };
         }
         if self.friction.acts() {
+            let least_n = self.least_force_n();
             let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
             let pressed = self.points.iter().enumerate().map(|(index, point)| {
                 let Some(d) = memory.near(index) else { return (Vec3::zeros(), 0.0) };
@@ -351,7 +355,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
                 let (normal, force) = point.pressed(d, factor);
                 (normal, force * felt.rough(&known.base, known.triangle))
             });
-            self.friction.follow(pressed, self.least_moment_nmm / LEAST_BEND_MM);
+            self.friction.follow(pressed, least_n);
         }
         for index in 0..self.points.len() {
             let point = self.points[index];

@@ -185,12 +185,23 @@ impl Bench {
     }
 
     /// Whether the state as it is, taken for an equilibrium, is a minimum.
-    pub(super) fn is_stable(&mut self) -> bool {
+    fn is_stable(&mut self) -> bool {
         self.with(|newton, elements, supports, outside, state| {
             newton.assemble(elements, supports, outside, state);
             let minimum = elements.len() + supports.conditions();
             newton.factor(elements, supports).is_some_and(|inertia| inertia.negative == minimum)
         })
+    }
+
+    /// The axial load up to `most` at which the rod as it lies, straight and so an equilibrium under every load, is no minimum any more.
+    pub(super) fn buckling_load(&mut self, most: f64) -> f64 {
+        let (mut low, mut high) = (0.0, most);
+        for _ in 0..40 {
+            let load = 0.5 * (low + high);
+            self.state.tensions.fill(-load);
+            if self.is_stable() { low = load } else { high = load }
+        }
+        low
     }
 
     /// What the clamp at the start exerts, at the state solved last.

@@ -186,14 +186,7 @@ fn snaking(length: f64, around: u32, weight: f64) -> Result<f64> {
     bench.supports.end_directions = vec![Vec3::y(), Vec3::z()];
     bench.supports.end_position = start + Vec3::x() * length;
     bench.solve()?;
-    // The straight rod is an equilibrium under every load.
-    let (mut low, mut high) = (0.0, 8.0);
-    for _ in 0..40 {
-        let load = 0.5 * (low + high);
-        bench.state.tensions.fill(-load);
-        if bench.is_stable() { low = load } else { high = load }
-    }
-    Ok(low)
+    Ok(bench.buckling_load(8.0))
 }
 
 /// F/√(EI w/r) of a helix without weight, for the weight w that would lift its energy to that of the straight rod at the bottom.

@@ -56,7 +56,7 @@ impl Correction {
     }
 
     /// Forgets.
-    pub(super) fn clear(&mut self) {
+    fn clear(&mut self) {
         self.tangents.clear();
         self.middles.clear();
         self.angles.clear();
