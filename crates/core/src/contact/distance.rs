@@ -63,6 +63,44 @@ pub struct Distance {
     pub hessian: Matrix3<f64>,
 }
 
+impl Distance {
+    /// Unit normal of the wall, into the lumen: along the gradient, whose length is not quite 1.
+    pub fn normal(&self) -> Vec3 {
+        self.gradient / self.gradient.norm()
+    }
+}
+
+/// How near a point is to a wall that may be out of its reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Nearness {
+    /// As far as was asked or farther: the distance, mm.
+    Beyond(f64),
+    /// Nearer.
+    Within(Distance),
+}
+
+impl Nearness {
+    /// The distance, mm.
+    pub fn value_mm(&self) -> f64 {
+        match self {
+            Self::Beyond(value_mm) => *value_mm,
+            Self::Within(distance) => distance.value_mm,
+        }
+    }
+}
+
+/// Most vertices that are noted as reaching a point; on any sensible mesh there are about ten.
+const NOTED: usize = 32;
+
+/// What the vertices that reach a point make of its distance.
+struct Reached {
+    weight: f64,
+    value_mm: f64,
+    /// How many they are; the first of them.
+    count: usize,
+    vertices: [u32; NOTED],
+}
+
 /// The smooth wall.
 #[derive(Debug, Clone)]
 pub struct SmoothWall {
@@ -128,7 +166,7 @@ impl SmoothWall {
         let corners = mesh.corners(index);
         let list = self.list(index);
         let look = |(least, largest): (f64, f64), x: Vec3| {
-            let f = self.value(&x, list).unwrap_or(0.0);
+            let f = self.reach(&x, list).map_or(0.0, |r| r.value_mm);
             (least.min(f), largest.max(f))
         };
         let found = few(&corners).into_iter().fold((f64::MAX, f64::MIN), look);
@@ -147,7 +185,7 @@ impl SmoothWall {
             }
             for x in grid(mesh.corners(index)) {
                 let list = self.list(index);
-                let beyond = self.value(&x, list).unwrap_or(0.0) - limit_mm;
+                let beyond = self.reach(&x, list).map_or(0.0, |r| r.value_mm) - limit_mm;
                 for &v in list.iter().filter(|&&v| self.quadrics[v as usize].local(&x).is_some()) {
                     offsets[v as usize] = offsets[v as usize].max(beyond);
                 }
@@ -184,36 +222,70 @@ impl SmoothWall {
         self.quadrics.iter().map(|q| &q.position)
     }
 
-    /// f alone.
-    fn value(&self, x: &Vec3, list: &[u32]) -> Option<f64> {
-        let (mut weight, mut value) = (0.0, 0.0);
+    /// f alone, of a point that the vertices of `list` reach.
+    fn reach(&self, x: &Vec3, list: &[u32]) -> Option<Reached> {
+        let mut found = Reached { weight: 0.0, value_mm: 0.0, count: 0, vertices: [0; NOTED] };
         for &v in list {
             let q = &self.quadrics[v as usize];
             let Some(local) = q.local(x) else { continue };
-            let w = (1.0 - local.u).powi(3) * q.window(local.value)[0];
-            weight += w;
-            value += w * local.value;
+            let g = 1.0 - local.u;
+            let w = g * g * g * q.window(local.value)[0];
+            if w == 0.0 {
+                continue;
+            }
+            found.weight += w;
+            found.value_mm += w * local.value;
+            if let Some(noted) = found.vertices.get_mut(found.count) {
+                *noted = v;
+            }
+            found.count += 1;
         }
-        (weight >= LEAST_WEIGHT).then(|| value / weight)
+        found.value_mm /= found.weight;
+        (found.weight >= LEAST_WEIGHT).then_some(found)
     }
 
     /// The distance of `x`, whose nearest triangle is `triangle` or close to it. `None` where no vertex reaches.
     pub fn distance(&self, x: &Vec3, triangle: u32) -> Option<Distance> {
-        self.weigh(x, triangle, |_, _, _, _| {})
+        match self.within(x, triangle, f64::INFINITY)? {
+            Nearness::Within(distance) => Some(distance),
+            Nearness::Beyond(_) => None,
+        }
+    }
+
+    /// As [`SmoothWall::distance`], with derivatives only where the distance is less than `limit_mm`: they are what it costs.
+    pub fn within(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<Nearness> {
+        let list = self.list(triangle as usize);
+        let reached = self.reach(x, list)?;
+        Some(if reached.value_mm < limit_mm {
+            Nearness::Within(self.derive(x, list, &reached, |_, _, _, _| {}))
+        } else {
+            Nearness::Beyond(reached.value_mm)
+        })
     }
 
     /// As [`SmoothWall::distance`]; `also` sees every vertex that reaches `x` with its weight and the weight's derivatives.
-    #[inline]
     pub(super) fn weigh(
         &self,
         x: &Vec3,
         triangle: u32,
-        mut also: impl FnMut(u32, f64, &Vec3, &Matrix3<f64>),
+        also: impl FnMut(u32, f64, &Vec3, &Matrix3<f64>),
     ) -> Option<Distance> {
-        let (mut weight, mut value) = (0.0, 0.0);
-        let (mut weight1, mut value1) = (Vec3::zeros(), Vec3::zeros());
-        let (mut weight2, mut value2) = (Matrix3::zeros(), Matrix3::zeros());
-        for &v in self.list(triangle as usize) {
+        let list = self.list(triangle as usize);
+        let reached = self.reach(x, list)?;
+        Some(self.derive(x, list, &reached, also))
+    }
+
+    /// The derivatives of f where its value is known.
+    #[inline]
+    fn derive(
+        &self,
+        x: &Vec3,
+        list: &[u32],
+        reached: &Reached,
+        mut also: impl FnMut(u32, f64, &Vec3, &Matrix3<f64>),
+    ) -> Distance {
+        let (mut slope, mut gradient, mut hessian) = (Vec3::zeros(), Vec3::zeros(), Matrix3::zeros());
+        for &v in reached.vertices.get(..reached.count).unwrap_or(list) {
             let q = &self.quadrics[v as usize];
             let Some(local) = q.local(x) else { continue };
             let (f, g) = (local.value, 1.0 - local.u);
@@ -230,38 +302,24 @@ impl SmoothWall {
             let w = a * b;
             let w1 = a1 * b + f1 * (a * b1);
             let w2 = a2 * b + (turned + turned.transpose() + f2 * a) * b1 + f1 * f1.transpose() * (a * b2);
-            let mixed = w1 * f1.transpose();
-            let both = w2 * f + mixed + mixed.transpose() + f2 * w;
             let frame = Matrix3::from_columns(&[q.axes[0], q.axes[1], q.normal]);
-            let (turned1, turned2) = (frame * w1, frame * w2 * frame.transpose());
-            also(v, w, &turned1, &turned2);
-            weight += w;
-            weight1 += turned1;
-            weight2 += turned2;
-            value += w * f;
-            value1 += frame * (w1 * f + f1 * w);
-            value2 += frame * both * frame.transpose();
+            let turned1 = frame * w1;
+            also(v, w, &turned1, &(frame * w2 * frame.transpose()));
+            let above = f - reached.value_mm;
+            let mixed = w1 * f1.transpose();
+            slope += turned1;
+            gradient += frame * (w1 * above + f1 * w);
+            hessian += frame * (w2 * above + mixed + mixed.transpose() + f2 * w) * frame.transpose();
         }
-        if weight < LEAST_WEIGHT {
-            return None;
+        let inverse = 1.0 / reached.weight;
+        let gradient = gradient * inverse;
+        let mixed = slope * gradient.transpose();
+        Distance {
+            value_mm: reached.value_mm,
+            gradient,
+            hessian: (hessian - mixed - mixed.transpose()) * inverse,
         }
-        let (value_mm, gradient, hessian) = mean((weight, weight1, weight2), (value, value1, value2));
-        Some(Distance { value_mm, gradient, hessian })
     }
-}
-
-/// A weighted mean with derivatives: the sum of weighted values over that of the weights.
-#[inline]
-pub(super) fn mean(
-    (weight, weight1, weight2): (f64, Vec3, Matrix3<f64>),
-    (value, value1, value2): (f64, Vec3, Matrix3<f64>),
-) -> (f64, Vec3, Matrix3<f64>) {
-    let inv = 1.0 / weight;
-    let f = value * inv;
-    let gradient = (value1 - weight1 * f) * inv;
-    let mixed = weight1 * gradient.transpose();
-    let hessian = (value2 - weight2 * f - mixed - mixed.transpose()) * inv;
-    (f, gradient, hessian)
 }
 
 /// The middles of a triangle and its sides.

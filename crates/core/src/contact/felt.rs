@@ -1,8 +1,12 @@
 //! The vessel as a device feels it: extended beyond its openings, smooth, and ready for queries.
 
-use super::SmoothWall;
+use nalgebra::Matrix3;
+
+use super::distance::Nearness;
 use super::extension::extended;
 use super::grading::{Grading, Stiffness};
+use super::wall::{FOLLOW, LOOK_AGAIN};
+use super::{Distance, SmoothWall};
 use crate::device::Device;
 use crate::insertion::WallProperties;
 use crate::vessel::{Wall, WallQuery};
@@ -17,7 +21,15 @@ pub struct FeltWall {
     pub query: WallQuery,
     /// Modulus and friction, where they are not the same everywhere.
     pub grading: Option<Grading>,
+    /// Radius of the thinnest piece of the device, mm.
+    pub(super) thinnest_mm: f64,
+    /// How far a point of the device must see, mm.
+    pub(super) reach_mm: f64,
 }
+
+/// How much farther than it must a point looks for the wall, mm: while it moves less it need not ask again. A point on the axis of a
+/// tube has all of its triangles at one distance, and a question that reaches them looks at all: asking a little farther is enough.
+const LOOK_MM: f64 = 0.5;
 
 impl FeltWall {
     /// Prepares `wall` for `device`.
@@ -29,7 +41,23 @@ impl FeltWall {
         let felt = Wall::from_surface(&extended(wall, thickest_mm))?;
         let smooth = SmoothWall::new(&felt, thinnest_mm, thickest_mm);
         let grading = if properties.region.is_empty() { None } else { Grading::new(&smooth, properties) };
-        Ok(Self { smooth, query: WallQuery::new(&felt)?, grading })
+        let reach_mm = (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + smooth.deepest_inset_mm() + LOOK_MM;
+        Ok(Self { smooth, query: WallQuery::new(&felt)?, grading, thinnest_mm, reach_mm })
+    }
+
+    /// How near `x` is, whose nearest triangle is `triangle` or close to it; with derivatives below `limit_mm`.
+    pub(crate) fn nearness(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
+        self.smooth.within(x, triangle, limit_mm).unwrap_or_else(|| {
+            // Where no quadric reaches, a surface is torn, and its triangles are what there is.
+            self.query.nearest(x, self.reach_mm).map_or(Nearness::Beyond(self.reach_mm), |flat| {
+                let (value_mm, gradient) = (flat.distance_mm, flat.normal);
+                if value_mm < limit_mm {
+                    Nearness::Within(Distance { value_mm, gradient, hessian: Matrix3::zeros() })
+                } else {
+                    Nearness::Beyond(value_mm)
+                }
+            })
+        })
     }
 
     /// The wall's modulus at `x`, whose nearest triangle is `triangle` or close to it; `softness` is the part of the stiffest

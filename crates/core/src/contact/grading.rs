@@ -26,7 +26,6 @@
 
 use nalgebra::Matrix3;
 
-use super::distance::mean;
 use super::{Distance, SmoothWall, WallPotential};
 use crate::Vec3;
 use crate::insertion::WallProperties;
@@ -146,8 +145,20 @@ fn blend(wall: &SmoothWall, x: &Vec3, triangle: u32, of: impl Fn(u32) -> f64) ->
         let corners = &list[..list.len().min(3)];
         return Blend::constant(corners.iter().map(|&v| of(v)).sum::<f64>() / corners.len() as f64);
     }
-    let (value, gradient, hessian) = mean((weight, weight1, weight2), (value, value1, value2));
-    Blend { value, gradient, hessian }
+    mean((weight, weight1, weight2), (value, value1, value2))
+}
+
+/// A weighted mean with derivatives: the sum of weighted values over that of the weights.
+fn mean(
+    (weight, weight1, weight2): (f64, Vec3, Matrix3<f64>),
+    (value, value1, value2): (f64, Vec3, Matrix3<f64>),
+) -> Blend {
+    let inv = 1.0 / weight;
+    let f = value * inv;
+    let gradient = (value1 - weight1 * f) * inv;
+    let mixed = weight1 * gradient.transpose();
+    let hessian = (value2 - weight2 * f - mixed - mixed.transpose()) * inv;
+    Blend { value: f, gradient, hessian }
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
 //! What the contact points of a device know of the wall about them, from one question to the next.
 
-use super::{ContactPoint, Distance};
+use super::distance::{Distance, Nearness};
+use super::places::Places;
+use super::wall::LOOK_AGAIN;
+use super::{ContactPoint, FeltWall};
 use crate::Vec3;
-use nalgebra::Matrix3;
 
 /// What a point knows of its surroundings.
 #[derive(Debug, Clone, Copy)]
@@ -19,8 +21,8 @@ pub(super) struct KnownPoint {
     pub(super) base: Vec3,
     /// No wall is nearer to it than this, mm.
     pub(super) base_clearance_mm: f64,
-    /// Whether the wall is near it: the reading of the point is the one taken there.
-    pub(super) near: bool,
+    /// Whether it presses on the wall there: the reading of the point is the one taken there.
+    pub(super) presses: bool,
 }
 
 const NOTHING: KnownPoint = KnownPoint {
@@ -30,20 +32,27 @@ const NOTHING: KnownPoint = KnownPoint {
     triangle: None,
     base: Vec3::new(0.0, 0.0, 0.0),
     base_clearance_mm: 0.0,
-    near: false,
+    presses: false,
 };
 
 /// The memory of all contact points of a device.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct WallMemory {
     pub(super) points: Vec<KnownPoint>,
     /// Where each point last read the distance of a near wall, and what it read. Apart from `points`: most points are free, and
     /// all of them are looked at many times a step.
-    pub(super) readings: Vec<(Vec3, Distance)>,
+    pub(super) readings: Vec<(Vec3, Nearness)>,
+    pub(super) places: Places,
     spare: Vec<KnownPoint>,
 }
 
 impl WallMemory {
+    /// Nothing is known yet of `felt`.
+    pub fn new(felt: &FeltWall) -> Self {
+        let places = Places::new(LOOK_AGAIN * felt.thinnest_mm, felt.reach_mm);
+        Self { points: Vec::new(), readings: Vec::new(), places, spare: Vec::new() }
+    }
+
     /// Takes memory for `points` points.
     pub fn reserve(&mut self, points: usize) {
         for list in [&mut self.points, &mut self.spare] {
@@ -54,14 +63,22 @@ impl WallMemory {
 
     pub(super) fn resize(&mut self, points: usize) {
         let nowhere = Vec3::repeat(f64::NAN);
-        let none = Distance { value_mm: 0.0, gradient: Vec3::zeros(), hessian: Matrix3::zeros() };
         self.points.resize(points, NOTHING);
-        self.readings.resize(points, (nowhere, none));
+        self.readings.resize(points, (nowhere, Nearness::Beyond(0.0)));
     }
 
-    /// The distance that point `index` read at its base, if the wall is near.
-    pub(super) fn near(&self, index: usize) -> Option<&Distance> {
-        self.points[index].near.then(|| &self.readings[index].1)
+    /// The distance that point `index` read at its base, if it presses on the wall there.
+    pub(super) fn pressed(&self, index: usize) -> Option<&Distance> {
+        match &self.readings[index].1 {
+            Nearness::Within(distance) if self.points[index].presses => Some(distance),
+            _ => None,
+        }
+    }
+
+    /// How near `x` is to the wall, with derivatives below `limit_mm`; `None` where nothing is within reach.
+    pub(crate) fn nearness(&mut self, felt: &FeltWall, x: &Vec3, limit_mm: f64) -> Option<Nearness> {
+        let place = self.places.around(&felt.query, x);
+        place.triangle.map(|triangle| felt.nearness(x, triangle, limit_mm))
     }
 
     /// The device has advanced along its own curve: what was known of a place, the point of `after` that comes to lie nearest to it

@@ -7,11 +7,12 @@ mod fit;
 pub mod friction;
 pub mod grading;
 mod memory;
+mod places;
 pub mod potential;
 mod quadric;
 pub mod wall;
 
-pub use distance::{Distance, SmoothWall};
+pub use distance::{Distance, Nearness, SmoothWall};
 pub use felt::FeltWall;
 pub use friction::{Friction, HandMotion};
 pub use grading::Grading;

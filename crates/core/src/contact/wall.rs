@@ -12,12 +12,12 @@
 
 use super::memory::WallMemory;
 use crate::Vec3;
-use crate::contact::{Distance, FeltWall, Friction, WallPotential, friction};
+use crate::contact::distance::{Distance, Nearness};
+use crate::contact::{FeltWall, Friction, WallPotential, friction};
 use crate::insertion::Contact;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{Assembly, ElementData, RodState};
 use crate::solve::External;
-use nalgebra::Matrix3;
 
 /// A place on the device where the wall is felt.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,11 +46,6 @@ impl ContactPoint {
         state.positions[e] * w0
             + state.positions[e + 1] * w1
             + (state.frames[e].t * s0 + state.frames[e + 1].t * s1) * h
-    }
-
-    /// Whether it presses on a wall at this distance.
-    fn presses(&self, d: &Distance) -> bool {
-        d.value_mm < self.potential.radius_mm
     }
 
     /// Normal of the wall and force on it at a distance, N; `factor` as in [`Stiffness`](super::grading::Stiffness).
@@ -106,26 +101,28 @@ impl Counters {
 /// How near a point stands.
 #[derive(Debug, Clone, Copy)]
 enum Reading {
-    /// Nothing within reach; no wall is nearer than this, mm.
+    /// Clear of the wall; none is nearer than this, mm.
     Free(f64),
-    /// The wall is near.
-    Near(Distance),
+    /// It presses.
+    Pressed(Distance),
     /// The point is where the potential does not allow it.
     Outside,
 }
 
 impl Reading {
-    fn of(distance: Distance, potential: &WallPotential) -> Self {
-        if potential.is_allowed(distance.value_mm) { Self::Near(distance) } else { Self::Outside }
+    fn of(nearness: Nearness, potential: &WallPotential) -> Self {
+        match nearness {
+            Nearness::Beyond(value_mm) => Self::Free(value_mm),
+            Nearness::Within(d) if potential.is_allowed(d.value_mm) => Self::Pressed(d),
+            Nearness::Within(_) => Self::Outside,
+        }
     }
 }
 
 /// Beyond its radius, a point is followed within this part of it.
-const FOLLOW: f64 = 0.5;
-/// How much farther than it must a point looks for the wall, mm: while it moves less it need not ask again.
-const LOOK_MM: f64 = 1.0;
-/// A point looks for other walls again when it has moved by this part of its radius.
-const LOOK_AGAIN: f64 = 0.5;
+pub(super) const FOLLOW: f64 = 0.5;
+/// A triangle is the nearest, or close to it, within this part of a point's radius from where it was found.
+pub(super) const LOOK_AGAIN: f64 = 0.5;
 /// The smooth distance changes by less than this part of the way.
 const STEEPEST: f64 = 2.0;
 /// Radius of the gentlest bend worth a number, mm.
@@ -189,7 +186,7 @@ impl<'a> WallContact<'a> {
             if let Some(triangle) = known.triangle {
                 let (place, reading) = self.memory.readings[index];
                 // Most points that are near a wall do not touch it, and are moved little.
-                let spare_mm = reading.value_mm - radius - STEEPEST * (x - place).norm();
+                let spare_mm = reading.value_mm() - radius - STEEPEST * (x - place).norm();
                 if spare_mm > 0.0 {
                     self.counters.avoided += 1;
                     return Reading::Free(radius + spare_mm);
@@ -198,40 +195,33 @@ impl<'a> WallContact<'a> {
                     self.counters.avoided += 1;
                     return Reading::of(reading, &potential);
                 }
-                if moved < LOOK_AGAIN * radius
-                    && let Some(distance) =
-                        self.felt.smooth.distance(x, triangle).filter(|d| d.value_mm > 0.0)
-                {
-                    self.counters.near += 1;
-                    self.memory.readings[index] = (*x, distance);
-                    return Reading::of(distance, &potential);
+                if moved < LOOK_AGAIN * radius {
+                    let nearness = self.felt.nearness(x, triangle, radius);
+                    if nearness.value_mm() > 0.0 {
+                        self.counters.near += 1;
+                        self.memory.readings[index] = (*x, nearness);
+                        return Reading::of(nearness, &potential);
+                    }
                 }
             }
         }
-        self.counters.queries += 1;
-        (known.looked_at, known.from_tip_mm) = (*x, self.points[index].from_tip_mm);
-        known.triangle = None;
-        // A point on the axis of a tube has all of its triangles at one distance, and a question that reaches them looks at all:
-        // asking a little farther than is needed is enough.
-        let reach_mm = near + self.felt.smooth.deepest_inset_mm() + LOOK_MM;
-        let Some(nearest) = self.felt.query.nearest(x, reach_mm) else {
-            known.clearance_mm = reach_mm;
-            return Reading::Free(reach_mm);
-        };
-        known.clearance_mm = nearest.distance_mm.abs();
+        let places = &mut self.memory.places;
+        let before = places.queries;
+        let query = &self.felt.query;
+        let place = if self.skip { places.around(query, x) } else { places.ask(query, x) };
+        self.counters.queries += places.queries - before;
+        (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
+        (known.clearance_mm, known.triangle) = (place.clearance_mm, None);
+        let clearance = place.clearance_mm - (x - place.middle).norm();
         // Past an opening there is no wall.
-        if nearest.rim || nearest.distance_mm > near + self.felt.smooth.inset_mm(nearest.triangle) {
-            return Reading::Free(known.clearance_mm);
+        let Some(triangle) = place.triangle else { return Reading::Free(clearance) };
+        if clearance > near + self.felt.smooth.inset_mm(triangle) {
+            return Reading::Free(clearance);
         }
-        known.triangle = Some(nearest.triangle);
-        // Where no quadric reaches, a surface is torn, and its triangles are what there is.
-        let distance = self.felt.smooth.distance(x, nearest.triangle).unwrap_or(Distance {
-            value_mm: nearest.distance_mm,
-            gradient: nearest.normal,
-            hessian: Matrix3::zeros(),
-        });
-        self.memory.readings[index] = (*x, distance);
-        Reading::of(distance, &potential)
+        known.triangle = Some(triangle);
+        let nearness = self.felt.nearness(x, triangle, radius);
+        self.memory.readings[index] = (*x, nearness);
+        Reading::of(nearness, &potential)
     }
 
     /// Friction of point `index` at `x`.
@@ -268,11 +258,8 @@ impl<'a> WallContact<'a> {
     pub fn touch(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<Touch> {
         let point = self.points[index];
         let x = point.position(elements, state);
-        let Reading::Near(distance) = self.read(index, &x) else { return None };
+        let Reading::Pressed(distance) = self.read(index, &x) else { return None };
         let penetration_mm = point.potential.penetration_mm(distance.value_mm);
-        if penetration_mm == 0.0 {
-            return None;
-        }
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
         let stiffness = self.felt.stiffness(&x, self.memory.points[index].triangle, 1.0);
         let (mut normal, mut force_n) = point.pressed(&distance, stiffness.factor);
@@ -312,12 +299,11 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let point = self.points[index];
             match self.read(index, &x) {
                 Reading::Free(_) => {}
-                Reading::Near(d) if point.presses(&d) => {
+                Reading::Pressed(d) => {
                     let triangle = self.memory.points[index].triangle;
                     let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
                     sum += factor * point.weight_mm * point.potential.value(d.value_mm);
                 }
-                Reading::Near(_) => {}
                 Reading::Outside => return f64::INFINITY,
             }
             if self.friction.acts() {
@@ -333,9 +319,9 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let reading = self.read(index, &x);
             let known = &mut self.memory.points[index];
             known.base = x;
-            (known.base_clearance_mm, known.near) = match reading {
+            (known.base_clearance_mm, known.presses) = match reading {
                 Reading::Free(clearance) => (clearance, false),
-                Reading::Near(d) => (d.value_mm, true),
+                Reading::Pressed(d) => (d.value_mm, true),
                 Reading::Outside => {
                     assembly.external_energy = f64::INFINITY;
                     return;
@@ -346,10 +332,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let least_n = self.least_force_n();
             let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
             let pressed = self.points.iter().enumerate().map(|(index, point)| {
-                let Some(d) = memory.near(index) else { return (Vec3::zeros(), 0.0) };
-                if !point.presses(d) {
-                    return point.pressed(d, 0.0);
-                }
+                let Some(d) = memory.pressed(index) else { return (Vec3::zeros(), 0.0) };
                 let known = &memory.points[index];
                 let factor = felt.stiffness(&known.base, known.triangle, softness).factor;
                 let (normal, force) = point.pressed(d, factor);
@@ -363,7 +346,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
             if self.friction.acts() {
                 self.add_friction(elements, state, assembly, index, &known.base);
             }
-            let Some(d) = self.memory.near(index).filter(|d| point.presses(d)) else { continue };
+            let Some(d) = self.memory.pressed(index) else { continue };
             let stiffness = self.felt.stiffness(&known.base, known.triangle, self.softness);
             let w = point.weight_mm;
             assembly.external_energy += stiffness.factor * w * point.potential.value(d.value_mm);
@@ -386,24 +369,20 @@ impl<const C: usize> External<C> for WallContact<'_> {
         true
     }
 
-    /// A point may move by nearly its clearance: the ball about it holds no wall, so no wall is crossed on the way.
+    /// A point may move by nearly its clearance, whatever the direction: the ball about it holds no wall. Farther it may go where its
+    /// straight way meets no wall, and nearly up to the wall where it does.
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         let mut fraction: f64 = 1.0;
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, to);
             let known = &self.memory.points[index];
-            let (base, mut clearance) = (known.base, known.base_clearance_mm);
-            let moved = (x - base).norm();
-            if moved <= SAFE * clearance * fraction.min(1.0) || moved == 0.0 {
+            if fraction * (x - known.base).norm() <= SAFE * known.base_clearance_mm {
                 continue;
             }
-            if let Some(nearest) = self.felt.query.nearest(&base, moved.min(1e6) / SAFE) {
-                self.counters.queries += 1;
-                clearance = clearance.max(nearest.distance_mm.abs());
-            } else {
-                continue;
+            self.counters.queries += 1;
+            if let Some(met) = self.felt.query.crossing(&known.base, &x, fraction / SAFE) {
+                fraction = SAFE * met;
             }
-            fraction = fraction.min(SAFE * clearance / moved);
         }
         fraction
     }

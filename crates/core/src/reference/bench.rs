@@ -118,10 +118,11 @@ impl Bench {
         let mut mesh = Mesh::default();
         mesh.build(&device, length, length / elements as f64, modulus);
         let frames = mesh.from_tip_mm.iter().map(|from_tip| tangents(length - from_tip)).collect();
+        let felt = FeltWall::new(wall, &device, properties)?;
         Ok(Self {
-            felt: FeltWall::new(wall, &device, properties)?,
+            memory: WallMemory::new(&felt),
+            felt,
             setup: *setup,
-            memory: WallMemory::default(),
             friction: Friction::default(),
             newton: Newton::new(mesh.elements.len()),
             plates: 0.0,

@@ -5,7 +5,7 @@ use crate::rod::element::element_energy;
 use crate::rod::{ElementData, Layout, RodState, Supports};
 
 /// Halvings towards the minimum along a step that a wall cut short.
-const REFINEMENTS: usize = 12;
+const REFINEMENTS: usize = 6;
 
 impl<const C: usize> Newton<C> {
     /// Axial forces of inextensible elements at the trial state: they are multipliers and take their full step. (Those of

@@ -5,7 +5,7 @@
 //! the angle weighted pseudonormal", IEEE TVCG 11, 2005). Types of parry and glam stay inside this file.
 
 use parry3d_f64::glamx::DVec3;
-use parry3d_f64::query::PointQueryWithLocation;
+use parry3d_f64::query::{PointQueryWithLocation, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags, TrianglePointLocation};
 
 use super::topology::{EdgeTable, NONE};
@@ -88,6 +88,13 @@ impl WallQuery {
     /// Unit normal of a triangle, into the lumen. `triangle` is one that [`WallQuery::nearest`] returned.
     pub fn inward_normal(&self, triangle: u32) -> Vec3 {
         self.inward[triangle as usize]
+    }
+
+    /// Where the straight way from one point to another first meets the wall, as a part of the way, up to `farthest` times its
+    /// length. `None` also for points that are not finite.
+    pub fn crossing(&self, from_mm: &Vec3, to_mm: &Vec3, farthest: f64) -> Option<f64> {
+        let ray = Ray::new(to_parry(from_mm), to_parry(&(to_mm - from_mm)));
+        self.shape.cast_local_ray(&ray, farthest, true)
     }
 
     /// The closest point of the wall if it is less than `reach_mm` away. `None` also for a point that is not finite.

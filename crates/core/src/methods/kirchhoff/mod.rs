@@ -112,16 +112,17 @@ impl<const C: usize> Kirchhoff<C> {
         }
         let friction = surroundings.properties.largest_friction();
         let nothing = Configuration::at(surroundings.sheath, friction);
+        let felt = FeltWall::new(surroundings.wall, surroundings.device, surroundings.properties)?;
         let mut method = Self {
             options,
-            felt: FeltWall::new(surroundings.wall, surroundings.device, surroundings.properties)?,
+            memory: WallMemory::new(&felt),
+            felt,
             newton: Newton::new(1),
             current: nothing.clone(),
             next: nothing.clone(),
             before: nothing,
             guess: Guess::new(surroundings.device.shaped_mm()),
             extension: Extension::default(),
-            memory: WallMemory::default(),
             shape: Shape::default(),
             report: StepReport { converged: true, angles: Layout::<C>::TWIST, ..Default::default() },
         };
@@ -204,7 +205,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 let (tip, tangent) = (self.current.state.positions[last], self.current.state.frames[last].t);
                 let radius = surroundings.device.section_at(0.0).radius_mm;
                 let way =
-                    self.extension.trace((&self.felt.smooth, &self.felt.query), tip, tangent, radius, wanted);
+                    self.extension.trace((&self.felt, &mut self.memory), tip, tangent, radius, wanted);
                 blocked = may_carry && way < (1.0 - 1e-9) * wanted;
                 if !blocked {
                     part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);

@@ -4,10 +4,9 @@
 use nalgebra::Rotation3;
 
 use crate::Vec3;
-use crate::contact::SmoothWall;
+use crate::contact::{FeltWall, Nearness, WallMemory};
 use crate::rod::quadrature::Point;
 use crate::rod::{Frame, RodState};
-use crate::vessel::WallQuery;
 
 use super::mesh::Mesh;
 
@@ -45,20 +44,14 @@ impl Extension {
     /// equilibrium would be that of a free tip.
     pub(super) fn trace(
         &mut self,
-        (wall, query): (&SmoothWall, &WallQuery),
+        (wall, memory): (&FeltWall, &mut WallMemory),
         tip: Vec3,
         tangent: Vec3,
         radius_mm: f64,
         wanted_mm: f64,
     ) -> f64 {
         self.curvature = Vec3::zeros();
-        let distance = |x: &Vec3, reach_mm: f64| {
-            let near = query.nearest(x, reach_mm).filter(|near| !near.rim)?;
-            Some(wall.distance(x, near.triangle).map_or((near.distance_mm, near.normal), |d| {
-                (d.value_mm, d.gradient.try_normalize(0.0).unwrap_or(near.normal))
-            }))
-        };
-        let at_tip = distance(&tip, 2.0 * radius_mm).map_or(radius_mm, |(d, _)| d);
+        let at_tip = memory.nearness(wall, &tip, 0.0).map_or(radius_mm, |near| near.value_mm());
         let touch = at_tip.clamp(SUNK * radius_mm, radius_mm);
         // Out of a soft wall that it has sunk into the tip may come in more than one piece.
         let clear = at_tip.min(CLEAR * radius_mm);
@@ -68,9 +61,8 @@ impl Extension {
         let mut pieces = 0.0;
         while pieces < count {
             let mut next = x + t * piece_mm;
-            if let Some((d, normal)) = distance(&next, radius_mm + piece_mm)
-                && d < touch
-            {
+            if let Some(Nearness::Within(near)) = memory.nearness(wall, &next, touch) {
+                let (d, normal) = (near.value_mm, near.normal());
                 if t.dot(&normal) < HEAD_ON {
                     break;
                 }
@@ -79,11 +71,12 @@ impl Extension {
                 let lift = (t.dot(&normal) + (touch - d) / piece_mm).clamp(-0.5, 0.5);
                 t = (along + normal * lift).normalize();
                 next = x + t * piece_mm;
-                if let Some((d, normal)) = distance(&next, 2.0 * radius_mm) {
+                if let Some(Nearness::Within(near)) = memory.nearness(wall, &next, touch) {
+                    let (d, normal) = (near.value_mm, near.normal());
                     if d < clear {
                         break;
                     }
-                    next += normal * (touch - d).max(0.0);
+                    next += normal * (touch - d);
                 }
             }
             x = next;

@@ -1,0 +1,134 @@
+//! What is nearest to places where a device has been.
+//!
+//! A device goes the same way again and again, and each of its points asks for the triangle nearest to it. Space is cut into
+//! cubic cells, and what is nearest to the middle of a cell is asked once, for all points that come to lie in it. Answers
+//! depend on the cell alone, not on what was asked before.
+
+use crate::Vec3;
+use crate::vessel::WallQuery;
+
+/// Cells that are remembered at a time; a power of two. A device of a metre lies in some thousands.
+const CELLS: usize = 1 << 14;
+/// Cells are counted up to this from the origin.
+const FARTHEST: f64 = 1e9;
+/// Stands for no triangle.
+const NONE: u32 = u32::MAX;
+
+/// What is known of the wall around a point in space.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    /// The point.
+    pub(super) middle: Vec3,
+    /// No wall is nearer to it than this, mm.
+    pub(super) clearance_mm: f64,
+    /// The nearest triangle; none beyond the reach of the question or past the end of the vessel.
+    pub(super) triangle: Option<u32>,
+}
+
+/// A cell that was asked for.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    key: [i32; 3],
+    triangle: u32,
+    clearance_mm: f64,
+}
+
+/// The memory of places.
+#[derive(Debug, Clone)]
+pub(super) struct Places {
+    size_mm: f64,
+    reach_mm: f64,
+    cells: Vec<Cell>,
+    /// Questions to the hierarchy so far.
+    pub(super) queries: u64,
+}
+
+impl Places {
+    /// Cells no point of which is farther than `radius_mm` from the middle, from which walls are looked for up to
+    /// `reach_mm` away.
+    pub(super) fn new(radius_mm: f64, reach_mm: f64) -> Self {
+        let unknown = Cell { key: [i32::MIN; 3], triangle: NONE, clearance_mm: 0.0 };
+        let size_mm = radius_mm * 2.0 / 3f64.sqrt();
+        Self { size_mm, reach_mm, cells: vec![unknown; CELLS], queries: 0 }
+    }
+
+    /// What is nearest to `x` itself.
+    pub(super) fn ask(&mut self, query: &WallQuery, x: &Vec3) -> Place {
+        self.queries += 1;
+        let nearest = query.nearest(x, self.reach_mm);
+        Place {
+            middle: *x,
+            clearance_mm: nearest.map_or(self.reach_mm, |n| n.distance_mm.abs()),
+            triangle: nearest.filter(|n| !n.rim).map(|n| n.triangle),
+        }
+    }
+
+    /// What is nearest to the middle of the cell that `x` lies in.
+    pub(super) fn around(&mut self, query: &WallQuery, x: &Vec3) -> Place {
+        let at = x.map(|c| (c / self.size_mm).floor());
+        // Also for what is not a number.
+        if !at.iter().all(|c| c.abs() < FARTHEST) {
+            return self.ask(query, x);
+        }
+        let key: [i32; 3] = [at.x as i32, at.y as i32, at.z as i32];
+        let middle = at.map(|c| (c + 0.5) * self.size_mm);
+        let slot = slot(key);
+        let known = self.cells[slot];
+        if known.key == key {
+            let triangle = (known.triangle != NONE).then_some(known.triangle);
+            return Place { middle, clearance_mm: known.clearance_mm, triangle };
+        }
+        let place = self.ask(query, &middle);
+        let triangle = place.triangle.unwrap_or(NONE);
+        self.cells[slot] = Cell { key, triangle, clearance_mm: place.clearance_mm };
+        place
+    }
+}
+
+/// Where a cell is kept: neighbours far apart, so that few drive each other out.
+fn slot(key: [i32; 3]) -> usize {
+    // Odd constants near 2⁶⁴ times the fractional parts of √2, √3 and √5: their multiples spread evenly.
+    const MIX: [u64; 3] = [0x6A09_E667_F3BC_C909, 0xBB67_AE85_84CA_A73B, 0x3C6E_F372_FE94_F82B];
+    let mixed = key.iter().zip(MIX).fold(0u64, |sum, (k, m)| sum.wrapping_add((*k as u64).wrapping_mul(m)));
+    (mixed >> (64 - CELLS.ilog2())) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vessel::{GeneratedWall, Resolution, anatomy};
+
+    #[test]
+    fn a_cell_is_asked_once_and_answers_as_the_hierarchy_does() {
+        let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(1.0))
+            .unwrap()
+            .wall;
+        let query = WallQuery::new(&wall).unwrap();
+        let mut places = Places::new(0.2, 3.0);
+        let at = |i: i32| Vec3::new(2.5 * f64::from(i).sin(), 2.5 * f64::from(i).cos(), 0.02 * f64::from(i));
+        for i in 0..3000 {
+            let x = at(i);
+            let place = places.around(&query, &x);
+            assert!((x - place.middle).norm() <= 0.2);
+            let nearest = query.nearest(&place.middle, 3.0).unwrap();
+            assert_eq!((place.triangle, place.clearance_mm), (Some(nearest.triangle), nearest.distance_mm));
+        }
+        let asked = places.queries;
+        assert!(asked <= 3000);
+        places.around(&query, &at(2999));
+        assert_eq!(places.queries, asked);
+    }
+
+    #[test]
+    fn no_number_and_no_wall_are_no_place() {
+        let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(2.0))
+            .unwrap()
+            .wall;
+        let query = WallQuery::new(&wall).unwrap();
+        let mut places = Places::new(0.2, 1.0);
+        for x in [Vec3::repeat(f64::NAN), Vec3::repeat(1e300), Vec3::new(0.0, 0.0, 50.0)] {
+            let place = places.around(&query, &x);
+            assert!(place.triangle.is_none() && place.clearance_mm == 1.0);
+        }
+    }
+}
