@@ -74,6 +74,21 @@ impl Stiffness {
         }
         (gradient, hessian)
     }
+
+    /// The same for a point that is held to the wall, pressing or off it, and pressed with `force_n` before: the gradient of a spring
+    /// that also pulls, and its Hessian with that force.
+    pub(super) fn holding(
+        &self,
+        potential: &WallPotential,
+        d: &Distance,
+        length_mm: f64,
+        force_n: f64,
+    ) -> (Vec3, Matrix3<f64>) {
+        let w = self.factor * length_mm;
+        let (first, second) = potential.holding(d.value_mm);
+        let plane = d.gradient * d.gradient.transpose();
+        (d.gradient * (w * first), plane * (w * second) - d.hessian * force_n)
+    }
 }
 
 /// Modulus and friction of a wall with regions.

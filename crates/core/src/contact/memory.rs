@@ -21,8 +21,10 @@ pub(super) struct KnownPoint {
     pub(super) base: Vec3,
     /// No wall is nearer to it than this, mm.
     pub(super) base_clearance_mm: f64,
-    /// Whether it presses on the wall there: the reading of the point is the one taken there.
+    /// Whether it presses on the wall there: the reading of the point is the one taken there, …
     pub(super) presses: bool,
+    /// … and its force on the wall there, N; 0 where it does not press.
+    pub(super) force_n: f64,
 }
 
 const NOTHING: KnownPoint = KnownPoint {
@@ -33,6 +35,7 @@ const NOTHING: KnownPoint = KnownPoint {
     base: Vec3::new(0.0, 0.0, 0.0),
     base_clearance_mm: 0.0,
     presses: false,
+    force_n: 0.0,
 };
 
 /// The memory of all contact points of a device.

@@ -51,6 +51,12 @@ impl WallPotential {
         distance_mm > FLOOR * self.radius_mm
     }
 
+    /// As [`WallPotential::derivatives`], with a spring that also pulls: what holds a point to a wall that it has come off.
+    pub(super) fn holding(&self, distance_mm: f64) -> (f64, f64) {
+        let (k, off_mm) = (self.modulus_n_per_mm2, distance_mm - self.radius_mm);
+        if off_mm > 0.0 { (k * off_mm, k) } else { self.derivatives(distance_mm) }
+    }
+
     /// ψ′(d) in N/mm and ψ″(d) in N/mm², at an allowed distance.
     pub fn derivatives(&self, distance_mm: f64) -> (f64, f64) {
         let (k, d, r) = (self.modulus_n_per_mm2, distance_mm, self.radius_mm);

@@ -140,6 +140,8 @@ pub struct WallContact<'a> {
     least_moment_nmm: f64,
     /// Part of the (stiffest) modulus that acts: a rigid wall is approached from a softer one.
     pub softness: f64,
+    /// Whether points that pressed in the last equilibrium are held to the wall, should they have come off it.
+    pub holding: bool,
     memory: &'a mut WallMemory,
     friction: &'a mut Friction,
     /// Work done and avoided.
@@ -164,6 +166,7 @@ impl<'a> WallContact<'a> {
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
             softness: 1.0,
+            holding: false,
             memory,
             friction,
             counters: Counters::default(),
@@ -172,6 +175,11 @@ impl<'a> WallContact<'a> {
 
     /// How near the wall point `index` would be at `x`.
     fn read(&mut self, index: usize, x: &Vec3) -> Reading {
+        self.read_within(index, x, self.points[index].potential.radius_mm)
+    }
+
+    /// The same, where a point counts as pressed nearer than `limit_mm`.
+    fn read_within(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
         let potential = self.points[index].potential;
         let radius = potential.radius_mm;
         let near = radius * (1.0 + FOLLOW);
@@ -186,17 +194,18 @@ impl<'a> WallContact<'a> {
             if let Some(triangle) = known.triangle {
                 let (place, reading) = self.memory.readings[index];
                 // Most points that are near a wall do not touch it, and are moved little.
-                let spare_mm = reading.value_mm() - radius - STEEPEST * (x - place).norm();
+                let spare_mm = reading.value_mm() - limit_mm - STEEPEST * (x - place).norm();
                 if spare_mm > 0.0 {
                     self.counters.avoided += 1;
-                    return Reading::Free(radius + spare_mm);
+                    return Reading::Free(limit_mm + spare_mm);
                 }
-                if place == *x {
+                let told = matches!(reading, Nearness::Within(_)) || reading.value_mm() >= limit_mm;
+                if place == *x && told {
                     self.counters.avoided += 1;
                     return Reading::of(reading, &potential);
                 }
                 if moved < LOOK_AGAIN * radius {
-                    let nearness = self.felt.nearness(x, triangle, radius);
+                    let nearness = self.felt.nearness(x, triangle, limit_mm);
                     if nearness.value_mm() > 0.0 {
                         self.counters.near += 1;
                         self.memory.readings[index] = (*x, nearness);
@@ -219,7 +228,7 @@ impl<'a> WallContact<'a> {
             return Reading::Free(clearance);
         }
         known.triangle = Some(triangle);
-        let nearness = self.felt.nearness(x, triangle, radius);
+        let nearness = self.felt.nearness(x, triangle, limit_mm);
         self.memory.readings[index] = (*x, nearness);
         Reading::of(nearness, &potential)
     }
@@ -282,6 +291,26 @@ impl<'a> WallContact<'a> {
         })
     }
 
+    /// How much the forces on the wall differ at a state from those of the last equilibrium, over the latter; 0 where there were none.
+    pub fn misfit(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+        let (mut misfit_n, mut sum_n) = (0.0, 0.0);
+        for index in 0..self.points.len() {
+            let point = self.points[index];
+            let x = point.position(elements, state);
+            let force_n = match self.read(index, &x) {
+                Reading::Pressed(d) => {
+                    let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, 1.0).factor;
+                    point.pressed(&d, factor).1
+                }
+                Reading::Free(_) | Reading::Outside => 0.0,
+            };
+            let was_n = self.memory.points[index].force_n;
+            misfit_n += (force_n - was_n).abs();
+            sum_n += was_n;
+        }
+        if sum_n > 0.0 { misfit_n / sum_n } else { 0.0 }
+    }
+
     /// Whether a point is beyond the wall.
     pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         (0..self.points.len()).any(|index| {
@@ -316,11 +345,17 @@ impl<const C: usize> External<C> for WallContact<'_> {
     fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, state);
-            let reading = self.read(index, &x);
+            let radius_mm = self.points[index].potential.radius_mm;
+            let held = self.holding && self.memory.points[index].presses;
+            let limit_mm = if held { (1.0 + FOLLOW) * radius_mm } else { radius_mm };
+            let reading = self.read_within(index, &x, limit_mm);
             let known = &mut self.memory.points[index];
             known.base = x;
             (known.base_clearance_mm, known.presses) = match reading {
-                Reading::Free(clearance) => (clearance, false),
+                Reading::Free(clearance) => {
+                    known.force_n = 0.0;
+                    (clearance, false)
+                }
                 Reading::Pressed(d) => (d.value_mm, true),
                 Reading::Outside => {
                     assembly.external_energy = f64::INFINITY;
@@ -328,7 +363,8 @@ impl<const C: usize> External<C> for WallContact<'_> {
                 }
             };
         }
-        if self.friction.acts() {
+        // Forces that hold are none that friction follows.
+        if self.friction.acts() && !self.holding {
             let least_n = self.least_force_n();
             let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
             let pressed = self.points.iter().enumerate().map(|(index, point)| {
@@ -349,8 +385,14 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let Some(d) = self.memory.pressed(index) else { continue };
             let stiffness = self.felt.stiffness(&known.base, known.triangle, self.softness);
             let w = point.weight_mm;
-            assembly.external_energy += stiffness.factor * w * point.potential.value(d.value_mm);
-            let (gradient, hessian) = stiffness.derivatives(&point.potential, d, w);
+            let (gradient, hessian) = if self.holding {
+                stiffness.holding(&point.potential, d, w, known.force_n)
+            } else {
+                assembly.external_energy += stiffness.factor * w * point.potential.value(d.value_mm);
+                let (gradient, hessian) = stiffness.derivatives(&point.potential, d, w);
+                self.memory.points[index].force_n = gradient.norm();
+                (gradient, hessian)
+            };
             let e = point.element;
             if point.xi == 1.0 {
                 assembly.add_node(e + 1, &gradient, &hessian);

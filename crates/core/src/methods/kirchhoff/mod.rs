@@ -15,6 +15,7 @@
 
 mod configuration;
 mod guess;
+mod hold;
 pub(crate) mod mesh;
 mod readout;
 mod repeat;

@@ -76,15 +76,16 @@ impl<const C: usize> Kirchhoff<C> {
         let learnt =
             self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked).ok_or(BEYOND)?;
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
+        let held = self.guess.hold(&mut self.newton, &mut contact, &supports, &next.mesh, &mut next.state);
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
         let data = &next.mesh.elements[elements - 1];
         let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
         let stiffest = surroundings.properties.stiffest_n_per_mm2();
         let softest_first = (SOFTEST * element_stiffness / stiffest).min(1.0);
-        // A guess that has learnt from the last step is so near that the wall may be met as it is.
-        let mut hurried = learnt && softest_first < 1.0;
+        // A guess that has learnt from the last step or kept its contacts is so near that the wall may be met as it is.
+        let mut hurried = (learnt || held) && softest_first < 1.0;
         let mut softness = if hurried { 1.0 } else { softest_first };
-        let mut iterations = 0;
+        let mut iterations = usize::from(held);
         let mut renewals = 0;
         let found = loop {
             contact.softness = softness;
