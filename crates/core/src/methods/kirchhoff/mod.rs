@@ -46,6 +46,8 @@ use slide::Extension;
 pub struct KirchhoffOptions {
     /// Element length, mm.
     pub element_mm: f64,
+    /// Force or moment that an equilibrium leaves at a node, over the largest in the device, its wall and its supports.
+    pub tolerance: f64,
     /// Most Newton iterations of one solution; a command may take ten times as many.
     pub max_iterations: usize,
     /// Whether work that cannot change the result is skipped; off only to show that it does not.
@@ -54,10 +56,12 @@ pub struct KirchhoffOptions {
 
 impl Default for KirchhoffOptions {
     fn default() -> Self {
-        Self { element_mm: 2.0, max_iterations: 500, skip: true }
+        Self { element_mm: 2.0, tolerance: 1e-9, max_iterations: 500, skip: true }
     }
 }
 
+/// A residual above this tells nothing of an equilibrium.
+const LARGEST_TOLERANCE: f64 = 1e-2;
 /// Most elements.
 const ELEMENT_LIMIT: f64 = 100_000.0;
 /// Retracting to within this of the sheath, mm, is retracting to it.
@@ -99,6 +103,7 @@ impl<const C: usize> Kirchhoff<C> {
     pub fn new(options: KirchhoffOptions, surroundings: &Surroundings<'_>) -> Result<Self> {
         let length_mm = surroundings.device.length_mm();
         crate::error::in_range("method.element_mm", options.element_mm, length_mm)?;
+        crate::error::in_range("method.tolerance", options.tolerance, LARGEST_TOLERANCE)?;
         if length_mm / options.element_mm > ELEMENT_LIMIT {
             return Err(Error::parameter(
                 "method.element_mm",

@@ -9,11 +9,9 @@ use crate::insertion::Surroundings;
 use crate::rod::Supports;
 use crate::solve::NewtonOptions;
 
-/// Residual over force scale at which a state is an equilibrium.
-const TOLERANCE: f64 = 1e-9;
 /// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, …
 const SOFTEST: f64 = 30.0;
-/// … each solved to this residual.
+/// … each solved to this residual over force scale, or to what is wanted if that is more.
 const LOOSE: f64 = 1e-3;
 /// Equilibria that may be found before friction and the forces it follows from have settled.
 const RENEWALS: usize = 100;
@@ -43,7 +41,7 @@ impl<const C: usize> Kirchhoff<C> {
         blocked: bool,
         budget: &mut usize,
     ) -> std::result::Result<Found, Cow<'static, str>> {
-        let modulus = surroundings.properties.modulus_n_per_mm2;
+        let (modulus, tolerance) = (surroundings.properties.modulus_n_per_mm2, self.options.tolerance);
         let (now, next) = (&self.current, &mut self.next);
         next.mesh.build(surroundings.device, inserted_mm, self.options.element_mm, modulus);
         slide(&now.mesh, &now.state, &self.extension, &next.mesh, &mut next.state);
@@ -91,7 +89,7 @@ impl<const C: usize> Kirchhoff<C> {
             contact.softness = softness;
             let options = NewtonOptions {
                 max_iterations: if hurried { HURRIED } else { self.options.max_iterations }.min(*budget),
-                tolerance: if softness < 1.0 { LOOSE } else { TOLERANCE },
+                tolerance: if softness < 1.0 { tolerance.max(LOOSE) } else { tolerance },
                 ..NewtonOptions::default()
             };
             let found = self.newton.solve(
