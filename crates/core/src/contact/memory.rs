@@ -1,7 +1,7 @@
 //! What the contact points of a device know of the wall about them, from one question to the next.
 
 use super::distance::{Distance, Nearness};
-use super::places::Places;
+use super::places::{Place, Places};
 use super::wall::LOOK_AGAIN;
 use super::{ContactPoint, FeltWall};
 use crate::Vec3;
@@ -46,6 +46,8 @@ pub struct WallMemory {
     /// all of them are looked at many times a step.
     pub(super) readings: Vec<(Vec3, Nearness)>,
     pub(super) places: Places,
+    /// The place asked for last.
+    last: Place,
     spare: Vec<KnownPoint>,
 }
 
@@ -53,7 +55,7 @@ impl WallMemory {
     /// Nothing is known yet of `felt`.
     pub fn new(felt: &FeltWall) -> Self {
         let places = Places::new(LOOK_AGAIN * felt.thinnest_mm, felt.reach_mm);
-        Self { points: Vec::new(), readings: Vec::new(), places, spare: Vec::new() }
+        Self { points: Vec::new(), readings: Vec::new(), places, last: Place::UNKNOWN, spare: Vec::new() }
     }
 
     /// Takes memory for `points` points.
@@ -78,10 +80,15 @@ impl WallMemory {
         }
     }
 
-    /// How near `x` is to the wall, with derivatives below `limit_mm`; `None` where nothing is within reach.
+    /// How near `x` is to the wall, with derivatives below `limit_mm`; `None` where it is known to be farther.
     pub(crate) fn nearness(&mut self, felt: &FeltWall, x: &Vec3, limit_mm: f64) -> Option<Nearness> {
-        let place = self.places.around(&felt.query, x);
-        place.triangle.map(|triangle| felt.nearness(x, triangle, limit_mm))
+        let far_mm = limit_mm + felt.smooth.deepest_inset_mm();
+        if self.last.clearance(x) > far_mm {
+            return None;
+        }
+        self.last = self.places.around(&felt.query, x);
+        let near = self.last.clearance(x) <= far_mm;
+        self.last.triangle.filter(|_| near).map(|triangle| felt.nearness(x, triangle, limit_mm))
     }
 
     /// The device has advanced along its own curve: what was known of a place, the point of `after` that comes to lie nearest to it

@@ -25,6 +25,16 @@ pub(super) struct Place {
     pub(super) triangle: Option<u32>,
 }
 
+impl Place {
+    /// Nothing is known.
+    pub(super) const UNKNOWN: Self = Self { middle: Vec3::new(0.0, 0.0, 0.0), clearance_mm: f64::NEG_INFINITY, triangle: None };
+
+    /// No wall is nearer to `x` than this, mm; negative where nothing is known.
+    pub(super) fn clearance(&self, x: &Vec3) -> f64 {
+        self.clearance_mm - (x - self.middle).norm()
+    }
+}
+
 /// A cell that was asked for.
 #[derive(Debug, Clone, Copy)]
 struct Cell {

@@ -9,24 +9,28 @@ const STEEP: f64 = 0.7;
 /// … and beyond levels off within this, so that feet stay finite at the centre of curvature.
 const LEVEL: f64 = 0.4;
 
-/// The quadric of one vertex.
+/// The quadric of one vertex. In the order in which it is read: most vertices that are asked are too far, and the first line of a
+/// processor's cache says so.
 #[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
 pub(super) struct Quadric {
     pub(super) position: Vec3,
     pub(super) normal: Vec3,
+    /// cᵢ, mm.
+    pub(super) offset_mm: f64,
+    /// No point that is farther from the normal than this is reached, mm; infinite until the window is open.
+    pub(super) farthest_mm: f64,
     /// Principal directions, across the normal.
     pub(super) axes: [Vec3; 2],
-    /// S along them, 1/mm; positive where the wall bends around the lumen.
+    /// S along them, 1/mm, the larger first; positive where the wall bends around the lumen.
     pub(super) curvature: [f64; 2],
     /// M in them, 1/mm².
     pub(super) support: Matrix2<f64>,
-    /// Half axes of the support, shortest and longest, mm.
-    pub(super) half_axes_mm: (f64, f64),
-    /// cᵢ, mm.
-    pub(super) offset_mm: f64,
     /// The window falls from 1 at the first to 0 at the second, above and below the surface, mm.
     pub(super) above_mm: (f64, f64),
     pub(super) below_mm: (f64, f64),
+    /// Half axes of the support, shortest and longest, mm.
+    pub(super) half_axes_mm: (f64, f64),
 }
 
 /// Window over the radius of the device, and over the support of a vertex: what a fit may be off by on a coarse mesh.
@@ -103,13 +107,11 @@ impl Quadric {
     pub(super) fn local(&self, x: &Vec3) -> Option<Local> {
         let y = x - self.position;
         let rise = self.normal.dot(&y);
-        let height = rise - self.offset_mm;
-        let [k, l] = self.curvature;
-        // The least that feet can be nearer than offsets: most vertices are too far, and this is soon said.
-        let nearer = (1.0 - (height * k).min(height * l).min(0.0)) * self.half_axes_mm.1;
-        if y.norm_squared() - rise * rise >= nearer * nearer {
+        if y.norm_squared() - rise * rise >= self.farthest_mm * self.farthest_mm {
             return None;
         }
+        let height = rise - self.offset_mm;
+        let [k, l] = self.curvature;
         let tau = Vector2::new(self.axes[0].dot(&y), self.axes[1].dot(&y));
         let spread = [Spread::at(height, k), Spread::at(height, l)];
         let sigma = Vector2::new(spread[0].value * tau.x, spread[1].value * tau.y);
@@ -162,6 +164,12 @@ impl Quadric {
         };
         self.above_mm = ((ABOVE.0 * size).min(centre), (ABOVE.1 * size).min(BEYOND_CENTRE * centre));
         self.below_mm = (BELOW.0 * size, BELOW.1 * size);
+        // Where the window is open heights differ from Q by the sag of the support at most, and feet are nearer than offsets by
+        // height times curvature.
+        let (long, [k, l]) = (self.half_axes_mm.1, self.curvature);
+        let sag = 0.5 * k.abs().max(l.abs()) * long * long;
+        let (highest, lowest) = (self.above_mm.1 + sag, self.below_mm.1 - sag);
+        self.farthest_mm = long * (1.0 - (highest * l.min(0.0)).min(lowest * k.max(0.0)));
     }
 
     /// b(Q) and its derivatives.

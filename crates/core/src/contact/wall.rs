@@ -221,7 +221,7 @@ impl<'a> WallContact<'a> {
         self.counters.queries += places.queries - before;
         (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
         (known.clearance_mm, known.triangle) = (place.clearance_mm, None);
-        let clearance = place.clearance_mm - (x - place.middle).norm();
+        let clearance = place.clearance(x);
         // Past an opening there is no wall.
         let Some(triangle) = place.triangle else { return Reading::Free(clearance) };
         if clearance > near + self.felt.smooth.inset_mm(triangle) {
