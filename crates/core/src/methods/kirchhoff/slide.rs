@@ -70,14 +70,13 @@ impl Extension {
                 let along = (t - normal * t.dot(&normal)).normalize();
                 let lift = (t.dot(&normal) + (touch - d) / piece_mm).clamp(-0.5, 0.5);
                 t = (along + normal * lift).normalize();
-                next = x + t * piece_mm;
-                if let Some(Nearness::Within(near)) = memory.nearness(wall, &next, touch) {
-                    let (d, normal) = (near.value_mm, near.normal());
-                    if d < clear {
-                        break;
-                    }
-                    next += normal * (touch - d);
+                let turned = x + t * piece_mm;
+                // So near by, the distance is that to a plane.
+                let d = d + normal.dot(&(turned - next));
+                if d < clear {
+                    break;
                 }
+                next = turned + normal * (touch - d).max(0.0);
             }
             x = next;
             pieces += 1.0;
