@@ -90,15 +90,10 @@ impl<const C: usize> Assembly<C> {
         self.external_energy = 0.0;
         self.rank_ones.clear();
         self.scale = [0.0; 2];
-        match (Layout::<C>::TWIST, self.hessian) {
-            (true, true) => self.add_elements::<14, true>(elements, state),
-            (true, false) => self.add_elements::<14, false>(elements, state),
-            (false, true) => self.add_elements::<11, true>(elements, state),
-            (false, false) => self.add_elements::<11, false>(elements, state),
-        }
         if !self.hessian {
-            return;
+            return self.add_elements::<false>(elements, state);
         }
+        self.add_elements::<true>(elements, state);
         let l = Layout::<C>;
         // Rows without meaning.
         self.matrix.add(Layout::<C>::BLOCK - 1, Layout::<C>::BLOCK - 1, 1.0);
@@ -111,53 +106,26 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    fn add_elements<const M: usize, const HESSIAN: bool>(
-        &mut self,
-        elements: &[ElementData],
-        state: &RodState,
-    ) {
+    fn add_elements<const HESSIAN: bool>(&mut self, elements: &[ElementData], state: &RodState) {
         let l = Layout::<C>;
-        let n_at = M - 1;
-        let mut system = ElementSystem::<M> {
-            gradient: [0.0; M],
-            hessian: [[0.0; M]; M],
-            stretch: [0.0; M],
-            energy: Energy::default(),
-        };
+        let mut system = ElementSystem::<C>::zeros();
         for (e, data) in elements.iter().enumerate() {
-            element_system::<M, HESSIAN>(data, &state.element(e), &mut system);
+            let gamma = data.augmentation();
+            element_system::<C, HESSIAN>(data, &state.element(e), gamma, &mut system);
             self.energy.add(&system.energy);
             let g = &system.gradient;
             let force = g[0].abs().max(g[1].abs()).max(g[2].abs());
             let moment = g[3].abs().max(g[4].abs());
             self.scale = [self.scale[0].max(force), self.scale[1].max(moment)];
-            let gamma = data.augmentation();
-            let gap = g[n_at];
-            for i in 0..M {
-                let at = l.row(e, i);
-                self.residual[at] += g[i];
-                let weight = gamma * system.stretch[i];
-                self.correction[at] += weight * gap;
-                if !HESSIAN {
-                    continue;
-                }
-                // Unknowns follow each other but for one place, that of the N before.
-                let (row, split) = (self.matrix.row_mut(at), Layout::<C>::BEFORE.max(i));
-                let skipped = usize::from(i < split);
-                let (near, far) = row.split_at_mut(split - i);
-                let add = |row: &mut [f64], columns: std::ops::Range<usize>| {
-                    let entries = system.hessian[i][columns.clone()].iter().zip(&system.stretch[columns]);
-                    row.iter_mut().zip(entries).for_each(|(r, (h, s))| *r += h + weight * s);
-                };
-                add(near, i..split);
-                add(&mut far[skipped..], split..M);
+            let at = l.element(e);
+            let gap = gamma * g[C - 1];
+            let residual = self.residual[at..at + C].iter_mut().zip(&system.gradient);
+            residual.for_each(|(r, g)| *r += g);
+            let correction = self.correction[at..at + C].iter_mut().zip(&system.stretch);
+            correction.for_each(|(r, s)| *r += gap * s);
+            if HESSIAN {
+                self.matrix.add_rows(at, &system.rows);
             }
-            if !HESSIAN {
-                continue;
-            }
-            // Now the flexibility of the transformed multiplier.
-            let extra = data.flexibility - data.flexibility / (1.0 - gamma * data.flexibility);
-            self.matrix.row_mut(l.row(e, n_at))[0] += extra;
         }
     }
 

@@ -21,8 +21,6 @@ impl<const C: usize> Layout<C> {
     pub const TWIST: bool = C > PLAIN;
     /// Unknowns a node.
     pub const BLOCK: usize = if Self::TWIST { 8 } else { 6 };
-    /// Local unknowns of an element before the place of the N of the element before.
-    pub(super) const BEFORE: usize = if Self::TWIST { 6 } else { 5 };
     const X: usize = if Self::TWIST { 1 } else { 0 };
 
     /// Number of unknowns of a rod with `elements` elements, with the rows of end supports.
@@ -66,15 +64,15 @@ impl<const C: usize> Layout<C> {
         Self::BLOCK * (elements + 1)
     }
 
-    /// Row of local unknown `k` of element `e`, in the order of [`super::element`].
+    /// Row of the first unknown of element `e`, its x₀. The element's unknowns are in `C` rows from there.
     #[inline]
-    pub(super) const fn row(self, e: usize, k: usize) -> usize {
-        let base = Self::BLOCK * e;
-        if Self::TWIST {
-            // x₀ t₀ θ₀ are 1..7, the N of the element before is 7, b x₁ t₁ θ₁ N are 8..16.
-            base + if k < Self::BEFORE { k + 1 } else { k + 2 }
-        } else {
-            base + if k < Self::BEFORE { k } else { k + 1 }
-        }
+    pub(super) const fn element(self, e: usize) -> usize {
+        Self::BLOCK * e + Self::X
+    }
+
+    /// First of the position unknowns of an element's second node, counted from [`Self::element`].
+    #[inline]
+    pub(super) const fn second(self) -> usize {
+        Self::BLOCK
     }
 }

@@ -69,6 +69,16 @@ impl<const C: usize> BandMatrix<C> {
         &mut self.rows[i]
     }
 
+    /// Adds `C` consecutive rows, the first to row `at`.
+    #[inline]
+    pub fn add_rows(&mut self, at: usize, rows: &[[f64; C]; C]) {
+        for (row, added) in self.rows[at..at + C].iter_mut().zip(rows) {
+            for k in 0..C {
+                row[k] += added[k];
+            }
+        }
+    }
+
     /// Turns row and column `i` into those of the identity: the unknown is held.
     pub fn hold(&mut self, i: usize) {
         for k in 1..C.min(i + 1) {
