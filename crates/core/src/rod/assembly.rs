@@ -18,7 +18,7 @@ use super::layout::Layout;
 use super::quadrature::{Point, hermite};
 use super::state::RodState;
 use crate::Vec3;
-use crate::solve::BandMatrix;
+use crate::solve::{BandMatrix, Shift};
 use nalgebra::Matrix3;
 
 /// A rank-one addition p qᵀ to the matrix that is not symmetric: loads that follow the rod.
@@ -114,17 +114,18 @@ impl<const C: usize> Assembly<C> {
             element_system::<C, HESSIAN>(data, &state.element(e), gamma, &mut system);
             self.energy.add(&system.energy);
             let g = &system.gradient;
-            let force = g[0].abs().max(g[1].abs()).max(g[2].abs());
-            let moment = g[3].abs().max(g[4].abs());
+            let (x, t) = (l.position(0), l.tangent(0));
+            let force = g[x].abs().max(g[x + 1].abs()).max(g[x + 2].abs());
+            let moment = g[t].abs().max(g[t + 1].abs());
             self.scale = [self.scale[0].max(force), self.scale[1].max(moment)];
-            let at = l.element(e);
+            let at = Layout::<C>::BLOCK * e;
             let gap = gamma * g[C - 1];
             let residual = self.residual[at..at + C].iter_mut().zip(&system.gradient);
             residual.for_each(|(r, g)| *r += g);
             let correction = self.correction[at..at + C].iter_mut().zip(&system.stretch);
             correction.for_each(|(r, s)| *r += gap * s);
             if HESSIAN {
-                self.matrix.add_rows(at, &system.rows);
+                self.matrix.add_blocks(at, &system.rows);
             }
         }
     }
@@ -242,30 +243,35 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    /// Adds σ∫|δr′|² (and σ∫δθ²) to `matrix`: the stiffness of a uniform tension σ, which is what cures the negative
-    /// curvature of compression, the commonest kind.
-    pub fn add_shift(matrix: &mut BandMatrix<C>, elements: &[ElementData], sigma: f64) {
+    /// Sets `shift` to ∫|δr′|² (and ∫δθ²) of a rod of which the rows in `held` are held: the stiffness of a uniform unit tension,
+    /// which is what cures the negative curvature of compression, the commonest kind.
+    pub fn unit_shift(elements: &[ElementData], held: &[Option<usize>], shift: &mut Shift) {
         let l = Layout::<C>;
+        shift.reset(Layout::<C>::dimension(elements.len()));
         for (e, data) in elements.iter().enumerate() {
-            let across = 1.5 * sigma / data.length;
-            let along = 0.5 * sigma * data.length;
+            let across = 1.5 / data.length;
+            let along = 0.5 * data.length;
             for a in 0..3 {
                 let (p, q) = (l.position(e) + a, l.position(e + 1) + a);
-                matrix.add(p, p, across);
-                matrix.add(q, q, across);
-                matrix.add(p, q, -across);
+                shift.diagonal[p] += across;
+                shift.diagonal[q] += across;
+                shift.next[p] -= across;
             }
             for i in [e, e + 1] {
                 for a in 0..2 {
-                    matrix.add(l.tangent(i) + a, l.tangent(i) + a, along);
+                    shift.diagonal[l.tangent(i) + a] += along;
                 }
                 if Layout::<C>::TWIST {
-                    matrix.add(l.angle(i), l.angle(i), along);
+                    shift.diagonal[l.angle(i)] += along;
                 }
             }
             if Layout::<C>::TWIST {
-                matrix.add(l.bubble(e), l.bubble(e), along);
+                shift.diagonal[l.bubble(e)] += along;
             }
+        }
+        for row in held.iter().flatten() {
+            shift.diagonal[*row] = 0.0;
+            shift.next[*row] = 0.0;
         }
     }
 }

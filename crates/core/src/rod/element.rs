@@ -180,13 +180,13 @@ pub(super) fn angles(a: &[f64; 3], p: &super::quadrature::Point) -> (f64, f64) {
     )
 }
 
-/// Gradient and upper triangle of the Hessian in the element's unknowns, as `C` consecutive rows of the band
-/// ([`super::layout`]): 11 without twist, 14 with it, and the row of the element before's N, which is empty.
+/// Gradient and upper triangle of the Hessian in the unknowns of the element's nodes, in the order of [`super::layout`]. Those
+/// that belong to the element before, its N and b at the first node, are empty.
 #[derive(Debug, Clone)]
 pub struct ElementSystem<const C: usize> {
     /// Gradient of the Lagrangian; the last entry is the constraint c − D N.
     pub gradient: [f64; C],
-    /// Hessian: row `i` holds entries `(i, i)` to `(i, C − 1)`, then zeros. The last one is that of N.
+    /// Hessian, upper triangle; the last column is that of N.
     pub rows: [[f64; C]; C],
     /// Derivative of the elongation c in the unknowns.
     pub stretch: [f64; C],
@@ -200,12 +200,13 @@ impl<const C: usize> ElementSystem<C> {
         let energy = Energy { bend: 0.0, twist: 0.0, axial: 0.0 };
         Self { gradient: [0.0; C], rows: [[0.0; C]; C], stretch: [0.0; C], energy }
     }
+}
 
-    /// Entry of the Hessian, `i` ≤ `j`.
-    #[inline(always)]
-    pub fn entry(&mut self, i: usize, j: usize) -> &mut f64 {
-        &mut self.rows[i][j - i]
-    }
+/// First places of x₀, t₀, x₁ and t₁.
+#[inline]
+const fn places<const C: usize>() -> [usize; 4] {
+    let l = Layout::<C>;
+    [l.position(0), l.tangent(0), l.position(1), l.tangent(1)]
 }
 
 /// The element's Lagrangian with derivatives; the Hessian only where `HESSIAN` is set, and with the augmentation `gamma` (γ
@@ -217,7 +218,6 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
     gamma: f64,
     out: &mut ElementSystem<C>,
 ) {
-    let l = Layout::<C>;
     let h = data.length;
     let ih = 1.0 / h;
     let (t0, t1) = (s.first.t, s.second.t);
@@ -263,7 +263,7 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
     g1 = g1 * f + t0 * turn - pull / 6.0;
 
     let ct = m * (-h / 6.0);
-    let (x0_at, t0_at, x1_at, t1_at) = (0, 3, l.second(), l.second() + 3);
+    let [x0_at, t0_at, x1_at, t1_at] = places::<C>();
     let (d0, d1) = ([s.first.u, s.first.v], [s.second.u, s.second.v]);
     let gx = ge * ih;
     out.gradient = [0.0; C];
@@ -285,9 +285,9 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
         let factors = Factors { stored, arc, mean, speed, length: h, tension: s.tension, gamma };
         add_hessian(s, ih, &second.complete(&factors), out);
         // With the augmentation goes the flexibility of the transformed multiplier.
-        out.rows[C - 1][0] = -data.flexibility / (1.0 - gamma * data.flexibility);
+        out.rows[C - 1][C - 1] = -data.flexibility / (1.0 - gamma * data.flexibility);
         for i in 0..C - 1 {
-            out.rows[i][C - 1 - i] = out.stretch[i];
+            out.rows[i][C - 1] = out.stretch[i];
         }
     }
     if Layout::<C>::TWIST {
@@ -299,8 +299,7 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
 /// Sets the rows of the Hessian from derivatives in the invariants.
 #[inline(always)]
 fn add_hessian<const C: usize>(s: &ElementState, ih: f64, v: &Derivatives, out: &mut ElementSystem<C>) {
-    let (x0_at, t0_at) = (0, 3);
-    let (x1_at, t1_at) = (Layout::<C>.second(), Layout::<C>.second() + 3);
+    let [x0_at, t0_at, x1_at, t1_at] = places::<C>();
     let (e, t0, t1) = (s.chord, s.first.t, s.second.t);
     let (d0, d1) = ([s.first.u, s.first.v], [s.second.u, s.second.v]);
     let ([vs, vp, vq, vr], vv) = (v.first, &v.second);
@@ -318,10 +317,10 @@ fn add_hessian<const C: usize>(s: &ElementState, ih: f64, v: &Derivatives, out: 
             if i == j {
                 value += 2.0 * vs * ih * ih;
             }
-            *out.entry(x0_at + i, x0_at + j) = value;
-            *out.entry(x1_at + i, x1_at + j) = value;
-            *out.entry(x0_at + i, x1_at + j) = -value;
-            *out.entry(x0_at + j, x1_at + i) = -value;
+            out.rows[x0_at + i][x0_at + j] = value;
+            out.rows[x1_at + i][x1_at + j] = value;
+            out.rows[x0_at + i][x1_at + j] = -value;
+            out.rows[x0_at + j][x1_at + i] = -value;
         }
     }
     // ∇g in the turns of the tangents: of e·t₀ and t₀·t₁ in those of t₀, of e·t₁ and t₀·t₁ in those of t₁.
@@ -333,10 +332,10 @@ fn add_hessian<const C: usize>(s: &ElementState, ih: f64, v: &Derivatives, out: 
         let column0 = wp * p[a] + wr * r0[a] + d0[a] * (vp * ih);
         let column1 = wq * q[a] + wr * r1[a] + d1[a] * (vq * ih);
         for i in 0..3 {
-            *out.entry(x0_at + i, t0_at + a) = -column0[i];
-            *out.entry(t0_at + a, x1_at + i) = column0[i];
-            *out.entry(x0_at + i, t1_at + a) = -column1[i];
-            *out.entry(x1_at + i, t1_at + a) = column1[i];
+            out.rows[x0_at + i][t0_at + a] = -column0[i];
+            out.rows[t0_at + a][x1_at + i] = column0[i];
+            out.rows[x0_at + i][t1_at + a] = -column1[i];
+            out.rows[x1_at + i][t1_at + a] = column1[i];
         }
         // Tangents turn on a sphere: ∇²(e·t₀) = −(e·t₀)I and so on.
         for b in a..2 {
@@ -348,11 +347,11 @@ fn add_hessian<const C: usize>(s: &ElementState, ih: f64, v: &Derivatives, out: 
                 first -= vp * along + vr * cosine;
                 last -= vq * across + vr * cosine;
             }
-            *out.entry(t0_at + a, t0_at + b) = first;
-            *out.entry(t1_at + a, t1_at + b) = last;
+            out.rows[t0_at + a][t0_at + b] = first;
+            out.rows[t1_at + a][t1_at + b] = last;
         }
         for b in 0..2 {
-            *out.entry(t0_at + a, t1_at + b) = (vv[1][2] * q[b] + vv[1][3] * r1[b]) * p[a]
+            out.rows[t0_at + a][t1_at + b] = (vv[1][2] * q[b] + vv[1][3] * r1[b]) * p[a]
                 + (vv[2][3] * q[b] + vv[3][3] * r1[b]) * r0[a]
                 + vr * d0[a].dot(&d1[b]);
         }

@@ -1,4 +1,4 @@
-//! The order of the unknowns, which makes the Newton matrix a band.
+//! The order of the unknowns, which makes the Newton matrix block tridiagonal.
 //!
 //! Node by node: without twist x (3), t (2), N — with it b, x (3), t (2), θ, N — where N and b belong to the element
 //! that **ends** at the node. A multiplier comes after every unknown it constrains: an inextensible element has
@@ -7,12 +7,12 @@
 //! rows for the multipliers of end supports. Rows without meaning (N and b of the first node, supports that are absent)
 //! hold the identity.
 
-/// Band rows without twist: half-bandwidth 11.
+/// Unknowns of two neighbouring nodes without twist.
 pub const PLAIN: usize = 12;
-/// Band rows with twist: half-bandwidth 14.
-pub const TWISTED: usize = 15;
+/// Unknowns of two neighbouring nodes with twist.
+pub const TWISTED: usize = 16;
 
-/// Places of the unknowns for a band of `C` numbers a row: [`PLAIN`] or [`TWISTED`].
+/// Places of the unknowns where two neighbouring nodes have `C`: [`PLAIN`] or [`TWISTED`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout<const C: usize>;
 
@@ -20,8 +20,9 @@ impl<const C: usize> Layout<C> {
     /// Whether there are angles.
     pub const TWIST: bool = C > PLAIN;
     /// Unknowns a node.
-    pub const BLOCK: usize = if Self::TWIST { 8 } else { 6 };
-    const X: usize = if Self::TWIST { 1 } else { 0 };
+    pub const BLOCK: usize = C / 2;
+    /// Place of the position among the unknowns of a node.
+    pub(super) const X: usize = if Self::TWIST { 1 } else { 0 };
 
     /// Number of unknowns of a rod with `elements` elements, with the rows of end supports.
     pub const fn dimension(elements: usize) -> usize {
@@ -62,17 +63,5 @@ impl<const C: usize> Layout<C> {
     #[inline]
     pub const fn support(self, elements: usize) -> usize {
         Self::BLOCK * (elements + 1)
-    }
-
-    /// Row of the first unknown of element `e`, its x₀. The element's unknowns are in `C` rows from there.
-    #[inline]
-    pub(super) const fn element(self, e: usize) -> usize {
-        Self::BLOCK * e + Self::X
-    }
-
-    /// First of the position unknowns of an element's second node, counted from [`Self::element`].
-    #[inline]
-    pub(super) const fn second(self) -> usize {
-        Self::BLOCK
     }
 }

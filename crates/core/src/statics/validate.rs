@@ -6,6 +6,9 @@ use crate::{Error, Result, Vec3};
 /// Most elements a case may ask for: far beyond use, far below what exhausts memory.
 const MAX_ELEMENTS: usize = 1_000_000;
 
+/// Tolerances that mean something: below, there is rounding alone; above, a shape that is no equilibrium would pass for one.
+const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-2;
+
 fn positive(name: &str, value: f64) -> Result<()> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
@@ -101,6 +104,15 @@ impl StaticCase {
             || self.solver.load_steps > 1_000_000
         {
             return Err(Error::parameter("solver", "0", "max_iterations and load_steps must be at least 1"));
+        }
+        let tolerance = self.solver.tolerance;
+        if !TOLERANCES.contains(&tolerance) {
+            let (least, most) = (TOLERANCES.start(), TOLERANCES.end());
+            return Err(Error::parameter(
+                "solver.tolerance",
+                tolerance,
+                format!("must be {least:e} to {most:e}: a part of the largest force in the rod"),
+            ));
         }
         Ok(())
     }
