@@ -386,6 +386,11 @@ impl<const C: usize> External<C> for WallContact<'_> {
         true
     }
 
+    /// Friction renews the normal forces it works with.
+    fn memoryless(&self) -> bool {
+        !self.friction.acts()
+    }
+
     /// A point may move by nearly its clearance: the ball about it holds no wall, so no wall is crossed on the way.
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         let mut fraction: f64 = 1.0;

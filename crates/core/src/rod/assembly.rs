@@ -82,7 +82,7 @@ impl<const C: usize> Assembly<C> {
     /// Clears everything and adds the rod's elements.
     pub fn assemble(&mut self, elements: &[ElementData], state: &RodState) {
         if self.hessian {
-            self.matrix.clear();
+            self.matrix.begin_blocks();
         }
         self.residual.fill(0.0);
         self.correction.fill(0.0);
@@ -125,7 +125,7 @@ impl<const C: usize> Assembly<C> {
             let correction = self.correction[at..at + C].iter_mut().zip(&system.stretch);
             correction.for_each(|(r, s)| *r += gap * s);
             if HESSIAN {
-                self.matrix.add_blocks(at, &system.rows);
+                self.matrix.lay_blocks(at, &system.rows);
             }
         }
     }

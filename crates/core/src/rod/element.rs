@@ -310,7 +310,10 @@ fn add_hessian<const C: usize>(s: &ElementState, ih: f64, v: &Derivatives, out: 
     let wp = product([vv[0][1], vv[1][1], vv[1][2]]);
     let wq = product([vv[0][2], vv[1][2], vv[2][2]]);
     let wr = product([vv[0][3], vv[1][3], vv[2][3]]);
-    out.rows = [[0.0; C]; C];
+    if Layout::<C>::TWIST {
+        // What is set below is the same every time; torsion adds to more.
+        out.rows = [[0.0; C]; C];
+    }
     for i in 0..3 {
         for j in i..3 {
             let mut value = by_x[0][i] * ws[j] + by_x[1][i] * wp[j] + by_x[2][i] * wq[j];

@@ -42,11 +42,6 @@ impl<const C: usize> BandMatrix<C> {
         self.rows.resize(dimension, [0.0; C]);
     }
 
-    /// Sets every entry to zero and keeps the memory.
-    pub fn clear(&mut self) {
-        self.rows.fill([0.0; C]);
-    }
-
     /// Adds `value` to entry `(i, j)` and, by symmetry, `(j, i)`. Entries outside the blocks are ignored; they can
     /// only be asked for by a caller that numbered its unknowns wrongly, which debug builds report.
     #[inline]
@@ -66,9 +61,17 @@ impl<const C: usize> BandMatrix<C> {
         self.rows.get(i).and_then(|row| row.get(column)).copied().unwrap_or(0.0)
     }
 
-    /// Adds the upper triangle of the rows of two blocks, the first of which begins at row `at`.
+    /// Begins a matrix that is put together with [`Self::lay_blocks`]: clears the first block and the last.
+    pub fn begin_blocks(&mut self) {
+        let last = self.rows.len() - Self::BLOCK;
+        self.rows[..Self::BLOCK].fill([0.0; C]);
+        self.rows[last..].fill([0.0; C]);
+    }
+
+    /// Adds the upper triangle of the rows of two blocks, the first of which begins at row `at`: what couples one node with the
+    /// next, node by node. What was in the second block before is overwritten.
     #[inline]
-    pub fn add_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
+    pub fn lay_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
         let targets = &mut self.rows[at..at + C];
         for i in 0..Self::BLOCK {
             for k in 0..C {
@@ -77,7 +80,8 @@ impl<const C: usize> BandMatrix<C> {
         }
         for i in Self::BLOCK..C {
             for k in 0..Self::BLOCK {
-                targets[i][k] += rows[i][Self::BLOCK + k];
+                targets[i][k] = rows[i][Self::BLOCK + k];
+                targets[i][Self::BLOCK + k] = 0.0;
             }
         }
     }
@@ -164,6 +168,18 @@ pub enum FactorError {
         /// The row.
         row: usize,
     },
+}
+
+/// Runs a block for every index below `$end` ≤ 8, each on its own: loops whose bounds hang on another index would not be unrolled,
+/// and their rows not kept in registers.
+macro_rules! unrolled {
+    ($i:ident in 0..$end:expr, $body:block) => { unrolled!(@ $i, $end, $body, 0 1 2 3 4 5 6 7) };
+    (@ $i:ident, $end:expr, $body:block, $($k:literal)*) => {
+        $({
+            let $i: usize = $k;
+            if $i < $end $body
+        })*
+    };
 }
 
 /// An LDLᵀ factorisation; its memory is reused from one factorisation to the next.
@@ -273,27 +289,41 @@ impl<const C: usize> Factor<C> {
         shift: Option<(&Shift, f64)>,
         b: &mut [f64],
     ) -> Result<Inertia, FactorError> {
-        let (n, block) = (self.dimension, C / 2);
+        const { assert!(C == 12 || C == 16, "a node has 6 or 8 unknowns") }
+        if C == 12 {
+            self.eliminate_blocks::<6, SOLVE>(matrix, shift, b)
+        } else {
+            self.eliminate_blocks::<8, SOLVE>(matrix, shift, b)
+        }
+    }
+
+    fn eliminate_blocks<const B: usize, const SOLVE: bool>(
+        &mut self,
+        matrix: &BandMatrix<C>,
+        shift: Option<(&Shift, f64)>,
+        b: &mut [f64],
+    ) -> Result<Inertia, FactorError> {
+        let n = self.dimension;
         let mut negative = 0;
         // What the block before takes from the block at hand.
-        let mut taken = [[0.0; C]; C];
-        for begin in (0..n).step_by(block) {
-            let rows = &mut self.rows[begin..begin + block];
-            let source = &matrix.rows[begin..begin + block];
-            for r in 0..block {
-                rows[r] = source[r];
-                if let Some((shift, factor)) = shift {
+        let mut taken = [[0.0; B]; B];
+        let (blocks, _) = self.rows[..n].as_chunks_mut::<B>();
+        let (sources, _) = matrix.rows.as_chunks::<B>();
+        for (k, (block, source)) in blocks.iter_mut().zip(sources).enumerate() {
+            let begin = k * B;
+            let mut rows = *source;
+            if let Some((shift, factor)) = shift {
+                for r in 0..B {
                     shift.add_to(begin + r, factor, &mut rows[r]);
                 }
-                for j in 0..block {
+            }
+            for r in 0..B {
+                for j in 0..B {
                     rows[r][j] -= taken[r][j];
                 }
             }
-            // The rows times D, before they are divided by it.
-            let mut scaled = [[0.0; C]; C];
-            for r in 0..block {
-                let row = rows[r];
-                let pivot = row[r];
+            unrolled!(r in 0..B, {
+                let pivot = rows[r][r];
                 if pivot == 0.0 {
                     return Err(FactorError::ZeroPivot { row: begin + r });
                 }
@@ -302,29 +332,31 @@ impl<const C: usize> Factor<C> {
                 }
                 negative += usize::from(pivot < 0.0);
                 let inverse = 1.0 / pivot;
-                let mut l = row;
-                for j in 0..C {
-                    l[j] *= inverse;
+                let mut l = [0.0; C];
+                for j in r + 1..C {
+                    l[j] = rows[r][j] * inverse;
                 }
-                for i in r + 1..block {
-                    for j in i..C {
-                        rows[i][j] -= l[i] * row[j];
+                unrolled!(i in 0..B, {
+                    if i > r {
+                        for j in i..C {
+                            rows[i][j] -= l[i] * rows[r][j];
+                        }
                     }
-                }
-                scaled[r] = row;
+                });
                 l[r] = inverse;
-                rows[r] = l;
-            }
-            taken = [[0.0; C]; C];
-            for i in 0..block {
-                for r in 0..block {
-                    for j in 0..block {
-                        taken[i][j] += rows[r][block + i] * scaled[r][block + j];
+                block[r] = l;
+            });
+            unrolled!(i in 0..B, {
+                let mut sum = [0.0; B];
+                for r in 0..B {
+                    for j in i..B {
+                        sum[j] += block[r][B + i] * rows[r][B + j];
                     }
                 }
-            }
+                taken[i] = sum;
+            });
             if SOLVE {
-                forward(rows, &mut b[begin..]);
+                forward(block, &mut b[begin..]);
             }
         }
         self.inertia = Inertia { positive: n - negative, negative };

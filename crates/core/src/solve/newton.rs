@@ -34,6 +34,10 @@ pub trait External<const C: usize> {
     fn obstructs(&self) -> bool {
         false
     }
+    /// Whether its energy hangs on the state alone, not on what [`External::add`] was given before.
+    fn memoryless(&self) -> bool {
+        false
+    }
     /// Part of the way from the state last given to [`External::add`] to `to` that crosses nothing.
     fn safe_fraction(&mut self, _elements: &[ElementData], _to: &RodState) -> f64 {
         1.0
@@ -260,8 +264,7 @@ impl<const C: usize> Newton<C> {
         let mut assembled = false;
         loop {
             if !std::mem::take(&mut assembled) {
-                let last = last_turn <= NEAR && QUADRATIC * last_turn * last_turn <= options.tolerance;
-                self.assembly.hessian = last_turn > SHORT && !last;
+                self.assembly.hessian = !residual_alone(last_turn, options.tolerance);
                 self.assemble_parts(elements, supports, external, state);
             }
             let mut size = self.residual(elements, external, supports, options.tolerance);
@@ -408,6 +411,18 @@ impl<const C: usize> Newton<C> {
             // What a step gains that is less than rounding, the energies need not be asked for.
             let blind =
                 minimum && supports.conditions() == 0 && turn <= SHORT && slope <= 0.0 && -slope <= rounding;
+            // Only where Newton's own step is taken, and the matrix says that it leads to a minimum. Axial forces stiffen the
+            // rod against bending over its length.
+            let newtons_turn = if minimum && shift == 0.0 && supports.conditions() == 0 {
+                let pulled =
+                    (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
+                turn.max(STIFFENING * pulled * WHISPER / whisper)
+            } else {
+                f64::INFINITY
+            };
+            let turn_of = |fraction: f64| if fraction == 1.0 { newtons_turn } else { f64::INFINITY };
+            // The first trial is nearly always taken: the energy is asked for together with what the next iteration begins with.
+            let bold = supports.conditions() == 0 && !follows && external.memoryless();
             let mut accepted = None;
             let mut refused = None;
             let old_multipliers = supports.multipliers;
@@ -434,7 +449,17 @@ impl<const C: usize> Newton<C> {
                     accepted = Some(record(change, change, alpha));
                     break;
                 }
-                let energy_change = self.energy(elements, external, state) - before;
+                let bold = bold && attempt == 0;
+                let energy_change = if bold {
+                    assembled = true;
+                    self.assembly.hessian = !residual_alone(turn_of(alpha), options.tolerance);
+                    let trial = std::mem::take(&mut self.trial);
+                    self.assemble_parts(elements, supports, external, &trial);
+                    self.trial = trial;
+                    self.assembly.energy.total() + self.assembly.external_energy - before
+                } else {
+                    self.energy(elements, external, state) - before
+                };
                 let change = energy_change + weigh(&supports.gaps(&self.trial)) - weighed;
                 let enough = change <= 1e-4 * alpha * slope.min(0.0) + rounding;
                 // On a path of unstable states the energy says nothing; steps there are short and Newton's own.
@@ -469,6 +494,10 @@ impl<const C: usize> Newton<C> {
                     accepted = Some(record(energy_change, change, alpha));
                     break;
                 }
+                if bold {
+                    self.assembly.hessian = false;
+                    self.assemble_parts(elements, supports, external, state);
+                }
                 if external.obstructs() {
                     refused = Some(alpha);
                 }
@@ -490,18 +519,16 @@ impl<const C: usize> Newton<C> {
                 }
                 return report;
             };
-            // Only where Newton's own step was taken, and the matrix says that it leads to a minimum. Axial forces stiffen the
-            // rod against bending over its length.
-            last_turn = if minimum && shift == 0.0 && record.fraction == 1.0 && supports.conditions() == 0 {
-                let pulled =
-                    (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
-                turn.max(STIFFENING * pulled * WHISPER / whisper)
-            } else {
-                f64::INFINITY
-            };
+            last_turn = turn_of(record.fraction);
             self.steps.push(record);
             std::mem::swap(state, &mut self.trial);
             supports.follow(state);
         }
     }
+}
+
+/// Whether a whole step of Newton's method that turned nodes by no more than `last_turn` ends so near to the equilibrium that the
+/// residual alone is looked at.
+fn residual_alone(last_turn: f64, tolerance: f64) -> bool {
+    last_turn <= SHORT || (last_turn <= NEAR && QUADRATIC * last_turn * last_turn <= tolerance)
 }
