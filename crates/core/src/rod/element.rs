@@ -45,7 +45,7 @@ impl ElementData {
     #[inline]
     pub fn augmentation(&self) -> f64 {
         let h = self.length;
-        let across = 12.0 * (self.bending[0] + self.bending[1] + self.bending[2]) / (3.0 * h * h * h);
+        let across = 4.0 * (self.bending[0] + self.bending[1] + self.bending[2]) / (h * h * h);
         if self.flexibility > 0.0 { across.min(0.5 / self.flexibility) } else { across }
     }
 
@@ -243,7 +243,8 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
     // The middle: m = r′/|r′| with r′ = 1.5 e − ¼(t₀ + t₁).
     let mid = mid_slope(&t0, &s.chord, &t1);
     let speed = mid.norm();
-    let m = mid / speed;
+    let slow = 1.0 / speed;
+    let m = mid * slow;
 
     // Times the factor f = g(t₀·t₁) (1 + 2|r′|)/3: f ∇U + U ∇f. ∇|r′| = m (1.5, −¼, −¼).
     let arc = arc_factor(&t0, &t1);
@@ -259,8 +260,9 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
     let pull = m * (arc.0 * stored + h * s.tension);
     let turn = arc.1 * mean * stored;
     ge = ge * f + pull;
-    g0 = g0 * f + t1 * turn - pull / 6.0;
-    g1 = g1 * f + t0 * turn - pull / 6.0;
+    let ends = pull * (1.0 / 6.0);
+    g0 = g0 * f + t1 * turn - ends;
+    g1 = g1 * f + t0 * turn - ends;
 
     let ct = m * (-h / 6.0);
     let [x0_at, t0_at, x1_at, t1_at] = places::<C>();
@@ -282,7 +284,7 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
     }
     out.gradient[C - 1] = c - data.flexibility * s.tension;
     if HESSIAN {
-        let factors = Factors { stored, arc, mean, speed, length: h, tension: s.tension, gamma };
+        let factors = Factors { stored, arc, mean, slow, length: h, tension: s.tension, gamma };
         add_hessian(s, ih, &second.complete(&factors), out);
         // With the augmentation goes the flexibility of the transformed multiplier.
         out.rows[C - 1][C - 1] = -data.flexibility / (1.0 - gamma * data.flexibility);

@@ -60,8 +60,8 @@ pub(super) struct Factors {
     pub(super) arc: (f64, f64, f64),
     /// Mean of |r′|.
     pub(super) mean: f64,
-    /// |r′(½)|.
-    pub(super) speed: f64,
+    /// 1/|r′(½)|.
+    pub(super) slow: f64,
     /// Length h.
     pub(super) length: f64,
     /// Axial force.
@@ -93,10 +93,9 @@ impl Derivatives {
     pub(super) fn complete(&self, f: &Factors) -> Self {
         let (arc, slope, curve) = f.arc;
         // d|r′(½)| / d|r′(½)|² times ⅔, which mean speed (⅓ + ⅔|r′(½)|) and elongation (⅔h(|r′(½)| − 1)) share.
-        let rate = 1.0 / (3.0 * f.speed);
+        let rate = f.slow * (1.0 / 3.0);
         let force = arc * f.stored + f.length * f.tension;
-        let bend =
-            -0.5 * rate / (f.speed * f.speed) * force + f.gamma * (f.length * rate) * (f.length * rate);
+        let bend = -0.5 * rate * (f.slow * f.slow) * force + f.gamma * (f.length * rate) * (f.length * rate);
         let along = slope * rate * f.stored;
         let factor = arc * f.mean;
         let mut by = MIDDLE.map(|w| arc * rate * w);

@@ -262,6 +262,7 @@ impl<const C: usize> Newton<C> {
         let straightening: f64 = elements.iter().map(ElementData::straightening_energy).sum();
         let mut stalled = 0;
         let mut assembled = false;
+        let mut trusting = true;
         loop {
             if !std::mem::take(&mut assembled) {
                 self.assembly.hessian = !residual_alone(last_turn, options.tolerance);
@@ -421,8 +422,9 @@ impl<const C: usize> Newton<C> {
                 f64::INFINITY
             };
             let turn_of = |fraction: f64| if fraction == 1.0 { newtons_turn } else { f64::INFINITY };
-            // The first trial is nearly always taken: the energy is asked for together with what the next iteration begins with.
-            let bold = supports.conditions() == 0 && !follows && external.memoryless();
+            // Where the last step's first trial was taken this one's nearly always is: the energy is asked for together with what
+            // the next iteration begins with.
+            let bold = trusting && supports.conditions() == 0 && !follows && external.memoryless();
             let mut accepted = None;
             let mut refused = None;
             let old_multipliers = supports.multipliers;
@@ -450,6 +452,7 @@ impl<const C: usize> Newton<C> {
                     break;
                 }
                 let bold = bold && attempt == 0;
+                trusting = attempt == 0;
                 let energy_change = if bold {
                     assembled = true;
                     self.assembly.hessian = !residual_alone(turn_of(alpha), options.tolerance);
