@@ -5,7 +5,7 @@
 //! angle bubble b, the same of the second node, and the axial force N. Derivatives are those of the energy pulled
 //! back by that retraction, exact at the current state, so second derivatives hold the curvature of the sphere (−(g·t)I)
 //! and of the reference twist. Energy and gradient come from the vectors y and z of each Gauss point, the Hessian from the
-//! element's invariants ([`super::invariants`]).
+//! element's invariants (`invariants`).
 
 use super::bending::{bending, bending_value};
 use super::element_torsion::add_torsion;
