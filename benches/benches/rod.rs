@@ -5,7 +5,7 @@
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use endowire_core::Vec3;
 use endowire_core::rod::element::{ElementSystem, element_energy, element_system};
-use endowire_core::rod::{Energy, Frame, Layout, PLAIN, RodState, TWISTED};
+use endowire_core::rod::{Frame, Layout, PLAIN, RodState, TWISTED};
 use endowire_core::solve::{BandMatrix, Factor, Newton, NewtonOptions};
 use endowire_tests::bent_rod::{bent, clamp, elements, system, tip_load};
 use std::hint::black_box;
@@ -18,23 +18,13 @@ fn element(c: &mut Criterion) {
     let mut group = c.benchmark_group("element");
     group.bench_function("energy", |b| b.iter(|| element_energy(&elements[1], black_box(&s), false)));
     group.bench_function("energy twisted", |b| b.iter(|| element_energy(&elements[1], black_box(&s), true)));
-    let mut plain = ElementSystem::<11> {
-        gradient: [0.0; 11],
-        hessian: [[0.0; 11]; 11],
-        stretch: [0.0; 11],
-        energy: Energy::default(),
-    };
+    let mut plain = ElementSystem::<PLAIN>::zeros();
     group.bench_function("system", |b| {
-        b.iter(|| element_system::<_, true>(&elements[1], black_box(&s), &mut plain));
+        b.iter(|| element_system::<_, true>(&elements[1], black_box(&s), 1.0, &mut plain));
     });
-    let mut full = ElementSystem::<14> {
-        gradient: [0.0; 14],
-        hessian: [[0.0; 14]; 14],
-        stretch: [0.0; 14],
-        energy: Energy::default(),
-    };
+    let mut full = ElementSystem::<TWISTED>::zeros();
     group.bench_function("system twisted", |b| {
-        b.iter(|| element_system::<_, true>(&elements[1], black_box(&s), &mut full));
+        b.iter(|| element_system::<_, true>(&elements[1], black_box(&s), 1.0, &mut full));
     });
     group.finish();
 }

@@ -2,7 +2,7 @@
 
 use endowire_core::Vec3;
 use endowire_core::rod::{Assembly, ElementData, Frame, Layout, RodState, Supports};
-use endowire_core::solve::Newton;
+use endowire_core::solve::{Newton, Shift};
 use endowire_core::statics::Loads;
 
 /// `n` equal elements of EI = 1 in all; pre-curved if `twisted`.
@@ -48,8 +48,9 @@ pub fn system<const C: usize>(n: usize) -> (Vec<ElementData>, RodState, Newton<C
     (elements, state, newton)
 }
 
-/// Shifts and holds what was assembled.
+/// Shifts what was assembled.
 pub fn make_regular<const C: usize>(elements: &[ElementData], newton: &mut Newton<C>) {
-    Assembly::add_shift(&mut newton.assembly.matrix, elements, 50.0);
-    clamp().hold(&mut newton.assembly);
+    let mut shift = Shift::default();
+    Assembly::<C>::unit_shift(elements, &clamp().held::<C>(), &mut shift);
+    newton.assembly.matrix.add_shift(&shift, 50.0);
 }

@@ -146,6 +146,23 @@ fn same_input_same_bits() {
 }
 
 #[test]
+fn a_tolerance_saves_iterations_and_costs_what_it_says() {
+    let mut case = case("tip_force");
+    let exact = case.solve().expect("the case is valid");
+    let mut last = exact.iterations;
+    for tolerance in [1e-6, 1e-3] {
+        case.solver.tolerance = tolerance;
+        let s = case.solve().expect("the case is valid");
+        assert!(s.converged && s.stable && s.residual <= tolerance, "{tolerance:e}: {:e}", s.residual);
+        assert!(s.iterations < last, "{tolerance:e}: {} iterations, before {last}", s.iterations);
+        last = s.iterations;
+        // The load is PL²/EI = 10, and the tip gives by no more than L³/EI.
+        let off = (Vec3::from(s.tip) - Vec3::from(exact.tip)).norm();
+        assert!(off > 0.0 && off <= 10.0 * tolerance, "{tolerance:e}: the tip is off by {off:e}");
+    }
+}
+
+#[test]
 fn load_steps_and_one_step_agree() {
     let mut c = case("load_steps");
     let stepped = c.solve().unwrap();
@@ -193,6 +210,9 @@ fn bad_cases_name_what_is_wrong() {
         ("type = \"free\"", "type = \"welded\"", "welded"),
         ("at = 1.0", "at = 1.5", "load[0].at"),
         ("value = [0.0, -10.0, 0.0]", "value = [0.0, inf, 0.0]", "load[0].value"),
+        ("[start]", "[solver]\ntolerance = 0.0\n[start]", "solver.tolerance"),
+        ("[start]", "[solver]\ntolerance = 0.1\n[start]", "solver.tolerance"),
+        ("[start]", "[solver]\ntolerance = nan\n[start]", "solver.tolerance"),
     ] {
         assert!(good.contains(from), "{from}");
         let error = parse(&good.replacen(from, to, 1)).unwrap_err();

@@ -27,7 +27,8 @@ pub(super) struct Place {
 
 impl Place {
     /// Nothing is known.
-    pub(super) const UNKNOWN: Self = Self { middle: Vec3::new(0.0, 0.0, 0.0), clearance_mm: f64::NEG_INFINITY, triangle: None };
+    pub(super) const UNKNOWN: Self =
+        Self { middle: Vec3::new(0.0, 0.0, 0.0), clearance_mm: f64::NEG_INFINITY, triangle: None };
 
     /// No wall is nearer to `x` than this, mm; negative where nothing is known.
     pub(super) fn clearance(&self, x: &Vec3) -> f64 {

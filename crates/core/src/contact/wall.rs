@@ -411,6 +411,11 @@ impl<const C: usize> External<C> for WallContact<'_> {
         true
     }
 
+    /// Friction renews the normal forces it works with.
+    fn memoryless(&self) -> bool {
+        !self.friction.acts()
+    }
+
     /// A point may move by nearly its clearance, whatever the direction: the ball about it holds no wall. Farther it may go where its
     /// straight way meets no wall, and nearly up to the wall where it does.
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {

@@ -18,7 +18,7 @@ use super::layout::Layout;
 use super::quadrature::{Point, hermite};
 use super::state::RodState;
 use crate::Vec3;
-use crate::solve::BandMatrix;
+use crate::solve::{BandMatrix, Shift};
 use nalgebra::Matrix3;
 
 /// A rank-one addition p qᵀ to the matrix that is not symmetric: loads that follow the rod.
@@ -82,7 +82,7 @@ impl<const C: usize> Assembly<C> {
     /// Clears everything and adds the rod's elements.
     pub fn assemble(&mut self, elements: &[ElementData], state: &RodState) {
         if self.hessian {
-            self.matrix.clear();
+            self.matrix.begin_blocks();
         }
         self.residual.fill(0.0);
         self.correction.fill(0.0);
@@ -90,15 +90,10 @@ impl<const C: usize> Assembly<C> {
         self.external_energy = 0.0;
         self.rank_ones.clear();
         self.scale = [0.0; 2];
-        match (Layout::<C>::TWIST, self.hessian) {
-            (true, true) => self.add_elements::<14, true>(elements, state),
-            (true, false) => self.add_elements::<14, false>(elements, state),
-            (false, true) => self.add_elements::<11, true>(elements, state),
-            (false, false) => self.add_elements::<11, false>(elements, state),
-        }
         if !self.hessian {
-            return;
+            return self.add_elements::<false>(elements, state);
         }
+        self.add_elements::<true>(elements, state);
         let l = Layout::<C>;
         // Rows without meaning.
         self.matrix.add(Layout::<C>::BLOCK - 1, Layout::<C>::BLOCK - 1, 1.0);
@@ -111,53 +106,27 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    fn add_elements<const M: usize, const HESSIAN: bool>(
-        &mut self,
-        elements: &[ElementData],
-        state: &RodState,
-    ) {
+    fn add_elements<const HESSIAN: bool>(&mut self, elements: &[ElementData], state: &RodState) {
         let l = Layout::<C>;
-        let n_at = M - 1;
-        let mut system = ElementSystem::<M> {
-            gradient: [0.0; M],
-            hessian: [[0.0; M]; M],
-            stretch: [0.0; M],
-            energy: Energy::default(),
-        };
+        let mut system = ElementSystem::<C>::zeros();
         for (e, data) in elements.iter().enumerate() {
-            element_system::<M, HESSIAN>(data, &state.element(e), &mut system);
+            let gamma = data.augmentation();
+            element_system::<C, HESSIAN>(data, &state.element(e), gamma, &mut system);
             self.energy.add(&system.energy);
             let g = &system.gradient;
-            let force = g[0].abs().max(g[1].abs()).max(g[2].abs());
-            let moment = g[3].abs().max(g[4].abs());
+            let (x, t) = (l.position(0), l.tangent(0));
+            let force = g[x].abs().max(g[x + 1].abs()).max(g[x + 2].abs());
+            let moment = g[t].abs().max(g[t + 1].abs());
             self.scale = [self.scale[0].max(force), self.scale[1].max(moment)];
-            let gamma = data.augmentation();
-            let gap = g[n_at];
-            for i in 0..M {
-                let at = l.row(e, i);
-                self.residual[at] += g[i];
-                let weight = gamma * system.stretch[i];
-                self.correction[at] += weight * gap;
-                if !HESSIAN {
-                    continue;
-                }
-                // Unknowns follow each other but for one place, that of the N before.
-                let (row, split) = (self.matrix.row_mut(at), Layout::<C>::BEFORE.max(i));
-                let skipped = usize::from(i < split);
-                let (near, far) = row.split_at_mut(split - i);
-                let add = |row: &mut [f64], columns: std::ops::Range<usize>| {
-                    let entries = system.hessian[i][columns.clone()].iter().zip(&system.stretch[columns]);
-                    row.iter_mut().zip(entries).for_each(|(r, (h, s))| *r += h + weight * s);
-                };
-                add(near, i..split);
-                add(&mut far[skipped..], split..M);
+            let at = Layout::<C>::BLOCK * e;
+            let gap = gamma * g[C - 1];
+            let residual = self.residual[at..at + C].iter_mut().zip(&system.gradient);
+            residual.for_each(|(r, g)| *r += g);
+            let correction = self.correction[at..at + C].iter_mut().zip(&system.stretch);
+            correction.for_each(|(r, s)| *r += gap * s);
+            if HESSIAN {
+                self.matrix.lay_blocks(at, &system.rows);
             }
-            if !HESSIAN {
-                continue;
-            }
-            // Now the flexibility of the transformed multiplier.
-            let extra = data.flexibility - data.flexibility / (1.0 - gamma * data.flexibility);
-            self.matrix.row_mut(l.row(e, n_at))[0] += extra;
         }
     }
 
@@ -274,30 +243,35 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    /// Adds σ∫|δr′|² (and σ∫δθ²) to `matrix`: the stiffness of a uniform tension σ, which is what cures the negative
-    /// curvature of compression, the commonest kind.
-    pub fn add_shift(matrix: &mut BandMatrix<C>, elements: &[ElementData], sigma: f64) {
+    /// Sets `shift` to ∫|δr′|² (and ∫δθ²) of a rod of which the rows in `held` are held: the stiffness of a uniform unit tension,
+    /// which is what cures the negative curvature of compression, the commonest kind.
+    pub fn unit_shift(elements: &[ElementData], held: &[Option<usize>], shift: &mut Shift) {
         let l = Layout::<C>;
+        shift.reset(Layout::<C>::dimension(elements.len()));
         for (e, data) in elements.iter().enumerate() {
-            let across = 1.5 * sigma / data.length;
-            let along = 0.5 * sigma * data.length;
+            let across = 1.5 / data.length;
+            let along = 0.5 * data.length;
             for a in 0..3 {
                 let (p, q) = (l.position(e) + a, l.position(e + 1) + a);
-                matrix.add(p, p, across);
-                matrix.add(q, q, across);
-                matrix.add(p, q, -across);
+                shift.diagonal[p] += across;
+                shift.diagonal[q] += across;
+                shift.next[p] -= across;
             }
             for i in [e, e + 1] {
                 for a in 0..2 {
-                    matrix.add(l.tangent(i) + a, l.tangent(i) + a, along);
+                    shift.diagonal[l.tangent(i) + a] += along;
                 }
                 if Layout::<C>::TWIST {
-                    matrix.add(l.angle(i), l.angle(i), along);
+                    shift.diagonal[l.angle(i)] += along;
                 }
             }
             if Layout::<C>::TWIST {
-                matrix.add(l.bubble(e), l.bubble(e), along);
+                shift.diagonal[l.bubble(e)] += along;
             }
+        }
+        for row in held.iter().flatten() {
+            shift.diagonal[*row] = 0.0;
+            shift.next[*row] = 0.0;
         }
     }
 }

@@ -8,9 +8,8 @@
 //! stretch as a whole changes nothing and the axial unknown is the axial force (see [`super::element`]).
 
 use crate::Vec3;
-use nalgebra::Matrix3;
 
-/// ½(AC − B²)/A^(5/2) with gradient and Hessian in (y, z).
+/// ½(AC − B²)/A^(5/2) with its gradient in (y, z) and its derivatives in (A, B, C).
 #[derive(Debug, Clone, Copy)]
 pub struct BendingDensity {
     /// Value.
@@ -19,12 +18,21 @@ pub struct BendingDensity {
     pub gy: Vec3,
     /// Gradient in z.
     pub gz: Vec3,
-    /// Second derivative in y, y.
-    pub hyy: Matrix3<f64>,
-    /// Second derivative in y (rows), z (columns).
-    pub hyz: Matrix3<f64>,
-    /// Second derivative in z, z.
-    pub hzz: Matrix3<f64>,
+    /// Derivatives in (A, B, C).
+    pub partials: Partials,
+}
+
+/// First and second derivatives of the density in A = y·y, B = y·z, C = z·z; those in (B, C) and (C, C) are zero.
+#[derive(Debug, Clone, Copy)]
+#[allow(missing_docs, reason = "named by what they are derivatives in")]
+pub struct Partials {
+    pub a: f64,
+    pub b: f64,
+    pub c: f64,
+    pub aa: f64,
+    pub ab: f64,
+    pub ac: f64,
+    pub bb: f64,
 }
 
 /// The density alone.
@@ -43,38 +51,21 @@ pub fn bending(y: &Vec3, z: &Vec3) -> BendingDensity {
     let b = y.dot(z);
     let c = z.dot(z);
     // a3 = A^(−3/2) and so on.
-    let a3 = a * a.sqrt();
+    let root = a.sqrt();
+    let a3 = a * root;
     let a5 = a3 * a;
     let a7 = a5 * a;
     let bb = b * b * a;
-    // Partial derivatives in (A, B, C); f_CC = f_BC = 0.
-    let fa = a5 * (1.25 * bb - 0.75 * c);
-    let fb = -b * a5;
-    let fc = 0.5 * a3;
-    let faa = a7 * (1.875 * c - 4.375 * bb);
-    let fab = 2.5 * b * a7;
-    let fac = -0.75 * a5;
-    let fbb = -a5;
-    let gy = y * (2.0 * fa) + z * fb;
-    let gz = y * fb + z * (2.0 * fc);
-    // yyᵀ, yzᵀ and zzᵀ carry all outer products.
-    let hyy = combine(y, z, 2.0 * fa, 4.0 * faa, 2.0 * fab, 2.0 * fab, fbb);
-    let hyz = combine(y, z, fb, 2.0 * fab, 4.0 * fac, fbb, 0.0);
-    let hzz = combine(y, z, 2.0 * fc, fbb, 0.0, 0.0, 0.0);
-    BendingDensity { value: bending_value(y, z), gy, gz, hyy, hyz, hzz }
-}
-
-/// `i·I + yy·yyᵀ + yz·yzᵀ + zy·zyᵀ + zz·zzᵀ`.
-#[inline]
-fn combine(y: &Vec3, z: &Vec3, i: f64, yy: f64, yz: f64, zy: f64, zz: f64) -> Matrix3<f64> {
-    let left = y * yy + z * zy;
-    let right = y * yz + z * zz;
-    let mut m = Matrix3::zeros();
-    for col in 0..3 {
-        for row in 0..3 {
-            m[(row, col)] = left[row] * y[col] + right[row] * z[col];
-        }
-        m[(col, col)] += i;
-    }
-    m
+    let partials = Partials {
+        a: a5 * (1.25 * bb - 0.75 * c),
+        b: -b * a5,
+        c: 0.5 * a3,
+        aa: a7 * (1.875 * c - 4.375 * bb),
+        ab: 2.5 * b * a7,
+        ac: -0.75 * a5,
+        bb: -a5,
+    };
+    let gy = y * (2.0 * partials.a) + z * partials.b;
+    let gz = y * partials.b + z * a3;
+    BendingDensity { value: 0.5 * y.cross(z).norm_squared() * a * a * root, gy, gz, partials }
 }

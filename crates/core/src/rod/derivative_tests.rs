@@ -4,6 +4,7 @@ use super::element::{
     ElementData, ElementState, ElementSystem, element_energy, element_system, elongation, mid_slope,
 };
 use super::frame::{Frame, reference_twist};
+use super::layout::{PLAIN, TWISTED};
 use crate::Vec3;
 
 fn noise(seed: &mut u64) -> f64 {
@@ -47,18 +48,18 @@ fn data(seed: &mut u64) -> ElementData {
     }
 }
 
-/// The Lagrangian after the unknowns have moved by `d` (13 entries and N).
-fn lagrangian(data: &ElementData, s: &ElementState, d: &[f64; 14]) -> f64 {
+/// The Lagrangian after the unknowns have moved by `d`; entries 0 and 7 are empty, the last one is N.
+fn lagrangian(data: &ElementData, s: &ElementState, d: &[f64; TWISTED]) -> f64 {
     let mut moved = *s;
-    moved.chord += (Vec3::new(d[7], d[8], d[9]) - Vec3::new(d[0], d[1], d[2])) / data.length;
-    moved.first = s.first.transported(d[3], d[4]);
-    moved.second = s.second.transported(d[10], d[11]);
+    moved.chord += (Vec3::new(d[9], d[10], d[11]) - Vec3::new(d[1], d[2], d[3])) / data.length;
+    moved.first = s.first.transported(d[4], d[5]);
+    moved.second = s.second.transported(d[12], d[13]);
     let before = reference_twist(&s.first, &s.second);
     let after = reference_twist(&moved.first, &moved.second);
-    moved.angles[0] += d[5];
-    moved.angles[1] += d[12] + after - before;
-    moved.angles[2] += d[6];
-    moved.tension += d[13];
+    moved.angles[0] += d[6];
+    moved.angles[1] += d[14] + after - before;
+    moved.angles[2] += d[8];
+    moved.tension += d[15];
     let rigid = ElementData { flexibility: 0.0, ..*data };
     let e = element_energy(&rigid, &moved, true);
     let c = elongation(data.length, &mid_slope(&moved.first.t, &moved.chord, &moved.second.t));
@@ -67,30 +68,25 @@ fn lagrangian(data: &ElementData, s: &ElementState, d: &[f64; 14]) -> f64 {
 
 /// Largest errors of gradient and Hessian, relative to their largest entries.
 fn errors(data: &ElementData, s: &ElementState, spoil: f64) -> (f64, f64) {
-    let mut out = ElementSystem {
-        gradient: [0.0; 14],
-        hessian: [[0.0; 14]; 14],
-        stretch: [0.0; 14],
-        energy: Default::default(),
-    };
-    element_system::<_, true>(data, s, &mut out);
+    let mut out = ElementSystem::<TWISTED>::zeros();
+    element_system::<_, true>(data, s, 0.0, &mut out);
     out.gradient[4] += spoil;
-    out.hessian[3][11] += spoil;
+    out.rows[4][13] += spoil;
     let at = |i: usize, a: f64, j: usize, b: f64| {
-        let mut d = [0.0; 14];
+        let mut d = [0.0; TWISTED];
         d[i] += a;
         d[j] += b;
         lagrangian(data, s, &d)
     };
     let step = 1e-3;
     let (mut eg, mut eh) = (0.0f64, 0.0f64);
-    let size_h = out.hessian.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+    let size_h = out.rows.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
     let size_g = out.gradient.iter().fold(0.1 * size_h, |m, v| m.max(v.abs()));
-    for i in 0..14 {
+    for i in 0..TWISTED {
         let first = |h: f64| (at(i, h, i, 0.0) - at(i, -h, i, 0.0)) / (2.0 * h);
         let g = (4.0 * first(step) - first(2.0 * step)) / 3.0;
         eg = eg.max((g - out.gradient[i]).abs() / size_g);
-        for j in i..14 {
+        for j in i..TWISTED {
             let second = |h: f64| {
                 if i == j {
                     (at(i, h, i, 0.0) - 2.0 * at(i, 0.0, i, 0.0) + at(i, -h, i, 0.0)) / (h * h)
@@ -99,7 +95,7 @@ fn errors(data: &ElementData, s: &ElementState, spoil: f64) -> (f64, f64) {
                 }
             };
             let v = (4.0 * second(step) - second(2.0 * step)) / 3.0;
-            eh = eh.max((v - out.hessian[i][j]).abs() / size_h);
+            eh = eh.max((v - out.rows[i][j]).abs() / size_h);
         }
     }
     (eg, eh)
@@ -107,11 +103,20 @@ fn errors(data: &ElementData, s: &ElementState, spoil: f64) -> (f64, f64) {
 
 #[test]
 fn element_derivatives_are_those_of_its_energy() {
-    // (turn of the tangent, deviation): nearly straight, random, strongly bent, nearly reversed.
-    for (angle, spread) in [(1e-6, 1e-6), (0.3, 0.2), (1.5, 0.1), (2.3, 0.05)] {
+    // (turn of the tangent, deviation, stretch): nearly straight, random, strongly bent, nearly reversed, strongly stretched,
+    // strongly pressed.
+    for (angle, spread, stretch) in [
+        (1e-6, 1e-6, 1.0),
+        (0.3, 0.2, 1.0),
+        (1.5, 0.1, 1.0),
+        (2.3, 0.05, 1.0),
+        (0.5, 0.1, 2.0),
+        (0.5, 0.1, 0.8),
+    ] {
         for seed in 1..30u64 {
             let mut s = seed * 77 + 5;
-            let (d, q) = (data(&mut s), state(&mut s, angle, spread));
+            let (d, mut q) = (data(&mut s), state(&mut s, angle, spread));
+            q.chord *= stretch;
             let (g, h) = errors(&d, &q, 0.0);
             assert!(g < 1e-8 && h < 5e-7, "angle {angle}, seed {seed}: gradient {g:e}, Hessian {h:e}");
         }
@@ -134,25 +139,83 @@ fn elements_with_and_without_twist_agree_where_nothing_twists() {
     d.rest_twist = [0.0; 3];
     d.torsion = [0.0; 3];
     q.angles = [0.0; 3];
-    let mut full = ElementSystem {
-        gradient: [0.0; 14],
-        hessian: [[0.0; 14]; 14],
-        stretch: [0.0; 14],
-        energy: Default::default(),
-    };
-    let mut plain = ElementSystem {
-        gradient: [0.0; 11],
-        hessian: [[0.0; 11]; 11],
-        stretch: [0.0; 11],
-        energy: Default::default(),
-    };
-    element_system::<_, true>(&d, &q, &mut full);
-    element_system::<_, true>(&d, &q, &mut plain);
-    let map = [0, 1, 2, 3, 4, 7, 8, 9, 10, 11, 13];
-    for i in 0..11 {
+    let (mut full, mut plain) = (ElementSystem::<TWISTED>::zeros(), ElementSystem::<PLAIN>::zeros());
+    element_system::<_, true>(&d, &q, 7.0, &mut full);
+    element_system::<_, true>(&d, &q, 7.0, &mut plain);
+    let map = [1, 2, 3, 4, 5, 7, 9, 10, 11, 12, 13, 15];
+    for i in 0..PLAIN {
         assert_eq!(plain.gradient[i], full.gradient[map[i]]);
-        for j in i..11 {
-            assert!((plain.hessian[i][j] - full.hessian[map[i]][map[j]]).abs() < 1e-13);
+        for j in i..PLAIN {
+            assert!((plain.rows[i][j] - full.rows[map[i]][map[j]]).abs() < 1e-13);
+        }
+    }
+}
+
+#[test]
+fn the_augmentation_is_the_square_of_the_stretch() {
+    let mut s = 31;
+    for (angle, spread) in [(1e-6, 1e-6), (0.3, 0.2), (1.5, 0.1)] {
+        let (d, q) = (data(&mut s), state(&mut s, angle, spread));
+        let gamma = d.augmentation();
+        let (mut with, mut without) = (ElementSystem::<PLAIN>::zeros(), ElementSystem::<PLAIN>::zeros());
+        element_system::<_, true>(&d, &q, gamma, &mut with);
+        element_system::<_, true>(&d, &q, 0.0, &mut without);
+        let last = PLAIN - 1;
+        assert_eq!(without.rows[last][last], -d.flexibility);
+        assert_eq!(with.rows[last][last], -d.flexibility / (1.0 - gamma * d.flexibility));
+        for i in 0..last {
+            assert_eq!(with.gradient[i], without.gradient[i]);
+            for j in i..last {
+                let added = with.rows[i][j] - without.rows[i][j];
+                let error = added - gamma * with.stretch[i] * with.stretch[j];
+                assert!(error.abs() < 1e-13 * gamma, "angle {angle}, ({i}, {j}): {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_hessian_of_a_nearly_straight_element_is_that_of_the_beam() {
+    // EI/h³ (12, 6h, 4h², 2h²) across, nothing along.
+    let first = Frame::new(Vec3::new(0.6, -0.3, 0.7), None);
+    for turn in [0.0, 1e-9] {
+        let second = first.transported(turn, 0.0);
+        let d = ElementData {
+            length: 0.5,
+            bending: [2.0; 3],
+            torsion: [1.0; 3],
+            rest_curvature: [[0.0; 2]; 3],
+            rest_twist: [0.0; 3],
+            flexibility: 0.0,
+        };
+        let q =
+            ElementState { first, second, chord: (first.t + second.t) * 0.5, tension: 0.0, angles: [0.0; 3] };
+        let mut out = ElementSystem::<PLAIN>::zeros();
+        element_system::<_, true>(&d, &q, 0.0, &mut out);
+        let (x0, t0, x1, t1) = (0, 3, 6, 9);
+        // A turn changes entries by its own size; beside it there is rounding of 192 along each pair of axes.
+        let room = 1e3 * turn + 1e-12;
+        let along = |i: usize, j: usize| first.u[i] * first.u[j] + first.v[i] * first.v[j];
+        for i in 0..3 {
+            for j in 0..3 {
+                let wanted = 12.0 * 2.0 / 0.125 * along(i, j);
+                assert!((out.rows[x0 + i][x1 + j] + wanted).abs() < room);
+                if j >= i {
+                    assert!((out.rows[x0 + i][x0 + j] - wanted).abs() < room);
+                    assert!((out.rows[x1 + i][x1 + j] - wanted).abs() < room);
+                }
+            }
+            let wanted = 6.0 * 2.0 / 0.25 * first.u[i];
+            for (entry, sign) in
+                [((x0 + i, t0), 1.0), ((t0, x1 + i), -1.0), ((x0 + i, t1), 1.0), ((x1 + i, t1), -1.0)]
+            {
+                assert!((out.rows[entry.0][entry.1] - sign * wanted).abs() < room);
+            }
+        }
+        for a in 0..2 {
+            assert!((out.rows[t0 + a][t0 + a] - 16.0).abs() < room);
+            assert!((out.rows[t1 + a][t1 + a] - 16.0).abs() < room);
+            assert!((out.rows[t0 + a][t1 + a] - 8.0).abs() < room);
         }
     }
 }

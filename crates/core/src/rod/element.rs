@@ -4,15 +4,17 @@
 //! (2: along u and v of its triad, moved by the smallest rotation), with twist its angle θ₀ and the element's
 //! angle bubble b, the same of the second node, and the axial force N. Derivatives are those of the energy pulled
 //! back by that retraction, exact at the current state, so second derivatives hold the curvature of the sphere (−(g·t)I)
-//! and of the reference twist.
+//! and of the reference twist. Energy and gradient come from the vectors y and z of each Gauss point, the Hessian from the
+//! element's invariants (`invariants`).
 
 use super::bending::{bending, bending_value};
 use super::element_torsion::add_torsion;
 use super::frame::Frame;
+use super::invariants::{Derivatives, Factors};
+use super::layout::Layout;
 use super::quadrature::GAUSS;
 use super::torsion::{TorsionInput, torsion_value};
 use crate::Vec3;
-use nalgebra::Matrix3;
 
 /// What an element is made of, sampled at its Gauss points.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +45,7 @@ impl ElementData {
     #[inline]
     pub fn augmentation(&self) -> f64 {
         let h = self.length;
-        let across = 12.0 * (self.bending[0] + self.bending[1] + self.bending[2]) / (3.0 * h * h * h);
+        let across = 4.0 * (self.bending[0] + self.bending[1] + self.bending[2]) / (h * h * h);
         if self.flexibility > 0.0 { across.min(0.5 / self.flexibility) } else { across }
     }
 
@@ -178,119 +180,100 @@ pub(super) fn angles(a: &[f64; 3], p: &super::quadrature::Point) -> (f64, f64) {
     )
 }
 
-/// Gradient and upper triangle of the Hessian in the element's `M` unknowns: 11 without twist, 14 with it.
+/// Gradient and upper triangle of the Hessian in the unknowns of the element's nodes, in the order of [`super::layout`]. Those
+/// that belong to the element before, its N and b at the first node, are empty.
 #[derive(Debug, Clone)]
-pub struct ElementSystem<const M: usize> {
+pub struct ElementSystem<const C: usize> {
     /// Gradient of the Lagrangian; the last entry is the constraint c − D N.
-    pub gradient: [f64; M],
-    /// Hessian, upper triangle; the last row is that of N.
-    pub hessian: [[f64; M]; M],
+    pub gradient: [f64; C],
+    /// Hessian, upper triangle; the last column is that of N.
+    pub rows: [[f64; C]; C],
     /// Derivative of the elongation c in the unknowns.
-    pub stretch: [f64; M],
+    pub stretch: [f64; C],
     /// Energies.
     pub energy: Energy,
 }
 
-/// Places of the unknowns of an element with `m` unknowns: (t₀, θ₀, b, x₁, t₁, θ₁, N); x₀ is first.
-pub(super) const fn places(m: usize) -> [usize; 7] {
-    if m == 14 { [3, 5, 6, 7, 10, 12, 13] } else { [3, 0, 0, 5, 8, 0, 10] }
+impl<const C: usize> ElementSystem<C> {
+    /// All zero.
+    pub const fn zeros() -> Self {
+        let energy = Energy { bend: 0.0, twist: 0.0, axial: 0.0 };
+        Self { gradient: [0.0; C], rows: [[0.0; C]; C], stretch: [0.0; C], energy }
+    }
 }
 
-/// The element's Lagrangian with derivatives, without augmentation; the Hessian only where `HESSIAN` is set.
+/// First places of x₀, t₀, x₁ and t₁.
 #[inline]
-pub fn element_system<const M: usize, const HESSIAN: bool>(
+const fn places<const C: usize>() -> [usize; 4] {
+    let l = Layout::<C>;
+    [l.position(0), l.tangent(0), l.position(1), l.tangent(1)]
+}
+
+/// The element's Lagrangian with derivatives; the Hessian only where `HESSIAN` is set, and with the augmentation `gamma` (γ
+/// in [`super::assembly`]; with 0 it is the Lagrangian's own).
+#[inline]
+pub fn element_system<const C: usize, const HESSIAN: bool>(
     data: &ElementData,
     s: &ElementState,
-    out: &mut ElementSystem<M>,
+    gamma: f64,
+    out: &mut ElementSystem<C>,
 ) {
-    let [t0_at, _, _, x1_at, t1_at, _, n_at] = places(M);
     let h = data.length;
     let ih = 1.0 / h;
     let (t0, t1) = (s.first.t, s.second.t);
 
-    // Bending in (e, t₀, t₁).
+    // Bending at unit speed, in (e, t₀, t₁).
     let mut energy = Energy::default();
     let (mut ge, mut g0, mut g1) = (Vec3::zeros(), Vec3::zeros(), Vec3::zeros());
-    let zero = Matrix3::zeros();
-    let (mut hee, mut he0, mut he1, mut h00, mut h01, mut h11) = (zero, zero, zero, zero, zero, zero);
+    let mut second = Derivatives::default();
     for (k, point) in GAUSS.iter().enumerate() {
         let (y, z) = point.derivatives(&s.chord, &t0, &t1);
         let f = bending(&y, &z);
         let scale = point.weight * data.bending[k] * ih;
         energy.bend += scale * f.value;
         let (gy, gz) = (f.gy * scale, f.gz * scale);
-        let ([ye, y0, y1], [ze, z0, z1]) = (point.y, point.z);
-        ge += gy * ye + gz * ze;
-        g0 += gy * y0 + gz * z0;
-        g1 += gy * y1 + gz * z1;
-        let (hyy, hyz, hzz) = (f.hyy * scale, f.hyz * scale, f.hzz * scale);
-        let hzy = hyz.transpose();
-        // Half products: derivative along y and z of the gradient in each vector.
-        let (ey, ez) = (hyy * ye + hzy * ze, hyz * ye + hzz * ze);
-        hee += ey * ye + ez * ze;
-        he0 += ey * y0 + ez * z0;
-        he1 += ey * y1 + ez * z1;
-        let (oy, oz) = (hyy * y0 + hzy * z0, hyz * y0 + hzz * z0);
-        h00 += oy * y0 + oz * z0;
-        h01 += oy * y1 + oz * z1;
-        h11 += hyy * (y1 * y1) + (hyz + hzy) * (y1 * z1) + hzz * (z1 * z1);
+        ge += gy * point.y[0] + gz * point.z[0];
+        g0 += gy * point.y[1] + gz * point.z[1];
+        g1 += gy * point.y[2] + gz * point.z[2];
+        if HESSIAN {
+            second.add_point(k, scale, &f.partials);
+        }
     }
 
-    // The middle: m = y/|y| with y = 1.5 e − ¼(t₀ + t₁).
+    // The middle: m = r′/|r′| with r′ = 1.5 e − ¼(t₀ + t₁).
     let mid = mid_slope(&t0, &s.chord, &t1);
     let speed = mid.norm();
-    let m = mid / speed;
+    let slow = 1.0 / speed;
+    let m = mid * slow;
 
-    // Times the factor f = g(t₀·t₁) (1 + 2|y|)/3: f ∇U + U ∇f, and so on. ∇|y| = m (1.5, −¼, −¼).
-    let (arc, slope, curve) = arc_factor(&t0, &t1);
+    // Times the factor f = g(t₀·t₁) (1 + 2|r′|)/3: f ∇U + U ∇f. ∇|r′| = m (1.5, −¼, −¼).
+    let arc = arc_factor(&t0, &t1);
     let stored = energy.bend;
     let mean = mean_speed(speed);
-    let f = arc * mean;
+    let f = arc.0 * mean;
     energy.bend *= f;
-    let ends = m * (arc / 6.0);
-    let (fe, f0, f1) = (m * arc, t1 * (slope * mean) - ends, t0 * (slope * mean) - ends);
-    // ∇∇f without the part of |y|'s own curvature, which joins that of the axial force below.
-    let (mt, cross) = (m * (2.0 / 3.0 * slope * stored), curve * mean * stored);
-    let bare = (ge, g0, g1);
-    ge = ge * f + fe * stored;
-    g0 = g0 * f + f0 * stored;
-    g1 = g1 * f + f1 * stored;
-    let both = |a: &Vec3, b: &Vec3| a * b.transpose();
-    let pee = both(&fe, &bare.0);
-    hee = hee * f + pee + pee.transpose();
-    he0 = he0 * f + both(&fe, &bare.1) + both(&bare.0, &f0) + both(&mt, &t1) * 1.5;
-    he1 = he1 * f + both(&fe, &bare.2) + both(&bare.0, &f1) + both(&mt, &t0) * 1.5;
-    let (p00, p11) = (both(&f0, &bare.1) - both(&mt, &t1) * 0.25, both(&f1, &bare.2) - both(&mt, &t0) * 0.25);
-    h00 = h00 * f + p00 + p00.transpose() + both(&t1, &t1) * cross;
-    h11 = h11 * f + p11 + p11.transpose() + both(&t0, &t0) * cross;
-    h01 = h01 * f + both(&f0, &bare.2) + both(&bare.1, &f1) + both(&t1, &t0) * cross
-        - (both(&mt, &t0) + both(&t1, &mt)) * 0.25
-        + Matrix3::identity() * (slope * mean * stored);
-
-    // Axial force at the middle: N c, c = ⅔h(|y| − 1).
+    // Axial force at the middle: N c, c = ⅔h(|r′| − 1). Its derivative in |r′| and that of f U are of one kind.
     let c = 2.0 / 3.0 * h * (speed - 1.0);
     if data.flexibility > 0.0 {
         energy.axial = 0.5 * c * c / data.flexibility;
     }
-    let ct = m * (-h / 6.0);
-    ge += m * (h * s.tension);
-    g0 += ct * s.tension;
-    g1 += ct * s.tension;
-    let across =
-        (Matrix3::identity() - m * m.transpose()) * ((2.0 / 3.0 * (h * s.tension + arc * stored)) / speed);
-    hee += across * 2.25;
-    he0 -= across * 0.375;
-    he1 -= across * 0.375;
-    h00 += across * 0.0625;
-    h01 += across * 0.0625;
-    h11 += across * 0.0625;
+    let pull = m * (arc.0 * stored + h * s.tension);
+    let turn = arc.1 * mean * stored;
+    ge = ge * f + pull;
+    let ends = pull * (1.0 / 6.0);
+    g0 = g0 * f + t1 * turn - ends;
+    g1 = g1 * f + t0 * turn - ends;
 
+    let ct = m * (-h / 6.0);
+    let [x0_at, t0_at, x1_at, t1_at] = places::<C>();
     let (d0, d1) = ([s.first.u, s.first.v], [s.second.u, s.second.v]);
     let gx = ge * ih;
+    out.gradient = [0.0; C];
+    out.stretch = [0.0; C];
     for i in 0..3 {
-        out.gradient[i] = -gx[i];
+        out.gradient[x0_at + i] = -gx[i];
         out.gradient[x1_at + i] = gx[i];
-        out.stretch[i] = -m[i];
+        out.stretch[x0_at + i] = -m[i];
         out.stretch[x1_at + i] = m[i];
     }
     for a in 0..2 {
@@ -299,54 +282,83 @@ pub fn element_system<const M: usize, const HESSIAN: bool>(
         out.stretch[t0_at + a] = ct.dot(&d0[a]);
         out.stretch[t1_at + a] = ct.dot(&d1[a]);
     }
-    out.gradient[n_at] = c - data.flexibility * s.tension;
-    out.stretch[n_at] = 0.0;
-    if M == 14 {
-        let [_, th0, b, _, _, th1, _] = places(M);
-        for i in [th0, b, th1] {
-            out.gradient[i] = 0.0;
-            out.stretch[i] = 0.0;
-        }
-    }
+    out.gradient[C - 1] = c - data.flexibility * s.tension;
     if HESSIAN {
-        out.hessian = [[0.0; M]; M];
-        let hxx = hee * (ih * ih);
-        for i in 0..3 {
-            for j in i..3 {
-                out.hessian[i][j] = hxx[(i, j)];
-                out.hessian[x1_at + i][x1_at + j] = hxx[(i, j)];
-            }
-            for j in 0..3 {
-                out.hessian[i][x1_at + j] = -hxx[(i, j)];
-            }
-        }
-        let (curve0, curve1) = (g0.dot(&t0), g1.dot(&t1));
-        for a in 0..2 {
-            let (column0, column1) = (he0 * d0[a] * ih, he1 * d1[a] * ih);
-            for i in 0..3 {
-                out.hessian[i][t0_at + a] = -column0[i];
-                out.hessian[t0_at + a][x1_at + i] = column0[i];
-                out.hessian[i][t1_at + a] = -column1[i];
-                out.hessian[x1_at + i][t1_at + a] = column1[i];
-            }
-            let (h00a, h10a, h11a) = (h00 * d0[a], h01.tr_mul(&d0[a]), h11 * d1[a]);
-            for b in 0..2 {
-                out.hessian[t0_at + a][t1_at + b] = h10a.dot(&d1[b]);
-                if b >= a {
-                    out.hessian[t0_at + a][t0_at + b] = h00a.dot(&d0[b]);
-                    out.hessian[t1_at + a][t1_at + b] = h11a.dot(&d1[b]);
-                }
-            }
-            out.hessian[t0_at + a][t0_at + a] -= curve0;
-            out.hessian[t1_at + a][t1_at + a] -= curve1;
-        }
-        out.hessian[n_at][n_at] = -data.flexibility;
-        for i in 0..n_at {
-            out.hessian[i][n_at] = out.stretch[i];
+        let factors = Factors { stored, arc, mean, slow, length: h, tension: s.tension, gamma };
+        add_hessian(s, ih, &second.complete(&factors), out);
+        // With the augmentation goes the flexibility of the transformed multiplier.
+        out.rows[C - 1][C - 1] = -data.flexibility / (1.0 - gamma * data.flexibility);
+        for i in 0..C - 1 {
+            out.rows[i][C - 1] = out.stretch[i];
         }
     }
-    if M == 14 {
-        add_torsion::<M, HESSIAN>(data, s, out, &mut energy);
+    if Layout::<C>::TWIST {
+        add_torsion::<C, HESSIAN>(data, s, out, &mut energy);
     }
     out.energy = energy;
+}
+
+/// Sets the rows of the Hessian from derivatives in the invariants.
+#[inline(always)]
+fn add_hessian<const C: usize>(s: &ElementState, ih: f64, v: &Derivatives, out: &mut ElementSystem<C>) {
+    let [x0_at, t0_at, x1_at, t1_at] = places::<C>();
+    let (e, t0, t1) = (s.chord, s.first.t, s.second.t);
+    let (d0, d1) = ([s.first.u, s.first.v], [s.second.u, s.second.v]);
+    let ([vs, vp, vq, vr], vv) = (v.first, &v.second);
+    // ∇g in x₁, and V_ij ∇gⱼ of them.
+    let by_x = [e * (2.0 * ih), t0 * ih, t1 * ih];
+    let product = |w: [f64; 3]| by_x[0] * w[0] + by_x[1] * w[1] + by_x[2] * w[2];
+    let ws = product([vv[0][0], vv[0][1], vv[0][2]]);
+    let wp = product([vv[0][1], vv[1][1], vv[1][2]]);
+    let wq = product([vv[0][2], vv[1][2], vv[2][2]]);
+    let wr = product([vv[0][3], vv[1][3], vv[2][3]]);
+    if Layout::<C>::TWIST {
+        // What is set below is the same every time; torsion adds to more.
+        out.rows = [[0.0; C]; C];
+    }
+    for i in 0..3 {
+        for j in i..3 {
+            let mut value = by_x[0][i] * ws[j] + by_x[1][i] * wp[j] + by_x[2][i] * wq[j];
+            if i == j {
+                value += 2.0 * vs * ih * ih;
+            }
+            out.rows[x0_at + i][x0_at + j] = value;
+            out.rows[x1_at + i][x1_at + j] = value;
+            out.rows[x0_at + i][x1_at + j] = -value;
+            out.rows[x0_at + j][x1_at + i] = -value;
+        }
+    }
+    // ∇g in the turns of the tangents: of e·t₀ and t₀·t₁ in those of t₀, of e·t₁ and t₀·t₁ in those of t₁.
+    let (p, r0) = ([e.dot(&d0[0]), e.dot(&d0[1])], [t1.dot(&d0[0]), t1.dot(&d0[1])]);
+    let (q, r1) = ([e.dot(&d1[0]), e.dot(&d1[1])], [t0.dot(&d1[0]), t0.dot(&d1[1])]);
+    let (along, across) = (e.dot(&t0), e.dot(&t1));
+    let cosine = t0.dot(&t1);
+    for a in 0..2 {
+        let column0 = wp * p[a] + wr * r0[a] + d0[a] * (vp * ih);
+        let column1 = wq * q[a] + wr * r1[a] + d1[a] * (vq * ih);
+        for i in 0..3 {
+            out.rows[x0_at + i][t0_at + a] = -column0[i];
+            out.rows[t0_at + a][x1_at + i] = column0[i];
+            out.rows[x0_at + i][t1_at + a] = -column1[i];
+            out.rows[x1_at + i][t1_at + a] = column1[i];
+        }
+        // Tangents turn on a sphere: ∇²(e·t₀) = −(e·t₀)I and so on.
+        for b in a..2 {
+            let mut first =
+                (vv[1][1] * p[b] + vv[1][3] * r0[b]) * p[a] + (vv[1][3] * p[b] + vv[3][3] * r0[b]) * r0[a];
+            let mut last =
+                (vv[2][2] * q[b] + vv[2][3] * r1[b]) * q[a] + (vv[2][3] * q[b] + vv[3][3] * r1[b]) * r1[a];
+            if a == b {
+                first -= vp * along + vr * cosine;
+                last -= vq * across + vr * cosine;
+            }
+            out.rows[t0_at + a][t0_at + b] = first;
+            out.rows[t1_at + a][t1_at + b] = last;
+        }
+        for b in 0..2 {
+            out.rows[t0_at + a][t1_at + b] = (vv[1][2] * q[b] + vv[1][3] * r1[b]) * p[a]
+                + (vv[2][3] * q[b] + vv[3][3] * r1[b]) * r0[a]
+                + vr * d0[a].dot(&d1[b]);
+        }
+    }
 }

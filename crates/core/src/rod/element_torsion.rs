@@ -1,10 +1,20 @@
 //! Twist and rest curvature of one element: the part of its energy that sees the material frame.
 
 use super::element::{ElementData, ElementState, ElementSystem, Energy, angles};
+use super::layout::{Layout, TWISTED};
 use super::quadrature::GAUSS;
 use super::torsion::torsion;
 use crate::Vec3;
 use nalgebra::Matrix3;
+
+/// First places of an element's unknowns.
+const X0: usize = Layout::<TWISTED>.position(0);
+const T0: usize = Layout::<TWISTED>.tangent(0);
+const ANGLE0: usize = Layout::<TWISTED>.angle(0);
+const BUBBLE: usize = Layout::<TWISTED>.bubble(0);
+const X1: usize = Layout::<TWISTED>.position(1);
+const T1: usize = Layout::<TWISTED>.tangent(1);
+const ANGLE1: usize = Layout::<TWISTED>.angle(1);
 
 /// A derivative of the local unknowns: of the chord and the far tangent, both in the first triad, and of (φ₀, φ₁, b).
 #[derive(Clone, Copy)]
@@ -19,10 +29,10 @@ struct Local {
 /// Turns of either tangent move all local unknowns; displacements move the chord alone and angles themselves, so the
 /// chain rule needs products with four columns, not thirteen.
 #[inline]
-pub(super) fn add_torsion<const M: usize, const HESSIAN: bool>(
+pub(super) fn add_torsion<const C: usize, const HESSIAN: bool>(
     data: &ElementData,
     s: &ElementState,
-    out: &mut ElementSystem<M>,
+    out: &mut ElementSystem<C>,
     energy: &mut Energy,
 ) {
     let (f0, f1) = (&s.first, &s.second);
@@ -73,15 +83,14 @@ pub(super) fn add_torsion<const M: usize, const HESSIAN: bool>(
         Local { chord: Vec3::zeros(), end: u1, angles: spin(k1[0]) },
         Local { chord: Vec3::zeros(), end: v1, angles: spin(k1[1]) },
     ];
-    const TURNS: [usize; 4] = [3, 4, 10, 11];
-    // θ₀, θ₁ and b.
-    const ANGLES: [usize; 3] = [5, 12, 6];
+    const TURNS: [usize; 4] = [T0, T0 + 1, T1, T1 + 1];
+    const ANGLES: [usize; 3] = [ANGLE0, ANGLE1, BUBBLE];
     // From the first triad back to space.
     let axes = Matrix3::from_columns(&[f0.t, f0.u, f0.v]);
     let force = axes * gc * ih;
     for i in 0..3 {
-        out.gradient[i] -= force[i];
-        out.gradient[7 + i] += force[i];
+        out.gradient[X0 + i] -= force[i];
+        out.gradient[X1 + i] += force[i];
         out.gradient[ANGLES[i]] += ga[i];
     }
     for (d, row) in turns.iter().zip(TURNS) {
@@ -101,40 +110,40 @@ pub(super) fn add_torsion<const M: usize, const HESSIAN: bool>(
     let crossed = axes * hca * ih;
     for i in 0..3 {
         for j in 0..3 {
-            out.hessian[i][7 + j] -= stiffness[(i, j)];
+            out.rows[X0 + i][X1 + j] -= stiffness[(i, j)];
             if j >= i {
-                out.hessian[i][j] += stiffness[(i, j)];
-                out.hessian[7 + i][7 + j] += stiffness[(i, j)];
+                out.rows[X0 + i][X0 + j] += stiffness[(i, j)];
+                out.rows[X1 + i][X1 + j] += stiffness[(i, j)];
             }
-            out.hessian[i][ANGLES[j]] -= crossed[(i, j)];
+            out.rows[X0 + i][ANGLES[j]] -= crossed[(i, j)];
         }
         // θ₀ and b stand before x₁, θ₁ behind it.
-        out.hessian[5][7 + i] += crossed[(i, 0)];
-        out.hessian[7 + i][12] += crossed[(i, 1)];
-        out.hessian[6][7 + i] += crossed[(i, 2)];
+        out.rows[ANGLE0][X1 + i] += crossed[(i, 0)];
+        out.rows[X1 + i][ANGLE1] += crossed[(i, 1)];
+        out.rows[BUBBLE][X1 + i] += crossed[(i, 2)];
     }
     for (i, j, value) in [
-        (5, 5, haa[(0, 0)]),
-        (5, 12, haa[(0, 1)]),
-        (5, 6, haa[(0, 2)]),
-        (12, 12, haa[(1, 1)]),
-        (6, 12, haa[(1, 2)]),
-        (6, 6, haa[(2, 2)]),
+        (ANGLE0, ANGLE0, haa[(0, 0)]),
+        (ANGLE0, ANGLE1, haa[(0, 1)]),
+        (ANGLE0, BUBBLE, haa[(0, 2)]),
+        (ANGLE1, ANGLE1, haa[(1, 1)]),
+        (BUBBLE, ANGLE1, haa[(1, 2)]),
+        (BUBBLE, BUBBLE, haa[(2, 2)]),
     ] {
-        out.hessian[i][j] += value;
+        out.rows[i][j] += value;
     }
     for (a, &row) in TURNS.iter().enumerate() {
         let product = axes * products[a].chord * ih;
         for i in 0..3 {
-            out.hessian[i][row] -= product[i];
-            let (first, last) = if row < 7 { (row, 7 + i) } else { (7 + i, row) };
-            out.hessian[first][last] += product[i];
+            out.rows[X0 + i][row] -= product[i];
+            let (first, last) = if row < X1 { (row, X1 + i) } else { (X1 + i, row) };
+            out.rows[first][last] += product[i];
             let (first, last) = if row < ANGLES[i] { (row, ANGLES[i]) } else { (ANGLES[i], row) };
-            out.hessian[first][last] += products[a].angles[i];
+            out.rows[first][last] += products[a].angles[i];
         }
         for b in a..4 {
             let q = &turns[b];
-            out.hessian[row][TURNS[b]] += products[a].chord.dot(&q.chord)
+            out.rows[row][TURNS[b]] += products[a].chord.dot(&q.chord)
                 + products[a].end.dot(&q.end)
                 + products[a].angles.dot(&q.angles);
         }
@@ -144,9 +153,9 @@ pub(super) fn add_torsion<const M: usize, const HESSIAN: bool>(
     let gp = ga[1];
     for (w, gw) in [(&chord, &gc), (&end, &gt)] {
         let along = gw.dot(w);
-        out.hessian[3][3] += gw.z * w.z - along;
-        out.hessian[4][4] += gw.y * w.y - along;
-        out.hessian[3][4] -= 0.5 * (gw.y * w.z + gw.z * w.y);
+        out.rows[T0][T0] += gw.z * w.z - along;
+        out.rows[T0 + 1][T0 + 1] += gw.y * w.y - along;
+        out.rows[T0][T0 + 1] -= 0.5 * (gw.y * w.z + gw.z * w.y);
     }
     let turn = [
         (f0.u * gc.x - f0.t * gc.y) * ih, // along u
@@ -159,19 +168,19 @@ pub(super) fn add_torsion<const M: usize, const HESSIAN: bool>(
     let first = [Vec3::y(), Vec3::z()];
     for a in 0..2 {
         for i in 0..3 {
-            out.hessian[i][3 + a] -= turn[a][i];
-            out.hessian[3 + a][7 + i] += turn[a][i];
+            out.rows[X0 + i][T0 + a] -= turn[a][i];
+            out.rows[T0 + a][X1 + i] += turn[a][i];
         }
-        out.hessian[10 + a][10 + a] -= bends;
+        out.rows[T1 + a][T1 + a] -= bends;
         for b in 0..2 {
             let p = ends[b];
             // −ω × p for ω along the turn of the first triad.
             let swing = if a == 0 { gt.x * p.y - gt.y * p.x } else { gt.x * p.z - gt.z * p.x };
             let twist = 0.5 * c * (first[a].dot(&sum.cross(&p)) - (k0[a] * ends[b].x + k1[b] * end[1 + a]));
-            out.hessian[3 + a][10 + b] += swing + gp * twist;
+            out.rows[T0 + a][T1 + b] += swing + gp * twist;
             if b >= a {
-                out.hessian[3 + a][3 + b] -= 0.5 * c * gp * (k0[a] * end[1 + b] + k0[b] * end[1 + a]);
-                out.hessian[10 + a][10 + b] -= 0.5 * c * gp * (k1[a] * ends[b].x + k1[b] * ends[a].x);
+                out.rows[T0 + a][T0 + b] -= 0.5 * c * gp * (k0[a] * end[1 + b] + k0[b] * end[1 + a]);
+                out.rows[T1 + a][T1 + b] -= 0.5 * c * gp * (k1[a] * ends[b].x + k1[b] * ends[a].x);
             }
         }
     }

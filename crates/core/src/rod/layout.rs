@@ -1,4 +1,4 @@
-//! The order of the unknowns, which makes the Newton matrix a band.
+//! The order of the unknowns, which makes the Newton matrix block tridiagonal.
 //!
 //! Node by node: without twist x (3), t (2), N — with it b, x (3), t (2), θ, N — where N and b belong to the element
 //! that **ends** at the node. A multiplier comes after every unknown it constrains: an inextensible element has
@@ -7,12 +7,12 @@
 //! rows for the multipliers of end supports. Rows without meaning (N and b of the first node, supports that are absent)
 //! hold the identity.
 
-/// Band rows without twist: half-bandwidth 11.
+/// Unknowns of two neighbouring nodes without twist.
 pub const PLAIN: usize = 12;
-/// Band rows with twist: half-bandwidth 14.
-pub const TWISTED: usize = 15;
+/// Unknowns of two neighbouring nodes with twist.
+pub const TWISTED: usize = 16;
 
-/// Places of the unknowns for a band of `C` numbers a row: [`PLAIN`] or [`TWISTED`].
+/// Places of the unknowns where two neighbouring nodes have `C`: [`PLAIN`] or [`TWISTED`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout<const C: usize>;
 
@@ -20,10 +20,9 @@ impl<const C: usize> Layout<C> {
     /// Whether there are angles.
     pub const TWIST: bool = C > PLAIN;
     /// Unknowns a node.
-    pub const BLOCK: usize = if Self::TWIST { 8 } else { 6 };
-    /// Local unknowns of an element before the place of the N of the element before.
-    pub(super) const BEFORE: usize = if Self::TWIST { 6 } else { 5 };
-    const X: usize = if Self::TWIST { 1 } else { 0 };
+    pub const BLOCK: usize = C / 2;
+    /// Place of the position among the unknowns of a node.
+    pub(super) const X: usize = if Self::TWIST { 1 } else { 0 };
 
     /// Number of unknowns of a rod with `elements` elements, with the rows of end supports.
     pub const fn dimension(elements: usize) -> usize {
@@ -64,17 +63,5 @@ impl<const C: usize> Layout<C> {
     #[inline]
     pub const fn support(self, elements: usize) -> usize {
         Self::BLOCK * (elements + 1)
-    }
-
-    /// Row of local unknown `k` of element `e`, in the order of [`super::element`].
-    #[inline]
-    pub(super) const fn row(self, e: usize, k: usize) -> usize {
-        let base = Self::BLOCK * e;
-        if Self::TWIST {
-            // x₀ t₀ θ₀ are 1..7, the N of the element before is 7, b x₁ t₁ θ₁ N are 8..16.
-            base + if k < Self::BEFORE { k + 1 } else { k + 2 }
-        } else {
-            base + if k < Self::BEFORE { k } else { k + 1 }
-        }
     }
 }

@@ -22,6 +22,7 @@ pub mod clamp;
 pub mod element;
 mod element_torsion;
 pub mod frame;
+mod invariants;
 pub mod layout;
 pub mod quadrature;
 pub mod state;

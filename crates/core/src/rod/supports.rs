@@ -10,7 +10,6 @@ use super::element::ElementData;
 use super::layout::Layout;
 use super::state::RodState;
 use crate::Vec3;
-use crate::solve::BandMatrix;
 
 /// Flexibility of the end supports, as a fraction of the rod's own: above rounding, and so far below the shift that is always on
 /// that a shape which can turn freely between its supports still counts as neutral.
@@ -112,6 +111,12 @@ impl Supports {
         let l = Layout::<C>;
         let n = elements.len();
         let first = l.support(n);
+        if self.conditions() == 0 {
+            for j in 0..6 {
+                assembly.matrix.add(first + j, first + j, 1.0);
+            }
+            return;
+        }
         let gaps = self.gaps(state);
         let (mut forward, mut turning) = (0.0, 0.0);
         for data in elements {
@@ -168,17 +173,12 @@ impl Supports {
         held
     }
 
-    /// Holds the rows of the first node in a matrix.
-    pub fn hold_rows<const C: usize>(&self, matrix: &mut BandMatrix<C>) {
-        for row in self.held::<C>().into_iter().flatten() {
-            matrix.hold(row);
-        }
-    }
-
     /// Holds the rows of the first node and clears their residual.
     pub fn hold<const C: usize>(&self, assembly: &mut Assembly<C>) {
-        self.hold_rows(&mut assembly.matrix);
         for row in self.held::<C>().into_iter().flatten() {
+            if assembly.hessian {
+                assembly.matrix.hold(row);
+            }
             assembly.residual[row] = 0.0;
             assembly.correction[row] = 0.0;
         }

@@ -11,7 +11,7 @@ mod saddle;
 mod trial;
 mod unsymmetric;
 
-pub use band::{BandMatrix, Factor, FactorError, Inertia};
+pub use band::{BandMatrix, Factor, FactorError, Inertia, Shift};
 pub use newton::{External, Newton};
 pub use report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 pub use residual::ResidualSize;

@@ -6,13 +6,13 @@
 //! re-use the factorisation; once the conditions hold the merit is the energy again. Every accepted step lowers the merit.
 //!
 //! Each iteration: assemble, factor, look at the inertia. Minima have one negative pivot per multiplier; with more the
-//! matrix is shifted by the stiffness of a uniform tension ([`Assembly::add_shift`]) until they are right, so every
+//! matrix is shifted by the stiffness of a uniform tension ([`Assembly::unit_shift`]) until they are right, so every
 //! step descends. At an equilibrium that is not a minimum the method leaves along the direction of most negative
 //! curvature (inverse iteration with the shifted factor). A whisper of the shift stays on always: it makes states that
 //! can turn freely (a buckled column about its axis) solvable and cannot be seen in the result, since the
 //! residual is never shifted.
 
-use super::band::{BandMatrix, Factor, FactorError, Inertia};
+use super::band::{Factor, FactorError, Inertia, Shift};
 use super::report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
 
@@ -32,6 +32,10 @@ pub trait External<const C: usize> {
     }
     /// Whether it can stop a step short, as a wall does.
     fn obstructs(&self) -> bool {
+        false
+    }
+    /// Whether its energy hangs on the state alone, not on what [`External::add`] was given before.
+    fn memoryless(&self) -> bool {
         false
     }
     /// Part of the way from the state last given to [`External::add`] to `to` that crosses nothing.
@@ -55,6 +59,11 @@ const STEPS: usize = 1024;
 /// A whole Newton step that turned no node by more than this, in radians, ends so near to the equilibrium that the residual alone is
 /// looked at, …
 const SHORT: f64 = 1e-5;
+/// … or turned them so little that a method that converges quadratically is within the tolerance: by no more than `NEAR`, and the
+/// square of the turn times `QUADRATIC` is no more than the tolerance, …
+const NEAR: f64 = 1e-3;
+/// … as it is
+const QUADRATIC: f64 = 10.0;
 /// … where axial forces changed by less than 1 / STIFFENING of that times EI/L², …
 const STIFFENING: f64 = 1e-2;
 /// … and another step with the same factors leaves a residual smaller by the last turn times no more than this.
@@ -67,7 +76,7 @@ pub struct Newton<const C: usize> {
     pub assembly: Assembly<C>,
     /// Residual rows of the first node before they were held: its reactions.
     pub start_residual: [f64; 8],
-    shifted: BandMatrix<C>,
+    unit_shift: Shift,
     pub(super) factor: Factor<C>,
     pub(super) step: Vec<f64>,
     pub(super) spare: Vec<f64>,
@@ -85,7 +94,7 @@ impl<const C: usize> Newton<C> {
         Self {
             assembly: Assembly::new(elements),
             start_residual: [0.0; 8],
-            shifted: BandMatrix::zeros(n),
+            unit_shift: Shift::default(),
             factor: Factor::new(n),
             step: vec![0.0; n],
             spare: vec![0.0; n],
@@ -112,7 +121,6 @@ impl<const C: usize> Newton<C> {
             return;
         }
         self.assembly.resize(elements);
-        self.shifted.resize(n);
         self.factor.resize(n);
         for list in [&mut self.step, &mut self.spare].into_iter().chain(&mut self.columns) {
             list.resize(n, 0.0);
@@ -150,10 +158,8 @@ impl<const C: usize> Newton<C> {
 
     /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
     pub fn inertia(&mut self, elements: &[ElementData], supports: &Supports, sigma: f64) -> Option<Inertia> {
-        self.shifted.copy_from(&self.assembly.matrix);
-        Assembly::add_shift(&mut self.shifted, elements, sigma);
-        supports.hold_rows(&mut self.shifted);
-        self.factor.factor(&self.shifted).ok()
+        Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
+        self.factor.factor_shifted(&self.assembly.matrix, &self.unit_shift, sigma).ok()
     }
 
     /// Factors the assembled matrix with the shift that is always on, for [`Self::apply_inverse`].
@@ -197,21 +203,17 @@ impl<const C: usize> Newton<C> {
     /// Returns the shift, and the inertia under the whisper alone if that was tried and could be factored.
     fn factor_shifted(
         &mut self,
-        elements: &[ElementData],
-        supports: &Supports,
+        whisper: f64,
         last: f64,
         bare: bool,
         wanted: Option<usize>,
     ) -> Result<(f64, Option<Inertia>), StopReason> {
-        let whisper = Self::whisper(elements);
         let mut sigma = if bare || last < 8.0 * whisper { 0.0 } else { last / 8.0 };
         let mut natural = None;
         for attempt in 0..=SHIFTS {
             self.right_hand_side();
-            self.shifted.copy_from(&self.assembly.matrix);
-            Assembly::add_shift(&mut self.shifted, elements, whisper + sigma);
-            supports.hold_rows(&mut self.shifted);
-            let found = self.factor.consume_solve(&mut self.shifted, &mut self.step);
+            let Self { assembly, unit_shift, step, .. } = self;
+            let found = self.factor.factor_solve_shifted(&assembly.matrix, unit_shift, whisper + sigma, step);
             if sigma == 0.0 {
                 natural = found.ok();
             }
@@ -250,6 +252,8 @@ impl<const C: usize> Newton<C> {
         self.trial.copy_from(state);
         self.other.copy_from(state);
         self.steps.clear();
+        let whisper = Self::whisper(elements);
+        Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
         let mut last_turn = f64::INFINITY;
         let mut shift = 0.0f64;
         let mut penalty = [0.0f64; 2];
@@ -258,9 +262,10 @@ impl<const C: usize> Newton<C> {
         let straightening: f64 = elements.iter().map(ElementData::straightening_energy).sum();
         let mut stalled = 0;
         let mut assembled = false;
+        let mut trusting = true;
         loop {
             if !std::mem::take(&mut assembled) {
-                self.assembly.hessian = last_turn > SHORT;
+                self.assembly.hessian = !residual_alone(last_turn, options.tolerance);
                 self.assemble_parts(elements, supports, external, state);
             }
             let mut size = self.residual(elements, external, supports, options.tolerance);
@@ -295,7 +300,7 @@ impl<const C: usize> Newton<C> {
             let minimum = options.minimum && !follows;
             let wanted = minimum.then_some(multipliers);
             let (sigma, natural) = if self.assembly.hessian {
-                match self.factor_shifted(elements, supports, shift, arrived, wanted) {
+                match self.factor_shifted(whisper, shift, arrived, wanted) {
                     Ok(found) => found,
                     Err(reason) => {
                         report.reason = reason;
@@ -407,6 +412,19 @@ impl<const C: usize> Newton<C> {
             // What a step gains that is less than rounding, the energies need not be asked for.
             let blind =
                 minimum && supports.conditions() == 0 && turn <= SHORT && slope <= 0.0 && -slope <= rounding;
+            // Only where Newton's own step is taken, and the matrix says that it leads to a minimum. Axial forces stiffen the
+            // rod against bending over its length.
+            let newtons_turn = if minimum && shift == 0.0 && supports.conditions() == 0 {
+                let pulled =
+                    (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
+                turn.max(STIFFENING * pulled * WHISPER / whisper)
+            } else {
+                f64::INFINITY
+            };
+            let turn_of = |fraction: f64| if fraction == 1.0 { newtons_turn } else { f64::INFINITY };
+            // Where the last step's first trial was taken this one's nearly always is: the energy is asked for together with what
+            // the next iteration begins with.
+            let bold = trusting && supports.conditions() == 0 && !follows && external.memoryless();
             let mut accepted = None;
             let mut refused = None;
             let old_multipliers = supports.multipliers;
@@ -433,7 +451,18 @@ impl<const C: usize> Newton<C> {
                     accepted = Some(record(change, change, alpha));
                     break;
                 }
-                let energy_change = self.energy(elements, external, state) - before;
+                let bold = bold && attempt == 0;
+                trusting = attempt == 0;
+                let energy_change = if bold {
+                    assembled = true;
+                    self.assembly.hessian = !residual_alone(turn_of(alpha), options.tolerance);
+                    let trial = std::mem::take(&mut self.trial);
+                    self.assemble_parts(elements, supports, external, &trial);
+                    self.trial = trial;
+                    self.assembly.energy.total() + self.assembly.external_energy - before
+                } else {
+                    self.energy(elements, external, state) - before
+                };
                 let change = energy_change + weigh(&supports.gaps(&self.trial)) - weighed;
                 let enough = change <= 1e-4 * alpha * slope.min(0.0) + rounding;
                 // On a path of unstable states the energy says nothing; steps there are short and Newton's own.
@@ -468,6 +497,10 @@ impl<const C: usize> Newton<C> {
                     accepted = Some(record(energy_change, change, alpha));
                     break;
                 }
+                if bold {
+                    self.assembly.hessian = false;
+                    self.assemble_parts(elements, supports, external, state);
+                }
                 if external.obstructs() {
                     refused = Some(alpha);
                 }
@@ -489,18 +522,16 @@ impl<const C: usize> Newton<C> {
                 }
                 return report;
             };
-            // Only where Newton's own step was taken, and the matrix says that it leads to a minimum. Axial forces stiffen the
-            // rod against bending over its length.
-            last_turn = if minimum && shift == 0.0 && record.fraction == 1.0 && supports.conditions() == 0 {
-                let pulled =
-                    (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
-                turn.max(STIFFENING * pulled * WHISPER / Self::whisper(elements))
-            } else {
-                f64::INFINITY
-            };
+            last_turn = turn_of(record.fraction);
             self.steps.push(record);
             std::mem::swap(state, &mut self.trial);
             supports.follow(state);
         }
     }
+}
+
+/// Whether a whole step of Newton's method that turned nodes by no more than `last_turn` ends so near to the equilibrium that the
+/// residual alone is looked at.
+fn residual_alone(last_turn: f64, tolerance: f64) -> bool {
+    last_turn <= SHORT || (last_turn <= NEAR && QUADRATIC * last_turn * last_turn <= tolerance)
 }

@@ -9,7 +9,8 @@ pub struct NewtonOptions {
     pub max_iterations: usize,
     /// Residual over force scale below which a state is an equilibrium.
     pub tolerance: f64,
-    /// Largest rotation of a node in one step, in radians.
+    /// Largest rotation of a node in one step, in radians. Somewhat less than a right angle is best: a dead load across a rod turns it
+    /// by no more.
     pub max_turn: f64,
     /// Whether to look for a minimum (or take any equilibrium, as continuation does).
     pub minimum: bool,
@@ -17,7 +18,7 @@ pub struct NewtonOptions {
 
 impl Default for NewtonOptions {
     fn default() -> Self {
-        Self { max_iterations: 500, tolerance: 1e-10, max_turn: 1.0, minimum: true }
+        Self { max_iterations: 500, tolerance: 1e-10, max_turn: 1.4, minimum: true }
     }
 }
 

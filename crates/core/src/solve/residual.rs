@@ -35,34 +35,35 @@ impl<const C: usize> Newton<C> {
         moment = held[3..].iter().fold(moment, |m, v| m.max(v.abs()));
         let mut relative = 0.0f64;
         let (mut small, mut rounding) = (true, true);
+        let residual = &self.assembly.residual;
+        let (forces, least) = (force + moment / length, f64::EPSILON / 1e-16);
+        let mut before = 1.0 / (elements[0].length * elements[0].length);
         for i in 0..=n {
             let (a, b) = (&elements[i.saturating_sub(1)], &elements[i.min(n - 1)]);
+            let after = if i < n { 1.0 / (b.length * b.length) } else { before };
             let h = a.length.min(b.length);
-            let stiff = (a.bending[2] / (a.length * a.length)).max(b.bending[0] / (b.length * b.length));
-            let forces = force + moment / length;
+            let stiff = (a.bending[2] * before).max(b.bending[0] * after);
+            before = after;
             let moments = moment + force * h;
             // What rounding of unit vectors leaves of a force 12 EI/h² δ and of a moment 6 EI/h δ.
             let floor = 100.0 * f64::EPSILON * stiff;
-            let mut row = |value: f64, scale: f64, floor: f64| {
-                let value = value.abs();
+            let mut rows = |value: f64, scale: f64, floor: f64| {
                 small &= value <= tolerance * scale;
                 rounding &= value <= tolerance * scale + floor;
-                let r =
-                    if value <= 1e-3 * floor { 0.0 } else { value / (scale + floor / f64::EPSILON * 1e-16) };
-                relative = if r.is_nan() || relative.is_nan() { f64::NAN } else { relative.max(r) };
+                let r = if value <= 1e-3 * floor { 0.0 } else { value / (scale + floor / least) };
+                relative = larger(relative, r);
             };
-            for k in 0..3 {
-                row(self.assembly.residual[l.position(i) + k], forces, floor);
-            }
-            for k in 0..2 {
-                row(self.assembly.residual[l.tangent(i) + k], moments, floor * h);
-            }
+            let largest =
+                |from: usize, to: usize| residual[from..to].iter().fold(0.0, |m, v| larger(m, v.abs()));
+            rows(largest(l.position(i), l.position(i) + 3), forces, floor);
+            let mut turning = largest(l.tangent(i), l.tangent(i) + 2);
             if Layout::<C>::TWIST {
-                row(self.assembly.residual[l.angle(i)], moments, floor * h);
+                turning = larger(turning, residual[l.angle(i)].abs());
                 if i < n {
-                    row(self.assembly.residual[l.bubble(i)], moments, floor * h);
+                    turning = larger(turning, residual[l.bubble(i)].abs());
                 }
             }
+            rows(turning, moments, floor * h);
         }
         let first = l.support(n);
         for j in 0..6 {
@@ -70,8 +71,13 @@ impl<const C: usize> Newton<C> {
             let value = self.assembly.residual[first + j].abs() / scale;
             small &= value <= tolerance;
             rounding &= value <= tolerance;
-            relative = if value.is_nan() || relative.is_nan() { f64::NAN } else { relative.max(value) };
+            relative = larger(relative, value);
         }
         ResidualSize { relative, small, rounding }
     }
+}
+
+/// The larger of two numbers that are not negative, or NaN where one is.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
 }

@@ -1,6 +1,7 @@
 //! The schema of CASE.toml.
 
 use super::{StaticProblem, StaticSolution};
+use crate::solve::NewtonOptions;
 use crate::{Error, Result, input};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -196,11 +197,14 @@ pub struct Solver {
     pub max_iterations: usize,
     /// Number of equal load steps.
     pub load_steps: usize,
+    /// Largest force or moment out of balance at any node, as a part of the largest in the rod; 1e-14 to 1e-2.
+    pub tolerance: f64,
 }
 
 impl Default for Solver {
     fn default() -> Self {
-        Self { max_iterations: 500, load_steps: 1 }
+        let NewtonOptions { max_iterations, tolerance, .. } = NewtonOptions::default();
+        Self { max_iterations, load_steps: 1, tolerance }
     }
 }
 

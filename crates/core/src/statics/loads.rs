@@ -163,6 +163,10 @@ impl<const C: usize> External<C> for Loads {
         sum * self.factor
     }
 
+    fn memoryless(&self) -> bool {
+        true
+    }
+
     fn conservative(&self) -> bool {
         self.moments.is_empty() && self.followers.is_empty()
     }

@@ -138,8 +138,8 @@ impl StaticProblem {
             None if supports.conditions() > 0 => guess::towards_end(&elements, start, frame, &supports),
             None => guess::rest_shape(&elements, start, frame),
         };
-        let options =
-            NewtonOptions { max_iterations: case.solver.max_iterations, ..NewtonOptions::default() };
+        let (max_iterations, tolerance) = (case.solver.max_iterations, case.solver.tolerance);
+        let options = NewtonOptions { max_iterations, tolerance, ..NewtonOptions::default() };
         let load_steps = case.solver.load_steps;
         let first = case.rod.section[0].clone();
         Ok(Self { elements, supports, loads, initial, twisted, options, load_steps, gj_given, first })

@@ -2,21 +2,38 @@
 
 use super::case::{EndKind, LoadKind, Section, StartKind, StaticCase};
 use crate::{Error, Result, Vec3};
+use std::fmt::Display;
 
 /// Most elements a case may ask for: far beyond use, far below what exhausts memory.
 const MAX_ELEMENTS: usize = 1_000_000;
 
-fn positive(name: &str, value: f64) -> Result<()> {
+/// Tolerances that mean something: below, there is rounding alone; above, a shape that is no equilibrium would pass for one.
+const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-2;
+
+/// A key of an entry of a list, written only where it is wrong.
+struct Key {
+    list: &'static str,
+    index: usize,
+    key: &'static str,
+}
+
+impl Display for Key {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}[{}].{}", self.list, self.index, self.key)
+    }
+}
+
+fn positive(name: impl Display, value: f64) -> Result<()> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
-    Err(Error::parameter(name, value, "must be a positive, finite number"))
+    Err(Error::parameter(name.to_string(), value, "must be a positive, finite number"))
 }
 
-fn finite(name: &str, values: &[f64]) -> Result<()> {
+fn finite(name: impl Display, values: &[f64]) -> Result<()> {
     for v in values {
         if !v.is_finite() {
-            return Err(Error::parameter(name, v, "must be a finite number"));
+            return Err(Error::parameter(name.to_string(), v, "must be a finite number"));
         }
     }
     Ok(())
@@ -63,12 +80,14 @@ impl StaticCase {
         }
         self.check_end()?;
         for (k, load) in self.load.iter().enumerate() {
-            let name = |key: &str| format!("load[{k}].{key}");
-            finite(&name("value"), &load.value)?;
-            let span = |key: &str, s: Option<f64>| match s {
-                Some(s) if !(0.0..=length).contains(&s) => {
-                    Err(Error::parameter(name(key), s, format!("must lie on the rod, 0 to {length}")))
-                }
+            let name = |key| Key { list: "load", index: k, key };
+            finite(name("value"), &load.value)?;
+            let span = |key: &'static str, s: Option<f64>| match s {
+                Some(s) if !(0.0..=length).contains(&s) => Err(Error::parameter(
+                    name(key).to_string(),
+                    s,
+                    format!("must lie on the rod, 0 to {length}"),
+                )),
                 _ => Ok(()),
             };
             span("at", load.at)?;
@@ -77,20 +96,24 @@ impl StaticCase {
             let spread = load.kind == LoadKind::Distributed;
             if spread && load.at.is_some() {
                 return Err(Error::parameter(
-                    name("at"),
+                    name("at").to_string(),
                     "given",
                     "a distributed load has no point; use from and to",
                 ));
             }
             if !spread && (load.from.is_some() || load.to.is_some()) {
                 return Err(Error::parameter(
-                    name("from"),
+                    name("from").to_string(),
                     "given",
                     "only a distributed load has from and to; use at",
                 ));
             }
             if load.from.unwrap_or(0.0) >= load.to.unwrap_or(length) {
-                return Err(Error::parameter(name("from"), load.from.unwrap_or(0.0), "must be less than to"));
+                return Err(Error::parameter(
+                    name("from").to_string(),
+                    load.from.unwrap_or(0.0),
+                    "must be less than to",
+                ));
             }
         }
         if let Some(initial) = &self.initial {
@@ -102,6 +125,15 @@ impl StaticCase {
         {
             return Err(Error::parameter("solver", "0", "max_iterations and load_steps must be at least 1"));
         }
+        let tolerance = self.solver.tolerance;
+        if !TOLERANCES.contains(&tolerance) {
+            let (least, most) = (TOLERANCES.start(), TOLERANCES.end());
+            return Err(Error::parameter(
+                "solver.tolerance",
+                tolerance,
+                format!("must be {least:e} to {most:e}: a part of the largest force in the rod"),
+            ));
+        }
         Ok(())
     }
 
@@ -112,37 +144,37 @@ impl StaticCase {
         }
         let mut begin = 0.0;
         for (k, section) in self.rod.section.iter().enumerate() {
-            let name = |key: &str| format!("rod.section[{k}].{key}");
-            positive(&name("until"), section.until)?;
+            let name = |key| Key { list: "rod.section", index: k, key };
+            positive(name("until"), section.until)?;
             if section.until <= begin || section.until > length * (1.0 + 1e-9) {
                 return Err(Error::parameter(
-                    name("until"),
+                    name("until").to_string(),
                     section.until,
                     format!("sections come in order: more than {begin}, at most the length {length}"),
                 ));
             }
             begin = section.until;
             let Section { ei, ei_end, gj, gj_end, ea, ea_end, .. } = section;
-            positive(&name("EI"), *ei)?;
+            positive(name("EI"), *ei)?;
             for (key, value) in
                 [("EI_end", ei_end), ("GJ", gj), ("GJ_end", gj_end), ("EA", ea), ("EA_end", ea_end)]
             {
                 if let Some(value) = value {
-                    positive(&name(key), *value)?;
+                    positive(name(key), *value)?;
                 }
             }
             for (key, end, begin) in [("GJ_end", gj_end, gj), ("EA_end", ea_end, ea)] {
                 if end.is_some() && begin.is_none() {
                     return Err(Error::parameter(
-                        name(key),
+                        name(key).to_string(),
                         "given",
                         "needs the value at the section's begin too",
                     ));
                 }
             }
-            finite(&name("rest_curvature"), &section.rest_curvature)?;
-            finite(&name("rest_curvature_end"), &section.rest_curvature_end.unwrap_or_default())?;
-            finite(&name("rest_twist"), &[section.rest_twist])?;
+            finite(name("rest_curvature"), &section.rest_curvature)?;
+            finite(name("rest_curvature_end"), &section.rest_curvature_end.unwrap_or_default())?;
+            finite(name("rest_twist"), &[section.rest_twist])?;
         }
         if (begin - length).abs() > 1e-9 * length {
             return Err(Error::parameter(

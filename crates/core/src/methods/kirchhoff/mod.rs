@@ -210,8 +210,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 let last = self.current.state.elements();
                 let (tip, tangent) = (self.current.state.positions[last], self.current.state.frames[last].t);
                 let radius = surroundings.device.section_at(0.0).radius_mm;
-                let way =
-                    self.extension.trace((&self.felt, &mut self.memory), tip, tangent, radius, wanted);
+                let way = self.extension.trace((&self.felt, &mut self.memory), tip, tangent, radius, wanted);
                 blocked = may_carry && way < (1.0 - 1e-9) * wanted;
                 if !blocked {
                     part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
