@@ -16,7 +16,7 @@ use crate::contact::distance::{Distance, Nearness};
 use crate::contact::{FeltWall, Friction, WallPotential, friction};
 use crate::insertion::Contact;
 use crate::rod::quadrature::{Point, hermite};
-use crate::rod::{Assembly, ElementData, RodState};
+use crate::rod::{Assembly, ElementData, PointSum, RodState};
 use crate::solve::External;
 
 /// A place on the device where the wall is felt.
@@ -101,9 +101,9 @@ impl Counters {
 /// How near a point stands.
 #[derive(Debug, Clone, Copy)]
 enum Reading {
-    /// Clear of the wall; none is nearer than this, mm.
+    /// No wall is nearer than this, mm; or, where derivatives are not wanted, it is as near as this.
     Free(f64),
-    /// It presses.
+    /// It presses, or is as near as was asked.
     Pressed(Distance),
     /// The point is where the potential does not allow it.
     Outside,
@@ -111,10 +111,12 @@ enum Reading {
 
 impl Reading {
     fn of(nearness: Nearness, potential: &WallPotential) -> Self {
+        if !potential.is_allowed(nearness.value_mm()) {
+            return Self::Outside;
+        }
         match nearness {
             Nearness::Beyond(value_mm) => Self::Free(value_mm),
-            Nearness::Within(d) if potential.is_allowed(d.value_mm) => Self::Pressed(d),
-            Nearness::Within(_) => Self::Outside,
+            Nearness::Within(d) => Self::Pressed(d),
         }
     }
 }
@@ -178,7 +180,7 @@ impl<'a> WallContact<'a> {
         self.read_within(index, x, self.points[index].potential.radius_mm)
     }
 
-    /// The same, where a point counts as pressed nearer than `limit_mm`.
+    /// The same, with derivatives nearer than `limit_mm`.
     fn read_within(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
         let potential = self.points[index].potential;
         let radius = potential.radius_mm;
@@ -194,10 +196,11 @@ impl<'a> WallContact<'a> {
             if let Some(triangle) = known.triangle {
                 let (place, reading) = self.memory.readings[index];
                 // Most points that are near a wall do not touch it, and are moved little.
-                let spare_mm = reading.value_mm() - limit_mm - STEEPEST * (x - place).norm();
+                let clear_mm = limit_mm.max(radius);
+                let spare_mm = reading.value_mm() - clear_mm - STEEPEST * (x - place).norm();
                 if spare_mm > 0.0 {
                     self.counters.avoided += 1;
-                    return Reading::Free(limit_mm + spare_mm);
+                    return Reading::Free(clear_mm + spare_mm);
                 }
                 let told = matches!(reading, Nearness::Within(_)) || reading.value_mm() >= limit_mm;
                 if place == *x && told {
@@ -233,22 +236,49 @@ impl<'a> WallContact<'a> {
         Reading::of(nearness, &potential)
     }
 
-    /// Friction of point `index` at `x`.
+    /// Friction of point `index` at its base.
     fn add_friction<const C: usize>(
         &self,
         elements: &[ElementData],
         state: &RodState,
         assembly: &mut Assembly<C>,
+        sum: &mut PointSum,
         index: usize,
-        x: &Vec3,
     ) {
-        let point = &self.points[index];
+        let (point, x) = (&self.points[index], &self.memory.points[index].base);
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
         let Some(f) = self.friction.derivatives(index, x, angle, radius_mm) else { return };
         assembly.external_energy += self.friction.value(index, x, angle, radius_mm);
         let e = point.element;
-        assembly.add_point(state, &elements[e], e, point.xi, &f.gradient, &f.hessian);
+        sum.add(point.xi, &f.gradient, assembly.hessian.then_some(&f.hessian));
         assembly.add_turn(state, &elements[e], e, point.xi, &f.mixed, (f.turn, f.turn2));
+    }
+
+    /// What point `index` feels at its base.
+    fn gather<const C: usize>(
+        &mut self,
+        elements: &[ElementData],
+        state: &RodState,
+        assembly: &mut Assembly<C>,
+        sum: &mut PointSum,
+        index: usize,
+    ) {
+        if self.friction.acts() {
+            self.add_friction(elements, state, assembly, sum, index);
+        }
+        let Some(d) = self.memory.pressed(index) else { return };
+        let (point, known) = (&self.points[index], &self.memory.points[index]);
+        let stiffness = self.felt.stiffness(&known.base, known.triangle, self.softness);
+        let w = point.weight_mm;
+        let (gradient, hessian) = if self.holding {
+            stiffness.holding(&point.potential, d, w, known.force_n)
+        } else {
+            assembly.external_energy += stiffness.factor * w * point.potential.value(d.value_mm);
+            let (gradient, hessian) = stiffness.derivatives(&point.potential, d, w);
+            self.memory.points[index].force_n = gradient.norm();
+            (gradient, hessian)
+        };
+        sum.add(point.xi, &gradient, assembly.hessian.then_some(&hessian));
     }
 
     /// Whether friction knows the normal forces of the equilibrium that was found. If not, it may renew them again.
@@ -326,12 +356,16 @@ impl<const C: usize> External<C> for WallContact<'_> {
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, state);
             let point = self.points[index];
-            match self.read(index, &x) {
-                Reading::Free(_) => {}
-                Reading::Pressed(d) => {
-                    let triangle = self.memory.points[index].triangle;
-                    let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
-                    sum += factor * point.weight_mm * point.potential.value(d.value_mm);
+            let radius_mm = point.potential.radius_mm;
+            // Derivatives serve the assembly that follows where friction acts; otherwise that was tried first.
+            let limit_mm = if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY };
+            match self.read_within(index, &x, limit_mm) {
+                Reading::Free(value_mm) | Reading::Pressed(Distance { value_mm, .. }) => {
+                    if value_mm < radius_mm {
+                        let triangle = self.memory.points[index].triangle;
+                        let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
+                        sum += factor * point.weight_mm * point.potential.value(value_mm);
+                    }
                 }
                 Reading::Outside => return f64::INFINITY,
             }
@@ -376,29 +410,18 @@ impl<const C: usize> External<C> for WallContact<'_> {
             });
             self.friction.follow(pressed, least_n);
         }
-        for index in 0..self.points.len() {
-            let point = self.points[index];
-            let known = self.memory.points[index];
-            if self.friction.acts() {
-                self.add_friction(elements, state, assembly, index, &known.base);
+        let mut begin = 0;
+        let mut sum = PointSum::default();
+        for group in self.points.chunk_by(|a, b| a.element == b.element) {
+            let end = begin + group.len();
+            for index in begin..end {
+                self.gather(elements, state, assembly, &mut sum, index);
             }
-            let Some(d) = self.memory.pressed(index) else { continue };
-            let stiffness = self.felt.stiffness(&known.base, known.triangle, self.softness);
-            let w = point.weight_mm;
-            let (gradient, hessian) = if self.holding {
-                stiffness.holding(&point.potential, d, w, known.force_n)
-            } else {
-                assembly.external_energy += stiffness.factor * w * point.potential.value(d.value_mm);
-                let (gradient, hessian) = stiffness.derivatives(&point.potential, d, w);
-                self.memory.points[index].force_n = gradient.norm();
-                (gradient, hessian)
-            };
-            let e = point.element;
-            if point.xi == 1.0 {
-                assembly.add_node(e + 1, &gradient, &hessian);
-            } else {
-                assembly.add_point(state, &elements[e], e, point.xi, &gradient, &hessian);
+            if !sum.is_empty() {
+                let e = group[0].element;
+                assembly.add_points(state, &elements[e], e, &std::mem::take(&mut sum));
             }
+            begin = end;
         }
     }
 

@@ -176,41 +176,6 @@ impl<const C: usize> Assembly<C> {
         ]
     }
 
-    /// Adds an energy of the point at ξ of element `e`, whose gradient and Hessian in that point's position are given.
-    pub fn add_point(
-        &mut self,
-        state: &RodState,
-        element: &ElementData,
-        e: usize,
-        xi: f64,
-        gradient: &Vec3,
-        hessian: &Matrix3<f64>,
-    ) {
-        let columns = Self::point_columns(state, element, e, xi);
-        for (i, (row, p)) in columns.iter().enumerate() {
-            self.residual[*row] += gradient.dot(p);
-            if !self.hessian {
-                continue;
-            }
-            let hp = hessian * p;
-            for (column, q) in &columns[i..] {
-                self.matrix.add(*row, *column, hp.dot(q));
-            }
-        }
-        if !self.hessian {
-            return;
-        }
-        // At second order the point moves by −½ s |δ|² t.
-        let l = Layout::<C>;
-        let [_, s0, _, s1] = hermite(xi);
-        for (node, s) in [(e, s0), (e + 1, s1)] {
-            let at = l.tangent(node);
-            let curve = s * element.length * gradient.dot(&state.frames[node].t);
-            self.matrix.add(at, at, -curve);
-            self.matrix.add(at + 1, at + 1, -curve);
-        }
-    }
-
     /// Adds the part of an energy of the point at ξ of element `e` that depends on the material angle there: its derivatives
     /// `first`, `second` in the angle and `mixed` in angle and position; nothing where the rod carries no angles.
     pub fn add_turn(

@@ -24,6 +24,7 @@ mod element_torsion;
 pub mod frame;
 mod invariants;
 pub mod layout;
+pub mod points;
 pub mod quadrature;
 pub mod state;
 pub mod supports;
@@ -34,6 +35,7 @@ pub use clamp::Clamp;
 pub use element::{ElementData, Energy};
 pub use frame::Frame;
 pub use layout::{Layout, PLAIN, TWISTED};
+pub use points::PointSum;
 pub use state::RodState;
 pub use supports::{EndAngle, Supports};
 

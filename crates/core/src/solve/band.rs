@@ -86,6 +86,17 @@ impl<const C: usize> BandMatrix<C> {
         }
     }
 
+    /// Adds the upper triangle of the rows of two blocks, the first of which begins at row `at`.
+    pub fn add_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
+        let (first, second) = self.rows[at..at + C].split_at_mut(Self::BLOCK);
+        for (target, row) in first.iter_mut().zip(rows) {
+            target.iter_mut().zip(row).for_each(|(t, r)| *t += r);
+        }
+        for (target, row) in second.iter_mut().zip(&rows[Self::BLOCK..]) {
+            target.iter_mut().zip(&row[Self::BLOCK..]).for_each(|(t, r)| *t += r);
+        }
+    }
+
     /// Turns row and column `i` into those of the identity: the unknown is held.
     pub fn hold(&mut self, i: usize) {
         let begin = i / Self::BLOCK * Self::BLOCK;

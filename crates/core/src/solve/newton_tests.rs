@@ -2,7 +2,7 @@
 
 use super::{External, Newton, NewtonOptions, NewtonReport, StepRecord};
 use crate::Vec3;
-use crate::rod::{Assembly, ElementData, Frame, PLAIN, RodState, Supports};
+use crate::rod::{Assembly, ElementData, Frame, PLAIN, PointSum, RodState, Supports};
 
 struct Tip(Vec3);
 impl<const C: usize> External<C> for Tip {
@@ -26,7 +26,9 @@ impl<const C: usize> External<C> for Spring {
         let off = self.place(elements, state) - self.1;
         assembly.external_energy += External::<C>::energy(self, elements, state);
         let hessian = nalgebra::Matrix3::identity() * self.2;
-        assembly.add_point(state, &elements[self.0], self.0, 0.3, &(off * self.2), &hessian);
+        let mut sum = PointSum::default();
+        sum.add(0.3, &(off * self.2), Some(&hessian));
+        assembly.add_points(state, &elements[self.0], self.0, &sum);
     }
 }
 impl Spring {

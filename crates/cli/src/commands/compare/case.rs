@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall, anatomy};
 use endowire_core::{Error, Result, Vec3};
@@ -137,7 +138,8 @@ impl Case {
             truth: Truth::Tip(Vec3::zeros()),
         };
         let shape = |elements: usize| -> Result<Shape> {
-            let mut simulation = scene.start("kirchhoff", elements)?;
+            let tolerance = KirchhoffOptions::default().tolerance;
+            let mut simulation = scene.start("kirchhoff", elements, tolerance)?;
             for _ in 0..scene.steps() {
                 simulation.step(Command::advance(scene.step_mm))?;
             }
@@ -173,10 +175,10 @@ impl Scene {
         (self.inserted_mm / self.step_mm).round() as usize
     }
 
-    fn start(&self, method: &str, elements: usize) -> Result<Simulation> {
-        contender::insertion(
+    fn start(&self, method: &str, elements: usize, tolerance: f64) -> Result<Simulation> {
+        contender::insertion_within(
             method,
-            self.inserted_mm / elements as f64,
+            (self.inserted_mm / elements as f64, tolerance),
             self.wall.clone(),
             WallProperties::default(),
             self.device.clone(),
@@ -185,7 +187,7 @@ impl Scene {
     }
 
     fn run(&self, method: &str, elements: usize, limit: Duration) -> Result<Option<Run>> {
-        let mut simulation = self.start(method, elements)?;
+        let mut simulation = self.start(method, elements, contender::INSERTION_TOLERANCE)?;
         let (mut iterations, mut unconverged) = (0, 0);
         let clock = Instant::now();
         for _ in 0..self.steps() {

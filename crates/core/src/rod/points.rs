@@ -1,0 +1,105 @@
+//! Energies of points on an element's centre line, gathered point by point and added to the system at once.
+//!
+//! The point at ξ is Σ cᵢ qᵢ with q = (x₀, h t₀, x₁, h t₁) and the weights cᵢ of [`hermite`], so energies of gradient g and Hessian H
+//! in the position have Σ cᵢ g and Σ cᵢ cⱼ H in q. Tangents turn on a sphere: at second order tᵢ moves by −½|δ|² tᵢ as well.
+
+use nalgebra::Matrix3;
+
+use super::assembly::Assembly;
+use super::element::ElementData;
+use super::layout::Layout;
+use super::quadrature::hermite;
+use super::state::RodState;
+use crate::Vec3;
+
+/// Gradients and Hessians of energies of points of one element.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PointSum {
+    /// In x₀, h t₀, x₁ and h t₁.
+    forces: [Vec3; 4],
+    /// In pairs of them, i ≤ j; the rest is zero.
+    stiffness: [[Matrix3<f64>; 4]; 4],
+    /// Whether there is anything.
+    felt: bool,
+}
+
+impl PointSum {
+    /// Whether nothing has been added.
+    pub fn is_empty(&self) -> bool {
+        !self.felt
+    }
+
+    /// Adds an energy of the point at ξ, whose gradient and, if wanted, Hessian in that point's position are given.
+    pub fn add(&mut self, xi: f64, gradient: &Vec3, hessian: Option<&Matrix3<f64>>) {
+        self.felt = true;
+        let c = hermite(xi);
+        for i in 0..4 {
+            self.forces[i] += gradient * c[i];
+        }
+        let Some(hessian) = hessian else { return };
+        for i in 0..4 {
+            let part = hessian * c[i];
+            for j in i..4 {
+                self.stiffness[i][j] += part * c[j];
+            }
+        }
+    }
+}
+
+impl<const C: usize> Assembly<C> {
+    /// Adds energies of points of element `e`.
+    pub fn add_points(&mut self, state: &RodState, element: &ElementData, e: usize, sum: &PointSum) {
+        let l = Layout::<C>;
+        let h = element.length;
+        let [f0, g0, f1, g1] = &sum.forces;
+        let (first, second) = (&state.frames[e], &state.frames[e + 1]);
+        let (d0, d1) = ([first.u * h, first.v * h], [second.u * h, second.v * h]);
+        let (x0, t0) = (l.position(e), l.tangent(e));
+        let (x1, t1) = (l.position(e + 1), l.tangent(e + 1));
+        for a in 0..3 {
+            self.residual[x0 + a] += f0[a];
+            self.residual[x1 + a] += f1[a];
+        }
+        for a in 0..2 {
+            self.residual[t0 + a] += d0[a].dot(g0);
+            self.residual[t1 + a] += d1[a].dot(g1);
+        }
+        if !self.hessian {
+            return;
+        }
+        let s = &sum.stiffness;
+        let begin = Layout::<C>::BLOCK * e;
+        let [x0, t0, x1, t1] = [x0, t0, x1, t1].map(|row| row - begin);
+        let mut rows = [[0.0; C]; C];
+        for a in 0..3 {
+            for b in 0..3 {
+                if b >= a {
+                    rows[x0 + a][x0 + b] = s[0][0][(a, b)];
+                    rows[x1 + a][x1 + b] = s[2][2][(a, b)];
+                }
+                rows[x0 + a][x1 + b] = s[0][2][(a, b)];
+            }
+        }
+        for a in 0..2 {
+            let (near, across) = (s[0][1] * d0[a], s[1][2] * d0[a]);
+            let (far, along) = (s[0][3] * d1[a], s[2][3] * d1[a]);
+            for b in 0..3 {
+                rows[x0 + b][t0 + a] = near[b];
+                rows[t0 + a][x1 + b] = across[b];
+                rows[x0 + b][t1 + a] = far[b];
+                rows[x1 + b][t1 + a] = along[b];
+            }
+            let (own, other, last) = (s[1][1] * d0[a], s[1][3] * d0[a], s[3][3] * d1[a]);
+            for b in 0..2 {
+                rows[t0 + a][t1 + b] = other.dot(&d1[b]);
+                if b >= a {
+                    rows[t0 + a][t0 + b] = own.dot(&d0[b]);
+                    rows[t1 + a][t1 + b] = last.dot(&d1[b]);
+                }
+            }
+            rows[t0 + a][t0 + a] -= h * g0.dot(&first.t);
+            rows[t1 + a][t1 + a] -= h * g1.dot(&second.t);
+        }
+        self.matrix.add_blocks(begin, &rows);
+    }
+}
