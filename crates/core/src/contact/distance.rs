@@ -374,6 +374,18 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_point_beyond_the_limit_is_told_its_distance_alone() {
+        let wall = tube(1.0);
+        for x in points() {
+            let triangle = wall.1.nearest(&x, 10.0).unwrap().triangle;
+            let here = wall.0.distance(&x, triangle).unwrap();
+            let within = |limit_mm: f64| wall.0.within(&x, triangle, limit_mm).unwrap();
+            assert_eq!(within(here.value_mm), Nearness::Beyond(here.value_mm));
+            assert_eq!(within(here.value_mm + 1e-9), Nearness::Within(here));
+        }
+    }
+
     /// Largest error of the distance from the wall of the tube at a height over its radius.
     fn error(wall: &(SmoothWall, WallQuery), height: f64) -> f64 {
         let off = |i: i32| {

@@ -93,6 +93,15 @@ mod tests {
     }
 
     #[test]
+    fn what_is_held_is_pulled_beyond_the_wall_and_pressed_as_ever() {
+        let (first, second) = POTENTIAL.holding(0.45);
+        assert!((first - 0.15).abs() < 1e-12 && second == 3.0);
+        for d in [0.2, 0.3, 0.4] {
+            assert_eq!(POTENTIAL.holding(d), if d < 0.4 { POTENTIAL.derivatives(d) } else { (0.0, 0.0) });
+        }
+    }
+
+    #[test]
     fn the_force_is_continuous_where_terms_switch_on() {
         for switch in [0.24, 0.4] {
             let (below, above) = (POTENTIAL.derivatives(switch - 1e-9), POTENTIAL.derivatives(switch + 1e-9));

@@ -103,3 +103,88 @@ impl<const C: usize> Assembly<C> {
         self.matrix.add_blocks(begin, &rows);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::{Frame, PLAIN, TWISTED};
+
+    /// Springs from three points of the second element to fixed places.
+    const SPRINGS: [(f64, f64, Vec3); 3] = [
+        (0.2, 3.0, Vec3::new(0.3, 0.2, -0.1)),
+        (0.7, 5.0, Vec3::new(1.1, -0.3, 0.4)),
+        (1.0, 2.0, Vec3::new(0.9, 0.6, 0.2)),
+    ];
+
+    fn place(element: &ElementData, state: &RodState, xi: f64) -> Vec3 {
+        let [a, b, c, d] = hermite(xi);
+        let h = element.length;
+        state.positions[1] * a + state.positions[2] * c + (state.frames[1].t * b + state.frames[2].t * d) * h
+    }
+
+    fn energy(element: &ElementData, state: &RodState) -> f64 {
+        SPRINGS.iter().map(|(xi, k, to)| 0.5 * k * (place(element, state, *xi) - to).norm_squared()).sum()
+    }
+
+    fn derivatives_are_those_of_the_energy<const C: usize>() {
+        let data = ElementData {
+            length: 0.8,
+            bending: [1.0; 3],
+            torsion: [1.0; 3],
+            rest_curvature: [[0.0; 2]; 3],
+            rest_twist: [0.0; 3],
+            flexibility: 0.0,
+        };
+        let elements = [data; 3];
+        let frame = |x: f64| Frame::new(Vec3::new(1.0, x, 0.3 - x * x), None);
+        let state = RodState::from_frames(&elements, Vec3::zeros(), [0.0, 0.4, 0.9, 1.0].map(frame).to_vec());
+        let mut assembly = Assembly::<C>::new(3);
+        assembly.matrix = crate::solve::BandMatrix::zeros(Layout::<C>::dimension(3));
+        let mut sum = PointSum::default();
+        assert!(sum.is_empty());
+        for (xi, k, to) in SPRINGS {
+            let off = place(&data, &state, xi) - to;
+            sum.add(xi, &(off * k), Some(&(Matrix3::identity() * k)));
+        }
+        assembly.add_points(&state, &data, 1, &sum);
+        let l = Layout::<C>;
+        let rows: Vec<usize> = (1..3)
+            .flat_map(|i| (0..5).map(move |a| (i, a)))
+            .map(|(i, a)| if a < 3 { l.position(i) + a } else { l.tangent(i) + a - 3 })
+            .collect();
+        // Positions move along lines and tangents along great circles.
+        let moved = |way: &[f64], h: f64| {
+            let mut to = state.clone();
+            for i in 0..2 {
+                let w = &way[5 * i..5 * i + 5];
+                to.positions[i + 1] += Vec3::new(w[0], w[1], w[2]) * h;
+                to.frames[i + 1] = state.frames[i + 1].transported(h * w[3], h * w[4]);
+            }
+            energy(&data, &to)
+        };
+        for seed in 0..20 {
+            let way: Vec<f64> = (0..10).map(|k| (1.7 * f64::from(seed) + 2.3 * f64::from(k)).sin()).collect();
+            let (h, here) = (1e-4, energy(&data, &state));
+            let (plus, minus) = (moved(&way, h), moved(&way, -h));
+            let slope: f64 = rows.iter().zip(&way).map(|(row, w)| assembly.residual[*row] * w).sum();
+            assert!(((plus - minus) / (2.0 * h) - slope).abs() < 1e-6, "slope in direction {seed}");
+            let mut curve = 0.0;
+            for (i, w) in rows.iter().zip(&way) {
+                for (j, v) in rows.iter().zip(&way) {
+                    curve += assembly.matrix.get(*i, *j) * w * v;
+                }
+            }
+            let found = (plus + minus - 2.0 * here) / (h * h);
+            assert!(
+                (found - curve).abs() < 1e-5 * (1.0 + curve.abs()),
+                "direction {seed}: {found} and {curve}"
+            );
+        }
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_energy_with_and_without_angles() {
+        derivatives_are_those_of_the_energy::<PLAIN>();
+        derivatives_are_those_of_the_energy::<TWISTED>();
+    }
+}

@@ -43,6 +43,19 @@ fn a_clean_wall_is_left_as_it_is() {
 }
 
 #[test]
+fn a_straight_way_is_stopped_by_the_wall_it_crosses_alone() {
+    let query = WallQuery::new(&tube()).unwrap();
+    let at = |x: f64, y: f64| Vec3::new(x, y, 0.0);
+    let met = query.crossing(&at(0.0, 50.0), &at(8.0, 51.0), 1.0).unwrap();
+    assert!((met - 0.5).abs() < 0.02, "{met}");
+    assert_eq!(query.crossing(&at(0.0, 50.0), &at(3.0, 90.0), 1.0), None);
+    // Beyond the end of the way, if asked.
+    assert_eq!(query.crossing(&at(0.0, 50.0), &at(3.0, 50.0), 1.0), None);
+    assert!((query.crossing(&at(0.0, 50.0), &at(3.0, 50.0), 2.0).unwrap() - 4.0 / 3.0).abs() < 0.05);
+    assert_eq!(query.crossing(&at(0.0, 50.0), &Vec3::repeat(f64::NAN), 1.0), None);
+}
+
+#[test]
 fn dirt_is_removed_and_reported() {
     let clean = tube();
     let mut dirty = soup(clean.mesh());
