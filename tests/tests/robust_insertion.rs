@@ -431,25 +431,11 @@ fn table_of_the_stress() {
     for case in stress.cases() {
         let from = clock.elapsed().as_secs_f64();
         let row = stress.run(&case);
-        let line = format!(
-            "E {:<6} EI {:<5} element {:<4} increment {:<5} friction {:<4} {:>3} steps {:>5} iterations (worst {}), {} substeps, {:.3} mm deep: {}",
-            case.modulus_n_per_mm2,
-            case.bending_stiffness_nmm2,
-            case.element_mm,
-            case.increment_mm,
-            case.friction,
-            row.steps,
-            row.iterations,
-            row.most_iterations,
-            row.most_substeps,
-            row.max_penetration_mm,
-            row.outcome
-        );
-        println!("{:>7.2} s {line}", clock.elapsed().as_secs_f64() - from);
+        println!("{:>7.2} s {row:?}", clock.elapsed().as_secs_f64() - from);
         match (row.pass, row.converged) {
             (true, true) => converged += 1,
             (true, false) => stopped += 1,
-            (false, _) => bad.push(line),
+            (false, _) => bad.push(format!("{row:?}")),
         }
     }
     println!(

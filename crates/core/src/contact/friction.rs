@@ -28,7 +28,7 @@
 
 use nalgebra::Matrix3;
 
-use super::wall::ContactPoint;
+use super::ContactPoint;
 use crate::Vec3;
 use crate::rod::quadrature::Point;
 use crate::rod::{ElementData, RodState};

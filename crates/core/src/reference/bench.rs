@@ -1,6 +1,6 @@
 //! A rod in equilibrium with walls and loads, without the insertion around it: the bench of the contact cases.
 
-use crate::contact::wall::Touch;
+use crate::contact::Touch;
 use crate::contact::{FeltWall, Friction, HandMotion, WallContact, WallMemory};
 use crate::device::Device;
 use crate::insertion::WallProperties;

@@ -4,6 +4,7 @@
 //! the size of a residual, the trial state, the way out of saddle points, and stiffness that is not symmetric.
 
 pub mod band;
+pub mod external;
 pub mod newton;
 pub mod report;
 mod residual;
@@ -12,9 +13,12 @@ mod trial;
 mod unsymmetric;
 
 pub use band::{BandMatrix, Factor, FactorError, Inertia, Shift};
-pub use newton::{External, Newton};
+pub use external::External;
+pub use newton::Newton;
 pub use report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 pub use residual::ResidualSize;
 
+#[cfg(test)]
+mod band_tests;
 #[cfg(test)]
 mod newton_tests;

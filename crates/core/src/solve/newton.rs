@@ -13,40 +13,9 @@
 //! residual is never shifted.
 
 use super::band::{Factor, FactorError, Inertia, Shift};
+use super::external::External;
 use super::report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
-
-/// Energies outside the rod: loads, walls.
-pub trait External<const C: usize> {
-    /// Potential energy at a state.
-    fn energy(&mut self, elements: &[ElementData], state: &RodState) -> f64;
-    /// Adds gradient, Hessian and energy at a state to the assembly.
-    fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>);
-    /// Work done on the way between two states by loads that have no potential.
-    fn work(&self, _from: &RodState, _to: &RodState) -> f64 {
-        0.0
-    }
-    /// Whether all of it has a potential. Where not, the stiffness is unsymmetric and there are no minima to look for.
-    fn conservative(&self) -> bool {
-        true
-    }
-    /// Whether it can stop a step short, as a wall does.
-    fn obstructs(&self) -> bool {
-        false
-    }
-    /// Whether its energy hangs on the state alone, not on what [`External::add`] was given before.
-    fn memoryless(&self) -> bool {
-        false
-    }
-    /// Part of the way from the state last given to [`External::add`] to `to` that crosses nothing.
-    fn safe_fraction(&mut self, _elements: &[ElementData], _to: &RodState) -> f64 {
-        1.0
-    }
-    /// Size of the forces and moments it exerts, for the scale of the residual.
-    fn scale(&self) -> [f64; 2] {
-        [0.0; 2]
-    }
-}
 
 /// Part of EI/L² that is always added as a uniform tension.
 const WHISPER: f64 = 1e-8;

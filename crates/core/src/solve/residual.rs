@@ -1,6 +1,7 @@
 //! How large a residual is, and when it is as small as it gets.
 
-use super::newton::{External, Newton};
+use super::external::External;
+use super::newton::Newton;
 use crate::rod::{ElementData, Layout, Supports};
 
 /// Size of a residual.

@@ -1,6 +1,7 @@
 //! The way out of an equilibrium that is no minimum: along its most negative curvature, as far as the energy falls.
 
-use super::newton::{ENERGY_ROUNDING, External, Newton};
+use super::external::External;
+use super::newton::{ENERGY_ROUNDING, Newton};
 use super::report::StepRecord;
 use crate::rod::{ElementData, Layout, RodState, Supports};
 

@@ -1,6 +1,7 @@
 //! The trial state of a line search: its axial forces, its energy, and its way back to the end conditions.
 
-use super::newton::{External, Newton};
+use super::external::External;
+use super::newton::Newton;
 use crate::rod::element::element_energy;
 use crate::rod::{ElementData, Layout, RodState, Supports};
 

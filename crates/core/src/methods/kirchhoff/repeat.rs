@@ -12,19 +12,26 @@ use crate::contact::HandMotion;
 use crate::rod::element::mid_slope;
 use crate::rod::{ElementData, Frame, RodState};
 
-/// How an equilibrium differed from the slid device, by node and element from the tip.
+/// How an equilibrium differed from the slid device in an element and its second node.
+#[derive(Debug, Clone, Copy)]
+struct Departure {
+    /// Change of the node's tangent, in the triad of the slid device.
+    tangent: Vec3,
+    /// Change of the direction in the middle of the element, in the triad of its first node.
+    middle: Vec3,
+    /// Change of the node's material angle against triads carried without twist, rad.
+    angle: f64,
+    /// Change of the angle bubble, rad.
+    bubble: f64,
+}
+
+/// What the last step changed on the slid device.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Correction {
     /// Advance, mm, and turn, rad, of the step.
     motion: [f64; 2],
-    /// Change of the tangents, in the triads of the slid device.
-    tangents: Vec<Vec3>,
-    /// Change of the directions in the middle of the elements, in the triads of their first nodes.
-    middles: Vec<Vec3>,
-    /// Change of the material angles against triads carried without twist, rad.
-    angles: Vec<f64>,
-    /// Change of the angle bubbles, rad.
-    bubbles: Vec<f64>,
+    /// From the tip.
+    departures: Vec<Departure>,
 }
 
 /// Motions are the same if their parts differ by less than this, …
@@ -49,23 +56,12 @@ fn motion(hand: HandMotion) -> [f64; 2] {
 impl Correction {
     /// Takes memory for `elements` elements.
     pub(super) fn reserve(&mut self, elements: usize) {
-        self.tangents.reserve(elements);
-        self.middles.reserve(elements);
-        self.angles.reserve(elements);
-        self.bubbles.reserve(elements);
-    }
-
-    /// Forgets.
-    fn clear(&mut self) {
-        self.tangents.clear();
-        self.middles.clear();
-        self.angles.clear();
-        self.bubbles.clear();
+        self.departures.reserve(elements);
     }
 
     /// Remembers the way from the slid device to the equilibrium that was found.
     pub(super) fn learn(&mut self, hand: HandMotion, slid: &RodState, found: &RodState) {
-        self.clear();
+        self.departures.clear();
         self.motion = motion(hand);
         let n = slid.elements();
         let far = |i: usize| (found.frames[i].t - slid.frames[i].t).norm_squared() > LARGEST * LARGEST;
@@ -75,10 +71,12 @@ impl Correction {
         let mut twist: f64 = found.reference_twists.iter().sum();
         for e in (0..n).rev() {
             let (f, i) = (&slid.frames[e], e + 1);
-            self.tangents.push(slid.frames[i].local(&(found.frames[i].t - slid.frames[i].t)));
-            self.middles.push(f.local(&(middle(found, e) - middle(slid, e))));
-            self.angles.push(found.angles[i] + twist - slid.angles[i]);
-            self.bubbles.push(found.bubbles[e] - slid.bubbles[e]);
+            self.departures.push(Departure {
+                tangent: slid.frames[i].local(&(found.frames[i].t - slid.frames[i].t)),
+                middle: f.local(&(middle(found, e) - middle(slid, e))),
+                angle: found.angles[i] + twist - slid.angles[i],
+                bubble: found.bubbles[e] - slid.bubbles[e],
+            });
             twist -= found.reference_twists[e];
         }
     }
@@ -89,24 +87,24 @@ impl Correction {
         let size = |m: [f64; 2]| m[0].hypot(m[1]);
         let factor = size(now) / size(last);
         let off = (now[0] - factor * last[0]).hypot(now[1] - factor * last[1]);
-        let known = !self.tangents.is_empty() && factor.is_finite();
+        let known = !self.departures.is_empty() && factor.is_finite();
         (known && off <= SAME * size(now) && (1.0 / LONGER..=LONGER).contains(&factor)).then_some(factor)
     }
 
     /// Changes the slid device in `state` by `factor` times what was learnt.
     pub(super) fn apply(&self, factor: f64, elements: &[ElementData], state: &mut RodState) {
         let n = state.elements();
-        let first = n - n.min(self.tangents.len());
+        let first = n - n.min(self.departures.len());
         // Each middle before the tangents on either side change.
         let mut t = state.frames[first].t;
         for e in first..n {
-            let k = n - 1 - e;
-            let m = middle(state, e) + axes(&state.frames[e]) * self.middles[k] * factor;
+            let by = &self.departures[n - 1 - e];
+            let m = middle(state, e) + axes(&state.frames[e]) * by.middle * factor;
             let far = state.frames[e + 1];
-            let t1 = (far.t + axes(&far) * self.tangents[k] * factor).normalize();
+            let t1 = (far.t + axes(&far) * by.tangent * factor).normalize();
             state.chords[e] = (m.normalize() + (t + t1) * 0.25) / 1.5;
-            state.angles[e + 1] += factor * self.angles[k];
-            state.bubbles[e] += factor * self.bubbles[k];
+            state.angles[e + 1] += factor * by.angle;
+            state.bubbles[e] += factor * by.bubble;
             if e > first {
                 state.frames[e].t = t;
             }
