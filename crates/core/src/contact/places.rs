@@ -50,7 +50,7 @@ pub(super) struct Places {
     size_mm: f64,
     reach_mm: f64,
     cells: Vec<Cell>,
-    /// Questions to the hierarchy so far.
+    /// Questions to the hierarchy since they were counted last.
     pub(super) queries: u64,
 }
 

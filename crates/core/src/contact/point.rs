@@ -66,7 +66,7 @@ pub struct Counters {
     pub queries: u64,
     /// Questions that the quadrics about the last triangle answered.
     pub near: u64,
-    /// Questions that the last clearance answered, or the same question before.
+    /// Questions that the last clearance answered, or the same question before, of the same point or of another in its place.
     pub avoided: u64,
     /// Nodes of sub-steps in which the device moved to a new equilibrium.
     pub nodes_solved: u64,

@@ -67,8 +67,7 @@ pub struct WallContact<'a> {
     pub holding: bool,
     memory: &'a mut WallMemory,
     friction: &'a mut Friction,
-    /// Work done and avoided.
-    pub counters: Counters,
+    counters: Counters,
 }
 
 impl<'a> WallContact<'a> {
@@ -138,11 +137,10 @@ impl<'a> WallContact<'a> {
                 }
             }
         }
-        let places = &mut self.memory.places;
-        let before = places.queries;
-        let query = &self.felt.query;
+        let (places, query) = (&mut self.memory.places, &self.felt.query);
+        let asked = places.queries;
         let place = if self.skip { places.around(query, x) } else { places.ask(query, x) };
-        self.counters.queries += places.queries - before;
+        self.counters.avoided += u64::from(places.queries == asked);
         (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
         (known.clearance_mm, known.triangle) = (place.clearance_mm, None);
         let clearance = place.clearance(x);
@@ -155,6 +153,12 @@ impl<'a> WallContact<'a> {
         let nearness = self.felt.nearness(x, triangle, limit_mm);
         self.memory.readings[index] = (*x, nearness);
         Reading::of(nearness, &potential)
+    }
+
+    /// Work done and avoided since it was counted last, looking for the tip's way included.
+    pub fn count(&mut self) -> Counters {
+        self.counters.queries += std::mem::take(&mut self.memory.places.queries);
+        std::mem::take(&mut self.counters)
     }
 
     /// Friction of point `index` at its base.

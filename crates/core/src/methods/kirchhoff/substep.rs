@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::slide::slide;
 use super::{Kirchhoff, softest};
-use crate::contact::{HandMotion, WallContact};
+use crate::contact::{Counters, HandMotion, WallContact};
 use crate::insertion::Surroundings;
 use crate::rod::Supports;
 use crate::solve::NewtonOptions;
@@ -123,9 +123,8 @@ impl<const C: usize> Kirchhoff<C> {
         };
         let nodes = elements as u64 + 1;
         let (solved, frozen) = if iterations > 0 { (nodes, 0) } else { (0, nodes) };
-        contact.counters.nodes_solved += solved;
-        contact.counters.nodes_frozen += frozen;
-        self.report.counters.add(&contact.counters);
+        let counted = contact.count();
+        self.report.counters.add(&Counters { nodes_solved: solved, nodes_frozen: frozen, ..counted });
         if !found.converged {
             // Each renewal of the lagged forces gave Newton's method another energy to lower.
             let unsettled = surroundings.properties.rubs() && !contact.friction_settled();
