@@ -49,14 +49,14 @@ const SHORT: usize = 6;
 impl Error {
     /// A [`Error::Parameter`] from anything printable.
     pub fn parameter(
-        name: impl Into<String>,
+        name: impl std::fmt::Display,
         value: impl std::fmt::Display,
         mend: impl Into<String>,
     ) -> Self {
         // A number of three hundred digits hides what is wrong with it.
         let text = value.to_string();
         let value = if text.len() > SHORT { text.parse().map_or(text, number) } else { text };
-        Self::Parameter { name: name.into(), value, mend: mend.into() }
+        Self::Parameter { name: name.to_string(), value, mend: mend.into() }
     }
 
     /// A [`Error::File`] for `path`.

@@ -109,12 +109,14 @@ mod tests {
     use super::*;
     use crate::vessel::{GeneratedWall, Resolution, anatomy};
 
+    fn tube(edge_mm: f64) -> WallQuery {
+        let tree = anatomy::tree("straight_tube").unwrap();
+        WallQuery::new(&GeneratedWall::new(&tree, Resolution::EdgeMm(edge_mm)).unwrap().wall).unwrap()
+    }
+
     #[test]
     fn a_cell_is_asked_once_and_answers_as_the_hierarchy_does() {
-        let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(1.0))
-            .unwrap()
-            .wall;
-        let query = WallQuery::new(&wall).unwrap();
+        let query = tube(1.0);
         let mut places = Places::new(0.2, 3.0);
         let at = |i: i32| Vec3::new(2.5 * f64::from(i).sin(), 2.5 * f64::from(i).cos(), 0.02 * f64::from(i));
         for i in 0..3000 {
@@ -132,10 +134,7 @@ mod tests {
 
     #[test]
     fn no_number_and_no_wall_are_no_place() {
-        let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(2.0))
-            .unwrap()
-            .wall;
-        let query = WallQuery::new(&wall).unwrap();
+        let query = tube(2.0);
         let mut places = Places::new(0.2, 1.0);
         for x in [Vec3::repeat(f64::NAN), Vec3::repeat(1e300), Vec3::new(0.0, 0.0, 50.0)] {
             let place = places.around(&query, &x);

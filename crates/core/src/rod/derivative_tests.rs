@@ -180,14 +180,7 @@ fn the_hessian_of_a_nearly_straight_element_is_that_of_the_beam() {
     let first = Frame::new(Vec3::new(0.6, -0.3, 0.7), None);
     for turn in [0.0, 1e-9] {
         let second = first.transported(turn, 0.0);
-        let d = ElementData {
-            length: 0.5,
-            bending: [2.0; 3],
-            torsion: [1.0; 3],
-            rest_curvature: [[0.0; 2]; 3],
-            rest_twist: [0.0; 3],
-            flexibility: 0.0,
-        };
+        let d = ElementData::plain(0.5, 2.0);
         let q =
             ElementState { first, second, chord: (first.t + second.t) * 0.5, tension: 0.0, angles: [0.0; 3] };
         let mut out = ElementSystem::<PLAIN>::zeros();

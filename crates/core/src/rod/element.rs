@@ -34,6 +34,19 @@ pub struct ElementData {
 }
 
 impl ElementData {
+    /// A straight, inextensible element, GJ as large as EI.
+    #[cfg(test)]
+    pub(crate) fn plain(length: f64, stiffness: f64) -> Self {
+        Self {
+            length,
+            bending: [stiffness; 3],
+            torsion: [stiffness; 3],
+            rest_curvature: [[0.0; 2]; 3],
+            rest_twist: [0.0; 3],
+            flexibility: 0.0,
+        }
+    }
+
     /// Energy that it takes to straighten the element, mJ: the size of the terms that bending energy is a difference of.
     pub fn straightening_energy(&self) -> f64 {
         let [u, v] = self.rest_curvature[1];

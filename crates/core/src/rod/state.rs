@@ -169,6 +169,16 @@ impl RodState {
         }
     }
 
+    /// Axial forces of inextensible elements after the Newton step `d` from `base`: they are multipliers and take their full step,
+    /// however far the state moves. (Those of stretchable elements move with the state.)
+    pub fn take_tensions<const C: usize>(&mut self, elements: &[ElementData], base: &Self, d: &[f64]) {
+        for (e, data) in elements.iter().enumerate() {
+            if data.flexibility == 0.0 {
+                self.tensions[e] = base.tensions[e] + d[Layout::<C>.tension(e)];
+            }
+        }
+    }
+
     /// The largest rotation a step holds, at nodes and in the middle of elements, and the largest change of angle.
     pub fn largest_turn<const C: usize>(elements: &[ElementData], base: &Self, d: &[f64]) -> (f64, f64) {
         let l = Layout::<C>;

@@ -111,15 +111,10 @@ impl Supports {
         let l = Layout::<C>;
         let n = elements.len();
         let first = l.support(n);
-        if self.conditions() == 0 {
-            for j in 0..6 {
-                assembly.matrix.add(first + j, first + j, 1.0);
-            }
-            return;
-        }
         let gaps = self.gaps(state);
         let (mut forward, mut turning) = (0.0, 0.0);
-        for data in elements {
+        let scaling = if self.conditions() > 0 { elements } else { &[] };
+        for data in scaling {
             forward += 1.0 / data.augmentation();
             turning += data.length / data.bending[1];
         }

@@ -142,13 +142,14 @@ impl<const C: usize> Newton<C> {
         Self::restore_tensions(elements, b);
     }
 
-    /// Newton's step from the assembled state, with the shift that is always on; `None` where the matrix cannot be factored.
-    pub fn full_step(&mut self, elements: &[ElementData], supports: &Supports) -> Option<&[f64]> {
-        self.factor(elements, supports)?;
+    /// Newton's step from the assembled state, with the shift that is always on, and the inertia of its matrix; `None` where that
+    /// cannot be factored.
+    pub fn full_step(&mut self, elements: &[ElementData], supports: &Supports) -> Option<(Inertia, &[f64])> {
+        let inertia = self.factor(elements, supports)?;
         self.right_hand_side();
         self.factor.solve(&mut self.step);
         Self::restore_tensions(elements, &mut self.step);
-        Some(&self.step)
+        Some((inertia, &self.step))
     }
 
     /// Sets the step to the right-hand side it answers.
@@ -414,7 +415,7 @@ impl<const C: usize> Newton<C> {
                 if supports.conditions() > 0 {
                     self.correct(elements, supports, first);
                 }
-                self.tensions(elements, state);
+                self.trial.take_tensions::<C>(elements, state, &self.step);
                 if blind {
                     let change = alpha * (1.0 - 0.5 * alpha) * slope;
                     accepted = Some(record(change, change, alpha));

@@ -56,14 +56,7 @@ impl std::ops::Deref for Solution {
 }
 
 fn cantilever(n: usize, outside: &mut dyn External<PLAIN>) -> (RodState, Solution) {
-    let data = ElementData {
-        length: 1.0 / n as f64,
-        bending: [1.0; 3],
-        torsion: [0.0; 3],
-        rest_curvature: [[0.0; 2]; 3],
-        rest_twist: [0.0; 3],
-        flexibility: 0.0,
-    };
+    let data = ElementData::plain(1.0 / n as f64, 1.0);
     let elements = vec![data; n];
     let mut state = RodState::straight(&elements, Vec3::zeros(), Frame::new(Vec3::x(), Some(Vec3::y())));
     let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };

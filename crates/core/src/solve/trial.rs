@@ -9,16 +9,6 @@ use crate::rod::{ElementData, Layout, RodState, Supports};
 const REFINEMENTS: usize = 6;
 
 impl<const C: usize> Newton<C> {
-    /// Axial forces of inextensible elements at the trial state: they are multipliers and take their full step. (Those of
-    /// stretchable elements moved with the state.)
-    pub(super) fn tensions(&mut self, elements: &[ElementData], state: &RodState) {
-        for (e, data) in elements.iter().enumerate() {
-            if data.flexibility == 0.0 {
-                self.trial.tensions[e] = state.tensions[e] + self.step[Layout::<C>.tension(e)];
-            }
-        }
-    }
-
     /// Undoes the change of multiplier of [`crate::rod::assembly`]: dN = m/(1 − γD).
     pub(super) fn restore_tensions(elements: &[ElementData], step: &mut [f64]) {
         for (e, data) in elements.iter().enumerate() {
@@ -100,7 +90,7 @@ impl<const C: usize> Newton<C> {
         for _ in 0..REFINEMENTS {
             let middle = 0.5 * (low + high);
             self.trial.advance::<C>(elements, state, &self.step, middle);
-            self.tensions(elements, state);
+            self.trial.take_tensions::<C>(elements, state, &self.step);
             let change = self.energy(elements, external, state) - before;
             if change < lowest {
                 (low, lowest) = (middle, change);
@@ -109,7 +99,7 @@ impl<const C: usize> Newton<C> {
             }
         }
         self.trial.advance::<C>(elements, state, &self.step, low);
-        self.tensions(elements, state);
+        self.trial.take_tensions::<C>(elements, state, &self.step);
         (low, lowest)
     }
 }

@@ -98,7 +98,7 @@ impl StaticProblem {
                         ));
                         break;
                     }
-                    let Some(step) = newton.full_step(elements, &held) else { break };
+                    let Some((_, step)) = newton.full_step(elements, &held) else { break };
                     let mut correction = step.to_vec();
                     let response = self.load_response(&mut newton, &base, &held, lambda)?;
                     let across = product(elements, l, &direction, &response);

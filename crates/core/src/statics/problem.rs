@@ -183,7 +183,7 @@ impl StaticProblem {
         let state = &solved.state;
         let mut newton = Newton::<C>::new(self.elements.len());
         newton.assemble(&self.elements, &solved.supports, &mut self.loads.clone(), state);
-        let Some(step) = newton.full_step(&self.elements, &solved.supports) else { return f64::NAN };
+        let Some((_, step)) = newton.full_step(&self.elements, &solved.supports) else { return f64::NAN };
         let mut next = state.clone();
         next.advance::<C>(&self.elements, state, step, 1.0);
         let bend = |s: &RodState, e: usize| s.frames[e].t.cross(&s.frames[e + 1].t).norm();

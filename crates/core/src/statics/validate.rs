@@ -27,13 +27,13 @@ fn positive(name: impl Display, value: f64) -> Result<()> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
-    Err(Error::parameter(name.to_string(), value, "must be a positive, finite number"))
+    Err(Error::parameter(name, value, "must be a positive, finite number"))
 }
 
 fn finite(name: impl Display, values: &[f64]) -> Result<()> {
     for v in values {
         if !v.is_finite() {
-            return Err(Error::parameter(name.to_string(), v, "must be a finite number"));
+            return Err(Error::parameter(name, v, "must be a finite number"));
         }
     }
     Ok(())
@@ -83,11 +83,9 @@ impl StaticCase {
             let name = |key| Key { list: "load", index: k, key };
             finite(name("value"), &load.value)?;
             let span = |key: &'static str, s: Option<f64>| match s {
-                Some(s) if !(0.0..=length).contains(&s) => Err(Error::parameter(
-                    name(key).to_string(),
-                    s,
-                    format!("must lie on the rod, 0 to {length}"),
-                )),
+                Some(s) if !(0.0..=length).contains(&s) => {
+                    Err(Error::parameter(name(key), s, format!("must lie on the rod, 0 to {length}")))
+                }
                 _ => Ok(()),
             };
             span("at", load.at)?;
@@ -96,24 +94,20 @@ impl StaticCase {
             let spread = load.kind == LoadKind::Distributed;
             if spread && load.at.is_some() {
                 return Err(Error::parameter(
-                    name("at").to_string(),
+                    name("at"),
                     "given",
                     "a distributed load has no point; use from and to",
                 ));
             }
             if !spread && (load.from.is_some() || load.to.is_some()) {
                 return Err(Error::parameter(
-                    name("from").to_string(),
+                    name("from"),
                     "given",
                     "only a distributed load has from and to; use at",
                 ));
             }
             if load.from.unwrap_or(0.0) >= load.to.unwrap_or(length) {
-                return Err(Error::parameter(
-                    name("from").to_string(),
-                    load.from.unwrap_or(0.0),
-                    "must be less than to",
-                ));
+                return Err(Error::parameter(name("from"), load.from.unwrap_or(0.0), "must be less than to"));
             }
         }
         if let Some(initial) = &self.initial {
@@ -148,7 +142,7 @@ impl StaticCase {
             positive(name("until"), section.until)?;
             if section.until <= begin || section.until > length * (1.0 + 1e-9) {
                 return Err(Error::parameter(
-                    name("until").to_string(),
+                    name("until"),
                     section.until,
                     format!("sections come in order: more than {begin}, at most the length {length}"),
                 ));
@@ -166,7 +160,7 @@ impl StaticCase {
             for (key, end, begin) in [("GJ_end", gj_end, gj), ("EA_end", ea_end, ea)] {
                 if end.is_some() && begin.is_none() {
                     return Err(Error::parameter(
-                        name(key).to_string(),
+                        name(key),
                         "given",
                         "needs the value at the section's begin too",
                     ));

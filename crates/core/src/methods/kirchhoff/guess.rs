@@ -8,7 +8,7 @@ use super::mesh::Mesh;
 use super::repeat::Correction;
 use super::slide::carry;
 use crate::contact::{HandMotion, WallContact};
-use crate::rod::{Layout, RodState, TWISTED};
+use crate::rod::RodState;
 use crate::solve::Newton;
 
 /// The candidates.
@@ -18,7 +18,6 @@ pub(super) struct Guess {
     pub(super) shaped_mm: f64,
     slid: RodState,
     pub(super) other: RodState,
-    pub(super) step: Vec<f64>,
     correction: Correction,
 }
 
@@ -33,7 +32,6 @@ impl Guess {
         self.slid.reserve(elements);
         self.other.reserve(elements);
         self.correction.reserve(elements);
-        self.step.reserve(Layout::<TWISTED>::dimension(elements));
     }
 
     /// Replaces the slid device in `state` by the best candidate; returns whether that has learnt from the last step. Where the

@@ -16,7 +16,7 @@
 use super::guess::Guess;
 use super::mesh::Mesh;
 use crate::contact::WallContact;
-use crate::rod::{Layout, RodState, Supports};
+use crate::rod::{RodState, Supports};
 use crate::solve::{External, Newton};
 
 /// Part of the forces on the wall by which those of a guess may differ before it is held. One that has learnt from small steps
@@ -42,23 +42,15 @@ impl Guess {
         contact.holding = true;
         newton.assemble(elements, supports, contact, state);
         contact.holding = false;
+        let Some((inertia, step)) = newton.full_step(elements, supports) else { return false };
+        let (turn, _) = RodState::largest_turn::<C>(elements, state, step);
         // Only towards a minimum: one negative pivot for each axial force.
-        if newton.factor(elements, supports).is_none_or(|inertia| inertia.negative != elements.len()) {
-            return false;
-        }
-        let (residual, correction) = (&newton.assembly.residual, &newton.assembly.correction);
-        self.step.clear();
-        self.step.extend(residual.iter().zip(correction).map(|(r, c)| -(r + c)));
-        newton.apply_inverse(elements, &mut self.step);
-        let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
-        if turn.is_nan() || turn > LARGEST_TURN {
+        if inertia.negative != elements.len() || turn.is_nan() || turn > LARGEST_TURN {
             return false;
         }
         self.other.copy_from(state);
-        self.other.advance::<C>(elements, state, &self.step, 1.0);
-        for (e, tension) in self.other.tensions.iter_mut().enumerate() {
-            *tension = state.tensions[e] + self.step[Layout::<C>.tension(e)];
-        }
+        self.other.advance::<C>(elements, state, step, 1.0);
+        self.other.take_tensions::<C>(elements, state, step);
         let crosses = External::<C>::safe_fraction(contact, elements, &self.other) < 1.0;
         if crosses || contact.is_outside(elements, &self.other) {
             return false;
