@@ -31,13 +31,12 @@ enum Reading {
 }
 
 impl Reading {
-    fn of(nearness: Nearness, potential: &WallPotential) -> Self {
-        if !potential.is_allowed(nearness.value_mm()) {
-            return Self::Outside;
-        }
+    /// A distance with derivatives may have been asked for from farther away than `limit_mm` before.
+    fn of(nearness: Nearness, potential: &WallPotential, limit_mm: f64) -> Self {
         match nearness {
-            Nearness::Beyond(value_mm) => Self::Free(value_mm),
-            Nearness::Within(d) => Self::Pressed(d),
+            near if !potential.is_allowed(near.value_mm()) => Self::Outside,
+            Nearness::Within(d) if d.value_mm < limit_mm => Self::Pressed(d),
+            near => Self::Free(near.value_mm()),
         }
     }
 }
@@ -125,14 +124,14 @@ impl<'a> WallContact<'a> {
                 let told = matches!(reading, Nearness::Within(_)) || reading.value_mm() >= limit_mm;
                 if place == *x && told {
                     self.counters.avoided += 1;
-                    return Reading::of(reading, &potential);
+                    return Reading::of(reading, &potential, limit_mm);
                 }
                 if moved < LOOK_AGAIN * radius {
                     let nearness = self.felt.nearness(x, triangle, limit_mm);
                     if nearness.value_mm() > 0.0 {
                         self.counters.near += 1;
                         self.memory.readings[index] = (*x, nearness);
-                        return Reading::of(nearness, &potential);
+                        return Reading::of(nearness, &potential, limit_mm);
                     }
                 }
             }
@@ -152,7 +151,7 @@ impl<'a> WallContact<'a> {
         known.triangle = Some(triangle);
         let nearness = self.felt.nearness(x, triangle, limit_mm);
         self.memory.readings[index] = (*x, nearness);
-        Reading::of(nearness, &potential)
+        Reading::of(nearness, &potential, limit_mm)
     }
 
     /// Work done and avoided since it was counted last, looking for the tip's way included.
