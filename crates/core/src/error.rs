@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::Vec3;
+
 /// Shorthand for results of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -41,6 +43,50 @@ pub enum Error {
     /// A computation did not reach its result.
     #[error("{0}")]
     Computation(String),
+    /// The device can go no farther: not a failure, but where the way ends.
+    #[error("{0}")]
+    End(PhysicalEnd),
+}
+
+/// Why a device can go no farther.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PhysicalEnd {
+    /// The tip has left the vessel, and is farther beyond the opening than anything is known.
+    Left {
+        /// Number of the opening.
+        opening: usize,
+        /// How far the tip is beyond its plane, mm.
+        beyond_mm: f64,
+        /// How far it may be, mm.
+        limit_mm: f64,
+    },
+    /// The vessel is narrower than the device.
+    Blocked {
+        /// Where, mm.
+        position_mm: Vec3,
+        /// Half of the room there, mm.
+        lumen_radius_mm: f64,
+        /// Radius of the device there, mm.
+        device_radius_mm: f64,
+    },
+}
+
+impl std::fmt::Display for PhysicalEnd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Left { opening, beyond_mm, limit_mm } => write!(
+                f,
+                "the tip has left the vessel through opening {opening} by {beyond_mm:.1} mm, and beyond {limit_mm} mm nothing \
+                 is known: stop the script earlier or use a vessel that goes on"
+            ),
+            Self::Blocked { position_mm, lumen_radius_mm, device_radius_mm } => write!(
+                f,
+                "blocked at [{:.2}, {:.2}, {:.2}]: half of the room there is {lumen_radius_mm:.3} mm, and the device has a \
+                 radius of {device_radius_mm:.3} mm: stop the script earlier or use a thinner device",
+                position_mm.x, position_mm.y, position_mm.z
+            ),
+        }
+    }
 }
 
 /// Numbers of no more characters stand as they are.
@@ -71,7 +117,7 @@ impl Error {
 
     /// Whether the input is at fault (as opposed to a computation that failed on good input).
     pub fn is_input(&self) -> bool {
-        !matches!(self, Self::Computation(_))
+        !matches!(self, Self::Computation(_) | Self::End(_))
     }
 }
 
@@ -85,7 +131,7 @@ pub(crate) fn number(value: f64) -> String {
 }
 
 /// A vector for people.
-pub(crate) fn vector(v: &crate::Vec3) -> String {
+pub(crate) fn vector(v: &Vec3) -> String {
     format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
 }
 

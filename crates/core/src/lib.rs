@@ -24,7 +24,7 @@ pub mod solve;
 pub mod statics;
 pub mod vessel;
 
-pub use error::{Error, Result};
+pub use error::{Error, PhysicalEnd, Result};
 pub use nalgebra;
 
 /// A point or direction in space, millimetres or unit length as its name says.

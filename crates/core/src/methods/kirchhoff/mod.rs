@@ -34,7 +34,7 @@ use crate::methods::Method;
 use crate::rod::Layout;
 use crate::shape::Shape;
 use crate::solve::Newton;
-use crate::{Error, Result};
+use crate::{Error, PhysicalEnd, Result};
 use configuration::Configuration;
 use guess::Guess;
 use mesh::MOST_POINTS;
@@ -289,10 +289,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
 /// The tip would be farther beyond an opening than anything is known.
 fn left(opening: usize, beyond_mm: f64) -> Error {
-    Error::Computation(format!(
-        "the tip has left the vessel through opening {opening} by {beyond_mm:.1} mm, and beyond {LEAVE_MM} mm nothing is \
-         known: stop the script earlier or use a vessel that goes on"
-    ))
+    Error::End(PhysicalEnd::Left { opening, beyond_mm, limit_mm: LEAVE_MM })
 }
 
 /// Least bending stiffness of a device, N·mm².
