@@ -92,10 +92,23 @@ impl Nearness {
 /// Most vertices that are noted as reaching a point; on any sensible mesh there are about ten.
 const NOTED: usize = 32;
 
+/// A point behind the surface that is asked about. How deep it is says the sheet that it has gone through, which faces this way: no
+/// window tells it from others, as one does in front.
+#[derive(Debug, Clone, Copy)]
+struct Behind {
+    facing: Vec3,
+    /// About where it is, mm: less than 0.
+    height_mm: f64,
+}
+
+/// Least cosine between the normals of vertices of one sheet.
+const FACING: f64 = 0.3;
+
 /// What the vertices that reach a point make of its distance.
 struct Reached {
     weight: f64,
     value_mm: f64,
+    behind: Option<Behind>,
     /// How many they are; the first of them.
     count: usize,
     vertices: [u32; NOTED],
@@ -105,6 +118,8 @@ struct Reached {
 #[derive(Debug, Clone)]
 pub struct SmoothWall {
     quadrics: Vec<Quadric>,
+    /// For every vertex, a triangle that it is a corner of.
+    triangles: Vec<u32>,
     /// For every triangle, where its list of vertices begins.
     starts: Vec<u32>,
     /// Vertices whose support may reach a point over the triangle.
@@ -126,6 +141,10 @@ impl SmoothWall {
             (0..count).map(|v| fit(v, &mesh.vertices_mm, &normals, &neighbours)).collect();
         quadrics.iter_mut().for_each(|q| q.open_window(thickest_mm));
 
+        let mut triangles = vec![0; count];
+        for (index, triangle) in mesh.triangles.iter().enumerate() {
+            triangle.iter().for_each(|v| triangles[*v as usize] = index as u32);
+        }
         let mut starts = Vec::with_capacity(mesh.triangles.len() + 1);
         let mut lists = Vec::new();
         let mut seen = vec![u32::MAX; count];
@@ -155,7 +174,7 @@ impl SmoothWall {
             }
         }
         starts.push(lists.len() as u32);
-        let mut smooth = Self { quadrics, starts, lists, insets_mm: Vec::new(), deepest_inset_mm: 0.0 };
+        let mut smooth = Self { quadrics, triangles, starts, lists, insets_mm: Vec::new(), deepest_inset_mm: 0.0 };
         smooth.draw_in(mesh, BEYOND * thinnest_mm);
         smooth
     }
@@ -186,7 +205,7 @@ impl SmoothWall {
             for x in grid(mesh.corners(index)) {
                 let list = self.list(index);
                 let beyond = self.reach(&x, list).map_or(0.0, |r| r.value_mm) - limit_mm;
-                for &v in list.iter().filter(|&&v| self.quadrics[v as usize].local(&x).is_some()) {
+                for &v in list.iter().filter(|&&v| self.quadrics[v as usize].local(&x, false).is_some()) {
                     offsets[v as usize] = offsets[v as usize].max(beyond);
                 }
             }
@@ -217,6 +236,27 @@ impl SmoothWall {
         &self.lists[self.starts[triangle] as usize..self.starts[triangle + 1] as usize]
     }
 
+    /// The triangle to ask for the distance of `x`, from `triangle` on along the surface: while a vertex of its list is nearer than its
+    /// corners, one that this vertex is a corner of.
+    pub(super) fn walk(&self, mut triangle: u32, x: &Vec3) -> u32 {
+        let square = |v: u32| (self.quadrics[v as usize].position - x).norm_squared();
+        let mut least = f64::INFINITY;
+        loop {
+            let list = self.list(triangle as usize);
+            let Some(nearest) = list.iter().copied().min_by(|a, b| square(*a).total_cmp(&square(*b))) else {
+                return triangle;
+            };
+            if square(nearest) >= least {
+                return triangle;
+            }
+            least = square(nearest);
+            if list.iter().take(3).any(|v| *v == nearest) {
+                return triangle;
+            }
+            triangle = self.triangles[nearest as usize];
+        }
+    }
+
     /// All vertices.
     pub(super) fn vertices_mm(&self) -> impl Iterator<Item = &Vec3> {
         self.quadrics.iter().map(|q| &q.position)
@@ -224,12 +264,28 @@ impl SmoothWall {
 
     /// f alone, of a point that the vertices of `list` reach.
     fn reach(&self, x: &Vec3, list: &[u32]) -> Option<Reached> {
-        let mut found = Reached { weight: 0.0, value_mm: 0.0, count: 0, vertices: [0; NOTED] };
+        let found = self.reach_from(x, list, None);
+        if found.as_ref().is_some_and(|found| found.value_mm > 0.0) {
+            return found;
+        }
+        // The list begins with the corners of the triangle.
+        let corners = || list.iter().take(3).map(|v| &self.quadrics[*v as usize]);
+        let facing = corners().map(|q| q.normal).sum::<Vec3>().normalize();
+        let height_mm = corners().map(|q| q.normal.dot(&(x - q.position))).fold(f64::INFINITY, f64::min);
+        if height_mm < 0.0 { self.reach_from(x, list, Some(Behind { facing, height_mm })) } else { found }
+    }
+
+    /// The same in front of the surface, or behind it.
+    fn reach_from(&self, x: &Vec3, list: &[u32], behind: Option<Behind>) -> Option<Reached> {
+        let mut found = Reached { weight: 0.0, value_mm: 0.0, behind, count: 0, vertices: [0; NOTED] };
         for &v in list {
             let q = &self.quadrics[v as usize];
-            let Some(local) = q.local(x) else { continue };
+            if behind.is_some_and(|b| q.normal.dot(&b.facing) < FACING) {
+                continue;
+            }
+            let Some(local) = q.local(x, behind.is_some()) else { continue };
             let g = 1.0 - local.u;
-            let w = g * g * g * q.window(local.value)[0];
+            let w = g * g * g * q.opened(local.value, behind.map(|b| b.height_mm))[0];
             if w == 0.0 {
                 continue;
             }
@@ -287,9 +343,12 @@ impl SmoothWall {
         let (mut slope, mut gradient, mut hessian) = (Vec3::zeros(), Vec3::zeros(), Matrix3::zeros());
         for &v in reached.vertices.get(..reached.count).unwrap_or(list) {
             let q = &self.quadrics[v as usize];
-            let Some(local) = q.local(x) else { continue };
+            if reached.behind.is_some_and(|b| q.normal.dot(&b.facing) < FACING) {
+                continue;
+            }
+            let Some(local) = q.local(x, reached.behind.is_some()) else { continue };
             let (f, g) = (local.value, 1.0 - local.u);
-            let [b, b1, b2] = q.window(f);
+            let [b, b1, b2] = q.opened(f, reached.behind.map(|b| b.height_mm));
             if b == 0.0 {
                 continue;
             }
@@ -370,6 +429,47 @@ mod tests {
                 assert!(((plus.value_mm - minus.value_mm) / (2.0 * h) - here.gradient[k]).abs() < 1e-8);
                 let column = (plus.gradient - minus.gradient) / (2.0 * h);
                 assert!((column - here.hessian.column(k)).norm() < 1e-5, "column {k}");
+            }
+        }
+    }
+
+    /// Of the tube, at a height over the wall that may be negative.
+    fn from_inside(wall: &(SmoothWall, WallQuery), i: i32, height_mm: f64) -> (Vec3, Distance) {
+        let angle = 2.399 * f64::from(i);
+        let on = |r: f64| Vec3::new(r * angle.cos(), r * angle.sin(), 30.0 + 0.1 * f64::from(i));
+        let triangle = wall.1.nearest(&on(3.8), 10.0).unwrap().triangle;
+        let x = on(4.0 - height_mm);
+        (x, wall.0.distance(&x, triangle).unwrap())
+    }
+
+    #[test]
+    fn behind_the_surface_the_distance_goes_on_as_in_front() {
+        let wall = tube(1.0);
+        for i in 0..200 {
+            // Across the surface, …
+            let (x, front) = from_inside(&wall, i, 0.0);
+            let n = front.normal();
+            let x = x - n * front.value_mm;
+            let triangle = wall.1.nearest(&x, 10.0).unwrap().triangle;
+            let (front, back) =
+                (wall.0.distance(&(x + n * 1e-6), triangle), wall.0.distance(&(x - n * 1e-6), triangle));
+            let (front, back) = (front.unwrap(), back.unwrap());
+            assert!(front.value_mm > 0.0 && back.value_mm < 0.0);
+            println!("{:e} {:e}", front.value_mm - back.value_mm - 2e-6, (front.gradient - back.gradient).norm());
+            // … and deep behind it.
+            for height in [-0.3, -2.0, -20.0] {
+                let (x, here) = from_inside(&wall, i, height);
+                assert!((here.value_mm - height).abs() < 2e-3 * (1.0 - height), "{height}: {here:?}");
+                let (h, triangle) = (1e-5, wall.1.nearest(&x, 100.0).unwrap().triangle);
+                let here = wall.0.distance(&x, triangle).unwrap();
+                let at = |x: Vec3| wall.0.distance(&x, triangle).unwrap();
+                for k in 0..3 {
+                    let (plus, minus) = (at(x + Vec3::ith(k, h)), at(x - Vec3::ith(k, h)));
+                    let slope = (plus.value_mm - minus.value_mm) / (2.0 * h);
+                    assert!((slope - here.gradient[k]).abs() < 1e-7, "{slope} {here:?}");
+                    let column = (plus.gradient - minus.gradient) / (2.0 * h);
+                    assert!((column - here.hessian.column(k)).norm() < 1e-5);
+                }
             }
         }
     }

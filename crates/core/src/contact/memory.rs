@@ -17,6 +17,8 @@ pub(super) struct KnownPoint {
     pub(super) clearance_mm: f64,
     /// The nearest triangle then, if the wall was near.
     pub(super) triangle: Option<u32>,
+    /// Of a point that has sunk into the wall at its base, a triangle of the wall that it has sunk into.
+    pub(super) side: Option<u32>,
     /// Position at the state that Newton's method is leaving.
     pub(super) base: Vec3,
     /// No wall is nearer to it than this, mm.
@@ -32,7 +34,8 @@ const NOTHING: KnownPoint = KnownPoint {
     from_tip_mm: 0.0,
     clearance_mm: -1.0,
     triangle: None,
-    base: Vec3::new(0.0, 0.0, 0.0),
+    side: None,
+    base: Vec3::new(f64::NAN, f64::NAN, f64::NAN),
     base_clearance_mm: 0.0,
     presses: false,
     force_n: 0.0,

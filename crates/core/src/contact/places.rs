@@ -66,10 +66,11 @@ impl Places {
     /// What is nearest to `x` itself.
     pub(super) fn ask(&mut self, query: &WallQuery, x: &Vec3) -> Place {
         self.queries += 1;
-        let nearest = query.nearest(x, self.reach_mm);
+        // Where no wall is near, the point may be far from it on either side.
+        let nearest = query.nearest(x, self.reach_mm).or_else(|| query.nearest(x, f64::MAX));
         Place {
             middle: *x,
-            clearance_mm: nearest.map_or(self.reach_mm, |n| n.distance_mm.abs()),
+            clearance_mm: nearest.map_or(self.reach_mm, |n| n.distance_mm),
             triangle: nearest.filter(|n| !n.rim).map(|n| n.triangle),
         }
     }

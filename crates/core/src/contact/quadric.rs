@@ -102,12 +102,13 @@ pub(super) struct Local {
 }
 
 impl Quadric {
-    /// What is seen of `x`; `None` beyond the support.
+    /// What is seen of `x`; `None` beyond the support. `farthest_mm` holds for points within the window; one that is deep behind
+    /// the surface may be farther from the normal.
     #[inline]
-    pub(super) fn local(&self, x: &Vec3) -> Option<Local> {
+    pub(super) fn local(&self, x: &Vec3, deep: bool) -> Option<Local> {
         let y = x - self.position;
         let rise = self.normal.dot(&y);
-        if y.norm_squared() - rise * rise >= self.farthest_mm * self.farthest_mm {
+        if !deep && y.norm_squared() - rise * rise >= self.farthest_mm * self.farthest_mm {
             return None;
         }
         let height = rise - self.offset_mm;
@@ -172,9 +173,18 @@ impl Quadric {
         self.farthest_mm = long * (1.0 - (highest * l.min(0.0)).min(lowest * k.max(0.0)));
     }
 
-    /// b(Q) and its derivatives.
+    /// b(Q) and its derivatives; behind the surface, at about `height_mm`, without an end, and over what it is there: a factor that
+    /// all weights have.
     #[inline]
-    pub(super) fn window(&self, value: f64) -> [f64; 3] {
+    pub(super) fn opened(&self, value: f64, height_mm: Option<f64>) -> [f64; 3] {
+        let Some(height_mm) = height_mm else { return self.window(value) };
+        let rate = BELOW.0 / (NEARER * self.below_mm.0);
+        let e = (-rate * (value - height_mm)).exp();
+        [e, -rate * e, rate * rate * e]
+    }
+
+    #[inline]
+    fn window(&self, value: f64) -> [f64; 3] {
         let (from, to) = if value > 0.0 { self.above_mm } else { self.below_mm };
         let [b, b1, b2] = fall(value, from, to);
         if b == 0.0 {

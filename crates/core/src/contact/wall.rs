@@ -14,7 +14,7 @@ use super::memory::WallMemory;
 use super::point::{ContactPoint, Counters, Touch};
 use crate::Vec3;
 use crate::contact::distance::{Distance, Nearness};
-use crate::contact::{FeltWall, Friction, WallPotential, friction};
+use crate::contact::{FeltWall, Friction, friction};
 use crate::insertion::Contact;
 use crate::rod::{Assembly, ElementData, PointSum, RodState};
 use crate::solve::External;
@@ -26,17 +26,21 @@ enum Reading {
     Free(f64),
     /// It presses, or is as near as was asked.
     Pressed(Distance),
-    /// The point is where the potential does not allow it.
-    Outside,
 }
 
 impl Reading {
     /// A distance with derivatives may have been asked for from farther away than `limit_mm` before.
-    fn of(nearness: Nearness, potential: &WallPotential, limit_mm: f64) -> Self {
+    fn of(nearness: Nearness, limit_mm: f64) -> Self {
         match nearness {
-            near if !potential.is_allowed(near.value_mm()) => Self::Outside,
             Nearness::Within(d) if d.value_mm < limit_mm => Self::Pressed(d),
             near => Self::Free(near.value_mm()),
+        }
+    }
+
+    /// Distance, mm, or less.
+    fn distance_mm(&self) -> f64 {
+        match self {
+            Self::Free(value_mm) | Self::Pressed(Distance { value_mm, .. }) => *value_mm,
         }
     }
 }
@@ -51,6 +55,13 @@ const STEEPEST: f64 = 2.0;
 const LEAST_BEND_MM: f64 = 100.0;
 /// Part of its clearance that a point may move in one step of Newton's method.
 const SAFE: f64 = 0.9;
+/// A point whose axis is nearer to the wall than this part of its radius has sunk into it: on which side of the wall it is says the
+/// side that it came from, and the nearest piece of wall is looked for along the wall, not through space.
+const SUNK: f64 = 0.3;
+/// Roundings of a coordinate by which a distance is off.
+const ROUNDING: f64 = 4.0;
+/// A guess is none if it sinks deeper than the last equilibrium by this part of the radius.
+const DEEPER: f64 = 0.3;
 
 /// The wall's energy along a device.
 pub struct WallContact<'a> {
@@ -66,6 +77,8 @@ pub struct WallContact<'a> {
     pub holding: bool,
     memory: &'a mut WallMemory,
     friction: &'a mut Friction,
+    /// What rounding of positions leaves of the forces at the last state, N.
+    rounding_n: f64,
     counters: Counters,
 }
 
@@ -90,6 +103,7 @@ impl<'a> WallContact<'a> {
             holding: false,
             memory,
             friction,
+            rounding_n: 0.0,
             counters: Counters::default(),
         }
     }
@@ -101,10 +115,24 @@ impl<'a> WallContact<'a> {
 
     /// The same, with derivatives nearer than `limit_mm`.
     fn read_within(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
-        let potential = self.points[index].potential;
-        let radius = potential.radius_mm;
+        let radius = self.points[index].potential.radius_mm;
         let near = radius * (1.0 + FOLLOW);
         let known = &mut self.memory.points[index];
+        if let Some(side) = known.side {
+            let (place, reading) = self.memory.readings[index];
+            let told = matches!(reading, Nearness::Within(_)) || reading.value_mm() >= limit_mm;
+            if self.skip && place == *x && told {
+                self.counters.avoided += 1;
+                return Reading::of(reading, limit_mm);
+            }
+            let triangle = self.felt.smooth.walk(side, x);
+            let nearness = self.felt.nearness(x, triangle, limit_mm);
+            (known.looked_at, known.from_tip_mm) = (*x, self.points[index].from_tip_mm);
+            (known.clearance_mm, known.triangle) = (0.0, Some(triangle));
+            self.counters.near += 1;
+            self.memory.readings[index] = (*x, nearness);
+            return Reading::of(nearness, limit_mm);
+        }
         if self.skip {
             let moved = (x - known.looked_at).norm();
             let clearance = known.clearance_mm - moved;
@@ -124,14 +152,14 @@ impl<'a> WallContact<'a> {
                 let told = matches!(reading, Nearness::Within(_)) || reading.value_mm() >= limit_mm;
                 if place == *x && told {
                     self.counters.avoided += 1;
-                    return Reading::of(reading, &potential, limit_mm);
+                    return Reading::of(reading, limit_mm);
                 }
                 if moved < LOOK_AGAIN * radius {
                     let nearness = self.felt.nearness(x, triangle, limit_mm);
                     if nearness.value_mm() > 0.0 {
                         self.counters.near += 1;
                         self.memory.readings[index] = (*x, nearness);
-                        return Reading::of(nearness, &potential, limit_mm);
+                        return Reading::of(nearness, limit_mm);
                     }
                 }
             }
@@ -151,7 +179,7 @@ impl<'a> WallContact<'a> {
         known.triangle = Some(triangle);
         let nearness = self.felt.nearness(x, triangle, limit_mm);
         self.memory.readings[index] = (*x, nearness);
-        Reading::of(nearness, &potential, limit_mm)
+        Reading::of(nearness, limit_mm)
     }
 
     /// Work done and avoided since it was counted last, looking for the tip's way included.
@@ -194,6 +222,8 @@ impl<'a> WallContact<'a> {
         let (point, known) = (&self.points[index], &self.memory.points[index]);
         let stiffness = self.felt.stiffness(&known.base, known.triangle, self.softness);
         let w = point.weight_mm;
+        let spring = stiffness.factor * w * point.potential.modulus_n_per_mm2;
+        self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * spring * known.base.amax());
         let (gradient, hessian) = if self.holding {
             stiffness.holding(&point.potential, d, w, known.force_n)
         } else {
@@ -256,7 +286,7 @@ impl<'a> WallContact<'a> {
                     let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, 1.0).factor;
                     point.pressed(&d, factor).1
                 }
-                Reading::Free(_) | Reading::Outside => 0.0,
+                Reading::Free(_) => 0.0,
             };
             let was_n = self.memory.points[index].force_n;
             misfit_n += (force_n - was_n).abs();
@@ -265,12 +295,41 @@ impl<'a> WallContact<'a> {
         if sum_n > 0.0 { misfit_n / sum_n } else { 0.0 }
     }
 
-    /// Whether a point is beyond the wall.
-    pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
-        (0..self.points.len()).any(|index| {
+    /// Whether the device has passed through the wall to where it is: followed from the sheath, a piece of it between two points in
+    /// the lumen meets the wall. Of a point that has sunk in the side is known.
+    pub fn passes_through(&mut self, elements: &[ElementData], state: &RodState) -> bool {
+        let mut last: Option<(Vec3, f64)> = None;
+        for index in (0..self.points.len()).rev() {
             let x = self.points[index].position(elements, state);
-            matches!(self.read(index, &x), Reading::Outside)
-        })
+            let distance_mm = self.read(index, &x).distance_mm();
+            if distance_mm < SUNK * self.points[index].potential.radius_mm {
+                last = None;
+                continue;
+            }
+            if let Some((from, clearance_mm)) = last
+                && (x - from).norm() > SAFE * clearance_mm.max(distance_mm)
+            {
+                self.counters.queries += 1;
+                if self.felt.query.crossing(&from, &x, 1.0).is_some() {
+                    return true;
+                }
+            }
+            last = Some((x, distance_mm));
+        }
+        false
+    }
+
+    /// Whether a guess is none: a point sinks much deeper than where it comes from, or passes through the wall on its way from there.
+    pub fn is_outside<const C: usize>(&mut self, elements: &[ElementData], state: &RodState) -> bool {
+        let deep = (0..self.points.len()).any(|index| {
+            let radius_mm = self.points[index].potential.radius_mm;
+            let known = &self.memory.points[index];
+            let was_mm = if known.side.is_some() { known.base_clearance_mm } else { SUNK * radius_mm };
+            let least_mm = was_mm.min(SUNK * radius_mm + DEEPER * radius_mm) - DEEPER * radius_mm;
+            let x = self.points[index].position(elements, state);
+            self.read(index, &x).distance_mm() <= least_mm
+        });
+        deep || External::<C>::safe_fraction(self, elements, state) < 1.0
     }
 }
 
@@ -283,15 +342,11 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let radius_mm = point.potential.radius_mm;
             // Derivatives serve the assembly that follows where friction acts; otherwise that was tried first.
             let limit_mm = if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY };
-            match self.read_within(index, &x, limit_mm) {
-                Reading::Free(value_mm) | Reading::Pressed(Distance { value_mm, .. }) => {
-                    if value_mm < radius_mm {
-                        let triangle = self.memory.points[index].triangle;
-                        let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
-                        sum += factor * point.weight_mm * point.potential.value(value_mm);
-                    }
-                }
-                Reading::Outside => return f64::INFINITY,
+            let value_mm = self.read_within(index, &x, limit_mm).distance_mm();
+            if value_mm < radius_mm {
+                let triangle = self.memory.points[index].triangle;
+                let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
+                sum += factor * point.weight_mm * point.potential.value(value_mm);
             }
             if self.friction.acts() {
                 sum += self.friction.value(index, &x, point.angle(state), point.potential.radius_mm);
@@ -309,17 +364,12 @@ impl<const C: usize> External<C> for WallContact<'_> {
             let reading = self.read_within(index, &x, limit_mm);
             let known = &mut self.memory.points[index];
             known.base = x;
-            (known.base_clearance_mm, known.presses) = match reading {
-                Reading::Free(clearance) => {
-                    known.force_n = 0.0;
-                    (clearance, false)
-                }
-                Reading::Pressed(d) => (d.value_mm, true),
-                Reading::Outside => {
-                    assembly.external_energy = f64::INFINITY;
-                    return;
-                }
-            };
+            known.base_clearance_mm = reading.distance_mm();
+            known.presses = matches!(reading, Reading::Pressed(_));
+            known.side = known.triangle.filter(|_| known.base_clearance_mm < SUNK * radius_mm);
+            if !known.presses {
+                known.force_n = 0.0;
+            }
         }
         // Forces that hold are none that friction follows.
         if self.friction.acts() && !self.holding {
@@ -334,6 +384,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
             });
             self.friction.follow(pressed, least_n);
         }
+        self.rounding_n = 0.0;
         let mut begin = 0;
         let mut sum = PointSum::default();
         for group in self.points.chunk_by(|a, b| a.element == b.element) {
@@ -354,6 +405,10 @@ impl<const C: usize> External<C> for WallContact<'_> {
         [self.least_force_n(), self.least_moment_nmm]
     }
 
+    fn rounding(&self) -> f64 {
+        self.rounding_n
+    }
+
     fn obstructs(&self) -> bool {
         true
     }
@@ -364,13 +419,14 @@ impl<const C: usize> External<C> for WallContact<'_> {
     }
 
     /// A point may move by nearly its clearance, whatever the direction: the ball about it holds no wall. Farther it may go where its
-    /// straight way meets no wall, and nearly up to the wall where it does.
+    /// straight way meets no wall, and nearly up to the wall where it does. A point that has sunk in knows its side, and the energy
+    /// holds it there.
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         let mut fraction: f64 = 1.0;
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, to);
             let known = &self.memory.points[index];
-            if fraction * (x - known.base).norm() <= SAFE * known.base_clearance_mm {
+            if known.side.is_some() || fraction * (x - known.base).norm() <= SAFE * known.base_clearance_mm {
                 continue;
             }
             self.counters.queries += 1;

@@ -28,6 +28,10 @@ pub trait External<const C: usize> {
     fn safe_fraction(&mut self, _elements: &[ElementData], _to: &RodState) -> f64 {
         1.0
     }
+    /// What rounding of positions leaves of its forces at a node.
+    fn rounding(&self) -> f64 {
+        0.0
+    }
     /// Size of the forces and moments it exerts, for the scale of the residual.
     fn scale(&self) -> [f64; 2] {
         [0.0; 2]

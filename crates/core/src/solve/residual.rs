@@ -29,6 +29,7 @@ impl<const C: usize> Newton<C> {
         let n = elements.len();
         let length: f64 = elements.iter().map(|e| e.length).sum();
         let outside = external.scale();
+        let outside_floor = external.rounding();
         let held = supports.multipliers;
         let mut force = self.assembly.scale[0].max(outside[0]);
         force = held[..3].iter().fold(force, |m, v| m.max(v.abs()));
@@ -47,7 +48,7 @@ impl<const C: usize> Newton<C> {
             before = after;
             let moments = moment + force * h;
             // What rounding of unit vectors leaves of a force 12 EI/h² δ and of a moment 6 EI/h δ.
-            let floor = 100.0 * f64::EPSILON * stiff;
+            let floor = 100.0 * f64::EPSILON * stiff + outside_floor;
             let mut rows = |value: f64, scale: f64, floor: f64| {
                 small &= value <= tolerance * scale;
                 rounding &= value <= tolerance * scale + floor;

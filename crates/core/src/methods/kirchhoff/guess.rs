@@ -11,6 +11,17 @@ use crate::contact::{HandMotion, WallContact};
 use crate::rod::RodState;
 use crate::solve::Newton;
 
+/// How good a guess is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Quality {
+    /// It repeats what the last step has taught.
+    Learnt,
+    /// It follows the last equilibrium.
+    Near,
+    /// It is beyond the wall.
+    Beyond,
+}
+
 /// The candidates.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Guess {
@@ -34,8 +45,8 @@ impl Guess {
         self.correction.reserve(elements);
     }
 
-    /// Replaces the slid device in `state` by the best candidate; returns whether that has learnt from the last step. Where the
-    /// tip's way is `blocked`, sliding is none. `None` if all candidates are beyond the wall.
+    /// Replaces the slid device in `state` by the best candidate. Where the tip's way is `blocked`, the one that carries the tip's
+    /// shape comes first.
     pub(super) fn choose<const C: usize>(
         &mut self,
         newton: &Newton<C>,
@@ -43,43 +54,36 @@ impl Guess {
         (now, mesh, state): (&Configuration, &Mesh, &mut RodState),
         hand: HandMotion,
         blocked: bool,
-    ) -> Option<bool> {
+    ) -> Quality {
         self.slid.copy_from(state);
         let elements = &mesh.elements;
         if let Some(factor) = self.correction.repeats(hand) {
             self.correction.apply(factor, elements, state);
-            if !contact.is_outside(elements, state) {
-                return Some(true);
+            if !contact.is_outside::<C>(elements, state) {
+                return Quality::Learnt;
             }
             state.copy_from(&self.slid);
         }
-        let outside = contact.is_outside(elements, state);
+        let outside = contact.is_outside::<C>(elements, state);
         if self.shaped_mm > 0.0 {
             self.other.copy_from(state);
             carry((&now.mesh, &now.state), mesh, self.shaped_mm, hand.turn_rad, &mut self.other);
-            if !contact.is_outside(elements, &self.other)
+            if !contact.is_outside::<C>(elements, &self.other)
                 && (outside
                     || blocked
                     || newton.energy_at(elements, contact, &self.other)
                         < newton.energy_at(elements, contact, state))
             {
                 std::mem::swap(state, &mut self.other);
-                return Some(false);
+                return Quality::Near;
             }
         }
-        let none = outside || (blocked && self.shaped_mm > 0.0);
-        (!none).then_some(false)
+        if outside { Quality::Beyond } else { Quality::Near }
     }
 
-    /// Goes back to the slid device; `None` if it is beyond the wall.
-    pub(super) fn plain(
-        &self,
-        contact: &mut WallContact<'_>,
-        mesh: &Mesh,
-        state: &mut RodState,
-    ) -> Option<()> {
+    /// Goes back to the slid device.
+    pub(super) fn plain(&self, state: &mut RodState) {
         state.copy_from(&self.slid);
-        (!contact.is_outside(&mesh.elements, state)).then_some(())
     }
 
     /// Learns from the equilibrium that was found.

@@ -17,7 +17,7 @@ use super::guess::Guess;
 use super::mesh::Mesh;
 use crate::contact::WallContact;
 use crate::rod::{RodState, Supports};
-use crate::solve::{External, Newton};
+use crate::solve::Newton;
 
 /// Part of the forces on the wall by which those of a guess may differ before it is held. One that has learnt from small steps
 /// differs by less, and Newton's method goes on from it as well.
@@ -51,8 +51,7 @@ impl Guess {
         self.other.copy_from(state);
         self.other.advance::<C>(elements, state, step, 1.0);
         self.other.take_tensions::<C>(elements, state, step);
-        let crosses = External::<C>::safe_fraction(contact, elements, &self.other) < 1.0;
-        if crosses || contact.is_outside(elements, &self.other) {
+        if contact.is_outside::<C>(elements, &self.other) {
             return false;
         }
         std::mem::swap(state, &mut self.other);

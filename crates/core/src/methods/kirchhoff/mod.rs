@@ -71,8 +71,6 @@ const SUBSTEP_LIMIT: usize = 4096;
 /// Newton iterations that a command may take in all its sub-steps, those in vain included, as a multiple of those that one
 /// solution may take: a command that gets nowhere comes to an end.
 const WORK: usize = 10;
-/// Part of the tip's radius by which a device is pushed on at least, where its tip stands head-on against the wall.
-const LEAST_WAY: f64 = 0.05;
 /// A step is a jump if more than this part of the stored energy was set free.
 const JUMP: f64 = 0.02;
 /// Stored energy below which nothing is called a jump, mJ.
@@ -199,10 +197,9 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let mut done = 0.0f64;
         let mut share = 1.0f64;
         let mut failure = Cow::from("the way is too long for one step");
-        let mut may_carry = self.guess.shaped_mm > 0.0;
         while done < 1.0 {
             let rest = 1.0 - done;
-            let mut part = rest.min(share);
+            let part = rest.min(share);
             let wanted = (target - start) * part;
             let mut blocked = false;
             self.extension = Extension::default();
@@ -211,10 +208,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 let (tip, tangent) = (self.current.state.positions[last], self.current.state.frames[last].t);
                 let radius = surroundings.device.section_at(0.0).radius_mm;
                 let way = self.extension.trace((&self.felt, &mut self.memory), tip, tangent, radius, wanted);
-                blocked = may_carry && way < (1.0 - 1e-9) * wanted;
-                if !blocked {
-                    part *= (way.max(LEAST_WAY * radius) / wanted).min(1.0);
-                }
+                blocked = way < (1.0 - 1e-9) * wanted;
             }
             // A rest that is rounding is none.
             let next = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
@@ -244,12 +238,10 @@ impl<const C: usize> Method for Kirchhoff<C> {
                     }
                     done = next;
                     share = (2.0 * part).min(1.0);
-                    may_carry = self.guess.shaped_mm > 0.0;
                 }
                 Err(reason) => {
                     failure = reason;
-                    share = if blocked { part } else { 0.25 * part };
-                    may_carry = false;
+                    share = 0.25 * part;
                 }
             }
             if done < 1.0 && (share < 1e-7 || substeps > SUBSTEP_LIMIT || budget == 0) {

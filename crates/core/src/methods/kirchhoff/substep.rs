@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::guess::Quality;
 use super::slide::slide;
 use super::{Kirchhoff, softest};
 use crate::contact::{Counters, HandMotion, WallContact};
@@ -17,8 +18,8 @@ const LOOSE: f64 = 1e-3;
 const RENEWALS: usize = 100;
 /// Newton iterations in which a guess that has learnt must come to its end, or the wall is approached from softer ones.
 const HURRIED: usize = 15;
-/// What is the matter where there is no guess.
-const BEYOND: &str = "the slid rod is beyond the wall";
+/// What is the matter where an equilibrium is on the other side of the wall.
+const PASSED: &str = "the device would pass through the wall";
 /// What is the matter where they do not.
 const UNSETTLED: &str = "friction and wall forces do not settle";
 
@@ -71,17 +72,17 @@ impl<const C: usize> Kirchhoff<C> {
             self.options.skip,
         );
         let candidates = (now, &next.mesh, &mut next.state);
-        let learnt =
-            self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked).ok_or(BEYOND)?;
+        let quality = self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
-        let held = self.guess.hold(&mut self.newton, &mut contact, &supports, &next.mesh, &mut next.state);
+        let near = quality != Quality::Beyond;
+        let held = near && self.guess.hold(&mut self.newton, &mut contact, &supports, &next.mesh, &mut next.state);
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
         let data = &next.mesh.elements[elements - 1];
         let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
         let stiffest = surroundings.properties.stiffest_n_per_mm2();
         let softest_first = (SOFTEST * element_stiffness / stiffest).min(1.0);
         // A guess that has learnt from the last step or kept its contacts is so near that the wall may be met as it is.
-        let mut hurried = (learnt || held) && softest_first < 1.0;
+        let mut hurried = (quality == Quality::Learnt || held) && softest_first < 1.0;
         let mut softness = if hurried { 1.0 } else { softest_first };
         let mut iterations = usize::from(held);
         let mut renewals = 0;
@@ -102,7 +103,7 @@ impl<const C: usize> Kirchhoff<C> {
             iterations += found.iterations;
             *budget -= found.iterations;
             if !found.converged && hurried {
-                self.guess.plain(&mut contact, &next.mesh, &mut next.state).ok_or(BEYOND)?;
+                self.guess.plain(&mut next.state);
                 (hurried, softness) = (false, softest_first);
                 continue;
             }
@@ -121,6 +122,7 @@ impl<const C: usize> Kirchhoff<C> {
                 return Err(UNSETTLED.into());
             }
         };
+        let passed = found.converged && contact.passes_through(&next.mesh.elements, &next.state);
         let nodes = elements as u64 + 1;
         let (solved, frozen) = if iterations > 0 { (nodes, 0) } else { (0, nodes) };
         let counted = contact.count();
@@ -130,6 +132,9 @@ impl<const C: usize> Kirchhoff<C> {
             let unsettled = surroundings.properties.rubs() && !contact.friction_settled();
             let reason = if unsettled { UNSETTLED.to_owned() } else { found.reason.to_string() };
             return Err(format!("{reason} (residual {:.1e})", found.residual).into());
+        }
+        if passed {
+            return Err(PASSED.into());
         }
         self.guess.learn(hand, &next.state);
         let dissipated_mj = next.friction.dissipated_mj(&next.mesh.elements, &next.state, &next.mesh.points);
