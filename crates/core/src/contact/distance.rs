@@ -455,7 +455,8 @@ mod tests {
                 (wall.0.distance(&(x + n * 1e-6), triangle), wall.0.distance(&(x - n * 1e-6), triangle));
             let (front, back) = (front.unwrap(), back.unwrap());
             assert!(front.value_mm > 0.0 && back.value_mm < 0.0);
-            println!("{:e} {:e}", front.value_mm - back.value_mm - 2e-6, (front.gradient - back.gradient).norm());
+            assert!((front.value_mm - back.value_mm - 2e-6).abs() < 1e-8, "{front:?} {back:?}");
+            assert!((front.gradient - back.gradient).norm() < 1e-5);
             // … and deep behind it.
             for height in [-0.3, -2.0, -20.0] {
                 let (x, here) = from_inside(&wall, i, height);
