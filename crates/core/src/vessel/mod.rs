@@ -3,6 +3,7 @@
 pub mod anatomy;
 mod centreline;
 mod check;
+mod conditioning;
 mod files;
 mod generate;
 mod inside;
@@ -20,6 +21,7 @@ mod weld;
 
 pub use centreline::{CentrelineNode, CentrelineTree};
 pub use check::{CheckReport, OpeningReport, check};
+pub use conditioning::{Conditioned, Conditioning, condition};
 pub use generate::{GeneratedWall, Resolution};
 pub use mesh::SurfaceMesh;
 pub use opening::Opening;

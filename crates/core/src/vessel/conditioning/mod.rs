@@ -1,0 +1,165 @@
+//! An even mesh of the same surface.
+//!
+//! The wall that devices feel blends quadrics fitted at the vertices of a mesh. That is good where a mesh is even, and bad where it has
+//! slivers, fans, facets much longer than the vessel is wide, or noise; and surfaces of real vessels have all of these. Here such a
+//! surface gets vertices that depend on its geometry and not on how it was meshed:
+//!
+//! 1. A mesh that is even already is returned as it is ([`evenness`]).
+//! 2. The lumen's radius and the curvature say how long edges should be ([`sizes`]).
+//! 3. The mesh is split, collapsed, flipped and evened out on the given surface ([`remesh`], [`corners`], [`reference`]).
+//! 4. Kinks and noise are faired within the limit ([`fairing`]); where that leaves curvature, steps 2 to 4 follow with shorter edges.
+//! 5. The distance of the two surfaces is measured both ways ([`deviation`]).
+//!
+//! Openings stay open, nothing is welded or cut, and what is not a manifold stays where it is.
+
+mod corners;
+mod deviation;
+mod evenness;
+mod fairing;
+mod reference;
+mod remesh;
+mod sizes;
+#[cfg(test)]
+mod tests;
+
+use super::SurfaceMesh;
+use super::wall::validate;
+use crate::{Error, Result, Vec3};
+use corners::Corners;
+use deviation::Deviation;
+use evenness::Evenness;
+use reference::Reference;
+use remesh::Remesher;
+use sizes::Wanted;
+
+/// Rounds of sizes, triangles and fairing; in each, edges are fitted to what the last one left.
+const ROUNDS: usize = 3;
+/// Rounds of remeshing in the first of these and in later ones.
+const REMESHINGS: (usize, usize) = (3, 1);
+/// Iterations of fairing in the last round and in the others.
+const ITERATIONS: (usize, usize) = (80, 25);
+/// How often edges are made shorter where the surfaces are farther apart than the limit.
+const CORRECTIONS: usize = 2;
+
+/// What [`condition`] may do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conditioning {
+    /// How far the conditioned surface may be from the given one, mm; where the lumen's radius is less than twenty times this, a
+    /// twentieth of the radius.
+    pub deviation_mm: f64,
+    /// Most triangles that are aimed at; edges get longer instead.
+    pub most_triangles: usize,
+}
+
+impl Default for Conditioning {
+    fn default() -> Self {
+        Self { deviation_mm: 0.1, most_triangles: 400_000 }
+    }
+}
+
+impl Conditioning {
+    fn wanted(&self) -> Wanted {
+        Wanted { deviation_mm: self.deviation_mm, most_triangles: self.most_triangles }
+    }
+
+    fn check(&self) -> Result<()> {
+        if !(self.deviation_mm > 0.0 && self.deviation_mm.is_finite()) {
+            let mend = "must be positive: how far the wall may be moved, in mm";
+            return Err(Error::parameter("deviation_mm", self.deviation_mm, mend));
+        }
+        if self.most_triangles == 0 {
+            return Err(Error::parameter("most_triangles", 0, "must be positive"));
+        }
+        Ok(())
+    }
+}
+
+/// A conditioned surface, and how it compares with the given one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conditioned {
+    /// The mesh, counter-clockwise from outside as the given one.
+    pub mesh: SurfaceMesh,
+    /// Whether it is another than the given one.
+    pub changed: bool,
+    /// Largest distance found between the two surfaces, both ways, mm.
+    pub deviation_mm: f64,
+    /// Mean of these distances, mm.
+    pub mean_deviation_mm: f64,
+    /// Shortest edge, mm.
+    pub edge_min_mm: f64,
+    /// Median edge, mm.
+    pub edge_median_mm: f64,
+    /// Longest edge, mm.
+    pub edge_max_mm: f64,
+    /// Smallest angle of a triangle, radians.
+    pub least_angle: f64,
+    /// Largest angle between two neighbouring triangles, radians.
+    pub largest_turn: f64,
+    /// Whether edges are longer than the surface asks for, because there would have been too many.
+    pub too_many: bool,
+}
+
+impl Conditioned {
+    fn new(mesh: SurfaceMesh, changed: bool, deviation: Deviation, even: Evenness, too_many: bool) -> Self {
+        Self {
+            mesh,
+            changed,
+            deviation_mm: deviation.largest_mm,
+            mean_deviation_mm: deviation.mean_mm,
+            edge_min_mm: even.edge_min_mm,
+            edge_median_mm: even.edge_median_mm,
+            edge_max_mm: even.edge_max_mm,
+            least_angle: even.least_angle,
+            largest_turn: even.largest_turn,
+            too_many,
+        }
+    }
+}
+
+/// An even mesh of `surface`, whose triangles must be counter-clockwise seen from outside the lumen. If it is even already, it is
+/// returned bit for bit.
+///
+/// # Errors
+/// [`Error::Mesh`] if there are no triangles, an index is out of range or a coordinate is not finite; [`Error::Parameter`] for an
+/// option out of its range.
+pub fn condition(surface: &SurfaceMesh, options: &Conditioning) -> Result<Conditioned> {
+    options.check()?;
+    validate(surface)?;
+    let reference = Reference::new(surface);
+    let mut corners = Corners::new(surface, options.deviation_mm);
+    let even = Evenness::of(&corners, |v| corners.at(v));
+    let fine = evenness::is_fine_enough(&mut corners, &reference, options);
+    if even.is_even() && fine {
+        return Ok(Conditioned::new(surface.clone(), false, Deviation::default(), even, false));
+    }
+    let remesher = Remesher { reference: &reference, most_triangles: options.most_triangles };
+    let mut curvature = Vec::new();
+    let mut too_many = false;
+    let mut at = Vec::new();
+    for round in 0..ROUNDS {
+        too_many = sizes::set(&mut corners, &reference, &curvature, options.wanted());
+        remesher.run(&mut corners, if round == 0 { REMESHINGS.0 } else { REMESHINGS.1 });
+        at = faired(&mut corners, &reference, round + 1 == ROUNDS);
+        curvature = fairing::curvature(&corners, &at);
+    }
+    let mut deviation = Deviation::default();
+    for correction in 0..=CORRECTIONS {
+        let mut far = Vec::new();
+        deviation = deviation::measure(&corners, &at, &reference, |v| far.push(v));
+        if far.is_empty() || too_many || correction == CORRECTIONS {
+            break;
+        }
+        far.sort_unstable();
+        far.dedup();
+        too_many |= sizes::shorten(&mut corners, &far, options.wanted());
+        remesher.run(&mut corners, 1);
+        at = faired(&mut corners, &reference, true);
+    }
+    let even = Evenness::of(&corners, |v| at[v as usize]);
+    let mesh = corners.surface(|v| at[v as usize]);
+    Ok(Conditioned::new(mesh, true, deviation, even, too_many))
+}
+
+fn faired(corners: &mut Corners, reference: &Reference, last: bool) -> Vec<Vec3> {
+    fairing::fair(corners, reference, if last { ITERATIONS.0 } else { ITERATIONS.1 })
+}

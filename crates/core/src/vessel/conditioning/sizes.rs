@@ -1,0 +1,209 @@
+//! How long edges should be, and how far the surface may move.
+//!
+//! The local radius of the lumen is half the chord of a ray cast inward along the normal (as in the shape diameter function of
+//! Shapira et al., *The Visual Computer* 24, 2008, with one ray), medianed over neighbours. Edges are to be
+//!
+//! ```text
+//! h = min(R / 3.5,  0.6 / κ,  √(2.4 R d))       not shorter than 0.6 t
+//! ```
+//!
+//! with the curvature κ of the conditioned surface so far, the limit t = min(deviation, R/20) and, at a septum of thickness d, a sag
+//! h²/8R below 0.3 d. A kink of angle θ can be rounded within t by an arc of radius 8t/θ² and length 8t/θ; with κ = θ²/8t the
+//! formula gives edges of 4.8 t/θ² there, which for the sharpest kink of all, θ = π, is the floor or less. κ is measured on the
+//! surface as it comes out, not on the triangles given, so that kinks of a coarse mesh that vanish within the limit cost nothing.
+//! Neighbouring lengths differ by at most 0.35 of their distance.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+
+use super::corners::Corners;
+use super::reference::Reference;
+use crate::Vec3;
+
+/// Edges over the local radius: 22 around a tube, as many as the smooth wall needs to be as good as round.
+const EDGE_PER_RADIUS: f64 = 1.0 / 3.5;
+/// Largest angle between the normals at the ends of an edge, radians, that is aimed at.
+const TURN: f64 = 0.6;
+/// Shortest edge over the limit: the sharpest kink needs no shorter ones.
+const FLOOR: f64 = 0.6;
+/// Where the surfaces are farther apart than the limit, edges are made so much shorter, …
+const SHORTER: f64 = 0.65;
+/// … down to this part of the limit.
+const SHORTEST: f64 = 1.5;
+/// The limit over the local radius, at most.
+const LIMIT_PER_RADIUS: f64 = 0.05;
+/// The limit over the thickness of a septum, at most: two sheets that both move leave a third of it.
+const LIMIT_PER_SEPTUM: f64 = 0.33;
+/// Where sheets touch already, least part of the limit, and of the edge that the radius asks for: nothing keeps them apart.
+const TOUCHING: (f64, f64) = (0.2, 0.25);
+/// Thickest septum that is looked for, in limits.
+const SEPTUM: f64 = 4.0;
+/// By how much wanted lengths may grow per length.
+const GRADING: f64 = 0.35;
+/// Most vertices from which rays are cast; others take the nearest one's radius.
+const RAYS: usize = 20_000;
+/// What a ray meets within this part of the whole surface's size is what it starts from.
+const SKIP: f64 = 1e-5;
+/// Least radius over the median of all: a smaller chord is that of a fold.
+const LEAST_RADIUS: f64 = 0.1;
+/// Triangles of edge h cover √3/4 h² each.
+const COVER: f64 = 0.433;
+
+/// What is wanted of the whole mesh.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted {
+    pub(super) deviation_mm: f64,
+    pub(super) most_triangles: usize,
+}
+
+/// Sets radius, limit and wanted length of all vertices. `curvature` is that of the surface so far, 1/mm, or nothing yet.
+/// Whether wanted lengths had to be raised to keep the number of triangles.
+pub(super) fn set(corners: &mut Corners, reference: &Reference, curvature: &[f64], wanted: Wanted) -> bool {
+    let septum = cast(corners, reference, wanted.deviation_mm);
+    let live: Vec<u32> = corners.live_vertices().collect();
+    for &v in &live {
+        let vertex = &mut corners.vertices[v as usize];
+        let (radius, thick) = (vertex.radius_mm, septum[v as usize]);
+        let limit = wanted.deviation_mm.min(LIMIT_PER_RADIUS * radius);
+        vertex.limit_mm = (LIMIT_PER_SEPTUM * thick).clamp(TOUCHING.0 * limit, limit);
+        let round = EDGE_PER_RADIUS * radius;
+        let bend = curvature.get(v as usize).copied().unwrap_or(0.0);
+        let length = round
+            .min(TURN / bend.max(f64::MIN_POSITIVE))
+            .min((2.4 * radius * thick).sqrt().max(TOUCHING.1 * round))
+            .max(FLOOR * limit);
+        vertex.target_mm = length;
+    }
+    grade(corners);
+    raise(corners, wanted.most_triangles)
+}
+
+/// Raises all wanted lengths until there are not too many triangles; whether that was needed.
+fn raise(corners: &mut Corners, most_triangles: usize) -> bool {
+    let raise = (expected_triangles(corners) / most_triangles as f64).sqrt();
+    let needed = raise > 1.0 && raise.is_finite();
+    if needed {
+        corners.vertices.iter_mut().for_each(|v| v.target_mm *= raise);
+    }
+    needed
+}
+
+/// Wants shorter edges at some vertices; whether lengths had to be raised to keep the number of triangles.
+pub(super) fn shorten(corners: &mut Corners, at: &[u32], wanted: Wanted) -> bool {
+    for &v in at {
+        let vertex = &mut corners.vertices[v as usize];
+        let floor = SHORTEST * wanted.deviation_mm.min(LIMIT_PER_RADIUS * vertex.radius_mm);
+        vertex.target_mm = vertex.target_mm.min((SHORTER * vertex.target_mm).max(floor));
+    }
+    grade(corners);
+    raise(corners, wanted.most_triangles)
+}
+
+/// Triangles of the wanted size that cover the surface.
+fn expected_triangles(corners: &Corners) -> f64 {
+    let of = |t: usize| {
+        let [a, b, c] = corners.positions(t as u32);
+        let wanted: f64 =
+            corners.triangles[t].iter().map(|&v| corners.vertices[v as usize].target_mm).sum::<f64>() / 3.0;
+        (b - a).cross(&(c - a)).norm() / (2.0 * COVER * wanted * wanted)
+    };
+    (0..corners.triangles.len()).filter(|&t| corners.lives(3 * t as u32)).map(of).sum()
+}
+
+/// Sets all radii; returns how thick the septum behind each vertex is, mm, infinite where there is none near.
+fn cast(corners: &mut Corners, reference: &Reference, deviation_mm: f64) -> Vec<f64> {
+    let count = corners.vertices.len();
+    let live: Vec<u32> = corners.live_vertices().collect();
+    let mut radius = vec![f64::NAN; count];
+    let mut septum = vec![f64::INFINITY; count];
+    let Some((low, high)) = reference.mesh.used_bounds_mm() else { return septum };
+    let size_mm = (high - low).norm();
+    let skip_mm = SKIP * size_mm;
+    let stride = live.len().div_ceil(RAYS).max(1);
+    for &v in live.iter().step_by(stride) {
+        let vertex = &corners.vertices[v as usize];
+        if vertex.normal == Vec3::zeros() {
+            continue;
+        }
+        let start = vertex.at;
+        if let Some(chord) = reference.cast(&start, &-vertex.normal, 1.0, skip_mm, size_mm) {
+            radius[v as usize] = 0.5 * chord;
+        }
+        if let Some(thick) = reference.cast(&start, &vertex.normal, -1.0, skip_mm, SEPTUM * deviation_mm) {
+            septum[v as usize] = thick;
+        }
+    }
+    spread(corners, &mut radius, &mut septum);
+    for _ in 0..2 {
+        radius = medians(corners, &radius);
+    }
+    let mut sorted: Vec<f64> = live.iter().map(|&v| radius[v as usize]).filter(|r| r.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.5 * size_mm);
+    let least = (LEAST_RADIUS * median).max(1e-6 * size_mm).max(f64::MIN_POSITIVE);
+    for &v in &live {
+        let r = radius[v as usize];
+        corners.vertices[v as usize].radius_mm = if r.is_finite() { r.max(least) } else { median.max(least) };
+    }
+    septum
+}
+
+/// Hands radii on over the surface to vertices that have none.
+fn spread(corners: &Corners, radius: &mut [f64], septum: &mut [f64]) {
+    let mut queue: VecDeque<u32> =
+        corners.live_vertices().filter(|&v| radius[v as usize].is_finite()).collect();
+    let (mut spokes, mut around) = (Vec::new(), Vec::new());
+    while let Some(v) = queue.pop_front() {
+        corners.spokes(v, &mut spokes);
+        corners.neighbours(&spokes, &mut around);
+        for &w in &around {
+            if radius[w as usize].is_nan() {
+                radius[w as usize] = radius[v as usize];
+                septum[w as usize] = septum[w as usize].min(septum[v as usize]);
+                queue.push_back(w);
+            }
+        }
+    }
+}
+
+/// Lower median of each vertex and its neighbours.
+fn medians(corners: &Corners, values: &[f64]) -> Vec<f64> {
+    let mut found = values.to_vec();
+    let (mut spokes, mut around, mut sorted) = (Vec::new(), Vec::new(), Vec::new());
+    for v in corners.live_vertices() {
+        corners.spokes(v, &mut spokes);
+        corners.neighbours(&spokes, &mut around);
+        sorted.clear();
+        sorted.push(values[v as usize]);
+        sorted.extend(around.iter().map(|&w| values[w as usize]));
+        sorted.sort_by(f64::total_cmp);
+        found[v as usize] = sorted[(sorted.len() - 1) / 2];
+    }
+    found
+}
+
+/// Lowers wanted lengths until neighbours differ by no more than [`GRADING`] of their distance: shortest first, as in Dijkstra's
+/// algorithm.
+fn grade(corners: &mut Corners) {
+    let mut heap: BinaryHeap<Reverse<(u64, u32)>> = corners
+        .live_vertices()
+        .map(|v| Reverse((corners.vertices[v as usize].target_mm.to_bits(), v)))
+        .collect();
+    let (mut spokes, mut around) = (Vec::new(), Vec::new());
+    while let Some(Reverse((bits, v))) = heap.pop() {
+        // Positive numbers sort like their bits.
+        let target = corners.vertices[v as usize].target_mm;
+        if target.to_bits() != bits {
+            continue;
+        }
+        corners.spokes(v, &mut spokes);
+        corners.neighbours(&spokes, &mut around);
+        for &w in &around {
+            let allowed = target + GRADING * (corners.at(v) - corners.at(w)).norm();
+            if corners.vertices[w as usize].target_mm > allowed {
+                corners.vertices[w as usize].target_mm = allowed;
+                heap.push(Reverse((allowed.to_bits(), w)));
+            }
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! What conditioning leaves alone, what it makes even, and what it keeps.
+
+use std::f64::consts::TAU;
+
+use super::*;
+use crate::vessel::{GeneratedWall, Resolution, Wall, anatomy, check};
+
+fn conditioned(mesh: &SurfaceMesh) -> Conditioned {
+    condition(mesh, &Conditioning::default()).unwrap()
+}
+
+/// Numbers between 0 and 1, the same every time.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// A tube of radius 2 mm along z, open at both ends: rings at the given heights, vertices at given angles.
+fn tube(heights: &[f64], angles: &[f64]) -> SurfaceMesh {
+    let mut mesh = SurfaceMesh::default();
+    let around = angles.len() as u32;
+    for z in heights {
+        mesh.vertices_mm.extend(angles.iter().map(|a| Vec3::new(2.0 * a.cos(), 2.0 * a.sin(), *z)));
+    }
+    for i in 0..heights.len() as u32 - 1 {
+        for k in 0..around {
+            let l = (k + 1) % around;
+            let (p, q, r, s) = (i * around + k, i * around + l, (i + 1) * around + k, (i + 1) * around + l);
+            mesh.triangles.extend([[p, q, r], [q, s, r]]);
+        }
+    }
+    mesh
+}
+
+/// Steps whose lengths span three decades, from 0 to `length`.
+fn uneven(length: f64, count: usize, seed: u64) -> Vec<f64> {
+    let mut numbers = Numbers(seed);
+    let steps: Vec<f64> = (0..count).map(|_| 10f64.powf(-3.0 * numbers.next())).collect();
+    let sum: f64 = steps.iter().sum();
+    let mut at = 0.0;
+    let mut all = vec![0.0];
+    for step in steps {
+        at += step * length / sum;
+        all.push(at);
+    }
+    all
+}
+
+fn even(length: f64, count: usize) -> Vec<f64> {
+    (0..=count).map(|i| length * i as f64 / count as f64).collect()
+}
+
+/// A tube whose triangles are as uneven as can be.
+fn uneven_tube(seed: u64) -> SurfaceMesh {
+    let mut angles = even(TAU, 24);
+    angles.pop();
+    // Slivers beside regular facets.
+    angles.extend([0.003, 1.5704, 3.3]);
+    angles.sort_by(f64::total_cmp);
+    tube(&uneven(20.0, 60, seed), &angles)
+}
+
+/// Largest distance from `x` of sample points to the true tube.
+fn off_tube(mesh: &SurfaceMesh) -> f64 {
+    mesh.vertices_mm.iter().map(|v| (v.x.hypot(v.y) - 2.0).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn generated_walls_are_returned_bit_for_bit() {
+    for (name, edges) in [
+        ("straight_tube", vec![0.5, 1.0, 1.25, 2.0, 3.0]),
+        ("curved_tube", vec![0.8, 1.2, 2.4]),
+        ("aortic_arch", vec![2.25, 3.0, 4.0]),
+        ("hepatic", vec![1.1, 2.0]),
+    ] {
+        let tree = anatomy::tree(name).unwrap();
+        for edge_mm in edges {
+            let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(edge_mm)).unwrap().wall;
+            let found = conditioned(wall.mesh());
+            assert!(!found.changed, "{name} {edge_mm}: {found:?}");
+            assert_eq!(&found.mesh, wall.mesh());
+        }
+    }
+}
+
+#[test]
+fn a_regular_grid_of_three_to_one_is_fine() {
+    let mut angles = even(TAU, 24);
+    angles.pop();
+    let mesh = tube(&even(20.0, 13), &angles);
+    assert!(!conditioned(&mesh).changed);
+}
+
+#[test]
+fn an_uneven_tube_comes_back_even_and_within_the_limit() {
+    let mesh = uneven_tube(1);
+    let found = conditioned(&mesh);
+    assert!(found.changed && !found.too_many);
+    let before = check(&mesh).unwrap();
+    assert!(before.edge_max_mm / before.edge_min_mm > 1000.0, "{before:?}");
+    // Rims are kept; elsewhere nothing is short.
+    assert!(
+        found.edge_max_mm < 1.2 && found.edge_median_mm > 0.25,
+        "{:?}",
+        (found.edge_max_mm, found.edge_median_mm)
+    );
+    assert!(
+        found.least_angle > 0.2 && found.largest_turn < 0.5,
+        "{} {}",
+        found.least_angle,
+        found.largest_turn
+    );
+    assert!(found.deviation_mm <= 0.1, "{}", found.deviation_mm);
+    assert!(off_tube(&found.mesh) < 0.1);
+}
+
+#[test]
+fn openings_and_topology_are_kept() {
+    let mesh = uneven_tube(2);
+    let (before, after) = (check(&mesh).unwrap(), check(&conditioned(&mesh).mesh).unwrap());
+    assert!(after.is_sound(), "{after:?}");
+    assert_eq!((after.openings.len(), after.components), (before.openings.len(), before.components));
+    assert!((after.volume_mm3 / before.volume_mm3 - 1.0).abs() < 0.03);
+}
+
+#[test]
+fn the_same_surface_gives_the_same_mesh() {
+    let mesh = uneven_tube(3);
+    assert_eq!(conditioned(&mesh), conditioned(&mesh));
+}
+
+#[test]
+fn soups_do_not_panic() {
+    for seed in 0..40 {
+        let mut numbers = Numbers(seed);
+        let points = 4 + (40.0 * numbers.next()) as usize;
+        let mut mesh = SurfaceMesh::default();
+        mesh.vertices_mm = (0..points)
+            .map(|_| Vec3::new(10.0 * numbers.next(), 10.0 * numbers.next(), (10.0 * numbers.next()).floor()))
+            .collect();
+        for _ in 0..3 * points {
+            mesh.triangles.push([0; 3].map(|_: u32| (points as f64 * numbers.next()) as u32));
+        }
+        let options = Conditioning { most_triangles: 5000, ..Conditioning::default() };
+        let found = condition(&mesh, &options).unwrap();
+        assert!(found.mesh.vertices_mm.iter().all(|v| v.iter().all(|c| c.is_finite())));
+        assert!(found.mesh.triangles.iter().flatten().all(|&v| (v as usize) < found.mesh.vertices_mm.len()));
+    }
+}
+
+#[test]
+fn a_wall_made_of_what_comes_out_is_sound() {
+    let wall = Wall::from_surface(&conditioned(&uneven_tube(4)).mesh).unwrap();
+    assert_eq!(wall.openings().len(), 2);
+    assert!(wall.report().notes().is_empty(), "{:?}", wall.report());
+}
+
+#[test]
+fn options_out_of_range_are_named() {
+    let mesh = uneven_tube(5);
+    let with =
+        |deviation_mm: f64| condition(&mesh, &Conditioning { deviation_mm, ..Conditioning::default() });
+    assert!(with(0.0).is_err() && with(f64::NAN).is_err() && with(0.05).is_ok());
+}
