@@ -1,19 +1,15 @@
 //! What is right and wrong with a surface, as it is.
 
-use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
-
-use super::intersect::triangles_intersect;
+use super::crossings::crossings;
 use super::topology::EdgeTable;
 use super::wall::{duplicate_pairs, flat_volume_mm3, validate, weld_tolerance_mm};
 use super::{SurfaceMesh, Wall, sliver};
-use crate::{Result, Vec3};
+use crate::Result;
 
 /// Intersecting pairs named in a report; a list of thousands helps nobody.
 const PAIRS_NAMED: usize = 10;
-/// Intersecting pairs after which counting ends, and pairs of close triangles after which looking ends: seconds.
+/// Intersecting pairs after which counting ends.
 const PAIRS_COUNTED: usize = 100_000;
-const PAIRS_TRIED: usize = 20_000_000;
 
 /// A boundary loop in a report.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -106,7 +102,7 @@ impl CheckReport {
 /// [`Error::Mesh`](crate::Error::Mesh) if there is no triangle with area, an index is out of range or a coordinate is not finite.
 pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
     validate(surface)?;
-    let wall = Wall::from_surface(surface)?;
+    let wall = Wall::welded(surface)?;
     let tolerance_mm = weld_tolerance_mm(surface);
     let target = super::weld::merge_targets(&surface.vertices_mm, tolerance_mm);
     let welded = SurfaceMesh {
@@ -183,42 +179,7 @@ pub(crate) struct Intersections {
 
 /// Counts intersecting pairs among the triangles with area, and names the first few.
 pub(crate) fn self_intersections(mesh: &SurfaceMesh, tolerance_mm: f64) -> Intersections {
-    let solid: Vec<usize> = (0..mesh.triangles.len())
-        .filter(|&i| !sliver::is_degenerate(&mesh.corners(i), tolerance_mm))
-        .collect();
-    let boxes: Vec<Aabb> = solid.iter().map(|&i| bounding_box(&mesh.corners(i))).collect();
-    let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-    let mut found = Intersections { count: 0, capped: false, first: Vec::new() };
-    let mut tried = 0;
-    let mut partners = Vec::new();
-    for (a, bounds) in boxes.iter().enumerate() {
-        partners.clear();
-        // Each pair once; leaves come in the order of the tree, so partners are sorted below.
-        for b in tree.intersect_aabb(bounds).map(|b| b as usize).filter(|&b| b > a) {
-            tried += 1;
-            if found.count + partners.len() >= PAIRS_COUNTED || tried > PAIRS_TRIED {
-                found.capped = true;
-                break;
-            }
-            if boxes[b].intersects(bounds)
-                && triangles_intersect(&mesh.vertices_mm, mesh.triangles[solid[a]], mesh.triangles[solid[b]])
-            {
-                partners.push(b);
-            }
-        }
-        partners.sort_unstable();
-        let room = PAIRS_NAMED - found.first.len();
-        found.first.extend(partners.iter().take(room).map(|&b| [solid[a], solid[b]]));
-        found.count += partners.len();
-        if found.capped {
-            break;
-        }
-    }
-    found
-}
-
-fn bounding_box(corners: &[Vec3; 3]) -> Aabb {
-    let low = corners[0].inf(&corners[1]).inf(&corners[2]);
-    let high = corners[0].sup(&corners[1]).sup(&corners[2]);
-    Aabb::new([low.x, low.y, low.z].into(), [high.x, high.y, high.z].into())
+    let found = crossings(mesh, tolerance_mm, None, PAIRS_COUNTED);
+    let first = found.pairs.iter().take(PAIRS_NAMED).map(|pair| pair.map(|t| t as usize)).collect();
+    Intersections { count: found.pairs.len(), capped: found.capped, first }
 }

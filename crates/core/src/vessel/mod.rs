@@ -3,6 +3,7 @@
 pub mod anatomy;
 mod centreline;
 mod check;
+mod crossings;
 mod files;
 mod generate;
 mod inside;
@@ -11,6 +12,7 @@ mod mesh;
 mod opening;
 mod orient;
 mod query;
+mod repair;
 mod sliver;
 #[cfg(test)]
 mod tests;
