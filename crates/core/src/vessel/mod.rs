@@ -6,6 +6,7 @@ mod check;
 mod crossings;
 mod files;
 mod generate;
+mod hints;
 mod inside;
 mod intersect;
 mod mesh;
@@ -14,6 +15,7 @@ mod orient;
 mod query;
 mod repair;
 mod sliver;
+mod survey;
 #[cfg(test)]
 mod tests;
 mod topology;
@@ -21,9 +23,11 @@ mod wall;
 mod weld;
 
 pub use centreline::{CentrelineNode, CentrelineTree};
-pub use check::{CheckReport, OpeningReport, check};
+pub use check::{CheckReport, OpeningReport, check, check_with};
 pub use generate::{GeneratedWall, Resolution};
+pub use hints::unit_hint;
 pub use mesh::SurfaceMesh;
 pub use opening::Opening;
 pub use query::{Nearest, WallQuery};
+pub use survey::{LumenReport, SeptaReport, StartReport, Survey, survey};
 pub use wall::{NO_NEIGHBOUR, RepairReport, Wall};
