@@ -194,6 +194,9 @@ pub(crate) enum VesselCommand {
         /// Millimetres per unit of the file
         #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
         unit_mm: f64,
+        /// Count septa between lumens that are thinner than so many mm
+        #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
+        septum_mm: f64,
         /// Print the report as one JSON document on stdout
         #[arg(long)]
         json: bool,

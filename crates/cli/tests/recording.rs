@@ -151,6 +151,25 @@ fn recording_anew_replaces_the_old_recording_and_nothing_else() {
     assert!(!out.join("frames/step_999999_3d.png").exists());
 }
 
+#[test]
+fn a_folder_with_other_files_is_refused_and_left_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = short_scene(folder.path());
+    let out = folder.path().join("data");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("summary.json"), "mine").unwrap();
+    std::fs::write(out.join("steps.csv"), "left,right\n1,2\n").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
+        .args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()])
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(told.contains("no earlier recording") && told.contains("recording"), "{told}");
+    assert_eq!(std::fs::read_to_string(out.join("summary.json")).unwrap(), "mine");
+    assert!(std::fs::read_to_string(out.join("steps.csv")).unwrap().starts_with("left"));
+}
+
 fn summary(folder: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(folder.join("summary.json")).unwrap()).unwrap()
 }
@@ -162,6 +181,7 @@ fn a_frame_that_cannot_be_written_ends_the_run_and_keeps_the_recording() {
     let out = folder.path().join("out");
     std::fs::create_dir(&out).unwrap();
     std::fs::write(out.join("frames"), "a file, not a folder").unwrap();
+    std::fs::write(out.join("steps.csv"), "").unwrap();
     let (code, told) = run(&scene, &out);
     assert_eq!(code, Some(1));
     assert_eq!((told["failure"]["step"].as_u64(), told["steps"].as_u64()), (Some(40), Some(40)));

@@ -25,7 +25,7 @@ pub(crate) struct FeltWall {
 impl FeltWall {
     pub(crate) fn new(surroundings: &Surroundings<'_>) -> Result<Self> {
         let radius_mm = surroundings.device.max_radius_mm();
-        let felt = Wall::from_surface(&extended(surroundings.wall, radius_mm))?;
+        let felt = Wall::welded(&extended(surroundings.wall, radius_mm))?;
         Ok(Self {
             smooth: SmoothWall::new(&felt, surroundings.device.min_radius_mm(), radius_mm),
             query: WallQuery::new(&felt)?,

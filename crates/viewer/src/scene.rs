@@ -17,6 +17,8 @@ pub(crate) struct Setup {
     pub(crate) spec: ViewSpec,
     pub(crate) wall: Arc<SurfaceMesh>,
     pub(crate) patient: Patient,
+    /// Whether the wall is closed, so that lengths inside it are known; else blood counts as the tissue around it.
+    pub(crate) lumen: bool,
     pub(crate) c_arm: Option<CArm>,
     pub(crate) camera: Option<Camera>,
 }
@@ -28,6 +30,7 @@ impl Setup {
             spec: spec.clone(),
             wall: Arc::default(),
             patient: Patient::Slab { tissue_mm: spec.xray.tissue_mm },
+            lumen: true,
             c_arm: None,
             camera: None,
         };
@@ -36,7 +39,13 @@ impl Setup {
         }
         check_drawable(wall)?;
         if spec.wants(View::Fluoro) {
-            check_closed(wall)?;
+            let closed = check_closed(wall);
+            // Only contrast medium shows what is inside the wall: blood is nearly tissue, and a device is drawn without it.
+            if !spec.injection.is_empty() || spec.xray.contrast_fraction > 0.0 {
+                closed?;
+            } else {
+                setup.lumen = closed.is_ok();
+            }
             setup.c_arm = Some(CArm::new(&spec.c_arm, spec.size_px, wall)?);
             setup.patient = Patient::new(spec, wall)?;
         }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use endowire_core::Error;
 use endowire_core::vessel::{
-    CentrelineTree, CheckReport, GeneratedWall, Resolution, SurfaceMesh, anatomy, check,
+    CentrelineTree, CheckReport, GeneratedWall, Resolution, SurfaceMesh, anatomy, check_with,
 };
 use serde::Serialize;
 
@@ -24,9 +24,9 @@ struct Document {
 }
 
 /// Reports on a surface file.
-pub(crate) fn check_file(file: &Path, unit_mm: f64, json: bool) -> Result<(), Failure> {
+pub(crate) fn check_file(file: &Path, unit_mm: f64, septum_mm: f64, json: bool) -> Result<(), Failure> {
     let provenance = Provenance::new(&[&read_input(file)?], 0);
-    report_on(file, unit_mm, provenance, json)
+    report_on(file, unit_mm, septum_mm, provenance, json)
 }
 
 /// Builds a wall from a tree, writes it, and reports on what was written.
@@ -46,7 +46,7 @@ pub(crate) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     };
     let generated = GeneratedWall::new(&tree, resolution).map_err(|e| as_flag(e).at(args.tree.display()))?;
     generated.wall.mesh().write(&args.out)?;
-    report_on(&args.out, 1.0, provenance, args.json)
+    report_on(&args.out, 1.0, 1.0, provenance, args.json)
 }
 
 /// Calls what the core calls by its field by the flag of the command line.
@@ -69,9 +69,20 @@ fn built_ins(failure: Failure) -> Failure {
     }
 }
 
-fn report_on(file: &Path, unit_mm: f64, provenance: Provenance, json: bool) -> Result<(), Failure> {
+fn report_on(
+    file: &Path,
+    unit_mm: f64,
+    septum_mm: f64,
+    provenance: Provenance,
+    json: bool,
+) -> Result<(), Failure> {
     let surface = SurfaceMesh::read(file, unit_mm)?;
-    let report = check(&surface).map_err(|e| Failure::from(e).at(file.display()))?;
+    let report = check_with(&surface, unit_mm, septum_mm).map_err(|error| match error {
+        Error::Parameter { name, value, mend } if name == "septum_mm" => {
+            Failure::from(Error::Parameter { name: "--septum-mm".to_owned(), value, mend })
+        }
+        other => Failure::from(other).at(file.display()),
+    })?;
     let document =
         Document { provenance, file: file.display().to_string(), sound: report.is_sound(), report };
     answer(&document, json, || text(&document))
@@ -122,7 +133,55 @@ fn text(document: &Document) -> String {
         format!("  self-intersections   {at_least}{}", r.self_intersections),
     ]);
     lines.extend(r.intersecting_pairs.iter().map(|[a, b]| format!("    triangles {a} and {b}")));
+    lines.extend(simulated(r));
+    lines.extend(r.hints.iter().map(|hint| format!("  {hint}")));
     lines.join("\n")
+}
+
+/// What the simulation makes of the surface.
+fn simulated(r: &CheckReport) -> Vec<String> {
+    let list = |v: &[f64; 3]| format!("[{:.2}, {:.2}, {:.2}]", v[0], v[1], v[2]);
+    let mut lines = vec!["as it is simulated:".to_owned()];
+    let notes = r.repair.notes();
+    let repair = |text: String| format!("  repair               {text}");
+    match notes.is_empty() {
+        true => lines.push(repair("nothing to do".to_owned())),
+        false => lines.extend(notes.into_iter().map(repair)),
+    }
+    if let Some(lumen) = &r.survey.lumen {
+        lines.push(format!(
+            "  half of the lumen    {:.3} mm at {}; one place in a hundred below {:.3}, one in twenty below {:.3}, median {:.3}",
+            lumen.smallest_mm,
+            list(&lumen.smallest_at_mm),
+            lumen.percentile_1_mm,
+            lumen.percentile_5_mm,
+            lumen.median_mm
+        ));
+    }
+    let septa = &r.survey.septa;
+    let thinnest = septa
+        .thinnest_mm
+        .zip(septa.thinnest_at_mm.as_ref())
+        .map_or_else(String::new, |(mm, at)| format!(", the thinnest {mm:.3} mm at {}", list(at)));
+    lines.push(format!(
+        "  septa below {:.1} mm   {} of {} triangles{thinnest}",
+        septa.below_mm, septa.thin, septa.asked
+    ));
+    if let Some(start) = &r.survey.start {
+        lines.push(format!(
+            "  a place inside       {}, {:.2} mm from the wall; {:.1} mm are free along [{:.2}, {:.2}, {:.2}]",
+            list(&start.position_mm),
+            start.clearance_mm,
+            start.free_mm,
+            start.direction[0],
+            start.direction[1],
+            start.direction[2]
+        ));
+    }
+    let contrast =
+        if r.contrast { "with contrast medium" } else { "without contrast medium: the wall does not close" };
+    lines.push(format!("  fluoroscopy          {contrast}"));
+    lines
 }
 
 /// Yes, or which edges stand against it.

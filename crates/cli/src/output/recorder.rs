@@ -1,7 +1,7 @@
 //! A run on disk: steps.csv line by line, shapes.npz and summary.json at the end — also at an early one.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use endowire_core::insertion::{Command, Energy, StepReport};
@@ -120,8 +120,10 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    /// Starts a recording in `folder`, which is made if it is not there; an earlier recording in it is replaced.
+    /// Starts a recording in `folder`, which is made if it is not there; an earlier recording in it is replaced. A folder that holds
+    /// other files is refused.
     pub(crate) fn new(folder: &Path) -> Result<Self, Failure> {
+        check_free(folder)?;
         let table = || -> io::Result<_> {
             std::fs::create_dir_all(folder)?;
             remove_earlier(folder)?;
@@ -271,6 +273,31 @@ impl Recorder {
         let path = folder.join("summary.json");
         std::fs::write(&path, to_json(summary)? + "\n").map_err(|e| Failure::write(&path, &e))?;
         shapes
+    }
+}
+
+/// How the table of steps begins.
+const TABLE_BEGINS: &[u8] = b"step,advance_mm,rotate_rad,";
+
+/// Refuses a folder with files in it that no recording has left there: some could have the names of those to be written.
+fn check_free(folder: &Path) -> Result<(), Failure> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    let first = entries.flatten().map(|entry| entry.file_name()).min();
+    // A recording that was ended at once has an empty table.
+    let begins = File::open(folder.join("steps.csv")).and_then(|file| {
+        let mut begins = Vec::new();
+        file.take(TABLE_BEGINS.len() as u64).read_to_end(&mut begins).map(|_| begins)
+    });
+    let ours = begins.is_ok_and(|begins| begins.is_empty() || begins == TABLE_BEGINS);
+    match first {
+        Some(name) if !ours => Err(Failure::Input(format!(
+            "--out {}: the folder is no earlier recording, and a recording would mix with its files ({} …): give a new or an \
+             empty folder, such as {}",
+            folder.display(),
+            Path::new(&name).display(),
+            folder.join("recording").display()
+        ))),
+        _ => Ok(()),
     }
 }
 

@@ -38,7 +38,7 @@ impl FeltWall {
     /// A wall that has no triangles left to query.
     pub fn new(wall: &Wall, device: &Device, properties: &WallProperties) -> Result<Self> {
         let (thinnest_mm, thickest_mm) = (device.min_radius_mm(), device.max_radius_mm());
-        let felt = Wall::from_surface(&extended(wall, thickest_mm))?;
+        let felt = Wall::welded(&extended(wall, thickest_mm))?;
         let smooth = SmoothWall::new(&felt, thinnest_mm, thickest_mm);
         let grading = if properties.region.is_empty() { None } else { Grading::new(&smooth, properties) };
         let reach_mm = (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + smooth.deepest_inset_mm() + LOOK_MM;

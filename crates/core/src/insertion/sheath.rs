@@ -48,11 +48,14 @@ impl Sheath {
     pub fn at_opening(wall: &Wall, opening: usize, depth_mm: f64) -> Result<Self> {
         let openings = wall.openings();
         let Some(place) = openings.get(opening) else {
-            return Err(Error::parameter(
-                "sheath.opening",
-                opening,
-                format!("the vessel has {} openings, numbered from 0", openings.len()),
-            ));
+            let mend = if openings.is_empty() {
+                "the vessel is closed: give sheath.position_mm, a point inside, and sheath.direction instead (endowire vessel \
+                 check FILE offers both)"
+                    .to_owned()
+            } else {
+                format!("the vessel has {} openings, numbered from 0", openings.len())
+            };
+            return Err(Error::parameter("sheath.opening", opening, mend));
         };
         if !(depth_mm.is_finite() && depth_mm >= 0.0) {
             return Err(Error::parameter(

@@ -58,6 +58,7 @@ impl Simulation {
         sheath: Sheath,
         method: &MethodChoice,
     ) -> Result<Self> {
+        check_elements(&device, method)?;
         Self::with_method(wall, properties, device, sheath, |surroundings| method.start(surroundings))
     }
 
@@ -109,7 +110,7 @@ impl Simulation {
     /// Carries out one command. After an error the state is as before.
     ///
     /// # Errors
-    /// A command that is not finite, pushes in more than the device's length or pulls out more than is inserted
+    /// A command that is not finite, turns more than a thousand times, pushes in more than the device's length or pulls out more than is inserted
     /// (all [`Error::Parameter`]); a step that found no equilibrium ([`Error::Computation`]).
     pub fn step(&mut self, command: Command) -> Result<&StepReport> {
         check_command(command, self.method.report().inserted_mm, self.device.length_mm())?;
@@ -150,6 +151,33 @@ impl Simulation {
     }
 }
 
+/// A device so many times as thick as the vessel comes from another unit.
+const MISFIT: f64 = 5.0;
+
+/// Most elements of a device: some kilobytes each.
+const ELEMENT_LIMIT: f64 = 1e5;
+
+/// Refuses a device that its method would cut into more elements than fit a memory.
+fn check_elements(device: &Device, method: &MethodChoice) -> Result<()> {
+    let element_mm = match method {
+        MethodChoice::Kirchhoff(options) => options.element_mm,
+        MethodChoice::Li2011Dense(options) | MethodChoice::Li2011Banded(options) => options.element_mm,
+    };
+    let elements = device.length_mm() / element_mm;
+    if element_mm > 0.0 && elements > ELEMENT_LIMIT {
+        return Err(Error::parameter(
+            "method.element_mm",
+            element_mm,
+            format!(
+                "cuts the device of {} mm into {elements:.1e} elements, and more than {ELEMENT_LIMIT:.0e} take gigabytes: use \
+                 longer elements or a shorter device",
+                device.length_mm()
+            ),
+        ));
+    }
+    Ok(())
+}
+
 /// Refuses a device that is in the wall from the start. Further in a vessel may be narrower: there the device does not pass.
 fn check_mouth(query: &WallQuery, device: &Device, sheath: &Sheath) -> Result<()> {
     let Some(near) = query.nearest(&sheath.position_mm, f64::MAX) else { return Ok(()) };
@@ -161,13 +189,22 @@ fn check_mouth(query: &WallQuery, device: &Device, sheath: &Sheath) -> Result<()
             format!("device.section[{section}].radius_mm"),
             radius_mm,
             format!(
-                "the wall is {room_mm:.3} mm from the sheath's mouth at {}: use a thinner device or move the sheath",
-                vector(&sheath.position_mm)
+                "the wall is {room_mm:.3} mm from the sheath's mouth at {}: use a thinner device or move the sheath{}",
+                vector(&sheath.position_mm),
+                if radius_mm > MISFIT * room_mm {
+                    ", or check vessel.unit_mm: they are not of one scale"
+                } else {
+                    ""
+                }
             ),
         )),
         _ => Ok(()),
     }
 }
+
+/// Largest turn of one command, rad: a thousand turns. Beyond that a hand's input is a mistake, and far beyond it an angle has no digits
+/// left that tell where on the circle it is.
+const TURN_LIMIT_RAD: f64 = 1000.0 * std::f64::consts::TAU;
 
 /// Slack in inserted length, mm: the rounding of thousands of summed increments.
 const LENGTH_SLACK_MM: f64 = 1e-6;
@@ -179,6 +216,16 @@ fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<(
         if !value.is_finite() {
             return Err(Error::parameter(name, value, "must be a finite number"));
         }
+    }
+    if command.rotate_rad.abs() > TURN_LIMIT_RAD {
+        return Err(Error::parameter(
+            "rotate_rad",
+            command.rotate_rad,
+            format!(
+                "is more than {:.0} turns in one command: turn less, in several commands if it is meant",
+                TURN_LIMIT_RAD / std::f64::consts::TAU
+            ),
+        ));
     }
     let target = inserted_mm + command.advance_mm;
     if target > device_mm + LENGTH_SLACK_MM {

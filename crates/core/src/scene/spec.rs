@@ -9,7 +9,7 @@ use crate::device::{Device, Section};
 use crate::input::from_toml;
 use crate::insertion::{Command, ScriptLine, Sheath, Simulation, WallProperties, script_commands};
 use crate::methods::MethodChoice;
-use crate::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall};
+use crate::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall, unit_hint};
 use crate::{Error, Result, Vec3};
 
 /// A scene as its file says it, with the folder that its paths start from.
@@ -297,6 +297,22 @@ impl Scene {
     /// As [`Scene::wall`], [`Scene::device`], [`Scene::sheath`] and [`Simulation::new`].
     pub fn simulation(&self) -> Result<Simulation> {
         let wall = self.wall()?;
+        // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.
+        let size_mm = wall.mesh().bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
+        let hint =
+            self.vessel.file.as_ref().and_then(|_| unit_hint(size_mm, self.vessel.unit_mm.unwrap_or(1.0)));
+        self.simulation_in(wall).map_err(|error| match (hint, error) {
+            (Some(hint), Error::Parameter { name, value, mend }) => {
+                Error::Parameter { name, value, mend: format!("{mend}; {hint}") }
+            }
+            (Some(hint), Error::Content { path, reason }) => {
+                Error::Content { path, reason: format!("{reason}; {hint}") }
+            }
+            (_, error) => error,
+        })
+    }
+
+    fn simulation_in(&self, wall: Wall) -> Result<Simulation> {
         let sheath = self.sheath(&wall)?;
         Simulation::with_properties(wall, self.vessel.wall.clone(), self.device()?, sheath, &self.method)
             .map_err(|error| match error {

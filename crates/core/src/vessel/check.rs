@@ -1,19 +1,17 @@
 //! What is right and wrong with a surface, as it is.
 
-use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
-
-use super::intersect::triangles_intersect;
+use super::crossings::crossings;
+use super::hints::unit_hint;
+use super::survey::{Survey, survey};
 use super::topology::EdgeTable;
-use super::wall::{duplicate_pairs, flat_volume_mm3, validate, weld_tolerance_mm};
-use super::{SurfaceMesh, Wall, sliver};
-use crate::{Result, Vec3};
+use super::wall::{duplicate_pairs, flat_volume_mm3, weld_tolerance_mm};
+use super::{RepairReport, SurfaceMesh, Wall, sliver};
+use crate::{Error, Result};
 
 /// Intersecting pairs named in a report; a list of thousands helps nobody.
 const PAIRS_NAMED: usize = 10;
-/// Intersecting pairs after which counting ends, and pairs of close triangles after which looking ends: seconds.
+/// Intersecting pairs after which counting ends.
 const PAIRS_COUNTED: usize = 100_000;
-const PAIRS_TRIED: usize = 20_000_000;
 
 /// A boundary loop in a report.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -30,8 +28,8 @@ pub struct OpeningReport {
     pub edges: usize,
 }
 
-/// What [`check`] found. Faces, volume and openings are those of the surface with duplicate vertices welded; counts of
-/// faults are those of the surface as given.
+/// What [`check`] found. Volume and openings are those of the repaired wall, which is what is simulated; faces and counts of faults
+/// are those of the surface as given, with duplicate vertices welded.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct CheckReport {
     /// Triangles as given.
@@ -82,7 +80,20 @@ pub struct CheckReport {
     pub edge_median_mm: f64,
     /// Longest edge in mm.
     pub edge_max_mm: f64,
+    /// What the repair does to the surface, and what it leaves.
+    pub repair: RepairReport,
+    /// Width of the lumen, thin septa and a place to begin, of the repaired wall.
+    #[serde(flatten)]
+    pub survey: Survey,
+    /// Whether the repaired wall is closed but for its openings, which contrast medium in fluoroscopy needs. Fluoroscopy without
+    /// needs nothing.
+    pub contrast: bool,
+    /// What the user may want to know or change.
+    pub hints: Vec<String>,
 }
+
+/// Thickness in mm below which [`check`] counts septa: that of a vessel's wall.
+const SEPTUM_MM: f64 = 1.0;
 
 impl CheckReport {
     /// Whether a device can be simulated in this wall as it is: consistent, outward, manifold, free of faults, around a volume.
@@ -105,8 +116,19 @@ impl CheckReport {
 /// # Errors
 /// [`Error::Mesh`](crate::Error::Mesh) if there is no triangle with area, an index is out of range or a coordinate is not finite.
 pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
-    validate(surface)?;
+    check_with(surface, 1.0, SEPTUM_MM)
+}
+
+/// As [`check`], of a surface read with `unit_mm`, which hints name, and with septa counted below `septum_mm`.
+///
+/// # Errors
+/// As [`check`], and [`Error::Parameter`] for a thickness that is not a number of 0 or more.
+pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result<CheckReport> {
+    if !(septum_mm.is_finite() && septum_mm >= 0.0) {
+        return Err(Error::parameter("septum_mm", septum_mm, "must be a thickness in mm, 0 or more"));
+    }
     let wall = Wall::from_surface(surface)?;
+    let given = Wall::welded(surface)?;
     let tolerance_mm = weld_tolerance_mm(surface);
     let target = super::weld::merge_targets(&surface.vertices_mm, tolerance_mm);
     let welded = SurfaceMesh {
@@ -126,7 +148,11 @@ pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
     edges.sort_by(f64::total_cmp);
     let edge = |k: usize| edges.get(k).copied().unwrap_or(0.0);
     let (low, high) = surface.used_bounds_mm().unwrap_or_default();
-    let report = wall.report();
+    let (report, repair) = (given.report(), wall.report().clone());
+    let survey = survey(&wall, septum_mm)?;
+    let contrast = repair.stray_edges + repair.non_manifold_edges + repair.one_sided_edges == 0
+        && wall.volume_mm3() > flat_volume_mm3(wall.mesh());
+    let hints = hints(&wall, &survey, (high - low).norm(), unit_mm);
     let non_manifold_edges = table.non_manifold();
     Ok(CheckReport {
         triangles: surface.triangles.len(),
@@ -163,7 +189,31 @@ pub fn check(surface: &SurfaceMesh) -> Result<CheckReport> {
         edge_min_mm: edge(0),
         edge_median_mm: edge(edges.len() / 2),
         edge_max_mm: edge(edges.len().saturating_sub(1)),
+        repair,
+        survey,
+        contrast,
+        hints,
     })
+}
+
+/// What the user may want to know or change, a sentence each.
+fn hints(wall: &Wall, survey: &Survey, diagonal_mm: f64, unit_mm: f64) -> Vec<String> {
+    let mut hints: Vec<String> = unit_hint(diagonal_mm, unit_mm).into_iter().collect();
+    if wall.openings().is_empty() {
+        let list = |v: &[f64; 3]| format!("[{:.3}, {:.3}, {:.3}]", v[0], v[1], v[2]);
+        hints.push(match &survey.start {
+            Some(start) => format!(
+                "the vessel is closed, so a sheath needs a point inside and a direction, such as sheath.position_mm = {} and \
+                 sheath.direction = {}",
+                list(&start.position_mm),
+                list(&start.direction)
+            ),
+            None => "the vessel is closed and no point is deep inside: open it, or give sheath.position_mm and \
+                     sheath.direction"
+                .to_owned(),
+        });
+    }
+    hints
 }
 
 /// Area of all triangles, mm².
@@ -183,42 +233,7 @@ pub(crate) struct Intersections {
 
 /// Counts intersecting pairs among the triangles with area, and names the first few.
 pub(crate) fn self_intersections(mesh: &SurfaceMesh, tolerance_mm: f64) -> Intersections {
-    let solid: Vec<usize> = (0..mesh.triangles.len())
-        .filter(|&i| !sliver::is_degenerate(&mesh.corners(i), tolerance_mm))
-        .collect();
-    let boxes: Vec<Aabb> = solid.iter().map(|&i| bounding_box(&mesh.corners(i))).collect();
-    let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-    let mut found = Intersections { count: 0, capped: false, first: Vec::new() };
-    let mut tried = 0;
-    let mut partners = Vec::new();
-    for (a, bounds) in boxes.iter().enumerate() {
-        partners.clear();
-        // Each pair once; leaves come in the order of the tree, so partners are sorted below.
-        for b in tree.intersect_aabb(bounds).map(|b| b as usize).filter(|&b| b > a) {
-            tried += 1;
-            if found.count + partners.len() >= PAIRS_COUNTED || tried > PAIRS_TRIED {
-                found.capped = true;
-                break;
-            }
-            if boxes[b].intersects(bounds)
-                && triangles_intersect(&mesh.vertices_mm, mesh.triangles[solid[a]], mesh.triangles[solid[b]])
-            {
-                partners.push(b);
-            }
-        }
-        partners.sort_unstable();
-        let room = PAIRS_NAMED - found.first.len();
-        found.first.extend(partners.iter().take(room).map(|&b| [solid[a], solid[b]]));
-        found.count += partners.len();
-        if found.capped {
-            break;
-        }
-    }
-    found
-}
-
-fn bounding_box(corners: &[Vec3; 3]) -> Aabb {
-    let low = corners[0].inf(&corners[1]).inf(&corners[2]);
-    let high = corners[0].sup(&corners[1]).sup(&corners[2]);
-    Aabb::new([low.x, low.y, low.z].into(), [high.x, high.y, high.z].into())
+    let found = crossings(mesh, tolerance_mm, None, PAIRS_COUNTED);
+    let first = found.pairs.iter().take(PAIRS_NAMED).map(|pair| pair.map(|t| t as usize)).collect();
+    Intersections { count: found.pairs.len(), capped: found.capped, first }
 }

@@ -7,7 +7,7 @@
 
 use std::f64::consts::PI;
 
-use super::Wall;
+use super::{SurfaceMesh, Wall};
 use crate::{Error, Result, Vec3};
 
 /// How far a winding number may be from an integer before the answer is refused.
@@ -24,14 +24,18 @@ fn solid_angle(corners: [Vec3; 3]) -> f64 {
     if volume == 0.0 { 0.0 } else { 2.0 * volume.atan2(denominator) }
 }
 
+/// Generalized winding number of `mesh` and `caps` around a point.
+pub(super) fn winding(mesh: &SurfaceMesh, caps: &[[Vec3; 3]], point_mm: &Vec3) -> f64 {
+    let triangles = (0..mesh.triangles.len()).map(|i| mesh.corners(i));
+    let sum: f64 = triangles.chain(caps.iter().copied()).map(|t| solid_angle(t.map(|v| v - point_mm))).sum();
+    sum / (4.0 * PI)
+}
+
 impl Wall {
     /// Generalized winding number of the wall and its caps around `point_mm`: 1 in the lumen, 0 outside, for a sound surface.
     /// Exact sum over all triangles; NaN for a point that is not finite.
     pub fn winding_number(&self, point_mm: &Vec3) -> f64 {
-        let mesh = (0..self.mesh.triangles.len()).map(|i| self.mesh.corners(i));
-        let sum: f64 =
-            mesh.chain(self.caps.iter().copied()).map(|t| solid_angle(t.map(|v| v - point_mm))).sum();
-        sum / (4.0 * PI)
+        winding(&self.mesh, &self.caps, point_mm)
     }
 
     /// Whether `point_mm` is in the lumen.

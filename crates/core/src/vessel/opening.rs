@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::SurfaceMesh;
-use super::topology::{EdgeTable, NONE};
+use super::topology::{EdgeTable, EdgeUse, NONE};
 use crate::Vec3;
 
 /// An open end of a wall: one closed loop of edges that belong to a single triangle each.
@@ -62,26 +62,23 @@ pub(crate) fn boundary(mesh: &SurfaceMesh) -> Boundary {
     let triangles = &mesh.triangles;
     let table = EdgeTable::new(triangles);
     let across = table.neighbours(triangles.len());
-    let mut open: BTreeMap<(u32, u8), bool> = BTreeMap::new();
-    for uses in table.edges() {
-        if let [only] = uses {
-            open.insert((only.triangle, only.side), false);
-        }
-    }
+    let single = |uses: &[EdgeUse]| if let [only] = uses { Some((only.triangle, only.side)) } else { None };
+    let mut open: Vec<(u32, u8)> = table.edges().filter_map(single).collect();
+    open.sort_unstable();
+    let mut visited = vec![false; open.len()];
     let mut loops = Vec::new();
     let mut stray_edges = 0;
-    let starts: Vec<(u32, u8)> = open.keys().copied().collect();
-    for start in &starts {
-        if open[start] {
+    for (index, start) in open.iter().enumerate() {
+        if visited[index] {
             continue;
         }
         let mut walked = Vec::new();
         let mut edge = *start;
         let closed = loop {
-            match open.get_mut(&edge) {
-                Some(visited) if !*visited => *visited = true,
-                Some(_) => break edge == *start,
-                None => break false,
+            match open.binary_search(&edge) {
+                Ok(place) if !visited[place] => visited[place] = true,
+                Ok(_) => break edge == *start,
+                Err(_) => break false,
             }
             walked.push(triangles[edge.0 as usize][edge.1 as usize]);
             edge = match next_open_edge(triangles, &across, edge) {

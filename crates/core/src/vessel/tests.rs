@@ -91,14 +91,16 @@ fn a_surface_that_is_inside_out_is_turned() {
 }
 
 #[test]
-fn a_speck_beside_the_vessel_is_kept_and_told() {
+fn a_speck_beside_the_vessel_is_dropped_and_told() {
     let mut mesh = tube().mesh().clone();
     let first = mesh.vertices_mm.len() as u32;
     let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]];
     mesh.vertices_mm.extend(corners.map(|c| Vec3::new(20.0, 0.0, 0.0) + Vec3::from(c)));
     mesh.triangles.extend([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]].map(|t| t.map(|v| v + first)));
-    let report = Wall::from_surface(&mesh).unwrap().report().clone();
-    assert_eq!((report.components, report.smallest_component, report.triangles_flipped), (2, 4, 4));
+    let wall = Wall::from_surface(&mesh).unwrap();
+    let report = wall.report();
+    assert_eq!((report.pieces_dropped, report.piece_triangles_dropped, report.components), (1, 4, 1));
+    assert_eq!(wall.mesh(), tube().mesh());
 }
 
 #[test]
@@ -297,9 +299,9 @@ proptest! {
         prop_assert_eq!(wall.mesh().vertices_mm.len(), clean.mesh().vertices_mm.len());
         prop_assert!((wall.volume_mm3() / clean.volume_mm3() - 1.0).abs() < 1e-4);
         prop_assert_eq!(wall.openings().len(), 2);
-        // The twin: jitter beyond the tolerance tears the surface apart.
+        // The twin: jitter beyond any crack tears the surface apart.
         for (i, v) in dirty.vertices_mm.iter_mut().enumerate() {
-            v.x += 0.01 * (i as f64).cos();
+            v.x += 0.8 * (i as f64).cos();
         }
         prop_assert!(Wall::from_surface(&dirty).unwrap().openings().len() > 2);
     }

@@ -25,31 +25,51 @@ pub(crate) struct EdgeTable {
 }
 
 impl EdgeTable {
-    /// Sorts the edges of `triangles`, O(n log n). Triangles with a repeated vertex are skipped.
+    /// Sorts the edges of `triangles`: counted out by their smaller vertex, then by the larger one among the few that share it.
+    /// Triangles with a repeated vertex are skipped.
     pub(crate) fn new(triangles: &[[u32; 3]]) -> Self {
-        let mut uses = Vec::with_capacity(3 * triangles.len());
-        for (index, t) in triangles.iter().enumerate() {
-            if t[0] == t[1] || t[1] == t[2] || t[2] == t[0] {
-                continue;
-            }
+        let whole = |t: &&[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+        let vertices = triangles.iter().flatten().max().map_or(0, |v| *v as usize + 1);
+        // Place of the first use of each vertex as the smaller one, moved on as uses are put down.
+        let mut place = vec![0_u32; vertices + 1];
+        for t in triangles.iter().filter(whole) {
             for side in 0..3 {
-                let (from, to) = (t[side], t[(side + 1) % 3]);
-                uses.push(EdgeUse {
-                    low: from.min(to),
-                    high: from.max(to),
-                    triangle: index as u32,
-                    side: side as u8,
-                    forward: from < to,
-                });
+                place[t[side].min(t[(side + 1) % 3]) as usize + 1] += 1;
             }
         }
-        uses.sort_unstable();
+        for v in 0..vertices {
+            place[v + 1] += place[v];
+        }
+        let mut ends = place.clone();
+        let blank = EdgeUse { low: 0, high: 0, triangle: 0, side: 0, forward: false };
+        let mut uses = vec![blank; place[vertices] as usize];
+        for (index, t) in triangles.iter().enumerate().filter(|(_, t)| whole(t)) {
+            for side in 0..3 {
+                let (from, to) = (t[side], t[(side + 1) % 3]);
+                let (low, high) = (from.min(to), from.max(to));
+                let end = &mut ends[low as usize];
+                uses[*end as usize] =
+                    EdgeUse { low, high, triangle: index as u32, side: side as u8, forward: from < to };
+                *end += 1;
+            }
+        }
+        for v in 0..vertices {
+            uses[place[v] as usize..place[v + 1] as usize].sort_unstable();
+        }
         Self { uses }
     }
 
     /// The uses of each edge, edge after edge.
     pub(crate) fn edges(&self) -> impl Iterator<Item = &[EdgeUse]> {
         self.uses.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high))
+    }
+
+    /// The uses of the edge between two vertices.
+    pub(crate) fn uses(&self, a: u32, b: u32) -> &[EdgeUse] {
+        let key = (a.min(b), a.max(b));
+        let first = self.uses.partition_point(|u| (u.low, u.high) < key);
+        let count = self.uses[first..].iter().take_while(|u| (u.low, u.high) == key).count();
+        &self.uses[first..first + count]
     }
 
     /// Number of edges shared by more than two triangles.

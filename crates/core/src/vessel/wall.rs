@@ -3,7 +3,7 @@
 use super::opening::{self, Opening};
 use super::topology::EdgeTable;
 pub use super::topology::NONE as NO_NEIGHBOUR;
-use super::{SurfaceMesh, orient, sliver, weld};
+use super::{SurfaceMesh, orient, repair, sliver, weld};
 use crate::{Error, Result, Vec3};
 
 /// Vertices closer than this fraction of the diagonal of the triangles' bounding box are one vertex: ten times the resolution of the
@@ -53,6 +53,30 @@ pub struct RepairReport {
     pub non_manifold_edges: usize,
     /// Edges across which no winding agrees: the surface is one-sided.
     pub one_sided_edges: usize,
+    /// Vertices merged over cracks wider than the tolerance of welding.
+    pub cracks_closed: usize,
+    /// Triangles of fins, second layers and membranes removed: edges had more than two triangles.
+    pub sheets_removed: usize,
+    /// Edges of more than two triangles along which the surface was cut apart, nothing moved.
+    pub edges_cut: usize,
+    /// Specks and floating patches dropped.
+    pub pieces_dropped: usize,
+    /// Outer skins dropped of a wall that was given with two: the inner one is the lumen's.
+    pub skins_dropped: usize,
+    /// Triangles of what was dropped.
+    pub piece_triangles_dropped: usize,
+    /// Holes and tears closed.
+    pub holes_filled: usize,
+    /// Triangles added to close holes, those of cut out folds too.
+    pub triangles_added: usize,
+    /// Pairs of triangles that intersected before folds were cut out.
+    pub intersections_found: usize,
+    /// Pairs that still do.
+    pub intersections_left: usize,
+    /// Whether there were too many to be found: then none was cured.
+    pub intersections_capped: bool,
+    /// Triangles cut out because they intersected or were folded.
+    pub fold_triangles_removed: usize,
 }
 
 impl RepairReport {
@@ -69,6 +93,18 @@ impl RepairReport {
         note(self.degenerate_removed, "degenerate triangles removed");
         note(self.duplicates_removed, "duplicate triangles removed");
         note(self.triangles_flipped, "triangles turned over");
+        note(self.cracks_closed, "vertices merged over cracks");
+        note(self.sheets_removed, "triangles of fins and second layers removed");
+        note(self.edges_cut, "edges of more than two triangles cut apart");
+        note(self.pieces_dropped, "small or flat pieces dropped");
+        note(self.skins_dropped, "outer skins of a double wall dropped: the inner one is the lumen");
+        note(self.holes_filled, "holes and tears closed");
+        note(self.fold_triangles_removed, "intersecting or folded triangles cut out and replaced");
+        let at_least = if self.intersections_capped { "or more " } else { "" };
+        note(
+            self.intersections_left,
+            &format!("{at_least}pairs of triangles still intersect: mend the surface there"),
+        );
         note(self.stray_edges, "open edges form no loop");
         note(self.non_manifold_edges, "edges belong to more than two triangles");
         note(self.one_sided_edges, "edges make the surface one-sided");
@@ -83,12 +119,42 @@ impl RepairReport {
 }
 
 impl Wall {
-    /// Repairs `surface` into a wall: welds, removes degenerate and duplicate triangles, makes the winding consistent and
-    /// outward, and takes boundary loops as openings. Positions of the vertices that stay are not changed.
+    /// Repairs `surface` into a wall: welds, removes degenerate and duplicate triangles, joins cracks, takes fins and second
+    /// layers away, makes the winding consistent and outward, drops specks and outer skins, closes holes and tears, cuts out
+    /// local folds, and takes the boundary loops that are left as openings. What is not faulty stays as it is, and vertices
+    /// that stay are not moved, except over cracks. [`Wall::report`] says what was done and what is left.
     ///
     /// # Errors
-    /// [`Error::Mesh`] if there is no triangle with area, an index is out of range or a coordinate is not finite.
+    /// [`Error::Mesh`] if there is no triangle with area, an index is out of range or a coordinate that is used is not finite.
     pub fn from_surface(surface: &SurfaceMesh) -> Result<Self> {
+        Self::mended(surface, true)
+    }
+
+    /// A wall of `surface` with vertices welded, triangles without area removed and the winding made consistent, and no more:
+    /// what is faulty beyond that stays.
+    ///
+    /// # Errors
+    /// As [`Wall::from_surface`].
+    pub fn welded(surface: &SurfaceMesh) -> Result<Self> {
+        Self::mended(surface, false)
+    }
+
+    /// A wall of a surface that is sound already: triangles and vertices keep their numbers. For surfaces that the program
+    /// makes; one that was given may be faulty.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] without triangles, for an index that is out of range or a coordinate that is not finite.
+    pub fn from_sound(mesh: SurfaceMesh) -> Result<Self> {
+        validate(&mesh)?;
+        let report = RepairReport {
+            triangles_given: mesh.triangles.len(),
+            vertices_given: mesh.vertices_mm.len(),
+            ..Default::default()
+        };
+        Ok(Self::finished(mesh, report))
+    }
+
+    fn mended(surface: &SurfaceMesh, whole: bool) -> Result<Self> {
         validate(surface)?;
         let mut report = RepairReport {
             triangles_given: surface.triangles.len(),
@@ -108,6 +174,9 @@ impl Wall {
             return Err(Error::Mesh("no triangle has an area; check the file and its unit".into()));
         }
         report.vertices_unreferenced = drop_unreferenced(&mut mesh) - report.vertices_welded;
+        if whole {
+            repair::join_sheets(&mut mesh, tolerance_mm, &mut report);
+        }
         let before = mesh.triangles.clone();
         let consistency = orient::make_consistent(&mut mesh.triangles);
         turn_outward(&mut mesh, &consistency);
@@ -115,6 +184,14 @@ impl Wall {
         report.triangles_flipped = before.iter().zip(&mesh.triangles).filter(|(a, b)| a != b).count();
         report.inside_out = report.triangles_flipped == mesh.triangles.len();
         report.one_sided_edges = consistency.contradictions;
+        if whole {
+            repair::cure(&mut mesh, tolerance_mm, &mut report);
+        }
+        Ok(Self::finished(mesh, report))
+    }
+
+    /// Counts what `mesh` is made of and finds its openings.
+    fn finished(mesh: SurfaceMesh, mut report: RepairReport) -> Self {
         let table = EdgeTable::new(&mesh.triangles);
         report.non_manifold_edges = table.non_manifold();
         let (component, count) = table.components(mesh.triangles.len());
@@ -128,7 +205,7 @@ impl Wall {
         report.openings = boundary.openings.len();
         report.stray_edges = boundary.stray_edges;
         let caps = boundary.openings.iter().flat_map(|o| o.cap(&mesh).collect::<Vec<_>>()).collect();
-        Ok(Self { mesh, openings: boundary.openings, caps, report })
+        Self { mesh, openings: boundary.openings, caps, report }
     }
 
     /// The repaired surface, open where the vessel is open.
@@ -197,14 +274,6 @@ pub(crate) fn validate(surface: &SurfaceMesh) -> Result<()> {
             surface.triangles.len()
         )));
     }
-    // Squares and cubes of coordinates must stay finite too.
-    let usable = |c: &f64| c.abs() < 1e100;
-    if let Some((i, v)) = surface.vertices_mm.iter().enumerate().find(|(_, v)| !v.iter().all(usable)) {
-        return Err(Error::Mesh(format!(
-            "vertex {i} is at ({}, {}, {}); all coordinates must be finite",
-            v.x, v.y, v.z
-        )));
-    }
     let count = surface.vertices_mm.len();
     let out_of_range = |t: &[u32; 3]| t.iter().any(|&v| v as usize >= count);
     if let Some((i, t)) = surface.triangles.iter().enumerate().find(|(_, t)| out_of_range(t)) {
@@ -213,11 +282,21 @@ pub(crate) fn validate(surface: &SurfaceMesh) -> Result<()> {
             count.max(1) - 1
         )));
     }
+    // Squares and cubes of coordinates must stay finite too. A vertex that no triangle uses may be anywhere.
+    let usable = |v: &Vec3| v.iter().all(|c| c.abs() < 1e100);
+    if let Some(i) = surface.triangles.iter().flatten().find(|i| !usable(&surface.vertices_mm[**i as usize]))
+    {
+        let v = surface.vertices_mm[*i as usize];
+        return Err(Error::Mesh(format!(
+            "vertex {i} is at ({}, {}, {}); all coordinates must be finite",
+            v.x, v.y, v.z
+        )));
+    }
     Ok(())
 }
 
 /// Keeps the first of all triangles on the same vertices, whatever their winding.
-fn remove_duplicates(triangles: &mut Vec<[u32; 3]>) -> usize {
+pub(super) fn remove_duplicates(triangles: &mut Vec<[u32; 3]>) -> usize {
     let before = triangles.len();
     let mut keep = vec![true; before];
     for (earlier, later) in duplicate_pairs(triangles) {

@@ -13,11 +13,14 @@ use crate::Vec3;
 const CELL_PER_TOLERANCE: f64 = 16.0;
 
 /// For each vertex the index of the vertex it is merged into (its own index if it stays): the smallest index of
-/// all vertices linked to it by steps of at most `tolerance_mm`. All coordinates must be finite.
+/// all vertices linked to it by steps of at most `tolerance_mm`. Vertices that are not finite are joined to none that is.
 pub(crate) fn merge_targets(vertices_mm: &[Vec3], tolerance_mm: f64) -> Vec<u32> {
     let mut sets = DisjointSets::new(vertices_mm.len());
     join_equal(vertices_mm, &mut sets);
-    let distinct: Vec<u32> = (0..vertices_mm.len() as u32).filter(|&v| sets.find(v) == v).collect();
+    // What is not finite lies nowhere, and near nothing.
+    let usable = |v: u32| vertices_mm[v as usize].iter().all(|c| c.is_finite());
+    let distinct: Vec<u32> =
+        (0..vertices_mm.len() as u32).filter(|&v| sets.find(v) == v && usable(v)).collect();
     if tolerance_mm > 0.0 {
         join_near(vertices_mm, &distinct, tolerance_mm, &mut sets);
     }

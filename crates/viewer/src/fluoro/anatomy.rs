@@ -21,7 +21,11 @@ pub(crate) struct Anatomy {
 impl Anatomy {
     /// Casts the rays of `view` through the scene.
     pub(crate) fn new(setup: &Setup, view: &CArm, engine: &mut dyn PathEngine) -> Result<Self> {
-        let lumen = engine.mesh(view, &setup.wall)?;
+        let lumen = if setup.lumen {
+            engine.mesh(view, &setup.wall)?
+        } else {
+            view.obliquities().map(|_| 0.0).collect()
+        };
         let mut maps = Self { lumen, ..Self::default() };
         match &setup.patient {
             Patient::Slab { tissue_mm } => {

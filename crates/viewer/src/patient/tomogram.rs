@@ -13,6 +13,8 @@ use nifti::{
 use crate::c_arm::CArm;
 use crate::spec::CtSpec;
 
+/// Sides of a voxel that can be meant, mm: a unit mistake is easily a factor of a thousand, and rays march by half a side.
+const VOXEL_MM: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
 /// Air: no tissue at all below this.
 const AIR_HU: f32 = -950.0;
 /// Bone begins.
@@ -85,12 +87,16 @@ impl Volume {
         }
         let (axes, origin) = placement(&header).map_err(bad)?;
         Self::new([nx, ny, nz].map(usize::from), axes, origin + Vec3::from(spec.offset_mm), voxels)
-            .ok_or_else(|| Error::content(path, "its axes do not span space; mend its sform or pixdim"))
+            .ok_or_else(|| Error::content(path, "its axes do not span space, or its voxels are no 0.001 to 1000 mm wide; mend its sform or pixdim"))
     }
 
     /// A volume with voxel (i, j, k) at `origin_mm` + `axes` · (i, j, k).
     fn new(size: [usize; 3], axes: Matrix3<f64>, origin_mm: Vec3, voxels: Vec<[f32; 2]>) -> Option<Self> {
         let smallest = axes.column_iter().map(|c| c.norm()).fold(f64::MAX, f64::min);
+        let sides = axes.column_iter().map(|c| c.norm());
+        if !sides.clone().all(|side| VOXEL_MM.contains(&side)) {
+            return None;
+        }
         let into = axes.try_inverse().filter(|m| m.iter().all(|x| x.is_finite()))?;
         Some(Self { size, into, origin_mm, step_mm: STEP * smallest, voxels })
     }

@@ -137,6 +137,9 @@ impl From<Pose> for String {
     }
 }
 
+/// Pixel pitches and field sizes between which geometry has digits left, mm.
+const PITCH_MM: [f64; 2] = [1e-4, 1e5];
+
 impl CArmSpec {
     /// Primary and secondary angle, from `pose` where that is given.
     pub fn angles_deg(&self) -> [f64; 2] {
@@ -166,6 +169,7 @@ impl CArmSpec {
         for (key, value) in [("pixel_mm", self.pixel_mm), ("field_mm", self.field_mm)] {
             if let Some(value) = value {
                 positive(&format!("view.c_arm.{key}"), value)?;
+                finite_within(&format!("view.c_arm.{key}"), value, PITCH_MM)?;
             }
         }
         if let (Some(field), Some(_)) = (self.field_mm, self.pixel_mm) {

@@ -42,7 +42,8 @@ fn format_of(path: &Path) -> Result<Format> {
 }
 
 impl SurfaceMesh {
-    /// Reads an STL (ASCII or binary), OBJ or PLY (ASCII or binary) surface. Polygons are cut into fans of triangles.
+    /// Reads an STL (ASCII or binary), OBJ or PLY (ASCII or binary) surface. Polygons are cut into fans of triangles;
+    /// faces of fewer than three corners become triangles without area, which the repair removes and counts.
     /// The surface is returned as it is in the file, scaled; [`Wall::from_surface`](super::Wall::from_surface) repairs it.
     ///
     /// `unit_mm`: millimetres per file unit (1 for millimetres, 10 for centimetres, 1000 for metres).
@@ -100,21 +101,25 @@ fn parse(format: Format, bytes: &[u8]) -> std::result::Result<SurfaceMesh, Reaso
 }
 
 fn scaled(mut mesh: SurfaceMesh, unit_mm: f64) -> std::result::Result<SurfaceMesh, Reason> {
-    for (index, v) in mesh.vertices_mm.iter_mut().enumerate() {
-        *v *= unit_mm;
-        if !v.iter().all(|c| c.is_finite()) {
-            return Err(format!(
-                "vertex {index} is at ({}, {}, {}); coordinates must be finite",
-                v.x, v.y, v.z
-            ));
-        }
+    mesh.vertices_mm.iter_mut().for_each(|v| *v *= unit_mm);
+    // A vertex that no triangle uses may be anywhere.
+    let lost = |i: &&u32| !mesh.vertices_mm[**i as usize].iter().all(|c| c.is_finite());
+    if let Some(index) = mesh.triangles.iter().flatten().find(lost) {
+        let v = mesh.vertices_mm[*index as usize];
+        let count = mesh.triangles.iter().filter(|t| t.iter().any(|i| lost(&i))).count();
+        return Err(format!(
+            "vertex {index} is at ({}, {}, {}), and {count} triangles need vertices like it; coordinates must be finite: \
+             remove these triangles or mend the export",
+            v.x, v.y, v.z
+        ));
     }
     let extent_mm = mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
     if extent_mm > EXTENT_LIMIT_MM {
         return Err(format!(
             "with unit_mm = {} the surface is {extent_mm:.1e} mm across, and no vessel more than {EXTENT_LIMIT_MM:.0e}: give \
-             the millimetres per unit of the file",
-            crate::error::number(unit_mm)
+             the millimetres per unit of the file{}",
+            crate::error::number(unit_mm),
+            super::unit_hint(extent_mm, unit_mm).map_or_else(String::new, |hint| format!(" ({hint})"))
         ));
     }
     Ok(mesh)
@@ -127,14 +132,19 @@ fn push_fan(
     what: impl Fn() -> String,
 ) -> std::result::Result<(), Reason> {
     let count = mesh.vertices_mm.len();
-    if polygon.len() < 3 {
-        return Err(format!("{} has {} corners; a face needs at least 3", what(), polygon.len()));
-    }
     if let Some(bad) = polygon.iter().find(|&&v| v < 0 || v >= count as i64 || v >= i64::from(u32::MAX)) {
         return Err(format!(
             "{} names vertex {bad} (counted from 0), but there are {count} vertices",
             what()
         ));
+    }
+    // A face of one or two corners is no reason to refuse thousands of others: as a triangle without area it is removed and
+    // counted with its like when the surface is repaired.
+    match polygon {
+        [] => return Ok(()),
+        [a] => mesh.triangles.push([*a as u32; 3]),
+        [a, b] => mesh.triangles.push([*a as u32, *b as u32, *b as u32]),
+        _ => {}
     }
     for pair in polygon[1..].windows(2) {
         mesh.triangles.push([polygon[0] as u32, pair[0] as u32, pair[1] as u32]);

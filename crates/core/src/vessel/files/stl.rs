@@ -76,10 +76,9 @@ fn parse_ascii(text: &str) -> Result<SurfaceMesh, Reason> {
                 corners += 1;
             }
             Some("endfacet") => {
-                if corners != 3 {
-                    return Err(format!("{}: a facet with {corners} vertices; it needs 3", what()));
-                }
-                push_last_three(&mut mesh);
+                let first = (mesh.vertices_mm.len() - corners) as i64;
+                let polygon: Vec<i64> = (first..first + corners as i64).collect();
+                super::push_fan(&mut mesh, &polygon, what)?;
                 corners = 0;
             }
             _ => {}

@@ -129,12 +129,31 @@ fn polygons_become_fans_and_negative_indices_count_back() {
 }
 
 #[test]
+fn faces_without_three_corners_are_counted_and_the_others_stay() {
+    let obj = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv nan 0 0\nf 1 2\nf 3\nf\nf 1 2 3\nf 2 2 3\n";
+    let stl = b"solid\nfacet\nvertex 0 0 0\nvertex 1 0 0\nendfacet\nfacet\nendfacet\nfacet\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nendfacet\n";
+    let ply = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 2\n\
+        property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n2 0 1\n3 0 1 2\n";
+    for (format, bytes, degenerate) in
+        [(Format::Obj, &obj[..], 3), (Format::Stl, &stl[..], 1), (Format::Ply, &ply[..], 1)]
+    {
+        let surface = scaled(parse(format, bytes).unwrap(), 2.0).unwrap();
+        let wall = crate::vessel::Wall::from_surface(&surface).unwrap();
+        assert_eq!((wall.mesh().triangles.len(), wall.report().degenerate_removed), (1, degenerate));
+    }
+    // The twin: a vertex that is used must be somewhere.
+    let used = parse(Format::Obj, b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n").unwrap();
+    let reason = scaled(used, 1.0).unwrap_err();
+    assert!(reason.contains("vertex 2 is at (NaN") && reason.contains("1 triangles"), "{reason}");
+}
+
+#[test]
 fn errors_name_the_place_and_the_way_out() {
     let reason = |format, text: &str| parse(format, text.as_bytes()).unwrap_err();
     assert_eq!(reason(Format::Obj, "v 0 0 zero\n"), "line 1: \"zero\" is not a number");
     assert!(reason(Format::Obj, "v 0 0 0\nf 1 2 3\n").contains("line 2 names vertex 1"));
     assert!(reason(Format::Obj, "v 0 0 0\n").contains("no triangles"));
-    assert!(reason(Format::Stl, "solid x\nfacet\nvertex 0 0 0\nendfacet\n").contains("line 4"));
+    assert!(reason(Format::Stl, "solid x\nfacet\nvertex 0 0\nendfacet\n").contains("line 3"));
     let ply = parse(Format::Ply, b"ply\nformat ascii 9.0\nelement nonsense\n").unwrap_err();
     assert_eq!(ply.lines().count(), 1, "{ply}");
     let unknown = SurfaceMesh::read(Path::new("wall.vtk"), 1.0).unwrap_err().to_string();

@@ -160,7 +160,7 @@ impl GeneratedWall {
             }
             _ => implicit_mesh(&field, &ends, edge_mm)?,
         };
-        let wall = Wall::from_surface(&mesh)?;
+        let wall = Wall::welded(&mesh)?;
         let ends = match_openings(&wall, &ends, edge_mm)?;
         Ok(Self { inlet: ends[0].1, wall, ends, edge_mm })
     }

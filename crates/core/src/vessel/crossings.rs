@@ -1,0 +1,240 @@
+//! Which triangles of a surface meet where they should not.
+//!
+//! Triangles are put in the order of a space-filling curve (Morton), and a binary tree of boxes stands over that order: building
+//! it is one sort, and neighbours lie side by side. Nearly all pairs whose boxes meet are neighbours of a smooth surface; two
+//! tests in plain arithmetic, each with a margin far above its rounding, tell most of them apart before exact predicates decide.
+
+use super::intersect::triangles_intersect;
+use super::{SurfaceMesh, sliver};
+use crate::Vec3;
+
+/// Triangles in a leaf of the tree.
+const LEAF: usize = 4;
+/// Pairs of close triangles that are looked at, for each triangle and in all: a sound mesh needs about twenty each.
+const TRIES_EACH: usize = 64;
+const TRIES_BEYOND: usize = 1_000_000;
+/// Part of a triangle's size below which a distance is rounding to the tests that need not be exact.
+const MARGIN: f64 = 1e-9;
+
+/// Pairs of triangles that intersect.
+#[derive(Debug, Default)]
+pub(crate) struct Crossings {
+    /// Pairs, the smaller number first, sorted.
+    pub(crate) pairs: Vec<[u32; 2]>,
+    /// Whether a limit ended the search: there may be more.
+    pub(crate) capped: bool,
+}
+
+struct Tree {
+    /// Triangles along the curve.
+    order: Vec<u32>,
+    /// Bounds of the triangles, by number.
+    boxes: Vec<[Vec3; 2]>,
+    /// Bounds of the nodes: node k has children 2k and 2k + 1, leaves begin at `leaves`.
+    nodes: Vec<[Vec3; 2]>,
+    leaves: usize,
+}
+
+const EMPTY: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+fn join(a: &[Vec3; 2], b: &[Vec3; 2]) -> [Vec3; 2] {
+    [a[0].inf(&b[0]), a[1].sup(&b[1])]
+}
+
+fn meet(a: &[Vec3; 2], b: &[Vec3; 2]) -> bool {
+    (0..3).all(|k| a[0][k] <= b[1][k] && b[0][k] <= a[1][k])
+}
+
+impl Tree {
+    fn new(mesh: &SurfaceMesh, mut members: Vec<u32>) -> Self {
+        let bounds = |corners: [Vec3; 3]| {
+            let [a, b, c] = corners;
+            [a.inf(&b).inf(&c), a.sup(&b).sup(&c)]
+        };
+        let boxes: Vec<[Vec3; 2]> = (0..mesh.triangles.len()).map(|i| bounds(mesh.corners(i))).collect();
+        let empty = [Vec3::repeat(EMPTY[0]), Vec3::repeat(EMPTY[1])];
+        let all = members.iter().fold(empty, |all, i| join(&all, &boxes[*i as usize]));
+        let scale =
+            (all[1] - all[0]).map(|side| if side > 0.0 { f64::from((1 << 20) - 1) / side } else { 0.0 });
+        let code = |i: u32| {
+            let [low, high] = boxes[i as usize];
+            let cell = ((low + high) / 2.0 - all[0]).component_mul(&scale);
+            spread(cell.x as u64) | spread(cell.y as u64) << 1 | spread(cell.z as u64) << 2
+        };
+        let mut keyed: Vec<(u64, u32)> = members.drain(..).map(|i| (code(i), i)).collect();
+        keyed.sort_unstable();
+        let order: Vec<u32> = keyed.into_iter().map(|(_, i)| i).collect();
+        let leaves = order.len().div_ceil(LEAF).next_power_of_two();
+        let mut nodes = vec![empty; 2 * leaves];
+        for (leaf, inside) in order.chunks(LEAF).enumerate() {
+            nodes[leaves + leaf] = inside.iter().fold(empty, |all, i| join(&all, &boxes[*i as usize]));
+        }
+        for node in (1..leaves).rev() {
+            nodes[node] = join(&nodes[2 * node], &nodes[2 * node + 1]);
+        }
+        Self { order, boxes, nodes, leaves }
+    }
+
+    /// Calls `visit` for the triangles from place `from` on whose bounds meet those of triangle `of`, until it says stop.
+    fn close_to(
+        &self,
+        of: u32,
+        from: usize,
+        stack: &mut Vec<(usize, usize)>,
+        mut visit: impl FnMut(u32) -> bool,
+    ) {
+        let bounds = &self.boxes[of as usize];
+        stack.clear();
+        // Node, and the place behind its last triangle.
+        stack.push((1, self.leaves * LEAF));
+        while let Some((node, end)) = stack.pop() {
+            if end <= from || !meet(bounds, &self.nodes[node]) {
+                continue;
+            }
+            if node < self.leaves {
+                // The width of a node's span is that of its level.
+                let width = (self.leaves * LEAF) >> node.ilog2();
+                stack.push((2 * node + 1, end));
+                stack.push((2 * node, end - width / 2));
+                continue;
+            }
+            for place in (end - LEAF).max(from)..end.min(self.order.len()) {
+                let other = self.order[place];
+                if meet(bounds, &self.boxes[other as usize]) && !visit(other) {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// The lower 20 bits, two zeros between each.
+fn spread(bits: u64) -> u64 {
+    let mut x = bits & 0x1f_ffff;
+    x = (x | x << 32) & 0x001f_0000_0000_ffff;
+    x = (x | x << 16) & 0x001f_0000_ff00_00ff;
+    x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+    x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+    (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+/// The intersecting pairs among the triangles with area, up to `limit`; with `marked` those pairs alone of which one is marked.
+pub(crate) fn crossings(
+    mesh: &SurfaceMesh,
+    tolerance_mm: f64,
+    marked: Option<&[bool]>,
+    limit: usize,
+) -> Crossings {
+    let solid: Vec<u32> = (0..mesh.triangles.len() as u32)
+        .filter(|&i| !sliver::is_degenerate(&mesh.corners(i as usize), tolerance_mm))
+        .collect();
+    let mut found = Crossings::default();
+    let most = TRIES_EACH * solid.len() + TRIES_BEYOND;
+    let tree = Tree::new(mesh, solid);
+    let mut tried = 0;
+    let mut stack = Vec::new();
+    for (place, &a) in tree.order.iter().enumerate() {
+        let is_marked = |t: u32| marked.is_none_or(|m| m[t as usize]);
+        if !is_marked(a) {
+            continue;
+        }
+        // Without marks each pair is met from its earlier member. A marked triangle looks at all others.
+        let from = if marked.is_some() { 0 } else { place + 1 };
+        tree.close_to(a, from, &mut stack, |b| {
+            if marked.is_some() && (a == b || (is_marked(b) && b < a)) {
+                return true;
+            }
+            tried += 1;
+            let (first, second) = (mesh.triangles[a as usize], mesh.triangles[b as usize]);
+            if !apart(&mesh.vertices_mm, first, second)
+                && triangles_intersect(&mesh.vertices_mm, first, second)
+            {
+                found.pairs.push([a.min(b), a.max(b)]);
+            }
+            found.capped |= found.pairs.len() >= limit || tried > most;
+            !found.capped
+        });
+        if found.capped {
+            break;
+        }
+    }
+    found.pairs.sort_unstable();
+    found
+}
+
+/// Whether two triangles are apart beyond doubt but for the vertices that they share.
+fn apart(vertices: &[Vec3], a: [u32; 3], b: [u32; 3]) -> bool {
+    let at = |t: [u32; 3]| t.map(|v| vertices[v as usize]);
+    let (pa, pb) = (at(a), at(b));
+    let mut shared = (0..3).filter(|&k| b.contains(&a[k]));
+    match (shared.next(), shared.next()) {
+        (None, _) => beside(&pa, &pb) || beside(&pb, &pa),
+        (Some(k), None) => {
+            let l = (0..3).find(|&l| b[l] == a[k]).unwrap_or(0);
+            cones_apart(&pa, k, &pb, l)
+        }
+        _ => false,
+    }
+}
+
+/// Whether all of `b` is beyond the plane of `a` or beyond one of its sides.
+fn beside(a: &[Vec3; 3], b: &[Vec3; 3]) -> bool {
+    let normal = (a[1] - a[0]).cross(&(a[2] - a[0]));
+    let size = (a[1] - a[0]).norm_squared().max((a[2] - a[0]).norm_squared());
+    let reach = b.iter().map(|p| (p - a[0]).norm_squared()).fold(size, f64::max).sqrt();
+    let beyond = |direction: &Vec3, from: &Vec3| {
+        let least = MARGIN * direction.norm() * reach;
+        b.iter().all(|p| direction.dot(&(p - from)) > least)
+    };
+    beyond(&normal, &a[0])
+        || beyond(&-normal, &a[0])
+        || (0..3).any(|k| beyond(&(a[(k + 1) % 3] - a[k]).cross(&normal), &a[k]))
+}
+
+/// Whether the round cones about two triangles that share a corner (`k` of one, `l` of the other) share nothing else.
+fn cones_apart(a: &[Vec3; 3], k: usize, b: &[Vec3; 3], l: usize) -> bool {
+    // Axis of the cone, and cosine and sine of its half angle.
+    let cone = |t: &[Vec3; 3], k: usize| {
+        let unit = |j: usize| (t[(k + j) % 3] - t[k]).normalize();
+        let (u, v) = (unit(1), unit(2));
+        let axis = (u + v).normalize();
+        (axis, axis.dot(&u), (u - v).norm() / 2.0)
+    };
+    let ((m, cos_a, sin_a), (n, cos_b, sin_b)) = (cone(a, k), cone(b, l));
+    // Half angles are below a right angle, so their sum is below two.
+    m.dot(&n) < cos_a * cos_b - sin_a * sin_b - MARGIN
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tree_finds_what_trying_all_pairs_finds() {
+        // Blades on a helix: some cross, most do not.
+        let mut mesh = SurfaceMesh::default();
+        for k in 0..120_u32 {
+            let t = f64::from(k);
+            let centre = Vec3::new((0.9 * t).cos() * 3.0, (0.9 * t).sin() * 3.0, 0.05 * t);
+            mesh.vertices_mm.extend([0.0, 2.1, 4.2].map(|turn: f64| {
+                centre + 0.7 * Vec3::new((turn + t).cos(), (turn + t).sin(), (turn - 2.0 * t).sin())
+            }));
+            mesh.triangles.push([3 * k, 3 * k + 1, 3 * k + 2]);
+        }
+        let all: Vec<[u32; 2]> = (0..120_u32)
+            .flat_map(|a| (a + 1..120).map(move |b| [a, b]))
+            .filter(|[a, b]| {
+                let t = |i: &u32| mesh.triangles[*i as usize];
+                triangles_intersect(&mesh.vertices_mm, t(a), t(b))
+            })
+            .collect();
+        assert!(all.len() > 10, "{}", all.len());
+        let found = crossings(&mesh, 0.0, None, usize::MAX);
+        assert_eq!((found.pairs, found.capped), (all.clone(), false));
+        let marked: Vec<bool> = (0..120).map(|k| k % 5 == 0).collect();
+        let some: Vec<[u32; 2]> =
+            all.iter().copied().filter(|pair| pair.iter().any(|t| marked[*t as usize])).collect();
+        assert_eq!(crossings(&mesh, 0.0, Some(&marked), usize::MAX).pairs, some);
+        assert!(crossings(&mesh, 0.0, None, 3).capped);
+    }
+}

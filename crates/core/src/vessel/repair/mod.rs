@@ -1,0 +1,62 @@
+//! What it takes to make a vessel wall of a surface with faults beyond doubled vertices and turned faces.
+//!
+//! Every step leaves what is not faulty as it is, and a surface without its fault untouched.
+
+mod cracks;
+mod fill;
+mod folds;
+mod holes;
+mod pieces;
+mod sheets;
+#[cfg(test)]
+mod tests;
+
+use super::SurfaceMesh;
+use super::sliver;
+use super::wall::{RepairReport, drop_unreferenced, remove_duplicates};
+
+/// Joins cracks and takes superfluous sheets away. For a mesh of welded vertices, before its winding is made consistent.
+pub(super) fn join_sheets(mesh: &mut SurfaceMesh, tolerance_mm: f64, report: &mut RepairReport) {
+    report.cracks_closed = cracks::close_cracks(mesh);
+    if report.cracks_closed > 0 {
+        report.degenerate_removed += sliver::remove_degenerate(mesh, tolerance_mm);
+        report.duplicates_removed += remove_duplicates(&mut mesh.triangles);
+    }
+    let resolved = sheets::resolve(mesh);
+    report.sheets_removed = resolved.removed;
+    report.edges_cut = resolved.cut;
+    if report.cracks_closed + resolved.removed + resolved.cut > 0 {
+        drop_unreferenced(mesh);
+    }
+}
+
+/// Drops pieces that are no vessel, closes holes and cures folds. For a mesh of consistent winding.
+pub(super) fn cure(mesh: &mut SurfaceMesh, tolerance_mm: f64, report: &mut RepairReport) {
+    let dropped = pieces::drop_pieces(mesh);
+    report.pieces_dropped = dropped.specks;
+    report.skins_dropped = dropped.skins;
+    report.piece_triangles_dropped = dropped.triangles;
+    let filled = holes::fill_holes(mesh);
+    report.holes_filled = filled.holes;
+    report.triangles_added = filled.triangles;
+    if filled.triangles > 0 {
+        // The filling of a crack has no area: its needles are flipped into the triangles beside.
+        sliver::remove_degenerate(mesh, tolerance_mm);
+    }
+    let cured = folds::cure(mesh, tolerance_mm);
+    report.intersections_found = cured.found;
+    report.intersections_left = cured.left;
+    report.intersections_capped = cured.capped;
+    report.fold_triangles_removed = cured.removed;
+    report.triangles_added += cured.added;
+    if cured.added > 0 {
+        sliver::remove_degenerate(mesh, tolerance_mm);
+    }
+    if filled.triangles + cured.added > 0 {
+        // Two fillings that share a chord, or a flip that met another: as rare as it is unwelcome.
+        report.sheets_removed += sheets::prune(mesh);
+    }
+    if dropped.triangles + filled.triangles + cured.removed > 0 {
+        drop_unreferenced(mesh);
+    }
+}

@@ -1,0 +1,154 @@
+//! Pieces that are no vessel: specks, patches that float over the surface, the outer skin of a wall with two.
+
+use super::holes::Rim;
+use crate::Vec3;
+use crate::vessel::topology::EdgeTable;
+use crate::vessel::wall::signed_volume;
+use crate::vessel::{SurfaceMesh, inside, mesh, opening};
+
+/// Part of the largest piece's area below which a piece is a speck, whatever it is.
+const SPECK: f64 = 1e-3;
+/// The same for a piece that is closed, into which no device gets, or that encloses next to nothing.
+const BLOB: f64 = 0.05;
+/// Volume over area to the power of 3/2 (a ball: 0.094) that is next to nothing.
+const FLAT: f64 = 1e-6;
+/// The same for a sheet.
+const SHEET: f64 = 0.3;
+/// A main piece has at least so many triangles: beside less nothing is small.
+const FEWEST: usize = 8;
+/// Area of an inner skin over that of the outer one, at least.
+const SKIN: f64 = 0.15;
+/// Triangles of an inner piece that are asked whether they are inside, and how many must be.
+const ASKED: usize = 16;
+const INSIDE: f64 = 0.8;
+
+/// What [`drop_pieces`] did.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+pub(super) struct Dropped {
+    /// Specks and floating sheets.
+    pub(super) specks: usize,
+    /// Outer skins.
+    pub(super) skins: usize,
+    /// Triangles of both.
+    pub(super) triangles: usize,
+}
+
+/// One connected piece.
+#[derive(Debug, Clone)]
+struct Piece {
+    triangles: usize,
+    area_mm2: f64,
+    volume_mm3: f64,
+    bounds: [Vec3; 2],
+    loops: usize,
+    /// Whether all its loops are borders of a sheet.
+    sheet: bool,
+    gone: bool,
+}
+
+/// Drops the pieces of a consistently oriented mesh that are no vessel.
+pub(super) fn drop_pieces(mesh: &mut SurfaceMesh) -> Dropped {
+    let mut dropped = Dropped::default();
+    let table = EdgeTable::new(&mesh.triangles);
+    let (piece_of, count) = table.components(mesh.triangles.len());
+    if count < 2 {
+        return dropped;
+    }
+    let mut pieces = measure(mesh, &table, &piece_of, count);
+    let main = (0..count).max_by(|a, b| pieces[*a].area_mm2.total_cmp(&pieces[*b].area_mm2).then(b.cmp(a)));
+    let Some(main) = main.filter(|main| pieces[*main].triangles >= FEWEST) else { return dropped };
+    let largest = pieces[main].area_mm2;
+    for piece in pieces.iter_mut() {
+        let share = piece.area_mm2 / largest;
+        let flat = piece.volume_mm3.abs() < FLAT * piece.area_mm2.powf(1.5);
+        piece.gone = share < SPECK
+            || (share < BLOB && (piece.loops == 0 || flat))
+            || (share < SHEET && piece.loops > 0 && piece.sheet);
+        dropped.specks += usize::from(piece.gone);
+    }
+    dropped.skins = drop_skins(mesh, &piece_of, &mut pieces);
+    let before = mesh.triangles.len();
+    let mut index = 0;
+    mesh.triangles.retain(|_| {
+        index += 1;
+        !pieces[piece_of[index - 1] as usize].gone
+    });
+    dropped.triangles = before - mesh.triangles.len();
+    dropped
+}
+
+fn measure(mesh: &SurfaceMesh, table: &EdgeTable, piece_of: &[u32], count: usize) -> Vec<Piece> {
+    let empty = [Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY)];
+    let blank = Piece {
+        triangles: 0,
+        area_mm2: 0.0,
+        volume_mm3: 0.0,
+        bounds: empty,
+        loops: 0,
+        sheet: true,
+        gone: false,
+    };
+    let mut pieces = vec![blank; count];
+    let origin = mesh.vertices_mm.first().copied().unwrap_or_default();
+    for (index, p) in piece_of.iter().enumerate() {
+        let (piece, corners) = (&mut pieces[*p as usize], mesh.corners(index));
+        piece.triangles += 1;
+        piece.area_mm2 += mesh::area(&corners);
+        piece.volume_mm3 += signed_volume(&corners, origin);
+        for corner in &corners {
+            piece.bounds = [piece.bounds[0].inf(corner), piece.bounds[1].sup(corner)];
+        }
+    }
+    let boundary = opening::boundary(mesh);
+    for (opening, triangle) in boundary.openings.iter().zip(&boundary.first_triangle) {
+        let piece = &mut pieces[piece_of[*triangle as usize] as usize];
+        piece.loops += 1;
+        piece.volume_mm3 += opening.cap(mesh).map(|cap| signed_volume(&cap, origin)).sum::<f64>();
+        piece.sheet &= Rim::of(mesh, table, opening).is_none_or(|rim| rim.across < -0.5);
+    }
+    pieces
+}
+
+/// Marks pieces that hold another one of their kind: that one is the lumen, they are the outside of the wall.
+fn drop_skins(mesh: &SurfaceMesh, piece_of: &[u32], pieces: &mut [Piece]) -> usize {
+    let mut order: Vec<usize> = (0..pieces.len()).filter(|p| !pieces[*p].gone).collect();
+    order.sort_by(|a, b| pieces[*b].area_mm2.total_cmp(&pieces[*a].area_mm2).then(a.cmp(b)));
+    let mut skins = 0;
+    // Pieces are few once specks are gone; if not, this is no vessel with two skins.
+    const MOST: usize = 8;
+    order.truncate(MOST);
+    for (rank, &outer) in order.iter().enumerate() {
+        let holds = order[rank + 1..].iter().any(|&inner| {
+            let (a, b) = (&pieces[outer], &pieces[inner]);
+            let slack = 1e-3 * (a.bounds[1] - a.bounds[0]).norm();
+            let nested = (0..3).all(|k| {
+                a.bounds[0][k] - slack <= b.bounds[0][k] && b.bounds[1][k] <= a.bounds[1][k] + slack
+            });
+            let alike = b.area_mm2 >= SKIN * a.area_mm2
+                && (b.bounds[1] - b.bounds[0]).norm() >= 0.7 * (a.bounds[1] - a.bounds[0]).norm();
+            nested && alike && is_inside(mesh, piece_of, inner, outer, b.triangles)
+        });
+        if holds {
+            pieces[outer].gone = true;
+            skins += 1;
+        }
+    }
+    skins
+}
+
+/// Whether most of piece `inner` is inside piece `outer`, closed by its caps.
+fn is_inside(mesh: &SurfaceMesh, piece_of: &[u32], inner: usize, outer: usize, triangles: usize) -> bool {
+    let of = |p: usize| (0..piece_of.len()).filter(move |t| piece_of[*t] as usize == p);
+    let mut shell = SurfaceMesh { vertices_mm: mesh.vertices_mm.clone(), triangles: Vec::new() };
+    shell.triangles.extend(of(outer).map(|t| mesh.triangles[t]));
+    let caps: Vec<[Vec3; 3]> =
+        opening::boundary(&shell).openings.iter().flat_map(|o| o.cap(&shell).collect::<Vec<_>>()).collect();
+    let every = (triangles / ASKED).max(1);
+    let (mut asked, mut within) = (0.0, 0.0);
+    for t in of(inner).skip(every / 2).step_by(every) {
+        let at = mesh.corners(t).iter().sum::<Vec3>() / 3.0;
+        asked += 1.0;
+        within += f64::from(u8::from(inside::winding(&shell, &caps, &at).abs() > 0.5));
+    }
+    within >= INSIDE * asked
+}

@@ -1,0 +1,176 @@
+//! What a wall holds for a device: how wide it is, where two vessels all but touch, and where one could begin.
+
+use std::f64::consts::PI;
+
+use super::{Wall, WallQuery};
+use crate::{Result, Vec3};
+
+/// Triangles that are asked, at most: evenly over the wall.
+const SAMPLES: usize = 20_000;
+/// Rays start so far, over the wall's size, from the triangle they start on.
+const OFF: f64 = 1e-7;
+/// Cosine between normals of two sheets back to back, at most.
+const BACK_TO_BACK: f64 = -0.5;
+/// Triangles that are so many steps apart are no longer one sheet bent around a corner.
+const STEPS_APART: usize = 8;
+/// Chords whose middle is tried for a sheath, and directions there.
+const PLACES: usize = 48;
+const DIRECTIONS: usize = 200;
+
+/// How wide the lumen is: half chords along the inward normals of the wall.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct LumenReport {
+    /// Smallest half chord in mm.
+    pub smallest_mm: f64,
+    /// The middle of that chord, mm.
+    pub smallest_at_mm: [f64; 3],
+    /// Half chord below which one in a hundred is, mm: what single faulty triangles do not change.
+    pub percentile_1_mm: f64,
+    /// The same for one in twenty, mm.
+    pub percentile_5_mm: f64,
+    /// Median half chord, mm.
+    pub median_mm: f64,
+    /// Chords measured.
+    pub chords: usize,
+}
+
+/// Where two sheets of the wall lie back to back, with two lumens on either side.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct SeptaReport {
+    /// Thickness below which a septum counts, mm.
+    pub below_mm: f64,
+    /// Triangles asked, and how many of them are part of such a septum.
+    pub asked: usize,
+    /// Triangles of such septa among them.
+    pub thin: usize,
+    /// Thickness of the thinnest, mm.
+    pub thinnest_mm: Option<f64>,
+    /// Where that is, mm.
+    pub thinnest_at_mm: Option<[f64; 3]>,
+}
+
+/// A place for a sheath inside the vessel.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct StartReport {
+    /// For `sheath.position_mm`.
+    pub position_mm: [f64; 3],
+    /// For `sheath.direction`: the way that is free the longest.
+    pub direction: [f64; 3],
+    /// Distance to the wall there, mm.
+    pub clearance_mm: f64,
+    /// Length of the free way, mm.
+    pub free_mm: f64,
+}
+
+/// What [`survey`] found; parts are absent where the wall encloses nothing.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Survey {
+    /// The lumen's width.
+    pub lumen: Option<LumenReport>,
+    /// Thin septa.
+    pub septa: SeptaReport,
+    /// A place to begin.
+    pub start: Option<StartReport>,
+}
+
+/// Measures `wall` by rays from up to 20,000 of its triangles. Septa thinner than `septum_mm` are counted.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the wall cannot be queried.
+pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
+    let mesh = wall.mesh();
+    let query = WallQuery::new(wall)?;
+    let size_mm = mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
+    let off_mm = OFF * size_mm;
+    let neighbours = wall.neighbours();
+    let every = mesh.triangles.len().div_ceil(SAMPLES).max(1);
+    let mut chords: Vec<(f64, Vec3)> = Vec::new();
+    let mut septa =
+        SeptaReport { below_mm: septum_mm, asked: 0, thin: 0, thinnest_mm: None, thinnest_at_mm: None };
+    for t in (0..mesh.triangles.len()).step_by(every) {
+        let at = mesh.corners(t).iter().sum::<Vec3>() / 3.0;
+        let inward = query.inward_normal(t as u32);
+        septa.asked += 1;
+        if let Some((mm, _)) = query.first_met(&(at + inward * off_mm), &inward, size_mm) {
+            let half = (mm + off_mm) / 2.0;
+            chords.push((half, at + inward * half));
+        }
+        let back = query.first_met(&(at - inward * off_mm), &-inward, septum_mm);
+        if let Some((mm, other)) = back
+            && query.inward_normal(other).dot(&inward) < BACK_TO_BACK
+            && !within_steps(&neighbours, t as u32, other)
+        {
+            septa.thin += 1;
+            if septa.thinnest_mm.is_none_or(|thinnest| mm < thinnest) {
+                septa.thinnest_mm = Some(mm);
+                septa.thinnest_at_mm = Some((at - inward * (mm / 2.0)).into());
+            }
+        }
+    }
+    chords.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let start = start(wall, &query, &chords, size_mm);
+    let at = |part: f64| chords[(part * (chords.len() - 1) as f64) as usize].0;
+    let lumen = chords.first().map(|(smallest_mm, place)| LumenReport {
+        smallest_mm: *smallest_mm,
+        smallest_at_mm: (*place).into(),
+        percentile_1_mm: at(0.01),
+        percentile_5_mm: at(0.05),
+        median_mm: at(0.5),
+        chords: chords.len(),
+    });
+    Ok(Survey { lumen, septa, start })
+}
+
+/// Whether one triangle is reached from the other over a few edges.
+fn within_steps(neighbours: &[[u32; 3]], from: u32, to: u32) -> bool {
+    let mut reached = vec![from];
+    let mut ring = 0;
+    for _ in 0..STEPS_APART {
+        let end = reached.len();
+        for k in ring..end {
+            for next in neighbours[reached[k] as usize] {
+                if next != super::NO_NEIGHBOUR && !reached.contains(&next) {
+                    reached.push(next);
+                }
+            }
+        }
+        ring = end;
+    }
+    reached.contains(&to)
+}
+
+/// The middle of a chord that is deepest in the lumen, and the direction in which the way is free the longest.
+fn start(wall: &Wall, query: &WallQuery, chords: &[(f64, Vec3)], size_mm: f64) -> Option<StartReport> {
+    // Few of the longest, many of the rest: the longest chords may run along the vessel.
+    let count = chords.len();
+    let step = |k: usize| count - 1 - (count - 1) * k * k / (PLACES * PLACES);
+    let mut best: Option<(f64, Vec3)> = None;
+    for k in 0..PLACES.min(count) {
+        let (_, place) = chords[step(k)];
+        let Some(near) = query.nearest(&place, f64::INFINITY) else { continue };
+        if !near.rim && near.distance_mm > best.map_or(0.0, |b| b.0) && wall.contains(&place).is_ok_and(|c| c)
+        {
+            best = Some((near.distance_mm, place));
+        }
+    }
+    let (clearance_mm, place) = best?;
+    let golden = PI * (3.0 - 5.0_f64.sqrt());
+    let mut longest = (0.0, Vec3::x());
+    for k in 0..DIRECTIONS {
+        let z = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
+        let (sin, cos) = (golden * k as f64).sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        let direction = Vec3::new(across * cos, across * sin, z);
+        // A way that leaves through an opening is as long as any.
+        let free = query.first_met(&place, &direction, size_mm).map_or(0.0, |met| met.0);
+        if free > longest.0 {
+            longest = (free, direction);
+        }
+    }
+    Some(StartReport {
+        position_mm: place.into(),
+        direction: longest.1.into(),
+        clearance_mm,
+        free_mm: longest.0,
+    })
+}
