@@ -1,5 +1,6 @@
 //! Shared helpers of the workspace tests.
 
 pub mod bent_rod;
-pub mod crossing;
 pub mod sweep;
+
+pub use endowire_core::reference::crossing;
