@@ -86,11 +86,11 @@ pub fn matches(name: &str, pattern: &str) -> bool {
     let ends = |c: Option<char>| c.is_none_or(char::is_whitespace);
     pattern.split_whitespace().all(|word| {
         if !word.contains('*') {
-            // A whole word of the name, so that `k1` is not `k100`, or a part of the surface's name.
+            // A whole word of the name, so that `k1` is not `k100`, or the beginning of the surface's.
             return name.match_indices(word).any(|(at, _)| {
                 let (before, after) =
                     (name[..at].chars().next_back(), name[at + word.len()..].chars().next());
-                (ends(before) && ends(after)) || (ends(before) && at == 0)
+                ends(before) && (ends(after) || at == 0)
             });
         }
         let mut rest = name;

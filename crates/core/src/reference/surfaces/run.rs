@@ -109,9 +109,10 @@ const FARTHEST_MM: f64 = 20.0;
 impl Cell {
     /// What the hand does in `surface`.
     pub fn script(&self, surface: &Surface) -> ScriptLine {
+        // Whole increments: the wire is longer than the surface asks for by its soft end.
         let steps = (surface.length_mm / self.increment_mm - 1e-9).ceil().max(1.0);
         ScriptLine {
-            advance_mm: Some(surface.length_mm),
+            advance_mm: Some(steps * self.increment_mm),
             rotate_deg: (self.turn_deg != 0.0).then_some(steps * self.turn_deg),
             step_mm: Some(self.increment_mm),
             step_deg: (self.turn_deg != 0.0).then_some(self.turn_deg),
@@ -282,8 +283,9 @@ fn insert(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::surfaces::{Surface, cells, surfaces_in};
-    use crate::vessel::{GeneratedWall, Resolution, anatomy};
+    use crate::reference::crossing::CrossingTest;
+    use crate::reference::surfaces::{cells, surfaces_in};
+    use crate::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 
     fn tube(sidecar: &str, closed: bool) -> Surface {
         let made =
@@ -320,29 +322,29 @@ mod tests {
         assert_eq!(thick.skipped, ["0.354 is too thick at the sheath"]);
     }
 
-    /// A twin: the wall that is inserted into and the triangles that are checked are not the same.
+    /// A twin: the triangles that are checked are not those that are inserted into.
     #[test]
     fn a_device_beyond_the_given_triangles_is_seen() {
-        let mut surface = tube("length_mm = 60.0", false);
-        // A lid across the tube at half its length, and inside and outside told by a wall that ends there.
-        let made = |to: f64| {
-            let mut mesh = surface.wall.mesh().clone();
-            mesh.vertices_mm.iter_mut().for_each(|v| v.z = v.z.min(to));
-            Wall::from_surface(&mesh).unwrap()
+        let start = "length_mm = 60.0\n[sheath]\nposition_mm = [0, 0, 1]\ndirection = [0, 0, 1]";
+        let cell = cells(1, false)[3];
+        let whole = tube(start, false);
+        let free = run(&whole, &cell, 1e9, &|| 0.0);
+        assert_eq!((free.ending, free.crossings, free.excursion_mm), (Ending::Arrived, 0, 0.0));
+        // A closed tube of 30 mm; the wire goes to 41 mm less what its tip bends back.
+        let mut closed = whole.wall.closed_mesh();
+        closed.vertices_mm.iter_mut().for_each(|v| v.z *= 0.3);
+        let checked = Surface {
+            given: CrossingTest::new(&closed),
+            wall: Wall::from_surface(&closed).unwrap(),
+            ..tube(start, false)
         };
-        use crate::vessel::Wall;
-        let short = made(30.0);
-        let lid = short.closed_mesh();
-        let free = run(&surface, &cells(1, false)[3], 1e9, &|| 0.0);
-        assert_eq!((free.crossings, free.excursion_mm), (0, 0.0));
-        let long = std::mem::replace(&mut surface.wall, short);
-        surface.given = crate::reference::crossing::CrossingTest::new(&lid);
-        let mut row = CellRow::new(&surface, &cells(1, false)[3]);
-        let whole = Surface { wall: long, ..tube("length_mm = 60.0", false) };
-        let mut simulation = cells(1, false)[3].simulation(&whole).unwrap();
-        simulation.step(Command::advance(40.0)).unwrap();
-        row.check(&surface, &simulation, false);
-        assert_eq!(row.crossings, 1);
-        assert!((9.0..12.5).contains(&row.excursion_mm), "{}", row.excursion_mm);
+        let mut simulation = cell.simulation(&whole).unwrap();
+        for (advance_mm, crossings) in [(25.0, 0), (15.0, 1)] {
+            simulation.step(Command::advance(advance_mm)).unwrap();
+            let mut row = CellRow::new(&checked, &cell);
+            row.check(&checked, &simulation, false);
+            assert_eq!(row.crossings, crossings);
+            assert_eq!((8.0..11.1).contains(&row.excursion_mm), crossings > 0, "{}", row.excursion_mm);
+        }
     }
 }

@@ -36,6 +36,8 @@ const RAYS: usize = 512;
 const PLACES: usize = 48;
 /// Directions tried at a place.
 const DIRECTIONS: usize = 256;
+/// How far from the best of them others are tried then, rad.
+const SPREADS_RAD: [f64; 3] = [0.1, 0.04, 0.015];
 /// Room at a place that will do, as a part of the largest found: the widest place of all is often a sac with no way on.
 const WIDE: f64 = 0.5;
 
@@ -99,16 +101,39 @@ pub(super) fn inside(wall: &Wall, query: &WallQuery, radius_mm: f64) -> Option<(
         }
         looked_at += 1;
         widest = widest.or(Some(room));
-        for direction in (0..DIRECTIONS).map(sphere) {
-            let way = query.crossing(&position_mm, &(position_mm + direction * size), 1.0).unwrap_or(1.0);
-            if best.is_none_or(|(longest, _)| way > longest) {
-                best = Some((way, Sheath { position_mm, direction: direction.normalize() }));
-            }
+        let (way, direction) = longest_way(query, position_mm, size);
+        if best.is_none_or(|(longest, _)| way > longest) {
+            best = Some((way, Sheath { position_mm, direction }));
         }
     }
     let (_, sheath) = best?;
     room_mm(wall, query, &sheath).filter(|room| *room > radius_mm)?;
     Some((sheath, Found::Inside))
+}
+
+/// The direction with the longest free way from a place, and that way as a part of `size`.
+fn longest_way(query: &WallQuery, from: Vec3, size: f64) -> (f64, Vec3) {
+    let way = |direction: Vec3| query.crossing(&from, &(from + direction * size), 1.0).unwrap_or(1.0);
+    let mut best = (0.0, Vec3::z());
+    let mut look = |direction: Vec3| {
+        let found = way(direction);
+        if found > best.0 {
+            best = (found, direction);
+        }
+        best.1
+    };
+    let mut around = Vec3::z();
+    for k in 0..DIRECTIONS {
+        around = look(sphere(k));
+    }
+    // Directions are a seventh of a radian apart; a narrow vessel asks for more.
+    for spread in SPREADS_RAD {
+        let middle = around;
+        for k in 0..DIRECTIONS / 8 {
+            around = look((middle + sphere(8 * k) * spread).normalize());
+        }
+    }
+    best
 }
 
 /// Points spread evenly over the unit sphere, on a spiral that turns by the golden angle.
