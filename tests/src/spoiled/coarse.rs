@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
+use endowire_core::reference::crossing::CrossingTest;
 use endowire_core::vessel::SurfaceMesh;
 
 use super::Editable;
@@ -10,14 +11,16 @@ use crate::noise::Noise;
 
 /// Longest edge that collapsing may make, mm, …
 const LONGEST_MM: f64 = 10.0;
-/// … and cosine by which it may turn a triangle: 12°, so that round stays round.
-const SMOOTH: f64 = 0.978;
+/// … and cosine by which it may turn a triangle: 26°, so that round stays round.
+const SMOOTH: f64 = 0.9;
+/// Farthest that a collapse may take the surface, mm.
+const OFF_MM: f64 = 0.15;
 /// Collapses tried for each triangle.
-const TRIED: usize = 2;
+const TRIED: usize = 4;
 /// Places that are refined, …
 const PLACES: usize = 6;
 /// … to edges of this length, mm, …
-const SHORTEST_MM: f64 = 0.01;
+const SHORTEST_MM: f64 = 0.004;
 /// … that grow with the distance from the place by this, …
 const GROWTH: f64 = 0.4;
 /// … up to this distance, mm.
@@ -29,16 +32,22 @@ const LEFT: f64 = 0.02;
 /// … and cosine by which it may turn one.
 const ROUGH: f64 = 0.5;
 
-/// Edges from 0.01 to 10 mm: edges collapsed at random where the surface is smooth, then six places refined. Vertices that stay
+/// Edges from micrometres to centimetres: edges collapsed at random where the surface is smooth, then six places refined. Vertices that stay
 /// are where they were, and new ones lie on the triangles.
 pub fn decades(mesh: &SurfaceMesh, seed: u64) -> SurfaceMesh {
     let mut random = Noise::new(seed);
     let mut edit = Editable::new(mesh);
+    let clean = CrossingTest::new(mesh);
     let count = mesh.triangles.len();
     for _ in 0..TRIED * count {
         let (index, side) = (random.below(count) as u32, random.below(3));
         let Some(corners) = edit.triangle(index) else { continue };
-        edit.collapse(corners[side], corners[(side + 1) % 3], LONGEST_MM, SMOOTH);
+        let edge = (corners[side], corners[(side + 1) % 3]);
+        edit.collapse(edge, LONGEST_MM, SMOOTH, |[a, b, c]| {
+            [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
+                .iter()
+                .all(|x| clean.distance_mm(x, OFF_MM).is_some())
+        });
     }
     for _ in 0..PLACES {
         let corners = mesh.corners(random.below(count));
@@ -85,9 +94,9 @@ pub fn decimated(mesh: &SurfaceMesh, seed: u64) -> SurfaceMesh {
         let Some(Reverse((_, a, b))) = queue.pop() else { break };
         let shared = edit.sharing(a, b).len();
         let (a, b) = if random.happens(0.5) { (a, b) } else { (b, a) };
-        let kept = if edit.collapse(a, b, f64::MAX, ROUGH) {
+        let kept = if edit.collapse((a, b), f64::MAX, ROUGH, |_| true) {
             b
-        } else if edit.collapse(b, a, f64::MAX, ROUGH) {
+        } else if edit.collapse((b, a), f64::MAX, ROUGH, |_| true) {
             a
         } else {
             continue;

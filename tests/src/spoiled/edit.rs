@@ -122,8 +122,14 @@ impl Editable {
     }
 
     /// Moves vertex `a` into its neighbour `b`, if the surface stays a surface, no edge gets longer than `longest_mm`, and no triangle
-    /// turns by more than the angle of this cosine. Returns whether it was done.
-    pub(super) fn collapse(&mut self, a: u32, b: u32, longest_mm: f64, least_cosine: f64) -> bool {
+    /// turns by more than the angle of this cosine, and each is one that `fits`. Returns whether it was done.
+    pub(super) fn collapse(
+        &mut self,
+        (a, b): (u32, u32),
+        longest_mm: f64,
+        least_cosine: f64,
+        fits: impl Fn([Vec3; 3]) -> bool,
+    ) -> bool {
         let shared = self.sharing(a, b);
         if shared.is_empty() || shared.len() > 2 {
             return false;
@@ -140,9 +146,12 @@ impl Editable {
         }
         for &index in self.fan(a).iter().filter(|t| !shared.contains(t)) {
             let Some(triangle) = self.triangle(index) else { continue };
-            let (before, after) =
-                (self.normal(triangle), self.normal(triangle.map(|v| if v == a { b } else { v })));
+            let moved = triangle.map(|v| if v == a { b } else { v });
+            let (before, after) = (self.normal(triangle), self.normal(moved));
             if after.norm() < 1e-9 || before.dot(&after) < least_cosine * before.norm() * after.norm() {
+                return false;
+            }
+            if !fits(moved.map(|v| self.at(v))) {
                 return false;
             }
         }
