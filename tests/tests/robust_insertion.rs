@@ -19,6 +19,7 @@ use endowire_core::vessel::{
     CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall, anatomy,
 };
 use endowire_tests::crossing::CrossingTest;
+use endowire_tests::noise::Noise;
 use endowire_tests::sweep::Tally;
 
 fn asset(name: &str) -> PathBuf {
@@ -144,16 +145,6 @@ fn table_of_the_loop() {
 #[ignore = "a minute"]
 fn table_of_the_arch_with_plaque() {
     table(6);
-}
-
-/// Equally distributed numbers from −1 to 1, the same in every run.
-struct Noise(u64);
-
-impl Noise {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 11) as f64) / (1u64 << 53) as f64 * 2.0 - 1.0
-    }
 }
 
 /// Resident memory of this process, MiB; none where the system does not tell.

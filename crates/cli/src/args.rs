@@ -180,6 +180,25 @@ pub(crate) struct VerifyArgs {
     /// Add the numerical stress table: stiffness, loads, meshes and shapes far from the ordinary
     #[arg(long)]
     pub(crate) stress: bool,
+    /// Instead of the reference cases, run a matrix of insertions into every surface of a folder (STL, OBJ, PLY; NAME.toml beside a
+    /// surface may give unit_mm, [sheath], length_mm and device_radius_mm)
+    #[arg(long, value_name = "DIR", conflicts_with = "stress")]
+    pub(crate) surfaces: Option<PathBuf>,
+    /// Every combination of the matrix: 162 cells a wire instead of 18
+    #[arg(long, requires = "surfaces")]
+    pub(crate) full: bool,
+    /// Only cells whose name has all of these words, as in "phantom* 0.035 mu0.3"
+    #[arg(long, value_name = "PATTERN", requires = "surfaces")]
+    pub(crate) cells: Option<String>,
+    /// Print the cells as scene files instead of running them
+    #[arg(long, requires = "surfaces", conflicts_with = "json")]
+    pub(crate) scene: bool,
+    /// Cells that run at the same time; the number of cores if absent
+    #[arg(long, value_name = "N", requires = "surfaces")]
+    pub(crate) jobs: Option<usize>,
+    /// Longest time of a cell: one that takes longer fails
+    #[arg(long, default_value_t = 120.0, value_name = "S", requires = "surfaces")]
+    pub(crate) limit_s: f64,
     /// Print the rows as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

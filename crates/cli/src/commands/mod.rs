@@ -6,6 +6,7 @@ mod fluoro;
 mod render;
 mod rod;
 mod run;
+mod surfaces;
 mod verify;
 mod vessel;
 

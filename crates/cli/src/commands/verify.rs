@@ -35,6 +35,9 @@ struct Stress {
 
 /// Runs every reference case and prints the table.
 pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
+    if let Some(folder) = &args.surfaces {
+        return super::surfaces::surfaces(args, folder);
+    }
     let stressed = if args.stress { stress::cases() } else { Vec::new() };
     let insertion = args.stress.then(InsertionStress::new).transpose()?;
     let combinations = insertion.as_ref().map_or_else(Vec::new, InsertionStress::cases);

@@ -6,6 +6,7 @@ mod bench;
 mod capstan;
 mod channel;
 mod contact;
+pub mod crossing;
 mod cylinder;
 mod insertion;
 pub mod insertion_stress;
@@ -14,6 +15,7 @@ mod quadratic;
 mod regions;
 mod spatial;
 pub mod stress;
+pub mod surfaces;
 mod whip;
 
 use crate::statics::{End, EndKind, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase};

@@ -129,6 +129,26 @@ impl SheathSpec {
         let given: Vec<&str> = keys.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
         format!("{{{}}}", given.join(", "))
     }
+
+    /// The sheath in `wall`.
+    ///
+    /// # Errors
+    /// An opening that is not there, keys that contradict each other, values that are not finite.
+    pub fn place(&self, wall: &Wall) -> Result<Sheath> {
+        match (self.opening, self.position_mm, self.direction) {
+            (Some(opening), None, None) => {
+                Sheath::at_opening(wall, opening, self.depth_mm.unwrap_or(DEPTH_MM))
+            }
+            (None, Some(position), Some(direction)) if self.depth_mm.is_none() => {
+                Sheath::new(Vec3::from(position), Vec3::from(direction))
+            }
+            _ => Err(Error::parameter(
+                "sheath",
+                self.given(),
+                "give either opening (with depth_mm if wanted) or position_mm and direction",
+            )),
+        }
+    }
 }
 
 /// A file that cannot be read, with the key that names it in front.
@@ -267,20 +287,7 @@ impl Scene {
     /// # Errors
     /// An opening that is not there, keys that contradict each other, values that are not finite.
     pub fn sheath(&self, wall: &Wall) -> Result<Sheath> {
-        let spec = &self.sheath;
-        match (spec.opening, spec.position_mm, spec.direction) {
-            (Some(opening), None, None) => {
-                Sheath::at_opening(wall, opening, spec.depth_mm.unwrap_or(DEPTH_MM))
-            }
-            (None, Some(position), Some(direction)) if spec.depth_mm.is_none() => {
-                Sheath::new(Vec3::from(position), Vec3::from(direction))
-            }
-            _ => Err(Error::parameter(
-                "sheath",
-                spec.given(),
-                "give either opening (with depth_mm if wanted) or position_mm and direction",
-            )),
-        }
+        self.sheath.place(wall)
     }
 
     /// The commands of the script, checked against the device.

@@ -1,0 +1,91 @@
+//! The matrix in one line.
+
+use serde::Serialize;
+
+use super::{CellRow, Ending};
+
+/// Newton iterations per millimetre that no command should need: a real insertion advances a few tens of millimetres a second.
+pub const ITERATIONS_PER_MM: f64 = 300.0;
+
+/// What all rows come to.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// Insertions.
+    pub cells: usize,
+    /// Those that carried out all commands.
+    pub arrived: usize,
+    /// Those whose tip left the vessel.
+    pub left: usize,
+    /// Those whose vessel was too narrow.
+    pub blocked: usize,
+    /// Those whose computation failed.
+    pub failed: usize,
+    /// Those that were refused.
+    pub refused: usize,
+    /// Part of the insertions that arrived, left or were blocked, %.
+    pub good_percent: f64,
+    /// Commands carried out.
+    pub steps: usize,
+    /// Newton iterations.
+    pub iterations: u64,
+    /// Commands of more than [`ITERATIONS_PER_MM`].
+    pub slow_steps: usize,
+    /// Insertions that crossed given triangles.
+    pub cells_crossing: usize,
+    /// Commands after which the device was in a given triangle.
+    pub crossings: usize,
+    /// Farthest way beyond the given triangles, mm.
+    pub excursion_mm: f64,
+    /// Jumps.
+    pub jumps: usize,
+    /// Slowest command, ms, …
+    pub slowest_ms: f64,
+    /// … and the insertion it belongs to.
+    pub slowest: String,
+}
+
+impl Summary {
+    /// Sums up.
+    pub fn of(rows: &[CellRow]) -> Self {
+        let mut sum = Self { cells: rows.len(), ..Self::default() };
+        for row in rows {
+            match row.ending {
+                Ending::Arrived => sum.arrived += 1,
+                Ending::Left => sum.left += 1,
+                Ending::Blocked => sum.blocked += 1,
+                Ending::Failed => sum.failed += 1,
+                Ending::Refused => sum.refused += 1,
+            }
+            sum.steps += row.steps;
+            sum.iterations += row.iterations;
+            sum.slow_steps += row.slow_steps;
+            sum.cells_crossing += usize::from(row.crossings > 0);
+            sum.crossings += row.crossings;
+            sum.excursion_mm = sum.excursion_mm.max(row.excursion_mm);
+            sum.jumps += row.jumps;
+            if row.slowest_ms > sum.slowest_ms {
+                (sum.slowest_ms, sum.slowest) = (row.slowest_ms, row.name.clone());
+            }
+        }
+        let good = sum.arrived + sum.left + sum.blocked;
+        sum.good_percent = 100.0 * good as f64 / rows.len().max(1) as f64;
+        sum
+    }
+}
+
+impl std::fmt::Display for Summary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { cells, arrived, left, blocked, failed, refused, good_percent, .. } = self;
+        write!(
+            f,
+            "{cells} cells: {arrived} arrived, {left} left, {blocked} blocked, {failed} failed, {refused} refused; \
+             {good_percent:.1} % good ends; {} commands, {} over {ITERATIONS_PER_MM} iterations/mm, {} jumps; \
+             {} crossings in {} cells, deepest {:.3} mm",
+            self.steps, self.slow_steps, self.jumps, self.crossings, self.cells_crossing, self.excursion_mm
+        )?;
+        if self.slowest.is_empty() {
+            return Ok(());
+        }
+        write!(f, "; slowest command {:.0} ms ({})", self.slowest_ms, self.slowest)
+    }
+}
