@@ -13,8 +13,8 @@ use crate::solve::NewtonOptions;
 const SOFTEST: f64 = 30.0;
 /// … each solved to this residual over force scale, or to what is wanted if that is more.
 const LOOSE: f64 = 1e-3;
-/// Equilibria that may be found before friction and the forces it follows from have settled.
-const RENEWALS: usize = 100;
+/// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
+const ROUNDS: usize = 5;
 /// Newton iterations in which a guess that has learnt must come to its end, or the wall is approached from softer ones.
 const HURRIED: usize = 15;
 /// What is the matter where there is no guess.
@@ -70,6 +70,7 @@ impl<const C: usize> Kirchhoff<C> {
             softest(surroundings.device),
             self.options.skip,
         );
+        contact.hand_over();
         let candidates = (now, &next.mesh, &mut next.state);
         let learnt =
             self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked).ok_or(BEYOND)?;
@@ -84,7 +85,7 @@ impl<const C: usize> Kirchhoff<C> {
         let mut hurried = (learnt || held) && softest_first < 1.0;
         let mut softness = if hurried { 1.0 } else { softest_first };
         let mut iterations = usize::from(held);
-        let mut renewals = 0;
+        let mut rounds = 0;
         let found = loop {
             contact.softness = softness;
             let options = NewtonOptions {
@@ -104,6 +105,7 @@ impl<const C: usize> Kirchhoff<C> {
             if !found.converged && hurried {
                 self.guess.plain(&mut contact, &next.mesh, &mut next.state).ok_or(BEYOND)?;
                 (hurried, softness) = (false, softest_first);
+                contact.hand_over();
                 continue;
             }
             if !found.converged {
@@ -111,13 +113,22 @@ impl<const C: usize> Kirchhoff<C> {
             }
             if softness < 1.0 {
                 softness = (10.0 * softness).min(1.0);
+                contact.hand_over();
                 continue;
             }
             if !surroundings.properties.rubs() || contact.friction_settled() {
                 break found;
             }
-            renewals += 1;
-            if renewals > RENEWALS {
+            if contact.handed_over() {
+                let system = (&mut self.newton, &mut contact, &supports);
+                let limits = (tolerance, *budget);
+                let (settled, steps) = self.settle.solve(system, &next.mesh.elements, &mut next.state, limits);
+                iterations += steps;
+                *budget -= steps;
+                rounds += 1;
+                if settled && rounds < ROUNDS {
+                    continue;
+                }
                 return Err(UNSETTLED.into());
             }
         };

@@ -1,0 +1,190 @@
+//! Friction and wall forces solved for together, where the one does not settle while the other is held.
+//!
+//! Lagged normal forces are a fixed-point iteration: an equilibrium with forces p₀ presses with p(p₀), which are the next ones. A
+//! thread that is wedged in a bend answers a change of friction with a larger change of what presses, and the iteration runs away
+//! although there is a solution. So it is continued to instead: of the normal forces a part λ follows the state at once,
+//!
+//! ```text
+//! r(x, λ) = ∇E(x) + friction of (1 − λ) p₀ + λ p(x),    λ = 0 … 1
+//! ```
+//!
+//! For λ = 0 the equilibrium is at hand; λ = 1 is Coulomb's law. The Newton matrix is that of lagged forces and a part that is not
+//! symmetric ([`crate::contact::friction`]), factored as a band with row interchanges. There is no energy to lower: a step is
+//! accepted where the next one with the same factors would be shorter, or where the residual is smaller (the natural
+//! monotonicity test of P. Deuflhard, *Newton Methods for Nonlinear Problems*, Springer 2004, section 3.3: lengths of steps, unlike
+//! residuals, do not hang on how stiff the wall is).
+
+use crate::contact::WallContact;
+use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
+use crate::solve::{BandLu, External, Newton, Shift};
+
+/// Newton iterations at one part.
+const ITERATIONS: usize = 30;
+/// Newton iterations of the whole way.
+const MOST: usize = 200;
+/// Least change of the part.
+const LEAST: f64 = 1e-3;
+/// Residual over force scale on the way to λ = 1.
+const LOOSE: f64 = 1e-5;
+/// Largest rotation of a node in one step, rad.
+const LARGEST_TURN: f64 = 0.5;
+/// A step whose root mean square turn is less than this, rad, is rounding: of coordinates of some ten millimetres over elements of
+/// some tenths of one, …
+const ROUNDED: f64 = 1e-13;
+/// … and a residual over force scale at that step must be below this. On a hard wall a soft thread presses by nanometres,
+/// and what rounding of positions leaves of that is far more than the tolerance.
+const LEFT: f64 = 1e-5;
+/// Part of the pressing forces that held points may pull with at the end.
+const PULL: f64 = 1e-6;
+
+/// The coupled solution with its memory.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Settle<const C: usize> {
+    lu: BandLu<C>,
+    shift: Shift,
+    step: Vec<f64>,
+    trial: RodState,
+    kept: RodState,
+}
+
+/// What is solved: Newton's method for its assembly, the wall, and what holds the rod.
+type System<'a, 'b, const C: usize> = (&'a mut Newton<C>, &'a mut WallContact<'b>, &'a Supports);
+
+impl<const C: usize> Settle<C> {
+    /// Takes memory for rods of up to `elements` elements.
+    pub(super) fn reserve(&mut self, elements: usize) {
+        let n = Layout::<C>::dimension(elements);
+        self.lu.reserve(n);
+        for list in [&mut self.step, &mut self.shift.diagonal, &mut self.shift.next] {
+            list.reserve(n.saturating_sub(list.len()));
+        }
+        self.trial.reserve(elements);
+        self.kept.reserve(elements);
+    }
+
+    /// Moves `state`, an equilibrium with lagged normal forces, to one with its own. Limits are the residual over
+    /// force scale and the number of iterations. Returns whether it is there and the iterations that were taken.
+    pub(super) fn solve(
+        &mut self,
+        (newton, contact, supports): System<'_, '_, C>,
+        elements: &[ElementData],
+        state: &mut RodState,
+        (tolerance, budget): (f64, usize),
+    ) -> (bool, usize) {
+        Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.shift);
+        self.trial.copy_from(state);
+        self.kept.copy_from(state);
+        let most = budget.min(MOST);
+        let (mut part, mut stride, mut iterations) = (0.0, 1.0f64, 0);
+        let trace = std::env::var("ZZ").is_ok();
+        while part < 1.0 && iterations < most {
+            let next = if part + stride > 1.0 - LEAST { 1.0 } else { part + stride };
+            contact.couple(next);
+            let wanted = if next < 1.0 { tolerance.max(LOOSE) } else { tolerance };
+            let limit = ITERATIONS.min(most - iterations);
+            let system = (&mut *newton, &mut *contact, supports);
+            let (found, steps) = self.newton(system, elements, state, (wanted, limit));
+            iterations += steps;
+            if trace {
+                eprintln!("  part {next:.4} from {part:.4}: {found} in {steps}");
+            }
+            if found {
+                part = next;
+                stride *= 2.0;
+                self.kept.copy_from(state);
+            } else {
+                state.copy_from(&self.kept);
+                stride = 0.25 * (next - part);
+                if stride < LEAST {
+                    break;
+                }
+            }
+        }
+        contact.uncouple();
+        (part == 1.0, iterations)
+    }
+
+    /// Newton's method with the part that is not symmetric, contacts held.
+    fn newton(
+        &mut self,
+        (newton, contact, supports): System<'_, '_, C>,
+        elements: &[ElementData],
+        state: &mut RodState,
+        (tolerance, limit): (f64, usize),
+    ) -> (bool, usize) {
+        let whisper = Newton::<C>::whisper(elements);
+        let mut best = f64::INFINITY;
+        let rounded = ROUNDED * elements.iter().map(|e| e.length).sum::<f64>().sqrt();
+        let trace = std::env::var("ZZ").is_ok_and(|v| v == "2");
+        // What presses at the beginning, and how hard.
+        contact.holding = false;
+        newton.assemble_residual(elements, supports, contact, state);
+        for iteration in 0..=limit {
+            contact.holding = true;
+            newton.assemble(elements, supports, contact, state);
+            contact.holding = false;
+            let size = newton.residual(elements, contact, supports, tolerance);
+            if !size.relative.is_finite() || !newton.assembly.external_energy.is_finite() {
+                return (false, iteration);
+            }
+            let free = contact.pull() <= PULL;
+            if free && (size.small || (size.rounding && size.relative > 0.5 * best)) {
+                return (true, iteration);
+            }
+            best = best.min(size.relative);
+            if iteration == limit {
+                break;
+            }
+            self.lu.copy_from(&newton.assembly.matrix, &self.shift, whisper);
+            contact.add_coupling(elements, state, &mut self.lu);
+            supports.held::<C>().into_iter().flatten().for_each(|row| self.lu.hold(row));
+            if self.lu.factor().is_err() {
+                return (false, iteration);
+            }
+            Self::answer(&self.lu, newton, elements, &mut self.step);
+            let length = Self::length(elements, &self.step);
+            if trace {
+                eprintln!("    {iteration} residual {:.2e} step {length:.2e} pull {:.1e}", size.relative, contact.pull());
+            }
+            if free && length <= rounded && size.relative <= LEFT {
+                return (true, iteration);
+            }
+            let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
+            if !turn.is_finite() {
+                return (false, iteration);
+            }
+            let mut fraction = (LARGEST_TURN / turn).min(1.0);
+            self.trial.advance::<C>(elements, state, &self.step, fraction);
+            fraction *= External::<C>::safe_fraction(contact, elements, &self.trial);
+            contact.take_forces::<C>(elements, state, &self.step, fraction);
+            self.step.iter_mut().for_each(|s| *s *= fraction);
+            self.trial.advance::<C>(elements, state, &self.step, 1.0);
+            self.trial.take_tensions::<C>(elements, state, &self.step);
+            std::mem::swap(state, &mut self.trial);
+        }
+        (false, limit)
+    }
+
+    /// Sets `step` to what the factored matrix answers to the assembled residual.
+    fn answer(lu: &BandLu<C>, newton: &Newton<C>, elements: &[ElementData], step: &mut Vec<f64>) {
+        let (residual, correction) = (&newton.assembly.residual, &newton.assembly.correction);
+        step.clear();
+        step.extend(residual.iter().zip(correction).map(|(r, c)| -(r + c)));
+        lu.solve(step);
+        Newton::<C>::restore_tensions(elements, step);
+    }
+
+    /// Length of a step: how far it turns nodes and chords, squared and summed.
+    fn length(elements: &[ElementData], step: &[f64]) -> f64 {
+        let l = Layout::<C>;
+        let mut sum = 0.0;
+        for (e, data) in elements.iter().enumerate() {
+            let (near, far) = (l.position(e), l.position(e + 1));
+            let chord = (0..3).map(|a| ((step[far + a] - step[near + a]) / data.length).powi(2));
+            let tangent = (0..2).map(|a| step[l.tangent(e + 1) + a].powi(2));
+            let angle = if Layout::<C>::TWIST { step[l.angle(e + 1)].powi(2) } else { 0.0 };
+            sum += data.length * (chord.sum::<f64>() + tangent.sum::<f64>() + angle);
+        }
+        sum.sqrt()
+    }
+}
