@@ -19,6 +19,9 @@ use nalgebra::Matrix3;
 use super::{Friction, WHOLE_RENEWALS};
 use crate::Vec3;
 
+/// Renewals on a wall softer than the one wanted.
+const SOFT_RENEWALS: usize = 4;
+
 /// Derivatives of a point's friction that lagged normal forces leave out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coupling {
@@ -37,6 +40,12 @@ impl Friction {
         self.coupled = Some(part);
     }
 
+    /// From now on there is no friction but what follows the state, and none of that yet.
+    pub fn forget(&mut self) {
+        self.coupled = Some(0.0);
+        self.sliders.iter_mut().for_each(|s| (s.lagged_n, s.force_n, s.matrix_n) = (0.0, 0.0, 0.0));
+    }
+
     /// Whether a part of the normal forces follows the state at once.
     pub fn is_coupled(&self) -> bool {
         self.coupled.is_some()
@@ -51,9 +60,11 @@ impl Friction {
         }
     }
 
-    /// Lagged normal forces are left alone once they should have settled, unless `renewals` begin anew.
-    pub fn hand_over(&mut self) {
-        (self.hands_over, self.renewals) = (true, 0);
+    /// Renewals of lagged normal forces begin anew, and end once they should have settled; on a wall that is not the one
+    /// wanted, `soon`.
+    pub fn hand_over(&mut self, soon: bool) {
+        let left = if soon { SOFT_RENEWALS } else { WHOLE_RENEWALS };
+        (self.hands_over, self.renewals) = (true, WHOLE_RENEWALS - left);
     }
 
     /// Whether lagged normal forces should have settled, have not, and are left alone.

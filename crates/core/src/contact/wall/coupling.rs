@@ -12,6 +12,21 @@ impl WallContact<'_> {
         self.friction.couple(part);
     }
 
+    /// From now on there is no friction but what follows the state, and none of that yet.
+    pub fn forget_friction(&mut self) {
+        self.friction.forget();
+    }
+
+    /// Keeps what presses and how hard.
+    pub fn keep_forces(&mut self) {
+        self.memory.keep_forces();
+    }
+
+    /// Goes back to what was kept, until the next state is assembled.
+    pub fn restore_forces(&mut self) {
+        self.memory.restore_forces();
+    }
+
     /// The normal forces of friction stay as they are.
     pub fn uncouple(&mut self) {
         self.friction.uncouple();
@@ -19,7 +34,7 @@ impl WallContact<'_> {
 
     /// Lagged normal forces may be renewed anew, and are left alone if they do not settle.
     pub fn hand_over(&mut self) {
-        self.friction.hand_over();
+        self.friction.hand_over(self.softness < 1.0);
     }
 
     /// Whether that has come to pass.

@@ -232,7 +232,12 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 self.current.withdraw(tail);
                 break;
             }
-            match self.try_step(surroundings, (inserted, tail), blocked, &mut budget) {
+            let zz = budget;
+            let zr = self.try_step(surroundings, (inserted, tail), blocked, &mut budget);
+            if std::env::var("ZZ").is_ok() {
+                eprintln!("substep to {inserted:.4} of {target}: {:?} with {}", zr.as_ref().map(|f| f.iterations), zz - budget);
+            }
+            match zr {
                 Ok(found) => {
                     iterations += found.iterations;
                     dissipated_mj += found.dissipated_mj;

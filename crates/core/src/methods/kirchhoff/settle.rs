@@ -16,18 +16,22 @@
 
 use crate::contact::WallContact;
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
-use crate::solve::{BandLu, External, Newton, Shift};
+use crate::solve::{BandLu, External, Newton, NewtonOptions, Shift};
 
 /// Newton iterations at one part.
 const ITERATIONS: usize = 30;
 /// Newton iterations of the whole way.
 const MOST: usize = 200;
+/// Newton iterations from one beginning.
+const MOST_A_WAY: usize = 80;
+/// Shifts tried until the symmetric part is that of a minimum.
+const SHIFTS: usize = 40;
 /// Least change of the part.
 const LEAST: f64 = 1e-3;
 /// Residual over force scale on the way to λ = 1.
 const LOOSE: f64 = 1e-5;
 /// Largest rotation of a node in one step, rad.
-const LARGEST_TURN: f64 = 0.5;
+const LARGEST_TURN: f64 = 0.3;
 /// A step whose root mean square turn is less than this, rad, is rounding: of coordinates of some ten millimetres over elements of
 /// some tenths of one, …
 const ROUNDED: f64 = 1e-13;
@@ -48,7 +52,7 @@ pub(super) struct Settle<const C: usize> {
 }
 
 /// What is solved: Newton's method for its assembly, the wall, and what holds the rod.
-type System<'a, 'b, const C: usize> = (&'a mut Newton<C>, &'a mut WallContact<'b>, &'a Supports);
+type System<'a, 'b, const C: usize> = (&'a mut Newton<C>, &'a mut WallContact<'b>, &'a mut Supports);
 
 impl<const C: usize> Settle<C> {
     /// Takes memory for rods of up to `elements` elements.
@@ -75,14 +79,74 @@ impl<const C: usize> Settle<C> {
         self.trial.copy_from(state);
         self.kept.copy_from(state);
         let most = budget.min(MOST);
-        let (mut part, mut stride, mut iterations) = (0.0, 1.0f64, 0);
+        let (mut there, mut iterations) = (false, 0);
+        for bare in [false, true] {
+            if bare {
+                // The way from the lagged forces leads nowhere: from a wall without friction there is another.
+                contact.forget_friction();
+                let options = NewtonOptions {
+                    max_iterations: most.saturating_sub(iterations),
+                    tolerance: tolerance.max(LOOSE),
+                    ..NewtonOptions::default()
+                };
+                let found = newton.solve(elements, supports, contact, state, &options);
+                if std::env::var("ZZ").is_ok() { eprintln!("  bare {} {}", found.converged, found.iterations); }
+                iterations += found.iterations;
+                if !found.converged {
+                    break;
+                }
+                self.kept.copy_from(state);
+            }
+            let limits = (tolerance, (iterations + MOST_A_WAY).min(most));
+            let steps;
+            (there, steps) = self.follow((newton, contact, supports), elements, state, limits, iterations);
+            iterations = steps;
+            if there || iterations >= most {
+                break;
+            }
+        }
+        contact.uncouple();
+        (there, iterations)
+    }
+
+    /// Moves `state`, a guess, to an equilibrium: the points that pressed before are held, and those that would pull let go. Returns
+    /// whether it is there and the iterations that were taken.
+    pub(super) fn approach(
+        &mut self,
+        system: System<'_, '_, C>,
+        elements: &[ElementData],
+        state: &mut RodState,
+        (tolerance, budget): (f64, usize),
+    ) -> (bool, usize) {
+        let (newton, contact, supports) = system;
+        Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.shift);
+        self.trial.copy_from(state);
+        contact.couple(1.0);
+        let limits = (tolerance, ITERATIONS.min(budget));
+        let (found, steps) = self.newton((newton, &mut *contact, supports), elements, state, limits);
+        contact.uncouple();
+        (found, steps)
+    }
+
+    /// Follows the part from 0 to 1.
+    fn follow(
+        &mut self,
+        (newton, contact, supports): System<'_, '_, C>,
+        elements: &[ElementData],
+        state: &mut RodState,
+        (tolerance, most): (f64, usize),
+        mut iterations: usize,
+    ) -> (bool, usize) {
+        let (mut part, mut stride) = (0.0, 1.0f64);
         let trace = std::env::var("ZZ").is_ok();
         while part < 1.0 && iterations < most {
             let next = if part + stride > 1.0 - LEAST { 1.0 } else { part + stride };
             contact.couple(next);
             let wanted = if next < 1.0 { tolerance.max(LOOSE) } else { tolerance };
             let limit = ITERATIONS.min(most - iterations);
-            let system = (&mut *newton, &mut *contact, supports);
+            // What presses at the beginning, and how hard.
+            newton.assemble_residual(elements, supports, contact, state);
+            let system = (&mut *newton, &mut *contact, &mut *supports);
             let (found, steps) = self.newton(system, elements, state, (wanted, limit));
             iterations += steps;
             if trace {
@@ -100,7 +164,6 @@ impl<const C: usize> Settle<C> {
                 }
             }
         }
-        contact.uncouple();
         (part == 1.0, iterations)
     }
 
@@ -114,11 +177,9 @@ impl<const C: usize> Settle<C> {
     ) -> (bool, usize) {
         let whisper = Newton::<C>::whisper(elements);
         let mut best = f64::INFINITY;
+        let mut last = 0.0;
         let rounded = ROUNDED * elements.iter().map(|e| e.length).sum::<f64>().sqrt();
         let trace = std::env::var("ZZ").is_ok_and(|v| v == "2");
-        // What presses at the beginning, and how hard.
-        contact.holding = false;
-        newton.assemble_residual(elements, supports, contact, state);
         for iteration in 0..=limit {
             contact.holding = true;
             newton.assemble(elements, supports, contact, state);
@@ -135,7 +196,22 @@ impl<const C: usize> Settle<C> {
             if iteration == limit {
                 break;
             }
-            self.lu.copy_from(&newton.assembly.matrix, &self.shift, whisper);
+            // Where the symmetric part is not that of a minimum it is made so, as in the solution with lagged forces.
+            let mut sigma = 0.0;
+            let mut convex = false;
+            for _ in 0..SHIFTS {
+                let inertia = newton.inertia(elements, supports, whisper + sigma);
+                convex = inertia.is_some_and(|i| i.negative == elements.len());
+                if convex {
+                    break;
+                }
+                sigma = if sigma == 0.0 { (1e5 * whisper).max(0.1 * last) } else { 4.0 * sigma };
+            }
+            if !convex {
+                return (false, iteration);
+            }
+            last = sigma;
+            self.lu.copy_from(&newton.assembly.matrix, &self.shift, whisper + sigma);
             contact.add_coupling(elements, state, &mut self.lu);
             supports.held::<C>().into_iter().flatten().for_each(|row| self.lu.hold(row));
             if self.lu.factor().is_err() {
@@ -144,7 +220,7 @@ impl<const C: usize> Settle<C> {
             Self::answer(&self.lu, newton, elements, &mut self.step);
             let length = Self::length(elements, &self.step);
             if trace {
-                eprintln!("    {iteration} residual {:.2e} step {length:.2e} pull {:.1e}", size.relative, contact.pull());
+                eprintln!("    {iteration} residual {:.2e} step {length:.2e} pull {:.1e} sigma {sigma:.1e}", size.relative, contact.pull());
             }
             if free && length <= rounded && size.relative <= LEFT {
                 return (true, iteration);

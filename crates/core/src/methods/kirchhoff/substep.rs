@@ -74,6 +74,7 @@ impl<const C: usize> Kirchhoff<C> {
         let candidates = (now, &next.mesh, &mut next.state);
         let learnt =
             self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked).ok_or(BEYOND)?;
+        contact.keep_forces();
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let held = self.guess.hold(&mut self.newton, &mut contact, &supports, &next.mesh, &mut next.state);
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
@@ -102,10 +103,27 @@ impl<const C: usize> Kirchhoff<C> {
             );
             iterations += found.iterations;
             *budget -= found.iterations;
+            if std::env::var("ZZ").is_ok() {
+                eprintln!("  newton {softness:.0e} hurried {hurried} {} {} {}", found.converged, found.iterations, found.reason);
+            }
             if !found.converged && hurried {
                 self.guess.plain(&mut contact, &next.mesh, &mut next.state).ok_or(BEYOND)?;
-                (hurried, softness) = (false, softest_first);
-                contact.hand_over();
+                hurried = false;
+                contact.restore_forces();
+                let system = (&mut self.newton, &mut contact, &mut supports);
+                let limits = (tolerance, *budget);
+                let (near, steps) = self.settle.approach(system, &next.mesh.elements, &mut next.state, limits);
+                iterations += steps;
+                *budget -= steps;
+                if std::env::var("ZZ").is_ok() {
+                    eprintln!("  approach {near} {steps}");
+                }
+                if !near {
+                    self.guess.plain(&mut contact, &next.mesh, &mut next.state).ok_or(BEYOND)?;
+                    softness = softest_first;
+                    contact.softness = softness;
+                    contact.hand_over();
+                }
                 continue;
             }
             if !found.converged {
@@ -113,6 +131,7 @@ impl<const C: usize> Kirchhoff<C> {
             }
             if softness < 1.0 {
                 softness = (10.0 * softness).min(1.0);
+                contact.softness = softness;
                 contact.hand_over();
                 continue;
             }
@@ -120,7 +139,7 @@ impl<const C: usize> Kirchhoff<C> {
                 break found;
             }
             if contact.handed_over() {
-                let system = (&mut self.newton, &mut contact, &supports);
+                let system = (&mut self.newton, &mut contact, &mut supports);
                 let limits = (tolerance, *budget);
                 let (settled, steps) = self.settle.solve(system, &next.mesh.elements, &mut next.state, limits);
                 iterations += steps;
