@@ -51,13 +51,15 @@ pub struct WallMemory {
     spare: Vec<KnownPoint>,
     /// Forces that were kept, and whether there was one.
     kept: Vec<(f64, bool)>,
+    /// Forces on the wall that a step leads to, N.
+    pub(super) aims: Vec<f64>,
 }
 
 impl WallMemory {
     /// Nothing is known yet of `felt`.
     pub fn new(felt: &FeltWall) -> Self {
         let places = Places::new(LOOK_AGAIN * felt.thinnest_mm, felt.reach_mm);
-        Self { points: Vec::new(), readings: Vec::new(), places, last: Place::UNKNOWN, spare: Vec::new(), kept: Vec::new() }
+        Self { points: Vec::new(), readings: Vec::new(), places, last: Place::UNKNOWN, spare: Vec::new(), kept: Vec::new(), aims: Vec::new() }
     }
 
     /// Takes memory for `points` points.
@@ -65,6 +67,7 @@ impl WallMemory {
         for list in [&mut self.points, &mut self.spare] {
             list.reserve(points.saturating_sub(list.len()));
         }
+        self.aims.reserve(points.saturating_sub(self.aims.len()));
         self.kept.reserve(points.saturating_sub(self.kept.len()));
         self.readings.reserve(points.saturating_sub(self.readings.len()));
     }

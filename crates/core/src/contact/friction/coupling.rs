@@ -19,8 +19,8 @@ use nalgebra::Matrix3;
 use super::{Friction, WHOLE_RENEWALS};
 use crate::Vec3;
 
-/// Renewals on a wall softer than the one wanted.
-const SOFT_RENEWALS: usize = 4;
+/// Renewals on a hard wall, where they seldom settle and cost many iterations each.
+const HARD_RENEWALS: usize = 4;
 
 /// Derivatives of a point's friction that lagged normal forces leave out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,10 +60,10 @@ impl Friction {
         }
     }
 
-    /// Renewals of lagged normal forces begin anew, and end once they should have settled; on a wall that is not the one
-    /// wanted, `soon`.
+    /// Renewals of lagged normal forces begin anew, and end once they should have settled; on a hard
+    /// wall `soon`.
     pub fn hand_over(&mut self, soon: bool) {
-        let left = if soon { SOFT_RENEWALS } else { WHOLE_RENEWALS };
+        let left = if soon { HARD_RENEWALS } else { WHOLE_RENEWALS };
         (self.hands_over, self.renewals) = (true, WHOLE_RENEWALS - left);
     }
 

@@ -32,9 +32,9 @@ impl WallContact<'_> {
         self.friction.uncouple();
     }
 
-    /// Lagged normal forces may be renewed anew, and are left alone if they do not settle.
-    pub fn hand_over(&mut self) {
-        self.friction.hand_over(self.softness < 1.0);
+    /// Lagged normal forces may be renewed anew, and are left alone if they do not settle, on a hard wall `soon`.
+    pub fn hand_over(&mut self, soon: bool) {
+        self.friction.hand_over(soon);
     }
 
     /// Whether that has come to pass.
@@ -105,23 +105,27 @@ impl WallContact<'_> {
         self.friction.take(pressed);
     }
 
-    /// The forces that a part of a step leads to, from the state assembled last: points that would pull are let go.
-    pub fn take_forces<const C: usize>(
-        &mut self,
-        elements: &[ElementData],
-        state: &RodState,
-        step: &[f64],
-        fraction: f64,
-    ) {
+    /// The forces that a step leads to, from the state assembled last.
+    pub fn aim<const C: usize>(&mut self, elements: &[ElementData], state: &RodState, step: &[f64]) {
+        self.memory.aims.clear();
         for (index, point) in self.points.iter().enumerate() {
-            let Some(d) = self.memory.pressed(index).copied() else { continue };
-            let known = &mut self.memory.points[index];
-            let w = self.felt.stiffness(&known.base, known.triangle, self.softness).factor * point.weight_mm;
-            let (first, second) = point.potential.holding(d.value_mm);
-            let columns = Assembly::<C>::point_columns(state, &elements[point.element], point.element, point.xi);
-            let moved: f64 = columns.iter().map(|(row, way)| d.gradient.dot(way) * step[*row]).sum();
-            let force = -w * (first + second * moved) * d.gradient.norm();
-            known.force_n += fraction * (force - known.force_n);
+            let force = self.memory.pressed(index).map_or(0.0, |d| {
+                let known = &self.memory.points[index];
+                let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
+                let (first, second) = point.potential.holding(d.value_mm);
+                let e = point.element;
+                let columns = Assembly::<C>::point_columns(state, &elements[e], e, point.xi);
+                let moved: f64 = columns.iter().map(|(row, way)| d.gradient.dot(way) * step[*row]).sum();
+                -factor * point.weight_mm * (first + second * moved) * d.gradient.norm()
+            });
+            self.memory.aims.push(force);
+        }
+    }
+
+    /// Takes a part of the way to the forces aimed at: points that would pull are let go.
+    pub fn take_aim(&mut self, fraction: f64) {
+        for (known, aim) in self.memory.points.iter_mut().zip(&self.memory.aims).filter(|(k, _)| k.presses) {
+            known.force_n += fraction * (aim - known.force_n);
             if known.force_n <= 0.0 {
                 (known.force_n, known.presses) = (0.0, false);
             }

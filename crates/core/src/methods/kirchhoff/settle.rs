@@ -38,6 +38,8 @@ const ROUNDED: f64 = 1e-13;
 /// … and a residual over force scale at that step must be below this. On a hard wall a soft thread presses by nanometres,
 /// and what rounding of positions leaves of that is far more than the tolerance.
 const LEFT: f64 = 1e-5;
+/// Trials of a step that must not lead beyond the wall.
+const TRIALS: usize = 6;
 /// Part of the pressing forces that held points may pull with at the end.
 const PULL: f64 = 1e-6;
 
@@ -84,8 +86,16 @@ impl<const C: usize> Settle<C> {
             if bare {
                 // The way from the lagged forces leads nowhere: from a wall without friction there is another.
                 contact.forget_friction();
+                newton.assemble_residual(elements, supports, contact, state);
+                let system = (&mut *newton, &mut *contact, &mut *supports);
+                let limits = (tolerance.max(LOOSE), ITERATIONS.min(most.saturating_sub(iterations)));
+                let (found, steps) = self.newton(system, elements, state, limits);
+                iterations += steps;
+                if !found {
+                    state.copy_from(&self.kept);
+                }
                 let options = NewtonOptions {
-                    max_iterations: most.saturating_sub(iterations),
+                    max_iterations: most.saturating_sub(iterations).min(MOST_A_WAY),
                     tolerance: tolerance.max(LOOSE),
                     ..NewtonOptions::default()
                 };
@@ -208,6 +218,7 @@ impl<const C: usize> Settle<C> {
                 sigma = if sigma == 0.0 { (1e5 * whisper).max(0.1 * last) } else { 4.0 * sigma };
             }
             if !convex {
+                if trace { eprintln!("    not convex"); }
                 return (false, iteration);
             }
             last = sigma;
@@ -232,7 +243,15 @@ impl<const C: usize> Settle<C> {
             let mut fraction = (LARGEST_TURN / turn).min(1.0);
             self.trial.advance::<C>(elements, state, &self.step, fraction);
             fraction *= External::<C>::safe_fraction(contact, elements, &self.trial);
-            contact.take_forces::<C>(elements, state, &self.step, fraction);
+            contact.aim::<C>(elements, state, &self.step);
+            for _ in 0..TRIALS {
+                self.trial.advance::<C>(elements, state, &self.step, fraction);
+                if !contact.is_outside(elements, &self.trial) {
+                    break;
+                }
+                fraction *= 0.4;
+            }
+            contact.take_aim(fraction);
             self.step.iter_mut().for_each(|s| *s *= fraction);
             self.trial.advance::<C>(elements, state, &self.step, 1.0);
             self.trial.take_tensions::<C>(elements, state, &self.step);

@@ -70,7 +70,6 @@ impl<const C: usize> Kirchhoff<C> {
             softest(surroundings.device),
             self.options.skip,
         );
-        contact.hand_over();
         let candidates = (now, &next.mesh, &mut next.state);
         let learnt =
             self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked).ok_or(BEYOND)?;
@@ -82,6 +81,7 @@ impl<const C: usize> Kirchhoff<C> {
         let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
         let stiffest = surroundings.properties.stiffest_n_per_mm2();
         let softest_first = (SOFTEST * element_stiffness / stiffest).min(1.0);
+        contact.hand_over(softest_first < 1.0);
         // A guess that has learnt from the last step or kept its contacts is so near that the wall may be met as it is.
         let mut hurried = (learnt || held) && softest_first < 1.0;
         let mut softness = if hurried { 1.0 } else { softest_first };
@@ -122,7 +122,7 @@ impl<const C: usize> Kirchhoff<C> {
                     self.guess.plain(&mut contact, &next.mesh, &mut next.state).ok_or(BEYOND)?;
                     softness = softest_first;
                     contact.softness = softness;
-                    contact.hand_over();
+                    contact.hand_over(softest_first < 1.0);
                 }
                 continue;
             }
@@ -132,13 +132,13 @@ impl<const C: usize> Kirchhoff<C> {
             if softness < 1.0 {
                 softness = (10.0 * softness).min(1.0);
                 contact.softness = softness;
-                contact.hand_over();
+                contact.hand_over(softest_first < 1.0);
                 continue;
             }
             if !surroundings.properties.rubs() || contact.friction_settled() {
                 break found;
             }
-            if contact.handed_over() {
+            if contact.handed_over() || softest_first < 1.0 {
                 let system = (&mut self.newton, &mut contact, &mut supports);
                 let limits = (tolerance, *budget);
                 let (settled, steps) = self.settle.solve(system, &next.mesh.elements, &mut next.state, limits);
