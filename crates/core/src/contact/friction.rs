@@ -330,15 +330,7 @@ mod tests {
             matrix_n: 0.0,
         };
         let at = slider.from_mm + (slip - normal * normal.dot(&slip));
-        (
-            Friction {
-                coefficient: 0.25,
-                stick_mm: 0.01,
-                sliders: vec![slider],
-                ..Friction::default()
-            },
-            at,
-        )
+        (Friction { coefficient: 0.25, stick_mm: 0.01, sliders: vec![slider], ..Friction::default() }, at)
     }
 
     #[test]

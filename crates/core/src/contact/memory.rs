@@ -59,7 +59,15 @@ impl WallMemory {
     /// Nothing is known yet of `felt`.
     pub fn new(felt: &FeltWall) -> Self {
         let places = Places::new(LOOK_AGAIN * felt.thinnest_mm, felt.reach_mm);
-        Self { points: Vec::new(), readings: Vec::new(), places, last: Place::UNKNOWN, spare: Vec::new(), kept: Vec::new(), aims: Vec::new() }
+        Self {
+            points: Vec::new(),
+            readings: Vec::new(),
+            places,
+            last: Place::UNKNOWN,
+            spare: Vec::new(),
+            kept: Vec::new(),
+            aims: Vec::new(),
+        }
     }
 
     /// Takes memory for `points` points.

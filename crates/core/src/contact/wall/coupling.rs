@@ -68,7 +68,8 @@ impl WallContact<'_> {
             let force_rate = (n * (-w * second * size * size) + bent * known.force_n) * rough;
             let normal_rate = (d.hessian - n * (d.hessian * n).transpose()) / size;
             let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
-            let Some(more) = self.friction.coupling(index, x, angle, radius_mm, (&force_rate, &normal_rate)) else {
+            let Some(more) = self.friction.coupling(index, x, angle, radius_mm, (&force_rate, &normal_rate))
+            else {
                 continue;
             };
             let e = point.element;

@@ -167,9 +167,7 @@ impl<const C: usize> Kirchhoff<C> {
         self.report.contacts.reserve(points);
         self.newton.reserve(elements);
         self.guess.reserve(elements);
-        if surroundings.properties.rubs() {
-            self.settle.reserve(elements);
-        }
+        self.settle.reserve(elements);
         let nodes = self.current.mesh.from_tip_mm.capacity();
         self.shape.positions_mm.reserve(nodes);
         self.shape.tangents.reserve(nodes);
@@ -232,12 +230,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 self.current.withdraw(tail);
                 break;
             }
-            let zz = budget;
-            let zr = self.try_step(surroundings, (inserted, tail), blocked, &mut budget);
-            if std::env::var("ZZ").is_ok() {
-                eprintln!("substep to {inserted:.4} of {target}: {:?} with {}", zr.as_ref().map(|f| f.iterations), zz - budget);
-            }
-            match zr {
+            match self.try_step(surroundings, (inserted, tail), blocked, &mut budget) {
                 Ok(found) => {
                     iterations += found.iterations;
                     dissipated_mj += found.dissipated_mj;

@@ -8,22 +8,35 @@
 //! r(x, λ) = ∇E(x) + friction of (1 − λ) p₀ + λ p(x),    λ = 0 … 1
 //! ```
 //!
-//! For λ = 0 the equilibrium is at hand; λ = 1 is Coulomb's law. The Newton matrix is that of lagged forces and a part that is not
-//! symmetric ([`crate::contact::friction`]), factored as a band with row interchanges. There is no energy to lower: a step is
-//! accepted where the next one with the same factors would be shorter, or where the residual is smaller (the natural
-//! monotonicity test of P. Deuflhard, *Newton Methods for Nonlinear Problems*, Springer 2004, section 3.3: lengths of steps, unlike
-//! residuals, do not hang on how stiff the wall is).
+//! For λ = 0 the equilibrium is at hand; λ = 1 is Coulomb's law, which is nearly always reached at once. The Newton matrix is that of
+//! lagged forces and a part that is not symmetric ([`crate::contact::friction`]), factored as a band with row interchanges.
+//!
+//! A thread presses on a rigid wall by nanometres, and a step along a curved wall is off it by more. So contacts have forces f of their
+//! own beside the depth p: f = w k p for those that press, 0 for the others. Newton's method for x and f, with f eliminated, is the
+//! step from a spring that also pulls, with f in the Hessian of wall and friction,
+//!
+//! ```text
+//! (K − f ∇∇d + w k ∇d ∇dᵀ + friction of f) δx = −(r + w k (d − r) ∇d + friction of w k p),    f ← w k (p − ∇d·δx)
+//! ```
+//!
+//! and where f would pull the point is let go; one that is beyond the wall is taken up. This is the semi-smooth Newton method of
+//! contact as an active set (M. Hintermüller, K. Ito, K. Kunisch, *The primal-dual active set strategy as a semismooth Newton method*,
+//! SIAM J. Optim. 13 (2002)): three or four steps where the spring alone chatters. There is no energy to lower. Where the symmetric part
+//! of the matrix is not that of a minimum, or its step is long, it is shifted as in the solution with lagged forces. What is found is
+//! judged by [`Newton::solve`] with its forces held: a saddle is left, and the way goes on from there.
 
 use crate::contact::WallContact;
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
 use crate::solve::{BandLu, External, Newton, NewtonOptions, Shift};
 
-/// Newton iterations at one part.
+/// Newton iterations at one part, …
 const ITERATIONS: usize = 30;
+/// … and at the first, from the lagged forces to Coulomb's law at once.
+const AT_ONCE: usize = 60;
 /// Newton iterations of the whole way.
-const MOST: usize = 200;
+const MOST: usize = 250;
 /// Newton iterations from one beginning.
-const MOST_A_WAY: usize = 80;
+const MOST_A_WAY: usize = 100;
 /// Shifts tried until the symmetric part is that of a minimum.
 const SHIFTS: usize = 40;
 /// Least change of the part.
@@ -31,7 +44,9 @@ const LEAST: f64 = 1e-3;
 /// Residual over force scale on the way to λ = 1.
 const LOOSE: f64 = 1e-5;
 /// Largest rotation of a node in one step, rad.
-const LARGEST_TURN: f64 = 0.3;
+const LARGEST_TURN: f64 = 0.2;
+/// Least shift beside the one that is always on, over that.
+const LEAST_SHIFT: f64 = 1e5;
 /// A step whose root mean square turn is less than this, rad, is rounding: of coordinates of some ten millimetres over elements of
 /// some tenths of one, …
 const ROUNDED: f64 = 1e-13;
@@ -100,7 +115,6 @@ impl<const C: usize> Settle<C> {
                     ..NewtonOptions::default()
                 };
                 let found = newton.solve(elements, supports, contact, state, &options);
-                if std::env::var("ZZ").is_ok() { eprintln!("  bare {} {}", found.converged, found.iterations); }
                 iterations += found.iterations;
                 if !found.converged {
                     break;
@@ -148,20 +162,16 @@ impl<const C: usize> Settle<C> {
         mut iterations: usize,
     ) -> (bool, usize) {
         let (mut part, mut stride) = (0.0, 1.0f64);
-        let trace = std::env::var("ZZ").is_ok();
         while part < 1.0 && iterations < most {
             let next = if part + stride > 1.0 - LEAST { 1.0 } else { part + stride };
             contact.couple(next);
             let wanted = if next < 1.0 { tolerance.max(LOOSE) } else { tolerance };
-            let limit = ITERATIONS.min(most - iterations);
+            let limit = if next == 1.0 && part == 0.0 { AT_ONCE } else { ITERATIONS }.min(most - iterations);
             // What presses at the beginning, and how hard.
             newton.assemble_residual(elements, supports, contact, state);
             let system = (&mut *newton, &mut *contact, &mut *supports);
             let (found, steps) = self.newton(system, elements, state, (wanted, limit));
             iterations += steps;
-            if trace {
-                eprintln!("  part {next:.4} from {part:.4}: {found} in {steps}");
-            }
             if found {
                 part = next;
                 stride *= 2.0;
@@ -185,11 +195,9 @@ impl<const C: usize> Settle<C> {
         state: &mut RodState,
         (tolerance, limit): (f64, usize),
     ) -> (bool, usize) {
-        let whisper = Newton::<C>::whisper(elements);
         let mut best = f64::INFINITY;
         let mut last = 0.0;
         let rounded = ROUNDED * elements.iter().map(|e| e.length).sum::<f64>().sqrt();
-        let trace = std::env::var("ZZ").is_ok_and(|v| v == "2");
         for iteration in 0..=limit {
             contact.holding = true;
             newton.assemble(elements, supports, contact, state);
@@ -206,41 +214,15 @@ impl<const C: usize> Settle<C> {
             if iteration == limit {
                 break;
             }
-            // Where the symmetric part is not that of a minimum it is made so, as in the solution with lagged forces.
-            let mut sigma = 0.0;
-            let mut convex = false;
-            for _ in 0..SHIFTS {
-                let inertia = newton.inertia(elements, supports, whisper + sigma);
-                convex = inertia.is_some_and(|i| i.negative == elements.len());
-                if convex {
-                    break;
-                }
-                sigma = if sigma == 0.0 { (1e5 * whisper).max(0.1 * last) } else { 4.0 * sigma };
-            }
-            if !convex {
-                if trace { eprintln!("    not convex"); }
+            let Some((length, sigma)) = self.direction((newton, contact, supports), elements, state, last)
+            else {
                 return (false, iteration);
-            }
+            };
             last = sigma;
-            self.lu.copy_from(&newton.assembly.matrix, &self.shift, whisper + sigma);
-            contact.add_coupling(elements, state, &mut self.lu);
-            supports.held::<C>().into_iter().flatten().for_each(|row| self.lu.hold(row));
-            if self.lu.factor().is_err() {
-                return (false, iteration);
-            }
-            Self::answer(&self.lu, newton, elements, &mut self.step);
-            let length = Self::length(elements, &self.step);
-            if trace {
-                eprintln!("    {iteration} residual {:.2e} step {length:.2e} pull {:.1e} sigma {sigma:.1e}", size.relative, contact.pull());
-            }
-            if free && length <= rounded && size.relative <= LEFT {
+            if free && sigma == 0.0 && length <= rounded && size.relative <= LEFT {
                 return (true, iteration);
             }
-            let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
-            if !turn.is_finite() {
-                return (false, iteration);
-            }
-            let mut fraction = (LARGEST_TURN / turn).min(1.0);
+            let mut fraction = 1.0;
             self.trial.advance::<C>(elements, state, &self.step, fraction);
             fraction *= External::<C>::safe_fraction(contact, elements, &self.trial);
             contact.aim::<C>(elements, state, &self.step);
@@ -258,6 +240,38 @@ impl<const C: usize> Settle<C> {
             std::mem::swap(state, &mut self.trial);
         }
         (false, limit)
+    }
+
+    /// Sets the step of the assembled state, shifted until the symmetric part of the matrix is that of a minimum, as in the solution
+    /// with lagged forces, and the step is short: a matrix that is nearly singular is damped, not its answer cut. Returns the length of
+    /// the step and the shift, beginning with an eighth of the `last` one.
+    fn direction(
+        &mut self,
+        (newton, contact, supports): System<'_, '_, C>,
+        elements: &[ElementData],
+        state: &RodState,
+        last: f64,
+    ) -> Option<(f64, f64)> {
+        let whisper = Newton::<C>::whisper(elements);
+        let least = LEAST_SHIFT * whisper;
+        let mut sigma = if last > 8.0 * least { last / 8.0 } else { 0.0 };
+        for _ in 0..SHIFTS {
+            let inertia = newton.inertia(elements, supports, whisper + sigma);
+            if inertia.is_some_and(|i| i.negative == elements.len()) {
+                self.lu.copy_from(&newton.assembly.matrix, &self.shift, whisper + sigma);
+                contact.add_coupling(elements, state, &mut self.lu);
+                supports.held::<C>().into_iter().flatten().for_each(|row| self.lu.hold(row));
+                if self.lu.factor().is_ok() {
+                    Self::answer(&self.lu, newton, elements, &mut self.step);
+                    let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
+                    if turn <= LARGEST_TURN {
+                        return Some((Self::length(elements, &self.step), sigma));
+                    }
+                }
+            }
+            sigma = (4.0 * sigma).max(least);
+        }
+        None
     }
 
     /// Sets `step` to what the factored matrix answers to the assembled residual.

@@ -103,21 +103,16 @@ impl<const C: usize> Kirchhoff<C> {
             );
             iterations += found.iterations;
             *budget -= found.iterations;
-            if std::env::var("ZZ").is_ok() {
-                eprintln!("  newton {softness:.0e} hurried {hurried} {} {} {}", found.converged, found.iterations, found.reason);
-            }
             if !found.converged && hurried {
                 self.guess.plain(&mut contact, &next.mesh, &mut next.state).ok_or(BEYOND)?;
                 hurried = false;
                 contact.restore_forces();
                 let system = (&mut self.newton, &mut contact, &mut supports);
                 let limits = (tolerance, *budget);
-                let (near, steps) = self.settle.approach(system, &next.mesh.elements, &mut next.state, limits);
+                let (near, steps) =
+                    self.settle.approach(system, &next.mesh.elements, &mut next.state, limits);
                 iterations += steps;
                 *budget -= steps;
-                if std::env::var("ZZ").is_ok() {
-                    eprintln!("  approach {near} {steps}");
-                }
                 if !near {
                     self.guess.plain(&mut contact, &next.mesh, &mut next.state).ok_or(BEYOND)?;
                     softness = softest_first;
@@ -141,7 +136,8 @@ impl<const C: usize> Kirchhoff<C> {
             if contact.handed_over() || softest_first < 1.0 {
                 let system = (&mut self.newton, &mut contact, &mut supports);
                 let limits = (tolerance, *budget);
-                let (settled, steps) = self.settle.solve(system, &next.mesh.elements, &mut next.state, limits);
+                let (settled, steps) =
+                    self.settle.solve(system, &next.mesh.elements, &mut next.state, limits);
                 iterations += steps;
                 *budget -= steps;
                 rounds += 1;
