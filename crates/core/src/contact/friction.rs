@@ -26,6 +26,8 @@
 //! Where a wall is smoother in some places than in others μ is the largest coefficient, and N the normal force times the
 //! part of it that acts where the point is: the coefficient of a place is lagged with its force.
 
+mod coupling;
+
 use nalgebra::Matrix3;
 
 use super::ContactPoint;
@@ -66,6 +68,10 @@ struct Slider {
     force_n: f64,
     /// Normal and force at the state seen last.
     seen: (Vec3, f64),
+    /// N when the coupled solution began.
+    lagged_n: f64,
+    /// N in its matrix.
+    matrix_n: f64,
 }
 
 /// Derivatives of a point's friction energy in its position and its angle.
@@ -93,6 +99,10 @@ pub struct Friction {
     settled: bool,
     /// How often normal forces were renewed in this step.
     renewals: usize,
+    /// Whether they are left alone once they should have settled, for another method to go on from there.
+    hands_over: bool,
+    /// Part of the normal forces that follows the state at once, if any does: see [`coupling`].
+    coupled: Option<f64>,
     sliders: Vec<Slider>,
 }
 
@@ -144,6 +154,7 @@ impl Friction {
         self.sliders.clear();
         self.settled = false;
         self.renewals = 0;
+        self.coupled = None;
         if !self.acts() {
             return;
         }
@@ -166,6 +177,8 @@ impl Friction {
                 normal: Vec3::zeros(),
                 force_n: 0.0,
                 seen: (Vec3::zeros(), 0.0),
+                lagged_n: 0.0,
+                matrix_n: 0.0,
             };
             if point.from_tip_mm < near_tip {
                 if index < count {
@@ -218,6 +231,12 @@ impl Friction {
         .sum()
     }
 
+    /// φ′/y and φ″ at a slip y.
+    fn rates(&self, y: f64) -> (f64, f64) {
+        let e = self.stick_mm;
+        if y >= e { (1.0 / y, 0.0) } else { (2.0 / e - y / (e * e), 2.0 / e - 2.0 * y / (e * e)) }
+    }
+
     /// Derivatives of a point's friction energy; `None` where nothing presses.
     pub fn derivatives(
         &self,
@@ -226,17 +245,17 @@ impl Friction {
         angle: f64,
         radius_mm: f64,
     ) -> Option<FrictionDerivatives> {
-        let slider = self.sliders.get(index).filter(|s| s.force_n > 0.0)?;
+        let coupled = self.coupled.is_some();
+        let slider = self.sliders.get(index).filter(|s| coupled || s.force_n > 0.0)?;
         let force = self.coefficient * slider.force_n;
+        let stiff = if coupled { self.coefficient * slider.matrix_n } else { force };
         let (slip, spin) = self.slip(index, x, angle, radius_mm);
-        let (y, e) = (slip.norm(), self.stick_mm);
-        // φ′/y and φ″.
-        let (over, second) =
-            if y >= e { (1.0 / y, 0.0) } else { (2.0 / e - y / (e * e), 2.0 / e - 2.0 * y / (e * e)) };
+        let y = slip.norm();
+        let (over, second) = self.rates(y);
         let gradient = slip * (force * over);
         let unit = if y > 0.0 { slip / y } else { Vec3::zeros() };
         let plane = Matrix3::identity() - slider.normal * slider.normal.transpose();
-        let hessian = (plane * over + unit * unit.transpose() * (second - over)) * force;
+        let hessian = (plane * over + unit * unit.transpose() * (second - over)) * stiff;
         let mixed = hessian * spin;
         Some(FrictionDerivatives {
             gradient,
@@ -256,7 +275,7 @@ impl Friction {
             sum += now.1;
             slider.seen = now;
         }
-        if self.settled || moved > STEADY * sum {
+        if self.settled || moved > STEADY * sum || self.handed_over() {
             return;
         }
         self.settled = self.unsettled(least_n) < SETTLED;
@@ -307,18 +326,11 @@ mod tests {
             normal,
             force_n: 2.0,
             seen: (normal, 2.0),
+            lagged_n: 0.0,
+            matrix_n: 0.0,
         };
         let at = slider.from_mm + (slip - normal * normal.dot(&slip));
-        (
-            Friction {
-                coefficient: 0.25,
-                stick_mm: 0.01,
-                settled: false,
-                renewals: 0,
-                sliders: vec![slider],
-            },
-            at,
-        )
+        (Friction { coefficient: 0.25, stick_mm: 0.01, sliders: vec![slider], ..Friction::default() }, at)
     }
 
     #[test]

@@ -87,7 +87,8 @@ impl Stiffness {
         let w = self.factor * length_mm;
         let (first, second) = potential.holding(d.value_mm);
         let plane = d.gradient * d.gradient.transpose();
-        (d.gradient * (w * first), plane * (w * second) - d.hessian * force_n)
+        let along = self.slope.map_or_else(Vec3::zeros, |(s1, _)| s1 * (w * potential.value(d.value_mm)));
+        (d.gradient * (w * first) + along, plane * (w * second) - d.hessian * force_n)
     }
 }
 

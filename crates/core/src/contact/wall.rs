@@ -10,6 +10,8 @@
 //! A point asks the bounding volume hierarchy only when it may have come near something new: while it has moved less than
 //! its last clearance, nothing can touch it.
 
+mod coupling;
+
 use super::memory::WallMemory;
 use super::point::{ContactPoint, Counters, Touch};
 use crate::Vec3;
@@ -371,8 +373,10 @@ impl<const C: usize> External<C> for WallContact<'_> {
                 known.force_n = 0.0;
             }
         }
-        // Forces that hold are none that friction follows.
-        if self.friction.acts() && !self.holding {
+        // Forces that hold are none that friction follows, unless it is solved for with them.
+        if self.friction.is_coupled() {
+            self.press_friction();
+        } else if self.friction.acts() && !self.holding {
             let least_n = self.least_force_n();
             let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
             let pressed = self.points.iter().enumerate().map(|(index, point)| {

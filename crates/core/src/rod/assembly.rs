@@ -157,7 +157,12 @@ impl<const C: usize> Assembly<C> {
 
     /// How the point at ξ of element `e` moves with the unknowns: rows and displacements,
     /// w₀ dx₀ + s₀(u a + v b) + ….
-    fn point_columns(state: &RodState, element: &ElementData, e: usize, xi: f64) -> [(usize, Vec3); 10] {
+    pub(crate) fn point_columns(
+        state: &RodState,
+        element: &ElementData,
+        e: usize,
+        xi: f64,
+    ) -> [(usize, Vec3); 10] {
         let l = Layout::<C>;
         let [w0, s0, w1, s1] = hermite(xi);
         let (s0, s1) = (s0 * element.length, s1 * element.length);

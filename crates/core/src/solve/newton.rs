@@ -108,6 +108,18 @@ impl<const C: usize> Newton<C> {
         self.assemble_parts(elements, supports, external, state);
     }
 
+    /// Assembles residual and energies at `state`, and leaves the matrix empty.
+    pub(crate) fn assemble_residual(
+        &mut self,
+        elements: &[ElementData],
+        supports: &Supports,
+        external: &mut dyn External<C>,
+        state: &RodState,
+    ) {
+        self.assembly.hessian = false;
+        self.assemble_parts(elements, supports, external, state);
+    }
+
     /// Assembles the system at `state`, without the matrix where the assembly wants none.
     fn assemble_parts(
         &mut self,

@@ -10,7 +10,7 @@ const REFINEMENTS: usize = 6;
 
 impl<const C: usize> Newton<C> {
     /// Undoes the change of multiplier of [`crate::rod::assembly`]: dN = m/(1 − γD).
-    pub(super) fn restore_tensions(elements: &[ElementData], step: &mut [f64]) {
+    pub(crate) fn restore_tensions(elements: &[ElementData], step: &mut [f64]) {
         for (e, data) in elements.iter().enumerate() {
             if data.flexibility > 0.0 {
                 step[Layout::<C>.tension(e)] /= 1.0 - data.augmentation() * data.flexibility;

@@ -19,6 +19,7 @@ mod hold;
 pub(crate) mod mesh;
 mod readout;
 mod repeat;
+mod settle;
 mod slide;
 mod substep;
 
@@ -38,6 +39,7 @@ use crate::{Error, PhysicalEnd, Result};
 use configuration::Configuration;
 use guess::Guess;
 use mesh::MOST_POINTS;
+use settle::Settle;
 use slide::Extension;
 
 /// Options of the exact rod.
@@ -87,6 +89,7 @@ pub struct Kirchhoff<const C: usize> {
     /// Where the command began, once its first sub-step is taken.
     before: Configuration,
     guess: Guess,
+    settle: Settle<C>,
     extension: Extension,
     memory: WallMemory,
     shape: Shape,
@@ -126,6 +129,7 @@ impl<const C: usize> Kirchhoff<C> {
             next: nothing.clone(),
             before: nothing,
             guess: Guess::new(surroundings.device.shaped_mm()),
+            settle: Settle::default(),
             extension: Extension::default(),
             shape: Shape::default(),
             report: StepReport { converged: true, angles: Layout::<C>::TWIST, ..Default::default() },
@@ -161,6 +165,7 @@ impl<const C: usize> Kirchhoff<C> {
         self.report.contacts.reserve(points);
         self.newton.reserve(elements);
         self.guess.reserve(elements);
+        self.settle.reserve(elements);
         let nodes = self.current.mesh.from_tip_mm.capacity();
         self.shape.positions_mm.reserve(nodes);
         self.shape.tangents.reserve(nodes);

@@ -14,8 +14,8 @@ use crate::solve::NewtonOptions;
 const SOFTEST: f64 = 30.0;
 /// … each solved to this residual over force scale, or to what is wanted if that is more.
 const LOOSE: f64 = 1e-3;
-/// Equilibria that may be found before friction and the forces it follows from have settled.
-const RENEWALS: usize = 100;
+/// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
+const ROUNDS: usize = 5;
 /// Newton iterations in which a guess that has learnt must come to its end, or the wall is approached from softer ones.
 const HURRIED: usize = 15;
 /// What is the matter where an equilibrium is on the other side of the wall.
@@ -73,6 +73,7 @@ impl<const C: usize> Kirchhoff<C> {
         );
         let candidates = (now, &next.mesh, &mut next.state);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked);
+        contact.keep_forces();
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let near = quality != Quality::Beyond;
         let held = near && self.guess.hold(&mut self.newton, &mut contact, &supports, &next.mesh, &mut next.state);
@@ -81,11 +82,12 @@ impl<const C: usize> Kirchhoff<C> {
         let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
         let stiffest = surroundings.properties.stiffest_n_per_mm2();
         let softest_first = (SOFTEST * element_stiffness / stiffest).min(1.0);
+        contact.hand_over(softest_first < 1.0);
         // A guess that has learnt from the last step or kept its contacts is so near that the wall may be met as it is.
         let mut hurried = (quality == Quality::Learnt || held) && softest_first < 1.0;
         let mut softness = if hurried { 1.0 } else { softest_first };
         let mut iterations = usize::from(held);
-        let mut renewals = 0;
+        let mut rounds = 0;
         let found = loop {
             contact.softness = softness;
             let options = NewtonOptions {
@@ -104,7 +106,20 @@ impl<const C: usize> Kirchhoff<C> {
             *budget -= found.iterations;
             if !found.converged && hurried {
                 self.guess.plain(&mut next.state);
-                (hurried, softness) = (false, softest_first);
+                hurried = false;
+                contact.restore_forces();
+                let system = (&mut self.newton, &mut contact, &mut supports);
+                let limits = (tolerance, *budget);
+                let (near, steps) =
+                    self.settle.approach(system, &next.mesh.elements, &mut next.state, limits);
+                iterations += steps;
+                *budget -= steps;
+                if !near {
+                    self.guess.plain(&mut next.state);
+                    softness = softest_first;
+                    contact.softness = softness;
+                    contact.hand_over(softest_first < 1.0);
+                }
                 continue;
             }
             if !found.converged {
@@ -112,13 +127,24 @@ impl<const C: usize> Kirchhoff<C> {
             }
             if softness < 1.0 {
                 softness = (10.0 * softness).min(1.0);
+                contact.softness = softness;
+                contact.hand_over(softest_first < 1.0);
                 continue;
             }
             if !surroundings.properties.rubs() || contact.friction_settled() {
                 break found;
             }
-            renewals += 1;
-            if renewals > RENEWALS {
+            if contact.handed_over() || softest_first < 1.0 {
+                let system = (&mut self.newton, &mut contact, &mut supports);
+                let limits = (tolerance, *budget);
+                let (settled, steps) =
+                    self.settle.solve(system, &next.mesh.elements, &mut next.state, limits);
+                iterations += steps;
+                *budget -= steps;
+                rounds += 1;
+                if settled && rounds < ROUNDS {
+                    continue;
+                }
                 return Err(UNSETTLED.into());
             }
         };

@@ -1,0 +1,152 @@
+//! Wall and friction solved for together: what the matrix of lagged normal forces leaves out, and what a point feels.
+
+use super::WallContact;
+use crate::contact::friction;
+use crate::rod::quadrature::Point;
+use crate::rod::{Assembly, ElementData, Layout, RodState};
+use crate::solve::BandLu;
+
+impl WallContact<'_> {
+    /// From now on a part of the normal forces of friction follows the state at once.
+    pub fn couple(&mut self, part: f64) {
+        self.friction.couple(part);
+    }
+
+    /// From now on there is no friction but what follows the state, and none of that yet.
+    pub fn forget_friction(&mut self) {
+        self.friction.forget();
+    }
+
+    /// Keeps what presses and how hard.
+    pub fn keep_forces(&mut self) {
+        self.memory.keep_forces();
+    }
+
+    /// Goes back to what was kept, until the next state is assembled.
+    pub fn restore_forces(&mut self) {
+        self.memory.restore_forces();
+    }
+
+    /// The normal forces of friction stay as they are.
+    pub fn uncouple(&mut self) {
+        self.friction.uncouple();
+    }
+
+    /// Lagged normal forces may be renewed anew, and are left alone if they do not settle, on a hard wall `soon`.
+    pub fn hand_over(&mut self, soon: bool) {
+        self.friction.hand_over(soon);
+    }
+
+    /// Whether that has come to pass.
+    pub fn handed_over(&self) -> bool {
+        self.friction.handed_over()
+    }
+
+    /// How far the lagged normal forces are from those of the state assembled last, over what counts as settled.
+    pub fn unsettled(&self) -> f64 {
+        self.friction.unsettled(self.least_force_n()) / friction::SETTLED
+    }
+
+    /// Adds to the matrix of the state assembled last the derivatives of friction that lagged normal forces leave out.
+    pub fn add_coupling<const C: usize>(
+        &self,
+        elements: &[ElementData],
+        state: &RodState,
+        matrix: &mut BandLu<C>,
+    ) {
+        let l = Layout::<C>;
+        for (index, point) in self.points.iter().enumerate() {
+            let Some(d) = self.memory.pressed(index) else { continue };
+            let known = &self.memory.points[index];
+            let x = &known.base;
+            let w = self.felt.stiffness(x, known.triangle, self.softness).factor * point.weight_mm;
+            let rough = self.felt.rough(x, known.triangle);
+            let (size, n) = (d.gradient.norm(), d.gradient / d.gradient.norm());
+            let second = point.potential.holding(d.value_mm).1;
+            // The force is −w ψ′ |∇d|. Where moduli and coefficients of friction differ they are taken as even in a step.
+            let bent = d.hessian * n / size;
+            let force_rate = (n * (-w * second * size * size) + bent * known.force_n) * rough;
+            let normal_rate = (d.hessian - n * (d.hessian * n).transpose()) / size;
+            let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
+            let Some(more) = self.friction.coupling(index, x, angle, radius_mm, (&force_rate, &normal_rate))
+            else {
+                continue;
+            };
+            let e = point.element;
+            let columns = Assembly::<C>::point_columns(state, &elements[e], e, point.xi);
+            for (column, way) in &columns {
+                let force = more.force * way;
+                for (row, to) in &columns {
+                    matrix.add(*row, *column, to.dot(&force));
+                }
+            }
+            if Layout::<C>::TWIST {
+                let [w0, w1, wb] = Point::at(point.xi, 0.0).phi;
+                for (row, share) in [(l.angle(e), w0), (l.bubble(e), wb), (l.angle(e + 1), w1)] {
+                    for (column, way) in &columns {
+                        matrix.add(row, *column, share * more.turn.dot(way));
+                    }
+                }
+            }
+        }
+    }
+
+    /// What points press with at the state assembled last, held ones that pull included, goes to friction.
+    pub(super) fn press_friction(&mut self) {
+        let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
+        let pressed = self.points.iter().enumerate().map(|(index, point)| {
+            let d = memory.pressed(index)?;
+            let known = &memory.points[index];
+            let w = felt.stiffness(&known.base, known.triangle, softness).factor * point.weight_mm;
+            let rough = felt.rough(&known.base, known.triangle);
+            let size = d.gradient.norm();
+            let force = -w * point.potential.holding(d.value_mm).0 * size;
+            Some((d.gradient / size, force * rough, known.force_n * rough))
+        });
+        self.friction.take(pressed);
+    }
+
+    /// The forces that a step leads to, from the state assembled last.
+    pub fn aim<const C: usize>(&mut self, elements: &[ElementData], state: &RodState, step: &[f64]) {
+        self.memory.aims.clear();
+        for (index, point) in self.points.iter().enumerate() {
+            let force = self.memory.pressed(index).map_or(0.0, |d| {
+                let known = &self.memory.points[index];
+                let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
+                let (first, second) = point.potential.holding(d.value_mm);
+                let e = point.element;
+                let columns = Assembly::<C>::point_columns(state, &elements[e], e, point.xi);
+                let moved: f64 = columns.iter().map(|(row, way)| d.gradient.dot(way) * step[*row]).sum();
+                -factor * point.weight_mm * (first + second * moved) * d.gradient.norm()
+            });
+            self.memory.aims.push(force);
+        }
+    }
+
+    /// Takes a part of the way to the forces aimed at: points that would pull are let go.
+    pub fn take_aim(&mut self, fraction: f64) {
+        for (known, aim) in self.memory.points.iter_mut().zip(&self.memory.aims).filter(|(k, _)| k.presses) {
+            known.force_n += fraction * (aim - known.force_n);
+            if known.force_n <= 0.0 {
+                (known.force_n, known.presses) = (0.0, false);
+            }
+        }
+    }
+
+    /// What held points pull with, over what the others press with.
+    pub fn pull(&self) -> f64 {
+        let (mut pull, mut press) = (0.0, 0.0);
+        for (index, point) in self.points.iter().enumerate() {
+            let Some(d) = self.memory.pressed(index) else { continue };
+            let known = &self.memory.points[index];
+            let w = self.felt.stiffness(&known.base, known.triangle, self.softness).factor * point.weight_mm;
+            let force = -w * point.potential.holding(d.value_mm).0;
+            if force < 0.0 {
+                pull -= force;
+            } else {
+                press += force;
+            }
+        }
+        if pull > 0.0 { pull / (press + self.least_force_n()) } else { 0.0 }
+    }
+}
