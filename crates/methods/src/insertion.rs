@@ -1,5 +1,6 @@
 //! Any of the methods as an insertion: core's trait `Method`.
 
+use endowire_core::contact::FeltWall;
 use endowire_core::contact::extension::left_through;
 use endowire_core::error::in_range;
 use endowire_core::insertion::{Command, Energy, StepReport, Surroundings, nodes_from_tip};
@@ -9,7 +10,7 @@ use endowire_core::{Error, Result, Vec3};
 use nalgebra::Rotation3;
 
 use crate::beam_fem::smallest_rotation;
-use crate::wall_load::{FeltWall, WallLoad};
+use crate::wall_load::WallLoad;
 use crate::{Chain, Posture, RodModel};
 
 /// How a device is cut up and how well its equilibria are met.
@@ -84,7 +85,7 @@ impl Insertion {
             posture: chain.straight(),
             chain,
             from_tip_mm: vec![0.0],
-            wall: FeltWall::new(surroundings)?,
+            wall: FeltWall::new(surroundings.wall, surroundings.device, surroundings.properties)?,
             shape: Shape::default(),
             report: StepReport { converged: true, ..StepReport::default() },
         };

@@ -3,11 +3,9 @@
 //! The wall is the scene's, not a method's: all methods feel core's smooth distance and its extensions beyond openings, the
 //! same that `kirchhoff` feels, and so have the same limit.
 
-use endowire_core::contact::SmoothWall;
-use endowire_core::contact::extension::extended;
+use endowire_core::Vec3;
+use endowire_core::contact::FeltWall;
 use endowire_core::insertion::{Contact, Surroundings};
-use endowire_core::vessel::{Wall, WallQuery};
-use endowire_core::{Result, Vec3};
 
 use crate::{NodalLoad, Push};
 
@@ -15,23 +13,6 @@ use crate::{NodalLoad, Push};
 const LOOK_MM: f64 = 3.0;
 /// A node near the wall looks for its nearest triangle again when it has moved by this part of its radius.
 const LOOK_AGAIN: f64 = 0.5;
-
-/// The vessel as a device feels it.
-pub(crate) struct FeltWall {
-    smooth: SmoothWall,
-    query: WallQuery,
-}
-
-impl FeltWall {
-    pub(crate) fn new(surroundings: &Surroundings<'_>) -> Result<Self> {
-        let radius_mm = surroundings.device.max_radius_mm();
-        let felt = Wall::welded(&extended(surroundings.wall, radius_mm))?;
-        Ok(Self {
-            smooth: SmoothWall::new(&felt, surroundings.device.min_radius_mm(), radius_mm),
-            query: WallQuery::new(&felt)?,
-        })
-    }
-}
 
 /// What a node knows of the wall.
 #[derive(Debug, Clone, Copy, Default)]

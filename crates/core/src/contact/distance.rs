@@ -6,7 +6,7 @@
 //! blended by a partition of unity (Ohtake et al., *Multi-level partition of unity implicits*, SIGGRAPH 2003):
 //!
 //! ```text
-//! y = x − Vᵢ,  h = Nᵢ·y − cᵢ,  τ = y − Nᵢ(Nᵢ·y)      height and offset
+//! y = x − Vᵢ,  h = Nᵢ·y,  τ = y − Nᵢ(Nᵢ·y)      height and offset
 //! σ = (I − hSᵢ)⁻¹ τ                                   foot of x, seen from Vᵢ along the surface
 //! Qᵢ(x) = h − ½ τᵀSᵢσ
 //! wᵢ(x) = (1 − σᵀMᵢσ)³ b(Qᵢ)   where positive
@@ -20,9 +20,6 @@
 //! tube would blend walls all around it, and find a play too large by a tenth of the radius. f is twice continuously
 //! differentiable, so a device feels an energy with an exact gradient and Hessian; from the distance to the sampled surface it
 //! differs at fourth order in the edge length, on a tube with 50 edges around by a hundredth of what the flat triangles do.
-//!
-//! Vertices sample a vessel, and between them the smooth wall lies beyond the triangles. Where a mesh is so coarse that it
-//! would do so by more than a device keeps from the wall, the offsets cᵢ draw it in; on all other meshes they are 0.
 //!
 //! With W = Σ wᵢ,
 //!
@@ -44,14 +41,6 @@ use crate::vessel::{SurfaceMesh, Wall};
 const LEAST_WEIGHT: f64 = 1e-9;
 /// Height above the surface up to which the lists of vertices are complete, in radii of the thickest device and in supports.
 const HEIGHT: (f64, f64) = (1.5, 0.5);
-/// The smooth wall lies no farther than this part of the thinnest device's radius beyond a triangle: the barrier of
-/// [`crate::contact::WallPotential`] stands at three tenths.
-const BEYOND: f64 = 0.2;
-/// Intervals along each side of a triangle at whose ends that is checked, …
-const CHECKED: u32 = 4;
-/// … unless few points differ by less than this part of what is allowed.
-const ENOUGH: f64 = 0.25;
-
 /// Signed distance with derivatives; positive in the lumen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
@@ -131,8 +120,8 @@ pub struct SmoothWall {
 }
 
 impl SmoothWall {
-    /// The smooth surface of `wall` for devices with radii from `thinnest_mm` to `thickest_mm`.
-    pub fn new(wall: &Wall, thinnest_mm: f64, thickest_mm: f64) -> Self {
+    /// The smooth surface of `wall` for devices with radii up to `thickest_mm`.
+    pub fn new(wall: &Wall, thickest_mm: f64) -> Self {
         let mesh = wall.mesh();
         let count = mesh.vertices_mm.len();
         let neighbours = vertex_neighbours(&mesh.triangles, count);
@@ -175,49 +164,18 @@ impl SmoothWall {
         }
         starts.push(lists.len() as u32);
         let mut smooth = Self { quadrics, triangles, starts, lists, insets_mm: Vec::new(), deepest_inset_mm: 0.0 };
-        smooth.draw_in(mesh, BEYOND * thinnest_mm);
+        smooth.measure_insets(mesh);
         smooth
     }
 
-    /// Least and largest f on a triangle of the mesh, at few points if they differ by less than `enough_mm`, or at all of a
-    /// grid.
-    fn range(&self, mesh: &SurfaceMesh, index: usize, enough_mm: f64) -> (f64, f64) {
-        let corners = mesh.corners(index);
-        let list = self.list(index);
-        let look = |(least, largest): (f64, f64), x: Vec3| {
-            let f = self.reach(&x, list).map_or(0.0, |r| r.value_mm);
-            (least.min(f), largest.max(f))
+    /// How far the smooth wall lies inside each triangle, at few points.
+    fn measure_insets(&mut self, mesh: &SurfaceMesh) {
+        let inset = |index: usize| {
+            let list = self.list(index);
+            let heights = few(&mesh.corners(index)).map(|x| self.reach(&x, list).map_or(0.0, |r| r.value_mm));
+            (-heights.into_iter().fold(0.0, f64::min)) as f32
         };
-        let found = few(&corners).into_iter().fold((f64::MAX, f64::MIN), look);
-        if found.1 - found.0 > enough_mm { grid(corners).fold(found, look) } else { found }
-    }
-
-    /// Sets the offsets so that f is at most `limit_mm` on the triangles, and measures how far inside them it lies.
-    fn draw_in(&mut self, mesh: &SurfaceMesh, limit_mm: f64) {
-        let enough_mm = ENOUGH * limit_mm;
-        let mut offsets = vec![0.0f64; self.quadrics.len()];
-        for index in 0..mesh.triangles.len() {
-            let (least, largest) = self.range(mesh, index, enough_mm);
-            self.insets_mm.push((-least).max(0.0) as f32);
-            if largest <= limit_mm {
-                continue;
-            }
-            for x in grid(mesh.corners(index)) {
-                let list = self.list(index);
-                let beyond = self.reach(&x, list).map_or(0.0, |r| r.value_mm) - limit_mm;
-                for &v in list.iter().filter(|&&v| self.quadrics[v as usize].local(&x, false).is_some()) {
-                    offsets[v as usize] = offsets[v as usize].max(beyond);
-                }
-            }
-        }
-        for (q, offset) in self.quadrics.iter_mut().zip(offsets) {
-            q.offset_mm = offset;
-        }
-        for index in 0..mesh.triangles.len() {
-            if self.list(index).iter().any(|&v| self.quadrics[v as usize].offset_mm > 0.0) {
-                self.insets_mm[index] = (-self.range(mesh, index, enough_mm).0).max(0.0) as f32;
-            }
-        }
+        self.insets_mm = (0..mesh.triangles.len()).map(inset).collect();
         self.deepest_inset_mm = self.insets_mm.iter().copied().fold(0.0, f32::max).into();
     }
 
@@ -386,12 +344,6 @@ fn few([a, b, c]: &[Vec3; 3]) -> [Vec3; 4] {
     [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5, (a + b + c) / 3.0]
 }
 
-/// Points all over a triangle.
-fn grid([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
-    let part = |k: u32| f64::from(k) / f64::from(CHECKED);
-    (0..=CHECKED).flat_map(move |i| (0..=CHECKED - i).map(move |j| a + (b - a) * part(i) + (c - a) * part(j)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -402,7 +354,7 @@ mod tests {
         let wall = GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(edge_mm))
             .unwrap()
             .wall;
-        (SmoothWall::new(&wall, 0.5, 4.0), WallQuery::new(&wall).unwrap())
+        (SmoothWall::new(&wall, 4.0), WallQuery::new(&wall).unwrap())
     }
 
     fn at(wall: &(SmoothWall, WallQuery), x: &Vec3) -> Distance {

@@ -1,4 +1,4 @@
-//! The vessel as a device feels it: extended beyond its openings, smooth, and ready for queries.
+//! The vessel as a device feels it: evenly meshed, extended beyond its openings, smooth, and ready for queries.
 
 use nalgebra::Matrix3;
 
@@ -9,7 +9,7 @@ use super::wall::{FOLLOW, LOOK_AGAIN};
 use super::{Distance, SmoothWall};
 use crate::device::Device;
 use crate::insertion::WallProperties;
-use crate::vessel::{Wall, WallQuery};
+use crate::vessel::{Conditioning, Wall, WallQuery, condition};
 use crate::{Result, Vec3};
 
 /// A wall prepared for the contact of one device.
@@ -38,8 +38,15 @@ impl FeltWall {
     /// A wall that has no triangles left to query.
     pub fn new(wall: &Wall, device: &Device, properties: &WallProperties) -> Result<Self> {
         let (thinnest_mm, thickest_mm) = (device.min_radius_mm(), device.max_radius_mm());
-        let felt = Wall::welded(&extended(wall, thickest_mm))?;
-        let smooth = SmoothWall::new(&felt, thinnest_mm, thickest_mm);
+        let options = Conditioning { deviation_mm: properties.deviation_mm, ..Conditioning::default() };
+        let conditioned = condition(wall.mesh(), &options)?;
+        let felt = if conditioned.changed {
+            extended(&Wall::welded(&conditioned.mesh)?, thickest_mm)
+        } else {
+            extended(wall, thickest_mm)
+        };
+        let felt = Wall::welded(&felt)?;
+        let smooth = SmoothWall::new(&felt, thickest_mm);
         let grading = if properties.region.is_empty() { None } else { Grading::new(&smooth, properties) };
         let reach_mm = (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + smooth.deepest_inset_mm() + LOOK_MM;
         Ok(Self { smooth, query: WallQuery::new(&felt)?, grading, thinnest_mm, reach_mm })

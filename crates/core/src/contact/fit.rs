@@ -137,7 +137,6 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[V
         support: Matrix2::from_fn(|i, j| seen(&plane, &axes[i], &axes[j])),
         axes,
         half_axes_mm,
-        offset_mm: 0.0,
         farthest_mm: f64::INFINITY,
         above_mm: (0.0, 0.0),
         below_mm: (0.0, 0.0),

@@ -16,8 +16,6 @@ const LEVEL: f64 = 0.4;
 pub(super) struct Quadric {
     pub(super) position: Vec3,
     pub(super) normal: Vec3,
-    /// cᵢ, mm.
-    pub(super) offset_mm: f64,
     /// No point that is farther from the normal than this is reached, mm; infinite until the window is open.
     pub(super) farthest_mm: f64,
     /// Principal directions, across the normal.
@@ -111,14 +109,13 @@ impl Quadric {
         if !deep && y.norm_squared() - rise * rise >= self.farthest_mm * self.farthest_mm {
             return None;
         }
-        let height = rise - self.offset_mm;
         let [k, l] = self.curvature;
         let tau = Vector2::new(self.axes[0].dot(&y), self.axes[1].dot(&y));
-        let spread = [Spread::at(height, k), Spread::at(height, l)];
+        let spread = [Spread::at(rise, k), Spread::at(rise, l)];
         let sigma = Vector2::new(spread[0].value * tau.x, spread[1].value * tau.y);
         let across = self.support * sigma;
         let u = sigma.dot(&across);
-        let value = height - 0.5 * (k * sigma.x * tau.x + l * sigma.y * tau.y);
+        let value = rise - 0.5 * (k * sigma.x * tau.x + l * sigma.y * tau.y);
         (u < 1.0).then_some(Local { tau, spread, across, u, value })
     }
 

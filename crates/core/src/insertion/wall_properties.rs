@@ -16,6 +16,11 @@ const LARGEST_RADIUS_MM: f64 = 1e6;
 /// points about a diameter apart, and a change much narrower than that lies between two of them.
 const TRANSITION_MM: f64 = 2.0;
 
+/// How far the felt wall may be from the given one, mm, unless the scene says otherwise: less than a scanner resolves.
+const DEVIATION_MM: f64 = 0.1;
+/// Largest such distance, mm.
+const LARGEST_DEVIATION_MM: f64 = 10.0;
+
 /// The wall of a vessel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -24,6 +29,9 @@ pub struct WallProperties {
     pub modulus_n_per_mm2: f64,
     /// Coulomb coefficient μ of friction between device and wall; 0 is frictionless and costs nothing.
     pub friction: f64,
+    /// How far the wall that is felt may be from the given surface, mm; where the lumen's radius is less than twenty times this, a
+    /// twentieth of the radius.
+    pub deviation_mm: f64,
     /// Where the wall is another, each laid over those before it.
     pub region: Vec<WallRegion>,
 }
@@ -31,7 +39,7 @@ pub struct WallProperties {
 impl Default for WallProperties {
     /// An artery's modulus in order of magnitude, frictionless.
     fn default() -> Self {
-        Self { modulus_n_per_mm2: 1.0, friction: 0.0, region: Vec::new() }
+        Self { modulus_n_per_mm2: 1.0, friction: 0.0, deviation_mm: DEVIATION_MM, region: Vec::new() }
     }
 }
 
@@ -140,6 +148,7 @@ impl WallProperties {
     pub(crate) fn check(&self, mesh: &SurfaceMesh) -> Result<()> {
         in_range("vessel.wall.modulus_n_per_mm2", self.modulus_n_per_mm2, LARGEST_MODULUS)?;
         check_friction("vessel.wall.friction", self.friction)?;
+        in_range("vessel.wall.deviation_mm", self.deviation_mm, LARGEST_DEVIATION_MM)?;
         for (index, region) in self.region.iter().enumerate() {
             let name = format!("vessel.wall.region[{index}]");
             let key = |key: &str| format!("{name}.{key}");
