@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
+use endowire_core::Vec3;
 use endowire_core::reference::crossing::CrossingTest;
 use endowire_core::vessel::SurfaceMesh;
 
@@ -15,6 +16,8 @@ const LONGEST_MM: f64 = 10.0;
 const SMOOTH: f64 = 0.9;
 /// Farthest that a collapse may take the surface, mm.
 const OFF_MM: f64 = 0.15;
+/// Farthest that decimation takes it, mm.
+const FARTHEST_MM: f64 = 4.0;
 /// Collapses tried for each triangle.
 const TRIED: usize = 4;
 /// Places that are refined, …
@@ -43,11 +46,7 @@ pub fn decades(mesh: &SurfaceMesh, seed: u64) -> SurfaceMesh {
         let (index, side) = (random.below(count) as u32, random.below(3));
         let Some(corners) = edit.triangle(index) else { continue };
         let edge = (corners[side], corners[(side + 1) % 3]);
-        edit.collapse(edge, LONGEST_MM, SMOOTH, |[a, b, c]| {
-            [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
-                .iter()
-                .all(|x| clean.distance_mm(x, OFF_MM).is_some())
-        });
+        edit.collapse(edge, LONGEST_MM, SMOOTH, |corners| near(&clean, corners, OFF_MM));
     }
     for _ in 0..PLACES {
         let corners = mesh.corners(random.below(count));
@@ -76,37 +75,51 @@ pub fn decades(mesh: &SurfaceMesh, seed: u64) -> SurfaceMesh {
     edit.finish()
 }
 
-/// All but a fiftieth of the triangles collapsed, the shortest edges first. The seed decides which end of an edge stays.
+/// All but a fiftieth of the triangles collapsed, the shortest edges first, and first those that take the surface least far. The seed
+/// decides which end of an edge stays.
 pub fn decimated(mesh: &SurfaceMesh, seed: u64) -> SurfaceMesh {
     let mut random = Noise::new(seed);
+    let clean = CrossingTest::new(mesh);
     let mut edit = Editable::new(mesh);
     let wanted = (LEFT * mesh.triangles.len() as f64).ceil() as usize;
     let mut left = mesh.triangles.len();
-    let mut queue = BinaryHeap::new();
-    let key = |edit: &Editable, a: u32, b: u32| Reverse((edit.length(a, b).to_bits(), a, b));
-    for corners in &mesh.triangles {
-        for side in 0..3 {
-            let (a, b) = (corners[side], corners[(side + 1) % 3]);
-            queue.push(key(&edit, a.min(b), a.max(b)));
+    let mut off_mm = OFF_MM;
+    while left > wanted && off_mm < FARTHEST_MM {
+        let mut queue = BinaryHeap::new();
+        let key = |edit: &Editable, a: u32, b: u32| Reverse((edit.length(a, b).to_bits(), a, b));
+        for corners in edit.triangles.iter().flatten() {
+            for side in 0..3 {
+                let (a, b) = (corners[side], corners[(side + 1) % 3]);
+                queue.push(key(&edit, a.min(b), a.max(b)));
+            }
         }
-    }
-    while left > wanted {
-        let Some(Reverse((_, a, b))) = queue.pop() else { break };
-        let shared = edit.sharing(a, b).len();
-        let (a, b) = if random.happens(0.5) { (a, b) } else { (b, a) };
-        let kept = if edit.collapse((a, b), f64::MAX, ROUGH, |_| true) {
-            b
-        } else if edit.collapse((b, a), f64::MAX, ROUGH, |_| true) {
-            a
-        } else {
-            continue;
-        };
-        left -= shared;
-        // Edges about it may now collapse that could not before.
-        for w in edit.neighbours(kept) {
-            queue.push(key(&edit, w.min(kept), w.max(kept)));
+        while left > wanted {
+            let Some(Reverse((_, a, b))) = queue.pop() else { break };
+            let shared = edit.sharing(a, b).len();
+            let (a, b) = if random.happens(0.5) { (a, b) } else { (b, a) };
+            let fits = |corners| near(&clean, corners, off_mm);
+            let kept = if edit.collapse((a, b), f64::MAX, ROUGH, fits) {
+                b
+            } else if edit.collapse((b, a), f64::MAX, ROUGH, fits) {
+                a
+            } else {
+                continue;
+            };
+            left -= shared;
+            // Edges about it may now collapse that could not before.
+            for w in edit.neighbours(kept) {
+                queue.push(key(&edit, w.min(kept), w.max(kept)));
+            }
         }
+        off_mm *= 1.5;
     }
     debug_assert_eq!(left, edit.count());
     edit.finish()
+}
+
+/// Whether a triangle is no farther than this from a surface.
+fn near(clean: &CrossingTest, [a, b, c]: [Vec3; 3], off_mm: f64) -> bool {
+    [(a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0, (a + b + c) / 3.0]
+        .iter()
+        .all(|x| clean.distance_mm(x, off_mm).is_some())
 }
