@@ -4,12 +4,12 @@
 //! Shapira et al., *The Visual Computer* 24, 2008, with one ray), medianed over neighbours. Edges are to be
 //!
 //! ```text
-//! h = min(R / 3.5,  0.6 / κ,  √(2.4 R d))       not shorter than max(0.6 t, R / 9)
+//! h = min(R / 3.5,  0.6 / κ,  √(2.4 R d))       not shorter than max(0.6 t, R / 7)
 //! ```
 //!
 //! with the curvature κ of the conditioned surface so far, the limit t = min(deviation, R/20) and, at a septum of thickness d, a sag
 //! h²/8R below 0.3 d. A kink of angle θ can be rounded within t by an arc of radius 8t/θ² and length 8t/θ; with κ = θ²/8t the
-//! formula gives edges of 4.8 t/θ² there, which for the sharpest kink of all, θ = π, is the floor or less; in wide vessels R/9 ends
+//! formula gives edges of 4.8 t/θ² there, which for the sharpest kink of all, θ = π, is the floor or less; in wide vessels R/7 ends
 //! this sooner. κ is measured on the surface as it comes out, not on the triangles given, so that kinks of a coarse mesh that vanish
 //! within the limit cost nothing.
 //! Neighbouring lengths differ by at most 0.35 of their distance.
@@ -28,11 +28,11 @@ const TURN: f64 = 0.6;
 /// Shortest edge over the limit: the sharpest kink needs no shorter ones; …
 const FLOOR: f64 = 0.6;
 /// … and over the local radius: the smooth wall rounds a kink over an edge or two by itself, and kinks of a coarse mesh are long.
-const FLOOR_PER_RADIUS: f64 = 1.0 / 9.0;
+const FLOOR_PER_RADIUS: f64 = 1.0 / 7.0;
 /// Where the surfaces are farther apart than the limit, edges are made so much shorter, …
 const SHORTER: f64 = 0.65;
 /// … down to this part of the local radius.
-const SHORTEST: f64 = 1.0 / 14.0;
+const SHORTEST: f64 = 1.0 / 11.0;
 /// The limit over the local radius, at most.
 const LIMIT_PER_RADIUS: f64 = 0.05;
 /// The limit over the thickness of a septum, at most: two sheets that both move leave a third of it.
