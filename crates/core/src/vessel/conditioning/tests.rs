@@ -64,9 +64,12 @@ fn uneven_tube(seed: u64) -> SurfaceMesh {
     tube(&uneven(20.0, 60, seed), &angles)
 }
 
-/// Largest distance from `x` of sample points to the true tube.
+/// Largest distance of vertices and centres of triangles from the true tube.
 fn off_tube(mesh: &SurfaceMesh) -> f64 {
-    mesh.vertices_mm.iter().map(|v| (v.x.hypot(v.y) - 2.0).abs()).fold(0.0, f64::max)
+    let off = |v: &Vec3| (v.x.hypot(v.y) - 2.0).abs();
+    let centre = |i: usize| mesh.corners(i).iter().sum::<Vec3>() / 3.0;
+    let centres = (0..mesh.triangles.len()).map(|i| off(&centre(i)));
+    mesh.vertices_mm.iter().map(off).chain(centres).fold(0.0, f64::max)
 }
 
 #[test]
@@ -116,6 +119,17 @@ fn an_uneven_tube_comes_back_even_and_within_the_limit() {
     );
     assert!(found.deviation_mm <= 0.1, "{}", found.deviation_mm);
     assert!(off_tube(&found.mesh) < 0.1);
+}
+
+#[test]
+fn meshings_of_one_tube_come_out_within_the_limit_of_each_other() {
+    let mut angles = even(TAU, 31);
+    angles.pop();
+    // Facets five times as long as wide, and steps over three decades: both are half the limit from the tube at most.
+    for mesh in [tube(&even(20.0, 10), &angles), uneven_tube(7)] {
+        let found = conditioned(&mesh);
+        assert!(found.changed && off_tube(&found.mesh) < 0.05, "{}", off_tube(&found.mesh));
+    }
 }
 
 #[test]
