@@ -9,6 +9,9 @@ use crate::vessel::topology::NONE;
 /// Sample points of the given surface, about.
 const SAMPLES: usize = 40_000;
 
+/// Square of the distance, in limits, from which on shorter edges are worth their number.
+const FAR: f64 = 1.44;
+
 /// Distances at sample points.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Deviation {
@@ -16,7 +19,7 @@ pub(super) struct Deviation {
     pub(super) mean_mm: f64,
 }
 
-/// Measures; `exceeded` is told vertices of the conditioned mesh near which the given surface is farther than the limit.
+/// Measures; `exceeded` is told vertices of the conditioned mesh near which the given surface is much farther than the limit.
 pub(super) fn measure(
     corners: &Corners,
     at: &[Vec3],
@@ -45,7 +48,7 @@ pub(super) fn measure(
                 square
             };
             note(square.sqrt());
-            if square > limit * limit {
+            if square > FAR * limit * limit {
                 t.iter().for_each(|&v| exceeded(v));
             }
         }
@@ -66,7 +69,7 @@ pub(super) fn measure(
                 let ends = mesh.triangles[triangle as usize];
                 let limit =
                     ends.iter().map(|&v| corners.vertices[v as usize].limit_mm).fold(f64::MAX, f64::min);
-                if square > limit * limit {
+                if square > FAR * limit * limit {
                     ends.iter().for_each(|&v| exceeded(v));
                 }
             }

@@ -4,11 +4,12 @@
 //! slivers, fans, facets much longer than the vessel is wide, or noise; and surfaces of real vessels have all of these. Here such a
 //! surface gets vertices that depend on its geometry and not on how it was meshed:
 //!
-//! 1. A mesh that is even already is returned as it is ([`evenness`]).
-//! 2. The lumen's radius and the curvature say how long edges should be ([`sizes`]).
-//! 3. The mesh is split, collapsed, flipped and evened out on the given surface ([`remesh`], [`corners`], [`reference`]).
-//! 4. Kinks and noise are faired within the limit ([`fairing`]); where that leaves curvature, steps 2 to 4 follow with shorter edges.
-//! 5. The distance of the two surfaces is measured both ways ([`deviation`]).
+//! 1. A mesh that is even already is returned as it is (`evenness`).
+//! 2. The lumen's radius and the curvature say how long edges should be (`sizes`).
+//! 3. The mesh is split, collapsed, flipped and evened out on the given surface (`remesh`, `corners`,
+//!    `reference`).
+//! 4. Kinks and noise are faired within the limit (`fairing`); where that leaves curvature, steps 2 to 4 follow with shorter edges.
+//! 5. The distance of the two surfaces is measured both ways (`deviation`).
 //!
 //! Openings stay open, nothing is welded or cut, and what is not a manifold stays where it is.
 
@@ -39,7 +40,7 @@ const REMESHINGS: (usize, usize) = (3, 1);
 /// Iterations of fairing in the last round and in the others.
 const ITERATIONS: (usize, usize) = (80, 25);
 /// How often edges are made shorter where the surfaces are farther apart than the limit.
-const CORRECTIONS: usize = 2;
+const CORRECTIONS: usize = 1;
 
 /// What [`condition`] may do.
 #[derive(Debug, Clone, Copy, PartialEq)]

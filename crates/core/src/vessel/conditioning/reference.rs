@@ -240,7 +240,7 @@ fn closest(x: &Vec3, [a, b, c]: &[Vec3; 3]) -> ([f64; 3], Feature) {
 }
 
 /// Square of the distance of `x` from a triangle.
-fn square_to(x: &Vec3, corners: &[Vec3; 3]) -> f64 {
+pub(super) fn square_to(x: &Vec3, corners: &[Vec3; 3]) -> f64 {
     let (w, _) = closest(x, corners);
     (x - corners[0] * w[0] - corners[1] * w[1] - corners[2] * w[2]).norm_squared()
 }

@@ -6,7 +6,7 @@
 //! Gunzburger, *SIAM Review* 41, 1999). Vertices always lie on the given surface. All orders are fixed.
 
 use super::corners::{Corners, Kind, Vertex, next, previous};
-use super::reference::Reference;
+use super::reference::{Reference, square_to};
 use crate::Vec3;
 use crate::vessel::topology::NONE;
 
@@ -26,6 +26,10 @@ const LEAST_COSINE: f64 = 0.7;
 const NEEDLE: f64 = 0.02;
 /// A vertex that is this near to where it should be, in wanted lengths, stays.
 const AT_REST: f64 = 0.05;
+/// How far from the surface a vertex may be left behind when it is collapsed or moved, in limits: ridges and tips stay.
+const LEFT: (f64, f64) = (0.8, 0.5);
+/// Cosine between a vertex's normal and those of its triangles below which it is the tip of a fold, which need not stay.
+const FOLDED: f64 = 0.2;
 /// How far a vertex of a rim that is left out may be from the rim that remains, in limits.
 const RIM: f64 = 0.25;
 /// How far from its old triangles a flipped edge may pass, in limits.
@@ -131,7 +135,8 @@ impl Remesher<'_, '_> {
             }
             for part in [1.0, 0.4] {
                 let foot = self.reference.walk(&(vertex.at + way * part), vertex.place);
-                if stays_sound(corners, &spokes, &foot.at) {
+                if stays_sound(corners, &spokes, &foot.at) && keeps(corners, &spokes, &foot.at, None, LEFT.1)
+                {
                     corners.vertices[v as usize].at = foot.at;
                     corners.vertices[v as usize].place = foot.triangle;
                     break;
@@ -176,6 +181,28 @@ fn stays_sound(corners: &Corners, spokes: &[u32], to: &Vec3) -> bool {
         after[e as usize % 3] = *to;
         may_become(&before, &after, &corners.vertices[corners.from(e) as usize].normal)
     })
+}
+
+/// Whether the place of the vertex whose spokes these are stays near the surface when it goes to another, onto a neighbour if that is
+/// given: within so many limits.
+fn keeps(corners: &Corners, spokes: &[u32], to: &Vec3, onto: Option<u32>, limits: f64) -> bool {
+    let Some(first) = spokes.first() else { return true };
+    let vertex = &corners.vertices[corners.from(*first) as usize];
+    let folded = |e: &u32| {
+        let (normal, _) = shape(&corners.positions(e / 3));
+        normal.dot(&vertex.normal) < FOLDED * normal.norm()
+    };
+    if spokes.iter().any(folded) {
+        return true;
+    }
+    let allowed = (limits * vertex.limit_mm).powi(2);
+    spokes.iter().filter(|&&e| onto.is_none_or(|v| !corners.triangles[e as usize / 3].contains(&v))).any(
+        |&e| {
+            let mut after = corners.positions(e / 3);
+            after[e as usize % 3] = *to;
+            square_to(&vertex.at, &after) <= allowed
+        },
+    )
 }
 
 fn collapse(corners: &mut Corners) {
@@ -251,7 +278,7 @@ fn try_collapse(corners: &mut Corners, e: u32, work: &mut Work) -> bool {
                 longest = longest.max(ratio);
             }
         }
-        Some(longest)
+        keeps(corners, &work.spokes[gone], &to, Some(ends[1 - gone]), LEFT.0).then_some(longest)
     };
     let gone = match (longest(0), longest(1)) {
         (Some(a), Some(b)) => usize::from(b < a),

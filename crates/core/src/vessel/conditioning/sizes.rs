@@ -4,13 +4,14 @@
 //! Shapira et al., *The Visual Computer* 24, 2008, with one ray), medianed over neighbours. Edges are to be
 //!
 //! ```text
-//! h = min(R / 3.5,  0.6 / κ,  √(2.4 R d))       not shorter than 0.6 t
+//! h = min(R / 3.5,  0.6 / κ,  √(2.4 R d))       not shorter than max(0.6 t, R / 7)
 //! ```
 //!
 //! with the curvature κ of the conditioned surface so far, the limit t = min(deviation, R/20) and, at a septum of thickness d, a sag
 //! h²/8R below 0.3 d. A kink of angle θ can be rounded within t by an arc of radius 8t/θ² and length 8t/θ; with κ = θ²/8t the
-//! formula gives edges of 4.8 t/θ² there, which for the sharpest kink of all, θ = π, is the floor or less. κ is measured on the
-//! surface as it comes out, not on the triangles given, so that kinks of a coarse mesh that vanish within the limit cost nothing.
+//! formula gives edges of 4.8 t/θ² there, which for the sharpest kink of all, θ = π, is the floor or less; in wide vessels R/7 ends
+//! this sooner. κ is measured on the surface as it comes out, not on the triangles given, so that kinks of a coarse mesh that vanish
+//! within the limit cost nothing.
 //! Neighbouring lengths differ by at most 0.35 of their distance.
 
 use std::cmp::Reverse;
@@ -24,12 +25,14 @@ use crate::Vec3;
 const EDGE_PER_RADIUS: f64 = 1.0 / 3.5;
 /// Largest angle between the normals at the ends of an edge, radians, that is aimed at.
 const TURN: f64 = 0.6;
-/// Shortest edge over the limit: the sharpest kink needs no shorter ones.
+/// Shortest edge over the limit: the sharpest kink needs no shorter ones; …
 const FLOOR: f64 = 0.6;
+/// … and over the local radius: the smooth wall rounds a kink over an edge or two by itself, and kinks of a coarse mesh are long.
+const FLOOR_PER_RADIUS: f64 = 1.0 / 7.0;
 /// Where the surfaces are farther apart than the limit, edges are made so much shorter, …
 const SHORTER: f64 = 0.65;
-/// … down to this part of the limit.
-const SHORTEST: f64 = 1.5;
+/// … down to this part of the local radius.
+const SHORTEST: f64 = 1.0 / 11.0;
 /// The limit over the local radius, at most.
 const LIMIT_PER_RADIUS: f64 = 0.05;
 /// The limit over the thickness of a septum, at most: two sheets that both move leave a third of it.
@@ -71,7 +74,7 @@ pub(super) fn set(corners: &mut Corners, reference: &Reference, curvature: &[f64
         let length = round
             .min(TURN / bend.max(f64::MIN_POSITIVE))
             .min((2.4 * radius * thick).sqrt().max(TOUCHING.1 * round))
-            .max(FLOOR * limit);
+            .max((FLOOR * limit).max(FLOOR_PER_RADIUS * radius));
         vertex.target_mm = length;
     }
     grade(corners);
@@ -92,7 +95,7 @@ fn raise(corners: &mut Corners, most_triangles: usize) -> bool {
 pub(super) fn shorten(corners: &mut Corners, at: &[u32], wanted: Wanted) -> bool {
     for &v in at {
         let vertex = &mut corners.vertices[v as usize];
-        let floor = SHORTEST * wanted.deviation_mm.min(LIMIT_PER_RADIUS * vertex.radius_mm);
+        let floor = SHORTEST * vertex.radius_mm;
         vertex.target_mm = vertex.target_mm.min((SHORTER * vertex.target_mm).max(floor));
     }
     grade(corners);

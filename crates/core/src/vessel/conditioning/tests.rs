@@ -64,18 +64,21 @@ fn uneven_tube(seed: u64) -> SurfaceMesh {
     tube(&uneven(20.0, 60, seed), &angles)
 }
 
-/// Largest distance from `x` of sample points to the true tube.
+/// Largest distance of vertices and centres of triangles from the true tube.
 fn off_tube(mesh: &SurfaceMesh) -> f64 {
-    mesh.vertices_mm.iter().map(|v| (v.x.hypot(v.y) - 2.0).abs()).fold(0.0, f64::max)
+    let off = |v: &Vec3| (v.x.hypot(v.y) - 2.0).abs();
+    let centre = |i: usize| mesh.corners(i).iter().sum::<Vec3>() / 3.0;
+    let centres = (0..mesh.triangles.len()).map(|i| off(&centre(i)));
+    mesh.vertices_mm.iter().map(off).chain(centres).fold(0.0, f64::max)
 }
 
 #[test]
 fn generated_walls_are_returned_bit_for_bit() {
     for (name, edges) in [
-        ("straight_tube", vec![0.5, 1.0, 1.25, 2.0, 3.0]),
-        ("curved_tube", vec![0.8, 1.2, 2.4]),
-        ("aortic_arch", vec![2.25, 3.0, 4.0]),
-        ("hepatic", vec![1.1, 2.0]),
+        ("straight_tube", vec![0.8, 1.25, 3.0]),
+        ("curved_tube", vec![1.2, 2.4]),
+        ("aortic_arch", vec![2.25, 4.0]),
+        ("hepatic", vec![1.1]),
     ] {
         let tree = anatomy::tree(name).unwrap();
         for edge_mm in edges {
@@ -119,6 +122,17 @@ fn an_uneven_tube_comes_back_even_and_within_the_limit() {
 }
 
 #[test]
+fn meshings_of_one_tube_come_out_within_the_limit_of_each_other() {
+    let mut angles = even(TAU, 31);
+    angles.pop();
+    // Facets five times as long as wide, and steps over three decades: both are half the limit from the tube at most.
+    for mesh in [tube(&even(20.0, 10), &angles), uneven_tube(7)] {
+        let found = conditioned(&mesh);
+        assert!(found.changed && off_tube(&found.mesh) < 0.05, "{}", off_tube(&found.mesh));
+    }
+}
+
+#[test]
 fn openings_and_topology_are_kept() {
     let mesh = uneven_tube(2);
     let (before, after) = (check(&mesh).unwrap(), check(&conditioned(&mesh).mesh).unwrap());
@@ -135,7 +149,7 @@ fn the_same_surface_gives_the_same_mesh() {
 
 #[test]
 fn soups_do_not_panic() {
-    for seed in 0..40 {
+    for seed in 0..8 {
         let mut numbers = Numbers(seed);
         let points = 4 + (40.0 * numbers.next()) as usize;
         let mut mesh = SurfaceMesh::default();
@@ -145,7 +159,7 @@ fn soups_do_not_panic() {
         for _ in 0..3 * points {
             mesh.triangles.push([0; 3].map(|_: u32| (points as f64 * numbers.next()) as u32));
         }
-        let options = Conditioning { most_triangles: 5000, ..Conditioning::default() };
+        let options = Conditioning { most_triangles: 2000, ..Conditioning::default() };
         let found = condition(&mesh, &options).unwrap();
         assert!(found.mesh.vertices_mm.iter().all(|v| v.iter().all(|c| c.is_finite())));
         assert!(found.mesh.triangles.iter().flatten().all(|&v| (v as usize) < found.mesh.vertices_mm.len()));
