@@ -95,8 +95,7 @@ const OPENINGS_LISTED: usize = 20;
 fn text(document: &Document) -> String {
     let r = &document.report;
     let size: Vec<String> = (0..3).map(|k| format!("{:.1}", r.high_mm[k] - r.low_mm[k])).collect();
-    let verdict =
-        if document.sound { "sound" } else { "faulty: it is repaired on loading as far as possible" };
+    let verdict = if document.sound { "sound" } else { "faulty: it is repaired on loading, as told below" };
     let mut lines = vec![
         format!("{}: {verdict}", document.file),
         format!("  triangles            {}", r.triangles),

@@ -290,3 +290,25 @@ pub fn script_commands(script: &[ScriptLine], device: &Device) -> Result<Vec<Com
     }
     Ok(list)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::methods::kirchhoff::KirchhoffOptions;
+
+    #[test]
+    fn turns_without_meaning_and_elements_without_number_are_refused() {
+        let told = |rad: f64| check_command(Command::rotate(rad), 0.0, 100.0).unwrap_err().to_string();
+        for rad in [1e308, -1e5, f64::MAX] {
+            assert!(told(rad).contains("more than 1000 turns"), "{}", told(rad));
+        }
+        assert!(told(f64::NAN).contains("finite"));
+        assert!(check_command(Command::rotate(-6000.0), 0.0, 100.0).is_ok());
+        let wire = Device::uniform(9000.0, 0.4, 10.0).unwrap();
+        let method = |element_mm| {
+            MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..KirchhoffOptions::default() })
+        };
+        assert!(check_elements(&wire, &method(1e-3)).unwrap_err().to_string().contains("gigabytes"));
+        assert!(check_elements(&wire, &method(0.5)).is_ok());
+    }
+}

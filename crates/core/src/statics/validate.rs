@@ -4,8 +4,8 @@ use super::case::{EndKind, LoadKind, Section, StartKind, StaticCase};
 use crate::{Error, Result, Vec3};
 use std::fmt::Display;
 
-/// Most elements a case may ask for: far beyond use, far below what exhausts memory.
-const MAX_ELEMENTS: usize = 1_000_000;
+/// Most elements a case may ask for: far beyond use, and about a gigabyte of memory with twist.
+const MAX_ELEMENTS: usize = 200_000;
 
 /// Tolerances that mean something: below, there is rounding alone; above, a shape that is no equilibrium would pass for one.
 const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-2;
@@ -69,7 +69,7 @@ impl StaticCase {
             return Err(Error::parameter(
                 "rod.elements",
                 self.rod.elements,
-                format!("must be 1 to {MAX_ELEMENTS}"),
+                format!("must be 1 to {MAX_ELEMENTS}: more would take gigabytes"),
             ));
         }
         self.check_sections()?;

@@ -1,7 +1,7 @@
 //! Which triangles of a surface meet where they should not.
 //!
 //! Triangles are put in the order of a space-filling curve (Morton), and a binary tree of boxes stands over that order: building
-//! it is one sort, and neighbours lie side by side. Nearly all pairs whose boxes meet are neighbours of a smooth surface; two
+//! it is one sort, and neighbours lie side by side. Nearly all pairs whose boxes meet are neighbours of a smooth surface; simple
 //! tests in plain arithmetic, each with a margin far above its rounding, tell most of them apart before exact predicates decide.
 
 use super::intersect::triangles_intersect;
@@ -75,36 +75,33 @@ impl Tree {
         Self { order, boxes, nodes, leaves }
     }
 
-    /// Calls `visit` for the triangles from place `from` on whose bounds meet those of triangle `of`, until it says stop.
-    fn close_to(
-        &self,
-        of: u32,
-        from: usize,
-        stack: &mut Vec<(usize, usize)>,
-        mut visit: impl FnMut(u32) -> bool,
-    ) {
-        let bounds = &self.boxes[of as usize];
+    /// Puts into `close` the leaves from `first` on whose bounds meet those of leaf `of`.
+    fn close_to(&self, of: usize, first: usize, stack: &mut Vec<(usize, usize)>, close: &mut Vec<usize>) {
+        let bounds = &self.nodes[self.leaves + of];
         stack.clear();
-        // Node, and the place behind its last triangle.
-        stack.push((1, self.leaves * LEAF));
+        close.clear();
+        // Node, and the leaf behind its last one.
+        stack.push((1, self.leaves));
         while let Some((node, end)) = stack.pop() {
-            if end <= from || !meet(bounds, &self.nodes[node]) {
+            if end <= first || !meet(bounds, &self.nodes[node]) {
                 continue;
             }
             if node < self.leaves {
                 // The width of a node's span is that of its level.
-                let width = (self.leaves * LEAF) >> node.ilog2();
+                let width = self.leaves >> node.ilog2();
                 stack.push((2 * node + 1, end));
                 stack.push((2 * node, end - width / 2));
-                continue;
-            }
-            for place in (end - LEAF).max(from)..end.min(self.order.len()) {
-                let other = self.order[place];
-                if meet(bounds, &self.boxes[other as usize]) && !visit(other) {
-                    return;
-                }
+            } else {
+                close.push(end - 1);
             }
         }
+    }
+
+    /// The triangles of a leaf, each with its place.
+    fn leaf(&self, leaf: usize) -> impl Iterator<Item = (usize, u32)> {
+        let first = (leaf * LEAF).min(self.order.len());
+        let end = (first + LEAF).min(self.order.len());
+        (first..end).zip(self.order[first..end].iter().copied())
     }
 }
 
@@ -132,30 +129,35 @@ pub(crate) fn crossings(
     let most = TRIES_EACH * solid.len() + TRIES_BEYOND;
     let tree = Tree::new(mesh, solid);
     let mut tried = 0;
-    let mut stack = Vec::new();
-    for (place, &a) in tree.order.iter().enumerate() {
-        let is_marked = |t: u32| marked.is_none_or(|m| m[t as usize]);
-        if !is_marked(a) {
+    let (mut stack, mut close) = (Vec::new(), Vec::new());
+    let is_marked = |t: u32| marked.is_none_or(|m| m[t as usize]);
+    'leaves: for leaf in 0..tree.order.len().div_ceil(LEAF) {
+        if !tree.leaf(leaf).any(|(_, t)| is_marked(t)) {
             continue;
         }
         // Without marks each pair is met from its earlier member. A marked triangle looks at all others.
-        let from = if marked.is_some() { 0 } else { place + 1 };
-        tree.close_to(a, from, &mut stack, |b| {
-            if marked.is_some() && (a == b || (is_marked(b) && b < a)) {
-                return true;
+        tree.close_to(leaf, if marked.is_some() { 0 } else { leaf }, &mut stack, &mut close);
+        for (place, a) in tree.leaf(leaf).filter(|(_, t)| is_marked(*t)) {
+            for (other, b) in close.iter().flat_map(|leaf| tree.leaf(*leaf)) {
+                let again = match marked {
+                    Some(_) => a == b || (is_marked(b) && b < a),
+                    None => other <= place,
+                };
+                if again || !meet(&tree.boxes[a as usize], &tree.boxes[b as usize]) {
+                    continue;
+                }
+                tried += 1;
+                let (first, second) = (mesh.triangles[a as usize], mesh.triangles[b as usize]);
+                if !apart(&mesh.vertices_mm, first, second)
+                    && triangles_intersect(&mesh.vertices_mm, first, second)
+                {
+                    found.pairs.push([a.min(b), a.max(b)]);
+                }
+                if found.pairs.len() >= limit || tried > most {
+                    found.capped = true;
+                    break 'leaves;
+                }
             }
-            tried += 1;
-            let (first, second) = (mesh.triangles[a as usize], mesh.triangles[b as usize]);
-            if !apart(&mesh.vertices_mm, first, second)
-                && triangles_intersect(&mesh.vertices_mm, first, second)
-            {
-                found.pairs.push([a.min(b), a.max(b)]);
-            }
-            found.capped |= found.pairs.len() >= limit || tried > most;
-            !found.capped
-        });
-        if found.capped {
-            break;
         }
     }
     found.pairs.sort_unstable();
@@ -167,28 +169,55 @@ fn apart(vertices: &[Vec3], a: [u32; 3], b: [u32; 3]) -> bool {
     let at = |t: [u32; 3]| t.map(|v| vertices[v as usize]);
     let (pa, pb) = (at(a), at(b));
     let mut shared = (0..3).filter(|&k| b.contains(&a[k]));
-    match (shared.next(), shared.next()) {
-        (None, _) => beside(&pa, &pb) || beside(&pb, &pa),
-        (Some(k), None) => {
+    match (shared.next(), shared.next(), shared.next()) {
+        (None, ..) => beside(&pa, &pb) || beside(&pb, &pa),
+        (Some(k), None, _) => {
             let l = (0..3).find(|&l| b[l] == a[k]).unwrap_or(0);
-            cones_apart(&pa, k, &pb, l)
+            fans_apart(&pa, k, &pb, l) || fans_apart(&pb, l, &pa, k) || cones_apart(&pa, k, &pb, l)
+        }
+        (Some(k), Some(l), None) => {
+            // Neighbours at an angle of more than a right one, seen along their edge, are not folded.
+            let along = pa[l] - pa[k];
+            let free = |t: [u32; 3], other: [u32; 3]| (0..3).find(|&j| !other.contains(&t[j])).unwrap_or(0);
+            let (p, q) = (pa[free(a, b)] - pa[k], pb[free(b, a)] - pa[k]);
+            along.cross(&p).dot(&along.cross(&q)) < 0.0
         }
         _ => false,
     }
 }
 
+/// Whether `direction` times an offset of length `reach` at most is positive beyond its rounding; squared, without roots.
+fn clear(dot: f64, direction: &Vec3, reach_squared: f64) -> bool {
+    dot > 0.0 && dot * dot > MARGIN * MARGIN * direction.norm_squared() * reach_squared
+}
+
 /// Whether all of `b` is beyond the plane of `a` or beyond one of its sides.
 fn beside(a: &[Vec3; 3], b: &[Vec3; 3]) -> bool {
     let normal = (a[1] - a[0]).cross(&(a[2] - a[0]));
+    let offsets = b.map(|p| p - a[0]);
     let size = (a[1] - a[0]).norm_squared().max((a[2] - a[0]).norm_squared());
-    let reach = b.iter().map(|p| (p - a[0]).norm_squared()).fold(size, f64::max).sqrt();
-    let beyond = |direction: &Vec3, from: &Vec3| {
-        let least = MARGIN * direction.norm() * reach;
-        b.iter().all(|p| direction.dot(&(p - from)) > least)
-    };
-    beyond(&normal, &a[0])
-        || beyond(&-normal, &a[0])
-        || (0..3).any(|k| beyond(&(a[(k + 1) % 3] - a[k]).cross(&normal), &a[k]))
+    let reach = offsets.iter().map(Vec3::norm_squared).fold(4.0 * size, f64::max);
+    let heights = offsets.map(|offset| normal.dot(&offset));
+    if heights.iter().all(|h| clear(*h, &normal, reach)) || heights.iter().all(|h| clear(-h, &normal, reach))
+    {
+        return true;
+    }
+    (0..3).any(|k| {
+        let outward = (a[(k + 1) % 3] - a[k]).cross(&normal);
+        b.iter().all(|p| clear(outward.dot(&(p - a[k])), &outward, reach))
+    })
+}
+
+/// Whether triangle `b` lies beyond one of the two sides of `a` that meet in their common corner (`k` of one, `l` of the other), or
+/// on one side of its plane.
+fn fans_apart(a: &[Vec3; 3], k: usize, b: &[Vec3; 3], l: usize) -> bool {
+    let (next, last) = (a[(k + 1) % 3] - a[k], a[(k + 2) % 3] - a[k]);
+    let normal = next.cross(&last);
+    let others = [b[(l + 1) % 3] - b[l], b[(l + 2) % 3] - b[l]];
+    let reach = next.norm_squared().max(last.norm_squared());
+    let reach = others.iter().map(Vec3::norm_squared).fold(reach, f64::max);
+    let beyond = |outward: Vec3| others.iter().all(|o| clear(outward.dot(o), &outward, reach));
+    beyond(next.cross(&normal)) || beyond(normal.cross(&last)) || beyond(normal) || beyond(-normal)
 }
 
 /// Whether the round cones about two triangles that share a corner (`k` of one, `l` of the other) share nothing else.

@@ -244,6 +244,33 @@ fn a_vertex_that_no_triangle_uses_changes_no_tolerance() {
 }
 
 #[test]
+fn a_check_tells_how_wide_the_vessel_is_and_where_two_all_but_touch() {
+    let tube = tube();
+    let report = check(tube.mesh()).unwrap();
+    let lumen = report.survey.lumen.unwrap();
+    assert!((lumen.smallest_mm - 4.0).abs() < 0.2 && (lumen.median_mm - 4.0).abs() < 0.2, "{lumen:?}");
+    assert_eq!((report.survey.septa.thin, report.hints.len()), (0, 0));
+    let start = report.survey.start.unwrap();
+    let position = Vec3::from(start.position_mm);
+    assert!(position.xz().norm() < 0.5 && (0.0..100.0).contains(&position.y), "{start:?}");
+    assert!(start.direction[1].abs() > 0.9 && report.contrast, "{start:?}");
+    // A second tube half a millimetre beside the first, closed at its ends, and in metres.
+    let mut both = tube.closed_mesh();
+    let shift = both.vertices_mm.len() as u32;
+    let second = tube.closed_mesh();
+    both.vertices_mm.extend(second.vertices_mm.iter().map(|v| v + Vec3::new(8.5, 0.0, 0.0)));
+    both.triangles.extend(second.triangles.iter().map(|t| t.map(|v| v + shift)));
+    let report = check(&both).unwrap();
+    let septa = &report.survey.septa;
+    assert!(septa.thin > 20 && (0.45..0.7).contains(&septa.thinnest_mm.unwrap()), "{septa:?}");
+    assert!(Vec3::from(septa.thinnest_at_mm.unwrap()).x - 4.25 < 0.2);
+    assert!(report.hints[0].contains("closed") && report.hints[0].contains("sheath.position_mm"));
+    both.vertices_mm.iter_mut().for_each(|v| *v /= 1000.0);
+    assert!(check(&both).unwrap().hints[0].contains("unit_mm = 1000"));
+    assert!(check_with(&both, 1.0, f64::NAN).is_err());
+}
+
+#[test]
 fn a_flat_sheet_is_no_vessel() {
     let sheet = SurfaceMesh {
         vertices_mm: [[0., 0.], [9., 0.], [9., 7.], [0., 7.]].map(|[x, y]| Vec3::new(x, y, 3.0)).to_vec(),
