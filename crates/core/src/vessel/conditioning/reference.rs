@@ -16,6 +16,8 @@ use crate::vessel::topology::{EdgeTable, NONE};
 
 /// Longest walk, in triangles. On the densest meshes a step of one wanted edge crosses some hundred.
 const WALK: usize = 4000;
+/// Cosine between a chord and the normal where it ends, at least; where it is less the chord says nothing.
+const ACROSS: f64 = 0.6;
 /// A corner normal that leans away from its triangle by more than this (41°) is of a crease or of noise.
 const LEANING: f64 = 0.75;
 
@@ -143,8 +145,12 @@ impl<'a> Reference<'a> {
             let faces = (b - a).cross(&(c - a)).dot(way) * outward > 0.0;
             meets(from, way, [a, b, c]).filter(|distance| faces && *distance > skip_mm)
         };
-        let (_, distance) = self.tree.cast_ray(&ray, reach_mm, hit)?;
-        (distance.is_finite() && distance < reach_mm).then_some(distance)
+        let (triangle, distance) = self.tree.cast_ray(&ray, reach_mm, hit)?;
+        let [a, b, c] = self.mesh.corners(triangle as usize);
+        let normal = (b - a).cross(&(c - a));
+        // Beside a ridge a ray meets its other flank, however wide the lumen is.
+        let across = normal.dot(way) * outward > ACROSS * normal.norm();
+        (across && distance.is_finite() && distance < reach_mm).then_some(distance)
     }
 
     /// Height of a smooth surface above a foot, mm: half the mean of the heights of the corners' tangent planes, which on a sphere
