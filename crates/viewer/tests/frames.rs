@@ -134,8 +134,10 @@ fn the_wall_hides_nothing_and_covers_what_is_behind_it() {
 }
 
 #[test]
-fn walls_without_an_inside_are_refused() {
-    let spec = spec(Backend::Cpu, 32, 1.0);
+fn walls_without_an_inside_are_refused_where_contrast_medium_is_in_them() {
+    let plain = spec(Backend::Cpu, 32, 1.0);
+    let mut spec = plain.clone();
+    spec.xray.contrast_fraction = 0.5;
     let good = sphere(5.0, 8, Vec3::zeros());
     let mut open = good.clone();
     open.triangles.pop();
@@ -147,6 +149,9 @@ fn walls_without_an_inside_are_refused() {
     poisoned.vertices_mm[3].y = f64::NAN;
     let three_d = ViewSpec { views: vec![View::ThreeD], ..spec.clone() };
     assert!(Renderer::new(&three_d, &open).is_ok(), "the 3D view needs no inside");
+    for mesh in [&open, &flipped, &inverted(&good)] {
+        assert!(Renderer::new(&plain, mesh).is_ok(), "without contrast medium nothing shows the inside");
+    }
     for (mesh, word) in [
         (open, "open"),
         (flipped, "wound"),
