@@ -34,11 +34,11 @@ use remesh::Remesher;
 use sizes::Wanted;
 
 /// Rounds of sizes, triangles and fairing; in each, edges are fitted to what the last one left.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 2;
 /// Rounds of remeshing in the first of these and in later ones.
 const REMESHINGS: (usize, usize) = (3, 1);
 /// Iterations of fairing in the last round and in the others.
-const ITERATIONS: (usize, usize) = (80, 25);
+const ITERATIONS: (usize, usize) = (40, 15);
 /// How often edges are made shorter where the surfaces are farther apart than the limit.
 const CORRECTIONS: usize = 1;
 

@@ -22,17 +22,17 @@ use super::reference::Reference;
 use crate::Vec3;
 
 /// Edges over the local radius: 22 around a tube, as many as the smooth wall needs to be as good as round.
-const EDGE_PER_RADIUS: f64 = 1.0 / 3.5;
+const EDGE_PER_RADIUS: f64 = 1.0 / 2.2;
 /// Largest angle between the normals at the ends of an edge, radians, that is aimed at.
-const TURN: f64 = 0.6;
+const TURN: f64 = 1.0;
 /// Shortest edge over the limit: the sharpest kink needs no shorter ones; …
 const FLOOR: f64 = 0.6;
 /// … and over the local radius: the smooth wall rounds a kink over an edge or two by itself, and kinks of a coarse mesh are long.
-const FLOOR_PER_RADIUS: f64 = 1.0 / 7.0;
+const FLOOR_PER_RADIUS: f64 = 1.0 / 3.5;
 /// Where the surfaces are farther apart than the limit, edges are made so much shorter, …
 const SHORTER: f64 = 0.65;
 /// … down to this part of the local radius.
-const SHORTEST: f64 = 1.0 / 11.0;
+const SHORTEST: f64 = 1.0 / 5.0;
 /// The limit over the local radius, at most.
 const LIMIT_PER_RADIUS: f64 = 0.05;
 /// The limit over the thickness of a septum, at most: two sheets that both move leave a third of it.
@@ -48,7 +48,7 @@ const RAYS: usize = 20_000;
 /// What a ray meets within this part of the whole surface's size is what it starts from.
 const SKIP: f64 = 1e-5;
 /// Least radius over the median of all: a smaller chord is that of a fold.
-const LEAST_RADIUS: f64 = 0.1;
+const LEAST_RADIUS: f64 = 0.3;
 /// Triangles of edge h cover √3/4 h² each.
 const COVER: f64 = 0.433;
 
