@@ -86,8 +86,6 @@ const NOTED: usize = 32;
 #[derive(Debug, Clone, Copy)]
 struct Behind {
     facing: Vec3,
-    /// About where it is, mm: less than 0.
-    height_mm: f64,
 }
 
 /// Least cosine between the normals of vertices of one sheet.
@@ -230,7 +228,7 @@ impl SmoothWall {
         let corners = || list.iter().take(3).map(|v| &self.quadrics[*v as usize]);
         let facing = corners().map(|q| q.normal).sum::<Vec3>().normalize();
         let height_mm = corners().map(|q| q.normal.dot(&(x - q.position))).fold(f64::INFINITY, f64::min);
-        if height_mm < 0.0 { self.reach_from(x, list, Some(Behind { facing, height_mm })) } else { found }
+        if height_mm < 0.0 { self.reach_from(x, list, Some(Behind { facing })) } else { found }
     }
 
     /// The same in front of the surface, or behind it.
@@ -243,7 +241,7 @@ impl SmoothWall {
             }
             let Some(local) = q.local(x, behind.is_some()) else { continue };
             let g = 1.0 - local.u;
-            let w = g * g * g * q.opened(local.value, behind.map(|b| b.height_mm))[0];
+            let w = g * g * g * q.opened(local.value, behind.is_some())[0];
             if w == 0.0 {
                 continue;
             }
@@ -306,7 +304,7 @@ impl SmoothWall {
             }
             let Some(local) = q.local(x, reached.behind.is_some()) else { continue };
             let (f, g) = (local.value, 1.0 - local.u);
-            let [b, b1, b2] = q.opened(f, reached.behind.map(|b| b.height_mm));
+            let [b, b1, b2] = q.opened(f, reached.behind.is_some());
             if b == 0.0 {
                 continue;
             }

@@ -45,6 +45,9 @@ const CENTRE: f64 = 1.05;
 /// … and is closed at this many times that height.
 const BEYOND_CENTRE: f64 = 1.15;
 
+/// Z: what is behind the surface counts by at most e^Z.
+const BOUND: f64 = 8.0;
+
 /// A window and its derivatives: 1 up to `from`, 0 from `to` on, in between 1 − t³(10 − 15t + 6t²).
 #[inline]
 fn fall(at: f64, from: f64, to: f64) -> [f64; 3] {
@@ -170,14 +173,16 @@ impl Quadric {
         self.farthest_mm = long * (1.0 - (highest * l.min(0.0)).min(lowest * k.max(0.0)));
     }
 
-    /// b(Q) and its derivatives; behind the surface, at about `height_mm`, without an end, and over what it is there: a factor that
-    /// all weights have.
+    /// b(Q) and its derivatives; behind the surface without an end, and bounded: e^{−Z tanh(z/Z)} with z = Q/0.3w.
     #[inline]
-    pub(super) fn opened(&self, value: f64, height_mm: Option<f64>) -> [f64; 3] {
-        let Some(height_mm) = height_mm else { return self.window(value) };
+    pub(super) fn opened(&self, value: f64, behind: bool) -> [f64; 3] {
+        if !behind {
+            return self.window(value);
+        }
         let rate = BELOW.0 / (NEARER * self.below_mm.0);
-        let e = (-rate * (value - height_mm)).exp();
-        [e, -rate * e, rate * rate * e]
+        let t = (rate * value / BOUND).tanh();
+        let (e, slope) = ((-BOUND * t).exp(), rate * (1.0 - t * t));
+        [e, -slope * e, (slope * slope + 2.0 * rate * slope * t / BOUND) * e]
     }
 
     #[inline]

@@ -102,6 +102,15 @@ impl<const C: usize> Kirchhoff<C> {
                 &mut next.state,
                 &options,
             );
+            if std::env::var("DBG").is_ok() { eprintln!("   ins {inserted_mm:.3} q {quality:?} held {held} soft {softness:.1e} it {} conv {} {} res {:.1e} fr {:?}", found.iterations, found.converged, found.reason, found.residual, self.newton.steps.iter().rev().take(4).map(|s| (s.fraction, s.shift, s.residual)).collect::<Vec<_>>()); }
+            if std::env::var("DBG2").is_ok() && !found.converged && found.iterations > 100 {
+                let (_, step) = self.newton.full_step(&next.mesh.elements, &supports).unwrap();
+                for a in [1e-9, 1e-7, 1e-5] {
+                let mut to = next.state.clone();
+                to.advance::<C>(&next.mesh.elements, &next.state, step, a);
+                eprintln!("   alpha {a}");
+                contact.dbg(&next.mesh.elements, &next.state, &to); }
+            }
             iterations += found.iterations;
             *budget -= found.iterations;
             if !found.converged && hurried {
