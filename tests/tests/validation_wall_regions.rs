@@ -138,7 +138,8 @@ fn end(properties: WallProperties) -> (Vec3, f64, StepReport) {
 
 #[test]
 fn a_region_that_holds_the_vessel_is_the_wall() {
-    let (tip, push, _) = end(WallProperties { modulus_n_per_mm2: 5.0, friction: 0.1, ..WallProperties::default() });
+    let (tip, push, _) =
+        end(WallProperties { modulus_n_per_mm2: 5.0, friction: 0.1, ..WallProperties::default() });
     let everywhere = |modulus: f64, friction: f64| WallProperties {
         region: vec![WallRegion {
             radius_mm: 1e4,

@@ -161,7 +161,8 @@ impl SmoothWall {
             }
         }
         starts.push(lists.len() as u32);
-        let mut smooth = Self { quadrics, triangles, starts, lists, insets_mm: Vec::new(), deepest_inset_mm: 0.0 };
+        let mut smooth =
+            Self { quadrics, triangles, starts, lists, insets_mm: Vec::new(), deepest_inset_mm: 0.0 };
         smooth.measure_insets(mesh);
         smooth
     }

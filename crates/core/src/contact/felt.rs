@@ -67,6 +67,12 @@ impl FeltWall {
         })
     }
 
+    /// Distance of `x` from the piece of wall that is next to it seen from `triangle`, mm: negative behind that piece, whatever wall is
+    /// nearest.
+    pub(super) fn distance_from(&self, triangle: u32, x: &Vec3) -> f64 {
+        self.nearness(x, self.smooth.walk(triangle, x), f64::NEG_INFINITY).value_mm()
+    }
+
     /// The wall's modulus at `x`, whose nearest triangle is `triangle` or close to it; `softness` is the part of the stiffest
     /// that acts.
     pub(super) fn stiffness(&self, x: &Vec3, triangle: Option<u32>, softness: f64) -> Stiffness {

@@ -240,7 +240,11 @@ mod tests {
         for (soft, stiff) in [(1.0, 3.0), (1e-3, 1e4), (1e4, 1e-3)] {
             for radius_mm in [0.5, 3.5] {
                 let regions = vec![region(50.0, Some(stiff), None)];
-                let wall = tube(&WallProperties { modulus_n_per_mm2: soft, region: regions, ..WallProperties::default() });
+                let wall = tube(&WallProperties {
+                    modulus_n_per_mm2: soft,
+                    region: regions,
+                    ..WallProperties::default()
+                });
                 let potential = WallPotential { modulus_n_per_mm2: soft, radius_mm };
                 for softness in [1.0, 0.1] {
                     for x in points() {
@@ -296,7 +300,12 @@ mod tests {
     #[test]
     fn moduli_are_those_of_the_last_region_and_rise_evenly_in_decades() {
         let regions = vec![region(50.0, Some(1e4), Some(0.2)), region(54.0, Some(10.0), None)];
-        let properties = WallProperties { modulus_n_per_mm2: 1e-2, friction: 0.1, region: regions, ..WallProperties::default() };
+        let properties = WallProperties {
+            modulus_n_per_mm2: 1e-2,
+            friction: 0.1,
+            region: regions,
+            ..WallProperties::default()
+        };
         let wall = tube(&properties);
         let at = |x: f64, z: f64| {
             let place = Vec3::new(x, 0.0, z);

@@ -297,23 +297,6 @@ impl<'a> WallContact<'a> {
         if sum_n > 0.0 { misfit_n / sum_n } else { 0.0 }
     }
 
-    #[doc(hidden)]
-    pub fn dbg(&mut self, elements: &[ElementData], state: &RodState, to: &RodState) {
-        for index in 0..self.points.len() {
-            let x = self.points[index].position(elements, state);
-            let y = self.points[index].position(elements, to);
-            let a = self.read(index, &x);
-            let (ka, sa) = (self.memory.points[index].triangle, self.memory.points[index].side);
-            let b = self.read(index, &y);
-            let kb = self.memory.points[index].triangle;
-            if let Reading::Pressed(d) = a {
-                let pred = d.gradient.dot(&(y - x));
-                let diff = b.distance_mm() - d.value_mm;
-                eprintln!("      {index} f {:.5} |g| {:.3} |H| {:.2e} move {:.2e} pred {pred:.3e} got {diff:.3e} tri {ka:?}->{kb:?} side {sa:?} at {:.3?} {}", d.value_mm, d.gradient.norm(), d.hessian.norm(), (y - x).norm(), x.as_slice(), if (pred-diff).abs() > 0.1 * pred.abs() + 1e-12 { "<<<<" } else { "" });
-            }
-        }
-    }
-
     /// Whether the device has passed through the wall to where it is: followed from the sheath, a piece of it between two points in
     /// the lumen meets the wall. Of a point that has sunk in the side is known.
     pub fn passes_through(&mut self, elements: &[ElementData], state: &RodState) -> bool {
@@ -331,10 +314,7 @@ impl<'a> WallContact<'a> {
                 self.counters.queries += 1;
                 // A flat triangle may stand into the smooth lumen: what has gone through is behind the piece of wall that is next to it.
                 let beside = self.memory.points[index + 1].triangle;
-                let behind = |triangle| {
-                    let triangle = self.felt.smooth.walk(triangle, &x);
-                    self.felt.nearness(&x, triangle, f64::NEG_INFINITY).value_mm() < 0.0
-                };
+                let behind = |triangle| self.felt.distance_from(triangle, &x) < 0.0;
                 if self.felt.query.crossing(&from, &x, 1.0).is_some() && beside.is_none_or(behind) {
                     return true;
                 }
@@ -457,8 +437,13 @@ impl<const C: usize> External<C> for WallContact<'_> {
                 continue;
             }
             self.counters.queries += 1;
-            if let Some(met) = self.felt.query.crossing(&known.base, &x, fraction / SAFE) {
-                fraction = SAFE * met;
+            let Some(met) = self.felt.query.crossing(&known.base, &x, fraction / SAFE) else { continue };
+            // Near the wall flat triangles may stand into the smooth lumen, and what it says counts.
+            let from_mm = known.base_clearance_mm;
+            match known.triangle.map(|triangle| self.felt.distance_from(triangle, &x)) {
+                Some(to_mm) if to_mm > 0.0 => {}
+                Some(to_mm) => fraction = fraction.min(SAFE * from_mm / (from_mm - to_mm)),
+                None => fraction = SAFE * met,
             }
         }
         fraction

@@ -76,7 +76,8 @@ impl<const C: usize> Kirchhoff<C> {
         contact.keep_forces();
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let near = quality != Quality::Beyond;
-        let held = near && self.guess.hold(&mut self.newton, &mut contact, &supports, &next.mesh, &mut next.state);
+        let held =
+            near && self.guess.hold(&mut self.newton, &mut contact, &supports, &next.mesh, &mut next.state);
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
         let data = &next.mesh.elements[elements - 1];
         let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
@@ -102,15 +103,6 @@ impl<const C: usize> Kirchhoff<C> {
                 &mut next.state,
                 &options,
             );
-            if std::env::var("DBG").is_ok() { eprintln!("   ins {inserted_mm:.3} q {quality:?} held {held} soft {softness:.1e} it {} conv {} {} res {:.1e} fr {:?}", found.iterations, found.converged, found.reason, found.residual, self.newton.steps.iter().rev().take(4).map(|s| (s.fraction, s.shift, s.residual)).collect::<Vec<_>>()); }
-            if std::env::var("DBG2").is_ok() && !found.converged && found.iterations > 100 {
-                let (_, step) = self.newton.full_step(&next.mesh.elements, &supports).unwrap();
-                for a in [1e-9, 1e-7, 1e-5] {
-                let mut to = next.state.clone();
-                to.advance::<C>(&next.mesh.elements, &next.state, step, a);
-                eprintln!("   alpha {a}");
-                contact.dbg(&next.mesh.elements, &next.state, &to); }
-            }
             iterations += found.iterations;
             *budget -= found.iterations;
             if !found.converged && hurried {
