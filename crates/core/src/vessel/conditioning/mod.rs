@@ -20,6 +20,7 @@ mod fairing;
 mod reference;
 mod remesh;
 mod sizes;
+mod spikes;
 #[cfg(test)]
 mod tests;
 
@@ -143,11 +144,10 @@ pub fn condition(surface: &SurfaceMesh, options: &Conditioning) -> Result<Condit
         at = faired(&mut corners, &reference, round + 1 == ROUNDS);
         curvature = fairing::curvature(&corners, &at);
     }
-    let mut deviation = Deviation::default();
-    for correction in 0..=CORRECTIONS {
+    for _ in 0..CORRECTIONS {
         let mut far = Vec::new();
-        deviation = deviation::measure(&corners, &at, &reference, |v| far.push(v));
-        if far.is_empty() || too_many || correction == CORRECTIONS {
+        deviation::measure(&corners, &at, &reference, |v| far.push(v));
+        if far.is_empty() || too_many {
             break;
         }
         far.sort_unstable();
@@ -156,6 +156,10 @@ pub fn condition(surface: &SurfaceMesh, options: &Conditioning) -> Result<Condit
         remesher.run(&mut corners, 1);
         at = faired(&mut corners, &reference, true);
     }
+    corners.vertices.iter_mut().zip(&at).for_each(|(vertex, at)| vertex.at = *at);
+    spikes::cut(&mut corners);
+    let at: Vec<Vec3> = corners.vertices.iter().map(|v| v.at).collect();
+    let deviation = deviation::measure(&corners, &at, &reference, |_| ());
     let even = Evenness::of(&corners, |v| at[v as usize]);
     let mesh = corners.surface(|v| at[v as usize]);
     Ok(Conditioned::new(mesh, true, deviation, even, too_many))
