@@ -12,8 +12,8 @@ use crate::vessel::topology::NONE;
 
 /// Angle by which the surface may bend back from the lumen, radians: 95°.
 const SHARP: f64 = 1.66;
-/// Angle of a fold, whichever way it bends, radians: 150°.
-const FOLD: f64 = 2.6;
+/// Angle of a fold, whichever way it bends, radians: 109°.
+const FOLD: f64 = 1.9;
 /// Least angle of a triangle, radians: 14°.
 const NEEDLE: f64 = 0.24;
 /// Most passes: each takes about half an edge off a blade.
