@@ -36,7 +36,8 @@ fn conditioned(wall: &Wall, properties: &WallProperties) -> Result<Option<Surfac
     if properties.deviation_mm == 0.0 {
         return Ok(None);
     }
-    let options = Conditioning { deviation_mm: properties.deviation_mm, ..Conditioning::default() };
+    let options =
+        Conditioning { deviation_mm: properties.deviation_mm, measured: false, ..Conditioning::default() };
     let conditioned = condition(wall.mesh(), &options)?;
     Ok(conditioned.changed.then_some(conditioned.mesh))
 }

@@ -229,7 +229,9 @@ fn collapse(corners: &mut Corners) {
 pub(super) fn pull_together(corners: &mut Corners, marked: &[bool]) {
     let mut work = Work::default();
     for e in 0..corners.half_edges() {
-        if !corners.leads(e)
+        if !corners.lives(e)
+            || !marked[corners.from(e) as usize]
+            || !corners.leads(e)
             || corners.twin(e) == NONE
             || corners.length_mm(e) >= TOGETHER * corners.target_mm(e)
             || [corners.from(e), corners.to(e)]
@@ -390,7 +392,9 @@ pub(super) fn flip_some(corners: &mut Corners, wanted: fn(&Pair) -> bool, marked
             continue;
         }
         let at = quad.map(|v| corners.at(v));
-        if !wanted(&Pair { at, excess: quad.map(|v| excess[v as usize]) }) || !(marked.is_some() || may_flip(corners, quad, &at)) {
+        if !wanted(&Pair { at, excess: quad.map(|v| excess[v as usize]) })
+            || !(marked.is_some() || may_flip(corners, quad, &at))
+        {
             continue;
         }
         corners.spokes(quad[2], &mut spokes);

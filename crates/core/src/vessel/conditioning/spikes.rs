@@ -24,8 +24,10 @@ const STEP: f64 = 0.5;
 /// Cuts off all that is sharp.
 pub(super) fn cut(corners: &mut Corners) {
     let (mut spokes, mut around) = (Vec::new(), Vec::new());
+    let mut moved = vec![true; corners.vertices.len()];
     for _ in 0..PASSES {
-        let mut moved = sharp(corners);
+        // What was not moved has not got sharp.
+        moved = sharp(corners, &moved);
         if !moved.contains(&true) {
             break;
         }
@@ -45,25 +47,27 @@ pub(super) fn cut(corners: &mut Corners) {
             *at += (mean - *at) * STEP;
         }
         pull_together(corners, &moved);
-        corners.set_normals();
         flip_some(corners, by_angles, Some(&moved));
     }
+    corners.set_normals();
 }
 
-/// Vertices of edges and triangles that no mesh should have.
-fn sharp(corners: &Corners) -> Vec<bool> {
+/// Vertices of edges and triangles that no mesh should have, where at least one end is `among` these.
+fn sharp(corners: &Corners, among: &[bool]) -> Vec<bool> {
     let mut found = vec![false; corners.vertices.len()];
-    for e in (0..corners.half_edges()).filter(|&e| corners.lives(e)) {
+    let (needle_cos, sharp_cos, fold_cos) = (NEEDLE.cos(), SHARP.cos(), FOLD.cos());
+    let moved = |e: &u32| among[corners.from(*e) as usize];
+    for e in (0..corners.half_edges()).filter(|&e| corners.lives(e)).filter(moved) {
         let (a, b, c) = (corners.from(e), corners.to(e), corners.apex(e));
         let (x, y) = (corners.at(b) - corners.at(a), corners.at(c) - corners.at(a));
         let normal = x.cross(&y);
-        let needle = normal.norm().atan2(x.dot(&y)) < NEEDLE;
+        let needle = x.dot(&y) > needle_cos * (x.norm_squared() * y.norm_squared()).sqrt();
         let back = corners.twin(e);
-        let bent = back != NONE && e < back && {
+        let bent = back != NONE && {
             let d = corners.at(corners.apex(back)) - corners.at(a);
             let other = d.cross(&(corners.at(b) - corners.at(a)));
-            let turn = normal.cross(&other).norm().atan2(normal.dot(&other));
-            turn > if d.dot(&normal) < 0.0 { SHARP } else { FOLD }
+            let least = if d.dot(&normal) < 0.0 { sharp_cos } else { fold_cos };
+            normal.dot(&other) < least * (normal.norm_squared() * other.norm_squared()).sqrt()
         };
         if needle || bent {
             [a, b, c].iter().for_each(|&v| found[v as usize] = true);
