@@ -20,6 +20,8 @@ const ROUNDS: usize = 5;
 const HURRIED: usize = 15;
 /// Residual over force scale above which the last resort has found nothing.
 const AT_REST: f64 = 0.05;
+/// Newton iterations after which a solution has gone astray: from another guess, nearer by, it is found in fewer.
+const STUCK: usize = 60;
 /// What is the matter where an equilibrium is on the other side of the wall.
 const PASSED: &str = "the device would pass through the wall";
 /// What is the matter where they do not.
@@ -136,7 +138,8 @@ impl<const C: usize> Kirchhoff<C> {
             }
             contact.softness = softness;
             let options = NewtonOptions {
-                max_iterations: if hurried { HURRIED } else { self.options.max_iterations }.min(*budget),
+                max_iterations: if hurried { HURRIED } else { self.options.max_iterations.min(STUCK) }
+                    .min(*budget),
                 tolerance: if softness < 1.0 { tolerance.max(LOOSE) } else { tolerance },
                 ..NewtonOptions::default()
             };
