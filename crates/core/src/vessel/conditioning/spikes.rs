@@ -61,7 +61,9 @@ fn sharp(corners: &Corners, among: &[bool]) -> Vec<bool> {
         let (a, b, c) = (corners.from(e), corners.to(e), corners.apex(e));
         let (x, y) = (corners.at(b) - corners.at(a), corners.at(c) - corners.at(a));
         let normal = x.cross(&y);
-        let needle = x.dot(&y) > needle_cos * (x.norm_squared() * y.norm_squared()).sqrt();
+        // Rims are as they were, and have short edges.
+        let inner = [a, b, c].iter().all(|&v| corners.kind(v) == Kind::Free);
+        let needle = inner && x.dot(&y) > needle_cos * (x.norm_squared() * y.norm_squared()).sqrt();
         let back = corners.twin(e);
         let bent = back != NONE && {
             let d = corners.at(corners.apex(back)) - corners.at(a);
