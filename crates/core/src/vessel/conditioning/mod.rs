@@ -9,9 +9,10 @@
 //! 3. The mesh is split, collapsed, flipped and evened out on the given surface (`remesh`, `corners`,
 //!    `reference`).
 //! 4. Kinks and noise are faired within the limit (`fairing`); where that leaves curvature, steps 2 to 4 follow with shorter edges.
-//! 5. The distance of the two surfaces is measured both ways (`deviation`).
+//! 5. Blades, spikes and folds that no even mesh can hold are cut off (`spikes`), beyond the limit if need be.
+//! 6. The distance of the two surfaces is measured both ways (`deviation`), if that is wanted.
 //!
-//! Openings stay open, nothing is welded or cut, and what is not a manifold stays where it is.
+//! Openings stay open, nothing is welded, and what is not a manifold stays where it is.
 
 mod corners;
 mod deviation;
