@@ -216,12 +216,28 @@ pub(crate) enum VesselCommand {
         /// Count septa between lumens that are thinner than so many mm
         #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
         septum_mm: f64,
+        #[command(flatten)]
+        felt: FeltArgs,
         /// Print the report as one JSON document on stdout
         #[arg(long)]
         json: bool,
     },
     /// Build a wall from a centre-line tree
     Generate(GenerateArgs),
+}
+
+/// What is wanted of the wall that devices feel; with none of these it is not made.
+#[derive(Debug, Default, clap::Args)]
+pub(crate) struct FeltArgs {
+    /// Write the evenly meshed wall that devices feel (.ply, .obj or .stl) and report on it
+    #[arg(long, value_name = "FILE")]
+    pub(crate) felt: Option<PathBuf>,
+    /// How far that wall may be from the surface, mm, as vessel.wall.deviation_mm of a scene; 0.1 if absent
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) deviation_mm: Option<f64>,
+    /// Draw that wall (PNG): red where it is inside the surface by that distance, blue where it is outside
+    #[arg(long, value_name = "FILE")]
+    pub(crate) picture: Option<PathBuf>,
 }
 
 #[derive(Debug, clap::Args)]

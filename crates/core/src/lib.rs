@@ -16,6 +16,7 @@ pub mod file;
 pub mod input;
 pub mod insertion;
 pub mod methods;
+mod parallel;
 pub mod reference;
 pub mod rod;
 pub mod scene;

@@ -2,6 +2,7 @@
 
 pub(crate) mod compare;
 pub(crate) mod experiment;
+mod felt;
 mod fluoro;
 mod render;
 mod rod;
@@ -21,8 +22,8 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Fluoro(args) => fluoro::fluoro(args),
         Command::Rod(args) => rod::rod(args),
         Command::Verify(args) => verify::verify(args),
-        Command::Vessel(VesselCommand::Check { file, unit_mm, septum_mm, json }) => {
-            vessel::check_file(file, *unit_mm, *septum_mm, *json)
+        Command::Vessel(VesselCommand::Check { file, unit_mm, septum_mm, felt, json }) => {
+            vessel::check_file(file, *unit_mm, *septum_mm, felt, *json)
         }
         Command::Vessel(VesselCommand::Generate(args)) => vessel::generate(args),
         Command::Compare(args) => compare::compare(args),

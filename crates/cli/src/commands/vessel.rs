@@ -8,7 +8,8 @@ use endowire_core::vessel::{
 };
 use serde::Serialize;
 
-use crate::args::GenerateArgs;
+use super::felt::FeltReport;
+use crate::args::{FeltArgs, GenerateArgs};
 use crate::failure::Failure;
 use crate::output::answer;
 use crate::output::provenance::{Provenance, read_input};
@@ -21,12 +22,20 @@ struct Document {
     sound: bool,
     #[serde(flatten)]
     report: CheckReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    felt: Option<FeltReport>,
 }
 
 /// Reports on a surface file.
-pub(crate) fn check_file(file: &Path, unit_mm: f64, septum_mm: f64, json: bool) -> Result<(), Failure> {
+pub(crate) fn check_file(
+    file: &Path,
+    unit_mm: f64,
+    septum_mm: f64,
+    felt: &FeltArgs,
+    json: bool,
+) -> Result<(), Failure> {
     let provenance = Provenance::new(&[&read_input(file)?], 0);
-    report_on(file, unit_mm, septum_mm, provenance, json)
+    report_on(file, unit_mm, septum_mm, felt, provenance, json)
 }
 
 /// Builds a wall from a tree, writes it, and reports on what was written.
@@ -46,7 +55,7 @@ pub(crate) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     };
     let generated = GeneratedWall::new(&tree, resolution).map_err(|e| as_flag(e).at(args.tree.display()))?;
     generated.wall.mesh().write(&args.out)?;
-    report_on(&args.out, 1.0, 1.0, provenance, args.json)
+    report_on(&args.out, 1.0, 1.0, &FeltArgs::default(), provenance, args.json)
 }
 
 /// Calls what the core calls by its field by the flag of the command line.
@@ -73,6 +82,7 @@ fn report_on(
     file: &Path,
     unit_mm: f64,
     septum_mm: f64,
+    felt: &FeltArgs,
     provenance: Provenance,
     json: bool,
 ) -> Result<(), Failure> {
@@ -83,8 +93,9 @@ fn report_on(
         }
         other => Failure::from(other).at(file.display()),
     })?;
+    let felt = FeltReport::new(&surface, felt)?;
     let document =
-        Document { provenance, file: file.display().to_string(), sound: report.is_sound(), report };
+        Document { provenance, file: file.display().to_string(), sound: report.is_sound(), report, felt };
     answer(&document, json, || text(&document))
 }
 
@@ -133,6 +144,7 @@ fn text(document: &Document) -> String {
     ]);
     lines.extend(r.intersecting_pairs.iter().map(|[a, b]| format!("    triangles {a} and {b}")));
     lines.extend(simulated(r));
+    lines.extend(document.felt.iter().flat_map(FeltReport::text));
     lines.extend(r.hints.iter().map(|hint| format!("  {hint}")));
     lines.join("\n")
 }

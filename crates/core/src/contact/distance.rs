@@ -29,13 +29,14 @@
 //! ```
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
 use nalgebra::Matrix3;
 
 use super::fit::{fit, vertex_neighbours, vertex_normals};
 use super::quadric::Quadric;
-use crate::Vec3;
 use crate::vessel::{SurfaceMesh, Wall};
+use crate::{Vec3, parallel};
 
 /// Sum of weights below which no vertex reaches a point.
 const LEAST_WEIGHT: f64 = 1e-9;
@@ -124,41 +125,24 @@ impl SmoothWall {
         let count = mesh.vertices_mm.len();
         let neighbours = vertex_neighbours(&mesh.triangles, count);
         let normals = vertex_normals(mesh);
-        let mut quadrics: Vec<Quadric> =
-            (0..count).map(|v| fit(v, &mesh.vertices_mm, &normals, &neighbours)).collect();
-        quadrics.iter_mut().for_each(|q| q.open_window(thickest_mm));
+        let fitted = |v: usize| {
+            let mut quadric = fit(v, &mesh.vertices_mm, &normals, &neighbours);
+            quadric.open_window(thickest_mm);
+            quadric
+        };
+        let quadrics = parallel::map(count, fitted);
 
         let mut triangles = vec![0; count];
         for (index, triangle) in mesh.triangles.iter().enumerate() {
             triangle.iter().for_each(|v| triangles[*v as usize] = index as u32);
         }
-        let mut starts = Vec::with_capacity(mesh.triangles.len() + 1);
-        let mut lists = Vec::new();
-        let mut seen = vec![u32::MAX; count];
-        let mut queue = VecDeque::new();
-        for (index, triangle) in mesh.triangles.iter().enumerate() {
-            starts.push(lists.len() as u32);
-            let corners = mesh.corners(index);
-            let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-            let size = corners.iter().map(|c| (c - centre).norm()).fold(0.0, f64::max);
-            queue.extend(triangle.iter().copied());
-            triangle.iter().for_each(|&v| seen[v as usize] = index as u32);
-            // Over the surface, not through space: the other side of a thin septum is another wall.
-            while let Some(v) = queue.pop_front() {
-                let q = &quadrics[v as usize];
-                let (short, long) = q.half_axes_mm;
-                let reach = long + size + (HEIGHT.0 * thickest_mm).max(HEIGHT.1 * short);
-                if (q.position - centre).norm() > reach {
-                    continue;
-                }
-                lists.push(v);
-                for &w in &neighbours[v as usize] {
-                    if seen[w as usize] != index as u32 {
-                        seen[w as usize] = index as u32;
-                        queue.push_back(w);
-                    }
-                }
-            }
+        let (mut starts, mut lists) = (Vec::with_capacity(mesh.triangles.len() + 1), Vec::new());
+        for (ends, list) in parallel::parts(mesh.triangles.len(), |part| {
+            listed(mesh, &quadrics, &neighbours, part, thickest_mm)
+        }) {
+            let first = lists.len() as u32;
+            starts.extend(ends.into_iter().map(|start| first + start));
+            lists.extend(list);
         }
         starts.push(lists.len() as u32);
         let mut smooth =
@@ -174,7 +158,7 @@ impl SmoothWall {
             let heights = few(&mesh.corners(index)).map(|x| self.reach(&x, list).map_or(0.0, |r| r.value_mm));
             (-heights.into_iter().fold(0.0, f64::min)) as f32
         };
-        self.insets_mm = (0..mesh.triangles.len()).map(inset).collect();
+        self.insets_mm = parallel::map(mesh.triangles.len(), inset);
         self.deepest_inset_mm = self.insets_mm.iter().copied().fold(0.0, f32::max).into();
     }
 
@@ -336,6 +320,44 @@ impl SmoothWall {
             hessian: (hessian - mixed - mixed.transpose()) * inverse,
         }
     }
+}
+
+/// The lists of some triangles one after the other, and where each starts.
+fn listed(
+    mesh: &SurfaceMesh,
+    quadrics: &[Quadric],
+    neighbours: &[Vec<u32>],
+    part: Range<usize>,
+    thickest_mm: f64,
+) -> (Vec<u32>, Vec<u32>) {
+    let (mut starts, mut lists) = (Vec::with_capacity(part.len()), Vec::new());
+    let mut seen = vec![u32::MAX; quadrics.len()];
+    let mut queue = VecDeque::new();
+    for index in part {
+        starts.push(lists.len() as u32);
+        let (triangle, corners) = (mesh.triangles[index], mesh.corners(index));
+        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let size = corners.iter().map(|c| (c - centre).norm()).fold(0.0, f64::max);
+        queue.extend(triangle.iter().copied());
+        triangle.iter().for_each(|&v| seen[v as usize] = index as u32);
+        // Over the surface, not through space: the other side of a thin septum is another wall.
+        while let Some(v) = queue.pop_front() {
+            let q = &quadrics[v as usize];
+            let (short, long) = q.half_axes_mm;
+            let reach = long + size + (HEIGHT.0 * thickest_mm).max(HEIGHT.1 * short);
+            if (q.position - centre).norm() > reach {
+                continue;
+            }
+            lists.push(v);
+            for &w in &neighbours[v as usize] {
+                if seen[w as usize] != index as u32 {
+                    seen[w as usize] = index as u32;
+                    queue.push_back(w);
+                }
+            }
+        }
+    }
+    (starts, lists)
 }
 
 /// The middles of a triangle and its sides.

@@ -9,7 +9,7 @@ use super::wall::{FOLLOW, LOOK_AGAIN};
 use super::{Distance, SmoothWall};
 use crate::device::Device;
 use crate::insertion::WallProperties;
-use crate::vessel::{Conditioning, Wall, WallQuery, condition};
+use crate::vessel::{Conditioning, SurfaceMesh, Wall, WallQuery, condition};
 use crate::{Result, Vec3};
 
 /// A wall prepared for the contact of one device.
@@ -31,6 +31,17 @@ pub struct FeltWall {
 /// tube has all of its triangles at one distance, and a question that reaches them looks at all: asking a little farther is enough.
 const LOOK_MM: f64 = 0.5;
 
+/// The even mesh of `wall`; `None` where it is felt as it is meshed.
+fn conditioned(wall: &Wall, properties: &WallProperties) -> Result<Option<SurfaceMesh>> {
+    if properties.deviation_mm == 0.0 {
+        return Ok(None);
+    }
+    let options =
+        Conditioning { deviation_mm: properties.deviation_mm, measured: false, ..Conditioning::default() };
+    let conditioned = condition(wall.mesh(), &options)?;
+    Ok(conditioned.changed.then_some(conditioned.mesh))
+}
+
 impl FeltWall {
     /// Prepares `wall` for `device`.
     ///
@@ -38,12 +49,9 @@ impl FeltWall {
     /// A wall that has no triangles left to query.
     pub fn new(wall: &Wall, device: &Device, properties: &WallProperties) -> Result<Self> {
         let (thinnest_mm, thickest_mm) = (device.min_radius_mm(), device.max_radius_mm());
-        let options = Conditioning { deviation_mm: properties.deviation_mm, ..Conditioning::default() };
-        let conditioned = condition(wall.mesh(), &options)?;
-        let felt = if conditioned.changed {
-            extended(&Wall::welded(&conditioned.mesh)?, thickest_mm)
-        } else {
-            extended(wall, thickest_mm)
+        let felt = match conditioned(wall, properties)? {
+            Some(mesh) => extended(&Wall::welded(&mesh)?, thickest_mm),
+            None => extended(wall, thickest_mm),
         };
         let felt = Wall::welded(&felt)?;
         let smooth = SmoothWall::new(&felt, thickest_mm);

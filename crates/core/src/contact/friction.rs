@@ -304,6 +304,27 @@ impl Friction {
         change / sum
     }
 
+    /// Normal forces are renewed no more.
+    pub fn hold(&mut self) {
+        self.settled = true;
+    }
+
+    /// Takes the normal forces half of the way to those seen last.
+    pub fn renew(&mut self) {
+        for slider in &mut self.sliders {
+            slider.lagged_n = slider.force_n;
+            slider.force_n += 0.5 * (slider.seen.1 - slider.force_n);
+            if slider.seen.1 > 0.0 {
+                slider.normal = slider.seen.0;
+            }
+        }
+    }
+
+    /// Goes back to the normal forces before [`Friction::renew`].
+    pub fn take_back(&mut self) {
+        self.sliders.iter_mut().for_each(|s| s.force_n = s.lagged_n);
+    }
+
     /// Lets the normal forces be renewed again.
     pub fn unsettle(&mut self) {
         self.settled = false;

@@ -58,7 +58,29 @@ pub struct WallMemory {
     pub(super) aims: Vec<f64>,
 }
 
+/// What the points of a device knew of the wall at some state, to go back to.
+#[derive(Debug, Clone, Default)]
+pub struct KnownPoints(Vec<KnownPoint>);
+
+impl KnownPoints {
+    /// Takes memory for `points` points.
+    pub fn reserve(&mut self, points: usize) {
+        self.0.reserve(points.saturating_sub(self.0.len()));
+    }
+}
+
 impl WallMemory {
+    /// Keeps what is known.
+    pub fn keep(&self, kept: &mut KnownPoints) {
+        kept.0.clone_from(&self.points);
+    }
+
+    /// Goes back to what was known.
+    pub fn restore(&mut self, kept: &KnownPoints) {
+        self.points.clone_from(&kept.0);
+        self.readings.iter_mut().for_each(|(place, _)| *place = Vec3::repeat(f64::NAN));
+    }
+
     /// Nothing is known yet of `felt`.
     pub fn new(felt: &FeltWall) -> Self {
         let places = Places::new(LOOK_AGAIN * felt.thinnest_mm, felt.reach_mm);

@@ -17,7 +17,7 @@ pub use distance::{Distance, Nearness, SmoothWall};
 pub use felt::FeltWall;
 pub use friction::{Friction, HandMotion};
 pub use grading::Grading;
-pub use memory::WallMemory;
+pub use memory::{KnownPoints, WallMemory};
 pub use point::{ContactPoint, Counters, Touch};
 pub use potential::WallPotential;
 pub use wall::WallContact;

@@ -79,6 +79,12 @@ pub struct StepReport {
     pub iterations: u32,
     /// Parts that the command was cut into.
     pub substeps: u32,
+    /// Parts of the command in which the way from the last equilibrium was lost, and the device was let come to rest as it could: the
+    /// last resort. 0 nearly always.
+    pub relaxations: u32,
+    /// What is left over where it came to rest, over the largest force in the device: of the forces at a node, or of those on the wall
+    /// that friction goes with.
+    pub imbalance: f64,
     /// Whether the device jumped to a lower minimum: it set free energy that the hand had put in.
     pub jumped: bool,
     /// Whether the device carries material angles: only with a shape or friction.

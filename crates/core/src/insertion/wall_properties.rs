@@ -30,7 +30,7 @@ pub struct WallProperties {
     /// Coulomb coefficient μ of friction between device and wall; 0 is frictionless and costs nothing.
     pub friction: f64,
     /// How far the wall that is felt may be from the given surface, mm; where the lumen's radius is less than twenty times this, a
-    /// twentieth of the radius.
+    /// twentieth of the radius. 0 leaves it as it is meshed, for surfaces whose meshes are known to be good.
     pub deviation_mm: f64,
     /// Where the wall is another, each laid over those before it.
     pub region: Vec<WallRegion>,
@@ -148,7 +148,10 @@ impl WallProperties {
     pub(crate) fn check(&self, mesh: &SurfaceMesh) -> Result<()> {
         in_range("vessel.wall.modulus_n_per_mm2", self.modulus_n_per_mm2, LARGEST_MODULUS)?;
         check_friction("vessel.wall.friction", self.friction)?;
-        in_range("vessel.wall.deviation_mm", self.deviation_mm, LARGEST_DEVIATION_MM)?;
+        if !(0.0..=LARGEST_DEVIATION_MM).contains(&self.deviation_mm) {
+            let mend = format!("must be from 0 (felt as it is meshed) to {LARGEST_DEVIATION_MM}");
+            return Err(Error::parameter("vessel.wall.deviation_mm", self.deviation_mm, mend));
+        }
         for (index, region) in self.region.iter().enumerate() {
             let name = format!("vessel.wall.region[{index}]");
             let key = |key: &str| format!("{name}.{key}");

@@ -31,7 +31,13 @@ pub(super) fn with_regions(
     let low = Vec3::new(-aside, floor, -aside);
     let high = Vec3::new(length + aside, ceiling, aside);
     let wall = Wall::from_surface(&cuboid(low, high, cell))?;
-    let properties = WallProperties { modulus_n_per_mm2: setup.modulus, region, ..WallProperties::default() };
+    // Planes need no other mesh, and the box's edges are not to be rounded.
+    let properties = WallProperties {
+        modulus_n_per_mm2: setup.modulus,
+        deviation_mm: 0.0,
+        region,
+        ..WallProperties::default()
+    };
     let straight = Frame::new(Vec3::x(), Some(Vec3::y()));
     let mut bench = Bench::on_wall(&wall, &properties, setup, Vec3::zeros(), |_| straight)?;
     let h = bench.elements()[0].length;

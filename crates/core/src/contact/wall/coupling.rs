@@ -1,7 +1,6 @@
 //! Wall and friction solved for together: what the matrix of lagged normal forces leaves out, and what a point feels.
 
 use super::WallContact;
-use crate::contact::friction;
 use crate::rod::quadrature::Point;
 use crate::rod::{Assembly, ElementData, Layout, RodState};
 use crate::solve::BandLu;
@@ -42,9 +41,24 @@ impl WallContact<'_> {
         self.friction.handed_over()
     }
 
-    /// How far the lagged normal forces are from those of the state assembled last, over what counts as settled.
+    /// Normal forces of friction stay as they are.
+    pub fn hold_friction(&mut self) {
+        self.friction.hold();
+    }
+
+    /// They go half of the way to those of the state assembled last.
+    pub fn renew_friction(&mut self) {
+        self.friction.renew();
+    }
+
+    /// They go back to where they were before that.
+    pub fn take_back_friction(&mut self) {
+        self.friction.take_back();
+    }
+
+    /// Part by which the lagged normal forces differ from those of the state assembled last.
     pub fn unsettled(&self) -> f64 {
-        self.friction.unsettled(self.least_force_n()) / friction::SETTLED
+        self.friction.unsettled(self.least_force_n())
     }
 
     /// Adds to the matrix of the state assembled last the derivatives of friction that lagged normal forces leave out.

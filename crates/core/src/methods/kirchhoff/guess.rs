@@ -30,6 +30,7 @@ pub(super) struct Guess {
     slid: RodState,
     pub(super) other: RodState,
     correction: Correction,
+    kept: Correction,
 }
 
 impl Guess {
@@ -43,6 +44,17 @@ impl Guess {
         self.slid.reserve(elements);
         self.other.reserve(elements);
         self.correction.reserve(elements);
+        self.kept.reserve(elements);
+    }
+
+    /// Keeps what has been learnt.
+    pub(super) fn keep(&mut self) {
+        self.kept.copy_from(&self.correction);
+    }
+
+    /// Goes back to what was kept.
+    pub(super) fn restore(&mut self) {
+        self.correction.copy_from(&self.kept);
     }
 
     /// Replaces the slid device in `state` by the best candidate. Where the tip's way is `blocked`, the one that carries the tip's

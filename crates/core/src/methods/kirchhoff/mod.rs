@@ -19,6 +19,7 @@ mod hold;
 pub(crate) mod mesh;
 mod readout;
 mod repeat;
+mod rest;
 mod settle;
 mod slide;
 mod substep;
@@ -28,7 +29,7 @@ use std::borrow::Cow;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::extension::{LEAVE_MM, left_through};
-use crate::contact::{FeltWall, WallMemory};
+use crate::contact::{FeltWall, KnownPoints, WallMemory};
 use crate::device::Device;
 use crate::insertion::{Command, StepReport, Surroundings};
 use crate::methods::Method;
@@ -39,8 +40,10 @@ use crate::{Error, PhysicalEnd, Result};
 use configuration::Configuration;
 use guess::Guess;
 use mesh::MOST_POINTS;
+use rest::Rest;
 use settle::Settle;
 use slide::Extension;
+use substep::Attempt;
 
 /// Options of the exact rod.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -68,11 +71,21 @@ const LARGEST_TOLERANCE: f64 = 1e-2;
 const ELEMENT_LIMIT: f64 = 100_000.0;
 /// Retracting to within this of the sheath, mm, is retracting to it.
 const ZERO_LENGTH_MM: f64 = 1e-9;
-/// Most sub-steps that one command may be cut into.
+/// Most sub-steps that one command may be cut into, …
 const SUBSTEP_LIMIT: usize = 4096;
-/// Newton iterations that a command may take in all its sub-steps, those in vain included, as a multiple of those that one
-/// solution may take: a command that gets nowhere comes to an end.
-const WORK: usize = 10;
+/// … and the least part of it that one is.
+const LEAST_SHARE: f64 = 1e-4;
+/// Newton iterations that a command may take in all its sub-steps for every millimetre and every [`WORK_RAD`], those in vain
+/// included, before it comes to rest as it can: its cost is bounded.
+const WORK: f64 = 180.0;
+/// See [`WORK`], rad.
+const WORK_RAD: f64 = 0.1;
+/// … and never more than so many times what one solution may take.
+const WORK_OF_ONE: usize = 10;
+/// How often the last resort is tried in a command; the last time what it comes to is taken whatever is left over.
+const RESORTS: usize = 6;
+/// A device that is at rest with less left over than this part of its forces is in equilibrium; more is told.
+const BALANCED: f64 = 1e-6;
 /// A step is a jump if more than this part of the stored energy was set free.
 const JUMP: f64 = 0.02;
 /// Stored energy below which nothing is called a jump, mJ.
@@ -90,8 +103,13 @@ pub struct Kirchhoff<const C: usize> {
     before: Configuration,
     guess: Guess,
     settle: Settle<C>,
+    rest: Rest,
     extension: Extension,
     memory: WallMemory,
+    /// What the points knew where the sub-step under way began, …
+    known_now: KnownPoints,
+    /// … and where the command did.
+    known_before: KnownPoints,
     shape: Shape,
     report: StepReport,
 }
@@ -130,7 +148,10 @@ impl<const C: usize> Kirchhoff<C> {
             before: nothing,
             guess: Guess::new(surroundings.device.shaped_mm()),
             settle: Settle::default(),
+            rest: Rest::default(),
             extension: Extension::default(),
+            known_now: KnownPoints::default(),
+            known_before: KnownPoints::default(),
             shape: Shape::default(),
             report: StepReport { converged: true, angles: Layout::<C>::TWIST, ..Default::default() },
         };
@@ -144,6 +165,8 @@ impl<const C: usize> Kirchhoff<C> {
         if moved {
             std::mem::swap(&mut self.current, &mut self.before);
         }
+        self.memory.restore(&self.known_before);
+        self.guess.restore();
     }
 
     /// Takes memory for the whole device, so that steps take none.
@@ -162,10 +185,13 @@ impl<const C: usize> Kirchhoff<C> {
             configuration.friction.reserve(points);
         }
         self.memory.reserve(points);
+        self.known_now.reserve(points);
+        self.known_before.reserve(points);
         self.report.contacts.reserve(points);
         self.newton.reserve(elements);
         self.guess.reserve(elements);
         self.settle.reserve(elements);
+        self.rest.reserve(elements);
         let nodes = self.current.mesh.from_tip_mm.capacity();
         self.shape.positions_mm.reserve(nodes);
         self.shape.tangents.reserve(nodes);
@@ -178,6 +204,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         if command == Command::default() {
             (self.report.iterations, self.report.substeps) = (0, 0);
             (self.report.dissipated_mj, self.report.jumped) = (0.0, false);
+            self.report.relaxations = 0;
             return Ok(());
         }
         let tip = self.current.state.positions[self.current.state.elements()];
@@ -194,16 +221,33 @@ impl<const C: usize> Method for Kirchhoff<C> {
             let r = &self.report;
             (r.rotation_rad, r.push_force_n, r.torque_nmm, r.energy.total())
         };
+        self.memory.keep(&mut self.known_before);
+        self.guess.keep();
         let (mut iterations, mut substeps, mut dissipated_mj) = (0, 0, 0.0);
-        let work = WORK.saturating_mul(self.options.max_iterations);
-        let mut budget = work;
+        let (mut relaxations, mut imbalance) = (0, 0.0f64);
+        let most = self.options.max_iterations;
+        let travel = (target - start).abs().max(command.rotate_rad.abs() / WORK_RAD).max(1.0);
+        let mut budget = ((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most));
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
         let mut share = 1.0f64;
+        let mut attempts = 0;
         let mut failure = Cow::from("the way is too long for one step");
         while done < 1.0 {
             let rest = 1.0 - done;
+            // Where the way is lost, the device is let come to rest as far as the command goes; and if it does not, in parts.
+            let relax = budget == 0 || share < LEAST_SHARE;
+            if relax && attempts == 0 {
+                share = rest;
+            }
+            // Where the way is lost, the device is let come to rest as far as the command goes; if it does not, in parts; and in the end
+            // wherever it is.
+            let relax = budget == 0 || share < LEAST_SHARE;
+            attempts += usize::from(relax);
+            if relax && (attempts == 1 || attempts == RESORTS) {
+                share = rest;
+            }
             let part = rest.min(share);
             let wanted = (target - start) * part;
             let mut blocked = false;
@@ -224,9 +268,13 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 self.current.withdraw(tail);
                 break;
             }
-            match self.try_step(surroundings, (inserted, tail), blocked, &mut budget) {
+            let resort = if relax { Some(attempts == RESORTS) } else { None };
+            let attempt = Attempt { inserted_mm: inserted, tail_rad: tail, blocked, resort };
+            match self.try_step(surroundings, attempt, &mut budget) {
                 Ok(found) => {
                     iterations += found.iterations;
+                    relaxations += u32::from(relax);
+                    imbalance = imbalance.max(found.residual.max(found.unsettled));
                     dissipated_mj += found.dissipated_mj;
                     let state = &self.next.state;
                     if let Some((opening, beyond)) =
@@ -247,14 +295,15 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 Err(reason) => {
                     failure = reason;
                     share = 0.25 * part;
+                    if relax {
+                        budget = 0;
+                    }
                 }
             }
-            if done < 1.0 && (share < 1e-7 || substeps > SUBSTEP_LIMIT || budget == 0) {
+            if done < 1.0 && (attempts >= RESORTS || substeps > SUBSTEP_LIMIT) {
                 self.go_back(moved);
-                let within =
-                    if budget == 0 { format!(" within {work} Newton iterations") } else { String::new() };
                 return Err(Error::Computation(format!(
-                    "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted{within}: {failure}"
+                    "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
                 )));
             }
         }
@@ -262,7 +311,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
         self.report.iterations = iterations as u32;
         self.report.substeps = substeps as u32;
         self.report.dissipated_mj = dissipated_mj;
-        self.report.converged = true;
+        (self.report.relaxations, self.report.imbalance) = (relaxations, imbalance);
+        self.report.converged = relaxations == 0 || imbalance <= BALANCED;
         self.write_report(surroundings);
         self.write_shape();
         // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between

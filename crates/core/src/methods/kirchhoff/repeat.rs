@@ -59,6 +59,12 @@ impl Correction {
         self.departures.reserve(elements);
     }
 
+    /// Copies another without allocating.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        self.motion = other.motion;
+        self.departures.clone_from(&other.departures);
+    }
+
     /// Remembers the way from the slid device to the equilibrium that was found.
     pub(super) fn learn(&mut self, hand: HandMotion, slid: &RodState, found: &RodState) {
         self.departures.clear();

@@ -20,6 +20,7 @@ mod fairing;
 mod reference;
 mod remesh;
 mod sizes;
+mod spikes;
 #[cfg(test)]
 mod tests;
 
@@ -50,11 +51,13 @@ pub struct Conditioning {
     pub deviation_mm: f64,
     /// Most triangles that are aimed at; edges get longer instead.
     pub most_triangles: usize,
+    /// Whether to measure how far the result is from the given surface.
+    pub measured: bool,
 }
 
 impl Default for Conditioning {
     fn default() -> Self {
-        Self { deviation_mm: 0.1, most_triangles: 400_000 }
+        Self { deviation_mm: 0.1, most_triangles: 400_000, measured: true }
     }
 }
 
@@ -82,10 +85,14 @@ pub struct Conditioned {
     pub mesh: SurfaceMesh,
     /// Whether it is another than the given one.
     pub changed: bool,
-    /// Largest distance found between the two surfaces, both ways, mm.
+    /// Largest distance found between the two surfaces, both ways, mm; 0 if it was not measured.
     pub deviation_mm: f64,
+    /// 99 of 100 of these distances are less, mm.
+    pub usual_deviation_mm: f64,
     /// Mean of these distances, mm.
     pub mean_deviation_mm: f64,
+    /// Where the surfaces are farthest apart, mm.
+    pub worst_mm: Option<Vec3>,
     /// Shortest edge, mm.
     pub edge_min_mm: f64,
     /// Median edge, mm.
@@ -102,11 +109,16 @@ pub struct Conditioned {
 
 impl Conditioned {
     fn new(mesh: SurfaceMesh, changed: bool, deviation: Deviation, even: Evenness, too_many: bool) -> Self {
+        let mut distances = deviation.distances_mm.concat();
+        distances.sort_by(f64::total_cmp);
+        let at = |part: f64| distances.get((distances.len() as f64 * part) as usize).copied().unwrap_or(0.0);
         Self {
             mesh,
             changed,
-            deviation_mm: deviation.largest_mm,
-            mean_deviation_mm: deviation.mean_mm,
+            deviation_mm: distances.last().copied().unwrap_or(0.0),
+            usual_deviation_mm: at(0.99),
+            mean_deviation_mm: distances.iter().sum::<f64>() / distances.len().max(1) as f64,
+            worst_mm: deviation.worst.map(|worst| worst.0),
             edge_min_mm: even.edge_min_mm,
             edge_median_mm: even.edge_median_mm,
             edge_max_mm: even.edge_max_mm,
@@ -143,19 +155,20 @@ pub fn condition(surface: &SurfaceMesh, options: &Conditioning) -> Result<Condit
         at = faired(&mut corners, &reference, round + 1 == ROUNDS);
         curvature = fairing::curvature(&corners, &at);
     }
-    let mut deviation = Deviation::default();
-    for correction in 0..=CORRECTIONS {
-        let mut far = Vec::new();
-        deviation = deviation::measure(&corners, &at, &reference, |v| far.push(v));
-        if far.is_empty() || too_many || correction == CORRECTIONS {
+    for _ in 0..CORRECTIONS {
+        let far = deviation::measure(&corners, &at, &reference).far;
+        if far.is_empty() || too_many {
             break;
         }
-        far.sort_unstable();
-        far.dedup();
         too_many |= sizes::shorten(&mut corners, &far, options.wanted());
         remesher.run(&mut corners, 1);
         at = faired(&mut corners, &reference, true);
     }
+    corners.vertices.iter_mut().zip(&at).for_each(|(vertex, at)| vertex.at = *at);
+    spikes::cut(&mut corners);
+    let at: Vec<Vec3> = corners.vertices.iter().map(|v| v.at).collect();
+    let deviation =
+        if options.measured { deviation::measure(&corners, &at, &reference) } else { Deviation::default() };
     let even = Evenness::of(&corners, |v| at[v as usize]);
     let mesh = corners.surface(|v| at[v as usize]);
     Ok(Conditioned::new(mesh, true, deviation, even, too_many))

@@ -16,6 +16,8 @@ const LONG: f64 = 4.0 / 3.0;
 const SHORT: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// … unless that leaves edges longer than this.
 const TOO_LONG: f64 = 1.4;
+/// Where a spike is cut off, edges shorter than this part of what is wanted are collapsed.
+const TOGETHER: f64 = 0.5;
 /// Halvings of one edge: from a metre to a micrometre.
 const HALVINGS: usize = 20;
 /// Passes of collapses with one bound; each finds less.
@@ -223,10 +225,44 @@ fn collapse(corners: &mut Corners) {
     }
 }
 
+/// Collapses the short ones of the edges between `marked` vertices, whatever that does to the surface.
+pub(super) fn pull_together(corners: &mut Corners, marked: &[bool]) {
+    let mut work = Work::default();
+    for e in 0..corners.half_edges() {
+        if !corners.lives(e)
+            || !marked[corners.from(e) as usize]
+            || !corners.leads(e)
+            || corners.twin(e) == NONE
+            || corners.length_mm(e) >= TOGETHER * corners.target_mm(e)
+            || [corners.from(e), corners.to(e)]
+                .iter()
+                .any(|&v| !marked[v as usize] || corners.kind(v) != Kind::Free)
+        {
+            continue;
+        }
+        work.look(corners, [corners.from(e), corners.to(e)]);
+        if corners.may_collapse(e, &work.around[0], &work.around[1]) {
+            let middle = 0.5 * (corners.at(corners.from(e)) + corners.at(corners.to(e)));
+            let kept = corners.to(e);
+            corners.collapse(e, false, &work.spokes[0]);
+            corners.vertices[kept as usize].at = middle;
+        }
+    }
+}
+
 #[derive(Default)]
 struct Work {
     spokes: [Vec<u32>; 2],
     around: [Vec<u32>; 2],
+}
+
+impl Work {
+    fn look(&mut self, corners: &Corners, ends: [u32; 2]) {
+        for k in 0..2 {
+            corners.spokes(ends[k], &mut self.spokes[k]);
+            corners.neighbours(&self.spokes[k], &mut self.around[k]);
+        }
+    }
 }
 
 fn try_collapse(corners: &mut Corners, e: u32, work: &mut Work) -> bool {
@@ -236,10 +272,7 @@ fn try_collapse(corners: &mut Corners, e: u32, work: &mut Work) -> bool {
     if kinds.contains(&Kind::Locked) || (kinds == [Kind::Rim; 2] && !open) {
         return false;
     }
-    for k in 0..2 {
-        corners.spokes(ends[k], &mut work.spokes[k]);
-        corners.neighbours(&work.spokes[k], &mut work.around[k]);
-    }
+    work.look(corners, ends);
     if !corners.may_collapse(e, &work.around[0], &work.around[1]) {
         return false;
     }
@@ -306,7 +339,7 @@ fn rim_stays(corners: &Corners, gone: u32, kept: u32, spokes: &[u32]) -> bool {
 }
 
 /// The two triangles of an edge a–b, with corners c and d across, and how many neighbours they have more than they should.
-struct Pair {
+pub(super) struct Pair {
     at: [Vec3; 4],
     excess: [i32; 4],
 }
@@ -321,7 +354,7 @@ fn by_valence(pair: &Pair) -> bool {
 }
 
 /// The angles across the edge sum to more than π (the criterion of Delaunay).
-fn by_angles(pair: &Pair) -> bool {
+pub(super) fn by_angles(pair: &Pair) -> bool {
     let [a, b, c, d] = pair.at;
     let angle = |at: Vec3| (a - at).cross(&(b - at)).norm().atan2((a - at).dot(&(b - at)));
     angle(c) + angle(d) > std::f64::consts::PI + 1e-3
@@ -334,6 +367,11 @@ fn quality(t: &[Vec3; 3]) -> f64 {
 }
 
 fn flip(corners: &mut Corners, wanted: fn(&Pair) -> bool) {
+    flip_some(corners, wanted, None);
+}
+
+/// Flips edges, only such whose ends are `marked` if that is given, and these without regard to where the surface was.
+pub(super) fn flip_some(corners: &mut Corners, wanted: fn(&Pair) -> bool, marked: Option<&[bool]>) {
     let mut excess: Vec<i32> =
         corners.vertices.iter().map(|v| if v.kind == Kind::Rim { -4 } else { -6 }).collect();
     for e in (0..corners.half_edges()).filter(|&e| corners.leads(e)) {
@@ -343,7 +381,10 @@ fn flip(corners: &mut Corners, wanted: fn(&Pair) -> bool) {
     let (mut spokes, mut around) = (Vec::new(), Vec::new());
     for e in 0..corners.half_edges() {
         let back = corners.twin(e);
-        if !corners.leads(e) || back == NONE {
+        if !corners.leads(e)
+            || back == NONE
+            || marked.is_some_and(|m| !m[corners.from(e) as usize] || !m[corners.to(e) as usize])
+        {
             continue;
         }
         let quad = [corners.from(e), corners.to(e), corners.apex(e), corners.apex(back)];
@@ -351,7 +392,9 @@ fn flip(corners: &mut Corners, wanted: fn(&Pair) -> bool) {
             continue;
         }
         let at = quad.map(|v| corners.at(v));
-        if !wanted(&Pair { at, excess: quad.map(|v| excess[v as usize]) }) || !may_flip(corners, quad, &at) {
+        if !wanted(&Pair { at, excess: quad.map(|v| excess[v as usize]) })
+            || !(marked.is_some() || may_flip(corners, quad, &at))
+        {
             continue;
         }
         corners.spokes(quad[2], &mut spokes);

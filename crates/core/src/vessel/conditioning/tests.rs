@@ -180,3 +180,84 @@ fn options_out_of_range_are_named() {
         |deviation_mm: f64| condition(&mesh, &Conditioning { deviation_mm, ..Conditioning::default() });
     assert!(with(0.0).is_err() && with(f64::NAN).is_err() && with(0.05).is_ok());
 }
+
+/// A closed box whose faces have cells of about `cell`, away from the origin by `at`.
+fn cuboid(size: Vec3, cell: f64, at: Vec3) -> SurfaceMesh {
+    let mut mesh = SurfaceMesh::default();
+    for axis in 0..3 {
+        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+        let count = |k: usize| (size[k] / cell).round().max(1.0) as u32;
+        let (m, n) = (count(a), count(b));
+        for side in [0.0, size[axis]] {
+            let first = mesh.vertices_mm.len() as u32;
+            for i in 0..=m {
+                for j in 0..=n {
+                    let mut x = at;
+                    x[axis] += side;
+                    x[a] += size[a] * f64::from(i) / f64::from(m);
+                    x[b] += size[b] * f64::from(j) / f64::from(n);
+                    mesh.vertices_mm.push(x);
+                }
+            }
+            for i in 0..m {
+                for j in 0..n {
+                    let at = |i: u32, j: u32| first + i * (n + 1) + j;
+                    let (p, q, r, s) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+                    let both = if side > 0.0 { [[p, q, r], [p, r, s]] } else { [[p, r, q], [p, s, r]] };
+                    mesh.triangles.extend(both);
+                }
+            }
+        }
+    }
+    Wall::welded(&mesh).unwrap().mesh().clone()
+}
+
+fn joined(a: &SurfaceMesh, b: &SurfaceMesh) -> SurfaceMesh {
+    let (mut mesh, first) = (a.clone(), a.vertices_mm.len() as u32);
+    mesh.vertices_mm.extend(&b.vertices_mm);
+    mesh.triangles.extend(b.triangles.iter().map(|t| t.map(|v| v + first)));
+    mesh
+}
+
+#[test]
+fn two_components_are_as_far_apart_as_they_were() {
+    // Two lumens beside each other: a septum of 0.15 mm between parallel sheets.
+    let size = Vec3::new(10.0, 6.0, 4.0);
+    let mesh =
+        joined(&cuboid(size, 3.0, Vec3::zeros()), &cuboid(size, 2.0, Vec3::new(0.0, 0.0, size.z + 0.15)));
+    let found = conditioned(&mesh);
+    let report = check(&found.mesh).unwrap();
+    assert!(found.changed && report.components == 2 && report.self_intersections == 0, "{report:?}");
+    let middle = size.z + 0.075;
+    assert!(found.mesh.vertices_mm.iter().all(|v| (v.z - middle).abs() > 0.02));
+}
+
+#[test]
+fn a_spike_is_cut_off() {
+    let mut mesh = uneven_tube(6);
+    let (least, _) = mesh
+        .vertices_mm
+        .iter()
+        .enumerate()
+        .min_by(|a, b| (a.1.z - 10.0).abs().total_cmp(&(b.1.z - 10.0).abs()))
+        .unwrap();
+    let out = Vec3::new(mesh.vertices_mm[least].x, mesh.vertices_mm[least].y, 0.0).normalize();
+    mesh.vertices_mm[least] += out * 3.0;
+    let found = conditioned(&mesh);
+    assert!(
+        found.largest_turn < 1.92 && found.least_angle > 0.2,
+        "{} {}",
+        found.largest_turn,
+        found.least_angle
+    );
+    assert_eq!(check(&found.mesh).unwrap().self_intersections, 0);
+}
+
+#[test]
+fn duplicated_triangles_do_no_harm() {
+    let mut mesh = uneven_tube(8);
+    mesh.triangles.extend(mesh.triangles.clone().iter().step_by(97));
+    let found = conditioned(&mesh);
+    assert!(found.mesh.vertices_mm.iter().all(|v| v.iter().all(|c| c.is_finite())));
+    assert!(off_tube(&found.mesh) < 0.2, "{}", off_tube(&found.mesh));
+}

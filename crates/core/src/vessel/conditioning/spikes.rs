@@ -1,0 +1,92 @@
+//! Cuts off what sticks out of the lumen more sharply than any mesh of this fineness can hold: blades, spikes and folds.
+//!
+//! Around edges at which the surface bends back from the lumen by more than a right angle, and around needles, vertices move to the
+//! means of their neighbours until none is left, short edges are collapsed and edges flipped. That ends a blade where it is about as
+//! wide as an edge is long. It narrows the lumen there, beyond the limit if need be. Ridges into the lumen are not sharp in this
+//! sense, and stay.
+
+use super::corners::{Corners, Kind};
+use super::remesh::{by_angles, flip_some, pull_together};
+use crate::Vec3;
+use crate::vessel::topology::NONE;
+
+/// Angle by which the surface may bend back from the lumen, radians: 95°.
+const SHARP: f64 = 1.66;
+/// Angle of a fold, whichever way it bends, radians: 109°.
+const FOLD: f64 = 1.9;
+/// Least angle of a triangle, radians: 14°.
+const NEEDLE: f64 = 0.24;
+/// Most passes: each takes about half an edge off a blade.
+const PASSES: usize = 30;
+/// Part of the way to the mean that a vertex goes in one pass.
+const STEP: f64 = 0.5;
+
+/// Cuts off all that is sharp.
+pub(super) fn cut(corners: &mut Corners) {
+    let (mut spokes, mut around) = (Vec::new(), Vec::new());
+    let mut moved = vec![true; corners.vertices.len()];
+    for _ in 0..PASSES {
+        // What was not moved has not got sharp.
+        moved = sharp(corners, &moved);
+        if !moved.contains(&true) {
+            break;
+        }
+        grow(corners, &mut moved);
+        let means: Vec<(u32, Vec3)> = corners
+            .live_vertices()
+            .filter(|&v| moved[v as usize] && corners.kind(v) == Kind::Free)
+            .filter_map(|v| {
+                corners.spokes(v, &mut spokes);
+                corners.neighbours(&spokes, &mut around);
+                let mean = around.iter().map(|&w| corners.at(w)).sum::<Vec3>() / around.len() as f64;
+                mean.iter().all(|c| c.is_finite()).then_some((v, mean))
+            })
+            .collect();
+        for (v, mean) in means {
+            let at = &mut corners.vertices[v as usize].at;
+            *at += (mean - *at) * STEP;
+        }
+        pull_together(corners, &moved);
+        flip_some(corners, by_angles, Some(&moved));
+    }
+    corners.set_normals();
+}
+
+/// Vertices of edges and triangles that no mesh should have, where at least one end is `among` these.
+fn sharp(corners: &Corners, among: &[bool]) -> Vec<bool> {
+    let mut found = vec![false; corners.vertices.len()];
+    let (needle_cos, sharp_cos, fold_cos) = (NEEDLE.cos(), SHARP.cos(), FOLD.cos());
+    let moved = |e: &u32| among[corners.from(*e) as usize];
+    for e in (0..corners.half_edges()).filter(|&e| corners.lives(e)).filter(moved) {
+        let (a, b, c) = (corners.from(e), corners.to(e), corners.apex(e));
+        let (x, y) = (corners.at(b) - corners.at(a), corners.at(c) - corners.at(a));
+        let normal = x.cross(&y);
+        // Rims are as they were, and have short edges.
+        let inner = [a, b, c].iter().all(|&v| corners.kind(v) == Kind::Free);
+        let needle = inner && x.dot(&y) > needle_cos * (x.norm_squared() * y.norm_squared()).sqrt();
+        let back = corners.twin(e);
+        let bent = back != NONE && {
+            let d = corners.at(corners.apex(back)) - corners.at(a);
+            let other = d.cross(&(corners.at(b) - corners.at(a)));
+            let least = if d.dot(&normal) < 0.0 { sharp_cos } else { fold_cos };
+            normal.dot(&other) < least * (normal.norm_squared() * other.norm_squared()).sqrt()
+        };
+        if needle || bent {
+            [a, b, c].iter().for_each(|&v| found[v as usize] = true);
+            if bent {
+                found[corners.apex(back) as usize] = true;
+            }
+        }
+    }
+    found
+}
+
+/// Adds the neighbours.
+fn grow(corners: &Corners, marked: &mut [bool]) {
+    let inner = marked.to_vec();
+    for e in (0..corners.half_edges()).filter(|&e| corners.lives(e)) {
+        for (a, b) in [(corners.from(e), corners.to(e)), (corners.to(e), corners.from(e))] {
+            marked[b as usize] |= inner[a as usize];
+        }
+    }
+}
