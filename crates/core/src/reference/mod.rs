@@ -193,6 +193,7 @@ pub const FAMILIES: &[Family] = &[
         title: "Wall with regions: two moduli (Hetényi 1946), friction over a part of a bend",
         run: regions::regions,
     },
+    Family { id: "C8", title: "Deep in a soft wall", run: insertion::yielding_tube },
 ];
 
 /// A straight inextensible rod of length 1 and EI 1 along x, clamped at the origin, free at its end.
