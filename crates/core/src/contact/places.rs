@@ -11,6 +11,8 @@ use crate::vessel::WallQuery;
 const CELLS: usize = 1 << 14;
 /// Cells are counted up to this from the origin.
 const FARTHEST: f64 = 1e9;
+/// How often a wall is looked for four times as far away before it is looked for anywhere.
+const FARTHER: u32 = 6;
 /// Stands for no triangle.
 const NONE: u32 = u32::MAX;
 
@@ -66,8 +68,9 @@ impl Places {
     /// What is nearest to `x` itself.
     pub(super) fn ask(&mut self, query: &WallQuery, x: &Vec3) -> Place {
         self.queries += 1;
-        // Where no wall is near, the point may be far from it on either side.
-        let nearest = query.nearest(x, self.reach_mm).or_else(|| query.nearest(x, f64::MAX));
+        // Where no wall is near, the point may be far from it on either side. A question without a limit would look at most of the wall.
+        let reaches = (0..FARTHER).map(|k| self.reach_mm * f64::from(1u32 << (2 * k)));
+        let nearest = reaches.chain([f64::MAX]).find_map(|reach_mm| query.nearest(x, reach_mm));
         Place {
             middle: *x,
             clearance_mm: nearest.map_or(self.reach_mm, |n| n.distance_mm),

@@ -23,6 +23,9 @@ use crate::Vec3;
 
 /// Edges over the local radius: 22 around a tube, as many as the smooth wall needs to be as good as round.
 const EDGE_PER_RADIUS: f64 = 1.0 / 2.2;
+/// Longest edge, mm: some radii of a device. In wide vessels that are given coarsely every edge is a kink, and a device must find it
+/// rounded on its own scale: with edges up to six of its radii nearly all insertions arrived, with ten and more few.
+const LONGEST_MM: f64 = 2.0;
 /// Largest angle between the normals at the ends of an edge, radians, that is aimed at.
 const TURN: f64 = 1.0;
 /// Shortest edge over the limit: the sharpest kink needs no shorter ones; …
@@ -69,12 +72,12 @@ pub(super) fn set(corners: &mut Corners, reference: &Reference, curvature: &[f64
         let (radius, thick) = (vertex.radius_mm, septum[v as usize]);
         let limit = wanted.deviation_mm.min(LIMIT_PER_RADIUS * radius);
         vertex.limit_mm = (LIMIT_PER_SEPTUM * thick).clamp(TOUCHING.0 * limit, limit);
-        let round = EDGE_PER_RADIUS * radius;
+        let round = (EDGE_PER_RADIUS * radius).min(LONGEST_MM);
         let bend = curvature.get(v as usize).copied().unwrap_or(0.0);
         let length = round
             .min(TURN / bend.max(f64::MIN_POSITIVE))
             .min((2.4 * radius * thick).sqrt().max(TOUCHING.1 * round))
-            .max((FLOOR * limit).max(FLOOR_PER_RADIUS * radius));
+            .max((FLOOR * limit).max(FLOOR_PER_RADIUS * radius).min(LONGEST_MM));
         vertex.target_mm = length;
     }
     grade(corners);
