@@ -93,6 +93,10 @@ impl WallQuery {
     /// Where the straight way from one point to another first meets the wall, as a part of the way, up to `farthest` times its
     /// length. `None` also for points that are not finite.
     pub fn crossing(&self, from_mm: &Vec3, to_mm: &Vec3, farthest: f64) -> Option<f64> {
+        // A ray of no numbers would be tested against every triangle.
+        if !from_mm.iter().chain(to_mm.iter()).all(|c| c.is_finite()) {
+            return None;
+        }
         let ray = Ray::new(to_parry(from_mm), to_parry(&(to_mm - from_mm)));
         self.shape.cast_local_ray(&ray, farthest, true)
     }
