@@ -132,7 +132,8 @@ impl Remesher<'_, '_> {
             let way = sum / total - vertex.at;
             let way = way - vertex.normal * vertex.normal.dot(&way);
             // Nothing to gain, or no number.
-            if !(way.norm_squared() > (AT_REST * vertex.target_mm).powi(2)) || !way.x.is_finite() {
+            let square = way.norm_squared();
+            if !square.is_finite() || square <= (AT_REST * vertex.target_mm).powi(2) {
                 continue;
             }
             for part in [1.0, 0.4] {
