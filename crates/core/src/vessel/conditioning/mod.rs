@@ -109,7 +109,7 @@ pub struct Conditioned {
 }
 
 impl Conditioned {
-    fn new(mesh: SurfaceMesh, changed: bool, deviation: &Deviation, even: Evenness, too_many: bool) -> Self {
+    fn new(mesh: SurfaceMesh, changed: bool, deviation: &Deviation, even: &Evenness, too_many: bool) -> Self {
         let mut distances = deviation.distances_mm.concat();
         distances.sort_by(f64::total_cmp);
         let at = |part: f64| distances.get((distances.len() as f64 * part) as usize).copied().unwrap_or(0.0);
@@ -144,7 +144,7 @@ pub fn condition(surface: &SurfaceMesh, options: &Conditioning) -> Result<Condit
     let even = Evenness::of(&corners, |v| corners.at(v));
     let fine = evenness::is_fine_enough(&mut corners, &reference, options);
     if even.is_even() && fine {
-        return Ok(Conditioned::new(surface.clone(), false, &Deviation::default(), even, false));
+        return Ok(Conditioned::new(surface.clone(), false, &Deviation::default(), &even, false));
     }
     let remesher = Remesher { reference: &reference, most_triangles: options.most_triangles };
     let mut curvature = Vec::new();
@@ -172,7 +172,7 @@ pub fn condition(surface: &SurfaceMesh, options: &Conditioning) -> Result<Condit
         if options.measured { deviation::measure(&corners, &at, &reference) } else { Deviation::default() };
     let even = Evenness::of(&corners, |v| at[v as usize]);
     let mesh = corners.surface(|v| at[v as usize]);
-    Ok(Conditioned::new(mesh, true, &deviation, even, too_many))
+    Ok(Conditioned::new(mesh, true, &deviation, &even, too_many))
 }
 
 fn faired(corners: &mut Corners, reference: &Reference, last: bool) -> Vec<Vec3> {

@@ -153,10 +153,10 @@ fn soups_do_not_panic() {
     for seed in 0..8 {
         let mut numbers = Numbers(seed);
         let points = 4 + (40.0 * numbers.next()) as usize;
-        let mut mesh = SurfaceMesh::default();
-        mesh.vertices_mm = (0..points)
+        let vertices_mm = (0..points)
             .map(|_| Vec3::new(10.0 * numbers.next(), 10.0 * numbers.next(), (10.0 * numbers.next()).floor()))
             .collect();
+        let mut mesh = SurfaceMesh { vertices_mm, triangles: Vec::new() };
         for _ in 0..3 * points {
             mesh.triangles.push([0; 3].map(|_: u32| (points as f64 * numbers.next()) as u32));
         }
