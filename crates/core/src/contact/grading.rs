@@ -224,7 +224,7 @@ mod tests {
         }
     }
 
-    /// Points about the edges of a region, from deep in the barrier to where nothing is pressed, and near the axis.
+    /// Points about the edges of a region, from deep in the wall to where nothing is pressed, and near the axis.
     fn points() -> impl Iterator<Item = Vec3> {
         (0..400).map(|i| {
             let i = f64::from(i);
