@@ -179,14 +179,14 @@ fn an_empty_mesh_is_refused() {
 }
 
 #[test]
-fn a_mesh_too_broken_to_tell_inside_from_outside_is_refused() {
-    // Three sheets that meet in one edge: no boundary closes, and the sheath lies between two of them.
+fn a_sheath_between_sheets_that_enclose_nothing_is_refused() {
+    // Three sheets that meet in one edge: one is taken away, and the sheath lies between the others.
     let obj = b"v 0 5 0\nv 80 5 0\nv 0 -5 5\nv 80 -5 5\nv 0 -5 -5\nv 80 -5 -5\nv 0 15 0\nv 80 15 0\n\
         f 1 2 4 3\nf 2 1 5 6\nf 1 2 8 7\n";
     Scene::good()
         .file("sheets.obj", obj)
         .with("tree = \"tube.csv\"\nedge_mm = 2.0", "file = \"sheets.obj\"")
-        .is_refused(&["sheets.obj", "inside from outside"]);
+        .is_refused(&["sheath.position_mm", "outside the vessel"]);
 }
 
 #[test]
