@@ -302,20 +302,21 @@ fn in_yielding_tube(fine: Fineness) -> Result<[InYieldingTube; 2]> {
 pub(super) fn yielding_tube() -> Result<Vec<Row>> {
     let at = |mm: f64| in_yielding_tube(Fineness { element_mm: mm, edge_mm: mm, modulus_n_per_mm2: 0.05 });
     let off = |found: &InYieldingTube, listed: &InYieldingTube| (found.tip - listed.tip).norm();
-    let found = at(0.5)?;
+    // At 0.5 mm the tip of 30 mm lies 2.3 µm out of the plane, which nothing but the wall's roundness holds it to.
+    let found = at(0.25)?;
     let mut rows = Vec::new();
     for ((found, listed), length) in found.iter().zip(&YIELDING).zip([30, 50]) {
-        let name = format!("C8 {length} mm in, h = 0.5 mm");
+        let name = format!("C8 {length} mm in, h = 0.25 mm");
         let (far, listed_far) = (found.tip.norm(), listed.tip.norm());
-        rows.push(Row::with_error(&name, "tip, mm", far, listed_far, off(found, listed), 5e-3));
+        rows.push(Row::with_error(&name, "tip, mm", far, listed_far, off(found, listed), 3e-3));
         rows.push(Row::relative(&name, "penetration of the tip", found.deepest, listed.deepest, 5e-3));
     }
     let ([_, deep], [_, listed]) = (&found, &YIELDING);
-    let name = "C8 50 mm in, h = 0.5 mm";
+    let name = "C8 50 mm in, h = 0.25 mm";
     rows.push(Row::relative(name, "bending energy", deep.bend, listed.bend, 5e-3));
     rows.push(Row::relative(name, "wall energy", deep.wall, listed.wall, 5e-3));
-    let errors = [&at(2.0)?[1], &at(1.0)?[1], deep].map(|found| off(found, listed));
-    rows.push(falling("C8 50 mm in", "tip, h = edges = 2, 1, 0.5 mm", &errors, 0.5));
+    let errors = [&at(1.0)?[1], &at(0.5)?[1], deep].map(|found| off(found, listed));
+    rows.push(falling("C8 50 mm in", "tip, h = edges = 1, 0.5, 0.25 mm", &errors, 0.5));
     Ok(rows)
 }
 
@@ -340,7 +341,7 @@ mod tests {
         let far = |modulus_n_per_mm2| {
             let [_, deep] = in_yielding_tube(Fineness { modulus_n_per_mm2, ..fine }).unwrap();
             let listed = &YIELDING[1];
-            [(deep.tip - listed.tip).norm() / 5e-3, (deep.wall / listed.wall - 1.0).abs() / 5e-3]
+            [(deep.tip - listed.tip).norm() / 3e-3, (deep.wall / listed.wall - 1.0).abs() / 5e-3]
         };
         let (same, other) = (far(0.05), far(0.0525));
         assert!(other.iter().all(|off| *off > 1.0), "{other:?}");
