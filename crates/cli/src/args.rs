@@ -181,7 +181,7 @@ pub(crate) struct VerifyArgs {
     #[arg(long)]
     pub(crate) stress: bool,
     /// Instead of the reference cases, run a matrix of insertions into every surface of a folder (STL, OBJ, PLY; NAME.toml beside a
-    /// surface may give unit_mm, [sheath], length_mm and device_radius_mm)
+    /// surface may give unit_mm, a table sheath, length_mm and device_radius_mm)
     #[arg(long, value_name = "DIR", conflicts_with = "stress")]
     pub(crate) surfaces: Option<PathBuf>,
     /// Every combination of the matrix: 162 cells a wire instead of 18
