@@ -131,7 +131,7 @@ impl<'a> WallContact<'a> {
             let nearness = self.felt.nearness(x, triangle, limit_mm);
             (known.looked_at, known.from_tip_mm) = (*x, self.points[index].from_tip_mm);
             (known.clearance_mm, known.triangle) = (0.0, Some(triangle));
-            self.counters.near += 1;
+            self.counters.near += u64::from(self.skip);
             self.memory.readings[index] = (*x, nearness);
             return Reading::of(nearness, limit_mm);
         }
