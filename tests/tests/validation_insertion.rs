@@ -8,6 +8,7 @@ use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 use endowire_tests::crossing::CrossingTest;
+use endowire_tests::sweep::crosses;
 
 fn kirchhoff(element_mm: f64) -> MethodChoice {
     MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..Default::default() })
@@ -39,7 +40,7 @@ fn the_result_does_not_depend_on_the_increment() {
         for _ in 0..(200.0 / step_mm).round() as usize {
             simulation.step(Command::advance(step_mm)).unwrap();
         }
-        assert!(!CrossingTest::new(simulation.wall().mesh()).crosses_curve(simulation.shape()));
+        assert!(!crosses(&CrossingTest::new(simulation.wall().mesh()), &simulation));
         (simulation.shape().tip_mm().unwrap(), simulation.report().push_force_n)
     };
     let (tip, force) = run(1.0);
@@ -129,17 +130,17 @@ fn in_and_out_returns_to_the_same_energy() {
 }
 
 #[test]
-#[ignore = "open: walls of 0.001 N/mm2 are sunk into by more than the radius; the test must tell that from passing through"]
-fn walls_of_any_stiffness_are_met_and_never_crossed() {
+fn walls_of_any_stiffness_are_met_and_never_passed_through() {
     for modulus in [1e-3, 1e-1, 1e2, 1e4] {
         let mut simulation = in_curved_tube(modulus);
         let crossing = CrossingTest::new(simulation.wall().mesh());
         for _ in 0..50 {
             simulation.step(Command::advance(4.0)).unwrap_or_else(|e| panic!("{modulus} N/mm²: {e}"));
-            assert!(!crossing.crosses_curve(simulation.shape()), "{modulus} N/mm²");
+            assert!(!crosses(&crossing, &simulation), "{modulus} N/mm²");
         }
+        // Only into the softest the axis itself sinks.
         let deepest = simulation.report().max_penetration_mm;
-        assert!(deepest < 0.445, "{modulus} N/mm²: {deepest} mm");
+        assert_eq!(deepest < 0.445, modulus > 0.05, "{modulus} N/mm²: {deepest} mm");
     }
 }
 
@@ -176,7 +177,7 @@ fn a_shaped_tip_turns_with_the_tail_and_finds_its_way_through_the_arch() {
     for _ in 0..50 {
         let report = simulation.step(Command { advance_mm: 5.0, rotate_rad: 0.1 }).unwrap();
         assert!(report.converged);
-        assert!(!crossing.crosses_curve(simulation.shape()));
+        assert!(!crosses(&crossing, &simulation));
     }
     // The free tip of a wire in air would have turned with the hand: the torque is the wall's doing.
     assert!(simulation.report().torque_nmm.abs() > 1e-6);

@@ -10,6 +10,7 @@ use endowire_core::insertion::{Command, Sheath, Simulation, StepReport, WallProp
 use endowire_core::methods::MethodChoice;
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 use endowire_tests::crossing::CrossingTest;
+use endowire_tests::sweep::crosses;
 
 /// Where the tip passes along the outer side of the curved tube between 150 and 170 mm inserted.
 const OUTER: [f64; 3] = [41.0, 0.0, 146.0];
@@ -94,20 +95,20 @@ fn the_push_force_is_the_slope_of_the_energy_across_the_edge_of_a_region() {
 }
 
 #[test]
-#[ignore = "open: the device jumps on the way back; whether it may is to be found out"]
 fn over_a_patch_and_back_returns_to_the_same_energy() {
     let mut simulation = in_curved_tube(patched(0.01, 10.0));
     let before = advance(&mut simulation, 145.0, 1.0);
     let mut on_patch = None;
-    for _ in 0..30 {
-        let report = simulation.step(Command::advance(1.0)).unwrap();
+    // In steps that resolve the edge of the patch: the force has a peak there, and what a step takes in is judged by its ends.
+    for _ in 0..120 {
+        let report = simulation.step(Command::advance(0.25)).unwrap();
         assert!(!report.jumped);
         on_patch =
             on_patch.or(Some(report.max_penetration_mm).filter(|p| *p < 0.5 * before.max_penetration_mm));
     }
     assert!(on_patch.is_some(), "the tip is as deep on the patch as before it");
-    for _ in 0..30 {
-        assert!(!simulation.step(Command::retract(1.0)).unwrap().jumped);
+    for _ in 0..120 {
+        assert!(!simulation.step(Command::retract(0.25)).unwrap().jumped);
     }
     let after = simulation.report();
     let change = (after.energy.total() / before.energy.total() - 1.0).abs();
@@ -118,16 +119,14 @@ fn over_a_patch_and_back_returns_to_the_same_energy() {
 }
 
 #[test]
-fn patches_of_any_stiffness_are_met_and_a_wall_that_is_firm_everywhere_is_not_crossed() {
+fn patches_of_any_stiffness_are_met_and_never_passed_through() {
     for (outside, inside) in [(1e-3, 1e4), (1e4, 1e-3), (1.0, 1e4)] {
         let mut simulation = in_curved_tube(patched(outside, inside));
         let crossing = CrossingTest::new(simulation.wall().mesh());
         for _ in 0..50 {
             let stepped = simulation.step(Command::advance(4.0));
             assert!(stepped.is_ok(), "{outside} and {inside} N/mm²: {}", stepped.unwrap_err());
-            // Into a wall of 10⁻³ N/mm² the axis sinks by more than the wire is thick.
-            let firm = outside.min(inside) >= 1.0;
-            assert!(!firm || !crossing.crosses_curve(simulation.shape()), "{outside} and {inside} N/mm²");
+            assert!(!crosses(&crossing, &simulation), "{outside} and {inside} N/mm²");
         }
     }
 }

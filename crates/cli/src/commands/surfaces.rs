@@ -199,7 +199,7 @@ fn text(document: &Document) -> String {
         let mut rows = document.cells.iter().filter(|row| row.surface == surface.name).peekable();
         if rows.peek().is_some() {
             line(format_args!(
-                "  {:<8} {:<52} {:>7} {:>5} {:>7} {:>6} {:>7} {:>8} {:>9} {:>7} {:>7} {:>5} {:>9}",
+                "  {:<8} {:<52} {:>7} {:>5} {:>7} {:>6} {:>7} {:>8} {:>9} {:>7} {:>7} {:>5} {:>6} {:>9}",
                 "end",
                 "cell",
                 "mm in",
@@ -212,6 +212,7 @@ fn text(document: &Document) -> String {
                 "set-up",
                 "pen. mm",
                 "jumps",
+                "resort",
                 "crossed"
             ));
         }
@@ -251,10 +252,10 @@ fn surface_text(surface: &SurfaceRow, line: &mut impl FnMut(std::fmt::Arguments<
 fn row_text(row: &CellRow, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
     let crossed = match row.crossings {
         0 => "–".to_owned(),
-        count => format!("{count}×{:.2}", row.excursion_mm),
+        count => format!("{count}×{:.2}", row.missing_mm),
     };
     line(format_args!(
-        "  {:<8} {:<52} {:>7.1} {:>5} {:>7} {:>6} {:>7.0} {:>8.2} {:>9.1} {:>7.2} {:>7.3} {:>5} {:>9}{}",
+        "  {:<8} {:<52} {:>7.1} {:>5} {:>7} {:>6} {:>7.0} {:>8.2} {:>9.1} {:>7.2} {:>7.3} {:>5} {:>6} {:>9}{}",
         row.ending.name(),
         row.name,
         row.inserted_mm,
@@ -267,6 +268,7 @@ fn row_text(row: &CellRow, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
         row.setup_s,
         row.max_penetration_mm,
         row.jumps,
+        row.relaxations,
         crossed,
         // A good end needs no words: where it left or was blocked is in the JSON document.
         row.message.as_ref().filter(|_| !row.ending.is_good()).map_or_else(String::new, |m| format!("  {m}")),

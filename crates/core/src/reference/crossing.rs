@@ -1,11 +1,16 @@
-//! Whether a device passes through a triangle of a surface, and how far from the surface it is.
+//! Whether a device passes through a triangle of a surface, and whether it has sunk in there as deep as its step says.
 //!
 //! An independent check: it shares no code with the queries of the simulation, and takes the triangles as they are given, before
 //! any repair.
+//!
+//! A soft wall gives way, and the axis of a device may lie behind it. Where the axis meets a triangle, the device has sunk in by its
+//! radius r; where it is D behind, by r + D. A depth changes by no more than the way along the device, so that a contact that is a
+//! away must tell at least r + D − a ([`CrossingTest::missing_mm`]). A device that has come through the wall tells less.
 
 use std::collections::BTreeMap;
 
 use crate::Vec3;
+use crate::insertion::Simulation;
 use crate::shape::Shape;
 use crate::vessel::SurfaceMesh;
 
@@ -17,10 +22,17 @@ const LEAST_CELL_MM: f64 = 0.5;
 /// Most cells along the longest edge of a triangle: one huge triangle among small ones must not fill millions of cells.
 const MOST_CELLS_ALONG: f64 = 32.0;
 
+/// Half of the distance between the places at which a device feels the wall, in radii, is at most this.
+const APART_RADII: f64 = 1.5;
+/// A device farther behind the triangles is told to be as far as this, mm.
+const FARTHEST_MM: f64 = 20.0;
+
 /// The triangles of a mesh in the cells of a grid, for testing lines against them.
 #[derive(Debug)]
 pub struct CrossingTest {
     triangles: Vec<[Vec3; 3]>,
+    /// Mean length of an edge, mm.
+    pub edge_mm: f64,
     cell_mm: f64,
     cells: BTreeMap<[i64; 3], Vec<u32>>,
 }
@@ -31,10 +43,11 @@ impl CrossingTest {
         let triangles: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|i| mesh.corners(i)).collect();
         let edges: f64 = triangles.iter().map(|[a, b, _]| (b - a).norm()).sum();
         let longest = triangles.iter().map(|[a, b, c]| (a.sup(b).sup(c) - a.inf(b).inf(c)).amax());
-        let cell_mm = (2.0 * edges / triangles.len().max(1) as f64)
+        let edge_mm = edges / triangles.len().max(1) as f64;
+        let cell_mm = (2.0 * edge_mm)
             .max(longest.fold(0.0, f64::max) / MOST_CELLS_ALONG)
             .max(LEAST_CELL_MM);
-        let mut test = Self { triangles, cell_mm, cells: BTreeMap::new() };
+        let mut test = Self { triangles, edge_mm, cell_mm, cells: BTreeMap::new() };
         for i in 0..test.triangles.len() {
             let [a, b, c] = test.triangles[i];
             let normal = (b - a).cross(&(c - a));
@@ -56,22 +69,47 @@ impl CrossingTest {
             .flat_map(move |x| (low.y..=high.y).flat_map(move |y| (low.z..=high.z).map(move |z| [x, y, z])))
     }
 
-    /// The first piece of the line through `points` that passes through a triangle.
-    pub fn first_crossing(&self, points: &[Vec3]) -> Option<usize> {
-        points.windows(2).position(|ends| {
-            self.cells_of(&ends[0].inf(&ends[1]), &ends[0].sup(&ends[1])).any(|cell| {
-                self.cells
-                    .get(&cell)
-                    .into_iter()
-                    .flatten()
-                    .any(|&i| passes(&self.triangles[i as usize], ends[0], ends[1]))
-            })
-        })
+    /// Where the straight way from one point to another first passes through a triangle, as a part of the way.
+    fn first_met(&self, from: Vec3, to: Vec3) -> Option<f64> {
+        let cells = self.cells_of(&from.inf(&to), &from.sup(&to));
+        let near = cells.flat_map(|cell| self.cells.get(&cell).into_iter().flatten());
+        near.filter_map(|&i| passes(&self.triangles[i as usize], from, to)).min_by(f64::total_cmp)
     }
 
     /// Whether any piece of the line through `points` passes through a triangle.
     pub fn crosses(&self, points: &[Vec3]) -> bool {
-        self.first_crossing(points).is_some()
+        points.windows(2).any(|ends| self.first_met(ends[0], ends[1]).is_some())
+    }
+
+    /// How much less deep than it is, mm, the device says to have sunk in where it passes through a triangle and beyond; `None` where
+    /// it passes through none. No more than the distance between the wall that is felt and the triangles if it was pressed in.
+    pub fn missing_mm(&self, simulation: &Simulation) -> Option<f64> {
+        let (shape, device) = (simulation.shape(), simulation.device());
+        let contacts = &simulation.report().contacts;
+        let points = curve(shape);
+        let missing = |x: &Vec3, behind_mm: f64, piece: usize| {
+            let radius_mm = device.section_at(shape.from_tip_mm[piece / CHORDS]).radius_mm;
+            let near = contacts.iter().map(|c| ((c.position_mm - x).norm(), c.penetration_mm));
+            let next = near.min_by(|a, b| a.0.total_cmp(&b.0));
+            // Next to a place without a contact the device does not press at all.
+            let told = next.filter(|(away, _)| *away < APART_RADII * radius_mm).map(|(away, depth)| away + depth);
+            radius_mm + behind_mm - told.unwrap_or(0.0)
+        };
+        let mut most: Option<f64> = None;
+        let mut note = |mm: f64| most = Some(most.map_or(mm.max(0.0), |most| most.max(mm)));
+        let mut behind = false;
+        for (piece, ends) in points.windows(2).enumerate() {
+            if let Some(part) = self.first_met(ends[0], ends[1]) {
+                note(missing(&ends[0].lerp(&ends[1], part), 0.0, piece));
+                behind = true;
+            }
+            behind = behind && simulation.wall().winding_number(&ends[1]) < 0.5;
+            if behind {
+                let distance_mm = self.distance_mm(&ends[1], FARTHEST_MM).unwrap_or(FARTHEST_MM);
+                note(missing(&ends[1], distance_mm, piece));
+            }
+        }
+        most
     }
 
     /// Distance of a point from the nearest triangle, mm, if one is within `reach_mm`.
@@ -121,18 +159,19 @@ pub fn curve(shape: &Shape) -> Vec<Vec3> {
     points
 }
 
-/// Möller and Trumbore, *Fast, minimum storage ray/triangle intersection*, 1997.
-fn passes([a, b, c]: &[Vec3; 3], from: Vec3, to: Vec3) -> bool {
+/// Where the way passes through a triangle, as a part of it: Möller and Trumbore, *Fast, minimum storage ray/triangle intersection*,
+/// 1997.
+fn passes([a, b, c]: &[Vec3; 3], from: Vec3, to: Vec3) -> Option<f64> {
     let (way, e, f) = (to - from, b - a, c - a);
     let p = way.cross(&f);
     let det = e.dot(&p);
     if det.abs() < 1e-14 {
-        return false;
+        return None;
     }
     let s = from - a;
     let q = s.cross(&e);
     let (u, v, t) = (s.dot(&p) / det, way.dot(&q) / det, f.dot(&q) / det);
-    u >= 0.0 && v >= 0.0 && u + v <= 1.0 && (0.0..=1.0).contains(&t)
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && (0.0..=1.0).contains(&t)).then_some(t)
 }
 
 /// Distance of a point from a triangle, by the regions of Ericson, *Real-Time Collision Detection*, 2005, section 5.1.5.

@@ -13,6 +13,7 @@
 //! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with respect
 //! to the inserted length.
 
+mod blocked;
 mod configuration;
 mod guess;
 mod hold;
@@ -236,14 +237,16 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let mut failure = Cow::from("the way is too long for one step");
         while done < 1.0 {
             let rest = 1.0 - done;
-            // Where the way is lost, the device is let come to rest as far as the command goes; and if it does not, in parts.
-            let relax = budget == 0 || share < LEAST_SHARE;
-            if relax && attempts == 0 {
-                share = rest;
-            }
             // Where the way is lost, the device is let come to rest as far as the command goes; if it does not, in parts; and in the end
             // wherever it is.
             let relax = budget == 0 || share < LEAST_SHARE;
+            if relax && attempts == 0 && command.advance_mm > 0.0 {
+                // Unless the vessel is too narrow to go on.
+                if let Some(end) = self.narrowest(surroundings) {
+                    self.go_back(moved);
+                    return Err(Error::End(end));
+                }
+            }
             attempts += usize::from(relax);
             if relax && (attempts == 1 || attempts == RESORTS) {
                 share = rest;

@@ -34,8 +34,10 @@ pub struct Summary {
     pub cells_crossing: usize,
     /// Commands after which the device was in a given triangle.
     pub crossings: usize,
-    /// Farthest way beyond the given triangles, mm.
-    pub excursion_mm: f64,
+    /// How much less deep than it was a device said to have sunk in there, mm.
+    pub missing_mm: f64,
+    /// Parts of commands in which the last resort was needed.
+    pub relaxations: u64,
     /// Jumps.
     pub jumps: usize,
     /// Slowest command, ms, …
@@ -61,7 +63,8 @@ impl Summary {
             sum.slow_steps += row.slow_steps;
             sum.cells_crossing += usize::from(row.crossings > 0);
             sum.crossings += row.crossings;
-            sum.excursion_mm = sum.excursion_mm.max(row.excursion_mm);
+            sum.missing_mm = sum.missing_mm.max(row.missing_mm);
+            sum.relaxations += row.relaxations;
             sum.jumps += row.jumps;
             if row.slowest_ms > sum.slowest_ms {
                 (sum.slowest_ms, sum.slowest) = (row.slowest_ms, row.name.clone());
@@ -79,9 +82,15 @@ impl std::fmt::Display for Summary {
         write!(
             f,
             "{cells} cells: {arrived} arrived, {left} left, {blocked} blocked, {failed} failed, {refused} refused; \
-             {good_percent:.1} % good ends; {} commands, {} over {ITERATIONS_PER_MM} iterations/mm, {} jumps; \
-             {} crossings in {} cells, deepest {:.3} mm",
-            self.steps, self.slow_steps, self.jumps, self.crossings, self.cells_crossing, self.excursion_mm
+             {good_percent:.1} % good ends; {} commands, {} over {ITERATIONS_PER_MM} iterations/mm, {} last resorts, {} \
+             jumps; {} crossings in {} cells, {:.3} mm not told",
+            self.steps,
+            self.slow_steps,
+            self.relaxations,
+            self.jumps,
+            self.crossings,
+            self.cells_crossing,
+            self.missing_mm
         )?;
         if self.slowest.is_empty() {
             return Ok(());
