@@ -39,6 +39,8 @@ use crate::rod::{ElementData, RodState};
 const STICK: f64 = 1e-3;
 /// Least slip length, mm: below it steps are lost in the rounding of positions.
 const LEAST_STICK_MM: f64 = 1e-8;
+/// … and where the hand holds still, as a part of that.
+const STICK_AT_REST: f64 = 0.1;
 /// Points nearer to the tip than this many radii (beside the advance) bring their normal force along; the others find the
 /// one that was felt where they come to lie, since the wall does not move.
 const TIP_RADII: f64 = 10.0;
@@ -47,7 +49,7 @@ const TIP_RADII: f64 = 10.0;
 /// have little to do with those of the equilibrium …
 const STEADY: f64 = 0.3;
 /// … and no more once they differ from the lagged ones by less than this part.
-pub(super) const SETTLED: f64 = 1e-4;
+pub(crate) const SETTLED: f64 = 1e-4;
 /// Renewals of a step that take the forces as they are; where they have not settled by then they overshoot, …
 const WHOLE_RENEWALS: usize = 20;
 /// … and from then on they take this part of the way.
@@ -103,6 +105,8 @@ pub struct Friction {
     hands_over: bool,
     /// Part of the normal forces that follows the state at once, if any does: see [`coupling`].
     coupled: Option<f64>,
+    /// Energy that was taken before the points were anchored anew, mJ.
+    taken_mj: f64,
     sliders: Vec<Slider>,
 }
 
@@ -155,6 +159,7 @@ impl Friction {
         self.settled = false;
         self.renewals = 0;
         self.coupled = None;
+        self.taken_mj = 0.0;
         if !self.acts() {
             return;
         }
@@ -224,11 +229,26 @@ impl Friction {
     /// Energy that friction has taken in the step, mJ.
     pub fn dissipated_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> f64 {
         let each = points.iter().enumerate().take(self.sliders.len());
-        each.map(|(index, point)| {
+        let taken = each.map(|(index, point)| {
             let x = point.position(elements, state);
             self.value(index, &x, point.angle(state), point.potential.radius_mm)
-        })
-        .sum()
+        });
+        self.taken_mj + taken.sum::<f64>()
+    }
+
+    /// Slip begins anew at `state`, with the normal forces seen there: the hand holds still, and the device slides on to where it comes
+    /// to rest. A point that sticks creeps less than in the step itself.
+    pub fn anchor(&mut self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) {
+        self.taken_mj = self.dissipated_mj(elements, state, points);
+        self.stick_mm = (self.stick_mm * STICK_AT_REST).max(LEAST_STICK_MM);
+        for (slider, point) in self.sliders.iter_mut().zip(points) {
+            slider.from_mm = point.position(elements, state);
+            slider.from_rad = point.angle(state);
+            slider.force_n = slider.seen.1;
+            if slider.seen.1 > 0.0 {
+                slider.normal = slider.seen.0;
+            }
+        }
     }
 
     /// φ′/y and φ″ at a slip y.
@@ -307,22 +327,6 @@ impl Friction {
     /// Normal forces are renewed no more.
     pub fn hold(&mut self) {
         self.settled = true;
-    }
-
-    /// Takes the normal forces half of the way to those seen last.
-    pub fn renew(&mut self) {
-        for slider in &mut self.sliders {
-            slider.lagged_n = slider.force_n;
-            slider.force_n += 0.5 * (slider.seen.1 - slider.force_n);
-            if slider.seen.1 > 0.0 {
-                slider.normal = slider.seen.0;
-            }
-        }
-    }
-
-    /// Goes back to the normal forces before [`Friction::renew`].
-    pub fn take_back(&mut self) {
-        self.sliders.iter_mut().for_each(|s| s.force_n = s.lagged_n);
     }
 
     /// Lets the normal forces be renewed again.

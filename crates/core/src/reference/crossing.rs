@@ -44,9 +44,7 @@ impl CrossingTest {
         let edges: f64 = triangles.iter().map(|[a, b, _]| (b - a).norm()).sum();
         let longest = triangles.iter().map(|[a, b, c]| (a.sup(b).sup(c) - a.inf(b).inf(c)).amax());
         let edge_mm = edges / triangles.len().max(1) as f64;
-        let cell_mm = (2.0 * edge_mm)
-            .max(longest.fold(0.0, f64::max) / MOST_CELLS_ALONG)
-            .max(LEAST_CELL_MM);
+        let cell_mm = (2.0 * edge_mm).max(longest.fold(0.0, f64::max) / MOST_CELLS_ALONG).max(LEAST_CELL_MM);
         let mut test = Self { triangles, edge_mm, cell_mm, cells: BTreeMap::new() };
         for i in 0..test.triangles.len() {
             let [a, b, c] = test.triangles[i];
@@ -92,7 +90,8 @@ impl CrossingTest {
             let near = contacts.iter().map(|c| ((c.position_mm - x).norm(), c.penetration_mm));
             let next = near.min_by(|a, b| a.0.total_cmp(&b.0));
             // Next to a place without a contact the device does not press at all.
-            let told = next.filter(|(away, _)| *away < APART_RADII * radius_mm).map(|(away, depth)| away + depth);
+            let told =
+                next.filter(|(away, _)| *away < APART_RADII * radius_mm).map(|(away, depth)| away + depth);
             radius_mm + behind_mm - told.unwrap_or(0.0)
         };
         let mut most: Option<f64> = None;

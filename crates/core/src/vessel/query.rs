@@ -6,7 +6,7 @@
 
 use parry3d_f64::glamx::DVec3;
 use parry3d_f64::query::{PointQueryWithLocation, Ray, RayCast};
-use parry3d_f64::shape::{FeatureId, TriMesh, TriMeshFlags, TrianglePointLocation};
+use parry3d_f64::shape::{CompositeShapeRef, TriMesh, TriMeshFlags, TrianglePointLocation};
 
 use super::topology::{EdgeTable, NONE};
 use super::{SurfaceMesh, Wall};
@@ -104,10 +104,9 @@ impl WallQuery {
     /// What a ray first meets within `reach_mm`: how far it is, and the triangle. `direction` is of unit length.
     pub(crate) fn first_met(&self, from_mm: &Vec3, direction: &Vec3, reach_mm: f64) -> Option<(f64, u32)> {
         let ray = Ray::new(to_parry(from_mm), to_parry(direction));
-        let met = self.shape.cast_local_ray_and_get_normal(&ray, reach_mm, true)?;
-        // Faces seen from behind are numbered after all others.
-        let FeatureId::Face(face) = met.feature else { return None };
-        Some((met.time_of_impact, face % self.inward.len() as u32))
+        // The feature of a hit is that of a triangle by itself; which triangle it was the composite shape tells.
+        let (triangle, way_mm) = CompositeShapeRef(&self.shape).cast_local_ray(&ray, reach_mm, true)?;
+        Some((way_mm, triangle))
     }
 
     /// The closest point of the wall if it is less than `reach_mm` away. `None` also for a point that is not finite.

@@ -46,14 +46,9 @@ impl WallContact<'_> {
         self.friction.hold();
     }
 
-    /// They go half of the way to those of the state assembled last.
-    pub fn renew_friction(&mut self) {
-        self.friction.renew();
-    }
-
-    /// They go back to where they were before that.
-    pub fn take_back_friction(&mut self) {
-        self.friction.take_back();
+    /// Slip begins anew at `state`, the state assembled last, with the normal forces there.
+    pub fn anchor_friction(&mut self, elements: &[ElementData], state: &RodState) {
+        self.friction.anchor(elements, state, self.points);
     }
 
     /// Part by which the lagged normal forces differ from those of the state assembled last.

@@ -41,7 +41,6 @@ use crate::{Error, PhysicalEnd, Result};
 use configuration::Configuration;
 use guess::Guess;
 use mesh::MOST_POINTS;
-use rest::Rest;
 use settle::Settle;
 use slide::Extension;
 use substep::Attempt;
@@ -85,8 +84,6 @@ const WORK_RAD: f64 = 0.1;
 const WORK_OF_ONE: usize = 10;
 /// How often the last resort is tried in a command; the last time what it comes to is taken whatever is left over.
 const RESORTS: usize = 6;
-/// A device that is at rest with less left over than this part of its forces is in equilibrium; more is told.
-const BALANCED: f64 = 1e-6;
 /// A step is a jump if more than this part of the stored energy was set free.
 const JUMP: f64 = 0.02;
 /// Stored energy below which nothing is called a jump, mJ.
@@ -104,7 +101,6 @@ pub struct Kirchhoff<const C: usize> {
     before: Configuration,
     guess: Guess,
     settle: Settle<C>,
-    rest: Rest,
     extension: Extension,
     memory: WallMemory,
     /// What the points knew where the sub-step under way began, …
@@ -149,7 +145,6 @@ impl<const C: usize> Kirchhoff<C> {
             before: nothing,
             guess: Guess::new(surroundings.device.shaped_mm()),
             settle: Settle::default(),
-            rest: Rest::default(),
             extension: Extension::default(),
             known_now: KnownPoints::default(),
             known_before: KnownPoints::default(),
@@ -192,7 +187,6 @@ impl<const C: usize> Kirchhoff<C> {
         self.newton.reserve(elements);
         self.guess.reserve(elements);
         self.settle.reserve(elements);
-        self.rest.reserve(elements);
         let nodes = self.current.mesh.from_tip_mm.capacity();
         self.shape.positions_mm.reserve(nodes);
         self.shape.tangents.reserve(nodes);
@@ -225,7 +219,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         self.memory.keep(&mut self.known_before);
         self.guess.keep();
         let (mut iterations, mut substeps, mut dissipated_mj) = (0, 0, 0.0);
-        let (mut relaxations, mut imbalance) = (0, 0.0f64);
+        let (mut relaxations, mut imbalance, mut balanced) = (0, 0.0f64, true);
         let most = self.options.max_iterations;
         let travel = (target - start).abs().max(command.rotate_rad.abs() / WORK_RAD).max(1.0);
         let mut budget = ((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most));
@@ -278,6 +272,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                     iterations += found.iterations;
                     relaxations += u32::from(relax);
                     imbalance = imbalance.max(found.residual.max(found.unsettled));
+                    balanced &= found.balanced;
                     dissipated_mj += found.dissipated_mj;
                     let state = &self.next.state;
                     if let Some((opening, beyond)) =
@@ -315,7 +310,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         self.report.substeps = substeps as u32;
         self.report.dissipated_mj = dissipated_mj;
         (self.report.relaxations, self.report.imbalance) = (relaxations, imbalance);
-        self.report.converged = relaxations == 0 || imbalance <= BALANCED;
+        self.report.converged = balanced;
         self.write_report(surroundings);
         self.write_shape();
         // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between

@@ -3,9 +3,10 @@
 use std::borrow::Cow;
 
 use super::guess::Quality;
+use super::rest::come_to_rest;
 use super::slide::slide;
 use super::{Kirchhoff, softest};
-use crate::contact::{Counters, HandMotion, WallContact};
+use crate::contact::{Counters, HandMotion, SETTLED, WallContact};
 use crate::insertion::Surroundings;
 use crate::rod::Supports;
 use crate::solve::NewtonOptions;
@@ -37,6 +38,8 @@ pub(super) struct Found {
     pub(super) residual: f64,
     /// Part by which the normal forces that friction follows differ from those of the wall.
     pub(super) unsettled: f64,
+    /// Whether it is an equilibrium.
+    pub(super) balanced: bool,
 }
 
 /// How far a sub-step goes, and how hard it tries.
@@ -127,7 +130,7 @@ impl<const C: usize> Kirchhoff<C> {
         let found = loop {
             if relax {
                 let system = (&mut self.newton, &mut contact, &mut supports);
-                let (found, steps) = self.rest.come_to_rest(
+                let (found, steps) = come_to_rest(
                     system,
                     &next.mesh.elements,
                     &mut next.state,
@@ -221,6 +224,7 @@ impl<const C: usize> Kirchhoff<C> {
         self.guess.learn(hand, &next.state);
         let dissipated_mj = next.friction.dissipated_mj(&next.mesh.elements, &next.state, &next.mesh.points);
         let unsettled = if relax && surroundings.properties.rubs() { unsettled } else { 0.0 };
-        Ok(Found { iterations, dissipated_mj, residual: found.residual, unsettled })
+        let balanced = found.converged && unsettled < SETTLED;
+        Ok(Found { iterations, dissipated_mj, residual: found.residual, unsettled, balanced })
     }
 }
