@@ -68,6 +68,8 @@ struct Slider {
     normal: Vec3,
     /// N: normal force, less where the wall is smoother.
     force_n: f64,
+    /// Normal and force with which the step began.
+    begun: (Vec3, f64),
     /// Normal and force at the state seen last.
     seen: (Vec3, f64),
     /// N when the coupled solution began.
@@ -181,6 +183,7 @@ impl Friction {
                 along,
                 normal: Vec3::zeros(),
                 force_n: 0.0,
+                begun: (Vec3::zeros(), 0.0),
                 seen: (Vec3::zeros(), 0.0),
                 lagged_n: 0.0,
                 matrix_n: 0.0,
@@ -204,6 +207,7 @@ impl Friction {
                     slider.force_n = point.weight_mm * pressure;
                 }
             }
+            slider.begun = (slider.normal, slider.force_n);
             self.sliders.push(slider);
         }
     }
@@ -329,6 +333,13 @@ impl Friction {
         self.settled = true;
     }
 
+    /// Normal forces are again those with which the step began, and are held.
+    pub fn rewind(&mut self) {
+        self.coupled = None;
+        self.settled = true;
+        self.sliders.iter_mut().for_each(|s| (s.normal, s.force_n) = s.begun);
+    }
+
     /// Lets the normal forces be renewed again.
     pub fn unsettle(&mut self) {
         self.settled = false;
@@ -350,6 +361,7 @@ mod tests {
             along,
             normal,
             force_n: 2.0,
+            begun: (normal, 2.0),
             seen: (normal, 2.0),
             lagged_n: 0.0,
             matrix_n: 0.0,

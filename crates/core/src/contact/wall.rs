@@ -16,7 +16,7 @@ use super::memory::WallMemory;
 use super::point::{ContactPoint, Counters, Touch};
 use crate::Vec3;
 use crate::contact::distance::{Distance, Nearness};
-use crate::contact::{FeltWall, Friction, friction};
+use crate::contact::{FeltWall, Friction};
 use crate::insertion::Contact;
 use crate::rod::{Assembly, ElementData, PointSum, RodState};
 use crate::solve::External;
@@ -235,13 +235,6 @@ impl<'a> WallContact<'a> {
             (gradient, hessian)
         };
         sum.add(point.xi, &gradient, assembly.hessian.then_some(&hessian));
-    }
-
-    /// Whether friction knows the normal forces of the equilibrium that was found. If not, it may renew them again.
-    pub fn friction_settled(&mut self) -> bool {
-        let settled = self.friction.unsettled(self.least_force_n()) < friction::SETTLED;
-        self.friction.unsettle();
-        settled
     }
 
     /// A device bent to a radius of 100 mm carries this.

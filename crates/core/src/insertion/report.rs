@@ -79,6 +79,8 @@ pub struct StepReport {
     pub iterations: u32,
     /// Parts that the command was cut into.
     pub substeps: u32,
+    /// How often the device slid on while the hand held still, because friction and wall forces were not to be had in one step.
+    pub slides: u32,
     /// Parts of the command in which the way from the last equilibrium was lost, and the device was let come to rest as it could: the
     /// last resort. 0 nearly always.
     pub relaxations: u32,

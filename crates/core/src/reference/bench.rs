@@ -1,7 +1,7 @@
 //! A rod in equilibrium with walls and loads, without the insertion around it: the bench of the contact cases.
 
 use crate::contact::Touch;
-use crate::contact::{FeltWall, Friction, HandMotion, WallContact, WallMemory};
+use crate::contact::{FeltWall, Friction, HandMotion, SETTLED, WallContact, WallMemory};
 use crate::device::Device;
 use crate::insertion::WallProperties;
 use crate::methods::kirchhoff::mesh::Mesh;
@@ -166,9 +166,10 @@ impl Bench {
                         found.reason, found.residual
                     )));
                 }
-                if !rubs || outside.contact.friction_settled() {
+                if !rubs || outside.contact.unsettled() < SETTLED {
                     return Ok(());
                 }
+                outside.contact.unsettle_friction();
             }
             Err(Error::Computation("friction does not settle".to_owned()))
         })

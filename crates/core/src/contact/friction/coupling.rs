@@ -135,6 +135,7 @@ mod tests {
             along: Vec3::new(0.8, 0.6, 0.1).normalize(),
             normal,
             force_n: force,
+            begun: (normal, force),
             seen: (normal, force),
             lagged_n: 1.1,
             matrix_n: force,

@@ -46,6 +46,16 @@ impl WallContact<'_> {
         self.friction.hold();
     }
 
+    /// Normal forces of friction may be renewed again.
+    pub fn unsettle_friction(&mut self) {
+        self.friction.unsettle();
+    }
+
+    /// Normal forces of friction are again those with which the step began, and are held.
+    pub fn rewind_friction(&mut self) {
+        self.friction.rewind();
+    }
+
     /// Slip begins anew at `state`, the state assembled last, with the normal forces there.
     pub fn anchor_friction(&mut self, elements: &[ElementData], state: &RodState) {
         self.friction.anchor(elements, state, self.points);

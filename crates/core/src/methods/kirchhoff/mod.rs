@@ -20,7 +20,7 @@ mod hold;
 pub(crate) mod mesh;
 mod readout;
 mod repeat;
-mod rest;
+mod search;
 mod settle;
 mod slide;
 mod substep;
@@ -199,7 +199,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         if command == Command::default() {
             (self.report.iterations, self.report.substeps) = (0, 0);
             (self.report.dissipated_mj, self.report.jumped) = (0.0, false);
-            self.report.relaxations = 0;
+            (self.report.relaxations, self.report.slides) = (0, 0);
             return Ok(());
         }
         let tip = self.current.state.positions[self.current.state.elements()];
@@ -219,7 +219,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         self.memory.keep(&mut self.known_before);
         self.guess.keep();
         let (mut iterations, mut substeps, mut dissipated_mj) = (0, 0, 0.0);
-        let (mut relaxations, mut imbalance, mut balanced) = (0, 0.0f64, true);
+        let (mut relaxations, mut slides, mut imbalance, mut balanced) = (0, 0, 0.0f64, true);
         let most = self.options.max_iterations;
         let travel = (target - start).abs().max(command.rotate_rad.abs() / WORK_RAD).max(1.0);
         let mut budget = ((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most));
@@ -271,7 +271,10 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 Ok(found) => {
                     iterations += found.iterations;
                     relaxations += u32::from(relax);
-                    imbalance = imbalance.max(found.residual.max(found.unsettled));
+                    slides += found.slides;
+                    if relax {
+                        imbalance = imbalance.max(found.residual.max(found.unsettled));
+                    }
                     balanced &= found.balanced;
                     dissipated_mj += found.dissipated_mj;
                     let state = &self.next.state;
@@ -291,6 +294,9 @@ impl<const C: usize> Method for Kirchhoff<C> {
                     share = (2.0 * part).min(1.0);
                 }
                 Err(reason) => {
+                    if std::env::var("DBG").is_ok() {
+                        eprintln!("at {start:.2} part {part:.4} relax {relax} budget {budget}: {reason}");
+                    }
                     failure = reason;
                     share = 0.25 * part;
                     if relax {
@@ -309,7 +315,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
         self.report.iterations = iterations as u32;
         self.report.substeps = substeps as u32;
         self.report.dissipated_mj = dissipated_mj;
-        (self.report.relaxations, self.report.imbalance) = (relaxations, imbalance);
+        (self.report.relaxations, self.report.slides, self.report.imbalance) =
+            (relaxations, slides, imbalance);
         self.report.converged = balanced;
         self.write_report(surroundings);
         self.write_shape();

@@ -3,26 +3,17 @@
 use std::borrow::Cow;
 
 use super::guess::Quality;
-use super::rest::come_to_rest;
+use super::search::Search;
 use super::slide::slide;
 use super::{Kirchhoff, softest};
 use crate::contact::{Counters, HandMotion, SETTLED, WallContact};
 use crate::insertion::Surroundings;
 use crate::rod::Supports;
-use crate::solve::NewtonOptions;
 
 /// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, …
 const SOFTEST: f64 = 30.0;
-/// … each solved to this residual over force scale, or to what is wanted if that is more.
-const LOOSE: f64 = 1e-3;
-/// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
-const ROUNDS: usize = 5;
-/// Newton iterations in which a guess that has learnt must come to its end, or the wall is approached from softer ones.
-const HURRIED: usize = 15;
 /// Residual over force scale above which the last resort has found nothing.
 const AT_REST: f64 = 0.05;
-/// Newton iterations after which a solution has gone astray: from another guess, nearer by, it is found in fewer.
-const STUCK: usize = 60;
 /// What is the matter where an equilibrium is on the other side of the wall.
 const PASSED: &str = "the device would pass through the wall";
 /// What is the matter where they do not.
@@ -32,6 +23,8 @@ const UNSETTLED: &str = "friction and wall forces do not settle";
 pub(super) struct Found {
     /// Newton iterations.
     pub(super) iterations: usize,
+    /// How often the device slid on while the hand held still.
+    pub(super) slides: u32,
     /// Energy that friction took, mJ.
     pub(super) dissipated_mj: f64,
     /// Residual over force scale.
@@ -120,111 +113,46 @@ impl<const C: usize> Kirchhoff<C> {
         let data = &next.mesh.elements[elements - 1];
         let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
         let stiffest = surroundings.properties.stiffest_n_per_mm2();
-        let softest_first = (SOFTEST * element_stiffness / stiffest).min(1.0);
-        contact.hand_over(softest_first < 1.0);
-        // A guess that has learnt from the last step or kept its contacts is so near that the wall may be met as it is.
-        let mut hurried = (quality == Quality::Learnt || held) && softest_first < 1.0;
-        let mut softness = if hurried { 1.0 } else { softest_first };
-        let mut iterations = usize::from(held);
-        let mut rounds = 0;
-        let found = loop {
-            if relax {
-                let system = (&mut self.newton, &mut contact, &mut supports);
-                let (found, steps) = come_to_rest(
-                    system,
-                    &next.mesh.elements,
-                    &mut next.state,
-                    (softest_first, tolerance, surroundings.properties.rubs()),
-                );
-                iterations += steps;
-                break found;
-            }
-            contact.softness = softness;
-            let options = NewtonOptions {
-                max_iterations: if hurried { HURRIED } else { self.options.max_iterations.min(STUCK) }
-                    .min(*budget),
-                tolerance: if softness < 1.0 { tolerance.max(LOOSE) } else { tolerance },
-                ..NewtonOptions::default()
-            };
-            let found = self.newton.solve(
-                &next.mesh.elements,
-                &mut supports,
-                &mut contact,
-                &mut next.state,
-                &options,
-            );
-            iterations += found.iterations;
-            *budget -= found.iterations;
-            if !found.converged && hurried {
-                self.guess.plain(&mut next.state);
-                hurried = false;
-                // Without friction softer walls lead there in fewer iterations than the active set.
-                let mut near = false;
-                if surroundings.properties.rubs() {
-                    contact.restore_forces();
-                    let system = (&mut self.newton, &mut contact, &mut supports);
-                    let limits = (tolerance, *budget);
-                    let steps;
-                    (near, steps) =
-                        self.settle.approach(system, &next.mesh.elements, &mut next.state, limits);
-                    iterations += steps;
-                    *budget -= steps;
-                }
-                if !near {
-                    self.guess.plain(&mut next.state);
-                    softness = softest_first;
-                    contact.softness = softness;
-                    contact.hand_over(softest_first < 1.0);
-                }
-                continue;
-            }
-            if !found.converged {
-                break found;
-            }
-            if softness < 1.0 {
-                softness = (10.0 * softness).min(1.0);
-                contact.softness = softness;
-                contact.hand_over(softest_first < 1.0);
-                continue;
-            }
-            if !surroundings.properties.rubs() || contact.friction_settled() {
-                break found;
-            }
-            if contact.handed_over() || softest_first < 1.0 {
-                let system = (&mut self.newton, &mut contact, &mut supports);
-                let limits = (tolerance, *budget);
-                let (settled, steps) =
-                    self.settle.solve(system, &next.mesh.elements, &mut next.state, limits);
-                iterations += steps;
-                *budget -= steps;
-                rounds += 1;
-                if settled && rounds < ROUNDS {
-                    continue;
-                }
-                return Err(UNSETTLED.into());
-            }
+        let softest = (SOFTEST * element_stiffness / stiffest).min(1.0);
+        let mut search = Search {
+            newton: &mut self.newton,
+            settle: &mut self.settle,
+            guess: &mut self.guess,
+            contact: &mut contact,
+            supports: &mut supports,
+            elements: &next.mesh.elements,
+            state: &mut next.state,
+            softest,
+            rubs: surroundings.properties.rubs(),
+            tolerance,
+            max_iterations: self.options.max_iterations,
+            budget: (!relax).then_some(budget),
+            iterations: usize::from(held),
+            slides: 0,
         };
+        // A guess that has learnt from the last step or kept its contacts is near.
+        let found = search.run(quality == Quality::Learnt || held);
+        let (iterations, slides) = (search.iterations, search.slides);
+        let unsettled = if surroundings.properties.rubs() { contact.unsettled() } else { 0.0 };
+        let balanced = found.converged && unsettled < SETTLED;
         let least = if resort == Some(true) { f64::MAX } else { AT_REST };
-        let at_rest = found.converged || (relax && found.residual <= least);
+        let at_rest = balanced || (relax && found.residual <= least);
         let passed = at_rest && contact.passes_through(&next.mesh.elements, &next.state);
-        let unsettled = contact.unsettled();
         let nodes = elements as u64 + 1;
         let (solved, frozen) = if iterations > 0 { (nodes, 0) } else { (0, nodes) };
         let counted = contact.count();
         self.report.counters.add(&Counters { nodes_solved: solved, nodes_frozen: frozen, ..counted });
         if !at_rest {
-            // Each renewal of the lagged forces gave Newton's method another energy to lower.
-            let unsettled = surroundings.properties.rubs() && !contact.friction_settled();
-            let reason = if unsettled { UNSETTLED.to_owned() } else { found.reason.to_string() };
-            return Err(format!("{reason} (residual {:.1e})", found.residual).into());
+            if found.converged {
+                return Err(UNSETTLED.into());
+            }
+            return Err(format!("{} (residual {:.1e})", found.reason, found.residual).into());
         }
         if passed {
             return Err(PASSED.into());
         }
         self.guess.learn(hand, &next.state);
         let dissipated_mj = next.friction.dissipated_mj(&next.mesh.elements, &next.state, &next.mesh.points);
-        let unsettled = if relax && surroundings.properties.rubs() { unsettled } else { 0.0 };
-        let balanced = found.converged && unsettled < SETTLED;
-        Ok(Found { iterations, dissipated_mj, residual: found.residual, unsettled, balanced })
+        Ok(Found { iterations, slides, dissipated_mj, residual: found.residual, unsettled, balanced })
     }
 }

@@ -1,0 +1,222 @@
+//! From a guess to the equilibrium next to it.
+//!
+//! A guess that has learnt from the last step is so near that the wall may be met as it is. From any other a wall that is stiffer than
+//! the elements of the rod is approached by softer ones, ten times stiffer each. Friction is held meanwhile to the normal forces of the
+//! last equilibrium: the energy then is bounded, every step of Newton's method lowers it, and it ends at a minimum.
+//!
+//! There the wall presses otherwise than friction believes. Where renewing the normal forces does not settle, friction and wall are
+//! solved for together ([`super::settle`]). Where that finds nothing, the hand holds still and the device slides on: slip begins anew
+//! where it is, with the normal forces that are felt there, until they no longer change. Each slide begins at rest, so that it ends
+//! lower than it began by what friction took,
+//!
+//! ```text
+//! E(xₖ₊₁) + Dₖ(xₖ₊₁) ≤ E(xₖ) + Dₖ(xₖ),    Dₖ(x) = Σ μ Nᵢ(xₖ) φ(|uᵢ(x; xₖ)|)
+//! ```
+//!
+//! and as E is bounded below what friction takes comes to an end, and with it the slip. The limit is in equilibrium with forces within
+//! the cones of Coulomb's law of its own normal forces: where a slow motion with friction comes to rest, in a few steps of it where
+//! elsewhere there is one.
+
+use super::guess::Guess;
+use super::settle::Settle;
+use crate::contact::{SETTLED, WallContact};
+use crate::rod::{ElementData, RodState, Supports};
+use crate::solve::{Newton, NewtonOptions, NewtonReport};
+
+/// Residual over force scale on softer walls.
+const LOOSE: f64 = 1e-3;
+/// Newton iterations in which a guess that has learnt must come to its end, or the wall is approached from softer ones.
+const HURRIED: usize = 15;
+/// Newton iterations after which a solution has gone astray: from another guess, nearer by, it is found in fewer.
+const STUCK: usize = 60;
+/// Newton iterations of the last resort: on a softer wall, and on the wall itself.
+const PATIENT: [usize; 2] = [25, 100];
+/// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
+const ROUNDS: usize = 5;
+/// Most slides with the hand held still. Two or three are the rule.
+const SLIDES: usize = 40;
+
+/// A search for an equilibrium.
+pub(super) struct Search<'a, 'b, const C: usize> {
+    pub(super) newton: &'a mut Newton<C>,
+    pub(super) settle: &'a mut Settle<C>,
+    pub(super) guess: &'a mut Guess,
+    pub(super) contact: &'a mut WallContact<'b>,
+    pub(super) supports: &'a mut Supports,
+    pub(super) elements: &'a [ElementData],
+    /// The guess, and then what was found.
+    pub(super) state: &'a mut RodState,
+    /// Part of the wall's modulus from which it is approached; 1 where it is no stiffer than the rod.
+    pub(super) softest: f64,
+    /// Whether there is friction.
+    pub(super) rubs: bool,
+    /// Residual over force scale of an equilibrium.
+    pub(super) tolerance: f64,
+    /// Most Newton iterations of one solution.
+    pub(super) max_iterations: usize,
+    /// Newton iterations that are left of the command's; none for the last resort, which takes what it needs.
+    pub(super) budget: Option<&'a mut usize>,
+    /// Newton iterations that were taken.
+    pub(super) iterations: usize,
+    /// How often the device slid on while the hand held still.
+    pub(super) slides: u32,
+}
+
+impl<const C: usize> Search<'_, '_, C> {
+    /// Finds it; `near` says whether the guess has learnt or kept its contacts. What is returned is not converged where nothing was
+    /// found, and with friction it has settled or not.
+    pub(super) fn run(&mut self, near: bool) -> NewtonReport {
+        let stiff = self.softest < 1.0;
+        self.contact.hand_over(stiff);
+        if self.budget.is_some() && if stiff { near } else { self.rubs } {
+            if let Some(found) = self.at_once() {
+                return self.settled(found);
+            }
+            self.guess.plain(self.state);
+            self.contact.rewind_friction();
+        }
+        let found = self.from_softer_walls();
+        if found.converged { self.settled(found) } else { found }
+    }
+
+    /// Newton's method from the state on.
+    fn newton(&mut self, most: usize, tolerance: f64) -> NewtonReport {
+        let left = self.budget.as_ref().map_or(usize::MAX, |budget| (**budget).min(self.max_iterations));
+        let options = NewtonOptions { max_iterations: most.min(left), tolerance, ..NewtonOptions::default() };
+        let found = self.newton.solve(self.elements, self.supports, self.contact, self.state, &options);
+        self.take(found.iterations);
+        if std::env::var("DBG").is_ok() {
+            eprintln!(
+                "   newton soft {:.1e} most {most}: {:?} res {:.1e} its {} unsettled {:.1e} handed {}",
+                self.contact.softness,
+                found.reason,
+                found.residual,
+                found.iterations,
+                self.contact.unsettled(),
+                self.contact.handed_over()
+            );
+        }
+        found
+    }
+
+    /// Counts iterations.
+    fn take(&mut self, iterations: usize) {
+        self.iterations += iterations;
+        if let Some(budget) = &mut self.budget {
+            **budget -= iterations.min(**budget);
+        }
+    }
+
+    /// The wall itself, from a guess that is near.
+    fn at_once(&mut self) -> Option<NewtonReport> {
+        self.contact.softness = 1.0;
+        let stiff = self.softest < 1.0;
+        let found = self.newton(if stiff { HURRIED } else { STUCK }, self.tolerance);
+        if found.converged {
+            return Some(found);
+        }
+        // Without friction softer walls lead there in fewer iterations than the active set.
+        if !self.rubs || !stiff {
+            return None;
+        }
+        self.guess.plain(self.state);
+        self.contact.restore_forces();
+        let limits = (self.tolerance, self.budget.as_ref().map_or(usize::MAX, |budget| **budget));
+        let system = (&mut *self.newton, &mut *self.contact, &mut *self.supports);
+        let (there, iterations) = self.settle.approach(system, self.elements, self.state, limits);
+        self.take(iterations);
+        if std::env::var("DBG").is_ok() {
+            eprintln!("   approach {there} its {iterations}");
+        }
+        if !there {
+            return None;
+        }
+        let found = self.newton(STUCK, self.tolerance);
+        found.converged.then_some(found)
+    }
+
+    /// The wall by way of softer ones.
+    fn from_softer_walls(&mut self) -> NewtonReport {
+        let patient = self.budget.is_none();
+        self.contact.softness = self.softest;
+        loop {
+            self.contact.hold_friction();
+            let last = self.contact.softness >= 1.0;
+            let most = if patient { PATIENT[usize::from(last)] } else { STUCK };
+            let tolerance = if last { self.tolerance } else { self.tolerance.max(LOOSE) };
+            let found = self.newton(most, tolerance);
+            if last || !(found.converged || patient) {
+                self.contact.softness = 1.0;
+                return found;
+            }
+            self.contact.softness = (10.0 * self.contact.softness).min(1.0);
+        }
+    }
+
+    /// Whether friction knows the normal forces of what was found.
+    fn is_settled(&self) -> bool {
+        !self.rubs || self.contact.unsettled() < SETTLED
+    }
+
+    /// From an equilibrium with the normal forces of others to one with its own.
+    fn settled(&mut self, mut found: NewtonReport) -> NewtonReport {
+        // On a wall that is no stiffer than the rod they settle by themselves, if they do.
+        while self.softest >= 1.0
+            && self.budget.is_some()
+            && !self.is_settled()
+            && !self.contact.handed_over()
+        {
+            self.contact.unsettle_friction();
+            found = self.newton(STUCK, self.tolerance);
+            if !found.converged {
+                return found;
+            }
+        }
+        if self.is_settled() {
+            return found;
+        }
+        self.guess.other.copy_from(self.state);
+        if self.budget.is_some()
+            && let Some(found) = self.together()
+        {
+            return found;
+        }
+        self.state.copy_from(&self.guess.other);
+        self.contact.rewind_friction();
+        found = self.newton(STUCK, self.tolerance);
+        for _ in 0..SLIDES {
+            if !found.converged || self.is_settled() {
+                break;
+            }
+            self.contact.anchor_friction(self.elements, self.state);
+            self.contact.hold_friction();
+            found = self.newton(STUCK, self.tolerance);
+            self.slides += 1;
+        }
+        found
+    }
+
+    /// Friction and wall solved for together. What is found may be no minimum, and is left then.
+    fn together(&mut self) -> Option<NewtonReport> {
+        for _ in 0..ROUNDS {
+            let limits = (self.tolerance, self.budget.as_ref().map_or(usize::MAX, |budget| **budget));
+            let system = (&mut *self.newton, &mut *self.contact, &mut *self.supports);
+            let (there, iterations) = self.settle.solve(system, self.elements, self.state, limits);
+            self.take(iterations);
+            if std::env::var("DBG").is_ok() {
+                eprintln!("   settle {there} its {iterations}");
+            }
+            if !there {
+                return None;
+            }
+            let found = self.newton(STUCK, self.tolerance);
+            if !found.converged {
+                return None;
+            }
+            if self.is_settled() {
+                return Some(found);
+            }
+        }
+        None
+    }
+}
