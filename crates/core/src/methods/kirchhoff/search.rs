@@ -29,8 +29,10 @@ const LOOSE: f64 = 1e-3;
 const HURRIED: usize = 15;
 /// Newton iterations after which a solution has gone astray: from another guess, nearer by, it is found in fewer.
 const STUCK: usize = 60;
-/// Newton iterations of the last resort: on a softer wall, and on the wall itself.
-const PATIENT: [usize; 2] = [25, 100];
+/// Newton iterations of the last resort: on a softer wall, on the wall itself, and of a slide.
+const PATIENT: [usize; 3] = [25, 100, 300];
+/// Newton iterations for friction and wall together.
+const TOGETHER: usize = 40;
 /// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
 const ROUNDS: usize = 5;
 /// Most slides with the hand held still. Two or three are the rule.
@@ -184,13 +186,14 @@ impl<const C: usize> Search<'_, '_, C> {
         self.state.copy_from(&self.guess.other);
         self.contact.rewind_friction();
         found = self.newton(STUCK, self.tolerance);
+        let most = if self.budget.is_none() { PATIENT[2] } else { STUCK };
         for _ in 0..SLIDES {
             if !found.converged || self.is_settled() {
                 break;
             }
             self.contact.anchor_friction(self.elements, self.state);
             self.contact.hold_friction();
-            found = self.newton(STUCK, self.tolerance);
+            found = self.newton(most, self.tolerance);
             self.slides += 1;
         }
         found
@@ -199,7 +202,8 @@ impl<const C: usize> Search<'_, '_, C> {
     /// Friction and wall solved for together. What is found may be no minimum, and is left then.
     fn together(&mut self) -> Option<NewtonReport> {
         for _ in 0..ROUNDS {
-            let limits = (self.tolerance, self.budget.as_ref().map_or(usize::MAX, |budget| **budget));
+            let left = self.budget.as_ref().map_or(usize::MAX, |budget| **budget);
+            let limits = (self.tolerance, left.min(TOGETHER));
             let system = (&mut *self.newton, &mut *self.contact, &mut *self.supports);
             let (there, iterations) = self.settle.solve(system, self.elements, self.state, limits);
             self.take(iterations);
