@@ -72,8 +72,6 @@ struct Slider {
     begun: (Vec3, f64),
     /// Normal and force at the state seen last.
     seen: (Vec3, f64),
-    /// N when the coupled solution began.
-    lagged_n: f64,
     /// N in its matrix.
     matrix_n: f64,
 }
@@ -105,8 +103,8 @@ pub struct Friction {
     renewals: usize,
     /// Whether they are left alone once they should have settled, for another method to go on from there.
     hands_over: bool,
-    /// Part of the normal forces that follows the state at once, if any does: see [`coupling`].
-    coupled: Option<f64>,
+    /// Whether normal forces follow the state at once: see [`coupling`].
+    coupled: bool,
     /// Energy that was taken before the points were anchored anew, mJ.
     taken_mj: f64,
     sliders: Vec<Slider>,
@@ -160,7 +158,7 @@ impl Friction {
         self.sliders.clear();
         self.settled = false;
         self.renewals = 0;
-        self.coupled = None;
+        self.coupled = false;
         self.taken_mj = 0.0;
         if !self.acts() {
             return;
@@ -185,7 +183,6 @@ impl Friction {
                 force_n: 0.0,
                 begun: (Vec3::zeros(), 0.0),
                 seen: (Vec3::zeros(), 0.0),
-                lagged_n: 0.0,
                 matrix_n: 0.0,
             };
             if point.from_tip_mm < near_tip {
@@ -269,10 +266,9 @@ impl Friction {
         angle: f64,
         radius_mm: f64,
     ) -> Option<FrictionDerivatives> {
-        let coupled = self.coupled.is_some();
-        let slider = self.sliders.get(index).filter(|s| coupled || s.force_n > 0.0)?;
+        let slider = self.sliders.get(index).filter(|s| self.coupled || s.force_n > 0.0)?;
         let force = self.coefficient * slider.force_n;
-        let stiff = if coupled { self.coefficient * slider.matrix_n } else { force };
+        let stiff = if self.coupled { self.coefficient * slider.matrix_n } else { force };
         let (slip, spin) = self.slip(index, x, angle, radius_mm);
         let y = slip.norm();
         let (over, second) = self.rates(y);
@@ -335,7 +331,7 @@ impl Friction {
 
     /// Normal forces are again those with which the step began, and are held.
     pub fn rewind(&mut self) {
-        self.coupled = None;
+        self.coupled = false;
         self.settled = true;
         self.sliders.iter_mut().for_each(|s| (s.normal, s.force_n) = s.begun);
     }
@@ -363,7 +359,6 @@ mod tests {
             force_n: 2.0,
             begun: (normal, 2.0),
             seen: (normal, 2.0),
-            lagged_n: 0.0,
             matrix_n: 0.0,
         };
         let at = slider.from_mm + (slip - normal * normal.dot(&slip));

@@ -52,8 +52,6 @@ pub struct WallMemory {
     /// The place asked for last.
     last: Place,
     spare: Vec<KnownPoint>,
-    /// Forces that were kept, and whether there was one.
-    kept: Vec<(f64, bool)>,
     /// Forces on the wall that a step leads to, N.
     pub(super) aims: Vec<f64>,
 }
@@ -90,7 +88,6 @@ impl WallMemory {
             places,
             last: Place::UNKNOWN,
             spare: Vec::new(),
-            kept: Vec::new(),
             aims: Vec::new(),
         }
     }
@@ -101,21 +98,7 @@ impl WallMemory {
             list.reserve(points.saturating_sub(list.len()));
         }
         self.aims.reserve(points.saturating_sub(self.aims.len()));
-        self.kept.reserve(points.saturating_sub(self.kept.len()));
         self.readings.reserve(points.saturating_sub(self.readings.len()));
-    }
-
-    /// Keeps what presses and how hard.
-    pub(super) fn keep_forces(&mut self) {
-        self.kept.clear();
-        self.kept.extend(self.points.iter().map(|known| (known.force_n, known.presses)));
-    }
-
-    /// Goes back to what was kept.
-    pub(super) fn restore_forces(&mut self) {
-        for (known, (force_n, presses)) in self.points.iter_mut().zip(&self.kept) {
-            (known.force_n, known.presses) = (*force_n, *presses);
-        }
     }
 
     pub(super) fn resize(&mut self, points: usize) {

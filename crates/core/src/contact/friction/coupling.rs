@@ -1,12 +1,11 @@
 //! Friction whose normal forces follow the state at once: what its derivatives are then.
 //!
 //! With lagged normal forces friction has a potential; with those of the state itself it has none, and its Newton matrix is not
-//! symmetric. Between the two lies N = (1 − λ) N₀ + λ f, the lagged normal force of a point blended with that of the state:
-//! for λ = 0 the solution is known, for λ = 1 it is Coulomb's law (`methods/kirchhoff/settle.rs`). With a(y) = φ′/y,
+//! symmetric (`methods/kirchhoff/settle.rs`). With the normal force f of the state, and a(y) = φ′/y,
 //!
 //! ```text
-//! g  = μ N a u                                              friction on the wall, minus that on the device
-//! dN = λ ∇f·dx,    dn = ∇n dx
+//! g  = μ N a u,    N = f                                    friction on the wall, minus that on the device
+//! dN = ∇f·dx,    dn = ∇n dx
 //! du = P dx + s dθ − dn (n·w) − n (dn·w) + r (θ − θₐ) dn × t,    w = x − a,    s = r n × t
 //! dg = μ a u dN + μ N (a du + (φ″ − a) û (û·du)),    d(g·s) = s·dg + g·(r dn × t)
 //! ```
@@ -32,29 +31,19 @@ pub struct Coupling {
 }
 
 impl Friction {
-    /// From now on this part of the normal forces follows the state; the rest stays as it is now.
-    pub fn couple(&mut self, part: f64) {
-        if self.coupled.is_none() {
-            self.sliders.iter_mut().for_each(|s| s.lagged_n = s.force_n);
-        }
-        self.coupled = Some(part);
+    /// From now on the normal forces follow the state.
+    pub fn couple(&mut self) {
+        self.coupled = true;
     }
 
-    /// From now on there is no friction but what follows the state, and none of that yet.
-    pub fn forget(&mut self) {
-        self.coupled = Some(0.0);
-        self.sliders.iter_mut().for_each(|s| (s.lagged_n, s.force_n, s.matrix_n) = (0.0, 0.0, 0.0));
-    }
-
-    /// Whether a part of the normal forces follows the state at once.
+    /// Whether they do.
     pub fn is_coupled(&self) -> bool {
-        self.coupled.is_some()
+        self.coupled
     }
 
     /// Normal forces are lagged again: they stay as they are.
     pub fn uncouple(&mut self) {
-        self.coupled = None;
-        self.settled = true;
+        (self.coupled, self.settled) = (false, true);
         for slider in &mut self.sliders {
             slider.force_n = slider.force_n.max(0.0);
         }
@@ -74,15 +63,13 @@ impl Friction {
 
     /// Normal forces of the state: for each point the normal, the force of the state, and that in the matrix, where it presses.
     pub fn take(&mut self, pressed: impl Iterator<Item = Option<(Vec3, f64, f64)>>) {
-        let Some(part) = self.coupled else { return };
         for (slider, now) in self.sliders.iter_mut().zip(pressed) {
             if let Some((normal, _, _)) = now {
                 slider.normal = normal;
             }
             let (force, stiff) = now.map_or((0.0, 0.0), |(_, force, stiff)| (force, stiff));
             slider.seen = (slider.normal, force.max(0.0));
-            slider.force_n = (1.0 - part) * slider.lagged_n + part * force;
-            slider.matrix_n = (1.0 - part) * slider.lagged_n + part * stiff;
+            (slider.force_n, slider.matrix_n) = (force, stiff);
         }
     }
 
@@ -95,7 +82,7 @@ impl Friction {
         radius_mm: f64,
         (force_rate, normal_rate): (&Vec3, &Matrix3<f64>),
     ) -> Option<Coupling> {
-        let (slider, part) = (self.sliders.get(index)?, self.coupled?);
+        let slider = self.sliders.get(index)?;
         let (slip, spin) = self.slip(index, x, angle, radius_mm);
         let y = slip.norm();
         let (over, second) = self.rates(y);
@@ -108,7 +95,7 @@ impl Friction {
             - normal_rate * n.dot(&way)
             - n * normal_rate.tr_mul(&way).transpose();
         let bent = slip_rate * over + unit * (slip_rate.tr_mul(&unit).transpose() * (second - over));
-        let derivative = slip * force_rate.transpose() * (self.coefficient * over * part) + bent * force;
+        let derivative = slip * force_rate.transpose() * (self.coefficient * over) + bent * force;
         let gradient = slip * (force * over);
         let turn = derivative.tr_mul(&spin) + (cross * normal_rate).tr_mul(&gradient);
         Some(Coupling { force: derivative, turn })
@@ -127,7 +114,7 @@ mod tests {
         (3.0 * (0.5 - x.z + 0.2 * x.x * x.x), Vec3::new(-0.4 * x.x, 0.1 * x.y, 1.0).normalize())
     }
 
-    fn at(x: &Vec3, part: f64) -> Friction {
+    fn at(x: &Vec3) -> Friction {
         let (force, normal) = wall(x);
         let slider = Slider {
             from_mm: Vec3::new(0.1, 0.2, 0.05),
@@ -137,13 +124,12 @@ mod tests {
             force_n: force,
             begun: (normal, force),
             seen: (normal, force),
-            lagged_n: 1.1,
             matrix_n: force,
         };
         let mut friction = Friction {
             coefficient: 0.4,
             stick_mm: 0.3,
-            coupled: Some(part),
+            coupled: true,
             sliders: vec![slider],
             ..Friction::default()
         };
@@ -153,35 +139,33 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_force_and_moment() {
-        for part in [0.0, 0.4, 1.0] {
-            // Slipping and sticking.
-            for x in [Vec3::new(0.7, 0.5, 0.1), Vec3::new(0.2, 0.15, 0.08)] {
-                let angle = 0.45;
-                let h = 1e-6;
-                let rates = [0, 1, 2].map(|k| {
-                    let (plus, minus) = (wall(&(x + Vec3::ith(k, h))), wall(&(x - Vec3::ith(k, h))));
-                    ((plus.0 - minus.0) / (2.0 * h), (plus.1 - minus.1) / (2.0 * h))
-                });
-                let force_rate = Vec3::from(rates.map(|r| r.0));
-                let normal_rate = Matrix3::from_columns(&rates.map(|r| r.1));
-                let here = at(&x, part);
-                let lagged = here.derivatives(0, &x, angle, RADIUS_MM).unwrap();
-                let more = here.coupling(0, &x, angle, RADIUS_MM, (&force_rate, &normal_rate)).unwrap();
-                let of = |x: &Vec3| {
-                    let d = at(x, part).derivatives(0, x, angle, RADIUS_MM).unwrap();
-                    (d.gradient, d.turn)
-                };
-                for k in 0..3 {
-                    let e = Vec3::ith(k, h);
-                    let (plus, minus) = (of(&(x + e)), of(&(x - e)));
-                    let force = (plus.0 - minus.0) / (2.0 * h);
-                    let turn = (plus.1 - minus.1) / (2.0 * h);
-                    let expected = lagged.hessian.column(k) + more.force.column(k);
-                    assert!((force - expected).norm() < 1e-6, "{part} {k}: {force} {expected}");
-                    assert!((turn - lagged.mixed[k] - more.turn[k]).abs() < 1e-6, "{part} {k}");
-                    // The symmetric part alone is another derivative.
-                    assert!(part == 0.0 || k < 2 || (force - lagged.hessian.column(k)).norm() > 0.05);
-                }
+        // Slipping and sticking.
+        for x in [Vec3::new(0.7, 0.5, 0.1), Vec3::new(0.2, 0.15, 0.08)] {
+            let angle = 0.45;
+            let h = 1e-6;
+            let rates = [0, 1, 2].map(|k| {
+                let (plus, minus) = (wall(&(x + Vec3::ith(k, h))), wall(&(x - Vec3::ith(k, h))));
+                ((plus.0 - minus.0) / (2.0 * h), (plus.1 - minus.1) / (2.0 * h))
+            });
+            let force_rate = Vec3::from(rates.map(|r| r.0));
+            let normal_rate = Matrix3::from_columns(&rates.map(|r| r.1));
+            let here = at(&x);
+            let lagged = here.derivatives(0, &x, angle, RADIUS_MM).unwrap();
+            let more = here.coupling(0, &x, angle, RADIUS_MM, (&force_rate, &normal_rate)).unwrap();
+            let of = |x: &Vec3| {
+                let d = at(x).derivatives(0, x, angle, RADIUS_MM).unwrap();
+                (d.gradient, d.turn)
+            };
+            for k in 0..3 {
+                let e = Vec3::ith(k, h);
+                let (plus, minus) = (of(&(x + e)), of(&(x - e)));
+                let force = (plus.0 - minus.0) / (2.0 * h);
+                let turn = (plus.1 - minus.1) / (2.0 * h);
+                let expected = lagged.hessian.column(k) + more.force.column(k);
+                assert!((force - expected).norm() < 1e-6, "{k}: {force} {expected}");
+                assert!((turn - lagged.mixed[k] - more.turn[k]).abs() < 1e-6, "{k}");
+                // The symmetric part alone is another derivative.
+                assert!(k < 2 || (force - lagged.hessian.column(k)).norm() > 0.05);
             }
         }
     }

@@ -6,24 +6,9 @@ use crate::rod::{Assembly, ElementData, Layout, RodState};
 use crate::solve::BandLu;
 
 impl WallContact<'_> {
-    /// From now on a part of the normal forces of friction follows the state at once.
-    pub fn couple(&mut self, part: f64) {
-        self.friction.couple(part);
-    }
-
-    /// From now on there is no friction but what follows the state, and none of that yet.
-    pub fn forget_friction(&mut self) {
-        self.friction.forget();
-    }
-
-    /// Keeps what presses and how hard.
-    pub fn keep_forces(&mut self) {
-        self.memory.keep_forces();
-    }
-
-    /// Goes back to what was kept, until the next state is assembled.
-    pub fn restore_forces(&mut self) {
-        self.memory.restore_forces();
+    /// From now on the normal forces of friction follow the state at once.
+    pub fn couple(&mut self) {
+        self.friction.couple();
     }
 
     /// The normal forces of friction stay as they are.

@@ -82,7 +82,7 @@ const WORK: f64 = 180.0;
 const WORK_RAD: f64 = 0.1;
 /// … and never more than so many times what one solution may take.
 const WORK_OF_ONE: usize = 10;
-/// How often the last resort is tried in a command; the last time what it comes to is taken whatever is left over.
+/// How often the last resort may find nothing in a command; after that what it comes to is taken whatever is left over.
 const RESORTS: usize = 6;
 /// A step is a jump if more than this part of the stored energy was set free.
 const JUMP: f64 = 0.02;
@@ -227,22 +227,22 @@ impl<const C: usize> Method for Kirchhoff<C> {
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
         let mut share = 1.0f64;
-        let mut attempts = 0;
+        // Last resorts that found nothing.
+        let mut failures = 0;
         let mut failure = Cow::from("the way is too long for one step");
         while done < 1.0 {
             let rest = 1.0 - done;
             // Where the way is lost, the device is let come to rest as far as the command goes; if it does not, in parts; and in the end
             // wherever it is.
             let relax = budget == 0 || share < LEAST_SHARE;
-            if relax && attempts == 0 && command.advance_mm > 0.0 {
+            if relax && failures == 0 && command.advance_mm > 0.0 {
                 // Unless the vessel is too narrow to go on.
                 if let Some(end) = self.narrowest(surroundings) {
                     self.go_back(moved);
                     return Err(Error::End(end));
                 }
             }
-            attempts += usize::from(relax);
-            if relax && (attempts == 1 || attempts == RESORTS) {
+            if relax && (failures == 0 || failures == RESORTS) {
                 share = rest;
             }
             let part = rest.min(share);
@@ -265,7 +265,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 self.current.withdraw(tail);
                 break;
             }
-            let resort = if relax { Some(attempts == RESORTS) } else { None };
+            let resort = if relax { Some(failures == RESORTS) } else { None };
             let attempt = Attempt { inserted_mm: inserted, tail_rad: tail, blocked, resort };
             match self.try_step(surroundings, attempt, &mut budget) {
                 Ok(found) => {
@@ -294,17 +294,15 @@ impl<const C: usize> Method for Kirchhoff<C> {
                     share = (2.0 * part).min(1.0);
                 }
                 Err(reason) => {
-                    if std::env::var("DBG").is_ok() {
-                        eprintln!("at {start:.2} part {part:.4} relax {relax} budget {budget}: {reason}");
-                    }
                     failure = reason;
                     share = 0.25 * part;
                     if relax {
                         budget = 0;
+                        failures += 1;
                     }
                 }
             }
-            if done < 1.0 && (attempts >= RESORTS || substeps > SUBSTEP_LIMIT) {
+            if done < 1.0 && (failures > RESORTS || substeps > SUBSTEP_LIMIT) {
                 self.go_back(moved);
                 return Err(Error::Computation(format!(
                     "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"

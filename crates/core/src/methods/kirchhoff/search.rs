@@ -30,13 +30,13 @@ const HURRIED: usize = 15;
 /// Newton iterations after which a solution has gone astray: from another guess, nearer by, it is found in fewer.
 const STUCK: usize = 60;
 /// Newton iterations of the last resort: on a softer wall, on the wall itself, and of a slide.
-const PATIENT: [usize; 3] = [25, 100, 300];
+const PATIENT: [usize; 3] = [60, 300, 300];
 /// Newton iterations for friction and wall together.
 const TOGETHER: usize = 40;
 /// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
 const ROUNDS: usize = 5;
-/// Most slides with the hand held still. Two or three are the rule.
-const SLIDES: usize = 40;
+/// Most slides with the hand held still, and in the last resort. Two or three are the rule.
+const SLIDES: [usize; 2] = [40, 400];
 
 /// A search for an equilibrium.
 pub(super) struct Search<'a, 'b, const C: usize> {
@@ -87,17 +87,6 @@ impl<const C: usize> Search<'_, '_, C> {
         let options = NewtonOptions { max_iterations: most.min(left), tolerance, ..NewtonOptions::default() };
         let found = self.newton.solve(self.elements, self.supports, self.contact, self.state, &options);
         self.take(found.iterations);
-        if std::env::var("DBG").is_ok() {
-            eprintln!(
-                "   newton soft {:.1e} most {most}: {:?} res {:.1e} its {} unsettled {:.1e} handed {}",
-                self.contact.softness,
-                found.reason,
-                found.residual,
-                found.iterations,
-                self.contact.unsettled(),
-                self.contact.handed_over()
-            );
-        }
         found
     }
 
@@ -112,28 +101,8 @@ impl<const C: usize> Search<'_, '_, C> {
     /// The wall itself, from a guess that is near.
     fn at_once(&mut self) -> Option<NewtonReport> {
         self.contact.softness = 1.0;
-        let stiff = self.softest < 1.0;
-        let found = self.newton(if stiff { HURRIED } else { STUCK }, self.tolerance);
-        if found.converged {
-            return Some(found);
-        }
-        // Without friction softer walls lead there in fewer iterations than the active set.
-        if !self.rubs || !stiff {
-            return None;
-        }
-        self.guess.plain(self.state);
-        self.contact.restore_forces();
-        let limits = (self.tolerance, self.budget.as_ref().map_or(usize::MAX, |budget| **budget));
-        let system = (&mut *self.newton, &mut *self.contact, &mut *self.supports);
-        let (there, iterations) = self.settle.approach(system, self.elements, self.state, limits);
-        self.take(iterations);
-        if std::env::var("DBG").is_ok() {
-            eprintln!("   approach {there} its {iterations}");
-        }
-        if !there {
-            return None;
-        }
-        let found = self.newton(STUCK, self.tolerance);
+        let most = if self.softest < 1.0 { HURRIED } else { STUCK };
+        let found = self.newton(most, self.tolerance);
         found.converged.then_some(found)
     }
 
@@ -186,8 +155,8 @@ impl<const C: usize> Search<'_, '_, C> {
         self.state.copy_from(&self.guess.other);
         self.contact.rewind_friction();
         found = self.newton(STUCK, self.tolerance);
-        let most = if self.budget.is_none() { PATIENT[2] } else { STUCK };
-        for _ in 0..SLIDES {
+        let (most, slides) = if self.budget.is_none() { (PATIENT[2], SLIDES[1]) } else { (STUCK, SLIDES[0]) };
+        for _ in 0..slides {
             if !found.converged || self.is_settled() {
                 break;
             }
@@ -207,9 +176,6 @@ impl<const C: usize> Search<'_, '_, C> {
             let system = (&mut *self.newton, &mut *self.contact, &mut *self.supports);
             let (there, iterations) = self.settle.solve(system, self.elements, self.state, limits);
             self.take(iterations);
-            if std::env::var("DBG").is_ok() {
-                eprintln!("   settle {there} its {iterations}");
-            }
             if !there {
                 return None;
             }

@@ -2,14 +2,8 @@
 //!
 //! Lagged normal forces are a fixed-point iteration: an equilibrium with forces p₀ presses with p(p₀), which are the next ones. A
 //! thread that is wedged in a bend answers a change of friction with a larger change of what presses, and the iteration runs away
-//! although there is a solution. So it is continued to instead: of the normal forces a part λ follows the state at once,
-//!
-//! ```text
-//! r(x, λ) = ∇E(x) + friction of (1 − λ) p₀ + λ p(x),    λ = 0 … 1
-//! ```
-//!
-//! For λ = 0 the equilibrium is at hand; λ = 1 is Coulomb's law, which is nearly always reached at once. The Newton matrix is that of
-//! lagged forces and a part that is not symmetric ([`crate::contact::friction`]), factored as a band with row interchanges.
+//! although there is a solution. Here the normal forces follow the state at once. The Newton matrix is that of lagged forces and a part
+//! that is not symmetric ([`crate::contact::friction`]), factored as a band with row interchanges.
 //!
 //! A thread presses on a rigid wall by nanometres, and a step along a curved wall is off it by more. So contacts have forces f of their
 //! own beside the depth p: f = w k p for those that press, 0 for the others. Newton's method for x and f, with f eliminated, is the
@@ -27,22 +21,10 @@
 
 use crate::contact::WallContact;
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
-use crate::solve::{BandLu, External, Newton, NewtonOptions, Shift};
+use crate::solve::{BandLu, External, Newton, Shift};
 
-/// Newton iterations at one part, …
-const ITERATIONS: usize = 30;
-/// … and at the first, from the lagged forces to Coulomb's law at once.
-const AT_ONCE: usize = 60;
-/// Newton iterations of the whole way.
-const MOST: usize = 250;
-/// Newton iterations from one beginning.
-const MOST_A_WAY: usize = 100;
 /// Shifts tried until the symmetric part is that of a minimum.
 const SHIFTS: usize = 40;
-/// Least change of the part.
-const LEAST: f64 = 1e-3;
-/// Residual over force scale on the way to λ = 1.
-const LOOSE: f64 = 1e-5;
 /// Largest rotation of a node in one step, rad.
 const LARGEST_TURN: f64 = 0.2;
 /// Least shift beside the one that is always on, over that.
@@ -65,7 +47,6 @@ pub(super) struct Settle<const C: usize> {
     shift: Shift,
     step: Vec<f64>,
     trial: RodState,
-    kept: RodState,
 }
 
 /// What is solved: Newton's method for its assembly, the wall, and what holds the rod.
@@ -80,7 +61,6 @@ impl<const C: usize> Settle<C> {
             list.reserve(n.saturating_sub(list.len()));
         }
         self.trial.reserve(elements);
-        self.kept.reserve(elements);
     }
 
     /// Moves `state`, an equilibrium with lagged normal forces, to one with its own. Limits are the residual over
@@ -90,101 +70,16 @@ impl<const C: usize> Settle<C> {
         (newton, contact, supports): System<'_, '_, C>,
         elements: &[ElementData],
         state: &mut RodState,
-        (tolerance, budget): (f64, usize),
+        limits: (f64, usize),
     ) -> (bool, usize) {
         Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.shift);
         self.trial.copy_from(state);
-        self.kept.copy_from(state);
-        let most = budget.min(MOST);
-        let (mut there, mut iterations) = (false, 0);
-        for bare in [false, true] {
-            if bare {
-                // The way from the lagged forces leads nowhere: from a wall without friction there is another.
-                contact.forget_friction();
-                newton.assemble_residual(elements, supports, contact, state);
-                let system = (&mut *newton, &mut *contact, &mut *supports);
-                let limits = (tolerance.max(LOOSE), ITERATIONS.min(most.saturating_sub(iterations)));
-                let (found, steps) = self.newton(system, elements, state, limits);
-                iterations += steps;
-                if !found {
-                    state.copy_from(&self.kept);
-                }
-                let options = NewtonOptions {
-                    max_iterations: most.saturating_sub(iterations).min(MOST_A_WAY),
-                    tolerance: tolerance.max(LOOSE),
-                    ..NewtonOptions::default()
-                };
-                let found = newton.solve(elements, supports, contact, state, &options);
-                iterations += found.iterations;
-                if !found.converged {
-                    break;
-                }
-                self.kept.copy_from(state);
-            }
-            let limits = (tolerance, (iterations + MOST_A_WAY).min(most));
-            let steps;
-            (there, steps) = self.follow((newton, contact, supports), elements, state, limits, iterations);
-            iterations = steps;
-            if there || iterations >= most {
-                break;
-            }
-        }
+        contact.couple();
+        // What presses at the beginning, and how hard.
+        newton.assemble_residual(elements, supports, contact, state);
+        let found = self.newton((newton, &mut *contact, supports), elements, state, limits);
         contact.uncouple();
-        (there, iterations)
-    }
-
-    /// Moves `state`, a guess, to an equilibrium: the points that pressed before are held, and those that would pull let go. Returns
-    /// whether it is there and the iterations that were taken.
-    pub(super) fn approach(
-        &mut self,
-        system: System<'_, '_, C>,
-        elements: &[ElementData],
-        state: &mut RodState,
-        (tolerance, budget): (f64, usize),
-    ) -> (bool, usize) {
-        let (newton, contact, supports) = system;
-        Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.shift);
-        self.trial.copy_from(state);
-        contact.couple(1.0);
-        let limits = (tolerance, ITERATIONS.min(budget));
-        let (found, steps) = self.newton((newton, &mut *contact, supports), elements, state, limits);
-        contact.uncouple();
-        (found, steps)
-    }
-
-    /// Follows the part from 0 to 1.
-    fn follow(
-        &mut self,
-        (newton, contact, supports): System<'_, '_, C>,
-        elements: &[ElementData],
-        state: &mut RodState,
-        (tolerance, most): (f64, usize),
-        mut iterations: usize,
-    ) -> (bool, usize) {
-        let (mut part, mut stride) = (0.0, 1.0f64);
-        while part < 1.0 && iterations < most {
-            let next = if part + stride > 1.0 - LEAST { 1.0 } else { part + stride };
-            contact.couple(next);
-            let wanted = if next < 1.0 { tolerance.max(LOOSE) } else { tolerance };
-            let limit = if next == 1.0 && part == 0.0 { AT_ONCE } else { ITERATIONS }.min(most - iterations);
-            // What presses at the beginning, and how hard.
-            newton.assemble_residual(elements, supports, contact, state);
-            let system = (&mut *newton, &mut *contact, &mut *supports);
-            let (found, steps) = self.newton(system, elements, state, (wanted, limit));
-            iterations += steps;
-            if found {
-                part = next;
-                stride *= 2.0;
-                self.kept.copy_from(state);
-            } else {
-                state.copy_from(&self.kept);
-                stride = 0.25 * (next - part);
-                if stride < LEAST {
-                    break;
-                }
-            }
-        }
-        (part == 1.0, iterations)
+        found
     }
 
     /// Newton's method with the part that is not symmetric, contacts held.

@@ -104,7 +104,6 @@ impl<const C: usize> Kirchhoff<C> {
         );
         let candidates = (now, &next.mesh, &mut next.state);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked);
-        contact.keep_forces();
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let near = quality != Quality::Beyond;
         let held =
