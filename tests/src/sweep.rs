@@ -15,7 +15,7 @@ const FELT_EDGES: f64 = 0.125;
 /// Whether the device is behind the triangles without having sunk in there as deep as it is.
 pub fn crosses(crossing: &CrossingTest, simulation: &Simulation) -> bool {
     let felt_mm = FELT_MM.max(FELT_EDGES * crossing.edge_mm);
-    crossing.missing_mm(simulation).is_some_and(|missing_mm| missing_mm > felt_mm)
+    crossing.missing_mm(simulation.wall(), simulation).is_some_and(|missing_mm| missing_mm > felt_mm)
 }
 
 /// What became of a list of commands.

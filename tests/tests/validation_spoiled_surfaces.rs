@@ -5,6 +5,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test fails by panicking; tables are printed")]
 
+use std::collections::BTreeMap;
+
 use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::Sheath;
@@ -199,13 +201,12 @@ fn all(courses: &'static [Course], seeds: std::ops::RangeInclusive<u64>) {
 }
 
 #[test]
-#[ignore = "until the wall is conditioned"]
 fn a_wire_in_a_spoiled_tube_lies_where_it_lies_in_the_clean_one() {
     all(&COURSES[..1], 1..=1);
 }
 
 #[test]
-#[ignore = "until the wall is conditioned; minutes"]
+#[ignore = "minutes"]
 fn a_wire_in_any_spoiled_vessel_lies_where_it_lies_in_the_clean_one() {
     all(&COURSES, 1..=3);
 }
@@ -248,14 +249,20 @@ fn extremes(mesh: &SurfaceMesh) -> (f64, f64, f64) {
     (short, long, thin)
 }
 
+/// Edges of one triangle alone.
+fn open_edges(mesh: &SurfaceMesh) -> usize {
+    let mut count = BTreeMap::new();
+    for [a, b, c] in &mesh.triangles {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            *count.entry((from.min(to), from.max(to))).or_insert(0) += 1;
+        }
+    }
+    count.values().filter(|triangles| **triangles == 1).count()
+}
+
 #[test]
-#[ignore = "open: a torn surface no longer counts its tears as openings; to be found out"]
 fn every_way_spoils_what_it_says_and_keeps_the_geometry() {
     let base = COURSES[0].wall(0.0, 1.2).wall.mesh().clone();
-    let openings = |mesh: &SurfaceMesh| {
-        let wall = endowire_core::vessel::Wall::from_surface(mesh).unwrap();
-        wall.openings().len() + wall.report().stray_edges
-    };
     let (short, long, thin) = extremes(&base);
     for (name, spoil) in WAYS {
         let surface = spoil(&base, 1);
@@ -265,9 +272,9 @@ fn every_way_spoils_what_it_says_and_keeps_the_geometry() {
         let (shortest, longest, thinnest) = extremes(&surface);
         println!(
             "{name:<14} {:>6} triangles, {deviation:.4} mm off, edges {shortest:.4} to {longest:.2} mm, thinnest {thinnest:.1e}, \
-             {} openings and stray edges",
+             {} open edges",
             surface.triangles.len(),
-            openings(&surface)
+            open_edges(&surface)
         );
         let bound = match name {
             "flips" => 1e-12,
@@ -290,7 +297,7 @@ fn every_way_spoils_what_it_says_and_keeps_the_geometry() {
                 let turned = base.triangles.iter().zip(&surface.triangles).filter(|(a, b)| a != b).count();
                 assert!(turned > before / 4);
             }
-            "torn" => assert!(openings(&surface) > openings(&base) + 10 && after < before),
+            "torn" => assert!(open_edges(&surface) > open_edges(&base) + 30 && after < before),
             "overlaps" | "dirt" => assert!(after > before),
             "decimated" => assert!(after <= before / 25 && longest > 2.0 * long, "{after} of {before}"),
             _ => assert_eq!(after, before),

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use crate::Vec3;
 use crate::insertion::Simulation;
 use crate::shape::Shape;
-use crate::vessel::SurfaceMesh;
+use crate::vessel::{SurfaceMesh, Wall};
 
 /// Chords per element: with 4 of them, a curve of radius 10 mm in an element of 5 mm is met within 0.02 mm.
 const CHORDS: usize = 4;
@@ -80,8 +80,8 @@ impl CrossingTest {
     }
 
     /// How much less deep than it is, mm, the device says to have sunk in where it passes through a triangle and beyond; `None` where
-    /// it passes through none. No more than the distance between the wall that is felt and the triangles if it was pressed in.
-    pub fn missing_mm(&self, simulation: &Simulation) -> Option<f64> {
+    /// it passes through none. No more than the distance between the wall that is felt and the triangles if it was pressed in. `wall` tells inside from outside.
+    pub fn missing_mm(&self, wall: &Wall, simulation: &Simulation) -> Option<f64> {
         let (shape, device) = (simulation.shape(), simulation.device());
         let contacts = &simulation.report().contacts;
         let points = curve(shape);
@@ -102,7 +102,7 @@ impl CrossingTest {
                 note(missing(&ends[0].lerp(&ends[1], part), 0.0, piece));
                 behind = true;
             }
-            behind = behind && simulation.wall().winding_number(&ends[1]) < 0.5;
+            behind = behind && wall.winding_number(&ends[1]) < 0.5;
             if behind {
                 let distance_mm = self.distance_mm(&ends[1], FARTHEST_MM).unwrap_or(FARTHEST_MM);
                 note(missing(&ends[1], distance_mm, piece));

@@ -207,7 +207,8 @@ impl CellRow {
             self.first_crossing_mm = self.first_crossing_mm.or(Some(self.inserted_mm));
         }
         if last || self.crossings <= CROSSINGS_MEASURED {
-            self.missing_mm = self.missing_mm.max(surface.given.missing_mm(simulation).unwrap_or(0.0));
+            self.missing_mm =
+                self.missing_mm.max(surface.given.missing_mm(&surface.wall, simulation).unwrap_or(0.0));
         }
     }
 }

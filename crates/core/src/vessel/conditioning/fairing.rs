@@ -150,6 +150,26 @@ pub(super) fn fair(corners: &Corners, reference: &Reference, iterations: usize) 
     place(&heights)
 }
 
+/// Mean of |L²p| along the normals over the edges there: nothing where a surface is smooth on the scale of its edges.
+pub(super) fn roughness(corners: &Corners) -> f64 {
+    let umbrella = Umbrella::new(corners);
+    let place: Vec<Vec3> = corners.vertices.iter().map(|v| v.at).collect();
+    let (mut first, mut second) = (vec![Vec3::zeros(); place.len()], vec![Vec3::zeros(); place.len()]);
+    umbrella.apply(&place, &mut first);
+    umbrella.apply(&first, &mut second);
+    let (mut sum, mut count) = (0.0, 0);
+    for (v, x) in second.iter().enumerate() {
+        let row = umbrella.row(v);
+        if row.is_empty() || row.iter().any(|(w, _)| umbrella.row(*w as usize).is_empty()) {
+            continue;
+        }
+        let edge: f64 = row.iter().map(|(w, weight)| weight * (place[*w as usize] - place[v]).norm()).sum();
+        sum += x.dot(&corners.vertices[v].normal).abs() / edge.max(f64::MIN_POSITIVE);
+        count += 1;
+    }
+    sum / f64::from(count.max(1))
+}
+
 /// Halves the heights of triangles that were turned over.
 fn draw_back(corners: &Corners, heights: &mut [f64]) {
     let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(&(c - a));

@@ -4,7 +4,7 @@
 //! slivers, fans, facets much longer than the vessel is wide, or noise; and surfaces of real vessels have all of these. Here such a
 //! surface gets vertices that depend on its geometry and not on how it was meshed:
 //!
-//! 1. A mesh that is even already is returned as it is (`evenness`).
+//! 1. A mesh that is even and smooth already is returned as it is (`evenness`).
 //! 2. The lumen's radius and the curvature say how long edges should be (`sizes`).
 //! 3. The mesh is split, collapsed, flipped and evened out on the given surface (`remesh`, `corners`,
 //!    `reference`).
@@ -35,6 +35,9 @@ use reference::Reference;
 use remesh::Remesher;
 use sizes::Wanted;
 
+/// Roughness above which an even mesh is faired all the same: even meshes of branching vessels have up to 0.023, and noise of a
+/// twenty-fifth of the edges 0.028.
+const ROUGH: f64 = 0.025;
 /// Rounds of sizes, triangles and fairing; in each, edges are fitted to what the last one left.
 const ROUNDS: usize = 2;
 /// Rounds of remeshing in the first of these and in later ones.
@@ -143,7 +146,7 @@ pub fn condition(surface: &SurfaceMesh, options: &Conditioning) -> Result<Condit
     let mut corners = Corners::new(surface, options.deviation_mm);
     let even = Evenness::of(&corners, |v| corners.at(v));
     let fine = evenness::is_fine_enough(&mut corners, &reference, options);
-    if even.is_even() && fine {
+    if even.is_even() && fine && fairing::roughness(&corners) <= ROUGH {
         return Ok(Conditioned::new(surface.clone(), false, &Deviation::default(), &even, false));
     }
     let remesher = Remesher { reference: &reference, most_triangles: options.most_triangles };
