@@ -141,6 +141,33 @@ fn a_scene_is_drawn_without_a_recording() {
 }
 
 #[test]
+fn drawing_anew_replaces_what_was_drawn_before_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, run) = recorded(folder.path());
+    let draw = |more: &[&str]| {
+        let output = endowire(&[&["render", text(&run), "--view", "3d", "--every", "40"], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let said = draw(&["--from", "26", "--size", "48x32"]);
+    assert!(!said.contains("replaces"), "{said}");
+    let frames = run.join("render");
+    assert_eq!(png_size(&frames.join("step_000066_3d.png")), (48, 32));
+    std::fs::write(frames.join("step_000099_3d.png"), "mine").unwrap();
+    let said = draw(&["--from", "30", "--size", "24x16"]);
+    assert!(said.contains("replaces 3 files of an earlier endowire render"), "{said}");
+    let mut names: Vec<String> = std::fs::read_dir(&frames)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| !name.starts_with('.'))
+        .collect();
+    names.sort();
+    let ours = ["step_000030_3d.png", "step_000070_3d.png", "step_000099_3d.png", "step_000106_3d.png"];
+    assert_eq!(names, ours);
+    assert_eq!(png_size(&frames.join("step_000070_3d.png")), (24, 16));
+}
+
+#[test]
 fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, run) = recorded(folder.path());
