@@ -125,6 +125,9 @@ impl Written {
     }
 }
 
+/// A hundred turns.
+const MOST_ORBIT_DEG: f64 = 36_000.0;
+
 /// Draws frames with the wishes of the command line.
 pub(crate) struct Studio<'a> {
     args: &'a FrameArgs,
@@ -157,6 +160,10 @@ impl<'a> Studio<'a> {
         let wall = scene.wall().map_err(in_scene)?.closed_mesh();
         let device = scene.device().map_err(in_scene)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
+        if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {
+            let text = format!("--orbit {orbit:e}: give -{MOST_ORBIT_DEG} to {MOST_ORBIT_DEG} degrees");
+            return Err(Failure::Input(text));
+        }
         if !spec.wants(View::Fluoro) && (args.dicom.is_some() || args.labels || args.raw || args.hold) {
             let text =
                 "--dicom, --labels, --raw and --hold belong to fluoroscopy: use --view fluoro or --view both";
@@ -199,7 +206,8 @@ impl<'a> Studio<'a> {
         if let (Some(orbit), true) = (self.args.orbit, self.drawn > 0) {
             let mut spec = ViewSpec { views: vec![View::ThreeD], ..self.spec.clone() };
             let part = self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64;
-            spec.camera.azimuth_deg = Some(spec.camera.azimuth_deg.unwrap_or(0.0) + orbit * part);
+            let azimuth = spec.camera.azimuth_deg.unwrap_or(0.0) + orbit * part;
+            spec.camera.azimuth_deg = Some(azimuth % 360.0);
             let device = device_view(still.shape, &self.device, &self.spec);
             let mut orbiting = Renderer::new(&spec, &self.wall)?;
             orbiting.show_contacts(still.contacts);
