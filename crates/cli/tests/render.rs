@@ -227,7 +227,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
         ),
         (
             still(&["--set", "c_arm.pixel_mm=0.001"]),
-            &["view.detector.blur_mm = 0.15: is 150 pixels", "give at most 0.1 mm"],
+            &["view.detector.blur_mm = 0.15: is 150 pixels", "give at most 0.05 mm"],
         ),
         (still(&["--orbit", "1e300", "--view", "both"]), &["--orbit 1", "give -36000 to 36000 degrees"]),
         (still(&["--set", "detector.seed=-1"]), &["detector.seed=-1", "u64"]),

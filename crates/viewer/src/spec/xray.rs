@@ -114,7 +114,7 @@ impl XRaySpec {
 }
 
 /// Widest blur in pixels: beyond it a frame would take minutes.
-const MOST_BLUR_PX: f64 = 100.0;
+const MOST_BLUR_PX: f64 = 50.0;
 
 /// The `[view.detector]` table.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -126,7 +126,7 @@ pub struct DetectorSpec {
     pub noise: bool,
     /// Seed of the noise, any whole number from 0: the same seed, the same frames.
     pub seed: u64,
-    /// Spread of the scintillator's light: standard deviation of a Gaussian at the detector, 0 to 10 and no more than 100 pixels.
+    /// Spread of the scintillator's light: standard deviation of a Gaussian at the detector, 0 to 10 and no more than 50 pixels.
     pub blur_mm: f64,
     /// Share of the last frame that is read again, 0 to 0.99.
     pub lag: f64,
