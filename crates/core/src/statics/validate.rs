@@ -293,3 +293,38 @@ impl StaticCase {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn work_that_never_ends_is_refused_by_key_and_number() {
+        let told = |elements: usize, solver: &str| {
+            let text = format!(
+                "[rod]\nlength = 1.0\nelements = {elements}\n[[rod.section]]\nuntil = 1.0\nEI = 1.0\n[start]\ntype = \"clamped\"\n\
+                 [solver]\n{solver}\n"
+            );
+            StaticCase::from_toml(&text, Path::new("a.toml"))
+                .err()
+                .map_or_else(String::new, |e| e.to_string())
+        };
+        assert_eq!(told(100, "load_steps = 10\nmax_iterations = 50"), "");
+        for (elements, solver, words) in [
+            (1_000_000, "", "rod.elements = 1000000: must be 1 to 200000"),
+            (
+                200_000,
+                "load_steps = 1000",
+                "solver.load_steps = 1000: with 200000 elements that is 200000000",
+            ),
+            (10, "load_steps = 2000000", "solver.load_steps = 2000000: must be 1 to 1000000"),
+            (10, "max_iterations = 0", "solver.max_iterations = 0: must be 1 to 100000"),
+            (10, "max_iterations = 100001", "solver.max_iterations = 100001: must be 1 to 100000"),
+        ] {
+            let error = told(elements, solver);
+            assert!(error.contains(words), "{words}: {error}");
+        }
+    }
+}
