@@ -45,9 +45,13 @@ pub(crate) enum Command {
 pub(crate) struct RunArgs {
     /// Scene file (TOML)
     pub(crate) scene: PathBuf,
-    /// Folder for the recording; out/NAME OF THE SCENE if absent
+    /// Folder for the recording; out/NAME OF THE SCENE if absent. An earlier recording in it is replaced
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// Record also into a folder that holds other files; of these, summary.json, steps.csv, shapes.npz and frames/step_*.png of the
+    /// same name are replaced
+    #[arg(long)]
+    pub(crate) force: bool,
     /// Print the summary as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

@@ -338,7 +338,7 @@ fn arguments_are_named_by_their_flag() {
 
 #[cfg(unix)]
 #[test]
-fn temporary_files_that_cannot_be_written_are_named_by_their_folder() {
+fn a_run_needs_no_folder_for_temporary_files() {
     let scene = Scene::good();
     std::fs::write(scene.path("scene.toml"), &scene.text).unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
@@ -352,8 +352,8 @@ fn temporary_files_that_cannot_be_written_are_named_by_their_folder() {
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{text}");
-    assert!(text.contains("/no/such/folder") && text.contains("TMPDIR"), "{text}");
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    assert!(scene.path("out/shapes.npz").exists());
 }
 
 #[cfg(unix)]

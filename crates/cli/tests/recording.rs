@@ -143,12 +143,53 @@ fn recording_anew_replaces_the_old_recording_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();
     let scene = short_scene(folder.path());
     let out = folder.path().join("out");
-    run(&scene, &out);
-    std::fs::write(out.join("notes.txt"), "mine").unwrap();
+    let told = |more: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
+            .args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()])
+            .args(more)
+            .output()
+            .unwrap();
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    assert!(!told(&[]).contains("replaces"));
+    let mine = ["notes.txt", "frames/step_by_step.png", "frames/step_000040_3d.png.bak", "frames/best.png"];
+    for name in mine {
+        std::fs::write(out.join(name), "mine").unwrap();
+    }
     std::fs::write(out.join("frames/step_999999_3d.png"), "old").unwrap();
-    run(&scene, &out);
-    assert!(out.join("notes.txt").exists());
+    let said = told(&[]);
+    assert!(said.contains("replaces the earlier recording in ") && said.contains("out: "), "{said}");
+    assert!(said.contains("summary.json, steps.csv, shapes.npz, 7 frames"), "{said}");
+    assert!(mine.iter().all(|name| out.join(name).exists()));
     assert!(!out.join("frames/step_999999_3d.png").exists());
+}
+
+#[test]
+fn a_folder_with_other_files_is_used_only_by_force_and_keeps_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = short_scene(folder.path());
+    let out = folder.path().join("data");
+    std::fs::create_dir_all(out.join("frames")).unwrap();
+    for name in ["steps.csv", "mine.txt", "frames/step_999999_3d.png"] {
+        std::fs::write(out.join(name), "left,right\n1,2\n").unwrap();
+    }
+    let run = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_endowire"));
+        command.args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()]);
+        let output = command.args(more).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (code, said) = run(&[]);
+    assert!(code == Some(2) && said.contains("--force"), "{said}");
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), 3, "nothing may be left there");
+    let (code, said) = run(&["--force"]);
+    assert!(
+        code == Some(0) && said.contains("replaces files in ") && said.contains("data: steps.csv\n"),
+        "{said}"
+    );
+    assert!(out.join("shapes.npz").exists() && out.join("mine.txt").exists());
+    assert!(out.join("frames/step_999999_3d.png").exists());
 }
 
 #[test]

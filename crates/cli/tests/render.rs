@@ -141,6 +141,33 @@ fn a_scene_is_drawn_without_a_recording() {
 }
 
 #[test]
+fn drawing_anew_replaces_what_was_drawn_before_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, run) = recorded(folder.path());
+    let draw = |more: &[&str]| {
+        let output = endowire(&[&["render", text(&run), "--view", "3d", "--every", "40"], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let said = draw(&["--from", "26", "--size", "48x32"]);
+    assert!(!said.contains("replaces"), "{said}");
+    let frames = run.join("render");
+    assert_eq!(png_size(&frames.join("step_000066_3d.png")), (48, 32));
+    std::fs::write(frames.join("step_000099_3d.png"), "mine").unwrap();
+    let said = draw(&["--from", "30", "--size", "24x16"]);
+    assert!(said.contains("replaces 3 files of an earlier endowire render"), "{said}");
+    let mut names: Vec<String> = std::fs::read_dir(&frames)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| !name.starts_with('.'))
+        .collect();
+    names.sort();
+    let ours = ["step_000030_3d.png", "step_000070_3d.png", "step_000099_3d.png", "step_000106_3d.png"];
+    assert_eq!(names, ours);
+    assert_eq!(png_size(&frames.join("step_000070_3d.png")), (24, 16));
+}
+
+#[test]
 fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
     let folder = tempfile::tempdir().unwrap();
     let (scene, run) = recorded(folder.path());
@@ -153,12 +180,12 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
     std::fs::write(&nan, pose).unwrap();
     let still = |more: &[&'static str]| [&["fluoro", text(&scene), "--steps", "0"], more].concat();
     // Each message names key, value and mend.
-    let cases: [(Vec<&str>, &[&str]); 15] = [
+    let cases: [(Vec<&str>, &[&str]); 20] = [
         (vec!["render", text(&nothing)], &["nothing", "recorded run"]),
         (vec!["render", text(&run), "--pose", "north 3"], &["north 3", "say angles as in \"LAO 40\""]),
         (
             vec!["render", text(&run), "--set", "c_arm.sid_mm=0"],
-            &["view.c_arm.sid_mm = 0: must be a finite number above 0"],
+            &["view.c_arm.sid_mm = 0: must be a number from 10 to 100000"],
         ),
         (
             vec!["render", text(&run), "--set", "c_arm.nothing=0"],
@@ -175,7 +202,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
             vec!["fluoro", text(&nan), "--steps", "0"],
             &["view.c_arm.primary_deg = NaN: must be a number from"],
         ),
-        (still(&["--set", "c_arm.sid_mm=0"]), &["view.c_arm.sid_mm = 0: must be a finite number above 0"]),
+        (still(&["--set", "c_arm.sid_mm=0"]), &["view.c_arm.sid_mm = 0: must be a number from 10 to 100000"]),
         (
             still(&["--set", "patient.ct={\"file\":\"none.nii\"}"]),
             &["view.patient.ct.file = ", "none.nii", "No such file"],
@@ -189,6 +216,21 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
             [&still(&["--labels", "--out"])[..], &[text(&labels)]].concat(),
             &["cannot write", "frame_000000_labels.json", "directory"],
         ),
+        // Pixels, kernels and volumes of numbers that nobody means: told before anything is computed.
+        (
+            still(&["--set", "c_arm.field_mm=1e-308"]),
+            &["view.c_arm.field_mm = 1e-308: must be a number from 0.01 to 100000"],
+        ),
+        (
+            still(&["--set", "c_arm.field_mm=0.01", "--size", "4096"]),
+            &["view.c_arm.field_mm = 0.01: with 4096 pixels", "must be 0.0001 to 1000 mm"],
+        ),
+        (
+            still(&["--set", "c_arm.pixel_mm=0.001"]),
+            &["view.detector.blur_mm = 0.15: is 150 pixels", "give at most 0.05 mm"],
+        ),
+        (still(&["--orbit", "1e300", "--view", "both"]), &["--orbit 1", "give -36000 to 36000 degrees"]),
+        (still(&["--set", "detector.seed=-1"]), &["detector.seed=-1", "u64"]),
         (still(&["--mode", "roadmap"]), &["view.xray.mode = roadmap", "give a [[view.injection]]"]),
     ];
     for (args, words) in cases {

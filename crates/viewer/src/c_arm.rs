@@ -26,7 +26,7 @@
 use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result, Vec3};
 
-use crate::spec::CArmSpec;
+use crate::spec::{CArmSpec, PITCH_MM};
 
 /// Part of the half frame that the vessel fills where the pixel pitch is left to us.
 const FILL: f64 = 0.92;
@@ -82,6 +82,7 @@ impl CArm {
             (None, None) => arm.fitting_pitch(wall)?,
         };
         arm.pixel_mm = whole / spec.magnification;
+        check_pitch(spec, size_px, arm.pixel_mm)?;
         arm.opening_px = spec.collimation_mm.map(|sides| sides.map(|side| side / 2.0 / arm.pixel_mm));
         Ok(arm)
     }
@@ -272,6 +273,25 @@ impl CArm {
     pub fn size_px(&self) -> [u32; 2] {
         self.size_px
     }
+}
+
+/// Refuses pixels beyond the range in which pictures can be computed, by the key that makes them so.
+fn check_pitch(spec: &CArmSpec, size_px: [u32; 2], pixel_mm: f64) -> Result<()> {
+    let [low, high] = PITCH_MM;
+    if (low..=high).contains(&pixel_mm) {
+        return Ok(());
+    }
+    let (key, value) = match (spec.pixel_mm, spec.field_mm) {
+        (Some(pitch), _) => ("pixel_mm", pitch.to_string()),
+        (None, Some(field)) => ("field_mm", field.to_string()),
+        (None, None) => ("pixel_mm", "absent".to_owned()),
+    };
+    let mend = format!(
+        "with {} pixels and magnification {} a pixel is {pixel_mm:e} mm wide at the detector; it must be {low} to {high} mm",
+        size_px[0].max(size_px[1]),
+        spec.magnification
+    );
+    Err(Error::parameter(format!("view.c_arm.{key}"), value, mend))
 }
 
 #[cfg(test)]

@@ -25,8 +25,11 @@ use crate::xray::Material;
 const SAGITTA: f64 = 0.04;
 /// Longest piece, mm: keeps the screen rectangle of an oblique straight piece small.
 const LONGEST_MM: f64 = 4.0;
-/// Most pieces between two given points, so that absurd input cannot exhaust memory.
-const MOST_PIECES: f64 = 4096.0;
+/// Most pieces between two given points, and about how many in all, so that absurd input cannot exhaust memory.
+const MOST_PIECES: usize = 4096;
+const MOST_PIECES_IN_ALL: usize = 1 << 20;
+/// Largest radius of a part, mm.
+const LARGEST_RADIUS_MM: f64 = 1e3;
 
 /// One point of a device's centre line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,16 +57,16 @@ pub struct DeviceView {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct DevicePart {
-    /// Where it begins and ends, in arc length from the tip in mm; absent: the whole device.
+    /// Where it begins and ends, in arc length from the tip in mm, 0 to 100,000; absent: the whole device.
     #[serde(default)]
     pub from_tip_mm: Option<[f64; 2]>,
     /// What it is made of; absent: as the device.
     #[serde(default)]
     pub material: Option<Material>,
-    /// Outer radius; absent: that of the device.
+    /// Outer radius, 0.000001 to 1000; absent: that of the device.
     #[serde(default)]
     pub outer_radius_mm: Option<f64>,
-    /// Radius of the bore; 0 is solid.
+    /// Radius of the bore, 0 to 1000 and less than the outer radius; 0 is solid.
     #[serde(default)]
     pub inner_radius_mm: f64,
 }
@@ -75,19 +78,20 @@ impl DevicePart {
             Err(Error::parameter(format!("{name}.{key}"), value, mend))
         };
         if let Some([first, last]) = self.from_tip_mm
-            && !(first >= 0.0 && first < last && last.is_finite())
+            && !(first >= 0.0 && first < last && last <= 1e5)
         {
-            let mend = "must be two finite lengths from the tip, the first less than the second";
+            let mend = "must be two lengths from the tip, 0 to 100000 mm, the first less than the second";
             return refuse("from_tip_mm", format!("[{first}, {last}]"), mend);
         }
         let most = match self.outer_radius_mm {
-            Some(outer) if !(outer.is_finite() && outer > 0.0) => {
-                return refuse("outer_radius_mm", outer.to_string(), "must be a finite number above 0");
+            Some(outer) if !(1e-6..=LARGEST_RADIUS_MM).contains(&outer) => {
+                let mend = "must be a number from 0.000001 to 1000";
+                return refuse("outer_radius_mm", outer.to_string(), mend);
             }
-            outer => outer.unwrap_or(f64::MAX),
+            outer => outer.unwrap_or(LARGEST_RADIUS_MM),
         };
         if !(0.0..most).contains(&self.inner_radius_mm) {
-            let mend = "must be at least 0 and less than the outer radius";
+            let mend = "must be at least 0, and less than the outer radius and 1000";
             return refuse("inner_radius_mm", self.inner_radius_mm.to_string(), mend);
         }
         Ok(())
@@ -118,6 +122,7 @@ impl DeviceView {
                 return Err(Error::parameter(format!("device.points[{i}]"), format!("{p:?}"), mend));
             }
         }
+        let most = (MOST_PIECES_IN_ALL / self.points.len().max(1)).clamp(1, MOST_PIECES) as f64;
         let mut fine: Vec<DevicePoint> = Vec::with_capacity(2 * self.points.len());
         for pair in self.points.windows(2) {
             let chord = pair[1].position_mm - pair[0].position_mm;
@@ -133,7 +138,7 @@ impl DeviceView {
             let turn = t0.angle(&along) + t1.angle(&along);
             let radius = pair[0].radius_mm.max(pair[1].radius_mm).max(f64::MIN_POSITIVE);
             let by_bend = (length * turn / (8.0 * SAGITTA * radius)).sqrt();
-            let pieces = by_bend.max(length / LONGEST_MM).ceil().clamp(1.0, MOST_PIECES) as usize;
+            let pieces = by_bend.max(length / LONGEST_MM).ceil().clamp(1.0, most) as usize;
             // Handles of this length make the curve match a circular arc through both ends to sixth order:
             // chord / cos²(θ/4) with θ the angle between the end tangents.
             let half_cos = ((1.0 + t0.dot(&t1).clamp(-1.0, 1.0)) / 2.0).sqrt();
@@ -378,6 +383,12 @@ mod tests {
         let coarse = arc(5.0, 180.0, 7, wire).points;
         let middle = (coarse[0].position_mm + coarse[1].position_mm) / 2.0;
         assert!((middle.norm() - 5.0).abs() > 10.0 * SAGITTA * wire);
+    }
+
+    #[test]
+    fn a_thread_of_no_thickness_is_cut_into_pieces_that_memory_holds() {
+        let fine = arc(1000.0, 180.0, 20_000, 1e-300).refined().unwrap();
+        assert!(fine.len() <= MOST_PIECES_IN_ALL && fine.len() > MOST_PIECES_IN_ALL / 2, "{}", fine.len());
     }
 
     #[test]

@@ -46,7 +46,9 @@ impl Setup {
             } else {
                 setup.lumen = closed.is_ok();
             }
-            setup.c_arm = Some(CArm::new(&spec.c_arm, spec.size_px, wall)?);
+            let c_arm = CArm::new(&spec.c_arm, spec.size_px, wall)?;
+            spec.detector.check_blur(c_arm.pixel_mm())?;
+            setup.c_arm = Some(c_arm);
             setup.patient = Patient::new(spec, wall)?;
         }
         let beam: Vec<_> = match &setup.c_arm {

@@ -27,7 +27,8 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     }
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let frames = args.count as usize;
-    let mut studio = Studio::new(&args.frames, &args.scene, &scene, ViewChoice::Fluoro, folder, frames)?;
+    let mut studio =
+        Studio::new("fluoro", &args.frames, &args.scene, &scene, ViewChoice::Fluoro, folder, frames)?;
     let mut simulation = scene.simulation().map_err(in_scene)?;
     let bar = progress::bar(steps, "step");
     for (index, command) in commands[..steps].iter().enumerate() {

@@ -1,7 +1,7 @@
 //! `endowire render`: frames of a recorded run.
 
 use endowire_core::scene::Scene;
-use endowire_viewer::{ContactView, Moment};
+use endowire_viewer::Moment;
 
 use crate::args::{RenderArgs, ViewChoice};
 use crate::failure::Failure;
@@ -12,19 +12,33 @@ use crate::output::{progress, tell};
 
 /// Draws the wanted steps.
 pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
-    let recording = Recording::read(&args.dir)?;
+    let recording = Recording::read(&args.dir, args.scene.as_deref())?;
     let path = args.scene.as_ref().unwrap_or(&recording.summary.scene_file);
     let scene = Scene::read(path)?;
     let mut inputs = vec![scene.text().as_bytes().to_vec()];
     for path in scene.input_paths() {
         inputs.push(read_input(&path)?);
     }
-    if Provenance::new(&inputs, scene.seed).scene_hash() != recording.summary.scene_hash {
+    let hash = Provenance::new(&inputs, scene.seed);
+    if recording.summary.scene_hash.as_ref().is_some_and(|recorded| recorded != hash.scene_hash()) {
         tell(format_args!(
             "endowire: {} or a file it names has changed since the run in {} was recorded",
             path.display(),
             args.dir.display()
         ));
+    }
+    if !recording.summary.complete {
+        tell(format_args!(
+            "endowire: the run in {} goes on or was ended from outside: {} steps of it are recorded",
+            args.dir.display(),
+            recording.steps()
+        ));
+    }
+    if recording.steps() == 0 {
+        return Err(Failure::Input(format!(
+            "{}: the run has recorded no step; run its scene again (endowire run)",
+            args.dir.display()
+        )));
     }
     let last = args.to.unwrap_or(recording.steps()).min(recording.steps());
     if args.every == 0 || args.from == 0 || args.from > last {
@@ -41,14 +55,11 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         steps.push(last);
     }
     let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
-    let mut studio = Studio::new(&args.frames, path, &scene, ViewChoice::Both, folder, steps.len())?;
+    let mut studio =
+        Studio::new("render", &args.frames, path, &scene, ViewChoice::Both, folder, steps.len())?;
     let bar = progress::bar(steps.len(), "frame");
     for &step in &steps {
-        let contacts: Vec<ContactView> = recording
-            .contacts(step)
-            .iter()
-            .map(|c| ContactView { position_mm: c.position_mm, force_n: c.force_n })
-            .collect();
+        let contacts = recording.contacts(step);
         let moment = Moment { frame: step as u64, time_s: step as f64 / studio.frames_per_s() };
         let shape = recording.shape(step);
         studio.draw(&Still {

@@ -33,81 +33,84 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
     let provenance = Provenance::new(&inputs, scene.seed);
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
-    let mut recorder = Recorder::new(&folder)?;
+    let mut recorder = Recorder::new(&folder, args.force)?;
 
     // From here on something is recorded: whatever happens, it is kept.
     let interrupted = interrupts();
     let bar = progress::bar(commands.len(), "step");
-    let mut step_time_s = 0.0;
-    let mut max_penetration_mm: f64 = 0.0;
-    let mut converged = true;
-    let mut failure = None;
+    let mut so_far = SoFar { step_time_s: 0.0, max_penetration_mm: 0.0, converged: true, failure: None };
+    let summary = |so_far: &SoFar, simulation: &Simulation, frames: &FrameWriter, recorder: &Recorder| {
+        let report = simulation.report();
+        Summary {
+            provenance: provenance.clone(),
+            complete: false,
+            scene: scene.name.clone(),
+            scene_file: std::path::absolute(&args.scene).unwrap_or_else(|_| args.scene.clone()),
+            method: scene.method.name(),
+            steps: recorder.steps(),
+            steps_asked: commands.len(),
+            converged: so_far.converged && so_far.failure.is_none(),
+            failure: so_far.failure.clone(),
+            inserted_mm: report.inserted_mm,
+            rotation_rad: report.rotation_rad,
+            tip_mm: simulation.shape().tip_mm().map(Into::into),
+            push_force_n: report.push_force_n,
+            torque_nmm: report.torque_nmm,
+            energy_mj: report.energy,
+            max_penetration_mm: so_far.max_penetration_mm,
+            left_through: report.left_through,
+            step_time_s: so_far.step_time_s,
+            wall_time_s: started.elapsed().as_secs_f64(),
+            renderer: frames.renderer(),
+            frames: recorder.frames.clone(),
+        }
+    };
+    recorder.checkpoint(|recorder| summary(&so_far, &simulation, &frames, recorder))?;
     for (index, command) in commands.iter().enumerate() {
         let failed = |reason: String| Some(StepFailure { step: index + 1, reason });
         if interrupted.load(Ordering::Relaxed) {
-            failure = failed("interrupted before it".to_owned());
+            so_far.failure = failed("interrupted before it".to_owned());
             break;
         }
         let clock = Instant::now();
         let result = simulation.step(*command);
-        step_time_s += clock.elapsed().as_secs_f64();
+        so_far.step_time_s += clock.elapsed().as_secs_f64();
         match result {
             Ok(report) => {
-                max_penetration_mm = max_penetration_mm.max(report.max_penetration_mm);
-                converged &= report.converged;
+                so_far.max_penetration_mm = so_far.max_penetration_mm.max(report.max_penetration_mm);
+                so_far.converged &= report.converged;
             }
             Err(error) => {
-                failure = failed(error.to_string());
+                so_far.failure = failed(error.to_string());
                 break;
             }
         }
         let last = index + 1 == commands.len();
         let recorded = recorder
             .record(*command, simulation.report(), simulation.shape())
-            .and_then(|()| frames.step(index + 1, last, &simulation, &mut recorder));
+            .and_then(|()| frames.step(index + 1, last, &simulation, &mut recorder))
+            .and_then(|()| recorder.checkpoint(|recorder| summary(&so_far, &simulation, &frames, recorder)));
         if let Err(error) = recorded {
-            failure = failed(error.to_string());
+            so_far.failure = failed(error.to_string());
             break;
         }
         bar.set_message(format!("{:.1} mm inserted", simulation.report().inserted_mm));
         bar.inc(1);
     }
     bar.finish_and_clear();
-    if failure.is_some() && recorder.steps() > 0 {
+    if so_far.failure.is_some() && recorder.steps() > 0 {
         // The picture of the end is a help; the first failure is the one to tell.
         let _ = frames.step(recorder.steps(), true, &simulation, &mut recorder);
     }
 
-    let report = simulation.report();
-    let summary = Summary {
-        provenance,
-        scene: scene.name.clone(),
-        scene_file: std::path::absolute(&args.scene).unwrap_or_else(|_| args.scene.clone()),
-        method: scene.method.name(),
-        steps: recorder.steps(),
-        steps_asked: commands.len(),
-        converged: converged && failure.is_none(),
-        failure: failure.clone(),
-        inserted_mm: report.inserted_mm,
-        rotation_rad: report.rotation_rad,
-        tip_mm: simulation.shape().tip_mm().map(Into::into),
-        push_force_n: report.push_force_n,
-        torque_nmm: report.torque_nmm,
-        energy_mj: report.energy,
-        max_penetration_mm,
-        left_through: report.left_through,
-        step_time_s,
-        wall_time_s: started.elapsed().as_secs_f64(),
-        renderer: frames.renderer(),
-        frames: recorder.frames.clone(),
-    };
-    let finished = recorder.finish(&summary).map_err(Failure::into_computation);
+    let mut summary = summary(&so_far, &simulation, &frames, &recorder);
+    let finished = recorder.finish(&mut summary).map_err(Failure::into_computation);
     if args.json {
         print_json(&summary)?;
     } else {
         tell(text(&summary, &folder, &simulation));
     }
-    match failure {
+    match so_far.failure {
         Some(StepFailure { step, reason }) => {
             let kept = match finished {
                 Ok(()) => format!("{} steps are kept in {}", summary.steps, folder.display()),
@@ -117,6 +120,14 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         }
         None => finished,
     }
+}
+
+/// What is known of a run while it goes on.
+struct SoFar {
+    step_time_s: f64,
+    max_penetration_mm: f64,
+    converged: bool,
+    failure: Option<StepFailure>,
 }
 
 /// Set by Ctrl-C, or by a request to terminate: the step under way is finished and recorded. A second one ends at once.

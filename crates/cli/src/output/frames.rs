@@ -14,6 +14,7 @@ use endowire_viewer::{
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::manifest::Manifest;
 use super::npz::write_map;
 use super::recorder::Recorder;
 use super::{print_json, tell, to_json};
@@ -124,6 +125,9 @@ impl Written {
     }
 }
 
+/// A hundred turns.
+const MOST_ORBIT_DEG: f64 = 36_000.0;
+
 /// Draws frames with the wishes of the command line.
 pub(crate) struct Studio<'a> {
     args: &'a FrameArgs,
@@ -136,12 +140,14 @@ pub(crate) struct Studio<'a> {
     drawn: usize,
     animation: Option<Animation>,
     series: Vec<Image>,
+    manifest: Manifest,
     files: Vec<PathBuf>,
 }
 
 impl<'a> Studio<'a> {
-    /// Prepares `frames` frames of a scene, in `folder`.
+    /// Prepares `frames` frames of a scene, in `folder`, where they replace those of an earlier call of the same command.
     pub(crate) fn new(
+        command: &str,
         args: &'a FrameArgs,
         path: &Path,
         scene: &Scene,
@@ -154,6 +160,10 @@ impl<'a> Studio<'a> {
         let wall = scene.wall().map_err(in_scene)?.closed_mesh();
         let device = scene.device().map_err(in_scene)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
+        if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {
+            let text = format!("--orbit {orbit:e}: give -{MOST_ORBIT_DEG} to {MOST_ORBIT_DEG} degrees");
+            return Err(Failure::Input(text));
+        }
         if !spec.wants(View::Fluoro) && (args.dicom.is_some() || args.labels || args.raw || args.hold) {
             let text =
                 "--dicom, --labels, --raw and --hold belong to fluoroscopy: use --view fluoro or --view both";
@@ -162,6 +172,14 @@ impl<'a> Studio<'a> {
         std::fs::create_dir_all(&folder).map_err(|e| {
             Failure::Input(format!("--out {}: {e}; name a folder that can be made", folder.display()))
         })?;
+        let begun = Manifest::begin(&folder, command);
+        let (manifest, replaced) = begun.map_err(|e| Failure::write(&folder, &e))?;
+        if replaced > 0 {
+            tell(format_args!(
+                "endowire: replaces {replaced} files of an earlier endowire {command} in {}",
+                folder.display()
+            ));
+        }
         Ok(Self {
             args,
             spec,
@@ -173,6 +191,7 @@ impl<'a> Studio<'a> {
             drawn: 0,
             animation: None,
             series: vec![],
+            manifest,
             files: vec![],
         })
     }
@@ -187,7 +206,8 @@ impl<'a> Studio<'a> {
         if let (Some(orbit), true) = (self.args.orbit, self.drawn > 0) {
             let mut spec = ViewSpec { views: vec![View::ThreeD], ..self.spec.clone() };
             let part = self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64;
-            spec.camera.azimuth_deg = Some(spec.camera.azimuth_deg.unwrap_or(0.0) + orbit * part);
+            let azimuth = spec.camera.azimuth_deg.unwrap_or(0.0) + orbit * part;
+            spec.camera.azimuth_deg = Some(azimuth % 360.0);
             let device = device_view(still.shape, &self.device, &self.spec);
             let mut orbiting = Renderer::new(&spec, &self.wall)?;
             orbiting.show_contacts(still.contacts);
@@ -208,7 +228,7 @@ impl<'a> Studio<'a> {
         self.drawn += 1;
         for (view, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {
-                let path = self.file(&format!("{}_{view}.png", still.name));
+                let path = self.file(&format!("{}_{view}.png", still.name))?;
                 image.write_png(&path)?;
             }
         }
@@ -217,7 +237,7 @@ impl<'a> Studio<'a> {
             _ => None,
         };
         if let Some(both) = &both {
-            let path = self.file(&format!("{}_both.png", still.name));
+            let path = self.file(&format!("{}_both.png", still.name))?;
             both.write_png(&path)?;
         }
         if let (Some(path), Some(shown)) =
@@ -245,9 +265,9 @@ impl<'a> Studio<'a> {
         if self.args.labels {
             let contacts: Vec<_> = still.contacts.iter().map(|c| c.position_mm).collect();
             let labels = self.renderer.labels(&device, &contacts)?;
-            let path = self.file(&format!("{}_mask.png", still.name));
+            let path = self.file(&format!("{}_mask.png", still.name))?;
             labels.mask.write_png(&path)?;
-            let path = self.file(&format!("{}_labels.json", still.name));
+            let path = self.file(&format!("{}_labels.json", still.name))?;
             std::fs::write(&path, to_json(&labels)? + "\n").map_err(|e| Failure::write(&path, &e))?;
         }
         if self.args.raw {
@@ -266,7 +286,7 @@ impl<'a> Studio<'a> {
             }
             maps.extend(paths.devices_mm.iter().map(|(material, map)| (format!("{material}_mm"), map)));
             for (name, map) in maps {
-                let path = self.file(&format!("{}_{name}.npy", still.name));
+                let path = self.file(&format!("{}_{name}.npy", still.name))?;
                 write_map(&path, paths.width as usize, map).map_err(|e| Failure::write(&path, &e))?;
             }
         }
@@ -274,9 +294,10 @@ impl<'a> Studio<'a> {
     }
 
     /// A file of the folder, noted.
-    fn file(&mut self, name: &str) -> PathBuf {
+    fn file(&mut self, name: &str) -> Result<PathBuf, Failure> {
+        self.manifest.add(name).map_err(|e| Failure::write(&self.folder, &e))?;
         self.files.push(name.into());
-        self.folder.join(name)
+        Ok(self.folder.join(name))
     }
 
     /// Ends animation and series.
@@ -286,7 +307,7 @@ impl<'a> Studio<'a> {
             self.files.push(path.clone());
         }
         if let (Some(image), true) = (self.renderer.last_image_hold(), self.args.hold) {
-            let path = self.file("hold.png");
+            let path = self.file("hold.png")?;
             image.write_png(&path)?;
         }
         if let (Some(path), Some(c_arm)) = (&self.args.dicom, self.renderer.c_arm()) {

@@ -1,12 +1,16 @@
 //! Everything that leaves the program: recordings, arrays, provenance, progress.
 
+mod arrays;
 pub(crate) mod chart;
+mod folder;
 pub(crate) mod frames;
+mod manifest;
 pub(crate) mod npz;
 pub(crate) mod progress;
 pub(crate) mod provenance;
 pub(crate) mod recorder;
 pub(crate) mod recording;
+mod whole;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};
@@ -14,6 +18,9 @@ use std::io::{ErrorKind, Write, stderr, stdout};
 use serde::Serialize;
 
 use crate::failure::Failure;
+
+/// What a recording tells of itself.
+const SUMMARY: &str = "summary.json";
 
 /// Prints a document and a line break on stdout. A reader that has left (`| head`) has what it wanted.
 pub(crate) fn print(document: impl Display) -> Result<(), Failure> {

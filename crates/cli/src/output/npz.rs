@@ -1,9 +1,9 @@
-//! Arrays for numpy: an uncompressed zip of `.npy` members, written without holding them in memory.
+//! Arrays for numpy: an uncompressed zip of `.npy` members, packed from files that grow while a run goes on; nothing is held in memory.
 //!
 //! Format: NumPy enhancement proposal 1, version 1.0. Only the 60-byte header is ours; the crates that read and write
 //! the whole format bring a parser generator for it. Only what is written here is read back.
 
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::Path;
 
@@ -22,53 +22,83 @@ pub(crate) enum Kind {
     I64,
 }
 
-/// One array that grows row by row, kept in an unnamed temporary file until it is packed.
-pub(crate) struct ArrayStream {
-    name: &'static str,
-    kind: Kind,
+/// What an array is called and made of.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Member {
+    pub(crate) name: &'static str,
+    pub(crate) kind: Kind,
     /// Numbers in a row; 1 makes a one-dimensional array.
-    columns: usize,
+    pub(crate) columns: usize,
+}
+
+impl Member {
+    /// The file it grows in: bare little-endian numbers, as `numpy.fromfile` reads them.
+    pub(crate) fn file_name(&self) -> String {
+        let kind = match self.kind {
+            Kind::F64 => "f64",
+            Kind::I64 => "i64",
+        };
+        format!("{}.{kind}", self.name)
+    }
+}
+
+/// One array that grows on disk until it is packed. What has been pushed is with the system: a program that is killed keeps it.
+pub(crate) struct ArrayStream {
+    member: Member,
     numbers: u64,
-    file: BufWriter<File>,
+    file: File,
 }
 
 impl ArrayStream {
+    /// An empty array in `folder`.
+    pub(crate) fn new(member: Member, folder: &Path) -> io::Result<Self> {
+        let path = folder.join(member.file_name());
+        File::create(&path)?;
+        // Appended to, so that numbers stay in line after a file was cut.
+        let file = OpenOptions::new().read(true).append(true).open(&path)?;
+        Ok(Self { member, numbers: 0, file })
+    }
+
     /// Numbers so far.
     pub(crate) fn len(&self) -> u64 {
         self.numbers
     }
 
-    /// Forgets all but the first numbers: what a write that failed half way has left.
+    /// Forgets all but the first numbers, and what a write that failed half way has left.
     pub(crate) fn truncate(&mut self, numbers: u64) {
         self.numbers = self.numbers.min(numbers);
-    }
-
-    /// An empty array.
-    pub(crate) fn new(name: &'static str, kind: Kind, columns: usize) -> io::Result<Self> {
-        Ok(Self { name, kind, columns, numbers: 0, file: BufWriter::new(tempfile::tempfile()?) })
+        // A disk that fails here as well changes nothing: only whole steps are read.
+        let _ = self.file.set_len(self.numbers * NUMBER_BYTES);
     }
 
     /// Appends floats.
     pub(crate) fn push_f64(&mut self, values: impl IntoIterator<Item = f64>) -> io::Result<()> {
-        for value in values {
-            self.file.write_all(&value.to_le_bytes())?;
-            self.numbers += 1;
-        }
-        Ok(())
+        let bytes: Vec<u8> = values.into_iter().flat_map(f64::to_le_bytes).collect();
+        self.push(&bytes)
     }
 
     /// Appends an integer.
     pub(crate) fn push_i64(&mut self, value: i64) -> io::Result<()> {
-        self.numbers += 1;
-        self.file.write_all(&value.to_le_bytes())
+        self.push(&value.to_le_bytes())
+    }
+
+    fn push(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.file.write_all(bytes)?;
+        self.numbers += bytes.len() as u64 / NUMBER_BYTES;
+        Ok(())
+    }
+
+    /// Waits until all is on the disk itself: then a power failure keeps it as well.
+    pub(crate) fn sync(&self) -> io::Result<()> {
+        self.file.sync_data()
     }
 
     fn header(&self) -> Vec<u8> {
-        let kind = match self.kind {
+        let kind = match self.member.kind {
             Kind::F64 => "<f8",
             Kind::I64 => "<i8",
         };
-        let shape = match self.columns {
+        let shape = match self.member.columns {
             1 => format!("({},)", self.numbers),
             columns => format!("({}, {columns})", self.numbers / columns as u64),
         };
@@ -118,20 +148,29 @@ pub(crate) fn read(path: &Path, name: &str) -> io::Result<Vec<[u8; 8]>> {
     Ok(bytes.chunks_exact(8).filter_map(|b| b.try_into().ok()).collect())
 }
 
+/// The whole numbers in the file of an array that is not packed; one that was being written is cut off.
+pub(crate) fn read_unpacked(folder: &Path, member: &Member) -> io::Result<Vec<[u8; 8]>> {
+    let bytes = std::fs::read(folder.join(member.file_name()))?;
+    Ok(bytes.chunks_exact(8).filter_map(|b| b.try_into().ok()).collect())
+}
+
 /// Packs arrays into a `.npz` file.
-pub(crate) fn write(path: &Path, arrays: Vec<ArrayStream>) -> io::Result<()> {
-    let mut archive = ZipWriter::new(BufWriter::new(File::create(path)?));
+pub(crate) fn write(file: File, arrays: &mut [ArrayStream]) -> io::Result<()> {
+    let mut archive = ZipWriter::new(BufWriter::new(file));
     // Stored, with the fixed time stamp of the zip epoch: the same arrays are the same bytes.
     let options = SimpleFileOptions::default()
         .compression_method(zip::CompressionMethod::Stored)
         .last_modified_time(zip::DateTime::default())
         .large_file(true);
     for array in arrays {
-        archive.start_file(format!("{}.npy", array.name), options)?;
+        archive.start_file(format!("{}.npy", array.member.name), options)?;
         archive.write_all(&array.header())?;
-        let mut data = array.file.into_inner().map_err(io::IntoInnerError::into_error)?;
-        data.rewind()?;
-        io::copy(&mut data.take(array.numbers * NUMBER_BYTES), &mut archive)?;
+        array.file.rewind()?;
+        let bytes = array.numbers * NUMBER_BYTES;
+        if io::copy(&mut (&array.file).take(bytes), &mut archive)? < bytes {
+            let text = format!("{} has lost numbers since they were recorded", array.member.file_name());
+            return Err(io::Error::new(io::ErrorKind::UnexpectedEof, text));
+        }
     }
     archive.finish()?.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
 }

@@ -1,16 +1,19 @@
-//! A run on disk: steps.csv line by line, shapes.npz and summary.json at the end — also at an early one.
+//! A run on disk. Every step is there as soon as it is recorded, in steps.csv and in the arrays, and summary.json follows once a second:
+//! a run that is killed leaves a recording. At the end, also at an early one, the arrays are packed and the summary is complete.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use endowire_core::insertion::{Command, Energy, StepReport};
 use endowire_core::shape::Shape;
 use serde::Serialize;
 
-use super::npz::{self, ArrayStream, Kind};
+use super::arrays::{self, ShapeArrays};
+use super::folder::{self, Claim};
 use super::provenance::Provenance;
-use super::to_json;
+use super::{SUMMARY, to_json, whole};
 use crate::failure::Failure;
 
 /// What `run` tells of a whole insertion: summary.json.
@@ -19,6 +22,9 @@ pub(crate) struct Summary {
     /// Where the result comes from.
     #[serde(flatten)]
     pub(crate) provenance: Provenance,
+    /// Whether the run has ended, if at a failure, and all of it is written. False while it goes on, and for ever once it is killed:
+    /// then the summary is that of a step before.
+    pub(crate) complete: bool,
     /// Name of the scene.
     pub(crate) scene: String,
     /// The scene's file, for frames afterwards.
@@ -101,62 +107,38 @@ struct Row {
     converged: bool,
 }
 
+/// How often a run that goes on writes its summary, and has the disk keep what a power failure would take.
+const CHECKPOINT_S: f64 = 1.0;
+
 /// Writes a run into a folder.
 pub(crate) struct Recorder {
     folder: PathBuf,
     table: csv::Writer<File>,
-    positions: ArrayStream,
-    tangents: ArrayStream,
-    from_tip: ArrayStream,
-    offsets: ArrayStream,
-    contact_points: ArrayStream,
-    contact_forces: ArrayStream,
-    contact_offsets: ArrayStream,
-    contacts: i64,
-    nodes: i64,
+    arrays: ShapeArrays,
     steps: usize,
     /// Frames written so far, relative to the folder.
     pub(crate) frames: Vec<String>,
+    checkpoint: Option<Instant>,
+    _claim: Claim,
 }
 
 impl Recorder {
     /// Starts a recording in `folder`, which is made if it is not there; an earlier recording in it is replaced. A folder that holds
-    /// other files is refused.
-    pub(crate) fn new(folder: &Path) -> Result<Self, Failure> {
-        check_free(folder)?;
-        let table = || -> io::Result<_> {
-            std::fs::create_dir_all(folder)?;
-            remove_earlier(folder)?;
-            File::create(folder.join("steps.csv"))
+    /// other files is refused, or, with `force`, used as it is.
+    pub(crate) fn new(folder: &Path, force: bool) -> Result<Self, Failure> {
+        let claim = folder::claim(folder, force)?;
+        let start = || -> io::Result<_> {
+            Ok((File::create(folder.join(folder::TABLE))?, ShapeArrays::new(folder)?))
         };
-        let table = csv::Writer::from_writer(table().map_err(|e| Failure::write(folder, &e))?);
-        let array = |name, kind, columns| {
-            ArrayStream::new(name, kind, columns).map_err(|error| {
-                let place = std::env::temp_dir();
-                Failure::Input(format!(
-                    "cannot write temporary files in {}: {error} (TMPDIR names another folder)",
-                    place.display()
-                ))
-            })
-        };
-        let mut offsets = array("offsets", Kind::I64, 1)?;
-        offsets.push_i64(0).map_err(|e| Failure::write(folder, &e))?;
-        let mut contact_offsets = array("contact_offsets", Kind::I64, 1)?;
-        contact_offsets.push_i64(0).map_err(|e| Failure::write(folder, &e))?;
+        let (table, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
         Ok(Self {
             folder: folder.to_path_buf(),
-            table,
-            positions: array("positions_mm", Kind::F64, 3)?,
-            tangents: array("tangents", Kind::F64, 3)?,
-            from_tip: array("from_tip_mm", Kind::F64, 1)?,
-            offsets,
-            contact_points: array("contact_positions_mm", Kind::F64, 3)?,
-            contact_forces: array("contact_forces_n", Kind::F64, 3)?,
-            contact_offsets,
-            contacts: 0,
-            nodes: 0,
+            table: csv::Writer::from_writer(table),
+            arrays,
             steps: 0,
             frames: Vec::new(),
+            checkpoint: None,
+            _claim: claim,
         })
     }
 
@@ -198,43 +180,27 @@ impl Recorder {
             angles: report.angles,
             converged: report.converged,
         };
-        let whole = self.arrays().map(|array| array.len());
-        let write = || -> io::Result<()> {
+        // The row comes last: every step of the table is in the arrays.
+        let write_row = || {
             self.table.serialize(row)?;
-            self.table.flush()?;
-            self.positions.push_f64(shape.positions_mm.iter().flat_map(|x| [x.x, x.y, x.z]))?;
-            self.tangents.push_f64(shape.tangents.iter().flat_map(|t| [t.x, t.y, t.z]))?;
-            self.from_tip.push_f64(shape.from_tip_mm.iter().copied())?;
-            let contacts = &report.contacts;
-            self.contact_points.push_f64(contacts.iter().flat_map(|c| <[f64; 3]>::from(c.position_mm)))?;
-            self.contact_forces.push_f64(contacts.iter().flat_map(|c| <[f64; 3]>::from(c.total_n())))?;
-            self.contact_offsets.push_i64(self.contacts + contacts.len() as i64)?;
-            self.offsets.push_i64(self.nodes + shape.len() as i64)
+            self.table.flush()
         };
-        match write() {
-            Ok(()) => {
-                self.steps += 1;
-                self.nodes += shape.len() as i64;
-                self.contacts += report.contacts.len() as i64;
-                Ok(())
-            }
-            Err(error) => {
-                self.arrays().into_iter().zip(whole).for_each(|(array, numbers)| array.truncate(numbers));
-                Err(Failure::write(&self.folder, &error))
-            }
-        }
+        let pushed = self.arrays.push(shape, report, write_row);
+        pushed.map_err(|error| Failure::write(&self.folder, &error))?;
+        self.steps += 1;
+        Ok(())
     }
 
-    fn arrays(&mut self) -> [&mut ArrayStream; 7] {
-        [
-            &mut self.positions,
-            &mut self.tangents,
-            &mut self.from_tip,
-            &mut self.offsets,
-            &mut self.contact_points,
-            &mut self.contact_forces,
-            &mut self.contact_offsets,
-        ]
+    /// Now and then, writes the summary as it is: what a run that is killed leaves.
+    pub(crate) fn checkpoint(&mut self, summary: impl FnOnce(&Self) -> Summary) -> Result<(), Failure> {
+        if self.checkpoint.is_some_and(|last| last.elapsed().as_secs_f64() < CHECKPOINT_S) {
+            return Ok(());
+        }
+        let sync = || self.arrays.sync().and_then(|()| self.table.get_ref().sync_data());
+        sync().map_err(|e| Failure::write(&self.folder, &e))?;
+        write_summary(&self.folder, &summary(self))?;
+        self.checkpoint = Some(Instant::now());
+        Ok(())
     }
 
     /// Writes a frame of the current step with `write`, and notes it for the summary.
@@ -245,8 +211,11 @@ impl Recorder {
     ) -> Result<(), Failure> {
         let folder = self.folder.join("frames");
         std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
-        let name = format!("step_{:06}_{view}.png", self.steps);
-        write(&folder.join(&name))?;
+        let name = folder::frame_name(self.steps, view);
+        let path = folder.join(&name);
+        let part = whole::unfinished(&path);
+        write(&part)?;
+        std::fs::rename(&part, &path).map_err(|e| Failure::write(&path, &e))?;
         self.frames.push(format!("frames/{name}"));
         Ok(())
     }
@@ -256,66 +225,18 @@ impl Recorder {
         self.steps
     }
 
-    /// Writes shapes.npz and summary.json; the second also where the first cannot be written.
-    pub(crate) fn finish(self, summary: &Summary) -> Result<(), Failure> {
-        let folder = &self.folder;
-        let arrays = vec![
-            self.positions,
-            self.tangents,
-            self.from_tip,
-            self.offsets,
-            self.contact_points,
-            self.contact_forces,
-            self.contact_offsets,
-        ];
-        let shapes = npz::write(&folder.join("shapes.npz"), arrays)
-            .map_err(|e| Failure::write(&folder.join("shapes.npz"), &e));
-        let path = folder.join("summary.json");
-        std::fs::write(&path, to_json(summary)? + "\n").map_err(|e| Failure::write(&path, &e))?;
-        shapes
+    /// Packs shapes.npz and writes summary.json; the second also where the first cannot be written.
+    pub(crate) fn finish(self, summary: &mut Summary) -> Result<(), Failure> {
+        // The claim ends with this function, when all is written.
+        let Self { folder, arrays, _claim, .. } = self;
+        let packed = arrays.pack(&folder).map_err(|e| Failure::write(&folder.join(arrays::PACKED), &e));
+        summary.complete = packed.is_ok();
+        write_summary(&folder, summary)?;
+        packed
     }
 }
 
-/// How the table of steps begins.
-const TABLE_BEGINS: &[u8] = b"step,advance_mm,rotate_rad,";
-
-/// Refuses a folder with files in it that no recording has left there: some could have the names of those to be written.
-fn check_free(folder: &Path) -> Result<(), Failure> {
-    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
-    let first = entries.flatten().map(|entry| entry.file_name()).min();
-    // A recording that was ended at once has an empty table.
-    let begins = File::open(folder.join("steps.csv")).and_then(|file| {
-        let mut begins = Vec::new();
-        file.take(TABLE_BEGINS.len() as u64).read_to_end(&mut begins).map(|_| begins)
-    });
-    let ours = begins.is_ok_and(|begins| begins.is_empty() || begins == TABLE_BEGINS);
-    match first {
-        Some(name) if !ours => Err(Failure::Input(format!(
-            "--out {}: the folder is no earlier recording, and a recording would mix with its files ({} …): give a new or an \
-             empty folder, such as {}",
-            folder.display(),
-            Path::new(&name).display(),
-            folder.join("recording").display()
-        ))),
-        _ => Ok(()),
-    }
-}
-
-/// Removes what an earlier recording left, and nothing else.
-fn remove_earlier(folder: &Path) -> io::Result<()> {
-    for name in ["summary.json", "steps.csv", "shapes.npz"] {
-        match std::fs::remove_file(folder.join(name)) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-            _ => {}
-        }
-    }
-    let Ok(frames) = std::fs::read_dir(folder.join("frames")) else { return Ok(()) };
-    for entry in frames {
-        let path = entry?.path();
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        if name.starts_with("step_") && name.ends_with(".png") {
-            std::fs::remove_file(path)?;
-        }
-    }
-    Ok(())
+fn write_summary(folder: &Path, summary: &Summary) -> Result<(), Failure> {
+    let path = folder.join(SUMMARY);
+    whole::write_text(&path, &(to_json(summary)? + "\n")).map_err(|e| Failure::write(&path, &e))
 }

@@ -1,12 +1,15 @@
 //! A recorded run, read back.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
 use endowire_core::shape::Shape;
+use endowire_viewer::ContactView;
 use serde::Deserialize;
 
-use super::npz;
+use super::npz::{self, Member};
+use super::{SUMMARY, arrays};
 use crate::failure::Failure;
 
 /// The parts of summary.json that frames need.
@@ -15,15 +18,14 @@ pub(crate) struct RecordedSummary {
     /// File of the scene.
     pub(crate) scene_file: PathBuf,
     /// Hash of the scene's text and of the files it names.
-    pub(crate) scene_hash: String,
+    pub(crate) scene_hash: Option<String>,
+    /// Whether the run has ended by itself; recordings of versions that packed them only then do not say it.
+    #[serde(default = "yes")]
+    pub(crate) complete: bool,
 }
 
-/// One contact of a step.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RecordedContact {
-    pub(crate) position_mm: Vec3,
-    /// Force of the wall on the device.
-    pub(crate) force_n: Vec3,
+fn yes() -> bool {
+    true
 }
 
 /// Shapes and contacts by step.
@@ -34,65 +36,107 @@ pub(crate) struct Recording {
     tangents: Vec<Vec3>,
     from_tip: Vec<f64>,
     offsets: Vec<usize>,
-    contacts: Vec<RecordedContact>,
+    contact_points: Vec<Vec3>,
+    /// Force of the wall on the device.
+    contact_forces: Vec<Vec3>,
     contact_offsets: Vec<usize>,
 }
 
 impl Recording {
-    /// Reads what `endowire run` has left in a folder.
-    pub(crate) fn read(folder: &Path) -> Result<Self, Failure> {
-        let at = |path: &Path, error: &dyn std::fmt::Display| {
-            Failure::Input(format!(
-                "{}: {error}; give the folder of a recorded run (endowire run)",
-                path.display()
-            ))
-        };
-        let path = folder.join("summary.json");
-        let text = std::fs::read(&path).map_err(|e| at(&path, &e))?;
-        let summary = serde_json::from_slice(&text).map_err(|e| at(&path, &e))?;
-        let path = folder.join("shapes.npz");
-        let floats = |name| -> Result<Vec<f64>, Failure> {
-            let bytes = npz::read(&path, name).map_err(|e| at(&path, &e))?;
-            Ok(bytes.into_iter().map(f64::from_le_bytes).collect())
-        };
-        let vectors = |name| -> Result<Vec<Vec3>, Failure> {
-            Ok(floats(name)?.chunks_exact(3).map(|x| Vec3::new(x[0], x[1], x[2])).collect())
-        };
-        let offsets = |name, most: usize| -> Result<Vec<usize>, Failure> {
-            let bytes = npz::read(&path, name).map_err(|e| at(&path, &e))?;
-            let offsets: Vec<usize> = bytes
-                .into_iter()
-                .map(|b| usize::try_from(i64::from_le_bytes(b)).unwrap_or(usize::MAX))
-                .collect();
-            if offsets.first() != Some(&0) || !offsets.is_sorted() || offsets.last() != Some(&most) {
-                return Err(at(&path, &format_args!("{name} do not fit the other arrays")));
+    /// Reads what `endowire run` has left in a folder, also where it was killed: then all whole steps. Where the file of the scene is
+    /// given, a summary that is damaged or lost is not missed.
+    pub(crate) fn read(folder: &Path, scene: Option<&Path>) -> Result<Self, Failure> {
+        let path = folder.join(SUMMARY);
+        let read = || -> io::Result<_> { Ok(serde_json::from_slice(&std::fs::read(&path)?)?) };
+        let summary = match (read(), scene) {
+            (Ok(summary), _) => summary,
+            (Err(_), Some(scene)) => {
+                RecordedSummary { scene_file: scene.to_path_buf(), scene_hash: None, complete: false }
             }
-            Ok(offsets)
+            (Err(e), None) => return Err(unreadable(&path, &e)),
         };
-        let (positions, tangents, from_tip) =
-            (vectors("positions_mm")?, vectors("tangents")?, floats("from_tip_mm")?);
-        if positions.len() != tangents.len() || positions.len() != from_tip.len() {
-            return Err(at(&path, &"its arrays have different lengths"));
+        let packed = folder.join(arrays::PACKED);
+        let growing = folder.join(arrays::GROWING);
+        // Growing arrays may still lie beside packed ones, which are whole if they are there.
+        if !packed.exists() && growing.is_dir() {
+            let bad = |e: io::Error| unreadable(&growing, &e);
+            let mut recording =
+                Self::from_arrays(summary, |member| npz::read_unpacked(&growing, member)).map_err(bad)?;
+            recording.cut_to_whole_steps();
+            return Ok(recording);
         }
-        let forces = vectors("contact_forces_n")?;
-        let contacts: Vec<RecordedContact> = vectors("contact_positions_mm")?
-            .into_iter()
-            .zip(forces)
-            .map(|(position_mm, force_n)| RecordedContact { position_mm, force_n })
-            .collect();
-        let recording = Self {
-            summary,
-            offsets: offsets("offsets", positions.len())?,
-            contact_offsets: offsets("contact_offsets", contacts.len())?,
-            positions,
-            tangents,
-            from_tip,
-            contacts,
-        };
-        if recording.offsets.len() != recording.contact_offsets.len() {
-            return Err(at(&path, &"shapes and contacts have different numbers of steps"));
-        }
+        let recording = Self::from_arrays(summary, |member| npz::read(&packed, member.name))
+            .map_err(|e| unreadable(&packed, &e))?;
+        recording.check().map_err(|what| unreadable(&packed, &what))?;
         Ok(recording)
+    }
+
+    fn from_arrays(
+        summary: RecordedSummary,
+        read: impl Fn(&Member) -> io::Result<Vec<[u8; 8]>>,
+    ) -> io::Result<Self> {
+        let floats = |member| -> io::Result<Vec<f64>> {
+            Ok(read(member)?.into_iter().map(f64::from_le_bytes).collect())
+        };
+        let vectors = |member| -> io::Result<Vec<Vec3>> {
+            Ok(floats(member)?.chunks_exact(3).map(|x| Vec3::new(x[0], x[1], x[2])).collect())
+        };
+        let offsets = |member| -> io::Result<Vec<usize>> {
+            let numbers = read(member)?.into_iter().map(i64::from_le_bytes);
+            Ok(numbers.map(|n| usize::try_from(n).unwrap_or(usize::MAX)).collect())
+        };
+        Ok(Self {
+            summary,
+            positions: vectors(&arrays::POSITIONS)?,
+            tangents: vectors(&arrays::TANGENTS)?,
+            from_tip: floats(&arrays::FROM_TIP)?,
+            offsets: offsets(&arrays::OFFSETS)?,
+            contact_points: vectors(&arrays::CONTACT_POSITIONS)?,
+            contact_forces: vectors(&arrays::CONTACT_FORCES)?,
+            contact_offsets: offsets(&arrays::CONTACT_OFFSETS)?,
+        })
+    }
+
+    /// Checks that the arrays of a run that has ended fit one another.
+    fn check(&self) -> Result<(), &'static str> {
+        let (nodes, contacts) = (self.positions.len(), self.contact_points.len());
+        if nodes != self.tangents.len()
+            || nodes != self.from_tip.len()
+            || contacts != self.contact_forces.len()
+        {
+            return Err("its arrays have different lengths");
+        }
+        for (offsets, most, what) in [
+            (&self.offsets, nodes, "offsets do not fit the other arrays"),
+            (&self.contact_offsets, contacts, "contact_offsets do not fit the other arrays"),
+        ] {
+            if offsets.first() != Some(&0) || !offsets.is_sorted() || offsets.last() != Some(&most) {
+                return Err(what);
+            }
+        }
+        if self.offsets.len() != self.contact_offsets.len() {
+            return Err("shapes and contacts have different numbers of steps");
+        }
+        Ok(())
+    }
+
+    /// Forgets what comes after the last step that is whole in every array: a run may be killed, and a disk lose power, anywhere.
+    fn cut_to_whole_steps(&mut self) {
+        let nodes = self.positions.len().min(self.tangents.len()).min(self.from_tip.len());
+        let contacts = self.contact_points.len().min(self.contact_forces.len());
+        let whole = |offsets: &[usize], most: usize| {
+            let from_zero = offsets.first() == Some(&0);
+            let rise = offsets.windows(2).take_while(|w| w[0] <= w[1] && w[1] <= most).count();
+            if from_zero { rise } else { 0 }
+        };
+        let steps = whole(&self.offsets, nodes).min(whole(&self.contact_offsets, contacts));
+        for offsets in [&mut self.offsets, &mut self.contact_offsets] {
+            offsets.truncate(steps + 1);
+            // Not even the first number may have been written.
+            if steps == 0 {
+                *offsets = vec![0];
+            }
+        }
     }
 
     /// Number of steps.
@@ -111,7 +155,93 @@ impl Recording {
     }
 
     /// The contacts after a step, counted from 1.
-    pub(crate) fn contacts(&self, step: usize) -> &[RecordedContact] {
-        &self.contacts[self.contact_offsets[step - 1]..self.contact_offsets[step]]
+    pub(crate) fn contacts(&self, step: usize) -> Vec<ContactView> {
+        (self.contact_offsets[step - 1]..self.contact_offsets[step])
+            .map(|k| ContactView { position_mm: self.contact_points[k], force_n: self.contact_forces[k] })
+            .collect()
+    }
+}
+
+fn unreadable(path: &Path, error: &dyn std::fmt::Display) -> Failure {
+    Failure::Input(format!("{}: {error}; give the folder of a recorded run (endowire run)", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use endowire_core::insertion::StepReport;
+
+    use super::super::arrays::ShapeArrays;
+    use super::*;
+
+    /// Three steps of one, two and three nodes; the number of a node is in all that is recorded of it.
+    fn killed(folder: &Path) {
+        std::fs::write(
+            folder.join(SUMMARY),
+            r#"{"scene_file": "a.toml", "scene_hash": "", "complete": false}"#,
+        )
+        .unwrap();
+        let mut arrays = ShapeArrays::new(folder).unwrap();
+        let mut nodes = 0;
+        for step in 1..=3 {
+            let numbers: Vec<f64> = (nodes..nodes + step).map(f64::from).collect();
+            nodes += step;
+            let vectors: Vec<Vec3> = numbers.iter().map(|x| Vec3::repeat(*x)).collect();
+            let shape = Shape { positions_mm: vectors.clone(), tangents: vectors, from_tip_mm: numbers };
+            arrays.push(&shape, &StepReport::default(), || Ok(())).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_recording_that_was_cut_at_any_byte_has_its_whole_steps() {
+        let folder = tempfile::tempdir().unwrap();
+        killed(folder.path());
+        assert_eq!(Recording::read(folder.path(), None).unwrap().steps(), 3);
+        let files: Vec<PathBuf> = std::fs::read_dir(folder.path().join(arrays::GROWING))
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+            .collect();
+        assert_eq!(files.len(), 7);
+        let mut seen = [false; 3];
+        for file in files {
+            let whole = std::fs::read(&file).unwrap();
+            for bytes in 0..whole.len() {
+                std::fs::write(&file, &whole[..bytes]).unwrap();
+                let recording = Recording::read(folder.path(), None).unwrap();
+                seen[recording.steps()] = true;
+                for step in 1..=recording.steps() {
+                    let shape = recording.shape(step);
+                    let first = (step * (step - 1) / 2) as f64;
+                    assert_eq!((shape.len(), shape.from_tip_mm[0]), (step, first), "{file:?} at {bytes}");
+                    assert_eq!(shape.positions_mm, shape.tangents, "{file:?} at {bytes}");
+                }
+            }
+            std::fs::write(&file, whole).unwrap();
+        }
+        assert_eq!(seen, [true; 3]);
+    }
+
+    #[test]
+    fn a_damaged_summary_is_told_and_not_needed_beside_the_scene() {
+        let folder = tempfile::tempdir().unwrap();
+        killed(folder.path());
+        std::fs::write(folder.path().join(SUMMARY), "{\"scene").unwrap();
+        let told = Recording::read(folder.path(), None).unwrap_err().to_string();
+        assert!(told.contains(SUMMARY) && told.contains("recorded run"), "{told}");
+        assert_eq!(Recording::read(folder.path(), Some(Path::new("a.toml"))).unwrap().steps(), 3);
+    }
+
+    #[test]
+    fn a_step_that_could_not_be_written_whole_is_taken_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut arrays = ShapeArrays::new(folder.path()).unwrap();
+        let one =
+            Shape { positions_mm: vec![Vec3::zeros()], tangents: vec![Vec3::z()], from_tip_mm: vec![0.0] };
+        arrays.push(&one, &StepReport::default(), || Ok(())).unwrap();
+        arrays.push(&one, &StepReport::default(), || Err(io::Error::other("full"))).unwrap_err();
+        arrays.pack(folder.path()).unwrap();
+        let packed = |member: &Member| npz::read(&folder.path().join(arrays::PACKED), member.name).unwrap();
+        assert_eq!(packed(&arrays::OFFSETS).len(), 2);
+        assert_eq!(packed(&arrays::POSITIONS).len(), 3);
+        assert!(!folder.path().join(arrays::GROWING).exists());
     }
 }

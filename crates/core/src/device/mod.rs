@@ -8,9 +8,9 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Section {
-    /// Length, mm.
+    /// Length, mm; at most ten metres, as that of the whole device.
     pub length_mm: f64,
-    /// Outer radius, mm.
+    /// Outer radius, mm; 10⁻⁶ to 50.
     pub radius_mm: f64,
     /// Bending stiffness EI, N·mm².
     pub bending_stiffness_nmm2: f64,
@@ -53,6 +53,11 @@ pub struct Device {
 const LENGTH_LIMIT_MM: f64 = 10_000.0;
 /// Thickest device accepted, mm. A 30 F sheath has radius 5 mm; more than 50 mm is a unit mistake.
 const RADIUS_LIMIT_MM: f64 = 50.0;
+/// Thinnest device accepted, mm: a molecule. Contact points begin at the tip closer than a radius, and their number grows with its
+/// logarithm.
+const LEAST_RADIUS_MM: f64 = 1e-6;
+/// Most sections: each point of a device looks for its own among them.
+const MOST_SECTIONS: usize = 1000;
 /// Stiffest device accepted, N·mm²: a solid steel rod of 12 mm diameter.
 const STIFFNESS_LIMIT_NMM2: f64 = 2e8;
 
@@ -65,6 +70,11 @@ impl Device {
         if sections.is_empty() {
             return Err(Error::parameter("device.section", "[]", "give at least one section, tip first"));
         }
+        if sections.len() > MOST_SECTIONS {
+            let value = format!("{} sections", sections.len());
+            let mend = format!("at most {MOST_SECTIONS} are taken: join neighbours that are nearly alike");
+            return Err(Error::parameter("device.section", value, mend));
+        }
         for (index, section) in sections.iter().enumerate() {
             for (field, value, limit) in [
                 ("length_mm", section.length_mm, LENGTH_LIMIT_MM),
@@ -73,6 +83,14 @@ impl Device {
                 ("torsional_stiffness_nmm2", section.torsion_nmm2(), STIFFNESS_LIMIT_NMM2),
             ] {
                 crate::error::in_range(&format!("device.section[{index}].{field}"), value, limit)?;
+            }
+            if section.radius_mm < LEAST_RADIUS_MM {
+                let mend = format!("must be at least {LEAST_RADIUS_MM} mm: no device is thinner");
+                return Err(Error::parameter(
+                    format!("device.section[{index}].radius_mm"),
+                    section.radius_mm,
+                    mend,
+                ));
             }
             let curvature = section.rest_curvature_per_mm;
             let bend = curvature[0].hypot(curvature[1]) * section.radius_mm;
@@ -146,5 +164,24 @@ impl Device {
     /// Largest outer radius, mm.
     pub fn max_radius_mm(&self) -> f64 {
         self.sections.iter().map(|s| s.radius_mm).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn radii_and_sections_beyond_any_device_are_refused_by_key() {
+        let straight = |radius_mm| Section::straight(10.0, radius_mm, 1.0);
+        let told = |sections: Vec<Section>| Device::new(sections).unwrap_err().to_string();
+        assert!(Device::new(vec![straight(1.0), straight(1e-6)]).is_ok());
+        for radius_mm in [1e-7, 1e-300, 1e-323] {
+            let error = told(vec![straight(1.0), straight(radius_mm)]);
+            assert!(error.starts_with("device.section[1].radius_mm = 1e-"), "{error}");
+            assert!(error.contains("at least 0.000001 mm"), "{error}");
+        }
+        let error = told(vec![Section::straight(1.0, 1.0, 1.0); 1001]);
+        assert!(error.starts_with("device.section = 1001 sections: at most 1000"), "{error}");
     }
 }

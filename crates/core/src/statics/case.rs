@@ -34,7 +34,7 @@ pub struct StaticCase {
 pub struct Rod {
     /// Length.
     pub length: f64,
-    /// Number of elements; they are spread so that sections and point loads begin at nodes, so a rod with more of those
+    /// Number of elements, 1 to 200,000; they are spread so that sections and point loads begin at nodes, so a rod with more of those
     /// than elements gets one element for each.
     pub elements: usize,
     /// Sections in order from the start.
@@ -193,9 +193,9 @@ pub struct Initial {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Solver {
-    /// Newton iterations allowed (in each load step).
+    /// Newton iterations allowed (in each load step), 1 to 100,000.
     pub max_iterations: usize,
-    /// Number of equal load steps.
+    /// Number of equal load steps, 1 to a million; with the elements no more than ten million in all.
     pub load_steps: usize,
     /// Largest force or moment out of balance at any node, as a part of the largest in the rod; 1e-14 to 1e-2.
     pub tolerance: f64,

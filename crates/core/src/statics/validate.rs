@@ -7,6 +7,11 @@ use std::fmt::Display;
 /// Most elements a case may ask for: far beyond use, and about a gigabyte of memory with twist.
 const MAX_ELEMENTS: usize = 200_000;
 
+/// Most iterations of a load step, most load steps, and most of them times elements: beyond it the answer takes longer than a coffee.
+const MAX_ITERATIONS: usize = 100_000;
+const MAX_LOAD_STEPS: usize = 1_000_000;
+const MAX_WORK: usize = 10_000_000;
+
 /// Tolerances that mean something: below, there is rounding alone; above, a shape that is no equilibrium would pass for one.
 const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-2;
 
@@ -113,11 +118,21 @@ impl StaticCase {
         if let Some(initial) = &self.initial {
             finite("initial.curvature", &initial.curvature)?;
         }
-        if self.solver.max_iterations == 0
-            || self.solver.load_steps == 0
-            || self.solver.load_steps > 1_000_000
-        {
-            return Err(Error::parameter("solver", "0", "max_iterations and load_steps must be at least 1"));
+        for (key, value, most) in [
+            ("solver.max_iterations", self.solver.max_iterations, MAX_ITERATIONS),
+            ("solver.load_steps", self.solver.load_steps, MAX_LOAD_STEPS),
+        ] {
+            if value == 0 || value > most {
+                return Err(Error::parameter(key, value, format!("must be 1 to {most}")));
+            }
+        }
+        let work = self.solver.load_steps.saturating_mul(self.rod.elements);
+        if work > MAX_WORK {
+            let mend = format!(
+                "with {} elements that is {work} elements to solve for, and at most {MAX_WORK} are begun: use fewer steps or elements",
+                self.rod.elements
+            );
+            return Err(Error::parameter("solver.load_steps", self.solver.load_steps, mend));
         }
         let tolerance = self.solver.tolerance;
         if !TOLERANCES.contains(&tolerance) {
@@ -276,5 +291,40 @@ impl StaticCase {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn work_that_never_ends_is_refused_by_key_and_number() {
+        let told = |elements: usize, solver: &str| {
+            let text = format!(
+                "[rod]\nlength = 1.0\nelements = {elements}\n[[rod.section]]\nuntil = 1.0\nEI = 1.0\n[start]\ntype = \"clamped\"\n\
+                 [solver]\n{solver}\n"
+            );
+            StaticCase::from_toml(&text, Path::new("a.toml"))
+                .err()
+                .map_or_else(String::new, |e| e.to_string())
+        };
+        assert_eq!(told(100, "load_steps = 10\nmax_iterations = 50"), "");
+        for (elements, solver, words) in [
+            (1_000_000, "", "rod.elements = 1000000: must be 1 to 200000"),
+            (
+                200_000,
+                "load_steps = 1000",
+                "solver.load_steps = 1000: with 200000 elements that is 200000000",
+            ),
+            (10, "load_steps = 2000000", "solver.load_steps = 2000000: must be 1 to 1000000"),
+            (10, "max_iterations = 0", "solver.max_iterations = 0: must be 1 to 100000"),
+            (10, "max_iterations = 100001", "solver.max_iterations = 100001: must be 1 to 100000"),
+        ] {
+            let error = told(elements, solver);
+            assert!(error.contains(words), "{words}: {error}");
+        }
     }
 }

@@ -30,7 +30,7 @@ impl CentrelineTree {
     /// A tree of `nodes`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the row if a number is not finite, a radius is not positive, a parent is not an earlier
+    /// [`Error::Parameter`] naming the row if a number is not finite, a radius is below 10⁻⁶ mm, a parent is not an earlier
     /// row, a point coincides with its parent, or there is not exactly one root with at least one child.
     pub fn new(nodes: Vec<CentrelineNode>) -> Result<Self> {
         for row in 0..nodes.len() {
@@ -143,6 +143,9 @@ const SIZE_LIMIT: u64 = 64 << 20;
 /// Largest usable number: distances and their squares stay well inside f64, and no vessel is a kilometre long.
 const LARGEST_MM: f64 = 1e6;
 
+/// Least radius: powers of it, as flow takes them, stay numbers, and no vessel is thinner than a molecule.
+const LEAST_RADIUS_MM: f64 = 1e-6;
+
 /// Checks a row against the rows before it: (column, value, how to mend it).
 fn check_row(
     nodes: &[CentrelineNode],
@@ -154,8 +157,9 @@ fn check_row(
             return Err((name, value.to_string(), format!("must be finite and at most {LARGEST_MM} mm")));
         }
     }
-    if !(node.radius_mm > 0.0 && node.radius_mm <= LARGEST_MM) {
-        return Err(("radius", node.radius_mm.to_string(), "must be positive and finite (mm)".into()));
+    if !(LEAST_RADIUS_MM..=LARGEST_MM).contains(&node.radius_mm) {
+        let mend = format!("must be {LEAST_RADIUS_MM} to {LARGEST_MM} mm");
+        return Err(("radius", crate::error::number(node.radius_mm), mend));
     }
     match node.parent {
         None if row == 0 => Ok(()),
@@ -197,6 +201,7 @@ mod tests {
             ("0 0 0 1 -1\n0 0 nan 1 0", "line 2: z = NaN"),
             ("0 0 0 1 -1\n0 0 inf 1 0", "line 2: z = inf"),
             ("0 0 0 0 -1", "line 1: radius = 0"),
+            ("0 0 0 1e-300 -1", "line 1: radius = 1e-300: must be 0.000001 to 1000000 mm"),
             ("# c\n0 0 0 1 -1\n0 0 1 -2 0", "line 3: radius = -2"),
             ("0 0 0 1 -1\n0 0 1 1 7", "line 2: parent = 7"),
             ("0 0 0 1 -1\n0 0 1 1 1", "line 2: parent = 1"),

@@ -19,6 +19,8 @@ use crate::spec::{FlowSpec, InjectionSpec};
 
 /// Points of the tree are set at most this far apart, mm.
 const SPACING_MM: f64 = 2.0;
+/// Most points: every cell of the lumen asks all of them which is nearest.
+const MOST_NODES: f64 = 50_000.0;
 /// Deviation of a front where it is injected, s.
 const FIRST_SPREAD_S: f64 = 0.05;
 
@@ -129,6 +131,18 @@ pub(super) fn nearest(nodes: &[Node], point: &Vec3) -> usize {
 /// The tree's points and some between them, from the inlet downstream, with the shares of the flow.
 fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
     let points = tree.nodes();
+    let pieces = |a: &Vec3, b: &Vec3| ((b - a).norm() / SPACING_MM).ceil().max(1.0);
+    let parent = |i: usize| points[i].parent.map(|parent| points[parent].position_mm);
+    let count: f64 = (0..points.len())
+        .filter_map(|i| parent(i).map(|before| pieces(&before, &points[i].position_mm)))
+        .sum();
+    if count > MOST_NODES {
+        let mend = format!(
+            "with a point each {SPACING_MM} mm it has {count:.0} points, at most {MOST_NODES} are followed: mend the unit (mm), or \
+             leave out branches or points"
+        );
+        return Err(Error::parameter("view.flow.tree", format!("{} rows", points.len()), mend));
+    }
     let mut neighbours: Vec<Vec<usize>> = vec![vec![]; points.len()];
     for (i, point) in points.iter().enumerate() {
         if let Some(parent) = point.parent {
@@ -162,7 +176,7 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
             let ((x0, r0), (x1, r1)) = (place(at), place(next));
             // A side branch begins where it leaves the trunk, and has its own radius from there on.
             let is_side = r1 < widest;
-            let steps = ((x1 - x0).norm() / SPACING_MM).ceil().max(1.0) as usize;
+            let steps = pieces(&x0, &x1) as usize;
             let step = (x1 - x0).norm() / steps as f64;
             let mut last = becomes;
             for k in 1..=steps {
@@ -260,6 +274,14 @@ mod tests {
         let at = |x: f64, y: f64| late[nearest(&flow.nodes, &Vec3::new(x, y, 0.0))];
         assert!(at(140.0, 30.0) > 0.1);
         assert_eq!((at(50.0, 0.0), at(140.0, -30.0)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_tree_of_too_many_points_is_refused_before_it_is_made() {
+        let node = |x: f64, parent| CentrelineNode { position_mm: Vec3::x() * x, radius_mm: 5.0, parent };
+        let long = CentrelineTree::new(vec![node(0.0, None), node(9e5, Some(0))]).unwrap();
+        let error = Flow::new(&long, &FlowSpec::default(), &[injection(None)]).unwrap_err().to_string();
+        assert!(error.contains("view.flow.tree") && error.contains("450000"), "{error}");
     }
 
     #[test]

@@ -15,6 +15,8 @@ use crate::spec::CtSpec;
 
 /// Sides of a voxel that can be meant, mm: a unit mistake is easily a factor of a thousand, and rays march by half a side.
 const VOXEL_MM: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+/// Most voxels of a volume: 512 × 512 × 1024, two gigabytes of materials.
+const MOST_VOXELS: u64 = 1 << 28;
 /// Air: no tissue at all below this.
 const AIR_HU: f32 = -950.0;
 /// Bone begins.
@@ -34,6 +36,19 @@ fn materials(hu: f32) -> [f32; 2] {
     }
     let bone = ((hu - SOFT_HU) / (CORTICAL_HU - SOFT_HU)).min(2.0);
     [(1.0 + SOFT_HU / 1000.0) * (1.0 - bone).max(0.0), bone]
+}
+
+/// Refuses a volume that memory may not hold.
+fn check_size(header: &NiftiHeader) -> std::result::Result<(), String> {
+    let dims = usize::from(header.dim[0]).clamp(1, 7);
+    let voxels = header.dim[1..=dims].iter().fold(1_u64, |product, n| product.saturating_mul(u64::from(*n)));
+    if voxels <= MOST_VOXELS {
+        return Ok(());
+    }
+    Err(format!(
+        "has {voxels} voxels (dim = {:?}), at most {MOST_VOXELS} are read: crop it or make it coarser",
+        &header.dim[1..=dims]
+    ))
 }
 
 /// A volume of materials in the scene's axes.
@@ -57,9 +72,12 @@ impl Volume {
         let path = &spec.file;
         std::fs::metadata(path)
             .map_err(|source| Error::parameter("view.patient.ct.file", path.display(), source.to_string()))?;
-        let object: InMemNiftiObject = ReaderOptions::new()
-            .read_file(path)
-            .map_err(|error| Error::content(path, format!("is no NIfTI volume: {error}")))?;
+        let unreadable =
+            |error: nifti::NiftiError| Error::content(path, format!("is no NIfTI volume: {error}"));
+        // The header first: it says how much memory the volume asks for.
+        check_size(&NiftiHeader::from_file(path).map_err(unreadable)?)
+            .map_err(|why| Error::content(path, why))?;
+        let object: InMemNiftiObject = ReaderOptions::new().read_file(path).map_err(unreadable)?;
         let header = object.header().clone();
         let volume = object.into_volume();
         let dim = volume.dim().to_vec();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-use super::{finite_within, positive};
+use super::{COORDINATE_MM, finite_within};
 use crate::device::DevicePart;
 
 /// The `[view.patient]` table: who lies on the table. Without it the body is a slab ([`crate::XRaySpec::tissue_mm`]).
@@ -22,13 +22,13 @@ pub struct PatientSpec {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TorsoSpec {
-    /// Left to right.
+    /// Left to right, 100 to 800.
     pub width_mm: f64,
-    /// Front to back.
+    /// Front to back, 80 to 600.
     pub depth_mm: f64,
-    /// Middle of the vertebral bodies, left and posterior; absent: behind the vessel's centre.
+    /// Middle of the vertebral bodies, left and posterior, -100,000 to 100,000; absent: behind the vessel's centre.
     pub spine_mm: Option<[f64; 2]>,
-    /// Height of the diaphragm's domes; absent: a third of the way up the vessel. Lungs and ribs are above it.
+    /// Height of the diaphragm's domes, -100,000 to 100,000; absent: a third of the way up the vessel. Lungs and ribs are above it.
     pub diaphragm_mm: Option<f64>,
     /// Vertebrae.
     pub spine: bool,
@@ -56,9 +56,9 @@ impl Default for TorsoSpec {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct CtSpec {
-    /// NIfTI volume (.nii or .nii.gz) of Hounsfield units.
+    /// NIfTI volume (.nii or .nii.gz) of Hounsfield units, of at most 268 million voxels (512 × 512 × 1024).
     pub file: PathBuf,
-    /// Where the volume's origin lies in the scene's axes.
+    /// Where the volume's origin lies in the scene's axes, each coordinate -100,000 to 100,000.
     #[serde(default)]
     pub offset_mm: [f64; 3],
 }
@@ -68,8 +68,11 @@ impl PatientSpec {
         if let Some(torso) = &self.torso {
             finite_within("view.patient.torso.width_mm", torso.width_mm, [100.0, 800.0])?;
             finite_within("view.patient.torso.depth_mm", torso.depth_mm, [80.0, 600.0])?;
-            for x in torso.spine_mm.into_iter().flatten().chain(torso.diaphragm_mm) {
-                finite_within("view.patient.torso", x, [-1e5, 1e5])?;
+            for x in torso.spine_mm.into_iter().flatten() {
+                finite_within("view.patient.torso.spine_mm", x, COORDINATE_MM)?;
+            }
+            if let Some(z) = torso.diaphragm_mm {
+                finite_within("view.patient.torso.diaphragm_mm", z, COORDINATE_MM)?;
             }
             if let Some(ct) = &self.ct {
                 let mend = "view.patient.torso is given too: keep one of the two";
@@ -77,7 +80,7 @@ impl PatientSpec {
             }
         }
         for x in self.ct.iter().flat_map(|ct| ct.offset_mm) {
-            finite_within("view.patient.ct.offset_mm", x, [-1e5, 1e5])?;
+            finite_within("view.patient.ct.offset_mm", x, COORDINATE_MM)?;
         }
         Ok(())
     }
@@ -87,15 +90,15 @@ impl PatientSpec {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlowSpec {
-    /// Centre-line table of the vessel (x y z radius parent, mm).
+    /// Centre-line table of the vessel (x y z radius parent, mm), of at most 50,000 points 2 mm apart or nearer.
     pub tree: Option<PathBuf>,
-    /// A point near the end of the tree where the blood comes in; absent: the root.
+    /// A point near the end of the tree where the blood comes in, each coordinate -100,000 to 100,000; absent: the root.
     pub inlet_mm: Option<[f64; 3]>,
-    /// Blood flow there.
+    /// Blood flow there, 0.001 to 100,000.
     pub inflow_ml_per_s: f64,
-    /// At a bifurcation the flow divides as radiusⁿ: 2 for large arteries, 3 (Murray's law) for small ones.
+    /// At a bifurcation the flow divides as radiusⁿ: 2 for large arteries, 3 (Murray's law) for small ones; 0 to 10.
     pub split_exponent: f64,
-    /// How fast a bolus spreads: its standard deviation in time grows as this times the square root of the transit time, s^½.
+    /// How fast a bolus spreads: its standard deviation in time grows as this times the square root of the transit time, s^½; 0 to 10.
     pub dispersion: f64,
 }
 
@@ -108,11 +111,11 @@ impl Default for FlowSpec {
 
 impl FlowSpec {
     pub(super) fn validate(&self) -> Result<()> {
-        positive("view.flow.inflow_ml_per_s", self.inflow_ml_per_s)?;
+        finite_within("view.flow.inflow_ml_per_s", self.inflow_ml_per_s, [0.001, 1e5])?;
         finite_within("view.flow.split_exponent", self.split_exponent, [0.0, 10.0])?;
         finite_within("view.flow.dispersion", self.dispersion, [0.0, 10.0])?;
         for x in self.inlet_mm.into_iter().flatten() {
-            finite_within("view.flow.inlet_mm", x, [-1e5, 1e5])?;
+            finite_within("view.flow.inlet_mm", x, COORDINATE_MM)?;
         }
         Ok(())
     }
@@ -122,13 +125,13 @@ impl FlowSpec {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct InjectionSpec {
-    /// When it begins, in the time of the frames.
+    /// When it begins, in the time of the frames, -10,000 to 10,000.
     pub start_s: f64,
-    /// How long it takes.
+    /// How long it takes, 0.001 to 10,000.
     pub duration_s: f64,
-    /// How fast.
+    /// How fast, 0.001 to 10,000.
     pub rate_ml_per_s: f64,
-    /// Where: the nearest point of the centre line; absent: the inlet.
+    /// Where: the nearest point of the centre line, each coordinate -100,000 to 100,000; absent: the inlet.
     pub at_mm: Option<[f64; 3]>,
 }
 
@@ -136,10 +139,10 @@ impl InjectionSpec {
     pub(super) fn validate(&self, index: usize) -> Result<()> {
         let key = |name: &str| format!("view.injection[{index}].{name}");
         finite_within(&key("start_s"), self.start_s, [-1e4, 1e4])?;
-        positive(&key("duration_s"), self.duration_s)?;
-        positive(&key("rate_ml_per_s"), self.rate_ml_per_s)?;
+        finite_within(&key("duration_s"), self.duration_s, [0.001, 1e4])?;
+        finite_within(&key("rate_ml_per_s"), self.rate_ml_per_s, [0.001, 1e4])?;
         for x in self.at_mm.into_iter().flatten() {
-            finite_within(&key("at_mm"), x, [-1e5, 1e5])?;
+            finite_within(&key("at_mm"), x, COORDINATE_MM)?;
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-use super::{finite_within, positive};
+use super::{COORDINATE_MM, finite_within};
 
 /// The `[view.c_arm]` table; conventions are those of [`crate::CArm`].
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
@@ -13,25 +13,27 @@ use super::{finite_within, positive};
 pub struct CArmSpec {
     /// Angles as they are said: "LAO 40 CRA 20". In place of the two below.
     pub pose: Option<Pose>,
-    /// Positioner primary angle, LAO positive (DICOM 0018,1510).
+    /// Positioner primary angle, LAO positive (DICOM 0018,1510); -360 to 360.
     pub primary_deg: f64,
-    /// Positioner secondary angle, cranial positive (DICOM 0018,1511).
+    /// Positioner secondary angle, cranial positive (DICOM 0018,1511); -90 to 90.
     pub secondary_deg: f64,
-    /// Source to detector.
+    /// Source to detector, 10 to 100,000.
     pub sid_mm: f64,
-    /// Source to isocentre: the height of the table decides it.
+    /// Source to isocentre: the height of the table decides it. 1 to 100,000, and less than `sid_mm`.
     pub sod_mm: f64,
-    /// Pixel pitch at the detector; absent: from `field_mm`, or else the vessel fills the frame.
+    /// Pixel pitch at the detector, 0.0001 to 1000, after magnification too; absent: from `field_mm`, or else the vessel fills the
+    /// frame.
     pub pixel_mm: Option<f64>,
-    /// Longer side of the detector's field of view. In place of `pixel_mm`.
+    /// Longer side of the detector's field of view, 0.01 to 100,000. In place of `pixel_mm`, whose limits a pixel must keep.
     pub field_mm: Option<f64>,
-    /// Magnification mode: the field of view is the detector's over this factor.
+    /// Magnification mode: the field of view is the detector's over this factor, 0.1 to 100.
     pub magnification: f64,
-    /// Turn of the picture about its centre, clockwise on the screen.
+    /// Turn of the picture about its centre, clockwise on the screen; -360 to 360.
     pub rotation_deg: f64,
-    /// Blades: width and height of what they leave open, at the detector. Absent: the whole field.
+    /// Blades: width and height of what they leave open, at the detector, each 0.01 to 100,000. Absent: the whole field.
     pub collimation_mm: Option<[f64; 2]>,
-    /// Centre of rotation, seen in the middle of the frame; absent: the centre of the vessel's bounding box.
+    /// Centre of rotation, seen in the middle of the frame, each coordinate -100,000 to 100,000; absent: the centre of the vessel's
+    /// bounding box.
     pub isocentre_mm: Option<[f64; 3]>,
 }
 
@@ -137,8 +139,10 @@ impl From<Pose> for String {
     }
 }
 
-/// Pixel pitches and field sizes between which geometry has digits left, mm.
-const PITCH_MM: [f64; 2] = [1e-4, 1e5];
+/// Pixel pitches between which geometry has digits left, mm.
+pub(crate) const PITCH_MM: [f64; 2] = [1e-4, 1e3];
+/// Fields of view and openings, mm.
+const FIELD_MM: [f64; 2] = [0.01, 1e5];
 
 impl CArmSpec {
     /// Primary and secondary angle, from `pose` where that is given.
@@ -159,17 +163,18 @@ impl CArmSpec {
                 ));
             }
         }
-        positive("view.c_arm.sid_mm", self.sid_mm)?;
-        positive("view.c_arm.sod_mm", self.sod_mm)?;
+        finite_within("view.c_arm.sid_mm", self.sid_mm, [10.0, 1e5])?;
+        finite_within("view.c_arm.sod_mm", self.sod_mm, [1.0, 1e5])?;
         if self.sod_mm >= self.sid_mm {
             let mend =
                 format!("must be less than sid_mm = {}: the isocentre is before the detector", self.sid_mm);
             return Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, mend));
         }
-        for (key, value) in [("pixel_mm", self.pixel_mm), ("field_mm", self.field_mm)] {
+        for (key, value, range) in
+            [("pixel_mm", self.pixel_mm, PITCH_MM), ("field_mm", self.field_mm, FIELD_MM)]
+        {
             if let Some(value) = value {
-                positive(&format!("view.c_arm.{key}"), value)?;
-                finite_within(&format!("view.c_arm.{key}"), value, PITCH_MM)?;
+                finite_within(&format!("view.c_arm.{key}"), value, range)?;
             }
         }
         if let (Some(field), Some(_)) = (self.field_mm, self.pixel_mm) {
@@ -179,13 +184,10 @@ impl CArmSpec {
         finite_within("view.c_arm.magnification", self.magnification, [0.1, 100.0])?;
         finite_within("view.c_arm.rotation_deg", self.rotation_deg, [-360.0, 360.0])?;
         for side in self.collimation_mm.into_iter().flatten() {
-            positive("view.c_arm.collimation_mm", side)?;
+            finite_within("view.c_arm.collimation_mm", side, FIELD_MM)?;
         }
-        if let Some(isocentre) = self.isocentre_mm
-            && !isocentre.iter().all(|x| x.is_finite())
-        {
-            let value = format!("{isocentre:?}");
-            return Err(Error::parameter("view.c_arm.isocentre_mm", value, "must be finite"));
+        for x in self.isocentre_mm.into_iter().flatten() {
+            finite_within("view.c_arm.isocentre_mm", x, COORDINATE_MM)?;
         }
         Ok(())
     }

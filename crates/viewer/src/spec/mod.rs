@@ -10,6 +10,7 @@ use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 pub use anatomy::{CtSpec, FlowSpec, InjectionSpec, PatientSpec, TorsoSpec};
+pub(crate) use c_arm::PITCH_MM;
 pub use c_arm::{CArmSpec, Pose};
 pub use xray::{DetectorSpec, Mode, XRaySpec};
 
@@ -18,6 +19,12 @@ use crate::device::DevicePart;
 /// Largest side of a frame. Flat detectors have up to about 3000 pixels a side, and with two rays across a
 /// pixel this is the texture size that every adapter offers.
 const LARGEST_SIDE_PX: u32 = 4096;
+
+/// Coordinates of places, mm: vessels are below ten metres, and digits are left for a pixel.
+const COORDINATE_MM: [f64; 2] = [-1e5, 1e5];
+
+/// Most tables of injections and of parts.
+const MOST_TABLES: usize = 1000;
 
 /// One of the two kinds of frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize)]
@@ -55,11 +62,12 @@ pub enum Backend {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ViewSpec {
-    /// Width and height of every frame in pixels.
+    /// Width and height of every frame in pixels, each 1 to 4096.
     pub size_px: [u32; 2],
     /// The frames wanted. Nothing is built for a view that is not named here.
     pub views: Vec<View>,
-    /// A frame each so many recorded steps; the last step always gets one. This is the recorder's to obey.
+    /// A frame each so many recorded steps; the last step always gets one. From 1. This is the recorder's to
+    /// obey.
     pub every: u32,
     /// What computes the frames.
     pub backend: Backend,
@@ -73,11 +81,12 @@ pub struct ViewSpec {
     pub patient: PatientSpec,
     /// Blood flow.
     pub flow: FlowSpec,
-    /// Contrast medium, by script.
+    /// Contrast medium, by script; at most 1000 tables.
     pub injection: Vec<InjectionSpec>,
-    /// What the device is made of, part by part; without any, it is a solid rod of `xray.device_material`.
+    /// What the device is made of, part by part; without any, it is a solid rod of `xray.device_material`. At most 1000
+    /// tables.
     pub device: Vec<DevicePart>,
-    /// Frames a second: recorded steps become moments by it.
+    /// Frames a second, 0.01 to 1000: recorded steps become moments by it.
     pub frames_per_s: f64,
     /// Bits a pixel of the fluoroscopic frames, 8 or 16.
     pub bits: u32,
@@ -111,9 +120,9 @@ impl Default for ViewSpec {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CameraSpec {
-    /// Around the long axis of the patient: 0 is anterior, 90 the patient's left.
+    /// Around the long axis of the patient: 0 is anterior, 90 the patient's left; -360 to 360.
     pub azimuth_deg: Option<f64>,
-    /// Above the transverse plane, towards the head.
+    /// Above the transverse plane, towards the head; -360 to 360.
     pub elevation_deg: Option<f64>,
     /// Whether a scale bar is drawn.
     pub scale_bar: bool,
@@ -159,6 +168,12 @@ impl ViewSpec {
         self.detector.validate()?;
         self.patient.validate()?;
         self.flow.validate()?;
+        for (key, tables) in [("injection", self.injection.len()), ("device", self.device.len())] {
+            if tables > MOST_TABLES {
+                let mend = format!("at most {MOST_TABLES} are read");
+                return Err(Error::parameter(format!("view.{key}"), format!("{tables} tables"), mend));
+            }
+        }
         self.injection.iter().enumerate().try_for_each(|(i, injection)| injection.validate(i))?;
         anatomy::validate_parts(&self.device)?;
         finite_within("view.frames_per_s", self.frames_per_s, [0.01, 1000.0])?;
@@ -179,13 +194,6 @@ fn finite_within(key: &str, value: f64, [low, high]: [f64; 2]) -> Result<()> {
         return Ok(());
     }
     Err(Error::parameter(key, value, format!("must be a number from {low} to {high}")))
-}
-
-fn positive(key: &str, value: f64) -> Result<()> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(());
-    }
-    Err(Error::parameter(key, value, "must be a finite number above 0"))
 }
 
 #[cfg(test)]
@@ -242,10 +250,14 @@ mod tests {
         }
     }
 
+    fn injection(duration_s: f64, rate_ml_per_s: f64) -> InjectionSpec {
+        InjectionSpec { start_s: 0.0, duration_s, rate_ml_per_s, at_mm: None }
+    }
+
     #[test]
     fn each_bad_value_names_its_key() {
         type Spoil = fn(&mut ViewSpec);
-        let cases: [(&str, Spoil); 24] = [
+        let cases: [(&str, Spoil); 43] = [
             ("size_px", |s| s.size_px = [0, 10]),
             ("size_px", |s| s.size_px = [10, 9000]),
             ("every", |s| s.every = 0),
@@ -272,6 +284,35 @@ mod tests {
             }),
             ("bits", |s| s.bits = 12),
             ("azimuth_deg", |s| s.camera.azimuth_deg = Some(f64::NAN)),
+            ("sid_mm", |s| s.c_arm.sid_mm = 1e300),
+            ("sod_mm", |s| s.c_arm.sod_mm = 1e-308),
+            ("pixel_mm", |s| s.c_arm.pixel_mm = Some(1e-308)),
+            ("field_mm", |s| s.c_arm.field_mm = Some(1e-308)),
+            ("field_mm", |s| s.c_arm.field_mm = Some(1e308)),
+            ("collimation_mm", |s| s.c_arm.collimation_mm = Some([1e-308, 1.0])),
+            ("isocentre_mm", |s| s.c_arm.isocentre_mm = Some([0.0, 1e300, 0.0])),
+            ("csi_mm", |s| s.xray.csi_mm = 1e-308),
+            ("window", |s| s.xray.window = Some([-1e308, 1e308])),
+            ("window", |s| s.xray.window = Some([1.0, 1.0 + 1e-12])),
+            ("dose_ngy", |s| s.detector.dose_ngy = Some(1e308)),
+            ("inflow_ml_per_s", |s| s.flow.inflow_ml_per_s = 1e-308),
+            ("injection[1].rate_ml_per_s", |s| {
+                s.injection = vec![injection(1.0, 1.0), injection(1.0, 1e308)];
+            }),
+            ("injection[0].duration_s", |s| s.injection = vec![injection(1e-308, 1.0)]),
+            ("view.injection = 1001 tables", |s| s.injection = vec![injection(1.0, 1.0); 1001]),
+            ("diaphragm_mm", |s| {
+                s.patient.torso = Some(TorsoSpec { diaphragm_mm: Some(1e300), ..TorsoSpec::default() });
+            }),
+            ("device[0].outer_radius_mm", |s| {
+                s.device = vec![DevicePart { outer_radius_mm: Some(1e308), ..DevicePart::default() }];
+            }),
+            ("device[0].inner_radius_mm", |s| {
+                s.device = vec![DevicePart { inner_radius_mm: 1e308, ..DevicePart::default() }];
+            }),
+            ("device[0].from_tip_mm", |s| {
+                s.device = vec![DevicePart { from_tip_mm: Some([0.0, 1e308]), ..DevicePart::default() }];
+            }),
         ];
         for (key, spoil) in cases {
             let mut spec = ViewSpec::default();

@@ -3,7 +3,7 @@
 use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-use super::{finite_within, positive};
+use super::finite_within;
 use crate::xray::Material;
 
 /// What the fluoroscopic view shows.
@@ -40,29 +40,29 @@ pub struct XRaySpec {
     pub mode: Mode,
     /// Peak voltage of the tube in kV, 50 to 125 in steps of 5.
     pub kvp: f64,
-    /// Filtration, aluminium.
+    /// Filtration, aluminium; 0 to 20.
     pub aluminium_mm: f64,
-    /// Filtration, copper.
+    /// Filtration, copper; 0 to 5.
     pub copper_mm: f64,
     /// Energies that stand for the spectrum. Absent: every line of its table, exact to a millionth. Eight are within a
-    /// ten-thousandth of it for most scenes, and an eighth of the work.
+    /// ten-thousandth of it for most scenes, and an eighth of the work. 1 to 1000.
     pub energy_bins: Option<u32>,
     /// One energy in place of the spectrum, 15 to 125 keV.
     pub energy_kev: Option<f64>,
     /// Volume fraction of contrast medium (370 mg iodine per ml) that is in the blood all the time, 0 to 1.
     pub contrast_fraction: f64,
     /// Thickness of soft tissue along the central ray. This body is a slab across the beam, as the 20 cm water phantom of
-    /// acceptance tests is: an even background from every angle, whose path lengths are known exactly. 0 is air. A patient
-    /// (`[view.patient]`) takes its place.
+    /// acceptance tests is: an even background from every angle, whose path lengths are known exactly. 0 is air, and 1000 the most. A
+    /// patient (`[view.patient]`) takes its place.
     pub tissue_mm: f64,
-    /// Scintillator: solid caesium iodide.
+    /// Scintillator: solid caesium iodide, 0.001 to 10.
     pub csi_mm: f64,
     /// Material of devices that do not name their own.
     pub device_material: Material,
     /// Share of the anatomy's coarse shading that the display takes out in fluoroscopy and cine, so that lungs and spine are both
-    /// seen; 0 shows the logarithm of the signal as it is.
+    /// seen; 0 shows the logarithm of the signal as it is, 1 takes out all of it.
     pub harmonised: f64,
-    /// Line integrals shown white and black in fluoroscopy and cine; absent: fitted to the anatomy, the same for all frames of
+    /// Line integrals shown white and black in fluoroscopy and cine, -100 to 100 and the black one larger by 0.0001 at least; absent: fitted to the anatomy, the same for all frames of
     /// a run.
     pub window: Option<[f64; 2]>,
 }
@@ -100,34 +100,37 @@ impl XRaySpec {
         }
         finite_within("view.xray.contrast_fraction", self.contrast_fraction, [0.0, 1.0])?;
         finite_within("view.xray.tissue_mm", self.tissue_mm, [0.0, 1000.0])?;
-        positive("view.xray.csi_mm", self.csi_mm)?;
+        finite_within("view.xray.csi_mm", self.csi_mm, [0.001, 10.0])?;
         finite_within("view.xray.harmonised", self.harmonised, [0.0, 1.0])?;
         if let Some([white, black]) = self.window
-            && !(white.is_finite() && black.is_finite() && white < black)
+            && !(white >= -100.0 && black <= 100.0 && black - white >= 1e-4)
         {
             let value = format!("[{white}, {black}]");
-            let mend = "must be two finite line integrals, the white one less than the black one";
+            let mend = "must be two line integrals from -100 to 100, the white one less than the black one by 0.0001 at least";
             return Err(Error::parameter("view.xray.window", value, mend));
         }
         Ok(())
     }
 }
 
+/// Widest blur in pixels: beyond it a frame would take minutes.
+const MOST_BLUR_PX: f64 = 50.0;
+
 /// The `[view.detector]` table.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DetectorSpec {
-    /// Air kerma at the detector behind the patient, a frame; absent: usual for the mode.
+    /// Air kerma at the detector behind the patient, a frame, 0.001 to a million; absent: usual for the mode.
     pub dose_ngy: Option<f64>,
     /// Whether quanta are counted; without, frames are smooth.
     pub noise: bool,
-    /// Seed of the noise: the same seed, the same frames.
+    /// Seed of the noise, any whole number from 0: the same seed, the same frames.
     pub seed: u64,
-    /// Spread of the scintillator's light: standard deviation of a Gaussian at the detector.
+    /// Spread of the scintillator's light: standard deviation of a Gaussian at the detector, 0 to 10 and no more than 50 pixels.
     pub blur_mm: f64,
-    /// Share of the last frame that is read again, below 1.
+    /// Share of the last frame that is read again, 0 to 0.99.
     pub lag: f64,
-    /// Share of scattered quanta in all, behind the grid, below 1.
+    /// Share of scattered quanta in all, behind the grid, 0 to 0.95.
     pub scatter_fraction: f64,
 }
 
@@ -145,10 +148,24 @@ impl DetectorSpec {
 
     pub(super) fn validate(&self) -> Result<()> {
         if let Some(dose) = self.dose_ngy {
-            positive("view.detector.dose_ngy", dose)?;
+            finite_within("view.detector.dose_ngy", dose, [0.001, 1e6])?;
         }
         finite_within("view.detector.blur_mm", self.blur_mm, [0.0, 10.0])?;
         finite_within("view.detector.lag", self.lag, [0.0, 0.99])?;
         finite_within("view.detector.scatter_fraction", self.scatter_fraction, [0.0, 0.95])
+    }
+
+    /// Checks the blur against the pixels: each takes three times as many neighbours in as it is pixels wide.
+    pub(crate) fn check_blur(&self, pixel_mm: f64) -> Result<()> {
+        if self.blur_mm <= MOST_BLUR_PX * pixel_mm {
+            return Ok(());
+        }
+        let mend = format!(
+            "is {:.0} pixels of {pixel_mm} mm, and at most {MOST_BLUR_PX} are spread over: give at most {} mm, or larger pixels \
+             (view.c_arm)",
+            self.blur_mm / pixel_mm,
+            MOST_BLUR_PX * pixel_mm
+        );
+        Err(Error::parameter("view.detector.blur_mm", self.blur_mm, mend))
     }
 }

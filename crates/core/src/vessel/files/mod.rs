@@ -134,7 +134,7 @@ fn push_fan(
     let count = mesh.vertices_mm.len();
     if let Some(bad) = polygon.iter().find(|&&v| v < 0 || v >= count as i64 || v >= i64::from(u32::MAX)) {
         return Err(format!(
-            "{} names vertex {bad} (counted from 0), but there are {count} vertices",
+            "{} names vertex {bad} (counted from 0), but there are {count} vertices: remove the face or mend the export",
             what()
         ));
     }

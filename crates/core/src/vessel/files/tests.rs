@@ -154,12 +154,43 @@ fn errors_name_the_place_and_the_way_out() {
     assert!(reason(Format::Obj, "v 0 0 0\nf 1 2 3\n").contains("line 2 names vertex 1"));
     assert!(reason(Format::Obj, "v 0 0 0\n").contains("no triangles"));
     assert!(reason(Format::Stl, "solid x\nfacet\nvertex 0 0\nendfacet\n").contains("line 3"));
-    let ply = parse(Format::Ply, b"ply\nformat ascii 9.0\nelement nonsense\n").unwrap_err();
-    assert_eq!(ply.lines().count(), 1, "{ply}");
     let unknown = SurfaceMesh::read(Path::new("wall.vtk"), 1.0).unwrap_err().to_string();
     assert!(unknown.contains(".vtk") && unknown.contains(".stl, .obj or .ply"), "{unknown}");
     for unit in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(SurfaceMesh::read(Path::new("a.stl"), unit).unwrap_err().to_string().starts_with("unit_mm"));
     }
     assert!(matches!(SurfaceMesh::read(Path::new("no such file.stl"), 1.0), Err(Error::File { .. })));
+}
+
+#[test]
+fn errors_of_ply_files_are_one_line_with_place_cause_and_mend() {
+    let head = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
+                element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    let with = |rows: &str| format!("{head}{rows}");
+    let long = format!("ply\n{}\n", "nonsense ".repeat(1000));
+    let cases = [
+        ("solid\n".to_owned(), "line 1, \"solid\": "),
+        (long, "line 2, \"nonsense nonsense"),
+        ("ply\nformat ascii 9.0\nelement nonsense\n".to_owned(), "line 3, \"element nonsense\": "),
+        ("ply\nelement vertex 1\n".to_owned(), "line 3: "),
+        (with("0 0 x\n"), "line 10, \"0 0 x\": cannot be read as the header declares it: mend it"),
+        (with("0 0\n"), "line 10, \"0 0\": has fewer values than its element has properties"),
+        (
+            with("0 0 0\n"),
+            "line 11: Unexpected end of file while reading element 'vertex' (expected 2, got 1)",
+        ),
+        (with("0 0 0\n1 0 0\n3 0 1\n"), "line 12, \"3 0 1\": expected 3 list elements, but found only 2"),
+        (with("0 0 0\n1 0 0\n3 0 1 7\n"), "face 0 names vertex 7"),
+        (
+            with("").replace("ascii", "binary_little_endian"),
+            "Unexpected end of file while reading binary element 'vertex'",
+        ),
+        (with("0 0 0\n1 0 0\n3 0 1 1\n").replace("float z", "float w"), "vertex 0 lacks x, y or z"),
+    ];
+    for (text, begins) in cases {
+        let reason = parse(Format::Ply, text.as_bytes()).unwrap_err();
+        assert!(reason.starts_with(begins), "{begins}: {reason}");
+        assert!(reason.lines().count() == 1 && reason.len() < 300, "{reason}");
+        assert!(reason.contains("mend") || reason.contains("export the surface again"), "{reason}");
+    }
 }

@@ -16,6 +16,10 @@ const SAMPLES_PER_RADIUS: f64 = 4.0;
 /// Most samples of one branch. A branch 50,000 radii long is an error of units, not a vessel.
 const MOST_SAMPLES: f64 = 200_000.0;
 
+/// Most branches of a tree, and most samples of all of them: a wall of more takes minutes and gigabytes.
+const MOST_BRANCHES: usize = 5000;
+const MOST_SAMPLES_IN_ALL: usize = 2_000_000;
+
 /// A child that turns more than this is no continuation of its parent but a branch of its own: the spline would bend
 /// tighter than the vessel is wide.
 const SHARPEST_CONTINUATION: f64 = FRAC_PI_3;
@@ -108,7 +112,8 @@ impl Branch {
 /// others start on the parent's axis with their own radius.
 pub(super) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> {
     let (nodes, children) = (tree.nodes(), tree.children());
-    let mut found = Vec::new();
+    let mut found: Vec<Branch> = Vec::new();
+    let mut samples = 0;
     // (rows, whether the first is only the point where the branch leaves its parent)
     let mut pending = vec![(vec![0], false)];
     while let Some((mut rows, leaves_parent)) = pending.pop() {
@@ -138,6 +143,15 @@ pub(super) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> {
             last = rows[rows.len() - 1];
         }
         found.push(fit(tree, &rows, leaves_parent, children[last].is_empty())?);
+        samples += found[found.len() - 1].samples.len();
+        if found.len() > MOST_BRANCHES || samples > MOST_SAMPLES_IN_ALL {
+            let mend = format!(
+                "the first {} branches need {samples} samples of their course, and at most {MOST_BRANCHES} branches and \
+                 {MOST_SAMPLES_IN_ALL} samples are taken: leave out thin branches, or check the units",
+                found.len()
+            );
+            return Err(Error::parameter("centreline rows", nodes.len(), mend));
+        }
     }
     Ok(found)
 }

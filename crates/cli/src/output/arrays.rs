@@ -1,0 +1,115 @@
+//! Shapes and contacts of a run as arrays. While it goes on they grow in a folder of their own, one file each, so that a run that is
+//! killed keeps every step; at its end they are packed into shapes.npz.
+
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use endowire_core::insertion::StepReport;
+use endowire_core::shape::Shape;
+
+use super::npz::{self, ArrayStream, Kind, Member};
+use super::whole;
+
+/// Where the arrays of a recording are at its end.
+pub(crate) const PACKED: &str = "shapes.npz";
+/// Where they grow.
+pub(crate) const GROWING: &str = "shapes.part";
+
+const fn member(name: &'static str, kind: Kind, columns: usize) -> Member {
+    Member { name, kind, columns }
+}
+
+pub(crate) const POSITIONS: Member = member("positions_mm", Kind::F64, 3);
+pub(crate) const TANGENTS: Member = member("tangents", Kind::F64, 3);
+pub(crate) const FROM_TIP: Member = member("from_tip_mm", Kind::F64, 1);
+pub(crate) const OFFSETS: Member = member("offsets", Kind::I64, 1);
+pub(crate) const CONTACT_POSITIONS: Member = member("contact_positions_mm", Kind::F64, 3);
+pub(crate) const CONTACT_FORCES: Member = member("contact_forces_n", Kind::F64, 3);
+pub(crate) const CONTACT_OFFSETS: Member = member("contact_offsets", Kind::I64, 1);
+
+/// All arrays, in the order they are packed.
+const MEMBERS: [Member; 7] =
+    [POSITIONS, TANGENTS, FROM_TIP, OFFSETS, CONTACT_POSITIONS, CONTACT_FORCES, CONTACT_OFFSETS];
+
+/// The arrays of a run that goes on.
+pub(crate) struct ShapeArrays {
+    folder: PathBuf,
+    arrays: [ArrayStream; 7],
+    nodes: i64,
+    contacts: i64,
+}
+
+impl ShapeArrays {
+    /// Arrays without a step, in the folder of a recording.
+    pub(crate) fn new(recording: &Path) -> io::Result<Self> {
+        let folder = recording.join(GROWING);
+        std::fs::create_dir_all(&folder)?;
+        let [a, b, c, d, e, f, g] = MEMBERS.map(|member| ArrayStream::new(member, &folder));
+        let mut arrays = [a?, b?, c?, d?, e?, f?, g?];
+        arrays[3].push_i64(0)?;
+        arrays[6].push_i64(0)?;
+        Ok(Self { folder, arrays, nodes: 0, contacts: 0 })
+    }
+
+    /// Adds a step, and what belongs to it by `write_more`; where one of them fails, the steps before it stay.
+    pub(crate) fn push(
+        &mut self,
+        shape: &Shape,
+        report: &StepReport,
+        write_more: impl FnOnce() -> io::Result<()>,
+    ) -> io::Result<()> {
+        let whole = self.arrays.each_ref().map(ArrayStream::len);
+        let nodes = self.nodes + shape.len() as i64;
+        let contacts = self.contacts + report.contacts.len() as i64;
+        let [positions, tangents, from_tip, offsets, points, forces, contact_offsets] = &mut self.arrays;
+        let push = || -> io::Result<()> {
+            positions.push_f64(shape.positions_mm.iter().flat_map(|x| [x.x, x.y, x.z]))?;
+            tangents.push_f64(shape.tangents.iter().flat_map(|t| [t.x, t.y, t.z]))?;
+            from_tip.push_f64(shape.from_tip_mm.iter().copied())?;
+            points.push_f64(report.contacts.iter().flat_map(|c| <[f64; 3]>::from(c.position_mm)))?;
+            forces.push_f64(report.contacts.iter().flat_map(|c| <[f64; 3]>::from(c.total_n())))?;
+            // Last, as a step counts when its offsets are there.
+            contact_offsets.push_i64(contacts)?;
+            offsets.push_i64(nodes)?;
+            write_more()
+        };
+        let pushed = push();
+        match pushed {
+            Ok(()) => (self.nodes, self.contacts) = (nodes, contacts),
+            Err(_) => self.arrays.iter_mut().zip(whole).for_each(|(array, numbers)| array.truncate(numbers)),
+        }
+        pushed
+    }
+
+    /// Waits until all steps are on the disk itself.
+    pub(crate) fn sync(&self) -> io::Result<()> {
+        self.arrays.iter().try_for_each(ArrayStream::sync)
+    }
+
+    /// Packs them into shapes.npz; where that fails, the growing ones stay.
+    pub(crate) fn pack(mut self, recording: &Path) -> io::Result<()> {
+        whole::write(&recording.join(PACKED), |part| npz::write(File::create(part)?, &mut self.arrays))?;
+        // An open file cannot be removed everywhere.
+        drop(self.arrays);
+        remove_growing(&self.folder)
+    }
+}
+
+/// Removes growing arrays and their folder, which stays if a user has put something into it.
+pub(crate) fn remove_growing(folder: &Path) -> io::Result<()> {
+    for member in MEMBERS {
+        remove(&folder.join(member.file_name()))?;
+    }
+    let _ = std::fs::remove_dir(folder);
+    Ok(())
+}
+
+/// Removes a file, if it is there.
+pub(crate) fn remove(path: &Path) -> io::Result<()> {
+    match std::fs::remove_file(path) {
+        // The second is what a path through something that is no folder gives.
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(()),
+        other => other,
+    }
+}

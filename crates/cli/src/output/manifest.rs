@@ -1,0 +1,67 @@
+//! A list of what a command has written into a folder, kept beside it, so that the next call replaces these files and no others.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Component, Path, PathBuf};
+
+use super::arrays::remove;
+
+/// The list of a call that goes on.
+pub(crate) struct Manifest {
+    file: File,
+}
+
+impl Manifest {
+    /// Begins a list for `command` in `folder`. What an earlier call has written there is removed, and counted.
+    pub(crate) fn begin(folder: &Path, command: &str) -> io::Result<(Self, usize)> {
+        let path = folder.join(format!(".endowire-{command}"));
+        let mut removed = 0;
+        for file in listed(&path, folder) {
+            if file.symlink_metadata().is_ok() {
+                remove(&file)?;
+                removed += 1;
+            }
+        }
+        Ok((Self { file: File::create(path)? }, removed))
+    }
+
+    /// Notes a file of the folder; to be called before it is written, or a call that is killed would leave it for ever.
+    pub(crate) fn add(&mut self, name: &str) -> io::Result<()> {
+        self.file.write_all(format!("{name}\n").as_bytes())
+    }
+}
+
+/// The files of a list that lie in the folder itself.
+fn listed(path: &Path, folder: &Path) -> Vec<PathBuf> {
+    let Ok(text) = std::fs::read_to_string(path) else { return vec![] };
+    let is_name = |line: &&str| {
+        let mut parts = Path::new(*line).components();
+        matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None))
+    };
+    text.lines().filter(is_name).map(|name| folder.join(name)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_listed_and_nothing_else_is_removed() {
+        let outer = tempfile::tempdir().unwrap();
+        let folder = outer.path().join("inner");
+        std::fs::create_dir(&folder).unwrap();
+        let (mut manifest, removed) = Manifest::begin(&folder, "render").unwrap();
+        assert_eq!(removed, 0);
+        for name in ["a.png", "b.png", "../outside.png", "gone.png"] {
+            manifest.add(name).unwrap();
+        }
+        for name in ["a.png", "b.png", "../outside.png", "mine.png"] {
+            std::fs::write(folder.join(name), "").unwrap();
+        }
+        // Another command has a list of its own.
+        assert_eq!(Manifest::begin(&folder, "fluoro").unwrap().1, 0);
+        assert_eq!(Manifest::begin(&folder, "render").unwrap().1, 2);
+        assert!(!folder.join("a.png").exists());
+        assert!(folder.join("mine.png").exists() && outer.path().join("outside.png").exists());
+    }
+}

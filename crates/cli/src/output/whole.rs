@@ -1,0 +1,31 @@
+//! Files that are there whole or not at all: written beside their place, then renamed into it.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// What a file is called until it is whole.
+pub(crate) fn unfinished(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".part");
+    name.into()
+}
+
+/// Writes a file with `write`, which gets the path to write to; its failure leaves nothing.
+pub(crate) fn write(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) -> io::Result<()> {
+    let part = unfinished(path);
+    let written = write(&part).and_then(|()| std::fs::rename(&part, path));
+    if written.is_err() {
+        let _ = std::fs::remove_file(&part);
+    }
+    written
+}
+
+/// Writes a text, and waits for the disk before it takes the place of what was there.
+pub(crate) fn write_text(path: &Path, text: &str) -> io::Result<()> {
+    write(path, |part| {
+        let mut file = File::create(part)?;
+        file.write_all(text.as_bytes())?;
+        file.sync_all()
+    })
+}
