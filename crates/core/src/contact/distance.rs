@@ -112,7 +112,7 @@ pub struct SmoothWall {
     starts: Vec<u32>,
     /// Vertices whose support may reach a point over the triangle.
     lists: Vec<u32>,
-    /// How far the smooth wall lies inside each triangle, mm, …
+    /// How far the smooth wall lies inside each triangle and its neighbours, mm, …
     insets_mm: Vec<f32>,
     /// … and the largest of these.
     deepest_inset_mm: f64,
@@ -151,14 +151,22 @@ impl SmoothWall {
         smooth
     }
 
-    /// How far the smooth wall lies inside each triangle, at few points.
+    /// How far the smooth wall lies inside each triangle, at few points, or inside one that shares a corner with it: a point that is
+    /// next to one triangle may feel the other.
     fn measure_insets(&mut self, mesh: &SurfaceMesh) {
         let inset = |index: usize| {
             let list = self.list(index);
             let heights = few(&mesh.corners(index)).map(|x| self.reach(&x, list).map_or(0.0, |r| r.value_mm));
             (-heights.into_iter().fold(0.0, f64::min)) as f32
         };
-        self.insets_mm = parallel::map(mesh.triangles.len(), inset);
+        let own = parallel::map(mesh.triangles.len(), inset);
+        let mut around = vec![0.0f32; mesh.vertices_mm.len()];
+        for (triangle, inset) in mesh.triangles.iter().zip(&own) {
+            triangle.iter().for_each(|v| around[*v as usize] = around[*v as usize].max(*inset));
+        }
+        let most =
+            |triangle: &[u32; 3]| triangle.iter().fold(0.0f32, |most, v| most.max(around[*v as usize]));
+        self.insets_mm = mesh.triangles.iter().map(most).collect();
         self.deepest_inset_mm = self.insets_mm.iter().copied().fold(0.0, f32::max).into();
     }
 
@@ -244,20 +252,31 @@ impl SmoothWall {
     /// The distance of `x`, whose nearest triangle is `triangle` or close to it. `None` where no vertex reaches.
     pub fn distance(&self, x: &Vec3, triangle: u32) -> Option<Distance> {
         match self.within(x, triangle, f64::INFINITY)? {
-            Nearness::Within(distance) => Some(distance),
-            Nearness::Beyond(_) => None,
+            (Nearness::Within(distance), _) => Some(distance),
+            (Nearness::Beyond(_), _) => None,
         }
     }
 
-    /// As [`SmoothWall::distance`], with derivatives only where the distance is less than `limit_mm`: they are what it costs.
-    pub fn within(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<Nearness> {
+    /// As [`SmoothWall::distance`], with derivatives only where the distance is less than `limit_mm`: they are what it costs. Beside it
+    /// how well the vertices reach: see [`SmoothWall::cover`].
+    pub fn within(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<(Nearness, f64)> {
         let list = self.list(triangle as usize);
         let reached = self.reach(x, list)?;
-        Some(if reached.value_mm < limit_mm {
+        let nearness = if reached.value_mm < limit_mm {
             Nearness::Within(self.derive(x, list, &reached, |_, _, _, _| {}))
         } else {
             Nearness::Beyond(reached.value_mm)
-        })
+        };
+        Some((nearness, reached.weight))
+    }
+
+    /// f, the sum of the weights W behind it, and ∇W.
+    pub(super) fn cover(&self, x: &Vec3, triangle: u32) -> Option<(Distance, f64, Vec3)> {
+        let list = self.list(triangle as usize);
+        let reached = self.reach(x, list)?;
+        let mut slope = Vec3::zeros();
+        let distance = self.derive(x, list, &reached, |_, _, w1, _| slope += w1);
+        Some((distance, reached.weight, slope))
     }
 
     /// As [`SmoothWall::distance`]; `also` sees every vertex that reaches `x` with its weight and the weight's derivatives.
@@ -454,7 +473,7 @@ mod tests {
         for x in points() {
             let triangle = wall.1.nearest(&x, 10.0).unwrap().triangle;
             let here = wall.0.distance(&x, triangle).unwrap();
-            let within = |limit_mm: f64| wall.0.within(&x, triangle, limit_mm).unwrap();
+            let within = |limit_mm: f64| wall.0.within(&x, triangle, limit_mm).unwrap().0;
             assert_eq!(within(here.value_mm), Nearness::Beyond(here.value_mm));
             assert_eq!(within(here.value_mm + 1e-9), Nearness::Within(here));
         }

@@ -31,6 +31,9 @@ pub struct FeltWall {
 /// tube has all of its triangles at one distance, and a question that reaches them looks at all: asking a little farther is enough.
 const LOOK_MM: f64 = 0.5;
 
+/// Sum of weights below which the flat triangles take part.
+const COVERED: f64 = 1e-3;
+
 /// The even mesh of `wall`; `None` where it is felt as it is meshed.
 fn conditioned(wall: &Wall, properties: &WallProperties) -> Result<Option<SurfaceMesh>> {
     if properties.deviation_mm == 0.0 {
@@ -61,18 +64,32 @@ impl FeltWall {
     }
 
     /// How near `x` is, whose nearest triangle is `triangle` or close to it; with derivatives below `limit_mm`.
+    ///
+    /// Where quadrics hardly reach, the flat triangles take their place bit by bit: with W the sum of the weights,
+    /// F = f + λ(W) (d − f) goes from the smooth distance f to that of the triangles, d.
     pub(crate) fn nearness(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
-        self.smooth.within(x, triangle, limit_mm).unwrap_or_else(|| {
-            // Where no quadric reaches, a surface is torn, and its triangles are what there is.
-            self.query.nearest(x, self.reach_mm).map_or(Nearness::Beyond(self.reach_mm), |flat| {
-                let (value_mm, gradient) = (flat.distance_mm, flat.normal);
-                if value_mm < limit_mm {
-                    Nearness::Within(Distance { value_mm, gradient, hessian: Matrix3::zeros() })
-                } else {
-                    Nearness::Beyond(value_mm)
-                }
-            })
-        })
+        if let Some((nearness, weight)) = self.smooth.within(x, triangle, limit_mm)
+            && weight >= COVERED
+        {
+            return nearness;
+        }
+        let Some(flat) = self.query.nearest(x, self.reach_mm) else { return Nearness::Beyond(self.reach_mm) };
+        let mut found =
+            Distance { value_mm: flat.distance_mm, gradient: flat.normal, hessian: Matrix3::zeros() };
+        if let Some((smooth, weight, slope)) = self.smooth.cover(x, triangle) {
+            let t = weight / COVERED;
+            let (share, rate) = ((1.0 - t) * (1.0 - t), -2.0 * (1.0 - t) / COVERED);
+            let apart = found.value_mm - smooth.value_mm;
+            let turn = slope * rate;
+            let away = found.gradient - smooth.gradient;
+            found = Distance {
+                value_mm: smooth.value_mm + share * apart,
+                gradient: smooth.gradient + away * share + turn * apart,
+                // Without the second derivatives of W: Newton's method is a little slower there.
+                hessian: smooth.hessian * (1.0 - share) + turn * away.transpose() + away * turn.transpose(),
+            };
+        }
+        if found.value_mm < limit_mm { Nearness::Within(found) } else { Nearness::Beyond(found.value_mm) }
     }
 
     /// Distance of `x` from the piece of wall that is next to it seen from `triangle`, mm: negative behind that piece, whatever wall is

@@ -21,6 +21,13 @@ pub(super) struct KnownPoint {
     pub(super) side: Option<u32>,
     /// Position at the state that Newton's method is leaving.
     pub(super) base: Vec3,
+    /// Where the wall was looked for when that state was assembled, and the triangle that was found: what points feel on the way from
+    /// there hangs on where they are alone, not on other steps that were tried.
+    pub(super) base_looked_at: Vec3,
+    /// See `base_looked_at`.
+    pub(super) base_triangle: Option<u32>,
+    /// See `base_looked_at`.
+    pub(super) base_looked_clearance_mm: f64,
     /// No wall is nearer to it than this, mm.
     pub(super) base_clearance_mm: f64,
     /// Whether it presses on the wall there: the reading of the point is the one taken there, …
@@ -36,6 +43,9 @@ const NOTHING: KnownPoint = KnownPoint {
     triangle: None,
     side: None,
     base: Vec3::new(f64::NAN, f64::NAN, f64::NAN),
+    base_looked_at: Vec3::new(f64::NAN, f64::NAN, f64::NAN),
+    base_triangle: None,
+    base_looked_clearance_mm: -1.0,
     base_clearance_mm: 0.0,
     presses: false,
     force_n: 0.0,

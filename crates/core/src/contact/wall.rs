@@ -127,9 +127,18 @@ impl<'a> WallContact<'a> {
                 self.counters.avoided += 1;
                 return Reading::of(reading, limit_mm);
             }
-            let triangle = self.felt.smooth.walk(side, x);
+            let triangle = match known.base_triangle {
+                Some(triangle) if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius => {
+                    known.looked_at = known.base_looked_at;
+                    triangle
+                }
+                _ => {
+                    known.looked_at = *x;
+                    self.felt.smooth.walk(side, x)
+                }
+            };
             let nearness = self.felt.nearness(x, triangle, limit_mm);
-            (known.looked_at, known.from_tip_mm) = (*x, self.points[index].from_tip_mm);
+            known.from_tip_mm = self.points[index].from_tip_mm;
             (known.clearance_mm, known.triangle) = (0.0, Some(triangle));
             self.counters.near += u64::from(self.skip);
             self.memory.readings[index] = (*x, nearness);
@@ -141,6 +150,10 @@ impl<'a> WallContact<'a> {
             if clearance > near + self.felt.smooth.deepest_inset_mm() {
                 self.counters.avoided += 1;
                 return Reading::Free(clearance);
+            }
+            if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius && known.base_triangle.is_some() {
+                (known.looked_at, known.triangle) = (known.base_looked_at, known.base_triangle);
+                known.clearance_mm = known.base_looked_clearance_mm;
             }
             if let Some(triangle) = known.triangle {
                 let (place, reading) = self.memory.readings[index];
@@ -156,7 +169,7 @@ impl<'a> WallContact<'a> {
                     self.counters.avoided += 1;
                     return Reading::of(reading, limit_mm);
                 }
-                if moved < LOOK_AGAIN * radius {
+                if (x - known.looked_at).norm() < LOOK_AGAIN * radius {
                     let nearness = self.felt.nearness(x, triangle, limit_mm);
                     if nearness.value_mm() > 0.0 {
                         self.counters.near += 1;
@@ -364,6 +377,8 @@ impl<const C: usize> External<C> for WallContact<'_> {
             known.base = x;
             known.base_clearance_mm = reading.distance_mm();
             known.presses = matches!(reading, Reading::Pressed(_));
+            (known.base_looked_at, known.base_triangle) = (known.looked_at, known.triangle);
+            known.base_looked_clearance_mm = known.clearance_mm;
             known.side = known.triangle.filter(|_| known.base_clearance_mm < SUNK * radius_mm);
             if !known.presses {
                 known.force_n = 0.0;

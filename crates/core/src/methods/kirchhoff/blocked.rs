@@ -4,10 +4,14 @@
 //! equilibrium is found on the way, the room across the lumen says whether that is why.
 
 use super::{Kirchhoff, softest};
-use crate::PhysicalEnd;
 use crate::contact::{FeltWall, Touch, WallContact};
 use crate::insertion::Surroundings;
+use crate::{PhysicalEnd, Vec3};
 
+/// How far off the wall, in radii, ways across begin: flat triangles may stand into the smooth lumen.
+const OFF: f64 = 0.3;
+/// Tangents of the angles between the normal and other ways across.
+const TILTS: [f64; 2] = [0.4, 1.0];
 /// Pieces of the near wall that the way across may meet before it has left them behind.
 const PIECES: usize = 4;
 /// From one of them the way goes on so much farther, mm.
@@ -40,20 +44,33 @@ impl<const C: usize> Kirchhoff<C> {
     }
 }
 
-/// Half of the way across the lumen from where the device touches, mm, if that is less than its radius.
+/// Half of the least way across the lumen where the device touches, mm, if that is less than its radius: along the normal, and aslant.
 fn room_mm(felt: &FeltWall, touch: &Touch, radius_mm: f64) -> Option<f64> {
     let contact = &touch.contact;
-    let foot = contact.position_mm + contact.normal * (contact.penetration_mm - radius_mm);
-    let mut across_mm = 0.0;
+    let n = contact.normal;
+    let from = contact.position_mm + n * (contact.penetration_mm - (1.0 - OFF) * radius_mm);
+    let e = n.cross(&Vec3::ith(n.iamin(), 1.0)).normalize();
+    let f = n.cross(&e);
+    let aslant = TILTS.into_iter().flat_map(|tilt| [e, f, -e, -f].map(|side| (n + side * tilt).normalize()));
+    let ways = std::iter::once(n).chain(aslant);
+    let across = ways.filter_map(|way| {
+        let ahead_mm = facing_mm(felt, &from, &way, 2.0 * radius_mm)?;
+        let (back_mm, _) = felt.query.first_met(&from, &-way, 2.0 * radius_mm - ahead_mm)?;
+        Some(0.5 * (ahead_mm + back_mm))
+    });
+    across.min_by(f64::total_cmp)
+}
+
+/// How far ahead the wall that faces `from` is, mm, within `reach_mm`.
+fn facing_mm(felt: &FeltWall, from: &Vec3, way: &Vec3, reach_mm: f64) -> Option<f64> {
+    let mut ahead_mm = 0.0;
     for _ in 0..PIECES {
-        let from = foot + contact.normal * across_mm;
-        let reach_mm = 2.0 * radius_mm - across_mm;
-        let (way_mm, triangle) = felt.query.first_met(&from, &contact.normal, reach_mm)?;
-        across_mm += way_mm;
-        if felt.query.inward_normal(triangle).dot(&contact.normal) < 0.0 {
-            return Some(0.5 * across_mm);
+        let (met_mm, triangle) = felt.query.first_met(&(from + way * ahead_mm), way, reach_mm - ahead_mm)?;
+        ahead_mm += met_mm;
+        if felt.query.inward_normal(triangle).dot(way) < 0.0 {
+            return Some(ahead_mm);
         }
-        across_mm += ON_MM;
+        ahead_mm += ON_MM;
     }
     None
 }

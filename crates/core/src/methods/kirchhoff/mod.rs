@@ -309,6 +309,13 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 )));
             }
         }
+        if !balanced
+            && command.advance_mm > 0.0
+            && let Some(end) = self.narrowest(surroundings)
+        {
+            self.go_back(moved);
+            return Err(Error::End(end));
+        }
         self.report.rotation_rad = rotation + command.rotate_rad;
         self.report.iterations = iterations as u32;
         self.report.substeps = substeps as u32;
