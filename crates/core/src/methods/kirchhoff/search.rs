@@ -36,7 +36,7 @@ const TOGETHER: usize = 40;
 /// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
 const ROUNDS: usize = 5;
 /// Most slides with the hand held still, and in the last resort. Two or three are the rule.
-const SLIDES: [usize; 2] = [40, 400];
+const SLIDES: [usize; 2] = [40, 120];
 
 /// A search for an equilibrium.
 pub(super) struct Search<'a, 'b, const C: usize> {
@@ -77,7 +77,7 @@ impl<const C: usize> Search<'_, '_, C> {
             self.guess.plain(self.state);
             self.contact.rewind_friction();
         }
-        let found = self.from_softer_walls();
+        let found = self.by_softer_walls();
         if found.converged { self.settled(found) } else { found }
     }
 
@@ -107,7 +107,7 @@ impl<const C: usize> Search<'_, '_, C> {
     }
 
     /// The wall by way of softer ones.
-    fn from_softer_walls(&mut self) -> NewtonReport {
+    fn by_softer_walls(&mut self) -> NewtonReport {
         let patient = self.budget.is_none();
         self.contact.softness = self.softest;
         loop {
