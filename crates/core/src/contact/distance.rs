@@ -258,7 +258,7 @@ impl SmoothWall {
     }
 
     /// As [`SmoothWall::distance`], with derivatives only where the distance is less than `limit_mm`: they are what it costs. Beside it
-    /// how well the vertices reach: see [`SmoothWall::cover`].
+    /// the sum of their weights: how well the vertices reach.
     pub fn within(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<(Nearness, f64)> {
         let list = self.list(triangle as usize);
         let reached = self.reach(x, list)?;

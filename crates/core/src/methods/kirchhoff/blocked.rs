@@ -4,11 +4,11 @@
 //! equilibrium is found on the way, the room across the lumen says whether that is why.
 
 use super::{Kirchhoff, softest};
-use crate::contact::{FeltWall, Touch, WallContact};
+use crate::contact::{FeltWall, WallContact};
 use crate::insertion::Surroundings;
 use crate::{PhysicalEnd, Vec3};
 
-/// How far off the wall, in radii, ways across begin: flat triangles may stand into the smooth lumen.
+/// How far off the wall, in radii, ways across begin.
 const OFF: f64 = 0.3;
 /// Tangents of the angles between the normal and other ways across.
 const TILTS: [f64; 2] = [0.4, 1.0];
@@ -33,7 +33,10 @@ impl<const C: usize> Kirchhoff<C> {
         for (index, point) in mesh.points.iter().enumerate() {
             let device_radius_mm = point.potential.radius_mm;
             let Some(touch) = contact.touch(&mesh.elements, &self.current.state, index) else { continue };
-            let Some(lumen_radius_mm) = room_mm(&self.felt, &touch, device_radius_mm) else { continue };
+            let Some(lumen_radius_mm) = room_mm(&self.felt, &touch.contact.position_mm, device_radius_mm)
+            else {
+                continue;
+            };
             let part = lumen_radius_mm / device_radius_mm;
             if least.is_none_or(|(narrowest, _)| part < narrowest) {
                 let position_mm = touch.contact.position_mm;
@@ -44,11 +47,12 @@ impl<const C: usize> Kirchhoff<C> {
     }
 }
 
-/// Half of the least way across the lumen where the device touches, mm, if that is less than its radius: along the normal, and aslant.
-fn room_mm(felt: &FeltWall, touch: &Touch, radius_mm: f64) -> Option<f64> {
-    let contact = &touch.contact;
-    let n = contact.normal;
-    let from = contact.position_mm + n * (contact.penetration_mm - (1.0 - OFF) * radius_mm);
+/// Half of the least way across the lumen at a place on the device's axis, mm, if that is less than its radius: along the normal of the
+/// nearest wall, and aslant.
+fn room_mm(felt: &FeltWall, place: &Vec3, radius_mm: f64) -> Option<f64> {
+    let near = felt.query.nearest(place, 2.0 * radius_mm)?;
+    let n = near.normal;
+    let from = near.point_mm + n * (OFF * radius_mm);
     let e = n.cross(&Vec3::ith(n.iamin(), 1.0)).normalize();
     let f = n.cross(&e);
     let aslant = TILTS.into_iter().flat_map(|tilt| [e, f, -e, -f].map(|side| (n + side * tilt).normalize()));
@@ -73,4 +77,53 @@ fn facing_mm(felt: &FeltWall, from: &Vec3, way: &Vec3, reach_mm: f64) -> Option<
         ahead_mm += ON_MM;
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::Device;
+    use crate::insertion::{Command, Sheath, WallProperties};
+    use crate::methods::Method;
+    use crate::methods::kirchhoff::KirchhoffOptions;
+    use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, WallQuery};
+
+    /// What is said of a wire of radius 0.4 mm that is pushed into a tube which narrows from 3 mm to `end_mm`.
+    fn pushed_into(end_mm: f64) -> Option<PhysicalEnd> {
+        let nodes = (0..40).map(|i| CentrelineNode {
+            position_mm: Vec3::z() * f64::from(i),
+            radius_mm: (3.0 - 0.1 * f64::from(i)).max(end_mm),
+            parent: usize::try_from(i - 1).ok(),
+        });
+        let tree = CentrelineTree::new(nodes.collect()).unwrap();
+        let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.3)).unwrap();
+        let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
+        let (device, properties) = (Device::uniform(60.0, 0.4, 10.0).unwrap(), WallProperties::default());
+        let query = WallQuery::new(&made.wall).unwrap();
+        let surroundings = Surroundings {
+            wall: &made.wall,
+            properties: &properties,
+            query: &query,
+            sheath: &sheath,
+            device: &device,
+        };
+        let mut wire =
+            Kirchhoff::<{ crate::rod::PLAIN }>::new(KirchhoffOptions::default(), &surroundings).unwrap();
+        for _ in 0..34 {
+            wire.step(&surroundings, Command::advance(1.0)).unwrap();
+        }
+        wire.narrowest(&surroundings)
+    }
+
+    #[test]
+    fn the_room_across_is_that_of_the_narrow_tube_and_a_wide_one_has_enough() {
+        match pushed_into(0.3) {
+            Some(PhysicalEnd::Blocked { position_mm, lumen_radius_mm, device_radius_mm }) => {
+                assert!((lumen_radius_mm - 0.3).abs() < 0.05, "{lumen_radius_mm}");
+                assert!(position_mm.z > 25.0 && device_radius_mm == 0.4, "{position_mm}");
+            }
+            other => panic!("{other:?}"),
+        }
+        assert_eq!(pushed_into(0.6), None);
+    }
 }

@@ -235,13 +235,6 @@ impl<const C: usize> Method for Kirchhoff<C> {
             // Where the way is lost, the device is let come to rest as far as the command goes; if it does not, in parts; and in the end
             // wherever it is.
             let relax = budget == 0 || share < LEAST_SHARE;
-            if relax && failures == 0 && command.advance_mm > 0.0 {
-                // Unless the vessel is too narrow to go on.
-                if let Some(end) = self.narrowest(surroundings) {
-                    self.go_back(moved);
-                    return Err(Error::End(end));
-                }
-            }
             if relax && (failures == 0 || failures == RESORTS) {
                 share = rest;
             }
@@ -309,6 +302,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 )));
             }
         }
+        // No equilibrium: unless the vessel is too narrow to go on, that is told.
         if !balanced
             && command.advance_mm > 0.0
             && let Some(end) = self.narrowest(surroundings)

@@ -31,6 +31,8 @@ const HURRIED: usize = 15;
 const STUCK: usize = 60;
 /// Newton iterations of the last resort: on a softer wall, on the wall itself, and of a slide.
 const PATIENT: [usize; 3] = [60, 300, 300];
+/// Newton iterations of all of it.
+const LONGEST: usize = 2000;
 /// Newton iterations for friction and wall together.
 const TOGETHER: usize = 40;
 /// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
@@ -56,7 +58,7 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) tolerance: f64,
     /// Most Newton iterations of one solution.
     pub(super) max_iterations: usize,
-    /// Newton iterations that are left of the command's; none for the last resort, which takes what it needs.
+    /// Newton iterations that are left of the command's; none for the last resort, which has its own.
     pub(super) budget: Option<&'a mut usize>,
     /// Newton iterations that were taken.
     pub(super) iterations: usize,
@@ -83,7 +85,10 @@ impl<const C: usize> Search<'_, '_, C> {
 
     /// Newton's method from the state on.
     fn newton(&mut self, most: usize, tolerance: f64) -> NewtonReport {
-        let left = self.budget.as_ref().map_or(usize::MAX, |budget| (**budget).min(self.max_iterations));
+        let left = match &self.budget {
+            Some(budget) => (**budget).min(self.max_iterations),
+            None => LONGEST.saturating_sub(self.iterations),
+        };
         let options = NewtonOptions { max_iterations: most.min(left), tolerance, ..NewtonOptions::default() };
         let found = self.newton.solve(self.elements, self.supports, self.contact, self.state, &options);
         self.take(found.iterations);

@@ -35,9 +35,9 @@ use reference::Reference;
 use remesh::Remesher;
 use sizes::Wanted;
 
-/// Roughness above which an even mesh is faired all the same: even meshes of branching vessels have up to 0.023, and noise of a
-/// twenty-fifth of the edges 0.028.
-const ROUGH: f64 = 0.025;
+/// Roughness above which an even mesh is faired all the same. Coarse meshes of smooth vessels have up to 0.03, and noise of a tenth of the
+/// edges 0.06.
+const ROUGH: f64 = 0.045;
 /// Rounds of sizes, triangles and fairing; in each, edges are fitted to what the last one left.
 const ROUNDS: usize = 2;
 /// Rounds of remeshing in the first of these and in later ones.
