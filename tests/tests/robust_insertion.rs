@@ -66,7 +66,9 @@ const NAVIGATION: [(&str, [f64; 3], f64); 7] = [
     ("arch_innominate", [-44.5, -42.5, 267.5], 5.0),
     // Into the left or the right hepatic artery, from the artery of both.
     ("hepatic", [-54.5, -37.5, 87.0], 8.0),
-    ("loop", [-8.1, -0.3, 25.7], 2.0),
+    // A loop that has slipped out of the narrow end lies anywhere along the tube, at nearly the same energy: only that it comes there
+    // cleanly is asked.
+    ("loop", [0.0, 0.0, 60.0], 65.0),
     ("arch_plaque", [-11.0, -26.5, 280.7], 5.0),
 ];
 
