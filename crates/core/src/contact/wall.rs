@@ -205,7 +205,7 @@ impl<'a> WallContact<'a> {
 
     /// Friction of point `index` at its base.
     fn add_friction<const C: usize>(
-        &self,
+        &mut self,
         elements: &[ElementData],
         state: &RodState,
         assembly: &mut Assembly<C>,
@@ -216,6 +216,7 @@ impl<'a> WallContact<'a> {
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
         let Some(f) = self.friction.derivatives(index, x, angle, radius_mm) else { return };
         assembly.external_energy += self.friction.value(index, x, angle, radius_mm);
+        self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * f.hessian.norm() * x.amax());
         let e = point.element;
         sum.add(point.xi, &f.gradient, assembly.hessian.then_some(&f.hessian));
         assembly.add_turn(state, &elements[e], e, point.xi, &f.mixed, (f.turn, f.turn2));

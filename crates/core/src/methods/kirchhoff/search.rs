@@ -38,7 +38,7 @@ const TOGETHER: usize = 40;
 /// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
 const ROUNDS: usize = 5;
 /// Most slides with the hand held still, and in the last resort. Two or three are the rule.
-const SLIDES: [usize; 2] = [40, 120];
+const SLIDES: [usize; 2] = [40, 400];
 
 /// A search for an equilibrium.
 pub(super) struct Search<'a, 'b, const C: usize> {
