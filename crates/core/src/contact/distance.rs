@@ -270,15 +270,6 @@ impl SmoothWall {
         Some((nearness, reached.weight))
     }
 
-    /// f, the sum of the weights W behind it, and ∇W.
-    pub(super) fn cover(&self, x: &Vec3, triangle: u32) -> Option<(Distance, f64, Vec3)> {
-        let list = self.list(triangle as usize);
-        let reached = self.reach(x, list)?;
-        let mut slope = Vec3::zeros();
-        let distance = self.derive(x, list, &reached, |_, _, w1, _| slope += w1);
-        Some((distance, reached.weight, slope))
-    }
-
     /// As [`SmoothWall::distance`]; `also` sees every vertex that reaches `x` with its weight and the weight's derivatives.
     pub(super) fn weigh(
         &self,

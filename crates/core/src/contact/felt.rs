@@ -76,7 +76,12 @@ impl FeltWall {
         let Some(flat) = self.query.nearest(x, self.reach_mm) else { return Nearness::Beyond(self.reach_mm) };
         let mut found =
             Distance { value_mm: flat.distance_mm, gradient: flat.normal, hessian: Matrix3::zeros() };
-        if let Some((smooth, weight, slope)) = self.smooth.cover(x, triangle) {
+        let (mut weight, mut slope) = (0.0, Vec3::zeros());
+        let weighed = self.smooth.weigh(x, triangle, |_, w, w1, _| {
+            weight += w;
+            slope += w1;
+        });
+        if let Some(smooth) = weighed {
             let t = weight / COVERED;
             let (share, rate) = ((1.0 - t) * (1.0 - t), -2.0 * (1.0 - t) / COVERED);
             let apart = found.value_mm - smooth.value_mm;

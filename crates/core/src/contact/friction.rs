@@ -37,10 +37,10 @@ use crate::rod::{ElementData, RodState};
 
 /// Slip below which a point sticks, as a part of the motion of the hand: what the regularisation gives away.
 const STICK: f64 = 1e-3;
+/// In every slide while the hand holds still it shrinks to this part.
+const STICK_AT_REST: f64 = 0.1;
 /// Least slip length, mm: below it steps are lost in the rounding of positions.
 const LEAST_STICK_MM: f64 = 1e-8;
-/// … and where the hand holds still, as a part of that.
-const STICK_AT_REST: f64 = 0.1;
 /// Points nearer to the tip than this many radii (beside the advance) bring their normal force along; the others find the
 /// one that was felt where they come to lie, since the wall does not move.
 const TIP_RADII: f64 = 10.0;
