@@ -1,9 +1,11 @@
 //! The centre line of an inserted device, as methods produce it and recorders and viewers read it.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Vec3;
 
 /// The inserted part of a device, from the sheath to the tip.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Shape {
     /// Node positions, sheath first, in millimetres.
     pub positions_mm: Vec<Vec3>,
