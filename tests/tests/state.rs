@@ -355,13 +355,22 @@ fn large() -> Simulation {
 fn a_clone_of_two_hundred_nodes_is_small() {
     let simulation = large();
     assert_eq!(simulation.shape().len(), 201);
-    let counted = allocation_counter::measure(|| drop(std::hint::black_box(simulation.clone())));
+    let mut kept = Vec::with_capacity(2);
+    let alike = allocation_counter::measure(|| kept.push(simulation.clone())).bytes_current;
+    // With a state of its own.
+    let moved = allocation_counter::measure(|| {
+        let mut clone = simulation.clone();
+        clone.step(Command::advance(1.0)).unwrap();
+        clone.drop_workspace();
+        kept.push(clone);
+    });
     println!(
-        "a clone of 200 nodes takes {} bytes, its state {}",
-        counted.bytes_max,
-        bytes(&simulation).len()
+        "200 nodes: {} bytes saved; a clone takes {alike} bytes, and {} after a step",
+        bytes(&simulation).len(),
+        moved.bytes_current
     );
-    assert!(counted.bytes_max < 500_000, "{}", counted.bytes_max);
+    assert!(alike < 50_000 && moved.bytes_current < 500_000, "{alike} {}", moved.bytes_current);
+    assert!(moved.bytes_current > 50_000 && kept[1].shape() != kept[0].shape());
 }
 
 #[test]

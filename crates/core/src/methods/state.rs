@@ -1,5 +1,7 @@
 //! All that the next step of an insertion depends on, whatever its method.
 
+use std::sync::Arc;
+
 use nalgebra::Rotation3;
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +14,7 @@ use crate::{Error, Result, Vec3};
 /// The state of an insertion: with vessel, device, sheath and options all that its next step depends on.
 ///
 /// Two simulations of one scene in one state answer the same commands with the same bits. It can be cloned, sent, and written by any
-/// format of `serde` that keeps every bit of a number.
+/// format of `serde` that keeps every bit of a number. Clones share their numbers, which nothing changes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct State {
     /// Name of the method.
@@ -25,11 +27,31 @@ pub struct State {
 #[non_exhaustive]
 pub enum Content {
     /// The exact rod.
-    Kirchhoff(Box<KirchhoffState>),
+    Kirchhoff(#[serde(with = "shared")] Arc<KirchhoffState>),
     /// The method of Li et al. 2011.
     Li2011(Box<Li2011State>),
     /// A method that keeps nodes and triads alone.
     Nodes(Box<NodesState>),
+}
+
+/// What is shared is written and read as it is.
+mod shared {
+    use std::sync::Arc;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<T: Serialize, S: Serializer>(
+        value: &Arc<T>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        (**value).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Arc<T>, D::Error> {
+        T::deserialize(deserializer).map(Arc::new)
+    }
 }
 
 /// Nodes and triads of a chain.

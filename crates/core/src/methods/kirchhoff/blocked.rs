@@ -119,7 +119,7 @@ mod tests {
             wire.step(&surroundings, Command::advance(1.0)).unwrap();
         }
         let environment = Environment { surroundings, felt: &wire.felt, options: &wire.options };
-        let mut workspace = Workspace::<{ crate::rod::PLAIN }>::new(&environment, &mut wire.state);
+        let mut workspace = Workspace::<{ crate::rod::PLAIN }>::new(&environment, &wire.state);
         workspace.carry_out(&environment, &wire.state, Command::advance(1.0)).unwrap();
         workspace.tools.narrowest(&environment, &workspace.now)
     }

@@ -44,7 +44,9 @@ impl<const C: usize> Workspace<C> {
         from: &KirchhoffState,
         command: Command,
     ) -> Result<()> {
-        let Self { tools, mesh, now, next } = self;
+        let Self { tools, mesh, now, next, most: (elements, points) } = self;
+        now.own(*elements, *points);
+        next.own(*elements, *points);
         let surroundings = &environment.surroundings;
         if command.advance_mm > 0.0
             && let Some((opening, beyond)) = left_through(surroundings.wall, &from.tip_mm())
@@ -143,7 +145,7 @@ impl<const C: usize> Workspace<C> {
         {
             return Err(Error::End(end));
         }
-        let report = &mut now.state.report;
+        let report = &mut now.parts().1.report;
         report.rotation_rad = rotation + command.rotate_rad;
         report.iterations = iterations as u32;
         (report.substeps, report.dissipated_mj) = (substeps as u32, dissipated_mj);
@@ -153,7 +155,8 @@ impl<const C: usize> Workspace<C> {
         report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
         report.nodes_frozen = from.report.nodes_frozen + tools.nodes_frozen;
         tools.write_report(environment, now);
-        now.state.report.jumped = jumped(&from.report, &now.state.report, target - start, command.rotate_rad);
+        let report = &mut now.parts().1.report;
+        report.jumped = jumped(&from.report, report, target - start, command.rotate_rad);
         Ok(())
     }
 }

@@ -1,5 +1,7 @@
 //! A device where it is: its state, and the mesh that belongs to it.
 
+use std::sync::Arc;
+
 use super::mesh::Mesh;
 use super::state::KirchhoffState;
 use crate::device::Device;
@@ -9,7 +11,8 @@ use crate::insertion::Sheath;
 #[derive(Debug, Clone)]
 pub(super) struct Configuration {
     pub(super) mesh: Mesh,
-    pub(super) state: KirchhoffState,
+    /// Written to before anyone else has it; from then on it is shared and never changed.
+    pub(super) state: Arc<KirchhoffState>,
 }
 
 /// What a sub-step starts from.
@@ -24,7 +27,7 @@ impl Configuration {
     pub(super) fn at(sheath: &Sheath) -> Self {
         let mut mesh = Mesh::default();
         mesh.clear();
-        Self { mesh, state: KirchhoffState::at(sheath) }
+        Self { mesh, state: Arc::new(KirchhoffState::at(sheath)) }
     }
 
     /// Where the next sub-step starts.
@@ -32,16 +35,22 @@ impl Configuration {
         Start { mesh: &self.mesh, state: &self.state }
     }
 
-    /// Takes memory for up to `elements` elements and `points` contact points.
-    pub(super) fn reserve(&mut self, elements: usize, points: usize) {
+    /// Makes sure that the state is shared with nobody, and takes memory for up to `elements` elements and `points` contact points.
+    pub(super) fn own(&mut self, elements: usize, points: usize) {
         self.mesh.reserve(elements, points);
-        self.state.reserve(elements, points);
+        Arc::make_mut(&mut self.state).reserve(elements, points);
+    }
+
+    /// The mesh, and the state to write to.
+    pub(super) fn parts(&mut self) -> (&mut Mesh, &mut KirchhoffState) {
+        (&mut self.mesh, Arc::make_mut(&mut self.state))
     }
 
     /// Pulls the device back to the sheath's mouth; the tail has the angle `tail_rad`.
     pub(super) fn withdraw(&mut self, tail_rad: f64) {
-        self.mesh.clear();
-        self.state.withdraw(tail_rad);
+        let (mesh, state) = self.parts();
+        mesh.clear();
+        state.withdraw(tail_rad);
     }
 }
 

@@ -74,7 +74,7 @@ const ELEMENT_LIMIT: f64 = 100_000.0;
 pub struct Kirchhoff<const C: usize> {
     options: KirchhoffOptions,
     felt: Arc<FeltWall>,
-    state: KirchhoffState,
+    state: Arc<KirchhoffState>,
     /// That of the state, for those who ask.
     shape: Shape,
     counters: Counters,
@@ -116,7 +116,7 @@ impl<const C: usize> Kirchhoff<C> {
         let mut method = Self {
             options,
             felt: Arc::new(felt),
-            state,
+            state: Arc::new(state),
             shape: Shape::default(),
             counters: Counters::default(),
             workspace: None,
@@ -137,12 +137,12 @@ impl<const C: usize> Kirchhoff<C> {
 }
 
 impl<const C: usize> Clone for Kirchhoff<C> {
-    /// Shares the wall, and makes a workspace of its own with its first command.
+    /// Shares the wall and the state, and makes a workspace of its own with its first command.
     fn clone(&self) -> Self {
         Self {
             options: self.options,
             felt: Arc::clone(&self.felt),
-            state: self.state.clone(),
+            state: Arc::clone(&self.state),
             shape: self.shape.clone(),
             counters: self.counters,
             workspace: None,
@@ -153,13 +153,13 @@ impl<const C: usize> Clone for Kirchhoff<C> {
 impl<const C: usize> Method for Kirchhoff<C> {
     fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()> {
         if command == Command::default() {
-            self.state.report.rest();
+            Arc::make_mut(&mut self.state).report.rest();
             return Ok(());
         }
         let environment =
             Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
         let mut workspace =
-            self.workspace.take().unwrap_or_else(|| Workspace::new(&environment, &mut self.state));
+            self.workspace.take().unwrap_or_else(|| Workspace::new(&environment, &self.state));
         let done = workspace.carry_out(&environment, &self.state, command);
         self.counters.add(&std::mem::take(&mut workspace.tools.counters));
         if done.is_ok() {
@@ -184,7 +184,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn state(&self) -> State {
-        State::new(NAME, Content::Kirchhoff(Box::new(self.state.clone())))
+        State::new(NAME, Content::Kirchhoff(Arc::clone(&self.state)))
     }
 
     fn restore(&mut self, surroundings: &Surroundings<'_>, state: &State) -> Result<()> {
@@ -203,10 +203,10 @@ impl<const C: usize> Method for Kirchhoff<C> {
             angles: Layout::<C>::TWIST,
             rubs: surroundings.properties.rubs(),
         })?;
-        self.state.clone_from(state);
+        self.state = Arc::clone(state);
         self.write_shape(&mesh.from_tip_mm);
         if let Some(workspace) = &mut self.workspace {
-            workspace.begin_at(&mut self.state, mesh);
+            workspace.mesh = mesh;
         }
         Ok(())
     }

@@ -12,7 +12,7 @@ impl<const C: usize> Tools<C> {
     /// Read-outs at a configuration, that of the last sub-step.
     pub(super) fn write_report(&mut self, environment: &Environment<'_>, at: &mut Configuration) {
         let surroundings = &environment.surroundings;
-        let Configuration { mesh, state } = at;
+        let (mesh, state) = at.parts();
         let (rod, report) = (&state.rod, &mut state.report);
         report.contacts.clear();
         report.max_penetration_mm = 0.0;

@@ -63,7 +63,7 @@ impl<const C: usize> Tools<C> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
         let Attempt { inserted_mm, tail_rad, blocked, resort } = attempt;
         let relax = resort.is_some();
-        let Configuration { mesh, state: after } = next;
+        let (mesh, after) = next.parts();
         meshed(environment, inserted_mm, mesh);
         let rod = &mut after.rod;
         slide(start.mesh, &start.state.rod, &self.extension, mesh, rod);

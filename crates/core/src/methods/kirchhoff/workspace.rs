@@ -19,6 +19,8 @@ pub(super) struct Workspace<const C: usize> {
     pub(super) now: Configuration,
     /// The sub-step under way.
     pub(super) next: Configuration,
+    /// Most elements and contact points.
+    pub(super) most: (usize, usize),
 }
 
 /// What a sub-step works with.
@@ -39,7 +41,7 @@ pub(super) struct Tools<const C: usize> {
 
 impl<const C: usize> Workspace<C> {
     /// Memory for the whole device, so that steps take none.
-    pub(super) fn new(environment: &Environment<'_>, state: &mut KirchhoffState) -> Box<Self> {
+    pub(super) fn new(environment: &Environment<'_>, state: &KirchhoffState) -> Box<Self> {
         let surroundings = environment.surroundings;
         let (elements, points) = largest(surroundings.device, environment.options.element_mm);
         let nothing = Configuration::at(surroundings.sheath);
@@ -59,20 +61,8 @@ impl<const C: usize> Workspace<C> {
         tools.settle.reserve(elements);
         tools.friction.reserve(points);
         tools.memory.reserve(points);
-        let mut workspace = Self { tools, mesh: Mesh::default(), now: nothing.clone(), next: nothing };
-        workspace.mesh.reserve(elements, points);
-        workspace.now.reserve(elements, points);
-        workspace.next.reserve(elements, points);
-        state.reserve(elements, points);
-        meshed(environment, state.report().inserted_mm, &mut workspace.mesh);
-        Box::new(workspace)
-    }
-
-    /// Commands start from another state, which belongs to `mesh`.
-    pub(super) fn begin_at(&mut self, state: &mut KirchhoffState, mesh: Mesh) {
-        let (elements, points) = (self.now.mesh.elements.capacity(), self.now.mesh.points.capacity());
-        self.mesh = mesh;
-        self.mesh.reserve(elements, points);
-        state.reserve(elements, points);
+        let mut mesh = Mesh::default();
+        meshed(environment, state.report().inserted_mm, &mut mesh);
+        Box::new(Self { tools, mesh, now: nothing.clone(), next: nothing, most: (elements, points) })
     }
 }
