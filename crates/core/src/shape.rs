@@ -28,6 +28,13 @@ impl Shape {
         self.positions_mm.is_empty()
     }
 
+    /// Takes memory for up to `nodes` nodes.
+    pub(crate) fn reserve(&mut self, nodes: usize) {
+        self.positions_mm.reserve(nodes.saturating_sub(self.positions_mm.len()));
+        self.tangents.reserve(nodes.saturating_sub(self.tangents.len()));
+        self.from_tip_mm.reserve(nodes.saturating_sub(self.from_tip_mm.len()));
+    }
+
     /// Position of the tip, if anything is inserted.
     pub fn tip_mm(&self) -> Option<Vec3> {
         self.positions_mm.last().copied()

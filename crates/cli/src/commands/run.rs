@@ -46,7 +46,11 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         draw_again(&mut frames, earlier.as_ref(), &simulation, commands.len(), &mut recorder)?;
         recorder
     } else {
-        Recorder::new(&folder, args.force)?
+        let recorder = Recorder::new(&folder, args.force)?;
+        if let Some(path) = &args.save_state {
+            forget_state(path)?;
+        }
+        recorder
     };
 
     // From here on something is recorded: whatever happens, it is kept.
@@ -158,6 +162,14 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
             Err(Failure::Computation(format!("{}: step {step}: {reason} ({kept})", args.scene.display())))
         }
         None => finished,
+    }
+}
+
+/// Removes the state of an earlier run: until this one has saved its own, there is none to go on from.
+fn forget_state(path: &Path) -> Result<(), Failure> {
+    match std::fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Failure::write(path, &e)),
+        _ => Ok(()),
     }
 }
 

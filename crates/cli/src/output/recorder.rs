@@ -305,7 +305,7 @@ struct Kept {
 }
 
 impl Kept {
-    /// Up to and with step `steps`; `None` where that was not recorded, and no step after it either.
+    /// Up to and with step `steps`; `None` where that was not recorded.
     fn of(table: &[u8], steps: usize) -> Option<Self> {
         let mut bytes = 0;
         let mut rows = 0;
@@ -329,11 +329,36 @@ impl Kept {
             }
             bytes += line.len() as u64;
         }
-        (rows == 0).then_some(Self { rows, bytes })
+        (steps == 0).then_some(Self { rows, bytes })
     }
 }
 
 fn write_summary(folder: &Path, summary: &Summary) -> Result<(), Failure> {
     let path = folder.join(SUMMARY);
     whole::write_text(&path, &(to_json(summary)? + "\n")).map_err(|e| Failure::write(&path, &e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_is_kept_up_to_the_step_of_the_state() {
+        let whole = "step,advance_mm\n1,2.0\n2,2.0\n3,2.0\n";
+        let kept = |table: &str, steps: usize| Kept::of(table.as_bytes(), steps).map(|k| (k.rows, k.bytes));
+        assert_eq!(kept(whole, 0), Some((0, 16)));
+        assert_eq!(kept(whole, 2), Some((2, 28)));
+        assert_eq!(kept(whole, 3), Some((3, 34)));
+        assert_eq!(kept(whole, 4), None);
+        // Killed within a row, within the head, before it.
+        assert_eq!(kept(&whole[..32], 2), Some((2, 28)));
+        assert_eq!(kept(&whole[..32], 3), None);
+        assert_eq!(kept(&whole[..9], 0), Some((0, 0)));
+        assert_eq!(kept("", 0), Some((0, 0)));
+        assert_eq!(kept("", 1), None);
+        // A recording that began after step 7.
+        let later = "step,advance_mm\n8,2.0\n9,2.0\n";
+        assert_eq!((kept(later, 7), kept(later, 8)), (Some((0, 16)), Some((1, 22))));
+        assert_eq!((kept(later, 6), kept(later, 0), kept("step\nx\n", 1)), (None, None, None));
+    }
 }

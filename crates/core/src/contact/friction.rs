@@ -163,6 +163,7 @@ impl Friction {
         self.sliders.clear();
         self.settled = false;
         self.renewals = 0;
+        self.hands_over = false;
         self.coupled = false;
         self.taken_mj = 0.0;
         if !self.acts() {

@@ -158,8 +158,14 @@ impl<const C: usize> Method for Kirchhoff<C> {
         }
         let environment =
             Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
-        let mut workspace =
-            self.workspace.take().unwrap_or_else(|| Workspace::new(&environment, &self.state));
+        let mut workspace = match self.workspace.take() {
+            Some(workspace) => workspace,
+            None => {
+                let workspace = Workspace::new(&environment, &self.state);
+                self.shape.reserve(workspace.most.0 + 1);
+                workspace
+            }
+        };
         let done = workspace.carry_out(&environment, &self.state, command);
         self.counters.add(&std::mem::take(&mut workspace.tools.counters));
         if done.is_ok() {
