@@ -33,8 +33,18 @@ fn wire(curvature_per_mm: f64) -> Device {
 }
 
 fn start(vessel: &str, properties: WallProperties, device: Device, method: &MethodChoice) -> Simulation {
+    start_at(2.0, vessel, properties, device, method)
+}
+
+fn start_at(
+    depth_mm: f64,
+    vessel: &str,
+    properties: WallProperties,
+    device: Device,
+    method: &MethodChoice,
+) -> Simulation {
     let made = GeneratedWall::new(&anatomy::tree(vessel).unwrap(), Resolution::Triangles(5_000)).unwrap();
-    let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0).unwrap();
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, depth_mm).unwrap();
     Simulation::with_properties(made.wall, properties, device, sheath, method).unwrap()
 }
 
@@ -96,7 +106,7 @@ fn every_step_can_be_taken_again(mut simulation: Simulation, from_mm: f64, seed:
 
 #[test]
 fn steps_with_friction_and_a_shaped_tip_can_be_taken_again() {
-    every_step_can_be_taken_again(start("aortic_arch", rubbing(), wire(0.03), &kirchhoff()), 120.0, 1);
+    every_step_can_be_taken_again(start("curved_tube", rubbing(), wire(0.03), &kirchhoff()), 120.0, 1);
 }
 
 #[test]
@@ -233,11 +243,11 @@ fn failures_change_nothing(mut simulation: Simulation, seed: u64, count: usize) 
 
 #[test]
 fn a_command_that_fails_leaves_the_state_to_the_byte() {
-    let blocked = failures_change_nothing(tube(true, 500), 5, 150);
-    let left = failures_change_nothing(tube(false, 500), 6, 600);
-    let hurried = failures_change_nothing(tube(false, 1), 7, 150);
+    let blocked = failures_change_nothing(tube(true, 500), 5, 120);
+    let left = failures_change_nothing(tube(false, 500), 6, 300);
+    let hurried = failures_change_nothing(tube(false, 1), 7, 80);
     println!("{blocked:?} {left:?} {hurried:?}");
-    assert!(blocked[0] > 5 && left[0] > 50 && left[1] > 50, "{blocked:?} {left:?} {hurried:?}");
+    assert!(blocked[0] > 4 && left[0] > 50 && left[1] > 50, "{blocked:?} {left:?} {hurried:?}");
 }
 
 #[test]
@@ -259,7 +269,7 @@ fn what_follows_a_failure_is_what_follows_without_it() {
     with.step(Command::advance(-3.0)).unwrap();
     let mut without = with.clone();
     let mut failures = 0;
-    for (k, command) in commands(9, 40).into_iter().enumerate() {
+    for (k, command) in commands(9, 15).into_iter().enumerate() {
         match with.step(Command::advance(7.0)) {
             Ok(_) => with.restore(&without.state()).unwrap(),
             Err(_) => failures += 1,
@@ -268,7 +278,7 @@ fn what_follows_a_failure_is_what_follows_without_it() {
         assert_eq!(with.step(command).is_ok(), without.step(command).is_ok(), "{k}");
         assert!(with.shape() == without.shape() && bytes(&with) == bytes(&without), "{k}");
     }
-    assert!(failures > 10, "{failures}");
+    assert!(failures > 4, "{failures}");
 }
 
 #[test]
@@ -285,7 +295,7 @@ fn a_state_of_another_scene_is_refused_and_changes_nothing() {
         ("state.elements", start("curved_tube", smooth(), wire(0.0), &finer)),
         ("state.angles", start("curved_tube", rubbing(), wire(0.0), &kirchhoff())),
         ("state.inserted_mm", start("curved_tube", smooth(), short, &kirchhoff())),
-        ("state.sheath", start("aortic_arch", smooth(), wire(0.0), &kirchhoff())),
+        ("state.sheath", start_at(3.0, "curved_tube", smooth(), wire(0.0), &kirchhoff())),
     ] {
         let before = bytes(&here);
         match here.restore(&saved) {
@@ -322,7 +332,7 @@ fn a_state_with_numbers_out_of_place_is_refused() {
 
 #[test]
 fn threads_on_one_vessel_have_the_bits_of_runs_one_after_another() {
-    let first = start("aortic_arch", rubbing(), wire(0.03), &kirchhoff());
+    let first = start("curved_tube", rubbing(), wire(0.03), &kirchhoff());
     let run = |mut simulation: Simulation, seed: u64| {
         (0..50).for_each(|_| simulation.step(Command::advance(2.0)).map(|_| ()).unwrap());
         commands(seed, 40).into_iter().for_each(|command| drop(simulation.step(command).map(|_| ())));
