@@ -55,13 +55,11 @@ impl Tally {
     /// Carries out one command and checks it. Returns whether it was carried out.
     pub fn step(&mut self, simulation: &mut Simulation, crossing: &CrossingTest, command: Command) -> bool {
         let number = self.steps + self.failures.len();
-        let (shape, mut report) = (simulation.shape().clone(), simulation.report().clone());
+        let (shape, report) = (simulation.shape().clone(), simulation.report().clone());
         let clock = Instant::now();
         let done = simulation.step(command).map(|_| ());
         self.seconds.push(clock.elapsed().as_secs_f64());
         if let Err(error) = done {
-            // Work that was done in vain was done.
-            report.counters = simulation.report().counters;
             if simulation.shape() != &shape || simulation.report() != &report {
                 self.disturbed.push(number);
             }

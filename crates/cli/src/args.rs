@@ -52,6 +52,15 @@ pub(crate) struct RunArgs {
     /// same name are replaced
     #[arg(long)]
     pub(crate) force: bool,
+    /// Save the state of the run into a file, again and again while it goes on and at its end. The file is whole at any moment, also after
+    /// the run was killed
+    #[arg(long, value_name = "FILE")]
+    pub(crate) save_state: Option<PathBuf>,
+    /// Go on from a saved state of the same scene. The recording in DIR goes on after the step the state was saved at: what was recorded
+    /// later is dropped, and what follows has the bits of a run that was never interrupted. A new or empty DIR gets the steps from
+    /// there on. With --save-state of the same file a run can be killed and resumed any number of times
+    #[arg(long, value_name = "FILE")]
+    pub(crate) resume: Option<PathBuf>,
     /// Print the summary as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

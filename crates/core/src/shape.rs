@@ -1,9 +1,11 @@
 //! The centre line of an inserted device, as methods produce it and recorders and viewers read it.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Vec3;
 
 /// The inserted part of a device, from the sheath to the tip.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Shape {
     /// Node positions, sheath first, in millimetres.
     pub positions_mm: Vec<Vec3>,
@@ -24,6 +26,13 @@ impl Shape {
     /// Whether there are no nodes.
     pub fn is_empty(&self) -> bool {
         self.positions_mm.is_empty()
+    }
+
+    /// Takes memory for up to `nodes` nodes.
+    pub(crate) fn reserve(&mut self, nodes: usize) {
+        self.positions_mm.reserve(nodes.saturating_sub(self.positions_mm.len()));
+        self.tangents.reserve(nodes.saturating_sub(self.tangents.len()));
+        self.from_tip_mm.reserve(nodes.saturating_sub(self.from_tip_mm.len()));
     }
 
     /// Position of the tip, if anything is inserted.

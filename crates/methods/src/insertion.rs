@@ -1,17 +1,19 @@
 //! Any of the methods as an insertion: core's trait `Method`.
 
+use std::sync::Arc;
+
 use endowire_core::contact::FeltWall;
 use endowire_core::contact::extension::left_through;
 use endowire_core::error::in_range;
 use endowire_core::insertion::{Command, Energy, StepReport, Surroundings, nodes_from_tip};
-use endowire_core::methods::Method;
+use endowire_core::methods::{Content, Method, NodesState, State, check_inserted};
 use endowire_core::shape::Shape;
 use endowire_core::{Error, Result, Vec3};
 use nalgebra::Rotation3;
 
 use crate::beam_fem::smallest_rotation;
 use crate::wall_load::WallLoad;
-use crate::{Chain, Posture, RodModel};
+use crate::{Chain, Outcome, Posture, RodModel};
 
 /// How a device is cut up and how well its equilibria are met.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,15 +38,22 @@ const ZERO_LENGTH_MM: f64 = 1e-9;
 const PART_RADII: f64 = 2.0;
 
 /// A method under way in a vessel. Nodes are marks on the device, as in core's methods.
+#[derive(Clone)]
 pub struct Insertion {
-    model: Box<dyn RodModel>,
+    model: Arc<dyn RodModel>,
     options: InsertionOptions,
+    wall: Arc<FeltWall>,
+    progress: Progress,
+    shape: Shape,
+    report: StepReport,
+}
+
+/// How far an insertion has come. The chain follows from the arc lengths and the turn.
+#[derive(Clone)]
+struct Progress {
     chain: Chain,
     posture: Posture,
     from_tip_mm: Vec<f64>,
-    wall: FeltWall,
-    shape: Shape,
-    report: StepReport,
 }
 
 impl Insertion {
@@ -79,13 +88,13 @@ impl Insertion {
         }
         let sheath = surroundings.sheath;
         let chain = Chain { start_mm: sheath.position_mm, direction: sheath.direction, ..Chain::default() };
+        let progress = Progress { posture: chain.straight(), chain, from_tip_mm: vec![0.0] };
+        let wall = FeltWall::new(surroundings.wall, surroundings.device, surroundings.properties)?;
         let mut insertion = Self {
-            model,
+            model: Arc::from(model),
             options,
-            posture: chain.straight(),
-            chain,
-            from_tip_mm: vec![0.0],
-            wall: FeltWall::new(surroundings.wall, surroundings.device, surroundings.properties)?,
+            wall: Arc::new(wall),
+            progress,
             shape: Shape::default(),
             report: StepReport { converged: true, ..StepReport::default() },
         };
@@ -93,26 +102,58 @@ impl Insertion {
         Ok(insertion)
     }
 
-    /// One part of a command: the chain slides along its own curve and relaxes.
-    fn part(&mut self, surroundings: &Surroundings<'_>, inserted_mm: f64) -> Result<()> {
+    /// One part of a command from `progress`: the chain slides along its own curve and relaxes.
+    fn part(
+        &self,
+        surroundings: &Surroundings<'_>,
+        progress: &mut Progress,
+        inserted_mm: f64,
+    ) -> Result<Outcome> {
         let mut from_tip_mm = Vec::new();
         nodes_from_tip(inserted_mm, self.options.element_mm, &mut from_tip_mm);
-        let mut posture = self.slid(&from_tip_mm);
-        self.fill_chain(surroundings, &from_tip_mm);
+        let mut posture = progress.slid(&from_tip_mm);
+        progress.fill_chain(surroundings, &from_tip_mm);
         let mut load = WallLoad::new(&self.wall, surroundings, &from_tip_mm);
-        let outcome = self.model.relax(&self.chain, &mut load, &mut posture, self.options.tolerance);
+        let outcome = self.model.relax(&progress.chain, &mut load, &mut posture, self.options.tolerance);
         if !posture.is_finite() {
             return Err(Error::Computation(format!(
                 "{}: diverged at {inserted_mm:.3} mm inserted: use longer segments or a softer wall",
                 self.model.name()
             )));
         }
-        (self.posture, self.from_tip_mm) = (posture, from_tip_mm);
-        self.report.iterations = self.report.iterations.saturating_add(outcome.iterations as u32);
-        self.report.converged &= outcome.converged;
-        Ok(())
+        (progress.posture, progress.from_tip_mm) = (posture, from_tip_mm);
+        Ok(outcome)
     }
 
+    fn write_shape(&mut self) {
+        let Progress { chain, posture, from_tip_mm } = &self.progress;
+        self.shape.positions_mm.clone_from(&posture.positions_mm);
+        self.shape.tangents = tangents(chain, posture);
+        self.shape.from_tip_mm.clone_from(from_tip_mm);
+    }
+
+    fn write_report(&mut self, surroundings: &Surroundings<'_>) {
+        let Progress { chain, posture, from_tip_mm } = &self.progress;
+        let report = &mut self.report;
+        report.inserted_mm = from_tip_mm[0];
+        let tip = posture.positions_mm[posture.positions_mm.len() - 1];
+        report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening);
+        let mut load = WallLoad::new(&self.wall, surroundings, from_tip_mm);
+        let wall = load.contacts(&posture.positions_mm, &mut report.contacts);
+        let bend = chain.bending_energy_mj(posture);
+        report.energy = Energy { bend, twist: 0.0, wall };
+        report.max_penetration_mm = report.contacts.iter().map(|c| c.penetration_mm).fold(0.0, f64::max);
+        report.push_force_n = 0.0;
+        if chain.segments() > 0 {
+            let held: Vec3 = report.contacts.iter().map(|c| c.normal * c.force_n).sum();
+            let (t, d) = (chain.direction, posture.chord(0).normalize());
+            let moment = chain.joint_stiffness(0) * t.cross(&d).norm().atan2(t.dot(&d));
+            report.push_force_n = -held.dot(&t) - 0.5 * moment * moment / chain.bending_nmm2[0];
+        }
+    }
+}
+
+impl Progress {
     fn fill_chain(&mut self, surroundings: &Surroundings<'_>, from_tip_mm: &[f64]) {
         let chain = &mut self.chain;
         chain.lengths_mm.clear();
@@ -178,31 +219,6 @@ impl Insertion {
         let slope = chord * (6.0 * u * v) + p * (v * (1.0 - 3.0 * u)) + q * (u * (3.0 * u - 2.0));
         (position, slope.normalize())
     }
-
-    fn write_shape(&mut self) {
-        self.shape.positions_mm.clone_from(&self.posture.positions_mm);
-        self.shape.tangents = tangents(&self.chain, &self.posture);
-        self.shape.from_tip_mm.clone_from(&self.from_tip_mm);
-    }
-
-    fn write_report(&mut self, surroundings: &Surroundings<'_>) {
-        let report = &mut self.report;
-        report.inserted_mm = self.from_tip_mm[0];
-        let tip = self.posture.positions_mm[self.posture.positions_mm.len() - 1];
-        report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening);
-        let mut load = WallLoad::new(&self.wall, surroundings, &self.from_tip_mm);
-        let wall = load.contacts(&self.posture.positions_mm, &mut report.contacts);
-        let bend = self.chain.bending_energy_mj(&self.posture);
-        report.energy = Energy { bend, twist: 0.0, wall };
-        report.max_penetration_mm = report.contacts.iter().map(|c| c.penetration_mm).fold(0.0, f64::max);
-        report.push_force_n = 0.0;
-        if self.chain.segments() > 0 {
-            let held: Vec3 = report.contacts.iter().map(|c| c.normal * c.force_n).sum();
-            let (t, d) = (self.chain.direction, self.posture.chord(0).normalize());
-            let moment = self.chain.joint_stiffness(0) * t.cross(&d).norm().atan2(t.dot(&d));
-            report.push_force_n = -held.dot(&t) - 0.5 * moment * moment / self.chain.bending_nmm2[0];
-        }
-    }
 }
 
 impl Method for Insertion {
@@ -212,27 +228,26 @@ impl Method for Insertion {
         let target = if target < ZERO_LENGTH_MM { 0.0 } else { target };
         let radius = surroundings.device.section_at(0.0).radius_mm;
         let parts = (command.advance_mm.abs() / (PART_RADII * radius)).ceil().max(1.0);
-        let before = (self.chain.clone(), self.posture.clone(), self.from_tip_mm.clone());
-        let report = self.report.clone();
-        self.report.iterations = 0;
-        self.report.converged = true;
-        self.report.substeps = parts as u32;
+        let mut progress = self.progress.clone();
+        let rotation_rad = self.report.rotation_rad;
+        let (mut iterations, mut converged) = (0u32, true);
         for k in 1..=parts as usize {
             let share = k as f64 / parts;
             let inserted = if k as f64 == parts { target } else { start + (target - start) * share };
-            self.chain.turn_rad = report.rotation_rad + command.rotate_rad * share;
+            progress.chain.turn_rad = rotation_rad + command.rotate_rad * share;
             if inserted == 0.0 {
-                self.fill_chain(surroundings, &[0.0]);
-                (self.posture, self.from_tip_mm) = (self.chain.straight(), vec![0.0]);
+                progress.fill_chain(surroundings, &[0.0]);
+                (progress.posture, progress.from_tip_mm) = (progress.chain.straight(), vec![0.0]);
                 continue;
             }
-            if let Err(error) = self.part(surroundings, inserted) {
-                (self.chain, self.posture, self.from_tip_mm) = before;
-                self.report = report;
-                return Err(error);
-            }
+            let outcome = self.part(surroundings, &mut progress, inserted)?;
+            iterations = iterations.saturating_add(outcome.iterations as u32);
+            converged &= outcome.converged;
         }
-        self.report.rotation_rad = report.rotation_rad + command.rotate_rad;
+        self.progress = progress;
+        let report = &mut self.report;
+        (report.iterations, report.converged, report.substeps) = (iterations, converged, parts as u32);
+        report.rotation_rad = rotation_rad + command.rotate_rad;
         self.write_report(surroundings);
         self.write_shape();
         Ok(())
@@ -244,6 +259,48 @@ impl Method for Insertion {
 
     fn report(&self) -> &StepReport {
         &self.report
+    }
+
+    fn state(&self) -> State {
+        let Progress { chain, posture, from_tip_mm } = self.progress.clone();
+        let nodes = NodesState {
+            positions_mm: posture.positions_mm,
+            frames: posture.frames,
+            from_tip_mm,
+            turn_rad: chain.turn_rad,
+            report: self.report.clone(),
+        };
+        State::new(self.model.name(), Content::Nodes(Box::new(nodes)))
+    }
+
+    fn restore(&mut self, surroundings: &Surroundings<'_>, state: &State) -> Result<()> {
+        let name = self.model.name();
+        let Content::Nodes(state) = state.of(name)? else { return Err(state.of_another(name)) };
+        check_inserted(state.report.inserted_mm, surroundings.device)?;
+        let mut from_tip_mm = Vec::new();
+        nodes_from_tip(state.report.inserted_mm, self.options.element_mm, &mut from_tip_mm);
+        let nodes = from_tip_mm.len();
+        let moved = state.positions_mm.first() != Some(&surroundings.sheath.position_mm);
+        if state.from_tip_mm != from_tip_mm
+            || state.positions_mm.len() != nodes
+            || state.frames.len() != nodes
+            || moved
+        {
+            let mend =
+                format!("{nodes} nodes are in this vessel from this sheath: restore a state of this scene");
+            return Err(Error::parameter("state.nodes", state.positions_mm.len(), mend));
+        }
+        let posture = Posture { positions_mm: state.positions_mm.clone(), frames: state.frames.clone() };
+        self.progress.chain.turn_rad = state.turn_rad;
+        self.progress.fill_chain(surroundings, &from_tip_mm);
+        (self.progress.posture, self.progress.from_tip_mm) = (posture, from_tip_mm);
+        self.report = state.report.clone();
+        self.write_shape();
+        Ok(())
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Method> {
+        Box::new(self.clone())
     }
 }
 

@@ -50,7 +50,7 @@ pub struct Outcome {
 }
 
 /// A discrete rod with the solution procedure of its paper.
-pub trait RodModel: Send {
+pub trait RodModel: Send + Sync {
     /// The name used in tables and scenes.
     fn name(&self) -> &'static str;
 

@@ -13,6 +13,8 @@ use crate::failure::Failure;
 use crate::output::progress;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::recorder::{Recorder, StepFailure, Summary};
+use crate::output::recording::Recording;
+use crate::output::saved::{Course, Saved, Saver};
 use crate::output::{frames::FrameWriter, print_json, tell};
 
 /// Runs the scene's script and records every step.
@@ -20,12 +22,17 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let started = Instant::now();
     let scene = Scene::read(&args.scene)?;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
+    let saved = args.resume.as_deref().map(Saved::read).transpose()?;
     let commands = scene.commands(&scene.device().map_err(in_scene)?).map_err(in_scene)?;
     if commands.is_empty() {
         let text = "script = []: give at least one [[script]] table, what the hand does".to_owned();
         return Err(Failure::Input(text).at(args.scene.display()));
     }
     let mut simulation = scene.simulation().map_err(in_scene)?;
+    let mut saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
+    if let Some(saved) = &saved {
+        saved.restore(&scene, &mut simulation, &commands)?;
+    }
     let mut frames = FrameWriter::new(&args.scene, &scene, &simulation)?;
     let mut inputs = vec![scene.text().as_bytes().to_vec()];
     for path in scene.input_paths() {
@@ -33,13 +40,31 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
     let provenance = Provenance::new(&inputs, scene.seed);
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
-    let mut recorder = Recorder::new(&folder, args.force)?;
+    let mut course = saved.map_or_else(Course::begin, |saved| saved.course());
+    let mut recorder = if args.resume.is_some() {
+        let (mut recorder, earlier) = Recorder::go_on(&folder, args.force, course.steps, simulation.shape())?;
+        draw_again(&mut frames, earlier.as_ref(), &simulation, commands.len(), &mut recorder)?;
+        recorder
+    } else {
+        let recorder = Recorder::new(&folder, args.force)?;
+        if let Some(path) = &args.save_state {
+            forget_state(path)?;
+        }
+        recorder
+    };
 
     // From here on something is recorded: whatever happens, it is kept.
     let interrupted = interrupts();
     let bar = progress::bar(commands.len(), "step");
-    let mut so_far = SoFar { step_time_s: 0.0, max_penetration_mm: 0.0, converged: true, failure: None };
-    let summary = |so_far: &SoFar, simulation: &Simulation, frames: &FrameWriter, recorder: &Recorder| {
+    bar.inc(course.steps as u64);
+    let mut failure: Option<StepFailure> = None;
+    // Whether a step was taken that could not be recorded.
+    let mut ahead = false;
+    let summary = |course: &Course,
+                   failure: &Option<StepFailure>,
+                   simulation: &Simulation,
+                   frames: &FrameWriter,
+                   recorder: &Recorder| {
         let report = simulation.report();
         Summary {
             provenance: provenance.clone(),
@@ -49,68 +74,86 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
             method: scene.method.name(),
             steps: recorder.steps(),
             steps_asked: commands.len(),
-            converged: so_far.converged && so_far.failure.is_none(),
-            failure: so_far.failure.clone(),
+            converged: course.converged && failure.is_none(),
+            failure: failure.clone(),
             inserted_mm: report.inserted_mm,
             rotation_rad: report.rotation_rad,
             tip_mm: simulation.shape().tip_mm().map(Into::into),
             push_force_n: report.push_force_n,
             torque_nmm: report.torque_nmm,
             energy_mj: report.energy,
-            max_penetration_mm: so_far.max_penetration_mm,
+            max_penetration_mm: course.max_penetration_mm,
             left_through: report.left_through,
-            step_time_s: so_far.step_time_s,
+            step_time_s: course.step_time_s,
             wall_time_s: started.elapsed().as_secs_f64(),
             renderer: frames.renderer(),
             frames: recorder.frames.clone(),
         }
     };
-    recorder.checkpoint(|recorder| summary(&so_far, &simulation, &frames, recorder))?;
-    for (index, command) in commands.iter().enumerate() {
+    let save = |saver: &mut Option<Saver>, simulation: &Simulation, course: Course, recorder: &Recorder| {
+        let Some(saver) = saver else { return Ok(()) };
+        saver.save(simulation, &commands, course, || recorder.sync())
+    };
+    recorder.checkpoint(|recorder| summary(&course, &failure, &simulation, &frames, recorder))?;
+    save(&mut saver, &simulation, course, &recorder)?;
+    for (index, command) in commands.iter().enumerate().skip(course.steps) {
         let failed = |reason: String| Some(StepFailure { step: index + 1, reason });
         if interrupted.load(Ordering::Relaxed) {
-            so_far.failure = failed("interrupted before it".to_owned());
+            failure = failed("interrupted before it".to_owned());
             break;
         }
         let clock = Instant::now();
         let result = simulation.step(*command);
-        so_far.step_time_s += clock.elapsed().as_secs_f64();
+        course.step_time_s += clock.elapsed().as_secs_f64();
         match result {
             Ok(report) => {
-                so_far.max_penetration_mm = so_far.max_penetration_mm.max(report.max_penetration_mm);
-                so_far.converged &= report.converged;
+                course.max_penetration_mm = course.max_penetration_mm.max(report.max_penetration_mm);
+                course.converged &= report.converged;
             }
             Err(error) => {
-                so_far.failure = failed(error.to_string());
+                failure = failed(error.to_string());
                 break;
             }
         }
         let last = index + 1 == commands.len();
+        let seen = (simulation.shape(), simulation.device());
         let recorded = recorder
             .record(*command, simulation.report(), simulation.shape())
-            .and_then(|()| frames.step(index + 1, last, &simulation, &mut recorder))
-            .and_then(|()| recorder.checkpoint(|recorder| summary(&so_far, &simulation, &frames, recorder)));
+            .and_then(|()| {
+                course.steps = index + 1;
+                frames.step(index + 1, last, seen, &mut recorder)
+            })
+            .and_then(|()| {
+                recorder.checkpoint(|recorder| summary(&course, &failure, &simulation, &frames, recorder))
+            })
+            .and_then(|()| match saver.as_ref().is_some_and(Saver::is_due) {
+                true => save(&mut saver, &simulation, course, &recorder),
+                false => Ok(()),
+            });
         if let Err(error) = recorded {
-            so_far.failure = failed(error.to_string());
+            failure = failed(error.to_string());
+            ahead = recorder.steps() == index;
             break;
         }
         bar.set_message(format!("{:.1} mm inserted", simulation.report().inserted_mm));
         bar.inc(1);
     }
     bar.finish_and_clear();
-    if so_far.failure.is_some() && recorder.steps() > 0 {
+    let saved = if ahead { Ok(()) } else { save(&mut saver, &simulation, course, &recorder) };
+    if failure.is_some() && recorder.steps() > 0 {
         // The picture of the end is a help; the first failure is the one to tell.
-        let _ = frames.step(recorder.steps(), true, &simulation, &mut recorder);
+        let seen = (simulation.shape(), simulation.device());
+        let _ = frames.step(recorder.steps(), true, seen, &mut recorder);
     }
 
-    let mut summary = summary(&so_far, &simulation, &frames, &recorder);
-    let finished = recorder.finish(&mut summary).map_err(Failure::into_computation);
+    let mut summary = summary(&course, &failure, &simulation, &frames, &recorder);
+    let finished = recorder.finish(&mut summary).and(saved).map_err(Failure::into_computation);
     if args.json {
         print_json(&summary)?;
     } else {
         tell(text(&summary, &folder, &simulation));
     }
-    match so_far.failure {
+    match failure {
         Some(StepFailure { step, reason }) => {
             let kept = match finished {
                 Ok(()) => format!("{} steps are kept in {}", summary.steps, folder.display()),
@@ -122,12 +165,29 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
 }
 
-/// What is known of a run while it goes on.
-struct SoFar {
-    step_time_s: f64,
-    max_penetration_mm: f64,
-    converged: bool,
-    failure: Option<StepFailure>,
+/// Removes the state of an earlier run: until this one has saved its own, there is none to go on from.
+fn forget_state(path: &Path) -> Result<(), Failure> {
+    match std::fs::remove_file(path) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Failure::write(path, &e)),
+        _ => Ok(()),
+    }
+}
+
+/// Draws the frames of a recording that goes on once more: the detector remembers those before.
+fn draw_again(
+    frames: &mut FrameWriter,
+    earlier: Option<&Recording>,
+    simulation: &Simulation,
+    steps_asked: usize,
+    recorder: &mut Recorder,
+) -> Result<(), Failure> {
+    let Some(earlier) = earlier else { return Ok(()) };
+    let before = recorder.steps() - earlier.steps();
+    for row in 1..=earlier.steps() {
+        let step = before + row;
+        frames.step(step, step == steps_asked, (&earlier.shape(row), simulation.device()), recorder)?;
+    }
+    Ok(())
 }
 
 /// Set by Ctrl-C, or by a request to terminate: the step under way is finished and recorded. A second one ends at once.

@@ -52,6 +52,45 @@ impl ShapeArrays {
         Ok(Self { folder, arrays, nodes: 0, contacts: 0 })
     }
 
+    /// Arrays without a step, in place of those that the recording has, packed or not.
+    pub(crate) fn anew(recording: &Path) -> io::Result<Self> {
+        remove(&recording.join(PACKED))?;
+        Self::new(recording)
+    }
+
+    /// The first `steps` steps of the arrays that a recording has, packed or not, to which more are added.
+    pub(crate) fn go_on(recording: &Path, steps: usize) -> io::Result<Self> {
+        let folder = recording.join(GROWING);
+        let packed = recording.join(PACKED);
+        if packed.exists() {
+            std::fs::create_dir_all(&folder)?;
+            for member in MEMBERS {
+                std::fs::write(folder.join(member.file_name()), npz::read(&packed, member.name)?.concat())?;
+            }
+        }
+        let count = |member: &Member| -> io::Result<i64> {
+            let numbers = npz::read_unpacked(&folder, member)?;
+            let number = numbers.get(steps).ok_or_else(|| io::Error::from(io::ErrorKind::UnexpectedEof))?;
+            Ok(i64::from_le_bytes(*number))
+        };
+        let (nodes, contacts) = (count(&OFFSETS)?, count(&CONTACT_OFFSETS)?);
+        let [n, c, s] = [nodes as u64, contacts as u64, steps as u64 + 1];
+        let open =
+            |member: Member, rows: u64| ArrayStream::open(member, &folder, rows * member.columns as u64);
+        let arrays = [
+            open(POSITIONS, n)?,
+            open(TANGENTS, n)?,
+            open(FROM_TIP, n)?,
+            open(OFFSETS, s)?,
+            open(CONTACT_POSITIONS, c)?,
+            open(CONTACT_FORCES, c)?,
+            open(CONTACT_OFFSETS, s)?,
+        ];
+        // Only now: what is packed is whole, whatever happens here.
+        remove(&packed)?;
+        Ok(Self { folder, arrays, nodes, contacts })
+    }
+
     /// Adds a step, and what belongs to it by `write_more`; where one of them fails, the steps before it stay.
     pub(crate) fn push(
         &mut self,

@@ -45,6 +45,16 @@ pub(crate) fn claim(folder: &Path, force: bool) -> Result<Claim, Failure> {
     Ok(claim)
 }
 
+/// Holds the folder of a recording that goes on.
+pub(crate) fn claim_again(folder: &Path) -> Result<Claim, Failure> {
+    lock(folder)
+}
+
+/// Removes the frames of a recording: those of the steps that stay are drawn again.
+pub(crate) fn remove_frames(folder: &Path) -> io::Result<()> {
+    frames(&folder.join("frames"))?.iter().try_for_each(std::fs::remove_file)
+}
+
 fn lock(folder: &Path) -> Result<Claim, Failure> {
     let path = folder.join(LOCK);
     let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path);
@@ -61,7 +71,7 @@ fn lock(folder: &Path) -> Result<Claim, Failure> {
 }
 
 /// Whether `endowire run` has recorded into a folder.
-fn is_recording(folder: &Path) -> bool {
+pub(crate) fn is_recording(folder: &Path) -> bool {
     let begins = File::open(folder.join(TABLE)).and_then(|file| {
         let mut begins = Vec::new();
         file.take(TABLE_BEGINS.len() as u64).read_to_end(&mut begins).map(|_| begins)

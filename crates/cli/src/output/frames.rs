@@ -77,17 +77,17 @@ impl FrameWriter {
         &mut self,
         step: usize,
         last: bool,
-        simulation: &Simulation,
+        (shape, device): (&Shape, &Device),
         recorder: &mut Recorder,
     ) -> Result<(), Failure> {
         let due = last || step.is_multiple_of(self.spec.every as usize);
         let Some(renderer) = self.renderer.as_mut().filter(|_| due) else { return Ok(()) };
-        let view = device_view(simulation.shape(), simulation.device(), &self.spec);
+        let view = device_view(shape, device, &self.spec);
         let moment = Moment { frame: step as u64, time_s: step as f64 / self.spec.frames_per_s };
         let frames = renderer.render_at(&[view], moment)?;
         for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {
-                recorder.frame(name, |path| Ok(image.write_png(path)?))?;
+                recorder.frame(step, name, |path| Ok(image.write_png(path)?))?;
             }
         }
         Ok(())

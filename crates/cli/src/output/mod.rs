@@ -10,6 +10,7 @@ pub(crate) mod progress;
 pub(crate) mod provenance;
 pub(crate) mod recorder;
 pub(crate) mod recording;
+pub(crate) mod saved;
 mod whole;
 
 use std::fmt::Display;

@@ -59,6 +59,19 @@ impl ArrayStream {
         Ok(Self { member, numbers: 0, file })
     }
 
+    /// The first `numbers` of an array that is in `folder` already.
+    pub(crate) fn open(member: Member, folder: &Path, numbers: u64) -> io::Result<Self> {
+        let file = OpenOptions::new().read(true).append(true).open(folder.join(member.file_name()))?;
+        if file.metadata()?.len() < numbers * NUMBER_BYTES {
+            return Err(io::Error::new(
+                io::ErrorKind::UnexpectedEof,
+                format!("{} is too short", member.file_name()),
+            ));
+        }
+        file.set_len(numbers * NUMBER_BYTES)?;
+        Ok(Self { member, numbers, file })
+    }
+
     /// Numbers so far.
     pub(crate) fn len(&self) -> u64 {
         self.numbers

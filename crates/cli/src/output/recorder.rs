@@ -1,7 +1,7 @@
 //! A run on disk. Every step is there as soon as it is recorded, in steps.csv and in the arrays, and summary.json follows once a second:
 //! a run that is killed leaves a recording. At the end, also at an early one, the arrays are packed and the summary is complete.
 
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -13,6 +13,7 @@ use serde::Serialize;
 use super::arrays::{self, ShapeArrays};
 use super::folder::{self, Claim};
 use super::provenance::Provenance;
+use super::recording::Recording;
 use super::{SUMMARY, to_json, whole};
 use crate::failure::Failure;
 
@@ -99,8 +100,6 @@ struct Row {
     substeps: u32,
     jumped: bool,
     left_through: Option<usize>,
-    queries: u64,
-    queries_avoided: u64,
     nodes_solved: u64,
     nodes_frozen: u64,
     angles: bool,
@@ -142,6 +141,64 @@ impl Recorder {
         })
     }
 
+    /// Goes on with the recording in `folder` after step `steps`, where the device has the shape `at`; what was recorded of later steps is
+    /// dropped. Returns the steps that stay. Where nothing has been recorded, the recording begins with the next step.
+    pub(crate) fn go_on(
+        folder: &Path,
+        force: bool,
+        steps: usize,
+        at: &Shape,
+    ) -> Result<(Self, Option<Recording>), Failure> {
+        if !folder::is_recording(folder) {
+            let mut recorder = Self::new(folder, force)?;
+            recorder.steps = steps;
+            return Ok((recorder, None));
+        }
+        let claim = folder::claim_again(folder)?;
+        let table_path = folder.join(folder::TABLE);
+        let rows = std::fs::read(&table_path).map_err(|e| Failure::write(&table_path, &e))?;
+        let kept = Kept::of(&rows, steps);
+        let refuse = |what: String| {
+            Failure::Input(format!(
+                "--out {}: {what}: give the folder that the state was saved beside, or a new one for the steps to come",
+                folder.display()
+            ))
+        };
+        let Some(kept) = kept else {
+            return Err(refuse(format!(
+                "step {steps}, after which the state was saved, is not recorded there"
+            )));
+        };
+        let recording = if kept.rows > 0 { Some(Recording::read_arrays(folder, kept.rows)?) } else { None };
+        if recording.as_ref().is_some_and(|recording| recording.shape(kept.rows) != *at) {
+            return Err(refuse(format!(
+                "step {steps} is recorded there with another shape than that of the state"
+            )));
+        }
+        let start = || -> io::Result<_> {
+            let arrays = match recording {
+                Some(_) => ShapeArrays::go_on(folder, kept.rows)?,
+                None => ShapeArrays::anew(folder)?,
+            };
+            let table = OpenOptions::new().append(true).open(&table_path)?;
+            table.set_len(kept.bytes)?;
+            folder::remove_frames(folder)?;
+            Ok((table, arrays))
+        };
+        let (table, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
+        let table = csv::WriterBuilder::new().has_headers(kept.bytes == 0).from_writer(table);
+        let recorder = Self {
+            folder: folder.to_path_buf(),
+            table,
+            arrays,
+            steps,
+            frames: Vec::new(),
+            checkpoint: None,
+            _claim: claim,
+        };
+        Ok((recorder, recording))
+    }
+
     /// Adds one step; where that fails, the steps before it stay.
     pub(crate) fn record(
         &mut self,
@@ -173,10 +230,8 @@ impl Recorder {
             substeps: report.substeps,
             jumped: report.jumped,
             left_through: report.left_through,
-            queries: report.counters.queries,
-            queries_avoided: report.counters.near + report.counters.avoided,
-            nodes_solved: report.counters.nodes_solved,
-            nodes_frozen: report.counters.nodes_frozen,
+            nodes_solved: report.nodes_solved,
+            nodes_frozen: report.nodes_frozen,
             angles: report.angles,
             converged: report.converged,
         };
@@ -196,22 +251,28 @@ impl Recorder {
         if self.checkpoint.is_some_and(|last| last.elapsed().as_secs_f64() < CHECKPOINT_S) {
             return Ok(());
         }
-        let sync = || self.arrays.sync().and_then(|()| self.table.get_ref().sync_data());
-        sync().map_err(|e| Failure::write(&self.folder, &e))?;
+        self.sync()?;
         write_summary(&self.folder, &summary(self))?;
         self.checkpoint = Some(Instant::now());
         Ok(())
     }
 
-    /// Writes a frame of the current step with `write`, and notes it for the summary.
+    /// Waits until all steps are on the disk itself.
+    pub(crate) fn sync(&self) -> Result<(), Failure> {
+        let synced = self.arrays.sync().and_then(|()| self.table.get_ref().sync_data());
+        synced.map_err(|e| Failure::write(&self.folder, &e))
+    }
+
+    /// Writes a frame of a step with `write`, and notes it for the summary.
     pub(crate) fn frame(
         &mut self,
+        step: usize,
         view: &str,
         write: impl FnOnce(&Path) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let folder = self.folder.join("frames");
         std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
-        let name = folder::frame_name(self.steps, view);
+        let name = folder::frame_name(step, view);
         let path = folder.join(&name);
         let part = whole::unfinished(&path);
         write(&part)?;
@@ -236,7 +297,68 @@ impl Recorder {
     }
 }
 
+/// The beginning of a table of steps.
+#[derive(Debug, PartialEq, Eq)]
+struct Kept {
+    rows: usize,
+    bytes: u64,
+}
+
+impl Kept {
+    /// Up to and with step `steps`; `None` where that was not recorded.
+    fn of(table: &[u8], steps: usize) -> Option<Self> {
+        let mut bytes = 0;
+        let mut rows = 0;
+        for (index, line) in table.split_inclusive(|byte| *byte == b'\n').enumerate() {
+            let whole = line.ends_with(b"\n");
+            let number = || std::str::from_utf8(line).ok()?.split(',').next()?.parse::<usize>().ok();
+            match (index, whole) {
+                (_, false) => break,
+                (0, _) => {}
+                _ => {
+                    let step = number()?;
+                    if step > steps {
+                        // It began where the state was saved.
+                        return (step == steps + 1).then_some(Self { rows, bytes });
+                    }
+                    rows += 1;
+                    if step == steps {
+                        return Some(Self { rows, bytes: bytes + line.len() as u64 });
+                    }
+                }
+            }
+            bytes += line.len() as u64;
+        }
+        (steps == 0).then_some(Self { rows, bytes })
+    }
+}
+
 fn write_summary(folder: &Path, summary: &Summary) -> Result<(), Failure> {
     let path = folder.join(SUMMARY);
     whole::write_text(&path, &(to_json(summary)? + "\n")).map_err(|e| Failure::write(&path, &e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_is_kept_up_to_the_step_of_the_state() {
+        let whole = "step,advance_mm\n1,2.0\n2,2.0\n3,2.0\n";
+        let kept = |table: &str, steps: usize| Kept::of(table.as_bytes(), steps).map(|k| (k.rows, k.bytes));
+        assert_eq!(kept(whole, 0), Some((0, 16)));
+        assert_eq!(kept(whole, 2), Some((2, 28)));
+        assert_eq!(kept(whole, 3), Some((3, 34)));
+        assert_eq!(kept(whole, 4), None);
+        // Killed within a row, within the head, before it.
+        assert_eq!(kept(&whole[..32], 2), Some((2, 28)));
+        assert_eq!(kept(&whole[..32], 3), None);
+        assert_eq!(kept(&whole[..9], 0), Some((0, 0)));
+        assert_eq!(kept("", 0), Some((0, 0)));
+        assert_eq!(kept("", 1), None);
+        // A recording that began after step 7.
+        let later = "step,advance_mm\n8,2.0\n9,2.0\n";
+        assert_eq!((kept(later, 7), kept(later, 8)), (Some((0, 16)), Some((1, 22))));
+        assert_eq!((kept(later, 6), kept(later, 0), kept("step\nx\n", 1)), (None, None, None));
+    }
 }

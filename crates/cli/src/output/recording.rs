@@ -139,6 +139,18 @@ impl Recording {
         }
     }
 
+    /// The first `steps` steps of the arrays in a folder.
+    pub(crate) fn read_arrays(folder: &Path, steps: usize) -> Result<Self, Failure> {
+        let mut recording = Self::read(folder, Some(Path::new("")))?;
+        if recording.steps() < steps {
+            let what = format!("its arrays hold {} steps and its table {steps}", recording.steps());
+            return Err(unreadable(folder, &what));
+        }
+        recording.offsets.truncate(steps + 1);
+        recording.contact_offsets.truncate(steps + 1);
+        Ok(recording)
+    }
+
     /// Number of steps.
     pub(crate) fn steps(&self) -> usize {
         self.offsets.len() - 1

@@ -29,6 +29,7 @@
 mod coupling;
 
 use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 use super::ContactPoint;
 use crate::Vec3;
@@ -74,6 +75,15 @@ struct Slider {
     seen: (Vec3, f64),
     /// N in its matrix.
     matrix_n: f64,
+}
+
+/// What presses at a contact point in an equilibrium.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct NormalForce {
+    /// Normal of the wall, into the lumen.
+    normal: Vec3,
+    /// Force, less where the wall is smoother, N.
+    force_n: f64,
 }
 
 /// Derivatives of a point's friction energy in its position and its angle.
@@ -127,11 +137,6 @@ impl Friction {
         Self { coefficient, ..Self::default() }
     }
 
-    /// Forgets all points. Keeps the memory.
-    pub fn clear(&mut self) {
-        self.sliders.clear();
-    }
-
     /// Takes memory for `points` points.
     pub fn reserve(&mut self, points: usize) {
         if self.acts() {
@@ -146,18 +151,19 @@ impl Friction {
 
     /// Begins a step: `state` is the device after it has slid along its own curve, with the angles it had before.
     ///
-    /// `before` are the points and friction of the last state, from which the first normal forces come.
+    /// `before` are the points of the last equilibrium and what pressed there, from which the first normal forces come.
     pub fn begin(
         &mut self,
         elements: &[ElementData],
         state: &RodState,
         points: &[ContactPoint],
-        before: (&[ContactPoint], &Self),
+        before: (&[ContactPoint], &[NormalForce]),
         hand: HandMotion,
     ) {
         self.sliders.clear();
         self.settled = false;
         self.renewals = 0;
+        self.hands_over = false;
         self.coupled = false;
         self.taken_mj = 0.0;
         if !self.acts() {
@@ -167,7 +173,7 @@ impl Friction {
         let radius = points.first().map_or(0.0, |p| p.potential.radius_mm);
         self.stick_mm = (STICK * (advance.abs() + radius * hand.turn_rad.abs())).max(LEAST_STICK_MM);
         let (old_points, old) = before;
-        let count = old_points.len().min(old.sliders.len());
+        let count = old_points.len().min(old.len());
         let near_tip = TIP_RADII * radius + advance.abs();
         let mut k = 0;
         for (index, point) in points.iter().enumerate() {
@@ -187,7 +193,7 @@ impl Friction {
             };
             if point.from_tip_mm < near_tip {
                 if index < count {
-                    (slider.normal, slider.force_n) = (old.sliders[index].normal, old.sliders[index].force_n);
+                    (slider.normal, slider.force_n) = (old[index].normal, old[index].force_n);
                 }
             } else {
                 // Label of the piece of device that was here before.
@@ -198,7 +204,7 @@ impl Friction {
                 if k + 1 < count {
                     let (a, b) = (&old_points[k], &old_points[k + 1]);
                     let share = ((label - a.from_tip_mm) / (b.from_tip_mm - a.from_tip_mm)).clamp(0.0, 1.0);
-                    let (p, q) = (&old.sliders[k], &old.sliders[k + 1]);
+                    let (p, q) = (&old[k], &old[k + 1]);
                     let pressure = (1.0 - share) * p.force_n / a.weight_mm + share * q.force_n / b.weight_mm;
                     slider.normal = if share < 0.5 { p.normal } else { q.normal };
                     slider.force_n = point.weight_mm * pressure;
@@ -207,6 +213,12 @@ impl Friction {
             slider.begun = (slider.normal, slider.force_n);
             self.sliders.push(slider);
         }
+    }
+
+    /// Keeps the normal forces that a step has ended with.
+    pub fn keep(&self, forces: &mut Vec<NormalForce>) {
+        forces.clear();
+        forces.extend(self.sliders.iter().map(|s| NormalForce { normal: s.normal, force_n: s.force_n }));
     }
 
     /// Slip vector of a point and the direction its surface takes when it spins.

@@ -1,4 +1,9 @@
 //! What the contact points of a device know of the wall about them, from one question to the next.
+//!
+//! What is known at an equilibrium ([`KnownPoints`]) belongs to the state of an insertion. A step takes it over, slides it with the device and
+//! goes on from there in its own memory ([`WallMemory`]), so that a step that fails has changed nothing.
+
+use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, Nearness};
 use super::places::{Place, Places};
@@ -7,7 +12,7 @@ use super::{ContactPoint, FeltWall};
 use crate::Vec3;
 
 /// What a point knows of its surroundings.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct KnownPoint {
     /// Where the wall was last looked for.
     pub(super) looked_at: Vec3,
@@ -57,7 +62,19 @@ const NOTHING: KnownPoint = KnownPoint {
     force_n: 0.0,
 };
 
-/// The memory of all contact points of a device.
+/// The reading of a point that has never been near a wall.
+const UNREAD: (Vec3, Nearness) = (Vec3::new(f64::NAN, f64::NAN, f64::NAN), Nearness::Beyond(0.0));
+
+/// What a point that is near a wall has read last, without derivatives.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct KnownDistance {
+    /// Where, mm.
+    at_mm: Vec3,
+    /// How near the wall was there, mm.
+    distance_mm: f64,
+}
+
+/// The memory of all contact points of a device in a step.
 #[derive(Debug, Clone)]
 pub struct WallMemory {
     pub(super) points: Vec<KnownPoint>,
@@ -67,60 +84,67 @@ pub struct WallMemory {
     pub(super) places: Places,
     /// The place asked for last.
     last: Place,
-    spare: Vec<KnownPoint>,
     /// Forces on the wall that a step leads to, N.
     pub(super) aims: Vec<f64>,
 }
 
-/// What the points of a device knew of the wall at some state, to go back to.
-#[derive(Debug, Clone, Default)]
-pub struct KnownPoints(Vec<KnownPoint>);
+/// What the points of a device know of the wall at an equilibrium.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct KnownPoints {
+    points: Vec<KnownPoint>,
+    /// None where a point has never been near a wall.
+    distances: Vec<Option<KnownDistance>>,
+}
 
 impl KnownPoints {
     /// Takes memory for `points` points.
     pub fn reserve(&mut self, points: usize) {
-        self.0.reserve(points.saturating_sub(self.0.len()));
+        self.points.reserve(points.saturating_sub(self.points.len()));
+        self.distances.reserve(points.saturating_sub(self.distances.len()));
+    }
+
+    /// Forgets all. Keeps the memory.
+    pub fn clear(&mut self) {
+        self.points.clear();
+        self.distances.clear();
+    }
+
+    /// Number of points.
+    pub(crate) fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether they may be what a device of `points` points knows of a wall of `triangles` triangles.
+    pub(crate) fn fits(&self, points: usize, triangles: usize) -> bool {
+        let there = |triangle: Option<u32>| triangle.is_none_or(|t| (t as usize) < triangles);
+        self.points.len() == points
+            && self.distances.len() == points
+            && self.points.iter().all(|p| there(p.triangle) && there(p.side) && there(p.base_triangle))
     }
 }
 
 impl WallMemory {
-    /// Keeps what is known.
-    pub fn keep(&self, kept: &mut KnownPoints) {
-        kept.0.clone_from(&self.points);
-    }
-
-    /// Goes back to what was known.
-    pub fn restore(&mut self, kept: &KnownPoints) {
-        self.points.clone_from(&kept.0);
-        self.readings.iter_mut().for_each(|(place, _)| *place = Vec3::repeat(f64::NAN));
-    }
-
     /// Nothing is known yet of `felt`.
     pub fn new(felt: &FeltWall) -> Self {
         let places = Places::new(LOOK_AGAIN * felt.thinnest_mm, felt.reach_mm);
-        Self {
-            points: Vec::new(),
-            readings: Vec::new(),
-            places,
-            last: Place::UNKNOWN,
-            spare: Vec::new(),
-            aims: Vec::new(),
-        }
+        Self { points: Vec::new(), readings: Vec::new(), places, last: Place::UNKNOWN, aims: Vec::new() }
+    }
+
+    /// Forgets the place asked for last, so that answers hang on the places that are asked for from here on alone.
+    pub(crate) fn leave_place(&mut self) {
+        self.last = Place::UNKNOWN;
     }
 
     /// Takes memory for `points` points.
     pub fn reserve(&mut self, points: usize) {
-        for list in [&mut self.points, &mut self.spare] {
-            list.reserve(points.saturating_sub(list.len()));
-        }
+        self.points.reserve(points.saturating_sub(self.points.len()));
         self.aims.reserve(points.saturating_sub(self.aims.len()));
         self.readings.reserve(points.saturating_sub(self.readings.len()));
     }
 
     pub(super) fn resize(&mut self, points: usize) {
-        let nowhere = Vec3::repeat(f64::NAN);
         self.points.resize(points, NOTHING);
-        self.readings.resize(points, (nowhere, Nearness::Beyond(0.0)));
+        self.readings.resize(points, UNREAD);
     }
 
     /// The distance that point `index` read at its base, if it presses on the wall there.
@@ -142,24 +166,46 @@ impl WallMemory {
         self.last.triangle.filter(|_| near).map(|triangle| felt.nearness(x, triangle, limit_mm))
     }
 
-    /// The device has advanced along its own curve: what was known of a place, the point of `after` that comes to lie nearest to it
-    /// knows, since the wall does not move. Beyond the tip each of the points `before` keeps its own.
-    pub fn slide(&mut self, before: &[ContactPoint], after: &[ContactPoint], advance_mm: f64) {
-        self.points.iter_mut().for_each(|known| known.from_tip_mm += advance_mm);
-        self.spare.clear();
-        let count = before.len().min(self.points.len());
+    /// Takes over what was known before the device advanced along its own curve: what was known of a place, the point of `after` that comes
+    /// to lie nearest to it knows, since the wall does not move. Beyond the tip each of the points `before` keeps its own.
+    pub fn begin(
+        &mut self,
+        known: &KnownPoints,
+        before: &[ContactPoint],
+        after: &[ContactPoint],
+        advance_mm: f64,
+    ) {
+        self.points.clear();
+        let count = before.len().min(known.points.len());
         let mut k = 0;
         for (index, point) in after.iter().enumerate() {
             let was = point.from_tip_mm - advance_mm;
             while k + 1 < count && before[k + 1].from_tip_mm <= was {
                 k += 1;
             }
-            let off = |known: &&KnownPoint| (known.from_tip_mm - point.from_tip_mm).abs();
+            let off = |known: &&KnownPoint| (known.from_tip_mm + advance_mm - point.from_tip_mm).abs();
             let places = if was < 0.0 { index..index + 1 } else { k.saturating_sub(1)..(k + 3).min(count) };
-            let known = self.points.get(places).unwrap_or_default();
-            let nearest = known.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-            self.spare.push(nearest.copied().unwrap_or(NOTHING));
+            let near = known.points.get(places).unwrap_or_default();
+            let nearest = near.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+            let slid = nearest.map(|n| KnownPoint { from_tip_mm: n.from_tip_mm + advance_mm, ..*n });
+            self.points.push(slid.unwrap_or(NOTHING));
         }
-        std::mem::swap(&mut self.points, &mut self.spare);
+        self.readings.clear();
+        let reading = |known: &Option<KnownDistance>| match known {
+            Some(KnownDistance { at_mm, distance_mm }) => (*at_mm, Nearness::Beyond(*distance_mm)),
+            None => UNREAD,
+        };
+        self.readings.extend(known.distances.iter().map(reading));
+    }
+
+    /// Keeps what is known at the end of a step.
+    pub fn keep(&self, known: &mut KnownPoints) {
+        known.points.clone_from(&self.points);
+        known.distances.clear();
+        let distance = |(at_mm, nearness): &(Vec3, Nearness)| {
+            let read = !at_mm.x.is_nan();
+            read.then(|| KnownDistance { at_mm: *at_mm, distance_mm: nearness.value_mm() })
+        };
+        known.distances.extend(self.readings.iter().map(distance));
     }
 }

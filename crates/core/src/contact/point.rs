@@ -59,7 +59,8 @@ pub struct Touch {
     pub contact: Contact,
 }
 
-/// Work done and avoided.
+/// Questions about the wall, asked and avoided. They tell of the work that was done, which hangs on what a simulation still knows of places
+/// where a device has been, and not of the state of an insertion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 pub struct Counters {
     /// Questions to the bounding volume hierarchy.
@@ -68,10 +69,6 @@ pub struct Counters {
     pub near: u64,
     /// Questions that the last clearance answered, or the same question before, of the same point or of another in its place.
     pub avoided: u64,
-    /// Nodes of sub-steps in which the device moved to a new equilibrium.
-    pub nodes_solved: u64,
-    /// Nodes of sub-steps in which the slid device was in equilibrium as it was.
-    pub nodes_frozen: u64,
 }
 
 impl Counters {
@@ -80,7 +77,5 @@ impl Counters {
         self.queries += other.queries;
         self.near += other.near;
         self.avoided += other.avoided;
-        self.nodes_solved += other.nodes_solved;
-        self.nodes_frozen += other.nodes_frozen;
     }
 }

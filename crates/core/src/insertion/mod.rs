@@ -7,6 +7,7 @@ mod sheath;
 mod simulation;
 mod wall_properties;
 
+pub use crate::methods::State;
 pub use command::{Command, ScriptLine, commands};
 pub use nodes::nodes_from_tip;
 pub use report::{Contact, Energy, StepReport};

@@ -1,12 +1,11 @@
 //! What a step tells.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
-use crate::contact::Counters;
 
 /// The terms of the total potential energy, mJ.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Energy {
     /// Bending.
     pub bend: f64,
@@ -24,7 +23,7 @@ impl Energy {
 }
 
 /// One place where the wall holds the device.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// Position on the device's axis, mm.
     pub position_mm: Vec3,
@@ -48,8 +47,17 @@ impl Contact {
     }
 }
 
-/// State of an insertion after a step.
-#[derive(Debug, Clone, PartialEq, Default)]
+impl StepReport {
+    /// What a step tells in which the hand does nothing.
+    pub(crate) fn rest(&mut self) {
+        (self.iterations, self.substeps) = (0, 0);
+        (self.dissipated_mj, self.jumped) = (0.0, false);
+        (self.relaxations, self.slides) = (0, 0);
+    }
+}
+
+/// What is seen and felt of an insertion after a step.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StepReport {
     /// Length inside the sheath's mouth, mm.
     pub inserted_mm: f64,
@@ -91,8 +99,10 @@ pub struct StepReport {
     pub jumped: bool,
     /// Whether the device carries material angles: only with a shape or friction.
     pub angles: bool,
-    /// Work done and avoided since the start.
-    pub counters: Counters,
+    /// Nodes of sub-steps in which the device moved to a new equilibrium, since the start.
+    pub nodes_solved: u64,
+    /// Nodes of sub-steps in which the slid device was in equilibrium as it was, since the start.
+    pub nodes_frozen: u64,
     /// Whether the step met the method's own convergence test.
     pub converged: bool,
 }

@@ -1,9 +1,12 @@
 //! A device, a vessel and a method, stepped by commands.
 
+use std::sync::Arc;
+
+use crate::contact::Counters;
 use crate::device::Device;
 use crate::error::vector;
 use crate::insertion::{Command, ScriptLine, Sheath, StepReport, WallProperties, commands};
-use crate::methods::{Method, MethodChoice};
+use crate::methods::{Method, MethodChoice, State};
 use crate::shape::Shape;
 use crate::vessel::{Wall, WallQuery};
 use crate::{Error, Result};
@@ -24,13 +27,34 @@ pub struct Surroundings<'a> {
 }
 
 /// An insertion under way.
+///
+/// What surrounds the device is shared by all clones of a simulation, which may run on any threads; what a clone has of its own is its
+/// state, and with its first step a workspace.
 pub struct Simulation {
+    scene: Arc<Environment>,
+    method: Box<dyn Method>,
+}
+
+/// What a simulation never changes.
+struct Environment {
     wall: Wall,
     properties: WallProperties,
     query: WallQuery,
     sheath: Sheath,
     device: Device,
-    method: Box<dyn Method>,
+}
+
+impl Environment {
+    fn surroundings(&self) -> Surroundings<'_> {
+        let Self { wall, properties, query, sheath, device } = self;
+        Surroundings { wall, properties, query, sheath, device }
+    }
+}
+
+impl Clone for Simulation {
+    fn clone(&self) -> Self {
+        Self { scene: Arc::clone(&self.scene), method: self.method.boxed_clone() }
+    }
 }
 
 /// How far in front of the sheath's mouth, mm, the inside test looks: the mouth itself may lie in the plane of an
@@ -97,32 +121,44 @@ impl Simulation {
         }
         let query = WallQuery::new(&wall)?;
         check_mouth(&query, &device, &sheath)?;
-        let method = start(&Surroundings {
-            wall: &wall,
-            properties: &properties,
-            query: &query,
-            sheath: &sheath,
-            device: &device,
-        })?;
-        Ok(Self { wall, properties, query, sheath, device, method })
+        let scene = Environment { wall, properties, query, sheath, device };
+        let method = start(&scene.surroundings())?;
+        Ok(Self { scene: Arc::new(scene), method })
     }
 
-    /// Carries out one command. After an error the state is as before.
+    /// Carries out one command. After an error the state is as before, to the bit.
     ///
     /// # Errors
     /// A command that is not finite, turns more than a thousand times, pushes in more than the device's length or pulls out more than is inserted
     /// (all [`Error::Parameter`]); a step that found no equilibrium ([`Error::Computation`]).
     pub fn step(&mut self, command: Command) -> Result<&StepReport> {
-        check_command(command, self.method.report().inserted_mm, self.device.length_mm())?;
-        let surroundings = Surroundings {
-            wall: &self.wall,
-            properties: &self.properties,
-            query: &self.query,
-            sheath: &self.sheath,
-            device: &self.device,
-        };
-        self.method.step(&surroundings, command)?;
+        check_command(command, self.method.report().inserted_mm, self.scene.device.length_mm())?;
+        self.method.step(&self.scene.surroundings(), command)?;
         Ok(self.method.report())
+    }
+
+    /// All that the next step depends on, beside what surrounds the device.
+    pub fn state(&self) -> State {
+        self.method.state()
+    }
+
+    /// Goes on from a state of this scene as if nothing else had been: shape, report and all further steps are those of the simulation that
+    /// it was taken from, to the bit. After an error nothing has changed.
+    ///
+    /// # Errors
+    /// A state of another method, vessel, device, sheath or element length, as far as its numbers show it ([`Error::Parameter`]).
+    pub fn restore(&mut self, state: &State) -> Result<()> {
+        self.method.restore(&self.scene.surroundings(), state)
+    }
+
+    /// Drops the memory that steps work with, which the next one takes anew; no result changes. For simulations that wait.
+    pub fn drop_workspace(&mut self) {
+        self.method.drop_workspace();
+    }
+
+    /// Questions about the wall since the start, of the simulation and those it was cloned from.
+    pub fn counters(&self) -> Counters {
+        self.method.counters()
     }
 
     /// The inserted centre line, sheath to tip.
@@ -137,17 +173,17 @@ impl Simulation {
 
     /// The vessel.
     pub fn wall(&self) -> &Wall {
-        &self.wall
+        &self.scene.wall
     }
 
     /// The device.
     pub fn device(&self) -> &Device {
-        &self.device
+        &self.scene.device
     }
 
     /// The sheath.
     pub fn sheath(&self) -> &Sheath {
-        &self.sheath
+        &self.scene.sheath
     }
 }
 

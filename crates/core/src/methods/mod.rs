@@ -2,10 +2,14 @@
 
 pub mod kirchhoff;
 pub mod li2011;
+mod state;
+
+pub use state::{Content, NodesState, State, check_inserted};
 
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
+use crate::contact::Counters;
 use crate::insertion::{Command, StepReport, Surroundings};
 use crate::rod::{PLAIN, TWISTED};
 use crate::shape::Shape;
@@ -13,10 +17,12 @@ use kirchhoff::{Kirchhoff, KirchhoffOptions};
 use li2011::{Li2011, Li2011Options, LinearSolver};
 
 /// A method keeps its own unknowns from step to step and moves them by commands.
+///
+/// What the next step depends on is its [`State`]; what it works with besides is a workspace, which may be dropped at any moment.
 pub trait Method: Send {
     /// Carries out one command and finds the equilibrium after it.
     ///
-    /// After an error the method is as it was before the command.
+    /// After an error the state is what it was before the command, to the bit.
     ///
     /// # Errors
     /// A command that the device or the method cannot follow (input), or an equilibrium not found (computation).
@@ -27,6 +33,26 @@ pub trait Method: Send {
 
     /// What the last step found.
     fn report(&self) -> &StepReport;
+
+    /// Questions about the wall since the method was made; those of the one it was cloned from are among them.
+    fn counters(&self) -> Counters {
+        Counters::default()
+    }
+
+    /// All that the next step depends on.
+    fn state(&self) -> State;
+
+    /// Goes on from `state`. After an error nothing has changed.
+    ///
+    /// # Errors
+    /// A state of another method, vessel or device, as far as that shows.
+    fn restore(&mut self, surroundings: &Surroundings<'_>, state: &State) -> Result<()>;
+
+    /// Drops what makes steps fast and no other: the next one makes it anew.
+    fn drop_workspace(&mut self) {}
+
+    /// The method in the same state.
+    fn boxed_clone(&self) -> Box<dyn Method>;
 }
 
 /// A method by name, with its options: the `[method]` table of a scene.
@@ -54,9 +80,9 @@ impl MethodChoice {
     /// The name used in scene files and results.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Kirchhoff(_) => "kirchhoff",
-            Self::Li2011Dense(_) => "li2011-dense",
-            Self::Li2011Banded(_) => "li2011-banded",
+            Self::Kirchhoff(_) => kirchhoff::NAME,
+            Self::Li2011Dense(_) => LinearSolver::Dense.method(),
+            Self::Li2011Banded(_) => LinearSolver::Banded.method(),
         }
     }
 

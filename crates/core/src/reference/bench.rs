@@ -181,7 +181,7 @@ impl Bench {
         let length = self.setup.length;
         let hand = HandMotion { from_mm: length, to_mm: length + advance, turn_rad: 0.0 };
         self.friction = Friction::new(coefficient);
-        let nothing = (&[][..], &Friction::default());
+        let nothing = (&[][..], &[][..]);
         self.friction.begin(&self.mesh.elements, &self.state, &self.mesh.points, nothing, hand);
         self.solve()
     }

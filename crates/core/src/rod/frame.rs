@@ -1,9 +1,11 @@
 //! Orthonormal triads of the nodes, their transport, and the reference twist between two of them.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Vec3;
 
 /// A triad: unit tangent `t` and two directions `u`, `v = t × u` across it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Tangent.
     pub t: Vec3,

@@ -4,12 +4,13 @@ use super::element::{ElementData, ElementState, mid_slope};
 use super::frame::{Frame, normalised, reference_twist, turn_parts};
 use super::layout::Layout;
 use crate::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// State of a rod of n elements: n + 1 nodes.
 ///
 /// Chords are kept beside positions, not as their differences: on a fine mesh the difference of two positions has
 /// lost the digits that curvature is made of.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RodState {
     /// Node triads. `t` is the tangent of the rod; `u`, `v` are the reference the angles are counted from.
     pub frames: Vec<Frame>,

@@ -109,6 +109,11 @@ impl WallQuery {
         Some((way_mm, triangle))
     }
 
+    /// Number of triangles.
+    pub fn triangles(&self) -> usize {
+        self.inward.len()
+    }
+
     /// The closest point of the wall if it is less than `reach_mm` away. `None` also for a point that is not finite.
     pub fn nearest(&self, point_mm: &Vec3, reach_mm: f64) -> Option<Nearest> {
         let reach = reach_mm.min(f64::MAX);

@@ -3,9 +3,10 @@
 //! A wall that yields lets a device through a vessel somewhat narrower than itself, and then there is nothing to tell. Where no
 //! equilibrium is found on the way, the room across the lumen says whether that is why.
 
-use super::{Kirchhoff, softest};
+use super::configuration::Configuration;
+use super::workspace::Tools;
+use super::{Environment, softest};
 use crate::contact::{FeltWall, WallContact};
-use crate::insertion::Surroundings;
 use crate::{PhysicalEnd, Vec3};
 
 /// How far off the wall, in radii, ways across begin.
@@ -17,24 +18,28 @@ const PIECES: usize = 4;
 /// From one of them the way goes on so much farther, mm.
 const ON_MM: f64 = 1e-3;
 
-impl<const C: usize> Kirchhoff<C> {
+impl<const C: usize> Tools<C> {
     /// The narrowest place at which the device presses on the wall and has less room across the lumen than its diameter.
-    pub(super) fn narrowest(&mut self, surroundings: &Surroundings<'_>) -> Option<PhysicalEnd> {
-        let mesh = &self.current.mesh;
+    pub(super) fn narrowest(
+        &mut self,
+        environment: &Environment<'_>,
+        at: &Configuration,
+    ) -> Option<PhysicalEnd> {
+        let Configuration { mesh, state } = at;
+        let felt = environment.felt;
         let mut contact = WallContact::new(
-            &self.felt,
+            felt,
             &mesh.points,
             &mut self.memory,
-            &mut self.current.friction,
-            softest(surroundings.device),
-            self.options.skip,
+            &mut self.friction,
+            softest(environment.surroundings.device),
+            environment.options.skip,
         );
         let mut least: Option<(f64, PhysicalEnd)> = None;
         for (index, point) in mesh.points.iter().enumerate() {
             let device_radius_mm = point.potential.radius_mm;
-            let Some(touch) = contact.touch(&mesh.elements, &self.current.state, index) else { continue };
-            let Some(lumen_radius_mm) = room_mm(&self.felt, &touch.contact.position_mm, device_radius_mm)
-            else {
+            let Some(touch) = contact.touch(&mesh.elements, &state.rod, index) else { continue };
+            let Some(lumen_radius_mm) = room_mm(felt, &touch.contact.position_mm, device_radius_mm) else {
                 continue;
             };
             let part = lumen_radius_mm / device_radius_mm;
@@ -83,9 +88,10 @@ fn facing_mm(felt: &FeltWall, from: &Vec3, way: &Vec3, reach_mm: f64) -> Option<
 mod tests {
     use super::*;
     use crate::device::Device;
-    use crate::insertion::{Command, Sheath, WallProperties};
+    use crate::insertion::{Command, Sheath, Surroundings, WallProperties};
     use crate::methods::Method;
-    use crate::methods::kirchhoff::KirchhoffOptions;
+    use crate::methods::kirchhoff::workspace::Workspace;
+    use crate::methods::kirchhoff::{Kirchhoff, KirchhoffOptions};
     use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, WallQuery};
 
     /// What is said of a wire of radius 0.4 mm that is pushed into a tube which narrows from 3 mm to `end_mm`.
@@ -107,12 +113,15 @@ mod tests {
             sheath: &sheath,
             device: &device,
         };
-        let mut wire =
-            Kirchhoff::<{ crate::rod::PLAIN }>::new(KirchhoffOptions::default(), &surroundings).unwrap();
-        for _ in 0..34 {
+        let options = KirchhoffOptions::default();
+        let mut wire = Kirchhoff::<{ crate::rod::PLAIN }>::new(options, &surroundings).unwrap();
+        for _ in 0..33 {
             wire.step(&surroundings, Command::advance(1.0)).unwrap();
         }
-        wire.narrowest(&surroundings)
+        let environment = Environment { surroundings, felt: &wire.felt, options: &wire.options };
+        let mut workspace = Workspace::<{ crate::rod::PLAIN }>::new(&environment, &wire.state);
+        workspace.carry_out(&environment, &wire.state, Command::advance(1.0)).unwrap();
+        workspace.tools.narrowest(&environment, &workspace.now)
     }
 
     #[test]

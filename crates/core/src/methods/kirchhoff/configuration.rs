@@ -1,39 +1,63 @@
-//! A device where it is: mesh, state, and the friction that it met on its way there.
+//! A device where it is: its state, and the mesh that belongs to it.
+
+use std::sync::Arc;
 
 use super::mesh::Mesh;
-use crate::contact::Friction;
+use super::state::KirchhoffState;
+use crate::device::Device;
 use crate::insertion::Sheath;
-use crate::rod::{Frame, RodState};
 
-/// What a step starts from and ends with.
-#[derive(Debug, Clone, Default)]
+/// What a sub-step ends with.
+#[derive(Debug, Clone)]
 pub(super) struct Configuration {
     pub(super) mesh: Mesh,
-    pub(super) state: RodState,
-    pub(super) friction: Friction,
+    /// Written to before anyone else has it; from then on it is shared and never changed.
+    pub(super) state: Arc<KirchhoffState>,
+}
+
+/// What a sub-step starts from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) state: &'a KirchhoffState,
 }
 
 impl Configuration {
     /// Nothing inserted.
-    pub(super) fn at(sheath: &Sheath, friction: f64) -> Self {
-        let mut configuration = Self { friction: Friction::new(friction), ..Self::default() };
-        configuration.mesh.from_tip_mm.push(0.0);
-        configuration.state.frames.push(Frame::new(sheath.direction, None));
-        configuration.state.angles.push(0.0);
-        configuration.state.positions.push(sheath.position_mm);
-        configuration
+    pub(super) fn at(sheath: &Sheath) -> Self {
+        let mut mesh = Mesh::default();
+        mesh.clear();
+        Self { mesh, state: Arc::new(KirchhoffState::at(sheath)) }
     }
 
-    /// Length inside the sheath's mouth, mm.
-    pub(super) fn inserted_mm(&self) -> f64 {
-        self.mesh.from_tip_mm[0]
+    /// Where the next sub-step starts.
+    pub(super) fn start(&self) -> Start<'_> {
+        Start { mesh: &self.mesh, state: &self.state }
+    }
+
+    /// Makes sure that the state is shared with nobody, and takes memory for up to `elements` elements and `points` contact points.
+    pub(super) fn own(&mut self, elements: usize, points: usize) {
+        self.mesh.reserve(elements, points);
+        Arc::make_mut(&mut self.state).reserve(elements, points);
+    }
+
+    /// The mesh, and the state to write to.
+    pub(super) fn parts(&mut self) -> (&mut Mesh, &mut KirchhoffState) {
+        (&mut self.mesh, Arc::make_mut(&mut self.state))
     }
 
     /// Pulls the device back to the sheath's mouth; the tail has the angle `tail_rad`.
     pub(super) fn withdraw(&mut self, tail_rad: f64) {
-        self.mesh.clear();
-        self.state.clear();
-        self.state.angles[0] = tail_rad;
-        self.friction.clear();
+        let (mesh, state) = self.parts();
+        mesh.clear();
+        state.withdraw(tail_rad);
     }
+}
+
+/// Elements and contact points of a whole device: most that a step works on.
+pub(super) fn largest(device: &Device, element_mm: f64) -> (usize, usize) {
+    let mut mesh = Mesh::default();
+    mesh.build(device, device.length_mm(), element_mm, 1.0);
+    // The first element may have more contact points than any other.
+    (mesh.elements.len() + 1, mesh.points.len() + super::mesh::MOST_POINTS)
 }

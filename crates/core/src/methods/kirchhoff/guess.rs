@@ -3,7 +3,7 @@
 //! The device slid along its own curve is the plain guess. Where the hand repeats its motion, what the last step changed on it is
 //! repeated too ([`Correction`]); a tip with a shape of its own may instead be carried by the device behind it.
 
-use super::configuration::Configuration;
+use super::configuration::Start;
 use super::mesh::Mesh;
 use super::repeat::Correction;
 use super::slide::carry;
@@ -29,8 +29,6 @@ pub(super) struct Guess {
     pub(super) shaped_mm: f64,
     slid: RodState,
     pub(super) other: RodState,
-    correction: Correction,
-    kept: Correction,
 }
 
 impl Guess {
@@ -43,18 +41,6 @@ impl Guess {
     pub(super) fn reserve(&mut self, elements: usize) {
         self.slid.reserve(elements);
         self.other.reserve(elements);
-        self.correction.reserve(elements);
-        self.kept.reserve(elements);
-    }
-
-    /// Keeps what has been learnt.
-    pub(super) fn keep(&mut self) {
-        self.kept.copy_from(&self.correction);
-    }
-
-    /// Goes back to what was kept.
-    pub(super) fn restore(&mut self) {
-        self.correction.copy_from(&self.kept);
     }
 
     /// Replaces the slid device in `state` by the best candidate. Where the tip's way is `blocked`, the one that carries the tip's
@@ -63,14 +49,15 @@ impl Guess {
         &mut self,
         newton: &Newton<C>,
         contact: &mut WallContact<'_>,
-        (now, mesh, state): (&Configuration, &Mesh, &mut RodState),
+        (start, mesh, state): (Start<'_>, &Mesh, &mut RodState),
         hand: HandMotion,
         blocked: bool,
     ) -> Quality {
         self.slid.copy_from(state);
         let elements = &mesh.elements;
-        if let Some(factor) = self.correction.repeats(hand) {
-            self.correction.apply(factor, elements, state);
+        let correction = &start.state.correction;
+        if let Some(factor) = correction.repeats(hand) {
+            correction.apply(factor, elements, state);
             if !contact.is_outside::<C>(elements, state) {
                 return Quality::Learnt;
             }
@@ -79,7 +66,7 @@ impl Guess {
         let outside = contact.is_outside::<C>(elements, state);
         if self.shaped_mm > 0.0 {
             self.other.copy_from(state);
-            carry((&now.mesh, &now.state), mesh, self.shaped_mm, hand.turn_rad, &mut self.other);
+            carry((start.mesh, &start.state.rod), mesh, self.shaped_mm, hand.turn_rad, &mut self.other);
             if !contact.is_outside::<C>(elements, &self.other)
                 && (outside
                     || blocked
@@ -98,8 +85,8 @@ impl Guess {
         state.copy_from(&self.slid);
     }
 
-    /// Learns from the equilibrium that was found.
-    pub(super) fn learn(&mut self, hand: HandMotion, found: &RodState) {
-        self.correction.learn(hand, &self.slid, found);
+    /// What an equilibrium that was found teaches.
+    pub(super) fn teach(&self, hand: HandMotion, found: &RodState, correction: &mut Correction) {
+        correction.learn(hand, &self.slid, found);
     }
 }

@@ -36,11 +36,11 @@ impl Mesh {
         self.points.clear();
     }
 
-    /// Takes memory for more elements and contact points.
+    /// Takes memory for up to `elements` elements and `points` contact points.
     pub(super) fn reserve(&mut self, elements: usize, points: usize) {
-        self.from_tip_mm.reserve(elements);
-        self.elements.reserve(elements);
-        self.points.reserve(points);
+        self.from_tip_mm.reserve((elements + 1).saturating_sub(self.from_tip_mm.len()));
+        self.elements.reserve(elements.saturating_sub(self.elements.len()));
+        self.points.reserve(points.saturating_sub(self.points.len()));
     }
 
     /// Meshes `inserted_mm` (above 0) of `device` with elements of `element_mm`.

@@ -14,6 +14,7 @@
 //! to the inserted length.
 
 mod blocked;
+mod command;
 mod configuration;
 mod guess;
 mod hold;
@@ -23,27 +24,26 @@ mod repeat;
 mod search;
 mod settle;
 mod slide;
+mod state;
 mod substep;
+mod workspace;
 
-use std::borrow::Cow;
+pub use state::KirchhoffState;
+
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::extension::{LEAVE_MM, left_through};
-use crate::contact::{FeltWall, KnownPoints, WallMemory};
+use crate::contact::{Counters, FeltWall};
 use crate::device::Device;
 use crate::insertion::{Command, StepReport, Surroundings};
-use crate::methods::Method;
+use crate::methods::{Content, Method, State};
 use crate::rod::Layout;
 use crate::shape::Shape;
-use crate::solve::Newton;
-use crate::{Error, PhysicalEnd, Result};
-use configuration::Configuration;
-use guess::Guess;
-use mesh::MOST_POINTS;
-use settle::Settle;
-use slide::Extension;
-use substep::Attempt;
+use crate::{Error, Result};
+use mesh::Mesh;
+use state::Belongs;
+use workspace::Workspace;
 
 /// Options of the exact rod.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -69,46 +69,24 @@ impl Default for KirchhoffOptions {
 const LARGEST_TOLERANCE: f64 = 1e-2;
 /// Most elements.
 const ELEMENT_LIMIT: f64 = 100_000.0;
-/// Retracting to within this of the sheath, mm, is retracting to it.
-const ZERO_LENGTH_MM: f64 = 1e-9;
-/// Most sub-steps that one command may be cut into, …
-const SUBSTEP_LIMIT: usize = 4096;
-/// … and the least part of it that one is.
-const LEAST_SHARE: f64 = 1e-4;
-/// Newton iterations that a command may take in all its sub-steps for every millimetre and every [`WORK_RAD`], those in vain
-/// included, before it comes to rest as it can: its cost is bounded.
-const WORK: f64 = 180.0;
-/// See [`WORK`], rad.
-const WORK_RAD: f64 = 0.1;
-/// … and never more than so many times what one solution may take.
-const WORK_OF_ONE: usize = 10;
-/// How often the last resort may find nothing in a command; after that what it comes to is taken whatever is left over.
-const RESORTS: usize = 6;
-/// A step is a jump if more than this part of the stored energy was set free.
-const JUMP: f64 = 0.02;
-/// Stored energy below which nothing is called a jump, mJ.
-const JUMP_FLOOR_MJ: f64 = 1e-6;
 
 /// The exact rod as an insertion method, with or without material angles.
 pub struct Kirchhoff<const C: usize> {
     options: KirchhoffOptions,
-    felt: FeltWall,
-    newton: Newton<C>,
-    current: Configuration,
-    /// The sub-step under way.
-    next: Configuration,
-    /// Where the command began, once its first sub-step is taken.
-    before: Configuration,
-    guess: Guess,
-    settle: Settle<C>,
-    extension: Extension,
-    memory: WallMemory,
-    /// What the points knew where the sub-step under way began, …
-    known_now: KnownPoints,
-    /// … and where the command did.
-    known_before: KnownPoints,
+    felt: Arc<FeltWall>,
+    state: Arc<KirchhoffState>,
+    /// That of the state, for those who ask.
     shape: Shape,
-    report: StepReport,
+    counters: Counters,
+    /// Made when the first command comes.
+    workspace: Option<Box<Workspace<C>>>,
+}
+
+/// What a step reads and does not change.
+struct Environment<'a> {
+    surroundings: Surroundings<'a>,
+    felt: &'a FeltWall,
+    options: &'a KirchhoffOptions,
 }
 
 impl<const C: usize> Kirchhoff<C> {
@@ -132,201 +110,71 @@ impl<const C: usize> Kirchhoff<C> {
         if options.max_iterations == 0 {
             return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
         }
-        let friction = surroundings.properties.largest_friction();
-        let nothing = Configuration::at(surroundings.sheath, friction);
+        let mut state = KirchhoffState::at(surroundings.sheath);
+        state.report.angles = Layout::<C>::TWIST;
         let felt = FeltWall::new(surroundings.wall, surroundings.device, surroundings.properties)?;
         let mut method = Self {
             options,
-            memory: WallMemory::new(&felt),
-            felt,
-            newton: Newton::new(1),
-            current: nothing.clone(),
-            next: nothing.clone(),
-            before: nothing,
-            guess: Guess::new(surroundings.device.shaped_mm()),
-            settle: Settle::default(),
-            extension: Extension::default(),
-            known_now: KnownPoints::default(),
-            known_before: KnownPoints::default(),
+            felt: Arc::new(felt),
+            state: Arc::new(state),
             shape: Shape::default(),
-            report: StepReport { converged: true, angles: Layout::<C>::TWIST, ..Default::default() },
+            counters: Counters::default(),
+            workspace: None,
         };
-        method.reserve(surroundings);
-        method.write_shape();
+        method.write_shape(&[0.0]);
         Ok(method)
     }
 
-    /// Goes back to where the command began, if sub-steps have been taken since.
-    fn go_back(&mut self, moved: bool) {
-        if moved {
-            std::mem::swap(&mut self.current, &mut self.before);
-        }
-        self.memory.restore(&self.known_before);
-        self.guess.restore();
+    /// The centre line of the state, with nodes at these arc lengths from the tip.
+    fn write_shape(&mut self, from_tip_mm: &[f64]) {
+        let rod = &self.state.rod;
+        self.shape.positions_mm.clone_from(&rod.positions);
+        self.shape.tangents.clear();
+        self.shape.tangents.extend(rod.frames.iter().map(|f| f.t));
+        self.shape.from_tip_mm.clear();
+        self.shape.from_tip_mm.extend_from_slice(from_tip_mm);
     }
+}
 
-    /// Takes memory for the whole device, so that steps take none.
-    fn reserve(&mut self, surroundings: &Surroundings<'_>) {
-        let device = surroundings.device;
-        let modulus = surroundings.properties.modulus_n_per_mm2;
-        let (mut elements, mut points) = (0, 0);
-        for configuration in [&mut self.current, &mut self.next, &mut self.before] {
-            let mesh = &mut configuration.mesh;
-            // The first element may have more contact points than any other.
-            mesh.build(device, device.length_mm(), self.options.element_mm, modulus);
-            (elements, points) = (mesh.elements.len() + 1, mesh.points.len() + MOST_POINTS);
-            mesh.reserve(1, MOST_POINTS);
-            mesh.clear();
-            configuration.state.reserve(elements);
-            configuration.friction.reserve(points);
+impl<const C: usize> Clone for Kirchhoff<C> {
+    /// Shares the wall and the state, and makes a workspace of its own with its first command.
+    fn clone(&self) -> Self {
+        Self {
+            options: self.options,
+            felt: Arc::clone(&self.felt),
+            state: Arc::clone(&self.state),
+            shape: self.shape.clone(),
+            counters: self.counters,
+            workspace: None,
         }
-        self.memory.reserve(points);
-        self.known_now.reserve(points);
-        self.known_before.reserve(points);
-        self.report.contacts.reserve(points);
-        self.newton.reserve(elements);
-        self.guess.reserve(elements);
-        self.settle.reserve(elements);
-        let nodes = self.current.mesh.from_tip_mm.capacity();
-        self.shape.positions_mm.reserve(nodes);
-        self.shape.tangents.reserve(nodes);
-        self.shape.from_tip_mm.reserve(nodes);
     }
 }
 
 impl<const C: usize> Method for Kirchhoff<C> {
     fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()> {
         if command == Command::default() {
-            (self.report.iterations, self.report.substeps) = (0, 0);
-            (self.report.dissipated_mj, self.report.jumped) = (0.0, false);
-            (self.report.relaxations, self.report.slides) = (0, 0);
+            Arc::make_mut(&mut self.state).report.rest();
             return Ok(());
         }
-        let tip = self.current.state.positions[self.current.state.elements()];
-        if command.advance_mm > 0.0
-            && let Some((opening, beyond)) = left_through(surroundings.wall, &tip)
-            && beyond + command.advance_mm > LEAVE_MM
-        {
-            return Err(left(opening, beyond));
-        }
-        let start = self.report.inserted_mm;
-        let target = (start + command.advance_mm).min(surroundings.device.length_mm());
-        let target = if target < ZERO_LENGTH_MM { 0.0 } else { target };
-        let (rotation, push, torque, energy) = {
-            let r = &self.report;
-            (r.rotation_rad, r.push_force_n, r.torque_nmm, r.energy.total())
+        let environment =
+            Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
+        let mut workspace = match self.workspace.take() {
+            Some(workspace) => workspace,
+            None => {
+                let workspace = Workspace::new(&environment, &self.state);
+                self.shape.reserve(workspace.most.0 + 1);
+                workspace
+            }
         };
-        self.memory.keep(&mut self.known_before);
-        self.guess.keep();
-        let (mut iterations, mut substeps, mut dissipated_mj) = (0, 0, 0.0);
-        let (mut relaxations, mut slides, mut imbalance, mut balanced) = (0, 0, 0.0f64, true);
-        let most = self.options.max_iterations;
-        let travel = (target - start).abs().max(command.rotate_rad.abs() / WORK_RAD).max(1.0);
-        let mut budget = ((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most));
-        let mut moved = false;
-        // Progress of the command, 0 to 1: advance and turn go together.
-        let mut done = 0.0f64;
-        let mut share = 1.0f64;
-        // Last resorts that found nothing.
-        let mut failures = 0;
-        let mut failure = Cow::from("the way is too long for one step");
-        while done < 1.0 {
-            let rest = 1.0 - done;
-            // Where the way is lost, the device is let come to rest as far as the command goes; if it does not, in parts; and in the end
-            // wherever it is.
-            let relax = budget == 0 || share < LEAST_SHARE;
-            if relax && (failures == 0 || failures == RESORTS) {
-                share = rest;
-            }
-            let part = rest.min(share);
-            let wanted = (target - start) * part;
-            let mut blocked = false;
-            self.extension = Extension::default();
-            if wanted > 0.0 {
-                let last = self.current.state.elements();
-                let (tip, tangent) = (self.current.state.positions[last], self.current.state.frames[last].t);
-                let radius = surroundings.device.section_at(0.0).radius_mm;
-                let way = self.extension.trace((&self.felt, &mut self.memory), tip, tangent, radius, wanted);
-                blocked = way < (1.0 - 1e-9) * wanted;
-            }
-            // A rest that is rounding is none.
-            let next = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
-            let inserted = if next == 1.0 { target } else { start + (target - start) * next };
-            let tail = rotation + command.rotate_rad * next;
-            substeps += 1;
-            if inserted == 0.0 {
-                self.current.withdraw(tail);
-                break;
-            }
-            let resort = if relax { Some(failures == RESORTS) } else { None };
-            let attempt = Attempt { inserted_mm: inserted, tail_rad: tail, blocked, resort };
-            match self.try_step(surroundings, attempt, &mut budget) {
-                Ok(found) => {
-                    iterations += found.iterations;
-                    relaxations += u32::from(relax);
-                    slides += found.slides;
-                    if relax {
-                        imbalance = imbalance.max(found.residual.max(found.unsettled));
-                    }
-                    balanced &= found.balanced;
-                    dissipated_mj += found.dissipated_mj;
-                    let state = &self.next.state;
-                    if let Some((opening, beyond)) =
-                        left_through(surroundings.wall, &state.positions[state.elements()])
-                        && beyond > LEAVE_MM
-                    {
-                        self.go_back(moved);
-                        return Err(left(opening, beyond));
-                    }
-                    std::mem::swap(&mut self.current, &mut self.next);
-                    if !moved {
-                        std::mem::swap(&mut self.before, &mut self.next);
-                        moved = true;
-                    }
-                    done = next;
-                    share = (2.0 * part).min(1.0);
-                }
-                Err(reason) => {
-                    failure = reason;
-                    share = 0.25 * part;
-                    if relax {
-                        budget = 0;
-                        failures += 1;
-                    }
-                }
-            }
-            if done < 1.0 && (failures > RESORTS || substeps > SUBSTEP_LIMIT) {
-                self.go_back(moved);
-                return Err(Error::Computation(format!(
-                    "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
-                )));
-            }
+        let done = workspace.carry_out(&environment, &self.state, command);
+        self.counters.add(&std::mem::take(&mut workspace.tools.counters));
+        if done.is_ok() {
+            std::mem::swap(&mut self.state, &mut workspace.now.state);
+            std::mem::swap(&mut workspace.mesh, &mut workspace.now.mesh);
+            self.write_shape(&workspace.mesh.from_tip_mm);
         }
-        // No equilibrium: unless the vessel is too narrow to go on, that is told.
-        if !balanced
-            && command.advance_mm > 0.0
-            && let Some(end) = self.narrowest(surroundings)
-        {
-            self.go_back(moved);
-            return Err(Error::End(end));
-        }
-        self.report.rotation_rad = rotation + command.rotate_rad;
-        self.report.iterations = iterations as u32;
-        self.report.substeps = substeps as u32;
-        self.report.dissipated_mj = dissipated_mj;
-        (self.report.relaxations, self.report.slides, self.report.imbalance) =
-            (relaxations, slides, imbalance);
-        self.report.converged = balanced;
-        self.write_report(surroundings);
-        self.write_shape();
-        // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between
-        // what it is at the ends.
-        let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
-        let work = least(push, self.report.push_force_n, target - start)
-            + least(torque, self.report.torque_nmm, command.rotate_rad);
-        let lost = work - self.report.dissipated_mj - (self.report.energy.total() - energy);
-        self.report.jumped = lost > JUMP * energy.max(self.report.energy.total()).max(JUMP_FLOOR_MJ);
-        Ok(())
+        self.workspace = Some(workspace);
+        done
     }
 
     fn shape(&self) -> &Shape {
@@ -334,13 +182,62 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn report(&self) -> &StepReport {
-        &self.report
+        &self.state.report
+    }
+
+    fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    fn state(&self) -> State {
+        State::new(NAME, Content::Kirchhoff(Arc::clone(&self.state)))
+    }
+
+    fn restore(&mut self, surroundings: &Surroundings<'_>, state: &State) -> Result<()> {
+        let Content::Kirchhoff(state) = state.of(NAME)? else { return Err(state.of_another(NAME)) };
+        let inserted_mm = state.report.inserted_mm;
+        crate::methods::check_inserted(inserted_mm, surroundings.device)?;
+        let environment =
+            Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
+        let mut mesh = Mesh::default();
+        meshed(&environment, inserted_mm, &mut mesh);
+        state.check(&Belongs {
+            felt: &self.felt,
+            sheath: surroundings.sheath,
+            elements: mesh.elements.len(),
+            points: mesh.points.len(),
+            angles: Layout::<C>::TWIST,
+            rubs: surroundings.properties.rubs(),
+        })?;
+        self.state = Arc::clone(state);
+        self.write_shape(&mesh.from_tip_mm);
+        if let Some(workspace) = &mut self.workspace {
+            workspace.mesh = mesh;
+        }
+        Ok(())
+    }
+
+    fn drop_workspace(&mut self) {
+        self.workspace = None;
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Method> {
+        Box::new(self.clone())
     }
 }
 
-/// The tip would be farther beyond an opening than anything is known.
-fn left(opening: usize, beyond_mm: f64) -> Error {
-    Error::End(PhysicalEnd::Left { opening, beyond_mm, limit_mm: LEAVE_MM })
+/// The name of the method in scenes and states.
+pub(crate) const NAME: &str = "kirchhoff";
+
+/// Meshes what is inserted.
+fn meshed(environment: &Environment<'_>, inserted_mm: f64, mesh: &mut Mesh) {
+    let surroundings = &environment.surroundings;
+    if inserted_mm == 0.0 {
+        mesh.clear();
+    } else {
+        let modulus = surroundings.properties.modulus_n_per_mm2;
+        mesh.build(surroundings.device, inserted_mm, environment.options.element_mm, modulus);
+    }
 }
 
 /// Least bending stiffness of a device, N·mm².

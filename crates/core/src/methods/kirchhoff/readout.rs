@@ -1,46 +1,42 @@
 //! What a step tells: energies, contacts, and what the hand feels.
 
-use super::{Kirchhoff, softest};
+use super::configuration::Configuration;
+use super::workspace::Tools;
+use super::{Environment, softest};
 use crate::contact::WallContact;
 use crate::contact::extension::left_through;
-use crate::insertion::{Energy, Surroundings};
+use crate::insertion::Energy;
 use crate::rod::{Clamp, Layout};
 
-impl<const C: usize> Kirchhoff<C> {
-    /// The centre line at the current state.
-    pub(super) fn write_shape(&mut self) {
-        self.shape.positions_mm.clone_from(&self.current.state.positions);
-        self.shape.tangents.clear();
-        self.shape.tangents.extend(self.current.state.frames.iter().map(|f| f.t));
-        self.shape.from_tip_mm.clone_from(&self.current.mesh.from_tip_mm);
-    }
-
-    /// Read-outs at the current state.
-    pub(super) fn write_report(&mut self, surroundings: &Surroundings<'_>) {
-        let report = &mut self.report;
+impl<const C: usize> Tools<C> {
+    /// Read-outs at a configuration, that of the last sub-step.
+    pub(super) fn write_report(&mut self, environment: &Environment<'_>, at: &mut Configuration) {
+        let surroundings = &environment.surroundings;
+        let (mesh, state) = at.parts();
+        let (rod, report) = (&state.rod, &mut state.report);
         report.contacts.clear();
         report.max_penetration_mm = 0.0;
-        report.inserted_mm = self.current.mesh.from_tip_mm[0];
+        report.inserted_mm = mesh.from_tip_mm[0];
         report.tip_rotation_rad = report.rotation_rad;
-        let tip = self.current.state.positions[self.current.state.elements()];
+        let tip = rod.positions[rod.elements()];
         report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening);
-        if self.current.mesh.elements.is_empty() {
+        if mesh.elements.is_empty() {
             report.energy = Energy::default();
             (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
             return;
         }
         let mut contact = WallContact::new(
-            &self.felt,
-            &self.current.mesh.points,
+            environment.felt,
+            &mesh.points,
             &mut self.memory,
-            &mut self.current.friction,
+            &mut self.friction,
             softest(surroundings.device),
-            self.options.skip,
+            environment.options.skip,
         );
         let stored = self.newton.assembly.energy;
         report.energy = Energy { bend: stored.bend, twist: stored.twist, wall: 0.0 };
-        for index in 0..self.current.mesh.points.len() {
-            let Some(touch) = contact.touch(&self.current.mesh.elements, &self.current.state, index) else {
+        for index in 0..mesh.points.len() {
+            let Some(touch) = contact.touch(&mesh.elements, rod, index) else {
                 continue;
             };
             report.energy.wall += touch.energy_mj;
@@ -48,14 +44,14 @@ impl<const C: usize> Kirchhoff<C> {
             report.contacts.push(touch.contact);
         }
 
-        let clamp = Clamp::new::<C>(&self.newton.start_residual, &self.current.state);
-        let frame = self.current.state.material_frame(0);
-        let data = &self.current.mesh.elements[0];
+        let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
+        let frame = rod.material_frame(0);
+        let data = &mesh.elements[0];
         let rest = frame.u * data.rest_curvature[0][0] + frame.v * data.rest_curvature[0][1];
         report.push_force_n = clamp.push_force(&frame.t, data.bending[0], data.torsion[0], &rest);
         report.torque_nmm = clamp.torque;
         if Layout::<C>::TWIST {
-            report.tip_rotation_rad += self.current.state.twist();
+            report.tip_rotation_rad += rod.twist();
         }
     }
 }

@@ -6,6 +6,7 @@
 //! on the way there, and Newton's method takes half the iterations.
 
 use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::contact::HandMotion;
@@ -13,7 +14,7 @@ use crate::rod::element::mid_slope;
 use crate::rod::{ElementData, Frame, RodState};
 
 /// How an equilibrium differed from the slid device in an element and its second node.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Departure {
     /// Change of the node's tangent, in the triad of the slid device.
     tangent: Vec3,
@@ -26,7 +27,7 @@ struct Departure {
 }
 
 /// What the last step changed on the slid device.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Correction {
     /// Advance, mm, and turn, rad, of the step.
     motion: [f64; 2],
@@ -59,10 +60,10 @@ impl Correction {
         self.departures.reserve(elements);
     }
 
-    /// Copies another without allocating.
-    pub(super) fn copy_from(&mut self, other: &Self) {
-        self.motion = other.motion;
-        self.departures.clone_from(&other.departures);
+    /// Forgets all. Keeps the memory.
+    pub(super) fn clear(&mut self) {
+        self.motion = [0.0; 2];
+        self.departures.clear();
     }
 
     /// Remembers the way from the slid device to the equilibrium that was found.

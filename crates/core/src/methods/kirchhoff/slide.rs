@@ -51,6 +51,7 @@ impl Extension {
         wanted_mm: f64,
     ) -> f64 {
         self.curvature = Vec3::zeros();
+        memory.leave_place();
         let at_tip = memory.nearness(wall, &tip, radius_mm).map_or(radius_mm, |near| near.value_mm());
         let touch = at_tip.clamp(SUNK * radius_mm, radius_mm);
         // Out of a soft wall that it has sunk into the tip may come in more than one piece.

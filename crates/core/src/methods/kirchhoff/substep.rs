@@ -2,12 +2,13 @@
 
 use std::borrow::Cow;
 
+use super::configuration::{Configuration, Start};
 use super::guess::Quality;
 use super::search::Search;
 use super::slide::slide;
-use super::{Kirchhoff, softest};
-use crate::contact::{Counters, HandMotion, SETTLED, WallContact};
-use crate::insertion::Surroundings;
+use super::workspace::Tools;
+use super::{Environment, meshed, softest};
+use crate::contact::{HandMotion, SETTLED, WallContact};
 use crate::rod::Supports;
 
 /// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, …
@@ -48,69 +49,48 @@ pub(super) struct Attempt {
     pub(super) resort: Option<bool>,
 }
 
-impl<const C: usize> Kirchhoff<C> {
-    /// One sub-step: slides and solves on `self.next`; the current state, and what its points know of the wall, is as before if that
-    /// fails. Newton iterations are taken from `budget`.
+impl<const C: usize> Tools<C> {
+    /// One sub-step from `start`: slides and solves on `next`, which is worth nothing if that fails. Newton iterations are taken from
+    /// `budget`.
     pub(super) fn try_step(
         &mut self,
-        surroundings: &Surroundings<'_>,
+        environment: &Environment<'_>,
+        start: Start<'_>,
         attempt: Attempt,
+        next: &mut Configuration,
         budget: &mut usize,
     ) -> std::result::Result<Found, Cow<'static, str>> {
-        self.memory.keep(&mut self.known_now);
-        let found = self.solve_step(surroundings, attempt, budget);
-        if found.is_err() {
-            self.memory.restore(&self.known_now);
-        }
-        found
-    }
-
-    fn solve_step(
-        &mut self,
-        surroundings: &Surroundings<'_>,
-        attempt: Attempt,
-        budget: &mut usize,
-    ) -> std::result::Result<Found, Cow<'static, str>> {
+        let (surroundings, options) = (&environment.surroundings, environment.options);
         let Attempt { inserted_mm, tail_rad, blocked, resort } = attempt;
         let relax = resort.is_some();
-        let (modulus, tolerance) = (surroundings.properties.modulus_n_per_mm2, self.options.tolerance);
-        let (now, next) = (&self.current, &mut self.next);
-        next.mesh.build(surroundings.device, inserted_mm, self.options.element_mm, modulus);
-        slide(&now.mesh, &now.state, &self.extension, &next.mesh, &mut next.state);
-        let hand = HandMotion {
-            from_mm: now.inserted_mm(),
-            to_mm: inserted_mm,
-            turn_rad: tail_rad - now.state.angles[0],
-        };
-        next.friction.begin(
-            &next.mesh.elements,
-            &next.state,
-            &next.mesh.points,
-            (&now.mesh.points, &now.friction),
-            hand,
-        );
-        next.state.angles[0] = tail_rad;
-        let elements = next.mesh.elements.len();
+        let (mesh, after) = next.parts();
+        meshed(environment, inserted_mm, mesh);
+        let rod = &mut after.rod;
+        slide(start.mesh, &start.state.rod, &self.extension, mesh, rod);
+        let from_mm = start.mesh.from_tip_mm[0];
+        let hand = HandMotion { from_mm, to_mm: inserted_mm, turn_rad: tail_rad - start.state.rod.angles[0] };
+        let before = (&start.mesh.points[..], &start.state.forces[..]);
+        self.friction.begin(&mesh.elements, rod, &mesh.points, before, hand);
+        rod.angles[0] = tail_rad;
+        let elements = mesh.elements.len();
         self.newton.resize(elements);
-        let advance = inserted_mm - now.inserted_mm();
-        self.memory.slide(&now.mesh.points, &next.mesh.points, advance);
+        self.memory.begin(&start.state.known, &start.mesh.points, &mesh.points, inserted_mm - from_mm);
         let mut contact = WallContact::new(
-            &self.felt,
-            &next.mesh.points,
+            environment.felt,
+            &mesh.points,
             &mut self.memory,
-            &mut next.friction,
+            &mut self.friction,
             softest(surroundings.device),
-            self.options.skip,
+            options.skip,
         );
-        let candidates = (now, &next.mesh, &mut next.state);
+        let candidates = (start, &*mesh, &mut *rod);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let near = quality != Quality::Beyond;
-        let held =
-            near && self.guess.hold(&mut self.newton, &mut contact, &supports, &next.mesh, &mut next.state);
+        let held = near && self.guess.hold(&mut self.newton, &mut contact, &supports, mesh, rod);
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
-        let data = &next.mesh.elements[elements - 1];
-        let element_stiffness = data.bending[2] / self.options.element_mm.powi(4);
+        let data = &mesh.elements[elements - 1];
+        let element_stiffness = data.bending[2] / options.element_mm.powi(4);
         let stiffest = surroundings.properties.stiffest_n_per_mm2();
         let softest = (SOFTEST * element_stiffness / stiffest).min(1.0);
         let mut search = Search {
@@ -119,12 +99,12 @@ impl<const C: usize> Kirchhoff<C> {
             guess: &mut self.guess,
             contact: &mut contact,
             supports: &mut supports,
-            elements: &next.mesh.elements,
-            state: &mut next.state,
+            elements: &mesh.elements,
+            state: rod,
             softest,
             rubs: surroundings.properties.rubs(),
-            tolerance,
-            max_iterations: self.options.max_iterations,
+            tolerance: options.tolerance,
+            max_iterations: options.max_iterations,
             budget: (!relax).then_some(budget),
             iterations: usize::from(held),
             slides: 0,
@@ -136,11 +116,15 @@ impl<const C: usize> Kirchhoff<C> {
         let balanced = found.converged && unsettled < SETTLED;
         let least = if resort == Some(true) { f64::MAX } else { AT_REST };
         let at_rest = balanced || (relax && found.residual <= least);
-        let passed = at_rest && contact.passes_through(&next.mesh.elements, &next.state);
+        let passed = at_rest && contact.passes_through(&mesh.elements, rod);
         let nodes = elements as u64 + 1;
-        let (solved, frozen) = if iterations > 0 { (nodes, 0) } else { (0, nodes) };
         let counted = contact.count();
-        self.report.counters.add(&Counters { nodes_solved: solved, nodes_frozen: frozen, ..counted });
+        self.counters.add(&counted);
+        if iterations > 0 {
+            self.nodes_solved += nodes;
+        } else {
+            self.nodes_frozen += nodes;
+        }
         if !at_rest {
             if found.converged {
                 return Err(UNSETTLED.into());
@@ -150,8 +134,10 @@ impl<const C: usize> Kirchhoff<C> {
         if passed {
             return Err(PASSED.into());
         }
-        self.guess.learn(hand, &next.state);
-        let dissipated_mj = next.friction.dissipated_mj(&next.mesh.elements, &next.state, &next.mesh.points);
+        self.guess.teach(hand, rod, &mut after.correction);
+        let dissipated_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
+        self.friction.keep(&mut after.forces);
+        self.memory.keep(&mut after.known);
         Ok(Found { iterations, slides, dissipated_mj, residual: found.residual, unsettled, balanced })
     }
 }

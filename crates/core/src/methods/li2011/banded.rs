@@ -25,7 +25,7 @@ struct Elimination {
 }
 
 /// Reusable memory of the solve.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Workspace {
     eliminations: Vec<Elimination>,
 }

@@ -16,7 +16,7 @@ use super::chain::{Chain, PlaneContact};
 use super::{banded, dense};
 use crate::device::Device;
 use crate::insertion::{Command, Contact, Energy, StepReport, Surroundings};
-use crate::methods::Method;
+use crate::methods::{Content, Method, State, check_inserted};
 use crate::shape::Shape;
 use crate::vessel::WallQuery;
 use crate::{Error, Result, Vec3};
@@ -64,22 +64,37 @@ const ELEMENT_LIMIT_BANDED: f64 = 1_000_000.0;
 const ZERO_LENGTH_MM: f64 = 1e-9;
 
 /// The paper's method as an insertion: see the [module docs](super) for what it leaves out.
+#[derive(Debug, Clone)]
 pub struct Li2011 {
     options: Li2011Options,
     solver: LinearSolver,
-    shape: Shape,
-    report: StepReport,
+    state: Li2011State,
+    // The rest is worked with and made anew by every step.
     chain: Chain,
     workspace: banded::Workspace,
     from_tip_mm: Vec<f64>,
     positions_mm: Vec<Vec3>,
     tangents: Vec<Vec3>,
-    /// The wall that each node is beyond in the last equilibrium, **tip first**: so nodes keep their index.
+}
+
+/// All that the next step of the paper's method depends on.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Li2011State {
+    shape: Shape,
+    report: StepReport,
+    /// The wall that each node is beyond, **tip first**: so nodes keep their index.
     beyond: Vec<Option<Plane>>,
 }
 
+impl Li2011State {
+    /// What the step that led here told.
+    pub fn report(&self) -> &StepReport {
+        &self.report
+    }
+}
+
 /// The plane of a wall triangle, offset by the device's radius.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct Plane {
     normal: Vec3,
     offset_mm: f64,
@@ -150,8 +165,11 @@ impl Li2011 {
         Ok(Self {
             options,
             solver,
-            shape,
-            report: StepReport { converged: true, ..Default::default() },
+            state: Li2011State {
+                shape,
+                report: StepReport { converged: true, ..Default::default() },
+                beyond: Vec::new(),
+            },
             chain: Chain {
                 start_mm: sheath.position_mm,
                 start_tangent: sheath.direction,
@@ -162,7 +180,6 @@ impl Li2011 {
             from_tip_mm: Vec::new(),
             positions_mm: Vec::new(),
             tangents: Vec::new(),
-            beyond: Vec::new(),
         })
     }
 
@@ -180,7 +197,7 @@ impl Li2011 {
         self.positions_mm.clear();
         let mut element = 0;
         for &s in &self.from_tip_mm[1..] {
-            self.positions_mm.push(on_curve(&self.shape, s, &mut element) + displacement);
+            self.positions_mm.push(on_curve(&self.state.shape, s, &mut element) + displacement);
         }
 
         self.chain.lengths_mm.clear();
@@ -200,7 +217,7 @@ impl Li2011 {
         let nodes = self.positions_mm.len();
         for (index, x) in self.positions_mm.iter().enumerate() {
             let radius_mm = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
-            let before = self.beyond.get(nodes - 1 - index).copied().flatten();
+            let before = self.state.beyond.get(nodes - 1 - index).copied().flatten();
             if let Some(Plane { normal, offset_mm, triangle, .. }) =
                 Plane::beyond(surroundings.query, x, radius_mm).or(before)
             {
@@ -231,15 +248,15 @@ impl Li2011 {
     /// Step 6, and the read-outs.
     fn update(&mut self, surroundings: &Surroundings<'_>, command: Command) {
         let sheath = surroundings.sheath;
-        self.shape.positions_mm.clear();
-        self.shape.positions_mm.push(sheath.position_mm);
-        self.shape.positions_mm.extend_from_slice(&self.positions_mm);
-        self.shape.tangents.clear();
-        self.shape.tangents.push(sheath.direction);
-        self.shape.tangents.extend_from_slice(&self.tangents);
-        self.shape.from_tip_mm.clone_from(&self.from_tip_mm);
+        let Li2011State { shape, report, beyond } = &mut self.state;
+        shape.positions_mm.clear();
+        shape.positions_mm.push(sheath.position_mm);
+        shape.positions_mm.extend_from_slice(&self.positions_mm);
+        shape.tangents.clear();
+        shape.tangents.push(sheath.direction);
+        shape.tangents.extend_from_slice(&self.tangents);
+        shape.from_tip_mm.clone_from(&self.from_tip_mm);
 
-        let report = &mut self.report;
         report.inserted_mm = self.from_tip_mm[0];
         report.rotation_rad += command.rotate_rad;
         // Without twist the tip turns with the hand.
@@ -252,14 +269,14 @@ impl Li2011 {
         report.iterations = 1;
 
         report.max_penetration_mm = 0.0;
-        self.beyond.clear();
+        beyond.clear();
         for (x, s) in self.positions_mm.iter().zip(&self.from_tip_mm[1..]).rev() {
             let plane = Plane::beyond(surroundings.query, x, surroundings.device.section_at(*s).radius_mm);
             report.max_penetration_mm = plane.map_or(0.0, |p| p.depth_mm).max(report.max_penetration_mm);
-            self.beyond.push(plane);
+            beyond.push(plane);
         }
         let nodes = self.positions_mm.len();
-        let reached = (1..=nodes).filter_map(|node| Some((node, self.beyond[nodes - node]?.triangle)));
+        let reached = (1..=nodes).filter_map(|node| Some((node, beyond[nodes - node]?.triangle)));
         report.converged = self.chain.contacts.iter().map(|c| (c.node, c.triangle)).eq(reached);
 
         report.contacts.clear();
@@ -273,7 +290,7 @@ impl Li2011 {
                 normal: contact.normal,
                 force_n,
                 friction_n: crate::Vec3::zeros(),
-                penetration_mm: self.beyond[nodes - contact.node].map_or(0.0, |plane| plane.depth_mm),
+                penetration_mm: beyond[nodes - contact.node].map_or(0.0, |plane| plane.depth_mm),
                 triangle: contact.triangle,
             });
         }
@@ -290,7 +307,7 @@ impl Li2011 {
 
 impl Method for Li2011 {
     fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()> {
-        let inserted_mm = self.report.inserted_mm + command.advance_mm;
+        let inserted_mm = self.state.report.inserted_mm + command.advance_mm;
         let inserted_mm = if inserted_mm < ZERO_LENGTH_MM { 0.0 } else { inserted_mm };
         self.translate(surroundings.device, inserted_mm, command.advance_mm);
         self.collide(surroundings);
@@ -300,11 +317,48 @@ impl Method for Li2011 {
     }
 
     fn shape(&self) -> &Shape {
-        &self.shape
+        &self.state.shape
     }
 
     fn report(&self) -> &StepReport {
-        &self.report
+        &self.state.report
+    }
+
+    fn state(&self) -> State {
+        State::new(self.solver.method(), Content::Li2011(Box::new(self.state.clone())))
+    }
+
+    fn restore(&mut self, surroundings: &Surroundings<'_>, state: &State) -> Result<()> {
+        let name = self.solver.method();
+        let Content::Li2011(state) = state.of(name)? else { return Err(state.of_another(name)) };
+        let inserted_mm = state.report.inserted_mm;
+        check_inserted(inserted_mm, surroundings.device)?;
+        crate::insertion::nodes_from_tip(inserted_mm, self.options.element_mm, &mut self.from_tip_mm);
+        let (shape, nodes) = (&state.shape, self.from_tip_mm.len());
+        let moved = shape.positions_mm.first() != Some(&surroundings.sheath.position_mm)
+            || shape.tangents.first() != Some(&surroundings.sheath.direction);
+        let beyond = [0, nodes - 1].contains(&state.beyond.len());
+        if shape.from_tip_mm != self.from_tip_mm || shape.tangents.len() != nodes || !beyond || moved {
+            let mend =
+                format!("{nodes} nodes are in this vessel from this sheath: restore a state of this scene");
+            return Err(Error::parameter("state.nodes", shape.len(), mend));
+        }
+        self.state.clone_from(state);
+        Ok(())
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Method> {
+        Box::new(self.clone())
+    }
+}
+
+impl LinearSolver {
+    /// Name of the method in scenes and states.
+    pub(crate) fn method(self) -> &'static str {
+        match self {
+            Self::Dense => "li2011-dense",
+            Self::Banded => "li2011-banded",
+        }
     }
 }
 

@@ -1,0 +1,252 @@
+//! The state of a run in a file, from which another run goes on.
+//!
+//! One line of text names the format, one of JSON says what the state belongs to, and the state follows in bytes that keep every bit of a
+//! number. A hash of it all is at the end: a file that is not whole is told from one that is.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use endowire_core::insertion::{Command, Simulation, State};
+use endowire_core::scene::Scene;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::whole;
+use crate::failure::Failure;
+
+/// The first line of a saved state, and its beginning in every version.
+const FORMAT: &str = "endowire state 1";
+const ANY_FORMAT: &str = "endowire state ";
+/// Bytes of the hash at the end.
+const HASH_BYTES: usize = 32;
+
+/// What a state belongs to: hashes of all that its steps depended on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Parts {
+    vessel: String,
+    wall: String,
+    device: String,
+    sheath: String,
+    method: String,
+}
+
+impl Parts {
+    /// Those of a simulation of `scene`.
+    fn new(scene: &Scene, simulation: &Simulation) -> Self {
+        let json = |value: Result<Vec<u8>, serde_json::Error>| hash(value.unwrap_or_default());
+        let mesh = simulation.wall().mesh();
+        let numbers = mesh.vertices_mm.iter().flat_map(|v| v.iter().flat_map(|c| c.to_le_bytes()));
+        let indices = mesh.triangles.iter().flatten().flat_map(|index| index.to_le_bytes());
+        let sheath = simulation.sheath();
+        let place = sheath.position_mm.iter().chain(&sheath.direction).flat_map(|c| c.to_le_bytes());
+        Self {
+            vessel: hash(numbers.chain(indices).collect()),
+            wall: json(serde_json::to_vec(&scene.vessel.wall)),
+            device: json(serde_json::to_vec(simulation.device().sections())),
+            sheath: hash(place.collect()),
+            method: json(serde_json::to_vec(&scene.method)),
+        }
+    }
+
+    /// What differs from `other`, in words.
+    fn differing(&self, other: &Self) -> Vec<&'static str> {
+        let pairs = [
+            ("the vessel", &self.vessel, &other.vessel),
+            ("the properties of its wall (vessel.wall)", &self.wall, &other.wall),
+            ("the device", &self.device, &other.device),
+            ("the sheath", &self.sheath, &other.sheath),
+            ("the method or its options", &self.method, &other.method),
+        ];
+        pairs.into_iter().filter(|(_, a, b)| a != b).map(|(name, ..)| name).collect()
+    }
+}
+
+/// Of the commands that were carried out.
+fn script_hash(done: &[Command]) -> String {
+    let numbers = done.iter().flat_map(|c| [c.advance_mm, c.rotate_rad]);
+    hash(numbers.flat_map(f64::to_le_bytes).collect())
+}
+
+fn hash(bytes: Vec<u8>) -> String {
+    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// What is known of a run while it goes on, beside the state.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(crate) struct Course {
+    /// Steps carried out.
+    pub(crate) steps: usize,
+    /// Time of the simulation, s.
+    pub(crate) step_time_s: f64,
+    /// Deepest penetration of the wall in any step, mm.
+    pub(crate) max_penetration_mm: f64,
+    /// Whether every step met its convergence test.
+    pub(crate) converged: bool,
+}
+
+impl Course {
+    /// Of a run that begins.
+    pub(crate) fn begin() -> Self {
+        Self { steps: 0, step_time_s: 0.0, max_penetration_mm: 0.0, converged: true }
+    }
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Header {
+    version: String,
+    git_revision: String,
+    scene: String,
+    course: Course,
+    parts: Parts,
+    script: String,
+}
+
+/// A state that was read.
+#[derive(Debug)]
+pub(crate) struct Saved {
+    path: PathBuf,
+    header: Header,
+    state: State,
+}
+
+impl Saved {
+    /// Reads a file that [`Saver`] has written.
+    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+        let refuse = |what: &str| {
+            Failure::Input(format!(
+                "--resume {}: {what}: give a file that --save-state has written",
+                path.display()
+            ))
+        };
+        let bytes = endowire_core::file::read(path, u64::MAX)?;
+        let first = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
+        if first != FORMAT.as_bytes() {
+            return Err(match std::str::from_utf8(first) {
+                Ok(line) if line.starts_with(ANY_FORMAT) => {
+                    refuse(&format!("its format is \"{line}\", and this version reads \"{FORMAT}\""))
+                }
+                _ => refuse("is no saved state"),
+            });
+        }
+        let Some((body, end)) = bytes.split_last_chunk::<HASH_BYTES>().filter(|(b, _)| b.len() > first.len())
+        else {
+            return Err(refuse("is not whole"));
+        };
+        if Sha256::digest(body).as_slice() != end {
+            return Err(refuse("is not whole or was changed"));
+        }
+        let rest = &body[first.len() + 1..];
+        let line = rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len());
+        let header = serde_json::from_slice(&rest[..line]).map_err(|e| refuse(&e.to_string()))?;
+        let state = rest.get(line + 1..).unwrap_or_default();
+        let state = postcard::from_bytes(state).map_err(|e| refuse(&e.to_string()))?;
+        Ok(Self { path: path.to_path_buf(), header, state })
+    }
+
+    /// What is known of the run up to the state.
+    pub(crate) fn course(&self) -> Course {
+        self.header.course
+    }
+
+    /// Takes the simulation of a scene, at its start, to the state, if it was saved in the same scene.
+    pub(crate) fn restore(
+        &self,
+        scene: &Scene,
+        simulation: &mut Simulation,
+        commands: &[Command],
+    ) -> Result<(), Failure> {
+        let refuse = |what: String| Failure::Input(format!("--resume {}: {what}", self.path.display()));
+        let steps = self.header.course.steps;
+        let Some(done) = commands.get(..steps) else {
+            return Err(refuse(format!(
+                "it was saved after step {steps}, and the script has {} steps: give the scene that it was saved in ({})",
+                commands.len(),
+                self.header.scene
+            )));
+        };
+        let mut differing = self.header.parts.differing(&Parts::new(scene, simulation));
+        if self.header.script != script_hash(done) {
+            differing.push("the part of the script that was carried out");
+        }
+        if !differing.is_empty() {
+            return Err(refuse(format!(
+                "it belongs to another scene ({}): {} {} not the same; give the scene that it was saved in",
+                self.header.scene,
+                differing.join(", "),
+                if differing.len() == 1 { "is" } else { "are" }
+            )));
+        }
+        if self.header.git_revision != env!("ENDOWIRE_GIT_REVISION") {
+            super::tell(format_args!(
+                "endowire: {} was saved by version {} ({}): steps of this one may differ in their last bits",
+                self.path.display(),
+                self.header.version,
+                self.header.git_revision
+            ));
+        }
+        simulation.restore(&self.state).map_err(|error| refuse(error.to_string()))
+    }
+}
+
+/// Saving takes no more than one part in so many of a run's time.
+const SHARE: u32 = 10;
+
+/// Writes the state of a run into a file, again and again.
+pub(crate) struct Saver {
+    path: PathBuf,
+    scene: String,
+    parts: Parts,
+    /// When the last one was written, and how long that took.
+    last: Option<(Instant, Duration)>,
+}
+
+impl Saver {
+    /// For a file, which is replaced, and a simulation of `scene`.
+    pub(crate) fn new(path: &Path, scene: &Scene, simulation: &Simulation) -> Self {
+        let parts = Parts::new(scene, simulation);
+        Self { path: path.to_path_buf(), scene: scene.name.clone(), parts, last: None }
+    }
+
+    /// Whether it is time to save.
+    pub(crate) fn is_due(&self) -> bool {
+        self.last.is_none_or(|(when, took)| when.elapsed() >= took * SHARE)
+    }
+
+    /// Saves; the file is the one before or this one, whole, whenever the program or the power ends. `sync` waits until the recording is
+    /// on the disk, so that no state is ahead of it.
+    pub(crate) fn save(
+        &mut self,
+        simulation: &Simulation,
+        commands: &[Command],
+        course: Course,
+        sync: impl FnOnce() -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let began = Instant::now();
+        sync()?;
+        let header = Header {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            git_revision: env!("ENDOWIRE_GIT_REVISION").to_owned(),
+            scene: self.scene.clone(),
+            course,
+            parts: self.parts.clone(),
+            script: script_hash(&commands[..course.steps]),
+        };
+        let failed = |what: String| Failure::Computation(format!("the state cannot be written: {what}"));
+        let header = serde_json::to_string(&header).map_err(|e| failed(e.to_string()))?;
+        let state = postcard::to_allocvec(&simulation.state()).map_err(|e| failed(e.to_string()))?;
+        let mut bytes = format!("{FORMAT}\n{header}\n").into_bytes();
+        bytes.extend(state);
+        let end = Sha256::digest(&bytes);
+        bytes.extend(end);
+        let written = whole::write(&self.path, |part| {
+            let mut file = File::create(part)?;
+            file.write_all(&bytes)?;
+            file.sync_all()
+        });
+        written.map_err(|e| Failure::write(&self.path, &e))?;
+        self.last = Some((Instant::now(), began.elapsed()));
+        Ok(())
+    }
+}

@@ -1,0 +1,179 @@
+//! One command: in one sub-step where that will do, in several where it will not, and to where the device comes to rest as it can where
+//! the way is lost.
+
+use std::borrow::Cow;
+
+use super::Environment;
+use super::configuration::Start;
+use super::slide::Extension;
+use super::state::KirchhoffState;
+use super::substep::Attempt;
+use super::workspace::{Tools, Workspace};
+use crate::contact::extension::{LEAVE_MM, left_through};
+use crate::insertion::{Command, StepReport};
+use crate::{Error, PhysicalEnd, Result};
+
+/// Retracting to within this of the sheath, mm, is retracting to it.
+const ZERO_LENGTH_MM: f64 = 1e-9;
+/// Most sub-steps that one command may be cut into, …
+const SUBSTEP_LIMIT: usize = 4096;
+/// … and the least part of it that one is.
+const LEAST_SHARE: f64 = 1e-4;
+/// Newton iterations that a command may take in all its sub-steps for every millimetre and every [`WORK_RAD`], those in vain
+/// included, before it comes to rest as it can: its cost is bounded.
+const WORK: f64 = 180.0;
+/// See [`WORK`], rad.
+const WORK_RAD: f64 = 0.1;
+/// … and never more than so many times what one solution may take.
+const WORK_OF_ONE: usize = 10;
+/// How often the last resort may find nothing in a command; after that what it comes to is taken whatever is left over.
+const RESORTS: usize = 6;
+/// A step is a jump if more than this part of the stored energy was set free.
+const JUMP: f64 = 0.02;
+/// Stored energy below which nothing is called a jump, mJ.
+const JUMP_FLOOR_MJ: f64 = 1e-6;
+
+impl<const C: usize> Workspace<C> {
+    /// Carries out a command from the state `from`, and leaves the new state in `now`.
+    ///
+    /// # Errors
+    /// As [`Method::step`](crate::methods::Method::step).
+    pub(super) fn carry_out(
+        &mut self,
+        environment: &Environment<'_>,
+        from: &KirchhoffState,
+        command: Command,
+    ) -> Result<()> {
+        let Self { tools, mesh, now, next, most: (elements, points) } = self;
+        now.own(*elements, *points);
+        next.own(*elements, *points);
+        let surroundings = &environment.surroundings;
+        if command.advance_mm > 0.0
+            && let Some((opening, beyond)) = left_through(surroundings.wall, &from.tip_mm())
+            && beyond + command.advance_mm > LEAVE_MM
+        {
+            return Err(left(opening, beyond));
+        }
+        let start = from.report.inserted_mm;
+        let target = (start + command.advance_mm).min(surroundings.device.length_mm());
+        let target = if target < ZERO_LENGTH_MM { 0.0 } else { target };
+        let rotation = from.report.rotation_rad;
+        let (mut iterations, mut substeps, mut dissipated_mj) = (0, 0, 0.0);
+        let (mut relaxations, mut slides, mut imbalance, mut balanced) = (0, 0, 0.0f64, true);
+        (tools.nodes_solved, tools.nodes_frozen) = (0, 0);
+        let most = environment.options.max_iterations;
+        let travel = (target - start).abs().max(command.rotate_rad.abs() / WORK_RAD).max(1.0);
+        let mut budget = ((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most));
+        let mut moved = false;
+        // Progress of the command, 0 to 1: advance and turn go together.
+        let mut done = 0.0f64;
+        let mut share = 1.0f64;
+        // Last resorts that found nothing.
+        let mut failures = 0;
+        let mut failure = Cow::from("the way is too long for one step");
+        while done < 1.0 {
+            let here = if moved { now.start() } else { Start { mesh, state: from } };
+            let rest = 1.0 - done;
+            // Where the way is lost, the device is let come to rest as far as the command goes; if it does not, in parts; and in the end
+            // wherever it is.
+            let relax = budget == 0 || share < LEAST_SHARE;
+            if relax && (failures == 0 || failures == RESORTS) {
+                share = rest;
+            }
+            let part = rest.min(share);
+            let wanted = (target - start) * part;
+            let mut blocked = false;
+            let Tools { extension, memory, .. } = &mut *tools;
+            *extension = Extension::default();
+            if wanted > 0.0 {
+                let tangent = here.state.rod.frames[here.state.rod.elements()].t;
+                let radius = surroundings.device.section_at(0.0).radius_mm;
+                let tip_mm = here.state.tip_mm();
+                let way = extension.trace((environment.felt, memory), tip_mm, tangent, radius, wanted);
+                blocked = way < (1.0 - 1e-9) * wanted;
+            }
+            // A rest that is rounding is none.
+            let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
+            let inserted = if to == 1.0 { target } else { start + (target - start) * to };
+            let tail = rotation + command.rotate_rad * to;
+            substeps += 1;
+            if inserted == 0.0 {
+                now.withdraw(tail);
+                break;
+            }
+            let resort = if relax { Some(failures == RESORTS) } else { None };
+            let attempt = Attempt { inserted_mm: inserted, tail_rad: tail, blocked, resort };
+            match tools.try_step(environment, here, attempt, next, &mut budget) {
+                Ok(found) => {
+                    iterations += found.iterations;
+                    relaxations += u32::from(relax);
+                    slides += found.slides;
+                    if relax {
+                        imbalance = imbalance.max(found.residual.max(found.unsettled));
+                    }
+                    balanced &= found.balanced;
+                    dissipated_mj += found.dissipated_mj;
+                    if let Some((opening, beyond)) = left_through(surroundings.wall, &next.state.tip_mm())
+                        && beyond > LEAVE_MM
+                    {
+                        return Err(left(opening, beyond));
+                    }
+                    std::mem::swap(now, next);
+                    moved = true;
+                    done = to;
+                    share = (2.0 * part).min(1.0);
+                }
+                Err(reason) => {
+                    failure = reason;
+                    share = 0.25 * part;
+                    if relax {
+                        budget = 0;
+                        failures += 1;
+                    }
+                }
+            }
+            if done < 1.0 && (failures > RESORTS || substeps > SUBSTEP_LIMIT) {
+                return Err(Error::Computation(format!(
+                    "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
+                )));
+            }
+        }
+        // No equilibrium: unless the vessel is too narrow to go on, that is told.
+        if !balanced
+            && command.advance_mm > 0.0
+            && let Some(end) = tools.narrowest(environment, now)
+        {
+            return Err(Error::End(end));
+        }
+        let report = &mut now.parts().1.report;
+        report.rotation_rad = rotation + command.rotate_rad;
+        report.iterations = iterations as u32;
+        (report.substeps, report.dissipated_mj) = (substeps as u32, dissipated_mj);
+        (report.relaxations, report.slides, report.imbalance) = (relaxations, slides, imbalance);
+        report.converged = balanced;
+        report.angles = from.report.angles;
+        report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
+        report.nodes_frozen = from.report.nodes_frozen + tools.nodes_frozen;
+        tools.write_report(environment, now);
+        let report = &mut now.parts().1.report;
+        report.jumped = jumped(&from.report, report, target - start, command.rotate_rad);
+        Ok(())
+    }
+}
+
+/// Whether energy was set free that the hand had put in.
+fn jumped(before: &StepReport, after: &StepReport, advance_mm: f64, turn_rad: f64) -> bool {
+    // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between
+    // what it is at the ends.
+    let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
+    let work = least(before.push_force_n, after.push_force_n, advance_mm)
+        + least(before.torque_nmm, after.torque_nmm, turn_rad);
+    let (energy, now) = (before.energy.total(), after.energy.total());
+    let lost = work - after.dissipated_mj - (now - energy);
+    lost > JUMP * energy.max(now).max(JUMP_FLOOR_MJ)
+}
+
+/// The tip would be farther beyond an opening than anything is known.
+fn left(opening: usize, beyond_mm: f64) -> Error {
+    Error::End(PhysicalEnd::Left { opening, beyond_mm, limit_mm: LEAVE_MM })
+}

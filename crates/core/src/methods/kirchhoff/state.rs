@@ -1,0 +1,141 @@
+//! All that the next step of the exact rod depends on.
+
+use std::fmt::Display;
+
+use serde::{Deserialize, Serialize};
+
+use super::repeat::Correction;
+use crate::contact::{FeltWall, KnownPoints, NormalForce};
+use crate::insertion::{Sheath, StepReport};
+use crate::rod::{Frame, RodState};
+use crate::{Error, Result, Vec3};
+
+/// The state of the exact rod: where it lies and with which forces, what the predictor has learnt, what its contact points know of the
+/// wall, and what the last step told.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct KirchhoffState {
+    pub(super) rod: RodState,
+    /// What presses at each contact point, tip first; empty without friction.
+    pub(super) forces: Vec<NormalForce>,
+    pub(super) known: KnownPoints,
+    pub(super) correction: Correction,
+    pub(super) report: StepReport,
+}
+
+/// What a mesh says of the states that belong to it.
+pub(super) struct Belongs<'a> {
+    pub(super) felt: &'a FeltWall,
+    pub(super) sheath: &'a Sheath,
+    /// Elements and contact points of the inserted length.
+    pub(super) elements: usize,
+    pub(super) points: usize,
+    pub(super) angles: bool,
+    pub(super) rubs: bool,
+}
+
+impl KirchhoffState {
+    /// Nothing inserted.
+    pub(super) fn at(sheath: &Sheath) -> Self {
+        let mut rod = RodState::default();
+        rod.frames.push(Frame::new(sheath.direction, None));
+        rod.angles.push(0.0);
+        rod.positions.push(sheath.position_mm);
+        Self {
+            rod,
+            forces: Vec::new(),
+            known: KnownPoints::default(),
+            correction: Correction::default(),
+            report: StepReport { converged: true, ..StepReport::default() },
+        }
+    }
+
+    /// What the step that led here told.
+    pub fn report(&self) -> &StepReport {
+        &self.report
+    }
+
+    /// Position of the tip, mm.
+    pub(super) fn tip_mm(&self) -> Vec3 {
+        self.rod.positions[self.rod.elements()]
+    }
+
+    /// Takes memory for up to `elements` elements and `points` contact points.
+    pub(super) fn reserve(&mut self, elements: usize, points: usize) {
+        self.rod.reserve(elements);
+        self.forces.reserve(points.saturating_sub(self.forces.len()));
+        self.known.reserve(points);
+        self.correction.reserve(elements);
+        let contacts = &mut self.report.contacts;
+        contacts.reserve(points.saturating_sub(contacts.len()));
+    }
+
+    /// Nothing is inserted any more: what is left is the angle of the tail.
+    pub(super) fn withdraw(&mut self, tail_rad: f64) {
+        self.rod.clear();
+        self.rod.angles[0] = tail_rad;
+        self.forces.clear();
+        self.known.clear();
+        self.correction.clear();
+    }
+
+    /// Checks that this is a state of a simulation with such a mesh: one that was read from a file may be any.
+    pub(super) fn check(&self, belongs: &Belongs<'_>) -> Result<()> {
+        let n = belongs.elements;
+        let elements = self.rod.elements();
+        if elements != n {
+            return Err(other("elements", elements, format!("the inserted length has {n} here")));
+        }
+        let r = &self.rod;
+        let nodes = [r.frames.len(), r.angles.len(), r.positions.len()];
+        let each = [r.tensions.len(), r.bubbles.len(), r.reference_twists.len()];
+        if nodes != [n + 1; 3] || each != [n; 3] {
+            return Err(other("rod", format!("{nodes:?} {each:?}"), "its lists have different lengths"));
+        }
+        if self.report.angles != belongs.angles {
+            let mend = "it has material angles where this simulation has none, or none where it has: another device or friction";
+            return Err(other("angles", self.report.angles, mend));
+        }
+        let forces = if belongs.rubs { belongs.points } else { 0 };
+        if self.forces.len() != forces {
+            return Err(other(
+                "forces",
+                self.forces.len(),
+                format!("{forces} contact points feel friction here"),
+            ));
+        }
+        if !self.known.fits(belongs.points, belongs.felt.query.triangles()) {
+            let mend = format!(
+                "{} contact points on {} triangles are felt here: another vessel, device or wall",
+                belongs.points,
+                belongs.felt.query.triangles()
+            );
+            return Err(other("known", self.known.len(), mend));
+        }
+        let (position, direction) = (belongs.sheath.position_mm, r.frames[0].t);
+        if r.positions[0] != position || (direction - belongs.sheath.direction).norm() > SAME_DIRECTION {
+            let mend = format!(
+                "the sheath's mouth is at {} here, and its direction must be the same",
+                show(&position)
+            );
+            return Err(other("sheath", show(&r.positions[0]), mend));
+        }
+        let vectors =
+            r.positions.iter().chain(&r.chords).chain(r.frames.iter().flat_map(|f| [&f.t, &f.u, &f.v]));
+        let numbers = [&r.tensions, &r.angles, &r.bubbles, &r.reference_twists].into_iter().flatten();
+        if !vectors.flat_map(|v| v.iter()).chain(numbers).all(|x| x.is_finite()) {
+            return Err(other("rod", "not finite", "all its numbers must be finite"));
+        }
+        Ok(())
+    }
+}
+
+/// Rounding of the length of a direction.
+const SAME_DIRECTION: f64 = 1e-12;
+
+fn show(v: &Vec3) -> String {
+    crate::error::vector(v)
+}
+
+fn other(what: &str, value: impl Display, mend: impl Display) -> Error {
+    Error::parameter(format!("state.{what}"), value, format!("{mend}: restore a state of this scene"))
+}

@@ -1,0 +1,68 @@
+//! What a step works with. None of it reaches the next step: it can be dropped and made anew at any moment.
+
+use super::configuration::{Configuration, largest};
+use super::guess::Guess;
+use super::mesh::Mesh;
+use super::settle::Settle;
+use super::slide::Extension;
+use super::state::KirchhoffState;
+use super::{Environment, meshed};
+use crate::contact::{Counters, Friction, WallMemory};
+use crate::solve::Newton;
+
+/// The workspace of a simulation.
+pub(super) struct Workspace<const C: usize> {
+    pub(super) tools: Tools<C>,
+    /// Mesh of the state that commands start from.
+    pub(super) mesh: Mesh,
+    /// Where the command under way has come to, once its first sub-step is taken.
+    pub(super) now: Configuration,
+    /// The sub-step under way.
+    pub(super) next: Configuration,
+    /// Most elements and contact points.
+    pub(super) most: (usize, usize),
+}
+
+/// What a sub-step works with.
+pub(super) struct Tools<const C: usize> {
+    pub(super) newton: Newton<C>,
+    pub(super) guess: Guess,
+    pub(super) settle: Settle<C>,
+    pub(super) friction: Friction,
+    pub(super) memory: WallMemory,
+    pub(super) extension: Extension,
+    /// Nodes of the sub-steps of the command in which the device moved, …
+    pub(super) nodes_solved: u64,
+    /// … and in which it was in equilibrium as it was.
+    pub(super) nodes_frozen: u64,
+    /// Questions about the wall.
+    pub(super) counters: Counters,
+}
+
+impl<const C: usize> Workspace<C> {
+    /// Memory for the whole device, so that steps take none.
+    pub(super) fn new(environment: &Environment<'_>, state: &KirchhoffState) -> Box<Self> {
+        let surroundings = environment.surroundings;
+        let (elements, points) = largest(surroundings.device, environment.options.element_mm);
+        let nothing = Configuration::at(surroundings.sheath);
+        let mut tools = Tools {
+            newton: Newton::new(1),
+            guess: Guess::new(surroundings.device.shaped_mm()),
+            settle: Settle::default(),
+            friction: Friction::new(surroundings.properties.largest_friction()),
+            memory: WallMemory::new(environment.felt),
+            extension: Extension::default(),
+            nodes_solved: 0,
+            nodes_frozen: 0,
+            counters: Counters::default(),
+        };
+        tools.newton.reserve(elements);
+        tools.guess.reserve(elements);
+        tools.settle.reserve(elements);
+        tools.friction.reserve(points);
+        tools.memory.reserve(points);
+        let mut mesh = Mesh::default();
+        meshed(environment, state.report().inserted_mm, &mut mesh);
+        Box::new(Self { tools, mesh, now: nothing.clone(), next: nothing, most: (elements, points) })
+    }
+}

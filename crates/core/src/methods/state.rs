@@ -1,0 +1,118 @@
+//! All that the next step of an insertion depends on, whatever its method.
+
+use std::sync::Arc;
+
+use nalgebra::Rotation3;
+use serde::{Deserialize, Serialize};
+
+use super::kirchhoff::KirchhoffState;
+use super::li2011::Li2011State;
+use crate::device::Device;
+use crate::insertion::StepReport;
+use crate::{Error, Result, Vec3};
+
+/// The state of an insertion: with vessel, device, sheath and options all that its next step depends on.
+///
+/// Two simulations of one scene in one state answer the same commands with the same bits. It can be cloned, sent, and written by any
+/// format of `serde` that keeps every bit of a number. Clones share their numbers, which nothing changes.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct State {
+    /// Name of the method.
+    method: String,
+    content: Content,
+}
+
+/// What a method keeps from step to step.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Content {
+    /// The exact rod.
+    Kirchhoff(#[serde(with = "shared")] Arc<KirchhoffState>),
+    /// The method of Li et al. 2011.
+    Li2011(Box<Li2011State>),
+    /// A method that keeps nodes and triads alone.
+    Nodes(Box<NodesState>),
+}
+
+/// What is shared is written and read as it is.
+mod shared {
+    use std::sync::Arc;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<T: Serialize, S: Serializer>(
+        value: &Arc<T>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        (**value).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Arc<T>, D::Error> {
+        T::deserialize(deserializer).map(Arc::new)
+    }
+}
+
+/// Nodes and triads of a chain.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct NodesState {
+    /// Node positions, sheath first, mm.
+    pub positions_mm: Vec<Vec3>,
+    /// Triads of the nodes: tangent and two material directions as columns.
+    pub frames: Vec<Rotation3<f64>>,
+    /// Arc lengths of the nodes from the tip, mm.
+    pub from_tip_mm: Vec<f64>,
+    /// Turn of the clamp, rad.
+    pub turn_rad: f64,
+    /// What the last step told.
+    pub report: StepReport,
+}
+
+impl State {
+    /// The state of a method of that name.
+    pub fn new(method: &str, content: Content) -> Self {
+        Self { method: method.to_owned(), content }
+    }
+
+    /// Name of the method.
+    pub fn method(&self) -> &str {
+        &self.method
+    }
+
+    /// What the step that led to it told.
+    pub fn report(&self) -> &StepReport {
+        match &self.content {
+            Content::Kirchhoff(state) => state.report(),
+            Content::Li2011(state) => state.report(),
+            Content::Nodes(state) => &state.report,
+        }
+    }
+
+    /// What a method of that name has kept.
+    ///
+    /// # Errors
+    /// A state of another method.
+    pub fn of(&self, method: &str) -> Result<&Content> {
+        if self.method == method { Ok(&self.content) } else { Err(self.of_another(method)) }
+    }
+
+    /// The error of a state that is none of `method`.
+    pub fn of_another(&self, method: &str) -> Error {
+        let mend =
+            format!("this simulation is one of {method}: restore a state of the same scene and method");
+        Error::parameter("state.method", &self.method, mend)
+    }
+}
+
+/// Checks the inserted length of a state that is restored.
+///
+/// # Errors
+/// A length that the device does not have.
+pub fn check_inserted(inserted_mm: f64, device: &Device) -> Result<()> {
+    if (0.0..=device.length_mm()).contains(&inserted_mm) {
+        return Ok(());
+    }
+    let mend = format!("the device is {} mm long here: restore a state of this scene", device.length_mm());
+    Err(Error::parameter("state.inserted_mm", inserted_mm, mend))
+}

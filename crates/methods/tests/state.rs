@@ -1,0 +1,45 @@
+//! The state of an insertion by any method is all that its next step depends on.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use endowire_core::device::Device;
+use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
+use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
+use endowire_methods::{Insertion, InsertionOptions, NAMES, Task, by_name};
+
+fn start(name: &str) -> Simulation {
+    let made = GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(1.5)).unwrap();
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
+    let wire = Device::uniform(120.0, 0.445, 10.0).unwrap();
+    Simulation::with_method(made.wall, WallProperties::default(), wire, sheath, |surroundings| {
+        let options = InsertionOptions { element_mm: 6.0, ..Default::default() };
+        Ok(Box::new(Insertion::new(by_name(name, Task::Insertion).unwrap(), options, surroundings)?))
+    })
+    .unwrap()
+}
+
+#[test]
+fn every_method_goes_on_from_its_state_and_refuses_those_of_others() {
+    let mut last = None;
+    for name in NAMES {
+        let mut simulation = start(name);
+        let mut again = simulation.clone();
+        for k in 0..30 {
+            again.restore(&simulation.state()).unwrap();
+            assert_eq!((again.shape(), again.report()), (simulation.shape(), simulation.report()));
+            let command = Command {
+                advance_mm: if k % 6 == 5 { -1.0 } else { 2.0 },
+                rotate_rad: 0.1 * f64::from(k % 3),
+            };
+            assert_eq!(simulation.step(command).is_ok(), again.step(command).is_ok(), "{name}");
+            assert_eq!(again.shape(), simulation.shape(), "{name}, step {k}");
+            assert_eq!(again.report(), simulation.report(), "{name}, step {k}");
+        }
+        assert!(simulation.report().inserted_mm > 30.0, "{name}");
+        assert_eq!(simulation.state().method(), name);
+        if let Some(other) = last.replace(simulation.state()) {
+            let error = simulation.restore(&other).unwrap_err();
+            assert!(error.is_input() && error.to_string().starts_with("state.method"), "{name}: {error}");
+        }
+    }
+}
