@@ -268,7 +268,8 @@ impl SmoothWall {
             found.count += 1;
         }
         found.value_mm /= found.weight;
-        found.coverage /= found.weight;
+        // Deep behind the surface feet lie far apart, and there are no triangles to go by instead.
+        found.coverage = if behind.is_some() { 1.0 } else { found.coverage / found.weight };
         (found.weight >= LEAST_WEIGHT).then_some(found)
     }
 
