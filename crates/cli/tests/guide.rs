@@ -156,6 +156,16 @@ fn every_command_of_the_guide_works() {
 }
 
 #[test]
+fn the_scene_of_the_readme_works() {
+    let readme = std::fs::read_to_string(workspace().join("README.md")).unwrap();
+    let (_, scene) = readme.split_once("```toml\n").unwrap();
+    let (scene, _) = scene.split_once("```").unwrap();
+    let chapter =
+        format!("```toml file=scene.toml\n{scene}```\n```sh\nendowire run scene.toml --json\n```\n");
+    assert_eq!(follow(&chapter).unwrap().len(), 1);
+}
+
+#[test]
 fn a_broken_command_fails() {
     let chapter =
         |command: &str| format!("Text.\n\n```sh\nendowire --version # it is there\n{command}\n```\n");
