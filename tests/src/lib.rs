@@ -7,3 +7,8 @@ pub mod sweep;
 pub mod twin;
 
 pub use endowire_core::reference::crossing;
+
+/// The guide's example is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/guide/7-library.md")]
+struct Guide;

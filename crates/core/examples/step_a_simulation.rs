@@ -1,4 +1,4 @@
-//! Steps an insertion from a program: a straight tube, a wire, a millimetre a step.
+//! Steps an insertion from a program: a curved tube, a wire, a millimetre a step.
 //!
 //! `cargo run -p endowire-core --example step_a_simulation`
 
