@@ -2,13 +2,16 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+mod common;
 
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use common::endowire;
 use serde_json::Value;
 
 fn endowire(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_endowire")).args(args).output().unwrap()
+    endowire().args(args).output().unwrap()
 }
 
 fn cases() -> PathBuf {
