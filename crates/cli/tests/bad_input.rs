@@ -4,7 +4,6 @@
 
 mod common;
 
-use common::endowire;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
@@ -80,7 +79,7 @@ impl Scene {
 }
 
 fn endowire(args: &[&Path]) -> Output {
-    endowire().args(args).output().unwrap()
+    common::endowire().args(args).output().unwrap()
 }
 
 #[test]
@@ -344,7 +343,7 @@ fn arguments_are_named_by_their_flag() {
 fn a_run_needs_no_folder_for_temporary_files() {
     let scene = Scene::good();
     std::fs::write(scene.path("scene.toml"), &scene.text).unwrap();
-    let output = endowire()
+    let output = common::endowire()
         .env("TMPDIR", "/no/such/folder")
         .args([
             "run".as_ref(),

@@ -9,12 +9,11 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use common::endowire;
 use npyz::NpyFile;
 use serde_json::Value;
 
 fn endowire(args: &[&str]) -> Output {
-    endowire().args(args).output().unwrap()
+    common::endowire().args(args).output().unwrap()
 }
 
 fn text(path: &Path) -> &str {

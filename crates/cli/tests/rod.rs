@@ -7,11 +7,10 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use common::endowire;
 use serde_json::Value;
 
 fn endowire(args: &[&str]) -> Output {
-    endowire().args(args).output().unwrap()
+    common::endowire().args(args).output().unwrap()
 }
 
 fn cases() -> PathBuf {

@@ -4,13 +4,13 @@ use endowire_core::vessel::{CentrelineTree, Resolution, anatomy};
 
 use super::*;
 
-fn arch() -> CentrelineTree {
-    anatomy::tree("aortic_arch").unwrap()
+fn tube() -> CentrelineTree {
+    anatomy::tree("curved_tube").unwrap()
 }
 
-/// A wall with a fork: it takes a multiple of [`LEAST`].
+/// A wall that takes a multiple of [`LEAST`] to make.
 fn recipe(tree: &CentrelineTree) -> WallRecipe<'_> {
-    WallRecipe::Generated { tree, resolution: Resolution::EdgeMm(2.5) }
+    WallRecipe::Generated { tree, resolution: Resolution::EdgeMm(0.6) }
 }
 
 fn cache(folder: &Path) -> Cache {
@@ -23,7 +23,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The only file, with another content that its hash at the end fits to.
+/// Gives a file another content, with the hash at its end that fits it.
 fn forge(path: &Path, change: impl FnOnce(&mut Vec<u8>)) {
     use sha2::{Digest, Sha256};
     let mut bytes = std::fs::read(path).unwrap();
@@ -37,7 +37,7 @@ fn forge(path: &Path, change: impl FnOnce(&mut Vec<u8>)) {
 #[test]
 fn a_kept_wall_is_the_one_that_was_made_and_is_not_made_again() {
     let folder = tempfile::tempdir().unwrap();
-    let (tree, cache) = (arch(), cache(&folder.path().join("new/walls")));
+    let (tree, cache) = (tube(), cache(&folder.path().join("new/walls")));
     let made = cache.wall(&recipe(&tree)).unwrap();
     let [file] = files(&folder.path().join("new/walls")).try_into().unwrap();
     assert_eq!(file.extension().unwrap(), EXTENSION);
@@ -49,13 +49,13 @@ fn a_kept_wall_is_the_one_that_was_made_and_is_not_made_again() {
     assert_ne!(cache.wall(&recipe(&tree)).unwrap().mesh(), made.mesh());
 }
 
-/// A byte of the first coordinate's mantissa: after the line, the key and the number of vertices.
+/// A byte of the first coordinate's mantissa: after the line, the key and the two or three bytes of the number of vertices.
 const FORGED: usize = 16 + 32 + 2 + 3;
 
 #[test]
 fn a_file_that_is_not_whole_or_not_ours_is_ignored_and_written_anew() {
     let folder = tempfile::tempdir().unwrap();
-    let (tree, cache) = (arch(), cache(folder.path()));
+    let (tree, cache) = (tube(), cache(folder.path()));
     let made = cache.wall(&recipe(&tree)).unwrap();
     let [file] = files(folder.path()).try_into().unwrap();
     let whole = std::fs::read(&file).unwrap();
@@ -84,7 +84,7 @@ fn a_place_that_cannot_be_written_is_no_failure() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("file");
     std::fs::write(&file, "mine").unwrap();
-    let (tree, cache) = (arch(), cache(&file.join("walls")));
+    let (tree, cache) = (tube(), cache(&file.join("walls")));
     assert!(cache.wall(&recipe(&tree)).is_ok() && cache.told.get());
     assert_eq!(std::fs::read(&file).unwrap(), b"mine");
 }
@@ -92,7 +92,7 @@ fn a_place_that_cannot_be_written_is_no_failure() {
 #[test]
 fn what_cannot_be_made_is_told_and_not_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let (tree, cache) = (arch(), cache(folder.path()));
+    let (tree, cache) = (tube(), cache(folder.path()));
     let wrong = WallRecipe::Generated { tree: &tree, resolution: Resolution::EdgeMm(-1.0) };
     let told = cache.wall(&wrong).unwrap_err().to_string();
     assert_eq!(told, wrong.make().unwrap_err().to_string());
@@ -102,7 +102,7 @@ fn what_cannot_be_made_is_told_and_not_kept() {
 #[test]
 fn many_may_want_the_same_wall_at_once() {
     let folder = tempfile::tempdir().unwrap();
-    let tree = arch();
+    let tree = tube();
     let made = recipe(&tree).make().unwrap();
     std::thread::scope(|scope| {
         for _ in 0..4 {
