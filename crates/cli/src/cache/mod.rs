@@ -20,7 +20,7 @@ use crate::output::tell;
 use entry::{EXTENSION, Key};
 
 /// What takes less to make is not kept: to read it back would save nothing to speak of.
-const LEAST: Duration = Duration::from_millis(20);
+const LEAST: Duration = Duration::from_millis(5);
 
 /// Walls in a folder; without one, all are made.
 pub(crate) struct Cache {
