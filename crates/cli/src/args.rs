@@ -61,9 +61,21 @@ pub(crate) struct RunArgs {
     /// there on. With --save-state of the same file a run can be killed and resumed any number of times
     #[arg(long, value_name = "FILE")]
     pub(crate) resume: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
     /// Print the summary as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Whether walls are kept from run to run.
+#[derive(Debug, clap::Args)]
+pub(crate) struct CacheArgs {
+    /// Make the vessel's wall anew and keep nothing of it. Otherwise a wall that takes long to make is kept, up to 1 GiB in all, in the
+    /// folder walls of $ENDOWIRE_CACHE, or of endowire where the system has the caches of a user (Linux: $XDG_CACHE_HOME or ~/.cache;
+    /// macOS: ~/Library/Caches; Windows: %LOCALAPPDATA%). It may be removed at any time
+    #[arg(long)]
+    pub(crate) no_cache: bool,
 }
 
 /// Which views are drawn.
@@ -114,6 +126,8 @@ pub(crate) struct FrameArgs {
     /// Write the last image hold, the mean of the last fluoroscopic frames
     #[arg(long)]
     pub(crate) hold: bool,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
     /// Print what was written as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

@@ -1,6 +1,7 @@
 //! The `endowire` command: parse, resolve, run, and say with the exit code how it went.
 
 mod args;
+mod cache;
 mod commands;
 mod environment;
 mod failure;

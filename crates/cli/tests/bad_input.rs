@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 /// A working scene in a folder of its own, to be spoilt one value at a time.
 struct Scene {
@@ -77,7 +79,7 @@ impl Scene {
 }
 
 fn endowire(args: &[&Path]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_endowire")).args(args).output().unwrap()
+    common::endowire().args(args).output().unwrap()
 }
 
 #[test]
@@ -341,7 +343,7 @@ fn arguments_are_named_by_their_flag() {
 fn a_run_needs_no_folder_for_temporary_files() {
     let scene = Scene::good();
     std::fs::write(scene.path("scene.toml"), &scene.text).unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
+    let output = common::endowire()
         .env("TMPDIR", "/no/such/folder")
         .args([
             "run".as_ref(),

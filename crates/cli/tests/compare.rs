@@ -2,10 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use common::endowire;
 use serde_json::Value;
 
 fn compare(out: &Path, args: &[&str]) -> Output {
@@ -13,7 +16,7 @@ fn compare(out: &Path, args: &[&str]) -> Output {
 }
 
 fn command(out: &Path, args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_endowire"));
+    let mut command = endowire();
     command.arg("compare").arg("--out").arg(out).args(args);
     command
 }

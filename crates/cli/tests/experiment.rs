@@ -2,13 +2,16 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::path::Path;
-use std::process::{Command, Output};
+mod common;
 
+use std::path::Path;
+use std::process::Output;
+
+use common::endowire;
 use serde_json::Value;
 
 fn experiment(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_endowire")).arg("experiment").args(args).output().unwrap()
+    endowire().arg("experiment").args(args).output().unwrap()
 }
 
 fn document(output: &Output) -> Value {

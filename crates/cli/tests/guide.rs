@@ -120,6 +120,7 @@ fn follow(chapter: &str) -> Result<Vec<Vec<String>>, String> {
             Action::Write { name, text } => std::fs::write(folder.path().join(name), text).unwrap(),
             Action::Run { line, arguments } => {
                 let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
+                    .env("ENDOWIRE_CACHE", concat!(env!("CARGO_TARGET_TMPDIR"), "/cache"))
                     .args(&arguments)
                     .current_dir(folder.path())
                     .output()

@@ -2,10 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Output, Stdio};
 use std::time::Duration;
 
+use common::endowire;
 use serde_json::Value;
 
 /// A run in the curved tube of so many steps that it never ends by itself, without frames unless `views` asks for them.
@@ -24,15 +27,11 @@ fn endless_scene(folder: &Path, views: &str) -> PathBuf {
 }
 
 fn start(scene: &Path, out: &Path) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_endowire"))
-        .args(["run".as_ref(), scene, "--out".as_ref(), out])
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
+    endowire().args(["run".as_ref(), scene, "--out".as_ref(), out]).stderr(Stdio::piped()).spawn().unwrap()
 }
 
 fn render(recording: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_endowire"))
+    endowire()
         .args(["render".as_ref(), recording.as_os_str()])
         .args(["--json", "--view", "3d", "--size", "24x16", "--from", "1", "--every", "100000"])
         .output()

@@ -2,10 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use common::endowire;
 use npyz::NpyFile;
 use serde_json::Value;
 use zip::ZipArchive;
@@ -15,10 +18,8 @@ fn assets() -> PathBuf {
 }
 
 fn run(scene: &Path, out: &Path) -> (Option<i32>, Value) {
-    let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
-        .args(["run".as_ref(), scene, "--out".as_ref(), out, "--json".as_ref()])
-        .output()
-        .unwrap();
+    let output =
+        endowire().args(["run".as_ref(), scene, "--out".as_ref(), out, "--json".as_ref()]).output().unwrap();
     let stdout = String::from_utf8(output.stdout).unwrap();
     let summary = serde_json::from_str(&stdout)
         .unwrap_or_else(|e| panic!("{e}: {stdout}{}", String::from_utf8_lossy(&output.stderr)));
@@ -144,7 +145,7 @@ fn recording_anew_replaces_the_old_recording_and_nothing_else() {
     let scene = short_scene(folder.path());
     let out = folder.path().join("out");
     let told = |more: &[&str]| {
-        let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
+        let output = endowire()
             .args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()])
             .args(more)
             .output()
@@ -175,7 +176,7 @@ fn a_folder_with_other_files_is_used_only_by_force_and_keeps_them() {
         std::fs::write(out.join(name), "left,right\n1,2\n").unwrap();
     }
     let run = |more: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_endowire"));
+        let mut command = endowire();
         command.args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()]);
         let output = command.args(more).output().unwrap();
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
@@ -200,10 +201,8 @@ fn a_folder_with_other_files_is_refused_and_left_as_it_is() {
     std::fs::create_dir(&out).unwrap();
     std::fs::write(out.join("summary.json"), "mine").unwrap();
     std::fs::write(out.join("steps.csv"), "left,right\n1,2\n").unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
-        .args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()])
-        .output()
-        .unwrap();
+    let output =
+        endowire().args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()]).output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{told}");
     assert!(told.contains("no earlier recording") && told.contains("recording"), "{told}");
@@ -260,7 +259,7 @@ fn a_reader_that_leaves_is_no_failure_and_a_full_disk_is() {
     use std::process::Stdio;
     let folder = tempfile::tempdir().unwrap();
     let command = |stdout: Stdio| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_endowire"));
+        let mut command = endowire();
         command
             .args(["vessel", "generate", "straight_tube", "--json", "--out"])
             .arg(folder.path().join("a.stl"));
@@ -278,8 +277,7 @@ fn a_reader_that_leaves_is_no_failure_and_a_full_disk_is() {
     assert!(text.contains("standard output") && text.trim_end().lines().count() == 1, "{text}");
     // Nobody hears what is said: the exit code still tells.
     let full = File::options().write(true).open("/dev/full").unwrap();
-    let status =
-        Command::new(env!("CARGO_BIN_EXE_endowire")).args(["run", "no/such"]).stderr(full).status().unwrap();
+    let status = endowire().args(["run", "no/such"]).stderr(full).status().unwrap();
     assert_eq!(status.code(), Some(2));
 }
 
@@ -291,7 +289,7 @@ fn an_interrupt_ends_the_run_after_the_step_under_way_and_keeps_the_recording() 
     let text = std::fs::read_to_string(&scene).unwrap().replace("\"3d\", \"fluoro\"", "");
     std::fs::write(&scene, text.replace("step_mm = 0.5", "step_mm = 0.0001")).unwrap();
     let out = folder.path().join("out");
-    let child = Command::new(env!("CARGO_BIN_EXE_endowire"))
+    let child = endowire()
         .args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()])
         .stderr(std::process::Stdio::piped())
         .spawn()
@@ -315,7 +313,7 @@ fn an_interrupt_ends_the_run_after_the_step_under_way_and_keeps_the_recording() 
 #[test]
 fn without_a_desktop_nothing_but_the_summary_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_endowire"))
+    let output = endowire()
         .env_remove("XDG_RUNTIME_DIR")
         .args([
             "run".as_ref(),

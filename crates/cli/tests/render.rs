@@ -2,16 +2,18 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use npyz::NpyFile;
 use serde_json::Value;
 
 fn endowire(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_endowire")).args(args).output().unwrap()
+    common::endowire().args(args).output().unwrap()
 }
 
 fn text(path: &Path) -> &str {

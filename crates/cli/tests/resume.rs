@@ -2,11 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
+use common::endowire;
 use serde_json::Value;
 
 /// The lines of the script, each of several steps: pushing, turning, pulling back.
@@ -37,7 +40,7 @@ fn scene(folder: &Path, name: &str, lines: usize, views: &str) -> PathBuf {
 }
 
 fn command(scene: &Path, out: &Path, more: &[&Path]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_endowire"));
+    let mut command = endowire();
     command.args(["run".as_ref(), scene, "--out".as_ref(), out]).args(more);
     command
 }

@@ -2,13 +2,15 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use serde_json::Value;
 
 fn endowire(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_endowire")).args(args).output().unwrap()
+    common::endowire().args(args).output().unwrap()
 }
 
 fn cases() -> PathBuf {

@@ -19,6 +19,7 @@ use super::npz::write_map;
 use super::recorder::Recorder;
 use super::{print_json, tell, to_json};
 use crate::args::{FrameArgs, ViewChoice};
+use crate::cache::Cache;
 use crate::failure::Failure;
 
 /// The part of a scene file that is the viewer's; the core reads the rest.
@@ -157,7 +158,7 @@ impl<'a> Studio<'a> {
     ) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         let spec = wished(view_table(path, scene)?, args, default)?;
-        let wall = scene.wall().map_err(in_scene)?.closed_mesh();
+        let wall = scene.wall_from(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
         let device = scene.device().map_err(in_scene)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
         if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {

@@ -1,5 +1,7 @@
 //! The vessel as a device feels it: evenly meshed, extended beyond its openings, smooth, and ready for queries.
 
+use std::borrow::Cow;
+
 use nalgebra::Matrix3;
 
 use super::distance::Nearness;
@@ -9,7 +11,7 @@ use super::wall::{FOLLOW, LOOK_AGAIN};
 use super::{Distance, SmoothWall};
 use crate::device::Device;
 use crate::insertion::WallProperties;
-use crate::vessel::{Conditioning, SurfaceMesh, Wall, WallQuery, condition};
+use crate::vessel::{Conditioning, NoStore, Wall, WallQuery, WallRecipe, WallStore};
 use crate::{Result, Vec3};
 
 /// A wall prepared for the contact of one device.
@@ -34,15 +36,14 @@ const LOOK_MM: f64 = 0.5;
 /// Coverage below which the flat triangles take part.
 const COVERED: f64 = 0.15;
 
-/// The even mesh of `wall`; `None` where it is felt as it is meshed.
-fn conditioned(wall: &Wall, properties: &WallProperties) -> Result<Option<SurfaceMesh>> {
+/// `wall` as an even mesh, or as it is where it is felt as it is meshed.
+fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) -> Result<Cow<'a, Wall>> {
     if properties.deviation_mm == 0.0 {
-        return Ok(None);
+        return Ok(Cow::Borrowed(wall));
     }
     let options =
         Conditioning { deviation_mm: properties.deviation_mm, measured: false, ..Conditioning::default() };
-    let conditioned = condition(wall.mesh(), &options)?;
-    Ok(conditioned.changed.then_some(conditioned.mesh))
+    store.wall(&WallRecipe::Even { surface: wall.mesh(), options }).map(Cow::Owned)
 }
 
 impl FeltWall {
@@ -51,11 +52,21 @@ impl FeltWall {
     /// # Errors
     /// A wall that has no triangles left to query.
     pub fn new(wall: &Wall, device: &Device, properties: &WallProperties) -> Result<Self> {
+        Self::from_store(wall, device, properties, &NoStore)
+    }
+
+    /// As [`FeltWall::new`], with the even mesh from `store`.
+    ///
+    /// # Errors
+    /// As [`FeltWall::new`].
+    pub fn from_store(
+        wall: &Wall,
+        device: &Device,
+        properties: &WallProperties,
+        store: &dyn WallStore,
+    ) -> Result<Self> {
         let (thinnest_mm, thickest_mm) = (device.min_radius_mm(), device.max_radius_mm());
-        let felt = match conditioned(wall, properties)? {
-            Some(mesh) => extended(&Wall::welded(&mesh)?, thickest_mm),
-            None => extended(wall, thickest_mm),
-        };
+        let felt = extended(&*even(wall, properties, store)?, thickest_mm);
         let felt = Wall::welded(&felt)?;
         let smooth = SmoothWall::new(&felt, thickest_mm);
         let grading = if properties.region.is_empty() { None } else { Grading::new(&smooth, properties) };

@@ -8,7 +8,7 @@ use crate::error::vector;
 use crate::insertion::{Command, ScriptLine, Sheath, StepReport, WallProperties, commands};
 use crate::methods::{Method, MethodChoice, State};
 use crate::shape::Shape;
-use crate::vessel::{Wall, WallQuery};
+use crate::vessel::{NoStore, Wall, WallQuery, WallStore};
 use crate::{Error, Result};
 
 /// What surrounds a method's unknowns: it may read all of it and change none.
@@ -82,8 +82,24 @@ impl Simulation {
         sheath: Sheath,
         method: &MethodChoice,
     ) -> Result<Self> {
+        Self::from_store(wall, properties, device, sheath, method, &NoStore)
+    }
+
+    /// As [`Simulation::with_properties`], with the wall that is felt from `store`.
+    ///
+    /// # Errors
+    /// As [`Simulation::with_properties`].
+    pub fn from_store(
+        wall: Wall,
+        properties: WallProperties,
+        device: Device,
+        sheath: Sheath,
+        method: &MethodChoice,
+        store: &dyn WallStore,
+    ) -> Result<Self> {
         check_elements(&device, method)?;
-        Self::with_method(wall, properties, device, sheath, |surroundings| method.start(surroundings))
+        let start = |surroundings: &Surroundings<'_>| method.start_from(surroundings, store);
+        Self::with_method(wall, properties, device, sheath, start)
     }
 
     /// As [`Simulation::with_properties`], with any method: `start` makes it for these surroundings.

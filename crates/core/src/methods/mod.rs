@@ -13,6 +13,7 @@ use crate::contact::Counters;
 use crate::insertion::{Command, StepReport, Surroundings};
 use crate::rod::{PLAIN, TWISTED};
 use crate::shape::Shape;
+use crate::vessel::{NoStore, WallStore};
 use kirchhoff::{Kirchhoff, KirchhoffOptions};
 use li2011::{Li2011, Li2011Options, LinearSolver};
 
@@ -91,12 +92,24 @@ impl MethodChoice {
     /// # Errors
     /// Options out of range.
     pub fn start(&self, surroundings: &Surroundings<'_>) -> Result<Box<dyn Method>> {
+        self.start_from(surroundings, &NoStore)
+    }
+
+    /// As [`MethodChoice::start`], with the wall that is felt from `store`.
+    ///
+    /// # Errors
+    /// As [`MethodChoice::start`].
+    pub fn start_from(
+        &self,
+        surroundings: &Surroundings<'_>,
+        store: &dyn WallStore,
+    ) -> Result<Box<dyn Method>> {
         Ok(match self {
             // A shape turns with the device, and friction twists it.
             Self::Kirchhoff(options) if surroundings.device.is_shaped() || surroundings.properties.rubs() => {
-                Box::new(Kirchhoff::<TWISTED>::new(*options, surroundings)?)
+                Box::new(Kirchhoff::<TWISTED>::new(*options, surroundings, store)?)
             }
-            Self::Kirchhoff(options) => Box::new(Kirchhoff::<PLAIN>::new(*options, surroundings)?),
+            Self::Kirchhoff(options) => Box::new(Kirchhoff::<PLAIN>::new(*options, surroundings, store)?),
             Self::Li2011Dense(options) => Box::new(Li2011::new(*options, LinearSolver::Dense, surroundings)?),
             Self::Li2011Banded(options) => {
                 Box::new(Li2011::new(*options, LinearSolver::Banded, surroundings)?)

@@ -9,7 +9,9 @@ use crate::device::{Device, Section};
 use crate::input::from_toml;
 use crate::insertion::{Command, ScriptLine, Sheath, Simulation, WallProperties, script_commands};
 use crate::methods::MethodChoice;
-use crate::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall, unit_hint};
+use crate::vessel::{
+    CentrelineTree, NoStore, Resolution, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint,
+};
 use crate::{Error, Result, Vec3};
 
 /// A scene as its file says it, with the folder that its paths start from.
@@ -225,6 +227,14 @@ impl Scene {
     /// # Errors
     /// A missing or unusable file, options that do not belong together, a wall that cannot be used.
     pub fn wall(&self) -> Result<Wall> {
+        self.wall_from(&NoStore)
+    }
+
+    /// As [`Scene::wall`], from `store`.
+    ///
+    /// # Errors
+    /// As [`Scene::wall`].
+    pub fn wall_from(&self, store: &dyn WallStore) -> Result<Wall> {
         let path = self.vessel_path()?;
         let spec = &self.vessel;
         if spec.tree.is_some() {
@@ -237,13 +247,13 @@ impl Scene {
             }
             let tree = CentrelineTree::read(&path).map_err(|e| missing("vessel.tree", e))?;
             let resolution = spec.resolution(&tree)?;
-            let generated = GeneratedWall::new(&tree, resolution).map_err(|error| match error {
+            let recipe = WallRecipe::Generated { tree: &tree, resolution };
+            return store.wall(&recipe).map_err(|error| match error {
                 Error::Parameter { name, value, mend } if name == "edge_mm" || name == "triangles" => {
                     Error::parameter(format!("vessel.{name}"), value, format!("{}: {mend}", path.display()))
                 }
                 other => Error::content(&path, other.to_string()),
-            })?;
-            return Ok(generated.wall);
+            });
         }
         for (name, given) in [
             ("vessel.edge_mm", spec.edge_mm.map(|v| v.to_string())),
@@ -259,7 +269,8 @@ impl Scene {
             }
             other => missing("vessel.file", other),
         })?;
-        Wall::from_surface(&surface).map_err(|e| Error::content(&path, e.to_string()))
+        let recipe = WallRecipe::Repaired { surface: &surface };
+        store.wall(&recipe).map_err(|e| Error::content(&path, e.to_string()))
     }
 
     /// The device.
@@ -303,12 +314,20 @@ impl Scene {
     /// # Errors
     /// As [`Scene::wall`], [`Scene::device`], [`Scene::sheath`] and [`Simulation::new`].
     pub fn simulation(&self) -> Result<Simulation> {
-        let wall = self.wall()?;
+        self.simulation_from(&NoStore)
+    }
+
+    /// As [`Scene::simulation`], with walls from `store`.
+    ///
+    /// # Errors
+    /// As [`Scene::simulation`].
+    pub fn simulation_from(&self, store: &dyn WallStore) -> Result<Simulation> {
+        let wall = self.wall_from(store)?;
         // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.
         let size_mm = wall.mesh().bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
         let hint =
             self.vessel.file.as_ref().and_then(|_| unit_hint(size_mm, self.vessel.unit_mm.unwrap_or(1.0)));
-        self.simulation_in(wall).map_err(|error| match (hint, error) {
+        self.simulation_in(wall, store).map_err(|error| match (hint, error) {
             (Some(hint), Error::Parameter { name, value, mend }) => {
                 Error::Parameter { name, value, mend: format!("{mend}; {hint}") }
             }
@@ -319,9 +338,9 @@ impl Scene {
         })
     }
 
-    fn simulation_in(&self, wall: Wall) -> Result<Simulation> {
+    fn simulation_in(&self, wall: Wall, store: &dyn WallStore) -> Result<Simulation> {
         let sheath = self.sheath(&wall)?;
-        Simulation::with_properties(wall, self.vessel.wall.clone(), self.device()?, sheath, &self.method)
+        Simulation::from_store(wall, self.vessel.wall.clone(), self.device()?, sheath, &self.method, store)
             .map_err(|error| match error {
                 // What is wrong with a surface is wrong with its file.
                 Error::Mesh(reason) => {

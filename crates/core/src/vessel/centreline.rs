@@ -7,10 +7,12 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use serde::Serialize;
+
 use crate::{Error, Result, Vec3};
 
 /// A point of a centre line.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CentrelineNode {
     /// Position in mm.
     pub position_mm: Vec3,
@@ -21,7 +23,7 @@ pub struct CentrelineNode {
 }
 
 /// A tree of centre-line points: one root, parents before their children, no two joined points in one place.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CentrelineTree {
     nodes: Vec<CentrelineNode>,
 }

@@ -1,9 +1,11 @@
 //! A triangle surface: vertices and index triples, nothing derived.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Vec3;
 
 /// A triangle surface in millimetres. Triangles are counter-clockwise seen from outside the lumen.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceMesh {
     /// Vertex positions in millimetres.
     pub vertices_mm: Vec<Vec3>,

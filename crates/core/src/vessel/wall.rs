@@ -1,5 +1,7 @@
 //! A surface made fit to be a vessel wall, with a record of what that took.
 
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
 use super::opening::{self, Opening};
 use super::topology::EdgeTable;
 pub use super::topology::NONE as NO_NEIGHBOUR;
@@ -23,7 +25,7 @@ pub struct Wall {
 }
 
 /// What [`Wall::from_surface`] found and did.
-#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RepairReport {
     /// Triangles as given.
     pub triangles_given: usize,
@@ -249,6 +251,21 @@ impl Wall {
     pub fn volume_mm3(&self) -> f64 {
         let origin = self.mesh.vertices_mm.first().copied().unwrap_or_default();
         self.mesh.signed_volume_mm3() + self.caps.iter().map(|cap| signed_volume(cap, origin)).sum::<f64>()
+    }
+}
+
+/// A wall is written as its mesh and report: what else it has comes from these, to the bit.
+impl Serialize for Wall {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        (&self.mesh, &self.report).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Wall {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        let (mesh, report) = Deserialize::deserialize(deserializer)?;
+        validate(&mesh).map_err(de::Error::custom)?;
+        Ok(Self::finished(mesh, report))
     }
 }
 

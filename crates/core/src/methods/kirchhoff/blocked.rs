@@ -92,7 +92,7 @@ mod tests {
     use crate::methods::Method;
     use crate::methods::kirchhoff::workspace::Workspace;
     use crate::methods::kirchhoff::{Kirchhoff, KirchhoffOptions};
-    use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, WallQuery};
+    use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution, WallQuery};
 
     /// What is said of a wire of radius 0.4 mm that is pushed into a tube which narrows from 3 mm to `end_mm`.
     fn pushed_into(end_mm: f64) -> Option<PhysicalEnd> {
@@ -114,7 +114,7 @@ mod tests {
             device: &device,
         };
         let options = KirchhoffOptions::default();
-        let mut wire = Kirchhoff::<{ crate::rod::PLAIN }>::new(options, &surroundings).unwrap();
+        let mut wire = Kirchhoff::<{ crate::rod::PLAIN }>::new(options, &surroundings, &NoStore).unwrap();
         for _ in 0..33 {
             wire.step(&surroundings, Command::advance(1.0)).unwrap();
         }

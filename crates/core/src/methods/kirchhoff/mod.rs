@@ -40,6 +40,7 @@ use crate::insertion::{Command, StepReport, Surroundings};
 use crate::methods::{Content, Method, State};
 use crate::rod::Layout;
 use crate::shape::Shape;
+use crate::vessel::WallStore;
 use crate::{Error, Result};
 use mesh::Mesh;
 use state::Belongs;
@@ -90,11 +91,15 @@ struct Environment<'a> {
 }
 
 impl<const C: usize> Kirchhoff<C> {
-    /// The method with nothing inserted.
+    /// The method with nothing inserted; the even mesh of the wall comes from `store`.
     ///
     /// # Errors
     /// An element length that is not positive or cuts the device into too many elements.
-    pub fn new(options: KirchhoffOptions, surroundings: &Surroundings<'_>) -> Result<Self> {
+    pub fn new(
+        options: KirchhoffOptions,
+        surroundings: &Surroundings<'_>,
+        store: &dyn WallStore,
+    ) -> Result<Self> {
         let length_mm = surroundings.device.length_mm();
         crate::error::in_range("method.element_mm", options.element_mm, length_mm)?;
         crate::error::in_range("method.tolerance", options.tolerance, LARGEST_TOLERANCE)?;
@@ -112,7 +117,8 @@ impl<const C: usize> Kirchhoff<C> {
         }
         let mut state = KirchhoffState::at(surroundings.sheath);
         state.report.angles = Layout::<C>::TWIST;
-        let felt = FeltWall::new(surroundings.wall, surroundings.device, surroundings.properties)?;
+        let Surroundings { wall, properties, device, .. } = *surroundings;
+        let felt = FeltWall::from_store(wall, device, properties, store)?;
         let mut method = Self {
             options,
             felt: Arc::new(felt),

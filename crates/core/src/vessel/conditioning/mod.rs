@@ -48,7 +48,7 @@ const ITERATIONS: (usize, usize) = (40, 15);
 const CORRECTIONS: usize = 1;
 
 /// What [`condition`] may do.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Conditioning {
     /// How far the conditioned surface may be from the given one, mm; where the lumen's radius is less than twenty times this, a
     /// twentieth of the radius.

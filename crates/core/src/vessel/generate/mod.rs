@@ -58,7 +58,7 @@ const COUNT_ATTEMPTS: usize = 5;
 const COUNT_TOLERANCE: f64 = 0.02;
 
 /// How fine a generated wall is.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub enum Resolution {
     /// Typical length of an edge in mm. In a tree with forks, branches thinner than this resolves get shorter edges, about ten
     /// around.

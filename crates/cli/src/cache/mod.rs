@@ -1,0 +1,93 @@
+//! Walls that took long to make, kept on disk: the next run with the same wall starts at once.
+//!
+//! A wall is found by a hash of all that it was made of, so nothing has to be told when a file or an option changes. Whatever is
+//! wrong with the cache costs time and nothing else.
+
+mod entry;
+mod place;
+mod room;
+
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use std::{io, io::Write};
+
+use endowire_core::Result;
+use endowire_core::vessel::{Wall, WallRecipe, WallStore};
+
+use crate::args::CacheArgs;
+use crate::output::tell;
+use entry::{EXTENSION, Key};
+
+/// What takes less to make is not kept: to read it back would save nothing to speak of.
+const LEAST: Duration = Duration::from_millis(5);
+
+/// Walls in a folder; without one, all are made.
+pub(crate) struct Cache {
+    folder: Option<PathBuf>,
+    /// Whether it was told that the folder cannot be written.
+    told: Cell<bool>,
+}
+
+impl Cache {
+    /// The user's, unless the command line asks for none.
+    pub(crate) fn new(args: &CacheArgs) -> Self {
+        let folder = if args.no_cache { None } else { place::folder() };
+        Self { folder, told: Cell::new(false) }
+    }
+
+    fn read(&self, folder: &Path, key: &Key) -> Option<Wall> {
+        let path = path(folder, key);
+        let wall = entry::read(&path, key)?;
+        room::touch(&path);
+        Some(wall)
+    }
+
+    fn keep(&self, folder: &Path, key: &Key, wall: &Wall) {
+        if let Err(error) = write(folder, key, wall)
+            && !self.told.replace(true)
+        {
+            tell(format_args!(
+                "endowire: the wall is not kept for the next run: {}: {error} (set ENDOWIRE_CACHE to a folder that can be \
+                 written, or give --no-cache)",
+                folder.display()
+            ));
+        }
+    }
+}
+
+impl WallStore for Cache {
+    fn wall(&self, recipe: &WallRecipe<'_>) -> Result<Wall> {
+        let Some((folder, key)) = self.folder.as_deref().zip(entry::key(recipe)) else {
+            return recipe.make();
+        };
+        if let Some(wall) = self.read(folder, &key) {
+            return Ok(wall);
+        }
+        let began = Instant::now();
+        let wall = recipe.make()?;
+        if began.elapsed() >= LEAST {
+            self.keep(folder, &key, &wall);
+        }
+        Ok(wall)
+    }
+}
+
+fn path(folder: &Path, key: &Key) -> PathBuf {
+    let name: String = key.iter().map(|byte| format!("{byte:02x}")).collect();
+    folder.join(name).with_extension(EXTENSION)
+}
+
+/// Writes a file beside its place and renames it into it: others who read or write the same wall at the same time see a whole one.
+fn write(folder: &Path, key: &Key, wall: &Wall) -> io::Result<()> {
+    let bytes = entry::bytes(key, wall).map_err(io::Error::other)?;
+    std::fs::create_dir_all(folder)?;
+    room::make(folder, bytes.len() as u64)?;
+    let mut part = tempfile::Builder::new().suffix(entry::UNFINISHED).tempfile_in(folder)?;
+    part.write_all(&bytes)?;
+    part.persist(path(folder, key))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

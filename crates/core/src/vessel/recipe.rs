@@ -1,0 +1,131 @@
+//! Walls by what they are made of, so that one that takes long to make can be kept and found again.
+
+use serde::Serialize;
+
+use super::{CentrelineTree, Conditioning, GeneratedWall, Resolution, SurfaceMesh, Wall, condition};
+use crate::Result;
+
+/// A wall that takes long to make, as all that decides its bits. Serialised, no two recipes are alike.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub enum WallRecipe<'a> {
+    /// The wall of a centre-line tree, [`GeneratedWall`].
+    Generated {
+        /// The tree.
+        tree: &'a CentrelineTree,
+        /// How fine it is meshed.
+        resolution: Resolution,
+    },
+    /// A surface made fit to be a wall, [`Wall::from_surface`].
+    Repaired {
+        /// The surface as it was given, mm.
+        surface: &'a SurfaceMesh,
+    },
+    /// The even mesh of a wall that devices feel, [`condition`].
+    Even {
+        /// The wall's mesh.
+        surface: &'a SurfaceMesh,
+        /// What may be done to it.
+        options: Conditioning,
+    },
+}
+
+impl WallRecipe<'_> {
+    /// Makes the wall.
+    ///
+    /// # Errors
+    /// As [`GeneratedWall::new`], [`Wall::from_surface`] and [`condition`].
+    pub fn make(&self) -> Result<Wall> {
+        match self {
+            Self::Generated { tree, resolution } => Ok(GeneratedWall::new(tree, *resolution)?.wall),
+            Self::Repaired { surface } => Wall::from_surface(surface),
+            Self::Even { surface, options } => {
+                let even = condition(surface, options)?;
+                // What is even already keeps the numbers of its vertices.
+                if even.changed { Wall::welded(&even.mesh) } else { Wall::from_sound(even.mesh) }
+            }
+        }
+    }
+}
+
+/// Where walls that take long to make are kept. The core has no such place: a program brings one.
+pub trait WallStore {
+    /// The wall of a recipe, to the bit that of [`WallRecipe::make`], kept or made.
+    ///
+    /// # Errors
+    /// Those of [`WallRecipe::make`]. What goes wrong with the store is none: then the wall is made.
+    fn wall(&self, recipe: &WallRecipe<'_>) -> Result<Wall>;
+}
+
+/// Keeps nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NoStore;
+
+impl WallStore for NoStore {
+    fn wall(&self, recipe: &WallRecipe<'_>) -> Result<Wall> {
+        recipe.make()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vessel::anatomy;
+
+    fn tube() -> Wall {
+        let tree = anatomy::tree("curved_tube").unwrap();
+        WallRecipe::Generated { tree: &tree, resolution: Resolution::EdgeMm(1.5) }.make().unwrap()
+    }
+
+    #[test]
+    fn recipes_that_make_different_walls_are_written_differently() {
+        let mut trees = ["curved_tube", "straight_tube"].map(|name| anatomy::tree(name).unwrap());
+        trees.sort_by_key(|tree| tree.nodes().len());
+        let wall = tube();
+        let mut moved = wall.mesh().clone();
+        moved.vertices_mm[7].x = f64::from_bits(moved.vertices_mm[7].x.to_bits() + 1);
+        let coarse = Conditioning { deviation_mm: 0.2, ..Conditioning::default() };
+        let fewer = Conditioning { most_triangles: 1000, ..Conditioning::default() };
+        let generated = |tree, resolution| WallRecipe::Generated { tree, resolution };
+        let even = |surface, options| WallRecipe::Even { surface, options };
+        let recipes = [
+            generated(&trees[0], Resolution::EdgeMm(1.0)),
+            generated(&trees[0], Resolution::EdgeMm(2.0)),
+            generated(&trees[0], Resolution::Triangles(1)),
+            generated(&trees[1], Resolution::EdgeMm(1.0)),
+            WallRecipe::Repaired { surface: wall.mesh() },
+            WallRecipe::Repaired { surface: &moved },
+            even(wall.mesh(), Conditioning::default()),
+            even(&moved, Conditioning::default()),
+            even(wall.mesh(), coarse),
+            even(wall.mesh(), fewer),
+        ];
+        let written: std::collections::BTreeSet<String> =
+            recipes.iter().map(|recipe| serde_json::to_string(recipe).unwrap()).collect();
+        assert_eq!(written.len(), recipes.len());
+    }
+
+    #[test]
+    fn a_wall_that_was_written_and_read_is_the_same_wall() {
+        let mut surface = tube().mesh().clone();
+        // Something to repair, so that there is something to report.
+        surface.triangles.swap_remove(5);
+        surface.triangles[9].swap(0, 1);
+        let wall = Wall::from_surface(&surface).unwrap();
+        let report = wall.report();
+        assert!(report.triangles_flipped > 0 && report.holes_filled > 0, "{report:?}");
+        let read: Wall = serde_json::from_str(&serde_json::to_string(&wall).unwrap()).unwrap();
+        assert_eq!(read.mesh(), wall.mesh());
+        assert_eq!(read.report(), report);
+        assert_eq!(read.openings(), wall.openings());
+        assert_eq!(read.caps(), wall.caps());
+    }
+
+    #[test]
+    fn what_is_no_wall_is_not_read_as_one() {
+        let written = serde_json::to_string(&tube()).unwrap();
+        let odd = written.replacen("\"triangles\":[[", "\"triangles\":[[4000000,1,2],[", 1);
+        assert_ne!(odd, written);
+        let refused = serde_json::from_str::<Wall>(&odd).unwrap_err().to_string();
+        assert!(refused.contains("beyond the last one"), "{refused}");
+    }
+}
