@@ -306,7 +306,8 @@ impl SmoothWall {
         let distance = self.derive(x, list, &reached, |at| {
             slope += at.gradient * (at.support - reached.coverage) + at.support_gradient * at.weight;
         });
-        Some((distance, reached.coverage, slope / reached.weight))
+        let even = reached.behind.is_some();
+        Some((distance, reached.coverage, if even { Vec3::zeros() } else { slope / reached.weight }))
     }
 
     /// As [`SmoothWall::distance`]; `also` sees every vertex that reaches `x` with its weight and the weight's derivatives.
