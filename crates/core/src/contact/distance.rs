@@ -9,16 +9,13 @@
 //! y = x − Vᵢ,  h = Nᵢ·y,  τ = y − Nᵢ(Nᵢ·y)      height and offset
 //! σ = (I − hSᵢ)⁻¹ τ                                   foot of x, seen from Vᵢ along the surface
 //! Qᵢ(x) = h − ½ τᵀSᵢσ
-//! aᵢ(x) = (1 − σᵀMᵢσ)³   where positive
-//! wᵢ(x) = aᵢ b(Qᵢ, σᵀMᵢσ)
+//! wᵢ(x) = (1 − σᵀMᵢσ)³ b(Qᵢ)   where positive
 //! f(x)  = Σ wᵢQᵢ / Σ wᵢ
 //! ```
 //!
 //! with Nᵢ the inward normal, Sᵢ the curvature and Mᵢ an ellipse that holds the neighbours of the vertex. The window b, e^{−Qᵢ/0.3w} for
 //! small |Qᵢ| and 0 beyond a width w, leaves out the other side of a narrow lumen and the back of a thin septum; where a device
-//! touches two sides at once, the nearer holds it. Behind a quadric, towards the rim of its support, the window is narrower, by
-//! 1 − σᵀMᵢσ: over a ridge that stands into the lumen each flank would go on beyond the crest, and as the nearer of the two hold what
-//! is not there. How well the vertices reach says their coverage Σ aᵢwᵢ / Σ wᵢ, 0.35 and more on any even mesh. Feet, not offsets,
+//! touches two sides at once, the nearer holds it. Feet, not offsets,
 //! say which vertices are near: at height h in a tube of radius R offsets shrink by 1 − h/R, and a device that nearly fills the
 //! tube would blend walls all around it, and find a play too large by a tenth of the radius. f is twice continuously
 //! differentiable, so a device feels an energy with an exact gradient and Hessian; from the distance to the sampled surface it
@@ -95,27 +92,10 @@ struct Behind {
 /// Least cosine between the normals of vertices of one sheet.
 const FACING: f64 = 0.3;
 
-/// A vertex that reaches a point.
-pub(super) struct Reaching {
-    pub(super) vertex: u32,
-    /// wᵢ, …
-    pub(super) weight: f64,
-    /// … ∇wᵢ, …
-    pub(super) gradient: Vec3,
-    /// … and ∇∇wᵢ.
-    pub(super) hessian: Matrix3<f64>,
-    /// aᵢ, …
-    support: f64,
-    /// … and ∇aᵢ.
-    support_gradient: Vec3,
-}
-
 /// What the vertices that reach a point make of its distance.
 struct Reached {
     weight: f64,
     value_mm: f64,
-    /// Σ aᵢwᵢ / Σ wᵢ.
-    coverage: f64,
     behind: Option<Behind>,
     /// How many they are; the first of them.
     count: usize,
@@ -246,30 +226,26 @@ impl SmoothWall {
 
     /// The same in front of the surface, or behind it.
     fn reach_from(&self, x: &Vec3, list: &[u32], behind: Option<Behind>) -> Option<Reached> {
-        let mut found =
-            Reached { weight: 0.0, value_mm: 0.0, coverage: 0.0, behind, count: 0, vertices: [0; NOTED] };
+        let mut found = Reached { weight: 0.0, value_mm: 0.0, behind, count: 0, vertices: [0; NOTED] };
         for &v in list {
             let q = &self.quadrics[v as usize];
             if behind.is_some_and(|b| q.normal.dot(&b.facing) < FACING) {
                 continue;
             }
             let Some(local) = q.local(x, behind.is_some()) else { continue };
-            let a = (1.0 - local.u) * (1.0 - local.u) * (1.0 - local.u);
-            let w = a * q.opened(&local, behind.is_some()).value;
+            let g = 1.0 - local.u;
+            let w = g * g * g * q.opened(local.value, behind.is_some())[0];
             if w == 0.0 {
                 continue;
             }
             found.weight += w;
             found.value_mm += w * local.value;
-            found.coverage += w * a;
             if let Some(noted) = found.vertices.get_mut(found.count) {
                 *noted = v;
             }
             found.count += 1;
         }
         found.value_mm /= found.weight;
-        // Deep behind the surface feet lie far apart, and there are no triangles to go by instead.
-        found.coverage = if behind.is_some() { 1.0 } else { found.coverage / found.weight };
         (found.weight >= LEAST_WEIGHT).then_some(found)
     }
 
@@ -282,36 +258,25 @@ impl SmoothWall {
     }
 
     /// As [`SmoothWall::distance`], with derivatives only where the distance is less than `limit_mm`: they are what it costs. Beside it
-    /// the coverage: how well the vertices reach.
+    /// the sum of their weights: how well the vertices reach.
     pub fn within(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<(Nearness, f64)> {
         let list = self.list(triangle as usize);
         let reached = self.reach(x, list)?;
         let nearness = if reached.value_mm < limit_mm {
-            Nearness::Within(self.derive(x, list, &reached, |_| {}))
+            Nearness::Within(self.derive(x, list, &reached, |_, _, _, _| {}))
         } else {
             Nearness::Beyond(reached.value_mm)
         };
-        Some((nearness, reached.coverage))
-    }
-
-    /// As [`SmoothWall::distance`], with the coverage C and
-    ///
-    /// ```text
-    /// ∇C = Σ [(aᵢ − C) ∇wᵢ + wᵢ ∇aᵢ] / Σ wᵢ
-    /// ```
-    pub(super) fn covered(&self, x: &Vec3, triangle: u32) -> Option<(Distance, f64, Vec3)> {
-        let list = self.list(triangle as usize);
-        let reached = self.reach(x, list)?;
-        let mut slope = Vec3::zeros();
-        let distance = self.derive(x, list, &reached, |at| {
-            slope += at.gradient * (at.support - reached.coverage) + at.support_gradient * at.weight;
-        });
-        let even = reached.behind.is_some();
-        Some((distance, reached.coverage, if even { Vec3::zeros() } else { slope / reached.weight }))
+        Some((nearness, reached.weight))
     }
 
     /// As [`SmoothWall::distance`]; `also` sees every vertex that reaches `x` with its weight and the weight's derivatives.
-    pub(super) fn weigh(&self, x: &Vec3, triangle: u32, also: impl FnMut(&Reaching)) -> Option<Distance> {
+    pub(super) fn weigh(
+        &self,
+        x: &Vec3,
+        triangle: u32,
+        also: impl FnMut(u32, f64, &Vec3, &Matrix3<f64>),
+    ) -> Option<Distance> {
         let list = self.list(triangle as usize);
         let reached = self.reach(x, list)?;
         Some(self.derive(x, list, &reached, also))
@@ -319,7 +284,13 @@ impl SmoothWall {
 
     /// The derivatives of f where its value is known.
     #[inline]
-    fn derive(&self, x: &Vec3, list: &[u32], reached: &Reached, mut also: impl FnMut(&Reaching)) -> Distance {
+    fn derive(
+        &self,
+        x: &Vec3,
+        list: &[u32],
+        reached: &Reached,
+        mut also: impl FnMut(u32, f64, &Vec3, &Matrix3<f64>),
+    ) -> Distance {
         let (mut slope, mut gradient, mut hessian) = (Vec3::zeros(), Vec3::zeros(), Matrix3::zeros());
         for &v in reached.vertices.get(..reached.count).unwrap_or(list) {
             let q = &self.quadrics[v as usize];
@@ -327,31 +298,23 @@ impl SmoothWall {
                 continue;
             }
             let Some(local) = q.local(x, reached.behind.is_some()) else { continue };
-            let opened = q.opened(&local, reached.behind.is_some());
-            if opened.value == 0.0 {
+            let (f, g) = (local.value, 1.0 - local.u);
+            let [b, b1, b2] = q.opened(f, reached.behind.is_some());
+            if b == 0.0 {
                 continue;
             }
             let [(f1, f2), (u1, u2)] = q.derivatives(&local);
             // a = (1 − u)³ has a′(u) = −3g², a″(u) = 6g.
-            let (f, g) = (local.value, 1.0 - local.u);
-            let (a, a1, a2) = (g * g * g, -3.0 * g * g, 6.0 * g);
-            let w = a * opened.value;
-            let (in_u, in_q) = (a1 * opened.value + a * opened.in_u, a * opened.in_q);
-            let in_uu = a2 * opened.value + 2.0 * a1 * opened.in_u + a * opened.in_uu;
-            let turned = u1 * f1.transpose() * (a1 * opened.in_q + a * opened.in_qu);
-            let w1 = u1 * in_u + f1 * in_q;
-            let w2 = (u1 * u1.transpose() * in_uu + u2 * in_u)
-                + (turned + turned.transpose() + f2 * in_q + f1 * f1.transpose() * (a * opened.in_qq));
+            let a = g * g * g;
+            let a1 = u1 * (-3.0 * g * g);
+            let a2 = u1 * u1.transpose() * (6.0 * g) - u2 * (3.0 * g * g);
+            let turned = a1 * f1.transpose();
+            let w = a * b;
+            let w1 = a1 * b + f1 * (a * b1);
+            let w2 = a2 * b + (turned + turned.transpose() + f2 * a) * b1 + f1 * f1.transpose() * (a * b2);
             let frame = Matrix3::from_columns(&[q.axes[0], q.axes[1], q.normal]);
             let turned1 = frame * w1;
-            also(&Reaching {
-                vertex: v,
-                weight: w,
-                gradient: turned1,
-                hessian: frame * w2 * frame.transpose(),
-                support: a,
-                support_gradient: frame * u1 * a1,
-            });
+            also(v, w, &turned1, &(frame * w2 * frame.transpose()));
             let above = f - reached.value_mm;
             let mixed = w1 * f1.transpose();
             slope += turned1;

@@ -90,17 +90,6 @@ impl Spread {
     }
 }
 
-/// A window with its derivatives in Q and u.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Opened {
-    pub(super) value: f64,
-    pub(super) in_q: f64,
-    pub(super) in_qq: f64,
-    pub(super) in_u: f64,
-    pub(super) in_uu: f64,
-    pub(super) in_qu: f64,
-}
-
 /// A point seen from a vertex, along its principal directions.
 pub(super) struct Local {
     pub(super) tau: Vector2<f64>,
@@ -184,37 +173,27 @@ impl Quadric {
         self.farthest_mm = long * (1.0 - (highest * l.min(0.0)).min(lowest * k.max(0.0)));
     }
 
-    /// b(Q, u) and its derivatives; behind the surface without an end, and bounded: e^{−Z tanh(z/Z)} with z = Q/0.3w.
+    /// b(Q) and its derivatives; behind the surface without an end, and bounded: e^{−Z tanh(z/Z)} with z = Q/0.3w.
     #[inline]
-    pub(super) fn opened(&self, local: &Local, behind: bool) -> Opened {
-        let (value, rate) = (local.value, BELOW.0 / (NEARER * self.below_mm.0));
-        if behind {
-            let t = (rate * value / BOUND).tanh();
-            let (e, slope) = ((-BOUND * t).exp(), rate * (1.0 - t * t));
-            let second = (slope * slope + 2.0 * rate * slope * t / BOUND) * e;
-            return Opened { value: e, in_q: -slope * e, in_qq: second, ..Opened::default() };
+    pub(super) fn opened(&self, value: f64, behind: bool) -> [f64; 3] {
+        if !behind {
+            return self.window(value);
         }
-        // What is behind the surface near the rim of the support is next to another piece of wall.
-        let (g, (from, to)) = if value > 0.0 { (1.0, self.above_mm) } else { (1.0 - local.u, self.below_mm) };
-        let z = value / g;
-        let [b, b1, b2] = fall(z, from, to);
+        let rate = BELOW.0 / (NEARER * self.below_mm.0);
+        let t = (rate * value / BOUND).tanh();
+        let (e, slope) = ((-BOUND * t).exp(), rate * (1.0 - t * t));
+        [e, -slope * e, (slope * slope + 2.0 * rate * slope * t / BOUND) * e]
+    }
+
+    #[inline]
+    fn window(&self, value: f64) -> [f64; 3] {
+        let (from, to) = if value > 0.0 { self.above_mm } else { self.below_mm };
+        let [b, b1, b2] = fall(value, from, to);
         if b == 0.0 {
-            return Opened::default();
+            return [0.0; 3];
         }
+        let rate = BELOW.0 / (NEARER * self.below_mm.0);
         let e = (-rate * value).exp();
-        let mut opened = Opened {
-            value: b * e,
-            in_q: (b1 / g - rate * b) * e,
-            in_qq: (b2 / (g * g) - 2.0 * rate * b1 / g + rate * rate * b) * e,
-            ..Opened::default()
-        };
-        if value < 0.0 && b1 != 0.0 {
-            // ∂z/∂u = z/g.
-            let (z1, z2) = (z / g, 2.0 * z / (g * g));
-            opened.in_u = b1 * z1 * e;
-            opened.in_uu = (b2 * z1 * z1 + b1 * z2) * e;
-            opened.in_qu = ((b2 * z1 + b1 / g) / g - rate * b1 * z1) * e;
-        }
-        opened
+        [b * e, (b1 - rate * b) * e, (b2 - 2.0 * rate * b1 + rate * rate * b) * e]
     }
 }

@@ -139,29 +139,20 @@ impl<'a> WallContact<'a> {
             };
             let nearness = self.felt.nearness(x, triangle, limit_mm);
             known.from_tip_mm = self.points[index].from_tip_mm;
-            (known.clearance_mm, known.triangle, known.free_mm) = (0.0, Some(triangle), 0.0);
+            (known.clearance_mm, known.triangle) = (0.0, Some(triangle));
             self.counters.near += u64::from(self.skip);
             self.memory.readings[index] = (*x, nearness);
             return Reading::of(nearness, limit_mm);
         }
         if self.skip {
-            let moved = (x - known.base_looked_at).norm();
-            if moved < known.base_free_mm {
-                self.counters.avoided += 1;
-                (known.looked_at, known.triangle) = (known.base_looked_at, None);
-                (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, known.base_free_mm);
-                return Reading::Free(known.clearance_mm - moved);
-            }
             let moved = (x - known.looked_at).norm();
-            let free_mm = known.clearance_mm - near - self.felt.smooth.deepest_inset_mm();
-            if moved < free_mm {
+            let clearance = known.clearance_mm - moved;
+            if clearance > near + self.felt.smooth.deepest_inset_mm() {
                 self.counters.avoided += 1;
-                known.free_mm = free_mm;
-                return Reading::Free(known.clearance_mm - moved);
+                return Reading::Free(clearance);
             }
             if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius && known.base_triangle.is_some() {
                 (known.looked_at, known.triangle) = (known.base_looked_at, known.base_triangle);
-                known.free_mm = 0.0;
                 known.clearance_mm = known.base_looked_clearance_mm;
             }
             if let Some(triangle) = known.triangle {
@@ -195,16 +186,12 @@ impl<'a> WallContact<'a> {
         (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
         (known.clearance_mm, known.triangle) = (place.clearance_mm, None);
         let clearance = place.clearance(x);
-        let Some(triangle) = place.triangle else {
-            // Past an opening there is no wall.
-            known.free_mm = (x - place.middle).norm() + LOOK_AGAIN * radius;
-            return Reading::Free(clearance);
-        };
-        known.free_mm = place.clearance_mm - near - self.felt.smooth.inset_mm(triangle);
-        if (x - place.middle).norm() < known.free_mm {
+        // Past an opening there is no wall.
+        let Some(triangle) = place.triangle else { return Reading::Free(clearance) };
+        if clearance > near + self.felt.smooth.inset_mm(triangle) {
             return Reading::Free(clearance);
         }
-        (known.triangle, known.free_mm) = (Some(triangle), 0.0);
+        known.triangle = Some(triangle);
         let nearness = self.felt.nearness(x, triangle, limit_mm);
         self.memory.readings[index] = (*x, nearness);
         Reading::of(nearness, limit_mm)
@@ -392,7 +379,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
             known.base_clearance_mm = reading.distance_mm();
             known.presses = matches!(reading, Reading::Pressed(_));
             (known.base_looked_at, known.base_triangle) = (known.looked_at, known.triangle);
-            (known.base_looked_clearance_mm, known.base_free_mm) = (known.clearance_mm, known.free_mm);
+            known.base_looked_clearance_mm = known.clearance_mm;
             known.side = known.triangle.filter(|_| known.base_clearance_mm < SUNK * radius_mm);
             if !known.presses {
                 known.force_n = 0.0;
