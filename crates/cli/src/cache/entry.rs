@@ -9,6 +9,8 @@ use std::time::UNIX_EPOCH;
 use endowire_core::vessel::{Wall, WallRecipe};
 use sha2::{Digest, Sha256};
 
+use crate::output::seal;
+
 /// The first line.
 const FORMAT: &str = "endowire wall 1\n";
 /// Largest file that is read, bytes.
@@ -40,19 +42,12 @@ pub(super) fn key(recipe: &WallRecipe<'_>) -> Option<Key> {
 /// A file's bytes.
 pub(super) fn bytes(key: &Key, wall: &Wall) -> postcard::Result<Vec<u8>> {
     let begun = [FORMAT.as_bytes(), key].concat();
-    let mut bytes = postcard::to_extend(wall, begun)?;
-    let end = Sha256::digest(&bytes);
-    bytes.extend(end);
-    Ok(bytes)
+    postcard::to_extend(wall, begun).map(seal::sealed)
 }
 
 /// The wall of a file, if it is there, whole, and that of the key.
 pub(super) fn read(path: &Path, key: &Key) -> Option<Wall> {
     let bytes = endowire_core::file::read(path, SIZE_LIMIT).ok()?;
-    let (body, end) = bytes.split_last_chunk::<32>()?;
-    let wall = body.strip_prefix(FORMAT.as_bytes())?.strip_prefix(key)?;
-    if Sha256::digest(body).as_slice() != end {
-        return None;
-    }
+    let wall = seal::opened(&bytes)?.strip_prefix(FORMAT.as_bytes())?.strip_prefix(key)?;
     postcard::from_bytes(wall).ok()
 }

@@ -16,7 +16,7 @@ use endowire_core::Result;
 use endowire_core::vessel::{Wall, WallRecipe, WallStore};
 
 use crate::args::CacheArgs;
-use crate::output::tell;
+use crate::output::{seal, tell};
 use entry::{EXTENSION, Key};
 
 /// What takes less to make is not kept: to read it back would save nothing to speak of.
@@ -74,8 +74,7 @@ impl WallStore for Cache {
 }
 
 fn path(folder: &Path, key: &Key) -> PathBuf {
-    let name: String = key.iter().map(|byte| format!("{byte:02x}")).collect();
-    folder.join(name).with_extension(EXTENSION)
+    folder.join(seal::hex(key)).with_extension(EXTENSION)
 }
 
 /// Writes a file beside its place and renames it into it: others who read or write the same wall at the same time see a whole one.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use super::entry::{EXTENSION, UNFINISHED};
+use crate::output::whole;
 
 /// Most bytes of all walls: some hundreds of them.
 const MOST_BYTES: u64 = 1 << 30;
@@ -34,7 +35,7 @@ fn make_within(folder: &Path, most_bytes: u64) -> io::Result<()> {
         } else if path.as_os_str().as_encoded_bytes().ends_with(UNFINISHED.as_bytes())
             && now.duration_since(used).is_ok_and(|age| age > LEFT_BEHIND)
         {
-            remove(&path)?;
+            whole::remove(&path)?;
         }
     }
     walls.sort();
@@ -43,7 +44,8 @@ fn make_within(folder: &Path, most_bytes: u64) -> io::Result<()> {
         if total <= most_bytes {
             break;
         }
-        remove(&path)?;
+        // Another process may have been faster.
+        whole::remove(&path)?;
         total -= size;
     }
     Ok(())
@@ -51,14 +53,6 @@ fn make_within(folder: &Path, most_bytes: u64) -> io::Result<()> {
 
 fn file(entry: &std::fs::DirEntry) -> Option<(PathBuf, Metadata)> {
     entry.metadata().ok().filter(Metadata::is_file).map(|data| (entry.path(), data))
-}
-
-/// Another process may have been faster.
-fn remove(path: &Path) -> io::Result<()> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
-    }
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use crate::output::provenance::{Provenance, read_input};
 use crate::output::recorder::{Recorder, StepFailure, Summary};
 use crate::output::recording::Recording;
 use crate::output::saved::{Course, Saved, Saver};
-use crate::output::{frames::FrameWriter, print_json, tell};
+use crate::output::{frames::FrameWriter, print_json, tell, whole};
 
 /// Runs the scene's script and records every step.
 pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
@@ -168,10 +168,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
 
 /// Removes the state of an earlier run: until this one has saved its own, there is none to go on from.
 fn forget_state(path: &Path) -> Result<(), Failure> {
-    match std::fs::remove_file(path) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Failure::write(path, &e)),
-        _ => Ok(()),
-    }
+    whole::remove(path).map_err(|e| Failure::write(path, &e))
 }
 
 /// Draws the frames of a recording that goes on once more: the detector remembers those before.

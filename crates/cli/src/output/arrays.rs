@@ -54,7 +54,7 @@ impl ShapeArrays {
 
     /// Arrays without a step, in place of those that the recording has, packed or not.
     pub(crate) fn anew(recording: &Path) -> io::Result<Self> {
-        remove(&recording.join(PACKED))?;
+        whole::remove(&recording.join(PACKED))?;
         Self::new(recording)
     }
 
@@ -87,7 +87,7 @@ impl ShapeArrays {
             open(CONTACT_OFFSETS, s)?,
         ];
         // Only now: what is packed is whole, whatever happens here.
-        remove(&packed)?;
+        whole::remove(&packed)?;
         Ok(Self { folder, arrays, nodes, contacts })
     }
 
@@ -138,17 +138,8 @@ impl ShapeArrays {
 /// Removes growing arrays and their folder, which stays if a user has put something into it.
 pub(crate) fn remove_growing(folder: &Path) -> io::Result<()> {
     for member in MEMBERS {
-        remove(&folder.join(member.file_name()))?;
+        whole::remove(&folder.join(member.file_name()))?;
     }
     let _ = std::fs::remove_dir(folder);
     Ok(())
-}
-
-/// Removes a file, if it is there.
-pub(crate) fn remove(path: &Path) -> io::Result<()> {
-    match std::fs::remove_file(path) {
-        // The second is what a path through something that is no folder gives.
-        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(()),
-        other => other,
-    }
 }

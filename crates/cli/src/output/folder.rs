@@ -93,10 +93,10 @@ fn remove_earlier(folder: &Path, recording: bool) -> io::Result<Vec<String>> {
         let path = folder.join(name);
         // Not the end of a link: a link itself is replaced.
         if path.symlink_metadata().is_ok() {
-            arrays::remove(&path)?;
+            whole::remove(&path)?;
             removed.push(name.to_owned());
         }
-        arrays::remove(&whole::unfinished(&path))?;
+        whole::remove(&whole::unfinished(&path))?;
     }
     if recording {
         let growing = folder.join(arrays::GROWING);

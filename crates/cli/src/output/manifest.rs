@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
-use super::arrays::remove;
+use super::whole::remove;
 
 /// The list of a call that goes on.
 pub(crate) struct Manifest {

@@ -11,7 +11,8 @@ pub(crate) mod provenance;
 pub(crate) mod recorder;
 pub(crate) mod recording;
 pub(crate) mod saved;
-mod whole;
+pub(crate) mod seal;
+pub(crate) mod whole;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use super::seal;
 use crate::failure::Failure;
 
 /// Version, revision, input and seed of a result.
@@ -26,7 +27,7 @@ impl Provenance {
             hash.update((input.len() as u64).to_le_bytes());
             hash.update(input);
         }
-        let scene_hash = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
+        let scene_hash = seal::hex(&hash.finalize());
         Self {
             version: env!("CARGO_PKG_VERSION"),
             git_revision: env!("ENDOWIRE_GIT_REVISION"),

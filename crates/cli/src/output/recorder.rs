@@ -335,7 +335,7 @@ impl Kept {
 
 fn write_summary(folder: &Path, summary: &Summary) -> Result<(), Failure> {
     let path = folder.join(SUMMARY);
-    whole::write_text(&path, &(to_json(summary)? + "\n")).map_err(|e| Failure::write(&path, &e))
+    whole::write_bytes(&path, (to_json(summary)? + "\n").as_bytes()).map_err(|e| Failure::write(&path, &e))
 }
 
 #[cfg(test)]

@@ -3,8 +3,6 @@
 //! One line of text names the format, one of JSON says what the state belongs to, and the state follows in bytes that keep every bit of a
 //! number. A hash of it all is at the end: a file that is not whole is told from one that is.
 
-use std::fs::File;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -13,14 +11,12 @@ use endowire_core::scene::Scene;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::whole;
+use super::{seal, whole};
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
 const FORMAT: &str = "endowire state 1";
 const ANY_FORMAT: &str = "endowire state ";
-/// Bytes of the hash at the end.
-const HASH_BYTES: usize = 32;
 
 /// What a state belongs to: hashes of all that its steps depended on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -70,7 +66,7 @@ fn script_hash(done: &[Command]) -> String {
 }
 
 fn hash(bytes: Vec<u8>) -> String {
-    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+    seal::hex(&Sha256::digest(bytes))
 }
 
 /// What is known of a run while it goes on, beside the state.
@@ -130,13 +126,10 @@ impl Saved {
                 _ => refuse("is no saved state"),
             });
         }
-        let Some((body, end)) = bytes.split_last_chunk::<HASH_BYTES>().filter(|(b, _)| b.len() > first.len())
-        else {
+        if bytes.len() <= first.len() + seal::BYTES {
             return Err(refuse("is not whole"));
-        };
-        if Sha256::digest(body).as_slice() != end {
-            return Err(refuse("is not whole or was changed"));
         }
+        let Some(body) = seal::opened(&bytes) else { return Err(refuse("is not whole or was changed")) };
         let rest = &body[first.len() + 1..];
         let line = rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len());
         let header = serde_json::from_slice(&rest[..line]).map_err(|e| refuse(&e.to_string()))?;
@@ -238,14 +231,7 @@ impl Saver {
         let state = postcard::to_allocvec(&simulation.state()).map_err(|e| failed(e.to_string()))?;
         let mut bytes = format!("{FORMAT}\n{header}\n").into_bytes();
         bytes.extend(state);
-        let end = Sha256::digest(&bytes);
-        bytes.extend(end);
-        let written = whole::write(&self.path, |part| {
-            let mut file = File::create(part)?;
-            file.write_all(&bytes)?;
-            file.sync_all()
-        });
-        written.map_err(|e| Failure::write(&self.path, &e))?;
+        whole::write_bytes(&self.path, &seal::sealed(bytes)).map_err(|e| Failure::write(&self.path, &e))?;
         self.last = Some((Instant::now(), began.elapsed()));
         Ok(())
     }

@@ -21,11 +21,20 @@ pub(crate) fn write(path: &Path, write: impl FnOnce(&Path) -> io::Result<()>) ->
     written
 }
 
-/// Writes a text, and waits for the disk before it takes the place of what was there.
-pub(crate) fn write_text(path: &Path, text: &str) -> io::Result<()> {
+/// Removes a file, if it is there.
+pub(crate) fn remove(path: &Path) -> io::Result<()> {
+    match std::fs::remove_file(path) {
+        // The second is what a path through something that is no folder gives.
+        Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(()),
+        other => other,
+    }
+}
+
+/// Writes bytes, and waits for the disk before they take the place of what was there.
+pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write(path, |part| {
         let mut file = File::create(part)?;
-        file.write_all(text.as_bytes())?;
+        file.write_all(bytes)?;
         file.sync_all()
     })
 }
