@@ -33,8 +33,8 @@ pub struct FeltWall {
 /// tube has all of its triangles at one distance, and a question that reaches them looks at all: asking a little farther is enough.
 const LOOK_MM: f64 = 0.5;
 
-/// Sum of weights below which the flat triangles take part.
-const COVERED: f64 = 1e-3;
+/// Coverage below which the flat triangles take part.
+const COVERED: f64 = 0.15;
 
 /// `wall` as an even mesh, or as it is where it is felt as it is meshed.
 fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) -> Result<Cow<'a, Wall>> {
@@ -76,24 +76,19 @@ impl FeltWall {
 
     /// How near `x` is, whose nearest triangle is `triangle` or close to it; with derivatives below `limit_mm`.
     ///
-    /// Where quadrics hardly reach, the flat triangles take their place bit by bit: with W the sum of the weights,
-    /// F = f + λ(W) (d − f) goes from the smooth distance f to that of the triangles, d.
+    /// Where quadrics hardly reach, the flat triangles take their place bit by bit: with their coverage C, F = f + λ(C) (d − f) goes
+    /// from the smooth distance f to that of the triangles, d.
     pub(crate) fn nearness(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
-        if let Some((nearness, weight)) = self.smooth.within(x, triangle, limit_mm)
-            && weight >= COVERED
+        if let Some((nearness, coverage)) = self.smooth.within(x, triangle, limit_mm)
+            && coverage >= COVERED
         {
             return nearness;
         }
         let Some(flat) = self.query.nearest(x, self.reach_mm) else { return Nearness::Beyond(self.reach_mm) };
         let mut found =
             Distance { value_mm: flat.distance_mm, gradient: flat.normal, hessian: Matrix3::zeros() };
-        let (mut weight, mut slope) = (0.0, Vec3::zeros());
-        let weighed = self.smooth.weigh(x, triangle, |_, w, w1, _| {
-            weight += w;
-            slope += w1;
-        });
-        if let Some(smooth) = weighed {
-            let t = weight / COVERED;
+        if let Some((smooth, coverage, slope)) = self.smooth.covered(x, triangle) {
+            let t = coverage / COVERED;
             let (share, rate) = ((1.0 - t) * (1.0 - t), -2.0 * (1.0 - t) / COVERED);
             let apart = found.value_mm - smooth.value_mm;
             let turn = slope * rate;
@@ -101,7 +96,7 @@ impl FeltWall {
             found = Distance {
                 value_mm: smooth.value_mm + share * apart,
                 gradient: smooth.gradient + away * share + turn * apart,
-                // Without the second derivatives of W: Newton's method is a little slower there.
+                // Without the second derivatives of C: Newton's method is a little slower there.
                 hessian: smooth.hessian * (1.0 - share) + turn * away.transpose() + away * turn.transpose(),
             };
         }

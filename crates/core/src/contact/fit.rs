@@ -140,5 +140,6 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[V
         farthest_mm: f64::INFINITY,
         above_mm: (0.0, 0.0),
         below_mm: (0.0, 0.0),
+        narrowing: 0.0,
     }
 }

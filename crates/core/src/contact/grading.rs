@@ -147,14 +147,14 @@ fn blend(wall: &SmoothWall, x: &Vec3, triangle: u32, of: impl Fn(u32) -> f64) ->
     let (mut weight, mut value) = (0.0, 0.0);
     let (mut weight1, mut value1) = (Vec3::zeros(), Vec3::zeros());
     let (mut weight2, mut value2) = (Matrix3::zeros(), Matrix3::zeros());
-    let reached = wall.weigh(x, triangle, |v, w, w1, w2| {
-        let s = of(v);
-        weight += w;
-        weight1 += w1;
-        weight2 += w2;
-        value += w * s;
-        value1 += w1 * s;
-        value2 += w2 * s;
+    let reached = wall.weigh(x, triangle, |at| {
+        let s = of(at.vertex);
+        weight += at.weight;
+        weight1 += at.gradient;
+        weight2 += at.hessian;
+        value += at.weight * s;
+        value1 += at.gradient * s;
+        value2 += at.hessian * s;
     });
     if reached.is_none() {
         // A torn surface, where the triangles are what there is: the list begins with its corners.

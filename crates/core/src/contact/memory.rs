@@ -22,6 +22,8 @@ pub(super) struct KnownPoint {
     pub(super) clearance_mm: f64,
     /// The nearest triangle then, if the wall was near.
     pub(super) triangle: Option<u32>,
+    /// While it is no farther than this from there, mm, it is free whatever else would be found.
+    pub(super) free_mm: f64,
     /// Of a point that has sunk into the wall at its base, a triangle of the wall that it has sunk into.
     pub(super) side: Option<u32>,
     /// Position at the state that Newton's method is leaving.
@@ -33,6 +35,8 @@ pub(super) struct KnownPoint {
     pub(super) base_triangle: Option<u32>,
     /// See `base_looked_at`.
     pub(super) base_looked_clearance_mm: f64,
+    /// See `base_looked_at`.
+    pub(super) base_free_mm: f64,
     /// No wall is nearer to it than this, mm.
     pub(super) base_clearance_mm: f64,
     /// Whether it presses on the wall there: the reading of the point is the one taken there, …
@@ -46,11 +50,13 @@ const NOTHING: KnownPoint = KnownPoint {
     from_tip_mm: 0.0,
     clearance_mm: -1.0,
     triangle: None,
+    free_mm: 0.0,
     side: None,
     base: Vec3::new(f64::NAN, f64::NAN, f64::NAN),
     base_looked_at: Vec3::new(f64::NAN, f64::NAN, f64::NAN),
     base_triangle: None,
     base_looked_clearance_mm: -1.0,
+    base_free_mm: 0.0,
     base_clearance_mm: 0.0,
     presses: false,
     force_n: 0.0,

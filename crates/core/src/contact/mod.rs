@@ -11,6 +11,8 @@ mod places;
 pub mod point;
 pub mod potential;
 mod quadric;
+#[cfg(test)]
+mod ridge_tests;
 pub mod wall;
 
 pub use distance::{Distance, Nearness, SmoothWall};

@@ -27,6 +27,8 @@ pub(super) struct Quadric {
     /// The window falls from 1 at the first to 0 at the second, above and below the surface, mm.
     pub(super) above_mm: (f64, f64),
     pub(super) below_mm: (f64, f64),
+    /// n, by which the window below is narrower towards the rim of the support: 1 − n at the rim itself.
+    pub(super) narrowing: f64,
     /// Half axes of the support, shortest and longest, mm.
     pub(super) half_axes_mm: (f64, f64),
 }
@@ -44,6 +46,10 @@ const NEARER: f64 = 0.3;
 const CENTRE: f64 = 1.05;
 /// … and is closed at this many times that height.
 const BEYOND_CENTRE: f64 = 1.15;
+
+/// In a tube so narrow, radii of the device over that of the tube, the wall behind a device is no other piece: from the first on the
+/// window below is less narrow towards the rim, and from the second on not at all.
+const NARROW: (f64, f64) = (0.5, 0.8);
 
 /// Z: what is behind the surface counts by at most e^Z.
 const BOUND: f64 = 8.0;
@@ -88,6 +94,17 @@ impl Spread {
         let square = value * value;
         Self { value, first: square * slope, second: square * (2.0 * value * slope * slope + bend) }
     }
+}
+
+/// A window with its derivatives in Q and u.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Opened {
+    pub(super) value: f64,
+    pub(super) in_q: f64,
+    pub(super) in_qq: f64,
+    pub(super) in_u: f64,
+    pub(super) in_uu: f64,
+    pub(super) in_qu: f64,
 }
 
 /// A point seen from a vertex, along its principal directions.
@@ -154,8 +171,8 @@ impl Quadric {
         [(f1, f2), (u1, u2)]
     }
 
-    /// Sets the window for devices up to `thickest_mm` in radius.
-    pub(super) fn open_window(&mut self, thickest_mm: f64) {
+    /// Sets the window for devices up to `thickest_mm` in radius; `around` says that the support reaches around the lumen.
+    pub(super) fn open_window(&mut self, thickest_mm: f64, around: bool) {
         let size = (WINDOW.0 * thickest_mm).max(WINDOW.1 * self.half_axes_mm.0);
         // The first curvature is the larger one.
         let centre = if self.curvature[0] > 0.0 {
@@ -165,6 +182,8 @@ impl Quadric {
         };
         self.above_mm = ((ABOVE.0 * size).min(centre), (ABOVE.1 * size).min(BEYOND_CENTRE * centre));
         self.below_mm = (BELOW.0 * size, BELOW.1 * size);
+        let narrow = (NARROW.1 - self.curvature[0] * thickest_mm) / (NARROW.1 - NARROW.0);
+        self.narrowing = if around { 0.0 } else { narrow.clamp(0.0, 1.0) };
         // Where the window is open heights differ from Q by the sag of the support at most, and feet are nearer than offsets by
         // height times curvature.
         let (long, [k, l]) = (self.half_axes_mm.1, self.curvature);
@@ -173,27 +192,38 @@ impl Quadric {
         self.farthest_mm = long * (1.0 - (highest * l.min(0.0)).min(lowest * k.max(0.0)));
     }
 
-    /// b(Q) and its derivatives; behind the surface without an end, and bounded: e^{−Z tanh(z/Z)} with z = Q/0.3w.
+    /// b(Q, u) and its derivatives; behind the surface without an end, and bounded: e^{−Z tanh(z/Z)} with z = Q/0.3w.
     #[inline]
-    pub(super) fn opened(&self, value: f64, behind: bool) -> [f64; 3] {
-        if !behind {
-            return self.window(value);
+    pub(super) fn opened(&self, local: &Local, behind: bool) -> Opened {
+        let (value, rate) = (local.value, BELOW.0 / (NEARER * self.below_mm.0));
+        if behind {
+            let t = (rate * value / BOUND).tanh();
+            let (e, slope) = ((-BOUND * t).exp(), rate * (1.0 - t * t));
+            let second = (slope * slope + 2.0 * rate * slope * t / BOUND) * e;
+            return Opened { value: e, in_q: -slope * e, in_qq: second, ..Opened::default() };
         }
-        let rate = BELOW.0 / (NEARER * self.below_mm.0);
-        let t = (rate * value / BOUND).tanh();
-        let (e, slope) = ((-BOUND * t).exp(), rate * (1.0 - t * t));
-        [e, -slope * e, (slope * slope + 2.0 * rate * slope * t / BOUND) * e]
-    }
-
-    #[inline]
-    fn window(&self, value: f64) -> [f64; 3] {
-        let (from, to) = if value > 0.0 { self.above_mm } else { self.below_mm };
-        let [b, b1, b2] = fall(value, from, to);
+        // What is behind the surface near the rim of the support is next to another piece of wall.
+        let n = if value > 0.0 { 0.0 } else { self.narrowing };
+        let (g, (from, to)) = (1.0 - n * local.u, if value > 0.0 { self.above_mm } else { self.below_mm });
+        let z = value / g;
+        let [b, b1, b2] = fall(z, from, to);
         if b == 0.0 {
-            return [0.0; 3];
+            return Opened::default();
         }
-        let rate = BELOW.0 / (NEARER * self.below_mm.0);
         let e = (-rate * value).exp();
-        [b * e, (b1 - rate * b) * e, (b2 - 2.0 * rate * b1 + rate * rate * b) * e]
+        let mut opened = Opened {
+            value: b * e,
+            in_q: (b1 / g - rate * b) * e,
+            in_qq: (b2 / (g * g) - 2.0 * rate * b1 / g + rate * rate * b) * e,
+            ..Opened::default()
+        };
+        if n > 0.0 && b1 != 0.0 {
+            // ∂z/∂u = nz/g.
+            let (z1, z2) = (n * z / g, 2.0 * n * n * z / (g * g));
+            opened.in_u = b1 * z1 * e;
+            opened.in_uu = (b2 * z1 * z1 + b1 * z2) * e;
+            opened.in_qu = ((b2 * z1 + b1 * n / g) / g - rate * b1 * z1) * e;
+        }
+        opened
     }
 }

@@ -139,20 +139,29 @@ impl<'a> WallContact<'a> {
             };
             let nearness = self.felt.nearness(x, triangle, limit_mm);
             known.from_tip_mm = self.points[index].from_tip_mm;
-            (known.clearance_mm, known.triangle) = (0.0, Some(triangle));
+            (known.clearance_mm, known.triangle, known.free_mm) = (0.0, Some(triangle), 0.0);
             self.counters.near += u64::from(self.skip);
             self.memory.readings[index] = (*x, nearness);
             return Reading::of(nearness, limit_mm);
         }
         if self.skip {
-            let moved = (x - known.looked_at).norm();
-            let clearance = known.clearance_mm - moved;
-            if clearance > near + self.felt.smooth.deepest_inset_mm() {
+            let moved = (x - known.base_looked_at).norm();
+            if moved < known.base_free_mm {
                 self.counters.avoided += 1;
-                return Reading::Free(clearance);
+                (known.looked_at, known.triangle) = (known.base_looked_at, None);
+                (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, known.base_free_mm);
+                return Reading::Free(known.clearance_mm - moved);
+            }
+            let moved = (x - known.looked_at).norm();
+            let free_mm = known.clearance_mm - near - self.felt.smooth.deepest_inset_mm();
+            if moved < free_mm {
+                self.counters.avoided += 1;
+                known.free_mm = free_mm;
+                return Reading::Free(known.clearance_mm - moved);
             }
             if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius && known.base_triangle.is_some() {
                 (known.looked_at, known.triangle) = (known.base_looked_at, known.base_triangle);
+                known.free_mm = 0.0;
                 known.clearance_mm = known.base_looked_clearance_mm;
             }
             if let Some(triangle) = known.triangle {
@@ -186,12 +195,16 @@ impl<'a> WallContact<'a> {
         (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
         (known.clearance_mm, known.triangle) = (place.clearance_mm, None);
         let clearance = place.clearance(x);
-        // Past an opening there is no wall.
-        let Some(triangle) = place.triangle else { return Reading::Free(clearance) };
-        if clearance > near + self.felt.smooth.inset_mm(triangle) {
+        let Some(triangle) = place.triangle else {
+            // Past an opening there is no wall.
+            known.free_mm = (x - place.middle).norm() + LOOK_AGAIN * radius;
+            return Reading::Free(clearance);
+        };
+        known.free_mm = place.clearance_mm - near - self.felt.smooth.inset_mm(triangle);
+        if (x - place.middle).norm() < known.free_mm {
             return Reading::Free(clearance);
         }
-        known.triangle = Some(triangle);
+        (known.triangle, known.free_mm) = (Some(triangle), 0.0);
         let nearness = self.felt.nearness(x, triangle, limit_mm);
         self.memory.readings[index] = (*x, nearness);
         Reading::of(nearness, limit_mm)
@@ -305,15 +318,24 @@ impl<'a> WallContact<'a> {
     }
 
     /// Whether the device has passed through the wall to where it is: followed from the sheath, a piece of it between two points in
-    /// the lumen meets the wall. Of a point that has sunk in the side is known.
+    /// the lumen meets the wall, or comes out of the wall on its other side. Of a point that has sunk in the side is known.
     pub fn passes_through(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         let mut last: Option<(Vec3, f64)> = None;
+        let mut sunk = false;
         for index in (0..self.points.len()).rev() {
             let x = self.points[index].position(elements, state);
             let distance_mm = self.read(index, &x).distance_mm();
-            if distance_mm < SUNK * self.points[index].potential.radius_mm {
-                last = None;
+            let sunk_mm = SUNK * self.points[index].potential.radius_mm;
+            if distance_mm < sunk_mm {
+                (last, sunk) = (None, true);
                 continue;
+            }
+            // What the smooth wall takes for the lumen may be that of another wall, seen through one that is thin.
+            let beyond = |felt: &FeltWall| {
+                felt.query.nearest(&x, felt.reach_mm).is_some_and(|flat| flat.distance_mm < -sunk_mm)
+            };
+            if std::mem::take(&mut sunk) && beyond(self.felt) {
+                return true;
             }
             if let Some((from, clearance_mm)) = last
                 && (x - from).norm() > SAFE * clearance_mm.max(distance_mm)
@@ -322,7 +344,9 @@ impl<'a> WallContact<'a> {
                 // A flat triangle may stand into the smooth lumen: what has gone through is behind the piece of wall that is next to it.
                 let beside = self.memory.points[index + 1].triangle;
                 let behind = |triangle| self.felt.distance_from(triangle, &x) < 0.0;
-                if self.felt.query.crossing(&from, &x, 1.0).is_some() && beside.is_none_or(behind) {
+                if self.felt.query.crossing(&from, &x, 1.0).is_some()
+                    && (beside.is_none_or(behind) || beyond(self.felt))
+                {
                     return true;
                 }
             }
@@ -379,7 +403,7 @@ impl<const C: usize> External<C> for WallContact<'_> {
             known.base_clearance_mm = reading.distance_mm();
             known.presses = matches!(reading, Reading::Pressed(_));
             (known.base_looked_at, known.base_triangle) = (known.looked_at, known.triangle);
-            known.base_looked_clearance_mm = known.clearance_mm;
+            (known.base_looked_clearance_mm, known.base_free_mm) = (known.clearance_mm, known.free_mm);
             known.side = known.triangle.filter(|_| known.base_clearance_mm < SUNK * radius_mm);
             if !known.presses {
                 known.force_n = 0.0;

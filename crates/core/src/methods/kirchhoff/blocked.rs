@@ -9,7 +9,7 @@ use super::{Environment, softest};
 use crate::contact::{FeltWall, WallContact};
 use crate::{PhysicalEnd, Vec3};
 
-/// How far off the wall, in radii, ways across begin.
+/// How far off the wall, in radii, ways across begin at most.
 const OFF: f64 = 0.3;
 /// Tangents of the angles between the normal and other ways across.
 const TILTS: [f64; 2] = [0.4, 1.0];
@@ -57,7 +57,9 @@ impl<const C: usize> Tools<C> {
 fn room_mm(felt: &FeltWall, place: &Vec3, radius_mm: f64) -> Option<f64> {
     let near = felt.query.nearest(place, 2.0 * radius_mm)?;
     let n = near.normal;
-    let from = near.point_mm + n * (OFF * radius_mm);
+    // In a lumen narrower than that the middle of what there is.
+    let opposite_mm = facing_mm(felt, &(near.point_mm + n * ON_MM), &n, OFF * radius_mm);
+    let from = near.point_mm + n * opposite_mm.map_or(OFF * radius_mm, |way_mm| 0.5 * way_mm);
     let e = n.cross(&Vec3::ith(n.iamin(), 1.0)).normalize();
     let f = n.cross(&e);
     let aslant = TILTS.into_iter().flat_map(|tilt| [e, f, -e, -f].map(|side| (n + side * tilt).normalize()));

@@ -132,13 +132,18 @@ impl<const C: usize> Workspace<C> {
                     }
                 }
             }
+            // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
             if done < 1.0 && (failures > RESORTS || substeps > SUBSTEP_LIMIT) {
+                if command.advance_mm > 0.0
+                    && let Some(end) = tools.narrowest(environment, now)
+                {
+                    return Err(Error::End(end));
+                }
                 return Err(Error::Computation(format!(
                     "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
                 )));
             }
         }
-        // No equilibrium: unless the vessel is too narrow to go on, that is told.
         if !balanced
             && command.advance_mm > 0.0
             && let Some(end) = tools.narrowest(environment, now)
