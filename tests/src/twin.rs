@@ -4,8 +4,8 @@ use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::methods::MethodChoice;
-use endowire_core::reference::crossing::curve;
 use endowire_core::vessel::{SurfaceMesh, Wall};
+use endowire_verify::crossing::curve;
 
 /// Commands at the end whose push forces are averaged: where a wire slides over single triangles, one force is chance.
 const AVERAGED: usize = 10;

@@ -13,7 +13,6 @@ use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::reference::insertion_stress::InsertionStress;
 use endowire_core::scene::Scene;
 use endowire_core::vessel::{
     CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall, anatomy,
@@ -21,6 +20,7 @@ use endowire_core::vessel::{
 use endowire_tests::crossing::CrossingTest;
 use endowire_tests::noise::Noise;
 use endowire_tests::sweep::Tally;
+use endowire_verify::insertion_stress::InsertionStress;
 
 fn asset(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join(name)

@@ -5,11 +5,11 @@ use endowire_core::insertion::{Sheath, Simulation, WallProperties};
 use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::methods::li2011::{Chain, Li2011Options, banded, dense};
-use endowire_core::reference::{at_end, unit_rod};
 use endowire_core::statics::LoadKind;
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result, Vec3};
 use endowire_methods::{Insertion, InsertionOptions, Task, by_name};
+use endowire_verify::{at_end, unit_rod};
 
 /// All names, ours first.
 pub(crate) fn names() -> Vec<&'static str> {

@@ -18,7 +18,7 @@ mod command;
 mod configuration;
 mod guess;
 mod hold;
-pub(crate) mod mesh;
+mod mesh;
 mod readout;
 mod repeat;
 mod search;
@@ -28,6 +28,7 @@ mod state;
 mod substep;
 mod workspace;
 
+pub use mesh::Mesh;
 pub use state::KirchhoffState;
 
 use std::sync::Arc;
@@ -42,7 +43,6 @@ use crate::rod::Layout;
 use crate::shape::Shape;
 use crate::vessel::WallStore;
 use crate::{Error, Result};
-use mesh::Mesh;
 use state::Belongs;
 use workspace::Workspace;
 

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::Vec3;
-use crate::insertion::Sheath;
-use crate::vessel::{Wall, WallQuery};
+use endowire_core::Vec3;
+use endowire_core::insertion::Sheath;
+use endowire_core::vessel::{Wall, WallQuery};
 
 /// How a sheath was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -148,7 +148,7 @@ fn sphere(k: usize) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vessel::{GeneratedWall, Resolution, anatomy};
+    use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 
     #[test]
     fn a_closed_vessel_is_entered_inside_along_its_course() {

@@ -4,10 +4,10 @@
 use super::Row;
 use super::bench::{Bench, Setup};
 use super::contact::falling;
-use crate::rod::Frame;
-use crate::rod::element::element_energy;
-use crate::vessel::{SurfaceMesh, Wall};
-use crate::{Result, Vec3};
+use endowire_core::rod::Frame;
+use endowire_core::rod::element::element_energy;
+use endowire_core::vessel::{SurfaceMesh, Wall};
+use endowire_core::{Result, Vec3};
 use std::f64::consts::{PI, SQRT_2, TAU};
 
 /// Radius of the rod over the play; only the difference of distance and radius counts.

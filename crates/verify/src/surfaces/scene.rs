@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{Cell, Surface};
-use crate::Result;
+use endowire_core::Result;
 
 impl Cell {
     /// The scene file of the cell: `endowire run` does with it what the matrix does.
@@ -58,10 +58,10 @@ impl Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::insertion::commands;
-    use crate::reference::surfaces::{cells, surfaces_in};
-    use crate::scene::Scene;
-    use crate::vessel::{GeneratedWall, Resolution, anatomy};
+    use crate::surfaces::{cells, surfaces_in};
+    use endowire_core::insertion::commands;
+    use endowire_core::scene::Scene;
+    use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 
     #[test]
     fn the_scene_of_a_cell_is_the_cell() {

@@ -1,15 +1,15 @@
 //! A rod in equilibrium with walls and loads, without the insertion around it: the bench of the contact cases.
 
-use crate::contact::Touch;
-use crate::contact::{FeltWall, Friction, HandMotion, SETTLED, WallContact, WallMemory};
-use crate::device::Device;
-use crate::insertion::WallProperties;
-use crate::methods::kirchhoff::mesh::Mesh;
-use crate::rod::{Assembly, Clamp, ElementData, PLAIN, RodState, Supports};
-use crate::solve::{External, Newton, NewtonOptions};
-use crate::statics::Loads;
-use crate::vessel::Wall;
-use crate::{Error, Result, Vec3};
+use endowire_core::contact::Touch;
+use endowire_core::contact::{FeltWall, Friction, HandMotion, SETTLED, WallContact, WallMemory};
+use endowire_core::device::Device;
+use endowire_core::insertion::WallProperties;
+use endowire_core::methods::kirchhoff::Mesh;
+use endowire_core::rod::{Assembly, Clamp, ElementData, PLAIN, RodState, Supports};
+use endowire_core::solve::{External, Newton, NewtonOptions};
+use endowire_core::statics::Loads;
+use endowire_core::vessel::Wall;
+use endowire_core::{Error, Result, Vec3};
 use nalgebra::Matrix3;
 
 /// Renewals of the forces that friction follows from.
@@ -99,7 +99,7 @@ impl Bench {
         wall: &Wall,
         setup: &Setup,
         start: Vec3,
-        tangents: impl Fn(f64) -> crate::rod::Frame,
+        tangents: impl Fn(f64) -> endowire_core::rod::Frame,
     ) -> Result<Self> {
         let properties = WallProperties { modulus_n_per_mm2: setup.modulus, ..WallProperties::default() };
         Self::on_wall(wall, &properties, setup, start, tangents)
@@ -111,7 +111,7 @@ impl Bench {
         properties: &WallProperties,
         setup: &Setup,
         start: Vec3,
-        tangents: impl Fn(f64) -> crate::rod::Frame,
+        tangents: impl Fn(f64) -> endowire_core::rod::Frame,
     ) -> Result<Self> {
         let Setup { length, bending, radius, elements, modulus } = *setup;
         let device = Device::uniform(length, radius, bending)?;
@@ -215,7 +215,7 @@ impl Bench {
     pub(super) fn touches(&mut self) -> Vec<(f64, Touch)> {
         let (length, points) = (self.setup.length, self.mesh.points.clone());
         self.with(|_, elements, _, outside, state| {
-            let touch = |(index, point): (usize, &crate::contact::ContactPoint)| {
+            let touch = |(index, point): (usize, &endowire_core::contact::ContactPoint)| {
                 let touch = outside.contact.touch(elements, state, index)?;
                 Some((length - point.from_tip_mm, touch))
             };

@@ -9,10 +9,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::Vec3;
-use crate::insertion::Simulation;
-use crate::shape::Shape;
-use crate::vessel::{SurfaceMesh, Wall};
+use endowire_core::Vec3;
+use endowire_core::insertion::Simulation;
+use endowire_core::shape::Shape;
+use endowire_core::vessel::{SurfaceMesh, Wall};
 
 /// Chords per element: with 4 of them, a curve of radius 10 mm in an element of 5 mm is met within 0.02 mm.
 const CHORDS: usize = 4;
@@ -206,7 +206,7 @@ fn to_triangle(p: &Vec3, [a, b, c]: &[Vec3; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vessel::{GeneratedWall, Resolution, anatomy};
+    use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 
     #[test]
     fn a_crossing_is_found_and_a_line_inside_is_none() {
@@ -233,7 +233,7 @@ mod tests {
         let made =
             GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(1.2)).unwrap();
         let test = CrossingTest::new(made.wall.mesh());
-        let query = crate::vessel::WallQuery::new(&made.wall).unwrap();
+        let query = endowire_core::vessel::WallQuery::new(&made.wall).unwrap();
         for k in 0..200 {
             let k = f64::from(k);
             let x = Vec3::new(45.0 + 50.0 * (0.7 * k).sin(), 6.0 * (1.3 * k).cos(), 70.0 + 75.0 * k.sin());

@@ -1,7 +1,7 @@
 //! The wires of the matrix.
 
-use crate::Result;
-use crate::device::{Device, Section};
+use endowire_core::Result;
+use endowire_core::device::{Device, Section};
 
 /// A guidewire: a stiff shaft that tapers to a floppy, curved tip.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,9 +2,9 @@
 
 use super::planar::{CRITICAL_DIGITS, DIGITS, tip_error};
 use super::{Row, at_end, observed_order, section, unit_rod};
-use crate::rod::{Frame, RodState};
-use crate::statics::{EndKind, Initial, LoadKind, Parameter, StartKind, StaticCase, StaticProblem};
-use crate::{Result, Vec3};
+use endowire_core::rod::{Frame, RodState};
+use endowire_core::statics::{EndKind, Initial, LoadKind, Parameter, StartKind, StaticCase, StaticProblem};
+use endowire_core::{Result, Vec3};
 use std::f64::consts::{FRAC_PI_4, PI};
 
 pub(super) fn bend() -> Result<Vec<Row>> {

@@ -3,8 +3,8 @@
 use super::bench::{Bench, Setup};
 use super::channel::channel;
 use super::{Row, observed_order};
-use crate::rod::RodState;
-use crate::{Error, Result, Vec3};
+use endowire_core::rod::RodState;
+use endowire_core::{Error, Result, Vec3};
 use std::f64::consts::PI;
 
 /// Heights of the walls of C2 above and below the rod.

@@ -3,11 +3,11 @@
 use super::Row;
 use super::contact::falling;
 use super::insertion::{Tube, push};
-use crate::device::{Device, Section};
-use crate::insertion::{Command, Sheath, Simulation, WallProperties};
-use crate::methods::MethodChoice;
-use crate::methods::kirchhoff::KirchhoffOptions;
-use crate::{Error, Result, Vec3};
+use endowire_core::device::{Device, Section};
+use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
+use endowire_core::methods::MethodChoice;
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::{Error, Result, Vec3};
 use std::f64::consts::SQRT_2;
 
 /// Radius of tube and wire, mm: κt = κ0 = 1/40, and EI = GJ, so λ is the angle of the tube.

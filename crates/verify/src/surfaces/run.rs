@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use super::{Cell, ITERATIONS_PER_MM, Surface};
-use crate::insertion::{Command, ScriptLine, Simulation, StepReport, WallProperties, commands};
-use crate::methods::MethodChoice;
-use crate::methods::kirchhoff::KirchhoffOptions;
-use crate::{Error, PhysicalEnd, Result};
+use endowire_core::insertion::{Command, ScriptLine, Simulation, StepReport, WallProperties, commands};
+use endowire_core::methods::MethodChoice;
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::{Error, PhysicalEnd, Result};
 
 /// How an insertion ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -278,9 +278,9 @@ fn insert(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::crossing::CrossingTest;
-    use crate::reference::surfaces::{cells, surfaces_in};
-    use crate::vessel::{GeneratedWall, Resolution, Wall, anatomy};
+    use crate::crossing::CrossingTest;
+    use crate::surfaces::{cells, surfaces_in};
+    use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 
     fn tube(sidecar: &str, closed: bool) -> Surface {
         let made =

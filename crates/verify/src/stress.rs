@@ -1,9 +1,9 @@
 //! Numerical stress: what `endowire verify --stress` runs. Every case must converge, or say what failed.
 
 use super::{at_end, section, unit_rod};
-use crate::rod::{Frame, RodState};
-use crate::statics::{LoadKind, StaticCase, StaticProblem};
-use crate::{Error, Result, Vec3};
+use endowire_core::rod::{Frame, RodState};
+use endowire_core::statics::{LoadKind, StaticCase, StaticProblem};
+use endowire_core::{Error, Result, Vec3};
 use serde::Serialize;
 
 /// A shape that one more Newton step would bend by less than this (radians) has settled, whatever the size of its residual:

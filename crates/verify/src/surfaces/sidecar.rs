@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::input::from_toml;
-use crate::scene::SheathSpec;
-use crate::{Error, Result};
+use endowire_core::input::from_toml;
+use endowire_core::scene::SheathSpec;
+use endowire_core::{Error, Result};
 
 /// A number, or several.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -59,7 +59,7 @@ impl Sidecar {
             }
         }
         if let Some(length_mm) = self.length_mm {
-            crate::error::in_range("length_mm", length_mm, 1e4)?;
+            endowire_core::error::in_range("length_mm", length_mm, 1e4)?;
         }
         match &self.sheath {
             Some(SheathSpec { position_mm: Some(position), .. }) if units.len() > 1 => Err(Error::parameter(

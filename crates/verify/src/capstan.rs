@@ -3,9 +3,9 @@
 use super::Row;
 use super::bench::{Bench, Setup};
 use super::insertion::Tube;
-use crate::insertion::WallProperties;
-use crate::rod::Frame;
-use crate::{Result, Vec3};
+use endowire_core::insertion::WallProperties;
+use endowire_core::rod::Frame;
+use endowire_core::{Result, Vec3};
 use std::f64::consts::PI;
 
 /// Straight parts and radius of the bend, radius and play of the wire, mm.

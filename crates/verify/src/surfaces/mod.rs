@@ -6,7 +6,7 @@
 //! failed, which a matrix is run to find.
 //!
 //! ```
-//! use endowire_core::reference::surfaces::{Cell, cells};
+//! use endowire_verify::surfaces::{Cell, cells};
 //!
 //! let (quick, full) = (cells(2, false), cells(2, true));
 //! assert_eq!((quick.len(), full.len()), (36, 324));

@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use crate::insertion::Sheath;
-use crate::reference::crossing::CrossingTest;
-use crate::vessel::{SurfaceMesh, Wall, WallQuery};
-use crate::{Error, Result};
+use crate::crossing::CrossingTest;
+use endowire_core::insertion::Sheath;
+use endowire_core::vessel::{SurfaceMesh, Wall, WallQuery};
+use endowire_core::{Error, Result};
 
 use super::start::{Found, at_opening, inside};
 use super::{SurfaceFile, WIRES, Wire};

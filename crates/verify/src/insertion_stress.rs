@@ -4,12 +4,12 @@
 //! thread to rod, coarse and fine elements, small and large increments, with and without friction. Every combination must
 //! converge at every step, or stop with a reason that names what is the matter.
 
-use crate::device::Device;
-use crate::insertion::{Command, Sheath, Simulation, WallProperties};
-use crate::methods::MethodChoice;
-use crate::methods::kirchhoff::KirchhoffOptions;
-use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall};
-use crate::{Result, Vec3};
+use endowire_core::device::Device;
+use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
+use endowire_core::methods::MethodChoice;
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall};
+use endowire_core::{Result, Vec3};
 use serde::Serialize;
 
 /// Wall moduli, N/mm².

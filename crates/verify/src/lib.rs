@@ -1,6 +1,8 @@
 //! Reference cases with exact or independently computed answers: what `endowire verify` runs.
 //!
-//! Each case is data and a function; nothing here knows what the solver returns.
+//! Each case is data and a function; nothing here knows what the solver returns. Beside the cases stand the [`stress`] table of
+//! rods, that of insertions ([`insertion_stress`]), the insertions into the [`surfaces`] of a folder, and the exact test for a device
+//! that [crosses](crossing) its wall.
 
 mod bench;
 mod capstan;
@@ -18,8 +20,10 @@ pub mod stress;
 pub mod surfaces;
 mod whip;
 
-use crate::statics::{End, EndKind, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase};
-use crate::{Result, Vec3};
+use endowire_core::statics::{
+    End, EndKind, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase,
+};
+use endowire_core::{Result, Vec3};
 use serde::Serialize;
 
 /// One compared number.

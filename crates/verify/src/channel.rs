@@ -1,10 +1,10 @@
 //! A rod between flat walls.
 
 use super::bench::{Bench, Setup};
-use crate::insertion::{WallProperties, WallRegion};
-use crate::rod::Frame;
-use crate::vessel::{SurfaceMesh, Wall};
-use crate::{Result, Vec3};
+use endowire_core::insertion::{WallProperties, WallRegion};
+use endowire_core::rod::Frame;
+use endowire_core::vessel::{SurfaceMesh, Wall};
+use endowire_core::{Result, Vec3};
 
 /// Stiffness of the plates at a node, over that of a rod of the element's length.
 const PLATES: f64 = 1e3;

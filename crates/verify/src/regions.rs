@@ -15,8 +15,8 @@ use super::bench::Setup;
 use super::capstan::{BEND, PLAY, RADIUS, STRAIGHT, drawn, rigid};
 use super::channel::with_regions;
 use super::contact::falling;
-use crate::insertion::{WallProperties, WallRegion};
-use crate::{Result, Vec3};
+use endowire_core::insertion::{WallProperties, WallRegion};
+use endowire_core::{Result, Vec3};
 
 /// EI of the rod in N·mm², its radius and half its length in mm, moduli left and right in N/mm².
 const BENDING: f64 = 160.0;

@@ -2,13 +2,13 @@
 
 use super::contact::falling;
 use super::{Row, at_end, unit_rod};
-use crate::device::Device;
-use crate::insertion::{Command, Sheath, Simulation, StepReport, WallProperties};
-use crate::methods::MethodChoice;
-use crate::methods::kirchhoff::KirchhoffOptions;
-use crate::statics::{LoadKind, StaticSolution};
-use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall};
-use crate::{Result, Vec3};
+use endowire_core::device::Device;
+use endowire_core::insertion::{Command, Sheath, Simulation, StepReport, WallProperties};
+use endowire_core::methods::MethodChoice;
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::statics::{LoadKind, StaticSolution};
+use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall};
+use endowire_core::{Result, Vec3};
 use std::f64::consts::FRAC_PI_2;
 
 /// A tube in the plane z = 0: straight along +x, from `begin_mm` before the origin to `straight_mm` beyond it, a bend to the

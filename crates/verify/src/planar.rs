@@ -1,8 +1,8 @@
 //! Part A: planar cases without contact.
 
 use super::{Row, at_end, observed_order, section, unit_rod};
-use crate::statics::{EndKind, LoadKind, Parameter, StartKind, StaticCase, StaticProblem};
-use crate::{Result, Vec3};
+use endowire_core::statics::{EndKind, LoadKind, Parameter, StartKind, StaticCase, StaticProblem};
+use endowire_core::{Result, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 fn tip_load(elements: usize, force: [f64; 3]) -> StaticCase {
