@@ -3,7 +3,7 @@
 use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_verify::crossing::curve;
 
@@ -45,7 +45,7 @@ impl Push {
             WallProperties::default(),
             self.wire.clone(),
             self.sheath,
-            &MethodChoice::default(),
+            &KirchhoffOptions::default(),
         )
         .map_err(refused)?;
         let mut forces = Vec::new();

@@ -11,7 +11,6 @@ use std::path::{Path, PathBuf};
 use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::scene::Scene;
 use endowire_core::vessel::{
@@ -256,7 +255,7 @@ fn tube(axis: &[Vec3], radius_mm: impl Fn(usize) -> f64, resolution: Resolution)
 
 fn start(wall: Wall, sheath: Sheath, device: Device) -> (Simulation, CrossingTest) {
     let crossing = CrossingTest::new(wall.mesh());
-    let method = MethodChoice::Kirchhoff(KirchhoffOptions::default());
+    let method = KirchhoffOptions::default();
     let simulation =
         Simulation::with_properties(wall, WallProperties::default(), device, sheath, &method).unwrap();
     (simulation, crossing)

@@ -4,14 +4,13 @@
 
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 use endowire_tests::crossing::CrossingTest;
 use endowire_tests::sweep::crosses;
 
-fn kirchhoff(element_mm: f64) -> MethodChoice {
-    MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..Default::default() })
+fn kirchhoff(element_mm: f64) -> KirchhoffOptions {
+    KirchhoffOptions { element_mm, ..Default::default() }
 }
 
 fn curved_tube() -> (Wall, Sheath) {
@@ -57,7 +56,7 @@ fn a_tolerance_saves_iterations_and_costs_little() {
         let (wall, sheath) = curved_tube();
         let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
         let options = KirchhoffOptions { element_mm: 4.0, tolerance, ..Default::default() };
-        let method = MethodChoice::Kirchhoff(options);
+        let method = options;
         let mut simulation = Simulation::new(wall, wire, sheath, &method).unwrap();
         let mut iterations = 0;
         for _ in 0..100 {
@@ -72,7 +71,7 @@ fn a_tolerance_saves_iterations_and_costs_little() {
     assert!(off > 0.0 && off < 1e-3, "{off:e}");
     let (wall, sheath) = curved_tube();
     let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
-    let method = MethodChoice::Kirchhoff(KirchhoffOptions { tolerance: 0.1, ..Default::default() });
+    let method = KirchhoffOptions { tolerance: 0.1, ..Default::default() };
     let refused = Simulation::new(wall, wire, sheath, &method).err().unwrap().to_string();
     assert!(refused.contains("method.tolerance"), "{refused}");
 }
@@ -149,7 +148,7 @@ fn skipping_queries_changes_nothing() {
     let run = |skip: bool| {
         let (wall, sheath) = curved_tube();
         let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
-        let method = MethodChoice::Kirchhoff(KirchhoffOptions { skip, ..Default::default() });
+        let method = KirchhoffOptions { skip, ..Default::default() };
         let mut simulation = Simulation::new(wall, wire, sheath, &method).unwrap();
         for _ in 0..80 {
             simulation.step(Command::advance(2.0)).unwrap();

@@ -4,7 +4,6 @@ use super::contact::falling;
 use super::{Row, at_end, unit_rod};
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, StepReport, WallProperties};
-use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::statics::{LoadKind, StaticSolution};
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall};
@@ -62,7 +61,7 @@ struct Fineness {
 fn at_origin(wall: Wall, wire: Device, fine: Fineness, friction: f64) -> Result<Simulation> {
     let Fineness { element_mm, modulus_n_per_mm2, .. } = fine;
     let sheath = Sheath::new(Vec3::zeros(), Vec3::x())?;
-    let method = MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..KirchhoffOptions::default() });
+    let method = KirchhoffOptions { element_mm, ..KirchhoffOptions::default() };
     let properties = WallProperties { modulus_n_per_mm2, friction, ..WallProperties::default() };
     Simulation::with_properties(wall, properties, wire, sheath, &method)
 }

@@ -6,7 +6,6 @@
 
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall};
 use endowire_core::{Result, Vec3};
@@ -173,10 +172,7 @@ impl InsertionStress {
             ..WallProperties::default()
         };
         let device = Device::uniform(100.0, 0.45, case.bending_stiffness_nmm2)?;
-        let method = MethodChoice::Kirchhoff(KirchhoffOptions {
-            element_mm: case.element_mm,
-            ..KirchhoffOptions::default()
-        });
+        let method = KirchhoffOptions { element_mm: case.element_mm, ..KirchhoffOptions::default() };
         Simulation::with_properties(self.wall.clone(), properties, device, self.sheath, &method)
     }
 }

@@ -4,9 +4,9 @@
 //! keep its length grows to ∫√(1 + t_y²) ds.
 
 use super::{Row, at_end, observed_order, unit_rod};
-use endowire_core::methods::li2011::{Chain, banded, dense};
 use endowire_core::statics::LoadKind;
 use endowire_core::{Result, Vec3};
+use endowire_methods::li2011::{Chain, banded, dense};
 
 /// Load, overshoot of the deflection over the exact rod in percent, length.
 const ROWS: [[f64; 3]; 4] =

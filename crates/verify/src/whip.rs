@@ -5,7 +5,6 @@ use super::contact::falling;
 use super::insertion::{Tube, push};
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::{Error, Result, Vec3};
 use std::f64::consts::SQRT_2;
@@ -30,7 +29,7 @@ fn in_tube(lambda: f64, play_mm: f64) -> Result<Simulation> {
     }])?;
     let sheath = Sheath::new(Vec3::zeros(), Vec3::x())?;
     let element_mm = length_mm / 40.0;
-    let method = MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..KirchhoffOptions::default() });
+    let method = KirchhoffOptions { element_mm, ..KirchhoffOptions::default() };
     let rigid = WallProperties { modulus_n_per_mm2: 1e4, ..WallProperties::default() };
     let mut simulation = Simulation::with_properties(wall, rigid, wire, sheath, &method)?;
     push(&mut simulation, length_mm, 40)?;

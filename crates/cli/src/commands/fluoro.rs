@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use endowire_core::scene::Scene;
+use endowire_methods::Scene;
 use endowire_viewer::{ContactView, Moment};
 
 use crate::args::{FluoroArgs, ViewChoice};

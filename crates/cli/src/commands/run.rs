@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use endowire_core::insertion::Simulation;
-use endowire_core::scene::Scene;
+use endowire_core::methods::MethodChoice;
+use endowire_methods::Scene;
 
 use crate::args::RunArgs;
 use crate::cache::Cache;

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use endowire_core::device::Device;
 use endowire_core::input::from_toml;
 use endowire_core::insertion::Simulation;
-use endowire_core::scene::Scene;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::SurfaceMesh;
+use endowire_methods::Scene;
 use endowire_viewer::{
     Angiogram, Animation, ContactView, DeviceView, Frames, Image, Moment, Renderer, View, ViewSpec,
 };

@@ -67,7 +67,7 @@ impl Simulation {
     /// # Errors
     /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
     /// tell, or method options out of range.
-    pub fn new(wall: Wall, device: Device, sheath: Sheath, method: &MethodChoice) -> Result<Self> {
+    pub fn new(wall: Wall, device: Device, sheath: Sheath, method: &dyn MethodChoice) -> Result<Self> {
         Self::with_properties(wall, WallProperties::default(), device, sheath, method)
     }
 
@@ -80,7 +80,7 @@ impl Simulation {
         properties: WallProperties,
         device: Device,
         sheath: Sheath,
-        method: &MethodChoice,
+        method: &dyn MethodChoice,
     ) -> Result<Self> {
         Self::from_store(wall, properties, device, sheath, method, &NoStore)
     }
@@ -94,11 +94,10 @@ impl Simulation {
         properties: WallProperties,
         device: Device,
         sheath: Sheath,
-        method: &MethodChoice,
+        method: &dyn MethodChoice,
         store: &dyn WallStore,
     ) -> Result<Self> {
-        check_elements(&device, method)?;
-        let start = |surroundings: &Surroundings<'_>| method.start_from(surroundings, store);
+        let start = |surroundings: &Surroundings<'_>| method.start(surroundings, store);
         Self::with_method(wall, properties, device, sheath, start)
     }
 
@@ -205,30 +204,6 @@ impl Simulation {
 
 /// A device so many times as thick as the vessel comes from another unit.
 const MISFIT: f64 = 5.0;
-
-/// Most elements of a device: some kilobytes each.
-const ELEMENT_LIMIT: f64 = 1e5;
-
-/// Refuses a device that its method would cut into more elements than fit a memory.
-fn check_elements(device: &Device, method: &MethodChoice) -> Result<()> {
-    let element_mm = match method {
-        MethodChoice::Kirchhoff(options) => options.element_mm,
-        MethodChoice::Li2011Dense(options) | MethodChoice::Li2011Banded(options) => options.element_mm,
-    };
-    let elements = device.length_mm() / element_mm;
-    if element_mm > 0.0 && elements > ELEMENT_LIMIT {
-        return Err(Error::parameter(
-            "method.element_mm",
-            element_mm,
-            format!(
-                "cuts the device of {} mm into {elements:.1e} elements, and more than {ELEMENT_LIMIT:.0e} take gigabytes: use \
-                 longer elements or a shorter device",
-                device.length_mm()
-            ),
-        ));
-    }
-    Ok(())
-}
 
 /// Refuses a device that is in the wall from the start. Further in a vessel may be narrower: there the device does not pass.
 fn check_mouth(query: &WallQuery, device: &Device, sheath: &Sheath) -> Result<()> {
@@ -346,21 +321,14 @@ pub fn script_commands(script: &[ScriptLine], device: &Device) -> Result<Vec<Com
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::methods::kirchhoff::KirchhoffOptions;
 
     #[test]
-    fn turns_without_meaning_and_elements_without_number_are_refused() {
+    fn turns_without_meaning_are_refused() {
         let told = |rad: f64| check_command(Command::rotate(rad), 0.0, 100.0).unwrap_err().to_string();
         for rad in [1e308, -1e5, f64::MAX] {
             assert!(told(rad).contains("more than 1000 turns"), "{}", told(rad));
         }
         assert!(told(f64::NAN).contains("finite"));
         assert!(check_command(Command::rotate(-6000.0), 0.0, 100.0).is_ok());
-        let wire = Device::uniform(9000.0, 0.4, 10.0).unwrap();
-        let method = |element_mm| {
-            MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..KirchhoffOptions::default() })
-        };
-        assert!(check_elements(&wire, &method(1e-3)).unwrap_err().to_string().contains("gigabytes"));
-        assert!(check_elements(&wire, &method(0.5)).is_ok());
     }
 }

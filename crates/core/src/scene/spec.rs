@@ -3,21 +3,24 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use serde::de::IgnoredAny;
+use serde::de::{DeserializeOwned, IgnoredAny};
 
 use crate::device::{Device, Section};
 use crate::input::from_toml;
 use crate::insertion::{Command, ScriptLine, Sheath, Simulation, WallProperties, script_commands};
-use crate::methods::MethodChoice;
+use crate::methods::{MethodChoice, OwnMethod};
 use crate::vessel::{
     CentrelineTree, NoStore, Resolution, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint,
 };
 use crate::{Error, Result, Vec3};
 
-/// A scene as its file says it, with the folder that its paths start from.
+/// A scene whose `[method]` is one of this crate's: the exact rod.
+pub type Scene = SceneOf<OwnMethod>;
+
+/// A scene as its file says it, with the folder that its paths start from. `M` is what its `[method]` may be.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Scene {
+pub struct SceneOf<M> {
     /// Name of the scene; the file's stem if absent.
     #[serde(default)]
     pub name: String,
@@ -32,7 +35,7 @@ pub struct Scene {
     pub sheath: SheathSpec,
     /// How its equilibrium is found.
     #[serde(default)]
-    pub method: MethodChoice,
+    pub method: M,
     /// What the hand does.
     #[serde(default)]
     pub script: Vec<ScriptLine>,
@@ -174,7 +177,7 @@ fn check_name(name: &str) -> Result<()> {
     Ok(())
 }
 
-impl Scene {
+impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// Reads a scene file.
     ///
     /// # Errors
@@ -216,7 +219,7 @@ impl Scene {
         }
     }
 
-    /// The files that the scene names, in the order of its tables: with [`Scene::text`] all that it is made of.
+    /// The files that the scene names, in the order of its tables: with [`SceneOf::text`] all that it is made of.
     pub fn input_paths(&self) -> Vec<PathBuf> {
         let named = [&self.vessel.file, &self.vessel.tree, &self.device.file];
         named.into_iter().flatten().map(|path| self.resolve(path)).collect()
@@ -230,10 +233,10 @@ impl Scene {
         self.wall_from(&NoStore)
     }
 
-    /// As [`Scene::wall`], from `store`.
+    /// As [`SceneOf::wall`], from `store`.
     ///
     /// # Errors
-    /// As [`Scene::wall`].
+    /// As [`SceneOf::wall`].
     pub fn wall_from(&self, store: &dyn WallStore) -> Result<Wall> {
         let path = self.vessel_path()?;
         let spec = &self.vessel;
@@ -312,15 +315,15 @@ impl Scene {
     /// The simulation, nothing inserted yet.
     ///
     /// # Errors
-    /// As [`Scene::wall`], [`Scene::device`], [`Scene::sheath`] and [`Simulation::new`].
+    /// As [`SceneOf::wall`], [`SceneOf::device`], [`SceneOf::sheath`] and [`Simulation::new`].
     pub fn simulation(&self) -> Result<Simulation> {
         self.simulation_from(&NoStore)
     }
 
-    /// As [`Scene::simulation`], with walls from `store`.
+    /// As [`SceneOf::simulation`], with walls from `store`.
     ///
     /// # Errors
-    /// As [`Scene::simulation`].
+    /// As [`SceneOf::simulation`].
     pub fn simulation_from(&self, store: &dyn WallStore) -> Result<Simulation> {
         let wall = self.wall_from(store)?;
         // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.

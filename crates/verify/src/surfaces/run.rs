@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use super::{Cell, ITERATIONS_PER_MM, Surface};
 use endowire_core::insertion::{Command, ScriptLine, Simulation, StepReport, WallProperties, commands};
-use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::{Error, PhysicalEnd, Result};
 
@@ -134,10 +133,7 @@ impl Cell {
 
     fn simulation(&self, surface: &Surface) -> Result<Simulation> {
         let place = &surface.places[self.wire];
-        let method = MethodChoice::Kirchhoff(KirchhoffOptions {
-            element_mm: self.element_mm,
-            ..KirchhoffOptions::default()
-        });
+        let method = KirchhoffOptions { element_mm: self.element_mm, ..KirchhoffOptions::default() };
         let device = place.wire.device(surface.length_mm)?;
         Simulation::with_properties(surface.wall.clone(), self.properties(), device, place.sheath, &method)
     }

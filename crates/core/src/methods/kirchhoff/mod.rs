@@ -38,8 +38,8 @@ use serde::{Deserialize, Serialize};
 use crate::contact::{Counters, FeltWall};
 use crate::device::Device;
 use crate::insertion::{Command, StepReport, Surroundings};
-use crate::methods::{Content, Method, State};
-use crate::rod::Layout;
+use crate::methods::{Content, Method, MethodChoice, State};
+use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
 use crate::vessel::WallStore;
 use crate::{Error, Result};
@@ -66,9 +66,25 @@ impl Default for KirchhoffOptions {
     }
 }
 
+impl MethodChoice for KirchhoffOptions {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {
+        // A shape turns with the device, and friction twists it.
+        let twists = surroundings.device.is_shaped() || surroundings.properties.rubs();
+        Ok(if twists {
+            Box::new(Kirchhoff::<TWISTED>::new(*self, surroundings, store)?)
+        } else {
+            Box::new(Kirchhoff::<PLAIN>::new(*self, surroundings, store)?)
+        })
+    }
+}
+
 /// A residual above this tells nothing of an equilibrium.
 const LARGEST_TOLERANCE: f64 = 1e-2;
-/// Most elements.
+/// Most elements of a device: some kilobytes each.
 const ELEMENT_LIMIT: f64 = 100_000.0;
 
 /// The exact rod as an insertion method, with or without material angles.
@@ -108,7 +124,9 @@ impl<const C: usize> Kirchhoff<C> {
                 "method.element_mm",
                 options.element_mm,
                 format!(
-                    "cuts the device of {length_mm} mm into more than {ELEMENT_LIMIT} elements: use longer ones"
+                    "cuts the device of {length_mm} mm into {:.1e} elements, and more than {ELEMENT_LIMIT:.0e} take gigabytes: use \
+                     longer elements or a shorter device",
+                    length_mm / options.element_mm
                 ),
             ));
         }
@@ -233,7 +251,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
 }
 
 /// The name of the method in scenes and states.
-pub(crate) const NAME: &str = "kirchhoff";
+const NAME: &str = "kirchhoff";
 
 /// Meshes what is inserted.
 fn meshed(environment: &Environment<'_>, inserted_mm: f64, mesh: &mut Mesh) {

@@ -19,7 +19,7 @@ use faer::linalg::solvers::Solve;
 use faer::{Accum, Mat, Par};
 
 use super::chain::Chain;
-use crate::Vec3;
+use endowire_core::Vec3;
 
 /// Solves for positions x₁…xₙ and tangents t₁…tₙ at the minimum of the energy of `chain`.
 ///

@@ -11,7 +11,7 @@
 //!
 //! x₀ and t₀ are the sheath (section 2.2.4) and do not vary; t₁…tₙ are the unknowns.
 
-use crate::Vec3;
+use endowire_core::Vec3;
 
 /// A node held off one wall triangle: the plane n·x = d, penalised with stiffness κ (eq. 7).
 #[derive(Debug, Clone, Copy, PartialEq)]

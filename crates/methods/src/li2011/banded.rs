@@ -14,7 +14,7 @@
 use nalgebra::{Cholesky, Matrix3};
 
 use super::chain::Chain;
-use crate::Vec3;
+use endowire_core::Vec3;
 
 /// Elimination of one element: u = free − by_x·x − by_t·t.
 #[derive(Debug, Clone, Copy)]

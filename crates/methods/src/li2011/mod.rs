@@ -36,4 +36,4 @@ pub mod stepper;
 mod chain_tests;
 
 pub use chain::{Chain, PlaneContact};
-pub use stepper::{Li2011, Li2011Options, Li2011State, LinearSolver};
+pub use stepper::{Li2011, Li2011Options, LinearSolver};

@@ -14,12 +14,12 @@ use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, PlaneContact};
 use super::{banded, dense};
-use crate::device::Device;
-use crate::insertion::{Command, Contact, Energy, StepReport, Surroundings};
-use crate::methods::{Content, Method, State, check_inserted};
-use crate::shape::Shape;
-use crate::vessel::WallQuery;
-use crate::{Error, Result, Vec3};
+use endowire_core::device::Device;
+use endowire_core::insertion::{Command, Contact, Energy, StepReport, Surroundings, nodes_from_tip};
+use endowire_core::methods::{ChainState, Content, Method, State, TouchedPlane, check_inserted};
+use endowire_core::shape::Shape;
+use endowire_core::vessel::WallQuery;
+use endowire_core::{Error, Result, Vec3};
 
 /// Options of the paper's method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -59,7 +59,7 @@ const DETECTION_GRID_MM: f64 = 1e-6;
 /// seconds.
 const ELEMENT_LIMIT_DENSE: f64 = 1_500.0;
 /// Most elements of the banded solve.
-const ELEMENT_LIMIT_BANDED: f64 = 1_000_000.0;
+const ELEMENT_LIMIT_BANDED: f64 = 100_000.0;
 /// Retracting to within this of the sheath, mm, is retracting to it: the rounding of summed increments.
 const ZERO_LENGTH_MM: f64 = 1e-9;
 
@@ -68,7 +68,7 @@ const ZERO_LENGTH_MM: f64 = 1e-9;
 pub struct Li2011 {
     options: Li2011Options,
     solver: LinearSolver,
-    state: Li2011State,
+    state: ChainState,
     // The rest is worked with and made anew by every step.
     chain: Chain,
     workspace: banded::Workspace,
@@ -77,45 +77,17 @@ pub struct Li2011 {
     tangents: Vec<Vec3>,
 }
 
-/// All that the next step of the paper's method depends on.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Li2011State {
-    shape: Shape,
-    report: StepReport,
-    /// The wall that each node is beyond, **tip first**: so nodes keep their index.
-    beyond: Vec<Option<Plane>>,
-}
-
-impl Li2011State {
-    /// What the step that led here told.
-    pub fn report(&self) -> &StepReport {
-        &self.report
-    }
-}
-
-/// The plane of a wall triangle, offset by the device's radius.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct Plane {
-    normal: Vec3,
-    offset_mm: f64,
-    triangle: u32,
-    /// How far the device's surface is in the wall, mm.
-    depth_mm: f64,
-}
-
-impl Plane {
-    /// The plane of the triangle nearest to `x`, if a surface of radius `radius_mm` about `x` reaches that triangle.
-    ///
-    /// Past the end of the vessel there is no wall.
-    fn beyond(query: &WallQuery, x: &Vec3, radius_mm: f64) -> Option<Self> {
-        let x = &x.map(|c| (c / DETECTION_GRID_MM).round() * DETECTION_GRID_MM);
-        let near = query.nearest(x, REACH_MM).filter(|near| !near.rim)?;
-        let depth_mm = radius_mm - near.distance_mm;
-        let normal = query.inward_normal(near.triangle);
-        let offset_mm = normal.dot(&near.point_mm) + radius_mm;
-        let reaches = depth_mm > DETECTION_GRID_MM && offset_mm - normal.dot(x) > DETECTION_GRID_MM;
-        reaches.then_some(Self { normal, offset_mm, triangle: near.triangle, depth_mm })
-    }
+/// The plane of the triangle nearest to `x`, if a surface of radius `radius_mm` about `x` reaches that triangle.
+///
+/// Past the end of the vessel there is no wall.
+fn reached(query: &WallQuery, x: &Vec3, radius_mm: f64) -> Option<TouchedPlane> {
+    let x = &x.map(|c| (c / DETECTION_GRID_MM).round() * DETECTION_GRID_MM);
+    let near = query.nearest(x, REACH_MM).filter(|near| !near.rim)?;
+    let depth_mm = radius_mm - near.distance_mm;
+    let normal = query.inward_normal(near.triangle);
+    let offset_mm = normal.dot(&near.point_mm) + radius_mm;
+    let reaches = depth_mm > DETECTION_GRID_MM && offset_mm - normal.dot(x) > DETECTION_GRID_MM;
+    reaches.then_some(TouchedPlane { normal, offset_mm, triangle: near.triangle, depth_mm })
 }
 
 impl Li2011 {
@@ -130,8 +102,12 @@ impl Li2011 {
         surroundings: &Surroundings<'_>,
     ) -> Result<Self> {
         let length_mm = surroundings.device.length_mm();
-        crate::error::in_range("method.element_mm", options.element_mm, length_mm)?;
-        crate::error::in_range("method.wall_stiffness_n_per_mm", options.wall_stiffness_n_per_mm, 1e9)?;
+        endowire_core::error::in_range("method.element_mm", options.element_mm, length_mm)?;
+        endowire_core::error::in_range(
+            "method.wall_stiffness_n_per_mm",
+            options.wall_stiffness_n_per_mm,
+            1e9,
+        )?;
         surroundings.properties.refuse_regions("the paper's method")?;
         if surroundings.properties.friction > 0.0 {
             return Err(Error::parameter(
@@ -152,7 +128,7 @@ impl Li2011 {
                 format!(
                     "cuts the device of {length_mm} mm into {} elements, more than the {limit} that this method takes: use \
                      longer elements",
-                    crate::error::number(elements.ceil())
+                    endowire_core::error::number(elements.ceil())
                 ),
             ));
         }
@@ -165,10 +141,10 @@ impl Li2011 {
         Ok(Self {
             options,
             solver,
-            state: Li2011State {
+            state: ChainState {
                 shape,
                 report: StepReport { converged: true, ..Default::default() },
-                beyond: Vec::new(),
+                touched: Vec::new(),
             },
             chain: Chain {
                 start_mm: sheath.position_mm,
@@ -190,7 +166,7 @@ impl Li2011 {
 
     /// Steps 1 and 2 of Algorithm 1: the nodes of the new inserted length, rigidly translated along the sheath.
     fn translate(&mut self, device: &Device, inserted_mm: f64, travel_mm: f64) {
-        crate::insertion::nodes_from_tip(inserted_mm, self.options.element_mm, &mut self.from_tip_mm);
+        nodes_from_tip(inserted_mm, self.options.element_mm, &mut self.from_tip_mm);
         let elements = self.from_tip_mm.len() - 1;
 
         let displacement = self.chain.start_tangent * travel_mm;
@@ -217,9 +193,9 @@ impl Li2011 {
         let nodes = self.positions_mm.len();
         for (index, x) in self.positions_mm.iter().enumerate() {
             let radius_mm = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
-            let before = self.state.beyond.get(nodes - 1 - index).copied().flatten();
-            if let Some(Plane { normal, offset_mm, triangle, .. }) =
-                Plane::beyond(surroundings.query, x, radius_mm).or(before)
+            let before = self.state.touched.get(nodes - 1 - index).copied().flatten();
+            if let Some(TouchedPlane { normal, offset_mm, triangle, .. }) =
+                reached(surroundings.query, x, radius_mm).or(before)
             {
                 self.chain.contacts.push(PlaneContact { node: index + 1, normal, offset_mm, triangle });
             }
@@ -248,7 +224,7 @@ impl Li2011 {
     /// Step 6, and the read-outs.
     fn update(&mut self, surroundings: &Surroundings<'_>, command: Command) {
         let sheath = surroundings.sheath;
-        let Li2011State { shape, report, beyond } = &mut self.state;
+        let ChainState { shape, report, touched } = &mut self.state;
         shape.positions_mm.clear();
         shape.positions_mm.push(sheath.position_mm);
         shape.positions_mm.extend_from_slice(&self.positions_mm);
@@ -269,15 +245,15 @@ impl Li2011 {
         report.iterations = 1;
 
         report.max_penetration_mm = 0.0;
-        beyond.clear();
+        touched.clear();
         for (x, s) in self.positions_mm.iter().zip(&self.from_tip_mm[1..]).rev() {
-            let plane = Plane::beyond(surroundings.query, x, surroundings.device.section_at(*s).radius_mm);
+            let plane = reached(surroundings.query, x, surroundings.device.section_at(*s).radius_mm);
             report.max_penetration_mm = plane.map_or(0.0, |p| p.depth_mm).max(report.max_penetration_mm);
-            beyond.push(plane);
+            touched.push(plane);
         }
         let nodes = self.positions_mm.len();
-        let reached = (1..=nodes).filter_map(|node| Some((node, beyond[nodes - node]?.triangle)));
-        report.converged = self.chain.contacts.iter().map(|c| (c.node, c.triangle)).eq(reached);
+        let touching = (1..=nodes).filter_map(|node| Some((node, touched[nodes - node]?.triangle)));
+        report.converged = self.chain.contacts.iter().map(|c| (c.node, c.triangle)).eq(touching);
 
         report.contacts.clear();
         let mut held_by = Vec3::zeros();
@@ -289,8 +265,8 @@ impl Li2011 {
                 position_mm,
                 normal: contact.normal,
                 force_n,
-                friction_n: crate::Vec3::zeros(),
-                penetration_mm: beyond[nodes - contact.node].map_or(0.0, |plane| plane.depth_mm),
+                friction_n: Vec3::zeros(),
+                penetration_mm: touched[nodes - contact.node].map_or(0.0, |plane| plane.depth_mm),
                 triangle: contact.triangle,
             });
         }
@@ -325,20 +301,20 @@ impl Method for Li2011 {
     }
 
     fn state(&self) -> State {
-        State::new(self.solver.method(), Content::Li2011(Box::new(self.state.clone())))
+        State::new(self.solver.method(), Content::Chain(Box::new(self.state.clone())))
     }
 
     fn restore(&mut self, surroundings: &Surroundings<'_>, state: &State) -> Result<()> {
         let name = self.solver.method();
-        let Content::Li2011(state) = state.of(name)? else { return Err(state.of_another(name)) };
+        let Content::Chain(state) = state.of(name)? else { return Err(state.of_another(name)) };
         let inserted_mm = state.report.inserted_mm;
         check_inserted(inserted_mm, surroundings.device)?;
-        crate::insertion::nodes_from_tip(inserted_mm, self.options.element_mm, &mut self.from_tip_mm);
+        nodes_from_tip(inserted_mm, self.options.element_mm, &mut self.from_tip_mm);
         let (shape, nodes) = (&state.shape, self.from_tip_mm.len());
         let moved = shape.positions_mm.first() != Some(&surroundings.sheath.position_mm)
             || shape.tangents.first() != Some(&surroundings.sheath.direction);
-        let beyond = [0, nodes - 1].contains(&state.beyond.len());
-        if shape.from_tip_mm != self.from_tip_mm || shape.tangents.len() != nodes || !beyond || moved {
+        let planes = [0, nodes - 1].contains(&state.touched.len());
+        if shape.from_tip_mm != self.from_tip_mm || shape.tangents.len() != nodes || !planes || moved {
             let mend =
                 format!("{nodes} nodes are in this vessel from this sheath: restore a state of this scene");
             return Err(Error::parameter("state.nodes", shape.len(), mend));
@@ -382,7 +358,7 @@ fn on_curve(shape: &Shape, s: f64, element: &mut usize) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vessel::{SurfaceMesh, Wall};
+    use endowire_core::vessel::{SurfaceMesh, Wall};
 
     /// A box with a narrow wedge from its far side up to z = 20: a carina.
     fn wedge() -> WallQuery {
@@ -405,13 +381,13 @@ mod tests {
     #[test]
     fn a_node_in_front_of_a_wedge_touches_it_only_where_it_is_near() {
         let query = wedge();
-        let reached = |z: f64| Plane::beyond(&query, &Vec3::new(0.0, 0.5, z), 0.4);
+        let reach = |z: f64| reached(&query, &Vec3::new(0.0, 0.5, z), 0.4);
         // Beyond the planes of both flanks, and five millimetres away from them.
-        assert!(reached(15.0).is_none());
-        assert!(reached(19.59).is_none());
-        let depth_mm = reached(19.9).map(|plane| plane.depth_mm).unwrap();
+        assert!(reach(15.0).is_none());
+        assert!(reach(19.59).is_none());
+        let depth_mm = reach(19.9).map(|plane| plane.depth_mm).unwrap();
         assert!((depth_mm - 0.3).abs() < 1e-6, "{depth_mm}");
         // Behind the edge, inside the wedge: the distance is negative.
-        assert!(reached(21.0).unwrap().depth_mm > 0.4);
+        assert!(reach(21.0).unwrap().depth_mm > 0.4);
     }
 }

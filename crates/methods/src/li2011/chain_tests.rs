@@ -2,7 +2,7 @@
 
 use super::chain::{Chain, PlaneContact};
 use super::{banded, dense};
-use crate::Vec3;
+use endowire_core::Vec3;
 
 struct Solution {
     positions_mm: Vec<Vec3>,
