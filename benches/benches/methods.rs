@@ -31,7 +31,8 @@ fn inserted(name: &str) -> endowire_core::Result<Simulation> {
     let wire = Device::uniform(200.0, 0.445, 10.0)?;
     let properties = WallProperties::default();
     let method = AnyMethod::named(name)?.with_element_mm(5.0);
-    let mut simulation = Simulation::with_properties(made.wall, properties, wire, sheath, &method)?;
+    let mut simulation =
+        Simulation::builder(made.wall, wire, sheath).properties(properties).method(&method).build()?;
     for _ in 0..80 {
         simulation.step(Command::advance(2.0))?;
     }

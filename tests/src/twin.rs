@@ -2,8 +2,7 @@
 
 use endowire_core::Vec3;
 use endowire_core::device::Device;
-use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::insertion::{Command, Sheath, Simulation};
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_verify::crossing::curve;
 
@@ -40,14 +39,8 @@ impl Push {
     pub fn insert(&self, surface: &SurfaceMesh) -> Result<Inserted, String> {
         let refused = |e: endowire_core::Error| format!("refused: {e}");
         let wall = Wall::from_surface(surface).map_err(refused)?;
-        let mut simulation = Simulation::with_properties(
-            wall,
-            WallProperties::default(),
-            self.wire.clone(),
-            self.sheath,
-            &KirchhoffOptions::default(),
-        )
-        .map_err(refused)?;
+        let mut simulation =
+            Simulation::builder(wall, self.wire.clone(), self.sheath).build().map_err(refused)?;
         let mut forces = Vec::new();
         for number in 0..(self.length_mm / self.step_mm).round() as usize {
             let report = simulation

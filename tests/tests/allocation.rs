@@ -70,8 +70,11 @@ fn nothing_is_allocated_in_a_step_of_an_insertion() {
         let region = if regions { vec![patch] } else { Vec::new() };
         let properties = WallProperties { friction, region, ..Default::default() };
         let method = KirchhoffOptions::default();
-        let mut simulation =
-            Simulation::with_properties(made.wall, properties, wire, sheath, &method).unwrap();
+        let mut simulation = Simulation::builder(made.wall, wire, sheath)
+            .properties(properties)
+            .method(&method)
+            .build()
+            .unwrap();
         for _ in 0..75 {
             simulation.step(Command::advance(2.0)).unwrap();
         }

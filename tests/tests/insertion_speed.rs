@@ -77,8 +77,11 @@ fn cost(case: &Case) -> Cost {
     let wire = Device::new(vec![Section::straight(30.0, 0.445, 5.0), Section::straight(430.0, 0.445, 50.0)]);
     let method = KirchhoffOptions { element_mm: case.element_mm, ..Default::default() };
     let properties = WallProperties { friction: case.friction, ..Default::default() };
-    let mut simulation =
-        Simulation::with_properties(made.wall, properties, wire.unwrap(), sheath, &method).unwrap();
+    let mut simulation = Simulation::builder(made.wall, wire.unwrap(), sheath)
+        .properties(properties)
+        .method(&method)
+        .build()
+        .unwrap();
     for _ in 0..(case.from_mm / case.step_mm).round() as usize {
         simulation.step(Command::advance(case.step_mm)).unwrap();
     }

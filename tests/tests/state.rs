@@ -46,7 +46,7 @@ fn start_at(
 ) -> Simulation {
     let made = GeneratedWall::new(&anatomy::tree(vessel).unwrap(), Resolution::Triangles(5_000)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, depth_mm).unwrap();
-    Simulation::with_properties(made.wall, properties, device, sheath, method).unwrap()
+    Simulation::builder(made.wall, device, sheath).properties(properties).method(method).build().unwrap()
 }
 
 fn rubbing() -> WallProperties {
@@ -214,7 +214,7 @@ fn tube(narrow: bool, max_iterations: usize) -> Simulation {
     let device = Device::new(vec![tip, Section::straight(72.0, 0.4, 10.0)]).unwrap();
     let method = KirchhoffOptions { max_iterations, ..KirchhoffOptions::default() };
     let properties = WallProperties { modulus_n_per_mm2: 1e4, friction: 0.2, ..WallProperties::default() };
-    Simulation::with_properties(made.wall, properties, device, sheath, &method).unwrap()
+    Simulation::builder(made.wall, device, sheath).properties(properties).method(&method).build().unwrap()
 }
 
 /// Commands of which many cannot be followed, and the state after every one that could not. Returns how many failed, by their reason.
@@ -356,8 +356,11 @@ fn large() -> Simulation {
         GeneratedWall::new(&anatomy::tree("aortic_arch").unwrap(), Resolution::Triangles(20_000)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0).unwrap();
     let method = KirchhoffOptions { element_mm: 1.0, ..KirchhoffOptions::default() };
-    let mut simulation =
-        Simulation::with_properties(made.wall, rubbing(), wire(0.03), sheath, &method).unwrap();
+    let mut simulation = Simulation::builder(made.wall, wire(0.03), sheath)
+        .properties(rubbing())
+        .method(&method)
+        .build()
+        .unwrap();
     (0..100).for_each(|_| simulation.step(Command::advance(2.0)).map(|_| ()).unwrap());
     simulation
 }

@@ -20,7 +20,10 @@ fn curved_tube() -> (Wall, Sheath) {
 fn largest_difference(a: &dyn MethodChoice, b: &dyn MethodChoice) -> f64 {
     let (wall, sheath) = curved_tube();
     let start = |method| {
-        Simulation::new(wall.clone(), Device::uniform(300.0, 0.45, 10.0).unwrap(), sheath, method).unwrap()
+        Simulation::builder(wall.clone(), Device::uniform(300.0, 0.45, 10.0).unwrap(), sheath)
+            .method(method)
+            .build()
+            .unwrap()
     };
     let (mut first, mut second) = (start(a), start(b));
     let mut commands = vec![Command::advance(1.5); 120];

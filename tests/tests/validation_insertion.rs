@@ -22,14 +22,11 @@ fn curved_tube() -> (Wall, Sheath) {
 fn in_curved_tube(modulus_n_per_mm2: f64) -> Simulation {
     let (wall, sheath) = curved_tube();
     let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
-    Simulation::with_properties(
-        wall,
-        WallProperties { modulus_n_per_mm2, ..Default::default() },
-        wire,
-        sheath,
-        &kirchhoff(2.0),
-    )
-    .unwrap()
+    Simulation::builder(wall, wire, sheath)
+        .properties(WallProperties { modulus_n_per_mm2, ..Default::default() })
+        .method(&kirchhoff(2.0))
+        .build()
+        .unwrap()
 }
 
 #[test]
@@ -57,7 +54,7 @@ fn a_tolerance_saves_iterations_and_costs_little() {
         let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
         let options = KirchhoffOptions { element_mm: 4.0, tolerance, ..Default::default() };
         let method = options;
-        let mut simulation = Simulation::new(wall, wire, sheath, &method).unwrap();
+        let mut simulation = Simulation::builder(wall, wire, sheath).method(&method).build().unwrap();
         let mut iterations = 0;
         for _ in 0..100 {
             iterations += simulation.step(Command::advance(2.0)).unwrap().iterations;
@@ -72,7 +69,7 @@ fn a_tolerance_saves_iterations_and_costs_little() {
     let (wall, sheath) = curved_tube();
     let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
     let method = KirchhoffOptions { tolerance: 0.1, ..Default::default() };
-    let refused = Simulation::new(wall, wire, sheath, &method).err().unwrap().to_string();
+    let refused = Simulation::builder(wall, wire, sheath).method(&method).build().err().unwrap().to_string();
     assert!(refused.contains("method.tolerance"), "{refused}");
 }
 
@@ -83,7 +80,8 @@ fn coarse_elements_keep_their_contacts() {
     let made = GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(0.8)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
     let wire = Device::uniform(250.0, 0.445, 10.0).unwrap();
-    let mut simulation = Simulation::new(made.wall, wire, sheath, &kirchhoff(40.0)).unwrap();
+    let mut simulation =
+        Simulation::builder(made.wall, wire, sheath).method(&kirchhoff(40.0)).build().unwrap();
     let mut iterations = 0;
     for _ in 0..100 {
         iterations += simulation.step(Command::advance(2.0)).unwrap().iterations;
@@ -149,7 +147,7 @@ fn skipping_queries_changes_nothing() {
         let (wall, sheath) = curved_tube();
         let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
         let method = KirchhoffOptions { skip, ..Default::default() };
-        let mut simulation = Simulation::new(wall, wire, sheath, &method).unwrap();
+        let mut simulation = Simulation::builder(wall, wire, sheath).method(&method).build().unwrap();
         for _ in 0..80 {
             simulation.step(Command::advance(2.0)).unwrap();
         }
@@ -172,7 +170,8 @@ fn a_shaped_tip_turns_with_the_tail_and_finds_its_way_through_the_arch() {
     let sheath = Sheath::at_opening(&arch.wall, arch.inlet, 2.0).unwrap();
     let tip = Section { rest_curvature_per_mm: [0.05, 0.0], ..Section::straight(30.0, 0.445, 5.0) };
     let wire = Device::new(vec![tip, Section::straight(400.0, 0.445, 15.0)]).unwrap();
-    let mut simulation = Simulation::new(arch.wall, wire, sheath, &kirchhoff(4.0)).unwrap();
+    let mut simulation =
+        Simulation::builder(arch.wall, wire, sheath).method(&kirchhoff(4.0)).build().unwrap();
     let crossing = CrossingTest::new(simulation.wall().mesh());
     for _ in 0..50 {
         let report = simulation.step(Command { advance_mm: 5.0, rotate_rad: 0.1 }).unwrap();

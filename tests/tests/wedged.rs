@@ -29,7 +29,7 @@ fn thread(friction: f64) -> Simulation {
     let properties = WallProperties { modulus_n_per_mm2: 1e4, friction, ..WallProperties::default() };
     let device = Device::uniform(100.0, 0.45, 1e-2).unwrap();
     let method = KirchhoffOptions { element_mm: 2.0, ..KirchhoffOptions::default() };
-    Simulation::with_properties(made.wall, properties, device, sheath, &method).unwrap()
+    Simulation::builder(made.wall, device, sheath).properties(properties).method(&method).build().unwrap()
 }
 
 /// Direction of the device near a place.

@@ -78,7 +78,11 @@ fn insert(model: &Model, made: &GeneratedWall, sheath: Sheath, wire: &Device) ->
     let (wall, properties) = (made.wall.clone(), WallProperties::default());
     let options = InsertionOptions { element_mm: 5.0, ..InsertionOptions::default() };
     let method = Inserted::new(Arc::clone(model), options);
-    let mut simulation = Simulation::with_properties(wall, properties, wire.clone(), sheath, &method).ok()?;
+    let mut simulation = Simulation::builder(wall, wire.clone(), sheath)
+        .properties(properties)
+        .method(&method)
+        .build()
+        .ok()?;
     let clock = Instant::now();
     let mut unconverged = 0;
     for _ in 0..80 {

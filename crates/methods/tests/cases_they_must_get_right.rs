@@ -101,7 +101,10 @@ impl Tube {
             exact @ AnyMethod::Kirchhoff(_) => exact,
             other => other.with_element_mm(6.0),
         };
-        Simulation::with_properties(self.made.wall.clone(), properties, wire, self.sheath, &method)
+        Simulation::builder(self.made.wall.clone(), wire, self.sheath)
+            .properties(properties)
+            .method(&method)
+            .build()
     }
 }
 

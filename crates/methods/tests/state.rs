@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use endowire_core::device::Device;
-use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
+use endowire_core::insertion::{Command, Sheath, Simulation};
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 use endowire_methods::{AnyMethod, NAMES};
 
@@ -12,7 +12,7 @@ fn start(name: &str) -> Simulation {
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
     let wire = Device::uniform(120.0, 0.445, 10.0).unwrap();
     let method = AnyMethod::named(name).unwrap().with_element_mm(6.0);
-    Simulation::with_properties(made.wall, WallProperties::default(), wire, sheath, &method).unwrap()
+    Simulation::builder(made.wall, wire, sheath).method(&method).build().unwrap()
 }
 
 #[test]

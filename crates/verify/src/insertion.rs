@@ -63,7 +63,7 @@ fn at_origin(wall: Wall, wire: Device, fine: Fineness, friction: f64) -> Result<
     let sheath = Sheath::new(Vec3::zeros(), Vec3::x())?;
     let method = KirchhoffOptions { element_mm, ..KirchhoffOptions::default() };
     let properties = WallProperties { modulus_n_per_mm2, friction, ..WallProperties::default() };
-    Simulation::with_properties(wall, properties, wire, sheath, &method)
+    Simulation::builder(wall, wire, sheath).properties(properties).method(&method).build()
 }
 
 pub(super) fn push(simulation: &mut Simulation, length_mm: f64, steps: usize) -> Result<()> {

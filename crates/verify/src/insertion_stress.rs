@@ -173,7 +173,10 @@ impl InsertionStress {
         };
         let device = Device::uniform(100.0, 0.45, case.bending_stiffness_nmm2)?;
         let method = KirchhoffOptions { element_mm: case.element_mm, ..KirchhoffOptions::default() };
-        Simulation::with_properties(self.wall.clone(), properties, device, self.sheath, &method)
+        Simulation::builder(self.wall.clone(), device, self.sheath)
+            .properties(properties)
+            .method(&method)
+            .build()
     }
 }
 

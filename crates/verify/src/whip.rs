@@ -31,7 +31,7 @@ fn in_tube(lambda: f64, play_mm: f64) -> Result<Simulation> {
     let element_mm = length_mm / 40.0;
     let method = KirchhoffOptions { element_mm, ..KirchhoffOptions::default() };
     let rigid = WallProperties { modulus_n_per_mm2: 1e4, ..WallProperties::default() };
-    let mut simulation = Simulation::with_properties(wall, rigid, wire, sheath, &method)?;
+    let mut simulation = Simulation::builder(wall, wire, sheath).properties(rigid).method(&method).build()?;
     push(&mut simulation, length_mm, 40)?;
     Ok(simulation)
 }

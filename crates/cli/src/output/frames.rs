@@ -158,7 +158,7 @@ impl<'a> Studio<'a> {
     ) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         let spec = wished(view_table(path, scene)?, args, default)?;
-        let wall = scene.wall_from(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
+        let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
         let device = scene.device().map_err(in_scene)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
         if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {

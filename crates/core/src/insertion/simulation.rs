@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use crate::contact::Counters;
 use crate::device::Device;
-use crate::error::vector;
-use crate::insertion::{Command, ScriptLine, Sheath, StepReport, WallProperties, commands};
-use crate::methods::{Method, MethodChoice, State};
+use crate::insertion::{
+    Command, ScriptLine, Sheath, SimulationBuilder, StepReport, WallProperties, commands,
+};
+use crate::methods::{Method, State};
 use crate::shape::Shape;
-use crate::vessel::{NoStore, Wall, WallQuery, WallStore};
+use crate::vessel::{Wall, WallQuery};
 use crate::{Error, Result};
 
 /// What surrounds a method's unknowns: it may read all of it and change none.
@@ -31,21 +32,21 @@ pub struct Surroundings<'a> {
 /// What surrounds the device is shared by all clones of a simulation, which may run on any threads; what a clone has of its own is its
 /// state, and with its first step a workspace.
 pub struct Simulation {
-    scene: Arc<Environment>,
-    method: Box<dyn Method>,
+    pub(super) scene: Arc<Environment>,
+    pub(super) method: Box<dyn Method>,
 }
 
 /// What a simulation never changes.
-struct Environment {
-    wall: Wall,
-    properties: WallProperties,
-    query: WallQuery,
-    sheath: Sheath,
-    device: Device,
+pub(super) struct Environment {
+    pub(super) wall: Wall,
+    pub(super) properties: WallProperties,
+    pub(super) query: WallQuery,
+    pub(super) sheath: Sheath,
+    pub(super) device: Device,
 }
 
 impl Environment {
-    fn surroundings(&self) -> Surroundings<'_> {
+    pub(super) fn surroundings(&self) -> Surroundings<'_> {
         let Self { wall, properties, query, sheath, device } = self;
         Surroundings { wall, properties, query, sheath, device }
     }
@@ -57,88 +58,10 @@ impl Clone for Simulation {
     }
 }
 
-/// How far in front of the sheath's mouth, mm, the inside test looks: the mouth itself may lie in the plane of an
-/// opening, where inside and outside meet.
-const MOUTH_MM: f64 = 1e-3;
-
 impl Simulation {
-    /// A device at the mouth of the sheath, nothing inserted.
-    ///
-    /// # Errors
-    /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
-    /// tell, or method options out of range.
-    pub fn new(wall: Wall, device: Device, sheath: Sheath, method: &dyn MethodChoice) -> Result<Self> {
-        Self::with_properties(wall, WallProperties::default(), device, sheath, method)
-    }
-
-    /// As [`Simulation::new`], with a wall of given modulus.
-    ///
-    /// # Errors
-    /// As [`Simulation::new`], and wall properties out of range.
-    pub fn with_properties(
-        wall: Wall,
-        properties: WallProperties,
-        device: Device,
-        sheath: Sheath,
-        method: &dyn MethodChoice,
-    ) -> Result<Self> {
-        Self::from_store(wall, properties, device, sheath, method, &NoStore)
-    }
-
-    /// As [`Simulation::with_properties`], with the wall that is felt from `store`.
-    ///
-    /// # Errors
-    /// As [`Simulation::with_properties`].
-    pub fn from_store(
-        wall: Wall,
-        properties: WallProperties,
-        device: Device,
-        sheath: Sheath,
-        method: &dyn MethodChoice,
-        store: &dyn WallStore,
-    ) -> Result<Self> {
-        let start = |surroundings: &Surroundings<'_>| method.start(surroundings, store);
-        Self::with_method(wall, properties, device, sheath, start)
-    }
-
-    /// As [`Simulation::with_properties`], with any method: `start` makes it for these surroundings.
-    ///
-    /// # Errors
-    /// As [`Simulation::with_properties`], and what `start` refuses.
-    pub fn with_method(
-        wall: Wall,
-        properties: WallProperties,
-        device: Device,
-        sheath: Sheath,
-        start: impl FnOnce(&Surroundings<'_>) -> Result<Box<dyn Method>>,
-    ) -> Result<Self> {
-        properties.check(wall.mesh())?;
-        if !wall.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
-            let p = sheath.position_mm;
-            let openings: Vec<String> = wall
-                .openings()
-                .iter()
-                .map(|o| {
-                    format!(
-                        "{} at [{:.1}, {:.1}, {:.1}]",
-                        o.index, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z
-                    )
-                })
-                .collect();
-            return Err(Error::parameter(
-                "sheath.position_mm",
-                vector(&p),
-                format!(
-                    "is outside the vessel: place it inside, or name an opening (sheath.opening); openings: {}",
-                    if openings.is_empty() { "none".to_owned() } else { openings.join(", ") }
-                ),
-            ));
-        }
-        let query = WallQuery::new(&wall)?;
-        check_mouth(&query, &device, &sheath)?;
-        let scene = Environment { wall, properties, query, sheath, device };
-        let method = start(&scene.surroundings())?;
-        Ok(Self { scene: Arc::new(scene), method })
+    /// A simulation of a device that enters `wall` through `sheath`, to be built.
+    pub fn builder<'a>(wall: Wall, device: Device, sheath: Sheath) -> SimulationBuilder<'a> {
+        SimulationBuilder::new(wall, device, sheath)
     }
 
     /// Carries out one command. After an error the state is as before, to the bit.
@@ -199,33 +122,6 @@ impl Simulation {
     /// The sheath.
     pub fn sheath(&self) -> &Sheath {
         &self.scene.sheath
-    }
-}
-
-/// A device so many times as thick as the vessel comes from another unit.
-const MISFIT: f64 = 5.0;
-
-/// Refuses a device that is in the wall from the start. Further in a vessel may be narrower: there the device does not pass.
-fn check_mouth(query: &WallQuery, device: &Device, sheath: &Sheath) -> Result<()> {
-    let Some(near) = query.nearest(&sheath.position_mm, f64::MAX) else { return Ok(()) };
-    // At the rim of an opening the distance has no sign.
-    let room_mm = near.distance_mm.abs();
-    let thickest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
-    match device.sections().iter().map(|s| s.radius_mm).enumerate().max_by(thickest) {
-        Some((section, radius_mm)) if radius_mm > room_mm => Err(Error::parameter(
-            format!("device.section[{section}].radius_mm"),
-            radius_mm,
-            format!(
-                "the wall is {room_mm:.3} mm from the sheath's mouth at {}: use a thinner device or move the sheath{}",
-                vector(&sheath.position_mm),
-                if radius_mm > MISFIT * room_mm {
-                    ", or check vessel.unit_mm: they are not of one scale"
-                } else {
-                    ""
-                }
-            ),
-        )),
-        _ => Ok(()),
     }
 }
 

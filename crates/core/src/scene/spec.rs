@@ -9,9 +9,7 @@ use crate::device::{Device, Section};
 use crate::input::from_toml;
 use crate::insertion::{Command, ScriptLine, Sheath, Simulation, WallProperties, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
-use crate::vessel::{
-    CentrelineTree, NoStore, Resolution, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint,
-};
+use crate::vessel::{CentrelineTree, Resolution, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint};
 use crate::{Error, Result, Vec3};
 
 /// A scene whose `[method]` is one of this crate's: the exact rod.
@@ -225,19 +223,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         named.into_iter().flatten().map(|path| self.resolve(path)).collect()
     }
 
-    /// Reads or builds the vessel wall.
+    /// Reads the vessel wall or builds it, or has it from `store` ([`NoStore`](crate::vessel::NoStore) keeps nothing).
     ///
     /// # Errors
     /// A missing or unusable file, options that do not belong together, a wall that cannot be used.
-    pub fn wall(&self) -> Result<Wall> {
-        self.wall_from(&NoStore)
-    }
-
-    /// As [`SceneOf::wall`], from `store`.
-    ///
-    /// # Errors
-    /// As [`SceneOf::wall`].
-    pub fn wall_from(&self, store: &dyn WallStore) -> Result<Wall> {
+    pub fn wall(&self, store: &dyn WallStore) -> Result<Wall> {
         let path = self.vessel_path()?;
         let spec = &self.vessel;
         if spec.tree.is_some() {
@@ -312,20 +302,12 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         script_commands(&self.script, device)
     }
 
-    /// The simulation, nothing inserted yet.
+    /// The simulation, nothing inserted yet, with walls from `store`.
     ///
     /// # Errors
-    /// As [`SceneOf::wall`], [`SceneOf::device`], [`SceneOf::sheath`] and [`Simulation::new`].
-    pub fn simulation(&self) -> Result<Simulation> {
-        self.simulation_from(&NoStore)
-    }
-
-    /// As [`SceneOf::simulation`], with walls from `store`.
-    ///
-    /// # Errors
-    /// As [`SceneOf::simulation`].
-    pub fn simulation_from(&self, store: &dyn WallStore) -> Result<Simulation> {
-        let wall = self.wall_from(store)?;
+    /// As [`SceneOf::wall`], [`SceneOf::device`], [`SceneOf::sheath`] and [`SimulationBuilder::build`](crate::insertion::SimulationBuilder::build).
+    pub fn simulation(&self, store: &dyn WallStore) -> Result<Simulation> {
+        let wall = self.wall(store)?;
         // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.
         let size_mm = wall.mesh().bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
         let hint =
@@ -343,7 +325,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
 
     fn simulation_in(&self, wall: Wall, store: &dyn WallStore) -> Result<Simulation> {
         let sheath = self.sheath(&wall)?;
-        Simulation::from_store(wall, self.vessel.wall.clone(), self.device()?, sheath, &self.method, store)
+        Simulation::builder(wall, self.device()?, sheath)
+            .properties(self.vessel.wall.clone())
+            .method(&self.method)
+            .store(store)
+            .build()
             .map_err(|error| match error {
                 // What is wrong with a surface is wrong with its file.
                 Error::Mesh(reason) => {

@@ -135,7 +135,10 @@ impl Cell {
         let place = &surface.places[self.wire];
         let method = KirchhoffOptions { element_mm: self.element_mm, ..KirchhoffOptions::default() };
         let device = place.wire.device(surface.length_mm)?;
-        Simulation::with_properties(surface.wall.clone(), self.properties(), device, place.sheath, &method)
+        Simulation::builder(surface.wall.clone(), device, place.sheath)
+            .properties(self.properties())
+            .method(&method)
+            .build()
     }
 }
 

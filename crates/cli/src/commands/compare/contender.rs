@@ -49,7 +49,7 @@ pub(crate) fn insertion_within(
         }
         _ => {}
     }
-    Simulation::with_properties(wall, properties, device, sheath, &choice)
+    Simulation::builder(wall, device, sheath).properties(properties).method(&choice).build()
 }
 
 /// Out-of-balance force of a static solve on n elements, in EI/L² over 1/n²: below what the elements get wrong.
