@@ -1,7 +1,9 @@
 //! Frames: the scene's `[view]` table, the renderer it asks for, and the files.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
+use endowire_core::Error;
 use endowire_core::device::Device;
 use endowire_core::input::from_toml;
 use endowire_core::insertion::Simulation;
@@ -88,10 +90,18 @@ impl FrameWriter {
         let frames = renderer.render_at(&[view], moment)?;
         for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {
-                recorder.frame(step, name, |path| Ok(image.write_png(path)?))?;
+                recorder.frame(step, name, |path| image.write_png(path).map_err(bare))?;
             }
         }
         Ok(())
+    }
+}
+
+/// What the system said, without the path that it said it of.
+fn bare(error: Error) -> io::Error {
+    match error {
+        Error::File { source, .. } => source,
+        other => io::Error::other(other.to_string()),
     }
 }
 
