@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use endowire_core::contact::Counters;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
@@ -142,25 +143,16 @@ fn walls_of_any_stiffness_are_met_and_never_passed_through() {
 }
 
 #[test]
-fn skipping_queries_changes_nothing() {
-    let run = |skip: bool| {
-        let (wall, sheath) = curved_tube();
-        let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
-        let method = KirchhoffOptions { skip, ..Default::default() };
-        let mut simulation = Simulation::builder(wall, wire, sheath).method(&method).build().unwrap();
-        for _ in 0..80 {
-            simulation.step(Command::advance(2.0)).unwrap();
-        }
-        simulation
-    };
-    let (with, without) = (run(true), run(false));
-    let (saved, spent) = (with.counters(), without.counters());
-    for (a, b) in with.shape().positions_mm.iter().zip(&without.shape().positions_mm) {
-        assert!((a - b).norm() < 1e-9, "{}", (a - b).norm());
+fn most_questions_about_the_wall_are_answered_from_memory() {
+    let (wall, sheath) = curved_tube();
+    let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
+    let mut simulation = Simulation::builder(wall, wire, sheath).build().unwrap();
+    for _ in 0..80 {
+        simulation.step(Command::advance(2.0)).unwrap();
     }
-    assert!(saved.avoided > 0 && saved.near > 0 && spent.avoided == 0 && spent.near == 0);
-    assert!(with.report().nodes_solved > 0 && with.report().nodes_frozen > 0);
-    assert!(saved.queries * 5 < spent.queries, "{saved:?} {spent:?}");
+    let Counters { queries, avoided, near, .. } = simulation.counters();
+    assert!(avoided > 0 && near > 0 && queries * 4 < avoided + near, "{:?}", simulation.counters());
+    assert!(simulation.report().nodes_solved > 0 && simulation.report().nodes_frozen > 0);
 }
 
 #[test]

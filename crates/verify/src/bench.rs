@@ -146,8 +146,7 @@ impl Bench {
         job: impl FnOnce(&mut Newton<PLAIN>, &[ElementData], &mut Supports, &mut Outside<'_>, &mut RodState) -> T,
     ) -> T {
         let (points, bending) = (&self.mesh.points, self.setup.bending);
-        let mut contact =
-            WallContact::new(&self.felt, points, &mut self.memory, &mut self.friction, bending, true);
+        let mut contact = WallContact::new(&self.felt, points, &mut self.memory, &mut self.friction, bending);
         contact.softness = self.softness;
         let mut outside = Outside { contact, loads: &mut self.loads, plates: self.plates };
         job(&mut self.newton, &self.mesh.elements, &mut self.supports, &mut outside, &mut self.state)

@@ -56,13 +56,11 @@ pub struct KirchhoffOptions {
     pub tolerance: f64,
     /// Most Newton iterations of one solution; a command may take ten times as many.
     pub max_iterations: usize,
-    /// Whether work that cannot change the result is skipped; off only to show that it does not.
-    pub skip: bool,
 }
 
 impl Default for KirchhoffOptions {
     fn default() -> Self {
-        Self { element_mm: 2.0, tolerance: 1e-9, max_iterations: 500, skip: true }
+        Self { element_mm: 2.0, tolerance: 1e-9, max_iterations: 500 }
     }
 }
 
