@@ -31,7 +31,7 @@ pub const NAMES: [&str; 9] = [
     "discrete-rod",
 ];
 
-/// Names of the methods that are a [`RodModel`].
+/// Names of the methods that are a [`RodModel`]: all but `kirchhoff` and the two of the paper.
 pub const MODEL_NAMES: &[&str] = NAMES.split_at(3).1;
 
 /// A method with its options.
@@ -150,6 +150,10 @@ pub fn static_model(name: &str) -> Option<Box<dyn RodModel>> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use endowire_core::input::parse_toml;
+
     use super::*;
 
     #[test]
@@ -163,5 +167,25 @@ mod tests {
         }
         let error = AnyMethod::named("kirchoff").map_err(|e| e.to_string());
         assert!(error.is_err_and(|e| e.contains("kirchoff") && e.contains("kirchhoff, li2011-dense")));
+    }
+
+    #[test]
+    fn a_scene_of_the_core_names_the_exact_rod_alone_and_one_of_this_crate_all() {
+        let read = |name: &str| {
+            let text = format!("[vessel]\n[device]\n[sheath]\n[method]\nname = \"{name}\"\n");
+            let file = Path::new("scene.toml");
+            let core = parse_toml::<endowire_core::scene::Scene>(&text, file).map_err(|e| e.to_string());
+            (core.err(), parse_toml::<Scene>(&text, file).map_err(|e| e.to_string()).err())
+        };
+        assert_eq!(read("kirchhoff"), (None, None));
+        for name in &NAMES[1..] {
+            let (core, here) = read(name);
+            assert!(core.is_some_and(|e| e.contains(name) && e.contains("expected `kirchhoff`")), "{name}");
+            assert_eq!(here, None);
+        }
+        let (core, here) = read("kirchoff");
+        for told in [core, here] {
+            assert!(told.is_some_and(|e| e.contains("did you mean `kirchhoff`?")));
+        }
     }
 }
