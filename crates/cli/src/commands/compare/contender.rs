@@ -11,7 +11,7 @@ use endowire_methods::{AnyMethod, static_model};
 use endowire_verify::{at_end, unit_rod};
 
 /// Tolerance of `kirchhoff` that compares with those of the others in an insertion. They may leave a force of 0.01 EI/L² out of balance
-/// in all ([`InsertionOptions`]); this is the part of the largest force that may be left at a node, and walls push with up to
+/// in all ([`endowire_methods::InsertionOptions`]); this is the part of the largest force that may be left at a node, and walls push with up to
 /// 24 EI/L² in these scenes.
 pub(crate) const INSERTION_TOLERANCE: f64 = 1e-4;
 
