@@ -17,8 +17,7 @@ pub mod wall;
 
 pub use distance::{Distance, Nearness, SmoothWall};
 pub use felt::FeltWall;
-pub(crate) use friction::SETTLED;
-pub use friction::{Friction, HandMotion, NormalForce};
+pub use friction::{Friction, HandMotion, NormalForce, SETTLED};
 pub use grading::Grading;
 pub use memory::{KnownPoints, WallMemory};
 pub use point::{ContactPoint, Counters, Touch};

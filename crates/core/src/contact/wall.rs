@@ -68,8 +68,6 @@ const DEEPER: f64 = 0.3;
 /// The wall's energy along a device.
 pub struct WallContact<'a> {
     felt: &'a FeltWall,
-    /// Whether clearances and the last triangle may replace queries.
-    skip: bool,
     points: &'a [ContactPoint],
     /// Moment of the softest piece at a radius of 100 mm, N·mm.
     least_moment_nmm: f64,
@@ -93,12 +91,10 @@ impl<'a> WallContact<'a> {
         memory: &'a mut WallMemory,
         friction: &'a mut Friction,
         softest_nmm2: f64,
-        skip: bool,
     ) -> Self {
         memory.resize(points.len());
         Self {
             felt,
-            skip,
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
             softness: 1.0,
@@ -117,80 +113,101 @@ impl<'a> WallContact<'a> {
 
     /// The same, with derivatives nearer than `limit_mm`.
     fn read_within(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
+        if let Some(side) = self.memory.points[index].side {
+            return self.read_from_side(index, x, side, limit_mm);
+        }
+        self.read_known(index, x, limit_mm).unwrap_or_else(|| self.read_anew(index, x, limit_mm))
+    }
+
+    /// The reading that was taken at `x`, if it tells enough.
+    fn read_there(&self, index: usize, x: &Vec3, limit_mm: f64) -> Option<Reading> {
+        let (place, reading) = self.memory.readings[index];
+        let told = matches!(reading, Nearness::Within(_)) || reading.value_mm() >= limit_mm;
+        (place == *x && told).then(|| Reading::of(reading, limit_mm))
+    }
+
+    /// Of a point that has sunk into the wall: followed from there along the surface.
+    fn read_from_side(&mut self, index: usize, x: &Vec3, side: u32, limit_mm: f64) -> Reading {
+        if let Some(reading) = self.read_there(index, x, limit_mm) {
+            self.counters.avoided += 1;
+            return reading;
+        }
+        let point = &self.points[index];
+        let known = &mut self.memory.points[index];
+        let triangle = match known.base_triangle {
+            Some(triangle) if (x - known.base_looked_at).norm() < LOOK_AGAIN * point.potential.radius_mm => {
+                known.looked_at = known.base_looked_at;
+                triangle
+            }
+            _ => {
+                known.looked_at = *x;
+                self.felt.smooth.walk(side, x)
+            }
+        };
+        let nearness = self.felt.nearness(x, triangle, limit_mm);
+        known.from_tip_mm = point.from_tip_mm;
+        (known.clearance_mm, known.triangle, known.free_mm) = (0.0, Some(triangle), 0.0);
+        self.counters.near += 1;
+        self.memory.readings[index] = (*x, nearness);
+        Reading::of(nearness, limit_mm)
+    }
+
+    /// What clearances and the last triangle say without a query.
+    fn read_known(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Option<Reading> {
         let radius = self.points[index].potential.radius_mm;
         let near = radius * (1.0 + FOLLOW);
         let known = &mut self.memory.points[index];
-        if let Some(side) = known.side {
-            let (place, reading) = self.memory.readings[index];
-            let told = matches!(reading, Nearness::Within(_)) || reading.value_mm() >= limit_mm;
-            if self.skip && place == *x && told {
-                self.counters.avoided += 1;
-                return Reading::of(reading, limit_mm);
-            }
-            let triangle = match known.base_triangle {
-                Some(triangle) if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius => {
-                    known.looked_at = known.base_looked_at;
-                    triangle
-                }
-                _ => {
-                    known.looked_at = *x;
-                    self.felt.smooth.walk(side, x)
-                }
-            };
-            let nearness = self.felt.nearness(x, triangle, limit_mm);
-            known.from_tip_mm = self.points[index].from_tip_mm;
-            (known.clearance_mm, known.triangle, known.free_mm) = (0.0, Some(triangle), 0.0);
-            self.counters.near += u64::from(self.skip);
-            self.memory.readings[index] = (*x, nearness);
-            return Reading::of(nearness, limit_mm);
+        let moved = (x - known.base_looked_at).norm();
+        if moved < known.base_free_mm {
+            self.counters.avoided += 1;
+            (known.looked_at, known.triangle) = (known.base_looked_at, None);
+            (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, known.base_free_mm);
+            return Some(Reading::Free(known.clearance_mm - moved));
         }
-        if self.skip {
-            let moved = (x - known.base_looked_at).norm();
-            if moved < known.base_free_mm {
-                self.counters.avoided += 1;
-                (known.looked_at, known.triangle) = (known.base_looked_at, None);
-                (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, known.base_free_mm);
-                return Reading::Free(known.clearance_mm - moved);
-            }
-            let moved = (x - known.looked_at).norm();
-            let free_mm = known.clearance_mm - near - self.felt.smooth.deepest_inset_mm();
-            if moved < free_mm {
-                self.counters.avoided += 1;
-                known.free_mm = free_mm;
-                return Reading::Free(known.clearance_mm - moved);
-            }
-            if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius && known.base_triangle.is_some() {
-                (known.looked_at, known.triangle) = (known.base_looked_at, known.base_triangle);
-                known.free_mm = 0.0;
-                known.clearance_mm = known.base_looked_clearance_mm;
-            }
-            if let Some(triangle) = known.triangle {
-                let (place, reading) = self.memory.readings[index];
-                // Most points that are near a wall do not touch it, and are moved little.
-                let clear_mm = limit_mm.max(radius);
-                let spare_mm = reading.value_mm() - clear_mm - STEEPEST * (x - place).norm();
-                if spare_mm > 0.0 {
-                    self.counters.avoided += 1;
-                    return Reading::Free(clear_mm + spare_mm);
-                }
-                let told = matches!(reading, Nearness::Within(_)) || reading.value_mm() >= limit_mm;
-                if place == *x && told {
-                    self.counters.avoided += 1;
-                    return Reading::of(reading, limit_mm);
-                }
-                if (x - known.looked_at).norm() < LOOK_AGAIN * radius {
-                    let nearness = self.felt.nearness(x, triangle, limit_mm);
-                    if nearness.value_mm() > 0.0 {
-                        self.counters.near += 1;
-                        self.memory.readings[index] = (*x, nearness);
-                        return Reading::of(nearness, limit_mm);
-                    }
-                }
-            }
+        let moved = (x - known.looked_at).norm();
+        let free_mm = known.clearance_mm - near - self.felt.smooth.deepest_inset_mm();
+        if moved < free_mm {
+            self.counters.avoided += 1;
+            known.free_mm = free_mm;
+            return Some(Reading::Free(known.clearance_mm - moved));
         }
-        let (places, query) = (&mut self.memory.places, &self.felt.query);
+        if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius && known.base_triangle.is_some() {
+            (known.looked_at, known.triangle) = (known.base_looked_at, known.base_triangle);
+            (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, 0.0);
+        }
+        let (triangle, looked_at) = (known.triangle?, known.looked_at);
+        // Most points that are near a wall do not touch it, and are moved little.
+        let (place, reading) = self.memory.readings[index];
+        let clear_mm = limit_mm.max(radius);
+        let spare_mm = reading.value_mm() - clear_mm - STEEPEST * (x - place).norm();
+        if spare_mm > 0.0 {
+            self.counters.avoided += 1;
+            return Some(Reading::Free(clear_mm + spare_mm));
+        }
+        if let Some(reading) = self.read_there(index, x, limit_mm) {
+            self.counters.avoided += 1;
+            return Some(reading);
+        }
+        if (x - looked_at).norm() >= LOOK_AGAIN * radius {
+            return None;
+        }
+        let nearness = self.felt.nearness(x, triangle, limit_mm);
+        if nearness.value_mm() <= 0.0 {
+            return None;
+        }
+        self.counters.near += 1;
+        self.memory.readings[index] = (*x, nearness);
+        Some(Reading::of(nearness, limit_mm))
+    }
+
+    /// From the triangle that is nearest through space.
+    fn read_anew(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
+        let radius = self.points[index].potential.radius_mm;
+        let near = radius * (1.0 + FOLLOW);
+        let known = &mut self.memory.points[index];
+        let places = &mut self.memory.places;
         let asked = places.queries;
-        let place = if self.skip { places.around(query, x) } else { places.ask(query, x) };
+        let place = places.around(&self.felt.query, x);
         self.counters.avoided += u64::from(places.queries == asked);
         (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
         (known.clearance_mm, known.triangle) = (place.clearance_mm, None);
