@@ -1,15 +1,19 @@
 //! Linear and nonlinear solvers: the banded LDLᵀ kernel, an LU beside it, and Newton's method with globalisation.
 //!
-//! [`newton`] is the iteration with its line search; [`report`] what goes in and comes out. It rests on the parts beside it:
-//! the size of a residual, the trial state, the way out of saddle points, and stiffness that is not symmetric.
+//! [`newton`] is the iteration; [`report`] what goes in and comes out. An iteration is inertia and shift, step, line search and stop,
+//! a file each; beside them are the size of a residual, the trial state, the way out of saddle points, and stiffness that is not
+//! symmetric.
 
 pub mod band;
 pub mod band_lu;
 pub mod external;
+mod line_search;
 pub mod newton;
 pub mod report;
 mod residual;
 mod saddle;
+mod shift;
+mod stop;
 mod trial;
 mod unsymmetric;
 
