@@ -4,9 +4,10 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use endowire_core::Vec3;
+use endowire_core::banded::{BandMatrix, Factor};
 use endowire_core::rod::element::{ElementSystem, element_energy, element_system};
 use endowire_core::rod::{Frame, Layout, PLAIN, RodState, TWISTED};
-use endowire_core::solve::{BandMatrix, Factor, Newton, NewtonOptions};
+use endowire_core::solve::{Newton, NewtonOptions};
 use endowire_tests::bent_rod::{bent, clamp, elements, system, tip_load};
 use std::hint::black_box;
 

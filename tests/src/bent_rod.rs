@@ -1,8 +1,9 @@
 //! A bent and twisted rod of unit length: what the timings of the rod's parts begin with.
 
 use endowire_core::Vec3;
+use endowire_core::banded::Shift;
 use endowire_core::rod::{Assembly, ElementData, Frame, Layout, RodState, Supports};
-use endowire_core::solve::{Newton, Shift};
+use endowire_core::solve::Newton;
 use endowire_core::statics::Loads;
 
 /// `n` equal elements of EI = 1 in all; pre-curved if `twisted`.

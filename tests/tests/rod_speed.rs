@@ -1,8 +1,9 @@
 //! The speed bars of the rod, least of many runs. Timing: run by hand, alone, with `--release -- --ignored --nocapture`.
 
 use endowire_core::Vec3;
+use endowire_core::banded::Factor;
 use endowire_core::rod::{Frame, Layout, PLAIN, RodState, TWISTED};
-use endowire_core::solve::{Factor, Newton, NewtonOptions};
+use endowire_core::solve::{Newton, NewtonOptions};
 use endowire_tests::bent_rod::{bent, clamp, elements, make_regular, tip_load};
 use std::time::Instant;
 

@@ -9,6 +9,7 @@
 //! [`statics::StaticSolution`] by [`solve::Newton`] on the elements of [`rod`], and [`reference`](mod@reference) holds the
 //! answers it is measured against.
 
+pub mod banded;
 pub mod contact;
 pub mod device;
 pub mod error;

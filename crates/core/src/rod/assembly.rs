@@ -18,7 +18,7 @@ use super::layout::Layout;
 use super::quadrature::{Point, hermite};
 use super::state::RodState;
 use crate::Vec3;
-use crate::solve::{BandMatrix, Shift};
+use crate::banded::{BandMatrix, Shift};
 use nalgebra::Matrix3;
 
 /// A rank-one addition p qᵀ to the matrix that is not symmetric: loads that follow the rod.

@@ -12,12 +12,12 @@
 //! can turn freely (a buckled column about its axis) solvable and cannot be seen in the result, since the
 //! residual is never shifted.
 
-use super::band::{Factor, Inertia, Shift};
 use super::external::External;
 use super::line_search::LineSearch;
 use super::report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 use super::residual::ResidualSize;
 use super::stop::Progress;
+use crate::banded::{Factor, Inertia, Shift};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
 
 /// Changes of energy below this part of the energies' size are rounding.

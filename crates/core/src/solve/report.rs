@@ -1,6 +1,6 @@
 //! What Newton's method is told and what it tells.
 
-use super::band::Inertia;
+use crate::banded::Inertia;
 
 /// Settings of Newton's method.
 #[derive(Debug, Clone, Copy, PartialEq)]

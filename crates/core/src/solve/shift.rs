@@ -4,9 +4,9 @@
 //! until they are right (Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 3.4, with the inertia in the place of a
 //! failed Cholesky factorisation).
 
-use super::band::{FactorError, Inertia};
 use super::newton::Newton;
 use super::report::StopReason;
+use crate::banded::{FactorError, Inertia};
 use crate::rod::{Assembly, ElementData, Supports};
 
 /// Part of EI/L² that is always added as a uniform tension.

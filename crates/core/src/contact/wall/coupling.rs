@@ -1,9 +1,9 @@
 //! Wall and friction solved for together: what the matrix of lagged normal forces leaves out, and what a point feels.
 
 use super::WallContact;
+use crate::banded::BandLu;
 use crate::rod::quadrature::Point;
 use crate::rod::{Assembly, ElementData, Layout, RodState};
-use crate::solve::BandLu;
 
 impl WallContact<'_> {
     /// From now on the normal forces of friction follow the state at once.

@@ -19,9 +19,10 @@
 //! of the matrix is not that of a minimum, or its step is long, it is shifted as in the solution with lagged forces. What is found is
 //! judged by [`Newton::solve`] with its forces held: a saddle is left, and the way goes on from there.
 
+use crate::banded::{BandLu, Shift};
 use crate::contact::WallContact;
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
-use crate::solve::{BandLu, External, Newton, Shift};
+use crate::solve::{External, Newton};
 
 /// Shifts tried until the symmetric part is that of a minimum.
 const SHIFTS: usize = 40;
