@@ -15,26 +15,23 @@
 
 use super::element::{ElementData, ElementSystem, Energy, element_system};
 use super::layout::Layout;
-use super::quadrature::{Point, hermite};
 use super::state::RodState;
-use crate::Vec3;
 use crate::banded::{BandMatrix, Shift};
-use nalgebra::Matrix3;
 
 /// A rank-one addition p qᵀ to the matrix that is not symmetric: loads that follow the rod.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RankOne {
+pub(crate) struct RankOne {
     /// First of three consecutive rows p lives in.
-    pub row: usize,
+    pub(crate) row: usize,
     /// Its entries.
-    pub p: [f64; 3],
+    pub(crate) p: [f64; 3],
     /// First of three consecutive columns q lives in.
-    pub column: usize,
+    pub(crate) column: usize,
     /// Its entries.
-    pub q: [f64; 3],
+    pub(crate) q: [f64; 3],
 }
 
-/// Matrix, residual and energy at one state. External energies add to it with the `add_*` methods.
+/// Matrix, residual and energy at one state. External energies add to it by its [`Stencils`](super::Stencils).
 #[derive(Debug, Clone)]
 pub struct Assembly<const C: usize> {
     /// The augmented matrix.
@@ -48,7 +45,7 @@ pub struct Assembly<const C: usize> {
     /// Energy of everything outside the rod.
     pub external_energy: f64,
     /// Unsymmetric additions to the matrix.
-    pub rank_ones: Vec<RankOne>,
+    pub(crate) rank_ones: Vec<RankOne>,
     /// Largest force and moment an element exerts on a node: the scale of the residual.
     pub scale: [f64; 2],
     /// Whether the matrix is wanted beside the residual. Where it is not, it is left empty.
@@ -126,89 +123,6 @@ impl<const C: usize> Assembly<C> {
             correction.for_each(|(r, s)| *r += gap * s);
             if HESSIAN {
                 self.matrix.lay_blocks(at, &system.rows);
-            }
-        }
-    }
-
-    /// Adds an energy of the position of node `i`.
-    pub fn add_node(&mut self, i: usize, gradient: &Vec3, hessian: &Matrix3<f64>) {
-        let at = Layout::<C>.position(i);
-        for a in 0..3 {
-            self.residual[at + a] += gradient[a];
-            if !self.hessian {
-                continue;
-            }
-            for b in a..3 {
-                self.matrix.add(at + a, at + b, hessian[(a, b)]);
-            }
-        }
-    }
-
-    /// Adds an energy of the angle of node `i`; nothing where the rod carries no angles.
-    pub fn add_angle(&mut self, i: usize, gradient: f64, hessian: f64) {
-        if Layout::<C>::TWIST {
-            let at = Layout::<C>.angle(i);
-            self.residual[at] += gradient;
-            if self.hessian {
-                self.matrix.add(at, at, hessian);
-            }
-        }
-    }
-
-    /// How the point at ξ of element `e` moves with the unknowns: rows and displacements,
-    /// w₀ dx₀ + s₀(u a + v b) + ….
-    pub(crate) fn point_columns(
-        state: &RodState,
-        element: &ElementData,
-        e: usize,
-        xi: f64,
-    ) -> [(usize, Vec3); 10] {
-        let l = Layout::<C>;
-        let [w0, s0, w1, s1] = hermite(xi);
-        let (s0, s1) = (s0 * element.length, s1 * element.length);
-        let (f0, f1) = (&state.frames[e], &state.frames[e + 1]);
-        [
-            (l.position(e), Vec3::x() * w0),
-            (l.position(e) + 1, Vec3::y() * w0),
-            (l.position(e) + 2, Vec3::z() * w0),
-            (l.tangent(e), f0.u * s0),
-            (l.tangent(e) + 1, f0.v * s0),
-            (l.position(e + 1), Vec3::x() * w1),
-            (l.position(e + 1) + 1, Vec3::y() * w1),
-            (l.position(e + 1) + 2, Vec3::z() * w1),
-            (l.tangent(e + 1), f1.u * s1),
-            (l.tangent(e + 1) + 1, f1.v * s1),
-        ]
-    }
-
-    /// Adds the part of an energy of the point at ξ of element `e` that depends on the material angle there: its derivatives
-    /// `first`, `second` in the angle and `mixed` in angle and position; nothing where the rod carries no angles.
-    pub fn add_turn(
-        &mut self,
-        state: &RodState,
-        element: &ElementData,
-        e: usize,
-        xi: f64,
-        mixed: &Vec3,
-        (first, second): (f64, f64),
-    ) {
-        if !Layout::<C>::TWIST {
-            return;
-        }
-        let l = Layout::<C>;
-        let [w0, w1, wb] = Point::at(xi, 0.0).phi;
-        let angles = [(l.angle(e), w0), (l.bubble(e), wb), (l.angle(e + 1), w1)];
-        let columns = Self::point_columns(state, element, e, xi);
-        for (i, &(row, p)) in angles.iter().enumerate() {
-            self.residual[row] += first * p;
-            if !self.hessian {
-                continue;
-            }
-            for &(column, q) in &angles[i..] {
-                self.matrix.add(row, column, second * p * q);
-            }
-            for (column, way) in &columns {
-                self.matrix.add(row, *column, p * mixed.dot(way));
             }
         }
     }

@@ -26,7 +26,9 @@ mod invariants;
 pub mod layout;
 pub mod points;
 pub mod quadrature;
+pub(crate) mod scatter;
 pub mod state;
+pub mod stencils;
 pub mod supports;
 pub mod torsion;
 
@@ -37,6 +39,7 @@ pub use frame::Frame;
 pub use layout::{Layout, PLAIN, TWISTED};
 pub use points::PointSum;
 pub use state::RodState;
+pub use stencils::{Stencils, Triple};
 pub use supports::{EndAngle, Supports};
 
 #[cfg(test)]

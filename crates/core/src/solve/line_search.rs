@@ -82,7 +82,7 @@ impl<const C: usize> Newton<C> {
     /// turned by it, in radians, if it was a whole step of Newton's; infinity otherwise.
     pub(super) fn line_search(
         &mut self,
-        problem: &mut Problem<'_, C>,
+        problem: &mut Problem<'_>,
         state: &mut RodState,
         search: &mut LineSearch,
         residual: f64,
@@ -107,7 +107,7 @@ impl<const C: usize> Newton<C> {
         // Where the last step's first trial was taken this one's nearly always is: the energy is asked for together with what
         // the next iteration begins with.
         let bold =
-            search.trusting && free && problem.external.conservative() && problem.external.memoryless();
+            search.trusting && free && problem.external.is_conservative() && problem.external.is_fixed();
         let multipliers = problem.supports.multipliers;
         let first = Layout::<C>.support(problem.elements.len());
         for j in 0..6 {
@@ -137,7 +137,7 @@ impl<const C: usize> Newton<C> {
                         self.assembly.hessian = false;
                         self.assemble_parts(problem.elements, problem.supports, problem.external, state);
                     }
-                    if problem.external.obstructs() {
+                    if problem.external.is_steep() {
                         refused = Some(part);
                     }
                     part = merit.parabola(change, part);
@@ -168,7 +168,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Weighs the end conditions above the reactions that the step leads to, and measures the merit along it.
-    fn merit_along(&self, problem: &Problem<'_, C>, state: &RodState, search: &mut LineSearch) -> Merit {
+    fn merit_along(&self, problem: &Problem<'_>, state: &RodState, search: &mut LineSearch) -> Merit {
         let l = Layout::<C>;
         let (elements, supports) = (problem.elements, &*problem.supports);
         let first = l.support(elements.len());
@@ -199,7 +199,7 @@ impl<const C: usize> Newton<C> {
 
     /// How far a whole step turns nodes, where it is Newton's own and the matrix says that it leads to a minimum; infinity elsewhere.
     /// Axial forces stiffen the rod against bending over its length.
-    fn whole_turn(&self, problem: &Problem<'_, C>, turn: f64, shift: f64) -> f64 {
+    fn whole_turn(&self, problem: &Problem<'_>, turn: f64, shift: f64) -> f64 {
         if !(problem.minimum && shift == 0.0 && problem.supports.conditions() == 0) {
             return f64::INFINITY;
         }
@@ -210,7 +210,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Sets the trial to a part of the step, at most `part`, that crosses nothing; returns the part.
-    fn place_trial(&mut self, problem: &mut Problem<'_, C>, state: &RodState, mut part: f64) -> f64 {
+    fn place_trial(&mut self, problem: &mut Problem<'_>, state: &RodState, mut part: f64) -> f64 {
         let Problem { elements, supports, external, .. } = problem;
         self.trial.advance::<C>(elements, state, &self.step, part);
         for _ in 0..4 {
@@ -229,7 +229,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Assembles the system at the trial.
-    fn assemble_trial(&mut self, problem: &mut Problem<'_, C>, hessian: bool) {
+    fn assemble_trial(&mut self, problem: &mut Problem<'_>, hessian: bool) {
         self.assembly.hessian = hessian;
         let trial = std::mem::take(&mut self.trial);
         self.assemble_parts(problem.elements, problem.supports, problem.external, &trial);
@@ -239,7 +239,7 @@ impl<const C: usize> Newton<C> {
     /// Whether a trial, the `attempt`th, at a `part` of the step with this `change` of merit is taken.
     fn accepts(
         &mut self,
-        problem: &mut Problem<'_, C>,
+        problem: &mut Problem<'_>,
         search: &mut LineSearch,
         merit: &Merit,
         (residual, change, part): (f64, f64, f64),
@@ -251,7 +251,7 @@ impl<const C: usize> Newton<C> {
         if !problem.options.minimum || merit.falls_enough(change, part) {
             return true;
         }
-        if problem.external.conservative() {
+        if problem.external.is_conservative() {
             return false;
         }
         // Where loads have no potential a smaller residual is as good; it costs an assembly, so it is asked last.

@@ -88,7 +88,7 @@ impl<const C: usize> Newton<C> {
         &mut self,
         elements: &[ElementData],
         supports: &Supports,
-        external: &mut dyn External<C>,
+        external: &mut dyn External,
         state: &RodState,
     ) {
         self.assembly.hessian = true;
@@ -100,7 +100,7 @@ impl<const C: usize> Newton<C> {
         &mut self,
         elements: &[ElementData],
         supports: &Supports,
-        external: &mut dyn External<C>,
+        external: &mut dyn External,
         state: &RodState,
     ) {
         self.assembly.hessian = false;
@@ -112,11 +112,11 @@ impl<const C: usize> Newton<C> {
         &mut self,
         elements: &[ElementData],
         supports: &Supports,
-        external: &mut dyn External<C>,
+        external: &mut dyn External,
         state: &RodState,
     ) {
         self.assembly.assemble(elements, state);
-        external.add(elements, state, &mut self.assembly);
+        external.linearise(elements, state, &mut self.assembly);
         supports.add(elements, state, &mut self.assembly);
         for (k, value) in self.start_residual.iter_mut().enumerate() {
             *value = self.assembly.residual.get(k).copied().unwrap_or(0.0);
@@ -129,7 +129,7 @@ impl<const C: usize> Newton<C> {
         &mut self,
         elements: &[ElementData],
         supports: &mut Supports,
-        external: &mut dyn External<C>,
+        external: &mut dyn External,
         state: &mut RodState,
         options: &NewtonOptions,
     ) -> NewtonReport {
@@ -139,7 +139,7 @@ impl<const C: usize> Newton<C> {
         self.steps.clear();
         Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
         // Loads without potential make the stiffness unsymmetric: its symmetric part says nothing about minima.
-        let minimum = options.minimum && external.conservative();
+        let minimum = options.minimum && external.is_conservative();
         let mut problem = Problem { elements, supports, external, options, minimum };
         let mut progress = Progress::default();
         let mut search = LineSearch::new(elements);
@@ -193,7 +193,7 @@ impl<const C: usize> Newton<C> {
     /// small enough, and with it where it turns out not to be.
     fn residual_at(
         &mut self,
-        problem: &mut Problem<'_, C>,
+        problem: &mut Problem<'_>,
         state: &RodState,
         progress: &Progress,
         assembled: bool,
@@ -215,7 +215,7 @@ impl<const C: usize> Newton<C> {
     /// without it, if that is known.
     fn descent_step(
         &mut self,
-        problem: &Problem<'_, C>,
+        problem: &Problem<'_>,
         shift: &mut f64,
         arrived: bool,
     ) -> Result<Option<Inertia>, StopReason> {
@@ -233,11 +233,11 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Says of an equilibrium with this inertia whether it is stable.
-    fn judge(&mut self, problem: &Problem<'_, C>, natural: Option<Inertia>, report: &mut NewtonReport) {
+    fn judge(&mut self, problem: &Problem<'_>, natural: Option<Inertia>, report: &mut NewtonReport) {
         let Some(inertia) = natural else { return };
         report.inertia = inertia;
         report.stable = inertia.negative == report.multipliers;
-        if !problem.external.conservative() {
+        if !problem.external.is_conservative() {
             // Divergence: the sign of the determinant of the whole, unsymmetric matrix.
             let sign = self.unsymmetric();
             let odd = (inertia.negative + report.multipliers) % 2 == 1;
@@ -248,14 +248,14 @@ impl<const C: usize> Newton<C> {
     /// No step lowers the energy: an equilibrium to rounding, or none.
     fn without_descent(
         &mut self,
-        problem: &mut Problem<'_, C>,
+        problem: &mut Problem<'_>,
         state: &RodState,
         progress: &Progress,
         natural: Option<Inertia>,
         mut report: NewtonReport,
     ) -> NewtonReport {
         let Problem { elements, supports, external, .. } = problem;
-        if !external.conservative() {
+        if !external.is_conservative() {
             self.assemble(elements, supports, *external, state);
         }
         if let Some(inertia) = natural {
@@ -271,16 +271,16 @@ impl<const C: usize> Newton<C> {
 }
 
 /// What is solved.
-pub(super) struct Problem<'a, const C: usize> {
+pub(super) struct Problem<'a> {
     pub(super) elements: &'a [ElementData],
     pub(super) supports: &'a mut Supports,
-    pub(super) external: &'a mut dyn External<C>,
+    pub(super) external: &'a mut dyn External,
     pub(super) options: &'a NewtonOptions,
     /// Whether a minimum is looked for, and there may be one.
     pub(super) minimum: bool,
 }
 
-impl<const C: usize> Problem<'_, C> {
+impl Problem<'_> {
     /// Negative pivots of a minimum: one for each multiplier.
     pub(super) fn multipliers(&self) -> usize {
         self.elements.len() + self.supports.conditions()

@@ -21,7 +21,7 @@ impl<const C: usize> Newton<C> {
     pub fn residual(
         &self,
         elements: &[ElementData],
-        external: &dyn External<C>,
+        external: &dyn External,
         supports: &Supports,
         tolerance: f64,
     ) -> ResidualSize {

@@ -57,7 +57,7 @@ impl<const C: usize> Newton<C> {
         &mut self,
         elements: &[ElementData],
         supports: &mut Supports,
-        external: &mut dyn External<C>,
+        external: &mut dyn External,
         state: &mut RodState,
     ) -> Option<StepRecord> {
         let l = Layout::<C>;

@@ -216,7 +216,7 @@ impl StaticProblem {
             loads.factor = self.loads.factor * step as f64 / self.load_steps as f64;
             let report = newton.solve(&self.elements, &mut supports, &mut loads, &mut state, &self.options);
             iterations += report.iterations;
-            monotone &= !External::<C>::conservative(&loads)
+            monotone &= !loads.is_conservative()
                 || newton.steps.iter().all(|s| s.merit_change <= 1e-12 * s.energy_scale);
             let failed = !report.converged;
             last = Some(report);
@@ -234,7 +234,7 @@ impl StaticProblem {
             twist: stored.twist,
             axial: stored.axial,
             total: stored.total(),
-            load: External::<C>::energy(&mut loads, &self.elements, &state),
+            load: loads.value(&self.elements, &state),
         };
         let clamp = Clamp::new::<C>(&newton.start_residual, &state);
         let held = supports.start_tangent;

@@ -21,6 +21,7 @@
 
 use crate::banded::{BandLu, Shift};
 use crate::contact::WallContact;
+use crate::rod::scatter::{add_unsymmetric, point_step};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
 use crate::solve::{External, Newton};
 
@@ -120,11 +121,14 @@ impl<const C: usize> Settle<C> {
             }
             let mut fraction = 1.0;
             self.trial.advance::<C>(elements, state, &self.step, fraction);
-            fraction *= External::<C>::safe_fraction(contact, elements, &self.trial);
-            contact.aim::<C>(elements, state, &self.step);
+            fraction *= contact.safe_fraction(elements, &self.trial);
+            contact.aim(|point, way| {
+                let e = point.element;
+                point_step::<C>(state, &elements[e], (e, point.xi), way, &self.step)
+            });
             for _ in 0..TRIALS {
                 self.trial.advance::<C>(elements, state, &self.step, fraction);
-                if !contact.is_outside::<C>(elements, &self.trial) {
+                if !contact.is_outside(elements, &self.trial) {
                     break;
                 }
                 fraction *= 0.4;
@@ -155,7 +159,11 @@ impl<const C: usize> Settle<C> {
             let inertia = newton.inertia(elements, supports, whisper + sigma);
             if inertia.is_some_and(|i| i.negative == elements.len()) {
                 self.lu.copy_from(&newton.assembly.matrix, &self.shift, whisper + sigma);
-                contact.add_coupling(elements, state, &mut self.lu);
+                contact.couplings(state, |point, more| {
+                    let e = point.element;
+                    let place = (e, point.xi);
+                    add_unsymmetric(&mut self.lu, state, &elements[e], place, &more.force, &more.turn);
+                });
                 supports.held::<C>().into_iter().flatten().for_each(|row| self.lu.hold(row));
                 if self.lu.factor().is_ok() {
                     Self::answer(&self.lu, newton, elements, &mut self.step);
