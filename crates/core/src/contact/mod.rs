@@ -10,6 +10,7 @@ mod memory;
 mod places;
 pub mod point;
 pub mod potential;
+mod properties;
 mod quadric;
 pub mod wall;
 
@@ -19,6 +20,7 @@ pub(crate) use friction::SETTLED;
 pub use friction::{Friction, HandMotion, NormalForce};
 pub use grading::Grading;
 pub use memory::{KnownPoints, WallMemory};
-pub use point::{ContactPoint, Counters, Touch};
+pub use point::{Contact, ContactPoint, Counters, Touch};
 pub use potential::WallPotential;
+pub use properties::{WallProperties, WallRegion};
 pub use wall::WallContact;

@@ -13,11 +13,10 @@
 mod coupling;
 
 use super::memory::WallMemory;
-use super::point::{ContactPoint, Counters, Touch};
+use super::point::{Contact, ContactPoint, Counters, FOLLOW, LOOK_AGAIN, Touch};
 use crate::Vec3;
 use crate::contact::distance::{Distance, Nearness};
 use crate::contact::{FeltWall, Friction};
-use crate::insertion::Contact;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::External;
 
@@ -47,10 +46,6 @@ impl Reading {
     }
 }
 
-/// Beyond its radius, a point is followed within this part of it.
-pub(super) const FOLLOW: f64 = 0.5;
-/// A triangle is the nearest, or close to it, within this part of a point's radius from where it was found.
-pub(super) const LOOK_AGAIN: f64 = 0.5;
 /// The smooth distance changes by less than this part of the way.
 const STEEPEST: f64 = 2.0;
 /// Radius of the gentlest bend worth a number, mm.

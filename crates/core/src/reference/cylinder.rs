@@ -5,7 +5,7 @@ use super::Row;
 use super::bench::{Bench, Setup};
 use super::contact::falling;
 use crate::rod::Frame;
-use crate::rod::element::element_energy;
+use crate::rod::{PLAIN, element_energy};
 use crate::vessel::{SurfaceMesh, Wall};
 use crate::{Result, Vec3};
 use std::f64::consts::{PI, SQRT_2, TAU};
@@ -122,7 +122,7 @@ impl Helix {
             sine2: mean(&|i| 1.0 - state.frames[i].t.x.powi(2)),
             pressure: force / (to - from),
             bending: mean(&|e| {
-                element_energy(&elements[e], &state.element(e), false).bend / elements[e].length
+                element_energy::<PLAIN>(&elements[e], &state.element::<PLAIN>(e)).bend / elements[e].length
             }),
             shortening: 1.0 - (state.positions[range.end].x - state.positions[range.start].x) / (to - from),
             height: 1.0 + mean(&|i| state.positions[i].y),

@@ -13,7 +13,8 @@
 //! with the same dq: an augmentation of the linear algebra, not of the mechanics. Its inertia tells minima from saddle
 //! points just as that of the first form does.
 
-use super::element::{ElementData, ElementSystem, Energy, element_system};
+use super::element::{ElementData, ElementSystem, Energy};
+use super::lagrangian::element_system;
 use super::layout::Layout;
 use super::state::RodState;
 use crate::banded::{BandMatrix, Shift};
@@ -94,12 +95,28 @@ impl<const C: usize> Assembly<C> {
         let l = Layout::<C>;
         // Rows without meaning.
         self.matrix.add(Layout::<C>::BLOCK - 1, Layout::<C>::BLOCK - 1, 1.0);
-        if Layout::<C>::TWIST {
-            self.matrix.add(0, 0, 1.0);
+        for set in 0..Layout::<C>::ANGLES {
+            self.matrix.add(set, set, 1.0);
         }
+        self.add_absent(elements);
         let first = l.support(elements.len());
         for row in first + 6..first + Layout::<C>::BLOCK {
             self.matrix.add(row, row, 1.0);
+        }
+    }
+
+    /// Angles of instruments that have ended mean nothing. The first set of a rod that has one is everywhere.
+    fn add_absent(&mut self, elements: &[ElementData]) {
+        let l = Layout::<C>;
+        if Layout::<C>::ANGLES < 2 {
+            return;
+        }
+        for (e, data) in elements.iter().enumerate() {
+            for set in (1..Layout::<C>::ANGLES).filter(|set| !data.materials[*set].is_present()) {
+                for row in [l.bubble(e, set), l.angle(e + 1, set)] {
+                    self.matrix.add(row, row, 1.0);
+                }
+            }
         }
     }
 
@@ -108,7 +125,7 @@ impl<const C: usize> Assembly<C> {
         let mut system = ElementSystem::<C>::zeros();
         for (e, data) in elements.iter().enumerate() {
             let gamma = data.augmentation();
-            element_system::<C, HESSIAN>(data, &state.element(e), gamma, &mut system);
+            element_system::<C, HESSIAN>(data, &state.element::<C>(e), gamma, &mut system);
             self.energy.add(&system.energy);
             let g = &system.gradient;
             let (x, t) = (l.position(0), l.tangent(0));
@@ -145,12 +162,12 @@ impl<const C: usize> Assembly<C> {
                 for a in 0..2 {
                     shift.diagonal[l.tangent(i) + a] += along;
                 }
-                if Layout::<C>::TWIST {
-                    shift.diagonal[l.angle(i)] += along;
+                for set in 0..Layout::<C>::ANGLES {
+                    shift.diagonal[l.angle(i, set)] += along;
                 }
             }
-            if Layout::<C>::TWIST {
-                shift.diagonal[l.bubble(e)] += along;
+            for set in 0..Layout::<C>::ANGLES {
+                shift.diagonal[l.bubble(e, set)] += along;
             }
         }
         for row in held.iter().flatten() {

@@ -17,15 +17,15 @@ pub struct Clamp {
 
 impl Clamp {
     /// From the residual rows of the first node before they were held
-    /// ([`Newton::start_residual`](crate::solve::Newton::start_residual)).
-    pub fn new<const C: usize>(rows: &[f64; 8], state: &RodState) -> Self {
+    /// (`Newton::start_residual` of the solver).
+    pub fn new<const C: usize>(rows: &[f64; C], state: &RodState) -> Self {
         let l = Layout::<C>;
         let (x, t) = (l.position(0), l.tangent(0));
         let frame = &state.frames[0];
         Self {
             force: Vec3::new(rows[x], rows[x + 1], rows[x + 2]),
             moment: frame.v * rows[t] - frame.u * rows[t + 1],
-            torque: if Layout::<C>::TWIST { rows[l.angle(0)] } else { 0.0 },
+            torque: if Layout::<C>::ANGLES > 0 { rows[l.angle(0, 0)] } else { 0.0 },
         }
     }
 

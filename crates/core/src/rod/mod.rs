@@ -7,7 +7,7 @@
 //!
 //!   ½∫EI |r′×r″|²/|r′|⁴ ds − ∫EI κ⁰·t′ ds + ½∫EI |κ⁰|² ds      bending ([`bending`], [`torsion`])
 //!   + ½∫GJ (τ − τ⁰)² ds                                        twist ([`torsion`])
-//!   + Σ N c − ½ D N²                                          axial ([`element`])
+//!   + Σ N c − ½ D N²                                          axial ([`lagrangian`])
 //!
 //! with c = ⅔h(|r′(½)| − 1), Simpson's elongation of an element whose end slopes are unit vectors, and D = ∫ds/EA.
 //! Sources: C. Meier, A. Popp, W. A. Wall, *An objective 3D large deformation finite element formulation for
@@ -23,6 +23,7 @@ pub mod element;
 mod element_torsion;
 pub mod frame;
 mod invariants;
+pub mod lagrangian;
 pub mod layout;
 pub mod points;
 pub mod quadrature;
@@ -34,9 +35,10 @@ pub mod torsion;
 
 pub use assembly::Assembly;
 pub use clamp::Clamp;
-pub use element::{ElementData, Energy};
+pub use element::{ElementData, Energy, Material};
 pub use frame::Frame;
-pub use layout::{Layout, PLAIN, TWISTED};
+pub use lagrangian::{element_energy, element_system};
+pub use layout::{Layout, MAX_ANGLES, PLAIN, TWISTED};
 pub use points::PointSum;
 pub use state::RodState;
 pub use stencils::{Stencils, Triple};

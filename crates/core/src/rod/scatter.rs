@@ -26,7 +26,7 @@ impl<const C: usize> Stencils for Assembly<C> {
     }
 
     fn add_turn(&mut self, i: usize, gradient: &Vec3, hessian: &Matrix3<f64>) {
-        let count = if Layout::<C>::TWIST { 3 } else { 2 };
+        let count = if Layout::<C>::ANGLES > 0 { 3 } else { 2 };
         self.add_three(Layout::<C>.tangent(i), count, gradient, hessian);
     }
 
@@ -42,7 +42,7 @@ impl<const C: usize> Stencils for Assembly<C> {
         mixed: &Vec3,
         (first, second): (f64, f64),
     ) {
-        if !Layout::<C>::TWIST {
+        if Layout::<C>::ANGLES == 0 {
             return;
         }
         let angles = angle_weights::<C>(e, xi);
@@ -65,7 +65,7 @@ impl<const C: usize> Stencils for Assembly<C> {
         let place = |(triple, mut values): (Triple, [f64; 3])| match triple {
             Triple::Position => (Layout::<C>.position(i), values),
             Triple::Turn => {
-                if !Layout::<C>::TWIST {
+                if Layout::<C>::ANGLES == 0 {
                     values[2] = 0.0;
                 }
                 (Layout::<C>.tangent(i), values)
@@ -93,11 +93,11 @@ impl<const C: usize> Assembly<C> {
     }
 }
 
-/// Weights of the angles in that of the point at ξ of element `e`.
+/// Weights of the angles of the first set in that of the point at ξ of element `e`.
 fn angle_weights<const C: usize>(e: usize, xi: f64) -> [(usize, f64); 3] {
     let l = Layout::<C>;
     let [w0, w1, wb] = Point::at(xi, 0.0).phi;
-    [(l.angle(e), w0), (l.bubble(e), wb), (l.angle(e + 1), w1)]
+    [(l.angle(e, 0), w0), (l.bubble(e, 0), wb), (l.angle(e + 1, 0), w1)]
 }
 
 /// How the point at ξ of element `e` moves with the unknowns: rows and displacements,
@@ -155,7 +155,7 @@ pub(crate) fn add_unsymmetric<const C: usize>(
             matrix.add(*row, *column, to.dot(&force));
         }
     }
-    if Layout::<C>::TWIST {
+    if Layout::<C>::ANGLES > 0 {
         for (row, share) in angle_weights::<C>(e, xi) {
             for (column, way) in &columns {
                 matrix.add(row, *column, share * moment.dot(way));

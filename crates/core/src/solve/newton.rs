@@ -30,8 +30,8 @@ const STEPS: usize = 1024;
 pub struct Newton<const C: usize> {
     /// The system at the current state.
     pub assembly: Assembly<C>,
-    /// Residual rows of the first node before they were held: its reactions.
-    pub start_residual: [f64; 8],
+    /// Residual rows of the first two nodes before the first was held: its reactions.
+    pub start_residual: [f64; C],
     pub(super) unit_shift: Shift,
     pub(super) factor: Factor<C>,
     pub(super) step: Vec<f64>,
@@ -49,7 +49,7 @@ impl<const C: usize> Newton<C> {
         let n = Layout::<C>::dimension(elements);
         Self {
             assembly: Assembly::new(elements),
-            start_residual: [0.0; 8],
+            start_residual: [0.0; C],
             unit_shift: Shift::default(),
             factor: Factor::new(n),
             step: vec![0.0; n],

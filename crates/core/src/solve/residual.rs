@@ -59,10 +59,10 @@ impl<const C: usize> Newton<C> {
                 |from: usize, to: usize| residual[from..to].iter().fold(0.0, |m, v| larger(m, v.abs()));
             rows(largest(l.position(i), l.position(i) + 3), forces, floor);
             let mut turning = largest(l.tangent(i), l.tangent(i) + 2);
-            if Layout::<C>::TWIST {
-                turning = larger(turning, residual[l.angle(i)].abs());
+            for set in 0..Layout::<C>::ANGLES {
+                turning = larger(turning, residual[l.angle(i, set)].abs());
                 if i < n {
-                    turning = larger(turning, residual[l.bubble(i)].abs());
+                    turning = larger(turning, residual[l.bubble(i, set)].abs());
                 }
             }
             rows(turning, moments, floor * h);

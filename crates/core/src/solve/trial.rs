@@ -2,8 +2,7 @@
 
 use super::external::External;
 use super::newton::Newton;
-use crate::rod::element::element_energy;
-use crate::rod::{ElementData, Layout, RodState, Supports};
+use crate::rod::{ElementData, Layout, RodState, Supports, element_energy};
 
 /// Halvings towards the minimum along a step that a wall cut short.
 const REFINEMENTS: usize = 6;
@@ -32,7 +31,7 @@ impl<const C: usize> Newton<C> {
     pub fn energy_at(&self, elements: &[ElementData], external: &mut dyn External, state: &RodState) -> f64 {
         let mut stored = 0.0;
         for (e, data) in elements.iter().enumerate() {
-            stored += element_energy(data, &state.element(e), Layout::<C>::TWIST).total();
+            stored += element_energy::<C>(data, &state.element::<C>(e)).total();
         }
         stored + external.value(elements, state)
     }

@@ -5,7 +5,7 @@ use super::guess;
 use super::loads::Loads;
 use super::solution::{Energies, Reaction, Reactions, StaticSolution};
 use crate::rod::quadrature::GAUSS;
-use crate::rod::{Clamp, ElementData, EndAngle, Frame, PLAIN, RodState, Supports, TWISTED};
+use crate::rod::{Clamp, ElementData, EndAngle, Frame, Material, PLAIN, RodState, Supports, TWISTED};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport};
 use crate::{Error, Result, Vec3};
 
@@ -102,7 +102,10 @@ impl StaticProblem {
         }
 
         let gj_given = case.rod.section[0].gj.is_some();
-        let shaped = elements.iter().any(|e| e.rest_curvature != [[0.0; 2]; 3] || e.rest_twist != [0.0; 3]);
+        let shaped = elements
+            .iter()
+            .map(|e| &e.materials[0])
+            .any(|m| m.rest_curvature != [[0.0; 2]; 3] || m.rest_twist != [0.0; 3]);
         let holds = matches!(case.end.kind, EndKind::Clamped | EndKind::Guided);
         let clamped = case.start.kind == StartKind::Clamped;
         let turned = holds && clamped && (gj_given || case.end.turns.is_some_and(|t| t != 0.0));
@@ -344,26 +347,21 @@ fn mesh(case: &StaticCase, nodes: &[f64]) -> Vec<ElementData> {
 /// An element of a section that begins at `begin`.
 fn element(section: &Section, begin: f64, from: f64, to: f64) -> ElementData {
     let h = to - from;
-    let mut data = ElementData {
-        length: h,
-        bending: [0.0; 3],
-        torsion: [0.0; 3],
-        rest_curvature: [[0.0; 2]; 3],
-        rest_twist: [section.rest_twist; 3],
-        flexibility: 0.0,
-    };
+    let mut material = Material { rest_twist: [section.rest_twist; 3], ..Material::NONE };
+    let mut flexibility = 0.0;
     for (p, point) in GAUSS.iter().enumerate() {
         let w = ((from + point.xi * h - begin) / (section.until - begin)).clamp(0.0, 1.0);
         let mix = |a: f64, b: Option<f64>| a + w * (b.unwrap_or(a) - a);
-        data.bending[p] = mix(section.ei, section.ei_end);
-        data.torsion[p] = section.gj.map_or(ASSUMED_GJ_RATIO * data.bending[p], |gj| mix(gj, section.gj_end));
+        let bending = mix(section.ei, section.ei_end);
+        material.bending[p] = bending;
+        material.torsion[p] = section.gj.map_or(ASSUMED_GJ_RATIO * bending, |gj| mix(gj, section.gj_end));
         let end = section.rest_curvature_end.unwrap_or(section.rest_curvature);
         for a in 0..2 {
-            data.rest_curvature[p][a] = mix(section.rest_curvature[a], Some(end[a]));
+            material.rest_curvature[p][a] = mix(section.rest_curvature[a], Some(end[a]));
         }
         if let Some(ea) = section.ea {
-            data.flexibility += point.weight * h / mix(ea, section.ea_end);
+            flexibility += point.weight * h / mix(ea, section.ea_end);
         }
     }
-    data
+    ElementData { flexibility, ..ElementData::of(h, material) }
 }

@@ -2,8 +2,8 @@
 
 use crate::contact::{ContactPoint, WallPotential};
 use crate::device::Device;
-use crate::rod::ElementData;
 use crate::rod::quadrature::GAUSS;
+use crate::rod::{ElementData, Material};
 
 /// Contact points lie no farther apart than this many radii of the device.
 const SPACING_RADII: f64 = 2.0;
@@ -60,14 +60,13 @@ impl Mesh {
             let length = ends[0] - ends[1];
             let section = |xi: f64| device.section_at(ends[0] - xi * length);
             let sample = GAUSS.map(|g| section(g.xi));
-            self.elements.push(ElementData {
-                length,
+            let material = Material {
                 bending: sample.map(|s| s.bending_stiffness_nmm2),
                 torsion: sample.map(|s| s.torsion_nmm2()),
                 rest_curvature: sample.map(|s| s.rest_curvature_per_mm),
                 rest_twist: [0.0; 3],
-                flexibility: 0.0,
-            });
+            };
+            self.elements.push(ElementData::of(length, material));
         }
         self.points.clear();
         // Half of the interval beyond the point at hand; beyond the tip there is its cap.

@@ -195,8 +195,8 @@ impl<const C: usize> Settle<C> {
             let (near, far) = (l.position(e), l.position(e + 1));
             let chord = (0..3).map(|a| ((step[far + a] - step[near + a]) / data.length).powi(2));
             let tangent = (0..2).map(|a| step[l.tangent(e + 1) + a].powi(2));
-            let angle = if Layout::<C>::TWIST { step[l.angle(e + 1)].powi(2) } else { 0.0 };
-            sum += data.length * (chord.sum::<f64>() + tangent.sum::<f64>() + angle);
+            let angles = (0..Layout::<C>::ANGLES).map(|set| step[l.angle(e + 1, set)].powi(2));
+            sum += data.length * (chord.sum::<f64>() + tangent.sum::<f64>() + angles.sum::<f64>());
         }
         sum.sqrt()
     }
