@@ -135,10 +135,8 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
             out.rows[i][C - 1] = out.stretch[i];
         }
     }
-    for set in 0..Layout::<C>::ANGLES {
-        if set == 0 || data.materials[set].is_present() {
-            add_torsion::<C, HESSIAN>(data, s, set, out, &mut energy);
-        }
+    if Layout::<C>::ANGLES > 0 {
+        add_torsion::<C, HESSIAN>(data, s, out, &mut energy);
     }
     out.energy = energy;
 }
