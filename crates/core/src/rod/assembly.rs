@@ -105,14 +105,14 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    /// Angles of instruments that have ended mean nothing. The first set of a rod that has one is everywhere.
+    /// Angles of instruments that have ended mean nothing.
     fn add_absent(&mut self, elements: &[ElementData]) {
         let l = Layout::<C>;
-        if Layout::<C>::ANGLES < 2 {
+        if Layout::<C>::ANGLES == 0 {
             return;
         }
         for (e, data) in elements.iter().enumerate() {
-            for set in (1..Layout::<C>::ANGLES).filter(|set| !data.materials[*set].is_present()) {
+            for set in (0..Layout::<C>::ANGLES).filter(|set| !data.materials[*set].is_present()) {
                 for row in [l.bubble(e, set), l.angle(e + 1, set)] {
                     self.matrix.add(row, row, 1.0);
                 }
@@ -132,6 +132,12 @@ impl<const C: usize> Assembly<C> {
             let force = g[x].abs().max(g[x + 1].abs()).max(g[x + 2].abs());
             let moment = g[t].abs().max(g[t + 1].abs());
             self.scale = [self.scale[0].max(force), self.scale[1].max(moment)];
+            if Layout::<C>::ANGLES > 1 {
+                // Instruments that hold each other may exert nothing on the rest of the world.
+                for set in 0..Layout::<C>::ANGLES {
+                    self.scale[1] = self.scale[1].max(g[l.angle(0, set)].abs());
+                }
+            }
             let at = Layout::<C>::BLOCK * e;
             let gap = gamma * g[C - 1];
             let residual = self.residual[at..at + C].iter_mut().zip(&system.gradient);

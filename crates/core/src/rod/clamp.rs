@@ -1,6 +1,6 @@
 //! What a clamp at the start of a rod exerts, and with what force a rod is driven through it.
 
-use super::layout::Layout;
+use super::layout::{Layout, MAX_ANGLES};
 use super::state::RodState;
 use crate::Vec3;
 
@@ -11,8 +11,10 @@ pub struct Clamp {
     pub force: Vec3,
     /// Moment across the tangent.
     pub moment: Vec3,
-    /// Moment along the tangent; 0 without angles.
+    /// Moment along the tangent, on all instruments together; 0 without angles.
     pub torque: f64,
+    /// That on the instrument of each set of angles.
+    pub torques: [f64; MAX_ANGLES],
 }
 
 impl Clamp {
@@ -22,10 +24,15 @@ impl Clamp {
         let l = Layout::<C>;
         let (x, t) = (l.position(0), l.tangent(0));
         let frame = &state.frames[0];
+        let mut torques = [0.0; MAX_ANGLES];
+        for (set, torque) in torques.iter_mut().enumerate().take(Layout::<C>::ANGLES) {
+            *torque = rows[l.angle(0, set)];
+        }
         Self {
             force: Vec3::new(rows[x], rows[x + 1], rows[x + 2]),
             moment: frame.v * rows[t] - frame.u * rows[t + 1],
-            torque: if Layout::<C>::ANGLES > 0 { rows[l.angle(0, 0)] } else { 0.0 },
+            torque: torques.iter().sum(),
+            torques,
         }
     }
 

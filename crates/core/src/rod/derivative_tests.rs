@@ -156,7 +156,7 @@ fn a_wrong_derivative_is_seen() {
 fn elements_with_and_without_twist_agree_where_nothing_twists() {
     let mut s = 4;
     let (mut d, mut q) = (data(&mut s), state(&mut s, 0.5, 0.1));
-    d.materials = [Material::NONE; MAX_ANGLES];
+    d.materials = [Material { torsion: [f64::MIN_POSITIVE; 3], ..Material::NONE }; MAX_ANGLES];
     q.angles = [[0.0; 3]; MAX_ANGLES];
     let (mut full, mut plain) = (ElementSystem::<TWISTED>::zeros(), ElementSystem::<PLAIN>::zeros());
     element_system::<_, true>(&d, &q, 7.0, &mut full);

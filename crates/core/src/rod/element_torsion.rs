@@ -93,7 +93,7 @@ pub(super) fn add_torsion<const C: usize, const HESSIAN: bool>(
     let mut spins = [AngleDerivatives::default(); MAX_ANGLES];
     for set in 0..Layout::<C>::ANGLES {
         let material = &data.materials[set];
-        if set == 0 || material.is_present() {
+        if material.is_present() {
             spins[set] = gather(material, &s.angles[set], data.length, &geometry, &mut shape, energy);
         }
     }

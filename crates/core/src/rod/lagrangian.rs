@@ -27,7 +27,8 @@ pub fn element_energy<const C: usize>(data: &ElementData, s: &ElementState) -> E
         energy.bend += point.weight * data.bending[k] * bending_value(&y, &z);
     }
     energy.bend *= arc_factor(&t0, &t1).0 * mean_speed(mid_slope(&t0, &s.chord, &t1).norm()) / data.length;
-    for (material, of) in data.materials.iter().zip(&s.angles).take(Layout::<C>::ANGLES) {
+    let instruments = data.materials.iter().zip(&s.angles).take(Layout::<C>::ANGLES);
+    for (material, of) in instruments.filter(|(material, _)| material.is_present()) {
         let (chord, end) = (s.first.local(&s.chord), s.first.local(&t1));
         for (k, point) in GAUSS.iter().enumerate() {
             let (y, z) = point.derivatives(&chord, &Vec3::x(), &end);

@@ -95,14 +95,29 @@ impl RodState {
         }
     }
 
-    /// Twist of the whole rod, rad, any number of turns.
-    pub fn twist(&self) -> f64 {
-        self.angles[self.elements()] - self.angles[0] + self.reference_twists.iter().sum::<f64>()
+    /// Sets of angles there is room for.
+    fn sets(&self) -> usize {
+        self.angles.len() / self.frames.len()
     }
 
-    /// The material triad (t, d₁, d₂) of node `i`.
+    /// Angle of the material triad at node `i` in a `set` of angles.
+    pub fn angle(&self, i: usize, set: usize) -> f64 {
+        self.angles[self.sets() * i + set]
+    }
+
+    /// Twist of the whole rod, rad, any number of turns.
+    pub fn twist(&self) -> f64 {
+        self.twist_to(self.elements(), 0)
+    }
+
+    /// Twist of the instrument in a `set` of angles from the first node to node `i`, rad, any number of turns.
+    pub fn twist_to(&self, i: usize, set: usize) -> f64 {
+        self.angle(i, set) - self.angle(0, set) + self.reference_twists[..i].iter().sum::<f64>()
+    }
+
+    /// The material triad (t, d₁, d₂) of node `i`, of the first instrument that has angles.
     pub fn material_frame(&self, i: usize) -> Frame {
-        self.frames[i].turned(self.angles[i])
+        self.frames[i].turned(self.angle(i, 0))
     }
 
     /// Leaves the first node alone. Keeps the memory.

@@ -47,6 +47,10 @@ impl<const C: usize> Newton<C> {
             let stiff = (a.bending[2] * before).max(b.bending[0] * after);
             before = after;
             let moments = moment + force * h;
+            // Angles round as tangents do.
+            let twisted = (0..Layout::<C>::ANGLES)
+                .map(|set| a.materials[set].torsion[2].max(b.materials[set].torsion[0]));
+            let spun = twisted.fold(0.0, f64::max) / (h * h);
             // What rounding of unit vectors leaves of a force 12 EI/h² δ and of a moment 6 EI/h δ.
             let floor = 100.0 * f64::EPSILON * stiff + outside_floor;
             let mut rows = |value: f64, scale: f64, floor: f64| {
@@ -65,7 +69,7 @@ impl<const C: usize> Newton<C> {
                     turning = larger(turning, residual[l.bubble(i, set)].abs());
                 }
             }
-            rows(turning, moments, floor * h);
+            rows(turning, moments, floor.max(100.0 * f64::EPSILON * spun) * h);
         }
         let first = l.support(n);
         for j in 0..6 {
