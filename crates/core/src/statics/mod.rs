@@ -33,3 +33,6 @@ pub use critical::Parameter;
 pub use loads::Loads;
 pub use problem::{Solved, StaticProblem};
 pub use solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution};
+
+#[cfg(test)]
+mod stack_tests;

@@ -24,8 +24,9 @@ use crate::rod::{ElementData, Frame, MAX_ANGLES, Material, RodState, Supports, e
 use crate::solve::External;
 use crate::{Error, Result, Vec3};
 
-/// Breaks nearer to each other than this part of the line are one.
-const SAME: f64 = 1e-12;
+/// Breaks nearer to each other than this part of the line share a node: over an element that is shorter, differences of unit vectors have
+/// lost the digits that curvature is made of.
+const NEAR: f64 = 1e-5;
 /// Step of the differences of the energy, as a part of the shortest piece between breaks.
 const STEP: f64 = 1e-3;
 
@@ -74,7 +75,7 @@ impl Stack {
                 format!("at most {MAX_ANGLES} instruments on one line may have a shape of their own"),
             ));
         }
-        let breaks = breaks(&instruments, held, SAME * case.rod.line_length());
+        let breaks = breaks(&instruments, held, NEAR * case.rod.line_length());
         let places: Vec<f64> = breaks.iter().map(|b| b.at).collect();
         let counts = spread(&places, case.rod.elements);
         Ok(Some(Self { instruments, sets, breaks, counts }))
@@ -98,21 +99,20 @@ impl Stack {
     /// The same with one instrument pushed on.
     fn mesh_with(&self, pushed: Option<(usize, f64)>) -> (Vec<f64>, Vec<ElementData>) {
         let by = |index: usize| pushed.filter(|(i, _)| *i == index).map_or(0.0, |(_, by)| by);
-        let place = |b: &Break| b.at + b.owners.iter().map(|index| by(*index)).sum::<f64>();
-        let places: Vec<f64> = self.breaks.iter().map(place).collect();
+        let along = |b: &Break| pushed.filter(|(i, _)| b.owners.contains(i)).map_or(0.0, |(_, by)| by);
+        let places: Vec<f64> = self.breaks.iter().map(|b| b.at + along(b)).collect();
         let nodes = nodes(&places, &self.counts);
         let tips: Vec<f64> = self.instruments.iter().enumerate().map(|(k, i)| i.inserted + by(k)).collect();
         let elements = nodes.windows(2).map(|w| self.element(w[0], w[1], &tips)).collect();
         (nodes, elements)
     }
 
-    /// An element between two arc lengths, of the instruments whose tips are beyond it.
+    /// An element between two arc lengths, of the instruments whose tips are in it or beyond.
     fn element(&self, from: f64, to: f64, tips: &[f64]) -> ElementData {
-        let (h, middle) = (to - from, 0.5 * (from + to));
-        let mut data = ElementData::of(h, Material::NONE);
+        let middle = 0.5 * (from + to);
+        let mut data = ElementData::of(to - from, Material::NONE);
         for ((instrument, set), tip) in self.instruments().zip(tips).filter(|(_, tip)| middle < **tip) {
-            let (section, begin) = section_at(&instrument.section, tip - middle);
-            let part = material(section, begin, &GAUSS.map(|point| tip - (from + point.xi * h)));
+            let part = instrument.between(from, to, *tip);
             for (sum, own) in data.bending.iter_mut().zip(part.bending) {
                 *sum += own;
             }
@@ -154,7 +154,7 @@ impl Stack {
 
     /// Node of an instrument's tip.
     pub(super) fn tip_node(&self, index: usize) -> usize {
-        let k = self.breaks.iter().position(|b| b.at >= self.instruments[index].inserted * (1.0 - SAME));
+        let k = self.breaks.iter().position(|b| b.at >= self.instruments[index].inserted);
         self.counts[..k.unwrap_or(self.counts.len())].iter().sum()
     }
 
@@ -167,7 +167,8 @@ impl Stack {
         supports: &Supports,
         external: &mut dyn External,
     ) -> Option<f64> {
-        let shared = |b: &Break| b.owners.contains(&index) && (b.fixed || b.owners.len() > 1);
+        let shared =
+            |b: &Break| b.owners.contains(&index) && (b.fixed || b.owners.iter().any(|i| *i != index));
         if self.breaks.iter().any(shared) {
             return None;
         }
@@ -202,6 +203,29 @@ impl Instrument {
         })
     }
 
+    /// What lies between two arc lengths with the tip at a third, at the Gauss points: of a section that ends between them, the part that is
+    /// there, by weights that integrate it exactly up to squares.
+    fn between(&self, from: f64, to: f64, tip: f64) -> Material {
+        let h = to - from;
+        let places = GAUSS.map(|point| tip - (from + point.xi * h));
+        let (section, begin) = section_at(&self.section, tip - 0.5 * (from + to));
+        if tip - from <= section.until && tip - to >= begin {
+            return material(section, begin, &places);
+        }
+        let mut sum = Material::NONE;
+        let mut begin = 0.0;
+        for (k, section) in self.section.iter().enumerate() {
+            let until = if k + 1 == self.section.len() { f64::INFINITY } else { section.until };
+            let (first, last) = ((tip - until).max(from), (tip - begin).min(to));
+            if first < last {
+                let shares = shares((first - from) / h, (last - from) / h);
+                add_share(&mut sum, &material(section, begin, &places), &shares);
+            }
+            begin = section.until;
+        }
+        sum
+    }
+
     /// Energy per length that the sheath sets free when it is pushed on: ½ EI |κ⁰|² at the start.
     fn straightening(&self) -> f64 {
         let (section, begin) = section_at(&self.section, self.inserted);
@@ -211,21 +235,51 @@ impl Instrument {
     }
 }
 
-/// The start, the ends of instruments and of their sections, and `held` arc lengths, in order; those that are nearer than `same` are one.
-fn breaks(instruments: &[Instrument], held: impl Iterator<Item = f64>, same: f64) -> Vec<Break> {
+/// Weights of the Gauss points in the integral over a part of an element, in units of their weights in that over all of it.
+fn shares(from: f64, to: f64) -> [f64; 3] {
+    let power = |n: i32| (to.powi(n) - from.powi(n)) / f64::from(n);
+    let [a, b, c] = GAUSS.map(|point| point.xi);
+    // ∫ (ξ − p)(ξ − q) over the part.
+    let product = |p: f64, q: f64| power(3) - (p + q) * power(2) + p * q * power(1);
+    [
+        product(b, c) / ((a - b) * (a - c) * GAUSS[0].weight),
+        product(a, c) / ((b - a) * (b - c) * GAUSS[1].weight),
+        product(a, b) / ((c - a) * (c - b) * GAUSS[2].weight),
+    ]
+}
+
+/// Adds a share of a section to what else an instrument is made of there; rest states are means, weighed by stiffness.
+fn add_share(sum: &mut Material, part: &Material, shares: &[f64; 3]) {
+    for k in 0..3 {
+        let (bending, torsion) = (shares[k] * part.bending[k], shares[k] * part.torsion[k]);
+        let (all_bending, all_torsion) = (sum.bending[k] + bending, sum.torsion[k] + torsion);
+        for a in 0..2 {
+            let moment = sum.bending[k] * sum.rest_curvature[k][a] + bending * part.rest_curvature[k][a];
+            sum.rest_curvature[k][a] = moment / all_bending;
+        }
+        sum.rest_twist[k] = (sum.torsion[k] * sum.rest_twist[k] + torsion * part.rest_twist[k]) / all_torsion;
+        (sum.bending[k], sum.torsion[k]) = (all_bending, all_torsion);
+    }
+}
+
+/// The start, the ends of instruments and of their sections, and `held` arc lengths, in order. Those that are nearer to each other than
+/// `near` are one, at the last of them: instruments end before their node, not beyond it.
+fn breaks(instruments: &[Instrument], held: impl Iterator<Item = f64>, near: f64) -> Vec<Break> {
     let fixed = held.chain([0.0]).map(|at| Break { at, owners: vec![], fixed: true });
     let mut all: Vec<Break> = fixed.collect();
     for (index, instrument) in instruments.iter().enumerate() {
         // What begins at the tip and after each section but the last, as far as it is beyond the start.
         let inner = &instrument.section[..instrument.section.len() - 1];
         let begins = [0.0].into_iter().chain(inner.iter().map(|s| s.until));
-        let places = begins.map(|from_tip| instrument.inserted - from_tip).filter(|at| *at > -same);
-        all.extend(places.map(|at| Break { at: at.max(0.0), owners: vec![index], fixed: false }));
+        let places = begins.map(|from_tip| instrument.inserted - from_tip).filter(|at| *at > 0.0);
+        all.extend(places.map(|at| Break { at, owners: vec![index], fixed: false }));
     }
     all.sort_by(|a, b| a.at.total_cmp(&b.at));
     all.dedup_by(|b, a| {
-        let one = b.at - a.at <= same;
+        let one = b.at - a.at <= near;
         if one {
+            // The start stays where it is.
+            a.at = if a.at > 0.0 { b.at } else { 0.0 };
             a.owners.append(&mut b.owners);
             a.fixed |= b.fixed;
         }
