@@ -132,12 +132,6 @@ impl<const C: usize> Assembly<C> {
             let force = g[x].abs().max(g[x + 1].abs()).max(g[x + 2].abs());
             let moment = g[t].abs().max(g[t + 1].abs());
             self.scale = [self.scale[0].max(force), self.scale[1].max(moment)];
-            if Layout::<C>::ANGLES > 1 {
-                // Instruments that hold each other may exert nothing on the rest of the world.
-                for set in 0..Layout::<C>::ANGLES {
-                    self.scale[1] = self.scale[1].max(g[l.angle(0, set)].abs());
-                }
-            }
             let at = Layout::<C>::BLOCK * e;
             let gap = gamma * g[C - 1];
             let residual = self.residual[at..at + C].iter_mut().zip(&system.gradient);

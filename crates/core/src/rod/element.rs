@@ -67,10 +67,15 @@ pub struct ElementData {
 }
 
 impl ElementData {
+    /// No instrument and no length.
+    pub const EMPTY: Self =
+        Self { length: 0.0, bending: [0.0; 3], flexibility: 0.0, materials: [Material::NONE; MAX_ANGLES] };
+
     /// An inextensible element of one instrument.
     pub fn of(length: f64, material: Material) -> Self {
-        let materials = [material, Material::NONE, Material::NONE];
-        Self { length, bending: material.bending, flexibility: 0.0, materials }
+        let mut data = Self { length, bending: material.bending, ..Self::EMPTY };
+        data.materials[0] = material;
+        data
     }
 
     /// A straight, inextensible element, GJ as large as EI.
@@ -86,6 +91,19 @@ impl ElementData {
             0.5 * self.length * material.bending[1] * (u * u + v * v)
         });
         each.sum()
+    }
+
+    /// Largest moment that it takes to bend one of several instruments into the shape of all: the others exert it. 0 for a single one.
+    pub fn mutual_moment(&self) -> f64 {
+        let all = self.bending[1];
+        if self.materials[0].bending[1] == all {
+            return 0.0;
+        }
+        let each = self.materials.iter().map(|material| {
+            let (own, [u, v]) = (material.bending[1], material.rest_curvature[1]);
+            own * u.hypot(v) * (1.0 - own / all)
+        });
+        each.fold(0.0, f64::max)
     }
 
     /// Factor γ of the augmentation γ·CᵀC (see [`super::assembly`]): as stiff along the rod as the element is across it,

@@ -35,6 +35,10 @@ impl<const C: usize> Newton<C> {
         force = held[..3].iter().fold(force, |m, v| m.max(v.abs()));
         let mut moment = self.assembly.scale[1].max(outside[1]);
         moment = held[3..].iter().fold(moment, |m, v| m.max(v.abs()));
+        if Layout::<C>::ANGLES > 0 {
+            // Instruments that hold each other may exert nothing on the rest of the world.
+            moment = elements.iter().map(ElementData::mutual_moment).fold(moment, f64::max);
+        }
         let mut relative = 0.0f64;
         let (mut small, mut rounding) = (true, true);
         let residual = &self.assembly.residual;

@@ -55,18 +55,20 @@ impl Mesh {
         modulus_n_per_mm2: f64,
     ) {
         crate::insertion::nodes_from_tip(inserted_mm, element_mm, &mut self.from_tip_mm);
-        self.elements.clear();
-        for ends in self.from_tip_mm.windows(2) {
+        // Only what one device needs is written: of elements that were here before the rest is empty.
+        self.elements.resize(self.from_tip_mm.len() - 1, ElementData::EMPTY);
+        for (ends, data) in self.from_tip_mm.windows(2).zip(&mut self.elements) {
             let length = ends[0] - ends[1];
             let section = |xi: f64| device.section_at(ends[0] - xi * length);
             let sample = GAUSS.map(|g| section(g.xi));
-            let material = Material {
-                bending: sample.map(|s| s.bending_stiffness_nmm2),
+            let bending = sample.map(|s| s.bending_stiffness_nmm2);
+            (data.length, data.bending) = (length, bending);
+            data.materials[0] = Material {
+                bending,
                 torsion: sample.map(|s| s.torsion_nmm2()),
                 rest_curvature: sample.map(|s| s.rest_curvature_per_mm),
                 rest_twist: [0.0; 3],
             };
-            self.elements.push(ElementData::of(length, material));
         }
         self.points.clear();
         // Half of the interval beyond the point at hand; beyond the tip there is its cap.
