@@ -5,9 +5,13 @@
 //! independent unknown (Hellinger–Reissner) and, with angles, an angle bubble b that makes the angle quadratic in
 //! the element. The Lagrangian is
 //!
-//!   ½∫EI |r′×r″|²/|r′|⁴ ds − ∫EI κ⁰·t′ ds + ½∫EI |κ⁰|² ds      bending ([`bending`], [`torsion`])
-//!   + ½∫GJ (τ − τ⁰)² ds                                        twist ([`torsion`])
+//!   ½∫EI |r′×r″|²/|r′|⁴ ds                                     bending ([`bending`])
+//!   + Σᵢ − ∫EIᵢ κᵢ⁰·t′ ds + ½∫EIᵢ |κᵢ⁰|² ds                     rest curvature ([`torsion`])
+//!   + Σᵢ ½∫GJᵢ (τᵢ − τᵢ⁰)² ds                                  twist ([`torsion`])
 //!   + Σ N c − ½ D N²                                          axial ([`lagrangian`])
+//!
+//! where instruments i that lie in one another share the centre line, EI is the sum of theirs, and κᵢ⁰ = R(θᵢ)(kᵢ₁, kᵢ₂) turns with the
+//! angle of each: Σ ½EIᵢ|t′ − κᵢ⁰|² (Dupont, Lock, Itkowitz and Butler, IEEE Trans. Robotics 26(2), 2010). A rod is one instrument.
 //!
 //! with c = ⅔h(|r′(½)| − 1), Simpson's elongation of an element whose end slopes are unit vectors, and D = ∫ds/EA.
 //! Sources: C. Meier, A. Popp, W. A. Wall, *An objective 3D large deformation finite element formulation for

@@ -78,16 +78,6 @@ impl StaticProblem {
                 (nodes, elements)
             }
         };
-        let node_at = |s: f64| {
-            let mut best = 0;
-            for (i, x) in nodes.iter().enumerate() {
-                if (x - s).abs() < (nodes[best] - s).abs() {
-                    best = i;
-                }
-            }
-            best
-        };
-
         let tangent = Vec3::from(case.start.tangent);
         let normal = case.start.normal.map_or_else(
             || if tangent.normalize().y.abs() < 0.9 { Vec3::y() } else { Vec3::z() },
@@ -95,22 +85,7 @@ impl StaticProblem {
         );
         let frame = Frame::new(tangent, Some(normal));
         let start = Vec3::from(case.start.position);
-        let mut loads = Loads::default();
-        for load in &case.load {
-            let value = Vec3::from(load.value);
-            let at = node_at(load.at.unwrap_or(length));
-            match load.kind {
-                LoadKind::Force => loads.forces.push((at, value)),
-                LoadKind::Moment => loads.moments.push((at, value)),
-                LoadKind::Follower => loads.followers.push((at, value)),
-                LoadKind::Distributed => loads.distributed.push((
-                    node_at(load.from.unwrap_or(0.0)),
-                    node_at(load.to.unwrap_or(length)),
-                    value,
-                )),
-            }
-        }
-
+        let loads = loads(case, &nodes);
         let first = case.rod.section.first().cloned();
         let gj_given = first.as_ref().is_none_or(|section| section.gj.is_some());
         let shaped = elements
@@ -126,28 +101,7 @@ impl StaticProblem {
             || loads.followers.iter().any(|(_, f)| f.y != 0.0 || f.z != 0.0);
         let angles = stack.as_ref().map_or(usize::from(twisted), Stack::angles);
 
-        let mut supports = Supports { start_tangent: clamped, start_angle: clamped, ..Supports::default() };
-        if let Some(p) = case.end.position {
-            supports.end_position = Vec3::from(p);
-            supports.end_directions = match case.end.slide {
-                None => vec![Vec3::x(), Vec3::y(), Vec3::z()],
-                Some(s) => {
-                    let across = Frame::new(Vec3::from(s), None);
-                    vec![across.u, across.v]
-                }
-            };
-        }
-        if holds {
-            let end = Frame::new(
-                case.end.tangent.map_or(frame.t, Vec3::from),
-                Some(case.end.normal.map_or(frame.u, Vec3::from)),
-            );
-            supports.end_tangent = Some(end.t);
-            if angles > 0 {
-                let turns = case.end.turns.unwrap_or(0.0);
-                supports.end_angle = Some(EndAngle { normal: end.u, turns, target: 0.0 });
-            }
-        }
+        let supports = supports(case, &frame, angles > 0);
         let initial = match (&stack, &case.initial) {
             (Some(stack), _) => stack.untwisted(&elements, start, frame),
             (None, Some(shape)) => guess::arc(&elements, start, frame, shape.curvature),
@@ -355,4 +309,62 @@ impl StaticProblem {
             monotone: solved.monotone,
         }
     }
+}
+
+/// The loads of a case on the nodes at these arc lengths.
+fn loads(case: &StaticCase, nodes: &[f64]) -> Loads {
+    let node_at = |s: f64| {
+        let mut best = 0;
+        for (i, x) in nodes.iter().enumerate() {
+            if (x - s).abs() < (nodes[best] - s).abs() {
+                best = i;
+            }
+        }
+        best
+    };
+    let length = nodes[nodes.len() - 1];
+    let mut loads = Loads::default();
+    for load in &case.load {
+        let value = Vec3::from(load.value);
+        let at = node_at(load.at.unwrap_or(length));
+        match load.kind {
+            LoadKind::Force => loads.forces.push((at, value)),
+            LoadKind::Moment => loads.moments.push((at, value)),
+            LoadKind::Follower => loads.followers.push((at, value)),
+            LoadKind::Distributed => loads.distributed.push((
+                node_at(load.from.unwrap_or(0.0)),
+                node_at(load.to.unwrap_or(length)),
+                value,
+            )),
+        }
+    }
+    loads
+}
+
+/// What holds the ends of a case whose start has this triad.
+fn supports(case: &StaticCase, frame: &Frame, twisted: bool) -> Supports {
+    let clamped = case.start.kind == StartKind::Clamped;
+    let mut supports = Supports { start_tangent: clamped, start_angle: clamped, ..Supports::default() };
+    if let Some(p) = case.end.position {
+        supports.end_position = Vec3::from(p);
+        supports.end_directions = match case.end.slide {
+            None => vec![Vec3::x(), Vec3::y(), Vec3::z()],
+            Some(s) => {
+                let across = Frame::new(Vec3::from(s), None);
+                vec![across.u, across.v]
+            }
+        };
+    }
+    if matches!(case.end.kind, EndKind::Clamped | EndKind::Guided) {
+        let end = Frame::new(
+            case.end.tangent.map_or(frame.t, Vec3::from),
+            Some(case.end.normal.map_or(frame.u, Vec3::from)),
+        );
+        supports.end_tangent = Some(end.t);
+        if twisted {
+            let turns = case.end.turns.unwrap_or(0.0);
+            supports.end_angle = Some(EndAngle { normal: end.u, turns, target: 0.0 });
+        }
+    }
+    supports
 }

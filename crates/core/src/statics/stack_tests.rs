@@ -157,6 +157,43 @@ fn a_single_instrument_is_a_rod() {
     assert!((one.instruments[0].torque - rod.reactions.start.torque).abs() < 1e-12);
 }
 
+/// `count` instruments that together are one of EI 1.2 and GJ 0.9, under a load that bends and twists.
+fn parts(count: usize) -> StaticSolution {
+    let share = |value: f64| value / count as f64;
+    let part = format!(
+        "[[rod.instrument]]\nname = \"part\"\ninserted = 1.0\nhand = 0.3\nsection = [{{ until = 3.0, EI = {:?}, GJ = {:?}, rest_curvature = [1.5, 0.3], rest_twist = 0.2 }}]\n",
+        share(1.2),
+        share(0.9)
+    );
+    let text = format!(
+        "[rod]\nelements = 24\n{}[start]\ntype = \"clamped\"\n[[load]]\nkind = \"force\"\nvalue = [0.5, -2.0, 1.5]\n",
+        part.repeat(count)
+    );
+    StaticCase::from_toml(&text, Path::new("parts.toml")).unwrap().solve().unwrap().checked().unwrap()
+}
+
+#[test]
+fn parts_that_turn_alike_are_the_whole() {
+    let whole = parts(1);
+    for count in [2, 3] {
+        let split = parts(count);
+        for a in 0..3 {
+            assert!(
+                (split.tip[a] - whole.tip[a]).abs() < 1e-10,
+                "{count} parts: {:?} {:?}",
+                split.tip,
+                whole.tip
+            );
+        }
+        let torque: f64 = split.instruments.iter().map(|i| i.torque).sum();
+        assert!((torque - whole.instruments[0].torque).abs() < 1e-9);
+        assert!((split.energy.total - whole.energy.total).abs() < 1e-10);
+        for part in &split.instruments {
+            assert!((part.twist - whole.instruments[0].twist).abs() < 1e-9);
+        }
+    }
+}
+
 #[test]
 fn what_is_no_case_of_several_instruments_is_told_by_key_and_mend() {
     type Spoil = fn(&mut StaticCase);
