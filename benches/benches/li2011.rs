@@ -2,7 +2,7 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use endowire_core::Vec3;
-use endowire_core::methods::li2011::{Chain, PlaneContact, banded, dense};
+use endowire_methods::li2011::{Chain, PlaneContact, banded, dense};
 
 /// A wire with every other node on a wall.
 fn chain(elements: usize) -> Chain {

@@ -6,9 +6,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
-use endowire_methods::{Insertion, InsertionOptions, Task, by_name, cantilever};
+use endowire_methods::{AnyMethod, cantilever, static_model};
 
 /// Those that take less than a second for what is asked here.
 const FAST: [&str; 5] = ["rigid-links", "mass-spring", "beam-fem-damped", "chord-energy", "discrete-rod"];
@@ -17,7 +16,7 @@ fn cantilevers(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("cantilever, 32 elements");
     group.sample_size(10);
     for name in FAST {
-        let Some(model) = by_name(name, Task::Cantilever) else { continue };
+        let Some(model) = static_model(name) else { continue };
         group.bench_function(name, |b| b.iter(|| cantilever(&*model, 32, Vec3::new(0.0, -10.0, 0.0), 5e-4)));
     }
     group.finish();
@@ -31,13 +30,9 @@ fn inserted(name: &str) -> endowire_core::Result<Simulation> {
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0)?;
     let wire = Device::uniform(200.0, 0.445, 10.0)?;
     let properties = WallProperties::default();
-    let mut simulation = Simulation::with_method(made.wall, properties, wire, sheath, |surroundings| {
-        let Some(model) = by_name(name, Task::Insertion) else {
-            return MethodChoice::default().start(surroundings);
-        };
-        let options = InsertionOptions { element_mm: 5.0, ..InsertionOptions::default() };
-        Ok(Box::new(Insertion::new(model, options, surroundings)?))
-    })?;
+    let method = AnyMethod::named(name)?.with_element_mm(5.0);
+    let mut simulation =
+        Simulation::builder(made.wall, wire, sheath).properties(properties).method(&method).build()?;
     for _ in 0..80 {
         simulation.step(Command::advance(2.0))?;
     }

@@ -20,7 +20,7 @@ fn element(c: &mut Criterion) {
     let mut group = c.benchmark_group("element");
     group.bench_function("energy", |b| b.iter(|| element_energy::<PLAIN>(&elements[1], black_box(&s))));
     group.bench_function("energy twisted", |b| {
-        b.iter(|| element_energy::<TWISTED>(&elements[1], black_box(&s)))
+        b.iter(|| element_energy::<TWISTED>(&elements[1], black_box(&s)));
     });
     let mut plain = ElementSystem::<PLAIN>::zeros();
     group.bench_function("system", |b| {

@@ -6,7 +6,7 @@ pub mod spoiled;
 pub mod sweep;
 pub mod twin;
 
-pub use endowire_core::reference::crossing;
+pub use endowire_verify::crossing;
 
 /// The guide's example is compiled and run with the tests.
 #[cfg(doctest)]

@@ -2,10 +2,9 @@
 
 use endowire_core::Vec3;
 use endowire_core::device::Device;
-use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
-use endowire_core::reference::crossing::curve;
+use endowire_core::insertion::{Command, Sheath, Simulation};
 use endowire_core::vessel::{SurfaceMesh, Wall};
+use endowire_verify::crossing::curve;
 
 /// Commands at the end whose push forces are averaged: where a wire slides over single triangles, one force is chance.
 const AVERAGED: usize = 10;
@@ -40,14 +39,8 @@ impl Push {
     pub fn insert(&self, surface: &SurfaceMesh) -> Result<Inserted, String> {
         let refused = |e: endowire_core::Error| format!("refused: {e}");
         let wall = Wall::from_surface(surface).map_err(refused)?;
-        let mut simulation = Simulation::with_properties(
-            wall,
-            WallProperties::default(),
-            self.wire.clone(),
-            self.sheath,
-            &MethodChoice::default(),
-        )
-        .map_err(refused)?;
+        let mut simulation =
+            Simulation::builder(wall, self.wire.clone(), self.sheath).build().map_err(refused)?;
         let mut forces = Vec::new();
         for number in 0..(self.length_mm / self.step_mm).round() as usize {
             let report = simulation

@@ -4,7 +4,7 @@
 
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties, WallRegion};
-use endowire_core::methods::MethodChoice;
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::rod::{PLAIN, TWISTED};
 use endowire_core::solve::{Newton, NewtonOptions};
 use endowire_core::statics::{StaticCase, StaticProblem};
@@ -73,9 +73,12 @@ fn nothing_is_allocated_in_a_step_of_an_insertion() {
         };
         let region = if regions { vec![patch] } else { Vec::new() };
         let properties = WallProperties { friction, region, ..Default::default() };
-        let method = MethodChoice::default();
-        let mut simulation =
-            Simulation::with_properties(made.wall, properties, wire, sheath, &method).unwrap();
+        let method = KirchhoffOptions::default();
+        let mut simulation = Simulation::builder(made.wall, wire, sheath)
+            .properties(properties)
+            .method(&method)
+            .build()
+            .unwrap();
         for _ in 0..75 {
             simulation.step(Command::advance(2.0)).unwrap();
         }

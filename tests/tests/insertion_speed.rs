@@ -10,7 +10,6 @@ use endowire_core::Vec3;
 use endowire_core::banded::Factor;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::rod::{Layout, PLAIN, TWISTED};
 use endowire_core::vessel::{GeneratedWall, Resolution, WallQuery, anatomy};
@@ -76,11 +75,13 @@ fn cost(case: &Case) -> Cost {
     let query = WallQuery::new(&made.wall).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0).unwrap();
     let wire = Device::new(vec![Section::straight(30.0, 0.445, 5.0), Section::straight(430.0, 0.445, 50.0)]);
-    let method =
-        MethodChoice::Kirchhoff(KirchhoffOptions { element_mm: case.element_mm, ..Default::default() });
+    let method = KirchhoffOptions { element_mm: case.element_mm, ..Default::default() };
     let properties = WallProperties { friction: case.friction, ..Default::default() };
-    let mut simulation =
-        Simulation::with_properties(made.wall, properties, wire.unwrap(), sheath, &method).unwrap();
+    let mut simulation = Simulation::builder(made.wall, wire.unwrap(), sheath)
+        .properties(properties)
+        .method(&method)
+        .build()
+        .unwrap();
     for _ in 0..(case.from_mm / case.step_mm).round() as usize {
         simulation.step(Command::advance(case.step_mm)).unwrap();
     }

@@ -10,17 +10,16 @@ use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
-use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
+use endowire_core::insertion::{Command, Sheath, Simulation};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::reference::insertion_stress::InsertionStress;
 use endowire_core::scene::Scene;
 use endowire_core::vessel::{
-    CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall, anatomy,
+    CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution, SurfaceMesh, Wall, anatomy,
 };
 use endowire_tests::crossing::CrossingTest;
 use endowire_tests::noise::Noise;
 use endowire_tests::sweep::Tally;
+use endowire_verify::insertion_stress::InsertionStress;
 
 fn asset(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join(name)
@@ -34,7 +33,7 @@ fn scene(name: &str, triangles: usize) -> (Scene, Wall) {
     }
     scene.vessel.edge_mm = None;
     scene.vessel.triangles = Some(triangles);
-    let wall = scene.wall().unwrap();
+    let wall = scene.wall(&NoStore).unwrap();
     (scene, wall)
 }
 
@@ -50,9 +49,11 @@ fn run_scene(
     let sheath = scene.sheath(wall).unwrap();
     let device = scene.device().unwrap();
     let commands = scene.commands(&device).unwrap();
-    let mut simulation =
-        Simulation::with_properties(wall.clone(), scene.vessel.wall.clone(), device, sheath, &scene.method)
-            .unwrap();
+    let mut simulation = Simulation::builder(wall.clone(), device, sheath)
+        .properties(scene.vessel.wall.clone())
+        .method(&scene.method)
+        .build()
+        .unwrap();
     let mut tally = Tally::default();
     tally.drive(&mut simulation, crossing, &commands);
     (simulation, tally)
@@ -160,7 +161,7 @@ fn resident_mib() -> Option<f64> {
 fn wander(count: usize) -> Tally {
     let mut scene = Scene::read(&asset("scenes/arch_carotid.toml")).unwrap();
     scene.vessel.triangles = Some(20_000);
-    let mut simulation = scene.simulation().unwrap();
+    let mut simulation = scene.simulation(&NoStore).unwrap();
     let crossing = CrossingTest::new(simulation.wall().mesh());
     let mut noise = Noise(1);
     let mut tally = Tally::default();
@@ -256,9 +257,8 @@ fn tube(axis: &[Vec3], radius_mm: impl Fn(usize) -> f64, resolution: Resolution)
 
 fn start(wall: Wall, sheath: Sheath, device: Device) -> (Simulation, CrossingTest) {
     let crossing = CrossingTest::new(wall.mesh());
-    let method = MethodChoice::Kirchhoff(KirchhoffOptions::default());
-    let simulation =
-        Simulation::with_properties(wall, WallProperties::default(), device, sheath, &method).unwrap();
+    let method = KirchhoffOptions::default();
+    let simulation = Simulation::builder(wall, device, sheath).method(&method).build().unwrap();
     (simulation, crossing)
 }
 

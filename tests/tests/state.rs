@@ -9,9 +9,10 @@ use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, State, WallProperties, WallRegion};
 use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::methods::li2011::Li2011Options;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, anatomy};
 use endowire_core::{Error, Vec3};
+use endowire_methods::AnyMethod;
+use endowire_methods::li2011::Li2011Options;
 use endowire_tests::noise::Noise;
 
 fn bytes(simulation: &Simulation) -> Vec<u8> {
@@ -22,8 +23,8 @@ fn state(bytes: &[u8]) -> State {
     postcard::from_bytes(bytes).unwrap()
 }
 
-fn kirchhoff() -> MethodChoice {
-    MethodChoice::Kirchhoff(KirchhoffOptions { element_mm: 4.0, ..KirchhoffOptions::default() })
+fn kirchhoff() -> KirchhoffOptions {
+    KirchhoffOptions { element_mm: 4.0, ..KirchhoffOptions::default() }
 }
 
 fn wire(curvature_per_mm: f64) -> Device {
@@ -32,7 +33,7 @@ fn wire(curvature_per_mm: f64) -> Device {
     Device::new(vec![tip, Section::straight(380.0, 0.445, 10.0)]).unwrap()
 }
 
-fn start(vessel: &str, properties: WallProperties, device: Device, method: &MethodChoice) -> Simulation {
+fn start(vessel: &str, properties: WallProperties, device: Device, method: &dyn MethodChoice) -> Simulation {
     start_at(2.0, vessel, properties, device, method)
 }
 
@@ -41,11 +42,11 @@ fn start_at(
     vessel: &str,
     properties: WallProperties,
     device: Device,
-    method: &MethodChoice,
+    method: &dyn MethodChoice,
 ) -> Simulation {
     let made = GeneratedWall::new(&anatomy::tree(vessel).unwrap(), Resolution::Triangles(5_000)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, depth_mm).unwrap();
-    Simulation::with_properties(made.wall, properties, device, sheath, method).unwrap()
+    Simulation::builder(made.wall, device, sheath).properties(properties).method(method).build().unwrap()
 }
 
 fn rubbing() -> WallProperties {
@@ -123,7 +124,7 @@ fn steps_of_a_shaped_tip_can_be_taken_again() {
 #[test]
 fn steps_of_the_papers_method_can_be_taken_again() {
     let options = Li2011Options { element_mm: 8.0, ..Li2011Options::default() };
-    for method in [MethodChoice::Li2011Dense(options), MethodChoice::Li2011Banded(options)] {
+    for method in [AnyMethod::Li2011Dense(options), AnyMethod::Li2011Banded(options)] {
         let simulation = start("curved_tube", WallProperties::default(), wire(0.0), &method);
         let mut again = simulation.clone();
         again.restore(&simulation.state()).unwrap();
@@ -211,9 +212,9 @@ fn tube(narrow: bool, max_iterations: usize) -> Simulation {
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
     let tip = Section { rest_curvature_per_mm: [0.02, 0.0], ..Section::straight(8.0, 0.4, 6.0) };
     let device = Device::new(vec![tip, Section::straight(72.0, 0.4, 10.0)]).unwrap();
-    let method = MethodChoice::Kirchhoff(KirchhoffOptions { max_iterations, ..KirchhoffOptions::default() });
+    let method = KirchhoffOptions { max_iterations, ..KirchhoffOptions::default() };
     let properties = WallProperties { modulus_n_per_mm2: 1e4, friction: 0.2, ..WallProperties::default() };
-    Simulation::with_properties(made.wall, properties, device, sheath, &method).unwrap()
+    Simulation::builder(made.wall, device, sheath).properties(properties).method(&method).build().unwrap()
 }
 
 /// Commands of which many cannot be followed, and the state after every one that could not. Returns how many failed, by their reason.
@@ -284,8 +285,8 @@ fn what_follows_a_failure_is_what_follows_without_it() {
 #[test]
 fn a_state_of_another_scene_is_refused_and_changes_nothing() {
     let smooth = WallProperties::default;
-    let banded = MethodChoice::Li2011Banded(Li2011Options { element_mm: 8.0, ..Li2011Options::default() });
-    let finer = MethodChoice::Kirchhoff(KirchhoffOptions { element_mm: 3.0, ..KirchhoffOptions::default() });
+    let banded = AnyMethod::Li2011Banded(Li2011Options { element_mm: 8.0, ..Li2011Options::default() });
+    let finer = KirchhoffOptions { element_mm: 3.0, ..KirchhoffOptions::default() };
     let mut there = start("curved_tube", smooth(), wire(0.0), &kirchhoff());
     (0..20).for_each(|_| there.step(Command::advance(2.0)).map(|_| ()).unwrap());
     let saved = there.state();
@@ -354,9 +355,12 @@ fn large() -> Simulation {
     let made =
         GeneratedWall::new(&anatomy::tree("aortic_arch").unwrap(), Resolution::Triangles(20_000)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0).unwrap();
-    let method = MethodChoice::Kirchhoff(KirchhoffOptions { element_mm: 1.0, ..KirchhoffOptions::default() });
-    let mut simulation =
-        Simulation::with_properties(made.wall, rubbing(), wire(0.03), sheath, &method).unwrap();
+    let method = KirchhoffOptions { element_mm: 1.0, ..KirchhoffOptions::default() };
+    let mut simulation = Simulation::builder(made.wall, wire(0.03), sheath)
+        .properties(rubbing())
+        .method(&method)
+        .build()
+        .unwrap();
     (0..100).for_each(|_| simulation.step(Command::advance(2.0)).map(|_| ()).unwrap());
     simulation
 }

@@ -5,8 +5,9 @@
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation};
 use endowire_core::methods::MethodChoice;
-use endowire_core::methods::li2011::Li2011Options;
 use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
+use endowire_methods::AnyMethod;
+use endowire_methods::li2011::Li2011Options;
 
 fn curved_tube() -> (Wall, Sheath) {
     let generated =
@@ -16,10 +17,13 @@ fn curved_tube() -> (Wall, Sheath) {
 }
 
 /// Largest distance between nodes of two methods over the same insertion: in, a turn, and half way out again.
-fn largest_difference(a: &MethodChoice, b: &MethodChoice) -> f64 {
+fn largest_difference(a: &dyn MethodChoice, b: &dyn MethodChoice) -> f64 {
     let (wall, sheath) = curved_tube();
     let start = |method| {
-        Simulation::new(wall.clone(), Device::uniform(300.0, 0.45, 10.0).unwrap(), sheath, method).unwrap()
+        Simulation::builder(wall.clone(), Device::uniform(300.0, 0.45, 10.0).unwrap(), sheath)
+            .method(method)
+            .build()
+            .unwrap()
     };
     let (mut first, mut second) = (start(a), start(b));
     let mut commands = vec![Command::advance(1.5); 120];
@@ -46,8 +50,7 @@ fn largest_difference(a: &MethodChoice, b: &MethodChoice) -> f64 {
 #[test]
 fn dense_and_banded_agree_over_a_whole_insertion() {
     let options = Li2011Options { element_mm: 3.0, ..Default::default() };
-    let difference =
-        largest_difference(&MethodChoice::Li2011Dense(options), &MethodChoice::Li2011Banded(options));
+    let difference = largest_difference(&AnyMethod::Li2011Dense(options), &AnyMethod::Li2011Banded(options));
     assert!(difference < 1e-8, "{difference:e} mm");
 }
 
@@ -55,7 +58,6 @@ fn dense_and_banded_agree_over_a_whole_insertion() {
 fn another_wall_stiffness_is_seen_by_the_same_comparison() {
     let options = Li2011Options { element_mm: 3.0, ..Default::default() };
     let stiffer = Li2011Options { wall_stiffness_n_per_mm: 1.0 + 1e-6, ..options };
-    let difference =
-        largest_difference(&MethodChoice::Li2011Banded(options), &MethodChoice::Li2011Banded(stiffer));
+    let difference = largest_difference(&AnyMethod::Li2011Banded(options), &AnyMethod::Li2011Banded(stiffer));
     assert!(difference > 1e-8, "{difference:e} mm");
 }

@@ -2,16 +2,16 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use endowire_core::contact::Counters;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 use endowire_tests::crossing::CrossingTest;
 use endowire_tests::sweep::crosses;
 
-fn kirchhoff(element_mm: f64) -> MethodChoice {
-    MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..Default::default() })
+fn kirchhoff(element_mm: f64) -> KirchhoffOptions {
+    KirchhoffOptions { element_mm, ..Default::default() }
 }
 
 fn curved_tube() -> (Wall, Sheath) {
@@ -23,14 +23,11 @@ fn curved_tube() -> (Wall, Sheath) {
 fn in_curved_tube(modulus_n_per_mm2: f64) -> Simulation {
     let (wall, sheath) = curved_tube();
     let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
-    Simulation::with_properties(
-        wall,
-        WallProperties { modulus_n_per_mm2, ..Default::default() },
-        wire,
-        sheath,
-        &kirchhoff(2.0),
-    )
-    .unwrap()
+    Simulation::builder(wall, wire, sheath)
+        .properties(WallProperties { modulus_n_per_mm2, ..Default::default() })
+        .method(&kirchhoff(2.0))
+        .build()
+        .unwrap()
 }
 
 #[test]
@@ -57,8 +54,8 @@ fn a_tolerance_saves_iterations_and_costs_little() {
         let (wall, sheath) = curved_tube();
         let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
         let options = KirchhoffOptions { element_mm: 4.0, tolerance, ..Default::default() };
-        let method = MethodChoice::Kirchhoff(options);
-        let mut simulation = Simulation::new(wall, wire, sheath, &method).unwrap();
+        let method = options;
+        let mut simulation = Simulation::builder(wall, wire, sheath).method(&method).build().unwrap();
         let mut iterations = 0;
         for _ in 0..100 {
             iterations += simulation.step(Command::advance(2.0)).unwrap().iterations;
@@ -72,8 +69,8 @@ fn a_tolerance_saves_iterations_and_costs_little() {
     assert!(off > 0.0 && off < 1e-3, "{off:e}");
     let (wall, sheath) = curved_tube();
     let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
-    let method = MethodChoice::Kirchhoff(KirchhoffOptions { tolerance: 0.1, ..Default::default() });
-    let refused = Simulation::new(wall, wire, sheath, &method).err().unwrap().to_string();
+    let method = KirchhoffOptions { tolerance: 0.1, ..Default::default() };
+    let refused = Simulation::builder(wall, wire, sheath).method(&method).build().err().unwrap().to_string();
     assert!(refused.contains("method.tolerance"), "{refused}");
 }
 
@@ -84,7 +81,8 @@ fn coarse_elements_keep_their_contacts() {
     let made = GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(0.8)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
     let wire = Device::uniform(250.0, 0.445, 10.0).unwrap();
-    let mut simulation = Simulation::new(made.wall, wire, sheath, &kirchhoff(40.0)).unwrap();
+    let mut simulation =
+        Simulation::builder(made.wall, wire, sheath).method(&kirchhoff(40.0)).build().unwrap();
     let mut iterations = 0;
     for _ in 0..100 {
         iterations += simulation.step(Command::advance(2.0)).unwrap().iterations;
@@ -145,25 +143,16 @@ fn walls_of_any_stiffness_are_met_and_never_passed_through() {
 }
 
 #[test]
-fn skipping_queries_changes_nothing() {
-    let run = |skip: bool| {
-        let (wall, sheath) = curved_tube();
-        let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
-        let method = MethodChoice::Kirchhoff(KirchhoffOptions { skip, ..Default::default() });
-        let mut simulation = Simulation::new(wall, wire, sheath, &method).unwrap();
-        for _ in 0..80 {
-            simulation.step(Command::advance(2.0)).unwrap();
-        }
-        simulation
-    };
-    let (with, without) = (run(true), run(false));
-    let (saved, spent) = (with.counters(), without.counters());
-    for (a, b) in with.shape().positions_mm.iter().zip(&without.shape().positions_mm) {
-        assert!((a - b).norm() < 1e-9, "{}", (a - b).norm());
+fn most_questions_about_the_wall_are_answered_from_memory() {
+    let (wall, sheath) = curved_tube();
+    let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
+    let mut simulation = Simulation::builder(wall, wire, sheath).build().unwrap();
+    for _ in 0..80 {
+        simulation.step(Command::advance(2.0)).unwrap();
     }
-    assert!(saved.avoided > 0 && saved.near > 0 && spent.avoided == 0 && spent.near == 0);
-    assert!(with.report().nodes_solved > 0 && with.report().nodes_frozen > 0);
-    assert!(saved.queries * 5 < spent.queries, "{saved:?} {spent:?}");
+    let Counters { queries, avoided, near, .. } = simulation.counters();
+    assert!(avoided > 0 && near > 0 && queries * 4 < avoided + near, "{:?}", simulation.counters());
+    assert!(simulation.report().nodes_solved > 0 && simulation.report().nodes_frozen > 0);
 }
 
 #[test]
@@ -173,7 +162,8 @@ fn a_shaped_tip_turns_with_the_tail_and_finds_its_way_through_the_arch() {
     let sheath = Sheath::at_opening(&arch.wall, arch.inlet, 2.0).unwrap();
     let tip = Section { rest_curvature_per_mm: [0.05, 0.0], ..Section::straight(30.0, 0.445, 5.0) };
     let wire = Device::new(vec![tip, Section::straight(400.0, 0.445, 15.0)]).unwrap();
-    let mut simulation = Simulation::new(arch.wall, wire, sheath, &kirchhoff(4.0)).unwrap();
+    let mut simulation =
+        Simulation::builder(arch.wall, wire, sheath).method(&kirchhoff(4.0)).build().unwrap();
     let crossing = CrossingTest::new(simulation.wall().mesh());
     for _ in 0..50 {
         let report = simulation.step(Command { advance_mm: 5.0, rotate_rad: 0.1 }).unwrap();

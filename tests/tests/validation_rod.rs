@@ -1,8 +1,8 @@
 //! The rod against exact solutions and against itself. Validation: nothing here was recorded from this program.
 
-use endowire_core::reference::{FAMILIES, Row, stress};
 use endowire_core::statics::{LoadKind, StaticCase, StaticSolution};
 use endowire_core::{Vec3, nalgebra};
+use endowire_verify::{FAMILIES, Row, stress};
 use std::path::Path;
 
 fn folder() -> std::path::PathBuf {

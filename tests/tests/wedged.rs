@@ -5,7 +5,6 @@
 use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Contact, Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution};
 
@@ -29,8 +28,8 @@ fn thread(friction: f64) -> Simulation {
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
     let properties = WallProperties { modulus_n_per_mm2: 1e4, friction, ..WallProperties::default() };
     let device = Device::uniform(100.0, 0.45, 1e-2).unwrap();
-    let method = MethodChoice::Kirchhoff(KirchhoffOptions { element_mm: 2.0, ..KirchhoffOptions::default() });
-    Simulation::with_properties(made.wall, properties, device, sheath, &method).unwrap()
+    let method = KirchhoffOptions { element_mm: 2.0, ..KirchhoffOptions::default() };
+    Simulation::builder(made.wall, device, sheath).properties(properties).method(&method).build().unwrap()
 }
 
 /// Direction of the device near a place.

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
+use endowire_methods::NAMES;
 use endowire_viewer::{Mode, Pose};
 
-use crate::commands::compare::{case::CASES, contender};
+use crate::commands::compare::case::CASES;
 use crate::commands::experiment::navigation::targets;
 
 /// Simulates catheters and guidewires in blood vessels: scripted insertions, experiments, 3D and fluoroscopic frames.
@@ -135,11 +136,11 @@ pub(crate) struct FrameArgs {
 
 /// The methods that are compared. A wrong name is answered with the nearest right one.
 fn method_names() -> PossibleValuesParser {
-    PossibleValuesParser::new(contender::names())
+    PossibleValuesParser::new(NAMES)
 }
 
 fn all_or_method_names() -> PossibleValuesParser {
-    PossibleValuesParser::new(std::iter::once("all").chain(contender::names()))
+    PossibleValuesParser::new(std::iter::once("all").chain(NAMES))
 }
 
 fn case_names() -> PossibleValuesParser {

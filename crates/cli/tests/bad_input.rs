@@ -197,6 +197,9 @@ fn absurd_sizes_are_refused_before_memory_is() {
     Scene::good().with("step_mm = 2.0", "step_mm = 1e-30").is_refused(&["script[0]"]);
     Scene::good().with("length_mm = 60.0", "length_mm = 6e30").is_refused(&["length_mm"]);
     Scene::good()
+        .with("[sheath]", "[method]\nname = \"kirchhoff\"\nelement_mm = 1e-6\n[sheath]")
+        .is_refused(&["method.element_mm", "gigabytes"]);
+    Scene::good()
         .with("[sheath]", "[method]\nname = \"li2011-dense\"\nelement_mm = 1e-6\n[sheath]")
         .is_refused(&["element_mm"]);
     Scene::good()

@@ -122,7 +122,7 @@ impl Error {
 }
 
 /// A number for people: with an exponent where digits would only be zeros.
-pub(crate) fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() || (1e-4..1e9).contains(&value.abs()) {
         value.to_string()
     } else {

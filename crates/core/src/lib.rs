@@ -6,8 +6,7 @@
 //! [`insertion::Command`]s and always tells its [`shape::Shape`] and an [`insertion::StepReport`].
 //!
 //! The exact rod stands on its own: a [`statics::StaticCase`] (a file or a value) is solved into a
-//! [`statics::StaticSolution`] by [`solve::Newton`] on the elements of [`rod`], and [`reference`](mod@reference) holds the
-//! answers it is measured against.
+//! [`statics::StaticSolution`] by [`solve::Newton`] on the elements of [`rod`].
 
 pub mod banded;
 pub mod contact;
@@ -18,7 +17,6 @@ pub mod input;
 pub mod insertion;
 pub mod methods;
 mod parallel;
-pub mod reference;
 pub mod rod;
 pub mod scene;
 pub mod shape;

@@ -3,6 +3,7 @@
 //!
 //! `cargo run --release -p endowire-methods --example tune [METHOD …]`
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use endowire_core::Vec3;
@@ -10,7 +11,7 @@ use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 use endowire_methods::{
-    BeamFem, DiscreteRod, Insertion, InsertionOptions, MassSpring, RigidLinks, RodModel, cantilever,
+    BeamFem, DiscreteRod, Inserted, InsertionOptions, MassSpring, RigidLinks, RodModel, cantilever,
 };
 
 /// Longest time of one set, s; a worse one is out.
@@ -18,44 +19,45 @@ const LIMIT: Duration = Duration::from_secs(4);
 /// How many of the best are shown.
 const SHOWN: usize = 4;
 
-type Make = Box<dyn Fn() -> Box<dyn RodModel>>;
+/// Models keep nothing from one run to the next.
+type Model = Arc<dyn RodModel>;
 
 /// A set of parameters under its description.
 struct Candidate {
     method: &'static str,
     text: String,
-    make: Make,
+    model: Model,
 }
 
 fn candidates() -> Vec<Candidate> {
     let mut list: Vec<Candidate> = Vec::new();
-    let mut add = |method, text: String, make: Make| list.push(Candidate { method, text, make });
+    let mut add = |method, text: String, model: Model| list.push(Candidate { method, text, model });
     for time_step in [0.005, 0.015, 0.05, 0.15, 0.25, 0.5, 1.0] {
         for damping in [0.005, 0.015, 0.05, 0.2, 0.6] {
             let model = RigidLinks { time_step, damping, ..RigidLinks::default() };
             let text = format!("time_step {time_step}, damping {damping}");
-            add("rigid-links", text, Box::new(move || Box::new(model)));
+            add("rigid-links", text, Arc::new(model));
         }
     }
     for axial_ratio in [1.0, 4.0, 16.0, 64.0] {
         for damping in [0.75, 1.5, 3.0, 10.0, 30.0] {
             let model = MassSpring { axial_ratio, damping, max_iterations: 200_000, ..MassSpring::default() };
             let text = format!("axial_ratio {axial_ratio}, damping {damping}");
-            add("mass-spring", text, Box::new(move || Box::new(model)));
+            add("mass-spring", text, Arc::new(model));
         }
     }
     for damping in [0.0, 20.0, 80.0, 300.0, 3e3, 1e4, 3e4, 1e5] {
         for axial_ratio in [10.0, 100.0, 1000.0] {
             let model = BeamFem { axial_ratio, damping, ..BeamFem::default() };
             let text = format!("axial_ratio {axial_ratio}, damping {damping}");
-            add("beam-fem", text, Box::new(move || Box::new(model)));
+            add("beam-fem", text, Arc::new(model));
         }
     }
     for time_step in [0.3, 0.6, 0.9] {
         for damping in [0.75, 1.5, 3.0, 10.0, 30.0] {
             let model = DiscreteRod { time_step, damping, max_iterations: 200_000, ..DiscreteRod::default() };
             let text = format!("time_step {time_step}, damping {damping}");
-            add("discrete-rod", text, Box::new(move || Box::new(model)));
+            add("discrete-rod", text, Arc::new(model));
         }
     }
     list
@@ -72,13 +74,15 @@ fn bend(model: &dyn RodModel) -> Option<(f64, f64)> {
 }
 
 /// Time of 160 mm into the curved tube on elements of 5 mm, and steps that did not converge.
-fn insert(make: &Make, made: &GeneratedWall, sheath: Sheath, wire: &Device) -> Option<(f64, f64)> {
+fn insert(model: &Model, made: &GeneratedWall, sheath: Sheath, wire: &Device) -> Option<(f64, f64)> {
     let (wall, properties) = (made.wall.clone(), WallProperties::default());
     let options = InsertionOptions { element_mm: 5.0, ..InsertionOptions::default() };
-    let mut simulation = Simulation::with_method(wall, properties, wire.clone(), sheath, |surroundings| {
-        Ok(Box::new(Insertion::new(make(), options, surroundings)?))
-    })
-    .ok()?;
+    let method = Inserted::new(Arc::clone(model), options);
+    let mut simulation = Simulation::builder(wall, wire.clone(), sheath)
+        .properties(properties)
+        .method(&method)
+        .build()
+        .ok()?;
     let clock = Instant::now();
     let mut unconverged = 0;
     for _ in 0..80 {
@@ -112,8 +116,8 @@ fn main() -> endowire_core::Result<()> {
                 println!("  {:>10.3} ms  {quantity} {value:<9.2e} {text}", 1e3 * time_s);
             }
         };
-        show("cantilever", "tip error", &|c| bend(&*(c.make)()));
-        show("insertion", "unconverged", &|c| insert(&c.make, &made, sheath, &wire));
+        show("cantilever", "tip error", &|c| bend(&*c.model));
+        show("insertion", "unconverged", &|c| insert(&c.model, &made, sheath, &wire));
     }
     Ok(())
 }

@@ -6,8 +6,9 @@ use endowire_core::contact::FeltWall;
 use endowire_core::contact::extension::left_through;
 use endowire_core::error::in_range;
 use endowire_core::insertion::{Command, Energy, StepReport, Surroundings, nodes_from_tip};
-use endowire_core::methods::{Content, Method, NodesState, State, check_inserted};
+use endowire_core::methods::{Content, Method, MethodChoice, NodesState, State, check_inserted};
 use endowire_core::shape::Shape;
+use endowire_core::vessel::WallStore;
 use endowire_core::{Error, Result, Vec3};
 use nalgebra::Rotation3;
 
@@ -27,6 +28,30 @@ pub struct InsertionOptions {
 impl Default for InsertionOptions {
     fn default() -> Self {
         Self { element_mm: 2.0, tolerance: 1e-2 }
+    }
+}
+
+/// A model and how it is inserted: what a simulation starts with.
+#[derive(Debug, Clone)]
+pub struct Inserted {
+    model: Arc<dyn RodModel>,
+    options: InsertionOptions,
+}
+
+impl Inserted {
+    /// That of a model with parameters of its own.
+    pub fn new(model: Arc<dyn RodModel>, options: InsertionOptions) -> Self {
+        Self { model, options }
+    }
+}
+
+impl MethodChoice for Inserted {
+    fn name(&self) -> &'static str {
+        self.model.name()
+    }
+
+    fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {
+        Ok(Box::new(Insertion::new(Arc::clone(&self.model), self.options, surroundings, store)?))
     }
 }
 
@@ -57,14 +82,15 @@ struct Progress {
 }
 
 impl Insertion {
-    /// The method with nothing inserted.
+    /// The method with nothing inserted; the even mesh of the wall comes from `store`.
     ///
     /// # Errors
     /// A device that the method refuses, or options out of range.
     pub fn new(
-        model: Box<dyn RodModel>,
+        model: Arc<dyn RodModel>,
         options: InsertionOptions,
         surroundings: &Surroundings<'_>,
+        store: &dyn WallStore,
     ) -> Result<Self> {
         model.check(surroundings.device)?;
         surroundings.properties.refuse_regions(model.name())?;
@@ -89,9 +115,10 @@ impl Insertion {
         let sheath = surroundings.sheath;
         let chain = Chain { start_mm: sheath.position_mm, direction: sheath.direction, ..Chain::default() };
         let progress = Progress { posture: chain.straight(), chain, from_tip_mm: vec![0.0] };
-        let wall = FeltWall::new(surroundings.wall, surroundings.device, surroundings.properties)?;
+        let wall =
+            FeltWall::from_store(surroundings.wall, surroundings.device, surroundings.properties, store)?;
         let mut insertion = Self {
-            model: Arc::from(model),
+            model,
             options,
             wall: Arc::new(wall),
             progress,

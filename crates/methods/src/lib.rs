@@ -1,14 +1,18 @@
-//! The field's methods for catheters and guidewires, each as its paper has it, to compare the core's own with.
+//! The methods by name, and the field's for catheters and guidewires beside the core's own, each as its paper has it.
+//!
+//! [`AnyMethod`] is what `[method]` of a scene may say, and [`Scene`] a scene file that is read so.
 //!
 //! | name | module | paper |
 //! |---|---|---|
+//! | `kirchhoff` | [`endowire_core::methods::kirchhoff`] | ours |
+//! | `li2011-dense`, `li2011-banded` | [`li2011`] | Li, Qin, Guo, Chui, Heng 2011 |
 //! | `rigid-links` | [`rigid_links`] | Dawson, Cotin, Meglan, Shaffer, Ferrell 2000 |
 //! | `mass-spring` | [`mass_spring`] | Wang, Duratti, Samur, Spaelter, Bleuler 2007 |
 //! | `beam-fem`, `beam-fem-damped` | [`beam_fem`] | Cotin, Duriez, Lenoir, Neumann, Dawson 2005 |
 //! | `chord-energy` | [`chord_energy`] | Konings et al. 2003; Alderliesten, Konings, Niessen 2004, 2007 |
 //! | `discrete-rod` | [`discrete_rod`] | Bergou et al. 2008; Tang et al. 2010 |
 //!
-//! A method is a [`RodModel`]: it relaxes a [`Chain`] of nodes under nodal loads, with the numerics of its paper. The same
+//! The last six are a [`RodModel`]: it relaxes a [`Chain`] of nodes under nodal loads, with the numerics of its paper. The same
 //! relaxation serves a static [`cantilever`](fn@cantilever) and, as [`Insertion`], core's trait `Method`. What is no part of
 //! any paper is shared: the discretisation of the device, the wall's energy per length (so that all methods have the same
 //! limit under refinement), and the slide along the own curve that starts each step.
@@ -23,8 +27,11 @@ pub mod chord_energy;
 pub mod discrete_rod;
 mod explicit;
 pub mod insertion;
+pub mod li2011;
 mod links;
 pub mod mass_spring;
+pub mod options;
+mod registry;
 pub mod rigid_links;
 mod wall_load;
 
@@ -33,9 +40,12 @@ pub use cantilever::{CantileverSolution, cantilever};
 pub use chain::{Chain, NodalLoad, Posture, Push, TipForce};
 pub use chord_energy::ChordEnergy;
 pub use discrete_rod::DiscreteRod;
-pub use insertion::{Insertion, InsertionOptions};
+pub use insertion::{Inserted, Insertion, InsertionOptions};
 pub use mass_spring::MassSpring;
+pub use registry::{AnyMethod, MODEL_NAMES, NAMES, Scene, static_model};
 pub use rigid_links::RigidLinks;
+
+use std::fmt::Debug;
 
 use endowire_core::device::Device;
 use endowire_core::{Error, Result};
@@ -50,7 +60,7 @@ pub struct Outcome {
 }
 
 /// A discrete rod with the solution procedure of its paper.
-pub trait RodModel: Send + Sync {
+pub trait RodModel: Debug + Send + Sync {
     /// The name used in tables and scenes.
     fn name(&self) -> &'static str;
 
@@ -73,44 +83,6 @@ pub trait RodModel: Send + Sync {
         posture: &mut Posture,
         tolerance: f64,
     ) -> Outcome;
-}
-
-/// Names of all methods of this crate.
-pub const NAMES: [&str; 6] =
-    ["rigid-links", "mass-spring", "beam-fem", "beam-fem-damped", "chord-energy", "discrete-rod"];
-
-/// What a method is asked to do: its best parameters depend on it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Task {
-    /// One static solve from the unloaded shape: the motion is as long as the device.
-    Cantilever,
-    /// Insertion: the device is held along its length, and each step is short.
-    Insertion,
-}
-
-/// The method of that name with the parameters that serve it best in `task`, as found by the example `tune`.
-pub fn by_name(name: &str, task: Task) -> Option<Box<dyn RodModel>> {
-    let insertion = task == Task::Insertion;
-    Some(match name {
-        "rigid-links" if insertion => {
-            Box::new(RigidLinks { time_step: 0.015, damping: 0.05, ..RigidLinks::default() })
-        }
-        "rigid-links" => Box::new(RigidLinks::default()),
-        "mass-spring" if insertion => {
-            Box::new(MassSpring { damping: 10.0, max_iterations: 200_000, ..MassSpring::default() })
-        }
-        "mass-spring" => Box::new(MassSpring::default()),
-        "beam-fem" => Box::new(BeamFem::default()),
-        "beam-fem-damped" if insertion => Box::new(BeamFem { damping: 1e4, ..BeamFem::default() }),
-        "beam-fem-damped" => Box::new(BeamFem::damped()),
-        "chord-energy" if insertion => Box::new(ChordEnergy { max_iterations: 20_000 }),
-        "chord-energy" => Box::new(ChordEnergy::default()),
-        "discrete-rod" if insertion => {
-            Box::new(DiscreteRod { damping: 10.0, max_iterations: 200_000, ..DiscreteRod::default() })
-        }
-        "discrete-rod" => Box::new(DiscreteRod::default()),
-        _ => return None,
-    })
 }
 
 /// The refusal of a device with a shape of its own by a method that has none.

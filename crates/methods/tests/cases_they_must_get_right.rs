@@ -7,11 +7,9 @@ use std::f64::consts::FRAC_PI_2;
 use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties, WallRegion};
-use endowire_core::methods::MethodChoice;
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 use endowire_methods::{
-    BeamFem, Chain, ChordEnergy, Insertion, InsertionOptions, NAMES, RodModel, Task, TipForce, by_name,
-    cantilever,
+    AnyMethod, BeamFem, Chain, ChordEnergy, MODEL_NAMES, RodModel, TipForce, cantilever, static_model,
 };
 
 /// Distance of the tip from `tip` under the load a.
@@ -24,8 +22,8 @@ fn tip_error(model: &dyn RodModel, n: usize, a: f64, tip: Vec3) -> f64 {
 
 #[test]
 fn a_small_load_deflects_by_a_third_of_it() {
-    for name in NAMES {
-        let model = by_name(name, Task::Cantilever).unwrap();
+    for &name in MODEL_NAMES {
+        let model = static_model(name).unwrap();
         let a = 0.01;
         let error = tip_error(&*model, 16, a, Vec3::new(1.0, -a / 3.0, 0.0));
         assert!(error < 0.01 * a / 3.0, "{name}: {error:e}");
@@ -39,8 +37,8 @@ fn exact() -> Vec3 {
 
 #[test]
 fn every_method_is_of_second_order() {
-    for name in NAMES {
-        let model = by_name(name, Task::Cantilever).unwrap();
+    for &name in MODEL_NAMES {
+        let model = static_model(name).unwrap();
         let error = |n| tip_error(&*model, n, 1.0, exact());
         let order = (error(8) / error(16)).log2();
         assert!((1.8..2.3).contains(&order), "{name}: {order}");
@@ -50,8 +48,8 @@ fn every_method_is_of_second_order() {
 #[test]
 fn a_large_load_is_met_by_all_but_the_undamped_beams() {
     let tip = Vec3::new(1.0 - 0.554995597754, -0.810609024880, 0.0);
-    for name in NAMES {
-        let model = by_name(name, Task::Cantilever).unwrap();
+    for &name in MODEL_NAMES {
+        let model = static_model(name).unwrap();
         if name == "beam-fem" {
             let found = cantilever(&*model, 16, Vec3::new(0.0, -10.0, 0.0), 1e-3);
             assert!(found.map_or(true, |solution| !solution.converged), "its stiffness knows no tension");
@@ -99,14 +97,14 @@ impl Tube {
         name: &str,
         wire: Device,
     ) -> endowire_core::Result<Simulation> {
-        Simulation::with_method(self.made.wall.clone(), properties, wire, self.sheath, |surroundings| {
-            if name == "kirchhoff" {
-                return MethodChoice::default().start(surroundings);
-            }
-            let options = InsertionOptions { element_mm: 6.0, ..Default::default() };
-            let model = by_name(name, Task::Insertion).unwrap();
-            Ok(Box::new(Insertion::new(model, options, surroundings)?))
-        })
+        let method = match AnyMethod::named(name).unwrap() {
+            exact @ AnyMethod::Kirchhoff(_) => exact,
+            other => other.with_element_mm(6.0),
+        };
+        Simulation::builder(self.made.wall.clone(), wire, self.sheath)
+            .properties(properties)
+            .method(&method)
+            .build()
     }
 }
 
@@ -114,7 +112,7 @@ impl Tube {
 fn shapes_friction_and_regions_are_refused_by_name() {
     let tube = tube();
     let bent = Section { rest_curvature_per_mm: [0.02, 0.0], ..Section::straight(30.0, 0.445, 10.0) };
-    for name in NAMES {
+    for &name in MODEL_NAMES {
         let shaped = tube.start(name, Device::new(vec![bent]).unwrap(), 0.0);
         let can = matches!(name, "beam-fem" | "beam-fem-damped" | "chord-energy");
         match shaped {

@@ -3,19 +3,16 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use endowire_core::device::Device;
-use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
+use endowire_core::insertion::{Command, Sheath, Simulation};
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
-use endowire_methods::{Insertion, InsertionOptions, NAMES, Task, by_name};
+use endowire_methods::{AnyMethod, NAMES};
 
 fn start(name: &str) -> Simulation {
     let made = GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(1.5)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
     let wire = Device::uniform(120.0, 0.445, 10.0).unwrap();
-    Simulation::with_method(made.wall, WallProperties::default(), wire, sheath, |surroundings| {
-        let options = InsertionOptions { element_mm: 6.0, ..Default::default() };
-        Ok(Box::new(Insertion::new(by_name(name, Task::Insertion).unwrap(), options, surroundings)?))
-    })
-    .unwrap()
+    let method = AnyMethod::named(name).unwrap().with_element_mm(6.0);
+    Simulation::builder(made.wall, wire, sheath).method(&method).build().unwrap()
 }
 
 #[test]

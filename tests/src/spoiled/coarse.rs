@@ -4,8 +4,8 @@ use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
 use endowire_core::Vec3;
-use endowire_core::reference::crossing::CrossingTest;
 use endowire_core::vessel::SurfaceMesh;
+use endowire_verify::crossing::CrossingTest;
 
 use super::Editable;
 use crate::noise::Noise;

@@ -8,8 +8,8 @@ mod edit;
 mod sheets;
 
 use endowire_core::Vec3;
-use endowire_core::reference::crossing::CrossingTest;
 use endowire_core::vessel::SurfaceMesh;
+use endowire_verify::crossing::CrossingTest;
 
 use crate::noise::Noise;
 use edit::Editable;

@@ -103,7 +103,7 @@ impl FeltReport {
 
 /// Draws the felt wall along its shortest extent: grey on the given surface, red where it is inside by the limit or more, blue where
 /// it is outside.
-fn draw(path: &Path, felt: &Conditioned, wall: &Wall, limit_mm: f64) -> Result<(), Failure> {
+fn draw(path: &Path, felt: &Conditioned<'_>, wall: &Wall, limit_mm: f64) -> Result<(), Failure> {
     let mesh = &felt.mesh;
     let query = WallQuery::new(wall)?;
     let bound = |f: fn(&Vec3, &Vec3) -> Vec3| mesh.vertices_mm.iter().copied().reduce(|a, b| f(&a, &b));

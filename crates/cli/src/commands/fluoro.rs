@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use endowire_core::scene::Scene;
+use endowire_methods::Scene;
 use endowire_viewer::{ContactView, Moment};
 
 use crate::args::{FluoroArgs, ViewChoice};
@@ -30,7 +30,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     let frames = args.count as usize;
     let mut studio =
         Studio::new("fluoro", &args.frames, &args.scene, &scene, ViewChoice::Fluoro, folder, frames)?;
-    let mut simulation = scene.simulation_from(&Cache::new(&args.frames.cache)).map_err(in_scene)?;
+    let mut simulation = scene.simulation(&Cache::new(&args.frames.cache)).map_err(in_scene)?;
     let bar = progress::bar(steps, "step");
     for (index, command) in commands[..steps].iter().enumerate() {
         simulation.step(*command).map_err(|e| {

@@ -1,6 +1,6 @@
 //! `endowire render`: frames of a recorded run.
 
-use endowire_core::scene::Scene;
+use endowire_methods::Scene;
 use endowire_viewer::Moment;
 
 use crate::args::{RenderArgs, ViewChoice};

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use endowire_core::insertion::Simulation;
-use endowire_core::scene::Scene;
+use endowire_core::methods::MethodChoice;
+use endowire_methods::Scene;
 
 use crate::args::RunArgs;
 use crate::cache::Cache;
@@ -29,7 +30,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         let text = "script = []: give at least one [[script]] table, what the hand does".to_owned();
         return Err(Failure::Input(text).at(args.scene.display()));
     }
-    let mut simulation = scene.simulation_from(&Cache::new(&args.cache)).map_err(in_scene)?;
+    let mut simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
     let mut saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
     if let Some(saved) = &saved {
         saved.restore(&scene, &mut simulation, &commands)?;

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use endowire_core::reference::surfaces::{
+use endowire_verify::surfaces::{
     Cell, CellRow, Ending, Summary, Surface, SurfaceFile, cells, matches, run, surfaces_in,
 };
 use serde::Serialize;

@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use endowire_core::reference::insertion_stress::{InsertionRow, InsertionStress};
-use endowire_core::reference::{FAMILIES, Row, stress};
+use endowire_verify::insertion_stress::{InsertionRow, InsertionStress};
+use endowire_verify::{FAMILIES, Row, stress};
 use serde::Serialize;
 
 use crate::args::VerifyArgs;

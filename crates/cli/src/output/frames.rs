@@ -1,13 +1,15 @@
 //! Frames: the scene's `[view]` table, the renderer it asks for, and the files.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
+use endowire_core::Error;
 use endowire_core::device::Device;
 use endowire_core::input::from_toml;
 use endowire_core::insertion::Simulation;
-use endowire_core::scene::Scene;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::SurfaceMesh;
+use endowire_methods::Scene;
 use endowire_viewer::{
     Angiogram, Animation, ContactView, DeviceView, Frames, Image, Moment, Renderer, View, ViewSpec,
 };
@@ -88,10 +90,18 @@ impl FrameWriter {
         let frames = renderer.render_at(&[view], moment)?;
         for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {
-                recorder.frame(step, name, |path| Ok(image.write_png(path)?))?;
+                recorder.frame(step, name, |path| image.write_png(path).map_err(bare))?;
             }
         }
         Ok(())
+    }
+}
+
+/// What the system said, without the path that it said it of.
+fn bare(error: Error) -> io::Error {
+    match error {
+        Error::File { source, .. } => source,
+        other => io::Error::other(other.to_string()),
     }
 }
 
@@ -158,7 +168,7 @@ impl<'a> Studio<'a> {
     ) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         let spec = wished(view_table(path, scene)?, args, default)?;
-        let wall = scene.wall_from(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
+        let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
         let device = scene.device().map_err(in_scene)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
         if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {

@@ -268,15 +268,13 @@ impl Recorder {
         &mut self,
         step: usize,
         view: &str,
-        write: impl FnOnce(&Path) -> Result<(), Failure>,
+        write: impl FnOnce(&Path) -> io::Result<()>,
     ) -> Result<(), Failure> {
         let folder = self.folder.join("frames");
         std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
         let name = folder::frame_name(step, view);
         let path = folder.join(&name);
-        let part = whole::unfinished(&path);
-        write(&part)?;
-        std::fs::rename(&part, &path).map_err(|e| Failure::write(&path, &e))?;
+        whole::write(&path, write).map_err(|e| Failure::write(&path, &e))?;
         self.frames.push(format!("frames/{name}"));
         Ok(())
     }

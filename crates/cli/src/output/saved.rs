@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use endowire_core::insertion::{Command, Simulation, State};
-use endowire_core::scene::Scene;
+use endowire_methods::Scene;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 

@@ -43,7 +43,7 @@ fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) 
     }
     let options =
         Conditioning { deviation_mm: properties.deviation_mm, measured: false, ..Conditioning::default() };
-    store.wall(&WallRecipe::Even { surface: wall.mesh(), options }).map(Cow::Owned)
+    store.wall(&WallRecipe::Even { wall, options }).map(Cow::Owned)
 }
 
 impl FeltWall {

@@ -52,7 +52,7 @@ const TIP_RADII: f64 = 10.0;
 /// have little to do with those of the equilibrium …
 const STEADY: f64 = 0.3;
 /// … and no more once they differ from the lagged ones by less than this part.
-pub(crate) const SETTLED: f64 = 1e-4;
+pub const SETTLED: f64 = 1e-4;
 /// Renewals of a step that take the forces as they are; where they have not settled by then they overshoot, …
 const WHOLE_RENEWALS: usize = 20;
 /// … and from then on they take this part of the way.

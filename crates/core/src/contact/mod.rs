@@ -16,8 +16,7 @@ pub mod wall;
 
 pub use distance::{Distance, Nearness, SmoothWall};
 pub use felt::FeltWall;
-pub(crate) use friction::SETTLED;
-pub use friction::{Friction, HandMotion, NormalForce};
+pub use friction::{Friction, HandMotion, NormalForce, SETTLED};
 pub use grading::Grading;
 pub use memory::{KnownPoints, WallMemory};
 pub use point::{Contact, ContactPoint, Counters, Touch};

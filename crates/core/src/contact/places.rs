@@ -66,7 +66,7 @@ impl Places {
     }
 
     /// What is nearest to `x` itself.
-    pub(super) fn ask(&mut self, query: &WallQuery, x: &Vec3) -> Place {
+    fn ask(&mut self, query: &WallQuery, x: &Vec3) -> Place {
         self.queries += 1;
         // Where no wall is near, the point may be far from it on either side. A question without a limit would look at most of the wall.
         let reaches = (0..FARTHER).map(|k| self.reach_mm * f64::from(1u32 << (2 * k)));

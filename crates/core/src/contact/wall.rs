@@ -63,8 +63,6 @@ const DEEPER: f64 = 0.3;
 /// The wall's energy along a device.
 pub struct WallContact<'a> {
     felt: &'a FeltWall,
-    /// Whether clearances and the last triangle may replace queries.
-    skip: bool,
     points: &'a [ContactPoint],
     /// Moment of the softest piece at a radius of 100 mm, N·mm.
     least_moment_nmm: f64,
@@ -88,12 +86,10 @@ impl<'a> WallContact<'a> {
         memory: &'a mut WallMemory,
         friction: &'a mut Friction,
         softest_nmm2: f64,
-        skip: bool,
     ) -> Self {
         memory.resize(points.len());
         Self {
             felt,
-            skip,
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
             softness: 1.0,
@@ -118,7 +114,7 @@ impl<'a> WallContact<'a> {
         if let Some(side) = known.side {
             let (place, reading) = self.memory.readings[index];
             let told = matches!(reading, Nearness::Within(_)) || reading.value_mm() >= limit_mm;
-            if self.skip && place == *x && told {
+            if place == *x && told {
                 self.counters.avoided += 1;
                 return Reading::of(reading, limit_mm);
             }
@@ -135,11 +131,12 @@ impl<'a> WallContact<'a> {
             let nearness = self.felt.nearness(x, triangle, limit_mm);
             known.from_tip_mm = self.points[index].from_tip_mm;
             (known.clearance_mm, known.triangle) = (0.0, Some(triangle));
-            self.counters.near += u64::from(self.skip);
+            self.counters.near += 1;
             self.memory.readings[index] = (*x, nearness);
             return Reading::of(nearness, limit_mm);
         }
-        if self.skip {
+        // Clearances and the last triangle may replace a query.
+        {
             let moved = (x - known.looked_at).norm();
             let clearance = known.clearance_mm - moved;
             if clearance > near + self.felt.smooth.deepest_inset_mm() {
@@ -176,7 +173,7 @@ impl<'a> WallContact<'a> {
         }
         let (places, query) = (&mut self.memory.places, &self.felt.query);
         let asked = places.queries;
-        let place = if self.skip { places.around(query, x) } else { places.ask(query, x) };
+        let place = places.around(query, x);
         self.counters.avoided += u64::from(places.queries == asked);
         (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
         (known.clearance_mm, known.triangle) = (place.clearance_mm, None);

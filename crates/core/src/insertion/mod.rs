@@ -1,5 +1,6 @@
 //! Pushing, pulling and turning a device through a sheath into a vessel.
 
+mod builder;
 mod command;
 mod nodes;
 mod report;
@@ -8,6 +9,7 @@ mod simulation;
 
 pub use crate::contact::{Contact, WallProperties, WallRegion};
 pub use crate::methods::State;
+pub use builder::SimulationBuilder;
 pub use command::{Command, ScriptLine, commands};
 pub use nodes::nodes_from_tip;
 pub use report::{Energy, StepReport};

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use crate::contact::Counters;
 use crate::device::Device;
-use crate::error::vector;
-use crate::insertion::{Command, ScriptLine, Sheath, StepReport, WallProperties, commands};
-use crate::methods::{Method, MethodChoice, State};
+use crate::insertion::{
+    Command, ScriptLine, Sheath, SimulationBuilder, StepReport, WallProperties, commands,
+};
+use crate::methods::{Method, State};
 use crate::shape::Shape;
-use crate::vessel::{NoStore, Wall, WallQuery, WallStore};
+use crate::vessel::{Wall, WallQuery};
 use crate::{Error, Result};
 
 /// What surrounds a method's unknowns: it may read all of it and change none.
@@ -31,21 +32,21 @@ pub struct Surroundings<'a> {
 /// What surrounds the device is shared by all clones of a simulation, which may run on any threads; what a clone has of its own is its
 /// state, and with its first step a workspace.
 pub struct Simulation {
-    scene: Arc<Environment>,
-    method: Box<dyn Method>,
+    pub(super) scene: Arc<Environment>,
+    pub(super) method: Box<dyn Method>,
 }
 
 /// What a simulation never changes.
-struct Environment {
-    wall: Wall,
-    properties: WallProperties,
-    query: WallQuery,
-    sheath: Sheath,
-    device: Device,
+pub(super) struct Environment {
+    pub(super) wall: Wall,
+    pub(super) properties: WallProperties,
+    pub(super) query: WallQuery,
+    pub(super) sheath: Sheath,
+    pub(super) device: Device,
 }
 
 impl Environment {
-    fn surroundings(&self) -> Surroundings<'_> {
+    pub(super) fn surroundings(&self) -> Surroundings<'_> {
         let Self { wall, properties, query, sheath, device } = self;
         Surroundings { wall, properties, query, sheath, device }
     }
@@ -57,89 +58,10 @@ impl Clone for Simulation {
     }
 }
 
-/// How far in front of the sheath's mouth, mm, the inside test looks: the mouth itself may lie in the plane of an
-/// opening, where inside and outside meet.
-const MOUTH_MM: f64 = 1e-3;
-
 impl Simulation {
-    /// A device at the mouth of the sheath, nothing inserted.
-    ///
-    /// # Errors
-    /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
-    /// tell, or method options out of range.
-    pub fn new(wall: Wall, device: Device, sheath: Sheath, method: &MethodChoice) -> Result<Self> {
-        Self::with_properties(wall, WallProperties::default(), device, sheath, method)
-    }
-
-    /// As [`Simulation::new`], with a wall of given modulus.
-    ///
-    /// # Errors
-    /// As [`Simulation::new`], and wall properties out of range.
-    pub fn with_properties(
-        wall: Wall,
-        properties: WallProperties,
-        device: Device,
-        sheath: Sheath,
-        method: &MethodChoice,
-    ) -> Result<Self> {
-        Self::from_store(wall, properties, device, sheath, method, &NoStore)
-    }
-
-    /// As [`Simulation::with_properties`], with the wall that is felt from `store`.
-    ///
-    /// # Errors
-    /// As [`Simulation::with_properties`].
-    pub fn from_store(
-        wall: Wall,
-        properties: WallProperties,
-        device: Device,
-        sheath: Sheath,
-        method: &MethodChoice,
-        store: &dyn WallStore,
-    ) -> Result<Self> {
-        check_elements(&device, method)?;
-        let start = |surroundings: &Surroundings<'_>| method.start_from(surroundings, store);
-        Self::with_method(wall, properties, device, sheath, start)
-    }
-
-    /// As [`Simulation::with_properties`], with any method: `start` makes it for these surroundings.
-    ///
-    /// # Errors
-    /// As [`Simulation::with_properties`], and what `start` refuses.
-    pub fn with_method(
-        wall: Wall,
-        properties: WallProperties,
-        device: Device,
-        sheath: Sheath,
-        start: impl FnOnce(&Surroundings<'_>) -> Result<Box<dyn Method>>,
-    ) -> Result<Self> {
-        properties.check(wall.mesh())?;
-        if !wall.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
-            let p = sheath.position_mm;
-            let openings: Vec<String> = wall
-                .openings()
-                .iter()
-                .map(|o| {
-                    format!(
-                        "{} at [{:.1}, {:.1}, {:.1}]",
-                        o.index, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z
-                    )
-                })
-                .collect();
-            return Err(Error::parameter(
-                "sheath.position_mm",
-                vector(&p),
-                format!(
-                    "is outside the vessel: place it inside, or name an opening (sheath.opening); openings: {}",
-                    if openings.is_empty() { "none".to_owned() } else { openings.join(", ") }
-                ),
-            ));
-        }
-        let query = WallQuery::new(&wall)?;
-        check_mouth(&query, &device, &sheath)?;
-        let scene = Environment { wall, properties, query, sheath, device };
-        let method = start(&scene.surroundings())?;
-        Ok(Self { scene: Arc::new(scene), method })
+    /// A simulation of a device that enters `wall` through `sheath`, to be built.
+    pub fn builder<'a>(wall: Wall, device: Device, sheath: Sheath) -> SimulationBuilder<'a> {
+        SimulationBuilder::new(wall, device, sheath)
     }
 
     /// Carries out one command. After an error the state is as before, to the bit.
@@ -200,57 +122,6 @@ impl Simulation {
     /// The sheath.
     pub fn sheath(&self) -> &Sheath {
         &self.scene.sheath
-    }
-}
-
-/// A device so many times as thick as the vessel comes from another unit.
-const MISFIT: f64 = 5.0;
-
-/// Most elements of a device: some kilobytes each.
-const ELEMENT_LIMIT: f64 = 1e5;
-
-/// Refuses a device that its method would cut into more elements than fit a memory.
-fn check_elements(device: &Device, method: &MethodChoice) -> Result<()> {
-    let element_mm = match method {
-        MethodChoice::Kirchhoff(options) => options.element_mm,
-        MethodChoice::Li2011Dense(options) | MethodChoice::Li2011Banded(options) => options.element_mm,
-    };
-    let elements = device.length_mm() / element_mm;
-    if element_mm > 0.0 && elements > ELEMENT_LIMIT {
-        return Err(Error::parameter(
-            "method.element_mm",
-            element_mm,
-            format!(
-                "cuts the device of {} mm into {elements:.1e} elements, and more than {ELEMENT_LIMIT:.0e} take gigabytes: use \
-                 longer elements or a shorter device",
-                device.length_mm()
-            ),
-        ));
-    }
-    Ok(())
-}
-
-/// Refuses a device that is in the wall from the start. Further in a vessel may be narrower: there the device does not pass.
-fn check_mouth(query: &WallQuery, device: &Device, sheath: &Sheath) -> Result<()> {
-    let Some(near) = query.nearest(&sheath.position_mm, f64::MAX) else { return Ok(()) };
-    // At the rim of an opening the distance has no sign.
-    let room_mm = near.distance_mm.abs();
-    let thickest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
-    match device.sections().iter().map(|s| s.radius_mm).enumerate().max_by(thickest) {
-        Some((section, radius_mm)) if radius_mm > room_mm => Err(Error::parameter(
-            format!("device.section[{section}].radius_mm"),
-            radius_mm,
-            format!(
-                "the wall is {room_mm:.3} mm from the sheath's mouth at {}: use a thinner device or move the sheath{}",
-                vector(&sheath.position_mm),
-                if radius_mm > MISFIT * room_mm {
-                    ", or check vessel.unit_mm: they are not of one scale"
-                } else {
-                    ""
-                }
-            ),
-        )),
-        _ => Ok(()),
     }
 }
 
@@ -346,21 +217,14 @@ pub fn script_commands(script: &[ScriptLine], device: &Device) -> Result<Vec<Com
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::methods::kirchhoff::KirchhoffOptions;
 
     #[test]
-    fn turns_without_meaning_and_elements_without_number_are_refused() {
+    fn turns_without_meaning_are_refused() {
         let told = |rad: f64| check_command(Command::rotate(rad), 0.0, 100.0).unwrap_err().to_string();
         for rad in [1e308, -1e5, f64::MAX] {
             assert!(told(rad).contains("more than 1000 turns"), "{}", told(rad));
         }
         assert!(told(f64::NAN).contains("finite"));
         assert!(check_command(Command::rotate(-6000.0), 0.0, 100.0).is_ok());
-        let wire = Device::uniform(9000.0, 0.4, 10.0).unwrap();
-        let method = |element_mm| {
-            MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, ..KirchhoffOptions::default() })
-        };
-        assert!(check_elements(&wire, &method(1e-3)).unwrap_err().to_string().contains("gigabytes"));
-        assert!(check_elements(&wire, &method(0.5)).is_ok());
     }
 }

@@ -1,21 +1,20 @@
 //! Whole methods that answer a command with the next equilibrium, behind one trait.
 
 pub mod kirchhoff;
-pub mod li2011;
 mod state;
 
-pub use state::{Content, NodesState, State, check_inserted};
+pub use state::{ChainState, Content, NodesState, State, TouchedPlane, check_inserted};
+
+use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
 use crate::contact::Counters;
 use crate::insertion::{Command, StepReport, Surroundings};
-use crate::rod::{PLAIN, TWISTED};
 use crate::shape::Shape;
-use crate::vessel::{NoStore, WallStore};
-use kirchhoff::{Kirchhoff, KirchhoffOptions};
-use li2011::{Li2011, Li2011Options, LinearSolver};
+use crate::vessel::WallStore;
+use kirchhoff::KirchhoffOptions;
 
 /// A method keeps its own unknowns from step to step and moves them by commands.
 ///
@@ -56,64 +55,43 @@ pub trait Method: Send {
     fn boxed_clone(&self) -> Box<dyn Method>;
 }
 
-/// A method by name, with its options: the `[method]` table of a scene.
+/// A method with its options: what a scene names in `[method]`, and what a simulation starts with.
+///
+/// A scene reads its table into any type that has this and `serde`'s `Deserialize`: this crate's is [`OwnMethod`].
+pub trait MethodChoice: Debug {
+    /// The name used in scene files and results.
+    fn name(&self) -> &'static str;
+
+    /// The method at rest at the sheath, nothing inserted; walls that take long to make come from `store`.
+    ///
+    /// # Errors
+    /// Options out of range, and what the method cannot do.
+    fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>>;
+}
+
+/// The methods of this crate, as `[method]` of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name")]
-pub enum MethodChoice {
+pub enum OwnMethod {
     /// The exact rod in equilibrium with the wall.
     #[serde(rename = "kirchhoff")]
     Kirchhoff(KirchhoffOptions),
-    /// Li et al. 2011 with the paper's dense solve.
-    #[serde(rename = "li2011-dense")]
-    Li2011Dense(Li2011Options),
-    /// Li et al. 2011, the same equations solved in O(n).
-    #[serde(rename = "li2011-banded")]
-    Li2011Banded(Li2011Options),
 }
 
-impl Default for MethodChoice {
+impl Default for OwnMethod {
     fn default() -> Self {
         Self::Kirchhoff(KirchhoffOptions::default())
     }
 }
 
-impl MethodChoice {
-    /// The name used in scene files and results.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Kirchhoff(_) => kirchhoff::NAME,
-            Self::Li2011Dense(_) => LinearSolver::Dense.method(),
-            Self::Li2011Banded(_) => LinearSolver::Banded.method(),
-        }
+impl MethodChoice for OwnMethod {
+    fn name(&self) -> &'static str {
+        let Self::Kirchhoff(options) = self;
+        options.name()
     }
 
-    /// The method at rest at the sheath, nothing inserted.
-    ///
-    /// # Errors
-    /// Options out of range.
-    pub fn start(&self, surroundings: &Surroundings<'_>) -> Result<Box<dyn Method>> {
-        self.start_from(surroundings, &NoStore)
-    }
-
-    /// As [`MethodChoice::start`], with the wall that is felt from `store`.
-    ///
-    /// # Errors
-    /// As [`MethodChoice::start`].
-    pub fn start_from(
-        &self,
-        surroundings: &Surroundings<'_>,
-        store: &dyn WallStore,
-    ) -> Result<Box<dyn Method>> {
-        Ok(match self {
-            // A shape turns with the device, and friction twists it.
-            Self::Kirchhoff(options) if surroundings.device.is_shaped() || surroundings.properties.rubs() => {
-                Box::new(Kirchhoff::<TWISTED>::new(*options, surroundings, store)?)
-            }
-            Self::Kirchhoff(options) => Box::new(Kirchhoff::<PLAIN>::new(*options, surroundings, store)?),
-            Self::Li2011Dense(options) => Box::new(Li2011::new(*options, LinearSolver::Dense, surroundings)?),
-            Self::Li2011Banded(options) => {
-                Box::new(Li2011::new(*options, LinearSolver::Banded, surroundings)?)
-            }
-        })
+    fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {
+        let Self::Kirchhoff(options) = self;
+        options.start(surroundings, store)
     }
 }

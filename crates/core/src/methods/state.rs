@@ -6,9 +6,9 @@ use nalgebra::Rotation3;
 use serde::{Deserialize, Serialize};
 
 use super::kirchhoff::KirchhoffState;
-use super::li2011::Li2011State;
 use crate::device::Device;
 use crate::insertion::StepReport;
+use crate::shape::Shape;
 use crate::{Error, Result, Vec3};
 
 /// The state of an insertion: with vessel, device, sheath and options all that its next step depends on.
@@ -28,8 +28,8 @@ pub struct State {
 pub enum Content {
     /// The exact rod.
     Kirchhoff(#[serde(with = "shared")] Arc<KirchhoffState>),
-    /// The method of Li et al. 2011.
-    Li2011(Box<Li2011State>),
+    /// A method that keeps nodes, tangents and the planes that hold them.
+    Chain(Box<ChainState>),
     /// A method that keeps nodes and triads alone.
     Nodes(Box<NodesState>),
 }
@@ -52,6 +52,30 @@ mod shared {
     ) -> Result<Arc<T>, D::Error> {
         T::deserialize(deserializer).map(Arc::new)
     }
+}
+
+/// Nodes and tangents, and the planes of the wall that they touch.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct ChainState {
+    /// The centre line.
+    pub shape: Shape,
+    /// What the last step told.
+    pub report: StepReport,
+    /// The plane that each node touches, **tip first**: so nodes keep their index.
+    pub touched: Vec<Option<TouchedPlane>>,
+}
+
+/// The plane of a wall triangle, offset by the device's radius.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TouchedPlane {
+    /// Unit normal n of the triangle, into the lumen.
+    pub normal: Vec3,
+    /// Offset d in mm: the device's axis touches where n·x = d.
+    pub offset_mm: f64,
+    /// The wall triangle.
+    pub triangle: u32,
+    /// How far the device's surface is in the wall, mm.
+    pub depth_mm: f64,
 }
 
 /// Nodes and triads of a chain.
@@ -84,7 +108,7 @@ impl State {
     pub fn report(&self) -> &StepReport {
         match &self.content {
             Content::Kirchhoff(state) => state.report(),
-            Content::Li2011(state) => state.report(),
+            Content::Chain(state) => &state.report,
             Content::Nodes(state) => &state.report,
         }
     }

@@ -19,7 +19,7 @@
 //! opening = 0                           # or: position_mm and direction
 //!
 //! [method]
-//! name = "li2011-banded"
+//! name = "kirchhoff"                    # endowire-methods knows more
 //! element_mm = 2.0
 //!
 //! [[script]]
@@ -29,4 +29,4 @@
 
 mod spec;
 
-pub use spec::{DeviceSpec, Scene, SheathSpec, VesselSpec};
+pub use spec::{DeviceSpec, Scene, SceneOf, SheathSpec, VesselSpec};

@@ -3,21 +3,22 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use serde::de::IgnoredAny;
+use serde::de::{DeserializeOwned, IgnoredAny};
 
 use crate::device::{Device, Section};
 use crate::input::from_toml;
 use crate::insertion::{Command, ScriptLine, Sheath, Simulation, WallProperties, script_commands};
-use crate::methods::MethodChoice;
-use crate::vessel::{
-    CentrelineTree, NoStore, Resolution, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint,
-};
+use crate::methods::{MethodChoice, OwnMethod};
+use crate::vessel::{CentrelineTree, Resolution, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint};
 use crate::{Error, Result, Vec3};
 
-/// A scene as its file says it, with the folder that its paths start from.
+/// A scene whose `[method]` is one of this crate's: the exact rod.
+pub type Scene = SceneOf<OwnMethod>;
+
+/// A scene as its file says it, with the folder that its paths start from. `M` is what its `[method]` may be.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Scene {
+pub struct SceneOf<M> {
     /// Name of the scene; the file's stem if absent.
     #[serde(default)]
     pub name: String,
@@ -32,7 +33,7 @@ pub struct Scene {
     pub sheath: SheathSpec,
     /// How its equilibrium is found.
     #[serde(default)]
-    pub method: MethodChoice,
+    pub method: M,
     /// What the hand does.
     #[serde(default)]
     pub script: Vec<ScriptLine>,
@@ -174,7 +175,7 @@ fn check_name(name: &str) -> Result<()> {
     Ok(())
 }
 
-impl Scene {
+impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// Reads a scene file.
     ///
     /// # Errors
@@ -216,25 +217,17 @@ impl Scene {
         }
     }
 
-    /// The files that the scene names, in the order of its tables: with [`Scene::text`] all that it is made of.
+    /// The files that the scene names, in the order of its tables: with [`SceneOf::text`] all that it is made of.
     pub fn input_paths(&self) -> Vec<PathBuf> {
         let named = [&self.vessel.file, &self.vessel.tree, &self.device.file];
         named.into_iter().flatten().map(|path| self.resolve(path)).collect()
     }
 
-    /// Reads or builds the vessel wall.
+    /// Reads the vessel wall or builds it, or has it from `store` ([`NoStore`](crate::vessel::NoStore) keeps nothing).
     ///
     /// # Errors
     /// A missing or unusable file, options that do not belong together, a wall that cannot be used.
-    pub fn wall(&self) -> Result<Wall> {
-        self.wall_from(&NoStore)
-    }
-
-    /// As [`Scene::wall`], from `store`.
-    ///
-    /// # Errors
-    /// As [`Scene::wall`].
-    pub fn wall_from(&self, store: &dyn WallStore) -> Result<Wall> {
+    pub fn wall(&self, store: &dyn WallStore) -> Result<Wall> {
         let path = self.vessel_path()?;
         let spec = &self.vessel;
         if spec.tree.is_some() {
@@ -309,20 +302,12 @@ impl Scene {
         script_commands(&self.script, device)
     }
 
-    /// The simulation, nothing inserted yet.
+    /// The simulation, nothing inserted yet, with walls from `store`.
     ///
     /// # Errors
-    /// As [`Scene::wall`], [`Scene::device`], [`Scene::sheath`] and [`Simulation::new`].
-    pub fn simulation(&self) -> Result<Simulation> {
-        self.simulation_from(&NoStore)
-    }
-
-    /// As [`Scene::simulation`], with walls from `store`.
-    ///
-    /// # Errors
-    /// As [`Scene::simulation`].
-    pub fn simulation_from(&self, store: &dyn WallStore) -> Result<Simulation> {
-        let wall = self.wall_from(store)?;
+    /// As [`SceneOf::wall`], [`SceneOf::device`], [`SceneOf::sheath`] and [`SimulationBuilder::build`](crate::insertion::SimulationBuilder::build).
+    pub fn simulation(&self, store: &dyn WallStore) -> Result<Simulation> {
+        let wall = self.wall(store)?;
         // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.
         let size_mm = wall.mesh().bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
         let hint =
@@ -340,7 +325,11 @@ impl Scene {
 
     fn simulation_in(&self, wall: Wall, store: &dyn WallStore) -> Result<Simulation> {
         let sheath = self.sheath(&wall)?;
-        Simulation::from_store(wall, self.vessel.wall.clone(), self.device()?, sheath, &self.method, store)
+        Simulation::builder(wall, self.device()?, sheath)
+            .properties(self.vessel.wall.clone())
+            .method(&self.method)
+            .store(store)
+            .build()
             .map_err(|error| match error {
                 // What is wrong with a surface is wrong with its file.
                 Error::Mesh(reason) => {

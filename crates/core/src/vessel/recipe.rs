@@ -22,9 +22,9 @@ pub enum WallRecipe<'a> {
     },
     /// The even mesh of a wall that devices feel, [`condition`].
     Even {
-        /// The wall's mesh.
-        surface: &'a SurfaceMesh,
-        /// What may be done to it.
+        /// The wall.
+        wall: &'a Wall,
+        /// What may be done to its mesh.
         options: Conditioning,
     },
 }
@@ -38,10 +38,10 @@ impl WallRecipe<'_> {
         match self {
             Self::Generated { tree, resolution } => Ok(GeneratedWall::new(tree, *resolution)?.wall),
             Self::Repaired { surface } => Wall::from_surface(surface),
-            Self::Even { surface, options } => {
-                let even = condition(surface, options)?;
+            Self::Even { wall, options } => {
+                let even = condition(wall.mesh(), options)?;
                 // What is even already keeps the numbers of its vertices.
-                if even.changed { Wall::welded(&even.mesh) } else { Wall::from_sound(even.mesh) }
+                if even.changed { Wall::welded(&even.mesh) } else { Ok((*wall).clone()) }
             }
         }
     }
@@ -83,10 +83,11 @@ mod tests {
         let wall = tube();
         let mut moved = wall.mesh().clone();
         moved.vertices_mm[7].x = f64::from_bits(moved.vertices_mm[7].x.to_bits() + 1);
+        let moved_wall = Wall::from_sound(moved.clone()).unwrap();
         let coarse = Conditioning { deviation_mm: 0.2, ..Conditioning::default() };
         let fewer = Conditioning { most_triangles: 1000, ..Conditioning::default() };
         let generated = |tree, resolution| WallRecipe::Generated { tree, resolution };
-        let even = |surface, options| WallRecipe::Even { surface, options };
+        let even = |wall, options| WallRecipe::Even { wall, options };
         let recipes = [
             generated(&trees[0], Resolution::EdgeMm(1.0)),
             generated(&trees[0], Resolution::EdgeMm(2.0)),
@@ -94,10 +95,10 @@ mod tests {
             generated(&trees[1], Resolution::EdgeMm(1.0)),
             WallRecipe::Repaired { surface: wall.mesh() },
             WallRecipe::Repaired { surface: &moved },
-            even(wall.mesh(), Conditioning::default()),
-            even(&moved, Conditioning::default()),
-            even(wall.mesh(), coarse),
-            even(wall.mesh(), fewer),
+            even(&wall, Conditioning::default()),
+            even(&moved_wall, Conditioning::default()),
+            even(&wall, coarse),
+            even(&wall, fewer),
         ];
         let written: std::collections::BTreeSet<String> =
             recipes.iter().map(|recipe| serde_json::to_string(recipe).unwrap()).collect();

@@ -7,7 +7,9 @@ mod raster;
 mod view3d;
 mod wall;
 
-pub(crate) use devices::{layers_in_beam, pixels_of};
+pub(crate) use devices::layers_in_beam;
+#[cfg(feature = "gpu")]
+pub(crate) use devices::pixels_of;
 pub(crate) use fluoro::CpuPaths;
 pub(crate) use wall::{check_closed, check_drawable, wall_crossings};
 

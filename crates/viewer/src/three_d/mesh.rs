@@ -1,6 +1,5 @@
 //! Triangles of the 3D view in view coordinates, ready for either engine.
 
-use bytemuck::{Pod, Zeroable};
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
@@ -12,7 +11,8 @@ const CREASE: f64 = 0.766;
 
 /// A corner of a triangle.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "gpu", derive(bytemuck::Pod, bytemuck::Zeroable))]
 pub(crate) struct Vertex {
     pub(crate) position: [f32; 3],
     pub(crate) normal: [f32; 3],

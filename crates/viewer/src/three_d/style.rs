@@ -28,7 +28,8 @@ pub(crate) struct Style {
     sheet: Vec4,
     /// Tangents of half the opening angles; nearest and farthest distance of the wall.
     frustum: Vec4,
-    /// Near and far plane.
+    /// Near and far plane, for the shader alone.
+    #[cfg(feature = "gpu")]
     planes: Vec4,
 }
 
@@ -43,11 +44,13 @@ impl Style {
             lamp: Vec3::new(-0.45, 0.62, 0.64).normalize().extend(0.35),
             sheet: Vec4::new(0.22, 0.85, 2.0, 0.72),
             frustum: Vec4::new(tx, ty, front, rear),
+            #[cfg(feature = "gpu")]
             planes: Vec4::new(camera.near as f32, camera.far as f32, 0.0, 0.0),
         }
     }
 
     /// The members in order, as the shader's uniform has them.
+    #[cfg(feature = "gpu")]
     pub(crate) fn uniform(&self) -> [[f32; 4]; 7] {
         [self.background, self.wall, self.device, self.lamp, self.sheet, self.frustum, self.planes]
             .map(|v| v.to_array())

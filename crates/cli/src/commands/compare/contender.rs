@@ -2,29 +2,16 @@
 
 use endowire_core::device::Device;
 use endowire_core::insertion::{Sheath, Simulation, WallProperties};
-use endowire_core::methods::MethodChoice;
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::methods::li2011::{Chain, Li2011Options, banded, dense};
-use endowire_core::reference::{at_end, unit_rod};
 use endowire_core::statics::LoadKind;
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result, Vec3};
-use endowire_methods::{Insertion, InsertionOptions, Task, by_name};
-
-/// All names, ours first.
-pub(crate) fn names() -> Vec<&'static str> {
-    let mut names = vec!["kirchhoff", "li2011-dense", "li2011-banded"];
-    names.extend(endowire_methods::NAMES);
-    names
-}
-
-/// A name that [`names`] does not have.
-fn unknown(method: &str) -> Error {
-    Error::parameter("method", method, format!("the methods are {}", names().join(", ")))
-}
+use endowire_methods::li2011::{Chain, banded, dense};
+use endowire_methods::{AnyMethod, static_model};
+use endowire_verify::{at_end, unit_rod};
 
 /// Tolerance of `kirchhoff` that compares with those of the others in an insertion. They may leave a force of 0.01 EI/L² out of balance
-/// in all ([`InsertionOptions`]); this is the part of the largest force that may be left at a node, and walls push with up to
+/// in all ([`endowire_methods::InsertionOptions`]); this is the part of the largest force that may be left at a node, and walls push with up to
 /// 24 EI/L² in these scenes.
 pub(crate) const INSERTION_TOLERANCE: f64 = 1e-4;
 
@@ -53,23 +40,16 @@ pub(crate) fn insertion_within(
     device: Device,
     sheath: Sheath,
 ) -> Result<Simulation> {
-    // Wall stiffness is per node in Li et al.: the same wall as the others' is the modulus times the element.
-    let li = Li2011Options { element_mm, wall_stiffness_n_per_mm: properties.modulus_n_per_mm2 * element_mm };
-    let choice = match method {
-        "kirchhoff" => {
-            MethodChoice::Kirchhoff(KirchhoffOptions { element_mm, tolerance, ..Default::default() })
+    let mut choice = AnyMethod::named(method)?.with_element_mm(element_mm);
+    match &mut choice {
+        AnyMethod::Kirchhoff(options) => options.tolerance = tolerance,
+        // Wall stiffness is per node in Li et al.: the same wall as the others' is the modulus times the element.
+        AnyMethod::Li2011Dense(options) | AnyMethod::Li2011Banded(options) => {
+            options.wall_stiffness_n_per_mm = properties.modulus_n_per_mm2 * element_mm;
         }
-        "li2011-dense" => MethodChoice::Li2011Dense(li),
-        "li2011-banded" => MethodChoice::Li2011Banded(li),
-        _ => {
-            let model = by_name(method, Task::Insertion).ok_or_else(|| unknown(method))?;
-            let options = InsertionOptions { element_mm, ..Default::default() };
-            return Simulation::with_method(wall, properties, device, sheath, |surroundings| {
-                Ok(Box::new(Insertion::new(model, options, surroundings)?))
-            });
-        }
-    };
-    Simulation::with_properties(wall, properties, device, sheath, &choice)
+        _ => {}
+    }
+    Simulation::builder(wall, device, sheath).properties(properties).method(&choice).build()
 }
 
 /// Out-of-balance force of a static solve on n elements, in EI/L² over 1/n²: below what the elements get wrong.
@@ -105,7 +85,8 @@ pub(crate) fn cantilever(method: &str, elements: usize, a: f64) -> Result<(Vec3,
             Ok((x[elements - 1], 1))
         }
         _ => {
-            let model = by_name(method, Task::Cantilever).ok_or_else(|| unknown(method))?;
+            let model = static_model(method)
+                .ok_or_else(|| Error::parameter("method", method, "has no static solution"))?;
             let tolerance = STATIC_TOLERANCE / (elements * elements) as f64;
             let force = Vec3::new(0.0, -a, 0.0);
             let solution = endowire_methods::cantilever(&*model, elements, force, tolerance)?;

@@ -13,8 +13,9 @@ use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Surroundings, WallProperties};
 use endowire_core::methods::Method;
-use endowire_core::methods::li2011::{Chain, Li2011, Li2011Options, LinearSolver, banded, dense};
 use endowire_core::vessel::{GeneratedWall, Resolution, Wall, WallQuery, anatomy};
+use endowire_methods::NAMES;
+use endowire_methods::li2011::{Chain, Li2011, Li2011Options, LinearSolver, banded, dense};
 use serde::Serialize;
 
 use crate::args::TimingArgs;
@@ -154,9 +155,8 @@ fn paper_ms(nodes: usize) -> Option<f64> {
 
 /// The methods asked for, in the order of the table.
 fn methods(asked: &[String]) -> Vec<&'static str> {
-    let mut known = contender::names();
-    known.retain(|name| asked.iter().any(|wanted| wanted == "all" || wanted == name));
-    known
+    let is_asked = |name: &&str| asked.iter().any(|wanted| wanted == "all" || wanted == name);
+    NAMES.into_iter().filter(is_asked).collect()
 }
 
 /// Element length with which `nodes` nodes, the sheath's too, are inserted; the timed increments stay within one element.

@@ -33,7 +33,6 @@ impl<const C: usize> Tools<C> {
             &mut self.memory,
             &mut self.friction,
             softest(environment.surroundings.device),
-            environment.options.skip,
         );
         let mut least: Option<(f64, PhysicalEnd)> = None;
         for (index, point) in mesh.points.iter().enumerate() {

@@ -18,13 +18,13 @@ pub(super) const MOST_POINTS: usize = 64;
 
 /// Elements and contact points of an inserted length.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Mesh {
+pub struct Mesh {
     /// Arc length from the tip of every node, mm, sheath first.
-    pub(crate) from_tip_mm: Vec<f64>,
+    pub from_tip_mm: Vec<f64>,
     /// Elements, sheath first.
-    pub(crate) elements: Vec<ElementData>,
+    pub elements: Vec<ElementData>,
     /// Contact points, tip first.
-    pub(crate) points: Vec<ContactPoint>,
+    pub points: Vec<ContactPoint>,
 }
 
 impl Mesh {
@@ -47,13 +47,7 @@ impl Mesh {
     ///
     /// Nodes are marks on the device, at whole element lengths from the tip; the first element is between half and one
     /// and a half elements long, shorter only where that is all there is.
-    pub(crate) fn build(
-        &mut self,
-        device: &Device,
-        inserted_mm: f64,
-        element_mm: f64,
-        modulus_n_per_mm2: f64,
-    ) {
+    pub fn build(&mut self, device: &Device, inserted_mm: f64, element_mm: f64, modulus_n_per_mm2: f64) {
         crate::insertion::nodes_from_tip(inserted_mm, element_mm, &mut self.from_tip_mm);
         // Only what one device needs is written: of elements that were here before the rest is empty.
         self.elements.resize(self.from_tip_mm.len() - 1, ElementData::EMPTY);

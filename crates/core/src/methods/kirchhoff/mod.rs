@@ -18,7 +18,7 @@ mod command;
 mod configuration;
 mod guess;
 mod hold;
-pub(crate) mod mesh;
+mod mesh;
 mod readout;
 mod repeat;
 mod search;
@@ -28,6 +28,7 @@ mod state;
 mod substep;
 mod workspace;
 
+pub use mesh::Mesh;
 pub use state::KirchhoffState;
 
 use std::sync::Arc;
@@ -37,12 +38,11 @@ use serde::{Deserialize, Serialize};
 use crate::contact::{Counters, FeltWall};
 use crate::device::Device;
 use crate::insertion::{Command, StepReport, Surroundings};
-use crate::methods::{Content, Method, State};
-use crate::rod::Layout;
+use crate::methods::{Content, Method, MethodChoice, State};
+use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
 use crate::vessel::WallStore;
 use crate::{Error, Result};
-use mesh::Mesh;
 use state::Belongs;
 use workspace::Workspace;
 
@@ -56,19 +56,33 @@ pub struct KirchhoffOptions {
     pub tolerance: f64,
     /// Most Newton iterations of one solution; a command may take ten times as many.
     pub max_iterations: usize,
-    /// Whether work that cannot change the result is skipped; off only to show that it does not.
-    pub skip: bool,
 }
 
 impl Default for KirchhoffOptions {
     fn default() -> Self {
-        Self { element_mm: 2.0, tolerance: 1e-9, max_iterations: 500, skip: true }
+        Self { element_mm: 2.0, tolerance: 1e-9, max_iterations: 500 }
+    }
+}
+
+impl MethodChoice for KirchhoffOptions {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {
+        // A shape turns with the device, and friction twists it.
+        let twists = surroundings.device.is_shaped() || surroundings.properties.rubs();
+        Ok(if twists {
+            Box::new(Kirchhoff::<TWISTED>::new(*self, surroundings, store)?)
+        } else {
+            Box::new(Kirchhoff::<PLAIN>::new(*self, surroundings, store)?)
+        })
     }
 }
 
 /// A residual above this tells nothing of an equilibrium.
 const LARGEST_TOLERANCE: f64 = 1e-2;
-/// Most elements.
+/// Most elements of a device: some kilobytes each.
 const ELEMENT_LIMIT: f64 = 100_000.0;
 
 /// The exact rod as an insertion method, with or without material angles.
@@ -108,7 +122,9 @@ impl<const C: usize> Kirchhoff<C> {
                 "method.element_mm",
                 options.element_mm,
                 format!(
-                    "cuts the device of {length_mm} mm into more than {ELEMENT_LIMIT} elements: use longer ones"
+                    "cuts the device of {length_mm} mm into {:.1e} elements, and more than {ELEMENT_LIMIT:.0e} take gigabytes: use \
+                     longer elements or a shorter device",
+                    length_mm / options.element_mm
                 ),
             ));
         }
@@ -233,7 +249,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
 }
 
 /// The name of the method in scenes and states.
-pub(crate) const NAME: &str = "kirchhoff";
+const NAME: &str = "kirchhoff";
 
 /// Meshes what is inserted.
 fn meshed(environment: &Environment<'_>, inserted_mm: f64, mesh: &mut Mesh) {

@@ -31,7 +31,6 @@ impl<const C: usize> Tools<C> {
             &mut self.memory,
             &mut self.friction,
             softest(surroundings.device),
-            environment.options.skip,
         );
         let stored = self.newton.assembly.energy;
         report.energy = Energy { bend: stored.bend, twist: stored.twist, wall: 0.0 };

@@ -81,7 +81,6 @@ impl<const C: usize> Tools<C> {
             &mut self.memory,
             &mut self.friction,
             softest(surroundings.device),
-            options.skip,
         );
         let candidates = (start, &*mesh, &mut *rod);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked);

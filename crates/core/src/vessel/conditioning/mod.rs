@@ -25,6 +25,8 @@ mod spikes;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
+
 use super::SurfaceMesh;
 use super::wall::validate;
 use crate::{Error, Result, Vec3};
@@ -84,9 +86,9 @@ impl Conditioning {
 
 /// A conditioned surface, and how it compares with the given one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Conditioned {
-    /// The mesh, counter-clockwise from outside as the given one.
-    pub mesh: SurfaceMesh,
+pub struct Conditioned<'a> {
+    /// The mesh, counter-clockwise from outside as the given one; that one itself if it is even already.
+    pub mesh: Cow<'a, SurfaceMesh>,
     /// Whether it is another than the given one.
     pub changed: bool,
     /// Largest distance found between the two surfaces, both ways, mm; 0 if it was not measured.
@@ -111,14 +113,14 @@ pub struct Conditioned {
     pub too_many: bool,
 }
 
-impl Conditioned {
-    fn new(mesh: SurfaceMesh, changed: bool, deviation: &Deviation, even: &Evenness, too_many: bool) -> Self {
+impl<'a> Conditioned<'a> {
+    fn new(mesh: Cow<'a, SurfaceMesh>, deviation: &Deviation, even: &Evenness, too_many: bool) -> Self {
         let mut distances = deviation.distances_mm.concat();
         distances.sort_by(f64::total_cmp);
         let at = |part: f64| distances.get((distances.len() as f64 * part) as usize).copied().unwrap_or(0.0);
         Self {
+            changed: matches!(mesh, Cow::Owned(_)),
             mesh,
-            changed,
             deviation_mm: distances.last().copied().unwrap_or(0.0),
             usual_deviation_mm: at(0.99),
             mean_deviation_mm: distances.iter().sum::<f64>() / distances.len().max(1) as f64,
@@ -139,7 +141,7 @@ impl Conditioned {
 /// # Errors
 /// [`Error::Mesh`] if there are no triangles, an index is out of range or a coordinate is not finite; [`Error::Parameter`] for an
 /// option out of its range.
-pub fn condition(surface: &SurfaceMesh, options: &Conditioning) -> Result<Conditioned> {
+pub fn condition<'a>(surface: &'a SurfaceMesh, options: &Conditioning) -> Result<Conditioned<'a>> {
     options.check()?;
     validate(surface)?;
     let reference = Reference::new(surface);
@@ -147,7 +149,7 @@ pub fn condition(surface: &SurfaceMesh, options: &Conditioning) -> Result<Condit
     let even = Evenness::of(&corners, |v| corners.at(v));
     let fine = evenness::is_fine_enough(&mut corners, &reference, options);
     if even.is_even() && fine && fairing::roughness(&corners) <= ROUGH {
-        return Ok(Conditioned::new(surface.clone(), false, &Deviation::default(), &even, false));
+        return Ok(Conditioned::new(Cow::Borrowed(surface), &Deviation::default(), &even, false));
     }
     let remesher = Remesher { reference: &reference, most_triangles: options.most_triangles };
     let mut curvature = Vec::new();
@@ -175,7 +177,7 @@ pub fn condition(surface: &SurfaceMesh, options: &Conditioning) -> Result<Condit
         if options.measured { deviation::measure(&corners, &at, &reference) } else { Deviation::default() };
     let even = Evenness::of(&corners, |v| at[v as usize]);
     let mesh = corners.surface(|v| at[v as usize]);
-    Ok(Conditioned::new(mesh, true, &deviation, &even, too_many))
+    Ok(Conditioned::new(Cow::Owned(mesh), &deviation, &even, too_many))
 }
 
 fn faired(corners: &mut Corners, reference: &Reference, last: bool) -> Vec<Vec3> {

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::*;
 use crate::vessel::{GeneratedWall, Resolution, Wall, anatomy, check};
 
-fn conditioned(mesh: &SurfaceMesh) -> Conditioned {
+fn conditioned(mesh: &SurfaceMesh) -> Conditioned<'_> {
     condition(mesh, &Conditioning::default()).unwrap()
 }
 
@@ -85,7 +85,7 @@ fn generated_walls_are_returned_bit_for_bit() {
             let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(edge_mm)).unwrap().wall;
             let found = conditioned(wall.mesh());
             assert!(!found.changed, "{name} {edge_mm}: {found:?}");
-            assert_eq!(&found.mesh, wall.mesh());
+            assert_eq!(&*found.mesh, wall.mesh());
         }
     }
 }

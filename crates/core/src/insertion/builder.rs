@@ -1,0 +1,117 @@
+//! What a simulation is made of, and the checks before it begins.
+
+use std::sync::Arc;
+
+use super::simulation::{Environment, Simulation};
+use super::{Sheath, WallProperties};
+use crate::device::Device;
+use crate::error::vector;
+use crate::methods::MethodChoice;
+use crate::methods::kirchhoff::KirchhoffOptions;
+use crate::vessel::{NoStore, Wall, WallQuery, WallStore};
+use crate::{Error, Result};
+
+/// A simulation to be built: wall, device and sheath, and what else is told.
+pub struct SimulationBuilder<'a> {
+    wall: Wall,
+    device: Device,
+    sheath: Sheath,
+    properties: WallProperties,
+    method: Option<&'a dyn MethodChoice>,
+    store: &'a dyn WallStore,
+}
+
+/// How far in front of the sheath's mouth, mm, the inside test looks: the mouth itself may lie in the plane of an
+/// opening, where inside and outside meet.
+const MOUTH_MM: f64 = 1e-3;
+
+impl<'a> SimulationBuilder<'a> {
+    pub(super) fn new(wall: Wall, device: Device, sheath: Sheath) -> Self {
+        Self { wall, device, sheath, properties: WallProperties::default(), method: None, store: &NoStore }
+    }
+
+    /// How the wall yields and rubs; [`WallProperties::default`] unless told.
+    #[must_use]
+    pub fn properties(mut self, properties: WallProperties) -> Self {
+        self.properties = properties;
+        self
+    }
+
+    /// How equilibria are found; [`KirchhoffOptions::default`], the exact rod, unless told.
+    #[must_use]
+    pub fn method(mut self, method: &'a dyn MethodChoice) -> Self {
+        self.method = Some(method);
+        self
+    }
+
+    /// Where walls that take long to make are kept; nowhere unless told.
+    #[must_use]
+    pub fn store(mut self, store: &'a dyn WallStore) -> Self {
+        self.store = store;
+        self
+    }
+
+    /// The device at the mouth of the sheath, nothing inserted.
+    ///
+    /// # Errors
+    /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
+    /// tell, wall properties or method options out of range, and what the method cannot do.
+    pub fn build(self) -> Result<Simulation> {
+        let Self { wall, device, sheath, properties, method, store } = self;
+        properties.check(wall.mesh())?;
+        check_inside(&wall, &sheath)?;
+        let query = WallQuery::new(&wall)?;
+        check_mouth(&query, &device, &sheath)?;
+        let scene = Environment { wall, properties, query, sheath, device };
+        let own = KirchhoffOptions::default();
+        let method = method.unwrap_or(&own).start(&scene.surroundings(), store)?;
+        Ok(Simulation { scene: Arc::new(scene), method })
+    }
+}
+
+/// Refuses a sheath whose mouth is outside the vessel.
+fn check_inside(wall: &Wall, sheath: &Sheath) -> Result<()> {
+    if wall.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
+        return Ok(());
+    }
+    let openings: Vec<String> = wall
+        .openings()
+        .iter()
+        .map(|o| format!("{} at [{:.1}, {:.1}, {:.1}]", o.index, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z))
+        .collect();
+    Err(Error::parameter(
+        "sheath.position_mm",
+        vector(&sheath.position_mm),
+        format!(
+            "is outside the vessel: place it inside, or name an opening (sheath.opening); openings: {}",
+            if openings.is_empty() { "none".to_owned() } else { openings.join(", ") }
+        ),
+    ))
+}
+
+/// A device so many times as thick as the vessel comes from another unit.
+const MISFIT: f64 = 5.0;
+
+/// Refuses a device that is in the wall from the start. Further in a vessel may be narrower: there the device does not pass.
+fn check_mouth(query: &WallQuery, device: &Device, sheath: &Sheath) -> Result<()> {
+    let Some(near) = query.nearest(&sheath.position_mm, f64::MAX) else { return Ok(()) };
+    // At the rim of an opening the distance has no sign.
+    let room_mm = near.distance_mm.abs();
+    let thickest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
+    match device.sections().iter().map(|s| s.radius_mm).enumerate().max_by(thickest) {
+        Some((section, radius_mm)) if radius_mm > room_mm => Err(Error::parameter(
+            format!("device.section[{section}].radius_mm"),
+            radius_mm,
+            format!(
+                "the wall is {room_mm:.3} mm from the sheath's mouth at {}: use a thinner device or move the sheath{}",
+                vector(&sheath.position_mm),
+                if radius_mm > MISFIT * room_mm {
+                    ", or check vessel.unit_mm: they are not of one scale"
+                } else {
+                    ""
+                }
+            ),
+        )),
+        _ => Ok(()),
+    }
+}

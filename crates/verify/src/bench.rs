@@ -1,0 +1,222 @@
+//! A rod in equilibrium with walls and loads, without the insertion around it: the bench of the contact cases.
+
+use endowire_core::contact::Touch;
+use endowire_core::contact::{FeltWall, Friction, HandMotion, SETTLED, WallContact, WallMemory};
+use endowire_core::device::Device;
+use endowire_core::insertion::WallProperties;
+use endowire_core::methods::kirchhoff::Mesh;
+use endowire_core::rod::{Clamp, ElementData, PLAIN, RodState, Stencils, Supports};
+use endowire_core::solve::{External, Newton, NewtonOptions};
+use endowire_core::statics::Loads;
+use endowire_core::vessel::Wall;
+use endowire_core::{Error, Result, Vec3};
+use nalgebra::Matrix3;
+
+/// Renewals of the forces that friction follows from.
+const RENEWALS: usize = 100;
+
+/// What lies on the bench.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Setup {
+    /// Length of the rod.
+    pub(super) length: f64,
+    /// Its bending stiffness.
+    pub(super) bending: f64,
+    /// Its radius.
+    pub(super) radius: f64,
+    /// Elements.
+    pub(super) elements: usize,
+    /// Foundation modulus of the walls.
+    pub(super) modulus: f64,
+}
+
+/// An untwisted rod, clamped at its start, among walls.
+pub(super) struct Bench {
+    felt: FeltWall,
+    setup: Setup,
+    mesh: Mesh,
+    memory: WallMemory,
+    friction: Friction,
+    newton: Newton<PLAIN>,
+    /// Stiffness at a node of two plates without play along the plane z = 0, between which the rod lies.
+    pub(super) plates: f64,
+    /// Part of the modulus that acts: a rigid wall is approached from a softer one.
+    pub(super) softness: f64,
+    /// Residual over force scale at which a state is an equilibrium.
+    pub(super) tolerance: f64,
+    /// Loads on the nodes.
+    pub(super) loads: Loads,
+    /// What holds the ends.
+    pub(super) supports: Supports,
+    /// Where the rod is.
+    pub(super) state: RodState,
+}
+
+/// The walls, the plates and the loads as one energy.
+struct Outside<'a> {
+    contact: WallContact<'a>,
+    loads: &'a mut Loads,
+    plates: f64,
+}
+
+impl External for Outside<'_> {
+    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+        self.loads.linearise(elements, state, into);
+        self.contact.linearise(elements, state, into);
+        if self.plates == 0.0 {
+            return;
+        }
+        for (i, x) in state.positions.iter().enumerate() {
+            let force = Vec3::z() * (self.plates * x.z);
+            into.add_value(0.5 * force.z * x.z);
+            into.add_node(i, &force, &(Matrix3::from_diagonal(&Vec3::z()) * self.plates));
+        }
+    }
+
+    fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+        let off: f64 = state.positions.iter().map(|x| x.z * x.z).sum();
+        0.5 * self.plates * off + self.contact.value(elements, state) + self.loads.value(elements, state)
+    }
+
+    fn is_steep(&self) -> bool {
+        true
+    }
+
+    fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
+        self.contact.safe_fraction(elements, to)
+    }
+
+    fn scale(&self) -> [f64; 2] {
+        self.loads.scale()
+    }
+}
+
+impl Bench {
+    /// A rod in the shape that `tangents` gives to its nodes, by their arc length, from `start` on.
+    pub(super) fn new(
+        wall: &Wall,
+        setup: &Setup,
+        start: Vec3,
+        tangents: impl Fn(f64) -> endowire_core::rod::Frame,
+    ) -> Result<Self> {
+        let properties = WallProperties { modulus_n_per_mm2: setup.modulus, ..WallProperties::default() };
+        Self::on_wall(wall, &properties, setup, start, tangents)
+    }
+
+    /// The same where parts of the wall have properties of their own.
+    pub(super) fn on_wall(
+        wall: &Wall,
+        properties: &WallProperties,
+        setup: &Setup,
+        start: Vec3,
+        tangents: impl Fn(f64) -> endowire_core::rod::Frame,
+    ) -> Result<Self> {
+        let Setup { length, bending, radius, elements, modulus } = *setup;
+        let device = Device::uniform(length, radius, bending)?;
+        let mut mesh = Mesh::default();
+        mesh.build(&device, length, length / elements as f64, modulus);
+        let frames = mesh.from_tip_mm.iter().map(|from_tip| tangents(length - from_tip)).collect();
+        let felt = FeltWall::new(wall, &device, properties)?;
+        Ok(Self {
+            memory: WallMemory::new(&felt),
+            felt,
+            setup: *setup,
+            friction: Friction::default(),
+            newton: Newton::new(mesh.elements.len()),
+            plates: 0.0,
+            softness: 1.0,
+            tolerance: NewtonOptions::default().tolerance,
+            loads: Loads::default(),
+            supports: Supports { start_tangent: true, start_angle: true, ..Supports::default() },
+            state: RodState::from_frames(&mesh.elements, start, frames),
+            mesh,
+        })
+    }
+
+    /// Elements of the rod.
+    pub(super) fn elements(&self) -> &[ElementData] {
+        &self.mesh.elements
+    }
+
+    /// Runs `job` with Newton's method and everything outside the rod.
+    fn with<T>(
+        &mut self,
+        job: impl FnOnce(&mut Newton<PLAIN>, &[ElementData], &mut Supports, &mut Outside<'_>, &mut RodState) -> T,
+    ) -> T {
+        let (points, bending) = (&self.mesh.points, self.setup.bending);
+        let mut contact = WallContact::new(&self.felt, points, &mut self.memory, &mut self.friction, bending);
+        contact.softness = self.softness;
+        let mut outside = Outside { contact, loads: &mut self.loads, plates: self.plates };
+        job(&mut self.newton, &self.mesh.elements, &mut self.supports, &mut outside, &mut self.state)
+    }
+
+    /// Moves the rod to a minimum of the energy, with friction to where Coulomb's law holds.
+    pub(super) fn solve(&mut self) -> Result<()> {
+        let options = NewtonOptions { tolerance: self.tolerance, ..NewtonOptions::default() };
+        let rubs = self.friction.acts();
+        self.with(|newton, elements, supports, outside, state| {
+            for _ in 0..RENEWALS {
+                let found = newton.solve(elements, supports, outside, state, &options);
+                if !found.converged {
+                    return Err(Error::Computation(format!(
+                        "{} (residual {:.1e})",
+                        found.reason, found.residual
+                    )));
+                }
+                if !rubs || outside.contact.unsettled() < SETTLED {
+                    return Ok(());
+                }
+                outside.contact.unsettle_friction();
+            }
+            Err(Error::Computation("friction does not settle".to_owned()))
+        })
+    }
+
+    /// The rod has slid along its own curve by `advance` to where it lies, and goes on to where friction and loads are in
+    /// equilibrium.
+    pub(super) fn slide(&mut self, coefficient: f64, advance: f64) -> Result<()> {
+        let length = self.setup.length;
+        let hand = HandMotion { from_mm: length, to_mm: length + advance, turn_rad: 0.0 };
+        self.friction = Friction::new(coefficient);
+        let nothing = (&[][..], &[][..]);
+        self.friction.begin(&self.mesh.elements, &self.state, &self.mesh.points, nothing, hand);
+        self.solve()
+    }
+
+    /// Whether the state as it is, taken for an equilibrium, is a minimum.
+    fn is_stable(&mut self) -> bool {
+        self.with(|newton, elements, supports, outside, state| {
+            newton.assemble(elements, supports, outside, state);
+            let minimum = elements.len() + supports.conditions();
+            newton.factor(elements, supports).is_some_and(|inertia| inertia.negative == minimum)
+        })
+    }
+
+    /// The axial load up to `most` at which the rod as it lies, straight and so an equilibrium under every load, is no minimum any more.
+    pub(super) fn buckling_load(&mut self, most: f64) -> f64 {
+        let (mut low, mut high) = (0.0, most);
+        for _ in 0..40 {
+            let load = 0.5 * (low + high);
+            self.state.tensions.fill(-load);
+            if self.is_stable() { low = load } else { high = load }
+        }
+        low
+    }
+
+    /// What the clamp at the start exerts, at the state solved last.
+    pub(super) fn clamp(&self) -> Clamp {
+        Clamp::new::<PLAIN>(&self.newton.start_residual, &self.state)
+    }
+
+    /// What presses on the wall, and at which arc length from the start.
+    pub(super) fn touches(&mut self) -> Vec<(f64, Touch)> {
+        let (length, points) = (self.setup.length, self.mesh.points.clone());
+        self.with(|_, elements, _, outside, state| {
+            let touch = |(index, point): (usize, &endowire_core::contact::ContactPoint)| {
+                let touch = outside.contact.touch(elements, state, index)?;
+                Some((length - point.from_tip_mm, touch))
+            };
+            points.iter().enumerate().filter_map(touch).collect()
+        })
+    }
+}

@@ -1,0 +1,81 @@
+//! A rod between flat walls.
+
+use super::bench::{Bench, Setup};
+use endowire_core::insertion::{WallProperties, WallRegion};
+use endowire_core::rod::Frame;
+use endowire_core::vessel::{SurfaceMesh, Wall};
+use endowire_core::{Result, Vec3};
+
+/// Stiffness of the plates at a node, over that of a rod of the element's length.
+const PLATES: f64 = 1e3;
+
+/// A straight rod along x from the origin, clamped there, in a channel whose walls are the planes y = floor and y = ceiling.
+///
+/// Two rigid plates without play hold the nodes in the plane z = 0: flat walls alone leave a buckled rod free to turn about
+/// its axis and escape. In the plane they do nothing.
+pub(super) fn channel(setup: &Setup, heights: [f64; 2]) -> Result<Bench> {
+    with_regions(setup, heights, 0.25 * setup.length, Vec::new())
+}
+
+/// The same with `region`s in walls whose triangles have sides of about `cell`.
+pub(super) fn with_regions(
+    setup: &Setup,
+    [floor, ceiling]: [f64; 2],
+    cell: f64,
+    region: Vec<WallRegion>,
+) -> Result<Bench> {
+    let (length, radius) = (setup.length, setup.radius);
+    // So far away that no edge of the box is felt: each of three steps (the edge is drawn in, vertices reach there, points
+    // feel these vertices) reaches at most a diagonal and a half of a cell.
+    let aside = cell * (6.0 * (radius / cell).max(1.0)).ceil();
+    let low = Vec3::new(-aside, floor, -aside);
+    let high = Vec3::new(length + aside, ceiling, aside);
+    let wall = Wall::from_surface(&cuboid(low, high, cell))?;
+    // Planes need no other mesh, and the box's edges are not to be rounded.
+    let properties = WallProperties {
+        modulus_n_per_mm2: setup.modulus,
+        deviation_mm: 0.0,
+        region,
+        ..WallProperties::default()
+    };
+    let straight = Frame::new(Vec3::x(), Some(Vec3::y()));
+    let mut bench = Bench::on_wall(&wall, &properties, setup, Vec3::zeros(), |_| straight)?;
+    let h = bench.elements()[0].length;
+    bench.plates = PLATES * setup.bending / (h * h * h);
+    Ok(bench)
+}
+
+/// The six faces of a box, in cells of about `cell`.
+fn cuboid(low: Vec3, high: Vec3, cell: f64) -> SurfaceMesh {
+    let mut mesh = SurfaceMesh::default();
+    let size = high - low;
+    for axis in 0..3 {
+        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+        let count = |k: usize| (size[k] / cell).round().max(1.0) as u32;
+        let (m, n) = (count(a), count(b));
+        for side in [low[axis], high[axis]] {
+            let first = mesh.vertices_mm.len() as u32;
+            for i in 0..=m {
+                for j in 0..=n {
+                    let mut x = low;
+                    x[axis] = side;
+                    x[a] += size[a] * f64::from(i) / f64::from(m);
+                    x[b] += size[b] * f64::from(j) / f64::from(n);
+                    mesh.vertices_mm.push(x);
+                }
+            }
+            for i in 0..m {
+                for j in 0..n {
+                    let at = |i: u32, j: u32| first + i * (n + 1) + j;
+                    let (p, q, r, s) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+                    if side == high[axis] {
+                        mesh.triangles.extend([[p, q, r], [p, r, s]]);
+                    } else {
+                        mesh.triangles.extend([[p, r, q], [p, s, r]]);
+                    }
+                }
+            }
+        }
+    }
+    mesh
+}

@@ -1,0 +1,289 @@
+//! C1: a rod in a cylinder that leaves its axis a play r: its helix under thrust, the loads at which it leaves the bottom of
+//! a horizontal cylinder, and friction along the helix. In units of EI and r.
+
+use super::Row;
+use super::bench::{Bench, Setup};
+use super::contact::falling;
+use endowire_core::rod::{Frame, PLAIN, element_energy};
+use endowire_core::vessel::{SurfaceMesh, Wall};
+use endowire_core::{Result, Vec3};
+use std::f64::consts::{PI, SQRT_2, TAU};
+
+/// Radius of the rod over the play; only the difference of distance and radius counts.
+const RADIUS: f64 = 0.3;
+
+/// The cylinder of play 1 about x, from −1 to `length` + 1: rings of `around` vertices, twice as far apart as these.
+fn cylinder(length: f64, around: u32) -> Result<Wall> {
+    let radius = 1.0 + RADIUS;
+    let apart = 2.0 * TAU * radius / f64::from(around);
+    let rings = ((length + 2.0) / apart).ceil() as u32;
+    let mut mesh = SurfaceMesh::default();
+    for i in 0..=rings {
+        let x = (length + 2.0) * f64::from(i) / f64::from(rings) - 1.0;
+        for k in 0..around {
+            // Every other ring is turned by half an edge.
+            let angle = TAU * (f64::from(k) + 0.5 * f64::from(i % 2)) / f64::from(around);
+            mesh.vertices_mm.push(Vec3::new(x, -radius * angle.cos(), radius * angle.sin()));
+        }
+    }
+    for i in 0..rings {
+        for k in 0..around {
+            let at = |i: u32, k: u32| i * around + k % around;
+            let (p, q, r, s) = (at(i, k), at(i, k + 1), at(i + 1, k), at(i + 1, k + 1));
+            let [first, second] = if i % 2 == 0 { [[p, q, r], [q, s, r]] } else { [[p, q, s], [p, s, r]] };
+            mesh.triangles.extend([first, second]);
+        }
+    }
+    Wall::from_surface(&mesh)
+}
+
+/// A place `turn` radians around the cylinder from its bottom, and the direction of a helix there.
+fn on_helix(turn: f64, angle: f64) -> (Vec3, Vec3) {
+    let (sin, cos) = turn.sin_cos();
+    (Vec3::new(0.0, -cos, sin), Vec3::new(angle.cos(), angle.sin() * sin, angle.sin() * cos))
+}
+
+/// How fine a helix is computed.
+#[derive(Debug, Clone, Copy)]
+struct Fineness {
+    /// Elements to a turn.
+    elements: usize,
+    /// Vertices around the cylinder.
+    around: u32,
+    /// How often the depth to which the helix presses itself into the wall goes into the play.
+    hardness: f64,
+}
+
+/// A rod wound into `turns` turns of about `angle` by the thrust that belongs to it: clamped at its start along the helix,
+/// otherwise free, so no moment about the cylinder's axis acts. What the ends disturb decays by a factor of 10⁴ in a turn.
+struct Helix {
+    bench: Bench,
+    turns: usize,
+    per_turn: usize,
+}
+
+/// What is measured in a turn.
+struct Turn {
+    /// Mean sin²α.
+    sine2: f64,
+    /// Contact force per length.
+    pressure: f64,
+    /// Bending energy per length.
+    bending: f64,
+    /// Shortening along the cylinder per length.
+    shortening: f64,
+    /// Mean height above the bottom.
+    height: f64,
+}
+
+/// Thrust 2 EI sin²α cos α/r² of a helix.
+fn thrust(sine2: f64) -> f64 {
+    2.0 * sine2 * (1.0 - sine2).sqrt()
+}
+
+impl Helix {
+    fn new(fine: Fineness, angle: f64, turns: usize) -> Result<Self> {
+        let Fineness { elements: per_turn, around, hardness } = fine;
+        let sine = angle.sin();
+        let length = TAU / sine * turns as f64;
+        let (modulus, elements) = (hardness * sine.powi(4), per_turn * turns);
+        let setup = Setup { length, bending: 1.0, radius: RADIUS, elements, modulus };
+        let start = on_helix(0.0, angle).0;
+        let shape = |s: f64| Frame::new(on_helix(s * sine, angle).1, None);
+        let mut bench = Bench::new(&cylinder(length, around)?, &setup, start, shape)?;
+        bench.tolerance = 1e-8;
+        bench.loads.forces = vec![(elements, Vec3::x() * -thrust(sine * sine))];
+        for softness in [0.1, 1.0] {
+            bench.softness = softness;
+            bench.solve()?;
+        }
+        Ok(Self { bench, turns, per_turn })
+    }
+
+    /// Arc lengths where turn `k` begins and ends, just before the nodes there.
+    fn range(&self, k: usize) -> [f64; 2] {
+        let h = self.bench.elements()[0].length;
+        [k, k + 1].map(|k| h * ((self.per_turn * k) as f64 - 1e-6))
+    }
+
+    /// The turn in the middle.
+    fn middle(&mut self) -> Turn {
+        let k = self.turns / 2;
+        let [from, to] = self.range(k);
+        let touches = self.bench.touches();
+        let inside = touches.iter().filter(|(s, _)| *s > from && *s < to);
+        let force: f64 = inside.map(|(_, touch)| touch.contact.force_n).sum();
+        let (elements, state) = (self.bench.elements(), &self.bench.state);
+        let range = self.per_turn * k..self.per_turn * (k + 1);
+        let mean =
+            |value: &dyn Fn(usize) -> f64| range.clone().map(value).sum::<f64>() / self.per_turn as f64;
+        Turn {
+            sine2: mean(&|i| 1.0 - state.frames[i].t.x.powi(2)),
+            pressure: force / (to - from),
+            bending: mean(&|e| {
+                element_energy::<PLAIN>(&elements[e], &state.element::<PLAIN>(e)).bend / elements[e].length
+            }),
+            shortening: 1.0 - (state.positions[range.end].x - state.positions[range.start].x) / (to - from),
+            height: 1.0 + mean(&|i| state.positions[i].y),
+        }
+    }
+
+    /// Thrust in the rod where turn `k` begins.
+    fn thrust_at(&mut self, k: usize) -> f64 {
+        let [end, _] = self.range(k);
+        let touches = self.bench.touches();
+        let before = touches.iter().filter(|(s, _)| *s < end).map(|(_, touch)| touch.contact);
+        let wall: f64 = before.map(|c| (c.normal * c.force_n + c.friction_n).x).sum();
+        self.bench.clamp().force.x + wall
+    }
+}
+
+/// Errors of thrust, contact force per length and push force of a helix.
+fn helix_rows(name: &str, fine: Fineness, angle: f64) -> Result<[Row; 3]> {
+    let mut helix = Helix::new(fine, angle, 3)?;
+    let Turn { sine2, pressure, .. } = helix.middle();
+    let clamp = helix.bench.clamp();
+    let push = clamp.push_force(&helix.bench.state.frames[0].t, 1.0, 1.0, &Vec3::zeros());
+    // n·t and the moment of a helix are −F cos α − EI sin⁴α/r² and EI sin²α/r, and the push force is the same along the rod.
+    let (drive, bound) = (thrust(sine2) * (1.0 - sine2).sqrt() + 0.5 * sine2 * sine2, 1e-3);
+    Ok([
+        Row::relative(name, "thrust", clamp.force.x, thrust(sine2), bound),
+        Row::relative(name, "contact force per length", pressure, sine2 * sine2, bound),
+        Row::relative(name, "push force", push, drive, bound),
+    ])
+}
+
+pub(super) fn helix() -> Result<Vec<Row>> {
+    let fine = Fineness { elements: 32, around: 64, hardness: 1e4 };
+    let mut rows = Vec::new();
+    for angle in [0.25, 0.5] {
+        rows.extend(helix_rows(&format!("C1 helix, α≈{angle}"), fine, angle)?);
+    }
+    let name = "C1 helix, α≈0.5";
+    let error = |fine: Fineness| -> Result<f64> { Ok(helix_rows(name, fine, 0.5)?[0].error) };
+    let found = rows[3].error;
+    let at = |hardness: f64| error(Fineness { hardness, ..fine });
+    rows.push(falling(name, "error of thrust, r/p = 10² … 10⁴", &[at(1e2)?, at(1e3)?, found], 0.5));
+    let coarse = error(Fineness { around: 32, ..fine })?;
+    rows.push(falling(name, "error of thrust, 32, 64 around", &[coarse, found], 0.5));
+    Ok(rows)
+}
+
+/// Foundation modulus of the cylinder under the rod that lies in it.
+const FLOOR: f64 = 1e3;
+
+/// Load at which a rod of weight 1 per length that lies at the bottom of the cylinder, pinned at both ends, begins to snake.
+fn snaking(length: f64, around: u32, weight: f64) -> Result<f64> {
+    let elements = (8.0 * length / PI) as usize;
+    let setup = Setup { length, bending: 1.0, radius: RADIUS, elements, modulus: FLOOR };
+    // As deep as its weight presses it.
+    let start = Vec3::y() * -(1.0 + weight / FLOOR);
+    let along = Frame::new(Vec3::x(), None);
+    let mut bench = Bench::new(&cylinder(length, around)?, &setup, start, |_| along)?;
+    bench.loads.distributed = vec![(0, elements, Vec3::y() * -weight)];
+    bench.supports.start_tangent = false;
+    bench.supports.end_directions = vec![Vec3::y(), Vec3::z()];
+    bench.supports.end_position = start + Vec3::x() * length;
+    bench.solve()?;
+    Ok(bench.buckling_load(8.0))
+}
+
+/// F/√(EI w/r) of a helix without weight, for the weight w that would lift its energy to that of the straight rod at the bottom.
+///
+/// Chen, Lin and Cheatham (1990) compare the straight rod with a uniform helix of the best pitch under the same load, of energy
+/// ½ EI r² q⁴ − ½ F r² q² + w r per length: nothing at F = 2√2 √(EI w/r). It is no limit of stability, and weight makes the
+/// helix uneven: minimised over its shape too, the energy vanishes 1.34 % earlier, at 2.79043 √(EI w/r).
+fn winding(angle: f64) -> Result<f64> {
+    let mut helix = Helix::new(Fineness { elements: 32, around: 48, hardness: 1e3 }, angle, 3)?;
+    let load = helix.bench.clamp().force.x;
+    let turn = helix.middle();
+    Ok(load / ((load * turn.shortening - turn.bending) / turn.height).sqrt())
+}
+
+pub(super) fn weight() -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    let bound = 1e-2;
+    for waves in [6.0, 4.5] {
+        // Between pins, n half-waves at F = EI (nπ/L)² + (w/r) (L/nπ)².
+        let half_waves = |n: i32| (f64::from(n) / waves).powi(2) + (waves / f64::from(n)).powi(2);
+        let expected = (1..20).map(half_waves).fold(f64::MAX, f64::min);
+        let name = format!("C1 snaking, {waves} half-waves of length");
+        let at = |around: u32| snaking(waves * PI, around, 1.0);
+        let loads = [at(16)?, at(32)?, at(64)?];
+        rows.push(Row::relative(&name, "load", loads[2], expected, bound));
+        let errors = loads.map(|load| (load / expected - 1.0).abs());
+        rows.push(falling(&name, "error of load, 16 … 64 around", &errors, 0.5));
+    }
+    let expected = 2.0 * SQRT_2;
+    let loads = [winding(0.3)?, winding(0.15)?];
+    rows.push(Row::relative("C1 winding, α≈0.15", "load", loads[1], expected, bound));
+    let errors = loads.map(|load| (load / expected - 1.0).abs());
+    rows.push(falling("C1 winding", "error of load, α≈0.3, 0.15", &errors, 0.5));
+    Ok(rows)
+}
+
+/// A rod that is pushed through its helix.
+///
+/// Where friction acts along the axis alone, thrust and helix belong together as without it, and F_in = F_out/(1 − x) with
+/// x = μ r L F_out/(4EI). A rod that slides along its own curve is rubbed along that curve, which turns it about the axis as
+/// well; then the whole helix keeps the pitch of its far end, presses with r F_out (2F − F_out)/(4EI) where the thrust is F,
+/// and F_in = ½ F_out (1 + e^{2x}): the same but for x³/3. Both hold for small α.
+struct Pushed {
+    /// Thrust where five turns begin and where they end, and that at the end of the rod.
+    thrust: [f64; 3],
+    /// μ r L/(4EI) of these turns.
+    friction: f64,
+}
+
+impl Pushed {
+    fn new(angle: f64, friction: f64) -> Result<Self> {
+        let mut helix = Helix::new(Fineness { elements: 16, around: 32, hardness: 1e3 }, angle, 7)?;
+        helix.bench.slide(friction, 0.1)?;
+        let length = helix.range(6)[0] - helix.range(1)[0];
+        let thrust = [helix.thrust_at(1), helix.thrust_at(6), thrust(angle.sin().powi(2))];
+        Ok(Self { thrust, friction: 0.25 * friction * length })
+    }
+
+    /// The ratio of the thrusts, and what it is with friction along the axis.
+    fn along_axis(&self) -> [f64; 2] {
+        let [before, behind, _] = self.thrust;
+        [before / behind, 1.0 / (1.0 - self.friction * behind)]
+    }
+
+    /// The ratio of F − ½F_out, and what it is with friction along the curve.
+    fn along_curve(&self) -> [f64; 2] {
+        let [before, behind, out] = self.thrust;
+        [(before - 0.5 * out) / (behind - 0.5 * out), (2.0 * self.friction * out).exp()]
+    }
+}
+
+pub(super) fn rubbed() -> Result<Vec<Row>> {
+    let bound = 1e-2;
+    let [ratio, expected] = Pushed::new(0.15, 0.05)?.along_axis();
+    let mut rows =
+        vec![Row::relative("C1 pushed, α≈0.15, μ=0.05", "ratio of thrusts", ratio, expected, bound)];
+    let [steep, flat] = [Pushed::new(0.2, 0.1)?, Pushed::new(0.1, 0.2)?].map(|pushed| pushed.along_curve());
+    rows.push(Row::relative("C1 pushed, α≈0.1, μ=0.2", "ratio of F − ½F_out", flat[0], flat[1], bound));
+    let errors = [steep, flat].map(|[ratio, expected]| (ratio / expected - 1.0).abs());
+    rows.push(falling("C1 pushed, μα=0.02", "error of ratio, α≈0.2, 0.1", &errors, 0.5));
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_wall_another_weight_and_another_friction_are_seen() {
+        let fine = Fineness { elements: 32, around: 48, hardness: 1e4 };
+        assert!(helix_rows("", fine, 0.5).unwrap().iter().all(|row| row.pass));
+        let soft = helix_rows("", Fineness { hardness: 100.0, around: 64, ..fine }, 0.5).unwrap();
+        assert!(soft.iter().all(|row| !row.pass), "{soft:?}");
+        // Heavier by 5 %: the load is 2.5 % higher.
+        let heavy = snaking(6.0 * PI, 48, 1.05).unwrap();
+        assert!(!Row::relative("", "", heavy, 2.0, 1e-2).pass, "{heavy}");
+        let [ratio, _] = Pushed::new(0.15, 0.06).unwrap().along_axis();
+        let [_, expected] = Pushed::new(0.15, 0.05).unwrap().along_axis();
+        assert!(!Row::relative("", "", ratio, expected, 1e-2).pass, "{ratio} {expected}");
+    }
+}

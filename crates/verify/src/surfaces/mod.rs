@@ -1,0 +1,30 @@
+//! Insertions into surfaces as they come: what `endowire verify --surfaces DIR` runs.
+//!
+//! Every surface of a folder is a vessel (`sidecar`), and every one gets the same matrix of insertions (`cells`): two wires,
+//! three increments, element lengths, frictions and moduli of the wall, with and without turning. A `run` pushes one wire into one
+//! surface command by command and tells how it ended: arrived, left through an opening, blocked where the vessel is too narrow – or
+//! failed, which a matrix is run to find.
+//!
+//! ```
+//! use endowire_verify::surfaces::{Cell, cells};
+//!
+//! let (quick, full) = (cells(2, false), cells(2, true));
+//! assert_eq!((quick.len(), full.len()), (36, 324));
+//! ```
+
+mod cells;
+mod run;
+mod scene;
+mod sidecar;
+mod start;
+mod summary;
+mod surface;
+mod wire;
+
+pub use cells::{Cell, ELEMENTS_MM, FRICTIONS, INCREMENTS_MM, MODULI_N_PER_MM2, TURNS_DEG, cells, matches};
+pub use run::{CellRow, Ending, run};
+pub use sidecar::{Sidecar, SurfaceFile, surfaces_in};
+pub use start::Found;
+pub use summary::{ITERATIONS_PER_MM, Summary};
+pub use surface::{Place, Surface};
+pub use wire::{WIRES, Wire};

@@ -1,0 +1,344 @@
+//! One insertion of the matrix.
+
+use serde::Serialize;
+
+use super::{Cell, ITERATIONS_PER_MM, Surface};
+use endowire_core::insertion::{Command, ScriptLine, Simulation, StepReport, WallProperties, commands};
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::{Error, PhysicalEnd, Result};
+
+/// How an insertion ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ending {
+    /// All commands were carried out.
+    Arrived,
+    /// The tip has left the vessel through an opening.
+    Left,
+    /// The vessel is narrower than the device.
+    Blocked,
+    /// A computation failed, or took too long.
+    Failed,
+    /// The input was refused before the first command.
+    Refused,
+}
+
+impl Ending {
+    /// Whether it is what a vessel does to a wire.
+    pub fn is_good(self) -> bool {
+        matches!(self, Self::Arrived | Self::Left | Self::Blocked)
+    }
+
+    /// One word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Arrived => "arrived",
+            Self::Left => "left",
+            Self::Blocked => "blocked",
+            Self::Failed => "FAILED",
+            Self::Refused => "refused",
+        }
+    }
+}
+
+/// One insertion and what became of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CellRow {
+    /// Name: surface, wire and values.
+    pub name: String,
+    /// Surface.
+    pub surface: String,
+    /// Wire, its diameter in inches.
+    pub wire: String,
+    /// What was varied.
+    #[serde(flatten)]
+    pub cell: Cell,
+    /// How it ended.
+    pub ending: Ending,
+    /// Why it did not arrive.
+    pub message: Option<String>,
+    /// Length asked for, mm.
+    pub length_mm: f64,
+    /// Length inserted, mm.
+    pub inserted_mm: f64,
+    /// Commands asked for.
+    pub commands: usize,
+    /// Commands carried out.
+    pub steps: usize,
+    /// Newton iterations of all steps.
+    pub iterations: u64,
+    /// Newton iterations of the worst step.
+    pub most_iterations: u32,
+    /// Newton iterations of the worst step per millimetre that it advanced.
+    pub most_iterations_per_mm: f64,
+    /// Steps that took more than [`ITERATIONS_PER_MM`].
+    pub slow_steps: usize,
+    /// Most parts that a command was cut into.
+    pub most_substeps: u32,
+    /// Steps that freed energy in a jump.
+    pub jumps: usize,
+    /// Deepest penetration that a step reported, mm.
+    pub max_penetration_mm: f64,
+    /// Parts of commands in which the last resort was needed.
+    pub relaxations: u64,
+    /// Steps after which the device's curve passed through a triangle as it was given.
+    pub crossings: usize,
+    /// Length that was inserted at the first of them, mm.
+    pub first_crossing_mm: Option<f64>,
+    /// How much less deep than it was the device said to have sunk in there, mm: the distance between the wall that is felt and the
+    /// given triangles, or more where it has come through. Measured after the first crossings and at the end.
+    pub missing_mm: f64,
+    /// Largest push force, N.
+    pub most_push_force_n: f64,
+    /// Time of the slowest command, that which failed included, ms.
+    pub slowest_ms: f64,
+    /// Time of the middle command, ms.
+    pub median_ms: f64,
+    /// Time to prepare the wall for the device, s.
+    pub setup_s: f64,
+    /// Time of all, checks included, s.
+    pub total_s: f64,
+}
+
+/// Crossed states that are measured: a device that has come through stays there, and the measure asks all triangles.
+const CROSSINGS_MEASURED: usize = 24;
+
+impl Cell {
+    /// What the hand does in `surface`.
+    pub fn script(&self, surface: &Surface) -> ScriptLine {
+        // Whole increments: the wire is longer than the surface asks for by its soft end.
+        let steps = (surface.length_mm / self.increment_mm - 1e-9).ceil().max(1.0);
+        ScriptLine {
+            advance_mm: Some(steps * self.increment_mm),
+            rotate_deg: (self.turn_deg != 0.0).then_some(steps * self.turn_deg),
+            step_mm: Some(self.increment_mm),
+            step_deg: (self.turn_deg != 0.0).then_some(self.turn_deg),
+            ..ScriptLine::default()
+        }
+    }
+
+    /// The wall.
+    pub fn properties(&self) -> WallProperties {
+        WallProperties {
+            modulus_n_per_mm2: self.modulus_n_per_mm2,
+            friction: self.friction,
+            ..WallProperties::default()
+        }
+    }
+
+    /// The name of the cell in `surface`: surface, wire and values.
+    pub fn name_in(&self, surface: &Surface) -> String {
+        format!("{} {} {}", surface.name, surface.places[self.wire].wire.name(), self.name())
+    }
+
+    fn simulation(&self, surface: &Surface) -> Result<Simulation> {
+        let place = &surface.places[self.wire];
+        let method = KirchhoffOptions { element_mm: self.element_mm, ..KirchhoffOptions::default() };
+        let device = place.wire.device(surface.length_mm)?;
+        Simulation::builder(surface.wall.clone(), device, place.sheath)
+            .properties(self.properties())
+            .method(&method)
+            .build()
+    }
+}
+
+impl CellRow {
+    /// A row of `cell` of which nothing is known yet.
+    pub fn new(surface: &Surface, cell: &Cell) -> Self {
+        Self {
+            name: cell.name_in(surface),
+            surface: surface.name.clone(),
+            wire: surface.places[cell.wire].wire.name(),
+            cell: *cell,
+            ending: Ending::Arrived,
+            message: None,
+            length_mm: surface.length_mm,
+            inserted_mm: 0.0,
+            commands: 0,
+            steps: 0,
+            iterations: 0,
+            most_iterations: 0,
+            most_iterations_per_mm: 0.0,
+            slow_steps: 0,
+            most_substeps: 0,
+            jumps: 0,
+            max_penetration_mm: 0.0,
+            relaxations: 0,
+            crossings: 0,
+            first_crossing_mm: None,
+            missing_mm: 0.0,
+            most_push_force_n: 0.0,
+            slowest_ms: 0.0,
+            median_ms: 0.0,
+            setup_s: 0.0,
+            total_s: 0.0,
+        }
+    }
+
+    /// Ends the row.
+    pub fn end(&mut self, ending: Ending, message: String) {
+        (self.ending, self.message) = (ending, Some(message));
+    }
+
+    /// Takes in what a step reported.
+    fn count(&mut self, report: &StepReport, command: Command) {
+        self.steps += 1;
+        self.inserted_mm = report.inserted_mm;
+        self.iterations += u64::from(report.iterations);
+        self.most_iterations = self.most_iterations.max(report.iterations);
+        let per_mm = f64::from(report.iterations) / command.advance_mm.abs().max(f64::MIN_POSITIVE);
+        self.most_iterations_per_mm = self.most_iterations_per_mm.max(per_mm);
+        self.slow_steps += usize::from(per_mm > ITERATIONS_PER_MM);
+        self.most_substeps = self.most_substeps.max(report.substeps);
+        self.jumps += usize::from(report.jumped);
+        self.relaxations += u64::from(report.relaxations);
+        self.max_penetration_mm = self.max_penetration_mm.max(report.max_penetration_mm);
+        self.most_push_force_n = self.most_push_force_n.max(report.push_force_n);
+    }
+
+    /// Whether the device passes through given triangles, and whether it has sunk in there.
+    fn check(&mut self, surface: &Surface, simulation: &Simulation, last: bool) {
+        if !surface.given.crosses_curve(simulation.shape()) {
+            return;
+        }
+        if !last {
+            self.crossings += 1;
+            self.first_crossing_mm = self.first_crossing_mm.or(Some(self.inserted_mm));
+        }
+        if last || self.crossings <= CROSSINGS_MEASURED {
+            self.missing_mm =
+                self.missing_mm.max(surface.given.missing_mm(&surface.wall, simulation).unwrap_or(0.0));
+        }
+    }
+}
+
+/// Runs a cell. `clock` tells seconds since any moment; a cell that takes more than `limit_s` fails.
+pub fn run(surface: &Surface, cell: &Cell, limit_s: f64, clock: &dyn Fn() -> f64) -> CellRow {
+    let begun = clock();
+    let mut row = CellRow::new(surface, cell);
+    let mut times_ms = Vec::new();
+    insert(&mut row, &mut times_ms, surface, cell, (begun, limit_s), clock);
+    times_ms.sort_by(f64::total_cmp);
+    row.median_ms = times_ms.get(times_ms.len() / 2).copied().unwrap_or(0.0);
+    row.slowest_ms = times_ms.last().copied().unwrap_or(0.0);
+    row.total_s = clock() - begun;
+    row
+}
+
+fn insert(
+    row: &mut CellRow,
+    times_ms: &mut Vec<f64>,
+    surface: &Surface,
+    cell: &Cell,
+    (begun, limit_s): (f64, f64),
+    clock: &dyn Fn() -> f64,
+) {
+    let (mut simulation, list) =
+        match cell.simulation(surface).and_then(|s| Ok((s, commands(&[cell.script(surface)])?))) {
+            Ok(ready) => ready,
+            Err(error) => {
+                let ending = if error.is_input() { Ending::Refused } else { Ending::Failed };
+                return row.end(ending, error.to_string());
+            }
+        };
+    row.setup_s = clock() - begun;
+    row.commands = list.len();
+    for command in list {
+        if clock() - begun > limit_s {
+            row.end(Ending::Failed, format!("too slow: not done within {limit_s} s"));
+            break;
+        }
+        let before = clock();
+        let result = simulation.step(command).cloned();
+        times_ms.push(1e3 * (clock() - before));
+        match result {
+            Ok(report) => {
+                row.count(&report, command);
+                if !report.converged {
+                    row.end(Ending::Failed, "a step ended without an equilibrium".to_owned());
+                    break;
+                }
+                row.check(surface, &simulation, false);
+            }
+            Err(error) => {
+                let ending = match &error {
+                    Error::End(PhysicalEnd::Left { .. }) => Ending::Left,
+                    Error::End(PhysicalEnd::Blocked { .. }) => Ending::Blocked,
+                    _ => Ending::Failed,
+                };
+                row.end(ending, error.to_string());
+                break;
+            }
+        }
+    }
+    row.check(surface, &simulation, true);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::crossing::CrossingTest;
+    use crate::surfaces::{cells, surfaces_in};
+    use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
+
+    fn tube(sidecar: &str, closed: bool) -> Surface {
+        let made =
+            GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(1.5)).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let mesh = if closed { made.wall.closed_mesh() } else { made.wall.mesh().clone() };
+        mesh.write(&folder.path().join("tube.ply")).unwrap();
+        std::fs::write(folder.path().join("tube.toml"), sidecar).unwrap();
+        Surface::read(&surfaces_in(folder.path()).unwrap()[0]).unwrap()
+    }
+
+    #[test]
+    fn a_tube_is_gone_through_left_refused_or_too_slow() {
+        let row = |surface: &Surface, limit_s: f64| run(surface, &cells(1, false)[3], limit_s, &|| 0.5);
+        let surface = tube("length_mm = 30.0", false);
+        assert_eq!((surface.places.len(), surface.skipped.len()), (2, 0));
+        let arrived = row(&surface, 1.0);
+        assert_eq!(
+            (arrived.ending, arrived.steps, arrived.crossings),
+            (Ending::Arrived, 30, 0),
+            "{arrived:?}"
+        );
+        assert!((arrived.inserted_mm - 30.0).abs() < 1e-9 && arrived.iterations > 0);
+        assert_eq!(arrived.name, "tube.ply 0.014 step1 el1 mu0.1 k100 turn0");
+        assert_eq!(row(&surface, -1.0).message.unwrap(), "too slow: not done within -1 s");
+
+        let left = row(&tube("device_radius_mm = 0.3", false), 1.0);
+        assert_eq!(left.ending, Ending::Left, "{left:?}");
+        assert!(left.ending.is_good() && left.inserted_mm > 95.0);
+
+        let outside = tube("[sheath]\nposition_mm = [9, 0, 0]\ndirection = [0, 0, 1]", false);
+        assert_eq!(row(&outside, 1.0).ending, Ending::Refused);
+        let thick = tube("device_radius_mm = [0.4, 4.5]", false);
+        assert_eq!(thick.skipped, ["0.354 is too thick at the sheath"]);
+    }
+
+    /// A twin: the triangles that are checked are not those that are inserted into.
+    #[test]
+    fn a_device_beyond_the_given_triangles_is_seen() {
+        let start = "length_mm = 60.0\n[sheath]\nposition_mm = [0, 0, 1]\ndirection = [0, 0, 1]";
+        let cell = cells(1, false)[3];
+        let whole = tube(start, false);
+        let free = run(&whole, &cell, 1e9, &|| 0.0);
+        assert_eq!((free.ending, free.crossings, free.missing_mm), (Ending::Arrived, 0, 0.0));
+        // A closed tube of 30 mm; the wire goes to 41 mm less what its tip bends back.
+        let mut closed = whole.wall.closed_mesh();
+        closed.vertices_mm.iter_mut().for_each(|v| v.z *= 0.3);
+        let checked = Surface {
+            given: CrossingTest::new(&closed),
+            wall: Wall::from_surface(&closed).unwrap(),
+            ..tube(start, false)
+        };
+        let mut simulation = cell.simulation(&whole).unwrap();
+        for (advance_mm, crossings) in [(25.0, 0), (15.0, 1)] {
+            simulation.step(Command::advance(advance_mm)).unwrap();
+            let mut row = CellRow::new(&checked, &cell);
+            row.check(&checked, &simulation, false);
+            assert_eq!(row.crossings, crossings);
+            assert_eq!((8.0..11.5).contains(&row.missing_mm), crossings > 0, "{}", row.missing_mm);
+        }
+    }
+}

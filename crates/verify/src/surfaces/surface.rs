@@ -1,0 +1,110 @@
+//! A surface ready for its insertions.
+
+use std::path::PathBuf;
+
+use crate::crossing::CrossingTest;
+use endowire_core::insertion::Sheath;
+use endowire_core::vessel::{SurfaceMesh, Wall, WallQuery};
+use endowire_core::{Error, Result};
+
+use super::start::{Found, at_opening, inside};
+use super::{SurfaceFile, WIRES, Wire};
+
+/// Longest insertion unless the sidecar says otherwise, mm.
+const LENGTH_MM: f64 = 400.0;
+/// The same in sizes of the vessel: a wire that has gone through it, or coils up in it, has seen enough.
+const LENGTH_IN_SIZES: f64 = 2.0;
+
+/// A wire that fits into a surface, and where it enters.
+#[derive(Debug, Clone)]
+pub struct Place {
+    /// The wire.
+    pub wire: Wire,
+    /// Where it enters.
+    pub sheath: Sheath,
+    /// How that was found.
+    pub found: Found,
+}
+
+/// A surface, repaired into a wall, with what its insertions share.
+#[derive(Debug)]
+pub struct Surface {
+    /// Name, as in tables and patterns.
+    pub name: String,
+    /// File.
+    pub path: PathBuf,
+    /// Millimetres per unit of the file.
+    pub unit_mm: f64,
+    /// The wall to insert into.
+    pub wall: Wall,
+    /// The triangles as they were given, before any repair.
+    pub given: CrossingTest,
+    /// Longest side of the surface's bounding box, mm.
+    pub size_mm: f64,
+    /// Length to insert, mm.
+    pub length_mm: f64,
+    /// The wires that fit, and where they enter.
+    pub places: Vec<Place>,
+    /// The wires that do not, and why.
+    pub skipped: Vec<String>,
+}
+
+impl Surface {
+    /// Reads a surface and finds where the wires enter it.
+    ///
+    /// # Errors
+    /// A file that cannot be read or repaired, a sheath that cannot be meant.
+    pub fn read(file: &SurfaceFile) -> Result<Self> {
+        let mesh = SurfaceMesh::read(&file.path, file.unit_mm)?;
+        let wall = Wall::from_surface(&mesh).map_err(|e| Error::content(&file.path, e.to_string()))?;
+        let (low, high) = wall.mesh().bounds_mm().unwrap_or_default();
+        let size_mm = (high - low).amax();
+        let mut surface = Self {
+            name: file.name.clone(),
+            path: file.path.clone(),
+            unit_mm: file.unit_mm,
+            given: CrossingTest::new(&mesh),
+            size_mm,
+            length_mm: file.sidecar.length_mm.unwrap_or_else(|| LENGTH_MM.min(LENGTH_IN_SIZES * size_mm)),
+            places: Vec::new(),
+            skipped: Vec::new(),
+            wall,
+        };
+        let query = WallQuery::new(&surface.wall)?;
+        let wires: Vec<Wire> = match file.sidecar.radii_mm() {
+            Some(radii) => radii.into_iter().map(Wire::of_radius).collect(),
+            None => WIRES.to_vec(),
+        };
+        let thinnest_mm = wires.iter().map(|w| w.radius_mm).fold(f64::MAX, f64::min);
+        let given = file.sidecar.sheath.as_ref().map(|sheath| sheath.place(&surface.wall)).transpose()?;
+        // Openings that not even the thinnest wire enters are cracks.
+        let open = given.is_some() || at_opening(&surface.wall, &query, thinnest_mm).is_some();
+        for wire in wires {
+            let radius_mm = wire.radius_mm;
+            let (room_mm, start) = match given {
+                Some(sheath) => {
+                    let room =
+                        query.nearest(&sheath.position_mm, f64::MAX).map(|near| near.distance_mm.abs());
+                    // Whatever else is wrong with a given sheath, the insertion says so.
+                    (room, room.is_none_or(|room| room > radius_mm).then_some((sheath, Found::Given)))
+                }
+                None if open => (None, at_opening(&surface.wall, &query, radius_mm)),
+                None => (None, inside(&surface.wall, &query, radius_mm)),
+            };
+            match start {
+                Some((sheath, found)) => surface.places.push(Place { wire, sheath, found }),
+                None => {
+                    let room =
+                        room_mm.map_or_else(String::new, |room| format!(", the wall is {room:.3} mm away"));
+                    let name = wire.name();
+                    surface.skipped.push(if given.is_some() || open {
+                        format!("{name} is too thick at the sheath{room}")
+                    } else {
+                        format!("{name}: no place inside was found: give [sheath] position_mm and direction")
+                    });
+                }
+            }
+        }
+        Ok(surface)
+    }
+}
