@@ -4,9 +4,11 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use endowire_core::Vec3;
-use endowire_core::rod::element::{ElementSystem, element_energy, element_system};
+use endowire_core::banded::{BandMatrix, Factor};
+use endowire_core::rod::element::ElementSystem;
 use endowire_core::rod::{Frame, Layout, PLAIN, RodState, TWISTED};
-use endowire_core::solve::{BandMatrix, Factor, Newton, NewtonOptions};
+use endowire_core::rod::{element_energy, element_system};
+use endowire_core::solve::{Newton, NewtonOptions};
 use endowire_tests::bent_rod::{bent, clamp, elements, system, tip_load};
 use std::hint::black_box;
 
@@ -14,10 +16,12 @@ const SIZES: [usize; 6] = [8, 32, 128, 300, 512, 1024];
 
 fn element(c: &mut Criterion) {
     let (elements, state) = bent(4, true);
-    let s = state.element(1);
+    let s = state.element::<TWISTED>(1);
     let mut group = c.benchmark_group("element");
-    group.bench_function("energy", |b| b.iter(|| element_energy(&elements[1], black_box(&s), false)));
-    group.bench_function("energy twisted", |b| b.iter(|| element_energy(&elements[1], black_box(&s), true)));
+    group.bench_function("energy", |b| b.iter(|| element_energy::<PLAIN>(&elements[1], black_box(&s))));
+    group.bench_function("energy twisted", |b| {
+        b.iter(|| element_energy::<TWISTED>(&elements[1], black_box(&s)));
+    });
     let mut plain = ElementSystem::<PLAIN>::zeros();
     group.bench_function("system", |b| {
         b.iter(|| element_system::<_, true>(&elements[1], black_box(&s), 1.0, &mut plain));
@@ -58,14 +62,14 @@ fn assembly<const C: usize>(c: &mut Criterion, name: &str) {
 fn solve<const C: usize>(c: &mut Criterion, name: &str) {
     let mut group = c.benchmark_group(format!("newton iteration{name}"));
     for n in SIZES {
-        let elements = elements(n, Layout::<C>::TWIST);
+        let elements = elements(n, Layout::<C>::ANGLES > 0);
         let frame = Frame::new(Vec3::x(), Some(Vec3::y()));
         let start = RodState::straight(&elements, Vec3::zeros(), frame);
         let mut newton = Newton::<C>::new(n);
         let mut state = start.clone();
         let options = NewtonOptions::default();
         let report = newton.solve(&elements, &mut clamp(), &mut tip_load(n), &mut state, &options);
-        if !Layout::<C>::TWIST {
+        if Layout::<C>::ANGLES == 0 {
             let error = (state.positions[n] - Vec3::new(1.0 - 0.554995597754, -0.810609024880, 0.0)).norm();
             println!("{n} elements: tip error {error:.1e}, {} iterations", report.iterations);
         }

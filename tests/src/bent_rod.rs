@@ -1,21 +1,20 @@
 //! A bent and twisted rod of unit length: what the timings of the rod's parts begin with.
 
 use endowire_core::Vec3;
-use endowire_core::rod::{Assembly, ElementData, Frame, Layout, RodState, Supports};
-use endowire_core::solve::{Newton, Shift};
+use endowire_core::banded::Shift;
+use endowire_core::rod::{Assembly, ElementData, Frame, Layout, Material, RodState, Supports};
+use endowire_core::solve::Newton;
 use endowire_core::statics::Loads;
 
 /// `n` equal elements of EI = 1 in all; pre-curved if `twisted`.
 pub fn elements(n: usize, twisted: bool) -> Vec<ElementData> {
-    let element = ElementData {
-        length: 1.0 / n as f64,
+    let material = Material {
         bending: [1.0; 3],
         torsion: [0.77; 3],
         rest_curvature: [[if twisted { 1.0 } else { 0.0 }, 0.0]; 3],
         rest_twist: [0.0; 3],
-        flexibility: 0.0,
     };
-    vec![element; n]
+    vec![ElementData::of(1.0 / n as f64, material); n]
 }
 
 /// The elements, bent and twisted evenly.
@@ -41,7 +40,7 @@ pub fn tip_load(n: usize) -> Loads {
 
 /// The system of a bent rod, assembled, held, and shifted until it is regular.
 pub fn system<const C: usize>(n: usize) -> (Vec<ElementData>, RodState, Newton<C>) {
-    let (elements, state) = bent(n, Layout::<C>::TWIST);
+    let (elements, state) = bent(n, Layout::<C>::ANGLES > 0);
     let mut newton = Newton::<C>::new(n);
     newton.assemble(&elements, &clamp(), &mut tip_load(n), &state);
     make_regular(&elements, &mut newton);

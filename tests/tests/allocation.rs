@@ -38,7 +38,11 @@ fn nothing_is_allocated_per_iteration() {
         let case = StaticCase::from_file(&path).expect("an example case is valid");
         let problem = StaticProblem::new(&case).expect("an example case is valid");
         let count = |limit| {
-            if problem.twisted { solve::<TWISTED>(&problem, limit) } else { solve::<PLAIN>(&problem, limit) }
+            if problem.angles > 0 {
+                solve::<TWISTED>(&problem, limit)
+            } else {
+                solve::<PLAIN>(&problem, limit)
+            }
         };
         let (few, two) = count(2);
         let (many, all) = count(500);

@@ -7,11 +7,11 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use endowire_core::Vec3;
+use endowire_core::banded::Factor;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::rod::{Layout, PLAIN, TWISTED};
-use endowire_core::solve::Factor;
 use endowire_core::vessel::{GeneratedWall, Resolution, WallQuery, anatomy};
 use endowire_tests::bent_rod::system;
 

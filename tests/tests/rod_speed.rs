@@ -1,14 +1,15 @@
 //! The speed bars of the rod, least of many runs. Timing: run by hand, alone, with `--release -- --ignored --nocapture`.
 
 use endowire_core::Vec3;
+use endowire_core::banded::Factor;
 use endowire_core::rod::{Frame, Layout, PLAIN, RodState, TWISTED};
-use endowire_core::solve::{Factor, Newton, NewtonOptions};
+use endowire_core::solve::{Newton, NewtonOptions};
 use endowire_tests::bent_rod::{bent, clamp, elements, make_regular, tip_load};
 use std::time::Instant;
 
 /// Seconds of (assembly, factor and solve) for `n` elements.
 fn measure<const C: usize>(n: usize, rounds: usize) -> (f64, f64) {
-    let (elements, state) = bent(n, Layout::<C>::TWIST);
+    let (elements, state) = bent(n, Layout::<C>::ANGLES > 0);
     let supports = clamp();
     let mut loads = tip_load(n);
     let mut newton = Newton::<C>::new(n);
@@ -32,7 +33,7 @@ fn measure<const C: usize>(n: usize, rounds: usize) -> (f64, f64) {
 
 /// Seconds an iteration of a whole solve: the cantilever under PL²/EI = 10 from straight, everything included.
 fn whole<const C: usize>(n: usize, rounds: usize) -> f64 {
-    let elements = elements(n, Layout::<C>::TWIST);
+    let elements = elements(n, Layout::<C>::ANGLES > 0);
     let start = RodState::straight(&elements, Vec3::zeros(), Frame::new(Vec3::x(), Some(Vec3::y())));
     let mut newton = Newton::<C>::new(n);
     let mut best = f64::INFINITY;

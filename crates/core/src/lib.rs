@@ -8,6 +8,7 @@
 //! The exact rod stands on its own: a [`statics::StaticCase`] (a file or a value) is solved into a
 //! [`statics::StaticSolution`] by [`solve::Newton`] on the elements of [`rod`].
 
+pub mod banded;
 pub mod contact;
 pub mod device;
 pub mod error;

@@ -5,7 +5,7 @@ use endowire_core::contact::{FeltWall, Friction, HandMotion, SETTLED, WallContac
 use endowire_core::device::Device;
 use endowire_core::insertion::WallProperties;
 use endowire_core::methods::kirchhoff::Mesh;
-use endowire_core::rod::{Assembly, Clamp, ElementData, PLAIN, RodState, Supports};
+use endowire_core::rod::{Clamp, ElementData, PLAIN, RodState, Stencils, Supports};
 use endowire_core::solve::{External, Newton, NewtonOptions};
 use endowire_core::statics::Loads;
 use endowire_core::vessel::Wall;
@@ -59,37 +59,35 @@ struct Outside<'a> {
     plates: f64,
 }
 
-impl External<PLAIN> for Outside<'_> {
-    fn energy(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
-        let off: f64 = state.positions.iter().map(|x| x.z * x.z).sum();
-        0.5 * self.plates * off
-            + External::<PLAIN>::energy(&mut self.contact, elements, state)
-            + External::<PLAIN>::energy(self.loads, elements, state)
-    }
-
-    fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<PLAIN>) {
-        self.loads.add(elements, state, assembly);
-        self.contact.add(elements, state, assembly);
+impl External for Outside<'_> {
+    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+        self.loads.linearise(elements, state, into);
+        self.contact.linearise(elements, state, into);
         if self.plates == 0.0 {
             return;
         }
         for (i, x) in state.positions.iter().enumerate() {
             let force = Vec3::z() * (self.plates * x.z);
-            assembly.external_energy += 0.5 * force.z * x.z;
-            assembly.add_node(i, &force, &(Matrix3::from_diagonal(&Vec3::z()) * self.plates));
+            into.add_value(0.5 * force.z * x.z);
+            into.add_node(i, &force, &(Matrix3::from_diagonal(&Vec3::z()) * self.plates));
         }
     }
 
-    fn obstructs(&self) -> bool {
+    fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+        let off: f64 = state.positions.iter().map(|x| x.z * x.z).sum();
+        0.5 * self.plates * off + self.contact.value(elements, state) + self.loads.value(elements, state)
+    }
+
+    fn is_steep(&self) -> bool {
         true
     }
 
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
-        External::<PLAIN>::safe_fraction(&mut self.contact, elements, to)
+        self.contact.safe_fraction(elements, to)
     }
 
     fn scale(&self) -> [f64; 2] {
-        External::<PLAIN>::scale(&*self.loads)
+        self.loads.scale()
     }
 }
 

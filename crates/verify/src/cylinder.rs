@@ -4,8 +4,7 @@
 use super::Row;
 use super::bench::{Bench, Setup};
 use super::contact::falling;
-use endowire_core::rod::Frame;
-use endowire_core::rod::element::element_energy;
+use endowire_core::rod::{Frame, PLAIN, element_energy};
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Result, Vec3};
 use std::f64::consts::{PI, SQRT_2, TAU};
@@ -122,7 +121,7 @@ impl Helix {
             sine2: mean(&|i| 1.0 - state.frames[i].t.x.powi(2)),
             pressure: force / (to - from),
             bending: mean(&|e| {
-                element_energy(&elements[e], &state.element(e), false).bend / elements[e].length
+                element_energy::<PLAIN>(&elements[e], &state.element::<PLAIN>(e)).bend / elements[e].length
             }),
             shortening: 1.0 - (state.positions[range.end].x - state.positions[range.start].x) / (to - from),
             height: 1.0 + mean(&|i| state.positions[i].y),

@@ -7,6 +7,7 @@
 mod bench;
 mod capstan;
 mod channel;
+mod coaxial;
 mod contact;
 pub mod crossing;
 mod cylinder;
@@ -198,12 +199,32 @@ pub const FAMILIES: &[Family] = &[
         run: regions::regions,
     },
     Family { id: "C8", title: "Deep in a soft wall", run: insertion::yielding_tube },
+    Family {
+        id: "D1",
+        title: "Instruments on one line: stiffness adds, in any order",
+        run: coaxial::stiffness_adds,
+    },
+    Family {
+        id: "D2",
+        title: "Two pre-curved instruments turned against each other (Dupont et al. 2010)",
+        run: coaxial::pair,
+    },
+    Family {
+        id: "D3",
+        title: "A curved instrument in a straight one: what pushing costs",
+        run: coaxial::curved_in_straight,
+    },
+    Family {
+        id: "D4",
+        title: "Straight instruments in a close-fitting arc: what pushing costs",
+        run: coaxial::straight_in_arc,
+    },
 ];
 
 /// A straight inextensible rod of length 1 and EI 1 along x, clamped at the origin, free at its end.
 pub fn unit_rod(elements: usize) -> StaticCase {
     StaticCase {
-        rod: Rod { length: 1.0, elements, section: vec![section(1.0, 1.0)] },
+        rod: Rod { length: 1.0, elements, section: vec![section(1.0, 1.0)], instrument: vec![] },
         start: Start {
             kind: StartKind::Clamped,
             position: [0.0; 3],

@@ -46,7 +46,7 @@ fn print_solution(document: &Document) {
     println!("  elements      {}", s.tensions.len());
     println!("  tip           {}", vector(&s.tip));
     println!("  tip tangent   {}, {:.9} rad from the start's", vector(&s.tip_tangent), s.tip_angle);
-    if s.twisted {
+    if s.twisted && s.instruments.is_empty() {
         println!("  twist         {:.9} rad", s.twist);
     }
     let e = &s.energy;
@@ -58,6 +58,17 @@ fn print_solution(document: &Document) {
     print_reaction("end", &s.reactions.end);
     if let Some(force) = s.push_force {
         println!("  push force    {force:.9} if the clamped start is a sleeve without friction");
+    }
+    for i in &s.instruments {
+        let push = i.push_force.map_or("jumps here".to_owned(), |force| format!("{force:.9}"));
+        println!(
+            "  {:<13} {} beyond the start, tip {}, twist {:.9} rad, push force {push}, torque {:.9}",
+            i.name,
+            i.inserted,
+            vector(&i.tip),
+            i.twist,
+            i.torque
+        );
     }
 }
 

@@ -7,10 +7,10 @@ use nalgebra::Matrix3;
 use super::distance::Nearness;
 use super::extension::extended;
 use super::grading::{Grading, Stiffness};
-use super::wall::{FOLLOW, LOOK_AGAIN};
+use super::point::{FOLLOW, LOOK_AGAIN};
+use super::properties::WallProperties;
 use super::{Distance, SmoothWall};
 use crate::device::Device;
-use crate::insertion::WallProperties;
 use crate::vessel::{Conditioning, NoStore, Wall, WallQuery, WallRecipe, WallStore};
 use crate::{Result, Vec3};
 

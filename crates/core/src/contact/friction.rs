@@ -28,6 +28,8 @@
 
 mod coupling;
 
+pub use coupling::Coupling;
+
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 

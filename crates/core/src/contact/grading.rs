@@ -26,9 +26,9 @@
 
 use nalgebra::Matrix3;
 
+use super::properties::WallProperties;
 use super::{Distance, SmoothWall, WallPotential};
 use crate::Vec3;
-use crate::insertion::WallProperties;
 
 /// A quantity given at the vertices, with derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -180,7 +180,7 @@ fn mean(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::insertion::WallRegion;
+    use crate::contact::WallRegion;
     use crate::vessel::{GeneratedWall, Resolution, WallQuery, anatomy};
 
     /// A tube of radius 4 mm about the z axis from 0 to 100 mm, triangles with edges of 1 mm.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, Nearness};
 use super::places::{Place, Places};
-use super::wall::LOOK_AGAIN;
+use super::point::LOOK_AGAIN;
 use super::{ContactPoint, FeltWall};
 use crate::Vec3;
 

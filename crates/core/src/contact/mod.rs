@@ -10,6 +10,7 @@ mod memory;
 mod places;
 pub mod point;
 pub mod potential;
+mod properties;
 mod quadric;
 #[cfg(test)]
 mod ridge_tests;
@@ -20,6 +21,7 @@ pub use felt::FeltWall;
 pub use friction::{Friction, HandMotion, NormalForce, SETTLED};
 pub use grading::Grading;
 pub use memory::{KnownPoints, WallMemory};
-pub use point::{ContactPoint, Counters, Touch};
+pub use point::{Contact, ContactPoint, Counters, Touch};
 pub use potential::WallPotential;
+pub use properties::{WallProperties, WallRegion};
 pub use wall::WallContact;

@@ -1,10 +1,16 @@
 //! Places on a device where the wall is felt, and what happens there.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Vec3;
 use crate::contact::{Distance, WallPotential};
-use crate::insertion::Contact;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, RodState};
+
+/// Beyond its radius, a point is followed within this part of it.
+pub(super) const FOLLOW: f64 = 0.5;
+/// A triangle is the nearest, or close to it, within this part of a point's radius from where it was found.
+pub(super) const LOOK_AGAIN: f64 = 0.5;
 
 /// A place on the device where the wall is felt.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,6 +56,31 @@ impl ContactPoint {
     }
 }
 
+/// One place where the wall holds the device.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Contact {
+    /// Position on the device's axis, mm.
+    pub position_mm: Vec3,
+    /// Direction of the wall's elastic force on the device: its normal into the lumen, unit length. At the edge of a region it
+    /// leans to the softer side.
+    pub normal: Vec3,
+    /// Elastic force, N: that by which the wall presses.
+    pub force_n: f64,
+    /// Friction force on the device, along the wall and against its slip, N.
+    pub friction_n: Vec3,
+    /// Depth to which the device's surface is beyond the wall, mm.
+    pub penetration_mm: f64,
+    /// Triangle of the wall mesh.
+    pub triangle: u32,
+}
+
+impl Contact {
+    /// Force of the wall on the device, normal and friction together, N.
+    pub fn total_n(&self) -> Vec3 {
+        self.normal * self.force_n + self.friction_n
+    }
+}
+
 /// A contact point that presses on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
@@ -61,7 +92,7 @@ pub struct Touch {
 
 /// Questions about the wall, asked and avoided. They tell of the work that was done, which hangs on what a simulation still knows of places
 /// where a device has been, and not of the state of an insertion.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Counters {
     /// Questions to the bounding volume hierarchy.
     pub queries: u64,

@@ -13,12 +13,11 @@
 mod coupling;
 
 use super::memory::WallMemory;
-use super::point::{ContactPoint, Counters, Touch};
+use super::point::{Contact, ContactPoint, Counters, FOLLOW, LOOK_AGAIN, Touch};
 use crate::Vec3;
 use crate::contact::distance::{Distance, Nearness};
 use crate::contact::{FeltWall, Friction};
-use crate::insertion::Contact;
-use crate::rod::{Assembly, ElementData, PointSum, RodState};
+use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::External;
 
 /// How near a point stands.
@@ -47,10 +46,6 @@ impl Reading {
     }
 }
 
-/// Beyond its radius, a point is followed within this part of it.
-pub(super) const FOLLOW: f64 = 0.5;
-/// A triangle is the nearest, or close to it, within this part of a point's radius from where it was found.
-pub(super) const LOOK_AGAIN: f64 = 0.5;
 /// The smooth distance changes by less than this part of the way.
 const STEEPEST: f64 = 2.0;
 /// Radius of the gentlest bend worth a number, mm.
@@ -234,35 +229,35 @@ impl<'a> WallContact<'a> {
     }
 
     /// Friction of point `index` at its base.
-    fn add_friction<const C: usize>(
+    fn add_friction(
         &mut self,
         elements: &[ElementData],
         state: &RodState,
-        assembly: &mut Assembly<C>,
+        into: &mut dyn Stencils,
         sum: &mut PointSum,
         index: usize,
     ) {
         let (point, x) = (&self.points[index], &self.memory.points[index].base);
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
         let Some(f) = self.friction.derivatives(index, x, angle, radius_mm) else { return };
-        assembly.external_energy += self.friction.value(index, x, angle, radius_mm);
+        into.add_value(self.friction.value(index, x, angle, radius_mm));
         self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * f.hessian.norm() * x.amax());
         let e = point.element;
-        sum.add(point.xi, &f.gradient, assembly.hessian.then_some(&f.hessian));
-        assembly.add_turn(state, &elements[e], e, point.xi, &f.mixed, (f.turn, f.turn2));
+        sum.add(point.xi, &f.gradient, into.wants_hessian().then_some(&f.hessian));
+        into.add_spin(state, &elements[e], (e, point.xi), &f.mixed, (f.turn, f.turn2));
     }
 
     /// What point `index` feels at its base.
-    fn gather<const C: usize>(
+    fn gather(
         &mut self,
         elements: &[ElementData],
         state: &RodState,
-        assembly: &mut Assembly<C>,
+        into: &mut dyn Stencils,
         sum: &mut PointSum,
         index: usize,
     ) {
         if self.friction.acts() {
-            self.add_friction(elements, state, assembly, sum, index);
+            self.add_friction(elements, state, into, sum, index);
         }
         let Some(d) = self.memory.pressed(index) else { return };
         let (point, known) = (&self.points[index], &self.memory.points[index]);
@@ -273,12 +268,12 @@ impl<'a> WallContact<'a> {
         let (gradient, hessian) = if self.holding {
             stiffness.holding(&point.potential, d, w, known.force_n)
         } else {
-            assembly.external_energy += stiffness.factor * w * point.potential.value(d.value_mm);
+            into.add_value(stiffness.factor * w * point.potential.value(d.value_mm));
             let (gradient, hessian) = stiffness.derivatives(&point.potential, d, w);
             self.memory.points[index].force_n = gradient.norm();
             (gradient, hessian)
         };
-        sum.add(point.xi, &gradient, assembly.hessian.then_some(&hessian));
+        sum.add(point.xi, &gradient, into.wants_hessian().then_some(&hessian));
     }
 
     /// A device bent to a radius of 100 mm carries this.
@@ -373,7 +368,7 @@ impl<'a> WallContact<'a> {
     }
 
     /// Whether a guess is none: a point sinks much deeper than where it comes from, or passes through the wall on its way from there.
-    pub fn is_outside<const C: usize>(&mut self, elements: &[ElementData], state: &RodState) -> bool {
+    pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         let deep = (0..self.points.len()).any(|index| {
             let radius_mm = self.points[index].potential.radius_mm;
             let known = &self.memory.points[index];
@@ -382,33 +377,12 @@ impl<'a> WallContact<'a> {
             let x = self.points[index].position(elements, state);
             self.read(index, &x).distance_mm() <= least_mm
         });
-        deep || External::<C>::safe_fraction(self, elements, state) < 1.0
+        deep || self.safe_fraction(elements, state) < 1.0
     }
 }
 
-impl<const C: usize> External<C> for WallContact<'_> {
-    fn energy(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
-        let mut sum = 0.0;
-        for index in 0..self.points.len() {
-            let x = self.points[index].position(elements, state);
-            let point = self.points[index];
-            let radius_mm = point.potential.radius_mm;
-            // Derivatives serve the assembly that follows where friction acts; otherwise that was tried first.
-            let limit_mm = if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY };
-            let value_mm = self.read_within(index, &x, limit_mm).distance_mm();
-            if value_mm < radius_mm {
-                let triangle = self.memory.points[index].triangle;
-                let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
-                sum += factor * point.weight_mm * point.potential.value(value_mm);
-            }
-            if self.friction.acts() {
-                sum += self.friction.value(index, &x, point.angle(state), point.potential.radius_mm);
-            }
-        }
-        sum
-    }
-
-    fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
+impl External for WallContact<'_> {
+    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, state);
             let radius_mm = self.points[index].potential.radius_mm;
@@ -447,14 +421,35 @@ impl<const C: usize> External<C> for WallContact<'_> {
         for group in self.points.chunk_by(|a, b| a.element == b.element) {
             let end = begin + group.len();
             for index in begin..end {
-                self.gather(elements, state, assembly, &mut sum, index);
+                self.gather(elements, state, into, &mut sum, index);
             }
             if !sum.is_empty() {
                 let e = group[0].element;
-                assembly.add_points(state, &elements[e], e, &std::mem::take(&mut sum));
+                into.add_points(state, &elements[e], e, &std::mem::take(&mut sum));
             }
             begin = end;
         }
+    }
+
+    fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+        let mut sum = 0.0;
+        for index in 0..self.points.len() {
+            let x = self.points[index].position(elements, state);
+            let point = self.points[index];
+            let radius_mm = point.potential.radius_mm;
+            // Derivatives serve the assembly that follows where friction acts; otherwise that was tried first.
+            let limit_mm = if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY };
+            let value_mm = self.read_within(index, &x, limit_mm).distance_mm();
+            if value_mm < radius_mm {
+                let triangle = self.memory.points[index].triangle;
+                let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
+                sum += factor * point.weight_mm * point.potential.value(value_mm);
+            }
+            if self.friction.acts() {
+                sum += self.friction.value(index, &x, point.angle(state), point.potential.radius_mm);
+            }
+        }
+        sum
     }
 
     /// In a device that carries less, force and moment have no scale of their own to be compared with.
@@ -466,12 +461,12 @@ impl<const C: usize> External<C> for WallContact<'_> {
         self.rounding_n
     }
 
-    fn obstructs(&self) -> bool {
+    fn is_steep(&self) -> bool {
         true
     }
 
     /// Friction renews the normal forces it works with.
-    fn memoryless(&self) -> bool {
+    fn is_fixed(&self) -> bool {
         !self.friction.acts()
     }
 

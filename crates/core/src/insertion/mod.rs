@@ -6,13 +6,12 @@ mod nodes;
 mod report;
 mod sheath;
 mod simulation;
-mod wall_properties;
 
+pub use crate::contact::{Contact, WallProperties, WallRegion};
 pub use crate::methods::State;
 pub use builder::SimulationBuilder;
 pub use command::{Command, ScriptLine, commands};
 pub use nodes::nodes_from_tip;
-pub use report::{Contact, Energy, StepReport};
+pub use report::{Energy, StepReport};
 pub use sheath::Sheath;
 pub use simulation::{Simulation, Surroundings, check_commands, script_commands};
-pub use wall_properties::{WallProperties, WallRegion};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::Vec3;
+use crate::contact::Contact;
 
 /// The terms of the total potential energy, mJ.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -19,31 +19,6 @@ impl Energy {
     /// Sum of all terms, mJ.
     pub fn total(&self) -> f64 {
         self.bend + self.twist + self.wall
-    }
-}
-
-/// One place where the wall holds the device.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Contact {
-    /// Position on the device's axis, mm.
-    pub position_mm: Vec3,
-    /// Direction of the wall's elastic force on the device: its normal into the lumen, unit length. At the edge of a region it
-    /// leans to the softer side.
-    pub normal: Vec3,
-    /// Elastic force, N: that by which the wall presses.
-    pub force_n: f64,
-    /// Friction force on the device, along the wall and against its slip, N.
-    pub friction_n: Vec3,
-    /// Depth to which the device's surface is beyond the wall, mm.
-    pub penetration_mm: f64,
-    /// Triangle of the wall mesh.
-    pub triangle: u32,
-}
-
-impl Contact {
-    /// Force of the wall on the device, normal and friction together, N.
-    pub fn total_n(&self) -> Vec3 {
-        self.normal * self.force_n + self.friction_n
     }
 }
 

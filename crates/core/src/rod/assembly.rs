@@ -13,28 +13,26 @@
 //! with the same dq: an augmentation of the linear algebra, not of the mechanics. Its inertia tells minima from saddle
 //! points just as that of the first form does.
 
-use super::element::{ElementData, ElementSystem, Energy, element_system};
+use super::element::{ElementData, ElementSystem, Energy};
+use super::lagrangian::element_system;
 use super::layout::Layout;
-use super::quadrature::{Point, hermite};
 use super::state::RodState;
-use crate::Vec3;
-use crate::solve::{BandMatrix, Shift};
-use nalgebra::Matrix3;
+use crate::banded::{BandMatrix, Shift};
 
 /// A rank-one addition p qᵀ to the matrix that is not symmetric: loads that follow the rod.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RankOne {
+pub(crate) struct RankOne {
     /// First of three consecutive rows p lives in.
-    pub row: usize,
+    pub(crate) row: usize,
     /// Its entries.
-    pub p: [f64; 3],
+    pub(crate) p: [f64; 3],
     /// First of three consecutive columns q lives in.
-    pub column: usize,
+    pub(crate) column: usize,
     /// Its entries.
-    pub q: [f64; 3],
+    pub(crate) q: [f64; 3],
 }
 
-/// Matrix, residual and energy at one state. External energies add to it with the `add_*` methods.
+/// Matrix, residual and energy at one state. External energies add to it by its [`Stencils`](super::Stencils).
 #[derive(Debug, Clone)]
 pub struct Assembly<const C: usize> {
     /// The augmented matrix.
@@ -48,7 +46,7 @@ pub struct Assembly<const C: usize> {
     /// Energy of everything outside the rod.
     pub external_energy: f64,
     /// Unsymmetric additions to the matrix.
-    pub rank_ones: Vec<RankOne>,
+    pub(crate) rank_ones: Vec<RankOne>,
     /// Largest force and moment an element exerts on a node: the scale of the residual.
     pub scale: [f64; 2],
     /// Whether the matrix is wanted beside the residual. Where it is not, it is left empty.
@@ -97,12 +95,28 @@ impl<const C: usize> Assembly<C> {
         let l = Layout::<C>;
         // Rows without meaning.
         self.matrix.add(Layout::<C>::BLOCK - 1, Layout::<C>::BLOCK - 1, 1.0);
-        if Layout::<C>::TWIST {
-            self.matrix.add(0, 0, 1.0);
+        for set in 0..Layout::<C>::ANGLES {
+            self.matrix.add(set, set, 1.0);
         }
+        self.add_absent(elements);
         let first = l.support(elements.len());
         for row in first + 6..first + Layout::<C>::BLOCK {
             self.matrix.add(row, row, 1.0);
+        }
+    }
+
+    /// Angles of instruments that have ended mean nothing.
+    fn add_absent(&mut self, elements: &[ElementData]) {
+        let l = Layout::<C>;
+        if Layout::<C>::ANGLES == 0 {
+            return;
+        }
+        for (e, data) in elements.iter().enumerate() {
+            for set in (0..Layout::<C>::ANGLES).filter(|set| !data.materials[*set].is_present()) {
+                for row in [l.bubble(e, set), l.angle(e + 1, set)] {
+                    self.matrix.add(row, row, 1.0);
+                }
+            }
         }
     }
 
@@ -111,7 +125,7 @@ impl<const C: usize> Assembly<C> {
         let mut system = ElementSystem::<C>::zeros();
         for (e, data) in elements.iter().enumerate() {
             let gamma = data.augmentation();
-            element_system::<C, HESSIAN>(data, &state.element(e), gamma, &mut system);
+            element_system::<C, HESSIAN>(data, &state.element::<C>(e), gamma, &mut system);
             self.energy.add(&system.energy);
             let g = &system.gradient;
             let (x, t) = (l.position(0), l.tangent(0));
@@ -126,89 +140,6 @@ impl<const C: usize> Assembly<C> {
             correction.for_each(|(r, s)| *r += gap * s);
             if HESSIAN {
                 self.matrix.lay_blocks(at, &system.rows);
-            }
-        }
-    }
-
-    /// Adds an energy of the position of node `i`.
-    pub fn add_node(&mut self, i: usize, gradient: &Vec3, hessian: &Matrix3<f64>) {
-        let at = Layout::<C>.position(i);
-        for a in 0..3 {
-            self.residual[at + a] += gradient[a];
-            if !self.hessian {
-                continue;
-            }
-            for b in a..3 {
-                self.matrix.add(at + a, at + b, hessian[(a, b)]);
-            }
-        }
-    }
-
-    /// Adds an energy of the angle of node `i`; nothing where the rod carries no angles.
-    pub fn add_angle(&mut self, i: usize, gradient: f64, hessian: f64) {
-        if Layout::<C>::TWIST {
-            let at = Layout::<C>.angle(i);
-            self.residual[at] += gradient;
-            if self.hessian {
-                self.matrix.add(at, at, hessian);
-            }
-        }
-    }
-
-    /// How the point at ξ of element `e` moves with the unknowns: rows and displacements,
-    /// w₀ dx₀ + s₀(u a + v b) + ….
-    pub(crate) fn point_columns(
-        state: &RodState,
-        element: &ElementData,
-        e: usize,
-        xi: f64,
-    ) -> [(usize, Vec3); 10] {
-        let l = Layout::<C>;
-        let [w0, s0, w1, s1] = hermite(xi);
-        let (s0, s1) = (s0 * element.length, s1 * element.length);
-        let (f0, f1) = (&state.frames[e], &state.frames[e + 1]);
-        [
-            (l.position(e), Vec3::x() * w0),
-            (l.position(e) + 1, Vec3::y() * w0),
-            (l.position(e) + 2, Vec3::z() * w0),
-            (l.tangent(e), f0.u * s0),
-            (l.tangent(e) + 1, f0.v * s0),
-            (l.position(e + 1), Vec3::x() * w1),
-            (l.position(e + 1) + 1, Vec3::y() * w1),
-            (l.position(e + 1) + 2, Vec3::z() * w1),
-            (l.tangent(e + 1), f1.u * s1),
-            (l.tangent(e + 1) + 1, f1.v * s1),
-        ]
-    }
-
-    /// Adds the part of an energy of the point at ξ of element `e` that depends on the material angle there: its derivatives
-    /// `first`, `second` in the angle and `mixed` in angle and position; nothing where the rod carries no angles.
-    pub fn add_turn(
-        &mut self,
-        state: &RodState,
-        element: &ElementData,
-        e: usize,
-        xi: f64,
-        mixed: &Vec3,
-        (first, second): (f64, f64),
-    ) {
-        if !Layout::<C>::TWIST {
-            return;
-        }
-        let l = Layout::<C>;
-        let [w0, w1, wb] = Point::at(xi, 0.0).phi;
-        let angles = [(l.angle(e), w0), (l.bubble(e), wb), (l.angle(e + 1), w1)];
-        let columns = Self::point_columns(state, element, e, xi);
-        for (i, &(row, p)) in angles.iter().enumerate() {
-            self.residual[row] += first * p;
-            if !self.hessian {
-                continue;
-            }
-            for &(column, q) in &angles[i..] {
-                self.matrix.add(row, column, second * p * q);
-            }
-            for (column, way) in &columns {
-                self.matrix.add(row, *column, p * mixed.dot(way));
             }
         }
     }
@@ -231,12 +162,12 @@ impl<const C: usize> Assembly<C> {
                 for a in 0..2 {
                     shift.diagonal[l.tangent(i) + a] += along;
                 }
-                if Layout::<C>::TWIST {
-                    shift.diagonal[l.angle(i)] += along;
+                for set in 0..Layout::<C>::ANGLES {
+                    shift.diagonal[l.angle(i, set)] += along;
                 }
             }
-            if Layout::<C>::TWIST {
-                shift.diagonal[l.bubble(e)] += along;
+            for set in 0..Layout::<C>::ANGLES {
+                shift.diagonal[l.bubble(e, set)] += along;
             }
         }
         for row in held.iter().flatten() {

@@ -1,6 +1,6 @@
 //! What a clamp at the start of a rod exerts, and with what force a rod is driven through it.
 
-use super::layout::Layout;
+use super::layout::{Layout, MAX_ANGLES};
 use super::state::RodState;
 use crate::Vec3;
 
@@ -11,21 +11,28 @@ pub struct Clamp {
     pub force: Vec3,
     /// Moment across the tangent.
     pub moment: Vec3,
-    /// Moment along the tangent; 0 without angles.
+    /// Moment along the tangent, on all instruments together; 0 without angles.
     pub torque: f64,
+    /// That on the instrument of each set of angles.
+    pub torques: [f64; MAX_ANGLES],
 }
 
 impl Clamp {
     /// From the residual rows of the first node before they were held
-    /// ([`Newton::start_residual`](crate::solve::Newton::start_residual)).
-    pub fn new<const C: usize>(rows: &[f64; 8], state: &RodState) -> Self {
+    /// (`Newton::start_residual` of the solver).
+    pub fn new<const C: usize>(rows: &[f64; C], state: &RodState) -> Self {
         let l = Layout::<C>;
         let (x, t) = (l.position(0), l.tangent(0));
         let frame = &state.frames[0];
+        let mut torques = [0.0; MAX_ANGLES];
+        for (set, torque) in torques.iter_mut().enumerate().take(Layout::<C>::ANGLES) {
+            *torque = rows[l.angle(0, set)];
+        }
         Self {
             force: Vec3::new(rows[x], rows[x + 1], rows[x + 2]),
             moment: frame.v * rows[t] - frame.u * rows[t + 1],
-            torque: if Layout::<C>::TWIST { rows[l.angle(0)] } else { 0.0 },
+            torque: torques.iter().sum(),
+            torques,
         }
     }
 

@@ -1,10 +1,9 @@
 //! Gradients and Hessians of the element against fourth-order differences of its energy.
 
-use super::element::{
-    ElementData, ElementState, ElementSystem, element_energy, element_system, elongation, mid_slope,
-};
+use super::element::{ElementData, ElementState, ElementSystem, Material, elongation, mid_slope};
 use super::frame::{Frame, reference_twist};
-use super::layout::{PLAIN, TWISTED};
+use super::lagrangian::{element_energy, element_system};
+use super::layout::{Layout, MAX_ANGLES, PLAIN, TWISTED};
 use crate::Vec3;
 
 fn noise(seed: &mut u64) -> f64 {
@@ -27,66 +26,77 @@ fn state(seed: &mut u64, angle: f64, spread: f64) -> ElementState {
     // The chord of an arc through both tangents, so that no state is absurdly stretched.
     let chord =
         (first.t + second.t) / (1.0 + 0.7 * first.t.dot(&second.t)).max(0.3) * 0.85 + vector(seed) * spread;
-    ElementState {
-        first,
-        second,
-        chord,
-        tension: 3.0 * noise(seed),
-        angles: [2.0 * noise(seed), 2.0 * noise(seed), 0.3 * noise(seed)],
+    let mut angles = || [2.0 * noise(seed), 2.0 * noise(seed), 0.3 * noise(seed)];
+    let angles = [angles(), angles(), angles()];
+    ElementState { first, second, chord, tension: 3.0 * noise(seed), angles }
+}
+
+fn positive(seed: &mut u64) -> f64 {
+    1.5 + noise(seed)
+}
+
+fn material(s: &mut u64) -> Material {
+    Material {
+        bending: [positive(s), positive(s), positive(s)],
+        torsion: [positive(s), positive(s), positive(s)],
+        rest_curvature: [[noise(s), noise(s)], [noise(s), noise(s)], [noise(s), noise(s)]],
+        rest_twist: [noise(s), noise(s), noise(s)],
     }
 }
 
+/// An element of three instruments with shapes of their own, and one without.
 fn data(seed: &mut u64) -> ElementData {
-    let positive = |s: &mut u64| 1.5 + noise(s);
-    ElementData {
-        length: 0.4 * positive(seed),
-        bending: [positive(seed), positive(seed), positive(seed)],
-        torsion: [positive(seed), positive(seed), positive(seed)],
-        rest_curvature: [[noise(seed), noise(seed)], [noise(seed), noise(seed)], [noise(seed), noise(seed)]],
-        rest_twist: [noise(seed), noise(seed), noise(seed)],
-        flexibility: 0.3 * positive(seed),
-    }
+    let materials = [material(seed), material(seed), material(seed)];
+    let bending =
+        [0, 1, 2].map(|k| materials.iter().map(|m| m.bending[k]).sum::<f64>() + 0.5 * positive(seed));
+    ElementData { length: 0.4 * positive(seed), bending, flexibility: 0.3 * positive(seed), materials }
 }
 
-/// The Lagrangian after the unknowns have moved by `d`; entries 0 and 7 are empty, the last one is N.
-fn lagrangian(data: &ElementData, s: &ElementState, d: &[f64; TWISTED]) -> f64 {
+/// The Lagrangian after the unknowns have moved by `d`; entries of b and N of the first node are empty, the last one is N.
+fn lagrangian<const C: usize>(data: &ElementData, s: &ElementState, d: &[f64; C]) -> f64 {
+    let l = Layout::<C>;
+    let three = |at: usize| Vec3::new(d[at], d[at + 1], d[at + 2]);
+    let (t0, t1) = (l.tangent(0), l.tangent(1));
     let mut moved = *s;
-    moved.chord += (Vec3::new(d[9], d[10], d[11]) - Vec3::new(d[1], d[2], d[3])) / data.length;
-    moved.first = s.first.transported(d[4], d[5]);
-    moved.second = s.second.transported(d[12], d[13]);
+    moved.chord += (three(l.position(1)) - three(l.position(0))) / data.length;
+    moved.first = s.first.transported(d[t0], d[t0 + 1]);
+    moved.second = s.second.transported(d[t1], d[t1 + 1]);
     let before = reference_twist(&s.first, &s.second);
     let after = reference_twist(&moved.first, &moved.second);
-    moved.angles[0] += d[6];
-    moved.angles[1] += d[14] + after - before;
-    moved.angles[2] += d[8];
-    moved.tension += d[15];
+    for (set, angles) in moved.angles.iter_mut().enumerate().take(Layout::<C>::ANGLES) {
+        angles[0] += d[l.angle(0, set)];
+        angles[1] += d[l.angle(1, set)] + after - before;
+        angles[2] += d[l.bubble(0, set)];
+    }
+    moved.tension += d[l.tension(0)];
     let rigid = ElementData { flexibility: 0.0, ..*data };
-    let e = element_energy(&rigid, &moved, true);
+    let e = element_energy::<C>(&rigid, &moved);
     let c = elongation(data.length, &mid_slope(&moved.first.t, &moved.chord, &moved.second.t));
     e.total() + moved.tension * c - 0.5 * data.flexibility * moved.tension * moved.tension
 }
 
 /// Largest errors of gradient and Hessian, relative to their largest entries.
-fn errors(data: &ElementData, s: &ElementState, spoil: f64) -> (f64, f64) {
-    let mut out = ElementSystem::<TWISTED>::zeros();
+fn errors<const C: usize>(data: &ElementData, s: &ElementState, spoil: f64) -> (f64, f64) {
+    let l = Layout::<C>;
+    let mut out = ElementSystem::<C>::zeros();
     element_system::<_, true>(data, s, 0.0, &mut out);
-    out.gradient[4] += spoil;
-    out.rows[4][13] += spoil;
+    out.gradient[l.tangent(0)] += spoil;
+    out.rows[l.tangent(0)][l.tangent(1) + 1] += spoil;
     let at = |i: usize, a: f64, j: usize, b: f64| {
-        let mut d = [0.0; TWISTED];
+        let mut d = [0.0; C];
         d[i] += a;
         d[j] += b;
         lagrangian(data, s, &d)
     };
-    let step = 1e-3;
+    let step = 5e-4;
     let (mut eg, mut eh) = (0.0f64, 0.0f64);
     let size_h = out.rows.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
     let size_g = out.gradient.iter().fold(0.1 * size_h, |m, v| m.max(v.abs()));
-    for i in 0..TWISTED {
+    for i in 0..C {
         let first = |h: f64| (at(i, h, i, 0.0) - at(i, -h, i, 0.0)) / (2.0 * h);
         let g = (4.0 * first(step) - first(2.0 * step)) / 3.0;
         eg = eg.max((g - out.gradient[i]).abs() / size_g);
-        for j in i..TWISTED {
+        for j in i..C {
             let second = |h: f64| {
                 if i == j {
                     (at(i, h, i, 0.0) - 2.0 * at(i, 0.0, i, 0.0) + at(i, -h, i, 0.0)) / (h * h)
@@ -117,8 +127,18 @@ fn element_derivatives_are_those_of_its_energy() {
             let mut s = seed * 77 + 5;
             let (d, mut q) = (data(&mut s), state(&mut s, angle, spread));
             q.chord *= stretch;
-            let (g, h) = errors(&d, &q, 0.0);
-            assert!(g < 1e-8 && h < 5e-7, "angle {angle}, seed {seed}: gradient {g:e}, Hessian {h:e}");
+            let of_widths = [
+                errors::<PLAIN>(&d, &q, 0.0),
+                errors::<TWISTED>(&d, &q, 0.0),
+                errors::<20>(&d, &q, 0.0),
+                errors::<24>(&d, &q, 0.0),
+            ];
+            for (sets, (g, h)) in of_widths.into_iter().enumerate() {
+                assert!(
+                    g < 1e-8 && h < 5e-7,
+                    "{sets} sets, angle {angle}, seed {seed}: gradient {g:e}, Hessian {h:e}"
+                );
+            }
         }
     }
 }
@@ -127,18 +147,17 @@ fn element_derivatives_are_those_of_its_energy() {
 fn a_wrong_derivative_is_seen() {
     let mut s = 9;
     let (d, q) = (data(&mut s), state(&mut s, 0.3, 0.2));
-    let (g, h) = errors(&d, &q, 1e-2);
-    assert!(g > 1e-8 && h > 5e-7);
+    for (g, h) in [errors::<TWISTED>(&d, &q, 1e-2), errors::<24>(&d, &q, 1e-2)] {
+        assert!(g > 1e-8 && h > 5e-7);
+    }
 }
 
 #[test]
 fn elements_with_and_without_twist_agree_where_nothing_twists() {
     let mut s = 4;
     let (mut d, mut q) = (data(&mut s), state(&mut s, 0.5, 0.1));
-    d.rest_curvature = [[0.0; 2]; 3];
-    d.rest_twist = [0.0; 3];
-    d.torsion = [0.0; 3];
-    q.angles = [0.0; 3];
+    d.materials = [Material { torsion: [f64::MIN_POSITIVE; 3], ..Material::NONE }; MAX_ANGLES];
+    q.angles = [[0.0; 3]; MAX_ANGLES];
     let (mut full, mut plain) = (ElementSystem::<TWISTED>::zeros(), ElementSystem::<PLAIN>::zeros());
     element_system::<_, true>(&d, &q, 7.0, &mut full);
     element_system::<_, true>(&d, &q, 7.0, &mut plain);
@@ -181,8 +200,13 @@ fn the_hessian_of_a_nearly_straight_element_is_that_of_the_beam() {
     for turn in [0.0, 1e-9] {
         let second = first.transported(turn, 0.0);
         let d = ElementData::plain(0.5, 2.0);
-        let q =
-            ElementState { first, second, chord: (first.t + second.t) * 0.5, tension: 0.0, angles: [0.0; 3] };
+        let q = ElementState {
+            first,
+            second,
+            chord: (first.t + second.t) * 0.5,
+            tension: 0.0,
+            angles: [[0.0; 3]; MAX_ANGLES],
+        };
         let mut out = ElementSystem::<PLAIN>::zeros();
         element_system::<_, true>(&d, &q, 0.0, &mut out);
         let (x0, t0, x1, t1) = (0, 3, 6, 9);

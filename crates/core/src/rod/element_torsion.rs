@@ -1,33 +1,85 @@
-//! Twist and rest curvature of one element: the part of its energy that sees the material frame.
+//! Twist and rest curvature of one element: the part of its energy that sees material frames.
+//!
+//! Instruments that share the centre line share its geometry, each turned against it by an angle of its own. In the first node's triad
+//! the energy depends on the chord, on the far tangent, and on (φ₀, φ₁, b) of every instrument, φ₁ = θ₁ + reference twist: local
+//! unknowns, of which energies and derivatives are sums over instruments and Gauss points. Then comes the chain rule. Turns of either
+//! tangent move all local unknowns, and every φ₁ by the same; displacements move the chord alone and angles themselves. So it needs
+//! products with four columns, not with all unknowns, and is gone through once, however many instruments there are.
 
-use super::element::{ElementData, ElementState, ElementSystem, Energy, angles};
-use super::layout::{Layout, TWISTED};
+use super::element::{ElementData, ElementState, ElementSystem, Energy, Material, angles};
+use super::frame::Frame;
+use super::layout::{Layout, MAX_ANGLES};
 use super::quadrature::GAUSS;
 use super::torsion::torsion;
 use crate::Vec3;
 use nalgebra::Matrix3;
 
-/// First places of an element's unknowns.
-const X0: usize = Layout::<TWISTED>.position(0);
-const T0: usize = Layout::<TWISTED>.tangent(0);
-const ANGLE0: usize = Layout::<TWISTED>.angle(0);
-const BUBBLE: usize = Layout::<TWISTED>.bubble(0);
-const X1: usize = Layout::<TWISTED>.position(1);
-const T1: usize = Layout::<TWISTED>.tangent(1);
-const ANGLE1: usize = Layout::<TWISTED>.angle(1);
-
-/// A derivative of the local unknowns: of the chord and the far tangent, both in the first triad, and of (φ₀, φ₁, b).
-#[derive(Clone, Copy)]
-struct Local {
+/// Derivatives in the chord and the far tangent, both in the first triad.
+#[derive(Clone, Copy, Default)]
+struct ShapeDerivatives {
     chord: Vec3,
     end: Vec3,
-    angles: Vec3,
+    chord_chord: Matrix3<f64>,
+    chord_end: Matrix3<f64>,
+    end_end: Matrix3<f64>,
 }
 
-/// Adds twist and rest curvature: 9 local unknowns (chord, far tangent, φ₀, φ₁, b), then the chain rule.
-///
-/// Turns of either tangent move all local unknowns; displacements move the chord alone and angles themselves, so the
-/// chain rule needs products with four columns, not thirteen.
+/// Derivatives in (φ₀, φ₁, b) of one instrument.
+#[derive(Clone, Copy, Default)]
+struct AngleDerivatives {
+    angles: Vec3,
+    chord_angles: Matrix3<f64>,
+    end_angles: Matrix3<f64>,
+    angles_angles: Matrix3<f64>,
+}
+
+/// What a unit turn of a tangent changes: chord and far tangent, and the reference twist.
+#[derive(Clone, Copy)]
+struct Turn {
+    chord: Vec3,
+    end: Vec3,
+    twist: f64,
+}
+
+/// The element's geometry in its first triad.
+struct Geometry {
+    chord: Vec3,
+    end: Vec3,
+    /// u and v of the second triad.
+    across: [Vec3; 2],
+    /// 1/(1 + t₀·t₁).
+    closeness: f64,
+    /// Rates of the reference twist in turns of the first tangent, …
+    near: [f64; 2],
+    /// … and of the second.
+    far: [f64; 2],
+}
+
+impl Geometry {
+    #[inline(always)]
+    fn new(s: &ElementState) -> Self {
+        let (f0, f1) = (&s.first, &s.second);
+        let (chord, end) = (f0.local(&s.chord), f0.local(&f1.t));
+        let across = [f0.local(&f1.u), f0.local(&f1.v)];
+        let closeness = 1.0 / (1.0 + end.x);
+        // K = t₀ × t₁/(1 + t₀·t₁): the reference twist turns by K·(turn of either tangent).
+        let k = Vec3::new(0.0, -end.z * closeness, end.y * closeness);
+        Self { chord, end, across, closeness, near: [k.y, k.z], far: across.map(|w| k.dot(&w)) }
+    }
+
+    /// Turns of the first tangent along u and v, and of the second.
+    #[inline(always)]
+    fn turns(&self) -> [Turn; 4] {
+        let swing = |w: &Vec3, a: usize| {
+            if a == 0 { Vec3::new(w.y, -w.x, 0.0) } else { Vec3::new(w.z, 0.0, -w.x) }
+        };
+        let near = |a| Turn { chord: swing(&self.chord, a), end: swing(&self.end, a), twist: self.near[a] };
+        let far = |a: usize| Turn { chord: Vec3::zeros(), end: self.across[a], twist: self.far[a] };
+        [near(0), near(1), far(0), far(1)]
+    }
+}
+
+/// Adds twist and rest curvature of all instruments that have angles.
 #[inline]
 pub(super) fn add_torsion<const C: usize, const HESSIAN: bool>(
     data: &ElementData,
@@ -35,152 +87,231 @@ pub(super) fn add_torsion<const C: usize, const HESSIAN: bool>(
     out: &mut ElementSystem<C>,
     energy: &mut Energy,
 ) {
-    let (f0, f1) = (&s.first, &s.second);
-    let (chord, end) = (f0.local(&s.chord), f0.local(&f1.t));
-    let zero = Matrix3::zeros();
-    let (mut gc, mut gt, mut ga) = (Vec3::zeros(), Vec3::zeros(), Vec3::zeros());
-    // Blocks of the local Hessian: rows and columns chord, end, angles.
-    let (mut hcc, mut hce, mut hee, mut hca, mut hea, mut haa) = (zero, zero, zero, zero, zero, zero);
+    let l = Layout::<C>;
+    let geometry = Geometry::new(s);
+    let mut shape = ShapeDerivatives::default();
+    let mut spins = [AngleDerivatives::default(); MAX_ANGLES];
+    for set in 0..Layout::<C>::ANGLES {
+        let material = &data.materials[set];
+        if material.is_present() {
+            spins[set] = gather(material, &s.angles[set], data.length, &geometry, &mut shape, energy);
+        }
+    }
+    let ih = 1.0 / data.length;
+    // From the first triad back to space.
+    let axes = Matrix3::from_columns(&[s.first.t, s.first.u, s.first.v]);
+    let turns = geometry.turns();
+    let force = axes * shape.chord * ih;
+    for i in 0..3 {
+        out.gradient[l.position(0) + i] -= force[i];
+        out.gradient[l.position(1) + i] += force[i];
+    }
+    // The torque at the second node turns with the reference twist.
+    let mut torque = 0.0;
+    for (set, spin) in spins.iter().enumerate().take(Layout::<C>::ANGLES) {
+        for (i, row) in angle_rows::<C>(set).into_iter().enumerate() {
+            out.gradient[row] += spin.angles[i];
+        }
+        torque += spin.angles[1];
+    }
+    for (d, row) in turns.iter().zip(turn_rows::<C>()) {
+        out.gradient[row] += shape.chord.dot(&d.chord) + shape.end.dot(&d.end) + torque * d.twist;
+    }
+    if HESSIAN {
+        add_displacements(&axes, ih, &shape, &spins, out);
+        add_turns(&axes, ih, &shape, &spins, &turns, out);
+        add_curvature(&s.first, &geometry, &shape, torque, ih, out);
+    }
+}
+
+/// Rows of the turns of both tangents.
+#[inline(always)]
+const fn turn_rows<const C: usize>() -> [usize; 4] {
+    let l = Layout::<C>;
+    [l.tangent(0), l.tangent(0) + 1, l.tangent(1), l.tangent(1) + 1]
+}
+
+/// Rows of (θ₀, θ₁, b).
+#[inline(always)]
+const fn angle_rows<const C: usize>(set: usize) -> [usize; 3] {
+    let l = Layout::<C>;
+    [l.angle(0, set), l.angle(1, set), l.bubble(0, set)]
+}
+
+/// Adds one instrument's energy and its derivatives in chord and far tangent, and returns those in its angles.
+#[inline(always)]
+fn gather(
+    material: &Material,
+    of: &[f64; 3],
+    length: f64,
+    geometry: &Geometry,
+    shape: &mut ShapeDerivatives,
+    energy: &mut Energy,
+) -> AngleDerivatives {
+    let mut spin = AngleDerivatives::default();
     for (k, point) in GAUSS.iter().enumerate() {
-        let (y, z) = point.derivatives(&chord, &Vec3::x(), &end);
-        let (phi, dphi) = angles(&s.angles, point);
-        let f = torsion(&y, &z, phi, dphi, &data.torsion_input(k));
+        let (y, z) = point.derivatives(&geometry.chord, &Vec3::x(), &geometry.end);
+        let (phi, dphi) = angles(of, point);
+        let f = torsion(&y, &z, phi, dphi, &material.torsion_input(k, length));
         energy.bend += f.bend;
         energy.twist += f.twist;
         let ([yc, _, ye], [zc, _, ze]) = (point.y, point.z);
-        gc += f.gy * yc + f.gz * zc;
-        gt += f.gy * ye + f.gz * ze;
+        shape.chord += f.gy * yc + f.gz * zc;
+        shape.end += f.gy * ye + f.gz * ze;
         let hzy = f.hyz.transpose();
         // Half products: derivative along y and z of the gradient in each vector.
         let (cy, cz) = (f.hyy * yc + hzy * zc, f.hyz * yc + f.hzz * zc);
-        hcc += cy * yc + cz * zc;
-        hce += cy * ye + cz * ze;
-        hee += f.hyy * (ye * ye) + (f.hyz + hzy) * (ye * ze) + f.hzz * (ze * ze);
+        shape.chord_chord += cy * yc + cz * zc;
+        shape.chord_end += cy * ye + cz * ze;
+        shape.end_end += f.hyy * (ye * ye) + (f.hyz + hzy) * (ye * ze) + f.hzz * (ze * ze);
         let (weight, slope) = (Vec3::from(point.phi), Vec3::from(point.dphi));
         let both = |p: &[Vec3; 2]| p[0] * weight.transpose() + p[1] * slope.transpose();
         let (hya, hza) = (both(&f.hyp), both(&f.hzp));
-        hca += hya * yc + hza * zc;
-        hea += hya * ye + hza * ze;
-        ga += weight * f.gp[0] + slope * f.gp[1];
-        haa += weight * weight.transpose() * f.hpp[0] + slope * slope.transpose() * f.hpp[1];
+        spin.chord_angles += hya * yc + hza * zc;
+        spin.end_angles += hya * ye + hza * ze;
+        spin.angles += weight * f.gp[0] + slope * f.gp[1];
+        spin.angles_angles += weight * weight.transpose() * f.hpp[0] + slope * slope.transpose() * f.hpp[1];
     }
-    energy.bend += data.rest_energy();
+    energy.bend += material.rest_energy(length);
+    spin
+}
 
-    let ih = 1.0 / data.length;
-    let (u1, v1) = (f0.local(&f1.u), f0.local(&f1.v));
-    let c = 1.0 / (1.0 + end.x);
-    // K = t₀ × t₁/(1 + t₀·t₁), in the first triad: the reference twist turns by K·(turn of either tangent).
-    let k = Vec3::new(0.0, -end.z * c, end.y * c);
-    let k0 = [k.y, k.z];
-    let k1 = [k.dot(&u1), k.dot(&v1)];
-    let swing = |w: &Vec3, a: usize| {
-        if a == 0 { Vec3::new(w.y, -w.x, 0.0) } else { Vec3::new(w.z, 0.0, -w.x) }
-    };
-    let spin = |rate: f64| Vec3::new(0.0, rate, 0.0);
-    let turns = [
-        Local { chord: swing(&chord, 0), end: swing(&end, 0), angles: spin(k0[0]) },
-        Local { chord: swing(&chord, 1), end: swing(&end, 1), angles: spin(k0[1]) },
-        Local { chord: Vec3::zeros(), end: u1, angles: spin(k1[0]) },
-        Local { chord: Vec3::zeros(), end: v1, angles: spin(k1[1]) },
-    ];
-    const TURNS: [usize; 4] = [T0, T0 + 1, T1, T1 + 1];
-    const ANGLES: [usize; 3] = [ANGLE0, ANGLE1, BUBBLE];
-    // From the first triad back to space.
-    let axes = Matrix3::from_columns(&[f0.t, f0.u, f0.v]);
-    let force = axes * gc * ih;
-    for i in 0..3 {
-        out.gradient[X0 + i] -= force[i];
-        out.gradient[X1 + i] += force[i];
-        out.gradient[ANGLES[i]] += ga[i];
-    }
-    for (d, row) in turns.iter().zip(TURNS) {
-        out.gradient[row] += gc.dot(&d.chord) + gt.dot(&d.end) + ga.dot(&d.angles);
-    }
-    if !HESSIAN {
-        return;
-    }
-
-    let products = turns.map(|d| Local {
-        chord: hcc * d.chord + hce * d.end + hca * d.angles,
-        end: hce.tr_mul(&d.chord) + hee * d.end + hea * d.angles,
-        angles: hca.tr_mul(&d.chord) + hea.tr_mul(&d.end) + haa * d.angles,
-    });
-
-    let stiffness = axes * hcc * axes.transpose() * (ih * ih);
-    let crossed = axes * hca * ih;
+/// Adds the Hessian in displacements and angles.
+#[inline(always)]
+fn add_displacements<const C: usize>(
+    axes: &Matrix3<f64>,
+    ih: f64,
+    shape: &ShapeDerivatives,
+    spins: &[AngleDerivatives; MAX_ANGLES],
+    out: &mut ElementSystem<C>,
+) {
+    let l = Layout::<C>;
+    let (x0, x1) = (l.position(0), l.position(1));
+    let stiffness = axes * shape.chord_chord * axes.transpose() * (ih * ih);
     for i in 0..3 {
         for j in 0..3 {
-            out.rows[X0 + i][X1 + j] -= stiffness[(i, j)];
+            out.rows[x0 + i][x1 + j] -= stiffness[(i, j)];
             if j >= i {
-                out.rows[X0 + i][X0 + j] += stiffness[(i, j)];
-                out.rows[X1 + i][X1 + j] += stiffness[(i, j)];
+                out.rows[x0 + i][x0 + j] += stiffness[(i, j)];
+                out.rows[x1 + i][x1 + j] += stiffness[(i, j)];
             }
-            out.rows[X0 + i][ANGLES[j]] -= crossed[(i, j)];
         }
-        // θ₀ and b stand before x₁, θ₁ behind it.
-        out.rows[ANGLE0][X1 + i] += crossed[(i, 0)];
-        out.rows[X1 + i][ANGLE1] += crossed[(i, 1)];
-        out.rows[BUBBLE][X1 + i] += crossed[(i, 2)];
     }
-    for (i, j, value) in [
-        (ANGLE0, ANGLE0, haa[(0, 0)]),
-        (ANGLE0, ANGLE1, haa[(0, 1)]),
-        (ANGLE0, BUBBLE, haa[(0, 2)]),
-        (ANGLE1, ANGLE1, haa[(1, 1)]),
-        (BUBBLE, ANGLE1, haa[(1, 2)]),
-        (BUBBLE, BUBBLE, haa[(2, 2)]),
-    ] {
-        out.rows[i][j] += value;
-    }
-    for (a, &row) in TURNS.iter().enumerate() {
-        let product = axes * products[a].chord * ih;
+    for (set, spin) in spins.iter().enumerate().take(Layout::<C>::ANGLES) {
+        let rows = angle_rows::<C>(set);
+        let [angle0, angle1, bubble] = rows;
+        let crossed = axes * spin.chord_angles * ih;
         for i in 0..3 {
-            out.rows[X0 + i][row] -= product[i];
-            let (first, last) = if row < X1 { (row, X1 + i) } else { (X1 + i, row) };
+            for j in 0..3 {
+                out.rows[x0 + i][rows[j]] -= crossed[(i, j)];
+            }
+            // θ₀ and b stand before x₁, θ₁ behind it.
+            out.rows[angle0][x1 + i] += crossed[(i, 0)];
+            out.rows[x1 + i][angle1] += crossed[(i, 1)];
+            out.rows[bubble][x1 + i] += crossed[(i, 2)];
+        }
+        let own = &spin.angles_angles;
+        for (i, j, value) in [
+            (angle0, angle0, own[(0, 0)]),
+            (angle0, angle1, own[(0, 1)]),
+            (angle0, bubble, own[(0, 2)]),
+            (angle1, angle1, own[(1, 1)]),
+            (bubble, angle1, own[(1, 2)]),
+            (bubble, bubble, own[(2, 2)]),
+        ] {
+            out.rows[i][j] += value;
+        }
+    }
+}
+
+/// Adds the Hessian in turns of the tangents, and in turns and everything else.
+#[inline(always)]
+fn add_turns<const C: usize>(
+    axes: &Matrix3<f64>,
+    ih: f64,
+    shape: &ShapeDerivatives,
+    spins: &[AngleDerivatives; MAX_ANGLES],
+    turns: &[Turn; 4],
+    out: &mut ElementSystem<C>,
+) {
+    let l = Layout::<C>;
+    let (x0, x1) = (l.position(0), l.position(1));
+    let rows = turn_rows::<C>();
+    for (a, (d, &row)) in turns.iter().zip(&rows).enumerate() {
+        // The Hessian times what the turn changes.
+        let mut chord = shape.chord_chord * d.chord + shape.chord_end * d.end;
+        let mut end = shape.chord_end.tr_mul(&d.chord) + shape.end_end * d.end;
+        let mut twist = 0.0;
+        for (set, spin) in spins.iter().enumerate().take(Layout::<C>::ANGLES) {
+            chord += spin.chord_angles.column(1) * d.twist;
+            end += spin.end_angles.column(1) * d.twist;
+            let angles = spin.chord_angles.tr_mul(&d.chord)
+                + spin.end_angles.tr_mul(&d.end)
+                + spin.angles_angles.column(1) * d.twist;
+            twist += angles[1];
+            for (i, angle) in angle_rows::<C>(set).into_iter().enumerate() {
+                let (first, last) = if row < angle { (row, angle) } else { (angle, row) };
+                out.rows[first][last] += angles[i];
+            }
+        }
+        let product = axes * chord * ih;
+        for i in 0..3 {
+            out.rows[x0 + i][row] -= product[i];
+            let (first, last) = if row < x1 { (row, x1 + i) } else { (x1 + i, row) };
             out.rows[first][last] += product[i];
-            let (first, last) = if row < ANGLES[i] { (row, ANGLES[i]) } else { (ANGLES[i], row) };
-            out.rows[first][last] += products[a].angles[i];
         }
         for b in a..4 {
             let q = &turns[b];
-            out.rows[row][TURNS[b]] += products[a].chord.dot(&q.chord)
-                + products[a].end.dot(&q.end)
-                + products[a].angles.dot(&q.angles);
+            out.rows[row][rows[b]] += chord.dot(&q.chord) + end.dot(&q.end) + twist * q.twist;
         }
     }
+}
 
-    // Second derivatives of the local unknowns.
-    let gp = ga[1];
-    for (w, gw) in [(&chord, &gc), (&end, &gt)] {
+/// Adds the gradient times second derivatives of the local unknowns.
+#[inline(always)]
+fn add_curvature<const C: usize>(
+    first: &Frame,
+    geometry: &Geometry,
+    shape: &ShapeDerivatives,
+    torque: f64,
+    ih: f64,
+    out: &mut ElementSystem<C>,
+) {
+    let l = Layout::<C>;
+    let (x0, t0, x1, t1) = (l.position(0), l.tangent(0), l.position(1), l.tangent(1));
+    let Geometry { chord, end, across, closeness, near, far } = geometry;
+    let (gc, gt) = (&shape.chord, &shape.end);
+    for (w, gw) in [(chord, gc), (end, gt)] {
         let along = gw.dot(w);
-        out.rows[T0][T0] += gw.z * w.z - along;
-        out.rows[T0 + 1][T0 + 1] += gw.y * w.y - along;
-        out.rows[T0][T0 + 1] -= 0.5 * (gw.y * w.z + gw.z * w.y);
+        out.rows[t0][t0] += gw.z * w.z - along;
+        out.rows[t0 + 1][t0 + 1] += gw.y * w.y - along;
+        out.rows[t0][t0 + 1] -= 0.5 * (gw.y * w.z + gw.z * w.y);
     }
     let turn = [
-        (f0.u * gc.x - f0.t * gc.y) * ih, // along u
-        (f0.v * gc.x - f0.t * gc.z) * ih, // along v
+        (first.u * gc.x - first.t * gc.y) * ih, // along u
+        (first.v * gc.x - first.t * gc.z) * ih, // along v
     ];
-    let ends = [u1, v1];
-    let bends = gt.dot(&end);
-    // t₀ + t₁ and t₀, t₁ in the first triad.
+    let bends = gt.dot(end);
+    // t₀ + t₁ and u₀, v₀ in the first triad.
     let sum = Vec3::new(1.0 + end.x, end.y, end.z);
-    let first = [Vec3::y(), Vec3::z()];
+    let axes = [Vec3::y(), Vec3::z()];
     for a in 0..2 {
         for i in 0..3 {
-            out.rows[X0 + i][T0 + a] -= turn[a][i];
-            out.rows[T0 + a][X1 + i] += turn[a][i];
+            out.rows[x0 + i][t0 + a] -= turn[a][i];
+            out.rows[t0 + a][x1 + i] += turn[a][i];
         }
-        out.rows[T1 + a][T1 + a] -= bends;
+        out.rows[t1 + a][t1 + a] -= bends;
         for b in 0..2 {
-            let p = ends[b];
+            let p = across[b];
             // −ω × p for ω along the turn of the first triad.
             let swing = if a == 0 { gt.x * p.y - gt.y * p.x } else { gt.x * p.z - gt.z * p.x };
-            let twist = 0.5 * c * (first[a].dot(&sum.cross(&p)) - (k0[a] * ends[b].x + k1[b] * end[1 + a]));
-            out.rows[T0 + a][T1 + b] += swing + gp * twist;
+            let twist =
+                0.5 * closeness * (axes[a].dot(&sum.cross(&p)) - (near[a] * p.x + far[b] * end[1 + a]));
+            out.rows[t0 + a][t1 + b] += swing + torque * twist;
             if b >= a {
-                out.rows[T0 + a][T0 + b] -= 0.5 * c * gp * (k0[a] * end[1 + b] + k0[b] * end[1 + a]);
-                out.rows[T1 + a][T1 + b] -= 0.5 * c * gp * (k1[a] * ends[b].x + k1[b] * ends[a].x);
+                let half = 0.5 * closeness * torque;
+                out.rows[t0 + a][t0 + b] -= half * (near[a] * end[1 + b] + near[b] * end[1 + a]);
+                out.rows[t1 + a][t1 + b] -= half * (far[a] * p.x + far[b] * across[a].x);
             }
         }
     }

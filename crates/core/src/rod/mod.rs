@@ -5,9 +5,13 @@
 //! independent unknown (Hellinger–Reissner) and, with angles, an angle bubble b that makes the angle quadratic in
 //! the element. The Lagrangian is
 //!
-//!   ½∫EI |r′×r″|²/|r′|⁴ ds − ∫EI κ⁰·t′ ds + ½∫EI |κ⁰|² ds      bending ([`bending`], [`torsion`])
-//!   + ½∫GJ (τ − τ⁰)² ds                                        twist ([`torsion`])
-//!   + Σ N c − ½ D N²                                          axial ([`element`])
+//!   ½∫EI |r′×r″|²/|r′|⁴ ds                                     bending ([`bending`])
+//!   + Σᵢ − ∫EIᵢ κᵢ⁰·t′ ds + ½∫EIᵢ |κᵢ⁰|² ds                     rest curvature ([`torsion`])
+//!   + Σᵢ ½∫GJᵢ (τᵢ − τᵢ⁰)² ds                                  twist ([`torsion`])
+//!   + Σ N c − ½ D N²                                          axial ([`lagrangian`])
+//!
+//! where instruments i that lie in one another share the centre line, EI is the sum of theirs, and κᵢ⁰ = R(θᵢ)(kᵢ₁, kᵢ₂) turns with the
+//! angle of each: Σ ½EIᵢ|t′ − κᵢ⁰|² (Dupont, Lock, Itkowitz and Butler, IEEE Trans. Robotics 26(2), 2010). A rod is one instrument.
 //!
 //! with c = ⅔h(|r′(½)| − 1), Simpson's elongation of an element whose end slopes are unit vectors, and D = ∫ds/EA.
 //! Sources: C. Meier, A. Popp, W. A. Wall, *An objective 3D large deformation finite element formulation for
@@ -23,20 +27,25 @@ pub mod element;
 mod element_torsion;
 pub mod frame;
 mod invariants;
+pub mod lagrangian;
 pub mod layout;
 pub mod points;
 pub mod quadrature;
+pub(crate) mod scatter;
 pub mod state;
+pub mod stencils;
 pub mod supports;
 pub mod torsion;
 
 pub use assembly::Assembly;
 pub use clamp::Clamp;
-pub use element::{ElementData, Energy};
+pub use element::{ElementData, Energy, Material};
 pub use frame::Frame;
-pub use layout::{Layout, PLAIN, TWISTED};
+pub use lagrangian::{element_energy, element_system};
+pub use layout::{Layout, MAX_ANGLES, PLAIN, TWISTED};
 pub use points::PointSum;
 pub use state::RodState;
+pub use stencils::{Stencils, Triple};
 pub use supports::{EndAngle, Supports};
 
 #[cfg(test)]

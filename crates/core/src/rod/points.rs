@@ -48,7 +48,7 @@ impl PointSum {
 
 impl<const C: usize> Assembly<C> {
     /// Adds energies of points of element `e`.
-    pub fn add_points(&mut self, state: &RodState, element: &ElementData, e: usize, sum: &PointSum) {
+    pub(super) fn add_gathered(&mut self, state: &RodState, element: &ElementData, e: usize, sum: &PointSum) {
         let l = Layout::<C>;
         let h = element.length;
         let [f0, g0, f1, g1] = &sum.forces;
@@ -138,7 +138,7 @@ mod tests {
             let off = place(&data, &state, xi) - to;
             sum.add(xi, &(off * k), Some(&(Matrix3::identity() * k)));
         }
-        assembly.add_points(&state, &data, 1, &sum);
+        assembly.add_gathered(&state, &data, 1, &sum);
         let l = Layout::<C>;
         let rows: Vec<usize> = (1..3)
             .flat_map(|i| (0..5).map(move |a| (i, a)))

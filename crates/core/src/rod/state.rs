@@ -2,7 +2,7 @@
 
 use super::element::{ElementData, ElementState, mid_slope};
 use super::frame::{Frame, normalised, reference_twist, turn_parts};
-use super::layout::Layout;
+use super::layout::{Layout, MAX_ANGLES};
 use crate::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -18,9 +18,9 @@ pub struct RodState {
     pub chords: Vec<Vec3>,
     /// Axial forces of the elements.
     pub tensions: Vec<f64>,
-    /// Angle of the material triad against the reference triad, at the nodes.
+    /// Angles of the material triads against the reference triad, at the nodes: node by node, those of a node set by set.
     pub angles: Vec<f64>,
-    /// Angle bubbles of the elements: the angle at the middle beyond the mean of its ends.
+    /// Angle bubbles of the elements, in the same order: the angle at the middle beyond the mean of its ends.
     pub bubbles: Vec<f64>,
     /// Reference twist of the elements, followed continuously over full turns.
     pub reference_twists: Vec<f64>,
@@ -69,26 +69,55 @@ impl RodState {
         }
     }
 
-    /// State of element `e`.
+    /// The same centre line with room for `sets` of angles, at least one, all of them those of the first.
+    pub fn with_sets(mut self, sets: usize) -> Self {
+        let repeat = |list: &[f64]| list.iter().flat_map(|angle| std::iter::repeat_n(*angle, sets)).collect();
+        self.angles = repeat(&self.angles);
+        self.bubbles = repeat(&self.bubbles);
+        self
+    }
+
+    /// State of element `e`, where two neighbouring nodes have `C` unknowns.
     #[inline]
-    pub fn element(&self, e: usize) -> ElementState {
+    pub fn element<const C: usize>(&self, e: usize) -> ElementState {
+        let k = Layout::<C>::ANGLES;
+        let mut angles = [[0.0; 3]; MAX_ANGLES];
+        for (set, angles) in angles.iter_mut().enumerate().take(k) {
+            let (first, second) = (self.angles[k * e + set], self.angles[k * (e + 1) + set]);
+            *angles = [first, second + self.reference_twists[e], self.bubbles[k * e + set]];
+        }
         ElementState {
             first: self.frames[e],
             second: self.frames[e + 1],
             chord: self.chords[e],
             tension: self.tensions[e],
-            angles: [self.angles[e], self.angles[e + 1] + self.reference_twists[e], self.bubbles[e]],
+            angles,
         }
+    }
+
+    /// Sets of angles there is room for.
+    fn sets(&self) -> usize {
+        self.angles.len() / self.frames.len()
+    }
+
+    /// Angle of the material triad at node `i` in a `set` of angles.
+    pub fn angle(&self, i: usize, set: usize) -> f64 {
+        self.angles[self.sets() * i + set]
     }
 
     /// Twist of the whole rod, rad, any number of turns.
     pub fn twist(&self) -> f64 {
-        self.angles[self.elements()] - self.angles[0] + self.reference_twists.iter().sum::<f64>()
+        self.twist_to(self.elements(), 0)
     }
 
-    /// The material triad (t, d₁, d₂) of node `i`.
+    /// Twist of the instrument in a `set` of angles from the first node to node `i`, rad, any number of turns.
+    pub fn twist_to(&self, i: usize, set: usize) -> f64 {
+        self.angle(i, set) - self.angle(0, set) + self.reference_twists[..i].iter().sum::<f64>()
+    }
+
+    /// The material triad (t, d₁, d₂) of node `i`, of the first instrument that has angles.
     pub fn material_frame(&self, i: usize) -> Frame {
-        self.frames[i].turned(self.angles[i])
+        self.frames[i].turned(self.angle(i, 0))
     }
 
     /// Leaves the first node alone. Keeps the memory.
@@ -134,11 +163,12 @@ impl RodState {
     /// any size is solved by one full step.
     pub fn advance<const C: usize>(&mut self, elements: &[ElementData], base: &Self, d: &[f64], alpha: f64) {
         let l = Layout::<C>;
+        let k = Layout::<C>::ANGLES;
         for i in 0..base.frames.len() {
             let t = l.tangent(i);
             self.frames[i] = base.frames[i].transported(alpha * d[t], alpha * d[t + 1]);
-            if Layout::<C>::TWIST {
-                self.angles[i] = base.angles[i] + alpha * d[l.angle(i)];
+            for set in 0..k {
+                self.angles[k * i + set] = base.angles[k * i + set] + alpha * d[l.angle(i, set)];
             }
         }
         self.positions[0] = base.positions[0] + position_step(d, l.position(0)) * alpha;
@@ -161,8 +191,10 @@ impl RodState {
             let ends = self.frames[e].t + self.frames[e + 1].t;
             self.chords[e] = (direction * length + ends * 0.25) / 1.5;
             self.positions[e + 1] = self.positions[e] + self.chords[e] * data.length;
-            if Layout::<C>::TWIST {
-                self.bubbles[e] = base.bubbles[e] + alpha * d[l.bubble(e)];
+            for set in 0..k {
+                self.bubbles[k * e + set] = base.bubbles[k * e + set] + alpha * d[l.bubble(e, set)];
+            }
+            if k > 0 {
                 let psi = reference_twist(&self.frames[e], &self.frames[e + 1]);
                 let turns = ((base.reference_twists[e] - psi) / std::f64::consts::TAU).round();
                 self.reference_twists[e] = psi + turns * std::f64::consts::TAU;
@@ -187,8 +219,8 @@ impl RodState {
         for i in 0..base.frames.len() {
             let t = l.tangent(i);
             square = square.max(d[t] * d[t] + d[t + 1] * d[t + 1]);
-            if Layout::<C>::TWIST {
-                twist = twist.max(d[l.angle(i)].abs());
+            for set in 0..Layout::<C>::ANGLES {
+                twist = twist.max(d[l.angle(i, set)].abs());
             }
         }
         for e in 0..elements.len() {

@@ -7,7 +7,7 @@
 
 use super::assembly::Assembly;
 use super::element::ElementData;
-use super::layout::Layout;
+use super::layout::{Layout, MAX_ANGLES};
 use super::state::RodState;
 use crate::Vec3;
 
@@ -20,7 +20,7 @@ const SUPPORT_FLEXIBILITY: f64 = 1e-12;
 pub struct Supports {
     /// The first node's tangent is held.
     pub start_tangent: bool,
-    /// The first node's angle is held.
+    /// The first node's angles are held.
     pub start_angle: bool,
     /// Directions (orthonormal) in which the last node's position is held; none to three.
     pub end_directions: Vec<Vec3>,
@@ -141,9 +141,9 @@ impl Supports {
                 assembly.matrix.add(first + j, first + j, 1.0);
             }
         }
-        if Layout::<C>::TWIST && self.end_angle.is_some() {
-            assembly.matrix.add(l.angle(n), first + 5, 1.0);
-            assembly.residual[l.angle(n)] += self.multipliers[5];
+        if Layout::<C>::ANGLES > 0 && self.end_angle.is_some() {
+            assembly.matrix.add(l.angle(n, 0), first + 5, 1.0);
+            assembly.residual[l.angle(n, 0)] += self.multipliers[5];
             assembly.matrix.add(first + 5, first + 5, -SUPPORT_FLEXIBILITY * turning);
             assembly.residual[first + 5] += gaps[5];
         } else {
@@ -152,9 +152,9 @@ impl Supports {
     }
 
     /// Rows of the first node that are held.
-    pub fn held<const C: usize>(&self) -> [Option<usize>; 6] {
+    pub fn held<const C: usize>(&self) -> [Option<usize>; 5 + MAX_ANGLES] {
         let l = Layout::<C>;
-        let mut held = [None; 6];
+        let mut held = [None; 5 + MAX_ANGLES];
         for (a, row) in held.iter_mut().enumerate().take(3) {
             *row = Some(l.position(0) + a);
         }
@@ -162,8 +162,10 @@ impl Supports {
             held[3] = Some(l.tangent(0));
             held[4] = Some(l.tangent(0) + 1);
         }
-        if Layout::<C>::TWIST && self.start_angle {
-            held[5] = Some(l.angle(0));
+        if self.start_angle {
+            for set in 0..Layout::<C>::ANGLES {
+                held[5 + set] = Some(l.angle(0, set));
+            }
         }
         held
     }

@@ -1,37 +1,58 @@
 //! Energies outside the rod, as Newton's method asks for them.
 
-use crate::rod::{Assembly, ElementData, RodState};
+use crate::rod::{ElementData, RodState, Stencils};
 
-/// Energies outside the rod: loads, walls.
-pub trait External<const C: usize> {
-    /// Potential energy at a state.
-    fn energy(&mut self, elements: &[ElementData], state: &RodState) -> f64;
-    /// Adds gradient, Hessian and energy at a state to the assembly.
-    fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>);
+/// An energy outside the rod: loads, walls, or several of them together. It says where it acts in terms of the rod
+/// ([`Stencils`]) and knows nothing of unknowns.
+///
+/// Newton's method asks in this order:
+///
+/// 1. [`linearise`](External::linearise) at a state, which is the *base* from then on, until the next one is linearised.
+/// 2. [`safe_fraction`](External::safe_fraction) of the way from the base to a trial.
+/// 3. [`value`](External::value) at that trial; as often as it takes, trials being nearer and nearer to the base.
+/// 4. [`linearise`](External::linearise) at the trial that was taken.
+///
+/// Where the energy hangs on the state alone ([`is_fixed`](External::is_fixed)), steps 3 and 4 may be one: the first trial is linearised
+/// at once, and the base again if that trial is refused. Where it does not, something in it is lagged, as the normal forces are that
+/// friction follows: what is lagged is renewed when a base is linearised and at no other time, so that one step lowers one energy.
+pub trait External {
+    /// Adds value, gradient and Hessian at a state, which becomes the base.
+    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils);
+
+    /// Potential energy at a state, with what is lagged as it was at the base.
+    fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64;
+
+    /// Part of the straight way from the base to `to` that crosses nothing.
+    fn safe_fraction(&mut self, _elements: &[ElementData], _to: &RodState) -> f64 {
+        1.0
+    }
+
+    /// Whether the energy hangs on the state alone, and nothing in it is lagged.
+    fn is_fixed(&self) -> bool {
+        false
+    }
+
+    /// Whether it rises so steeply within a step that a trial may have to be looked for between one that was taken and one that was
+    /// refused, as a wall does.
+    fn is_steep(&self) -> bool {
+        false
+    }
+
+    /// Whether all of it has a potential. Where not, the stiffness is unsymmetric and there are no minima to look for.
+    fn is_conservative(&self) -> bool {
+        true
+    }
+
     /// Work done on the way between two states by loads that have no potential.
     fn work(&self, _from: &RodState, _to: &RodState) -> f64 {
         0.0
     }
-    /// Whether all of it has a potential. Where not, the stiffness is unsymmetric and there are no minima to look for.
-    fn conservative(&self) -> bool {
-        true
-    }
-    /// Whether it can stop a step short, as a wall does.
-    fn obstructs(&self) -> bool {
-        false
-    }
-    /// Whether its energy hangs on the state alone, not on what [`External::add`] was given before.
-    fn memoryless(&self) -> bool {
-        false
-    }
-    /// Part of the way from the state last given to [`External::add`] to `to` that crosses nothing.
-    fn safe_fraction(&mut self, _elements: &[ElementData], _to: &RodState) -> f64 {
-        1.0
-    }
-    /// What rounding of positions leaves of its forces at a node.
+
+    /// What rounding of positions leaves of its forces at a node, at the base.
     fn rounding(&self) -> f64 {
         0.0
     }
+
     /// Size of the forces and moments it exerts, for the scale of the residual.
     fn scale(&self) -> [f64; 2] {
         [0.0; 2]

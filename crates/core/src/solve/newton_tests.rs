@@ -2,33 +2,33 @@
 
 use super::{External, Newton, NewtonOptions, NewtonReport, StepRecord};
 use crate::Vec3;
-use crate::rod::{Assembly, ElementData, Frame, PLAIN, PointSum, RodState, Supports};
+use crate::rod::{ElementData, Frame, PLAIN, PointSum, RodState, Stencils, Supports};
 
 struct Tip(Vec3);
-impl<const C: usize> External<C> for Tip {
-    fn energy(&mut self, _: &[ElementData], state: &RodState) -> f64 {
+impl External for Tip {
+    fn value(&mut self, _: &[ElementData], state: &RodState) -> f64 {
         -self.0.dot(&state.positions[state.elements()])
     }
-    fn add(&mut self, _: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
+    fn linearise(&mut self, _: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         let n = state.elements();
-        assembly.add_node(n, &-self.0, &nalgebra::Matrix3::zeros());
-        assembly.external_energy -= self.0.dot(&state.positions[n]);
+        into.add_node(n, &-self.0, &nalgebra::Matrix3::zeros());
+        into.add_value(-self.0.dot(&state.positions[n]));
     }
 }
 
 /// A spring from the middle of element `e` to a point: an energy between nodes, as a wall is.
 struct Spring(usize, Vec3, f64);
-impl<const C: usize> External<C> for Spring {
-    fn energy(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+impl External for Spring {
+    fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         0.5 * self.2 * (self.place(elements, state) - self.1).norm_squared()
     }
-    fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
+    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         let off = self.place(elements, state) - self.1;
-        assembly.external_energy += External::<C>::energy(self, elements, state);
+        into.add_value(self.value(elements, state));
         let hessian = nalgebra::Matrix3::identity() * self.2;
         let mut sum = PointSum::default();
         sum.add(0.3, &(off * self.2), Some(&hessian));
-        assembly.add_points(state, &elements[self.0], self.0, &sum);
+        into.add_points(state, &elements[self.0], self.0, &sum);
     }
 }
 impl Spring {
@@ -55,7 +55,7 @@ impl std::ops::Deref for Solution {
     }
 }
 
-fn cantilever(n: usize, outside: &mut dyn External<PLAIN>) -> (RodState, Solution) {
+fn cantilever(n: usize, outside: &mut dyn External) -> (RodState, Solution) {
     let data = ElementData::plain(1.0 / n as f64, 1.0);
     let elements = vec![data; n];
     let mut state = RodState::straight(&elements, Vec3::zeros(), Frame::new(Vec3::x(), Some(Vec3::y())));

@@ -1,6 +1,6 @@
 //! What Newton's method is told and what it tells.
 
-use super::band::Inertia;
+use crate::banded::Inertia;
 
 /// Settings of Newton's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,4 +86,29 @@ pub struct NewtonReport {
     pub converged: bool,
     /// Why the method stopped.
     pub reason: StopReason,
+}
+
+impl NewtonReport {
+    /// Nothing is found yet; a minimum has `multipliers` negative pivots.
+    pub(super) fn of(multipliers: usize) -> Self {
+        Self {
+            iterations: 0,
+            residual: f64::INFINITY,
+            inertia: Inertia::default(),
+            multipliers,
+            stable: false,
+            converged: false,
+            reason: StopReason::MaxIterations,
+        }
+    }
+
+    /// An equilibrium.
+    pub(super) fn converged(self, reason: StopReason) -> Self {
+        Self { converged: true, reason, ..self }
+    }
+
+    /// None.
+    pub(super) fn stopped(self, reason: StopReason) -> Self {
+        Self { reason, ..self }
+    }
 }

@@ -21,7 +21,7 @@ impl<const C: usize> Newton<C> {
     pub fn residual(
         &self,
         elements: &[ElementData],
-        external: &dyn External<C>,
+        external: &dyn External,
         supports: &Supports,
         tolerance: f64,
     ) -> ResidualSize {
@@ -35,6 +35,10 @@ impl<const C: usize> Newton<C> {
         force = held[..3].iter().fold(force, |m, v| m.max(v.abs()));
         let mut moment = self.assembly.scale[1].max(outside[1]);
         moment = held[3..].iter().fold(moment, |m, v| m.max(v.abs()));
+        if Layout::<C>::ANGLES > 0 {
+            // Instruments that hold each other may exert nothing on the rest of the world.
+            moment = elements.iter().map(ElementData::mutual_moment).fold(moment, f64::max);
+        }
         let mut relative = 0.0f64;
         let (mut small, mut rounding) = (true, true);
         let residual = &self.assembly.residual;
@@ -47,6 +51,10 @@ impl<const C: usize> Newton<C> {
             let stiff = (a.bending[2] * before).max(b.bending[0] * after);
             before = after;
             let moments = moment + force * h;
+            // Angles round as tangents do.
+            let twisted = (0..Layout::<C>::ANGLES)
+                .map(|set| a.materials[set].torsion[2].max(b.materials[set].torsion[0]));
+            let spun = twisted.fold(0.0, f64::max) / (h * h);
             // What rounding of unit vectors leaves of a force 12 EI/h² δ and of a moment 6 EI/h δ.
             let floor = 100.0 * f64::EPSILON * stiff + outside_floor;
             let mut rows = |value: f64, scale: f64, floor: f64| {
@@ -59,13 +67,13 @@ impl<const C: usize> Newton<C> {
                 |from: usize, to: usize| residual[from..to].iter().fold(0.0, |m, v| larger(m, v.abs()));
             rows(largest(l.position(i), l.position(i) + 3), forces, floor);
             let mut turning = largest(l.tangent(i), l.tangent(i) + 2);
-            if Layout::<C>::TWIST {
-                turning = larger(turning, residual[l.angle(i)].abs());
+            for set in 0..Layout::<C>::ANGLES {
+                turning = larger(turning, residual[l.angle(i, set)].abs());
                 if i < n {
-                    turning = larger(turning, residual[l.bubble(i)].abs());
+                    turning = larger(turning, residual[l.bubble(i, set)].abs());
                 }
             }
-            rows(turning, moments, floor * h);
+            rows(turning, moments, floor.max(100.0 * f64::EPSILON * spun) * h);
         }
         let first = l.support(n);
         for j in 0..6 {

@@ -33,8 +33,8 @@ impl<const C: usize> Newton<C> {
                     let row = l.tangent(i) + a;
                     self.spare[row] = h * self.step[row];
                 }
-                if Layout::<C>::TWIST {
-                    self.spare[l.angle(i)] = h * self.step[l.angle(i)];
+                for row in (0..Layout::<C>::ANGLES).map(|set| l.angle(i, set)) {
+                    self.spare[row] = h * self.step[row];
                 }
             }
             for row in supports.held::<C>().into_iter().flatten() {
@@ -57,7 +57,7 @@ impl<const C: usize> Newton<C> {
         &mut self,
         elements: &[ElementData],
         supports: &mut Supports,
-        external: &mut dyn External<C>,
+        external: &mut dyn External,
         state: &mut RodState,
     ) -> Option<StepRecord> {
         let l = Layout::<C>;

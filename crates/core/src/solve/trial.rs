@@ -2,8 +2,7 @@
 
 use super::external::External;
 use super::newton::Newton;
-use crate::rod::element::element_energy;
-use crate::rod::{ElementData, Layout, RodState, Supports};
+use crate::rod::{ElementData, Layout, RodState, Supports, element_energy};
 
 /// Halvings towards the minimum along a step that a wall cut short.
 const REFINEMENTS: usize = 6;
@@ -22,24 +21,19 @@ impl<const C: usize> Newton<C> {
     pub(super) fn energy(
         &self,
         elements: &[ElementData],
-        external: &mut dyn External<C>,
+        external: &mut dyn External,
         state: &RodState,
     ) -> f64 {
         self.energy_at(elements, external, &self.trial) - external.work(state, &self.trial)
     }
 
     /// Potential energy of any state.
-    pub fn energy_at(
-        &self,
-        elements: &[ElementData],
-        external: &mut dyn External<C>,
-        state: &RodState,
-    ) -> f64 {
+    pub fn energy_at(&self, elements: &[ElementData], external: &mut dyn External, state: &RodState) -> f64 {
         let mut stored = 0.0;
         for (e, data) in elements.iter().enumerate() {
-            stored += element_energy(data, &state.element(e), Layout::<C>::TWIST).total();
+            stored += element_energy::<C>(data, &state.element::<C>(e)).total();
         }
-        stored + external.energy(elements, state)
+        stored + external.value(elements, state)
     }
 
     /// Second-order corrections of the end conditions with the factorisation at hand.
@@ -81,7 +75,7 @@ impl<const C: usize> Newton<C> {
     pub(super) fn reach_wall(
         &mut self,
         elements: &[ElementData],
-        external: &mut dyn External<C>,
+        external: &mut dyn External,
         state: &RodState,
         before: f64,
         ends: (f64, f64, f64),

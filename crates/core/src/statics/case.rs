@@ -32,16 +32,37 @@ pub struct StaticCase {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rod {
-    /// Length.
+    /// Length; absent where there are instruments, which have theirs.
+    #[serde(default)]
     pub length: f64,
-    /// Number of elements, 1 to 200,000; they are spread so that sections and point loads begin at nodes, so a rod with more of those
-    /// than elements gets one element for each.
+    /// Number of elements, 1 to 200,000; they are spread so that sections, instruments and point loads begin and end at nodes, so a
+    /// rod with more of those than elements gets one element for each.
     pub elements: usize,
-    /// Sections in order from the start.
+    /// Sections in order from the start; none where there are instruments.
+    #[serde(default)]
+    pub section: Vec<Section>,
+    /// Instruments that share one centre line, each in or on the others, in any order; none for a single rod.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub instrument: Vec<Instrument>,
+}
+
+/// One of several instruments on one centre line: inextensible, it slides and turns in the others without friction, and comes out of a
+/// straight sheath whose mouth is the start.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Instrument {
+    /// What results call it.
+    pub name: String,
+    /// Length beyond the start.
+    pub inserted: f64,
+    /// Angle in radians by which the hand has turned its d₁ about the tangent, against the start's.
+    #[serde(default)]
+    pub hand: f64,
+    /// Sections in order from its tip, `until` counted from there; the last one ends no nearer than `inserted`.
     pub section: Vec<Section>,
 }
 
-/// A stretch of the rod. Values with an `_end` vary linearly from the section's begin to its end.
+/// A stretch of the rod, or of an instrument. Values with an `_end` vary linearly from the section's begin to its end.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Section {
@@ -205,6 +226,13 @@ impl Default for Solver {
     fn default() -> Self {
         let NewtonOptions { max_iterations, tolerance, .. } = NewtonOptions::default();
         Self { max_iterations, load_steps: 1, tolerance }
+    }
+}
+
+impl Rod {
+    /// Length of the centre line.
+    pub fn line_length(&self) -> f64 {
+        self.instrument.iter().map(|i| i.inserted).fold(self.length, f64::max)
     }
 }
 

@@ -4,7 +4,7 @@
 //! rod, √∫|δt|² ds/L, so it is the same whatever the units, and the load factor is whatever the shape needs.
 
 use super::problem::StaticProblem;
-use crate::rod::{ElementData, Layout, PLAIN, RodState, TWISTED};
+use crate::rod::{ElementData, Layout, RodState};
 use crate::solve::{Newton, NewtonOptions};
 use crate::{Error, Result};
 
@@ -35,7 +35,7 @@ impl StaticProblem {
         if !(step.is_finite() && step > 0.0) {
             return Err(Error::parameter("step", step, "must be a positive rotation in radians"));
         }
-        if self.twisted { self.follow::<TWISTED>(step, points) } else { self.follow::<PLAIN>(step, points) }
+        by_angles!(self.angles, self.follow(step, points))
     }
 
     fn follow<const C: usize>(&self, step: f64, points: usize) -> Result<Vec<PathPoint>> {

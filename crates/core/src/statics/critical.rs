@@ -1,7 +1,7 @@
 //! Critical loads: where the stiffness on a path of equilibria ceases to be positive.
 
 use super::problem::StaticProblem;
-use crate::rod::{PLAIN, RodState, Supports, TWISTED};
+use crate::rod::{RodState, Supports};
 use crate::solve::{Newton, NewtonOptions};
 use crate::{Error, Result, Vec3};
 
@@ -81,11 +81,14 @@ impl StaticProblem {
     /// The lowest parameter between `from` and `to` at which an eigenvalue of the stiffness changes sign, by bisection on the
     /// inertia, to the relative `tolerance`. For problems whose loads have a potential.
     pub fn critical(&self, parameter: Parameter, from: f64, to: f64, tolerance: f64) -> Result<f64> {
-        if self.twisted {
-            self.bisect::<TWISTED>(parameter, from, to, tolerance)
-        } else {
-            self.bisect::<PLAIN>(parameter, from, to, tolerance)
-        }
+        by_angles!(self.angles, self.bisect(parameter, from, to, tolerance))
+    }
+
+    /// Equilibrium at one parameter.
+    fn state_at<const C: usize>(&self, parameter: Parameter, value: f64) -> Result<RodState> {
+        let mut path = Path::<C>::new(self, parameter);
+        path.at(value)?;
+        Ok(path.state)
     }
 
     fn bisect<const C: usize>(
@@ -135,15 +138,7 @@ impl StaticProblem {
             // The probe must not grow with the factor.
             let share = if parameter == Parameter::Loads { 1.0 / value } else { 1.0 };
             problem.loads.distributed.push((0, n, Vec3::from(probe) * share));
-            let state = if problem.twisted {
-                let mut path = Path::<TWISTED>::new(&problem, parameter);
-                path.at(value)?;
-                path.state
-            } else {
-                let mut path = Path::<PLAIN>::new(&problem, parameter);
-                path.at(value)?;
-                path.state
-            };
+            let state = by_angles!(problem.angles, problem.state_at(parameter, value))?;
             let moved = state
                 .positions
                 .iter()

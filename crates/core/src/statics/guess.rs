@@ -14,9 +14,10 @@ pub(super) fn rest_shape(elements: &[ElementData], start: Vec3, frame: Frame) ->
     for data in elements {
         let (mut k, mut twist) = ([0.0; 2], 0.0);
         for (p, point) in GAUSS.iter().enumerate() {
-            k[0] += point.weight * data.rest_curvature[p][0];
-            k[1] += point.weight * data.rest_curvature[p][1];
-            twist += point.weight * data.rest_twist[p];
+            let material = &data.materials[0];
+            k[0] += point.weight * material.rest_curvature[p][0];
+            k[1] += point.weight * material.rest_curvature[p][1];
+            twist += point.weight * material.rest_twist[p];
         }
         let turn = 0.5 * data.length * twist;
         material = material.turned(turn).transported(k[0] * data.length, k[1] * data.length).turned(turn);

@@ -1,8 +1,7 @@
 //! Loads: dead forces, moments and weight, and forces that follow the rod.
 
 use crate::Vec3;
-use crate::rod::assembly::RankOne;
-use crate::rod::{Assembly, ElementData, Layout, RodState};
+use crate::rod::{ElementData, Frame, RodState, Stencils, Triple};
 use crate::solve::External;
 use nalgebra::Matrix3;
 
@@ -43,8 +42,51 @@ impl Loads {
     }
 }
 
-impl<const C: usize> External<C> for Loads {
-    fn energy(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+impl External for Loads {
+    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+        into.add_value(self.value(elements, state));
+        let none = Matrix3::zeros();
+        for (i, f) in &self.forces {
+            into.add_node(*i, &(f * -self.factor), &none);
+        }
+        for (i, f) in &self.constant {
+            into.add_node(*i, &-f, &none);
+        }
+        for (first, last, q) in &self.distributed {
+            let q = q * self.factor;
+            for e in *first..*last {
+                // ∫r ds = h (x₀ + x₁)/2 + h² (t₀ − t₁)/12 for a cubic.
+                let h = elements[e].length;
+                for i in [e, e + 1] {
+                    into.add_node(i, &(q * (-0.5 * h)), &none);
+                }
+                for (i, weight) in [(e, h * h / 12.0), (e + 1, -h * h / 12.0)] {
+                    let frame = &state.frames[i];
+                    let curve = weight * q.dot(&frame.t);
+                    let gradient = Vec3::new(-(weight * q.dot(&frame.u)), -(weight * q.dot(&frame.v)), 0.0);
+                    into.add_turn(i, &gradient, &Matrix3::from_diagonal(&Vec3::new(curve, curve, 0.0)));
+                }
+            }
+        }
+        for (i, m) in &self.moments {
+            linearise_moment(*i, &state.frames[*i], &(m * self.factor), into);
+        }
+        for (i, value) in &self.followers {
+            let value = value * self.factor;
+            let force = Self::follower(state, *i, &value);
+            into.add_node(*i, &-force, &none);
+            let frame = &state.frames[*i];
+            let (along, u, v) = (value.x, force.dot(&frame.u), force.dot(&frame.v));
+            let rates =
+                [frame.u * along - frame.t * u, frame.v * along - frame.t * v, frame.v * u - frame.u * v];
+            for (k, rate) in rates.iter().enumerate() {
+                let p = [-rate.x, -rate.y, -rate.z];
+                into.add_rank_one(*i, (Triple::Position, p), (Triple::Turn, unit(k)));
+            }
+        }
+    }
+
+    fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         let mut sum = 0.0;
         for (i, f) in &self.forces {
             sum -= f.dot(&(state.positions[*i] - state.positions[0]));
@@ -59,84 +101,6 @@ impl<const C: usize> External<C> for Loads {
             sum -= f.dot(&(state.positions[*i] - state.positions[0]));
         }
         sum
-    }
-
-    fn add(&mut self, elements: &[ElementData], state: &RodState, assembly: &mut Assembly<C>) {
-        let l = Layout::<C>;
-        assembly.external_energy += External::<C>::energy(self, elements, state);
-        for (i, f) in &self.forces {
-            assembly.add_node(*i, &(f * -self.factor), &Matrix3::zeros());
-        }
-        for (i, f) in &self.constant {
-            assembly.add_node(*i, &-f, &Matrix3::zeros());
-        }
-        for (first, last, q) in &self.distributed {
-            let q = q * self.factor;
-            for e in *first..*last {
-                // ∫r ds = h (x₀ + x₁)/2 + h² (t₀ − t₁)/12 for a cubic.
-                let h = elements[e].length;
-                for i in [e, e + 1] {
-                    for a in 0..3 {
-                        assembly.residual[l.position(i) + a] -= 0.5 * h * q[a];
-                    }
-                }
-                for (i, weight) in [(e, h * h / 12.0), (e + 1, -h * h / 12.0)] {
-                    let frame = &state.frames[i];
-                    let row = l.tangent(i);
-                    let curve = weight * q.dot(&frame.t);
-                    assembly.residual[row] -= weight * q.dot(&frame.u);
-                    assembly.residual[row + 1] -= weight * q.dot(&frame.v);
-                    assembly.matrix.add(row, row, curve);
-                    assembly.matrix.add(row + 1, row + 1, curve);
-                }
-            }
-        }
-        for (i, m) in &self.moments {
-            // Virtual work M·(t × δt + t δθ). Its derivative is half symmetric and half not: a dead moment has no potential.
-            let m = m * self.factor;
-            let frame = &state.frames[*i];
-            let row = l.tangent(*i);
-            let (u, v, t) = (m.dot(&frame.u), m.dot(&frame.v), m.dot(&frame.t));
-            assembly.residual[row] -= v;
-            assembly.residual[row + 1] += u;
-            let mut skew = [[0.0, 0.5 * t, 0.0], [-0.5 * t, 0.0, 0.0], [0.0; 3]];
-            if Layout::<C>::TWIST {
-                let angle = l.angle(*i);
-                assembly.residual[angle] -= t;
-                assembly.matrix.add(row, angle, -0.5 * u);
-                assembly.matrix.add(row + 1, angle, -0.5 * v);
-                skew[0][2] = 0.5 * u;
-                skew[1][2] = 0.5 * v;
-                skew[2] = [-0.5 * u, -0.5 * v, 0.0];
-            }
-            for k in 0..3 {
-                if skew[k] != [0.0; 3] {
-                    let mut p = [0.0; 3];
-                    p[k] = 1.0;
-                    assembly.rank_ones.push(RankOne { row, p, column: row, q: skew[k] });
-                }
-            }
-        }
-        for (i, value) in &self.followers {
-            let value = value * self.factor;
-            let force = Self::follower(state, *i, &value);
-            assembly.add_node(*i, &-force, &Matrix3::zeros());
-            let frame = &state.frames[*i];
-            let (along, u, v) = (value.x, force.dot(&frame.u), force.dot(&frame.v));
-            let rates =
-                [frame.u * along - frame.t * u, frame.v * along - frame.t * v, frame.v * u - frame.u * v];
-            let count = if Layout::<C>::TWIST { 3 } else { 2 };
-            for (k, rate) in rates.iter().enumerate().take(count) {
-                let mut q = [0.0; 3];
-                q[k] = 1.0;
-                assembly.rank_ones.push(RankOne {
-                    row: l.position(*i),
-                    p: [-rate.x, -rate.y, -rate.z],
-                    column: l.tangent(*i),
-                    q,
-                });
-            }
-        }
     }
 
     fn work(&self, from: &RodState, to: &RodState) -> f64 {
@@ -163,11 +127,11 @@ impl<const C: usize> External<C> for Loads {
         sum * self.factor
     }
 
-    fn memoryless(&self) -> bool {
+    fn is_fixed(&self) -> bool {
         true
     }
 
-    fn conservative(&self) -> bool {
+    fn is_conservative(&self) -> bool {
         self.moments.is_empty() && self.followers.is_empty()
     }
 
@@ -184,4 +148,23 @@ fn centroid(elements: &[ElementData], state: &RodState, e: usize) -> Vec3 {
     let h = elements[e].length;
     (state.positions[e] + state.positions[e + 1]) * 0.5
         + (state.frames[e].t - state.frames[e + 1].t) * (h / 12.0)
+}
+
+/// A dead moment on node `i`: its virtual work is M·(t × δt + t δθ). The derivative of that is half symmetric and half not: a dead
+/// moment has no potential.
+fn linearise_moment(i: usize, frame: &Frame, m: &Vec3, into: &mut dyn Stencils) {
+    let (u, v, t) = (m.dot(&frame.u), m.dot(&frame.v), m.dot(&frame.t));
+    let (a, b) = (-0.5 * u, -0.5 * v);
+    let symmetric = Matrix3::new(0.0, 0.0, a, 0.0, 0.0, b, a, b, 0.0);
+    into.add_turn(i, &Vec3::new(-v, u, -t), &symmetric);
+    let skew = [[0.0, 0.5 * t, 0.5 * u], [-0.5 * t, 0.0, 0.5 * v], [-0.5 * u, -0.5 * v, 0.0]];
+    for (k, q) in skew.into_iter().enumerate() {
+        into.add_rank_one(i, (Triple::Turn, unit(k)), (Triple::Turn, q));
+    }
+}
+
+fn unit(k: usize) -> [f64; 3] {
+    let mut values = [0.0; 3];
+    values[k] = 1.0;
+    values
 }

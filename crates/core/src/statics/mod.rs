@@ -1,19 +1,38 @@
-//! General static problems of one rod: what `endowire rod CASE.toml` solves.
+//! General static problems of one rod, or of several instruments on one centre line: what `endowire rod CASE.toml` solves.
 //!
 //! Units are the caller's: any consistent set, or none at all (a case may well say length 1 and EI 1).
+
+/// Calls a method that is generic in the unknowns of two nodes for a rod with so many sets of angles.
+macro_rules! by_angles {
+    ($angles:expr, $this:ident.$method:ident($($argument:expr),*)) => {
+        match $angles {
+            0 => $this.$method::<{ crate::rod::PLAIN }>($($argument),*),
+            1 => $this.$method::<{ crate::rod::TWISTED }>($($argument),*),
+            2 => $this.$method::<{ crate::rod::PLAIN + 8 }>($($argument),*),
+            _ => $this.$method::<{ crate::rod::PLAIN + 12 }>($($argument),*),
+        }
+    };
+}
 
 mod case;
 mod continuation;
 mod critical;
 mod guess;
 mod loads;
+mod mesh;
 mod problem;
 mod solution;
+mod stack;
 mod validate;
 
-pub use case::{End, EndKind, Initial, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase};
+pub use case::{
+    End, EndKind, Initial, Instrument, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase,
+};
 pub use continuation::PathPoint;
 pub use critical::Parameter;
 pub use loads::Loads;
 pub use problem::{Solved, StaticProblem};
-pub use solution::{Energies, Reaction, Reactions, StaticSolution};
+pub use solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution};
+
+#[cfg(test)]
+mod stack_tests;

@@ -3,14 +3,13 @@
 use super::case::{EndKind, LoadKind, Section, StartKind, StaticCase};
 use super::guess;
 use super::loads::Loads;
-use super::solution::{Energies, Reaction, Reactions, StaticSolution};
-use crate::rod::quadrature::GAUSS;
-use crate::rod::{Clamp, ElementData, EndAngle, Frame, PLAIN, RodState, Supports, TWISTED};
+use super::mesh::{self, ASSUMED_GJ_RATIO};
+use super::solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution};
+use super::stack::Stack;
+use crate::rod::{Clamp, ElementData, EndAngle, Frame, RodState, Supports};
 use crate::solve::{External, Newton, NewtonOptions, NewtonReport};
 use crate::{Error, Result, Vec3};
 
-/// GJ/EI assumed where GJ is absent and turns out not to matter (a round wire with ν = 0.3).
-const ASSUMED_GJ_RATIO: f64 = 1.0 / 1.3;
 /// Twist energy above this part of the rest shows that GJ did matter.
 const TWIST_MATTERS: f64 = 1e-9;
 
@@ -25,14 +24,17 @@ pub struct StaticProblem {
     pub loads: Loads,
     /// Shape the search starts from.
     pub initial: RodState,
-    /// Whether angles are carried.
-    pub twisted: bool,
+    /// Sets of angles that are carried: none where nothing twists.
+    pub angles: usize,
     /// Settings of Newton's method.
     pub options: NewtonOptions,
     /// Number of load steps.
     pub load_steps: usize,
     gj_given: bool,
-    first: Section,
+    /// The section at the start of a single rod.
+    first: Option<Section>,
+    /// Instruments, if there are several.
+    stack: Option<Stack>,
 }
 
 /// Result of the solver before it is written out.
@@ -52,32 +54,30 @@ pub struct Solved {
     pub start: Reaction,
     /// As in [`StaticSolution::push_force`].
     pub push_force: Option<f64>,
+    /// Of each of several instruments, as in [`InstrumentSolution`]: push force and torque.
+    pub instruments: Vec<(Option<f64>, f64)>,
 }
 
 impl StaticProblem {
     /// Builds the problem of a case.
     pub fn new(case: &StaticCase) -> Result<Self> {
         case.check()?;
-        let length = case.rod.length;
-        let mut breaks: Vec<f64> = vec![0.0, length];
-        breaks.extend(case.rod.section.iter().map(|s| s.until.min(length)));
-        for load in &case.load {
-            breaks.extend([load.at, load.from, load.to].into_iter().flatten());
-        }
-        breaks.sort_by(f64::total_cmp);
-        breaks.dedup_by(|b, a| *b - *a <= 1e-12 * length);
-        let nodes = spread(&breaks, case.rod.elements);
-        let elements = mesh(case, &nodes);
-        let node_at = |s: f64| {
-            let mut best = 0;
-            for (i, x) in nodes.iter().enumerate() {
-                if (x - s).abs() < (nodes[best] - s).abs() {
-                    best = i;
-                }
+        let length = case.rod.line_length();
+        let held = case.load.iter().flat_map(|load| [load.at, load.from, load.to]).flatten();
+        let stack = Stack::new(case, held.clone())?;
+        let (nodes, elements) = match &stack {
+            Some(stack) => stack.mesh(),
+            None => {
+                let mut breaks: Vec<f64> = vec![0.0, length];
+                breaks.extend(case.rod.section.iter().map(|s| s.until.min(length)));
+                breaks.extend(held);
+                breaks.sort_by(f64::total_cmp);
+                breaks.dedup_by(|b, a| *b - *a <= 1e-12 * length);
+                let nodes = mesh::nodes(&breaks, &mesh::spread(&breaks, case.rod.elements));
+                let elements = mesh::elements(&case.rod, &nodes);
+                (nodes, elements)
             }
-            best
         };
-
         let tangent = Vec3::from(case.start.tangent);
         let normal = case.start.normal.map_or_else(
             || if tangent.normalize().y.abs() < 0.9 { Vec3::y() } else { Vec3::z() },
@@ -85,24 +85,13 @@ impl StaticProblem {
         );
         let frame = Frame::new(tangent, Some(normal));
         let start = Vec3::from(case.start.position);
-        let mut loads = Loads::default();
-        for load in &case.load {
-            let value = Vec3::from(load.value);
-            let at = node_at(load.at.unwrap_or(length));
-            match load.kind {
-                LoadKind::Force => loads.forces.push((at, value)),
-                LoadKind::Moment => loads.moments.push((at, value)),
-                LoadKind::Follower => loads.followers.push((at, value)),
-                LoadKind::Distributed => loads.distributed.push((
-                    node_at(load.from.unwrap_or(0.0)),
-                    node_at(load.to.unwrap_or(length)),
-                    value,
-                )),
-            }
-        }
-
-        let gj_given = case.rod.section[0].gj.is_some();
-        let shaped = elements.iter().any(|e| e.rest_curvature != [[0.0; 2]; 3] || e.rest_twist != [0.0; 3]);
+        let loads = loads(case, &nodes);
+        let first = case.rod.section.first().cloned();
+        let gj_given = first.as_ref().is_none_or(|section| section.gj.is_some());
+        let shaped = elements
+            .iter()
+            .map(|e| &e.materials[0])
+            .any(|m| m.rest_curvature != [[0.0; 2]; 3] || m.rest_twist != [0.0; 3]);
         let holds = matches!(case.end.kind, EndKind::Clamped | EndKind::Guided);
         let clamped = case.start.kind == StartKind::Clamped;
         let turned = holds && clamped && (gj_given || case.end.turns.is_some_and(|t| t != 0.0));
@@ -110,39 +99,21 @@ impl StaticProblem {
             || turned
             || !loads.moments.is_empty()
             || loads.followers.iter().any(|(_, f)| f.y != 0.0 || f.z != 0.0);
+        let angles = stack.as_ref().map_or(usize::from(twisted), Stack::angles);
 
-        let mut supports = Supports { start_tangent: clamped, start_angle: clamped, ..Supports::default() };
-        if let Some(p) = case.end.position {
-            supports.end_position = Vec3::from(p);
-            supports.end_directions = match case.end.slide {
-                None => vec![Vec3::x(), Vec3::y(), Vec3::z()],
-                Some(s) => {
-                    let across = Frame::new(Vec3::from(s), None);
-                    vec![across.u, across.v]
-                }
-            };
-        }
-        if holds {
-            let end = Frame::new(
-                case.end.tangent.map_or(frame.t, Vec3::from),
-                Some(case.end.normal.map_or(frame.u, Vec3::from)),
-            );
-            supports.end_tangent = Some(end.t);
-            if twisted {
-                let turns = case.end.turns.unwrap_or(0.0);
-                supports.end_angle = Some(EndAngle { normal: end.u, turns, target: 0.0 });
+        let supports = supports(case, &frame, angles > 0);
+        let initial = match (&stack, &case.initial) {
+            (Some(stack), _) => stack.untwisted(&elements, start, frame),
+            (None, Some(shape)) => guess::arc(&elements, start, frame, shape.curvature),
+            (None, None) if supports.conditions() > 0 => {
+                guess::towards_end(&elements, start, frame, &supports)
             }
-        }
-        let initial = match &case.initial {
-            Some(shape) => guess::arc(&elements, start, frame, shape.curvature),
-            None if supports.conditions() > 0 => guess::towards_end(&elements, start, frame, &supports),
-            None => guess::rest_shape(&elements, start, frame),
+            (None, None) => guess::rest_shape(&elements, start, frame),
         };
         let (max_iterations, tolerance) = (case.solver.max_iterations, case.solver.tolerance);
         let options = NewtonOptions { max_iterations, tolerance, ..NewtonOptions::default() };
         let load_steps = case.solver.load_steps;
-        let first = case.rod.section[0].clone();
-        Ok(Self { elements, supports, loads, initial, twisted, options, load_steps, gj_given, first })
+        Ok(Self { elements, supports, loads, initial, angles, options, load_steps, gj_given, first, stack })
     }
 
     /// Adds a constant force along the end's tangent that load factors leave alone.
@@ -159,9 +130,11 @@ impl StaticProblem {
 
     /// Solves from the initial shape and returns the state itself.
     pub fn solve_state(&self) -> Result<Solved> {
-        let solved = if self.twisted { self.run::<TWISTED>() } else { self.run::<PLAIN>() };
+        let solved = by_angles!(self.angles, self.run());
         let energy = &solved.energy;
-        if self.twisted && !self.gj_given && energy.twist > TWIST_MATTERS * (energy.total + energy.load.abs())
+        if self.angles > 0
+            && !self.gj_given
+            && energy.twist > TWIST_MATTERS * (energy.total + energy.load.abs())
         {
             return Err(Error::parameter(
                 "rod.section.GJ",
@@ -176,7 +149,7 @@ impl StaticProblem {
     /// the elements, summed along the rod, in radians. It tells how far the state is from the equilibrium of its mesh, whatever
     /// the scale of its residual, and is blind to turns of the whole rod that change nothing. For loads with a potential.
     pub fn next_bend(&self, solved: &Solved) -> f64 {
-        if self.twisted { self.bend_after::<TWISTED>(solved) } else { self.bend_after::<PLAIN>(solved) }
+        by_angles!(self.angles, self.bend_after(solved))
     }
 
     fn bend_after<const C: usize>(&self, solved: &Solved) -> f64 {
@@ -216,7 +189,7 @@ impl StaticProblem {
             loads.factor = self.loads.factor * step as f64 / self.load_steps as f64;
             let report = newton.solve(&self.elements, &mut supports, &mut loads, &mut state, &self.options);
             iterations += report.iterations;
-            monotone &= !External::<C>::conservative(&loads)
+            monotone &= !loads.is_conservative()
                 || newton.steps.iter().all(|s| s.merit_change <= 1e-12 * s.energy_scale);
             let failed = !report.converged;
             last = Some(report);
@@ -234,7 +207,7 @@ impl StaticProblem {
             twist: stored.twist,
             axial: stored.axial,
             total: stored.total(),
-            load: External::<C>::energy(&mut loads, &self.elements, &state),
+            load: loads.value(&self.elements, &state),
         };
         let clamp = Clamp::new::<C>(&newton.start_residual, &state);
         let held = supports.start_tangent;
@@ -244,12 +217,49 @@ impl StaticProblem {
             moment: if held { moment.into() } else { [0.0; 3] },
             torque: if held { clamp.torque } else { 0.0 },
         };
-        let push_force = held.then(|| {
-            let (first, frame) = (&self.first, state.material_frame(0));
+        let push_force = self.first.as_ref().filter(|_| held).map(|first| {
+            let frame = state.material_frame(0);
             let rest = frame.u * first.rest_curvature[0] + frame.v * first.rest_curvature[1];
             clamp.push_force(&frame.t, first.ei, first.gj.unwrap_or(ASSUMED_GJ_RATIO * first.ei), &rest)
         });
-        Solved { state, supports, report, monotone, energy, start, push_force }
+        let instruments = self.hands::<C>(&state, &supports, &mut loads, &clamp);
+        Solved { state, supports, report, monotone, energy, start, push_force, instruments }
+    }
+
+    /// Push force and torque of each of several instruments at an equilibrium among energies outside the rod, as in
+    /// [`InstrumentSolution`]; empty for a single rod.
+    pub fn hands<const C: usize>(
+        &self,
+        state: &RodState,
+        supports: &Supports,
+        external: &mut dyn External,
+        clamp: &Clamp,
+    ) -> Vec<(Option<f64>, f64)> {
+        let Some(stack) = &self.stack else { return Vec::new() };
+        let sets = stack.instruments().map(|(_, set)| set).enumerate();
+        let hand = |(index, set): (usize, Option<usize>)| {
+            let force = stack.push_force::<C>(index, state, supports, external);
+            (force, set.map_or(0.0, |set| clamp.torques[set]))
+        };
+        sets.map(hand).collect()
+    }
+
+    /// What each of several instruments does.
+    fn instruments(&self, solved: &Solved) -> Vec<InstrumentSolution> {
+        let Some(stack) = &self.stack else { return Vec::new() };
+        let each = stack.instruments().zip(&solved.instruments).enumerate();
+        let told = each.map(|(index, ((instrument, set), (push_force, torque)))| {
+            let tip = stack.tip_node(index);
+            InstrumentSolution {
+                name: instrument.name.clone(),
+                inserted: instrument.inserted,
+                tip: solved.state.positions[tip].into(),
+                twist: set.map_or(0.0, |set| solved.state.twist_to(tip, set)),
+                push_force: *push_force,
+                torque: *torque,
+            }
+        });
+        told.collect()
     }
 
     /// Writes a solved state out.
@@ -279,7 +289,7 @@ impl StaticProblem {
             nodes: state.positions.iter().map(|p| (*p).into()).collect(),
             tangents: state.frames.iter().map(|f| f.t.into()).collect(),
             normals: (0..=n).map(|i| state.material_frame(i).u.into()).collect(),
-            twist: if self.twisted { state.twist() } else { 0.0 },
+            twist: if self.angles > 0 && self.stack.is_none() { state.twist() } else { 0.0 },
             tensions: state.tensions.clone(),
             energy: solved.energy,
             reactions: Reactions {
@@ -287,6 +297,7 @@ impl StaticProblem {
                 end: Reaction { force: force.into(), moment: moment.into(), torque: -m[5] },
             },
             push_force: solved.push_force,
+            instruments: self.instruments(solved),
             iterations: report.iterations,
             residual: report.residual,
             inertia: [report.inertia.positive, report.inertia.negative],
@@ -294,76 +305,66 @@ impl StaticProblem {
             stable: report.stable,
             converged: report.converged,
             stop: report.reason.to_string(),
-            twisted: self.twisted,
+            twisted: self.angles > 0,
             monotone: solved.monotone,
         }
     }
 }
 
-/// Nodes such that every break is one, `elements` of them if that is enough, as even as can be.
-fn spread(breaks: &[f64], elements: usize) -> Vec<f64> {
-    let length = breaks[breaks.len() - 1];
-    let mut counts: Vec<usize> = breaks
-        .windows(2)
-        .map(|w| (((w[1] - w[0]) / length * elements as f64).floor() as usize).max(1))
-        .collect();
-    let mut used: usize = counts.iter().sum();
-    while used < elements {
-        // One more where elements are longest.
+/// The loads of a case on the nodes at these arc lengths.
+fn loads(case: &StaticCase, nodes: &[f64]) -> Loads {
+    let node_at = |s: f64| {
         let mut best = 0;
-        for k in 0..counts.len() {
-            let size = |k: usize| (breaks[k + 1] - breaks[k]) / counts[k] as f64;
-            if size(k) > size(best) * (1.0 + 1e-9) {
-                best = k;
+        for (i, x) in nodes.iter().enumerate() {
+            if (x - s).abs() < (nodes[best] - s).abs() {
+                best = i;
             }
         }
-        counts[best] += 1;
-        used += 1;
-    }
-    let mut nodes = vec![0.0];
-    for (w, count) in breaks.windows(2).zip(&counts) {
-        for k in 1..=*count {
-            nodes.push(w[0] + (w[1] - w[0]) * k as f64 / *count as f64);
-        }
-    }
-    nodes
-}
-
-fn mesh(case: &StaticCase, nodes: &[f64]) -> Vec<ElementData> {
-    let mut out = Vec::with_capacity(nodes.len() - 1);
-    for w in nodes.windows(2) {
-        let middle = 0.5 * (w[0] + w[1]);
-        let k = case.rod.section.iter().position(|s| middle < s.until).unwrap_or(case.rod.section.len() - 1);
-        let section = &case.rod.section[k];
-        let begin = if k == 0 { 0.0 } else { case.rod.section[k - 1].until };
-        out.push(element(section, begin, w[0], w[1]));
-    }
-    out
-}
-
-/// An element of a section that begins at `begin`.
-fn element(section: &Section, begin: f64, from: f64, to: f64) -> ElementData {
-    let h = to - from;
-    let mut data = ElementData {
-        length: h,
-        bending: [0.0; 3],
-        torsion: [0.0; 3],
-        rest_curvature: [[0.0; 2]; 3],
-        rest_twist: [section.rest_twist; 3],
-        flexibility: 0.0,
+        best
     };
-    for (p, point) in GAUSS.iter().enumerate() {
-        let w = ((from + point.xi * h - begin) / (section.until - begin)).clamp(0.0, 1.0);
-        let mix = |a: f64, b: Option<f64>| a + w * (b.unwrap_or(a) - a);
-        data.bending[p] = mix(section.ei, section.ei_end);
-        data.torsion[p] = section.gj.map_or(ASSUMED_GJ_RATIO * data.bending[p], |gj| mix(gj, section.gj_end));
-        let end = section.rest_curvature_end.unwrap_or(section.rest_curvature);
-        for a in 0..2 {
-            data.rest_curvature[p][a] = mix(section.rest_curvature[a], Some(end[a]));
-        }
-        if let Some(ea) = section.ea {
-            data.flexibility += point.weight * h / mix(ea, section.ea_end);
+    let length = nodes[nodes.len() - 1];
+    let mut loads = Loads::default();
+    for load in &case.load {
+        let value = Vec3::from(load.value);
+        let at = node_at(load.at.unwrap_or(length));
+        match load.kind {
+            LoadKind::Force => loads.forces.push((at, value)),
+            LoadKind::Moment => loads.moments.push((at, value)),
+            LoadKind::Follower => loads.followers.push((at, value)),
+            LoadKind::Distributed => loads.distributed.push((
+                node_at(load.from.unwrap_or(0.0)),
+                node_at(load.to.unwrap_or(length)),
+                value,
+            )),
         }
     }
-    data
+    loads
+}
+
+/// What holds the ends of a case whose start has this triad.
+fn supports(case: &StaticCase, frame: &Frame, twisted: bool) -> Supports {
+    let clamped = case.start.kind == StartKind::Clamped;
+    let mut supports = Supports { start_tangent: clamped, start_angle: clamped, ..Supports::default() };
+    if let Some(p) = case.end.position {
+        supports.end_position = Vec3::from(p);
+        supports.end_directions = match case.end.slide {
+            None => vec![Vec3::x(), Vec3::y(), Vec3::z()],
+            Some(s) => {
+                let across = Frame::new(Vec3::from(s), None);
+                vec![across.u, across.v]
+            }
+        };
+    }
+    if matches!(case.end.kind, EndKind::Clamped | EndKind::Guided) {
+        let end = Frame::new(
+            case.end.tangent.map_or(frame.t, Vec3::from),
+            Some(case.end.normal.map_or(frame.u, Vec3::from)),
+        );
+        supports.end_tangent = Some(end.t);
+        if twisted {
+            let turns = case.end.turns.unwrap_or(0.0);
+            supports.end_angle = Some(EndAngle { normal: end.u, turns, target: 0.0 });
+        }
+    }
+    supports
 }

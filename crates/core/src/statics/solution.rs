@@ -37,6 +37,25 @@ pub struct Reactions {
     pub end: Reaction,
 }
 
+/// What one of several instruments does and what its hand feels.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InstrumentSolution {
+    /// Its name.
+    pub name: String,
+    /// Length beyond the start.
+    pub inserted: f64,
+    /// Position of its tip.
+    pub tip: [f64; 3],
+    /// Angle of the tip's d₁ against that at the start, in radians, any number of turns: its twist.
+    pub twist: f64,
+    /// Force with which its hand pushes: the derivative of the energy of all instruments, loads and what lies in the sheath included, in
+    /// its inserted length, at fixed angles and other lengths. `None` where that jumps, as the energy has a kink: where its tip or the end
+    /// of one of its sections is at that of another, at the start or at a load.
+    pub push_force: Option<f64>,
+    /// Torque with which its hand turns it: the derivative of the energy in its angle.
+    pub torque: f64,
+}
+
 /// A solved case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StaticSolution {
@@ -54,7 +73,7 @@ pub struct StaticSolution {
     pub tangents: Vec<[f64; 3]>,
     /// Material directions d₁ of the nodes; of a rod that carries no angles, the untwisted reference.
     pub normals: Vec<[f64; 3]>,
-    /// Twist of the whole rod in radians, any number of turns; zero where the rod carries no angles.
+    /// Twist of the whole rod in radians, any number of turns; zero where the rod carries no angles, and with several instruments.
     pub twist: f64,
     /// Axial force of the elements.
     pub tensions: Vec<f64>,
@@ -65,6 +84,9 @@ pub struct StaticSolution {
     /// Force with which the rod must be pushed to stay where it is, if the clamp at its start is a frictionless sleeve that it
     /// slides through; `None` where the start is not clamped. See [`Clamp::push_force`](crate::rod::Clamp::push_force).
     pub push_force: Option<f64>,
+    /// Each instrument, in the order of the case; left out for a single rod.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub instruments: Vec<InstrumentSolution>,
     /// Newton iterations, all load steps together.
     pub iterations: usize,
     /// Largest residual over the force scale.

@@ -16,13 +16,13 @@ const MAX_WORK: usize = 10_000_000;
 const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-2;
 
 /// A key of an entry of a list, written only where it is wrong.
-struct Key {
-    list: &'static str,
+struct Key<'a> {
+    list: &'a str,
     index: usize,
     key: &'static str,
 }
 
-impl Display for Key {
+impl Display for Key<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}[{}].{}", self.list, self.index, self.key)
     }
@@ -65,11 +65,59 @@ fn across(name: &str, normal: &[f64; 3], tangent: &[f64; 3]) -> Result<()> {
     Ok(())
 }
 
+/// Sections of a rod or an instrument: in order, and each with values that can be.
+fn check_sections(list: &str, sections: &[Section]) -> Result<()> {
+    if sections.is_empty() {
+        return Err(Error::parameter(list, "none", format!("there must be at least one [[{list}]]")));
+    }
+    let mut begin = 0.0;
+    for (k, section) in sections.iter().enumerate() {
+        let name = |key| Key { list, index: k, key };
+        positive(name("until"), section.until)?;
+        if section.until <= begin {
+            let mend = format!("sections come in order: more than {begin}");
+            return Err(Error::parameter(name("until"), section.until, mend));
+        }
+        begin = section.until;
+        let Section { ei, ei_end, gj, gj_end, ea, ea_end, .. } = section;
+        positive(name("EI"), *ei)?;
+        for (key, value) in
+            [("EI_end", ei_end), ("GJ", gj), ("GJ_end", gj_end), ("EA", ea), ("EA_end", ea_end)]
+        {
+            if let Some(value) = value {
+                positive(name(key), *value)?;
+            }
+        }
+        for (key, end, begin) in [("GJ_end", gj_end, gj), ("EA_end", ea_end, ea)] {
+            if end.is_some() && begin.is_none() {
+                return Err(Error::parameter(
+                    name(key),
+                    "given",
+                    "needs the value at the section's begin too",
+                ));
+            }
+        }
+        finite(name("rest_curvature"), &section.rest_curvature)?;
+        finite(name("rest_curvature_end"), &section.rest_curvature_end.unwrap_or_default())?;
+        finite(name("rest_twist"), &[section.rest_twist])?;
+    }
+    let known = sections.iter().filter(|s| s.gj.is_some()).count();
+    if known != 0 && known != sections.len() {
+        return Err(Error::parameter(
+            format!("{list}.GJ"),
+            "missing in some sections",
+            "give it in all or in none",
+        ));
+    }
+    Ok(())
+}
+
 impl StaticCase {
     /// Checks every value and that none contradicts another.
     pub fn check(&self) -> Result<()> {
-        let length = self.rod.length;
-        positive("rod.length", length)?;
+        if self.rod.instrument.is_empty() {
+            positive("rod.length", self.rod.length)?;
+        }
         if self.rod.elements == 0 || self.rod.elements > MAX_ELEMENTS {
             return Err(Error::parameter(
                 "rod.elements",
@@ -77,7 +125,12 @@ impl StaticCase {
                 format!("must be 1 to {MAX_ELEMENTS}: more would take gigabytes"),
             ));
         }
-        self.check_sections()?;
+        if self.rod.instrument.is_empty() {
+            self.check_rod()?;
+        } else {
+            self.check_instruments()?;
+        }
+        let length = self.rod.line_length();
         direction("start.tangent", &self.start.tangent)?;
         finite("start.position", &self.start.position)?;
         if let Some(n) = &self.start.normal {
@@ -146,59 +199,86 @@ impl StaticCase {
         Ok(())
     }
 
-    fn check_sections(&self) -> Result<()> {
-        let length = self.rod.length;
-        if self.rod.section.is_empty() {
-            return Err(Error::parameter("rod.section", "none", "a rod has at least one [[rod.section]]"));
-        }
-        let mut begin = 0.0;
-        for (k, section) in self.rod.section.iter().enumerate() {
-            let name = |key| Key { list: "rod.section", index: k, key };
-            positive(name("until"), section.until)?;
-            if section.until <= begin || section.until > length * (1.0 + 1e-9) {
+    /// The sections of a single rod.
+    fn check_rod(&self) -> Result<()> {
+        let (length, sections) = (self.rod.length, &self.rod.section);
+        check_sections("rod.section", sections)?;
+        for (k, section) in sections.iter().enumerate() {
+            if section.until > length * (1.0 + 1e-9) {
+                let begin = if k == 0 { 0.0 } else { sections[k - 1].until };
                 return Err(Error::parameter(
-                    name("until"),
+                    Key { list: "rod.section", index: k, key: "until" },
                     section.until,
                     format!("sections come in order: more than {begin}, at most the length {length}"),
                 ));
             }
-            begin = section.until;
-            let Section { ei, ei_end, gj, gj_end, ea, ea_end, .. } = section;
-            positive(name("EI"), *ei)?;
-            for (key, value) in
-                [("EI_end", ei_end), ("GJ", gj), ("GJ_end", gj_end), ("EA", ea), ("EA_end", ea_end)]
-            {
-                if let Some(value) = value {
-                    positive(name(key), *value)?;
-                }
-            }
-            for (key, end, begin) in [("GJ_end", gj_end, gj), ("EA_end", ea_end, ea)] {
-                if end.is_some() && begin.is_none() {
-                    return Err(Error::parameter(
-                        name(key),
-                        "given",
-                        "needs the value at the section's begin too",
-                    ));
-                }
-            }
-            finite(name("rest_curvature"), &section.rest_curvature)?;
-            finite(name("rest_curvature_end"), &section.rest_curvature_end.unwrap_or_default())?;
-            finite(name("rest_twist"), &[section.rest_twist])?;
         }
-        if (begin - length).abs() > 1e-9 * length {
+        let end = sections[sections.len() - 1].until;
+        if (end - length).abs() > 1e-9 * length {
             return Err(Error::parameter(
-                format!("rod.section[{}].until", self.rod.section.len() - 1),
-                begin,
+                format!("rod.section[{}].until", sections.len() - 1),
+                end,
                 format!("the last section must end at the rod's length {length}"),
             ));
         }
-        let known = self.rod.section.iter().filter(|s| s.gj.is_some()).count();
-        if known != 0 && known != self.rod.section.len() {
-            return Err(Error::parameter(
-                "rod.section.GJ",
-                "missing in some sections",
-                "give it in all or in none",
-            ));
+        Ok(())
+    }
+
+    /// Several instruments on one line.
+    fn check_instruments(&self) -> Result<()> {
+        let given = |key: &str, mend: &str| Err(Error::parameter(key, "given", mend));
+        if self.rod.length != 0.0 || !self.rod.section.is_empty() {
+            let key = if self.rod.length != 0.0 { "rod.length" } else { "rod.section" };
+            return given(key, "instruments have lengths and sections of their own; leave it out");
+        }
+        if self.start.kind != StartKind::Clamped {
+            let mend = "instruments come out of a sheath that holds them; use clamped";
+            return Err(Error::parameter("start.type", "pinned", mend));
+        }
+        if !matches!(self.end.kind, EndKind::Free | EndKind::Pinned) {
+            let kind = format!("{:?}", self.end.kind).to_lowercase();
+            let mend = "several instruments end where they end; use free or pinned";
+            return Err(Error::parameter("end.type", kind, mend));
+        }
+        if self.initial.is_some() {
+            return given(
+                "initial",
+                "instruments start from the shape that they take untwisted; leave it out",
+            );
+        }
+        for (index, load) in self.load.iter().enumerate() {
+            if !matches!(load.kind, LoadKind::Force | LoadKind::Distributed) {
+                let kind = format!("{:?}", load.kind).to_lowercase();
+                let mend = "of several instruments none is said to carry it; use force or distributed";
+                return Err(Error::parameter(Key { list: "load", index, key: "kind" }, kind, mend));
+            }
+        }
+        for (index, instrument) in self.rod.instrument.iter().enumerate() {
+            let name = |key| Key { list: "rod.instrument", index, key };
+            positive(name("inserted"), instrument.inserted)?;
+            finite(name("hand"), &[instrument.hand])?;
+            let list = format!("rod.instrument[{index}].section");
+            check_sections(&list, &instrument.section)?;
+            let length = instrument.section[instrument.section.len() - 1].until;
+            if length < instrument.inserted {
+                let mend =
+                    format!("the instrument is {length} long, as its last section says: insert no more");
+                return Err(Error::parameter(name("inserted"), instrument.inserted, mend));
+            }
+            for (k, section) in instrument.section.iter().enumerate() {
+                let key = |key| Key { list: &list, index: k, key };
+                if section.ea.is_some() {
+                    return Err(Error::parameter(
+                        key("EA"),
+                        "given",
+                        "instruments are inextensible; leave it out",
+                    ));
+                }
+                if instrument.is_shaped() && section.gj.is_none() {
+                    let mend = "an instrument with rest curvature or twist is twisted by the others: give the torsion stiffness";
+                    return Err(Error::parameter(key("GJ"), "missing", mend));
+                }
+            }
         }
         Ok(())
     }
@@ -255,18 +335,19 @@ impl StaticCase {
                 span -= s * s.dot(&span);
             }
             let inextensible = self.rod.section.iter().all(|s| s.ea.is_none());
-            if inextensible && span.norm() > self.rod.length * (1.0 + 1e-12) {
+            let length = self.rod.line_length();
+            if inextensible && span.norm() > length * (1.0 + 1e-12) {
                 return Err(Error::parameter(
                     "end.position",
                     format!("{p:?}"),
                     format!(
                         "is {} away from the start, but the rod is inextensible and {} long; bring it nearer or give EA",
                         span.norm(),
-                        self.rod.length
+                        length
                     ),
                 ));
             }
-            if inextensible && end.slide.is_none() && span.norm() > self.rod.length * (1.0 - 1e-12) {
+            if inextensible && end.slide.is_none() && span.norm() > length * (1.0 - 1e-12) {
                 self.check_straight(&span)?;
             }
         }

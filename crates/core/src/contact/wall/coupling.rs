@@ -1,9 +1,10 @@
 //! Wall and friction solved for together: what the matrix of lagged normal forces leaves out, and what a point feels.
 
 use super::WallContact;
-use crate::rod::quadrature::Point;
-use crate::rod::{Assembly, ElementData, Layout, RodState};
-use crate::solve::BandLu;
+use crate::Vec3;
+use crate::contact::ContactPoint;
+use crate::contact::friction::Coupling;
+use crate::rod::{ElementData, RodState};
 
 impl WallContact<'_> {
     /// From now on the normal forces of friction follow the state at once.
@@ -51,14 +52,8 @@ impl WallContact<'_> {
         self.friction.unsettled(self.least_force_n())
     }
 
-    /// Adds to the matrix of the state assembled last the derivatives of friction that lagged normal forces leave out.
-    pub fn add_coupling<const C: usize>(
-        &self,
-        elements: &[ElementData],
-        state: &RodState,
-        matrix: &mut BandLu<C>,
-    ) {
-        let l = Layout::<C>;
+    /// Tells the derivatives of friction at the base, `state`, that lagged normal forces leave out, point by point.
+    pub fn couplings(&self, state: &RodState, mut to: impl FnMut(&ContactPoint, &Coupling)) {
         for (index, point) in self.points.iter().enumerate() {
             let Some(d) = self.memory.pressed(index) else { continue };
             let known = &self.memory.points[index];
@@ -76,22 +71,7 @@ impl WallContact<'_> {
             else {
                 continue;
             };
-            let e = point.element;
-            let columns = Assembly::<C>::point_columns(state, &elements[e], e, point.xi);
-            for (column, way) in &columns {
-                let force = more.force * way;
-                for (row, to) in &columns {
-                    matrix.add(*row, *column, to.dot(&force));
-                }
-            }
-            if Layout::<C>::TWIST {
-                let [w0, w1, wb] = Point::at(point.xi, 0.0).phi;
-                for (row, share) in [(l.angle(e), w0), (l.bubble(e), wb), (l.angle(e + 1), w1)] {
-                    for (column, way) in &columns {
-                        matrix.add(row, *column, share * more.turn.dot(way));
-                    }
-                }
-            }
+            to(point, &more);
         }
     }
 
@@ -110,18 +90,16 @@ impl WallContact<'_> {
         self.friction.take(pressed);
     }
 
-    /// The forces that a step leads to, from the state assembled last.
-    pub fn aim<const C: usize>(&mut self, elements: &[ElementData], state: &RodState, step: &[f64]) {
+    /// The forces that a step from the base leads to: `moved` tells how much of it moves a point along a direction.
+    pub fn aim(&mut self, moved: impl Fn(&ContactPoint, &Vec3) -> f64) {
         self.memory.aims.clear();
         for (index, point) in self.points.iter().enumerate() {
             let force = self.memory.pressed(index).map_or(0.0, |d| {
                 let known = &self.memory.points[index];
                 let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
                 let (first, second) = point.potential.holding(d.value_mm);
-                let e = point.element;
-                let columns = Assembly::<C>::point_columns(state, &elements[e], e, point.xi);
-                let moved: f64 = columns.iter().map(|(row, way)| d.gradient.dot(way) * step[*row]).sum();
-                -factor * point.weight_mm * (first + second * moved) * d.gradient.norm()
+                let along = moved(point, &d.gradient);
+                -factor * point.weight_mm * (first + second * along) * d.gradient.norm()
             });
             self.memory.aims.push(force);
         }

@@ -58,16 +58,16 @@ impl Guess {
         let correction = &start.state.correction;
         if let Some(factor) = correction.repeats(hand) {
             correction.apply(factor, elements, state);
-            if !contact.is_outside::<C>(elements, state) {
+            if !contact.is_outside(elements, state) {
                 return Quality::Learnt;
             }
             state.copy_from(&self.slid);
         }
-        let outside = contact.is_outside::<C>(elements, state);
+        let outside = contact.is_outside(elements, state);
         if self.shaped_mm > 0.0 {
             self.other.copy_from(state);
             carry((start.mesh, &start.state.rod), mesh, self.shaped_mm, hand.turn_rad, &mut self.other);
-            if !contact.is_outside::<C>(elements, &self.other)
+            if !contact.is_outside(elements, &self.other)
                 && (outside
                     || blocked
                     || newton.energy_at(elements, contact, &self.other)

@@ -51,7 +51,7 @@ impl Guess {
         self.other.copy_from(state);
         self.other.advance::<C>(elements, state, step, 1.0);
         self.other.take_tensions::<C>(elements, state, step);
-        if contact.is_outside::<C>(elements, &self.other) {
+        if contact.is_outside(elements, &self.other) {
             return false;
         }
         std::mem::swap(state, &mut self.other);

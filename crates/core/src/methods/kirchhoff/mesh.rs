@@ -2,8 +2,8 @@
 
 use crate::contact::{ContactPoint, WallPotential};
 use crate::device::Device;
-use crate::rod::ElementData;
 use crate::rod::quadrature::GAUSS;
+use crate::rod::{ElementData, Material};
 
 /// Contact points lie no farther apart than this many radii of the device.
 const SPACING_RADII: f64 = 2.0;
@@ -49,19 +49,20 @@ impl Mesh {
     /// and a half elements long, shorter only where that is all there is.
     pub fn build(&mut self, device: &Device, inserted_mm: f64, element_mm: f64, modulus_n_per_mm2: f64) {
         crate::insertion::nodes_from_tip(inserted_mm, element_mm, &mut self.from_tip_mm);
-        self.elements.clear();
-        for ends in self.from_tip_mm.windows(2) {
+        // Only what one device needs is written: of elements that were here before the rest is empty.
+        self.elements.resize(self.from_tip_mm.len() - 1, ElementData::EMPTY);
+        for (ends, data) in self.from_tip_mm.windows(2).zip(&mut self.elements) {
             let length = ends[0] - ends[1];
             let section = |xi: f64| device.section_at(ends[0] - xi * length);
             let sample = GAUSS.map(|g| section(g.xi));
-            self.elements.push(ElementData {
-                length,
-                bending: sample.map(|s| s.bending_stiffness_nmm2),
+            let bending = sample.map(|s| s.bending_stiffness_nmm2);
+            (data.length, data.bending) = (length, bending);
+            data.materials[0] = Material {
+                bending,
                 torsion: sample.map(|s| s.torsion_nmm2()),
                 rest_curvature: sample.map(|s| s.rest_curvature_per_mm),
                 rest_twist: [0.0; 3],
-                flexibility: 0.0,
-            });
+            };
         }
         self.points.clear();
         // Half of the interval beyond the point at hand; beyond the tip there is its cap.

@@ -132,7 +132,7 @@ impl<const C: usize> Kirchhoff<C> {
             return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
         }
         let mut state = KirchhoffState::at(surroundings.sheath);
-        state.report.angles = Layout::<C>::TWIST;
+        state.report.angles = Layout::<C>::ANGLES > 0;
         let Surroundings { wall, properties, device, .. } = *surroundings;
         let felt = FeltWall::from_store(wall, device, properties, store)?;
         let mut method = Self {
@@ -228,7 +228,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
             sheath: surroundings.sheath,
             elements: mesh.elements.len(),
             points: mesh.points.len(),
-            angles: Layout::<C>::TWIST,
+            angles: Layout::<C>::ANGLES > 0,
             rubs: surroundings.properties.rubs(),
         })?;
         self.state = Arc::clone(state);

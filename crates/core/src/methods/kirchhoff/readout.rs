@@ -45,11 +45,11 @@ impl<const C: usize> Tools<C> {
 
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
         let frame = rod.material_frame(0);
-        let data = &mesh.elements[0];
+        let data = &mesh.elements[0].materials[0];
         let rest = frame.u * data.rest_curvature[0][0] + frame.v * data.rest_curvature[0][1];
         report.push_force_n = clamp.push_force(&frame.t, data.bending[0], data.torsion[0], &rest);
         report.torque_nmm = clamp.torque;
-        if Layout::<C>::TWIST {
+        if Layout::<C>::ANGLES > 0 {
             report.tip_rotation_rad += rod.twist();
         }
     }

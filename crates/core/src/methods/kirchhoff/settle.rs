@@ -19,9 +19,11 @@
 //! of the matrix is not that of a minimum, or its step is long, it is shifted as in the solution with lagged forces. What is found is
 //! judged by [`Newton::solve`] with its forces held: a saddle is left, and the way goes on from there.
 
+use crate::banded::{BandLu, Shift};
 use crate::contact::WallContact;
+use crate::rod::scatter::{add_unsymmetric, point_step};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
-use crate::solve::{BandLu, External, Newton, Shift};
+use crate::solve::{External, Newton};
 
 /// Shifts tried until the symmetric part is that of a minimum.
 const SHIFTS: usize = 40;
@@ -119,11 +121,14 @@ impl<const C: usize> Settle<C> {
             }
             let mut fraction = 1.0;
             self.trial.advance::<C>(elements, state, &self.step, fraction);
-            fraction *= External::<C>::safe_fraction(contact, elements, &self.trial);
-            contact.aim::<C>(elements, state, &self.step);
+            fraction *= contact.safe_fraction(elements, &self.trial);
+            contact.aim(|point, way| {
+                let e = point.element;
+                point_step::<C>(state, &elements[e], (e, point.xi), way, &self.step)
+            });
             for _ in 0..TRIALS {
                 self.trial.advance::<C>(elements, state, &self.step, fraction);
-                if !contact.is_outside::<C>(elements, &self.trial) {
+                if !contact.is_outside(elements, &self.trial) {
                     break;
                 }
                 fraction *= 0.4;
@@ -154,7 +159,11 @@ impl<const C: usize> Settle<C> {
             let inertia = newton.inertia(elements, supports, whisper + sigma);
             if inertia.is_some_and(|i| i.negative == elements.len()) {
                 self.lu.copy_from(&newton.assembly.matrix, &self.shift, whisper + sigma);
-                contact.add_coupling(elements, state, &mut self.lu);
+                contact.couplings(state, |point, more| {
+                    let e = point.element;
+                    let place = (e, point.xi);
+                    add_unsymmetric(&mut self.lu, state, &elements[e], place, &more.force, &more.turn);
+                });
                 supports.held::<C>().into_iter().flatten().for_each(|row| self.lu.hold(row));
                 if self.lu.factor().is_ok() {
                     Self::answer(&self.lu, newton, elements, &mut self.step);
@@ -186,8 +195,8 @@ impl<const C: usize> Settle<C> {
             let (near, far) = (l.position(e), l.position(e + 1));
             let chord = (0..3).map(|a| ((step[far + a] - step[near + a]) / data.length).powi(2));
             let tangent = (0..2).map(|a| step[l.tangent(e + 1) + a].powi(2));
-            let angle = if Layout::<C>::TWIST { step[l.angle(e + 1)].powi(2) } else { 0.0 };
-            sum += data.length * (chord.sum::<f64>() + tangent.sum::<f64>() + angle);
+            let angles = (0..Layout::<C>::ANGLES).map(|set| step[l.angle(e + 1, set)].powi(2));
+            sum += data.length * (chord.sum::<f64>() + tangent.sum::<f64>() + angles.sum::<f64>());
         }
         sum.sqrt()
     }

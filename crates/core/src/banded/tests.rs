@@ -1,6 +1,6 @@
 //! The block factorisation against faer.
 
-use super::band::*;
+use super::*;
 
 /// A small deterministic generator: tests need spread, not quality.
 fn noise(seed: &mut u64) -> f64 {
@@ -57,6 +57,10 @@ fn solution_and_inertia_agree_with_faer() {
             assert!(error < 1e-9 && inertia, "width 12, {blocks} blocks, seed {seed}: {error:e}");
             let (error, inertia) = against_faer::<16>(8 * blocks, seed + 100, 0.0);
             assert!(error < 1e-9 && inertia, "width 16, {blocks} blocks, seed {seed}: {error:e}");
+            let (error, inertia) = against_faer::<20>(10 * blocks, seed + 200, 0.0);
+            assert!(error < 1e-9 && inertia, "width 20, {blocks} blocks, seed {seed}: {error:e}");
+            let (error, inertia) = against_faer::<24>(12 * blocks, seed + 300, 0.0);
+            assert!(error < 1e-9 && inertia, "width 24, {blocks} blocks, seed {seed}: {error:e}");
         }
     }
 }

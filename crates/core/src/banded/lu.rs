@@ -6,7 +6,8 @@
 //! (Golub and Van Loan, *Matrix Computations*, 4th ed., section 4.3.3; LAPACK's `dgbtrf`). It is needed where friction does
 //! not settle otherwise, which is seldom: plain loops will do, and faer has no band solver that keeps its memory.
 
-use super::band::{BandMatrix, FactorError, Shift};
+use super::ldlt::FactorError;
+use super::matrix::{BandMatrix, Shift};
 
 /// A banded matrix of the width of a [`BandMatrix`] of blocks of `C / 2` rows, not symmetric, and its factors in its place.
 #[derive(Debug, Clone, Default)]

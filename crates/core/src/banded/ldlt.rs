@@ -1,4 +1,4 @@
-//! Symmetric block tridiagonal matrices and their LDLᵀ factorisation without pivoting.
+//! The LDLᵀ factorisation of symmetric block tridiagonal matrices without pivoting.
 //!
 //! The rows of a rod's Newton system couple only neighbouring nodes, so with the unknowns of a node as one block the matrix is
 //! block tridiagonal. faer has no such solver and LAPACK's band solver works with a run-time width; with the block a
@@ -13,147 +13,7 @@
 //! tries again. A pivot that is zero or not finite stops the factorisation with its row, so NaN never spreads
 //! unseen.
 
-/// A symmetric matrix of blocks of `C / 2` rows, each coupled with the next.
-///
-/// A row of the upper triangle holds `C` numbers: the columns of its own block and of the next. Those left of the diagonal are
-/// zero.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BandMatrix<const C: usize> {
-    rows: Vec<[f64; C]>,
-}
-
-impl<const C: usize> BandMatrix<C> {
-    /// Rows of a block.
-    const BLOCK: usize = C / 2;
-
-    /// The zero matrix; `dimension` is a multiple of `C / 2`.
-    pub fn zeros(dimension: usize) -> Self {
-        debug_assert!(dimension.is_multiple_of(Self::BLOCK), "{dimension} rows are no whole blocks");
-        Self { rows: vec![[0.0; C]; dimension] }
-    }
-
-    /// Number of rows.
-    pub fn dimension(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// Changes the dimension; keeps the memory, and no entry that means anything.
-    pub fn resize(&mut self, dimension: usize) {
-        self.rows.resize(dimension, [0.0; C]);
-    }
-
-    /// Adds `value` to entry `(i, j)` and, by symmetry, `(j, i)`. Entries outside the blocks are ignored; they can
-    /// only be asked for by a caller that numbered its unknowns wrongly, which debug builds report.
-    #[inline]
-    pub fn add(&mut self, i: usize, j: usize, value: f64) {
-        let (i, j) = if i <= j { (i, j) } else { (j, i) };
-        let column = j - i / Self::BLOCK * Self::BLOCK;
-        debug_assert!(column < C && j < self.rows.len(), "entry ({i}, {j}) lies outside the blocks");
-        if let Some(entry) = self.rows.get_mut(i).and_then(|row| row.get_mut(column)) {
-            *entry += value;
-        }
-    }
-
-    /// Entry `(i, j)`; zero outside the blocks.
-    pub fn get(&self, i: usize, j: usize) -> f64 {
-        let (i, j) = if i <= j { (i, j) } else { (j, i) };
-        let column = j - i / Self::BLOCK * Self::BLOCK;
-        self.rows.get(i).and_then(|row| row.get(column)).copied().unwrap_or(0.0)
-    }
-
-    /// Begins a matrix that is put together with [`Self::lay_blocks`]: clears the first block and the last.
-    pub fn begin_blocks(&mut self) {
-        let last = self.rows.len() - Self::BLOCK;
-        self.rows[..Self::BLOCK].fill([0.0; C]);
-        self.rows[last..].fill([0.0; C]);
-    }
-
-    /// Adds the upper triangle of the rows of two blocks, the first of which begins at row `at`: what couples one node with the
-    /// next, node by node. What was in the second block before is overwritten.
-    #[inline]
-    pub fn lay_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
-        let targets = &mut self.rows[at..at + C];
-        for i in 0..Self::BLOCK {
-            for k in 0..C {
-                targets[i][k] += rows[i][k];
-            }
-        }
-        for i in Self::BLOCK..C {
-            for k in 0..Self::BLOCK {
-                targets[i][k] = rows[i][Self::BLOCK + k];
-                targets[i][Self::BLOCK + k] = 0.0;
-            }
-        }
-    }
-
-    /// Adds the upper triangle of the rows of two blocks, the first of which begins at row `at`.
-    pub fn add_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
-        let (first, second) = self.rows[at..at + C].split_at_mut(Self::BLOCK);
-        for (target, row) in first.iter_mut().zip(rows) {
-            target.iter_mut().zip(row).for_each(|(t, r)| *t += r);
-        }
-        for (target, row) in second.iter_mut().zip(&rows[Self::BLOCK..]) {
-            target.iter_mut().zip(&row[Self::BLOCK..]).for_each(|(t, r)| *t += r);
-        }
-    }
-
-    /// Turns row and column `i` into those of the identity: the unknown is held.
-    pub fn hold(&mut self, i: usize) {
-        let begin = i / Self::BLOCK * Self::BLOCK;
-        for k in begin.saturating_sub(Self::BLOCK)..i {
-            self.rows[k][i - k / Self::BLOCK * Self::BLOCK] = 0.0;
-        }
-        self.rows[i] = [0.0; C];
-        self.rows[i][i - begin] = 1.0;
-    }
-
-    /// Adds `factor` times a shift.
-    pub fn add_shift(&mut self, shift: &Shift, factor: f64) {
-        for (i, row) in self.rows.iter_mut().enumerate() {
-            shift.add_to(i, factor, row);
-        }
-    }
-
-    /// `y = A x`.
-    pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
-        y.fill(0.0);
-        for (i, row) in self.rows.iter().enumerate() {
-            let begin = i / Self::BLOCK * Self::BLOCK;
-            y[i] += row[i - begin] * x[i];
-            for j in i + 1..(begin + C).min(self.rows.len()) {
-                y[i] += row[j - begin] * x[j];
-                y[j] += row[j - begin] * x[i];
-            }
-        }
-    }
-}
-
-/// A matrix that is added to another before it is factored: a diagonal, and one entry a row at the same place of the next block.
-#[derive(Debug, Clone, Default)]
-pub struct Shift {
-    /// Entries of the diagonal.
-    pub diagonal: Vec<f64>,
-    /// Entries between a row and the same row of the next block.
-    pub next: Vec<f64>,
-}
-
-impl Shift {
-    /// The zero shift of this dimension; keeps the memory.
-    pub fn reset(&mut self, dimension: usize) {
-        for list in [&mut self.diagonal, &mut self.next] {
-            list.clear();
-            list.resize(dimension, 0.0);
-        }
-    }
-
-    /// Adds `factor` times row `i` to that row of a matrix.
-    #[inline(always)]
-    fn add_to<const C: usize>(&self, i: usize, factor: f64, row: &mut [f64; C]) {
-        let own = i % (C / 2);
-        row[own] += factor * self.diagonal[i];
-        row[C / 2 + own] += factor * self.next[i];
-    }
-}
+use super::matrix::{BandMatrix, Shift};
 
 /// Numbers of positive, negative and zero eigenvalues (zero: the factorisation met a zero pivot and stopped).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -181,10 +41,10 @@ pub enum FactorError {
     },
 }
 
-/// Runs a block for every index below `$end` ≤ 8, each on its own: loops whose bounds hang on another index would not be unrolled,
+/// Runs a block for every index below `$end` ≤ 12, each on its own: loops whose bounds hang on another index would not be unrolled,
 /// and their rows not kept in registers.
 macro_rules! unrolled {
-    ($i:ident in 0..$end:expr, $body:block) => { unrolled!(@ $i, $end, $body, 0 1 2 3 4 5 6 7) };
+    ($i:ident in 0..$end:expr, $body:block) => { unrolled!(@ $i, $end, $body, 0 1 2 3 4 5 6 7 8 9 10 11) };
     (@ $i:ident, $end:expr, $body:block, $($k:literal)*) => {
         $({
             let $i: usize = $k;
@@ -300,11 +160,12 @@ impl<const C: usize> Factor<C> {
         shift: Option<(&Shift, f64)>,
         b: &mut [f64],
     ) -> Result<Inertia, FactorError> {
-        const { assert!(C == 12 || C == 16, "a node has 6 or 8 unknowns") }
-        if C == 12 {
-            self.eliminate_blocks::<6, SOLVE>(matrix, shift, b)
-        } else {
-            self.eliminate_blocks::<8, SOLVE>(matrix, shift, b)
+        const { assert!(C >= 12 && C <= 24 && C.is_multiple_of(4), "a node has 6, 8, 10 or 12 unknowns") }
+        match C {
+            12 => self.eliminate_blocks::<6, SOLVE>(matrix, shift, b),
+            16 => self.eliminate_blocks::<8, SOLVE>(matrix, shift, b),
+            20 => self.eliminate_blocks::<10, SOLVE>(matrix, shift, b),
+            _ => self.eliminate_blocks::<12, SOLVE>(matrix, shift, b),
         }
     }
 

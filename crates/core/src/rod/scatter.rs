@@ -1,0 +1,165 @@
+//! The assembly scatters the stencils of energies outside the rod.
+
+use nalgebra::Matrix3;
+
+use super::assembly::{Assembly, RankOne};
+use super::element::ElementData;
+use super::layout::Layout;
+use super::points::PointSum;
+use super::quadrature::{Point, hermite};
+use super::state::RodState;
+use super::stencils::{Stencils, Triple};
+use crate::Vec3;
+use crate::banded::BandLu;
+
+impl<const C: usize> Stencils for Assembly<C> {
+    fn wants_hessian(&self) -> bool {
+        self.hessian
+    }
+
+    fn add_value(&mut self, energy: f64) {
+        self.external_energy += energy;
+    }
+
+    fn add_node(&mut self, i: usize, gradient: &Vec3, hessian: &Matrix3<f64>) {
+        self.add_three(Layout::<C>.position(i), 3, gradient, hessian);
+    }
+
+    fn add_turn(&mut self, i: usize, gradient: &Vec3, hessian: &Matrix3<f64>) {
+        let count = if Layout::<C>::ANGLES > 0 { 3 } else { 2 };
+        self.add_three(Layout::<C>.tangent(i), count, gradient, hessian);
+    }
+
+    fn add_points(&mut self, state: &RodState, element: &ElementData, e: usize, sum: &PointSum) {
+        self.add_gathered(state, element, e, sum);
+    }
+
+    fn add_spin(
+        &mut self,
+        state: &RodState,
+        element: &ElementData,
+        (e, xi): (usize, f64),
+        mixed: &Vec3,
+        (first, second): (f64, f64),
+    ) {
+        if Layout::<C>::ANGLES == 0 {
+            return;
+        }
+        let angles = angle_weights::<C>(e, xi);
+        let columns = point_columns::<C>(state, element, e, xi);
+        for (i, &(row, p)) in angles.iter().enumerate() {
+            self.residual[row] += first * p;
+            if !self.hessian {
+                continue;
+            }
+            for &(column, q) in &angles[i..] {
+                self.matrix.add(row, column, second * p * q);
+            }
+            for (column, way) in &columns {
+                self.matrix.add(row, *column, p * mixed.dot(way));
+            }
+        }
+    }
+
+    fn add_rank_one(&mut self, i: usize, rows: (Triple, [f64; 3]), columns: (Triple, [f64; 3])) {
+        let place = |(triple, mut values): (Triple, [f64; 3])| match triple {
+            Triple::Position => (Layout::<C>.position(i), values),
+            Triple::Turn => {
+                if Layout::<C>::ANGLES == 0 {
+                    values[2] = 0.0;
+                }
+                (Layout::<C>.tangent(i), values)
+            }
+        };
+        let ((row, p), (column, q)) = (place(rows), place(columns));
+        if p != [0.0; 3] && q != [0.0; 3] {
+            self.rank_ones.push(RankOne { row, p, column, q });
+        }
+    }
+}
+
+impl<const C: usize> Assembly<C> {
+    /// Adds derivatives in the first `count` of three unknowns from row `at` on.
+    fn add_three(&mut self, at: usize, count: usize, gradient: &Vec3, hessian: &Matrix3<f64>) {
+        for a in 0..count {
+            self.residual[at + a] += gradient[a];
+            if !self.hessian {
+                continue;
+            }
+            for b in a..count {
+                self.matrix.add(at + a, at + b, hessian[(a, b)]);
+            }
+        }
+    }
+}
+
+/// Weights of the angles of the first set in that of the point at ξ of element `e`.
+fn angle_weights<const C: usize>(e: usize, xi: f64) -> [(usize, f64); 3] {
+    let l = Layout::<C>;
+    let [w0, w1, wb] = Point::at(xi, 0.0).phi;
+    [(l.angle(e, 0), w0), (l.bubble(e, 0), wb), (l.angle(e + 1, 0), w1)]
+}
+
+/// How the point at ξ of element `e` moves with the unknowns: rows and displacements,
+/// w₀ dx₀ + s₀(u a + v b) + ….
+fn point_columns<const C: usize>(
+    state: &RodState,
+    element: &ElementData,
+    e: usize,
+    xi: f64,
+) -> [(usize, Vec3); 10] {
+    let l = Layout::<C>;
+    let [w0, s0, w1, s1] = hermite(xi);
+    let (s0, s1) = (s0 * element.length, s1 * element.length);
+    let (f0, f1) = (&state.frames[e], &state.frames[e + 1]);
+    [
+        (l.position(e), Vec3::x() * w0),
+        (l.position(e) + 1, Vec3::y() * w0),
+        (l.position(e) + 2, Vec3::z() * w0),
+        (l.tangent(e), f0.u * s0),
+        (l.tangent(e) + 1, f0.v * s0),
+        (l.position(e + 1), Vec3::x() * w1),
+        (l.position(e + 1) + 1, Vec3::y() * w1),
+        (l.position(e + 1) + 2, Vec3::z() * w1),
+        (l.tangent(e + 1), f1.u * s1),
+        (l.tangent(e + 1) + 1, f1.v * s1),
+    ]
+}
+
+/// How much the point at ξ of element `e` moves along `way` with the step `d`.
+pub(crate) fn point_step<const C: usize>(
+    state: &RodState,
+    element: &ElementData,
+    (e, xi): (usize, f64),
+    way: &Vec3,
+    d: &[f64],
+) -> f64 {
+    let columns = point_columns::<C>(state, element, e, xi);
+    columns.iter().map(|(row, column)| way.dot(column) * d[*row]).sum()
+}
+
+/// Adds the derivatives of a force on the point at ξ of element `e`, and of a moment about the tangent there, in that point's position
+/// to a matrix that is not symmetric.
+pub(crate) fn add_unsymmetric<const C: usize>(
+    matrix: &mut BandLu<C>,
+    state: &RodState,
+    element: &ElementData,
+    (e, xi): (usize, f64),
+    force: &Matrix3<f64>,
+    moment: &Vec3,
+) {
+    let columns = point_columns::<C>(state, element, e, xi);
+    for (column, way) in &columns {
+        let force = force * way;
+        for (row, to) in &columns {
+            matrix.add(*row, *column, to.dot(&force));
+        }
+    }
+    if Layout::<C>::ANGLES > 0 {
+        for (row, share) in angle_weights::<C>(e, xi) {
+            for (column, way) in &columns {
+                matrix.add(row, *column, share * moment.dot(way));
+            }
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! The line search: how much of a step is taken.
+//!
+//! The merit is the potential energy and, where the far end is held, the weighted distance from its conditions. The first trial is the
+//! whole step, or as much of it as turns no node too far and crosses no wall; others follow at the minimum of a parabola until the merit
+//! falls enough (Armijo's condition; Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 3.1).
+
+use super::newton::{ENERGY_ROUNDING, Newton, Problem};
+use super::report::{StepRecord, StopReason};
+use super::shift::WHISPER;
+use super::stop::{SHORT, residual_alone};
+use crate::rod::{ElementData, Layout, RodState};
+
+/// Most trials.
+const TRIALS: usize = 24;
+/// Part of what the slope promises that a trial must gain.
+const ARMIJO: f64 = 1e-4;
+/// A step that is not whole counts as one where axial forces changed by less than 1 / STIFFENING of its turn times EI/L².
+const STIFFENING: f64 = 1e-2;
+/// Trials after which loads without potential may let the residual grow.
+const PATIENCE: usize = 6;
+
+/// What line searches hand on from one to the next.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LineSearch {
+    /// Weights of the gaps of position and of direction in the merit.
+    penalty: [f64; 2],
+    /// Whether the first trial was taken last.
+    trusting: bool,
+    /// Whether the state is assembled already: as the trial that was taken.
+    pub(super) assembled: bool,
+    /// A device in its own shape stores nothing, as the difference of terms of this size.
+    straightening: f64,
+}
+
+impl LineSearch {
+    pub(super) fn new(elements: &[ElementData]) -> Self {
+        let straightening = elements.iter().map(ElementData::straightening_energy).sum();
+        Self { penalty: [0.0; 2], trusting: true, assembled: false, straightening }
+    }
+
+    /// Weighs the gaps of the end conditions.
+    fn weigh(&self, gaps: &[f64; 6]) -> f64 {
+        self.penalty[0] * (gaps[0].abs() + gaps[1].abs() + gaps[2].abs())
+            + self.penalty[1] * (gaps[3].abs() + gaps[4].abs() + gaps[5].abs())
+    }
+}
+
+/// The merit where a step begins.
+#[derive(Debug, Clone, Copy)]
+struct Merit {
+    /// Potential energy.
+    energy: f64,
+    /// Weighted gaps.
+    gaps: f64,
+    /// Slope of both along the step.
+    slope: f64,
+    /// Size of the energies it is made of.
+    scale: f64,
+}
+
+impl Merit {
+    /// What rounding leaves of a change.
+    fn rounding(&self) -> f64 {
+        ENERGY_ROUNDING * self.scale
+    }
+
+    /// Whether a change along a part of the step is fall enough.
+    fn falls_enough(&self, change: f64, part: f64) -> bool {
+        change <= ARMIJO * part * self.slope.min(0.0) + self.rounding()
+    }
+
+    /// Part of the step at which the parabola through value, slope and the `change` at `part` has its minimum.
+    fn parabola(&self, change: f64, part: f64) -> f64 {
+        let curve = change - self.slope * part;
+        let minimum = if curve > 0.0 { -0.5 * self.slope * part / curve } else { 0.5 };
+        part * if minimum.is_finite() { minimum.clamp(0.1, 0.6) } else { 0.1 }
+    }
+}
+
+impl<const C: usize> Newton<C> {
+    /// Moves `state` along the step from the assembled state, whose relative residual and shift are given. Returns how far nodes were
+    /// turned by it, in radians, if it was a whole step of Newton's; infinity otherwise.
+    pub(super) fn line_search(
+        &mut self,
+        problem: &mut Problem<'_>,
+        state: &mut RodState,
+        search: &mut LineSearch,
+        residual: f64,
+        shift: f64,
+    ) -> Result<f64, StopReason> {
+        let merit = self.merit_along(problem, state, search);
+        let (turn, _) = RodState::largest_turn::<C>(problem.elements, state, &self.step);
+        if !turn.is_finite() {
+            return Err(StopReason::NotFinite);
+        }
+        let most = problem.options.max_turn;
+        let mut part = if turn > most { most / turn } else { 1.0 };
+        let free = problem.supports.conditions() == 0;
+        // What a step gains that is less than rounding, the energies need not be asked for.
+        let blind = problem.minimum
+            && free
+            && turn <= SHORT
+            && merit.slope <= 0.0
+            && -merit.slope <= merit.rounding();
+        let whole_turn = self.whole_turn(problem, turn, shift);
+        let turn_of = |part: f64| if part == 1.0 { whole_turn } else { f64::INFINITY };
+        // Where the last step's first trial was taken this one's nearly always is: the energy is asked for together with what
+        // the next iteration begins with.
+        let bold =
+            search.trusting && free && problem.external.is_conservative() && problem.external.is_fixed();
+        let multipliers = problem.supports.multipliers;
+        let first = Layout::<C>.support(problem.elements.len());
+        for j in 0..6 {
+            problem.supports.multipliers[j] += self.step[first + j];
+        }
+        let mut refused = None;
+        for attempt in 0..TRIALS {
+            part = self.place_trial(problem, state, part);
+            search.assembled = false;
+            let (mut energy_change, mut change);
+            if blind {
+                change = part * (1.0 - 0.5 * part) * merit.slope;
+                energy_change = change;
+            } else {
+                let bold = bold && attempt == 0;
+                search.trusting = attempt == 0;
+                energy_change = if bold {
+                    search.assembled = true;
+                    self.assemble_trial(problem, !residual_alone(turn_of(part), problem.options.tolerance));
+                    self.assembly.energy.total() + self.assembly.external_energy - merit.energy
+                } else {
+                    self.energy(problem.elements, problem.external, state) - merit.energy
+                };
+                change = energy_change + search.weigh(&problem.supports.gaps(&self.trial)) - merit.gaps;
+                if !self.accepts(problem, search, &merit, (residual, change, part), attempt) {
+                    if bold {
+                        self.assembly.hessian = false;
+                        self.assemble_parts(problem.elements, problem.supports, problem.external, state);
+                    }
+                    if problem.external.is_steep() {
+                        refused = Some(part);
+                    }
+                    part = merit.parabola(change, part);
+                    continue;
+                }
+                // On a path of unstable states the energy says nothing; steps there are short and Newton's own.
+                if let Some(refused) = refused.filter(|_| problem.options.minimum) {
+                    let ends = (part, refused, energy_change);
+                    (part, energy_change) =
+                        self.reach_wall(problem.elements, problem.external, state, merit.energy, ends);
+                    (change, search.assembled) = (energy_change, false);
+                }
+            }
+            self.steps.push(StepRecord {
+                energy_change,
+                merit_change: change,
+                energy_scale: merit.scale,
+                residual,
+                fraction: part,
+                shift,
+            });
+            std::mem::swap(state, &mut self.trial);
+            problem.supports.follow(state);
+            return Ok(turn_of(part));
+        }
+        problem.supports.multipliers = multipliers;
+        Err(StopReason::NoDescent)
+    }
+
+    /// Weighs the end conditions above the reactions that the step leads to, and measures the merit along it.
+    fn merit_along(&self, problem: &Problem<'_>, state: &RodState, search: &mut LineSearch) -> Merit {
+        let l = Layout::<C>;
+        let (elements, supports) = (problem.elements, &*problem.supports);
+        let first = l.support(elements.len());
+        let gaps = supports.gaps(state);
+        // Multipliers take their full step: they are estimates at this state, however far it moves.
+        for j in 0..6 {
+            let value = supports.multipliers[j] + self.step[first + j];
+            let penalty = &mut search.penalty[usize::from(j >= 3)];
+            *penalty = penalty.max(2.0 * value.abs());
+        }
+        let mut slope = 0.0;
+        for i in 0..first {
+            slope += self.assembly.residual[i] * self.step[i];
+        }
+        for e in 0..elements.len() {
+            let row = l.tension(e);
+            slope -= self.assembly.residual[row] * self.step[row];
+        }
+        for j in 0..6 {
+            slope += supports.multipliers[j] * gaps[j];
+        }
+        let weighed = search.weigh(&gaps);
+        slope -= weighed;
+        let (stored, outside) = (self.assembly.energy.total(), self.assembly.external_energy);
+        let scale = stored.abs() + outside.abs() + weighed + slope.abs() + search.straightening;
+        Merit { energy: stored + outside, gaps: weighed, slope, scale }
+    }
+
+    /// How far a whole step turns nodes, where it is Newton's own and the matrix says that it leads to a minimum; infinity elsewhere.
+    /// Axial forces stiffen the rod against bending over its length.
+    fn whole_turn(&self, problem: &Problem<'_>, turn: f64, shift: f64) -> f64 {
+        if !(problem.minimum && shift == 0.0 && problem.supports.conditions() == 0) {
+            return f64::INFINITY;
+        }
+        let l = Layout::<C>;
+        let elements = problem.elements;
+        let pulled = (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
+        turn.max(STIFFENING * pulled * WHISPER / Self::whisper(elements))
+    }
+
+    /// Sets the trial to a part of the step, at most `part`, that crosses nothing; returns the part.
+    fn place_trial(&mut self, problem: &mut Problem<'_>, state: &RodState, mut part: f64) -> f64 {
+        let Problem { elements, supports, external, .. } = problem;
+        self.trial.advance::<C>(elements, state, &self.step, part);
+        for _ in 0..4 {
+            let safe = external.safe_fraction(elements, &self.trial);
+            if safe >= 1.0 {
+                break;
+            }
+            part *= safe;
+            self.trial.advance::<C>(elements, state, &self.step, part);
+        }
+        if supports.conditions() > 0 {
+            self.correct(elements, supports, Layout::<C>.support(elements.len()));
+        }
+        self.trial.take_tensions::<C>(elements, state, &self.step);
+        part
+    }
+
+    /// Assembles the system at the trial.
+    fn assemble_trial(&mut self, problem: &mut Problem<'_>, hessian: bool) {
+        self.assembly.hessian = hessian;
+        let trial = std::mem::take(&mut self.trial);
+        self.assemble_parts(problem.elements, problem.supports, problem.external, &trial);
+        self.trial = trial;
+    }
+
+    /// Whether a trial, the `attempt`th, at a `part` of the step with this `change` of merit is taken.
+    fn accepts(
+        &mut self,
+        problem: &mut Problem<'_>,
+        search: &mut LineSearch,
+        merit: &Merit,
+        (residual, change, part): (f64, f64, f64),
+        attempt: usize,
+    ) -> bool {
+        if !change.is_finite() {
+            return false;
+        }
+        if !problem.options.minimum || merit.falls_enough(change, part) {
+            return true;
+        }
+        if problem.external.is_conservative() {
+            return false;
+        }
+        // Where loads have no potential a smaller residual is as good; it costs an assembly, so it is asked last.
+        search.assembled = true;
+        self.assemble_trial(problem, true);
+        let Problem { elements, supports, external, options, .. } = problem;
+        let found = self.residual(elements, *external, supports, options.tolerance).relative;
+        found < 0.9 * residual || (attempt > PATIENCE && found < 2.0 * residual)
+    }
+}

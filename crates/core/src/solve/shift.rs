@@ -1,0 +1,91 @@
+//! Inertia and shift: a matrix that is not that of a minimum is made one by a uniform tension.
+//!
+//! A minimum has one negative pivot for each multiplier. With more, the stiffness of a uniform tension ([`Assembly::unit_shift`]) is added
+//! until they are right (Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 3.4, with the inertia in the place of a
+//! failed Cholesky factorisation).
+
+use super::newton::Newton;
+use super::report::StopReason;
+use crate::banded::{FactorError, Inertia};
+use crate::rod::{Assembly, ElementData, Supports};
+
+/// Part of EI/L² that is always added as a uniform tension.
+pub(super) const WHISPER: f64 = 1e-8;
+/// Shifts tried beyond the first before a matrix is called singular.
+const SHIFTS: usize = 60;
+
+impl<const C: usize> Newton<C> {
+    /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
+    pub fn inertia(&mut self, elements: &[ElementData], supports: &Supports, sigma: f64) -> Option<Inertia> {
+        Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
+        self.factor.factor_shifted(&self.assembly.matrix, &self.unit_shift, sigma).ok()
+    }
+
+    /// Factors the assembled matrix with the shift that is always on, for [`Self::apply_inverse`].
+    pub fn factor(&mut self, elements: &[ElementData], supports: &Supports) -> Option<Inertia> {
+        self.inertia(elements, supports, Self::whisper(elements))
+    }
+
+    /// Replaces a right-hand side by the step that answers it, with the matrix factored last.
+    pub fn apply_inverse(&self, elements: &[ElementData], b: &mut [f64]) {
+        self.factor.solve(b);
+        Self::restore_tensions(elements, b);
+    }
+
+    /// Newton's step from the assembled state, with the shift that is always on, and the inertia of its matrix; `None` where that
+    /// cannot be factored.
+    pub fn full_step(&mut self, elements: &[ElementData], supports: &Supports) -> Option<(Inertia, &[f64])> {
+        let inertia = self.factor(elements, supports)?;
+        self.right_hand_side();
+        self.factor.solve(&mut self.step);
+        Self::restore_tensions(elements, &mut self.step);
+        Some((inertia, &self.step))
+    }
+
+    /// Sets the step to the right-hand side it answers.
+    pub(super) fn right_hand_side(&mut self) {
+        let (residual, correction) = (&self.assembly.residual, &self.assembly.correction);
+        for (s, (r, c)) in self.step.iter_mut().zip(residual.iter().zip(correction)) {
+            *s = -(r + c);
+        }
+    }
+
+    /// The shift that is always on.
+    pub fn whisper(elements: &[ElementData]) -> f64 {
+        let length: f64 = elements.iter().map(|e| e.length).sum();
+        // EI averaged as springs in series: the stiffness the whole rod shows.
+        let soft: f64 = elements.iter().map(|e| e.length / e.bending[1]).sum();
+        WHISPER / (length * soft)
+    }
+
+    /// Factors the matrix and solves for the step, under the whisper and a shift. It begins at an eighth of the last one, or
+    /// at none if that was small or `bare` is set, and grows until there are `wanted` negative pivots, if a number is wanted.
+    /// Returns the shift, and the inertia under the whisper alone if that was tried and could be factored.
+    pub(super) fn factor_shifted(
+        &mut self,
+        whisper: f64,
+        last: f64,
+        bare: bool,
+        wanted: Option<usize>,
+    ) -> Result<(f64, Option<Inertia>), StopReason> {
+        let mut sigma = if bare || last < 8.0 * whisper { 0.0 } else { last / 8.0 };
+        let mut natural = None;
+        for attempt in 0..=SHIFTS {
+            self.right_hand_side();
+            let Self { assembly, unit_shift, step, .. } = self;
+            let found = self.factor.factor_solve_shifted(&assembly.matrix, unit_shift, whisper + sigma, step);
+            if sigma == 0.0 {
+                natural = found.ok();
+            }
+            match found {
+                Ok(inertia) if wanted.is_none_or(|negative| inertia.negative == negative) => {
+                    return Ok((sigma, natural));
+                }
+                Err(FactorError::NotFinite { .. }) if attempt > 20 => return Err(StopReason::NotFinite),
+                _ => {}
+            }
+            sigma = if sigma == 0.0 { (1e5 * whisper).max(last / 8.0) } else { sigma * 4.0 };
+        }
+        Err(StopReason::Singular)
+    }
+}

@@ -1,0 +1,297 @@
+//! Part D: several instruments on one centre line.
+
+use nalgebra::Matrix3;
+
+use super::planar::tip_error;
+use super::{Row, at_end, section, unit_rod};
+use endowire_core::rod::quadrature::{GAUSS, hermite};
+use endowire_core::rod::{Clamp, ElementData, Frame, PLAIN, PointSum, RodState, Stencils};
+use endowire_core::solve::{External, Newton};
+use endowire_core::statics::{Instrument, LoadKind, Parameter, Section, StaticCase, StaticProblem};
+use endowire_core::{Error, Result, Vec3};
+
+/// A straight instrument.
+fn straight(name: &str, inserted: f64, ei: f64) -> Instrument {
+    Instrument { name: name.to_owned(), inserted, hand: 0.0, section: vec![section(2.0, ei)] }
+}
+
+/// A pre-curved one.
+fn curved(name: &str, inserted: f64, [ei, gj, curvature]: [f64; 3]) -> Instrument {
+    let section = Section { gj: Some(gj), rest_curvature: [curvature, 0.0], ..section(2.0, ei) };
+    Instrument { name: name.to_owned(), inserted, hand: 0.0, section: vec![section] }
+}
+
+/// Instruments that come out of a sheath at the origin along x.
+fn stack(elements: usize, instruments: Vec<Instrument>) -> StaticCase {
+    let mut case = unit_rod(elements);
+    (case.rod.length, case.rod.section, case.rod.instrument) = (0.0, vec![], instruments);
+    case
+}
+
+/// D1: A7's rod made of two instruments.
+pub(super) fn stiffness_adds() -> Result<Vec<Row>> {
+    let tip = [0.9731845852, 0.1951633542, 0.0];
+    let buckling = 1.603056745715;
+    let (outer, inner) = (straight("outer", 0.7, 0.9), straight("inner", 1.0, 0.1));
+    let mut rows = Vec::new();
+    for (order, instruments) in
+        [("outer first", vec![outer.clone(), inner.clone()]), ("inner first", vec![inner, outer])]
+    {
+        let under = |force: [f64; 3], elements: usize| {
+            let mut case = stack(elements, instruments.clone());
+            case.load = vec![at_end(LoadKind::Force, force)];
+            case
+        };
+        let across = under([0.0, 0.5, 0.0], 32);
+        let solved = across.solve()?.checked()?;
+        let along = StaticProblem::new(&under([-1.0, 0.0, 0.0], 64))?;
+        let critical = along.critical(Parameter::Loads, 0.5 * buckling, 1.4 * buckling, 1e-10)?;
+        let name = format!("D1 {order}, 32 elements");
+        let error = tip_error(&across, tip)?;
+        let distance = |p: [f64; 3]| Vec3::from(p).norm();
+        let point = Row::with_error(&name, "tip", distance(solved.tip), distance(tip), error, 1e-6);
+        rows.push(point.iterations(solved.iterations));
+        rows.push(Row::relative(&name, "tip angle", solved.tip_angle, 0.4265866725, 1e-6));
+        let name = format!("D1 {order}, 64 elements");
+        rows.push(Row::relative(&name, "critical load", critical, buckling, 1e-6));
+    }
+    Ok(rows)
+}
+
+/// Two pre-curved instruments of length 1, of which the first is turned.
+struct Pair {
+    problem: StaticProblem,
+    iterations: usize,
+}
+
+impl Pair {
+    const BENDING: [f64; 2] = [1.0, 2.0];
+    const CURVATURES: [f64; 2] = [1.2, 0.8];
+    /// GJ of the second over that of the first.
+    const TORSION: f64 = 1.5;
+
+    /// λ² = κ₁κ₂ EI₁EI₂/(EI₁ + EI₂) (1/GJ₁ + 1/GJ₂).
+    fn new(lambda: f64) -> Result<Self> {
+        let [a, b] = Self::BENDING;
+        let [p, q] = Self::CURVATURES;
+        let torsion = p * q * a * b / (a + b) * (1.0 + 1.0 / Self::TORSION) / (lambda * lambda);
+        Self::with_torsion(torsion)
+    }
+
+    fn with_torsion(torsion: f64) -> Result<Self> {
+        let ([a, b], [p, q]) = (Self::BENDING, Self::CURVATURES);
+        let first = curved("first", 1.0, [a, torsion, p]);
+        let second = curved("second", 1.0, [b, Self::TORSION * torsion, q]);
+        let problem = StaticProblem::new(&stack(64, vec![first, second]))?;
+        Ok(Self { problem, iterations: 0 })
+    }
+
+    /// Turns the first to an angle against the second, in degrees, from where they are; returns that of the tips.
+    fn turn_to(&mut self, hand: f64) -> Result<f64> {
+        let before = self.problem.initial.clone();
+        self.problem.initial.angles[0] = hand.to_radians();
+        let solved = self.problem.solve_state()?;
+        self.problem.initial = before;
+        if !solved.report.converged {
+            return Err(Error::Computation(format!(
+                "D2: no equilibrium at {hand}°: {}",
+                solved.report.reason
+            )));
+        }
+        self.iterations = solved.report.iterations;
+        self.problem.initial = solved.state;
+        let state = &self.problem.initial;
+        let tip = state.elements();
+        Ok((state.angle(tip, 0) - state.angle(tip, 1)).to_degrees())
+    }
+
+    /// Angle of the hand at which the tips are at `tip` degrees, by the secant method.
+    fn hand_for(&mut self, tip: f64) -> Result<f64> {
+        let (mut hand, mut slope) = (tip, 1.0);
+        let mut last = None;
+        for _ in 0..30 {
+            let off = tip - self.turn_to(hand)?;
+            if off.abs() < 1e-9 {
+                return Ok(hand);
+            }
+            if let Some((before, before_off)) = last {
+                slope = (before_off - off) / (hand - before);
+            }
+            last = Some((hand, off));
+            hand += off / slope;
+        }
+        Err(Error::Computation(format!("D2: no hand angle found for tips at {tip}°")))
+    }
+
+    /// Angle of the hand at which the tips snap round, and their angle just before, by bisection.
+    fn snap(&mut self) -> Result<[f64; 2]> {
+        /// Tips that are farther round than this have snapped, degrees.
+        const ROUND: f64 = 130.0;
+        let (mut low, mut tip, mut step) = (0.0, 0.0, 5.0);
+        while step > 1e-7 && low < 360.0 {
+            let here = self.problem.initial.clone();
+            let found = self.turn_to(low + step)?;
+            if found < ROUND {
+                (low, tip) = (low + step, found);
+            } else {
+                self.problem.initial = here;
+                step *= 0.5;
+            }
+        }
+        Ok([low, tip])
+    }
+}
+
+/// D2: two pre-curved instruments turned against each other.
+pub(super) fn pair() -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    for (lambda, hands) in [(0.8, [39.589933027, 108.272382565]), (1.5, [67.324275333, 151.898367219])] {
+        let mut pair = Pair::new(lambda)?;
+        for (tip, expected) in [30.0, 90.0].into_iter().zip(hands) {
+            let hand = pair.hand_for(tip)?;
+            let quantity = format!("hand for a tip at {tip}°");
+            rows.push(Row::relative(&format!("D2 λ={lambda}"), &quantity, hand, expected, 1e-4));
+        }
+    }
+    let [hand, tip] = Pair::new(2.5)?.snap()?;
+    rows.push(Row::relative("D2 λ=2.5", "hand where it snaps", hand, 228.975789690, 1e-3));
+    // The tip runs ahead of the hand there without bound: it is known to the root of what the hand is.
+    rows.push(Row::relative("D2 λ=2.5", "tip where it snaps", tip, 92.41541, 1e-3));
+    rows.push(rigid_torsion()?);
+    Ok(rows)
+}
+
+/// Rigid in torsion, they bend to an arc of the mean of their curvatures, weighed by stiffness.
+fn rigid_torsion() -> Result<Row> {
+    let mut pair = Pair::with_torsion(1e4)?;
+    pair.turn_to(90.0)?;
+    let ([a, b], [p, q]) = (Pair::BENDING, Pair::CURVATURES);
+    // The first is turned from y to z.
+    let curvature = Vec3::new(0.0, b * q, a * p) / (a + b);
+    let k = curvature.norm();
+    let expected = Vec3::x() * (k.sin() / k) + curvature * ((1.0 - k.cos()) / (k * k));
+    let state = &pair.problem.initial;
+    let tip = state.positions[state.elements()];
+    Ok(Row::point("D2 GJ = 10⁴ EI, 90°", "tip of the arc", tip.into(), expected.into(), 1.0, 1e-4))
+}
+
+/// D3: a curved inner in a straight outer.
+pub(super) fn curved_in_straight() -> Result<Vec<Row>> {
+    const CURVATURE: f64 = 1.3;
+    const BENDING: [f64; 2] = [0.8, 1.7];
+    let [a, b] = BENDING;
+    let overlap = 0.5 * CURVATURE * CURVATURE * a * b / (a + b);
+    let sheathed = 0.5 * CURVATURE * CURVATURE * a;
+    let mut rows = Vec::new();
+    for (name, lengths, forces) in [
+        ("D3 inner beyond outer", [1.0, 0.6], [-sheathed, overlap]),
+        ("D3 outer beyond inner", [0.6, 1.0], [overlap - sheathed, 0.0]),
+    ] {
+        let inner = curved("inner", lengths[0], [a, 0.7, CURVATURE]);
+        let solved = stack(32, vec![inner, straight("outer", lengths[1], b)]).solve()?.checked()?;
+        for (told, expected) in solved.instruments.iter().zip(forces) {
+            let force = told.push_force.unwrap_or(f64::NAN);
+            let quantity = format!("push force of the {}", told.name);
+            let error = (force - expected).abs() / overlap;
+            rows.push(Row::with_error(name, &quantity, force, expected, error, 1e-4));
+        }
+        let k = a * CURVATURE / (a + b);
+        let arc = [(k * 0.6f64).sin() / k, (1.0 - (k * 0.6f64).cos()) / k, 0.0];
+        let shorter = solved.instruments.iter().min_by(|x, y| x.inserted.total_cmp(&y.inserted));
+        let end = shorter.map_or([f64::NAN; 3], |i| i.tip);
+        rows.push(Row::point(name, "end of the overlap", end, arc, 1.0, 1e-6));
+    }
+    Ok(rows)
+}
+
+/// A close-fitting channel along a circle of this radius about (0, radius, 0), ½ k d² per length.
+struct Channel {
+    radius: f64,
+    stiffness: f64,
+}
+
+impl Channel {
+    /// Energy per length at a point with its derivatives.
+    fn at(&self, x: &Vec3) -> (f64, Vec3, Matrix3<f64>) {
+        let from_centre = Vec3::new(x.x, x.y - self.radius, 0.0);
+        let distance = from_centre.norm();
+        let normal = from_centre / distance;
+        let off = distance - self.radius;
+        let along = Matrix3::from_diagonal(&Vec3::new(1.0, 1.0, 0.0)) - normal * normal.transpose();
+        let across = normal * normal.transpose() + Matrix3::from_diagonal(&Vec3::z());
+        let hessian = (across + along * (off / distance)) * self.stiffness;
+        let gradient = (normal * off + Vec3::z() * x.z) * self.stiffness;
+        (0.5 * self.stiffness * (off * off + x.z * x.z), gradient, hessian)
+    }
+
+    /// Goes through its quadrature points: element, ξ, weight, and what is there.
+    fn points(
+        &self,
+        elements: &[ElementData],
+        state: &RodState,
+        mut to: impl FnMut(usize, f64, f64, (f64, Vec3, Matrix3<f64>)),
+    ) {
+        for (e, data) in elements.iter().enumerate() {
+            for point in &GAUSS {
+                let [w0, s0, w1, s1] = hermite(point.xi);
+                let bend = state.frames[e].t * s0 + state.frames[e + 1].t * s1;
+                let x = state.positions[e] * w0 + state.positions[e + 1] * w1 + bend * data.length;
+                to(e, point.xi, point.weight * data.length, self.at(&x));
+            }
+        }
+    }
+}
+
+impl External for Channel {
+    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+        let mut sums = vec![PointSum::default(); elements.len()];
+        self.points(elements, state, |e, xi, weight, (value, gradient, hessian)| {
+            into.add_value(weight * value);
+            sums[e].add(xi, &(gradient * weight), Some(&(hessian * weight)));
+        });
+        for (e, sum) in sums.iter().enumerate() {
+            into.add_points(state, &elements[e], e, sum);
+        }
+    }
+
+    fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+        let mut sum = 0.0;
+        self.points(elements, state, |_, _, weight, (value, ..)| sum += weight * value);
+        sum
+    }
+
+    fn is_fixed(&self) -> bool {
+        true
+    }
+}
+
+/// D4: straight instruments in a close-fitting arc.
+pub(super) fn straight_in_arc() -> Result<Vec<Row>> {
+    const RADIUS: f64 = 1.25;
+    let mut channel = Channel { radius: RADIUS, stiffness: 1e8 };
+    let instruments =
+        vec![straight("inner", 1.2, 0.4), straight("middle", 0.8, 1.0), straight("outer", 0.5, 2.0)];
+    let stiffness: Vec<f64> = instruments.iter().map(|i| i.section[0].ei).collect();
+    let problem = StaticProblem::new(&stack(384, instruments))?;
+    let elements = &problem.elements;
+    let mut frames = vec![Frame::new(Vec3::x(), Some(Vec3::y()))];
+    for (e, data) in elements.iter().enumerate() {
+        frames.push(frames[e].transported(data.length / RADIUS, 0.0));
+    }
+    let mut state = RodState::from_frames(elements, Vec3::zeros(), frames);
+    let mut supports = problem.supports.clone();
+    let mut newton = Newton::<PLAIN>::new(elements.len());
+    let report = newton.solve(elements, &mut supports, &mut channel, &mut state, &problem.options);
+    if !report.converged {
+        return Err(Error::Computation(format!("D4: {}", report.reason)));
+    }
+    let clamp = Clamp::new::<PLAIN>(&newton.start_residual, &state);
+    let hands = problem.hands::<PLAIN>(&state, &supports, &mut channel, &clamp);
+    let names = ["inner", "middle", "outer"];
+    let rows = hands.iter().zip(stiffness).zip(names).map(|(((force, _), ei), name)| {
+        let expected = 0.5 * ei / (RADIUS * RADIUS);
+        let quantity = format!("push force of the {name}");
+        Row::relative("D4 384 elements", &quantity, force.unwrap_or(f64::NAN), expected, 1e-4)
+    });
+    Ok(rows.collect())
+}
