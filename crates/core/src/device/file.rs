@@ -30,7 +30,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::part::{Part, PartTable, length_ways};
-use super::quantity::one_of;
+use super::quantity::{Quantity, one_of};
 use super::{Device, LENGTH_LIMIT_MM, Section};
 use crate::input::from_toml;
 use crate::{Error, Result};
@@ -119,12 +119,13 @@ impl FileTable {
             (true, false) => self.of_parts(length_mm)?,
             (_, true) => self.of_sections()?,
         };
-        if let Some(length_mm) = length_mm.filter(|l| (l - device.length_mm()).abs() > SAME_LENGTH_MM) {
+        let differs = |length: &Quantity| (length.ends.at(0.0) - device.length_mm()).abs() > SAME_LENGTH_MM;
+        if let Some(length) = length.filter(differs) {
             let mend = format!(
                 "the parts have {} mm together: they must agree, or one part leaves its length out and is what is left",
                 device.length_mm()
             );
-            return Err(Error::parameter("device length in mm", length_mm, mend));
+            return Err(Error::parameter(format!("device.{}", length.key), length.given, mend));
         }
         Ok(DeviceFile { name: self.name, kind: self.kind, source: self.source, parts, device })
     }

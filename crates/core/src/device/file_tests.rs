@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::path::Path;
 
-use super::{DeviceFile, Kind};
+use super::{CutError, DeviceFile, Kind};
 use crate::Vec3;
 
 /// A catheter that is right, to be spoilt one value at a time.
@@ -115,7 +115,7 @@ fn a_taper_is_cut_within_the_error_that_is_stated() {
         let taper = file.parts[1].clone();
         assert_eq!(taper.sections().len(), count);
         // Asked for densely, no place differs by more than what is stated.
-        let (radius_mm, stiffness) = taper.cut_error();
+        let CutError { radius_mm, stiffness } = taper.cut_error();
         let mut largest = (0.0f64, 0.0f64);
         for k in 0..1000 {
             let place = (f64::from(k) + 0.5) / 1000.0;
@@ -146,7 +146,7 @@ fn a_taper_is_cut_within_the_error_that_is_stated() {
     let core = read(wire).unwrap().parts[0].clone();
     assert!((core.at(1.0).bending_stiffness_nmm2 / core.at(0.0).bending_stiffness_nmm2 - 16.0).abs() < 1e-12);
     assert_eq!(
-        core.cut_error().1,
+        core.cut_error().stiffness,
         core.sections()[0].bending_stiffness_nmm2 / core.at(0.0).bending_stiffness_nmm2 - 1.0
     );
 }
@@ -271,7 +271,7 @@ fn what_is_wrong_is_named_by_file_part_key_and_value() {
             "length_mm = 90.0",
             "part \"shaft\".length_mm = absent: the other parts have 105.7",
         ),
-        ("nmm2 = 70.0", "nmm2 = 70.0\nlength_mm = 60.0", "device length in mm = 100: the parts have 95.7"),
+        ("nmm2 = 70.0", "nmm2 = 70.0\nlength_mm = 60.0", "device.length_cm = 10: the parts have 95.7"),
         // Keys and words.
         ("outer_diameter_french", "outer_diameter_frensh", "unknown field `outer_diameter_frensh`"),
         ("outer_diameter_french", "outer_diameter_frensh", "did you mean `outer_diameter_french`?"),

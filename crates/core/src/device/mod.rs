@@ -11,7 +11,7 @@ mod quantity;
 mod rest_shape;
 
 pub use file::{DeviceFile, Kind};
-pub use part::{Coat, Part};
+pub use part::{Coat, CutError, Part};
 
 use serde::{Deserialize, Serialize};
 

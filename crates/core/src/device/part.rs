@@ -76,6 +76,16 @@ enum Stiffness {
     Modulus(Ends),
 }
 
+/// Largest differences between a taper and its sections, which are at the ends of sections where EI rises or falls along each: everywhere,
+/// unless modulus and size are tapered against each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CutError {
+    /// Of the outer radius, mm.
+    pub radius_mm: f64,
+    /// Of EI, relative to the taper's.
+    pub stiffness: f64,
+}
+
 /// A named part of a device: constant or linearly tapered between its ends, of one curvature at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
@@ -144,17 +154,16 @@ impl Part {
         (0..self.cuts).map(cut).collect()
     }
 
-    /// Largest difference between the taper and its sections: of the outer radius in mm, and of EI relative to the taper's. Values change
-    /// in one sense along a section, so that it is at one of the section's ends.
-    pub fn cut_error(&self) -> (f64, f64) {
+    /// How far the sections are from the taper that they stand for.
+    pub fn cut_error(&self) -> CutError {
         let count = self.cuts as f64;
-        let mut error = (0.0f64, 0.0f64);
+        let mut error = CutError { radius_mm: 0.0, stiffness: 0.0 };
         for (k, section) in self.sections().iter().enumerate() {
             for end in [k, k + 1] {
                 let taper = self.at(end as f64 / count);
                 let relative = section.bending_stiffness_nmm2 / taper.bending_stiffness_nmm2 - 1.0;
-                error.0 = error.0.max((section.radius_mm - taper.radius_mm).abs());
-                error.1 = error.1.max(relative.abs());
+                error.radius_mm = error.radius_mm.max((section.radius_mm - taper.radius_mm).abs());
+                error.stiffness = error.stiffness.max(relative.abs());
             }
         }
         error

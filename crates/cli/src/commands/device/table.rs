@@ -39,7 +39,7 @@ impl PartRow {
         let both = |value: fn(&Section) -> f64| [value(&ends[0]), value(&ends[1])];
         let [from_mm, to_mm] = part.from_tip_mm;
         let [first, second] = ends[0].rest_curvature_per_mm;
-        let (cut_radius_error_mm, cut_stiffness_error) = part.cut_error();
+        let cut = part.cut_error();
         Self {
             part: part.name.clone(),
             from_mm,
@@ -54,8 +54,8 @@ impl PartRow {
             rest_curvature_per_mm: [first, second],
             bend_deg: (first.hypot(second) * (to_mm - from_mm)).to_degrees(),
             sections: part.sections().len(),
-            cut_radius_error_mm,
-            cut_stiffness_error,
+            cut_radius_error_mm: cut.radius_mm,
+            cut_stiffness_error: cut.stiffness,
             material: part.material.clone(),
             coat: part
                 .coat
