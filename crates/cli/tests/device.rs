@@ -95,7 +95,7 @@ fn scene(folder: &Path, device: &str, more: &str) -> String {
     let text = format!(
         "[vessel]\nfile = \"{0}/vessels/straight_tube.stl\"\n[device]\nfile = \"{device}\"\n\
          [sheath]\nposition_mm = [0.0, 0.0, 1.0]\ndirection = [0.0, 0.0, 1.0]\n[[script]]\nadvance_mm = 30.0\nstep_mm = 5.0\n\
-         [view]\nsize_px = [200, 200]\nbackend = \"cpu\"\n[view.c_arm]\npixel_mm = 0.3\n{more}",
+         [view]\nsize_px = [200, 200]\nbackend = \"cpu\"\n[view.c_arm]\npixel_mm = 0.3\nisocentre_mm = [0.0, 0.0, 16.0]\n{more}",
         assets.display()
     );
     std::fs::write(&path, text).unwrap();
