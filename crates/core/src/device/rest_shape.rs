@@ -14,38 +14,32 @@ impl Device {
     /// It begins at the origin along z, its first material direction along x. Arcs are exact: a section of curvature κ and length L bends by
     /// κL in the plane of its curvature, which the arcs behind it have carried along without twist.
     pub fn rest_shape(&self, length_mm: f64, step_mm: f64) -> Shape {
+        // Where each section that is seen begins, from the tip, and its length.
         let mut pieces = Vec::new();
-        let mut from_tip_mm = 0.0;
+        let mut seen_mm = 0.0;
         for section in self.sections() {
-            let length = section.length_mm.min(length_mm - from_tip_mm);
+            let length = section.length_mm.min(length_mm - seen_mm);
             if length.is_nan() || length <= 0.0 {
                 break;
             }
-            pieces.push((length, section.rest_curvature_per_mm));
-            from_tip_mm += length;
+            pieces.push((seen_mm, length, section.rest_curvature_per_mm));
+            seen_mm += length;
         }
         let mut frame = Frame::new(Vec3::z(), Some(Vec3::x()));
         let mut position = Vec3::zeros();
-        let mut shape = Shape::default();
-        let mut add = |position: Vec3, tangent: Vec3, from_tip_mm: f64| {
-            shape.positions_mm.push(position);
-            shape.tangents.push(tangent);
-            shape.from_tip_mm.push(from_tip_mm);
-        };
-        add(position, frame.t, from_tip_mm);
-        for (length, [first, second]) in pieces.into_iter().rev() {
+        let mut shape =
+            Shape { positions_mm: vec![position], tangents: vec![frame.t], from_tip_mm: vec![seen_mm] };
+        for (begin_mm, length, [first, second]) in pieces.into_iter().rev() {
             let points = (length / step_mm).ceil().clamp(1.0, MOST_POINTS);
             for k in 1..=points as usize {
-                let s = length * k as f64 / points;
-                let end = frame.transported(first * s, second * s);
-                add(position + along_arc(&frame, [first, second], s), end.t, (from_tip_mm - s).max(0.0));
+                let s = length * (k as f64 / points);
+                shape.positions_mm.push(position + along_arc(&frame, [first, second], s));
+                shape.tangents.push(frame.transported(first * s, second * s).t);
+                shape.from_tip_mm.push(begin_mm + (length - s));
             }
             position += along_arc(&frame, [first, second], length);
             frame = frame.transported(first * length, second * length);
-            from_tip_mm -= length;
         }
-        // Sums of lengths that are subtracted again leave a rounding.
-        shape.from_tip_mm.last_mut().map(|tip| *tip = 0.0);
         shape
     }
 }
