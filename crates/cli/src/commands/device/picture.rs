@@ -99,7 +99,7 @@ impl Drawing {
             match drawing.parts.last_mut() {
                 // One line, without seams: the point between two parts is in both.
                 Some(last) if last.looks_like(&next) => {
-                    last.points_mm.extend(next.points_mm.into_iter().skip(1))
+                    last.points_mm.extend(next.points_mm.into_iter().skip(1));
                 }
                 _ => drawing.parts.push(next),
             }
