@@ -35,6 +35,9 @@ pub(crate) enum Command {
     /// Check or generate vessel walls
     #[command(subcommand)]
     Vessel(VesselCommand),
+    /// Show device files: parts, sizes in all units, stiffnesses, materials, sources, and the shape at rest
+    #[command(subcommand)]
+    Device(DeviceCommand),
     /// Run time against error, method by method: tables and a work–precision picture
     Compare(CompareArgs),
     /// Repeat an experiment of Li et al. 2011
@@ -252,6 +255,33 @@ pub(crate) enum VesselCommand {
     },
     /// Build a wall from a centre-line tree
     Generate(GenerateArgs),
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum DeviceCommand {
+    /// One device, part by part
+    Show {
+        /// Device file (TOML)
+        file: PathBuf,
+        /// Draw its shape at rest (.svg or .png)
+        #[arg(long, value_name = "PICTURE")]
+        out: Option<PathBuf>,
+        /// Print the parts as one JSON document on stdout
+        #[arg(long)]
+        json: bool,
+    },
+    /// The devices of a folder, one a line
+    List {
+        /// Folder of device files (TOML)
+        #[arg(default_value = "assets/devices")]
+        folder: PathBuf,
+        /// Draw all shapes at rest on one sheet, to one scale (.svg or .png)
+        #[arg(long, value_name = "PICTURE")]
+        out: Option<PathBuf>,
+        /// Print the devices as one JSON document on stdout
+        #[arg(long)]
+        json: bool,
+    },
 }
 
 /// What is wanted of the wall that devices feel; with none of these it is not made.

@@ -30,6 +30,7 @@ mod c_arm;
 mod contrast;
 mod cpu;
 mod device;
+mod device_file;
 mod fluoro;
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -46,6 +47,7 @@ mod xray;
 
 pub use c_arm::CArm;
 pub use device::{DevicePart, DevicePoint, DeviceView};
+pub use device_file::device_parts;
 pub use fluoro::Moment;
 pub use output::{Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, PixelFormat};
 pub use renderer::{Frames, Renderer};

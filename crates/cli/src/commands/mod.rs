@@ -1,6 +1,7 @@
 //! One file a command.
 
 pub(crate) mod compare;
+mod device;
 pub(crate) mod experiment;
 mod felt;
 mod fluoro;
@@ -11,7 +12,7 @@ mod surfaces;
 mod verify;
 mod vessel;
 
-use crate::args::{Args, Command, VesselCommand};
+use crate::args::{Args, Command, DeviceCommand, VesselCommand};
 use crate::failure::Failure;
 
 /// Runs the command that was asked for.
@@ -26,6 +27,10 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
             vessel::check_file(file, *unit_mm, *septum_mm, felt, *json)
         }
         Command::Vessel(VesselCommand::Generate(args)) => vessel::generate(args),
+        Command::Device(DeviceCommand::Show { file, out, json }) => device::show(file, out.as_deref(), *json),
+        Command::Device(DeviceCommand::List { folder, out, json }) => {
+            device::list(folder, out.as_deref(), *json)
+        }
         Command::Compare(args) => compare::compare(args),
         Command::Experiment(command) => experiment::experiment(command),
     }

@@ -55,31 +55,41 @@ pub(crate) fn write(
     size: (u32, u32),
     chart: &impl Chart,
 ) -> Result<Vec<PathBuf>, Failure> {
+    let paths = ["svg", "png"].map(|extension| folder.join(format!("{name}.{extension}")));
+    paths.iter().try_for_each(|path| write_file(path, size, chart))?;
+    Ok(paths.into())
+}
+
+/// Draws one chart into a file, SVG or PNG by its extension.
+pub(crate) fn write_file(path: &Path, size: (u32, u32), chart: &impl Chart) -> Result<(), Failure> {
     static FONT: Once = Once::new();
     FONT.call_once(|| {
         // Only a font that cannot be read is refused, and this one is part of the program.
         let _ = register_font(FAMILY, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
     });
-    let failed =
-        |e: &dyn std::fmt::Display| Failure::Computation(format!("the chart {name} cannot be drawn: {e}"));
-    let (svg, png) = (folder.join(format!("{name}.svg")), folder.join(format!("{name}.png")));
-    let mut text = String::new();
-    {
-        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        root.fill(&WHITE).map_err(|e| failed(&e))?;
-        chart.draw(&root).map_err(|e| failed(&e))?;
-        root.present().map_err(|e| failed(&e))?;
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("svg") => {
+            let mut text = String::new();
+            draw(SVGBackend::with_string(&mut text, size), path, chart)?;
+            std::fs::write(path, text)
+        }
+        Some("png") => {
+            let mut pixels = vec![0; 3 * (size.0 * size.1) as usize];
+            draw(BitMapBackend::with_buffer(&mut pixels, size), path, chart)?;
+            write_png(path, size, &pixels)
+        }
+        _ => return Err(Failure::Input(format!("--out {}: name a file .svg or .png", path.display()))),
     }
-    std::fs::write(&svg, text).map_err(|e| Failure::write(&svg, &e))?;
-    let mut pixels = vec![0; 3 * (size.0 * size.1) as usize];
-    {
-        let root = BitMapBackend::with_buffer(&mut pixels, size).into_drawing_area();
-        root.fill(&WHITE).map_err(|e| failed(&e))?;
-        chart.draw(&root).map_err(|e| failed(&e))?;
-        root.present().map_err(|e| failed(&e))?;
-    }
-    write_png(&png, size, &pixels).map_err(|e| Failure::write(&png, &e))?;
-    Ok(vec![svg, png])
+    .map_err(|e| Failure::write(path, &e))
+}
+
+/// Draws on a backend, and ends with it.
+fn draw<B: DrawingBackend>(backend: B, path: &Path, chart: &impl Chart) -> Result<(), Failure> {
+    let root = backend.into_drawing_area();
+    root.fill(&WHITE)
+        .and_then(|()| chart.draw(&root))
+        .and_then(|()| root.present())
+        .map_err(|e| Failure::Computation(format!("the chart {} cannot be drawn: {e}", path.display())))
 }
 
 fn write_png(path: &Path, size: (u32, u32), rgb: &[u8]) -> std::io::Result<()> {

@@ -12,6 +12,7 @@ use endowire_core::vessel::SurfaceMesh;
 use endowire_methods::Scene;
 use endowire_viewer::{
     Angiogram, Animation, ContactView, DeviceView, Frames, Image, Moment, Renderer, View, ViewSpec,
+    device_parts,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -31,13 +32,18 @@ struct ViewTable {
     view: ViewSpec,
 }
 
-/// The `[view]` table of a scene: paths start from its folder, and contrast medium flows in the vessel's own tree unless the table
-/// names another.
+/// The `[view]` table of a scene: paths start from its folder, contrast medium flows in the vessel's own tree, and the device is made of
+/// what its file says, unless the table names another.
 fn view_table(path: &Path, scene: &Scene) -> Result<ViewSpec, Failure> {
     let (ViewTable { view }, _) = from_toml(path)?;
     let mut view = view.in_folder(path.parent().unwrap_or(Path::new("")));
     if let (None, Some(tree)) = (&view.flow.tree, &scene.vessel.tree) {
         view.flow.tree = Some(scene.resolve(tree));
+    }
+    if let (true, Some(named), Some(file)) =
+        (view.device.is_empty(), &scene.device.file, scene.device_file()?)
+    {
+        view.device = device_parts(&file).map_err(|e| Failure::from(e).at(scene.resolve(named).display()))?;
     }
     Ok(view)
 }

@@ -1,4 +1,17 @@
 //! What is pushed: a wire or catheter of sections, from the tip backwards.
+//!
+//! A [`Device`] is what methods see: sections of constant properties. A [`DeviceFile`] is what a maker's data sheet becomes: named
+//! parts in the units of the trade, tapers and arcs, materials and sources, and the sections made of them.
+
+mod file;
+#[cfg(test)]
+mod file_tests;
+mod part;
+mod quantity;
+mod rest_shape;
+
+pub use file::{DeviceFile, Kind};
+pub use part::{Coat, CutError, Part};
 
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +25,9 @@ pub struct Section {
     pub length_mm: f64,
     /// Outer radius, mm; 10⁻⁶ to 50.
     pub radius_mm: f64,
+    /// Radius of the lumen, mm; solid if absent. Less than `radius_mm`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inner_radius_mm: Option<f64>,
     /// Bending stiffness EI, N·mm².
     pub bending_stiffness_nmm2: f64,
     /// Torsional stiffness GJ, N·mm²; EI/1.3 if absent: a solid round wire of Poisson ratio 0.3.
@@ -28,6 +44,7 @@ impl Section {
         Self {
             length_mm,
             radius_mm,
+            inner_radius_mm: None,
             bending_stiffness_nmm2,
             torsional_stiffness_nmm2: None,
             rest_curvature_per_mm: [0.0; 2],
@@ -37,6 +54,39 @@ impl Section {
     /// GJ, N·mm².
     pub fn torsion_nmm2(&self) -> f64 {
         self.torsional_stiffness_nmm2.unwrap_or(self.bending_stiffness_nmm2 / 1.3)
+    }
+
+    /// Checks every value; errors begin with `name`.
+    fn check(&self, name: &str) -> Result<()> {
+        for (field, value, limit) in [
+            ("length_mm", self.length_mm, LENGTH_LIMIT_MM),
+            ("radius_mm", self.radius_mm, RADIUS_LIMIT_MM),
+            ("bending_stiffness_nmm2", self.bending_stiffness_nmm2, STIFFNESS_LIMIT_NMM2),
+            ("torsional_stiffness_nmm2", self.torsion_nmm2(), STIFFNESS_LIMIT_NMM2),
+        ] {
+            crate::error::in_range(&format!("{name}.{field}"), value, limit)?;
+        }
+        if self.radius_mm < LEAST_RADIUS_MM {
+            let mend = format!("must be at least {LEAST_RADIUS_MM} mm: no device is thinner");
+            return Err(Error::parameter(format!("{name}.radius_mm"), self.radius_mm, mend));
+        }
+        if let Some(inner) = self.inner_radius_mm.filter(|inner| !(*inner > 0.0 && *inner < self.radius_mm)) {
+            let mend = format!(
+                "must be above 0 and less than the outer radius, {} mm; leave it out where the device is solid",
+                self.radius_mm
+            );
+            return Err(Error::parameter(format!("{name}.inner_radius_mm"), inner, mend));
+        }
+        let curvature = self.rest_curvature_per_mm;
+        let bend = curvature[0].hypot(curvature[1]) * self.radius_mm;
+        if bend.is_nan() || bend > 1.0 {
+            return Err(Error::parameter(
+                format!("{name}.rest_curvature_per_mm"),
+                format!("{curvature:?}"),
+                "must be finite, and its radius no smaller than the device's own",
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -76,31 +126,7 @@ impl Device {
             return Err(Error::parameter("device.section", value, mend));
         }
         for (index, section) in sections.iter().enumerate() {
-            for (field, value, limit) in [
-                ("length_mm", section.length_mm, LENGTH_LIMIT_MM),
-                ("radius_mm", section.radius_mm, RADIUS_LIMIT_MM),
-                ("bending_stiffness_nmm2", section.bending_stiffness_nmm2, STIFFNESS_LIMIT_NMM2),
-                ("torsional_stiffness_nmm2", section.torsion_nmm2(), STIFFNESS_LIMIT_NMM2),
-            ] {
-                crate::error::in_range(&format!("device.section[{index}].{field}"), value, limit)?;
-            }
-            if section.radius_mm < LEAST_RADIUS_MM {
-                let mend = format!("must be at least {LEAST_RADIUS_MM} mm: no device is thinner");
-                return Err(Error::parameter(
-                    format!("device.section[{index}].radius_mm"),
-                    section.radius_mm,
-                    mend,
-                ));
-            }
-            let curvature = section.rest_curvature_per_mm;
-            let bend = curvature[0].hypot(curvature[1]) * section.radius_mm;
-            if bend.is_nan() || bend > 1.0 {
-                return Err(Error::parameter(
-                    format!("device.section[{index}].rest_curvature_per_mm"),
-                    format!("{curvature:?}"),
-                    "must be finite, and its radius no smaller than the device's own",
-                ));
-            }
+            section.check(&format!("device.section[{index}]"))?;
         }
         let length_mm = sections.iter().map(|s| s.length_mm).sum();
         crate::error::in_range("device length (sum of section lengths) in mm", length_mm, LENGTH_LIMIT_MM)?;
@@ -170,6 +196,19 @@ impl Device {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_lumen_is_narrower_than_its_device() {
+        let tube = |inner_radius_mm| {
+            Device::new(vec![Section { inner_radius_mm, ..Section::straight(10.0, 1.0, 1.0) }])
+        };
+        assert!(tube(None).is_ok() && tube(Some(0.999)).is_ok());
+        for bad in [0.0, -0.1, 1.0, 1.5, f64::NAN] {
+            let error = tube(Some(bad)).unwrap_err().to_string();
+            assert!(error.starts_with("device.section[0].inner_radius_mm = "), "{error}");
+            assert!(error.contains("less than the outer radius, 1 mm"), "{error}");
+        }
+    }
 
     #[test]
     fn radii_and_sections_beyond_any_device_are_refused_by_key() {

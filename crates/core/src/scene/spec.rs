@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-use crate::device::{Device, Section};
+use crate::device::{Device, DeviceFile, Section};
 use crate::input::from_toml;
 use crate::insertion::{Command, ScriptLine, Sheath, Simulation, WallProperties, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
@@ -85,22 +85,11 @@ impl VesselSpec {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DeviceSpec {
-    /// A device file with `[[section]]` tables.
+    /// A [`DeviceFile`].
     pub file: Option<PathBuf>,
     /// Sections, tip first.
     #[serde(default)]
     pub section: Vec<Section>,
-}
-
-/// A device file.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DeviceFile {
-    #[serde(default, rename = "name")]
-    _name: IgnoredAny,
-    #[serde(default, rename = "source")]
-    _source: IgnoredAny,
-    section: Vec<Section>,
 }
 
 /// `[sheath]`: an opening of the vessel, or a point and a direction.
@@ -271,19 +260,23 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// # Errors
     /// A missing or unusable file, values out of range.
     pub fn device(&self) -> Result<Device> {
-        match (&self.device.file, self.device.section.is_empty()) {
-            (Some(file), true) => {
-                let path = self.resolve(file);
-                let (device, _): (DeviceFile, _) = from_toml(&path).map_err(|e| missing("device.file", e))?;
-                Device::new(device.section).map_err(|e| Error::content(&path, e.to_string()))
-            }
-            (Some(file), false) => Err(Error::parameter(
-                "device.file",
-                file.display(),
-                "device.section is given too: keep one of the two",
-            )),
-            (None, _) => Device::new(self.device.section.clone()),
+        match self.device_file()? {
+            Some(file) => Ok(file.device),
+            None => Device::new(self.device.section.clone()),
         }
+    }
+
+    /// The device file, with parts, materials and sources, if the scene names one.
+    ///
+    /// # Errors
+    /// A missing or unusable file, values out of range, sections in the scene too.
+    pub fn device_file(&self) -> Result<Option<DeviceFile>> {
+        let Some(file) = &self.device.file else { return Ok(None) };
+        if !self.device.section.is_empty() {
+            let mend = "device.section is given too: keep one of the two";
+            return Err(Error::parameter("device.file", file.display(), mend));
+        }
+        DeviceFile::read(&self.resolve(file)).map(Some).map_err(|e| missing("device.file", e))
     }
 
     /// The sheath in `wall`.

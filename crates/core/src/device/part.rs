@@ -1,0 +1,362 @@
+//! One part of a device file: data in, sections out.
+
+use serde::Deserialize;
+
+use super::quantity::{Ends, Quantity, Way, one_of, second_moment_mm4};
+use super::{LENGTH_LIMIT_MM, RADIUS_LIMIT_MM, STIFFNESS_LIMIT_NMM2, Section};
+use crate::{Error, Result};
+
+/// Millimetres in an inch.
+const INCH_MM: f64 = 25.4;
+/// Millimetres in a French (Charrière), as a diameter.
+const FRENCH_MM: f64 = 1.0 / 3.0;
+/// Stiffest material, MPa: diamond.
+const MODULUS_LIMIT_MPA: f64 = 1.2e6;
+/// Most sections that a taper is cut into.
+const MOST_CUTS: usize = 200;
+/// Widest arc of a tip, degrees: three turns.
+const MOST_ANGLE_DEG: f64 = 1080.0;
+
+/// A `[[part]]` table as it stands in the file. Values that may be tapered are a number or two.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PartTable {
+    pub(super) name: String,
+    length_mm: Option<f64>,
+    length_cm: Option<f64>,
+    bend: Option<Bend>,
+    rest_curvature_per_mm: Option<[f64; 2]>,
+    radius_mm: Option<Ends>,
+    outer_diameter_mm: Option<Ends>,
+    outer_diameter_inch: Option<Ends>,
+    outer_diameter_french: Option<Ends>,
+    inner_radius_mm: Option<Ends>,
+    inner_diameter_mm: Option<Ends>,
+    inner_diameter_inch: Option<Ends>,
+    inner_diameter_french: Option<Ends>,
+    bending_stiffness_nmm2: Option<Ends>,
+    flexural_modulus_mpa: Option<Ends>,
+    flexural_modulus_gpa: Option<Ends>,
+    torsional_stiffness_nmm2: Option<Ends>,
+    sections: Option<usize>,
+    material: Option<String>,
+    coat: Option<Coat>,
+    source: Option<String>,
+}
+
+/// An arc that a part has at rest.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Bend {
+    /// Radius of the centre line.
+    radius_mm: f64,
+    /// Angle between the tangents of the two ends.
+    angle_deg: f64,
+    /// Where the arc bends to, about the device's axis; 0 is the first material direction, 180 the opposite bend in the same plane.
+    #[serde(default)]
+    direction_deg: f64,
+}
+
+/// The outermost layer of a part, of another material: a coil, a jacket, a marker band.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Coat {
+    /// Its material.
+    pub material: String,
+    /// From the outer radius inwards, mm.
+    pub thickness_mm: f64,
+}
+
+/// How EI is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stiffness {
+    /// N·mm².
+    Bending(Ends),
+    /// Flexural modulus of the whole cross-section, MPa = N/mm².
+    Modulus(Ends),
+}
+
+/// Largest differences between a taper and its sections, which are at the ends of sections where EI rises or falls along each: everywhere,
+/// unless modulus and size are tapered against each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CutError {
+    /// Of the outer radius, mm.
+    pub radius_mm: f64,
+    /// Of EI, relative to the taper's.
+    pub stiffness: f64,
+}
+
+/// A named part of a device: constant or linearly tapered between its ends, of one curvature at rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Its name.
+    pub name: String,
+    /// Where it begins and ends, in arc length from the tip, mm.
+    pub from_tip_mm: [f64; 2],
+    /// What it is made of. Names are the viewer's to know.
+    pub material: Option<String>,
+    /// Its outermost layer, where that is of another material.
+    pub coat: Option<Coat>,
+    /// Where its data come from.
+    pub source: Option<String>,
+    radius_mm: Ends,
+    inner_radius_mm: Option<Ends>,
+    stiffness: Stiffness,
+    torsion_nmm2: Option<Ends>,
+    rest_curvature_per_mm: [f64; 2],
+    cuts: usize,
+}
+
+impl Part {
+    /// A section of a device file that has no parts.
+    pub(super) fn of_section(name: String, section: &Section, begin_mm: f64) -> Self {
+        Self {
+            name,
+            from_tip_mm: [begin_mm, begin_mm + section.length_mm],
+            material: None,
+            coat: None,
+            source: None,
+            radius_mm: Ends::constant(section.radius_mm),
+            inner_radius_mm: section.inner_radius_mm.map(Ends::constant),
+            stiffness: Stiffness::Bending(Ends::constant(section.bending_stiffness_nmm2)),
+            torsion_nmm2: section.torsional_stiffness_nmm2.map(Ends::constant),
+            rest_curvature_per_mm: section.rest_curvature_per_mm,
+            cuts: 1,
+        }
+    }
+
+    /// The part as it is at a fraction (0 to 1) of its length from the end towards the tip, as a section of its whole length.
+    pub fn at(&self, fraction: f64) -> Section {
+        let radius_mm = self.radius_mm.at(fraction);
+        let inner_radius_mm = self.inner_radius_mm.map(|inner| inner.at(fraction));
+        Section {
+            length_mm: self.from_tip_mm[1] - self.from_tip_mm[0],
+            radius_mm,
+            inner_radius_mm,
+            bending_stiffness_nmm2: match self.stiffness {
+                Stiffness::Bending(ei) => ei.at(fraction),
+                Stiffness::Modulus(e) => {
+                    e.at(fraction) * second_moment_mm4(radius_mm, inner_radius_mm.unwrap_or(0.0))
+                }
+            },
+            torsional_stiffness_nmm2: self.torsion_nmm2.map(|gj| gj.at(fraction)),
+            rest_curvature_per_mm: self.rest_curvature_per_mm,
+        }
+    }
+
+    /// The sections that stand for it, tip first: a taper is cut into equal lengths, each as the taper is in its middle.
+    pub fn sections(&self) -> Vec<Section> {
+        let count = self.cuts as f64;
+        let cut = |k: usize| {
+            let middle = self.at((k as f64 + 0.5) / count);
+            Section { length_mm: middle.length_mm / count, ..middle }
+        };
+        (0..self.cuts).map(cut).collect()
+    }
+
+    /// How far the sections are from the taper that they stand for.
+    pub fn cut_error(&self) -> CutError {
+        let count = self.cuts as f64;
+        let mut error = CutError { radius_mm: 0.0, stiffness: 0.0 };
+        for (k, section) in self.sections().iter().enumerate() {
+            for end in [k, k + 1] {
+                let taper = self.at(end as f64 / count);
+                let relative = section.bending_stiffness_nmm2 / taper.bending_stiffness_nmm2 - 1.0;
+                error.radius_mm = error.radius_mm.max((section.radius_mm - taper.radius_mm).abs());
+                error.stiffness = error.stiffness.max(relative.abs());
+            }
+        }
+        error
+    }
+}
+
+impl PartTable {
+    /// How errors call the part.
+    fn place(&self) -> String {
+        format!("part \"{}\"", self.name)
+    }
+
+    /// Its length, if it says one, mm.
+    ///
+    /// # Errors
+    /// A length given twice or out of range, an arc without a length.
+    pub(super) fn length_mm(&self) -> Result<Option<f64>> {
+        let place = self.place();
+        let length = one_of(&place, length_ways(self.length_mm, self.length_cm), LENGTH_LIMIT_MM)?;
+        let Some(bend) = self.bend else { return Ok(length.map(|length| length.ends.at(0.0))) };
+        if let Some(length) = length {
+            let mend = "bend has the length radius_mm · angle: keep one of the two";
+            return Err(Error::parameter(format!("{place}.{}", length.key), length.given, mend));
+        }
+        let named = |key: &str| format!("{place}.bend.{key}");
+        crate::error::in_range(&named("radius_mm"), bend.radius_mm, LENGTH_LIMIT_MM)?;
+        crate::error::in_range(&named("angle_deg"), bend.angle_deg, MOST_ANGLE_DEG)?;
+        if !(-360.0..=360.0).contains(&bend.direction_deg) {
+            let mend = "must be a number from -360 to 360";
+            return Err(Error::parameter(named("direction_deg"), bend.direction_deg, mend));
+        }
+        Ok(Some(bend.radius_mm * bend.angle_deg.to_radians()))
+    }
+
+    /// The part that begins at an arc length from the tip. `is_tube`: whether it must have a lumen. `source` stands in where it has none.
+    ///
+    /// # Errors
+    /// Values that are missing, out of range, given twice, or contradict each other, by key.
+    pub(super) fn resolve(
+        &self,
+        begin_mm: f64,
+        length_mm: f64,
+        is_tube: bool,
+        source: Option<&str>,
+    ) -> Result<Part> {
+        let place = self.place();
+        let missing = |key: &str, mend: &str| Err(Error::parameter(format!("{place}.{key}"), "absent", mend));
+        let Some(outer) = self.outer(&place)? else {
+            let mend = "give outer_diameter_mm, outer_diameter_inch, outer_diameter_french or radius_mm";
+            return missing("outer_diameter_mm", mend);
+        };
+        let inner = self.inner(&place)?;
+        if is_tube && inner.is_none() {
+            let mend = "the device is a tube by its kind: give inner_diameter_mm, inner_diameter_inch, \
+                        inner_diameter_french or inner_radius_mm";
+            return missing("inner_diameter_mm", mend);
+        }
+        self.check_layers(&place, outer, inner)?;
+        let Some((stiffness, stiffness_ends)) = self.stiffness(&place)? else {
+            let mend = "give bending_stiffness_nmm2, flexural_modulus_mpa or flexural_modulus_gpa";
+            return missing("bending_stiffness_nmm2", mend);
+        };
+        let torsion_way =
+            Way { key: "torsional_stiffness_nmm2", given: self.torsional_stiffness_nmm2, factor: 1.0 };
+        let torsion = one_of(&place, [torsion_way], STIFFNESS_LIMIT_NMM2)?.map(|q| q.ends);
+        let inner = inner.map(|inner| inner.ends);
+        let tapered = [Some(outer.ends), inner, Some(stiffness_ends), torsion];
+        let part = Part {
+            name: self.name.clone(),
+            from_tip_mm: [begin_mm, begin_mm + length_mm],
+            material: self.material.clone(),
+            coat: self.coat.clone(),
+            source: self.source.clone().or_else(|| source.map(str::to_owned)),
+            radius_mm: outer.ends,
+            inner_radius_mm: inner,
+            stiffness,
+            torsion_nmm2: torsion,
+            rest_curvature_per_mm: self.curvature(&place, outer.ends)?,
+            cuts: self.cuts(&place, tapered.into_iter().flatten().any(Ends::is_taper))?,
+        };
+        // EI and GJ follow from other values: out of range they are known only now.
+        [0.0, 1.0].iter().try_for_each(|end| part.at(*end).check(&place))?;
+        Ok(part)
+    }
+
+    fn outer(&self, place: &str) -> Result<Option<Quantity>> {
+        let ways = [
+            Way { key: "radius_mm", given: self.radius_mm, factor: 1.0 },
+            Way { key: "outer_diameter_mm", given: self.outer_diameter_mm, factor: 0.5 },
+            Way { key: "outer_diameter_inch", given: self.outer_diameter_inch, factor: 0.5 * INCH_MM },
+            Way { key: "outer_diameter_french", given: self.outer_diameter_french, factor: 0.5 * FRENCH_MM },
+        ];
+        one_of(place, ways, RADIUS_LIMIT_MM)
+    }
+
+    fn inner(&self, place: &str) -> Result<Option<Quantity>> {
+        let ways = [
+            Way { key: "inner_radius_mm", given: self.inner_radius_mm, factor: 1.0 },
+            Way { key: "inner_diameter_mm", given: self.inner_diameter_mm, factor: 0.5 },
+            Way { key: "inner_diameter_inch", given: self.inner_diameter_inch, factor: 0.5 * INCH_MM },
+            Way { key: "inner_diameter_french", given: self.inner_diameter_french, factor: 0.5 * FRENCH_MM },
+        ];
+        one_of(place, ways, RADIUS_LIMIT_MM)
+    }
+
+    /// How EI is known, and the values that say it.
+    fn stiffness(&self, place: &str) -> Result<Option<(Stiffness, Ends)>> {
+        let modulus = [
+            Way { key: "flexural_modulus_mpa", given: self.flexural_modulus_mpa, factor: 1.0 },
+            Way { key: "flexural_modulus_gpa", given: self.flexural_modulus_gpa, factor: 1000.0 },
+        ];
+        let bending = Way { key: "bending_stiffness_nmm2", given: self.bending_stiffness_nmm2, factor: 1.0 };
+        let modulus = one_of(place, modulus, MODULUS_LIMIT_MPA)?;
+        let bending = one_of(place, [bending], STIFFNESS_LIMIT_NMM2)?;
+        match (bending, modulus) {
+            (Some(bending), Some(modulus)) => {
+                let mend = format!("{} is given too: keep one of the two", bending.key);
+                Err(Error::parameter(format!("{place}.{}", modulus.key), modulus.given, mend))
+            }
+            (Some(bending), None) => Ok(Some((Stiffness::Bending(bending.ends), bending.ends))),
+            (None, modulus) => Ok(modulus.map(|modulus| (Stiffness::Modulus(modulus.ends), modulus.ends))),
+        }
+    }
+
+    /// The lumen is narrower than the part, and the coat thinner than the wall, at both ends and so everywhere between.
+    fn check_layers(&self, place: &str, outer: Quantity, inner: Option<Quantity>) -> Result<()> {
+        for end in [0, 1] {
+            let radius_mm = outer.ends.0[end];
+            let inner_mm = inner.map_or(0.0, |inner| inner.ends.0[end]);
+            if let Some(inner) = inner.filter(|_| inner_mm >= radius_mm) {
+                let mend = format!(
+                    "is a radius of {inner_mm:.4} mm: must be less than the outer one, {radius_mm:.4} mm"
+                );
+                return Err(Error::parameter(format!("{place}.{}", inner.key), inner.given, mend));
+            }
+            if let Some(coat) = &self.coat
+                && !(coat.thickness_mm > 0.0 && coat.thickness_mm < radius_mm - inner_mm)
+            {
+                let mend = format!("must be above 0 and less than the wall, {:.4} mm", radius_mm - inner_mm);
+                let name = format!("{place}.coat.thickness_mm");
+                return Err(Error::parameter(name, coat.thickness_mm, mend));
+            }
+        }
+        Ok(())
+    }
+
+    fn curvature(&self, place: &str, radius_mm: Ends) -> Result<[f64; 2]> {
+        match (self.bend, self.rest_curvature_per_mm) {
+            (Some(_), Some(curvature)) => {
+                let name = format!("{place}.rest_curvature_per_mm");
+                Err(Error::parameter(
+                    name,
+                    format!("{curvature:?}"),
+                    "bend is given too: keep one of the two",
+                ))
+            }
+            (Some(bend), None) => {
+                let widest_mm = radius_mm.0[0].max(radius_mm.0[1]);
+                if bend.radius_mm < widest_mm {
+                    let mend = format!("must be at least the part's own radius, {widest_mm:.4} mm");
+                    return Err(Error::parameter(format!("{place}.bend.radius_mm"), bend.radius_mm, mend));
+                }
+                let (sin, cos) = bend.direction_deg.to_radians().sin_cos();
+                Ok([cos / bend.radius_mm, sin / bend.radius_mm])
+            }
+            (None, curvature) => Ok(curvature.unwrap_or_default()),
+        }
+    }
+
+    /// Number of sections.
+    fn cuts(&self, place: &str, tapered: bool) -> Result<usize> {
+        let refused =
+            |value: String, mend: String| Err(Error::parameter(format!("{place}.sections"), value, mend));
+        match (self.sections, tapered) {
+            (None, false) => Ok(1),
+            (None, true) => refused(
+                "absent".into(),
+                format!("the part is tapered: say how many sections it is cut into, 1 to {MOST_CUTS}"),
+            ),
+            (Some(count), true) if (1..=MOST_CUTS).contains(&count) => Ok(count),
+            (Some(count), true) => refused(count.to_string(), format!("must be 1 to {MOST_CUTS}")),
+            (Some(count), false) => refused(
+                count.to_string(),
+                "nothing in the part is tapered: leave it out, or give two values, [towards the tip, at the other end]".into(),
+            ),
+        }
+    }
+}
+
+/// The keys that may give a length.
+pub(super) fn length_ways(length_mm: Option<f64>, length_cm: Option<f64>) -> [Way; 2] {
+    [
+        Way { key: "length_mm", given: length_mm.map(Ends::constant), factor: 1.0 },
+        Way { key: "length_cm", given: length_cm.map(Ends::constant), factor: 10.0 },
+    ]
+}
