@@ -13,7 +13,7 @@ use endowire_tests::noise::Noise;
 use endowire_tests::readers;
 
 /// Damaged files in all from each kind of file.
-const ROUNDS: usize = 20_000;
+const ROUNDS: usize = 5_000;
 
 /// Longest message: a few lines of a terminal.
 const LONGEST: usize = 1_000;
