@@ -158,6 +158,7 @@ impl SmoothWall {
         };
         let quadrics = parallel::map(count, fitted);
 
+        let windows_mm: f64 = quadrics.iter().map(Quadric::window_mm).sum();
         let mut triangles = vec![0; count];
         for (index, triangle) in mesh.triangles.iter().enumerate() {
             triangle.iter().for_each(|v| triangles[*v as usize] = index as u32);
@@ -178,7 +179,7 @@ impl SmoothWall {
             lists,
             insets_mm: Vec::new(),
             deepest_inset_mm: 0.0,
-            passing_mm: PASSING * thickest_mm,
+            passing_mm: PASSING * windows_mm / count as f64,
         };
         smooth.measure_insets(mesh);
         smooth
@@ -250,7 +251,7 @@ impl SmoothWall {
         if found.as_ref().is_some_and(|found| found.value_mm > 0.0) {
             return found;
         }
-        if self.height(x, list).0 < 0.0 { self.reach_from(x, list, Some(self.behind(list))) } else { found }
+        self.reach_from(x, list, Some(self.behind(list))).or(found)
     }
 
     /// The same in front of the surface, or behind it.
