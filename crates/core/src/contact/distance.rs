@@ -158,7 +158,6 @@ impl SmoothWall {
         };
         let quadrics = parallel::map(count, fitted);
 
-        let windows_mm: f64 = quadrics.iter().map(Quadric::window_mm).sum();
         let mut triangles = vec![0; count];
         for (index, triangle) in mesh.triangles.iter().enumerate() {
             triangle.iter().for_each(|v| triangles[*v as usize] = index as u32);
@@ -179,7 +178,7 @@ impl SmoothWall {
             lists,
             insets_mm: Vec::new(),
             deepest_inset_mm: 0.0,
-            passing_mm: PASSING * windows_mm / count as f64,
+            passing_mm: PASSING * thickest_mm,
         };
         smooth.measure_insets(mesh);
         smooth

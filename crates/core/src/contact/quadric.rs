@@ -192,11 +192,6 @@ impl Quadric {
         self.farthest_mm = long * (1.0 - (highest * l.min(0.0)).min(lowest * k.max(0.0)));
     }
 
-    /// Height of the window, mm: its scale.
-    pub(super) fn window_mm(&self) -> f64 {
-        self.below_mm.0 / BELOW.0
-    }
-
     /// b(Q, u) and its derivatives; behind the surface without an end, and bounded: e^{−Z tanh(z/Z)} with z = Q/0.3w.
     #[inline]
     pub(super) fn opened(&self, local: &Local, behind: bool) -> Opened {

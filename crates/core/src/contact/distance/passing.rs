@@ -13,8 +13,8 @@
 use super::{Behind, Distance, Nearness, Reached, SmoothWall};
 use crate::Vec3;
 
-/// t over the mean height of the windows: over a fifth of the thickest device's radius, or for a thin device over what fits may be off by.
-pub(super) const PASSING: f64 = 0.16;
+/// t over the radius of the thickest device.
+pub(super) const PASSING: f64 = 0.2;
 
 impl SmoothWall {
     /// As [`SmoothWall::distance`], with derivatives only where the distance is less than `limit_mm`: they are what it costs. Beside it
@@ -55,7 +55,9 @@ impl SmoothWall {
                 hessian: hessian + turned + turned.transpose() + bend * apart,
             }
         };
-        let coverage = front.coverage + share * (back.coverage - front.coverage);
+        // Triangles take part as in front until all is as behind.
+        let [deep, ..] = self.share(front.value_mm + self.passing_mm);
+        let coverage = front.coverage + deep * (back.coverage - front.coverage);
         Some((told(value_mm, &passing), coverage))
     }
 
@@ -79,8 +81,8 @@ impl SmoothWall {
         slope /= front.weight;
         if coverage != front.coverage {
             // Behind the surface the coverage is 1.
-            let [share, in_f, _] = self.share(front.value_mm);
-            slope = slope * (1.0 - share) + f.gradient * (in_f * (1.0 - front.coverage));
+            let [deep, in_f, _] = self.share(front.value_mm + self.passing_mm);
+            slope = slope * (1.0 - deep) + f.gradient * (in_f * (1.0 - front.coverage));
         }
         Some((distance, coverage, slope))
     }
