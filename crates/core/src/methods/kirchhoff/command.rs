@@ -134,21 +134,14 @@ impl<const C: usize> Workspace<C> {
             }
             // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
             if done < 1.0 && (failures > RESORTS || substeps > SUBSTEP_LIMIT) {
-                if command.advance_mm > 0.0
-                    && let Some(end) = tools.narrowest(environment, now)
-                {
-                    return Err(Error::End(end));
-                }
+                tools.refuse_narrower(environment, now, command)?;
                 return Err(Error::Computation(format!(
                     "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
                 )));
             }
         }
-        if !balanced
-            && command.advance_mm > 0.0
-            && let Some(end) = tools.narrowest(environment, now)
-        {
-            return Err(Error::End(end));
+        if !balanced {
+            tools.refuse_narrower(environment, now, command)?;
         }
         let report = &mut now.parts().1.report;
         report.rotation_rad = rotation + command.rotate_rad;
