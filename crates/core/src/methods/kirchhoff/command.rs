@@ -99,6 +99,8 @@ impl<const C: usize> Workspace<C> {
             substeps += 1;
             if inserted == 0.0 {
                 now.withdraw(tail);
+                now.parts().1.report.rotation_rad = tail;
+                tools.write_report(environment, now);
                 break;
             }
             let resort = if relax { Some(failures == RESORTS) } else { None };
@@ -144,7 +146,6 @@ impl<const C: usize> Workspace<C> {
             tools.refuse_narrower(environment, now, command)?;
         }
         let report = &mut now.parts().1.report;
-        report.rotation_rad = rotation + command.rotate_rad;
         report.iterations = iterations as u32;
         (report.substeps, report.dissipated_mj) = (substeps as u32, dissipated_mj);
         (report.relaxations, report.slides, report.imbalance) = (relaxations, slides, imbalance);
@@ -152,8 +153,6 @@ impl<const C: usize> Workspace<C> {
         report.angles = from.report.angles;
         report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
         report.nodes_frozen = from.report.nodes_frozen + tools.nodes_frozen;
-        tools.write_report(environment, now);
-        let report = &mut now.parts().1.report;
         report.jumped = jumped(&from.report, report, target - start, command.rotate_rad);
         Ok(())
     }
