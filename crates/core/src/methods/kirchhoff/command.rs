@@ -28,6 +28,8 @@ const WORK_RAD: f64 = 0.1;
 const WORK_OF_ONE: usize = 10;
 /// How often the last resort may find nothing in a command; after that what it comes to is taken whatever is left over.
 const RESORTS: usize = 6;
+/// How often a device that came to rest at the end of its way, but in no equilibrium, is let go on from there with the hand held still.
+const AGAIN: usize = 4;
 /// A step is a jump if more than this part of the stored energy was set free.
 const JUMP: f64 = 0.02;
 /// Stored energy below which nothing is called a jump, mJ.
@@ -70,8 +72,11 @@ impl<const C: usize> Workspace<C> {
         let mut share = 1.0f64;
         // Last resorts that found nothing.
         let mut failures = 0;
+        let mut again = AGAIN;
         let mut failure = Cow::from("the way is too long for one step");
-        while done < 1.0 {
+        while done < 1.0 || (!balanced && again > 0) {
+            // What has come to rest without an equilibrium at the end of its way goes on from there.
+            again -= usize::from(done >= 1.0);
             let here = if moved { now.start() } else { Start { mesh, state: from } };
             let rest = 1.0 - done;
             // Where the way is lost, the device is let come to rest as far as the command goes; if it does not, in parts; and in the end
@@ -113,7 +118,7 @@ impl<const C: usize> Workspace<C> {
                     if relax {
                         imbalance = imbalance.max(found.residual.max(found.unsettled));
                     }
-                    balanced &= found.balanced;
+                    balanced = found.balanced;
                     dissipated_mj += found.dissipated_mj;
                     if let Some((opening, beyond)) = left_through(surroundings.wall, &next.state.tip_mm())
                         && beyond > LEAVE_MM
