@@ -147,7 +147,7 @@ impl<const C: usize> Tools<C> {
         after.report.rotation_rad = tail_rad;
         self.write_report(environment, next);
         let (_, after) = next.parts();
-        if resort != Some(true) && rises(&start.state.report, &after.report, dissipated_mj) {
+        if rises(&start.state.report, &after.report, dissipated_mj) {
             return Err(STORED.into());
         }
         self.guess.teach(hand, &after.rod, &mut after.correction);
