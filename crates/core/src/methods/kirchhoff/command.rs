@@ -130,6 +130,8 @@ impl<const C: usize> Workspace<C> {
                     done = to;
                     share = (2.0 * part).min(1.0);
                 }
+                // From the same place the same comes of it.
+                Err(_) if done >= 1.0 => break,
                 Err(reason) => {
                     failure = reason;
                     share = 0.25 * part;
