@@ -148,7 +148,8 @@ impl<const C: usize> Tools<C> {
         after.report.rotation_rad = tail_rad;
         self.write_report(environment, next);
         let (_, after) = next.parts();
-        if rises(&start.state.report, &after.report, dissipated_mj) {
+        let taken = resort == Some(true) && balanced;
+        if !taken && rises(&start.state.report, &after.report, dissipated_mj) {
             return Err(STORED.into());
         }
         self.guess.teach(hand, &after.rod, &mut after.correction);
