@@ -44,7 +44,16 @@ const fn insertion(
     modulus_n_per_mm2: f64,
     friction: f64,
 ) -> Insertion {
-    Insertion { name, tree, inserted_mm, increment_mm, turn_rad: 0.0, modulus_n_per_mm2, friction, shaped: false }
+    Insertion {
+        name,
+        tree,
+        inserted_mm,
+        increment_mm,
+        turn_rad: 0.0,
+        modulus_n_per_mm2,
+        friction,
+        shaped: false,
+    }
 }
 
 /// A 0.035-inch wire, its tip bent where it is `shaped`.

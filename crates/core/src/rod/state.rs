@@ -143,6 +143,11 @@ impl RodState {
         }
     }
 
+    /// Largest distance of a node from where it is in another state of the same size, mm.
+    pub fn farthest_mm(&self, other: &Self) -> f64 {
+        self.positions.iter().zip(&other.positions).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    }
+
     /// Copies another state of the same size without allocating.
     pub fn copy_from(&mut self, other: &Self) {
         self.frames.clone_from(&other.frames);

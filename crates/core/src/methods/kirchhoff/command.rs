@@ -7,7 +7,7 @@ use super::Environment;
 use super::configuration::Start;
 use super::slide::Extension;
 use super::state::KirchhoffState;
-use super::substep::Attempt;
+use super::substep::{AT_REST, Attempt};
 use super::workspace::{Tools, Workspace};
 use crate::contact::extension::{LEAVE_MM, left_through};
 use crate::insertion::{Command, StepReport};
@@ -30,6 +30,8 @@ const WORK_OF_ONE: usize = 10;
 const RESORTS: usize = 6;
 /// How often a device that came to rest at the end of its way, but in no equilibrium, is let go on from there with the hand held still.
 const AGAIN: usize = 4;
+/// What moved by less than this in another last resort, in its least radii, is at rest.
+const REST_RADII: f64 = 1e-3;
 /// A step is a jump if more than this part of the stored energy was set free.
 const JUMP: f64 = 0.02;
 /// Stored energy below which nothing is called a jump, mJ.
@@ -73,6 +75,7 @@ impl<const C: usize> Workspace<C> {
         // Last resorts that found nothing.
         let mut failures = 0;
         let mut again = AGAIN;
+        let thinnest_mm = surroundings.device.min_radius_mm();
         let mut failure = Cow::from("the way is too long for one step");
         while done < 1.0 || (!balanced && again > 0) {
             // What has come to rest without an equilibrium at the end of its way goes on from there.
@@ -118,7 +121,12 @@ impl<const C: usize> Workspace<C> {
                     if relax {
                         imbalance = imbalance.max(found.residual.max(found.unsettled));
                     }
-                    balanced = found.balanced;
+                    // At a crease of the wall forces are those of one side or the other and never in balance; where nothing moves
+                    // any more the device is at rest all the same.
+                    let rests = done >= 1.0
+                        && found.residual <= AT_REST
+                        && here.state.rod.farthest_mm(&next.state.rod) <= REST_RADII * thinnest_mm;
+                    balanced = found.balanced || rests;
                     dissipated_mj += found.dissipated_mj;
                     if let Some((opening, beyond)) = left_through(surroundings.wall, &next.state.tip_mm())
                         && beyond > LEAVE_MM

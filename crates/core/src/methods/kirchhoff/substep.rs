@@ -15,7 +15,7 @@ use crate::rod::Supports;
 /// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, …
 const SOFTEST: f64 = 30.0;
 /// Residual over force scale above which the last resort has found nothing.
-const AT_REST: f64 = 0.05;
+pub(super) const AT_REST: f64 = 0.05;
 /// What is the matter where an equilibrium is on the other side of the wall.
 const PASSED: &str = "the device would pass through the wall";
 /// An equilibrium is on another branch where more energy is stored than the hand gives: than this many times what the larger of its
