@@ -7,7 +7,7 @@ use endowire_viewer::{DevicePart, device_parts};
 use pyo3::prelude::*;
 
 use crate::document;
-use crate::error::exception;
+use crate::error::{InputError, exception};
 
 /// A wire or catheter: its sections, tip first.
 #[pyclass(frozen, from_py_object, module = "endowire", name = "Instrument")]
@@ -53,6 +53,29 @@ impl Instrument {
     #[getter]
     fn sections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         document::write(py, &self.device.sections())
+    }
+
+    /// Nothing changes an instrument: its copy is itself.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, _memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyAny>, String))> {
+        let instrument = slf.get();
+        let parts = serde_json::to_string(&instrument.parts)
+            .map_err(|e| InputError::new_err(format!("the instrument cannot be written: {e}")))?;
+        Ok((slf.get_type().getattr("_unpickled")?, (instrument.sections(slf.py())?, parts)))
+    }
+
+    #[staticmethod]
+    fn _unpickled(sections: &Bound<'_, PyAny>, parts: &str) -> PyResult<Self> {
+        let parts = serde_json::from_str(parts)
+            .map_err(|e| InputError::new_err(format!("the parts of an instrument: {e}")))?;
+        Ok(Self { parts, ..Self::new(sections)? })
     }
 
     fn __repr__(&self) -> String {

@@ -2,6 +2,7 @@
 
 use endowire_core::insertion::Command;
 use numpy::{AllowTypeChange, PyArrayLikeDyn};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 use crate::error::refuse;
@@ -33,26 +34,16 @@ pub(crate) fn commands(moves: &Moves<'_>, count: Option<usize>) -> PyResult<Vec<
     Ok(numbers.chunks_exact(2).map(|pair| Command { advance_mm: pair[0], rotate_rad: pair[1] }).collect())
 }
 
-/// One number, or one for each instrument.
-#[derive(FromPyObject)]
-pub(crate) enum Each {
-    One(f64),
-    List(Vec<f64>),
-}
-
-impl Each {
-    /// The number of the only instrument.
-    pub(crate) fn only(&self, name: &str) -> PyResult<f64> {
-        match self {
-            Self::One(value) => Ok(*value),
-            Self::List(list) => match list[..] {
-                [value] => Ok(value),
-                _ => Err(refuse(
-                    name,
-                    format!("{} numbers", list.len()),
-                    &format!("must be one number, or {INSTRUMENTS}: one for each instrument"),
-                )),
-            },
-        }
+/// One number, or one for each instrument: that of the only instrument.
+pub(crate) fn of_only(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<f64> {
+    let Some(value) = value else { return Ok(0.0) };
+    if let Ok(number) = value.extract::<f64>() {
+        return Ok(number);
+    }
+    let wanted = format!("must be a number, or {INSTRUMENTS}: one for each instrument");
+    match value.extract::<Vec<f64>>() {
+        Ok(list) if list.len() == INSTRUMENTS => Ok(list[0]),
+        Ok(list) => Err(refuse(name, format!("{} numbers", list.len()), &wanted)),
+        Err(_) => Err(PyTypeError::new_err(format!("{name} = {}: {wanted}", value.repr()?))),
     }
 }

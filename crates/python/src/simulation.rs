@@ -16,7 +16,7 @@ use crate::document;
 use crate::error::{exception, refuse};
 use crate::instrument::Instrument;
 use crate::interrupt::interruptible;
-use crate::moves::{Each, INSTRUMENTS, Moves, commands};
+use crate::moves::{INSTRUMENTS, Moves, commands, of_only};
 use crate::report::StepReport;
 use crate::state::State;
 use crate::vessel::Vessel;
@@ -132,11 +132,16 @@ impl Simulation {
     ///
     /// Raises InputError for a command that cannot be followed, EndOfWay where the way ends, ComputationError where no equilibrium was found;
     /// then everything is as before.
-    #[pyo3(signature = (advance_mm=Each::One(0.0), rotate_rad=Each::One(0.0)), text_signature = "(self, advance_mm=0.0, rotate_rad=0.0)")]
-    fn step(&self, py: Python<'_>, advance_mm: Each, rotate_rad: Each) -> PyResult<StepReport> {
+    #[pyo3(signature = (advance_mm=None, rotate_rad=None))]
+    fn step(
+        &self,
+        py: Python<'_>,
+        advance_mm: Option<&Bound<'_, PyAny>>,
+        rotate_rad: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<StepReport> {
         let command = Command {
-            advance_mm: advance_mm.only("advance_mm")?,
-            rotate_rad: rotate_rad.only("rotate_rad")?,
+            advance_mm: of_only("advance_mm", advance_mm)?,
+            rotate_rad: of_only("rotate_rad", rotate_rad)?,
         };
         self.with(py, |simulation| simulation.step(command).cloned()).map(StepReport::new).map_err(exception)
     }

@@ -9,11 +9,12 @@ use endowire_core::vessel::{
 };
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use serde::Serialize;
 
 use crate::arrays::{Table, array, points, rows};
 use crate::document;
-use crate::error::{exception, refuse};
+use crate::error::{InputError, exception, refuse};
 use crate::interrupt::interruptible;
 
 /// A vessel's wall, and its centre line where it was made from one. It never changes.
@@ -23,6 +24,9 @@ pub(crate) struct Vessel {
     /// The tree it was made from, with the opening at its root.
     tree: Option<(CentrelineTree, usize)>,
 }
+
+/// The bytes of a wall, its centre line and its inlet.
+type Pickled<'py> = (Bound<'py, PyBytes>, Option<Bound<'py, PyArray2<f64>>>, Option<usize>);
 
 /// A centre-line tree: the path of its table or the name of a built-in anatomy, or an array.
 #[derive(FromPyObject)]
@@ -158,6 +162,31 @@ impl Vessel {
     /// Writes the wall as a surface file; the ending (stl, obj, ply) says which.
     fn write(&self, path: PathBuf) -> PyResult<()> {
         self.wall.mesh().write(&path).map_err(exception)
+    }
+
+    /// Nothing changes a vessel: its copy is itself.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, _memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
+        let (py, vessel) = (slf.py(), slf.get());
+        let wall = postcard::to_allocvec(&*vessel.wall)
+            .map_err(|e| InputError::new_err(format!("the vessel cannot be written: {e}")))?;
+        let parts = (PyBytes::new(py, &wall), vessel.centreline(py)?, vessel.inlet());
+        Ok((slf.get_type().getattr("_unpickled")?, parts))
+    }
+
+    #[staticmethod]
+    fn _unpickled(wall: &[u8], centreline: Option<Table<'_, f64>>, inlet: Option<usize>) -> PyResult<Self> {
+        let wall = postcard::from_bytes(wall)
+            .map_err(|e| InputError::new_err(format!("the bytes of a vessel: {e}")))?;
+        let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?.zip(inlet);
+        Ok(Self { wall: Arc::new(wall), tree })
     }
 
     fn __repr__(&self) -> String {

@@ -44,6 +44,10 @@ impl Batch {
             let mend = format!("give one for each of the {} simulations", self.simulations.len());
             return Err(Error::parameter("commands", commands.len(), mend));
         }
+        // Threads are started for many, and not for one: a program may have to fork.
+        if let ([simulation], [command]) = (&mut self.simulations[..], commands) {
+            return Ok(vec![simulation.step(*command).map(drop)]);
+        }
         // Steps differ in length by orders of magnitude: each is a piece of work of its own.
         let each = self.simulations.par_iter_mut().zip(commands.par_iter()).with_max_len(1);
         Ok(each.map(|(simulation, command)| simulation.step(*command).map(drop)).collect())

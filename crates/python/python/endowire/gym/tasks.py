@@ -1,0 +1,50 @@
+"""The tasks behind the registered ids."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import Instrument, Vessel
+from .environment import InsertionEnv
+from .task import Task
+from .targets import CentrelineTarget
+from .vector import InsertionVectorEnv
+from .vessels import FixedVessel
+
+
+def hooked_wire() -> Instrument:
+    """A guidewire of 0.035" with a soft tip bent by 72° about a radius of 12.1 mm."""
+    return Instrument(
+        [
+            {"length_mm": 15.2, "radius_mm": 0.35, "bending_stiffness_nmm2": 1.0, "rest_curvature_per_mm": [1 / 12.1, 0.0]},
+            {"length_mm": 434.8, "radius_mm": 0.445, "bending_stiffness_nmm2": 12.0},
+        ]
+    )
+
+
+def curved_tube(**parts: Any) -> Task:
+    """The hooked wire in a tube that bends by 180°."""
+    vessels = FixedVessel(Vessel.generate("curved_tube", edge_mm=1.5))
+    return Task(**{"instruments": [hooked_wire()], "vessels": vessels, **parts})
+
+
+def aortic_arch(**parts: Any) -> Task:
+    """The hooked wire from the descending aorta into the branches of the arch."""
+    vessels = FixedVessel(Vessel.generate("aortic_arch", edge_mm=3.0))
+    target = CentrelineTarget(least_mm=100.0)
+    return Task(**{"instruments": [hooked_wire()], "vessels": vessels, "target": target, **parts})
+
+
+TASKS = {"CurvedTube": curved_tube, "AorticArch": aortic_arch}
+
+
+def make_env(task: str, render_mode: str | None = None, **parts: Any) -> InsertionEnv:
+    """The environment of a task of `TASKS`; keywords replace its parts."""
+    return InsertionEnv(TASKS[task](**parts), render_mode)
+
+
+def make_vector_env(
+    task: str, num_envs: int = 1, render_mode: str | None = None, **parts: Any
+) -> InsertionVectorEnv:
+    """The vector environment of a task of `TASKS`; keywords replace its parts."""
+    return InsertionVectorEnv(TASKS[task](**parts), num_envs, render_mode)
