@@ -16,7 +16,7 @@ from ._endowire import (
     check_vessel,
     solve_rod,
 )
-from .errors import ComputationError, EndowireError, EndOfWay, InputError
+from .errors import ComputationError, EndOfWay, EndowireError, InputError
 
 __all__ = [
     "Batch",

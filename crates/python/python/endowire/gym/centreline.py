@@ -57,5 +57,8 @@ class Centreline:
         segment, part, _ = self.nearest(point_mm)
         length = self.lengths_mm[segment]
         return float(
-            min(ways_mm[segment + 1] + (1.0 - part) * length, ways_mm[self.parents[segment + 1]] + part * length)
+            min(
+                ways_mm[segment + 1] + (1.0 - part) * length,
+                ways_mm[self.parents[segment + 1]] + part * length,
+            )
         )

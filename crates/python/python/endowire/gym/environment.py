@@ -42,7 +42,9 @@ class InsertionEnv(gymnasium.Env[dict[str, NDArray[Any]], NDArray[np.float32]]):
         """
         velocities = np.asarray(action, dtype=float)
         if velocities.shape != self.action_space.shape:
-            raise InputError(f"action = an array of shape {velocities.shape}: must have the shape {self.action_space.shape}")
+            raise InputError(
+                f"action = an array of shape {velocities.shape}: must have the shape {self.action_space.shape}"
+            )
         if not np.isfinite(velocities).all():
             raise InputError(f"action = {velocities.tolist()}: every number must be finite")
         self._episodes.step(velocities[None], np.array([True]))

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
-from .. import Batch, EndowireError, EndOfWay
+from .. import Batch, EndOfWay, EndowireError
 from .task import Task
 from .vessels import Site
 
@@ -20,7 +21,9 @@ class Episodes:
 
     def __init__(self, task: Task, n: int) -> None:
         self.task = task
-        self.action_space, self.observation_space = task.action_space(), task.observation_space()
+        self.action_space = task.action_space()
+        self._spaces = task.observation_spaces()
+        self.observation_space = spaces.Dict(self._spaces)
         instruments = len(task.instruments)
         self._lengths_mm = np.array([instrument.length_mm for instrument in task.instruments])
         #: The simulations.
@@ -88,14 +91,18 @@ class Episodes:
         """All parts of the observations, within their spaces."""
         observed = {}
         for name, part in self.task.observations.items():
-            space = self.observation_space[name]
+            space = self._spaces[name]
             values = part.observe(self)
-            observed[name] = values if values.dtype == np.uint8 else np.clip(values, space.low, space.high).astype(space.dtype)
+            observed[name] = (
+                values
+                if values.dtype == np.uint8
+                else np.clip(values, space.low, space.high).astype(space.dtype)
+            )
         return observed
 
     def rewards(self) -> NDArray[np.float64]:
         """The sum of all parts of the reward, shape (n,)."""
-        return np.sum([part.reward(self) for part in self.task.rewards], axis=0, dtype=float)
+        return sum((part.reward(self) for part in self.task.rewards), np.zeros(len(self.sites)))
 
     def ended(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Terminated and truncated, shape (n,); one that failed is truncated."""
@@ -115,5 +122,8 @@ class Episodes:
         self.tip_mm = self.batch.tip_mm
         self.reached = np.linalg.norm(self.tip_mm - self.target_mm, axis=1) < self.task.threshold_mm
         self.way_mm = np.array(
-            [site.centreline.way_mm(ways, tip) for site, ways, tip in zip(self.sites, self._ways_mm, self.tip_mm, strict=True)]
+            [
+                site.centreline.way_mm(ways, tip)
+                for site, ways, tip in zip(self.sites, self._ways_mm, self.tip_mm, strict=True)
+            ]
         )

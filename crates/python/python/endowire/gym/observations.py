@@ -70,7 +70,8 @@ class Hands:
     def space(self, task: Task) -> spaces.Box:
         lengths = [[instrument.length_mm, 1.0, 1.0] for instrument in task.instruments]
         high = np.asarray(lengths, dtype=np.float32)
-        return spaces.Box(high * np.float32([0.0, -1.0, -1.0]), high, dtype=np.float32)
+        low = high * np.array([0.0, -1.0, -1.0], dtype=np.float32)
+        return spaces.Box(low, high, dtype=np.float32)
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         turn = episodes.batch.rotation_rad
@@ -133,7 +134,9 @@ class Fluoroscopy:
         for k, site in enumerate(episodes.sites):
             simulation, frame = episodes.batch.simulation(k), int(episodes.frame[k])
             for p, view in enumerate(views):
-                pictures[k, p] = site.renderer(view).render(simulation, frame).fluoro
+                picture = site.renderer(view).render(simulation, frame).fluoro
+                assert picture is not None
+                pictures[k, p] = picture
         return pictures
 
     def _view(self, primary_deg: float, secondary_deg: float) -> dict[str, Any]:

@@ -64,14 +64,18 @@ class Task:
         high = np.tile(np.asarray(self.speed_limits, dtype=np.float32), (len(self.instruments), 1))
         return spaces.Box(-high, high, dtype=np.float32)
 
-    def observation_space(self) -> spaces.Dict:
-        """A dictionary of the parts."""
-        return spaces.Dict({name: part.space(self) for name, part in self.observations.items()})
+    def observation_spaces(self) -> dict[str, spaces.Box]:
+        """The space of each part of the observations."""
+        return {name: part.space(self) for name, part in self.observations.items()}
 
     def start(self, site: Site) -> Simulation:
         """The simulation of a site with nothing inserted, made once: copy it."""
         if self._number not in site.starts:
             site.starts[self._number] = Simulation(
-                site.vessel, list(self.instruments), wall=dict(self.wall), method=dict(self.method), **site.sheath
+                site.vessel,
+                list(self.instruments),
+                wall=dict(self.wall),
+                method=dict(self.method),
+                **site.sheath,
             )
         return site.starts[self._number]

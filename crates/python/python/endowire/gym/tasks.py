@@ -6,8 +6,8 @@ from typing import Any
 
 from .. import Instrument, Vessel
 from .environment import InsertionEnv
-from .task import Task
 from .targets import CentrelineTarget
+from .task import Task
 from .vector import InsertionVectorEnv
 from .vessels import FixedVessel
 
@@ -16,7 +16,12 @@ def hooked_wire() -> Instrument:
     """A guidewire of 0.035" with a soft tip bent by 72° about a radius of 12.1 mm."""
     return Instrument(
         [
-            {"length_mm": 15.2, "radius_mm": 0.35, "bending_stiffness_nmm2": 1.0, "rest_curvature_per_mm": [1 / 12.1, 0.0]},
+            {
+                "length_mm": 15.2,
+                "radius_mm": 0.35,
+                "bending_stiffness_nmm2": 1.0,
+                "rest_curvature_per_mm": [1 / 12.1, 0.0],
+            },
             {"length_mm": 434.8, "radius_mm": 0.445, "bending_stiffness_nmm2": 12.0},
         ]
     )

@@ -42,9 +42,15 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
     ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         """Begins all episodes. Environment k has the seed ``seed + k``, or ``seed[k]``."""
         if seed is not None:
-            seeds = [seed + k for k in range(self.num_envs)] if isinstance(seed, (int, np.integer)) else list(seed)
+            seeds = (
+                [seed + k for k in range(self.num_envs)]
+                if isinstance(seed, (int, np.integer))
+                else list(seed)
+            )
             if len(seeds) != self.num_envs:
-                raise InputError(f"seed = {len(seeds)} numbers: give one, or one for each of {self.num_envs} environments")
+                raise InputError(
+                    f"seed = {len(seeds)} numbers: give one, or one for each of {self.num_envs} environments"
+                )
             for k, own in enumerate(seeds):
                 if own is not None:
                     self._generators[k] = seeding.np_random(int(own))[0]
@@ -54,14 +60,18 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
 
     def step(
         self, actions: NDArray[np.float32]
-    ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+    ) -> tuple[
+        dict[str, NDArray[Any]], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
+    ]:
         """Moves all by velocities, shape (num_envs, n_instruments, 2): mm/s and rad/s, clipped to the limits.
 
         Raises InputError for actions of another shape; then nothing has moved.
         """
         velocities = np.asarray(actions, dtype=float)
         if velocities.shape != self.action_space.shape:
-            raise InputError(f"actions = an array of shape {velocities.shape}: must have the shape {self.action_space.shape}")
+            raise InputError(
+                f"actions = an array of shape {velocities.shape}: must have the shape {self.action_space.shape}"
+            )
         over = self._over
         self._episodes.step(velocities, ~over)
         rewards = np.where(over, 0.0, self._episodes.rewards())

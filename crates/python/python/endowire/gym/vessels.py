@@ -58,7 +58,9 @@ class FixedVessel:
         """A vessel with the centre line it was generated from, or another one (x, y, z, radius, parent; shape (n, 5))."""
         table = vessel.centreline if centreline is None else np.asarray(centreline, dtype=float)
         if table is None:
-            raise ValueError("centreline = None: give the centre line of a vessel that was not generated from one")
+            raise ValueError(
+                "centreline = None: give the centre line of a vessel that was not generated from one"
+            )
         self.site = Site(vessel, Centreline(table), sheath)
         low, high = vessel.vertices_mm.min(axis=0), vessel.vertices_mm.max(axis=0)
         # Instruments may leave through an opening.
