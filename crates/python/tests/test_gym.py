@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode
 
 import endowire
 import endowire.gym
-from endowire.gym import InsertionVectorEnv, Task, ends, observations, rewards, vessels
+from endowire.gym import InsertionVectorEnv, Task, arches, ends, observations, rewards, vessels
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +108,23 @@ def test_tasks_are_sent_to_other_processes(task):
     assert str(list(rollout(endowire.gym.InsertionEnv(sent), 3, 3))) == str(
         list(rollout(endowire.gym.InsertionEnv(task), 3, 3))
     )
+
+
+def test_arches_vary_and_come_from_their_seed():
+    tables = [arches.arch(np.random.default_rng(seed))[0] for seed in (4, 4, 6)]
+    assert np.array_equal(tables[0], tables[1]) and not np.array_equal(tables[0][-1], tables[2][-1])
+    for table in tables:
+        low, high = arches.ArchVariety.bounds_mm
+        assert (table[:, :3] > low).all() and (table[:, :3] < high).all() and (table[:, 3] > 2.0).all()
+
+
+def test_an_arch_has_its_targets_in_its_branches():
+    variety = arches.ArchVariety(count=1, edge_mm=6.0, seed=4)
+    env = gymnasium.make("endowire/ArchVariety-v0", vessels=variety).unwrapped
+    first, _ = env.reset(seed=1)
+    other, _ = env.reset(seed=2)
+    assert not np.array_equal(first["target_mm"], other["target_mm"])
+    assert env.observation_space.contains(first)
+    for _ in range(5):
+        *_, info = env.step(np.array([[30.0, 1.0]]))
+    assert info["failure"] == "" and info["way_mm"] > 0.0

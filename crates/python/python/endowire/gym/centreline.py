@@ -33,7 +33,8 @@ class Centreline:
 
     def point_mm(self, segment: int, part: float) -> NDArray[np.float64]:
         """A place on the tree."""
-        return self._begin_mm[segment] + part * self._along_mm[segment]
+        point: NDArray[np.float64] = self._begin_mm[segment] + part * self._along_mm[segment]
+        return point
 
     def ways_mm(self, point_mm: NDArray[np.float64]) -> NDArray[np.float64]:
         """Length of the way along the tree from each row to the place nearest to a point, mm, shape (n,)."""

@@ -20,7 +20,7 @@ class TargetSampler(Protocol):
 
 
 class CentrelineTarget:
-    """A point of the centre line, all alike likely, at least so far from the sheath along the way."""
+    """A point of the centre line where the site has targets, all alike likely, at least so far from the sheath along the way."""
 
     def __init__(self, least_mm: float = 50.0) -> None:
         self.least_mm = least_mm
@@ -29,6 +29,8 @@ class CentrelineTarget:
         line = site.centreline
         ways_mm = line.ways_mm(start.tip_mm)
         far = np.minimum(ways_mm[1:], ways_mm[line.parents[1:]]) >= self.least_mm
+        if site.targets is not None:
+            far &= site.targets
         if not far.any():
             raise ValueError(
                 f"least_mm = {self.least_mm}: no point of the centre line is so far from the sheath; "

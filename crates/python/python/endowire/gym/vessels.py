@@ -20,8 +20,16 @@ class Site:
     It never changes, but keeps what is made for it: copies share it, and pickles leave it behind.
     """
 
-    def __init__(self, vessel: Vessel, centreline: Centreline, sheath: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        vessel: Vessel,
+        centreline: Centreline,
+        sheath: Mapping[str, Any],
+        targets: NDArray[np.bool_] | None = None,
+    ) -> None:
         self.vessel, self.centreline, self.sheath = vessel, centreline, dict(sheath)
+        #: Whether targets may lie on each segment of the centre line; anywhere if None.
+        self.targets = targets
         #: Simulations with nothing inserted, by the number of their task: made once and copied for each episode.
         self.starts: dict[int, Simulation] = {}
         self._renderers: dict[str, Renderer] = {}
@@ -37,7 +45,7 @@ class Site:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Site, (self.vessel, self.centreline, self.sheath)
+        return Site, (self.vessel, self.centreline, self.sheath, self.targets)
 
 
 class VesselSource(Protocol):
