@@ -9,6 +9,9 @@ use pyo3::prelude::*;
 use crate::document;
 use crate::error::{InputError, exception};
 
+/// The sections of an instrument, and what it is made of.
+type Pickled<'py> = (Bound<'py, PyAny>, String);
+
 /// A wire or catheter: its sections, tip first.
 #[pyclass(frozen, from_py_object, module = "endowire", name = "Instrument")]
 #[derive(Clone)]
@@ -64,7 +67,7 @@ impl Instrument {
         slf
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyAny>, String))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
         let instrument = slf.get();
         let parts = serde_json::to_string(&instrument.parts)
             .map_err(|e| InputError::new_err(format!("the instrument cannot be written: {e}")))?;

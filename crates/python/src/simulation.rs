@@ -191,8 +191,8 @@ impl Simulation {
     }
 
     /// Arc lengths of these points from the tip, mm, shape (n,).
-    #[getter]
-    fn from_tip_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    #[getter(from_tip_mm)]
+    fn arc_lengths_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.with(py, |simulation| simulation.shape().from_tip_mm.clone()))
     }
 
