@@ -28,6 +28,8 @@ const WORK_RAD: f64 = 0.1;
 const WORK_OF_ONE: usize = 10;
 /// How often the last resort may find nothing in a command; after that what it comes to is taken whatever is left over.
 const RESORTS: usize = 6;
+/// How often a device that came to rest at the end of its way, but in no equilibrium, is let go on from there with the hand held still.
+const AGAIN: usize = 4;
 /// A step is a jump if more than this part of the stored energy was set free.
 const JUMP: f64 = 0.02;
 /// Stored energy below which nothing is called a jump, mJ.
@@ -70,8 +72,11 @@ impl<const C: usize> Workspace<C> {
         let mut share = 1.0f64;
         // Last resorts that found nothing.
         let mut failures = 0;
+        let mut again = AGAIN;
         let mut failure = Cow::from("the way is too long for one step");
-        while done < 1.0 {
+        while done < 1.0 || (!balanced && again > 0) {
+            // What has come to rest without an equilibrium at the end of its way goes on from there.
+            again -= usize::from(done >= 1.0);
             let here = if moved { now.start() } else { Start { mesh, state: from } };
             let rest = 1.0 - done;
             // Where the way is lost, the device is let come to rest as far as the command goes; if it does not, in parts; and in the end
@@ -99,6 +104,8 @@ impl<const C: usize> Workspace<C> {
             substeps += 1;
             if inserted == 0.0 {
                 now.withdraw(tail);
+                now.parts().1.report.rotation_rad = tail;
+                tools.write_report(environment, now);
                 break;
             }
             let resort = if relax { Some(failures == RESORTS) } else { None };
@@ -111,7 +118,7 @@ impl<const C: usize> Workspace<C> {
                     if relax {
                         imbalance = imbalance.max(found.residual.max(found.unsettled));
                     }
-                    balanced &= found.balanced;
+                    balanced = found.balanced;
                     dissipated_mj += found.dissipated_mj;
                     if let Some((opening, beyond)) = left_through(surroundings.wall, &next.state.tip_mm())
                         && beyond > LEAVE_MM
@@ -144,7 +151,6 @@ impl<const C: usize> Workspace<C> {
             tools.refuse_narrower(environment, now, command)?;
         }
         let report = &mut now.parts().1.report;
-        report.rotation_rad = rotation + command.rotate_rad;
         report.iterations = iterations as u32;
         (report.substeps, report.dissipated_mj) = (substeps as u32, dissipated_mj);
         (report.relaxations, report.slides, report.imbalance) = (relaxations, slides, imbalance);
@@ -152,8 +158,6 @@ impl<const C: usize> Workspace<C> {
         report.angles = from.report.angles;
         report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
         report.nodes_frozen = from.report.nodes_frozen + tools.nodes_frozen;
-        tools.write_report(environment, now);
-        let report = &mut now.parts().1.report;
         report.jumped = jumped(&from.report, report, target - start, command.rotate_rad);
         Ok(())
     }

@@ -9,6 +9,7 @@ use super::slide::slide;
 use super::workspace::Tools;
 use super::{Environment, meshed, softest};
 use crate::contact::{HandMotion, SETTLED, WallContact};
+use crate::insertion::StepReport;
 use crate::rod::Supports;
 
 /// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, …
@@ -17,6 +18,15 @@ const SOFTEST: f64 = 30.0;
 const AT_REST: f64 = 0.05;
 /// What is the matter where an equilibrium is on the other side of the wall.
 const PASSED: &str = "the device would pass through the wall";
+/// An equilibrium is on another branch where more energy is stored than the hand gives: than this many times what the larger of its
+/// forces before and after does on the way, …
+const LARGEST_RISE: f64 = 10.0;
+/// … and this part of what was stored before, …
+const RISE_SHARE: f64 = 0.02;
+/// … beyond what is too little to tell, mJ.
+const RISE_FLOOR_MJ: f64 = 1e-3;
+/// What is the matter where it is.
+const STORED: &str = "more energy would be stored than the hand gives";
 /// What is the matter where they do not.
 const UNSETTLED: &str = "friction and wall forces do not settle";
 
@@ -133,10 +143,27 @@ impl<const C: usize> Tools<C> {
         if passed {
             return Err(PASSED.into());
         }
-        self.guess.teach(hand, rod, &mut after.correction);
         let dissipated_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
+        after.report.rotation_rad = tail_rad;
+        self.write_report(environment, next);
+        let (_, after) = next.parts();
+        if rises(&start.state.report, &after.report, dissipated_mj) {
+            return Err(STORED.into());
+        }
+        self.guess.teach(hand, &after.rod, &mut after.correction);
         self.friction.keep(&mut after.forces);
         self.memory.keep(&mut after.known);
         Ok(Found { iterations, slides, dissipated_mj, residual: found.residual, unsettled, balanced })
     }
+}
+
+/// Whether more energy is stored, or taken by friction, than the hand can have put in. A device that was led to the far side of a
+/// crest, or into a corner of the wall that holds it from both sides, is in equilibrium there, at any energy, and nothing leads
+/// there from where it was; shorter steps stay on the branch on which it is.
+fn rises(before: &StepReport, after: &StepReport, dissipated_mj: f64) -> bool {
+    let most = |before: f64, after: f64, way: f64| before.abs().max(after.abs()) * way.abs();
+    let work = most(before.push_force_n, after.push_force_n, after.inserted_mm - before.inserted_mm)
+        + most(before.torque_nmm, after.torque_nmm, after.rotation_rad - before.rotation_rad);
+    let energy = before.energy.total();
+    after.energy.total() + dissipated_mj - energy > LARGEST_RISE * work + RISE_SHARE * energy + RISE_FLOOR_MJ
 }
