@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import count
 from typing import Any
 
 import numpy as np
@@ -14,8 +13,6 @@ from .. import Instrument, Simulation
 from . import ends, observations, rewards
 from .targets import CentrelineTarget, TargetSampler
 from .vessels import Site, VesselSource
-
-_numbers = count()
 
 
 def _observations() -> dict[str, observations.Observation]:
@@ -57,7 +54,6 @@ class Task:
     method: Mapping[str, Any] = field(default_factory=lambda: {"name": "kirchhoff", "element_mm": 5.0})
     #: Keys of `[view]` of a scene file for `render()`.
     view: Mapping[str, Any] = field(default_factory=lambda: {"views": ["3d"], "size_px": [480, 480]})
-    _number: int = field(default_factory=lambda: next(_numbers), init=False, repr=False)
 
     def action_space(self) -> spaces.Box:
         """Velocities of each instrument: push in mm/s, turn in rad/s, shape (n_instruments, 2)."""
@@ -70,12 +66,12 @@ class Task:
 
     def start(self, site: Site) -> Simulation:
         """The simulation of a site with nothing inserted, made once: copy it."""
-        if self._number not in site.starts:
-            site.starts[self._number] = Simulation(
+        if self not in site.starts:
+            site.starts[self] = Simulation(
                 site.vessel,
                 list(self.instruments),
                 wall=dict(self.wall),
                 method=dict(self.method),
                 **site.sheath,
             )
-        return site.starts[self._number]
+        return site.starts[self]

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .. import Renderer, Simulation, Vessel
 from .centreline import Centreline
+
+if TYPE_CHECKING:
+    from .task import Task
 
 
 class Site:
@@ -30,8 +34,8 @@ class Site:
         self.vessel, self.centreline, self.sheath = vessel, centreline, dict(sheath)
         #: Whether targets may lie on each segment of the centre line; anywhere if None.
         self.targets = targets
-        #: Simulations with nothing inserted, by the number of their task: made once and copied for each episode.
-        self.starts: dict[int, Simulation] = {}
+        #: Simulations with nothing inserted, by task: made once and copied for each episode.
+        self.starts: WeakKeyDictionary[Task, Simulation] = WeakKeyDictionary()
         self._renderers: dict[str, Renderer] = {}
 
     def renderer(self, view: Mapping[str, Any]) -> Renderer:
