@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
+use crate::rod::quadrature::hermite;
 
 /// The inserted part of a device, from the sheath to the tip.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -35,8 +36,49 @@ impl Shape {
         self.from_tip_mm.reserve(nodes.saturating_sub(self.from_tip_mm.len()));
     }
 
+    /// The point of the centre line at an arc length from the tip, mm: on the cubic curve through positions and tangents of the nodes
+    /// around it. Beyond either end it is that end; `None` where there is no node.
+    pub fn position_at(&self, from_tip_mm: f64) -> Option<Vec3> {
+        let tip = self.tip_mm()?;
+        // Lengths fall along the nodes: those before `after` are farther from the tip.
+        let after = self.from_tip_mm.partition_point(|s| *s > from_tip_mm);
+        if after == 0 {
+            return self.positions_mm.first().copied();
+        }
+        let Some(end_mm) = self.from_tip_mm.get(after) else { return Some(tip) };
+        let before = after - 1;
+        let h = self.from_tip_mm[before] - end_mm;
+        let [w0, s0, w1, s1] = hermite((self.from_tip_mm[before] - from_tip_mm) / h);
+        let (x, t) = (&self.positions_mm, &self.tangents);
+        Some(x[before] * w0 + x[after] * w1 + (t[before] * s0 + t[after] * s1) * h)
+    }
+
     /// Position of the tip, if anything is inserted.
     pub fn tip_mm(&self) -> Option<Vec3> {
         self.positions_mm.last().copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_between_nodes_lie_on_the_curve() {
+        // Two arcs of a circle of radius 10 mm; the cubic stays within h⁴κ³/384 of an arc.
+        let node = |angle: f64| Vec3::new(10.0 * angle.sin(), 0.0, 10.0 - 10.0 * angle.cos());
+        let angles = [0.0, 0.2, 0.4];
+        let shape = Shape {
+            positions_mm: angles.map(node).to_vec(),
+            tangents: angles.map(|a: f64| Vec3::new(a.cos(), 0.0, a.sin())).to_vec(),
+            from_tip_mm: vec![4.0, 2.0, 0.0],
+        };
+        for (from_tip_mm, angle) in [(4.0, 0.0), (3.0, 0.1), (2.0, 0.2), (0.5, 0.35), (0.0, 0.4)] {
+            let off = (shape.position_at(from_tip_mm).unwrap() - node(angle)).norm();
+            assert!(off < 1e-4, "{from_tip_mm}: {off}");
+        }
+        assert_eq!(shape.position_at(9.0), Some(node(0.0)));
+        assert_eq!(shape.position_at(-1.0), shape.tip_mm());
+        assert_eq!(Shape::default().position_at(1.0), None);
     }
 }

@@ -15,6 +15,7 @@
 
 use std::ops::Range;
 
+use endowire_core::device::Device;
 use endowire_core::shape::Shape;
 use endowire_core::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
@@ -110,6 +111,13 @@ impl DeviceView {
             })
             .collect();
         Self { points, ..Self::default() }
+    }
+
+    /// A device where `shape` says, as thick as its sections, made of `parts`.
+    pub fn of_device(shape: &Shape, device: &Device, parts: &[DevicePart]) -> Self {
+        let mut view = Self::from_shape(shape, |from_tip_mm| device.section_at(from_tip_mm).radius_mm);
+        view.parts.extend_from_slice(parts);
+        view
     }
 
     /// Refines the centre line; empty where there is nothing to draw.

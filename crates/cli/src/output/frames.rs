@@ -5,16 +5,14 @@ use std::path::{Path, PathBuf};
 
 use endowire_core::Error;
 use endowire_core::device::Device;
-use endowire_core::input::from_toml;
 use endowire_core::insertion::Simulation;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_methods::Scene;
 use endowire_viewer::{
     Angiogram, Animation, ContactView, DeviceView, Frames, Image, Moment, Renderer, View, ViewSpec,
-    device_parts,
 };
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 
 use super::manifest::Manifest;
@@ -24,36 +22,6 @@ use super::{print_json, tell, to_json};
 use crate::args::{FrameArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
-
-/// The part of a scene file that is the viewer's; the core reads the rest.
-#[derive(Deserialize)]
-struct ViewTable {
-    #[serde(default)]
-    view: ViewSpec,
-}
-
-/// The `[view]` table of a scene: paths start from its folder, contrast medium flows in the vessel's own tree, and the device is made of
-/// what its file says, unless the table names another.
-fn view_table(path: &Path, scene: &Scene) -> Result<ViewSpec, Failure> {
-    let (ViewTable { view }, _) = from_toml(path)?;
-    let mut view = view.in_folder(path.parent().unwrap_or(Path::new("")));
-    if let (None, Some(tree)) = (&view.flow.tree, &scene.vessel.tree) {
-        view.flow.tree = Some(scene.resolve(tree));
-    }
-    if let (true, Some(named), Some(file)) =
-        (view.device.is_empty(), &scene.device.file, scene.device_file()?)
-    {
-        view.device = device_parts(&file).map_err(|e| Failure::from(e).at(scene.resolve(named).display()))?;
-    }
-    Ok(view)
-}
-
-/// The device as the viewer sees it.
-fn device_view(shape: &Shape, device: &Device, spec: &ViewSpec) -> DeviceView {
-    let mut view = DeviceView::from_shape(shape, |from_tip_mm| device.section_at(from_tip_mm).radius_mm);
-    view.parts.clone_from(&spec.device);
-    view
-}
 
 /// Draws the steps of a run that the scene wants to see.
 pub(crate) struct FrameWriter {
@@ -66,7 +34,7 @@ impl FrameWriter {
     /// Prepares what the scene file asks for.
     pub(crate) fn new(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
-        let spec = view_table(path, scene)?;
+        let spec = ViewSpec::of_scene(scene, path)?;
         spec.validate().map_err(in_scene)?;
         let renderer = if spec.views.is_empty() {
             None
@@ -91,7 +59,7 @@ impl FrameWriter {
     ) -> Result<(), Failure> {
         let due = last || step.is_multiple_of(self.spec.every as usize);
         let Some(renderer) = self.renderer.as_mut().filter(|_| due) else { return Ok(()) };
-        let view = device_view(shape, device, &self.spec);
+        let view = DeviceView::of_device(shape, device, &self.spec.device);
         let moment = Moment { frame: step as u64, time_s: step as f64 / self.spec.frames_per_s };
         let frames = renderer.render_at(&[view], moment)?;
         for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
@@ -173,7 +141,7 @@ impl<'a> Studio<'a> {
         frames: usize,
     ) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
-        let spec = wished(view_table(path, scene)?, args, default)?;
+        let spec = wished(ViewSpec::of_scene(scene, path)?, args, default)?;
         let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
         let device = scene.device().map_err(in_scene)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
@@ -225,7 +193,7 @@ impl<'a> Studio<'a> {
             let part = self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64;
             let azimuth = spec.camera.azimuth_deg.unwrap_or(0.0) + orbit * part;
             spec.camera.azimuth_deg = Some(azimuth % 360.0);
-            let device = device_view(still.shape, &self.device, &self.spec);
+            let device = DeviceView::of_device(still.shape, &self.device, &self.spec.device);
             let mut orbiting = Renderer::new(&spec, &self.wall)?;
             orbiting.show_contacts(still.contacts);
             let three_d = orbiting.render_at(std::slice::from_ref(&device), still.moment)?.three_d;
@@ -235,7 +203,7 @@ impl<'a> Studio<'a> {
             };
             return self.write(still, &Frames { three_d, fluoro });
         }
-        let device = device_view(still.shape, &self.device, &self.spec);
+        let device = DeviceView::of_device(still.shape, &self.device, &self.spec.device);
         self.renderer.show_contacts(still.contacts);
         let frames = self.renderer.render_at(&[device], still.moment)?;
         self.write(still, &frames)
@@ -278,7 +246,7 @@ impl<'a> Studio<'a> {
 
     /// Labels and arrays.
     fn write_data(&mut self, still: &Still) -> Result<(), Failure> {
-        let device = [device_view(still.shape, &self.device, &self.spec)];
+        let device = [DeviceView::of_device(still.shape, &self.device, &self.spec.device)];
         if self.args.labels {
             let contacts: Vec<_> = still.contacts.iter().map(|c| c.position_mm).collect();
             let labels = self.renderer.labels(&device, &contacts)?;

@@ -1,5 +1,6 @@
 //! Pushing, pulling and turning a device through a sheath into a vessel.
 
+mod batch;
 mod builder;
 mod command;
 mod nodes;
@@ -9,6 +10,7 @@ mod simulation;
 
 pub use crate::contact::{Contact, WallProperties, WallRegion};
 pub use crate::methods::State;
+pub use batch::Batch;
 pub use builder::SimulationBuilder;
 pub use command::{Command, ScriptLine, commands};
 pub use nodes::nodes_from_tip;

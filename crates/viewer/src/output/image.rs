@@ -64,6 +64,11 @@ impl Image {
         &self.data
     }
 
+    /// All pixels, without a copy.
+    pub fn into_data(self) -> Vec<u8> {
+        self.data
+    }
+
     /// The bytes of the pixel in column `x` and row `y`, or `None` outside the picture.
     pub fn pixel(&self, x: u32, y: u32) -> Option<&[u8]> {
         if x >= self.width || y >= self.height {

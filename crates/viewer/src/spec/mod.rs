@@ -2,6 +2,7 @@
 
 mod anatomy;
 mod c_arm;
+mod of_scene;
 mod xray;
 
 use std::path::Path;

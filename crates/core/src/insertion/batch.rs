@@ -1,0 +1,110 @@
+//! Many insertions stepped side by side, each as if it were alone.
+
+use rayon::iter::{
+    IndexedParallelIterator, IntoParallelRefIterator, IntoParallelRefMutIterator, ParallelIterator,
+};
+
+use crate::insertion::{Command, Simulation};
+use crate::{Error, Result};
+
+/// Simulations that are stepped on all cores, or on as many threads as `RAYON_NUM_THREADS` says.
+///
+/// Each has its own state and shares what clones share: a thousand clones of one simulation hold one vessel. What comes out is to the bit
+/// what stepping one after the other gives.
+#[derive(Clone, Default)]
+pub struct Batch {
+    simulations: Vec<Simulation>,
+}
+
+impl Batch {
+    /// A batch of these, in this order. They may differ in everything.
+    pub fn new(simulations: Vec<Simulation>) -> Self {
+        Self { simulations }
+    }
+
+    /// The simulations.
+    pub fn simulations(&self) -> &[Simulation] {
+        &self.simulations
+    }
+
+    /// The simulations, to restore, exchange or step one by one.
+    pub fn simulations_mut(&mut self) -> &mut [Simulation] {
+        &mut self.simulations
+    }
+
+    /// Carries out one command in each simulation. One that fails is left as it was and does not concern the others: what
+    /// [`Simulation::step`] says of it stands in its place.
+    ///
+    /// A command that moves nothing ([`Command::default`]) costs nothing: for those that wait.
+    ///
+    /// # Errors
+    /// As many commands as simulations are wanted ([`Error::Parameter`]); otherwise nothing is stepped.
+    pub fn step(&mut self, commands: &[Command]) -> Result<Vec<Result<()>>> {
+        if commands.len() != self.simulations.len() {
+            let mend = format!("give one for each of the {} simulations", self.simulations.len());
+            return Err(Error::parameter("commands", commands.len(), mend));
+        }
+        // Threads are started for many, and not for one: a program may have to fork.
+        if let ([simulation], [command]) = (&mut self.simulations[..], commands) {
+            return Ok(vec![simulation.step(*command).map(drop)]);
+        }
+        // Steps differ in length by orders of magnitude: each is a piece of work of its own.
+        let each = self.simulations.par_iter_mut().zip(commands.par_iter()).with_max_len(1);
+        Ok(each.map(|(simulation, command)| simulation.step(*command).map(drop)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::{Device, Section};
+    use crate::insertion::{Sheath, WallProperties};
+    use crate::vessel::{GeneratedWall, Resolution, anatomy};
+
+    fn simulation() -> Simulation {
+        let tree = anatomy::tree("curved_tube").unwrap();
+        let vessel = GeneratedWall::new(&tree, Resolution::EdgeMm(2.0)).unwrap();
+        let sheath = Sheath::at_opening(&vessel.wall, vessel.inlet, 1.0).unwrap();
+        let tip = Section { rest_curvature_per_mm: [0.05, 0.0], ..Section::straight(20.0, 0.45, 5.0) };
+        let wire = Device::new(vec![tip, Section::straight(180.0, 0.45, 20.0)]).unwrap();
+        let rough = WallProperties { friction: 0.1, ..WallProperties::default() };
+        Simulation::builder(vessel.wall, wire, sheath).properties(rough).build().unwrap()
+    }
+
+    /// What environment `k` does in its `step`th step.
+    fn command(k: usize, step: usize) -> Command {
+        Command { advance_mm: 1.0 + 0.25 * k as f64, rotate_rad: 0.1 * ((k + step) % 5) as f64 }
+    }
+
+    #[test]
+    fn a_batch_gives_the_bits_of_one_by_one() {
+        let start = simulation();
+        let mut alone = vec![start.clone(); 5];
+        let mut batch = Batch::new(alone.clone());
+        for step in 0..40 {
+            let commands: Vec<Command> = (0..5).map(|k| command(k, step)).collect();
+            let told = batch.step(&commands).unwrap();
+            for (k, (one, told)) in alone.iter_mut().zip(told).enumerate() {
+                assert_eq!(one.step(commands[k]).is_ok(), told.is_ok());
+                assert_eq!(one.shape(), batch.simulations()[k].shape());
+                assert_eq!(one.report(), batch.simulations()[k].report());
+            }
+        }
+        assert!(alone.iter().any(|one| !one.report().contacts.is_empty()));
+    }
+
+    #[test]
+    fn one_that_fails_stays_as_it_was_and_the_others_go_on() {
+        let mut batch = Batch::new(vec![simulation(); 3]);
+        batch.step(&[Command::advance(5.0); 3]).unwrap();
+        let before = batch.simulations()[1].shape().clone();
+        let commands = [Command::advance(1.0), Command::advance(f64::NAN), Command::advance(2.0)];
+        let told = batch.step(&commands).unwrap();
+        assert!(told[0].is_ok() && told[2].is_ok());
+        assert!(told[1].as_ref().is_err_and(|e| e.to_string().contains("advance_mm = NaN")));
+        assert_eq!(batch.simulations()[1].shape(), &before);
+        assert_eq!(batch.simulations()[2].report().inserted_mm, 7.0);
+        let refused = batch.step(&commands[..2]).unwrap_err().to_string();
+        assert!(refused.contains("commands = 2") && refused.contains("3 simulations"), "{refused}");
+    }
+}

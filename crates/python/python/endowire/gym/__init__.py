@@ -1,0 +1,37 @@
+"""Environments for Gymnasium 1.0 and later, composed of parts that can be replaced.
+
+``import endowire.gym`` registers the ids ``endowire/CurvedTube-v0``, ``endowire/AorticArch-v0`` and ``endowire/ArchVariety-v0``; ``gymnasium.make`` and
+``gymnasium.make_vec`` take every part of a `Task` as a keyword.
+"""
+
+from gymnasium import register as _register
+
+from . import arches, ends, observations, rewards, targets, vessels
+from .centreline import Centreline
+from .environment import InsertionEnv
+from .episodes import Episodes
+from .task import Task
+from .tasks import TASKS as _TASKS
+from .vector import InsertionVectorEnv
+
+__all__ = [
+    "Centreline",
+    "Episodes",
+    "InsertionEnv",
+    "InsertionVectorEnv",
+    "Task",
+    "arches",
+    "ends",
+    "observations",
+    "rewards",
+    "targets",
+    "vessels",
+]
+
+for _task in _TASKS:
+    _register(
+        id=f"endowire/{_task}-v0",
+        entry_point="endowire.gym.tasks:make_env",
+        vector_entry_point="endowire.gym.tasks:make_vector_env",
+        kwargs={"task": _task},
+    )

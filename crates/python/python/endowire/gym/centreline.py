@@ -1,0 +1,65 @@
+"""Ways along the centre line of a vessel."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Centreline:
+    """A tree of points, each joined to its parent.
+
+    ``table`` has the shape (n, 5): x, y, z and radius in mm, and the row of the parent, which comes before; -1 for the root.
+    """
+
+    def __init__(self, table: NDArray[np.float64]) -> None:
+        self.positions_mm = np.ascontiguousarray(table[:, :3])
+        self.radii_mm = table[:, 3].copy()
+        self.parents = table[:, 4].astype(int)
+        # Segment k joins row k + 1 to its parent.
+        self._begin_mm = self.positions_mm[self.parents[1:]]
+        self._along_mm = self.positions_mm[1:] - self._begin_mm
+        self.lengths_mm = np.linalg.norm(self._along_mm, axis=1)
+        self._squares = self.lengths_mm**2
+
+    def nearest(self, point_mm: NDArray[np.float64]) -> tuple[int, float, float]:
+        """The place on the tree nearest to a point: segment, part of it (0 at the parent, 1 at the row), distance in mm."""
+        to_point = point_mm - self._begin_mm
+        part = np.clip(np.einsum("ij,ij->i", to_point, self._along_mm) / self._squares, 0.0, 1.0)
+        off = to_point - part[:, None] * self._along_mm
+        squared = np.einsum("ij,ij->i", off, off)
+        segment = int(np.argmin(squared))
+        return segment, float(part[segment]), float(np.sqrt(squared[segment]))
+
+    def point_mm(self, segment: int, part: float) -> NDArray[np.float64]:
+        """A place on the tree."""
+        point: NDArray[np.float64] = self._begin_mm[segment] + part * self._along_mm[segment]
+        return point
+
+    def ways_mm(self, point_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Length of the way along the tree from each row to the place nearest to a point, mm, shape (n,)."""
+        segment, part, _ = self.nearest(point_mm)
+        ways = np.full(len(self.parents), np.inf)
+        ways[segment + 1] = (1.0 - part) * self.lengths_mm[segment]
+        ways[self.parents[segment + 1]] = part * self.lengths_mm[segment]
+        # Towards the root, then away from it: parents come before their children.
+        for row in range(len(ways) - 1, 0, -1):
+            parent = self.parents[row]
+            ways[parent] = min(ways[parent], ways[row] + self.lengths_mm[row - 1])
+        for row in range(1, len(ways)):
+            ways[row] = min(ways[row], ways[self.parents[row]] + self.lengths_mm[row - 1])
+        return ways
+
+    def way_mm(self, ways_mm: NDArray[np.float64], point_mm: NDArray[np.float64]) -> float:
+        """Length of the way from the place nearest to a point to the end that ``ways_mm`` lead to, mm.
+
+        On the segment of the end itself it is up to twice too long, and continuous.
+        """
+        segment, part, _ = self.nearest(point_mm)
+        length = self.lengths_mm[segment]
+        return float(
+            min(
+                ways_mm[segment + 1] + (1.0 - part) * length,
+                ways_mm[self.parents[segment + 1]] + part * length,
+            )
+        )

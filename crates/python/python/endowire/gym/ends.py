@@ -1,0 +1,52 @@
+"""When an episode ends."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .episodes import Episodes
+
+
+class End(Protocol):
+    """One reason for an episode to end. A simulation that fails ends it too."""
+
+    #: Whether the task itself ends (terminated), or only the watching (truncated).
+    terminates: bool
+
+    def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
+        """Whether it holds, for all environments, shape (n,)."""
+        ...
+
+
+class TargetReached:
+    """The tip is at the target."""
+
+    terminates = True
+
+    def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
+        return episodes.reached
+
+
+class LeftVessel:
+    """The tip has left the vessel through an opening."""
+
+    terminates = False
+
+    def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
+        return episodes.batch.left_through >= 0
+
+
+class StepLimit:
+    """So many steps were made."""
+
+    terminates = False
+
+    def __init__(self, steps: int = 1000) -> None:
+        self.steps = steps
+
+    def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
+        return episodes.steps >= self.steps

@@ -1,0 +1,63 @@
+"""One environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import InputError
+from .episodes import Episodes
+from .pictures import picture
+from .task import Task
+
+
+class InsertionEnv(gymnasium.Env[dict[str, NDArray[Any]], NDArray[np.float32]]):
+    """A task as an environment of Gymnasium."""
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 8}
+
+    def __init__(self, task: Task, render_mode: str | None = None) -> None:
+        self.task, self.render_mode = task, render_mode
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / task.control_period_s))}
+        self._episodes = Episodes(task, 1)
+        self.action_space = self._episodes.action_space
+        self.observation_space = self._episodes.observation_space
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        super().reset(seed=seed)
+        self._episodes.begin({0: self.np_random})
+        return self._observation(), self._info()
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[dict[str, NDArray[Any]], float, bool, bool, dict[str, Any]]:
+        """Moves by velocities, shape (n_instruments, 2): mm/s and rad/s, clipped to the limits.
+
+        Raises InputError for an action of another shape, and for one that is not finite; then nothing has moved.
+        """
+        velocities = np.asarray(action, dtype=float)
+        if velocities.shape != self.action_space.shape:
+            raise InputError(
+                f"action = an array of shape {velocities.shape}: must have the shape {self.action_space.shape}"
+            )
+        if not np.isfinite(velocities).all():
+            raise InputError(f"action = {velocities.tolist()}: every number must be finite")
+        self._episodes.step(velocities[None], np.array([True]))
+        terminated, truncated = self._episodes.ended()
+        reward = float(self._episodes.rewards()[0])
+        return self._observation(), reward, bool(terminated[0]), bool(truncated[0]), self._info()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """The picture of the task's view, shape (height, width, 3), with ``render_mode="rgb_array"``."""
+        return picture(self._episodes, 0) if self.render_mode == "rgb_array" else None
+
+    def _observation(self) -> dict[str, NDArray[Any]]:
+        return {name: values[0] for name, values in self._episodes.observe().items()}
+
+    def _info(self) -> dict[str, Any]:
+        return {name: values[0] for name, values in self._episodes.info().items()}

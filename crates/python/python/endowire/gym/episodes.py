@@ -1,0 +1,129 @@
+"""Episodes that run side by side: what the environments of a vector have in common. A single environment is a vector of one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from .. import Batch, EndOfWay, EndowireError
+from .task import Task
+from .vessels import Site
+
+#: Frames of an episode, at most: each has a noise of its own.
+_FRAMES = 1 << 20
+
+
+class Episodes:
+    """The episodes of ``n`` environments. Parts of a task read its attributes; arrays have n rows."""
+
+    def __init__(self, task: Task, n: int) -> None:
+        self.task = task
+        self.action_space = task.action_space()
+        self._spaces = task.observation_spaces()
+        self.observation_space = spaces.Dict(self._spaces)
+        instruments = len(task.instruments)
+        self._lengths_mm = np.array([instrument.length_mm for instrument in task.instruments])
+        #: The simulations.
+        self.batch: Batch = Batch([])
+        #: The site of each.
+        self.sites: list[Site] = []
+        #: Where the tip shall go, mm, shape (n, 3).
+        self.target_mm = np.zeros((n, 3))
+        #: Where it is, mm, shape (n, 3).
+        self.tip_mm = np.zeros((n, 3))
+        #: Way along the centre line to the target, mm, shape (n,), now and before the last step.
+        self.way_mm, self.way_before_mm = np.zeros(n), np.zeros(n)
+        #: Whether the tip is at the target, shape (n,).
+        self.reached = np.zeros(n, dtype=bool)
+        #: Steps made, shape (n,).
+        self.steps = np.zeros(n, dtype=int)
+        #: Number of the frame that shows it, shape (n,): seeds the noise of pictures.
+        self.frame = np.zeros(n, dtype=np.int64)
+        #: Last actions within the limits, shape (n, n_instruments, 2).
+        self.action = np.zeros((n, instruments, 2))
+        #: What went wrong in the last step: exceptions by environment.
+        self.failures: dict[int, EndowireError] = {}
+        self._ways_mm: list[NDArray[np.float64]] = [np.zeros(0)] * n
+
+    def begin(self, generators: dict[int, np.random.Generator]) -> None:
+        """Begins episodes of these environments; everything random comes from their generators."""
+        sampled = {k: self.task.vessels.sample(rng) for k, rng in generators.items()}
+        starts = {k: self.task.start(site) for k, site in sampled.items()}
+        if not self.sites:
+            self.batch = Batch([starts[k] for k in sorted(starts)])
+            self.sites = [sampled[k] for k in sorted(sampled)]
+        for k, rng in generators.items():
+            site, simulation = sampled[k], starts[k].copy()
+            # A shaped tip comes out of the sheath at any roll.
+            simulation.step(rotate_rad=[rng.uniform(0.0, 2.0 * np.pi) for _ in self.task.instruments])
+            self.batch.replace(k, simulation)
+            self.sites[k] = site
+            self.target_mm[k] = self.task.target.sample(rng, site, starts[k])
+            self._ways_mm[k] = site.centreline.ways_mm(self.target_mm[k])
+            self.frame[k] = int(rng.integers(1 << 30)) * _FRAMES
+            self.steps[k], self.action[k] = 0, 0.0
+            self.failures.pop(k, None)
+        self._look()
+        for k in generators:
+            self.way_before_mm[k] = self.way_mm[k]
+
+    def step(self, actions: NDArray[np.float64], moving: NDArray[np.bool_]) -> None:
+        """Moves those environments by velocities, shape (n, n_instruments, 2); the others wait."""
+        limits = self.action_space.high
+        self.action = np.where(moving[:, None, None], np.clip(actions, -limits, limits), self.action)
+        moves = self.action * self.task.control_period_s
+        # Nothing is pushed in beyond its end or pulled out of the sheath.
+        inserted_mm = self.batch.inserted_mm
+        moves[..., 0] = np.clip(moves[..., 0], -inserted_mm, self._lengths_mm - inserted_mm)
+        moves[~moving] = 0.0
+        told = self.batch.step(moves)
+        # Where the way ends an instrument stays, and may be pulled back.
+        self.failures = {k: failure for k, failure in told.items() if not isinstance(failure, EndOfWay)}
+        self.steps += moving
+        self.frame += moving
+        self.way_before_mm = self.way_mm.copy()
+        self._look()
+
+    def observe(self) -> dict[str, NDArray[Any]]:
+        """All parts of the observations, within their spaces."""
+        observed = {}
+        for name, part in self.task.observations.items():
+            space = self._spaces[name]
+            values = part.observe(self)
+            observed[name] = (
+                values
+                if values.dtype == np.uint8
+                else np.clip(values, space.low, space.high).astype(space.dtype)
+            )
+        return observed
+
+    def rewards(self) -> NDArray[np.float64]:
+        """The sum of all parts of the reward, shape (n,)."""
+        return sum((part.reward(self) for part in self.task.rewards), np.zeros(len(self.sites)))
+
+    def ended(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Terminated and truncated, shape (n,); one that failed is truncated."""
+        n = len(self.sites)
+        terminated, truncated = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        for end in self.task.ends:
+            (terminated if end.terminates else truncated).__ior__(end.ended(self))
+        truncated[list(self.failures)] = True
+        return terminated, truncated
+
+    def info(self) -> dict[str, NDArray[Any]]:
+        """What is told beside the observations, a row for each environment."""
+        failed = np.array([str(self.failures.get(k, "")) for k in range(len(self.sites))], dtype=object)
+        return {"reached": self.reached.copy(), "way_mm": self.way_mm.copy(), "failure": failed}
+
+    def _look(self) -> None:
+        self.tip_mm = self.batch.tip_mm
+        self.reached = np.linalg.norm(self.tip_mm - self.target_mm, axis=1) < self.task.threshold_mm
+        self.way_mm = np.array(
+            [
+                site.centreline.way_mm(ways, tip)
+                for site, ways, tip in zip(self.sites, self._ways_mm, self.tip_mm, strict=True)
+            ]
+        )

@@ -1,0 +1,146 @@
+"""What is observed: parts of a dictionary, each with its space. All work on all environments of a vector at once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .episodes import Episodes
+    from .task import Task
+
+
+class Observation(Protocol):
+    """One part of the observations."""
+
+    def space(self, task: Task) -> spaces.Box:
+        """The space of one environment."""
+        ...
+
+    def observe(self, episodes: Episodes) -> NDArray[Any]:
+        """The part for all environments, shape (n, *space.shape)."""
+        ...
+
+
+def _place(task: Task, *shape: int) -> spaces.Box:
+    """Positions within the box of the vessels, mm."""
+    low, high = (np.broadcast_to(corner, (*shape, 3)).astype(np.float32) for corner in task.vessels.bounds_mm)
+    return spaces.Box(low, high, dtype=np.float32)
+
+
+class Tip:
+    """Position of the tip, mm, shape (3,)."""
+
+    def space(self, task: Task) -> spaces.Box:
+        return _place(task)
+
+    def observe(self, episodes: Episodes) -> NDArray[np.float64]:
+        return episodes.tip_mm
+
+
+class Target:
+    """Position of the target, mm, shape (3,)."""
+
+    def space(self, task: Task) -> spaces.Box:
+        return _place(task)
+
+    def observe(self, episodes: Episodes) -> NDArray[np.float64]:
+        return episodes.target_mm
+
+
+class Shape:
+    """Points of the centre line at arc lengths from the tip, mm, shape (len(from_tip_mm), 3)."""
+
+    def __init__(self, from_tip_mm: tuple[float, ...] = (0.0, 2.0, 4.0, 8.0, 16.0, 32.0)) -> None:
+        self.from_tip_mm = np.asarray(from_tip_mm, dtype=float)
+
+    def space(self, task: Task) -> spaces.Box:
+        return _place(task, len(self.from_tip_mm))
+
+    def observe(self, episodes: Episodes) -> NDArray[np.float64]:
+        return episodes.batch.points_mm(self.from_tip_mm)
+
+
+class Hands:
+    """Inserted length in mm and turn of the tail as cosine and sine, shape (n_instruments, 3)."""
+
+    def space(self, task: Task) -> spaces.Box:
+        lengths = [[instrument.length_mm, 1.0, 1.0] for instrument in task.instruments]
+        high = np.asarray(lengths, dtype=np.float32)
+        low = high * np.array([0.0, -1.0, -1.0], dtype=np.float32)
+        return spaces.Box(low, high, dtype=np.float32)
+
+    def observe(self, episodes: Episodes) -> NDArray[np.float64]:
+        turn = episodes.batch.rotation_rad
+        return np.stack([episodes.batch.inserted_mm, np.cos(turn), np.sin(turn)], axis=-1)
+
+
+class Forces:
+    """Push force in N and torque in N·mm of each hand, and the largest force of a contact in N: shape (2 n_instruments + 1,).
+
+    Values beyond ``largest`` are shown as it.
+    """
+
+    def __init__(self, largest: float = 100.0) -> None:
+        self.largest = largest
+
+    def space(self, task: Task) -> spaces.Box:
+        return spaces.Box(-self.largest, self.largest, (2 * len(task.instruments) + 1,), dtype=np.float32)
+
+    def observe(self, episodes: Episodes) -> NDArray[np.float64]:
+        batch = episodes.batch
+        contact = batch.largest_contact_force_n[:, None]
+        return np.concatenate([batch.push_force_n, batch.torque_nmm, contact], axis=1)
+
+
+class LastAction:
+    """The action before, within its limits, shape (n_instruments, 2)."""
+
+    def space(self, task: Task) -> spaces.Box:
+        return task.action_space()
+
+    def observe(self, episodes: Episodes) -> NDArray[np.float64]:
+        return episodes.action
+
+
+class Fluoroscopy:
+    """The fluoroscopic picture of one plane or more, 8 bits, shape (planes, height, width).
+
+    ``planes`` are the primary and secondary angles of the C-arm in degrees; ``view`` has further keys of `[view]` of a scene file.
+    The detector has no lag: environments share it.
+    """
+
+    def __init__(
+        self,
+        planes: tuple[tuple[float, float], ...] = ((0.0, 0.0),),
+        size_px: tuple[int, int] = (128, 128),
+        view: dict[str, Any] | None = None,
+    ) -> None:
+        self.planes = planes
+        self.size_px = size_px
+        self.view = dict(view or {})
+
+    def space(self, task: Task) -> spaces.Box:
+        width, height = self.size_px
+        return spaces.Box(0, 255, (len(self.planes), height, width), dtype=np.uint8)
+
+    def observe(self, episodes: Episodes) -> NDArray[np.uint8]:
+        width, height = self.size_px
+        pictures = np.empty((len(episodes.sites), len(self.planes), height, width), dtype=np.uint8)
+        views = [self._view(*angles) for angles in self.planes]
+        for k, site in enumerate(episodes.sites):
+            simulation, frame = episodes.batch.simulation(k), int(episodes.frame[k])
+            for p, view in enumerate(views):
+                picture = site.renderer(view).render(simulation, frame).fluoro
+                assert picture is not None
+                pictures[k, p] = picture
+        return pictures
+
+    def _view(self, primary_deg: float, secondary_deg: float) -> dict[str, Any]:
+        view = {**self.view, "views": ["fluoro"], "size_px": list(self.size_px), "bits": 8}
+        view["detector"] = {**view.get("detector", {}), "lag": 0.0}
+        view["c_arm"] = {**view.get("c_arm", {}), "primary_deg": primary_deg, "secondary_deg": secondary_deg}
+        return view

@@ -1,0 +1,18 @@
+"""Pictures for people."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .episodes import Episodes
+
+
+def picture(episodes: Episodes, k: int) -> NDArray[np.uint8]:
+    """Environment ``k`` in its task's view, shape (height, width, 3): in 3D where that is asked for, else in fluoroscopy."""
+    renderer = episodes.sites[k].renderer({**episodes.task.view, "bits": 8})
+    frames = renderer.render(episodes.batch.simulation(k), int(episodes.frame[k]))
+    if frames.three_d is not None:
+        return np.ascontiguousarray(frames.three_d[..., :3])
+    assert frames.fluoro is not None
+    return np.repeat(frames.fluoro[..., None], 3, axis=2)

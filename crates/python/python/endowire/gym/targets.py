@@ -1,0 +1,55 @@
+"""Where the tip shall go."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import Simulation
+from .vessels import Site
+
+
+class TargetSampler(Protocol):
+    """Gives each episode its target."""
+
+    def sample(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
+        """A point in the vessel, mm, shape (3,); all that is random in it comes from ``rng``. In ``start`` nothing is inserted."""
+        ...
+
+
+class CentrelineTarget:
+    """A point of the centre line where the site has targets, all alike likely, at least so far from the sheath along the way."""
+
+    def __init__(self, least_mm: float = 50.0) -> None:
+        self.least_mm = least_mm
+
+    def sample(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
+        line = site.centreline
+        ways_mm = line.ways_mm(start.tip_mm)
+        far = np.minimum(ways_mm[1:], ways_mm[line.parents[1:]]) >= self.least_mm
+        if site.targets is not None:
+            far &= site.targets
+        if not far.any():
+            raise ValueError(
+                f"least_mm = {self.least_mm}: no point of the centre line is so far from the sheath; "
+                f"the farthest is {ways_mm.max():.1f} mm away"
+            )
+        segments = np.flatnonzero(far)
+        ends_mm = np.cumsum(line.lengths_mm[segments])
+        at_mm = rng.uniform(0.0, ends_mm[-1])
+        k = min(int(np.searchsorted(ends_mm, at_mm, side="right")), len(segments) - 1)
+        segment = int(segments[k])
+        part = 1.0 - (ends_mm[k] - at_mm) / line.lengths_mm[segment]
+        return line.point_mm(segment, float(np.clip(part, 0.0, 1.0)))
+
+
+class FixedTarget:
+    """The same point in every episode, mm."""
+
+    def __init__(self, position_mm: tuple[float, float, float]) -> None:
+        self.position_mm = np.asarray(position_mm, dtype=float)
+
+    def sample(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
+        return self.position_mm

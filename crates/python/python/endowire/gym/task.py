@@ -1,0 +1,77 @@
+"""What an environment is made of: every part may be replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from .. import Instrument, Simulation
+from . import ends, observations, rewards
+from .targets import CentrelineTarget, TargetSampler
+from .vessels import Site, VesselSource
+
+
+def _observations() -> dict[str, observations.Observation]:
+    return {
+        "tip_mm": observations.Tip(),
+        "shape_mm": observations.Shape(),
+        "target_mm": observations.Target(),
+        "forces": observations.Forces(),
+    }
+
+
+def _rewards() -> list[rewards.Reward]:
+    return [rewards.Reached(), rewards.EachStep(), rewards.Approach()]
+
+
+def _ends() -> list[ends.End]:
+    return [ends.TargetReached(), ends.LeftVessel(), ends.StepLimit()]
+
+
+@dataclass(eq=False)
+class Task:
+    """Instruments in a vessel, a target, and what is observed, worth and the end."""
+
+    instruments: Sequence[Instrument]
+    vessels: VesselSource
+    target: TargetSampler = field(default_factory=CentrelineTarget)
+    observations: Mapping[str, observations.Observation] = field(default_factory=_observations)
+    rewards: Sequence[rewards.Reward] = field(default_factory=_rewards)
+    ends: Sequence[ends.End] = field(default_factory=_ends)
+    #: How near the tip comes to a target that it reaches, mm.
+    threshold_mm: float = 5.0
+    #: Time between two actions, s.
+    control_period_s: float = 1.0 / 7.5
+    #: Fastest push in mm/s and turn in rad/s of a hand.
+    speed_limits: tuple[float, float] = (35.0, 3.14)
+    #: Keys of `[vessel.wall]` of a scene file.
+    wall: Mapping[str, Any] = field(default_factory=dict)
+    #: Keys of `[method]` of a scene file.
+    method: Mapping[str, Any] = field(default_factory=lambda: {"name": "kirchhoff", "element_mm": 5.0})
+    #: Keys of `[view]` of a scene file for `render()`.
+    view: Mapping[str, Any] = field(default_factory=lambda: {"views": ["3d"], "size_px": [480, 480]})
+
+    def action_space(self) -> spaces.Box:
+        """Velocities of each instrument: push in mm/s, turn in rad/s, shape (n_instruments, 2)."""
+        high = np.tile(np.asarray(self.speed_limits, dtype=np.float32), (len(self.instruments), 1))
+        return spaces.Box(-high, high, dtype=np.float32)
+
+    def observation_spaces(self) -> dict[str, spaces.Box]:
+        """The space of each part of the observations."""
+        return {name: part.space(self) for name, part in self.observations.items()}
+
+    def start(self, site: Site) -> Simulation:
+        """The simulation of a site with nothing inserted, made once: copy it."""
+        if self not in site.starts:
+            site.starts[self] = Simulation(
+                site.vessel,
+                list(self.instruments),
+                wall=dict(self.wall),
+                method=dict(self.method),
+                **site.sheath,
+            )
+        return site.starts[self]

@@ -1,0 +1,94 @@
+"""Many environments in one: stepped on all cores, in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from .. import InputError
+from .episodes import Episodes
+from .pictures import picture
+from .task import Task
+
+
+class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32], NDArray[Any]]):
+    """``num_envs`` environments of a task. Environment k does to the bit what `InsertionEnv` does with the same seed.
+
+    An environment whose episode has ended begins a new one in the next step, whose action it does not look at (AutoresetMode.NEXT_STEP).
+    What fails in one is told in ``info["failure"]`` and truncates its episode; the others go on.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 8, "autoreset_mode": AutoresetMode.NEXT_STEP}
+
+    def __init__(self, task: Task, num_envs: int = 1, render_mode: str | None = None) -> None:
+        super().__init__()
+        self.task, self.num_envs, self.render_mode = task, num_envs, render_mode
+        self._episodes = Episodes(task, num_envs)
+        self.single_action_space = self._episodes.action_space
+        self.single_observation_space = self._episodes.observation_space
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
+        self._over = np.zeros(num_envs, dtype=bool)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Begins all episodes. Environment k has the seed ``seed + k``, or ``seed[k]``."""
+        if seed is not None:
+            seeds = (
+                [seed + k for k in range(self.num_envs)]
+                if isinstance(seed, (int, np.integer))
+                else list(seed)
+            )
+            if len(seeds) != self.num_envs:
+                raise InputError(
+                    f"seed = {len(seeds)} numbers: give one, or one for each of {self.num_envs} environments"
+                )
+            for k, own in enumerate(seeds):
+                if own is not None:
+                    self._generators[k] = seeding.np_random(int(own))[0]
+        self._episodes.begin(dict(enumerate(self._generators)))
+        self._over[:] = False
+        return self._episodes.observe(), self._info()
+
+    def step(
+        self, actions: NDArray[np.float32]
+    ) -> tuple[
+        dict[str, NDArray[Any]], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
+    ]:
+        """Moves all by velocities, shape (num_envs, n_instruments, 2): mm/s and rad/s, clipped to the limits.
+
+        Raises InputError for actions of another shape; then nothing has moved.
+        """
+        velocities = np.asarray(actions, dtype=float)
+        if velocities.shape != self.action_space.shape:
+            raise InputError(
+                f"actions = an array of shape {velocities.shape}: must have the shape {self.action_space.shape}"
+            )
+        over = self._over
+        self._episodes.step(velocities, ~over)
+        rewards = np.where(over, 0.0, self._episodes.rewards())
+        terminated, truncated = (ended & ~over for ended in self._episodes.ended())
+        if over.any():
+            self._episodes.begin({int(k): self._generators[k] for k in np.flatnonzero(over)})
+        self._over = terminated | truncated
+        return self._episodes.observe(), rewards, terminated, truncated, self._info()
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """The pictures of all environments, with ``render_mode="rgb_array"``."""
+        if self.render_mode != "rgb_array":
+            return None
+        return tuple(picture(self._episodes, k) for k in range(self.num_envs))
+
+    def _info(self) -> dict[str, Any]:
+        info: dict[str, Any] = {}
+        for name, values in self._episodes.info().items():
+            info[name], info[f"_{name}"] = values, np.ones(self.num_envs, dtype=bool)
+        return info

@@ -1,0 +1,212 @@
+//! Many simulations, stepped side by side.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use endowire_core::insertion;
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::exceptions::PyIndexError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{Numbers, array, numbers, points};
+use crate::error::exception;
+use crate::instrument::Instrument;
+use crate::moves::{INSTRUMENTS, Moves, commands};
+use crate::simulation::{Simulation, points_at, tip_mm};
+use crate::state::State;
+
+/// Simulations stepped side by side on all cores (or on RAYON_NUM_THREADS threads), each to the bit as if it were alone.
+#[pyclass(frozen, module = "endowire", name = "Batch")]
+pub(crate) struct Batch {
+    inner: Mutex<Members>,
+}
+
+struct Members {
+    batch: insertion::Batch,
+    instruments: Vec<std::sync::Arc<[Instrument]>>,
+}
+
+impl Batch {
+    /// Does something with the members, without the interpreter.
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut Members) -> T + Send) -> T {
+        py.detach(|| {
+            let mut members: MutexGuard<'_, Members> =
+                self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+            work(&mut members)
+        })
+    }
+
+    /// Does something with one of them; a negative index counts from the end.
+    fn at<T: Send>(
+        &self,
+        py: Python<'_>,
+        index: isize,
+        work: impl FnOnce(&mut Members, usize) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
+        self.with(py, |members| {
+            let count = members.instruments.len();
+            let place = if index < 0 { index.checked_add_unsigned(count) } else { Some(index) };
+            match place.and_then(|place| usize::try_from(place).ok()).filter(|place| *place < count) {
+                Some(place) => work(members, place),
+                None => Err(PyIndexError::new_err(format!("{index}: the batch has {count} simulations"))),
+            }
+        })
+    }
+
+    /// A number of each report.
+    fn of_each<'py, T: numpy::Element + Send>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&insertion::StepReport) -> T + Send + Sync,
+    ) -> Bound<'py, PyArray1<T>> {
+        let list = self.with(py, |members| {
+            members.batch.simulations().iter().map(|s| of(s.report())).collect::<Vec<T>>()
+        });
+        PyArray1::from_vec(py, list)
+    }
+
+    /// A number of each hand.
+    fn of_hands<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&insertion::StepReport) -> f64 + Send + Sync,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let list: Vec<f64> =
+            self.with(py, |members| members.batch.simulations().iter().map(|s| of(s.report())).collect());
+        let rows = list.len();
+        array(py, list, [rows, INSTRUMENTS])
+    }
+}
+
+#[pymethods]
+impl Batch {
+    /// A batch of copies of simulations, in this order. They may differ in everything.
+    #[new]
+    fn new(py: Python<'_>, simulations: Vec<Py<Simulation>>) -> Self {
+        let copied = simulations.iter().map(|one| {
+            let one = one.get();
+            (one.with(py, |simulation| simulation.clone()), std::sync::Arc::clone(&one.instruments))
+        });
+        let (list, instruments): (Vec<_>, Vec<_>) = copied.unzip();
+        Self { inner: Mutex::new(Members { batch: insertion::Batch::new(list), instruments }) }
+    }
+
+    fn __len__(&self, py: Python<'_>) -> usize {
+        self.with(py, |members| members.instruments.len())
+    }
+
+    /// Carries out one command in each: an array of shape (n, n_instruments, 2) of advance_mm and rotate_rad. Where both are 0, nothing is
+    /// done.
+    ///
+    /// Returns the failures: a dictionary from the index of a simulation to the exception that `Simulation.step` would have raised; empty
+    /// where all went well. Those that failed are as before, and do not concern the others.
+    fn step<'py>(&self, py: Python<'py>, moves: Moves<'_>) -> PyResult<Bound<'py, PyDict>> {
+        let count = self.__len__(py);
+        let commands = commands(&moves, Some(count))?;
+        let told = self.with(py, |members| members.batch.step(&commands)).map_err(exception)?;
+        let failures = PyDict::new(py);
+        for (index, failed) in told.into_iter().enumerate().filter_map(|(k, told)| told.err().map(|e| (k, e)))
+        {
+            failures.set_item(index, exception(failed).into_value(py))?;
+        }
+        Ok(failures)
+    }
+
+    /// A copy of one of them.
+    fn simulation(&self, py: Python<'_>, index: isize) -> PyResult<Simulation> {
+        self.at(py, index, |members, k| {
+            let simulation = members.batch.simulations()[k].clone();
+            Ok(Simulation::new(simulation, members.instruments[k].to_vec()))
+        })
+    }
+
+    /// Puts a copy of a simulation in the place of one of them.
+    fn replace(&self, py: Python<'_>, index: isize, simulation: &Simulation) -> PyResult<()> {
+        let new = simulation.with(py, |simulation| simulation.clone());
+        self.at(py, index, |members, k| {
+            members.batch.simulations_mut()[k] = new;
+            members.instruments[k] = std::sync::Arc::clone(&simulation.instruments);
+            Ok(())
+        })
+    }
+
+    /// The state of one of them.
+    fn state(&self, py: Python<'_>, index: isize) -> PyResult<State> {
+        self.at(py, index, |members, k| Ok(State { state: members.batch.simulations()[k].state() }))
+    }
+
+    /// Lets one of them go on from a state of its scene.
+    fn restore(&self, py: Python<'_>, index: isize, state: &State) -> PyResult<()> {
+        self.at(py, index, |members, k| {
+            members.batch.simulations_mut()[k].restore(&state.state).map_err(exception)
+        })
+    }
+
+    /// Positions of the tips, mm, shape (n, 3).
+    #[getter]
+    fn tip_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let tips: Vec<_> = self.with(py, |members| members.batch.simulations().iter().map(tip_mm).collect());
+        points(py, tips)
+    }
+
+    /// Points of the centre lines at these arc lengths from the tip, mm: shape (m,) to (n, m, 3).
+    fn points_mm<'py>(
+        &self,
+        py: Python<'py>,
+        from_tip_mm: Numbers<'_>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let lengths = numbers(&from_tip_mm);
+        let (count, list) = self.with(py, |members| {
+            let all = members.batch.simulations();
+            let list = all.iter().flat_map(|s| points_at(s, &lengths)).flat_map(|p| [p.x, p.y, p.z]);
+            (all.len(), list.collect::<Vec<f64>>())
+        });
+        array(py, list, [count, lengths.len(), 3])
+    }
+
+    /// Lengths inside the sheath's mouth, mm, shape (n, n_instruments).
+    #[getter]
+    fn inserted_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.of_hands(py, |report| report.inserted_mm)
+    }
+
+    /// Turns of the tails since the start, rad, shape (n, n_instruments).
+    #[getter]
+    fn rotation_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.of_hands(py, |report| report.rotation_rad)
+    }
+
+    /// Forces with which the hands push, N, shape (n, n_instruments).
+    #[getter]
+    fn push_force_n<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.of_hands(py, |report| report.push_force_n)
+    }
+
+    /// Torques with which the hands hold the tails, N·mm, shape (n, n_instruments).
+    #[getter]
+    fn torque_nmm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.of_hands(py, |report| report.torque_nmm)
+    }
+
+    /// Largest normal forces of the wall at a contact, N, shape (n,); 0 without contact.
+    #[getter]
+    fn largest_contact_force_n<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.of_each(py, |report| report.contacts.iter().map(|c| c.force_n).fold(0.0, f64::max))
+    }
+
+    /// Openings through which the tips have left the vessel, shape (n,); -1 inside.
+    #[getter]
+    fn left_through<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        self.of_each(py, |report| report.left_through.map_or(-1, |opening| opening as i64))
+    }
+
+    /// Whether the last steps met the method's own convergence test, shape (n,).
+    #[getter]
+    fn converged<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        self.of_each(py, |report| report.converged)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!("<endowire.Batch of {}>", self.__len__(py))
+    }
+}

@@ -1,0 +1,23 @@
+//! Errors as exceptions, in the same words. The classes are Python's own: `endowire/errors.py`.
+
+use endowire_core::Error;
+use pyo3::PyErr;
+
+pyo3::import_exception!(endowire.errors, InputError);
+pyo3::import_exception!(endowire.errors, ComputationError);
+pyo3::import_exception!(endowire.errors, EndOfWay);
+
+/// The exception of an error.
+pub(crate) fn exception(error: Error) -> PyErr {
+    let text = error.to_string();
+    match error {
+        Error::End(_) => EndOfWay::new_err(text),
+        error if error.is_input() => InputError::new_err(text),
+        _ => ComputationError::new_err(text),
+    }
+}
+
+/// A value that is out of its range, told as the libraries tell it.
+pub(crate) fn refuse(name: &str, value: impl std::fmt::Display, mend: &str) -> PyErr {
+    exception(Error::parameter(name, value, mend))
+}

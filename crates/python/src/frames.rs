@@ -1,0 +1,136 @@
+//! Pictures of both views, and what is seen in them.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use endowire_core::Vec3;
+use endowire_core::vessel::Wall;
+use endowire_viewer::{self as viewer, Image, Moment, PixelFormat, ViewSpec};
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::arrays::array;
+use crate::document;
+use crate::error::exception;
+use crate::interrupt::interruptible;
+use crate::simulation::Simulation;
+use crate::vessel::Vessel;
+
+/// Draws instruments in a vessel: the 3D view, fluoroscopy, or both.
+#[pyclass(frozen, module = "endowire", name = "Renderer")]
+pub(crate) struct Renderer {
+    inner: Mutex<viewer::Renderer>,
+}
+
+/// The frames of one moment: `three_d`, 8-bit RGBA of shape (height, width, 4), and `fluoro`, 8 or 16 bits of shape (height, width); None
+/// where a view was not asked for.
+#[pyclass(frozen, get_all, module = "endowire", name = "Frames")]
+pub(crate) struct Frames {
+    /// The 3D view.
+    three_d: Option<Py<PyAny>>,
+    /// The fluoroscopic view.
+    fluoro: Option<Py<PyAny>>,
+}
+
+impl Renderer {
+    /// A renderer for `spec`, but for what `view` says otherwise.
+    pub(crate) fn prepare(
+        py: Python<'_>,
+        spec: &ViewSpec,
+        view: Option<&Bound<'_, PyAny>>,
+        wall: Arc<Wall>,
+    ) -> PyResult<Self> {
+        let spec = match view {
+            Some(table) => document::read_over("view", spec, table)?,
+            None => spec.clone(),
+        };
+        let made = interruptible(py, move || viewer::Renderer::new(&spec, &wall.closed_mesh()))?;
+        Ok(Self { inner: Mutex::new(made.map_err(exception)?) })
+    }
+
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut viewer::Renderer) -> T + Send) -> T {
+        py.detach(|| work(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner)))
+    }
+
+    /// The instruments, made of what the table of the view says, if it says so.
+    fn views(&self, py: Python<'_>, simulation: &Simulation) -> Vec<viewer::DeviceView> {
+        let mut views = simulation.views(py);
+        let parts = self.with(py, |renderer| renderer.spec().device.clone());
+        if !parts.is_empty() {
+            views.iter_mut().for_each(|view| view.parts.clone_from(&parts));
+        }
+        views
+    }
+}
+
+#[pymethods]
+impl Renderer {
+    /// Prepares views of a vessel. `view` has the keys of `[view]` of a scene file: views (["3d", "fluoro"]), size_px, c_arm, xray, detector,
+    /// patient, camera, …
+    ///
+    /// Raises InputError for values out of range, and for a vessel that cannot be drawn.
+    #[new]
+    fn new(py: Python<'_>, vessel: &Vessel, view: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Self::prepare(py, &ViewSpec::default(), Some(view), Arc::clone(&vessel.wall))
+    }
+
+    /// What draws: "CPU reference", or the graphics interface and adapter.
+    #[getter]
+    fn backend(&self, py: Python<'_>) -> String {
+        self.with(py, |renderer| renderer.backend().to_owned())
+    }
+
+    /// Draws the views of a simulation as it is. `frame` is the number of the frame, which seeds its noise and tells its time; the next one
+    /// unless told.
+    #[pyo3(signature = (simulation, frame=None))]
+    fn render(&self, py: Python<'_>, simulation: &Simulation, frame: Option<u64>) -> PyResult<Frames> {
+        let views = self.views(py, simulation);
+        let frames = self
+            .with(py, |renderer| match frame {
+                None => renderer.render(&views),
+                Some(frame) => {
+                    let time_s = frame as f64 / renderer.spec().frames_per_s;
+                    renderer.render_at(&views, Moment { frame, time_s })
+                }
+            })
+            .map_err(exception)?;
+        let of = |image: Option<Image>| image.map(|image| pixels(py, image)).transpose();
+        Ok(Frames { three_d: of(frames.three_d)?, fluoro: of(frames.fluoro)? })
+    }
+
+    /// What the fluoroscopic view shows, without noise: a dictionary of `mask` (height, width; k + 1 where instrument k is seen), `devices`
+    /// (centre_line_px, tip_px, tip_visible) and `contacts` (pixel, visible). Pixel coordinates are x and y from the top left.
+    fn labels<'py>(&self, py: Python<'py>, simulation: &Simulation) -> PyResult<Bound<'py, PyDict>> {
+        let views = self.views(py, simulation);
+        let contacts: Vec<Vec3> = simulation
+            .with(py, |simulation| simulation.report().contacts.iter().map(|c| c.position_mm).collect());
+        let labels = self.with(py, |renderer| renderer.labels(&views, &contacts)).map_err(exception)?;
+        let told = PyDict::new(py);
+        let devices = PyList::empty(py);
+        for device in labels.devices {
+            let one = PyDict::new(py);
+            let line = device.centre_line_px;
+            one.set_item("centre_line_px", array(py, line.as_flattened().to_vec(), [line.len(), 2])?)?;
+            one.set_item("tip_px", device.tip_px)?;
+            one.set_item("tip_visible", device.tip_visible)?;
+            devices.append(one)?;
+        }
+        told.set_item("devices", devices)?;
+        told.set_item("contacts", document::write(py, &labels.contacts)?)?;
+        told.set_item("mask", pixels(py, labels.mask)?)?;
+        Ok(told)
+    }
+}
+
+/// A picture as an array, which takes its pixels over.
+fn pixels(py: Python<'_>, image: Image) -> PyResult<Py<PyAny>> {
+    let (height, width) = (image.height() as usize, image.width() as usize);
+    Ok(match image.format() {
+        PixelFormat::Gray8 => array(py, image.into_data(), [height, width])?.into_any().unbind(),
+        PixelFormat::Rgba8 => array(py, image.into_data(), [height, width, 4])?.into_any().unbind(),
+        PixelFormat::Gray16 => {
+            let wide = image.data().chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect();
+            PyArray1::<u16>::from_vec(py, wide).reshape([height, width])?.into_any().unbind()
+        }
+    })
+}

@@ -1,0 +1,38 @@
+//! Work that Ctrl-C ends.
+
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::thread;
+use std::time::Duration;
+
+use pyo3::prelude::*;
+
+use crate::error::ComputationError;
+
+/// How long a signal waits at most.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Does `work` on a thread of its own, without the interpreter, while this one looks for signals: for what takes seconds in one piece. After a
+/// signal the thread ends when its work is done, and nobody hears of it.
+///
+/// # Errors
+/// What the signal's handler raises, `KeyboardInterrupt` for Ctrl-C.
+pub(crate) fn interruptible<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let (sender, mut receiver) = sync_channel(1);
+    thread::Builder::new().name("endowire".to_owned()).spawn(move || {
+        // Nobody listens after a signal.
+        let _ = sender.send(work());
+    })?;
+    loop {
+        let listening = &mut receiver;
+        match py.detach(move || listening.recv_timeout(PATIENCE)) {
+            Ok(made) => return Ok(made),
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(ComputationError::new_err("the computation ended without a result"));
+            }
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! The native module of the Python package `endowire`: the classes of the libraries as Python sees them.
+//!
+//! Nothing is computed here. Arguments become values of `endowire-core` and `endowire-viewer`, results become numpy arrays, errors become
+//! exceptions with the same words. The interpreter is let go of while anything is computed.
+
+#![allow(clippy::needless_pass_by_value, reason = "pyo3 hands over what it has extracted")]
+
+mod arrays;
+mod batch;
+mod document;
+mod error;
+mod frames;
+mod instrument;
+mod interrupt;
+mod moves;
+mod report;
+mod rod;
+mod scene;
+mod simulation;
+mod state;
+mod vessel;
+
+use pyo3::prelude::*;
+
+/// The native part of `endowire`; import that instead.
+#[pymodule(gil_used = false)]
+mod _endowire {
+    #[pymodule_export]
+    use super::batch::Batch;
+    #[pymodule_export]
+    use super::frames::{Frames, Renderer};
+    #[pymodule_export]
+    use super::instrument::Instrument;
+    #[pymodule_export]
+    use super::report::StepReport;
+    #[pymodule_export]
+    use super::rod::solve_rod;
+    #[pymodule_export]
+    use super::scene::Scene;
+    #[pymodule_export]
+    use super::simulation::Simulation;
+    #[pymodule_export]
+    use super::state::State;
+    #[pymodule_export]
+    use super::vessel::{Vessel, check_vessel};
+}

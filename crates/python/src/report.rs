@@ -1,0 +1,166 @@
+//! What a step tells.
+
+use endowire_core::insertion;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+use crate::arrays::points;
+use crate::document;
+
+/// What is seen and felt after a step. Quantities of the hand are arrays of shape (n_instruments,).
+#[pyclass(frozen, module = "endowire", name = "StepReport")]
+pub(crate) struct StepReport {
+    report: insertion::StepReport,
+}
+
+impl StepReport {
+    pub(crate) fn new(report: insertion::StepReport) -> Self {
+        Self { report }
+    }
+
+    fn of_contacts<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&insertion::Contact) -> f64,
+    ) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.report.contacts.iter().map(of).collect())
+    }
+}
+
+#[pymethods]
+impl StepReport {
+    /// Length of each instrument inside the sheath's mouth, mm.
+    #[getter]
+    fn inserted_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, vec![self.report.inserted_mm])
+    }
+
+    /// Turn of each tail since the start, rad.
+    #[getter]
+    fn rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, vec![self.report.rotation_rad])
+    }
+
+    /// Turn of each tip since the start, carried along the axis without twist, rad.
+    #[getter]
+    fn tip_rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, vec![self.report.tip_rotation_rad])
+    }
+
+    /// Force with which the hand pushes each instrument, N; negative where it must pull.
+    #[getter]
+    fn push_force_n<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, vec![self.report.push_force_n])
+    }
+
+    /// Torque with which the hand holds each tail, N·mm.
+    #[getter]
+    fn torque_nmm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, vec![self.report.torque_nmm])
+    }
+
+    /// Energy of bending, mJ.
+    #[getter]
+    fn bend_energy_mj(&self) -> f64 {
+        self.report.energy.bend
+    }
+
+    /// Energy of twist, mJ.
+    #[getter]
+    fn twist_energy_mj(&self) -> f64 {
+        self.report.energy.twist
+    }
+
+    /// Energy of the vessel wall's deformation, mJ.
+    #[getter]
+    fn wall_energy_mj(&self) -> f64 {
+        self.report.energy.wall
+    }
+
+    /// Deepest penetration of the wall, mm; 0 without contact.
+    #[getter]
+    fn max_penetration_mm(&self) -> f64 {
+        self.report.max_penetration_mm
+    }
+
+    /// Energy that friction took in this step, mJ.
+    #[getter]
+    fn dissipated_mj(&self) -> f64 {
+        self.report.dissipated_mj
+    }
+
+    /// Where the wall holds the instruments: points on the axis, mm, shape (n, 3).
+    #[getter]
+    fn contact_positions_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        points(py, self.report.contacts.iter().map(|c| c.position_mm))
+    }
+
+    /// Force of the wall at each contact, normal and friction together, N, shape (n, 3).
+    #[getter]
+    fn contact_forces_n<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        points(py, self.report.contacts.iter().map(insertion::Contact::total_n))
+    }
+
+    /// Normal force at each contact, N, shape (n,).
+    #[getter]
+    fn contact_normal_forces_n<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.of_contacts(py, |c| c.force_n)
+    }
+
+    /// Depth of each contact, mm, shape (n,).
+    #[getter]
+    fn contact_penetrations_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.of_contacts(py, |c| c.penetration_mm)
+    }
+
+    /// The opening through which the tip has left the vessel, while it is beyond it; None inside.
+    #[getter]
+    fn left_through(&self) -> Option<usize> {
+        self.report.left_through
+    }
+
+    /// Iterations (linear solves) of this step.
+    #[getter]
+    fn iterations(&self) -> u32 {
+        self.report.iterations
+    }
+
+    /// Parts of the command in which the way from the last equilibrium was lost; 0 nearly always.
+    #[getter]
+    fn relaxations(&self) -> u32 {
+        self.report.relaxations
+    }
+
+    /// What is left out of balance, over the largest force in the instruments.
+    #[getter]
+    fn imbalance(&self) -> f64 {
+        self.report.imbalance
+    }
+
+    /// Whether the instruments jumped to a lower minimum.
+    #[getter]
+    fn jumped(&self) -> bool {
+        self.report.jumped
+    }
+
+    /// Whether the step met the method's own convergence test.
+    #[getter]
+    fn converged(&self) -> bool {
+        self.report.converged
+    }
+
+    /// All of it as dictionaries, lists and numbers, under the names of the Rust library.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        document::write(py, &self.report)
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<endowire.StepReport: {} mm inserted, push force {} N, {} contacts, converged {}>",
+            self.report.inserted_mm,
+            self.report.push_force_n,
+            self.report.contacts.len(),
+            self.report.converged
+        )
+    }
+}

@@ -1,0 +1,269 @@
+//! An insertion under way.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use endowire_core::insertion::{self, Command, WallProperties};
+use endowire_core::scene::SheathSpec;
+use endowire_core::vessel::NoStore;
+use endowire_core::{Result, Vec3};
+use endowire_methods::AnyMethod;
+use endowire_viewer::DeviceView;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+use crate::arrays::{Numbers, numbers, points};
+use crate::document;
+use crate::error::{exception, refuse};
+use crate::instrument::Instrument;
+use crate::interrupt::interruptible;
+use crate::moves::{INSTRUMENTS, Moves, commands, of_only};
+use crate::report::StepReport;
+use crate::state::State;
+use crate::vessel::Vessel;
+
+/// An instrument, or several.
+#[derive(FromPyObject)]
+pub(crate) enum Instruments {
+    One(Instrument),
+    List(Vec<Instrument>),
+}
+
+/// An insertion under way: instruments in a vessel, stepped by what the hand does.
+///
+/// Copies share the vessel and cost microseconds. A step that raises leaves everything as it was, to the bit.
+#[pyclass(frozen, from_py_object, module = "endowire", name = "Simulation")]
+pub(crate) struct Simulation {
+    inner: Mutex<insertion::Simulation>,
+    pub(crate) instruments: Arc<[Instrument]>,
+}
+
+impl Clone for Simulation {
+    fn clone(&self) -> Self {
+        Self { inner: Mutex::new(self.lock().clone()), instruments: Arc::clone(&self.instruments) }
+    }
+}
+
+impl Simulation {
+    pub(crate) fn new(simulation: insertion::Simulation, instruments: Vec<Instrument>) -> Self {
+        Self { inner: Mutex::new(simulation), instruments: instruments.into() }
+    }
+
+    /// The simulation, alone. Never wait for it with the interpreter held: whoever has it may step for long.
+    fn lock(&self) -> MutexGuard<'_, insertion::Simulation> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Does something with the simulation, without the interpreter.
+    pub(crate) fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut insertion::Simulation) -> T + Send,
+    ) -> T {
+        py.detach(|| work(&mut self.lock()))
+    }
+
+    /// The instruments as the viewer sees them.
+    pub(crate) fn views(&self, py: Python<'_>) -> Vec<DeviceView> {
+        let shape = self.with(py, |simulation| simulation.shape().clone());
+        self.instruments.iter().map(|i| DeviceView::of_device(&shape, &i.device, &i.parts)).collect()
+    }
+
+    fn of_hand<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&insertion::StepReport) -> f64 + Send + Sync,
+    ) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, vec![self.with(py, |simulation| of(simulation.report()))])
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    /// Instruments at the mouth of a sheath in a vessel, nothing inserted.
+    ///
+    /// The sheath is at an `opening` of the vessel, `depth_mm` inside it (1 unless told), or at `position_mm` with a `direction`; told
+    /// nothing, at the opening at the root of a generated vessel, and at the largest of any other. `wall` has the keys of `[vessel.wall]`
+    /// of a scene file (modulus_n_per_mm2, friction, region), `method` those of `[method]` (name, element_mm, …).
+    ///
+    /// Raises InputError for values that are out of range or do not belong together.
+    #[new]
+    #[pyo3(signature = (vessel, instruments, *, opening=None, depth_mm=None, position_mm=None, direction=None, wall=None, method=None))]
+    #[allow(clippy::too_many_arguments, reason = "keywords of Python")]
+    fn py_new(
+        py: Python<'_>,
+        vessel: &Vessel,
+        instruments: Instruments,
+        opening: Option<usize>,
+        depth_mm: Option<f64>,
+        position_mm: Option<[f64; 3]>,
+        direction: Option<[f64; 3]>,
+        wall: Option<&Bound<'_, PyAny>>,
+        method: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let instruments = match instruments {
+            Instruments::One(instrument) => vec![instrument],
+            Instruments::List(list) => list,
+        };
+        if instruments.len() != INSTRUMENTS {
+            return Err(refuse("instruments", instruments.len(), "give one"));
+        }
+        let device = instruments[0].device.clone();
+        let properties: WallProperties =
+            wall.map(|table| document::read("wall", table)).transpose()?.unwrap_or_default();
+        let method: AnyMethod =
+            method.map(|table| document::read("method", table)).transpose()?.unwrap_or_default();
+        let nowhere = opening.is_none() && position_mm.is_none() && direction.is_none();
+        let opening = opening.or_else(|| nowhere.then(|| vessel.inlet().unwrap_or(0)));
+        let sheath = SheathSpec { opening, depth_mm, position_mm, direction };
+        let wall = Arc::clone(&vessel.wall);
+        let built = interruptible(py, move || -> Result<insertion::Simulation> {
+            let sheath = sheath.place(&wall)?;
+            insertion::Simulation::builder((*wall).clone(), device, sheath)
+                .properties(properties)
+                .method(&method)
+                .store(&NoStore)
+                .build()
+        })?;
+        Ok(Self::new(built.map_err(exception)?, instruments))
+    }
+
+    /// Carries out one command: the length pushed in (negative: pulled back), mm, and the turn of the tail, rad; a number, or one for each
+    /// instrument. Returns the StepReport.
+    ///
+    /// Raises InputError for a command that cannot be followed, EndOfWay where the way ends, ComputationError where no equilibrium was found;
+    /// then everything is as before.
+    #[pyo3(signature = (advance_mm=None, rotate_rad=None))]
+    fn step(
+        &self,
+        py: Python<'_>,
+        advance_mm: Option<&Bound<'_, PyAny>>,
+        rotate_rad: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<StepReport> {
+        let command = Command {
+            advance_mm: of_only("advance_mm", advance_mm)?,
+            rotate_rad: of_only("rotate_rad", rotate_rad)?,
+        };
+        self.with(py, |simulation| simulation.step(command).cloned()).map(StepReport::new).map_err(exception)
+    }
+
+    /// Carries out commands one after the other: an array of shape (steps, n_instruments, 2) of advance_mm and rotate_rad. Returns the last
+    /// StepReport. Ctrl-C ends it between two steps.
+    ///
+    /// Raises what `step` raises, after the steps before.
+    fn run(&self, py: Python<'_>, moves: Moves<'_>) -> PyResult<StepReport> {
+        for command in commands(&moves, None)? {
+            self.with(py, |simulation| simulation.step(command).map(drop)).map_err(exception)?;
+            py.check_signals()?;
+        }
+        Ok(self.report(py))
+    }
+
+    /// What the last step told.
+    #[getter]
+    fn report(&self, py: Python<'_>) -> StepReport {
+        StepReport::new(self.with(py, |simulation| simulation.report().clone()))
+    }
+
+    /// Number of instruments.
+    #[getter]
+    fn n_instruments(&self) -> usize {
+        self.instruments.len()
+    }
+
+    /// The instruments.
+    #[getter]
+    fn instruments(&self) -> Vec<Instrument> {
+        self.instruments.to_vec()
+    }
+
+    /// The inserted centre line, from the sheath to the tip, mm, shape (n, 3).
+    #[getter]
+    fn positions_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let shape = self.with(py, |simulation| simulation.shape().positions_mm.clone());
+        points(py, shape)
+    }
+
+    /// Unit tangents at these points, towards the tip, shape (n, 3).
+    #[getter]
+    fn tangents<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let shape = self.with(py, |simulation| simulation.shape().tangents.clone());
+        points(py, shape)
+    }
+
+    /// Arc lengths of these points from the tip, mm, shape (n,).
+    #[getter(from_tip_mm)]
+    fn arc_lengths_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.with(py, |simulation| simulation.shape().from_tip_mm.clone()))
+    }
+
+    /// Position of the tip, mm, shape (3,).
+    #[getter]
+    fn tip_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let tip = self.with(py, |simulation| tip_mm(simulation));
+        PyArray1::from_vec(py, vec![tip.x, tip.y, tip.z])
+    }
+
+    /// Length of each instrument inside the sheath's mouth, mm, shape (n_instruments,).
+    #[getter]
+    fn inserted_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.of_hand(py, |report| report.inserted_mm)
+    }
+
+    /// Turn of each tail since the start, rad, shape (n_instruments,).
+    #[getter]
+    fn rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.of_hand(py, |report| report.rotation_rad)
+    }
+
+    /// Points of the centre line at these arc lengths from the tip, mm: shape (n,) to (n, 3). Lengths that are not inserted are in the
+    /// sheath's mouth.
+    fn points_mm<'py>(
+        &self,
+        py: Python<'py>,
+        from_tip_mm: Numbers<'_>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let lengths = numbers(&from_tip_mm);
+        points(py, self.with(py, |simulation| points_at(simulation, &lengths)))
+    }
+
+    /// All that the next step depends on, beside what surrounds the instruments.
+    fn state(&self, py: Python<'_>) -> State {
+        State { state: self.with(py, |simulation| simulation.state()) }
+    }
+
+    /// Goes on from a state of the same scene, to the bit.
+    ///
+    /// Raises InputError for a state of another method, vessel or instrument; then nothing has changed.
+    fn restore(&self, py: Python<'_>, state: &State) -> PyResult<()> {
+        self.with(py, |simulation| simulation.restore(&state.state)).map_err(exception)
+    }
+
+    /// A simulation in the same state that shares the vessel.
+    fn copy(&self, py: Python<'_>) -> Self {
+        py.detach(|| self.clone())
+    }
+
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        self.copy(py)
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: Bound<'_, PyAny>) -> Self {
+        self.copy(py)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let inserted_mm = self.with(py, |simulation| simulation.report().inserted_mm);
+        format!("<endowire.Simulation: {inserted_mm} mm inserted>")
+    }
+}
+
+/// The tip; before anything is inserted it is in the sheath's mouth.
+pub(crate) fn tip_mm(simulation: &insertion::Simulation) -> Vec3 {
+    simulation.shape().tip_mm().unwrap_or(simulation.sheath().position_mm)
+}
+
+/// Points at arc lengths from the tip.
+pub(crate) fn points_at(simulation: &insertion::Simulation, from_tip_mm: &[f64]) -> Vec<Vec3> {
+    let mouth = simulation.sheath().position_mm;
+    from_tip_mm.iter().map(|s| simulation.shape().position_at(*s).unwrap_or(mouth)).collect()
+}

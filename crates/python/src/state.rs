@@ -1,0 +1,100 @@
+//! All that the next step depends on.
+
+use std::path::PathBuf;
+
+use endowire_core::Error;
+use endowire_core::insertion;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::error::{InputError, exception};
+use crate::report::StepReport;
+
+/// The first bytes of a saved state.
+const FORMAT: &[u8] = b"endowire.State 1\n";
+
+/// All that the next step of a simulation depends on, beside what surrounds the instruments.
+///
+/// It never changes, is small, and can be copied, pickled, sent and saved. `Simulation.restore` goes on from it to the bit.
+#[pyclass(frozen, module = "endowire", name = "State")]
+pub(crate) struct State {
+    pub(crate) state: insertion::State,
+}
+
+#[pymethods]
+impl State {
+    /// Name of the method that it is a state of.
+    #[getter]
+    fn method(&self) -> &str {
+        self.state.method()
+    }
+
+    /// What the step that led to it told.
+    #[getter]
+    fn report(&self) -> StepReport {
+        StepReport::new(self.state.report().clone())
+    }
+
+    /// The state as bytes, every bit of its numbers kept.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &self.bytes()?))
+    }
+
+    /// A state from the bytes of `to_bytes`.
+    ///
+    /// Raises InputError for bytes that are none.
+    #[staticmethod]
+    fn from_bytes(data: &[u8]) -> PyResult<Self> {
+        let refuse = |what: String| InputError::new_err(format!("the bytes of a state: {what}"));
+        let Some(state) = data.strip_prefix(FORMAT) else {
+            return Err(refuse(format!(
+                "they do not begin with {:?}: give what State.to_bytes or State.save has written",
+                String::from_utf8_lossy(FORMAT)
+            )));
+        };
+        let state = postcard::from_bytes(state).map_err(|e| refuse(e.to_string()))?;
+        Ok(Self { state })
+    }
+
+    /// Writes the state into a file.
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        std::fs::write(&path, self.bytes()?).map_err(|e| exception(Error::file(&path, e)))
+    }
+
+    /// Reads a state from a file of `save`.
+    #[staticmethod]
+    fn load(path: PathBuf) -> PyResult<Self> {
+        Self::from_bytes(&endowire_core::file::read(&path, u64::MAX).map_err(exception)?)
+    }
+
+    /// Nothing changes a state: its copy is itself.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, _memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let py = slf.py();
+        Ok((slf.get_type().getattr("from_bytes")?, (slf.get().to_bytes(py)?,)))
+    }
+
+    fn __repr__(&self) -> String {
+        let report = self.state.report();
+        format!(
+            "<endowire.State of {}: {} mm inserted, turned by {} rad>",
+            self.state.method(),
+            report.inserted_mm,
+            report.rotation_rad
+        )
+    }
+}
+
+impl State {
+    fn bytes(&self) -> PyResult<Vec<u8>> {
+        postcard::to_extend(&self.state, FORMAT.to_vec())
+            .map_err(|e| InputError::new_err(format!("the state cannot be written: {e}")))
+    }
+}

@@ -1,0 +1,256 @@
+//! What instruments are pushed into.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use endowire_core::Vec3;
+use endowire_core::vessel::{
+    CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall, anatomy, check_with,
+};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde::Serialize;
+
+use crate::arrays::{Table, array, points, rows};
+use crate::document;
+use crate::error::{InputError, exception, refuse};
+use crate::interrupt::interruptible;
+
+/// A vessel's wall, and its centre line where it was made from one. It never changes.
+#[pyclass(frozen, module = "endowire", name = "Vessel")]
+pub(crate) struct Vessel {
+    pub(crate) wall: Arc<Wall>,
+    /// The tree it was made from, with the opening at its root.
+    tree: Option<(CentrelineTree, usize)>,
+}
+
+/// The bytes of a wall, its centre line and its inlet.
+type Pickled<'py> = (Bound<'py, PyBytes>, Option<Bound<'py, PyArray2<f64>>>, Option<usize>);
+
+/// A centre-line tree: the path of its table or the name of a built-in anatomy, or an array.
+#[derive(FromPyObject)]
+pub(crate) enum Tree<'py> {
+    Path(PathBuf),
+    Table(Table<'py, f64>),
+}
+
+#[derive(Serialize)]
+struct OpeningDocument {
+    index: usize,
+    centre_mm: [f64; 3],
+    radius_mm: f64,
+    direction: [f64; 3],
+}
+
+#[pymethods]
+impl Vessel {
+    /// Reads a surface file (STL, OBJ, PLY) and mends what can be mended; `unit_mm` is millimetres per unit of the file.
+    ///
+    /// Raises InputError for a file that cannot be read or serves as no wall.
+    #[staticmethod]
+    #[pyo3(signature = (path, unit_mm = 1.0))]
+    fn read(py: Python<'_>, path: PathBuf, unit_mm: f64) -> PyResult<Self> {
+        let made = interruptible(py, move || Wall::from_surface(&SurfaceMesh::read(&path, unit_mm)?))?;
+        Ok(Self::of_wall(made.map_err(exception)?))
+    }
+
+    /// The wall of a triangle surface: vertices in mm, shape (n, 3), and triangles of vertex indices, shape (m, 3), counter-clockwise seen
+    /// from outside. What can be mended is mended.
+    #[staticmethod]
+    fn from_arrays(py: Python<'_>, vertices_mm: Table<'_, f64>, triangles: Table<'_, i64>) -> PyResult<Self> {
+        let vertices_mm: Vec<Vec3> = rows("vertices_mm", &vertices_mm)?.into_iter().map(Vec3::from).collect();
+        let index = |corner: i64| {
+            u32::try_from(corner)
+                .ok()
+                .filter(|corner| (*corner as usize) < vertices_mm.len())
+                .ok_or_else(|| refuse("triangles", corner, "must be the number of a vertex, from 0"))
+        };
+        let triangles = rows::<i64, 3>("triangles", &triangles)?
+            .into_iter()
+            .map(|[a, b, c]| Ok([index(a)?, index(b)?, index(c)?]))
+            .collect::<PyResult<_>>()?;
+        let surface = SurfaceMesh { vertices_mm, triangles };
+        let made = interruptible(py, move || Wall::from_surface(&surface))?;
+        Ok(Self::of_wall(made.map_err(exception)?))
+    }
+
+    /// Builds the wall of a centre-line tree: a built-in anatomy ("straight_tube", "curved_tube", "aortic_arch", "hepatic"), the path of a
+    /// table, or an array of shape (n, 5) of x, y, z, radius (mm) and the row of the parent (-1 for the root).
+    ///
+    /// `edge_mm` or `triangles` say how fine; without them edges are a quarter of the smallest radius.
+    #[staticmethod]
+    #[pyo3(signature = (tree, edge_mm = None, triangles = None))]
+    fn generate(
+        py: Python<'_>,
+        tree: Tree<'_>,
+        edge_mm: Option<f64>,
+        triangles: Option<usize>,
+    ) -> PyResult<Self> {
+        let tree = tree.tree()?;
+        let resolution = match (edge_mm, triangles) {
+            (Some(edge_mm), None) => Resolution::EdgeMm(edge_mm),
+            (None, Some(count)) => Resolution::Triangles(count),
+            (None, None) => Resolution::fitting(&tree),
+            (Some(edge_mm), Some(_)) => {
+                return Err(refuse("edge_mm", edge_mm, "triangles is given too: keep one of the two"));
+            }
+        };
+        let made = interruptible(py, move || GeneratedWall::new(&tree, resolution).map(|made| (made, tree)))?;
+        let (made, tree) = made.map_err(exception)?;
+        Ok(Self { wall: Arc::new(made.wall), tree: Some((tree, made.inlet)) })
+    }
+
+    /// Vertices of the wall, mm, shape (n, 3).
+    #[getter]
+    fn vertices_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        points(py, self.wall.mesh().vertices_mm.iter().copied())
+    }
+
+    /// Vertex indices of its triangles, shape (m, 3).
+    #[getter]
+    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        let triangles = &self.wall.mesh().triangles;
+        array(py, triangles.as_flattened().to_vec(), [triangles.len(), 3])
+    }
+
+    /// Its openings, largest first: dictionaries of index, centre_mm, radius_mm and direction (out of the vessel).
+    #[getter]
+    fn openings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let openings: Vec<OpeningDocument> = (self.wall.openings().iter())
+            .map(|o| OpeningDocument {
+                index: o.index,
+                centre_mm: o.centre_mm.into(),
+                radius_mm: o.radius_mm,
+                direction: o.direction.into(),
+            })
+            .collect();
+        document::write(py, &openings)
+    }
+
+    /// The centre line it was generated from, shape (n, 5): x, y, z, radius (mm) and the row of the parent; None without one.
+    #[getter]
+    fn centreline<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let Some((tree, _)) = &self.tree else { return Ok(None) };
+        let row = |node: &CentrelineNode| {
+            let (p, parent) = (node.position_mm, node.parent.map_or(-1.0, |row| row as f64));
+            [p.x, p.y, p.z, node.radius_mm, parent]
+        };
+        let numbers: Vec<f64> = tree.nodes().iter().flat_map(row).collect();
+        array(py, numbers, [tree.nodes().len(), 5]).map(Some)
+    }
+
+    /// The opening at the root of the centre line it was generated from; None without one.
+    #[getter]
+    pub(crate) fn inlet(&self) -> Option<usize> {
+        self.tree.as_ref().map(|(_, inlet)| *inlet)
+    }
+
+    /// Whether points (mm, shape (n, 3)) are inside: booleans of shape (n,).
+    fn contains<'py>(
+        &self,
+        py: Python<'py>,
+        points_mm: Table<'_, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let points = rows("points_mm", &points_mm)?;
+        let wall = &self.wall;
+        let inside: endowire_core::Result<Vec<bool>> =
+            py.detach(|| points.into_iter().map(|p: [f64; 3]| wall.contains(&Vec3::from(p))).collect());
+        Ok(PyArray1::from_vec(py, inside.map_err(exception)?))
+    }
+
+    /// Writes the wall as a surface file; the ending (stl, obj, ply) says which.
+    fn write(&self, path: PathBuf) -> PyResult<()> {
+        self.wall.mesh().write(&path).map_err(exception)
+    }
+
+    /// Nothing changes a vessel: its copy is itself.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, _memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
+        let (py, vessel) = (slf.py(), slf.get());
+        let wall = postcard::to_allocvec(&*vessel.wall)
+            .map_err(|e| InputError::new_err(format!("the vessel cannot be written: {e}")))?;
+        let parts = (PyBytes::new(py, &wall), vessel.centreline(py)?, vessel.inlet());
+        Ok((slf.get_type().getattr("_unpickled")?, parts))
+    }
+
+    #[staticmethod]
+    fn _unpickled(wall: &[u8], centreline: Option<Table<'_, f64>>, inlet: Option<usize>) -> PyResult<Self> {
+        let wall = postcard::from_bytes(wall)
+            .map_err(|e| InputError::new_err(format!("the bytes of a vessel: {e}")))?;
+        let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?.zip(inlet);
+        Ok(Self { wall: Arc::new(wall), tree })
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<endowire.Vessel: {} triangles, {} openings>",
+            self.wall.mesh().triangles.len(),
+            self.wall.openings().len()
+        )
+    }
+}
+
+impl Vessel {
+    pub(crate) fn of_wall(wall: Wall) -> Self {
+        Self { wall: Arc::new(wall), tree: None }
+    }
+}
+
+impl Tree<'_> {
+    fn tree(&self) -> PyResult<CentrelineTree> {
+        match self {
+            Self::Path(path) => match built_in(path) {
+                Some(tree) => Ok(tree),
+                None => CentrelineTree::read(path).map_err(exception),
+            },
+            Self::Table(table) => {
+                let nodes = rows::<f64, 5>("tree", table)?
+                    .into_iter()
+                    .enumerate()
+                    .map(|(row, [x, y, z, radius_mm, parent])| {
+                        let parent = match parent {
+                            -1.0 => None,
+                            row if row >= 0.0 && row.fract() == 0.0 => Some(row as usize),
+                            _ => {
+                                let name = format!("tree[{row}][4]");
+                                return Err(refuse(&name, parent, "must be the row of the parent, or -1"));
+                            }
+                        };
+                        Ok(CentrelineNode { position_mm: Vec3::new(x, y, z), radius_mm, parent })
+                    })
+                    .collect::<PyResult<_>>()?;
+                CentrelineTree::new(nodes).map_err(exception)
+            }
+        }
+    }
+}
+
+/// The built-in anatomy of that name, unless a file is called so.
+fn built_in(path: &Path) -> Option<CentrelineTree> {
+    path.to_str().filter(|_| !path.exists()).and_then(anatomy::tree)
+}
+
+/// Checks a surface file as `endowire vessel check` does: a dictionary of what was found, and `sound`.
+#[pyfunction]
+#[pyo3(signature = (path, unit_mm = 1.0, septum_mm = 1.0))]
+pub(crate) fn check_vessel<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    unit_mm: f64,
+    septum_mm: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let report =
+        interruptible(py, move || check_with(&SurfaceMesh::read(&path, unit_mm)?, unit_mm, septum_mm))?
+            .map_err(exception)?;
+    let told = document::write(py, &report)?;
+    told.set_item("sound", report.is_sound())?;
+    Ok(told)
+}

@@ -1,0 +1,33 @@
+import numpy as np
+import pytest
+
+import endowire
+
+VIEW = {"views": ["3d", "fluoro"], "size_px": [48, 32], "backend": "cpu"}
+
+
+def test_both_views_and_labels_are_arrays(vessel, simulation):
+    simulation.run([[[5.0, 0.0]]] * 16)
+    renderer = endowire.Renderer(vessel, VIEW)
+    frames = renderer.render(simulation, frame=3)
+    assert frames.three_d.shape == (32, 48, 4) and frames.three_d.dtype == np.uint8
+    assert frames.fluoro.shape == (32, 48) and frames.fluoro.dtype == np.uint8
+    labels = renderer.labels(simulation)
+    device = labels["devices"][0]
+    assert labels["mask"].max() == 1 and device["tip_visible"]
+    x, y = device["tip_px"]
+    near = labels["mask"][max(int(y) - 1, 0) : int(y) + 2, max(int(x) - 1, 0) : int(x) + 2]
+    assert near.any() and device["centre_line_px"].shape[1] == 2
+
+
+def test_sixteen_bits_and_one_view(vessel, simulation):
+    simulation.step(50.0)
+    frames = endowire.Renderer(vessel, {**VIEW, "views": ["fluoro"], "bits": 16}).render(simulation)
+    assert frames.three_d is None and frames.fluoro.dtype == np.uint16 and frames.fluoro.max() > 255
+
+
+def test_a_wrong_view_is_named(vessel):
+    with pytest.raises(endowire.InputError, match="unknown field `sizepx`"):
+        endowire.Renderer(vessel, {"sizepx": [1, 1]})
+    with pytest.raises(endowire.InputError, match="view.size_px"):
+        endowire.Renderer(vessel, {"size_px": [0, 1]})

@@ -1,0 +1,130 @@
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+import endowire
+import endowire.gym
+from endowire.gym import InsertionVectorEnv, Task, arches, ends, observations, rewards, vessels
+
+
+@pytest.fixture(scope="module")
+def task(vessel, wire):
+    return Task(
+        [wire],
+        vessels.FixedVessel(vessel),
+        rewards=[rewards.Reached(), rewards.Approach(), rewards.ContactForce()],
+        ends=[ends.TargetReached(), ends.LeftVessel(), ends.StepLimit(15)],
+        wall={"friction": 0.1},
+        view={"views": ["3d"], "size_px": [32, 32], "backend": "cpu"},
+    )
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", ["CurvedTube", "AorticArch"])
+def test_registered_ids_pass_the_checker(name):
+    view = {"views": ["3d"], "size_px": [32, 32], "backend": "cpu"}
+    check_env(gymnasium.make(f"endowire/{name}-v0", render_mode="rgb_array", view=view).unwrapped)
+
+
+def rollout(env, seed, steps=40):
+    env.action_space.seed(seed)
+    yield env.reset(seed=seed)[0]
+    over = False
+    for _ in range(steps):
+        action = env.action_space.sample()
+        if over:
+            observation, reward, over = env.reset()[0], 0.0, False
+        else:
+            observation, reward, terminated, truncated, _ = env.step(action)
+            over = terminated or truncated
+        yield observation, action, reward, over
+
+
+def test_a_seed_decides_everything_and_a_vector_does_what_single_ones_do(task):
+    singles = [list(rollout(endowire.gym.InsertionEnv(task), 7 + k)) for k in range(3)]
+    assert str(singles[0]) == str(list(rollout(endowire.gym.InsertionEnv(task), 7)))
+    vector = InsertionVectorEnv(task, 3)
+    observed, _ = vector.reset(seed=7)
+    for k, single in enumerate(singles):
+        assert all(np.array_equal(observed[name][k], part) for name, part in single[0].items())
+    ended = 0
+    for step in range(1, 41):
+        actions = np.stack([single[step][1] for single in singles])
+        observed, reward, terminated, truncated, _ = vector.step(actions)
+        for k, single in enumerate(singles):
+            observation, _, alone, over = single[step]
+            assert all(np.array_equal(observed[name][k], part) for name, part in observation.items())
+            assert reward[k] == alone and (terminated | truncated)[k] == over
+        ended += (terminated | truncated).sum()
+    assert ended >= 6
+    assert vector.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+
+
+def test_one_that_fails_is_told_and_the_others_go_on(task):
+    vector = InsertionVectorEnv(task, 3)
+    vector.reset(seed=1)
+    actions = np.full((3, 1, 2), 10.0)
+    actions[1, 0, 0] = np.nan
+    _, _, _, truncated, info = vector.step(actions)
+    assert (
+        truncated.tolist() == [False, True, False]
+        and "NaN" in info["failure"][1]
+        and info["failure"][0] == ""
+    )
+    _, _, _, truncated, info = vector.step(np.full((3, 1, 2), 10.0))
+    assert not truncated.any() and not info["failure"].any()
+    with pytest.raises(endowire.InputError, match=r"must have the shape \(3, 1, 2\)"):
+        vector.step(np.zeros((3, 2)))
+
+
+def test_wrong_actions_of_one_are_exceptions(task):
+    env = endowire.gym.InsertionEnv(task)
+    env.reset(seed=1)
+    with pytest.raises(endowire.InputError, match="finite"):
+        env.step(np.array([[np.nan, 0.0]]))
+    with pytest.raises(endowire.InputError, match="shape"):
+        env.step(np.zeros(2))
+    assert env.step(np.array([[10.0, 0.0]]))[4]["failure"] == ""
+
+
+def test_pictures_of_two_planes_are_observed(vessel, wire):
+    planes = observations.Fluoroscopy(
+        planes=((0.0, 0.0), (90.0, 0.0)), size_px=(24, 16), view={"backend": "cpu"}
+    )
+    env = endowire.gym.InsertionEnv(
+        Task([wire], vessels.FixedVessel(vessel), observations={"fluoroscopy": planes})
+    )
+    first, again, other = (env.reset(seed=seed)[0]["fluoroscopy"] for seed in (5, 5, 6))
+    assert first.shape == (2, 16, 24) and env.observation_space["fluoroscopy"].contains(first)
+    assert np.array_equal(first, again) and not np.array_equal(first, other)
+
+
+def test_tasks_are_sent_to_other_processes(task):
+    sent = pickle.loads(pickle.dumps(task))
+    assert str(list(rollout(endowire.gym.InsertionEnv(sent), 3, 3))) == str(
+        list(rollout(endowire.gym.InsertionEnv(task), 3, 3))
+    )
+
+
+def test_arches_vary_and_come_from_their_seed():
+    tables = [arches.arch(np.random.default_rng(seed))[0] for seed in (4, 4, 6)]
+    assert np.array_equal(tables[0], tables[1]) and not np.array_equal(tables[0][-1], tables[2][-1])
+    for table in tables:
+        low, high = arches.ArchVariety.bounds_mm
+        assert (table[:, :3] > low).all() and (table[:, :3] < high).all() and (table[:, 3] > 2.0).all()
+
+
+def test_an_arch_has_its_targets_in_its_branches():
+    variety = arches.ArchVariety(count=1, edge_mm=6.0, seed=4)
+    env = gymnasium.make("endowire/ArchVariety-v0", vessels=variety).unwrapped
+    first, _ = env.reset(seed=1)
+    other, _ = env.reset(seed=2)
+    assert not np.array_equal(first["target_mm"], other["target_mm"])
+    assert env.observation_space.contains(first)
+    for _ in range(5):
+        *_, info = env.step(np.array([[30.0, 1.0]]))
+    assert info["failure"] == "" and info["way_mm"] > 0.0

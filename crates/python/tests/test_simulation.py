@@ -1,0 +1,113 @@
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import endowire
+
+
+def test_a_step_tells_what_is_seen_and_felt(simulation):
+    simulation.run(np.tile([[2.0, 0.05]], (70, 1, 1)))
+    report = simulation.step(1.0, rotate_rad=[0.1])
+    assert report.converged and report.inserted_mm.shape == (1,)
+    assert report.inserted_mm[0] == pytest.approx(141.0) and report.rotation_rad[0] == pytest.approx(3.6)
+    assert (
+        report.contact_positions_mm.shape
+        == report.contact_forces_n.shape
+        == (len(report.contact_normal_forces_n), 3)
+    )
+    assert len(report.contact_normal_forces_n) > 0 and (report.contact_normal_forces_n > 0).all()
+    assert report.to_dict()["push_force_n"] == report.push_force_n[0]
+    assert simulation.positions_mm.shape == simulation.tangents.shape == (len(simulation.from_tip_mm), 3)
+    assert np.array_equal(simulation.positions_mm[-1], simulation.tip_mm)
+    assert np.array_equal(simulation.points_mm(simulation.from_tip_mm), simulation.positions_mm)
+
+
+def test_copies_share_the_vessel_and_nothing_else(simulation):
+    simulation.step(50.0)
+    other = copy.deepcopy(simulation)
+    other.step(1.0)
+    assert simulation.inserted_mm[0] == 50.0 and other.inserted_mm[0] == 51.0
+
+
+def test_states_are_copied_pickled_and_saved_to_the_bit(simulation, tmp_path):
+    simulation.run([[[2.0, 0.1]]] * 40)
+    state, shape = simulation.state(), simulation.positions_mm
+    simulation.step(3.0)
+    after = simulation.positions_mm
+    state.save(tmp_path / "state")
+    for kept in (
+        state,
+        copy.copy(state),
+        pickle.loads(pickle.dumps(state)),
+        endowire.State.load(tmp_path / "state"),
+    ):
+        simulation.restore(kept)
+        assert np.array_equal(simulation.positions_mm, shape)
+        simulation.step(3.0)
+        assert np.array_equal(simulation.positions_mm, after)
+    with pytest.raises(endowire.InputError, match=r"State\.save"):
+        endowire.State.from_bytes(b"something else")
+    with pytest.raises(endowire.InputError):
+        endowire.State.from_bytes(state.to_bytes()[:200])
+
+
+def test_parts_are_pickled(vessel, wire):
+    again = pickle.loads(pickle.dumps((vessel, wire)))
+    assert np.array_equal(again[0].vertices_mm, vessel.vertices_mm)
+    assert np.array_equal(again[0].centreline, vessel.centreline) and again[0].inlet == vessel.inlet
+    assert again[1].sections == wire.sections
+
+
+@pytest.mark.parametrize(
+    ("wrong", "kind", "words"),
+    [
+        (lambda s: s.step(float("nan")), ValueError, "advance_mm = NaN: must be a finite number"),
+        (lambda s: s.step("far"), TypeError, "advance_mm = 'far'"),
+        (lambda s: s.step([1.0, 2.0]), endowire.InputError, "advance_mm = 2 numbers"),
+        (lambda s: s.step(1e6), endowire.InputError, "the device is 300 mm long"),
+        (lambda s: s.run(np.zeros((3, 2))), endowire.InputError, r"shape \(n, 1, 2\)"),
+        (lambda s: s.restore(None), TypeError, "State"),
+    ],
+)
+def test_wrong_commands_change_nothing(simulation, wrong, kind, words):
+    simulation.step(10.0)
+    before = simulation.positions_mm
+    with pytest.raises(kind, match=words):
+        wrong(simulation)
+    assert np.array_equal(simulation.positions_mm, before)
+
+
+def test_wrong_parts_are_named(vessel, wire):
+    with pytest.raises(endowire.InputError, match="unknown field `frction`.*`friction`"):
+        endowire.Simulation(vessel, wire, wall={"frction": 0.1})
+    with pytest.raises(endowire.InputError, match="wall: every number must be finite"):
+        endowire.Simulation(vessel, wire, wall={"friction": float("inf")})
+    with pytest.raises(endowire.InputError, match="sheath.opening = 7"):
+        endowire.Simulation(vessel, wire, opening=7)
+    with pytest.raises(endowire.InputError, match="instruments = 2"):
+        endowire.Simulation(vessel, [wire, wire])
+    with pytest.raises(endowire.InputError, match="no_such.stl"):
+        endowire.Vessel.read("no_such.stl")
+    with pytest.raises(endowire.InputError, match=r"triangles = 9"):
+        endowire.Vessel.from_arrays(np.zeros((3, 3)), [[0, 1, 9]])
+
+
+def test_the_way_ends_where_the_vessel_ends(vessel, wire):
+    simulation = endowire.Simulation(vessel, wire)
+    with pytest.raises(endowire.EndOfWay, match="left the vessel"):
+        simulation.run(np.tile([[5.0, 0.0]], (60, 1, 1)))
+    assert simulation.inserted_mm[0] > 200.0
+
+
+def test_vessels_are_made_checked_and_written(vessel, tmp_path):
+    vessel.write(tmp_path / "tube.stl")
+    told = endowire.check_vessel(tmp_path / "tube.stl")
+    assert told["sound"] and len(told["openings"]) == 2
+    again = endowire.Vessel.read(tmp_path / "tube.stl")
+    assert len(again.triangles) == len(vessel.triangles) and again.centreline is None
+    line = vessel.centreline[:, :3]
+    assert vessel.contains(line[1:-1]).all() and not vessel.contains(line + [0.0, 50.0, 0.0]).any()
+    table = np.array([[0, 0, 0, 3.0, -1], [0, 0, 40, 3.0, 0]])
+    assert len(endowire.Vessel.generate(table, triangles=800).openings) == 2
