@@ -9,9 +9,11 @@ mod file_tests;
 mod part;
 mod quantity;
 mod rest_shape;
+mod stack;
 
 pub use file::{DeviceFile, Kind};
 pub use part::{Coat, CutError, Part};
+pub use stack::{Instrument, Stack};
 
 use serde::{Deserialize, Serialize};
 

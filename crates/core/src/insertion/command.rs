@@ -30,6 +30,15 @@ impl Command {
     }
 }
 
+/// What the hand of one of several instruments does.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Move {
+    /// Number of the instrument, the innermost being 0 ([`Stack::find`](crate::device::Stack::find) has it by name).
+    pub instrument: usize,
+    /// Its motion.
+    pub command: Command,
+}
+
 /// One line of a script: a motion and the increments it is cut into.
 ///
 /// `advance_mm` or `retract_mm`, with or without `rotate_deg`; given together they happen together.

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::contact::Counters;
-use crate::device::Device;
+use crate::device::{Device, Stack};
 use crate::insertion::{
-    Command, ScriptLine, Sheath, SimulationBuilder, StepReport, WallProperties, commands,
+    Command, Move, ScriptLine, Sheath, SimulationBuilder, StepReport, WallProperties, commands,
 };
 use crate::methods::{Method, State};
 use crate::shape::Shape;
@@ -23,8 +23,10 @@ pub struct Surroundings<'a> {
     pub query: &'a WallQuery,
     /// Where the device comes from.
     pub sheath: &'a Sheath,
-    /// The device.
+    /// The device; of several instruments the innermost.
     pub device: &'a Device,
+    /// All instruments.
+    pub stack: &'a Stack,
 }
 
 /// An insertion under way.
@@ -42,13 +44,13 @@ pub(super) struct Environment {
     pub(super) properties: WallProperties,
     pub(super) query: WallQuery,
     pub(super) sheath: Sheath,
-    pub(super) device: Device,
+    pub(super) stack: Stack,
 }
 
 impl Environment {
     pub(super) fn surroundings(&self) -> Surroundings<'_> {
-        let Self { wall, properties, query, sheath, device } = self;
-        Surroundings { wall, properties, query, sheath, device }
+        let Self { wall, properties, query, sheath, stack } = self;
+        Surroundings { wall, properties, query, sheath, device: stack.first(), stack }
     }
 }
 
@@ -59,20 +61,64 @@ impl Clone for Simulation {
 }
 
 impl Simulation {
-    /// A simulation of a device that enters `wall` through `sheath`, to be built.
-    pub fn builder<'a>(wall: Wall, device: Device, sheath: Sheath) -> SimulationBuilder<'a> {
-        SimulationBuilder::new(wall, device, sheath)
+    /// A simulation of a device, or of several instruments, that enter `wall` through `sheath`, to be built.
+    pub fn builder<'a>(wall: Wall, stack: impl Into<Stack>, sheath: Sheath) -> SimulationBuilder<'a> {
+        SimulationBuilder::new(wall, stack.into(), sheath)
     }
 
-    /// Carries out one command. After an error the state is as before, to the bit.
+    /// Carries out one command, of several instruments on the innermost. After an error the state is as before, to the bit.
     ///
     /// # Errors
     /// A command that is not finite, turns more than a thousand times, pushes in more than the device's length or pulls out more than is inserted
     /// (all [`Error::Parameter`]); a step that found no equilibrium ([`Error::Computation`]).
     pub fn step(&mut self, command: Command) -> Result<&StepReport> {
-        check_command(command, self.method.report().inserted_mm, self.scene.device.length_mm())?;
+        if self.scene.stack.is_several() {
+            return self.step_together(&[Move { instrument: 0, command }]);
+        }
+        check_command(command, self.method.report().inserted_mm, self.scene.stack.length_mm())?;
         self.method.step(&self.scene.surroundings(), command)?;
         Ok(self.method.report())
+    }
+
+    /// Moves instruments, each by its own command, all at the same time. After an error the state is as before, to the bit.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`] for each; an instrument that is not there or moved twice, and instruments that would be in together and do not
+    /// lie in one another (all [`Error::Parameter`]).
+    pub fn step_together(&mut self, moves: &[Move]) -> Result<&StepReport> {
+        self.check_moves(moves)?;
+        let surroundings = self.scene.surroundings();
+        if self.scene.stack.is_several() {
+            self.method.step_together(&surroundings, moves)?;
+        } else {
+            let command = moves.first().map_or_else(Command::default, |one| one.command);
+            self.method.step(&surroundings, command)?;
+        }
+        Ok(self.method.report())
+    }
+
+    fn check_moves(&self, moves: &[Move]) -> Result<()> {
+        let report = self.method.report();
+        let instruments = self.scene.stack.instruments();
+        let inserted =
+            |index: usize| report.instruments.get(index).map_or(report.inserted_mm, |i| i.inserted_mm);
+        for (index, one) in moves.iter().enumerate() {
+            let Some(instrument) = instruments.get(one.instrument) else {
+                let mend = format!("there are {}, the innermost is 0", instruments.len());
+                return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, mend));
+            };
+            if moves[..index].iter().any(|other| other.instrument == one.instrument) {
+                let mend = format!("{:?} is moved twice: add its motions up", instrument.name);
+                return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, mend));
+            }
+            check_command(one.command, inserted(one.instrument), instrument.device.length_mm())
+                .map_err(|error| within(&instrument.name, error))?;
+        }
+        let by =
+            |index: usize| moves.iter().find(|m| m.instrument == index).map_or(0.0, |m| m.command.advance_mm);
+        let after = (0..instruments.len()).map(|index| inserted(index) + by(index));
+        // What is pulled back to the mouth is out, whatever rounding leaves of it.
+        self.scene.stack.check_fit(after.map(|mm| if mm <= LENGTH_SLACK_MM { 0.0 } else { mm }))
     }
 
     /// All that the next step depends on, beside what surrounds the device.
@@ -114,9 +160,14 @@ impl Simulation {
         &self.scene.wall
     }
 
-    /// The device.
+    /// The device; of several instruments the innermost.
     pub fn device(&self) -> &Device {
-        &self.scene.device
+        self.scene.stack.first()
+    }
+
+    /// All instruments.
+    pub fn stack(&self) -> &Stack {
+        &self.scene.stack
     }
 
     /// The sheath.
@@ -131,6 +182,16 @@ const TURN_LIMIT_RAD: f64 = 1000.0 * std::f64::consts::TAU;
 
 /// Slack in inserted length, mm: the rounding of thousands of summed increments.
 const LENGTH_SLACK_MM: f64 = 1e-6;
+
+/// The same error, of the instrument of that name.
+fn within(instrument: &str, error: Error) -> Error {
+    match error {
+        Error::Parameter { name, value, mend } => {
+            Error::Parameter { name: format!("{instrument}.{name}"), value, mend }
+        }
+        other => other,
+    }
+}
 
 fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<()> {
     // Without the last digits of a sum of increments.
