@@ -76,13 +76,20 @@ fn an_end_passes_through_the_mesh_without_a_jump_and_hands_feel_the_slope() {
         assert!(simulation.report().converged);
     }
     let largest = energies.iter().copied().fold(0.0, f64::max);
-    // A jump is there three times in fourth differences, and what is smooth hardly at all.
-    let jumps = energies.windows(5).map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs() / 3.0);
-    let jump = jumps.fold(0.0, f64::max);
-    assert!(jump <= 1e-6 * largest, "{jump} of {largest}");
+    // Where the hook's end leaves the catheter the force jumps, and the energy has a kink.
+    let kink = |first: usize| {
+        (first..first + 5).any(|k| (1.0 + step_mm * (k + 1) as f64 - 15.0).abs() < 1.01 * step_mm)
+    };
+    let smooth: Vec<usize> = (0..count - 4).filter(|k| !kink(*k)).collect();
+    for &k in &smooth {
+        // A jump is there three times in fourth differences, and what is smooth hardly at all.
+        let w = &energies[k..k + 5];
+        let jump = (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs() / 3.0;
+        assert!(jump <= 1e-6 * largest, "{jump} of {largest} after {k} steps");
+    }
     let strongest = forces.iter().fold(0.0f64, |most, f| most.max(f.abs()));
-    for (k, window) in energies.windows(5).enumerate() {
-        let off = (forces[k + 2] - slope(window, step_mm)).abs();
+    for &k in &smooth {
+        let off = (forces[k + 2] - slope(&energies[k..k + 5], step_mm)).abs();
         assert!(off <= 1e-3 * strongest, "{off} of {strongest} after {k} steps");
     }
 }
@@ -145,7 +152,7 @@ fn a_refused_command_changes_nothing_and_a_wire_is_exchanged() {
     for _ in 0..10 {
         push(&mut simulation, &[(wire, 4.0), (catheter, 3.0)]).unwrap();
     }
-    let bytes = |simulation: &Simulation| toml::to_string(&simulation.state()).unwrap();
+    let bytes = |simulation: &Simulation| serde_json::to_vec(&simulation.state()).unwrap();
     let before = bytes(&simulation);
     for (moves, told) in [
         (vec![(other, 1.0)], "other.radius_mm = 0.3: \"wire\" has no lumen"),
