@@ -67,7 +67,6 @@ pub struct StepReport {
     /// Torque with which the hand must hold the tail, N·mm; of several instruments the sum.
     pub torque_nmm: f64,
     /// Each of several instruments, the innermost first; empty for a device alone.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub instruments: Vec<InstrumentReport>,
     /// Deepest penetration of the device's surface into the wall at any node, mm; 0 without contact.
     pub max_penetration_mm: f64,

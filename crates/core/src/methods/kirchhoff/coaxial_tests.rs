@@ -30,12 +30,14 @@ fn wire_in_catheter() -> Stack {
 
 /// Instruments at the mouth of a straight tube.
 fn in_tube(stack: impl Into<Stack>, radius_mm: f64) -> Simulation {
-    let nodes = (0..16).map(|i| CentrelineNode {
-        position_mm: Vec3::z() * (20.0 * f64::from(i)),
-        radius_mm,
-        parent: usize::try_from(i - 1).ok(),
-    });
-    let tree = CentrelineTree::new(nodes.collect()).unwrap();
+    along((0..16).map(|i| Vec3::z() * (20.0 * f64::from(i))), radius_mm, stack)
+}
+
+/// Instruments at the mouth of a tube about these points.
+fn along(axis: impl Iterator<Item = Vec3>, radius_mm: f64, stack: impl Into<Stack>) -> Simulation {
+    let node =
+        |(i, position_mm): (usize, Vec3)| CentrelineNode { position_mm, radius_mm, parent: i.checked_sub(1) };
+    let tree = CentrelineTree::new(axis.enumerate().map(node).collect()).unwrap();
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.4 * radius_mm)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
     Simulation::builder(made.wall, stack, sheath).build().unwrap()
@@ -65,31 +67,34 @@ fn slope(energies: &[f64], step_mm: f64) -> f64 {
     (8.0 * (d - b) - (e - a)) / (12.0 * step_mm)
 }
 
+/// Advances the wire out of the catheter, and returns energies and the wire's push forces.
+fn advanced(simulation: &mut Simulation, step_mm: f64, count: usize) -> (Vec<f64>, Vec<f64>) {
+    let step = |_| {
+        let energy = push(simulation, &[(WIRE, step_mm)]).unwrap();
+        assert!(simulation.report().converged);
+        (energy, simulation.report().instruments[WIRE].push_force_n.unwrap())
+    };
+    (0..count).map(step).unzip()
+}
+
+/// Largest jump of five energies over their smooth trend: it is there three times in fourth differences, and what is smooth hardly at all.
+fn jump(w: &[f64]) -> f64 {
+    (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs() / 3.0
+}
+
 #[test]
 fn an_end_passes_through_the_mesh_without_a_jump_and_hands_feel_the_slope() {
     let mut simulation = both_in(120.0);
     let (step_mm, count) = (0.1, 400);
-    let (mut energies, mut forces) = (Vec::new(), Vec::new());
-    for _ in 0..count {
-        energies.push(push(&mut simulation, &[(WIRE, step_mm)]).unwrap());
-        forces.push(simulation.report().instruments[WIRE].push_force_n.unwrap());
-        assert!(simulation.report().converged);
-    }
+    let (energies, forces) = advanced(&mut simulation, step_mm, count);
     let largest = energies.iter().copied().fold(0.0, f64::max);
-    // Where the hook's end leaves the catheter the force jumps, and the energy has a kink.
-    let kink = |first: usize| {
-        (first..first + 5).any(|k| (1.0 + step_mm * (k + 1) as f64 - 15.0).abs() < 1.01 * step_mm)
-    };
-    let smooth: Vec<usize> = (0..count - 4).filter(|k| !kink(*k)).collect();
-    for &k in &smooth {
-        // A jump is there three times in fourth differences, and what is smooth hardly at all.
-        let w = &energies[k..k + 5];
-        let jump = (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs() / 3.0;
-        assert!(jump <= 1e-6 * largest, "{jump} of {largest} after {k} steps");
-    }
     let strongest = forces.iter().fold(0.0f64, |most, f| most.max(f.abs()));
-    for &k in &smooth {
-        let off = (forces[k + 2] - slope(&energies[k..k + 5], step_mm)).abs();
+    // Where the hook's end leaves the catheter the force jumps, and the energy has a kink.
+    let kink = |k: usize| (1.0 + step_mm * (k + 1) as f64 - 15.0).abs() < 1.01 * step_mm;
+    for k in (0..count - 4).filter(|first| !(*first..first + 5).any(kink)) {
+        let window = &energies[k..k + 5];
+        assert!(jump(window) <= 1e-6 * largest, "{} of {largest} after {k} steps", jump(window));
+        let off = (forces[k + 2] - slope(window, step_mm)).abs();
         assert!(off <= 1e-3 * strongest, "{off} of {strongest} after {k} steps");
     }
 }
