@@ -1,7 +1,9 @@
 //! Shared helpers of the workspace tests.
 
 pub mod bent_rod;
+pub mod damage;
 pub mod noise;
+pub mod readers;
 pub mod spoiled;
 pub mod sweep;
 pub mod twin;

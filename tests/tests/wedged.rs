@@ -4,32 +4,19 @@
 
 use endowire_core::Vec3;
 use endowire_core::device::Device;
-use endowire_core::insertion::{Command, Contact, Sheath, Simulation, WallProperties};
+use endowire_core::insertion::{Command, Contact, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution};
+use endowire_verify::insertion_stress::InsertionStress;
 
 const FRICTION: f64 = 0.5;
 
-/// 10 mm straight, a quarter circle of radius 20 mm, 40 mm straight; bore 3 mm.
+/// In the vessel of the stress table, a quarter circle between straight lengths.
 fn thread(friction: f64) -> Simulation {
-    let mut axis: Vec<Vec3> = (0..5).map(|i| Vec3::x() * (2.0 * f64::from(i))).collect();
-    axis.extend((0..=15).map(|i| {
-        let (sin, cos) = (f64::from(i) * std::f64::consts::FRAC_PI_2 / 15.0).sin_cos();
-        Vec3::new(10.0 + 20.0 * sin, 20.0 - 20.0 * cos, 0.0)
-    }));
-    axis.extend((1..=20).map(|i| Vec3::new(30.0, 20.0 + 2.0 * f64::from(i), 0.0)));
-    let nodes = axis.into_iter().enumerate().map(|(i, position_mm)| CentrelineNode {
-        position_mm,
-        radius_mm: 3.0,
-        parent: i.checked_sub(1),
-    });
-    let tree = CentrelineTree::new(nodes.collect()).unwrap();
-    let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.8)).unwrap();
-    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
+    let InsertionStress { wall, sheath } = InsertionStress::new().unwrap();
     let properties = WallProperties { modulus_n_per_mm2: 1e4, friction, ..WallProperties::default() };
     let device = Device::uniform(100.0, 0.45, 1e-2).unwrap();
     let method = KirchhoffOptions { element_mm: 2.0, ..KirchhoffOptions::default() };
-    Simulation::builder(made.wall, device, sheath).properties(properties).method(&method).build().unwrap()
+    Simulation::builder(wall, device, sheath).properties(properties).method(&method).build().unwrap()
 }
 
 /// Direction of the device near a place.

@@ -71,8 +71,10 @@ pub struct InsertionRow {
 /// The vessel of the table: 10 mm straight, a quarter circle of radius 20 mm, 40 mm straight; bore 3 mm.
 #[derive(Debug)]
 pub struct InsertionStress {
-    wall: Wall,
-    sheath: Sheath,
+    /// Its wall.
+    pub wall: Wall,
+    /// One millimetre inside its inlet.
+    pub sheath: Sheath,
 }
 
 impl InsertionStress {

@@ -250,7 +250,7 @@ impl SmoothWall {
         if found.as_ref().is_some_and(|found| found.value_mm > 0.0) {
             return found;
         }
-        if self.height(x, list).0 < 0.0 { self.reach_from(x, list, Some(self.behind(list))) } else { found }
+        self.reach_from(x, list, Some(self.behind(list))).or(found)
     }
 
     /// The same in front of the surface, or behind it.

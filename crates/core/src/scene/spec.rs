@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
 use crate::device::{Device, DeviceFile, Section};
-use crate::input::from_toml;
+use crate::input::{from_toml, parse_toml};
 use crate::insertion::{Command, ScriptLine, Sheath, Simulation, WallProperties, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
 use crate::vessel::{CentrelineTree, Resolution, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint};
@@ -170,14 +170,26 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// # Errors
     /// Names file, line and key of what does not fit.
     pub fn read(path: &Path) -> Result<Self> {
-        let (mut scene, text): (Self, String) = from_toml(path)?;
-        scene.folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        scene.text = text;
-        if scene.name.is_empty() {
-            scene.name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let (scene, text): (Self, String) = from_toml(path)?;
+        scene.of_file(text, path)
+    }
+
+    /// Reads a scene from the text of a file, from whose folder its paths start; errors call it `path`.
+    ///
+    /// # Errors
+    /// As [`Self::read`], less those of reading a file.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
+        parse_toml::<Self>(text, path)?.of_file(text.to_owned(), path)
+    }
+
+    fn of_file(mut self, text: String, path: &Path) -> Result<Self> {
+        self.folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        self.text = text;
+        if self.name.is_empty() {
+            self.name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         }
-        check_name(&scene.name).map_err(|e| Error::content(path, e.to_string()))?;
-        Ok(scene)
+        check_name(&self.name).map_err(|e| Error::content(path, e.to_string()))?;
+        Ok(self)
     }
 
     /// The text the scene was read from.

@@ -53,7 +53,15 @@ impl CentrelineTree {
     /// and for what is no number.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = crate::file::read(path, SIZE_LIMIT)?;
-        Self::parse(&String::from_utf8_lossy(&bytes)).map_err(|reason| Error::content(path, reason))
+        Self::from_bytes(&bytes, path)
+    }
+
+    /// Reads a table from the bytes of a file, which errors call `path`.
+    ///
+    /// # Errors
+    /// As [`Self::read`], less those of reading a file.
+    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
+        Self::parse(&String::from_utf8_lossy(bytes)).map_err(|reason| Error::content(path, reason))
     }
 
     /// Reads the text of a table; the error names line and value.

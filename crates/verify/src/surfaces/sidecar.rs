@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use endowire_core::input::from_toml;
+use endowire_core::input::{from_toml, parse_toml};
 use endowire_core::scene::SheathSpec;
 use endowire_core::{Error, Result};
 
@@ -46,6 +46,19 @@ impl Sidecar {
     /// `device_radius_mm`: radii of the wires to insert, in place of the usual ones.
     pub fn radii_mm(&self) -> Option<Vec<f64>> {
         self.device_radius_mm.as_ref().map(OneOrMore::list)
+    }
+
+    /// Reads a sidecar from TOML text and checks it; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// Names line and key of what does not fit, or key and value of what cannot be meant.
+    pub fn from_toml(text: &str, name: &Path) -> Result<Self> {
+        parse_toml::<Self>(text, name)?.checked(name)
+    }
+
+    fn checked(self, name: &Path) -> Result<Self> {
+        self.check().map_err(|e| Error::content(name, e.to_string()))?;
+        Ok(self)
     }
 
     /// Refuses what cannot be meant.
@@ -109,8 +122,11 @@ pub fn surfaces_in(folder: &Path) -> Result<Vec<SurfaceFile>> {
     let mut files = Vec::new();
     for path in paths {
         let beside = path.with_extension("toml");
-        let sidecar = if beside.exists() { from_toml::<Sidecar>(&beside)?.0 } else { Sidecar::default() };
-        sidecar.check().map_err(|e| Error::content(&beside, e.to_string()))?;
+        let sidecar = if beside.exists() {
+            from_toml::<Sidecar>(&beside)?.0.checked(&beside)?
+        } else {
+            Sidecar::default()
+        };
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let units = sidecar.units_mm();
         for &unit_mm in &units {

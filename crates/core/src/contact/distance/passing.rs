@@ -5,27 +5,16 @@
 //! through from one to the other, so on the depth t behind the surface the first, f, passes into the second, g:
 //!
 //! ```text
-//! F = f + s (g − f),    s = S(−f/t) S(−h/t),    S(x) = x³(10 − 15x + 6x²) from 0 to 1
+//! F = f + s (g − f),    s = S(−f/t),    S(x) = x³(10 − 15x + 6x²) from 0 to 1.
 //! ```
 //!
-//! with h the least height over the planes at the corners of the triangle that is asked: over a ridge one of its flanks is in front.
-//! F is twice continuously differentiable.
+//! F is twice continuously differentiable. In front of the surface it is f: there the other side would be felt beyond sharp crests.
 
 use super::{Behind, Distance, Nearness, Reached, SmoothWall};
 use crate::Vec3;
 
 /// t over the radius of the thickest device.
 pub(super) const PASSING: f64 = 0.2;
-
-/// s with its derivatives in f and h.
-struct Share {
-    value: f64,
-    in_f: f64,
-    in_h: f64,
-    in_ff: f64,
-    in_fh: f64,
-    in_hh: f64,
-}
 
 impl SmoothWall {
     /// As [`SmoothWall::distance`], with derivatives only where the distance is less than `limit_mm`: they are what it costs. Beside it
@@ -40,8 +29,7 @@ impl SmoothWall {
         if let Some(front) = front.as_ref().filter(|front| front.value_mm >= 0.0) {
             return Some((told(front.value_mm, &|| derived(front)), front.coverage));
         }
-        let (height_mm, normal) = self.height(x, list);
-        let back = if height_mm < 0.0 { self.reach_from(x, list, Some(self.behind(list))) } else { None };
+        let back = self.reach_from(x, list, Some(self.behind(list)));
         let (front, back) = match (front, back) {
             (Some(front), Some(back)) => (front, back),
             (one, None) | (None, one) => {
@@ -49,28 +37,27 @@ impl SmoothWall {
                 return Some((told(one.value_mm, &|| derived(&one)), one.coverage));
             }
         };
-        let share = self.share(front.value_mm, height_mm);
+        let [share, in_f, in_ff] = self.share(front.value_mm);
         let apart = back.value_mm - front.value_mm;
-        let value_mm = front.value_mm + share.value * apart;
-        let coverage = front.coverage + share.value * (back.coverage - front.coverage);
+        let value_mm = front.value_mm + share * apart;
         let passing = || {
-            if share.value == 1.0 {
+            if share == 1.0 {
                 return derived(&back);
             }
             let (f, g) = (derived(&front), derived(&back));
-            let slope = f.gradient * share.in_f + normal * share.in_h;
-            let mixed = f.gradient * normal.transpose() * share.in_fh;
-            let bend = f.gradient * f.gradient.transpose() * share.in_ff
-                + (mixed + mixed.transpose())
-                + (normal * normal.transpose() * share.in_hh + f.hessian * share.in_f);
-            let turned = slope * (g.gradient - f.gradient).transpose();
-            let hessian = f.hessian + (g.hessian - f.hessian) * share.value;
+            let between = g.gradient - f.gradient;
+            let turned = f.gradient * between.transpose() * in_f;
+            let bend = f.gradient * f.gradient.transpose() * in_ff + f.hessian * in_f;
+            let hessian = f.hessian + (g.hessian - f.hessian) * share;
             Distance {
                 value_mm,
-                gradient: f.gradient + (g.gradient - f.gradient) * share.value + slope * apart,
+                gradient: f.gradient + between * share + f.gradient * (in_f * apart),
                 hessian: hessian + turned + turned.transpose() + bend * apart,
             }
         };
+        // Triangles take part as in front until all is as behind.
+        let [deep, ..] = self.share(front.value_mm + self.passing_mm);
+        let coverage = front.coverage + deep * (back.coverage - front.coverage);
         Some((told(value_mm, &passing), coverage))
     }
 
@@ -94,40 +81,24 @@ impl SmoothWall {
         slope /= front.weight;
         if coverage != front.coverage {
             // Behind the surface the coverage is 1.
-            let (height_mm, normal) = self.height(x, list);
-            let share = self.share(front.value_mm, height_mm);
-            let turn = f.gradient * share.in_f + normal * share.in_h;
-            slope = slope * (1.0 - share.value) + turn * (1.0 - front.coverage);
+            let [deep, in_f, _] = self.share(front.value_mm + self.passing_mm);
+            slope = slope * (1.0 - deep) + f.gradient * (in_f * (1.0 - front.coverage));
         }
         Some((distance, coverage, slope))
     }
 
-    /// Least height over the planes at the corners of the triangle whose list this is, mm, and its gradient.
-    pub(super) fn height(&self, x: &Vec3, list: &[u32]) -> (f64, Vec3) {
-        // The list begins with the corners.
-        let corners = list.iter().take(3).map(|v| &self.quadrics[*v as usize]);
-        let heights = corners.map(|q| (q.normal.dot(&(x - q.position)), q.normal));
-        heights.fold((f64::INFINITY, Vec3::zeros()), |least, h| if h.0 < least.0 { h } else { least })
-    }
-
     /// What a point behind that triangle is behind of.
     pub(super) fn behind(&self, list: &[u32]) -> Behind {
+        // The list begins with the corners.
         let corners = list.iter().take(3).map(|v| self.quadrics[*v as usize].normal);
         Behind { facing: corners.sum::<Vec3>().normalize() }
     }
 
-    fn share(&self, front_mm: f64, height_mm: f64) -> Share {
+    /// s at a distance f from the surface, and its derivatives in f.
+    fn share(&self, front_mm: f64) -> [f64; 3] {
         let rate = -1.0 / self.passing_mm;
-        let ([f, f1, f2], [h, h1, h2]) = (rise(front_mm * rate), rise(height_mm * rate));
-        let square = rate * rate;
-        Share {
-            value: f * h,
-            in_f: f1 * h * rate,
-            in_h: f * h1 * rate,
-            in_ff: f2 * h * square,
-            in_fh: f1 * h1 * square,
-            in_hh: f * h2 * square,
-        }
+        let [share, first, second] = rise(front_mm * rate);
+        [share, first * rate, second * rate * rate]
     }
 }
 

@@ -7,7 +7,8 @@ use super::Environment;
 use super::configuration::Configuration;
 use super::workspace::Tools;
 use crate::contact::{FeltWall, WallContact};
-use crate::{PhysicalEnd, Vec3};
+use crate::insertion::Command;
+use crate::{Error, PhysicalEnd, Result, Vec3};
 
 /// How far off the wall, in radii, ways across begin at most.
 const OFF: f64 = 0.3;
@@ -19,6 +20,24 @@ const PIECES: usize = 4;
 const ON_MM: f64 = 1e-3;
 
 impl<const C: usize> Tools<C> {
+    /// Refuses to push on where the vessel is narrower than the device, for commands of the hands that have found no equilibrium.
+    ///
+    /// # Errors
+    /// [`PhysicalEnd::Blocked`] with the narrowest place, if there is one and an instrument advances.
+    pub(super) fn refuse_narrower(
+        &mut self,
+        environment: &Environment<'_>,
+        at: &Configuration,
+        commands: &[Command],
+    ) -> Result<()> {
+        if commands.iter().any(|command| command.advance_mm > 0.0)
+            && let Some(end) = self.narrowest(environment, at)
+        {
+            return Err(Error::End(end));
+        }
+        Ok(())
+    }
+
     /// The narrowest place at which the device presses on the wall and has less room across the lumen than its diameter.
     pub(super) fn narrowest(
         &mut self,

@@ -182,3 +182,25 @@ fn a_refused_command_changes_nothing_and_a_wire_is_exchanged() {
     assert_eq!(simulation.report().inserted_mm, 0.0);
     assert_eq!(simulation.shape().positions_mm.len(), 1);
 }
+#[test]
+fn hands_feel_the_slope_in_a_bend_too() {
+    // Straight for 30 mm, then an arc of radius 40 mm.
+    let place = |s: f64| {
+        let angle = (s - 30.0).max(0.0) / 40.0;
+        Vec3::new(40.0 * (1.0 - angle.cos()), 0.0, s.min(30.0) + 40.0 * angle.sin())
+    };
+    let mut simulation = along((0..36).map(|i| place(4.0 * f64::from(i))), 4.0, wire_in_catheter());
+    push(&mut simulation, &[(WIRE, 1.0)]).unwrap();
+    for _ in 0..20 {
+        push(&mut simulation, &[(WIRE, 4.0), (CATHETER, 4.0)]).unwrap();
+    }
+    let (step_mm, count) = (0.1, 200);
+    let (energies, forces) = advanced(&mut simulation, step_mm, count);
+    let largest = energies.iter().copied().fold(0.0, f64::max);
+    let strongest = forces.iter().fold(0.0f64, |most, f| most.max(f.abs()));
+    for (k, window) in energies.windows(5).enumerate() {
+        let off = (forces[k + 2] - slope(window, step_mm)).abs();
+        println!("{k} {:.2e} {:.2e} {}", jump(window) / largest, off / strongest, forces[k + 2]);
+    }
+}
+

@@ -49,7 +49,6 @@ impl<const C: usize> Workspace<C> {
         let surroundings = &environment.surroundings;
         way.begin(surroundings.stack, &from.report, moves);
         let (start, target) = (line_mm(&way.start), line_mm(&way.target));
-        let advances = way.commands.iter().any(|command| command.advance_mm > 0.0);
         if target > start
             && let Some((opening, beyond)) = left_through(surroundings.wall, &from.tip_mm())
             && beyond + (target - start) > LEAVE_MM
@@ -131,19 +130,14 @@ impl<const C: usize> Workspace<C> {
             }
             // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
             if done < 1.0 && (failures > RESORTS || substeps > SUBSTEP_LIMIT) {
-                if advances && let Some(end) = tools.narrowest(environment, now) {
-                    return Err(Error::End(end));
-                }
+                tools.refuse_narrower(environment, now, &way.commands)?;
                 return Err(Error::Computation(format!(
                     "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
                 )));
             }
         }
-        if !balanced
-            && advances
-            && let Some(end) = tools.narrowest(environment, now)
-        {
-            return Err(Error::End(end));
+        if !balanced {
+            tools.refuse_narrower(environment, now, &way.commands)?;
         }
         let report = &mut now.parts().1.report;
         report.iterations = iterations as u32;

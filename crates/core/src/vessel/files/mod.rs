@@ -53,9 +53,18 @@ impl SurfaceMesh {
     /// [`Error::Content`] for an unknown extension, unusable content (the reason says where) or a surface over 10 m across.
     pub fn read(path: &Path, unit_mm: f64) -> Result<Self> {
         check_unit(unit_mm)?;
-        let format = format_of(path)?;
-        let bytes = crate::file::read(path, SIZE_LIMIT)?;
-        let mesh = parse(format, &bytes).map_err(|reason| Error::content(path, reason))?;
+        // A name that tells no format is refused before a large file is read.
+        format_of(path)?;
+        Self::from_bytes(&crate::file::read(path, SIZE_LIMIT)?, path, unit_mm)
+    }
+
+    /// Reads a surface from the bytes of a file; the extension of `path` tells the format, and errors name it.
+    ///
+    /// # Errors
+    /// As [`Self::read`], less those of reading a file.
+    pub fn from_bytes(bytes: &[u8], path: &Path, unit_mm: f64) -> Result<Self> {
+        check_unit(unit_mm)?;
+        let mesh = parse(format_of(path)?, bytes).map_err(|reason| Error::content(path, reason))?;
         scaled(mesh, unit_mm).map_err(|reason| Error::content(path, reason))
     }
 

@@ -1,0 +1,111 @@
+//! An insertion in parts: closest points and smooth distances, the felt wall made from a surface, whole steps against the number
+//! of elements, and clones.
+#![allow(missing_docs, reason = "the macros of criterion expand to undocumented items")]
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use endowire_core::contact::{FeltWall, SmoothWall};
+use endowire_core::device::Device;
+use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::vessel::{GeneratedWall, Resolution, WallQuery, anatomy};
+use endowire_core::{Error, Result, Vec3};
+
+/// Radius of the wire, mm.
+const RADIUS_MM: f64 = 0.445;
+
+/// Length that is inserted before the clock starts, mm: the wire lies along the bends of the curved tube.
+const INSERTED_MM: f64 = 160.0;
+
+fn vessel(triangles: usize) -> Result<GeneratedWall> {
+    let tree = anatomy::tree("curved_tube")
+        .ok_or_else(|| Error::parameter("vessel", "curved_tube", "is not built in"))?;
+    GeneratedWall::new(&tree, Resolution::Triangles(triangles))
+}
+
+/// A wire of `elements` elements, inserted.
+fn inserted(elements: usize, friction: f64) -> Result<Simulation> {
+    let made = vessel(20_000)?;
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0)?;
+    let wire = Device::uniform(200.0, RADIUS_MM, 10.0)?;
+    let method = KirchhoffOptions { element_mm: INSERTED_MM / elements as f64, ..Default::default() };
+    let properties = WallProperties { friction, ..Default::default() };
+    let mut simulation =
+        Simulation::builder(made.wall, wire, sheath).properties(properties).method(&method).build()?;
+    for _ in 0..80 {
+        simulation.step(Command::advance(INSERTED_MM / 80.0))?;
+    }
+    Ok(simulation)
+}
+
+/// A query at every place where a wire of 300 nodes may touch: points within its radius of the wall.
+fn queries(c: &mut Criterion) {
+    let Ok(made) = vessel(20_000) else { return };
+    let Ok(query) = WallQuery::new(&made.wall) else { return };
+    let mesh = made.wall.mesh();
+    let step = (mesh.triangles.len() / 300).max(1);
+    let places: Vec<(Vec3, u32)> = (0..mesh.triangles.len())
+        .step_by(step)
+        .map(|index| {
+            let [a, b, d] = mesh.corners(index);
+            let triangle = index as u32;
+            ((a + b + d) / 3.0 + query.inward_normal(triangle) * RADIUS_MM, triangle)
+        })
+        .collect();
+    let smooth = SmoothWall::new(&made.wall, RADIUS_MM);
+    let mut group = c.benchmark_group(format!("{} contact queries", places.len()));
+    group.bench_function("nearest", |b| {
+        b.iter(|| places.iter().filter(|(x, _)| query.nearest(black_box(x), 3.0).is_some()).count());
+    });
+    group.bench_function("smooth distance with derivatives", |b| {
+        b.iter(|| places.iter().filter_map(|(x, t)| black_box(smooth.distance(black_box(x), *t))).count());
+    });
+    group.finish();
+}
+
+fn felt_walls(c: &mut Criterion) {
+    let Ok(wire) = Device::uniform(200.0, RADIUS_MM, 10.0) else { return };
+    let mut group = c.benchmark_group("felt wall of triangles");
+    group.sample_size(10);
+    for triangles in [20_000, 200_000] {
+        let Ok(made) = vessel(triangles) else { continue };
+        group.bench_function(BenchmarkId::from_parameter(triangles), |b| {
+            b.iter(|| FeltWall::new(&made.wall, &wire, &WallProperties::default()));
+        });
+    }
+    group.finish();
+}
+
+fn steps(c: &mut Criterion) {
+    for friction in [0.0, 0.1] {
+        let mut group = c.benchmark_group(format!("1 mm in and out, friction {friction}, elements"));
+        group.sample_size(10);
+        for elements in [50, 100, 300] {
+            let Ok(mut simulation) = inserted(elements, friction) else { continue };
+            group.bench_function(BenchmarkId::from_parameter(elements), |b| {
+                b.iter(|| {
+                    let there = simulation.step(Command::advance(1.0)).is_ok();
+                    there && simulation.step(Command::retract(1.0)).is_ok()
+                });
+            });
+        }
+        group.finish();
+    }
+}
+
+/// A clone as a search over commands makes it, and the state alone, which is taken back by `restore`.
+fn clones(c: &mut Criterion) {
+    let Ok(simulation) = inserted(199, 0.1) else { return };
+    let mut group = c.benchmark_group("copy of 200 nodes");
+    group.bench_function("clone", |b| {
+        b.iter_with_large_drop(|| black_box(&simulation).clone());
+    });
+    group.bench_function("state", |b| {
+        b.iter_with_large_drop(|| black_box(&simulation).state());
+    });
+    group.finish();
+}
+
+criterion_group!(benches, queries, felt_walls, steps, clones);
+criterion_main!(benches);

@@ -1,0 +1,101 @@
+//! Every reader of files that a library function reaches, on bytes: what the fuzz targets and the test of damaged files call.
+
+use std::path::Path;
+
+use endowire_core::device::Device;
+use endowire_core::insertion::{Sheath, Simulation, State};
+use endowire_core::statics::{StaticCase, StaticProblem};
+use endowire_core::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, anatomy};
+use endowire_core::{Error, Result};
+use endowire_methods::Scene;
+use endowire_verify::surfaces::Sidecar;
+
+fn surface(bytes: &[u8], name: &str) -> Result<()> {
+    SurfaceMesh::from_bytes(bytes, Path::new(name), 1.0).map(drop)
+}
+
+/// A surface as OBJ.
+///
+/// # Errors
+/// As [`SurfaceMesh::from_bytes`].
+pub fn obj(bytes: &[u8]) -> Result<()> {
+    surface(bytes, "a.obj")
+}
+
+/// A surface as STL, of either kind.
+///
+/// # Errors
+/// As [`SurfaceMesh::from_bytes`].
+pub fn stl(bytes: &[u8]) -> Result<()> {
+    surface(bytes, "a.stl")
+}
+
+/// A surface as PLY, of any kind.
+///
+/// # Errors
+/// As [`SurfaceMesh::from_bytes`].
+pub fn ply(bytes: &[u8]) -> Result<()> {
+    surface(bytes, "a.ply")
+}
+
+/// A table of a centre-line tree.
+///
+/// # Errors
+/// As [`CentrelineTree::from_bytes`].
+pub fn centreline(bytes: &[u8]) -> Result<()> {
+    CentrelineTree::from_bytes(bytes, Path::new("a.csv")).map(drop)
+}
+
+/// A scene with its device and script; the files that it names are not opened.
+///
+/// # Errors
+/// As [`Scene::from_toml`], [`Device::new`] and [`Scene::commands`].
+pub fn scene(bytes: &[u8]) -> Result<()> {
+    let scene = Scene::from_toml(text(bytes)?, Path::new("a.toml"))?;
+    if scene.device.file.is_some() {
+        return Ok(());
+    }
+    scene.commands(&scene.device()?).map(drop)
+}
+
+/// A case of rods, up to the problem that would be solved.
+///
+/// # Errors
+/// As [`StaticCase::from_toml`] and [`StaticProblem::new`].
+pub fn rod_case(bytes: &[u8]) -> Result<()> {
+    StaticProblem::new(&StaticCase::from_toml(text(bytes)?, Path::new("a.toml"))?).map(drop)
+}
+
+/// What is said of a surface in the file beside it.
+///
+/// # Errors
+/// As [`Sidecar::from_toml`].
+pub fn sidecar(bytes: &[u8]) -> Result<()> {
+    Sidecar::from_toml(text(bytes)?, Path::new("a.toml")).map(drop)
+}
+
+/// The state of a simulation, restored into one of the same scene.
+///
+/// # Errors
+/// What is no state, and as [`Simulation::restore`].
+pub fn state(simulation: &mut Simulation, bytes: &[u8]) -> Result<()> {
+    let state: State =
+        postcard::from_bytes(bytes).map_err(|e| Error::content(Path::new("state"), e.to_string()))?;
+    simulation.restore(&state)
+}
+
+/// The simulation that [`state`] restores into: a wire of 100 mm in a coarse straight tube.
+///
+/// # Errors
+/// None, unless what the simulation is made of is refused.
+pub fn simulation() -> Result<Simulation> {
+    let tree = anatomy::tree("straight_tube")
+        .ok_or_else(|| Error::parameter("vessel", "straight_tube", "is not built in"))?;
+    let made = GeneratedWall::new(&tree, Resolution::Triangles(1_000))?;
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0)?;
+    Simulation::builder(made.wall, Device::uniform(100.0, 0.4, 10.0)?, sheath).build()
+}
+
+fn text(bytes: &[u8]) -> Result<&str> {
+    std::str::from_utf8(bytes).map_err(|e| Error::content(Path::new("a.toml"), format!("is no text: {e}")))
+}
