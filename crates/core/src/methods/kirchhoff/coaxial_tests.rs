@@ -71,7 +71,7 @@ fn slope(energies: &[f64], step_mm: f64) -> f64 {
 fn advanced(simulation: &mut Simulation, step_mm: f64, count: usize) -> (Vec<f64>, Vec<f64>) {
     let step = |_| {
         let energy = push(simulation, &[(WIRE, step_mm)]).unwrap();
-        assert!(simulation.report().converged);
+        let r = simulation.report(); println!("{:.2} its {} subs {} relax {} imb {:.2e} conv {} contacts {} F {:?} E {energy:.9}", r.inserted_mm, r.iterations, r.substeps, r.relaxations, r.imbalance, r.converged, r.contacts.len(), r.instruments[0].push_force_n);
         (energy, simulation.report().instruments[WIRE].push_force_n.unwrap())
     };
     (0..count).map(step).unzip()

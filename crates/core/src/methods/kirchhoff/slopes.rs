@@ -6,13 +6,13 @@
 
 use super::Environment;
 use super::coaxial::{Nodes, line_mm};
-use super::configuration::Configuration;
+use super::configuration::{Configuration, Start};
 use super::hands::{Hand, lengths};
 use super::mesh::Mesh;
 use super::workspace::Tools;
 use crate::contact::WallContact;
 use crate::insertion::InstrumentReport;
-use crate::rod::{Clamp, RodState, element_energy};
+use crate::rod::{Clamp, element_energy};
 use crate::solve::External;
 
 /// Step of the differences of the energy, as a part of the shortest element.
@@ -44,7 +44,7 @@ impl<const C: usize> Tools<C> {
                 inserted_mm: hand.inserted_mm,
                 rotation_rad: hand.turn_rad,
                 tip_rotation_rad: hand.turn_rad + twist,
-                push_force_n: self.push_force(environment, index, &inserted, &at.mesh, &at.state.rod),
+                push_force_n: self.push_force(environment, index, &inserted, at.start()),
                 torque_nmm: set.zip(clamp).map_or(0.0, |(set, clamp)| clamp.torques[set]),
             });
         }
@@ -61,11 +61,10 @@ impl<const C: usize> Tools<C> {
         environment: &Environment<'_>,
         index: usize,
         inserted_mm: &[f64],
-        mesh: &Mesh,
-        rod: &RodState,
+        at: Start<'_>,
     ) -> Option<f64> {
         let stack = environment.surroundings.stack;
-        let shortest = mesh.elements.iter().map(|e| e.length).fold(f64::INFINITY, f64::min);
+        let shortest = at.mesh.elements.iter().map(|e| e.length).fold(f64::INFINITY, f64::min);
         let (own, step) = (inserted_mm[index], STEP * shortest);
         let meets = |(other, end): (usize, &f64)| other != index && (end - own).abs() <= MEET * step;
         if own <= MEET * step || inserted_mm.iter().enumerate().any(meets) {
@@ -75,7 +74,7 @@ impl<const C: usize> Tools<C> {
         let mut energy = |by: f64| {
             let mut inserted = inserted_mm.to_vec();
             inserted[index] += by;
-            self.energy_with(environment, &nodes, &inserted, rod)
+            self.energy_with(environment, &nodes, &inserted, at)
         };
         let near = energy(step) - energy(-step);
         let far = energy(2.0 * step) - energy(-2.0 * step);
@@ -85,23 +84,25 @@ impl<const C: usize> Tools<C> {
         Some((8.0 * near - far) / (12.0 * step) - straightening)
     }
 
-    /// Energy of instruments with these lengths inserted and the unknowns of `rod`.
+    /// Energy of instruments with these lengths inserted and the unknowns of those that are `at` a place near by.
     fn energy_with(
         &mut self,
         environment: &Environment<'_>,
         nodes: &Nodes,
         inserted_mm: &[f64],
-        rod: &RodState,
+        at: Start<'_>,
     ) -> f64 {
         let surroundings = &environment.surroundings;
         let mut mesh = Mesh::default();
         nodes.mesh(surroundings.stack, inserted_mm, surroundings.properties.modulus_n_per_mm2, &mut mesh);
-        let mut moved = rod.clone();
+        let mut moved = at.state.rod.clone();
         moved.place(&mesh.elements);
         let each = mesh.elements.iter().enumerate();
         let stored: f64 =
             each.map(|(e, data)| element_energy::<C>(data, &moved.element::<C>(e)).total()).sum();
         let softest = surroundings.stack.softest_nmm2();
+        let advance_mm = mesh.from_tip_mm[0] - at.mesh.from_tip_mm[0];
+        self.memory.begin(&at.state.known, &at.mesh.points, &mesh.points, advance_mm);
         let mut contact =
             WallContact::new(environment.felt, &mesh.points, &mut self.memory, &mut self.friction, softest);
         stored + contact.value(&mesh.elements, &moved)
