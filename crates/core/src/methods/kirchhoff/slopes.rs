@@ -15,8 +15,9 @@ use crate::insertion::InstrumentReport;
 use crate::rod::{Clamp, element_energy};
 use crate::solve::External;
 
-/// Step of the differences of the energy, as a part of the shortest element.
-const STEP: f64 = 1e-3;
+/// Step of the differences of the energy, as a part of the shortest element: less than a device sinks into a wall, whose energy bends where
+/// that begins.
+const STEP: f64 = 1e-5;
 /// Steps within which ends meet.
 const MEET: f64 = 4.0;
 
