@@ -11,6 +11,8 @@ pub struct Instrument {
     pub name: String,
     /// Its sections.
     pub device: Device,
+    /// Whether its tip may be farther in than that of the instrument in it; one that must not lead is pushed over that alone.
+    pub may_lead: bool,
 }
 
 /// Instruments on one line, the innermost first; those that are never in at the same time may share a place.
@@ -23,12 +25,14 @@ pub struct Stack {
 
 /// Most instruments of a stack.
 const MOST: usize = 16;
+/// Slack in inserted lengths, mm: the rounding of thousands of summed increments.
+pub(crate) const LENGTH_SLACK_MM: f64 = 1e-6;
 
 impl From<Device> for Stack {
     /// A device alone, named `device`.
     fn from(device: Device) -> Self {
         let sets = vec![device.is_shaped().then_some(0)];
-        Self { instruments: vec![Instrument { name: "device".to_owned(), device }], sets }
+        Self { instruments: vec![Instrument { name: "device".to_owned(), device, may_lead: true }], sets }
     }
 }
 
@@ -123,19 +127,53 @@ impl Stack {
         farthest.map_or(0.0, |(device, _)| device.section_at(0.0).radius_mm)
     }
 
-    /// Checks that instruments which are in together lie in one another: each in the lumen of the next.
+    /// Checks that instruments with these lengths inserted can be in together: each in the lumen of the next, with its tail out of that
+    /// one's, and behind or in front as it may be.
     ///
     /// # Errors
-    /// The first that does not go into the next one that is in.
-    pub fn check_fit(&self, inserted_mm: impl Iterator<Item = f64>) -> Result<()> {
-        let mut inner: Option<&Instrument> = None;
-        for (outer, _) in self.instruments.iter().zip(inserted_mm).filter(|(_, mm)| *mm > 0.0) {
+    /// The first that does not go with the next one that is in.
+    pub fn check_places(&self, inserted_mm: impl Iterator<Item = f64>) -> Result<()> {
+        let mut inner: Option<(&Instrument, f64)> = None;
+        // What is pulled back to the mouth is out, whatever rounding leaves of it.
+        for outer in self.instruments.iter().zip(inserted_mm).filter(|(_, mm)| *mm > LENGTH_SLACK_MM) {
             if let Some(inner) = inner.replace(outer) {
-                check_pair(inner, outer)?;
+                check_pair(inner.0, outer.0)?;
+                check_tails(inner, outer)?;
+                check_lead(inner, outer)?;
             }
         }
         Ok(())
     }
+}
+
+/// Whether the tail of an inner instrument stays out of that of the outer one, where its hand is.
+fn check_tails((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instrument, f64)) -> Result<()> {
+    let tail_mm = outer.device.length_mm() - outer_mm;
+    let most_mm = inner.device.length_mm() - tail_mm;
+    if inner_mm <= most_mm + LENGTH_SLACK_MM {
+        return Ok(());
+    }
+    let mend = format!(
+        "{tail_mm:.3} mm of {:?} are outside, and the tail of {:?} would be in them: insert at most {:.3} mm, insert {:?} farther, or \
+         use a longer instrument",
+        outer.name,
+        inner.name,
+        most_mm.max(0.0),
+        outer.name
+    );
+    Err(Error::parameter(format!("{}.inserted_mm", inner.name), inner_mm, mend))
+}
+
+/// Whether an outer instrument that must not lead is behind the inner one.
+fn check_lead((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instrument, f64)) -> Result<()> {
+    if outer.may_lead || outer_mm <= inner_mm + LENGTH_SLACK_MM {
+        return Ok(());
+    }
+    let mend = format!(
+        "must not lead, and {:?} is {inner_mm:.3} mm in: advance that first, or allow it with may_lead",
+        inner.name
+    );
+    Err(Error::parameter(format!("{}.inserted_mm", outer.name), outer_mm, mend))
 }
 
 /// Whether one instrument goes into another.
@@ -170,7 +208,7 @@ mod tests {
 
     fn instrument(name: &str, radius_mm: f64, inner_radius_mm: Option<f64>) -> Instrument {
         let section = Section { inner_radius_mm, ..Section::straight(100.0, radius_mm, 10.0) };
-        Instrument { name: name.to_owned(), device: Device::new(vec![section]).unwrap() }
+        Instrument { name: name.to_owned(), device: Device::new(vec![section]).unwrap(), may_lead: true }
     }
 
     #[test]
@@ -178,15 +216,33 @@ mod tests {
         let catheter = instrument("catheter", 0.9, Some(0.5));
         let wires = [instrument("wire", 0.2, None), instrument("stiff wire", 0.5, None)];
         let stack = Stack::new(wires.into_iter().chain([catheter]).collect()).unwrap();
-        let told = |mm: [f64; 3]| stack.check_fit(mm.into_iter()).map_err(|e| e.to_string());
-        assert!(told([10.0, 0.0, 20.0]).is_ok() && told([0.0, 10.0, 20.0]).is_ok());
+        let told = |mm: [f64; 3]| stack.check_places(mm.into_iter()).map_err(|e| e.to_string());
+        assert!(told([20.0, 0.0, 20.0]).is_ok() && told([0.0, 10.0, 20.0]).is_ok());
         assert!(told([10.0, 10.0, 20.0]).unwrap_err().contains("\"stiff wire\" has no lumen"));
         assert_eq!(stack.find("catheter").unwrap(), 2);
         let error = stack.find("cathter").unwrap_err().to_string();
         assert!(error.contains("did you mean \"catheter\"?"), "{error}");
         let thick = Stack::new(vec![instrument("a", 0.6, None), instrument("b", 0.9, Some(0.5))]).unwrap();
-        let error = thick.check_fit([1.0, 1.0].into_iter()).unwrap_err().to_string();
+        let error = thick.check_places([1.0, 1.0].into_iter()).unwrap_err().to_string();
         assert!(error.starts_with("a.radius_mm = 0.6: the lumen of \"b\" has radius 0.5 mm"), "{error}");
         assert!(Stack::new(vec![instrument("a", 0.6, None), instrument("a", 0.9, Some(0.5))]).is_err());
+    }
+    #[test]
+    fn tails_stay_outside_and_what_must_not_lead_is_pushed_over_a_wire() {
+        let section = Section::straight(150.0, 0.2, 5.0);
+        let wire = Device::new(vec![section]).unwrap();
+        let wire = Instrument { name: "wire".to_owned(), device: wire, may_lead: true };
+        let catheter = Instrument { may_lead: false, ..instrument("catheter", 0.9, Some(0.5)) };
+        let stack = Stack::new(vec![wire, catheter]).unwrap();
+        let told = |mm: [f64; 2]| stack.check_places(mm.into_iter()).map_err(|e| e.to_string());
+        assert!(told([70.0, 20.0]).is_ok() && told([20.0, 20.0]).is_ok() && told([0.0, 20.0]).is_ok());
+        let error = told([70.1, 20.0]).unwrap_err();
+        assert!(
+            error.starts_with("wire.inserted_mm = 70.1: 80.000 mm of \"catheter\" are outside"),
+            "{error}"
+        );
+        assert!(error.contains("insert at most 70.000 mm"), "{error}");
+        let error = told([20.0, 20.1]).unwrap_err();
+        assert!(error.starts_with("catheter.inserted_mm = 20.1: must not lead"), "{error}");
     }
 }

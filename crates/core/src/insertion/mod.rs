@@ -4,14 +4,16 @@ mod builder;
 mod command;
 mod nodes;
 mod report;
+mod script;
 mod sheath;
 mod simulation;
 
 pub use crate::contact::{Contact, WallProperties, WallRegion};
 pub use crate::methods::State;
 pub use builder::SimulationBuilder;
-pub use command::{Command, Move, ScriptLine, commands};
+pub use command::{Command, Move};
 pub use nodes::nodes_from_tip;
 pub use report::{Energy, InstrumentReport, StepReport};
+pub use script::{Script, ScriptLine, script_commands};
 pub use sheath::Sheath;
-pub use simulation::{Simulation, Surroundings, check_commands, script_commands};
+pub use simulation::{Simulation, Surroundings, check_commands};

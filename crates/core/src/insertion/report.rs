@@ -31,6 +31,16 @@ impl StepReport {
     }
 }
 
+impl StepReport {
+    /// Length inserted of each instrument, or of the device alone, mm.
+    pub fn lengths_mm(&self) -> Vec<f64> {
+        if self.instruments.is_empty() {
+            return vec![self.inserted_mm];
+        }
+        self.instruments.iter().map(|instrument| instrument.inserted_mm).collect()
+    }
+}
+
 /// What one of several instruments does after a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct InstrumentReport {

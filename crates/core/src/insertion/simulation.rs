@@ -3,10 +3,8 @@
 use std::sync::Arc;
 
 use crate::contact::Counters;
-use crate::device::{Device, Stack};
-use crate::insertion::{
-    Command, Move, ScriptLine, Sheath, SimulationBuilder, StepReport, WallProperties, commands,
-};
+use crate::device::{Device, LENGTH_SLACK_MM, Stack};
+use crate::insertion::{Command, Move, Sheath, SimulationBuilder, StepReport, WallProperties};
 use crate::methods::{Method, State};
 use crate::shape::Shape;
 use crate::vessel::{Wall, WallQuery};
@@ -83,8 +81,8 @@ impl Simulation {
     /// Moves instruments, each by its own command, all at the same time. After an error the state is as before, to the bit.
     ///
     /// # Errors
-    /// As [`Simulation::step`] for each; an instrument that is not there or moved twice, and instruments that would be in together and do not
-    /// lie in one another (all [`Error::Parameter`]).
+    /// As [`Simulation::step`] for each; an instrument that is not there or moved twice, and instruments that cannot be in
+    /// together so far ([`Stack::check_places`]; all [`Error::Parameter`]).
     pub fn step_together(&mut self, moves: &[Move]) -> Result<&StepReport> {
         self.check_moves(moves)?;
         let surroundings = self.scene.surroundings();
@@ -117,8 +115,7 @@ impl Simulation {
         let by =
             |index: usize| moves.iter().find(|m| m.instrument == index).map_or(0.0, |m| m.command.advance_mm);
         let after = (0..instruments.len()).map(|index| inserted(index) + by(index));
-        // What is pulled back to the mouth is out, whatever rounding leaves of it.
-        self.scene.stack.check_fit(after.map(|mm| if mm <= LENGTH_SLACK_MM { 0.0 } else { mm }))
+        self.scene.stack.check_places(after)
     }
 
     /// All that the next step depends on, beside what surrounds the device.
@@ -180,9 +177,6 @@ impl Simulation {
 /// left that tell where on the circle it is.
 const TURN_LIMIT_RAD: f64 = 1000.0 * std::f64::consts::TAU;
 
-/// Slack in inserted length, mm: the rounding of thousands of summed increments.
-const LENGTH_SLACK_MM: f64 = 1e-6;
-
 /// The same error, of the instrument of that name.
 fn within(instrument: &str, error: Error) -> Error {
     match error {
@@ -193,7 +187,7 @@ fn within(instrument: &str, error: Error) -> Error {
     }
 }
 
-fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<()> {
+pub(super) fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<()> {
     // Without the last digits of a sum of increments.
     let shown_mm = (inserted_mm * 1e6).round() / 1e6;
     for (name, value) in [("advance_mm", command.advance_mm), ("rotate_rad", command.rotate_rad)] {
@@ -245,34 +239,6 @@ pub fn check_commands(list: &[Command], device: &Device) -> Result<()> {
         inserted_mm += command.advance_mm;
     }
     Ok(())
-}
-
-/// The commands of a script, checked against a device before the first is carried out.
-///
-/// # Errors
-/// As [`commands`] and [`Simulation::step`], naming the line of the script and its key.
-pub fn script_commands(script: &[ScriptLine], device: &Device) -> Result<Vec<Command>> {
-    let list = commands(script)?;
-    let mut rest = list.iter();
-    let mut inserted_mm = 0.0;
-    for (index, line) in script.iter().enumerate() {
-        let name = format!("script[{index}]");
-        for (step, command) in rest.by_ref().take(line.increments(&name)?).enumerate() {
-            check_command(*command, inserted_mm, device.length_mm()).map_err(|error| match error {
-                Error::Parameter { name: key, mend, .. } => {
-                    let value = line.advance_mm.or(line.retract_mm).unwrap_or(0.0);
-                    Error::parameter(
-                        format!("{name}.{key}"),
-                        value,
-                        format!("in its step {}, {mend}", step + 1),
-                    )
-                }
-                other => other,
-            })?;
-            inserted_mm += command.advance_mm;
-        }
-    }
-    Ok(list)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ const WIRE: usize = 0;
 const CATHETER: usize = 1;
 
 fn instrument(name: &str, sections: [Section; 2]) -> Instrument {
-    Instrument { name: name.to_owned(), device: Device::new(sections.to_vec()).unwrap() }
+    Instrument { name: name.to_owned(), device: Device::new(sections.to_vec()).unwrap(), may_lead: true }
 }
 
 /// A hooked wire in a bent catheter.
@@ -130,6 +130,7 @@ fn straight_instruments_of_one_length_are_one_device() {
     let one = |name: &str, section: Section| Instrument {
         name: name.to_owned(),
         device: Device::new(vec![section]).unwrap(),
+        may_lead: true,
     };
     let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
     let wire = Section::straight(150.0, 0.2, 20.0);
@@ -150,7 +151,7 @@ fn a_refused_command_changes_nothing_and_a_wire_is_exchanged() {
     let mut instruments = wire_in_catheter().instruments().to_vec();
     instruments.insert(
         0,
-        instrument("other", [Section::straight(10.0, 0.3, 4.0), Section::straight(100.0, 0.3, 30.0)]),
+        instrument("other", [Section::straight(10.0, 0.3, 4.0), Section::straight(300.0, 0.3, 30.0)]),
     );
     let mut simulation = in_tube(Stack::new(instruments).unwrap(), 20.0);
     let (other, wire, catheter) = (0, 1, 2);

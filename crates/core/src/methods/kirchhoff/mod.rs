@@ -263,7 +263,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         for (hand, device) in hands.iter().zip(devices) {
             crate::methods::check_inserted(hand.inserted_mm, device)?;
         }
-        surroundings.stack.check_fit(hands.iter().map(|hand| hand.inserted_mm))?;
+        surroundings.stack.check_places(hands.iter().map(|hand| hand.inserted_mm))?;
         let environment =
             Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
         let mut mesh = Mesh::default();
