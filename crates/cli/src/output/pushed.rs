@@ -1,6 +1,6 @@
 //! What is pushed, as the viewer sees it: the device, or each of several instruments.
 
-use endowire_core::device::{Device, DeviceFile, Section, Stack};
+use endowire_core::device::{Device, Section, Stack};
 use endowire_core::shape::Shape;
 use endowire_methods::Scene;
 use endowire_viewer::{DevicePart, DeviceView, ViewSpec, device_parts};
@@ -21,7 +21,7 @@ impl Pushed {
         let mut parts = Vec::new();
         for (file, device) in scene.device_files()?.iter().zip(stack.devices()) {
             parts.push(match file {
-                Some(file) => made_of(scene, file)?,
+                Some((path, file)) => device_parts(file).map_err(|e| Failure::from(e).at(path.display()))?,
                 None => tubes(device),
             });
         }
@@ -48,11 +48,6 @@ impl Pushed {
         };
         each.map(view).collect()
     }
-}
-
-/// The parts of a device file.
-fn made_of(scene: &Scene, file: &DeviceFile) -> Result<Vec<DevicePart>, Failure> {
-    device_parts(file).map_err(|e| Failure::from(e).at(format_args!("{} ({})", scene.name, file.name)))
 }
 
 /// Sections of a scene as tubes; none where all are solid.

@@ -127,6 +127,14 @@ impl Stack {
         farthest.map_or(0.0, |(device, _)| device.section_at(0.0).radius_mm)
     }
 
+    /// Outer radius of the outermost instrument at a place so far from the tip of the line, mm, with these lengths inserted.
+    pub fn felt_radius_mm(&self, inserted_mm: &[f64], from_tip_mm: f64) -> f64 {
+        let line_mm = inserted_mm.iter().copied().fold(0.0, f64::max);
+        let own = |inserted: f64| from_tip_mm - (line_mm - inserted);
+        let there = self.devices().zip(inserted_mm).rev().find(|(_, inserted)| own(**inserted) >= 0.0);
+        there.map_or(0.0, |(device, inserted)| device.section_at(own(*inserted)).radius_mm)
+    }
+
     /// Checks that instruments with these lengths inserted can be in together: each in the lumen of the next, with its tail out of that
     /// one's, and behind or in front as it may be.
     ///

@@ -362,11 +362,12 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         Ok(lengths_mm)
     }
 
-    /// The device files, with parts, materials and sources, of the device or of each instrument, where the scene names them.
+    /// The device files with their paths, and with parts, materials and sources, of the device or of each instrument, where the scene
+    /// names them.
     ///
     /// # Errors
     /// A missing or unusable file, values out of range, sections in the scene too.
-    pub fn device_files(&self) -> Result<Vec<Option<DeviceFile>>> {
+    pub fn device_files(&self) -> Result<Vec<Option<(PathBuf, DeviceFile)>>> {
         let device = self.device.iter().map(|spec| ("device".to_owned(), &spec.file, &spec.section));
         let each = self.instrument.iter().enumerate();
         let each = each.map(|(index, spec)| (format!("instrument[{index}]"), &spec.file, &spec.section));
@@ -376,7 +377,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// A device of the scene by its table's name.
     fn read_device(&self, name: &str, file: &Option<PathBuf>, section: &[Section]) -> Result<Device> {
         match self.read_file(name, file, section)? {
-            Some(file) => Ok(file.device),
+            Some((_, file)) => Ok(file.device),
             None => Device::new(section.to_vec()).map_err(|error| match error {
                 Error::Parameter { name: key, value, mend } => {
                     Error::Parameter { name: key.replacen("device", name, 1), value, mend }
@@ -392,14 +393,18 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         name: &str,
         file: &Option<PathBuf>,
         section: &[Section],
-    ) -> Result<Option<DeviceFile>> {
+    ) -> Result<Option<(PathBuf, DeviceFile)>> {
         let Some(file) = file else { return Ok(None) };
         let key = format!("{name}.file");
         if !section.is_empty() {
             let mend = format!("{name}.section is given too: keep one of the two");
             return Err(Error::parameter(key, file.display(), mend));
         }
-        DeviceFile::read(&self.resolve(file)).map(Some).map_err(|e| missing(&key, e))
+        let path = self.resolve(file);
+        match DeviceFile::read(&path) {
+            Ok(file) => Ok(Some((path, file))),
+            Err(error) => Err(missing(&key, error)),
+        }
     }
 
     /// The sheath in `wall`.
