@@ -7,7 +7,7 @@ use endowire_core::Error;
 use endowire_core::device::{Device, Instrument, Section, Stack};
 use endowire_core::insertion::{Command, Move, Sheath, Simulation, State};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
+use endowire_core::vessel::{GeneratedWall, anatomy};
 use endowire_tests::crossing::CrossingTest;
 use endowire_tests::noise::Noise;
 use endowire_tests::sweep::crosses;
@@ -41,7 +41,8 @@ fn stack() -> Stack {
 /// All of them in the arch, the thinner farther in.
 fn in_the_arch() -> (Simulation, CrossingTest) {
     let made =
-        GeneratedWall::new(&anatomy::tree("aortic_arch").unwrap(), Resolution::Triangles(5_000)).unwrap();
+        GeneratedWall::new(&anatomy::tree("aortic_arch").unwrap(), anatomy::asset_resolution("aortic_arch"))
+            .unwrap();
     let crossing = CrossingTest::new(made.wall.mesh());
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0).unwrap();
     let options = KirchhoffOptions { element_mm: 4.0, ..KirchhoffOptions::default() };
@@ -89,12 +90,15 @@ fn drive(seed: u64, count: usize) -> (usize, usize) {
         let done = simulation.step_together(&last).map(|report| report.converged);
         match &done {
             Ok(converged) => {
-                assert!(*converged, "step {k}: {last:?} is no equilibrium");
-                assert!(!crosses(&crossing, &simulation), "step {k}: {last:?} crosses the wall");
+                assert!(*converged, "seed {seed}, step {k}: {last:?} is no equilibrium");
+                assert!(!crosses(&crossing, &simulation), "seed {seed}, step {k}: {last:?} crosses the wall");
             }
             Err(error) => {
-                assert!(matches!(error, Error::Parameter { .. } | Error::End(_)), "step {k}: {error}");
-                assert!(bytes(&simulation) == before, "step {k}: refused, and another state");
+                assert!(
+                    matches!(error, Error::Parameter { .. } | Error::End(_)),
+                    "seed {seed}, step {k}: {error}"
+                );
+                assert!(bytes(&simulation) == before, "seed {seed}, step {k}: refused, and another state");
                 refused += 1;
                 last.clear();
             }
@@ -102,14 +106,14 @@ fn drive(seed: u64, count: usize) -> (usize, usize) {
         if k % 7 == 0 {
             let state: State = postcard::from_bytes(&before).unwrap();
             again.restore(&state).unwrap();
-            assert!(bytes(&again) == before, "step {k}: another state");
+            assert!(bytes(&again) == before, "seed {seed}, step {k}: another state");
             assert_eq!(
                 again.step_together(&last).is_ok() || last.is_empty(),
                 done.is_ok() || last.is_empty()
             );
             if done.is_ok() {
-                assert!(bytes(&again) == bytes(&simulation), "step {k}: another result");
-                assert_eq!(again.shape(), simulation.shape(), "step {k}");
+                assert!(bytes(&again) == bytes(&simulation), "seed {seed}, step {k}: another result");
+                assert_eq!(again.shape(), simulation.shape(), "seed {seed}, step {k}");
             }
         }
     }

@@ -58,7 +58,8 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
     let mut studio =
         Studio::new("render", &args.frames, path, &scene, ViewChoice::Both, folder, steps.len())?;
-    let lengths = Lengths::read(&args.dir, &scene.stack()?)?;
+    let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
+    let lengths = Lengths::read(&args.dir, &stack)?;
     let bar = progress::bar(steps.len(), "frame");
     for &step in &steps {
         let contacts = recording.contacts(step);

@@ -58,7 +58,7 @@ impl FrameWriter {
         } else {
             Some(Renderer::new(&spec, &simulation.wall().closed_mesh()).map_err(in_scene)?)
         };
-        Ok(Self { pushed: Pushed::new(scene, &spec)?, spec, renderer })
+        Ok(Self { pushed: Pushed::new(path, scene, &spec)?, spec, renderer })
     }
 
     /// What draws, for the summary.
@@ -162,7 +162,7 @@ impl<'a> Studio<'a> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         let spec = wished(view_table(path, scene)?, args, default)?;
         let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
-        let pushed = Pushed::new(scene, &spec)?;
+        let pushed = Pushed::new(path, scene, &spec)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
         if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {
             let text = format!("--orbit {orbit:e}: give -{MOST_ORBIT_DEG} to {MOST_ORBIT_DEG} degrees");

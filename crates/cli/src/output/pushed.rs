@@ -1,5 +1,7 @@
 //! What is pushed, as the viewer sees it: the device, or each of several instruments.
 
+use std::path::Path;
+
 use endowire_core::device::{Device, Section, Stack};
 use endowire_core::shape::Shape;
 use endowire_methods::Scene;
@@ -15,11 +17,12 @@ pub(crate) struct Pushed {
 }
 
 impl Pushed {
-    /// Those of a scene. A device alone is made of what the `[view]` table says, if it says so, and else everything of what its file says.
-    pub(crate) fn new(scene: &Scene, spec: &ViewSpec) -> Result<Self, Failure> {
-        let stack = scene.stack()?;
+    /// Those of the scene in a file. A device alone is made of what the `[view]` table says, if it says so, and else everything of what its file says.
+    pub(crate) fn new(path: &Path, scene: &Scene, spec: &ViewSpec) -> Result<Self, Failure> {
+        let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
+        let stack = scene.stack().map_err(in_scene)?;
         let mut parts = Vec::new();
-        for (file, device) in scene.device_files()?.iter().zip(stack.devices()) {
+        for (file, device) in scene.device_files().map_err(in_scene)?.iter().zip(stack.devices()) {
             parts.push(match file {
                 Some((path, file)) => device_parts(file).map_err(|e| Failure::from(e).at(path.display()))?,
                 None => tubes(device),
@@ -31,7 +34,7 @@ impl Pushed {
             (false, true) => {
                 let text = "view.device describes one device, and the scene has several instruments: leave it out, and give materials in \
                             their files";
-                return Err(Failure::Input(text.to_owned()));
+                return Err(Failure::Input(text.to_owned()).at(path.display()));
             }
         }
         Ok(Self { stack, parts })
