@@ -22,19 +22,21 @@ pub(super) enum Quality {
     Beyond,
 }
 
-/// The candidates.
+/// The candidates. By default those of several instruments, whose nodes are other marks in every step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Guess {
     /// Length from the tip within which the device has a shape of its own, mm.
     pub(super) shaped_mm: f64,
+    /// Whether nodes are the same marks from step to step, so that one learns from the last.
+    learns: bool,
     slid: RodState,
     pub(super) other: RodState,
 }
 
 impl Guess {
-    /// For a device with a shape of its own within `shaped_mm` of its tip.
+    /// For a device alone with a shape of its own within `shaped_mm` of its tip.
     pub(super) fn new(shaped_mm: f64) -> Self {
-        Self { shaped_mm, ..Self::default() }
+        Self { shaped_mm, learns: true, ..Self::default() }
     }
 
     /// Takes memory for `elements` elements.
@@ -87,6 +89,8 @@ impl Guess {
 
     /// What an equilibrium that was found teaches.
     pub(super) fn teach(&self, hand: HandMotion, found: &RodState, correction: &mut Correction) {
-        correction.learn(hand, &self.slid, found);
+        if self.learns {
+            correction.learn(hand, &self.slid, found);
+        }
     }
 }

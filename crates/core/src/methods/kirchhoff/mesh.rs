@@ -25,6 +25,8 @@ pub struct Mesh {
     pub elements: Vec<ElementData>,
     /// Contact points, tip first.
     pub points: Vec<ContactPoint>,
+    /// Lengths inserted of several instruments; empty for a device alone.
+    pub(super) inserted_mm: Vec<f64>,
 }
 
 impl Mesh {
@@ -34,6 +36,7 @@ impl Mesh {
         self.from_tip_mm.push(0.0);
         self.elements.clear();
         self.points.clear();
+        self.inserted_mm.clear();
     }
 
     /// Takes memory for up to `elements` elements and `points` contact points.
