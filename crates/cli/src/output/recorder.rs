@@ -115,7 +115,6 @@ struct Row {
     jumped: bool,
     left_through: Option<usize>,
     nodes_solved: u64,
-    nodes_frozen: u64,
     angles: bool,
     converged: bool,
 }
@@ -246,7 +245,6 @@ impl Recorder {
             jumped: report.jumped,
             left_through: report.left_through,
             nodes_solved: report.nodes_solved,
-            nodes_frozen: report.nodes_frozen,
             angles: report.angles,
             converged: report.converged,
         };

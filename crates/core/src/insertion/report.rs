@@ -102,10 +102,9 @@ pub struct StepReport {
     pub jumped: bool,
     /// Whether the device carries material angles: only with a shape or friction.
     pub angles: bool,
-    /// Nodes of sub-steps in which the device moved to a new equilibrium, since the start.
+    /// Nodes of sub-steps in which the device moved to a new equilibrium, since the start; where it is in one as it has slid, nothing is
+    /// solved for.
     pub nodes_solved: u64,
-    /// Nodes of sub-steps in which the slid device was in equilibrium as it was, since the start.
-    pub nodes_frozen: u64,
     /// Whether the step met the method's own convergence test.
     pub converged: bool,
 }

@@ -61,7 +61,7 @@ impl<const C: usize> Workspace<C> {
         }
         let (mut iterations, mut substeps, mut dissipated_mj) = (0, 0, 0.0);
         let (mut relaxations, mut slides, mut imbalance, mut balanced) = (0, 0, 0.0f64, true);
-        (tools.nodes_solved, tools.nodes_frozen) = (0, 0);
+        tools.nodes_solved = 0;
         let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD).max(1.0);
         let mut budget = ((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most));
@@ -162,7 +162,6 @@ impl<const C: usize> Workspace<C> {
         report.converged = balanced;
         report.angles = from.report.angles;
         report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
-        report.nodes_frozen = from.report.nodes_frozen + tools.nodes_frozen;
         report.jumped = jumped(&from.report, report, way);
         Ok(())
     }

@@ -139,13 +139,10 @@ impl<const C: usize> Tools<C> {
         let least = if resort == Some(true) { f64::MAX } else { AT_REST };
         let at_rest = balanced || (relax && found.residual <= least);
         let passed = at_rest && contact.passes_through(&mesh.elements, rod);
-        let nodes = elements as u64 + 1;
         let counted = contact.count();
         self.counters.add(&counted);
         if iterations > 0 {
-            self.nodes_solved += nodes;
-        } else {
-            self.nodes_frozen += nodes;
+            self.nodes_solved += elements as u64 + 1;
         }
         if !at_rest {
             if found.converged {

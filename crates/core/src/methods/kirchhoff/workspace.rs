@@ -36,10 +36,8 @@ pub(super) struct Tools<const C: usize> {
     pub(super) friction: Friction,
     pub(super) memory: WallMemory,
     pub(super) extension: Extension,
-    /// Nodes of the sub-steps of the command in which the device moved, …
+    /// Nodes of the sub-steps of the command in which the device moved.
     pub(super) nodes_solved: u64,
-    /// … and in which it was in equilibrium as it was.
-    pub(super) nodes_frozen: u64,
     /// Questions about the wall.
     pub(super) counters: Counters,
 }
@@ -62,7 +60,6 @@ impl<const C: usize> Workspace<C> {
             memory: WallMemory::new(environment.felt),
             extension: Extension::default(),
             nodes_solved: 0,
-            nodes_frozen: 0,
             counters: Counters::default(),
         };
         tools.newton.reserve(elements);
