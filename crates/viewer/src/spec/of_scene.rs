@@ -22,7 +22,7 @@ impl ViewSpec {
     /// own tree.
     ///
     /// # Errors
-    /// [`Error::Content`] for a table that does not fit, naming line and key.
+    /// [`endowire_core::Error::Content`] for a table that does not fit, naming line and key.
     pub fn of_scene<M: MethodChoice + DeserializeOwned + Default>(
         scene: &SceneOf<M>,
         path: &Path,
