@@ -33,6 +33,7 @@ pub(super) fn write_instruments<const C: usize>(
 ) {
     let sets = environment.surroundings.stack.sets();
     let inserted = lengths(hands);
+    let nodes = Nodes::new(environment.surroundings.stack, &inserted, environment.options.element_mm);
     let mut told = Vec::with_capacity(hands.len());
     for (index, hand) in hands.iter().enumerate() {
         let set = sets[index].filter(|_| hand.inserted_mm > 0.0);
@@ -46,7 +47,7 @@ pub(super) fn write_instruments<const C: usize>(
             inserted_mm: hand.inserted_mm,
             rotation_rad: hand.turn_rad,
             tip_rotation_rad: hand.turn_rad + twist,
-            push_force_n: push_force::<C>(environment, index, &inserted, pressed, at.start()),
+            push_force_n: push_force::<C>(environment, &nodes, (index, &inserted), pressed, at.start()),
             torque_nmm: set.zip(clamp).map_or(0.0, |(set, clamp)| clamp.torques[set]),
         });
     }
@@ -60,8 +61,8 @@ pub(super) fn write_instruments<const C: usize>(
 /// Force with which one hand pushes; none where it jumps.
 fn push_force<const C: usize>(
     environment: &Environment<'_>,
-    index: usize,
-    inserted_mm: &[f64],
+    nodes: &Nodes,
+    (index, inserted_mm): (usize, &[f64]),
     pressed: &[Pressed],
     at: Start<'_>,
 ) -> Option<f64> {
@@ -72,11 +73,10 @@ fn push_force<const C: usize>(
     if own <= MEET * step || inserted_mm.iter().enumerate().any(meets) {
         return None;
     }
-    let nodes = Nodes::new(stack, inserted_mm, environment.options.element_mm);
     let beside = |by: f64| {
         let mut inserted = inserted_mm.to_vec();
         inserted[index] += by;
-        Beside::new(environment, &nodes, &inserted, at)
+        Beside::new(environment, nodes, &inserted, at)
     };
     let (back, on) = (beside(-step), beside(step));
     let stored = 0.5 * (on.stored_more_than::<C>(&back, at) / step);
