@@ -15,7 +15,7 @@ use super::{seal, whole};
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 2";
+const FORMAT: &str = "endowire state 3";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// What a state belongs to: hashes of all that its steps depended on.

@@ -101,7 +101,7 @@ impl Nodes {
             if inserted <= covered {
                 continue;
             }
-            alone.build(device, inserted, self.element_mm, modulus_n_per_mm2);
+            alone.build_points(device, inserted, self.element_mm, modulus_n_per_mm2);
             cover(device, inserted, covered, &mut alone.points);
             for point in &alone.points {
                 let from_tip_mm = line - inserted + point.from_tip_mm;

@@ -15,6 +15,22 @@ pub(super) struct Hand {
     pub(super) turn_rad: f64,
 }
 
+/// Advance, mm, and turn, rad, of a hand.
+pub(super) type Motion = [f64; 2];
+
+/// Sets `motions` to what takes the hands of a state to `hands`.
+pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<Motion>) {
+    let was = |index: usize| {
+        let own = report.instruments.get(index);
+        own.map_or((report.inserted_mm, report.rotation_rad), |i| (i.inserted_mm, i.rotation_rad))
+    };
+    motions.clear();
+    motions.extend(hands.iter().enumerate().map(|(index, hand)| {
+        let (inserted_mm, turn_rad) = was(index);
+        [hand.inserted_mm - inserted_mm, hand.turn_rad - turn_rad]
+    }));
+}
+
 /// Sets `hands` to where those of a state are.
 pub(super) fn read(report: &StepReport, hands: &mut Vec<Hand>) {
     hands.clear();

@@ -3,6 +3,7 @@
 use super::Environment;
 use super::configuration::Configuration;
 use super::hands::Hand;
+use super::slopes::write_instruments;
 use super::workspace::Tools;
 use crate::contact::WallContact;
 use crate::contact::extension::left_through;
@@ -31,7 +32,7 @@ impl<const C: usize> Tools<C> {
             report.energy = Energy::default();
             (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
             if surroundings.stack.is_several() {
-                self.write_instruments(environment, hands, None, at);
+                write_instruments::<C>(environment, hands, None, &[], at);
             }
             return;
         }
@@ -44,6 +45,7 @@ impl<const C: usize> Tools<C> {
         );
         let stored = self.newton.assembly.energy;
         report.energy = Energy { bend: stored.bend, twist: stored.twist, wall: 0.0 };
+        let mut pressed = Vec::new();
         for index in 0..mesh.points.len() {
             let Some(touch) = contact.touch(&mesh.elements, rod, index) else {
                 continue;
@@ -51,11 +53,14 @@ impl<const C: usize> Tools<C> {
             report.energy.wall += touch.energy_mj;
             report.max_penetration_mm = report.max_penetration_mm.max(touch.contact.penetration_mm);
             report.contacts.push(touch.contact);
+            if surroundings.stack.is_several() {
+                pressed.push((index, touch));
+            }
         }
 
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
         if surroundings.stack.is_several() {
-            return self.write_instruments(environment, hands, Some(&clamp), at);
+            return write_instruments::<C>(environment, hands, Some(&clamp), &pressed, at);
         }
         let frame = rod.material_frame(0);
         let data = &mesh.elements[0].materials[0];

@@ -196,11 +196,14 @@ pub(super) fn slide_together(
 ) {
     slide_curve(from, state, extension, to, out);
     let (n, old) = (to.elements.len(), state.elements());
+    // The first element whose far end is not before a place; elements are in order, sheath first.
+    let holding = |from_tip: f64| from.from_tip_mm[1..].partition_point(|end| *end > from_tip);
     out.tensions.clear();
     for ends in to.from_tip_mm.windows(2) {
         let middle = 0.5 * (ends[0] + ends[1]);
-        let known = (0..old).find(|&e| from.from_tip_mm[e + 1] <= middle && middle <= from.from_tip_mm[e]);
-        out.tensions.push(known.map_or(0.0, |e| state.tensions[e]));
+        let known = holding(middle);
+        let is_in = known < old && middle <= from.from_tip_mm[known];
+        out.tensions.push(if is_in { state.tensions[known] } else { 0.0 });
     }
     // Triads carried without twist are those that angles are counted from.
     let carried: Vec<f64> = std::iter::once(0.0)
@@ -224,8 +227,7 @@ pub(super) fn slide_together(
             if inserted <= from_tip {
                 return state.angle(0, set);
             }
-            let last = old - 1;
-            let e = (0..old).find(|&e| from.from_tip_mm[e + 1] <= place).unwrap_or(last);
+            let e = holding(place).min(old - 1);
             let xi = ((from.from_tip_mm[e] - place) / from.elements[e].length).clamp(0.0, 1.0);
             let [w0, w1, wb] = Point::at(xi, 0.0).phi;
             w0 * (state.angle(e, set) + carried[e])

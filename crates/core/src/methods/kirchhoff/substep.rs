@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::configuration::{Configuration, Start};
 use super::guess::Quality;
-use super::hands::Hand;
+use super::hands::{Hand, motions};
 use super::search::Search;
 use super::slide::{slide, slide_together};
 use super::workspace::Tools;
@@ -104,6 +104,7 @@ impl<const C: usize> Tools<C> {
             &mut self.friction,
             stack.softest_nmm2(),
         );
+        motions(&start.state.report, hands, &mut self.guess.motions);
         let candidates = (start, &*mesh, &mut *rod);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
@@ -160,7 +161,7 @@ impl<const C: usize> Tools<C> {
         if !taken && rises(&start.state.report, &after.report, dissipated_mj) {
             return Err(STORED.into());
         }
-        self.guess.teach(hand, &after.rod, &mut after.correction);
+        self.guess.teach(&after.rod, &mut after.correction);
         self.friction.keep(&mut after.forces);
         self.memory.keep(&mut after.known);
         Ok(Found { iterations, slides, dissipated_mj, residual: found.residual, unsettled, balanced })
