@@ -100,6 +100,17 @@ impl Correction {
         self.turns.clear();
     }
 
+    /// Elements that have learnt.
+    pub(super) fn len(&self) -> usize {
+        self.departures.len()
+    }
+
+    /// Whether all of `elements` elements with so many sets of angles have learnt, or none.
+    pub(super) fn fits(&self, elements: usize, sets: usize) -> bool {
+        let n = self.len();
+        (n == 0 || n == elements) && self.turns.len() == n * sets
+    }
+
     /// Remembers the way from the slid device to the equilibrium that was found.
     pub(super) fn learn(&mut self, motions: &[Motion], slid: &RodState, found: &RodState) {
         self.clear();

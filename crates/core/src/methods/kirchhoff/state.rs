@@ -134,6 +134,13 @@ impl KirchhoffState {
             );
             return Err(other("known", self.known.len(), mend));
         }
+        if !self.correction.fits(n, sets) {
+            return Err(other(
+                "correction",
+                self.correction.len(),
+                format!("{n} elements or none have learnt"),
+            ));
+        }
         let (position, direction) = (belongs.sheath.position_mm, r.frames[0].t);
         if r.positions[0] != position || (direction - belongs.sheath.direction).norm() > SAME_DIRECTION {
             let mend = format!(
