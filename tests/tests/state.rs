@@ -168,7 +168,11 @@ fn spoil(value: &mut serde_json::Value, key: &str) {
                     serde_json::Value::Number(number) if name == key => {
                         *inner = (0.5 * number.as_f64().unwrap() - 0.1).into();
                     }
-                    serde_json::Value::Array(list) if name == key && key == "departures" => list.clear(),
+                    serde_json::Value::Array(list)
+                        if key == "departures" && ["departures", "turns"].contains(&name.as_str()) =>
+                    {
+                        list.clear();
+                    }
                     serde_json::Value::Array(list) if name == key => {
                         list.iter_mut().for_each(|x| *x = (x.as_f64().unwrap() + 0.1).into());
                     }
