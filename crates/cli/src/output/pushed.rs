@@ -45,9 +45,7 @@ impl Pushed {
         let line_mm = inserted_mm.iter().copied().fold(0.0, f64::max);
         let each = self.stack.devices().zip(&self.parts).zip(inserted_mm).filter(|(_, mm)| **mm > 0.0);
         let view = |((device, parts), mm): ((&Device, &Vec<DevicePart>), &f64)| {
-            let own = shape.behind(line_mm - mm);
-            let view = DeviceView::from_shape(&own, |from_tip_mm| device.section_at(from_tip_mm).radius_mm);
-            DeviceView { parts: parts.clone(), ..view }
+            DeviceView::of_device(&shape.behind(line_mm - mm), device, parts)
         };
         each.map(view).collect()
     }

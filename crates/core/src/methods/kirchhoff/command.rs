@@ -5,13 +5,13 @@ use std::borrow::Cow;
 
 use super::Environment;
 use super::configuration::Start;
-use super::hands::{Way, line_mm};
+use super::hands::{Way, line_mm, told};
 use super::slide::Extension;
 use super::state::KirchhoffState;
 use super::substep::{AT_REST, Attempt};
 use super::workspace::{Tools, Workspace};
 use crate::contact::extension::{LEAVE_MM, left_through};
-use crate::insertion::{Move, StepReport};
+use crate::insertion::{InstrumentReport, Move, StepReport};
 use crate::{Error, PhysicalEnd, Result};
 
 /// Most sub-steps that one command may be cut into, …
@@ -174,19 +174,14 @@ fn jumped(before: &StepReport, after: &StepReport, way: &Way) -> bool {
     let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
     let mut work = 0.0;
     for (index, (start, target)) in way.start.iter().zip(&way.target).enumerate() {
-        let ((push, torque), (push_after, torque_after)) = (felt(before, index), felt(after, index));
-        work += least(push, push_after, target.inserted_mm - start.inserted_mm)
-            + least(torque, torque_after, way.commands[index].rotate_rad);
+        let (was, is) = (told(before, index), told(after, index));
+        let push = |hand: &InstrumentReport| hand.push_force_n.unwrap_or(0.0);
+        work += least(push(&was), push(&is), target.inserted_mm - start.inserted_mm)
+            + least(was.torque_nmm, is.torque_nmm, way.commands[index].rotate_rad);
     }
     let (energy, now) = (before.energy.total(), after.energy.total());
     let lost = work - after.dissipated_mj - (now - energy);
     lost > JUMP * energy.max(now).max(JUMP_FLOOR_MJ)
-}
-
-/// Push force and torque of a hand.
-fn felt(report: &StepReport, index: usize) -> (f64, f64) {
-    let own = report.instruments.get(index);
-    own.map_or((report.push_force_n, report.torque_nmm), |i| (i.push_force_n.unwrap_or(0.0), i.torque_nmm))
 }
 
 /// The tip would be farther beyond an opening than anything is known.

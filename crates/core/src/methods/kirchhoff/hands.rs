@@ -1,7 +1,7 @@
 //! Where the hands are: of a device alone one, of several instruments one each.
 
 use crate::device::Stack;
-use crate::insertion::{Command, Move, StepReport};
+use crate::insertion::{Command, InstrumentReport, Move, StepReport};
 
 /// Retracting to within this of the sheath, mm, is retracting to it.
 const ZERO_LENGTH_MM: f64 = 1e-9;
@@ -18,27 +18,33 @@ pub(super) struct Hand {
 /// Advance, mm, and turn, rad, of a hand.
 pub(super) type Motion = [f64; 2];
 
+/// What a report tells of one hand: of a device alone the whole.
+pub(super) fn told(report: &StepReport, index: usize) -> InstrumentReport {
+    report.instruments.get(index).copied().unwrap_or(InstrumentReport {
+        inserted_mm: report.inserted_mm,
+        rotation_rad: report.rotation_rad,
+        tip_rotation_rad: report.tip_rotation_rad,
+        push_force_n: Some(report.push_force_n),
+        torque_nmm: report.torque_nmm,
+    })
+}
+
 /// Sets `motions` to what takes the hands of a state to `hands`.
 pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<Motion>) {
-    let was = |index: usize| {
-        let own = report.instruments.get(index);
-        own.map_or((report.inserted_mm, report.rotation_rad), |i| (i.inserted_mm, i.rotation_rad))
-    };
     motions.clear();
     motions.extend(hands.iter().enumerate().map(|(index, hand)| {
-        let (inserted_mm, turn_rad) = was(index);
-        [hand.inserted_mm - inserted_mm, hand.turn_rad - turn_rad]
+        let was = told(report, index);
+        [hand.inserted_mm - was.inserted_mm, hand.turn_rad - was.rotation_rad]
     }));
 }
 
 /// Sets `hands` to where those of a state are.
 pub(super) fn read(report: &StepReport, hands: &mut Vec<Hand>) {
     hands.clear();
-    if report.instruments.is_empty() {
-        hands.push(Hand { inserted_mm: report.inserted_mm, turn_rad: report.rotation_rad });
-    }
-    let each = report.instruments.iter();
-    hands.extend(each.map(|i| Hand { inserted_mm: i.inserted_mm, turn_rad: i.rotation_rad }));
+    hands.extend((0..report.instruments.len().max(1)).map(|index| {
+        let own = told(report, index);
+        Hand { inserted_mm: own.inserted_mm, turn_rad: own.rotation_rad }
+    }));
 }
 
 /// The lengths inserted.

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::configuration::{Configuration, Start};
 use super::guess::Quality;
-use super::hands::{Hand, motions};
+use super::hands::{Hand, motions, told};
 use super::search::Search;
 use super::slide::{slide, slide_together};
 use super::workspace::Tools;
@@ -173,19 +173,15 @@ impl<const C: usize> Tools<C> {
 /// there from where it was; shorter steps stay on the branch on which it is.
 fn rises(before: &StepReport, after: &StepReport, dissipated_mj: f64) -> bool {
     let most = |before: f64, after: f64, way: f64| before.abs().max(after.abs()) * way.abs();
-    let mut work = most(before.push_force_n, after.push_force_n, after.inserted_mm - before.inserted_mm)
-        + most(before.torque_nmm, after.torque_nmm, after.rotation_rad - before.rotation_rad);
-    if !after.instruments.is_empty() {
-        work = 0.0;
-        for (was, is) in before.instruments.iter().zip(&after.instruments) {
-            let way = is.inserted_mm - was.inserted_mm;
-            let (Some(push), Some(pushes)) = (was.push_force_n, is.push_force_n) else {
-                // At the tip of another its force jumps, and nothing can be said.
-                return false;
-            };
-            work += most(push, pushes, way)
-                + most(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
-        }
+    let mut work = 0.0;
+    for index in 0..after.instruments.len().max(1) {
+        let (was, is) = (told(before, index), told(after, index));
+        let (Some(push), Some(pushes)) = (was.push_force_n, is.push_force_n) else {
+            // At the tip of another its force jumps, and nothing can be said.
+            return false;
+        };
+        work += most(push, pushes, is.inserted_mm - was.inserted_mm)
+            + most(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
     }
     let energy = before.energy.total();
     after.energy.total() + dissipated_mj - energy > LARGEST_RISE * work + RISE_SHARE * energy + RISE_FLOOR_MJ
