@@ -3,12 +3,21 @@
 //! A surface ends where the scan ended, and a wall that stops holding a tip from one point to the next has no
 //! equilibrium there. Every opening that a device can pass is extended straight along its direction, as flow extensions
 //! are in vessel models; smaller ones are holes of the mesh and closed. The triangles of the vessel keep their numbers.
+//!
+//! A rim has the corners of a surface that was cut there, and drawn out straight they would be furrows in which a tip is caught. So
+//! the rim passes into the ellipse next to it, r(s) = c + a cos s + b sin s with the part s of its length, over its own width.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Matrix3;
 
 use crate::Vec3;
 use crate::vessel::{Opening, SurfaceMesh, Wall};
 
 /// How far beyond an opening a tip may go, mm.
 pub const LEAVE_MM: f64 = 30.0;
+/// Length over which a rim passes into an ellipse, in radii of the opening.
+const ROUNDING: f64 = 2.0;
 /// Length of the extensions, mm; they are closed there, so that nothing is ever where no wall is.
 const EXTENSION_MM: f64 = LEAVE_MM + 2.0;
 
@@ -32,11 +41,14 @@ fn extend(mesh: &mut SurfaceMesh, opening: &Opening) {
     let around: f64 = (0..count).map(|k| (at(k + 1) - at(k)).norm()).sum();
     let rings = (EXTENSION_MM / (around / count as f64)).ceil().clamp(1.0, 1000.0) as usize;
     let rim: Vec<Vec3> = (0..count).map(at).collect();
+    let round = ellipse(&rim);
     let mut last = opening.boundary.clone();
     for ring in 1..=rings {
-        let way = opening.direction * (EXTENSION_MM * ring as f64 / rings as f64);
+        let way_mm = EXTENSION_MM * ring as f64 / rings as f64;
+        let t = (way_mm / (ROUNDING * opening.radius_mm)).min(1.0);
+        let (share, way) = (t * t * (3.0 - 2.0 * t), opening.direction * way_mm);
         let first = mesh.vertices_mm.len() as u32;
-        mesh.vertices_mm.extend(rim.iter().map(|v| v + way));
+        mesh.vertices_mm.extend(rim.iter().zip(&round).map(|(v, w)| v + (w - v) * share + way));
         let next: Vec<u32> = (first..first + count as u32).collect();
         for k in 0..count {
             let l = (k + 1) % count;
@@ -49,6 +61,31 @@ fn extend(mesh: &mut SurfaceMesh, opening: &Opening) {
     let centre = mesh.vertices_mm.len() as u32;
     mesh.vertices_mm.push(opening.centre_mm + opening.direction * EXTENSION_MM);
     mesh.triangles.extend((0..count).map(|k| [last[k], last[(k + 1) % count], centre]));
+}
+
+/// The points of the ellipse next to a closed line, one for each of its corners: least squares over its length.
+fn ellipse(line: &[Vec3]) -> Vec<Vec3> {
+    let count = line.len();
+    let side = |k: usize| (line[(k + 1) % count] - line[k]).norm();
+    let around: f64 = (0..count).map(side).sum();
+    let (mut s, mut matrix, mut right) = (0.0, Matrix3::zeros(), Matrix3::zeros());
+    let mut rows = Vec::with_capacity(count);
+    for k in 0..count {
+        let row = Vec3::new(1.0, f64::cos(s), f64::sin(s));
+        let length = 0.5 * (side(k) + side((k + count - 1) % count));
+        matrix += row * row.transpose() * length;
+        right += row * line[k].transpose() * length;
+        rows.push(row);
+        s += side(k) * TAU / around;
+    }
+    match matrix.cholesky() {
+        Some(factor) => {
+            let found = factor.solve(&right);
+            rows.iter().map(|row| found.tr_mul(row)).collect()
+        }
+        // A triangle without an area.
+        None => line.to_vec(),
+    }
 }
 
 fn close(mesh: &mut SurfaceMesh, opening: &Opening) {
@@ -83,6 +120,25 @@ mod tests {
         assert!(report.watertight && report.is_sound(), "{report:?}");
         let closed = check(&extended(&wall, 100.0)).unwrap();
         assert!(closed.watertight && closed.is_sound(), "{closed:?}");
+    }
+
+    #[test]
+    fn corners_of_a_rim_vanish_and_an_ellipse_stays() {
+        let polygon = |rough: f64| -> Vec<Vec3> {
+            (0..24)
+                .map(|k| {
+                    let (sin, cos) = (TAU * f64::from(k) / 24.0).sin_cos();
+                    Vec3::new(3.0 * cos, 3.0 * sin, 0.3 * cos) * (1.0 + rough * f64::from(k % 2))
+                })
+                .collect()
+        };
+        let (smooth, rough) = (polygon(0.0), polygon(0.1));
+        for (v, w) in smooth.iter().zip(ellipse(&smooth)) {
+            assert!((v - w).norm() < 0.01, "{v} {w}");
+        }
+        let sizes: Vec<f64> = ellipse(&rough).iter().map(|v| v.xy().norm()).collect();
+        let (least, most) = sizes.iter().fold((f64::MAX, 0.0f64), |(a, b), r| (a.min(*r), b.max(*r)));
+        assert!(most - least < 0.02 && (least - 3.15).abs() < 0.03, "{least} {most}");
     }
 
     #[test]

@@ -12,6 +12,10 @@ const SUPPORT: f64 = 1.1;
 const LARGEST_BEND: f64 = 0.8;
 /// Square of the thinnest ellipse's ratio of axes, about.
 const THINNEST: f64 = 0.01;
+/// Power by which neighbours count less with their distance: n of (1 + u)^−n. A quadric is asked within its support, and what is beyond a kink
+/// next to it must not bend it: with n = 1, the outer ring counting most, it was off by 0.1 mm at 3 of 100 places of coarse wide
+/// vessels, with 5 at 1 of 1,000; with 16, and little but the inner ring, at 6 of 1,000.
+const NEAR: i32 = 5;
 /// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.
 const REGULAR: f64 = 1e-6;
 
@@ -94,7 +98,7 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[V
             continue;
         }
         let (p, q, h) = flat(w);
-        let weight = 1.0 / (1.0 + Vector2::new(p, q).dot(&(plane * Vector2::new(p, q))));
+        let weight = (1.0 + Vector2::new(p, q).dot(&(plane * Vector2::new(p, q)))).powi(-NEAR);
         let (p, q, h) = (p / long, q / long, h / long);
         let row = SVector::<f64, 5>::new(p, q, 0.5 * p * p, p * q, 0.5 * q * q);
         matrix += row * row.transpose() * weight;
