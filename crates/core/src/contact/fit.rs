@@ -13,9 +13,9 @@ const LARGEST_BEND: f64 = 0.8;
 /// Square of the thinnest ellipse's ratio of axes, about.
 const THINNEST: f64 = 0.01;
 /// Power by which neighbours count less with their distance: n of (1 + u)^−n. A quadric is asked within its support, and what is beyond a kink
-/// next to it must not bend it: with n = 1, the outer ring counting most, it was off by 0.1 mm at 3 of 100 places of coarse wide
-/// vessels, with 5 at 1 of 1,000; with 16, and little but the inner ring, at 6 of 1,000.
-const NEAR: i32 = 5;
+/// next to it must not bend it. With n = 1, the outer ring counting most, the smooth wall was off by 0.1 mm at 3 of 100 places of
+/// coarse wide vessels, with 6 at 1 of 1,000, and from a vessel that is known it was twice as far; with 16 it is worse again.
+const NEAR: i32 = 6;
 /// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.
 const REGULAR: f64 = 1e-6;
 

@@ -342,9 +342,12 @@ impl<'a> WallContact<'a> {
                 (last, sunk) = (None, true);
                 continue;
             }
-            // What the smooth wall takes for the lumen may be that of another wall, seen through one that is thin.
+            // What the smooth wall takes for the lumen may be that of another wall, seen through one that is thin. Where facets are
+            // coarse the smooth wall stands beyond them, and what is outside of those is still in front of their own piece of it.
             let beyond = |felt: &FeltWall| {
-                felt.query.nearest(&x, felt.reach_mm).is_some_and(|flat| flat.distance_mm < -sunk_mm)
+                felt.query.nearest(&x, felt.reach_mm).is_some_and(|flat| {
+                    flat.distance_mm < -sunk_mm && felt.distance_from(flat.triangle, &x) < 0.0
+                })
             };
             if std::mem::take(&mut sunk) && beyond(self.felt) {
                 return true;

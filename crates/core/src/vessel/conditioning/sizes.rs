@@ -4,14 +4,13 @@
 //! Shapira et al., *The Visual Computer* 24, 2008, with one ray), medianed over neighbours. Edges are to be
 //!
 //! ```text
-//! h = min(R / 3.5,  0.6 / κ,  √(2.4 R d))       not shorter than max(0.6 t, R / 7)
+//! h = min(R / 2.2,  1 / κ,  √(2.4 R d),  2 mm)       not shorter than max(0.6 t, R / 3.5)
 //! ```
 //!
 //! with the curvature κ of the conditioned surface so far, the limit t = min(deviation, R/20) and, at a septum of thickness d, a sag
 //! h²/8R below 0.3 d. A kink of angle θ can be rounded within t by an arc of radius 8t/θ² and length 8t/θ; with κ = θ²/8t the
-//! formula gives edges of 4.8 t/θ² there, which for the sharpest kink of all, θ = π, is the floor or less; in wide vessels R/7 ends
-//! this sooner. κ is measured on the surface as it comes out, not on the triangles given, so that kinks of a coarse mesh that vanish
-//! within the limit cost nothing.
+//! formula gives edges of 8 t/θ² there; in wide vessels R/3.5 ends this sooner. κ is measured on the surface as it comes out, not on
+//! the triangles given, so that kinks of a coarse mesh that vanish within the limit cost nothing.
 //! Neighbouring lengths differ by at most 0.35 of their distance.
 
 use std::cmp::Reverse;
