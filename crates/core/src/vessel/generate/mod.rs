@@ -150,7 +150,7 @@ impl GeneratedWall {
                 format!("would need about {expected:.1e} triangles; at most {MOST_TRIANGLES:.0e} are made");
             return Err(Error::parameter("edge_mm", edge_mm, mend));
         }
-        let field = Field { branches: branches.to_vec(), extension: 4.0 * grid };
+        let field = Field::new(branches.to_vec(), 4.0 * grid);
         let ends = trim::ends(&field);
         let mesh = match branches {
             [only] if ends.len() == 2 => {
@@ -268,6 +268,8 @@ fn crowded_edges(quads: &[[u32; 4]]) -> usize {
 /// Moves vertices towards the mean of their neighbours along the surface, and back onto it.
 fn even_out(field: &Field, nets: &mut nets::Nets) {
     let mut vertices = std::mem::take(&mut nets.vertices);
+    // Gradients where vertices lie, of those known from the round before.
+    let mut gradients: Vec<Option<Vec3>> = vec![None; vertices.len()];
     for round in 0..=SMOOTHING_ROUNDS {
         let mut sum = vec![(Vec3::zeros(), 0.0); vertices.len()];
         for quad in &nets.quads {
@@ -277,30 +279,33 @@ fn even_out(field: &Field, nets: &mut nets::Nets) {
                 sum[a].1 += 1.0;
             }
         }
-        for (v, (sum, count)) in vertices.iter_mut().zip(sum) {
+        for ((v, gradient), (sum, count)) in vertices.iter_mut().zip(&mut gradients).zip(sum) {
             nets.with_local(field, &v.clone(), |local| {
                 if round > 0 && count > 0.0 {
-                    let normal = field.value(local, v).gradient.try_normalize(1e-6).unwrap_or_default();
+                    let gradient = gradient.unwrap_or_else(|| field.value(local, v).gradient);
+                    let normal = gradient.try_normalize(1e-6).unwrap_or_default();
                     let pull = sum / count - *v;
                     *v += 0.5 * (pull - normal * normal.dot(&pull));
                 }
-                project(field, local, v, nets.edge);
+                *gradient = project(field, local, v, nets.edge).map(|value| value.gradient);
             });
         }
     }
     nets.vertices = vertices;
 }
 
-/// Newton along the gradient.
-fn project(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) {
+/// Newton along the gradient. Returns the value at the end, if it is on the surface and within the reach of `local`.
+fn project(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) -> Option<field::Value> {
+    let start = *point;
     for _ in 0..PROJECTION_STEPS {
         let value = field.value(local, point);
         if value.f.abs() <= ON_SURFACE_MM {
-            break;
+            return ((*point - start).norm() <= nets::MARGIN * edge).then_some(value);
         }
         let step = value.gradient * (-value.f / value.gradient.norm_squared().max(1e-6));
         *point += step.cap_magnitude(0.5 * edge);
     }
+    None
 }
 
 /// Adds a triangle or a quadrilateral, the latter cut along its shorter diagonal.

@@ -166,7 +166,7 @@ fn many_branches_from_one_point_end_soon_with_the_grid_that_was_tried() {
 #[test]
 fn samples_are_found_as_by_looking_at_all_of_them() {
     let curved = tree(&[([0., 0., 0.], 0.5, -1), ([5., 0., 20.], 0.7, 0), ([0., 8., 40.], 0.4, 1)]);
-    let field = Field { branches: curve::branches(&curved).unwrap(), extension: 1.0 };
+    let field = Field::new(curve::branches(&curved).unwrap(), 1.0);
     let samples = &field.branches[0].samples;
     for k in 0..300 {
         let at = f64::from(k);
@@ -200,7 +200,7 @@ fn absurd_resolutions_are_refused_with_a_reason() {
 #[test]
 fn gradients_agree_with_differences_away_from_blends() {
     let curved = tree(&[([0., 0., 0.], 3.0, -1), ([5., 0., 20.], 4.0, 0), ([0., 8., 40.], 2.0, 1)]);
-    let field = Field { branches: curve::branches(&curved).unwrap(), extension: 1.0 };
+    let field = Field::new(curve::branches(&curved).unwrap(), 1.0);
     let point = Vec3::new(4.0, 5.0, 18.0);
     let value = field.branch_alone(0, &point);
     let step = 1e-5;
