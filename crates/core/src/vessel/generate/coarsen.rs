@@ -10,9 +10,9 @@ use std::collections::BTreeMap;
 use super::nets::Nets;
 use super::trim::{End, onto_rim};
 use super::{Field, project};
-use crate::Vec3;
 use crate::vessel::SurfaceMesh;
 use crate::vessel::topology::{EdgeTable, NONE};
+use crate::{Vec3, parallel};
 
 /// Rounds of collapsing, flipping and evening out. Later rounds find next to nothing to collapse.
 const ROUNDS: usize = 6;
@@ -173,11 +173,13 @@ impl Coarsener<'_> {
                 }
             }
         }
-        for (index, (sum, count)) in sum.into_iter().enumerate() {
-            if count > 0.0 {
-                let v = mesh.vertices_mm[index];
-                (mesh.vertices_mm[index], info[index].target) =
-                    self.settle(v + 0.5 * (sum / count - v), info[index].rim);
+        let settled = parallel::map(sum.len(), |index| {
+            let ((sum, count), v) = (sum[index], mesh.vertices_mm[index]);
+            (count > 0.0).then(|| self.settle(v + 0.5 * (sum / count - v), info[index].rim))
+        });
+        for (index, settled) in settled.into_iter().enumerate() {
+            if let Some(settled) = settled {
+                (mesh.vertices_mm[index], info[index].target) = settled;
             }
         }
     }

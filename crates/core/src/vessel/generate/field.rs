@@ -53,24 +53,22 @@ pub(super) struct Local {
     parts: Vec<(usize, Vec<u32>)>,
     centre: Vec3,
     reach: f64,
-    /// The part of the least value at the centre.
-    leader: usize,
-    /// At the centre no blend of the other parts is less than this.
-    others: f64,
+    /// Parts by their values at the centre, the least first, with those values.
+    order: Vec<(usize, f64)>,
+    /// How far blends of all but the first of them can lie below the least of these.
+    sag: f64,
     /// What holds farther out.
     wider: Option<Arc<Local>>,
 }
 
 impl Local {
     fn new(parts: Vec<(usize, Vec<u32>)>, at_centre: &[Value], centre: Vec3, reach: f64) -> Self {
-        let f = |k: &usize| at_centre[*k].f;
-        let leader = (0..parts.len()).min_by(|a, b| f(a).total_cmp(&f(b))).unwrap_or(0);
-        let others = || (0..parts.len()).filter(|&k| k != leader).map(|k| at_centre[k]);
-        let least = others().map(|v| v.f).fold(f64::INFINITY, f64::min);
+        let mut order: Vec<(usize, f64)> = at_centre.iter().map(|v| v.f).enumerate().collect();
+        order.sort_by(|a, b| a.1.total_cmp(&b.1));
         // Each blend of two of them lowers the lesser by a sixth of its width at most.
-        let widest = others().map(|v| BLEND * v.radius).fold(0.0, f64::max);
-        let others = least - widest / 6.0 * parts.len().saturating_sub(2) as f64;
-        Self { parts, centre, reach, leader, others, wider: None }
+        let widest = order.iter().skip(1).map(|&(k, _)| BLEND * at_centre[k].radius).fold(0.0, f64::max);
+        let sag = widest / 6.0 * parts.len().saturating_sub(2) as f64;
+        Self { parts, centre, reach, order, sag, wider: None }
     }
 
     /// The narrowest that holds at `point`.
@@ -130,13 +128,8 @@ impl Field {
     /// The field at `point`, which must be within the reach of `local` or of what is wider.
     pub(super) fn value(&self, local: &Local, point: &Vec3) -> Value {
         let local = local.around(point);
-        if let Some(leader) = local.parts.get(local.leader) {
-            // Where no other branch, and no blend of others, can blend with this one, the minimum is this one to the bit.
-            let value = self.branch_value(leader, point);
-            let others = local.others - self.steepness * (point - local.centre).norm();
-            if others > value.f + BLEND * value.radius {
-                return value;
-            }
+        if let Some(value) = self.value_of_near(local, point) {
+            return value;
         }
         let mut values = local.parts.iter().map(|part| self.branch_value(part, point));
         let first = values.next().unwrap_or(Value {
@@ -146,6 +139,36 @@ impl Field {
             exposure: 0.0,
         });
         values.fold(first, smooth_minimum)
+    }
+
+    /// The field from the few branches that reach `point`: where no other, and no blend of others, is near enough to blend with
+    /// these, the minimum is theirs to the bit. None where it takes more of them.
+    fn value_of_near(&self, local: &Local, point: &Vec3) -> Option<Value> {
+        let change = self.steepness * (point - local.centre).norm();
+        let mut near: [Option<(usize, Value)>; FEW] = [None; FEW];
+        let (mut count, mut highest, mut widest) = (0, f64::NEG_INFINITY, 0.0_f64);
+        let mut others = f64::INFINITY;
+        for &(k, at_centre) in &local.order {
+            let reached = |f: f64| count == 0 || f - local.sag <= highest + widest;
+            if !reached(at_centre - change) {
+                others = others.min(at_centre - change);
+                break;
+            }
+            let value = self.branch_value(&local.parts[k], point);
+            if !reached(value.f) {
+                others = others.min(value.f);
+                continue;
+            }
+            *near.get_mut(count)? = Some((k, value));
+            count += 1;
+            highest = highest.max(value.f);
+            widest = widest.max(BLEND * value.radius);
+        }
+        if others - local.sag <= highest + widest {
+            return None;
+        }
+        near[..count].sort_by_key(|kept| kept.map(|(k, _)| k));
+        near.into_iter().flatten().map(|(_, value)| value).reduce(smooth_minimum)
     }
 
     /// The field of one branch alone, all samples considered.
@@ -222,7 +245,7 @@ pub(super) fn near(branch: &Branch, centre: &Vec3, slack: f64) -> Vec<u32> {
     samples
 }
 
-/// Samples that are compared one by one.
+/// Samples that are compared, or branches that are blended, one by one.
 const FEW: usize = 4;
 
 /// The one of `samples` (ascending) nearest to `point`, the first of equals; by halves, of which those are left out that

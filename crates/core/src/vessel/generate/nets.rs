@@ -8,11 +8,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::field::{Field, Local};
-use crate::{Error, Result, Vec3};
+use crate::{Error, Result, Vec3, parallel};
 
 /// Cells along a block. Larger blocks waste samples away from the surface, smaller ones repeat more at their faces.
 const BLOCK: usize = 8;
 const CORNERS: usize = BLOCK + 1;
+
+/// Corners of a cell, by their distance from the first in the list of a block's.
+const CELL: [usize; 8] = {
+    let (y, z) = (CORNERS, CORNERS * CORNERS);
+    [0, 1, y, y + 1, z, z + 1, z + y, z + y + 1]
+};
 
 /// Cells along the smallest part of a block that is left out as a whole.
 const LEAF: usize = 2;
@@ -159,18 +165,28 @@ pub(super) fn mesh(field: &Field, edge: f64) -> Result<Nets> {
     let steepness = field.steepness();
     let mut nets = Nets { vertices: Vec::new(), quads: Vec::new(), edge, locals: BTreeMap::new() };
     let mut blocks: BTreeMap<Key, Block> = BTreeMap::new();
-    for key in candidates(field, edge) {
-        let first = key.map(|k| f64::from(k) * BLOCK as f64);
+    let keys: Vec<Key> = candidates(field, edge).into_iter().collect();
+    let first_corner = |key: &Key| key.map(|k| f64::from(k) * BLOCK as f64);
+    let sampled = parallel::map(keys.len(), |k| {
+        let first = first_corner(&keys[k]);
         let centre = grid_point(first.map(|c| c + BLOCK as f64 / 2.0), edge);
         let local = field.local(&centre, half_diagonal + MARGIN * edge);
         if field.value(&local, &centre).f.abs() > steepness * half_diagonal {
-            continue;
+            return None;
         }
         let local = Arc::new(local);
         let (corners, leaves) = Sampler::block(field, edge, first, &local);
+        Some((local, corners, leaves))
+    });
+    for (key, sampled) in keys.into_iter().zip(sampled) {
+        let Some((local, corners, leaves)) = sampled else { continue };
+        let first = first_corner(&key);
         let mut cells = vec![u32::MAX; BLOCK * BLOCK * BLOCK];
         let before = nets.vertices.len();
         for_each_cell(|at| {
+            if leaves[leaf_index(at.map(|k| k / LEAF))].is_none() {
+                return;
+            }
             if let Some(inside) = crossing_mean(&corners, at) {
                 cells[cell_index(at)] = nets.vertices.len() as u32;
                 let cell = [0, 1, 2].map(|axis| first[axis] + at[axis] as f64 + inside[axis]);
@@ -233,6 +249,11 @@ fn candidates(field: &Field, edge: f64) -> BTreeSet<Key> {
 
 /// Mean of the points where the surface crosses the twelve edges of a cell, from its first corner, in cells.
 fn crossing_mean(corners: &[f64], cell: [usize; 3]) -> Option<[f64; 3]> {
+    let base = corner_index(cell);
+    let inside = CELL.iter().filter(|&&corner| corners[base + corner] < 0.0).count();
+    if inside == 0 || inside == CELL.len() {
+        return None;
+    }
     let value = |offset: [usize; 3]| corners[corner_index([0, 1, 2].map(|a| cell[a] + offset[a]))];
     let (mut sum, mut count) = (Vec3::zeros(), 0.0);
     for axis in 0..3 {
