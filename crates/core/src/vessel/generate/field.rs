@@ -128,9 +128,11 @@ impl Field {
     /// The field at `point`, which must be within the reach of `local` or of what is wider.
     pub(super) fn value(&self, local: &Local, point: &Vec3) -> Value {
         let local = local.around(point);
-        if let Some(value) = self.value_of_near(local, point) {
-            return value;
-        }
+        self.value_of_near(local, point).unwrap_or_else(|| self.value_of_all(local, point))
+    }
+
+    /// The same from all branches of `local`.
+    pub(super) fn value_of_all(&self, local: &Local, point: &Vec3) -> Value {
         let mut values = local.parts.iter().map(|part| self.branch_value(part, point));
         let first = values.next().unwrap_or(Value {
             f: f64::INFINITY,
