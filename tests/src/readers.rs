@@ -46,16 +46,18 @@ pub fn centreline(bytes: &[u8]) -> Result<()> {
     CentrelineTree::from_bytes(bytes, Path::new("a.csv")).map(drop)
 }
 
-/// A scene with its device and script; the files that it names are not opened.
+/// A scene with what is pushed and its script; the files that it names are not opened.
 ///
 /// # Errors
-/// As [`Scene::from_toml`], [`Device::new`] and [`Scene::commands`].
+/// As [`Scene::from_toml`], `SceneOf::stack` and `SceneOf::steps`.
 pub fn scene(bytes: &[u8]) -> Result<()> {
     let scene = Scene::from_toml(text(bytes)?, Path::new("a.toml"))?;
-    if scene.device.file.is_some() {
+    if scene.device.iter().any(|device| device.file.is_some())
+        || scene.instrument.iter().any(|i| i.file.is_some())
+    {
         return Ok(());
     }
-    scene.commands(&scene.device()?).map(drop)
+    scene.steps(&scene.stack()?).map(drop)
 }
 
 /// A case of rods, up to the problem that would be solved.

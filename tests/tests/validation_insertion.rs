@@ -147,12 +147,13 @@ fn most_questions_about_the_wall_are_answered_from_memory() {
     let (wall, sheath) = curved_tube();
     let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
     let mut simulation = Simulation::builder(wall, wire, sheath).build().unwrap();
+    let mut skipped = 0;
     for _ in 0..80 {
-        simulation.step(Command::advance(2.0)).unwrap();
+        skipped += usize::from(simulation.step(Command::advance(2.0)).unwrap().iterations == 0);
     }
     let Counters { queries, avoided, near, .. } = simulation.counters();
     assert!(avoided > 0 && near > 0 && queries * 4 < avoided + near, "{:?}", simulation.counters());
-    assert!(simulation.report().nodes_solved > 0 && simulation.report().nodes_frozen > 0);
+    assert!(simulation.report().nodes_solved > 0 && skipped > 0, "{skipped}");
 }
 
 #[test]

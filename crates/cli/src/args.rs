@@ -52,8 +52,8 @@ pub(crate) struct RunArgs {
     /// Folder for the recording; out/NAME OF THE SCENE if absent. An earlier recording in it is replaced
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Record also into a folder that holds other files; of these, summary.json, steps.csv, shapes.npz and frames/step_*.png of the
-    /// same name are replaced
+    /// Record also into a folder that holds other files; of these, summary.json, steps.csv, instruments.csv,
+    /// shapes.npz and frames/step_*.png of the same name are replaced
     #[arg(long)]
     pub(crate) force: bool,
     /// Save the state of the run into a file, again and again while it goes on and at its end. The file is whole at any moment, also after

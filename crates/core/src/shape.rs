@@ -53,6 +53,20 @@ impl Shape {
         Some(x[before] * w0 + x[after] * w1 + (t[before] * s0 + t[after] * s1) * h)
     }
 
+    /// The part up to the node nearest to a place so far from the tip, mm: that of an instrument which ends there.
+    pub fn behind(&self, from_tip_mm: f64) -> Self {
+        let off = |place: usize| (self.from_tip_mm[place] - from_tip_mm).abs();
+        let Some(last) = (0..self.len()).min_by(|a, b| off(*a).total_cmp(&off(*b))) else {
+            return Self::default();
+        };
+        let end_mm = self.from_tip_mm[last];
+        Self {
+            positions_mm: self.positions_mm[..=last].to_vec(),
+            tangents: self.tangents[..=last].to_vec(),
+            from_tip_mm: self.from_tip_mm[..=last].iter().map(|mm| mm - end_mm).collect(),
+        }
+    }
+
     /// Position of the tip, if anything is inserted.
     pub fn tip_mm(&self) -> Option<Vec3> {
         self.positions_mm.last().copied()

@@ -116,6 +116,10 @@ impl MethodChoice for AnyMethod {
         }
     }
 
+    fn takes_several(&self) -> bool {
+        matches!(self, Self::Kirchhoff(options) if options.takes_several())
+    }
+
     fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {
         let paper = |options: &Li2011Options, solver| -> Result<Box<dyn Method>> {
             Ok(Box::new(Li2011::new(*options, solver, surroundings)?))

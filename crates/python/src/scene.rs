@@ -54,10 +54,12 @@ impl Scene {
 
     /// The simulation, nothing inserted yet.
     fn simulation(&self, py: Python<'_>) -> PyResult<Simulation> {
+        // Several instruments are refused.
+        self.scene.device().map_err(exception)?;
         let scene = Arc::clone(&self.scene);
         let built = interruptible(py, move || scene.simulation(&NoStore))?.map_err(exception)?;
-        let instrument = match self.scene.device_file().map_err(exception)? {
-            Some(file) => Instrument::of_file(file)?,
+        let instrument = match self.scene.device_files().map_err(exception)?.into_iter().flatten().next() {
+            Some((_, file)) => Instrument::of_file(file)?,
             None => Instrument { device: built.device().clone(), parts: vec![] },
         };
         Ok(Simulation::new(built, vec![instrument]))

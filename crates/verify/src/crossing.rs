@@ -82,11 +82,12 @@ impl CrossingTest {
     /// How much less deep than it is, mm, the device says to have sunk in where it passes through a triangle and beyond; `None` where
     /// it passes through none. No more than the distance between the wall that is felt and the triangles if it was pressed in. `wall` tells inside from outside.
     pub fn missing_mm(&self, wall: &Wall, simulation: &Simulation) -> Option<f64> {
-        let (shape, device) = (simulation.shape(), simulation.device());
+        let (shape, stack) = (simulation.shape(), simulation.stack());
+        let inserted_mm = simulation.report().lengths_mm();
         let contacts = &simulation.report().contacts;
         let points = curve(shape);
         let missing = |x: &Vec3, behind_mm: f64, piece: usize| {
-            let radius_mm = device.section_at(shape.from_tip_mm[piece / CHORDS]).radius_mm;
+            let radius_mm = stack.felt_radius_mm(&inserted_mm, shape.from_tip_mm[piece / CHORDS]);
             let near = contacts.iter().map(|c| ((c.position_mm - x).norm(), c.penetration_mm));
             let next = near.min_by(|a, b| a.0.total_cmp(&b.0));
             // Next to a place without a contact the device does not press at all.

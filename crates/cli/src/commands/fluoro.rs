@@ -21,10 +21,10 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         return Err(Failure::Input(format!("--time {}: must be finite", args.time)));
     }
     let scene = Scene::read(&args.scene)?;
-    let commands = scene.commands(&scene.device().map_err(in_scene)?).map_err(in_scene)?;
-    let steps = args.steps.unwrap_or(commands.len());
-    if steps > commands.len() {
-        return Err(Failure::Input(format!("--steps {steps}: the script has {} steps", commands.len())));
+    let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(in_scene)?;
+    let steps = args.steps.unwrap_or(script.len());
+    if steps > script.len() {
+        return Err(Failure::Input(format!("--steps {steps}: the script has {} steps", script.len())));
     }
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let frames = args.count as usize;
@@ -32,8 +32,8 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         Studio::new("fluoro", &args.frames, &args.scene, &scene, ViewChoice::Fluoro, folder, frames)?;
     let mut simulation = scene.simulation(&Cache::new(&args.frames.cache)).map_err(in_scene)?;
     let bar = progress::bar(steps, "step");
-    for (index, command) in commands[..steps].iter().enumerate() {
-        simulation.step(*command).map_err(|e| {
+    for (index, moves) in script.steps().take(steps).enumerate() {
+        simulation.step_together(moves).map_err(|e| {
             Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), index + 1))
         })?;
         bar.inc(1);
@@ -45,11 +45,13 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         .iter()
         .map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() })
         .collect();
+    let inserted_mm = simulation.report().lengths_mm();
     for k in 0..args.count {
         let time_s = args.time + f64::from(k) / studio.frames_per_s();
         let moment = Moment { frame: u64::from(k), time_s };
         let name = format!("frame_{k:06}");
-        studio.draw(&Still { name, moment, shape: simulation.shape(), contacts: &contacts })?;
+        let shape = simulation.shape();
+        studio.draw(&Still { name, moment, shape, inserted_mm: &inserted_mm, contacts: &contacts })?;
     }
     studio.finish()?.tell(args.frames.json)
 }

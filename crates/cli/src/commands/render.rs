@@ -6,6 +6,7 @@ use endowire_viewer::Moment;
 use crate::args::{RenderArgs, ViewChoice};
 use crate::failure::Failure;
 use crate::output::frames::{Still, Studio};
+use crate::output::instruments::Lengths;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::recording::Recording;
 use crate::output::{progress, tell};
@@ -57,15 +58,19 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
     let mut studio =
         Studio::new("render", &args.frames, path, &scene, ViewChoice::Both, folder, steps.len())?;
+    let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
+    let lengths = Lengths::read(&args.dir, &stack)?;
     let bar = progress::bar(steps.len(), "frame");
     for &step in &steps {
         let contacts = recording.contacts(step);
         let moment = Moment { frame: step as u64, time_s: step as f64 / studio.frames_per_s() };
         let shape = recording.shape(step);
+        let inserted_mm = lengths.after(step, &shape)?;
         studio.draw(&Still {
             name: format!("step_{step:06}"),
             moment,
             shape: &shape,
+            inserted_mm: &inserted_mm,
             contacts: &contacts,
         })?;
         bar.inc(1);

@@ -12,9 +12,10 @@ use endowire_methods::Scene;
 use crate::args::RunArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
+use crate::output::instruments::Lengths;
 use crate::output::progress;
 use crate::output::provenance::{Provenance, read_input};
-use crate::output::recorder::{Recorder, StepFailure, Summary};
+use crate::output::recorder::{InstrumentSummary, Recorder, StepFailure, Summary};
 use crate::output::recording::Recording;
 use crate::output::saved::{Course, Saved, Saver};
 use crate::output::{frames::FrameWriter, print_json, tell, whole};
@@ -25,15 +26,15 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let scene = Scene::read(&args.scene)?;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
     let saved = args.resume.as_deref().map(Saved::read).transpose()?;
-    let commands = scene.commands(&scene.device().map_err(in_scene)?).map_err(in_scene)?;
-    if commands.is_empty() {
+    let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(in_scene)?;
+    if script.is_empty() {
         let text = "script = []: give at least one [[script]] table, what the hand does".to_owned();
         return Err(Failure::Input(text).at(args.scene.display()));
     }
     let mut simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
     let mut saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
     if let Some(saved) = &saved {
-        saved.restore(&scene, &mut simulation, &commands)?;
+        saved.restore(&scene, &mut simulation, &script)?;
     }
     let mut frames = FrameWriter::new(&args.scene, &scene, &simulation)?;
     let mut inputs = vec![scene.text().as_bytes().to_vec()];
@@ -44,11 +45,11 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let mut course = saved.map_or_else(Course::begin, |saved| saved.course());
     let mut recorder = if args.resume.is_some() {
-        let (mut recorder, earlier) = Recorder::go_on(&folder, args.force, course.steps, simulation.shape())?;
-        draw_again(&mut frames, earlier.as_ref(), &simulation, commands.len(), &mut recorder)?;
+        let (mut recorder, earlier) = Recorder::go_on(&folder, args.force, course.steps, &simulation)?;
+        draw_again(&mut frames, earlier.as_ref(), (&folder, &simulation), script.len(), &mut recorder)?;
         recorder
     } else {
-        let recorder = Recorder::new(&folder, args.force)?;
+        let recorder = Recorder::new(&folder, args.force, simulation.stack())?;
         if let Some(path) = &args.save_state {
             forget_state(path)?;
         }
@@ -57,7 +58,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
 
     // From here on something is recorded: whatever happens, it is kept.
     let interrupted = interrupts();
-    let bar = progress::bar(commands.len(), "step");
+    let bar = progress::bar(script.len(), "step");
     bar.inc(course.steps as u64);
     let mut failure: Option<StepFailure> = None;
     // Whether a step was taken that could not be recorded.
@@ -75,7 +76,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
             scene_file: std::path::absolute(&args.scene).unwrap_or_else(|_| args.scene.clone()),
             method: scene.method.name(),
             steps: recorder.steps(),
-            steps_asked: commands.len(),
+            steps_asked: script.len(),
             converged: course.converged && failure.is_none(),
             failure: failure.clone(),
             inserted_mm: report.inserted_mm,
@@ -83,6 +84,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
             tip_mm: simulation.shape().tip_mm().map(Into::into),
             push_force_n: report.push_force_n,
             torque_nmm: report.torque_nmm,
+            instruments: instruments(simulation),
             energy_mj: report.energy,
             max_penetration_mm: course.max_penetration_mm,
             left_through: report.left_through,
@@ -94,18 +96,18 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     };
     let save = |saver: &mut Option<Saver>, simulation: &Simulation, course: Course, recorder: &Recorder| {
         let Some(saver) = saver else { return Ok(()) };
-        saver.save(simulation, &commands, course, || recorder.sync())
+        saver.save(simulation, &script, course, || recorder.sync())
     };
     recorder.checkpoint(|recorder| summary(&course, &failure, &simulation, &frames, recorder))?;
     save(&mut saver, &simulation, course, &recorder)?;
-    for (index, command) in commands.iter().enumerate().skip(course.steps) {
+    for (index, moves) in script.steps().enumerate().skip(course.steps) {
         let failed = |reason: String| Some(StepFailure { step: index + 1, reason });
         if interrupted.load(Ordering::Relaxed) {
             failure = failed("interrupted before it".to_owned());
             break;
         }
         let clock = Instant::now();
-        let result = simulation.step(*command);
+        let result = simulation.step_together(moves);
         course.step_time_s += clock.elapsed().as_secs_f64();
         match result {
             Ok(report) => {
@@ -117,10 +119,11 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
                 break;
             }
         }
-        let last = index + 1 == commands.len();
-        let seen = (simulation.shape(), simulation.device());
+        let last = index + 1 == script.len();
+        let lengths_mm = simulation.report().lengths_mm();
+        let seen = (simulation.shape(), lengths_mm.as_slice());
         let recorded = recorder
-            .record(*command, simulation.report(), simulation.shape())
+            .record(moves, &simulation)
             .and_then(|()| {
                 course.steps = index + 1;
                 frames.step(index + 1, last, seen, &mut recorder)
@@ -144,7 +147,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let saved = if ahead { Ok(()) } else { save(&mut saver, &simulation, course, &recorder) };
     if failure.is_some() && recorder.steps() > 0 {
         // The picture of the end is a help; the first failure is the one to tell.
-        let seen = (simulation.shape(), simulation.device());
+        let lengths_mm = simulation.report().lengths_mm();
+        let seen = (simulation.shape(), lengths_mm.as_slice());
         let _ = frames.step(recorder.steps(), true, seen, &mut recorder);
     }
 
@@ -167,6 +171,12 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
 }
 
+/// What each of several instruments has come to.
+fn instruments(simulation: &Simulation) -> Vec<InstrumentSummary> {
+    let each = simulation.stack().instruments().iter().zip(&simulation.report().instruments);
+    each.map(|(one, report)| InstrumentSummary { name: one.name.clone(), report: *report }).collect()
+}
+
 /// Removes the state of an earlier run: until this one has saved its own, there is none to go on from.
 fn forget_state(path: &Path) -> Result<(), Failure> {
     whole::remove(path).map_err(|e| Failure::write(path, &e))
@@ -176,15 +186,18 @@ fn forget_state(path: &Path) -> Result<(), Failure> {
 fn draw_again(
     frames: &mut FrameWriter,
     earlier: Option<&Recording>,
-    simulation: &Simulation,
+    (folder, simulation): (&Path, &Simulation),
     steps_asked: usize,
     recorder: &mut Recorder,
 ) -> Result<(), Failure> {
     let Some(earlier) = earlier else { return Ok(()) };
     let before = recorder.steps() - earlier.steps();
+    let lengths = Lengths::read(folder, simulation.stack())?;
     for row in 1..=earlier.steps() {
         let step = before + row;
-        frames.step(step, step == steps_asked, (&earlier.shape(row), simulation.device()), recorder)?;
+        let shape = earlier.shape(row);
+        let lengths_mm = lengths.after(step, &shape)?;
+        frames.step(step, step == steps_asked, (&shape, &lengths_mm), recorder)?;
     }
     Ok(())
 }

@@ -4,19 +4,17 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use endowire_core::Error;
-use endowire_core::device::Device;
 use endowire_core::insertion::Simulation;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_methods::Scene;
-use endowire_viewer::{
-    Angiogram, Animation, ContactView, DeviceView, Frames, Image, Moment, Renderer, View, ViewSpec,
-};
+use endowire_viewer::{Angiogram, Animation, ContactView, Frames, Image, Moment, Renderer, View, ViewSpec};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::manifest::Manifest;
 use super::npz::write_map;
+use super::pushed::Pushed;
 use super::recorder::Recorder;
 use super::{print_json, tell, to_json};
 use crate::args::{FrameArgs, ViewChoice};
@@ -26,6 +24,7 @@ use crate::failure::Failure;
 /// Draws the steps of a run that the scene wants to see.
 pub(crate) struct FrameWriter {
     spec: ViewSpec,
+    pushed: Pushed,
     /// None where no view is asked for: then nothing is built.
     renderer: Option<Renderer>,
 }
@@ -41,7 +40,7 @@ impl FrameWriter {
         } else {
             Some(Renderer::new(&spec, &simulation.wall().closed_mesh()).map_err(in_scene)?)
         };
-        Ok(Self { spec, renderer })
+        Ok(Self { pushed: Pushed::new(path, scene, &spec)?, spec, renderer })
     }
 
     /// What draws, for the summary.
@@ -54,14 +53,14 @@ impl FrameWriter {
         &mut self,
         step: usize,
         last: bool,
-        (shape, device): (&Shape, &Device),
+        (shape, inserted_mm): (&Shape, &[f64]),
         recorder: &mut Recorder,
     ) -> Result<(), Failure> {
         let due = last || step.is_multiple_of(self.spec.every as usize);
         let Some(renderer) = self.renderer.as_mut().filter(|_| due) else { return Ok(()) };
-        let view = DeviceView::of_device(shape, device, &self.spec.device);
+        let views = self.pushed.views(shape, inserted_mm);
         let moment = Moment { frame: step as u64, time_s: step as f64 / self.spec.frames_per_s };
-        let frames = renderer.render_at(&[view], moment)?;
+        let frames = renderer.render_at(&views, moment)?;
         for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {
                 recorder.frame(step, name, |path| image.write_png(path).map_err(bare))?;
@@ -85,6 +84,8 @@ pub(crate) struct Still<'a> {
     pub(crate) name: String,
     pub(crate) moment: Moment,
     pub(crate) shape: &'a Shape,
+    /// Length in of the device, or of each instrument, mm.
+    pub(crate) inserted_mm: &'a [f64],
     pub(crate) contacts: &'a [ContactView],
 }
 
@@ -118,7 +119,7 @@ pub(crate) struct Studio<'a> {
     args: &'a FrameArgs,
     spec: ViewSpec,
     wall: SurfaceMesh,
-    device: Device,
+    pushed: Pushed,
     renderer: Renderer,
     folder: PathBuf,
     frames: usize,
@@ -143,7 +144,7 @@ impl<'a> Studio<'a> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         let spec = wished(ViewSpec::of_scene(scene, path)?, args, default)?;
         let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
-        let device = scene.device().map_err(in_scene)?;
+        let pushed = Pushed::new(path, scene, &spec)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
         if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {
             let text = format!("--orbit {orbit:e}: give -{MOST_ORBIT_DEG} to {MOST_ORBIT_DEG} degrees");
@@ -169,7 +170,7 @@ impl<'a> Studio<'a> {
             args,
             spec,
             wall,
-            device,
+            pushed,
             renderer,
             folder,
             frames,
@@ -193,19 +194,19 @@ impl<'a> Studio<'a> {
             let part = self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64;
             let azimuth = spec.camera.azimuth_deg.unwrap_or(0.0) + orbit * part;
             spec.camera.azimuth_deg = Some(azimuth % 360.0);
-            let device = DeviceView::of_device(still.shape, &self.device, &self.spec.device);
+            let views = self.pushed.views(still.shape, still.inserted_mm);
             let mut orbiting = Renderer::new(&spec, &self.wall)?;
             orbiting.show_contacts(still.contacts);
-            let three_d = orbiting.render_at(std::slice::from_ref(&device), still.moment)?.three_d;
+            let three_d = orbiting.render_at(&views, still.moment)?.three_d;
             let fluoro = match self.spec.wants(View::Fluoro) {
-                true => self.renderer.render_at(&[device], still.moment)?.fluoro,
+                true => self.renderer.render_at(&views, still.moment)?.fluoro,
                 false => None,
             };
             return self.write(still, &Frames { three_d, fluoro });
         }
-        let device = DeviceView::of_device(still.shape, &self.device, &self.spec.device);
+        let views = self.pushed.views(still.shape, still.inserted_mm);
         self.renderer.show_contacts(still.contacts);
-        let frames = self.renderer.render_at(&[device], still.moment)?;
+        let frames = self.renderer.render_at(&views, still.moment)?;
         self.write(still, &frames)
     }
 
@@ -246,7 +247,7 @@ impl<'a> Studio<'a> {
 
     /// Labels and arrays.
     fn write_data(&mut self, still: &Still) -> Result<(), Failure> {
-        let device = [DeviceView::of_device(still.shape, &self.device, &self.spec.device)];
+        let device = self.pushed.views(still.shape, still.inserted_mm);
         if self.args.labels {
             let contacts: Vec<_> = still.contacts.iter().map(|c| c.position_mm).collect();
             let labels = self.renderer.labels(&device, &contacts)?;

@@ -6,12 +6,13 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use endowire_core::insertion::{Command, Energy, StepReport};
-use endowire_core::shape::Shape;
+use endowire_core::device::Stack;
+use endowire_core::insertion::{Energy, InstrumentReport, Move, Simulation};
 use serde::Serialize;
 
 use super::arrays::{self, ShapeArrays};
 use super::folder::{self, Claim};
+use super::instruments::InstrumentTable;
 use super::provenance::Provenance;
 use super::recording::Recording;
 use super::{SUMMARY, to_json, whole};
@@ -50,6 +51,9 @@ pub(crate) struct Summary {
     pub(crate) push_force_n: f64,
     /// Torque at the end, N·mm.
     pub(crate) torque_nmm: f64,
+    /// Each of several instruments at the end.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) instruments: Vec<InstrumentSummary>,
     /// Energy at the end, mJ.
     pub(crate) energy_mj: Energy,
     /// Deepest penetration of the wall in any step, mm.
@@ -64,6 +68,16 @@ pub(crate) struct Summary {
     pub(crate) renderer: Option<String>,
     /// Frames, relative to the folder of this file.
     pub(crate) frames: Vec<String>,
+}
+
+/// One of several instruments at the end of a run.
+#[derive(Debug, Serialize)]
+pub(crate) struct InstrumentSummary {
+    /// Its name.
+    pub(crate) name: String,
+    /// What its hand has done and feels.
+    #[serde(flatten)]
+    pub(crate) report: InstrumentReport,
 }
 
 /// What ended a run early: no equilibrium, a recording or frame that could not be written, or an interrupt.
@@ -101,7 +115,6 @@ struct Row {
     jumped: bool,
     left_through: Option<usize>,
     nodes_solved: u64,
-    nodes_frozen: u64,
     angles: bool,
     converged: bool,
 }
@@ -113,6 +126,7 @@ const CHECKPOINT_S: f64 = 1.0;
 pub(crate) struct Recorder {
     folder: PathBuf,
     table: csv::Writer<File>,
+    instruments: Option<InstrumentTable>,
     arrays: ShapeArrays,
     steps: usize,
     /// Frames written so far, relative to the folder.
@@ -124,15 +138,17 @@ pub(crate) struct Recorder {
 impl Recorder {
     /// Starts a recording in `folder`, which is made if it is not there; an earlier recording in it is replaced. A folder that holds
     /// other files is refused, or, with `force`, used as it is.
-    pub(crate) fn new(folder: &Path, force: bool) -> Result<Self, Failure> {
+    pub(crate) fn new(folder: &Path, force: bool, stack: &Stack) -> Result<Self, Failure> {
         let claim = folder::claim(folder, force)?;
         let start = || -> io::Result<_> {
-            Ok((File::create(folder.join(folder::TABLE))?, ShapeArrays::new(folder)?))
+            let table = File::create(folder.join(folder::TABLE))?;
+            Ok((table, InstrumentTable::new(folder, stack)?, ShapeArrays::new(folder)?))
         };
-        let (table, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
+        let (table, instruments, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
         Ok(Self {
             folder: folder.to_path_buf(),
             table: csv::Writer::from_writer(table),
+            instruments,
             arrays,
             steps: 0,
             frames: Vec::new(),
@@ -141,16 +157,16 @@ impl Recorder {
         })
     }
 
-    /// Goes on with the recording in `folder` after step `steps`, where the device has the shape `at`; what was recorded of later steps is
+    /// Goes on with the recording in `folder` after step `steps`, where the simulation is; what was recorded of later steps is
     /// dropped. Returns the steps that stay. Where nothing has been recorded, the recording begins with the next step.
     pub(crate) fn go_on(
         folder: &Path,
         force: bool,
         steps: usize,
-        at: &Shape,
+        at: &Simulation,
     ) -> Result<(Self, Option<Recording>), Failure> {
         if !folder::is_recording(folder) {
-            let mut recorder = Self::new(folder, force)?;
+            let mut recorder = Self::new(folder, force, at.stack())?;
             recorder.steps = steps;
             return Ok((recorder, None));
         }
@@ -170,7 +186,7 @@ impl Recorder {
             )));
         };
         let recording = if kept.rows > 0 { Some(Recording::read_arrays(folder, kept.rows)?) } else { None };
-        if recording.as_ref().is_some_and(|recording| recording.shape(kept.rows) != *at) {
+        if recording.as_ref().is_some_and(|recording| recording.shape(kept.rows) != *at.shape()) {
             return Err(refuse(format!(
                 "step {steps} is recorded there with another shape than that of the state"
             )));
@@ -183,13 +199,14 @@ impl Recorder {
             let table = OpenOptions::new().append(true).open(&table_path)?;
             table.set_len(kept.bytes)?;
             folder::remove_frames(folder)?;
-            Ok((table, arrays))
+            Ok((table, InstrumentTable::go_on(folder, at.stack(), steps)?, arrays))
         };
-        let (table, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
+        let (table, instruments, arrays) = start().map_err(|e| Failure::write(folder, &e))?;
         let table = csv::WriterBuilder::new().has_headers(kept.bytes == 0).from_writer(table);
         let recorder = Self {
             folder: folder.to_path_buf(),
             table,
+            instruments,
             arrays,
             steps,
             frames: Vec::new(),
@@ -200,12 +217,9 @@ impl Recorder {
     }
 
     /// Adds one step; where that fails, the steps before it stay.
-    pub(crate) fn record(
-        &mut self,
-        command: Command,
-        report: &StepReport,
-        shape: &Shape,
-    ) -> Result<(), Failure> {
+    pub(crate) fn record(&mut self, moves: &[Move], simulation: &Simulation) -> Result<(), Failure> {
+        let (report, shape) = (simulation.report(), simulation.shape());
+        let command = moves.first().map(|one| one.command).unwrap_or_default();
         let tip = shape.tip_mm().unwrap_or_default();
         let row = Row {
             step: self.steps + 1,
@@ -231,12 +245,14 @@ impl Recorder {
             jumped: report.jumped,
             left_through: report.left_through,
             nodes_solved: report.nodes_solved,
-            nodes_frozen: report.nodes_frozen,
             angles: report.angles,
             converged: report.converged,
         };
         // The row comes last: every step of the table is in the arrays.
         let write_row = || {
+            if let Some(instruments) = &mut self.instruments {
+                instruments.push(row.step, moves, simulation)?;
+            }
             self.table.serialize(row)?;
             self.table.flush()
         };
@@ -259,7 +275,9 @@ impl Recorder {
 
     /// Waits until all steps are on the disk itself.
     pub(crate) fn sync(&self) -> Result<(), Failure> {
-        let synced = self.arrays.sync().and_then(|()| self.table.get_ref().sync_data());
+        let instruments = || self.instruments.as_ref().map_or(Ok(()), InstrumentTable::sync);
+        let synced = self.arrays.sync().and_then(|()| instruments());
+        let synced = synced.and_then(|()| self.table.get_ref().sync_data());
         synced.map_err(|e| Failure::write(&self.folder, &e))
     }
 

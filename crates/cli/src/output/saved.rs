@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use endowire_core::insertion::{Command, Simulation, State};
+use endowire_core::insertion::{Script, Simulation, State};
 use endowire_methods::Scene;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -15,7 +15,7 @@ use super::{seal, whole};
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 1";
+const FORMAT: &str = "endowire state 3";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// What a state belongs to: hashes of all that its steps depended on.
@@ -40,7 +40,7 @@ impl Parts {
         Self {
             vessel: hash(numbers.chain(indices).collect()),
             wall: json(serde_json::to_vec(&scene.vessel.wall)),
-            device: json(serde_json::to_vec(simulation.device().sections())),
+            device: json(pushed(scene, simulation)),
             sheath: hash(place.collect()),
             method: json(serde_json::to_vec(&scene.method)),
         }
@@ -59,10 +59,28 @@ impl Parts {
     }
 }
 
-/// Of the commands that were carried out.
-fn script_hash(done: &[Command]) -> String {
-    let numbers = done.iter().flat_map(|c| [c.advance_mm, c.rotate_rad]);
-    hash(numbers.flat_map(f64::to_le_bytes).collect())
+/// The device, or instruments with their names, and what of them is in at the start.
+fn pushed(scene: &Scene, simulation: &Simulation) -> serde_json::Result<Vec<u8>> {
+    let stack = simulation.stack();
+    if !stack.is_several() {
+        return serde_json::to_vec(simulation.device().sections());
+    }
+    let start_mm = scene.instrument.iter().map(|spec| spec.inserted_mm);
+    let each = stack.instruments().iter().zip(start_mm);
+    serde_json::to_vec(&each.map(|(one, mm)| (&one.name, one.device.sections(), mm)).collect::<Vec<_>>())
+}
+
+/// Of the first steps of a script.
+fn script_hash(script: &Script, steps: usize, several: bool) -> String {
+    let mut numbers = Vec::new();
+    for one in script.steps().take(steps).flatten() {
+        if several {
+            numbers.extend((one.instrument as u64).to_le_bytes());
+        }
+        numbers
+            .extend([one.command.advance_mm, one.command.rotate_rad].into_iter().flat_map(f64::to_le_bytes));
+    }
+    hash(numbers)
 }
 
 fn hash(bytes: Vec<u8>) -> String {
@@ -148,19 +166,19 @@ impl Saved {
         &self,
         scene: &Scene,
         simulation: &mut Simulation,
-        commands: &[Command],
+        script: &Script,
     ) -> Result<(), Failure> {
         let refuse = |what: String| Failure::Input(format!("--resume {}: {what}", self.path.display()));
         let steps = self.header.course.steps;
-        let Some(done) = commands.get(..steps) else {
+        if steps > script.len() {
             return Err(refuse(format!(
                 "it was saved after step {steps}, and the script has {} steps: give the scene that it was saved in ({})",
-                commands.len(),
+                script.len(),
                 self.header.scene
             )));
-        };
+        }
         let mut differing = self.header.parts.differing(&Parts::new(scene, simulation));
-        if self.header.script != script_hash(done) {
+        if self.header.script != script_hash(script, steps, simulation.stack().is_several()) {
             differing.push("the part of the script that was carried out");
         }
         if !differing.is_empty() {
@@ -212,7 +230,7 @@ impl Saver {
     pub(crate) fn save(
         &mut self,
         simulation: &Simulation,
-        commands: &[Command],
+        script: &Script,
         course: Course,
         sync: impl FnOnce() -> Result<(), Failure>,
     ) -> Result<(), Failure> {
@@ -224,7 +242,7 @@ impl Saver {
             scene: self.scene.clone(),
             course,
             parts: self.parts.clone(),
-            script: script_hash(&commands[..course.steps]),
+            script: script_hash(script, course.steps, simulation.stack().is_several()),
         };
         let failed = |what: String| Failure::Computation(format!("the state cannot be written: {what}"));
         let header = serde_json::to_string(&header).map_err(|e| failed(e.to_string()))?;

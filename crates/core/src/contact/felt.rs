@@ -65,7 +65,19 @@ impl FeltWall {
         properties: &WallProperties,
         store: &dyn WallStore,
     ) -> Result<Self> {
-        let (thinnest_mm, thickest_mm) = (device.min_radius_mm(), device.max_radius_mm());
+        Self::for_radii(wall, (device.min_radius_mm(), device.max_radius_mm()), properties, store)
+    }
+
+    /// As [`FeltWall::from_store`], for devices of this smallest and largest radius, mm.
+    ///
+    /// # Errors
+    /// As [`FeltWall::new`].
+    pub fn for_radii(
+        wall: &Wall,
+        (thinnest_mm, thickest_mm): (f64, f64),
+        properties: &WallProperties,
+        store: &dyn WallStore,
+    ) -> Result<Self> {
         let felt = extended(&*even(wall, properties, store)?, thickest_mm);
         let felt = Wall::welded(&felt)?;
         let smooth = SmoothWall::new(&felt, thickest_mm);

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, Nearness};
 use super::places::{Place, Places};
-use super::point::LOOK_AGAIN;
+use super::point::{FOLLOW, LOOK_AGAIN};
 use super::{ContactPoint, FeltWall};
 use crate::Vec3;
 
@@ -183,11 +183,22 @@ impl WallMemory {
             while k + 1 < count && before[k + 1].from_tip_mm <= was {
                 k += 1;
             }
-            let off = |known: &&KnownPoint| (known.from_tip_mm + advance_mm - point.from_tip_mm).abs();
+            let off = |known: &KnownPoint| (known.from_tip_mm + advance_mm - point.from_tip_mm).abs();
             let places = if was < 0.0 { index..index + 1 } else { k.saturating_sub(1)..(k + 3).min(count) };
-            let near = known.points.get(places).unwrap_or_default();
-            let nearest = near.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-            let slid = nearest.map(|n| KnownPoint { from_tip_mm: n.from_tip_mm + advance_mm, ..*n });
+            let near = known.points.get(places.clone()).unwrap_or_default();
+            let nearest = near.iter().zip(before.get(places).unwrap_or_default());
+            let nearest = nearest.min_by(|(a, _), (b, _)| off(a).total_cmp(&off(b)));
+            let slid = nearest.map(|(n, was)| {
+                // Where a thinner piece has lain free, a thicker one is so within less.
+                let thicker_mm = (point.potential.radius_mm - was.potential.radius_mm).max(0.0);
+                let less_mm = (1.0 + FOLLOW) * thicker_mm;
+                KnownPoint {
+                    from_tip_mm: n.from_tip_mm + advance_mm,
+                    free_mm: n.free_mm - less_mm,
+                    base_free_mm: n.base_free_mm - less_mm,
+                    ..*n
+                }
+            });
             self.points.push(slid.unwrap_or(NOTHING));
         }
         self.readings.clear();

@@ -9,9 +9,12 @@ mod file_tests;
 mod part;
 mod quantity;
 mod rest_shape;
+mod stack;
 
 pub use file::{DeviceFile, Kind};
 pub use part::{Coat, CutError, Part};
+pub(crate) use stack::LENGTH_SLACK_MM;
+pub use stack::{Instrument, Stack};
 
 use serde::{Deserialize, Serialize};
 
@@ -189,7 +192,18 @@ impl Device {
 
     /// Largest outer radius, mm.
     pub fn max_radius_mm(&self) -> f64 {
-        self.sections.iter().map(|s| s.radius_mm).fold(0.0, f64::max)
+        self.max_radius_within(f64::INFINITY)
+    }
+
+    /// Largest outer radius nearer to the tip than this, mm; 0 where that is nothing.
+    pub fn max_radius_within(&self, from_tip_mm: f64) -> f64 {
+        let begins = self.sections.iter().scan(0.0, |end_mm, section| {
+            let begin_mm = *end_mm;
+            *end_mm += section.length_mm;
+            Some(begin_mm)
+        });
+        let within = self.sections.iter().zip(begins).filter(|(_, begin_mm)| *begin_mm < from_tip_mm);
+        within.map(|(section, _)| section.radius_mm).fold(0.0, f64::max)
     }
 }
 

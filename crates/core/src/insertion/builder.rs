@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::simulation::{Environment, Simulation};
 use super::{Sheath, WallProperties};
-use crate::device::Device;
+use crate::device::{Device, Stack};
 use crate::error::vector;
 use crate::methods::MethodChoice;
 use crate::methods::kirchhoff::KirchhoffOptions;
@@ -14,7 +14,7 @@ use crate::{Error, Result};
 /// A simulation to be built: wall, device and sheath, and what else is told.
 pub struct SimulationBuilder<'a> {
     wall: Wall,
-    device: Device,
+    stack: Stack,
     sheath: Sheath,
     properties: WallProperties,
     method: Option<&'a dyn MethodChoice>,
@@ -26,8 +26,8 @@ pub struct SimulationBuilder<'a> {
 const MOUTH_MM: f64 = 1e-3;
 
 impl<'a> SimulationBuilder<'a> {
-    pub(super) fn new(wall: Wall, device: Device, sheath: Sheath) -> Self {
-        Self { wall, device, sheath, properties: WallProperties::default(), method: None, store: &NoStore }
+    pub(super) fn new(wall: Wall, stack: Stack, sheath: Sheath) -> Self {
+        Self { wall, stack, sheath, properties: WallProperties::default(), method: None, store: &NoStore }
     }
 
     /// How the wall yields and rubs; [`WallProperties::default`] unless told.
@@ -57,14 +57,19 @@ impl<'a> SimulationBuilder<'a> {
     /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
     /// tell, wall properties or method options out of range, and what the method cannot do.
     pub fn build(self) -> Result<Simulation> {
-        let Self { wall, device, sheath, properties, method, store } = self;
+        let Self { wall, stack, sheath, properties, method, store } = self;
         properties.check(wall.mesh())?;
         check_inside(&wall, &sheath)?;
         let query = WallQuery::new(&wall)?;
-        check_mouth(&query, &device, &sheath)?;
-        let scene = Environment { wall, properties, query, sheath, device };
+        stack.devices().try_for_each(|device| check_mouth(&query, device, &sheath))?;
+        let scene = Environment { wall, properties, query, sheath, stack };
         let own = KirchhoffOptions::default();
-        let method = method.unwrap_or(&own).start(&scene.surroundings(), store)?;
+        let method = method.unwrap_or(&own);
+        if scene.stack.is_several() && !method.takes_several() {
+            let mend = "pushes one device and no more: leave one instrument, or choose kirchhoff";
+            return Err(Error::parameter("method.name", method.name(), mend));
+        }
+        let method = method.start(&scene.surroundings(), store)?;
         Ok(Simulation { scene: Arc::new(scene), method })
     }
 }

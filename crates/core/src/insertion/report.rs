@@ -31,25 +31,53 @@ impl StepReport {
     }
 }
 
+impl StepReport {
+    /// Length inserted of each instrument, or of the device alone, mm.
+    pub fn lengths_mm(&self) -> Vec<f64> {
+        if self.instruments.is_empty() {
+            return vec![self.inserted_mm];
+        }
+        self.instruments.iter().map(|instrument| instrument.inserted_mm).collect()
+    }
+}
+
+/// What one of several instruments does after a step.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct InstrumentReport {
+    /// Length inside the sheath's mouth, mm.
+    pub inserted_mm: f64,
+    /// Turn of its hand since the start, rad.
+    pub rotation_rad: f64,
+    /// Turn of its tip, carried along the axis without twist, rad.
+    pub tip_rotation_rad: f64,
+    /// Force with which its hand must push, N: the slope of the energy with respect to its inserted length. None where that jumps: its
+    /// tip is at that of another, or nothing of it is in.
+    pub push_force_n: Option<f64>,
+    /// Torque with which its hand must hold it, N·mm: the slope of the energy with respect to its turn.
+    pub torque_nmm: f64,
+}
+
 /// What is seen and felt of an insertion after a step.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StepReport {
-    /// Length inside the sheath's mouth, mm.
+    /// Length inside the sheath's mouth, mm; of several instruments that of the farthest.
     pub inserted_mm: f64,
-    /// Turn of the tail since the start, rad.
+    /// Turn of the tail since the start, rad; of several instruments that of the innermost, as the next.
     pub rotation_rad: f64,
     /// Turn of the tip about the device's axis since the start, carried along the axis without twist, rad: what is left of the
     /// hand's turn, or what a whip adds to it.
     pub tip_rotation_rad: f64,
     /// Energy terms, mJ.
     pub energy: Energy,
-    /// Force with which the hand must push to hold the device, N; negative where it must pull.
+    /// Force with which the hand must push to hold the device, N; negative where it must pull. Of several instruments the sum.
     ///
     /// F = −n·t − |m|²/(2EI) at the sheath, with n and m the internal force and moment: the second,
     /// configurational term makes it the derivative of the energy with respect to the inserted length.
     pub push_force_n: f64,
-    /// Torque with which the hand must hold the tail, N·mm.
+    /// Torque with which the hand must hold the tail, N·mm; of several instruments the sum.
     pub torque_nmm: f64,
+    /// Each of several instruments, the innermost first; empty for a device alone.
+    pub instruments: Vec<InstrumentReport>,
     /// Deepest penetration of the device's surface into the wall at any node, mm; 0 without contact.
     pub max_penetration_mm: f64,
     /// Energy that friction took in this step, mJ.
@@ -74,10 +102,9 @@ pub struct StepReport {
     pub jumped: bool,
     /// Whether the device carries material angles: only with a shape or friction.
     pub angles: bool,
-    /// Nodes of sub-steps in which the device moved to a new equilibrium, since the start.
+    /// Nodes of sub-steps in which the device moved to a new equilibrium, since the start; where it is in one as it has slid, nothing is
+    /// solved for.
     pub nodes_solved: u64,
-    /// Nodes of sub-steps in which the slid device was in equilibrium as it was, since the start.
-    pub nodes_frozen: u64,
     /// Whether the step met the method's own convergence test.
     pub converged: bool,
 }

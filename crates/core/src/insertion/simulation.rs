@@ -3,10 +3,8 @@
 use std::sync::Arc;
 
 use crate::contact::Counters;
-use crate::device::Device;
-use crate::insertion::{
-    Command, ScriptLine, Sheath, SimulationBuilder, StepReport, WallProperties, commands,
-};
+use crate::device::{Device, LENGTH_SLACK_MM, Stack};
+use crate::insertion::{Command, Move, Sheath, SimulationBuilder, StepReport, WallProperties};
 use crate::methods::{Method, State};
 use crate::shape::Shape;
 use crate::vessel::{Wall, WallQuery};
@@ -23,8 +21,10 @@ pub struct Surroundings<'a> {
     pub query: &'a WallQuery,
     /// Where the device comes from.
     pub sheath: &'a Sheath,
-    /// The device.
+    /// The device; of several instruments the innermost.
     pub device: &'a Device,
+    /// All instruments.
+    pub stack: &'a Stack,
 }
 
 /// An insertion under way.
@@ -42,13 +42,13 @@ pub(super) struct Environment {
     pub(super) properties: WallProperties,
     pub(super) query: WallQuery,
     pub(super) sheath: Sheath,
-    pub(super) device: Device,
+    pub(super) stack: Stack,
 }
 
 impl Environment {
     pub(super) fn surroundings(&self) -> Surroundings<'_> {
-        let Self { wall, properties, query, sheath, device } = self;
-        Surroundings { wall, properties, query, sheath, device }
+        let Self { wall, properties, query, sheath, stack } = self;
+        Surroundings { wall, properties, query, sheath, device: stack.first(), stack }
     }
 }
 
@@ -59,20 +59,63 @@ impl Clone for Simulation {
 }
 
 impl Simulation {
-    /// A simulation of a device that enters `wall` through `sheath`, to be built.
-    pub fn builder<'a>(wall: Wall, device: Device, sheath: Sheath) -> SimulationBuilder<'a> {
-        SimulationBuilder::new(wall, device, sheath)
+    /// A simulation of a device, or of several instruments, that enter `wall` through `sheath`, to be built.
+    pub fn builder<'a>(wall: Wall, stack: impl Into<Stack>, sheath: Sheath) -> SimulationBuilder<'a> {
+        SimulationBuilder::new(wall, stack.into(), sheath)
     }
 
-    /// Carries out one command. After an error the state is as before, to the bit.
+    /// Carries out one command, of several instruments on the innermost. After an error the state is as before, to the bit.
     ///
     /// # Errors
     /// A command that is not finite, turns more than a thousand times, pushes in more than the device's length or pulls out more than is inserted
     /// (all [`Error::Parameter`]); a step that found no equilibrium ([`Error::Computation`]).
     pub fn step(&mut self, command: Command) -> Result<&StepReport> {
-        check_command(command, self.method.report().inserted_mm, self.scene.device.length_mm())?;
+        if self.scene.stack.is_several() {
+            return self.step_together(&[Move { instrument: 0, command }]);
+        }
+        check_command(command, self.method.report().inserted_mm, self.scene.stack.length_mm())?;
         self.method.step(&self.scene.surroundings(), command)?;
         Ok(self.method.report())
+    }
+
+    /// Moves instruments, each by its own command, all at the same time. After an error the state is as before, to the bit.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`] for each; an instrument that is not there or moved twice, and instruments that cannot be in
+    /// together so far ([`Stack::check_places`]; all [`Error::Parameter`]).
+    pub fn step_together(&mut self, moves: &[Move]) -> Result<&StepReport> {
+        self.check_moves(moves)?;
+        let surroundings = self.scene.surroundings();
+        if self.scene.stack.is_several() {
+            self.method.step_together(&surroundings, moves)?;
+        } else {
+            let command = moves.first().map_or_else(Command::default, |one| one.command);
+            self.method.step(&surroundings, command)?;
+        }
+        Ok(self.method.report())
+    }
+
+    fn check_moves(&self, moves: &[Move]) -> Result<()> {
+        let report = self.method.report();
+        let instruments = self.scene.stack.instruments();
+        let inserted =
+            |index: usize| report.instruments.get(index).map_or(report.inserted_mm, |i| i.inserted_mm);
+        for (index, one) in moves.iter().enumerate() {
+            let Some(instrument) = instruments.get(one.instrument) else {
+                let mend = format!("there are {}, the innermost is 0", instruments.len());
+                return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, mend));
+            };
+            if moves[..index].iter().any(|other| other.instrument == one.instrument) {
+                let mend = format!("{:?} is moved twice: add its motions up", instrument.name);
+                return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, mend));
+            }
+            check_command(one.command, inserted(one.instrument), instrument.device.length_mm())
+                .map_err(|error| within(&instrument.name, error))?;
+        }
+        let by =
+            |index: usize| moves.iter().find(|m| m.instrument == index).map_or(0.0, |m| m.command.advance_mm);
+        let after = (0..instruments.len()).map(|index| inserted(index) + by(index));
+        self.scene.stack.check_places(after)
     }
 
     /// All that the next step depends on, beside what surrounds the device.
@@ -114,9 +157,14 @@ impl Simulation {
         &self.scene.wall
     }
 
-    /// The device.
+    /// The device; of several instruments the innermost.
     pub fn device(&self) -> &Device {
-        &self.scene.device
+        self.scene.stack.first()
+    }
+
+    /// All instruments.
+    pub fn stack(&self) -> &Stack {
+        &self.scene.stack
     }
 
     /// The sheath.
@@ -129,10 +177,17 @@ impl Simulation {
 /// left that tell where on the circle it is.
 const TURN_LIMIT_RAD: f64 = 1000.0 * std::f64::consts::TAU;
 
-/// Slack in inserted length, mm: the rounding of thousands of summed increments.
-const LENGTH_SLACK_MM: f64 = 1e-6;
+/// The same error, of the instrument of that name.
+fn within(instrument: &str, error: Error) -> Error {
+    match error {
+        Error::Parameter { name, value, mend } => {
+            Error::Parameter { name: format!("{instrument}.{name}"), value, mend }
+        }
+        other => other,
+    }
+}
 
-fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<()> {
+pub(super) fn check_command(command: Command, inserted_mm: f64, device_mm: f64) -> Result<()> {
     // Without the last digits of a sum of increments.
     let shown_mm = (inserted_mm * 1e6).round() / 1e6;
     for (name, value) in [("advance_mm", command.advance_mm), ("rotate_rad", command.rotate_rad)] {
@@ -184,34 +239,6 @@ pub fn check_commands(list: &[Command], device: &Device) -> Result<()> {
         inserted_mm += command.advance_mm;
     }
     Ok(())
-}
-
-/// The commands of a script, checked against a device before the first is carried out.
-///
-/// # Errors
-/// As [`commands`] and [`Simulation::step`], naming the line of the script and its key.
-pub fn script_commands(script: &[ScriptLine], device: &Device) -> Result<Vec<Command>> {
-    let list = commands(script)?;
-    let mut rest = list.iter();
-    let mut inserted_mm = 0.0;
-    for (index, line) in script.iter().enumerate() {
-        let name = format!("script[{index}]");
-        for (step, command) in rest.by_ref().take(line.increments(&name)?).enumerate() {
-            check_command(*command, inserted_mm, device.length_mm()).map_err(|error| match error {
-                Error::Parameter { name: key, mend, .. } => {
-                    let value = line.advance_mm.or(line.retract_mm).unwrap_or(0.0);
-                    Error::parameter(
-                        format!("{name}.{key}"),
-                        value,
-                        format!("in its step {}, {mend}", step + 1),
-                    )
-                }
-                other => other,
-            })?;
-            inserted_mm += command.advance_mm;
-        }
-    }
-    Ok(list)
 }
 
 #[cfg(test)]

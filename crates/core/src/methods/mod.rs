@@ -9,11 +9,11 @@ use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
-use crate::Result;
 use crate::contact::Counters;
-use crate::insertion::{Command, StepReport, Surroundings};
+use crate::insertion::{Command, Move, StepReport, Surroundings};
 use crate::shape::Shape;
 use crate::vessel::WallStore;
+use crate::{Error, Result};
 use kirchhoff::KirchhoffOptions;
 
 /// A method keeps its own unknowns from step to step and moves them by commands.
@@ -27,6 +27,15 @@ pub trait Method: Send {
     /// # Errors
     /// A command that the device or the method cannot follow (input), or an equilibrium not found (computation).
     fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()>;
+
+    /// Moves several instruments at the same time; asked of methods that take several, and of no other.
+    ///
+    /// # Errors
+    /// As [`Method::step`].
+    fn step_together(&mut self, _surroundings: &Surroundings<'_>, moves: &[Move]) -> Result<()> {
+        let mend = "this method pushes one device: use step";
+        Err(Error::parameter("moves", moves.len(), mend))
+    }
 
     /// The inserted centre line.
     fn shape(&self) -> &Shape;
@@ -62,6 +71,11 @@ pub trait MethodChoice: Debug {
     /// The name used in scene files and results.
     fn name(&self) -> &'static str;
 
+    /// Whether it takes several instruments that lie in one another.
+    fn takes_several(&self) -> bool {
+        false
+    }
+
     /// The method at rest at the sheath, nothing inserted; walls that take long to make come from `store`.
     ///
     /// # Errors
@@ -88,6 +102,11 @@ impl MethodChoice for OwnMethod {
     fn name(&self) -> &'static str {
         let Self::Kirchhoff(options) = self;
         options.name()
+    }
+
+    fn takes_several(&self) -> bool {
+        let Self::Kirchhoff(options) = self;
+        options.takes_several()
     }
 
     fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {

@@ -96,8 +96,8 @@ impl RodState {
     }
 
     /// Sets of angles there is room for.
-    fn sets(&self) -> usize {
-        self.angles.len() / self.frames.len()
+    pub(crate) fn sets(&self) -> usize {
+        self.angles.len() / self.frames.len().max(1)
     }
 
     /// Angle of the material triad at node `i` in a `set` of angles.
@@ -122,8 +122,8 @@ impl RodState {
 
     /// Leaves the first node alone. Keeps the memory.
     pub fn clear(&mut self) {
+        self.angles.truncate(self.sets());
         self.frames.truncate(1);
-        self.angles.truncate(1);
         self.positions.truncate(1);
         self.chords.clear();
         for list in [&mut self.tensions, &mut self.bubbles, &mut self.reference_twists] {
@@ -135,7 +135,7 @@ impl RodState {
     pub fn reserve(&mut self, elements: usize) {
         let more = |len: usize| (elements + 1).saturating_sub(len);
         self.frames.reserve(more(self.frames.len()));
-        self.angles.reserve(more(self.angles.len()));
+        self.angles.reserve((self.sets().max(1) * (elements + 1)).saturating_sub(self.angles.len()));
         self.positions.reserve(more(self.positions.len()));
         self.chords.reserve(more(self.chords.len()));
         for list in [&mut self.tensions, &mut self.bubbles, &mut self.reference_twists] {

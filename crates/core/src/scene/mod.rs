@@ -26,7 +26,30 @@
 //! advance_mm = 200.0
 //! step_mm = 1.0
 //! ```
+//!
+//! Several instruments that lie in one another take the place of `[device]`, the innermost first, and lines of the script name theirs:
+//!
+//! ```toml
+//! [[instrument]]
+//! name = "wire"
+//! file = "../devices/microwire_018.toml"
+//! inserted_mm = 20.0                    # at the start; 0 if absent
+//!
+//! [[instrument]]
+//! name = "catheter"
+//! file = "../devices/catheter_4f_vertebral.toml"
+//! may_lead = false                      # never farther in than the wire in it; it may if absent
+//!
+//! [[script]]
+//! instrument = "wire"
+//! advance_mm = 100.0
+//! with = [{ instrument = "catheter", advance_mm = 80.0 }]
+//!
+//! [[script]]
+//! instrument = "wire"
+//! withdraw = true                       # all of it
+//! ```
 
 mod spec;
 
-pub use spec::{DeviceSpec, Scene, SceneOf, SheathSpec, VesselSpec};
+pub use spec::{DeviceSpec, InstrumentSpec, Scene, SceneOf, SheathSpec, VesselSpec};

@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-use crate::device::{Device, DeviceFile, Section};
+use crate::device::{Device, DeviceFile, Instrument, Section, Stack};
 use crate::input::{from_toml, parse_toml};
-use crate::insertion::{Command, ScriptLine, Sheath, Simulation, WallProperties, script_commands};
+use crate::insertion::{
+    Command, Move, Script, ScriptLine, Sheath, Simulation, WallProperties, script_commands,
+};
 use crate::methods::{MethodChoice, OwnMethod};
 use crate::vessel::{CentrelineTree, Resolution, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint};
 use crate::{Error, Result, Vec3};
@@ -27,8 +29,11 @@ pub struct SceneOf<M> {
     pub seed: u64,
     /// What the device is pushed into.
     pub vessel: VesselSpec,
-    /// What is pushed.
-    pub device: DeviceSpec,
+    /// What is pushed, where it is one device.
+    pub device: Option<DeviceSpec>,
+    /// What is pushed, where it is several that lie in one another, the innermost first.
+    #[serde(default)]
+    pub instrument: Vec<InstrumentSpec>,
     /// Where it enters.
     pub sheath: SheathSpec,
     /// How its equilibrium is found.
@@ -92,6 +97,29 @@ pub struct DeviceSpec {
     pub section: Vec<Section>,
 }
 
+/// `[[instrument]]`: one of several that lie in one another, with sections here, or a file that has them.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstrumentSpec {
+    /// What script and recording call it.
+    pub name: String,
+    /// A [`DeviceFile`].
+    pub file: Option<PathBuf>,
+    /// Sections, tip first.
+    #[serde(default)]
+    pub section: Vec<Section>,
+    /// Length that is in at the start, mm.
+    #[serde(default)]
+    pub inserted_mm: f64,
+    /// Whether its tip may be farther in than that of the instrument in it; it may if absent.
+    #[serde(default = "yes")]
+    pub may_lead: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
 /// `[sheath]`: an opening of the vessel, or a point and a direction.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -105,6 +133,9 @@ pub struct SheathSpec {
     /// Direction of insertion, any length.
     pub direction: Option<[f64; 3]>,
 }
+
+/// Instruments that are in at the start are pushed there together, the farthest by so much a step, mm.
+const START_MM: f64 = 1.0;
 
 /// Depth of the sheath's mouth inside an opening, mm, unless the scene says otherwise: clear of the rim.
 const DEPTH_MM: f64 = 1.0;
@@ -220,8 +251,10 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
 
     /// The files that the scene names, in the order of its tables: with [`SceneOf::text`] all that it is made of.
     pub fn input_paths(&self) -> Vec<PathBuf> {
-        let named = [&self.vessel.file, &self.vessel.tree, &self.device.file];
-        named.into_iter().flatten().map(|path| self.resolve(path)).collect()
+        let devices = self.device.iter().map(|device| &device.file);
+        let devices = devices.chain(self.instrument.iter().map(|instrument| &instrument.file));
+        let named = [&self.vessel.file, &self.vessel.tree].into_iter().chain(devices);
+        named.flatten().map(|path| self.resolve(path)).collect()
     }
 
     /// Reads the vessel wall or builds it, or has it from `store` ([`NoStore`](crate::vessel::NoStore) keeps nothing).
@@ -267,28 +300,111 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         store.wall(&recipe).map_err(|e| Error::content(&path, e.to_string()))
     }
 
-    /// The device.
+    /// The device of a scene that pushes one.
     ///
     /// # Errors
-    /// A missing or unusable file, values out of range.
+    /// A missing or unusable file, values out of range, several instruments.
     pub fn device(&self) -> Result<Device> {
-        match self.device_file()? {
-            Some(file) => Ok(file.device),
-            None => Device::new(self.device.section.clone()),
+        match self.stack()? {
+            stack if stack.is_several() => {
+                let mend =
+                    "the scene has several instruments, and one device is asked for: leave one [device]";
+                Err(Error::parameter("instrument", stack.instruments().len(), mend))
+            }
+            stack => Ok(stack.first().clone()),
         }
     }
 
-    /// The device file, with parts, materials and sources, if the scene names one.
+    /// What is pushed: the device alone, or all instruments.
+    ///
+    /// # Errors
+    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`].
+    pub fn stack(&self) -> Result<Stack> {
+        match (&self.device, self.instrument.is_empty()) {
+            (Some(spec), true) => self.read_device("device", &spec.file, &spec.section).map(Stack::from),
+            (None, false) => {
+                let each = self.instrument.iter().enumerate().map(|(index, spec)| {
+                    let device =
+                        self.read_device(&format!("instrument[{index}]"), &spec.file, &spec.section)?;
+                    Ok(Instrument { name: spec.name.clone(), device, may_lead: spec.may_lead })
+                });
+                Stack::new(each.collect::<Result<_>>()?)
+            }
+            (None, true) => {
+                let mend = "give [device], or an [[instrument]] for each of several, the innermost first";
+                Err(Error::parameter("device", "{}", mend))
+            }
+            (Some(_), false) => {
+                let mend = "[device] is given too: keep one of the two";
+                Err(Error::parameter("instrument", self.instrument.len(), mend))
+            }
+        }
+    }
+
+    /// Lengths of the instruments that are in at the start, mm.
+    ///
+    /// # Errors
+    /// A length that an instrument does not have, and instruments that cannot be in together so far ([`Stack::check_places`]).
+    pub fn inserted_mm(&self, stack: &Stack) -> Result<Vec<f64>> {
+        let mut lengths_mm = vec![0.0; stack.instruments().len()];
+        for (index, (spec, device)) in self.instrument.iter().zip(stack.devices()).enumerate() {
+            if !(0.0..=device.length_mm()).contains(&spec.inserted_mm) {
+                let mend = format!("must be 0 to its length, {} mm", device.length_mm());
+                return Err(Error::parameter(
+                    format!("instrument[{index}].inserted_mm"),
+                    spec.inserted_mm,
+                    mend,
+                ));
+            }
+            lengths_mm[index] = spec.inserted_mm;
+        }
+        stack.check_places(lengths_mm.iter().copied())?;
+        Ok(lengths_mm)
+    }
+
+    /// The device files with their paths, and with parts, materials and sources, of the device or of each instrument, where the scene
+    /// names them.
     ///
     /// # Errors
     /// A missing or unusable file, values out of range, sections in the scene too.
-    pub fn device_file(&self) -> Result<Option<DeviceFile>> {
-        let Some(file) = &self.device.file else { return Ok(None) };
-        if !self.device.section.is_empty() {
-            let mend = "device.section is given too: keep one of the two";
-            return Err(Error::parameter("device.file", file.display(), mend));
+    pub fn device_files(&self) -> Result<Vec<Option<(PathBuf, DeviceFile)>>> {
+        let device = self.device.iter().map(|spec| ("device".to_owned(), &spec.file, &spec.section));
+        let each = self.instrument.iter().enumerate();
+        let each = each.map(|(index, spec)| (format!("instrument[{index}]"), &spec.file, &spec.section));
+        device.chain(each).map(|(name, file, section)| self.read_file(&name, file, section)).collect()
+    }
+
+    /// A device of the scene by its table's name.
+    fn read_device(&self, name: &str, file: &Option<PathBuf>, section: &[Section]) -> Result<Device> {
+        match self.read_file(name, file, section)? {
+            Some((_, file)) => Ok(file.device),
+            None => Device::new(section.to_vec()).map_err(|error| match error {
+                Error::Parameter { name: key, value, mend } => {
+                    Error::Parameter { name: key.replacen("device", name, 1), value, mend }
+                }
+                other => other,
+            }),
         }
-        DeviceFile::read(&self.resolve(file)).map(Some).map_err(|e| missing("device.file", e))
+    }
+
+    /// The device file that a table names, if it does.
+    fn read_file(
+        &self,
+        name: &str,
+        file: &Option<PathBuf>,
+        section: &[Section],
+    ) -> Result<Option<(PathBuf, DeviceFile)>> {
+        let Some(file) = file else { return Ok(None) };
+        let key = format!("{name}.file");
+        if !section.is_empty() {
+            let mend = format!("{name}.section is given too: keep one of the two");
+            return Err(Error::parameter(key, file.display(), mend));
+        }
+        let path = self.resolve(file);
+        match DeviceFile::read(&path) {
+            Ok(file) => Ok(Some((path, file))),
+            Err(error) => Err(missing(&key, error)),
+        }
     }
 
     /// The sheath in `wall`.
@@ -299,7 +415,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         self.sheath.place(wall)
     }
 
-    /// The commands of the script, checked against the device.
+    /// The commands of the script of a device alone, checked against it.
     ///
     /// # Errors
     /// A line that is not finite, contradictory, absurd, or moves the device beyond its ends.
@@ -307,10 +423,18 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         script_commands(&self.script, device)
     }
 
-    /// The simulation, nothing inserted yet, with walls from `store`.
+    /// The steps of the script, checked against what is pushed.
     ///
     /// # Errors
-    /// As [`SceneOf::wall`], [`SceneOf::device`], [`SceneOf::sheath`] and [`SimulationBuilder::build`](crate::insertion::SimulationBuilder::build).
+    /// As [`Script::new`] and [`SceneOf::inserted_mm`].
+    pub fn steps(&self, stack: &Stack) -> Result<Script> {
+        Script::new(&self.script, stack, &self.inserted_mm(stack)?)
+    }
+
+    /// The simulation at the start, with walls from `store`: nothing inserted but what instruments say.
+    ///
+    /// # Errors
+    /// As [`SceneOf::wall`], [`SceneOf::stack`], [`SceneOf::sheath`], [`SceneOf::inserted_mm`], [`Simulation::step_together`] and [`SimulationBuilder::build`](crate::insertion::SimulationBuilder::build).
     pub fn simulation(&self, store: &dyn WallStore) -> Result<Simulation> {
         let wall = self.wall(store)?;
         // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.
@@ -330,7 +454,15 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
 
     fn simulation_in(&self, wall: Wall, store: &dyn WallStore) -> Result<Simulation> {
         let sheath = self.sheath(&wall)?;
-        Simulation::builder(wall, self.device()?, sheath)
+        let stack = self.stack()?;
+        let inserted_mm = self.inserted_mm(&stack)?;
+        let mut simulation = self.built(wall, stack, sheath, store)?;
+        push_in(&mut simulation, &inserted_mm)?;
+        Ok(simulation)
+    }
+
+    fn built(&self, wall: Wall, stack: Stack, sheath: Sheath, store: &dyn WallStore) -> Result<Simulation> {
+        Simulation::builder(wall, stack, sheath)
             .properties(self.vessel.wall.clone())
             .method(&self.method)
             .store(store)
@@ -354,4 +486,15 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 other => other,
             })
     }
+}
+
+/// Pushes these lengths in together, from nothing inserted.
+fn push_in(simulation: &mut Simulation, lengths_mm: &[f64]) -> Result<()> {
+    let steps = (lengths_mm.iter().copied().fold(0.0, f64::max) / START_MM).ceil();
+    let part = |(instrument, mm): (usize, &f64)| Move { instrument, command: Command::advance(mm / steps) };
+    let moves: Vec<Move> = lengths_mm.iter().enumerate().filter(|(_, mm)| **mm > 0.0).map(part).collect();
+    for _ in 0..steps as usize {
+        simulation.step_together(&moves)?;
+    }
+    Ok(())
 }

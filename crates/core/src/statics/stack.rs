@@ -20,7 +20,7 @@
 use super::case::{Instrument, StaticCase};
 use super::mesh::{material, nodes, section_at, spread};
 use crate::rod::quadrature::GAUSS;
-use crate::rod::{ElementData, Frame, MAX_ANGLES, Material, RodState, Supports, element_energy};
+use crate::rod::{ElementData, Frame, MAX_ANGLES, Material, RodState, Supports, element_energy, shares};
 use crate::solve::External;
 use crate::{Error, Result, Vec3};
 
@@ -219,7 +219,7 @@ impl Instrument {
             let (first, last) = ((tip - until).max(from), (tip - begin).min(to));
             if first < last {
                 let shares = shares((first - from) / h, (last - from) / h);
-                add_share(&mut sum, &material(section, begin, &places), &shares);
+                sum.add_share(&material(section, begin, &places), &shares);
             }
             begin = section.until;
         }
@@ -232,33 +232,6 @@ impl Instrument {
         let here = material(section, begin, &[self.inserted; 3]);
         let [u, v] = here.rest_curvature[0];
         0.5 * here.bending[0] * (u * u + v * v)
-    }
-}
-
-/// Weights of the Gauss points in the integral over a part of an element, in units of their weights in that over all of it.
-fn shares(from: f64, to: f64) -> [f64; 3] {
-    let power = |n: i32| (to.powi(n) - from.powi(n)) / f64::from(n);
-    let [a, b, c] = GAUSS.map(|point| point.xi);
-    // ∫ (ξ − p)(ξ − q) over the part.
-    let product = |p: f64, q: f64| power(3) - (p + q) * power(2) + p * q * power(1);
-    [
-        product(b, c) / ((a - b) * (a - c) * GAUSS[0].weight),
-        product(a, c) / ((b - a) * (b - c) * GAUSS[1].weight),
-        product(a, b) / ((c - a) * (c - b) * GAUSS[2].weight),
-    ]
-}
-
-/// Adds a share of a section to what else an instrument is made of there; rest states are means, weighed by stiffness.
-fn add_share(sum: &mut Material, part: &Material, shares: &[f64; 3]) {
-    for k in 0..3 {
-        let (bending, torsion) = (shares[k] * part.bending[k], shares[k] * part.torsion[k]);
-        let (all_bending, all_torsion) = (sum.bending[k] + bending, sum.torsion[k] + torsion);
-        for a in 0..2 {
-            let moment = sum.bending[k] * sum.rest_curvature[k][a] + bending * part.rest_curvature[k][a];
-            sum.rest_curvature[k][a] = moment / all_bending;
-        }
-        sum.rest_twist[k] = (sum.torsion[k] * sum.rest_twist[k] + torsion * part.rest_twist[k]) / all_torsion;
-        (sum.bending[k], sum.torsion[k]) = (all_bending, all_torsion);
     }
 }
 

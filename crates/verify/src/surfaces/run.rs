@@ -3,7 +3,9 @@
 use serde::Serialize;
 
 use super::{Cell, ITERATIONS_PER_MM, Surface};
-use endowire_core::insertion::{Command, ScriptLine, Simulation, StepReport, WallProperties, commands};
+use endowire_core::insertion::{
+    Command, ScriptLine, Simulation, StepReport, WallProperties, script_commands,
+};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::{Error, PhysicalEnd, Result};
 
@@ -233,14 +235,16 @@ fn insert(
     (begun, limit_s): (f64, f64),
     clock: &dyn Fn() -> f64,
 ) {
-    let (mut simulation, list) =
-        match cell.simulation(surface).and_then(|s| Ok((s, commands(&[cell.script(surface)])?))) {
-            Ok(ready) => ready,
-            Err(error) => {
-                let ending = if error.is_input() { Ending::Refused } else { Ending::Failed };
-                return row.end(ending, error.to_string());
-            }
-        };
+    let (mut simulation, list) = match cell
+        .simulation(surface)
+        .and_then(|s| script_commands(&[cell.script(surface)], s.device()).map(|list| (s, list)))
+    {
+        Ok(ready) => ready,
+        Err(error) => {
+            let ending = if error.is_input() { Ending::Refused } else { Ending::Failed };
+            return row.end(ending, error.to_string());
+        }
+    };
     row.setup_s = clock() - begun;
     row.commands = list.len();
     for command in list {

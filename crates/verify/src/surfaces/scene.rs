@@ -59,7 +59,7 @@ impl Cell {
 mod tests {
     use super::*;
     use crate::surfaces::{cells, surfaces_in};
-    use endowire_core::insertion::commands;
+    use endowire_core::insertion::script_commands;
     use endowire_core::scene::Scene;
     use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 
@@ -82,7 +82,7 @@ mod tests {
             assert_eq!(sheath.position_mm, place.sheath.position_mm);
             assert_eq!(scene.vessel.wall, cell.properties());
             let list = scene.commands(&device).unwrap();
-            assert_eq!(list, commands(&[cell.script(&surface)]).unwrap());
+            assert_eq!(list, script_commands(&[cell.script(&surface)], &device).unwrap());
             assert!((list[0].advance_mm - cell.increment_mm).abs() < 1e-12);
             assert!((list[0].rotate_rad.to_degrees() - cell.turn_deg).abs() < 1e-9);
         }

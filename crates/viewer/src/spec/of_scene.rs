@@ -2,16 +2,14 @@
 
 use std::path::Path;
 
+use endowire_core::Result;
 use endowire_core::input::parse_toml;
 use endowire_core::methods::MethodChoice;
 use endowire_core::scene::SceneOf;
-use endowire_core::{Error, Result};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::ViewSpec;
-use crate::device_file::device_parts;
-
 /// The part of a scene file that is the viewer's.
 #[derive(Deserialize)]
 struct ViewTable {
@@ -20,11 +18,11 @@ struct ViewTable {
 }
 
 impl ViewSpec {
-    /// The `[view]` table of a scene that was read from `path`: paths start from its folder, contrast medium flows in the vessel's own
-    /// tree, and the device is made of what its file says, unless the table names another.
+    /// The `[view]` table of a scene that was read from `path`: paths start from its folder, and contrast medium flows in the vessel's
+    /// own tree.
     ///
     /// # Errors
-    /// [`Error::Content`] for a table that does not fit, naming line and key, and for a device file that names an unknown material.
+    /// [`endowire_core::Error::Content`] for a table that does not fit, naming line and key.
     pub fn of_scene<M: MethodChoice + DeserializeOwned + Default>(
         scene: &SceneOf<M>,
         path: &Path,
@@ -33,12 +31,6 @@ impl ViewSpec {
         let mut view = view.in_folder(&scene.resolve(Path::new("")));
         if let (None, Some(tree)) = (&view.flow.tree, &scene.vessel.tree) {
             view.flow.tree = Some(scene.resolve(tree));
-        }
-        if let (true, Some(named), Some(file)) =
-            (view.device.is_empty(), &scene.device.file, scene.device_file()?)
-        {
-            view.device =
-                device_parts(&file).map_err(|e| Error::content(&scene.resolve(named), e.to_string()))?;
         }
         Ok(view)
     }

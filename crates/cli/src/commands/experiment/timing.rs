@@ -10,7 +10,7 @@
 use std::time::Instant;
 
 use endowire_core::Vec3;
-use endowire_core::device::Device;
+use endowire_core::device::{Device, Stack};
 use endowire_core::insertion::{Command, Sheath, Surroundings, WallProperties};
 use endowire_core::methods::Method;
 use endowire_core::vessel::{GeneratedWall, Resolution, Wall, WallQuery, anatomy};
@@ -93,12 +93,14 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
     let query = WallQuery::new(&generated.wall)?;
     let sheath = Sheath::at_opening(&generated.wall, generated.inlet, 1.0)?;
     let device = Device::uniform(INSERTED_MM + TIMED_MM * args.repeats as f64, RADIUS_MM, STIFFNESS_NMM2)?;
+    let stack = Stack::from(device.clone());
     let surroundings = Surroundings {
         wall: &generated.wall,
         properties: &WallProperties::default(),
         query: &query,
         sheath: &sheath,
         device: &device,
+        stack: &stack,
     };
 
     let methods = methods(&args.methods);

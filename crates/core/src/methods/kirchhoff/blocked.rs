@@ -3,9 +3,9 @@
 //! A wall that yields lets a device through a vessel somewhat narrower than itself, and then there is nothing to tell. Where no
 //! equilibrium is found on the way, the room across the lumen says whether that is why.
 
+use super::Environment;
 use super::configuration::Configuration;
 use super::workspace::Tools;
-use super::{Environment, softest};
 use crate::contact::{FeltWall, WallContact};
 use crate::insertion::Command;
 use crate::{Error, PhysicalEnd, Result, Vec3};
@@ -20,17 +20,17 @@ const PIECES: usize = 4;
 const ON_MM: f64 = 1e-3;
 
 impl<const C: usize> Tools<C> {
-    /// Refuses to push on where the vessel is narrower than the device, for a command that has found no equilibrium.
+    /// Refuses to push on where the vessel is narrower than the device, for commands of the hands that have found no equilibrium.
     ///
     /// # Errors
-    /// [`PhysicalEnd::Blocked`] with the narrowest place, if there is one and the command advances.
+    /// [`PhysicalEnd::Blocked`] with the narrowest place, if there is one and an instrument advances.
     pub(super) fn refuse_narrower(
         &mut self,
         environment: &Environment<'_>,
         at: &Configuration,
-        command: Command,
+        commands: &[Command],
     ) -> Result<()> {
-        if command.advance_mm > 0.0
+        if commands.iter().any(|command| command.advance_mm > 0.0)
             && let Some(end) = self.narrowest(environment, at)
         {
             return Err(Error::End(end));
@@ -51,7 +51,7 @@ impl<const C: usize> Tools<C> {
             &mesh.points,
             &mut self.memory,
             &mut self.friction,
-            softest(environment.surroundings.device),
+            environment.surroundings.stack.softest_nmm2(),
         );
         let mut least: Option<(f64, PhysicalEnd)> = None;
         for (index, point) in mesh.points.iter().enumerate() {
@@ -107,8 +107,8 @@ fn facing_mm(felt: &FeltWall, from: &Vec3, way: &Vec3, reach_mm: f64) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::Device;
-    use crate::insertion::{Sheath, Surroundings, WallProperties};
+    use crate::device::{Device, Stack};
+    use crate::insertion::{Command, Move, Sheath, Surroundings, WallProperties};
     use crate::methods::Method;
     use crate::methods::kirchhoff::workspace::Workspace;
     use crate::methods::kirchhoff::{Kirchhoff, KirchhoffOptions};
@@ -126,12 +126,14 @@ mod tests {
         let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
         let (device, properties) = (Device::uniform(60.0, 0.4, 10.0).unwrap(), WallProperties::default());
         let query = WallQuery::new(&made.wall).unwrap();
+        let stack = Stack::from(device.clone());
         let surroundings = Surroundings {
             wall: &made.wall,
             properties: &properties,
             query: &query,
             sheath: &sheath,
             device: &device,
+            stack: &stack,
         };
         let options = KirchhoffOptions::default();
         let mut wire = Kirchhoff::<{ crate::rod::PLAIN }>::new(options, &surroundings, &NoStore).unwrap();
@@ -140,7 +142,8 @@ mod tests {
         }
         let environment = Environment { surroundings, felt: &wire.felt, options: &wire.options };
         let mut workspace = Workspace::<{ crate::rod::PLAIN }>::new(&environment, &wire.state);
-        workspace.carry_out(&environment, &wire.state, Command::advance(1.0)).unwrap();
+        let moves = [Move { instrument: 0, command: Command::advance(1.0) }];
+        workspace.carry_out(&environment, &wire.state, &moves).unwrap();
         workspace.tools.narrowest(&environment, &workspace.now)
     }
 

@@ -5,16 +5,15 @@ use std::borrow::Cow;
 
 use super::Environment;
 use super::configuration::Start;
+use super::hands::{Way, line_mm, told};
 use super::slide::Extension;
 use super::state::KirchhoffState;
 use super::substep::{AT_REST, Attempt};
 use super::workspace::{Tools, Workspace};
 use crate::contact::extension::{LEAVE_MM, left_through};
-use crate::insertion::{Command, StepReport};
+use crate::insertion::{InstrumentReport, Move, StepReport};
 use crate::{Error, PhysicalEnd, Result};
 
-/// Retracting to within this of the sheath, mm, is retracting to it.
-const ZERO_LENGTH_MM: f64 = 1e-9;
 /// Most sub-steps that one command may be cut into, …
 const SUBSTEP_LIMIT: usize = 4096;
 /// … and the least part of it that one is.
@@ -46,27 +45,25 @@ impl<const C: usize> Workspace<C> {
         &mut self,
         environment: &Environment<'_>,
         from: &KirchhoffState,
-        command: Command,
+        moves: &[Move],
     ) -> Result<()> {
-        let Self { tools, mesh, now, next, most: (elements, points) } = self;
+        let Self { tools, mesh, now, next, most: (elements, points), way, hands } = self;
         now.own(*elements, *points);
         next.own(*elements, *points);
         let surroundings = &environment.surroundings;
-        if command.advance_mm > 0.0
+        way.begin(surroundings.stack, &from.report, moves);
+        let (start, target) = (line_mm(&way.start), line_mm(&way.target));
+        if target > start
             && let Some((opening, beyond)) = left_through(surroundings.wall, &from.tip_mm())
-            && beyond + command.advance_mm > LEAVE_MM
+            && beyond + (target - start) > LEAVE_MM
         {
             return Err(left(opening, beyond));
         }
-        let start = from.report.inserted_mm;
-        let target = (start + command.advance_mm).min(surroundings.device.length_mm());
-        let target = if target < ZERO_LENGTH_MM { 0.0 } else { target };
-        let rotation = from.report.rotation_rad;
         let (mut iterations, mut substeps, mut dissipated_mj) = (0, 0, 0.0);
         let (mut relaxations, mut slides, mut imbalance, mut balanced) = (0, 0, 0.0f64, true);
-        (tools.nodes_solved, tools.nodes_frozen) = (0, 0);
+        tools.nodes_solved = 0;
         let most = environment.options.max_iterations;
-        let travel = (target - start).abs().max(command.rotate_rad.abs() / WORK_RAD).max(1.0);
+        let travel = way.travel_mm(WORK_RAD).max(1.0);
         let mut budget = ((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most));
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
@@ -95,24 +92,22 @@ impl<const C: usize> Workspace<C> {
             *extension = Extension::default();
             if wanted > 0.0 {
                 let tangent = here.state.rod.frames[here.state.rod.elements()].t;
-                let radius = surroundings.device.section_at(0.0).radius_mm;
+                let radius = surroundings.stack.tip_radius_mm(way.target.iter().map(|hand| hand.inserted_mm));
                 let tip_mm = here.state.tip_mm();
                 let way = extension.trace((environment.felt, memory), tip_mm, tangent, radius, wanted);
                 blocked = way < (1.0 - 1e-9) * wanted;
             }
             // A rest that is rounding is none.
             let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
-            let inserted = if to == 1.0 { target } else { start + (target - start) * to };
-            let tail = rotation + command.rotate_rad * to;
+            way.at(to, hands);
             substeps += 1;
-            if inserted == 0.0 {
-                now.withdraw(tail);
-                now.parts().1.report.rotation_rad = tail;
-                tools.write_report(environment, now);
+            if line_mm(hands) == 0.0 {
+                now.withdraw(surroundings.stack, hands);
+                tools.write_report(environment, hands, now);
                 break;
             }
             let resort = if relax { Some(failures == RESORTS) } else { None };
-            let attempt = Attempt { inserted_mm: inserted, tail_rad: tail, blocked, resort };
+            let attempt = Attempt { hands, blocked, resort };
             match tools.try_step(environment, here, attempt, next, &mut budget) {
                 Ok(found) => {
                     iterations += found.iterations;
@@ -151,14 +146,14 @@ impl<const C: usize> Workspace<C> {
             }
             // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
             if done < 1.0 && (failures > RESORTS || substeps > SUBSTEP_LIMIT) {
-                tools.refuse_narrower(environment, now, command)?;
+                tools.refuse_narrower(environment, now, &way.commands)?;
                 return Err(Error::Computation(format!(
                     "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
                 )));
             }
         }
         if !balanced {
-            tools.refuse_narrower(environment, now, command)?;
+            tools.refuse_narrower(environment, now, &way.commands)?;
         }
         let report = &mut now.parts().1.report;
         report.iterations = iterations as u32;
@@ -167,19 +162,23 @@ impl<const C: usize> Workspace<C> {
         report.converged = balanced;
         report.angles = from.report.angles;
         report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
-        report.nodes_frozen = from.report.nodes_frozen + tools.nodes_frozen;
-        report.jumped = jumped(&from.report, report, target - start, command.rotate_rad);
+        report.jumped = jumped(&from.report, report, way);
         Ok(())
     }
 }
 
 /// Whether energy was set free that the hand had put in.
-fn jumped(before: &StepReport, after: &StepReport, advance_mm: f64, turn_rad: f64) -> bool {
+fn jumped(before: &StepReport, after: &StepReport, way: &Way) -> bool {
     // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between
     // what it is at the ends.
     let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
-    let work = least(before.push_force_n, after.push_force_n, advance_mm)
-        + least(before.torque_nmm, after.torque_nmm, turn_rad);
+    let mut work = 0.0;
+    for (index, (start, target)) in way.start.iter().zip(&way.target).enumerate() {
+        let (was, is) = (told(before, index), told(after, index));
+        let push = |hand: &InstrumentReport| hand.push_force_n.unwrap_or(0.0);
+        work += least(push(&was), push(&is), target.inserted_mm - start.inserted_mm)
+            + least(was.torque_nmm, is.torque_nmm, way.commands[index].rotate_rad);
+    }
     let (energy, now) = (before.energy.total(), after.energy.total());
     let lost = work - after.dissipated_mj - (now - energy);
     lost > JUMP * energy.max(now).max(JUMP_FLOOR_MJ)

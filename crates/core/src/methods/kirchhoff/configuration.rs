@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use super::hands::Hand;
 use super::mesh::Mesh;
 use super::state::KirchhoffState;
-use crate::device::Device;
-use crate::insertion::Sheath;
+use crate::device::Stack;
+use crate::insertion::Surroundings;
 
 /// What a sub-step ends with.
 #[derive(Debug, Clone)]
@@ -24,10 +25,10 @@ pub(super) struct Start<'a> {
 
 impl Configuration {
     /// Nothing inserted.
-    pub(super) fn at(sheath: &Sheath) -> Self {
+    pub(super) fn at(surroundings: &Surroundings<'_>) -> Self {
         let mut mesh = Mesh::default();
         mesh.clear();
-        Self { mesh, state: Arc::new(KirchhoffState::at(sheath)) }
+        Self { mesh, state: Arc::new(KirchhoffState::at(surroundings)) }
     }
 
     /// Where the next sub-step starts.
@@ -46,18 +47,24 @@ impl Configuration {
         (&mut self.mesh, Arc::make_mut(&mut self.state))
     }
 
-    /// Pulls the device back to the sheath's mouth; the tail has the angle `tail_rad`.
-    pub(super) fn withdraw(&mut self, tail_rad: f64) {
+    /// Everything is pulled back to the sheath's mouth, where the hands are.
+    pub(super) fn withdraw(&mut self, stack: &Stack, hands: &[Hand]) {
         let (mesh, state) = self.parts();
         mesh.clear();
-        state.withdraw(tail_rad);
+        state.withdraw(stack, hands);
     }
 }
 
-/// Elements and contact points of a whole device: most that a step works on.
-pub(super) fn largest(device: &Device, element_mm: f64) -> (usize, usize) {
+/// Elements and contact points of whole devices: most that a step works on.
+pub(super) fn largest(stack: &Stack, element_mm: f64) -> (usize, usize) {
+    let (mut elements, mut points) = (0, 0);
     let mut mesh = Mesh::default();
-    mesh.build(device, device.length_mm(), element_mm, 1.0);
+    for device in stack.devices() {
+        mesh.build(device, device.length_mm(), element_mm, 1.0);
+        elements = elements.max(mesh.elements.len());
+        points += mesh.points.len();
+    }
+    let others: usize = stack.devices().skip(1).map(|device| device.sections().len()).sum();
     // The first element may have more contact points than any other.
-    (mesh.elements.len() + 1, mesh.points.len() + super::mesh::MOST_POINTS)
+    (elements + 1 + others, points + super::mesh::MOST_POINTS)
 }

@@ -4,6 +4,7 @@
 //! repeated too ([`Correction`]); a tip with a shape of its own may instead be carried by the device behind it.
 
 use super::configuration::Start;
+use super::hands::Motion;
 use super::mesh::Mesh;
 use super::repeat::Correction;
 use super::slide::carry;
@@ -22,17 +23,21 @@ pub(super) enum Quality {
     Beyond,
 }
 
-/// The candidates.
+/// The candidates. By default those of several instruments, whose tips are carried by nothing.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Guess {
     /// Length from the tip within which the device has a shape of its own, mm.
     pub(super) shaped_mm: f64,
+    /// What each hand does in the sub-step.
+    pub(super) motions: Vec<Motion>,
+    /// What was learnt, on the nodes of the sub-step.
+    learnt: Correction,
     slid: RodState,
     pub(super) other: RodState,
 }
 
 impl Guess {
-    /// For a device with a shape of its own within `shaped_mm` of its tip.
+    /// For a device alone with a shape of its own within `shaped_mm` of its tip.
     pub(super) fn new(shaped_mm: f64) -> Self {
         Self { shaped_mm, ..Self::default() }
     }
@@ -56,8 +61,14 @@ impl Guess {
         self.slid.copy_from(state);
         let elements = &mesh.elements;
         let correction = &start.state.correction;
-        if let Some(factor) = correction.repeats(hand) {
-            correction.apply(factor, elements, state);
+        if let Some(factor) = correction.repeats(&self.motions) {
+            // Nodes of a device alone are the same marks in every step.
+            if mesh.inserted_mm.is_empty() {
+                correction.apply(factor, elements, state);
+            } else {
+                correction.transfer(start.mesh, mesh, &mut self.learnt);
+                self.learnt.apply(factor, elements, state);
+            }
             if !contact.is_outside(elements, state) {
                 return Quality::Learnt;
             }
@@ -86,7 +97,7 @@ impl Guess {
     }
 
     /// What an equilibrium that was found teaches.
-    pub(super) fn teach(&self, hand: HandMotion, found: &RodState, correction: &mut Correction) {
-        correction.learn(hand, &self.slid, found);
+    pub(super) fn teach(&self, found: &RodState, correction: &mut Correction) {
+        correction.learn(&self.motions, &self.slid, found);
     }
 }

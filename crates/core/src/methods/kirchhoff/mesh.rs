@@ -25,6 +25,8 @@ pub struct Mesh {
     pub elements: Vec<ElementData>,
     /// Contact points, tip first.
     pub points: Vec<ContactPoint>,
+    /// Lengths inserted of several instruments; empty for a device alone.
+    pub(super) inserted_mm: Vec<f64>,
 }
 
 impl Mesh {
@@ -34,6 +36,7 @@ impl Mesh {
         self.from_tip_mm.push(0.0);
         self.elements.clear();
         self.points.clear();
+        self.inserted_mm.clear();
     }
 
     /// Takes memory for up to `elements` elements and `points` contact points.
@@ -48,7 +51,7 @@ impl Mesh {
     /// Nodes are marks on the device, at whole element lengths from the tip; the first element is between half and one
     /// and a half elements long, shorter only where that is all there is.
     pub fn build(&mut self, device: &Device, inserted_mm: f64, element_mm: f64, modulus_n_per_mm2: f64) {
-        crate::insertion::nodes_from_tip(inserted_mm, element_mm, &mut self.from_tip_mm);
+        self.build_points(device, inserted_mm, element_mm, modulus_n_per_mm2);
         // Only what one device needs is written: of elements that were here before the rest is empty.
         self.elements.resize(self.from_tip_mm.len() - 1, ElementData::EMPTY);
         for (ends, data) in self.from_tip_mm.windows(2).zip(&mut self.elements) {
@@ -64,28 +67,39 @@ impl Mesh {
                 rest_twist: [0.0; 3],
             };
         }
+    }
+
+    /// Sets nodes and contact points as [`Mesh::build`] does, and leaves the elements alone.
+    pub(super) fn build_points(
+        &mut self,
+        device: &Device,
+        inserted_mm: f64,
+        element_mm: f64,
+        modulus_n_per_mm2: f64,
+    ) {
+        crate::insertion::nodes_from_tip(inserted_mm, element_mm, &mut self.from_tip_mm);
         self.points.clear();
         // Half of the interval beyond the point at hand; beyond the tip there is its cap.
         let mut half_beyond = device.section_at(0.0).radius_mm;
-        for (e, data) in self.elements.iter().enumerate().rev() {
-            let radius_mm = device.section_at(self.from_tip_mm[e + 1]).radius_mm;
-            let intervals =
-                (data.length / (SPACING_RADII * radius_mm)).ceil().clamp(INTERVALS.0, INTERVALS.1);
-            let spacing = data.length / intervals;
-            let is_last = e + 1 == self.elements.len();
+        let last = self.from_tip_mm.len() - 2;
+        for (e, ends) in self.from_tip_mm.windows(2).enumerate().rev() {
+            let length = ends[0] - ends[1];
+            let radius_mm = device.section_at(ends[1]).radius_mm;
+            let intervals = (length / (SPACING_RADII * radius_mm)).ceil().clamp(INTERVALS.0, INTERVALS.1);
+            let spacing = length / intervals;
             // Distance from the element's far end.
             let mut at = 0.0;
-            let mut fine = if is_last { TIP_SPACING_RADII * radius_mm } else { spacing };
-            while at < (1.0 - 1e-9) * data.length {
-                let left = data.length - at;
+            let mut fine = if e == last { TIP_SPACING_RADII * radius_mm } else { spacing };
+            while at < (1.0 - 1e-9) * length {
+                let left = length - at;
                 let step = fine.min(spacing);
                 // The intervals that are left are made equal where the fine ones end.
                 let step =
                     if step >= spacing { left / (left / spacing - 1e-9).ceil() } else { step.min(left) };
                 self.points.push(ContactPoint {
                     element: e,
-                    xi: 1.0 - at / data.length,
-                    from_tip_mm: self.from_tip_mm[e + 1] + at,
+                    xi: 1.0 - at / length,
+                    from_tip_mm: ends[1] + at,
                     weight_mm: half_beyond + 0.5 * step,
                     potential: WallPotential { modulus_n_per_mm2, radius_mm },
                 });

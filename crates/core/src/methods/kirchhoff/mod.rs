@@ -14,9 +14,13 @@
 //! to the inserted length.
 
 mod blocked;
+mod coaxial;
+#[cfg(test)]
+mod coaxial_tests;
 mod command;
 mod configuration;
 mod guess;
+mod hands;
 mod hold;
 mod mesh;
 mod readout;
@@ -24,6 +28,7 @@ mod repeat;
 mod search;
 mod settle;
 mod slide;
+mod slopes;
 mod state;
 mod substep;
 mod workspace;
@@ -36,13 +41,14 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::{Counters, FeltWall};
-use crate::device::Device;
-use crate::insertion::{Command, StepReport, Surroundings};
+use crate::insertion::{Command, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
 use crate::vessel::WallStore;
 use crate::{Error, Result};
+use coaxial::Nodes;
+use hands::Hand;
 use state::Belongs;
 use workspace::Workspace;
 
@@ -70,6 +76,9 @@ impl MethodChoice for KirchhoffOptions {
     }
 
     fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {
+        if surroundings.stack.is_several() {
+            return several(*self, surroundings, store);
+        }
         // A shape turns with the device, and friction twists it.
         let twists = surroundings.device.is_shaped() || surroundings.properties.rubs();
         Ok(if twists {
@@ -78,6 +87,29 @@ impl MethodChoice for KirchhoffOptions {
             Box::new(Kirchhoff::<PLAIN>::new(*self, surroundings, store)?)
         })
     }
+
+    fn takes_several(&self) -> bool {
+        true
+    }
+}
+
+/// The method for several instruments, with a set of angles for each that has a shape of its own.
+fn several(
+    options: KirchhoffOptions,
+    surroundings: &Surroundings<'_>,
+    store: &dyn WallStore,
+) -> Result<Box<dyn Method>> {
+    let friction = surroundings.properties.largest_friction();
+    if friction > 0.0 {
+        let mend = "several instruments slide on the wall without friction: set it to 0, or push one device";
+        return Err(Error::parameter("wall.friction", friction, mend));
+    }
+    Ok(match surroundings.stack.sets().iter().flatten().count() {
+        0 => Box::new(Kirchhoff::<PLAIN>::new(options, surroundings, store)?),
+        1 => Box::new(Kirchhoff::<TWISTED>::new(options, surroundings, store)?),
+        2 => Box::new(Kirchhoff::<{ PLAIN + 8 }>::new(options, surroundings, store)?),
+        _ => Box::new(Kirchhoff::<{ PLAIN + 12 }>::new(options, surroundings, store)?),
+    })
 }
 
 /// A residual above this tells nothing of an equilibrium.
@@ -114,7 +146,7 @@ impl<const C: usize> Kirchhoff<C> {
         surroundings: &Surroundings<'_>,
         store: &dyn WallStore,
     ) -> Result<Self> {
-        let length_mm = surroundings.device.length_mm();
+        let length_mm = surroundings.stack.length_mm();
         crate::error::in_range("method.element_mm", options.element_mm, length_mm)?;
         crate::error::in_range("method.tolerance", options.tolerance, LARGEST_TOLERANCE)?;
         if length_mm / options.element_mm > ELEMENT_LIMIT {
@@ -131,10 +163,10 @@ impl<const C: usize> Kirchhoff<C> {
         if options.max_iterations == 0 {
             return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
         }
-        let mut state = KirchhoffState::at(surroundings.sheath);
+        let mut state = KirchhoffState::at(surroundings);
         state.report.angles = Layout::<C>::ANGLES > 0;
-        let Surroundings { wall, properties, device, .. } = *surroundings;
-        let felt = FeltWall::from_store(wall, device, properties, store)?;
+        let Surroundings { wall, properties, stack, .. } = *surroundings;
+        let felt = FeltWall::for_radii(wall, stack.radii_mm(), properties, store)?;
         let mut method = Self {
             options,
             felt: Arc::new(felt),
@@ -174,7 +206,11 @@ impl<const C: usize> Clone for Kirchhoff<C> {
 
 impl<const C: usize> Method for Kirchhoff<C> {
     fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()> {
-        if command == Command::default() {
+        self.step_together(surroundings, &[Move { instrument: 0, command }])
+    }
+
+    fn step_together(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> Result<()> {
+        if moves.iter().all(|one| one.command == Command::default()) {
             Arc::make_mut(&mut self.state).report.rest();
             return Ok(());
         }
@@ -188,7 +224,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
                 workspace
             }
         };
-        let done = workspace.carry_out(&environment, &self.state, command);
+        let done = workspace.carry_out(&environment, &self.state, moves);
         self.counters.add(&std::mem::take(&mut workspace.tools.counters));
         if done.is_ok() {
             std::mem::swap(&mut self.state, &mut workspace.now.state);
@@ -217,18 +253,27 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
     fn restore(&mut self, surroundings: &Surroundings<'_>, state: &State) -> Result<()> {
         let Content::Kirchhoff(state) = state.of(NAME)? else { return Err(state.of_another(NAME)) };
-        let inserted_mm = state.report.inserted_mm;
-        crate::methods::check_inserted(inserted_mm, surroundings.device)?;
+        let mut hands = Vec::new();
+        hands::read(&state.report, &mut hands);
+        let devices = surroundings.stack.devices();
+        if hands.len() != devices.len() {
+            let mend = format!("there are {} instruments here: restore a state of this scene", devices.len());
+            return Err(Error::parameter("state.instruments", hands.len(), mend));
+        }
+        for (hand, device) in hands.iter().zip(devices) {
+            crate::methods::check_inserted(hand.inserted_mm, device)?;
+        }
+        surroundings.stack.check_places(hands.iter().map(|hand| hand.inserted_mm))?;
         let environment =
             Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
         let mut mesh = Mesh::default();
-        meshed(&environment, inserted_mm, &mut mesh);
+        meshed(&environment, &hands, &mut mesh);
         state.check(&Belongs {
             felt: &self.felt,
             sheath: surroundings.sheath,
             elements: mesh.elements.len(),
             points: mesh.points.len(),
-            angles: Layout::<C>::ANGLES > 0,
+            sets: Layout::<C>::ANGLES,
             rubs: surroundings.properties.rubs(),
         })?;
         self.state = Arc::clone(state);
@@ -252,17 +297,16 @@ impl<const C: usize> Method for Kirchhoff<C> {
 const NAME: &str = "kirchhoff";
 
 /// Meshes what is inserted.
-fn meshed(environment: &Environment<'_>, inserted_mm: f64, mesh: &mut Mesh) {
-    let surroundings = &environment.surroundings;
-    if inserted_mm == 0.0 {
+fn meshed(environment: &Environment<'_>, hands: &[Hand], mesh: &mut Mesh) {
+    let Surroundings { device, stack, properties, .. } = environment.surroundings;
+    let (element_mm, modulus) = (environment.options.element_mm, properties.modulus_n_per_mm2);
+    let line_mm = hands::line_mm(hands);
+    if line_mm == 0.0 {
         mesh.clear();
+    } else if stack.is_several() {
+        let inserted_mm = hands::lengths(hands);
+        Nodes::new(stack, &inserted_mm, element_mm).mesh(stack, &inserted_mm, modulus, mesh);
     } else {
-        let modulus = surroundings.properties.modulus_n_per_mm2;
-        mesh.build(surroundings.device, inserted_mm, environment.options.element_mm, modulus);
+        mesh.build(device, line_mm, element_mm, modulus);
     }
-}
-
-/// Least bending stiffness of a device, N·mm².
-fn softest(device: &Device) -> f64 {
-    device.sections().iter().map(|s| s.bending_stiffness_nmm2).fold(f64::MAX, f64::min)
 }

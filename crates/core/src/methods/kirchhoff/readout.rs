@@ -1,8 +1,10 @@
 //! What a step tells: energies, contacts, and what the hand feels.
 
+use super::Environment;
 use super::configuration::Configuration;
+use super::hands::Hand;
+use super::slopes::write_instruments;
 use super::workspace::Tools;
-use super::{Environment, softest};
 use crate::contact::WallContact;
 use crate::contact::extension::left_through;
 use crate::insertion::Energy;
@@ -10,19 +12,28 @@ use crate::rod::{Clamp, Layout};
 
 impl<const C: usize> Tools<C> {
     /// Read-outs at a configuration, that of the last sub-step.
-    pub(super) fn write_report(&mut self, environment: &Environment<'_>, at: &mut Configuration) {
+    pub(super) fn write_report(
+        &mut self,
+        environment: &Environment<'_>,
+        hands: &[Hand],
+        at: &mut Configuration,
+    ) {
         let surroundings = &environment.surroundings;
         let (mesh, state) = at.parts();
         let (rod, report) = (&state.rod, &mut state.report);
         report.contacts.clear();
         report.max_penetration_mm = 0.0;
         report.inserted_mm = mesh.from_tip_mm[0];
+        report.rotation_rad = hands[0].turn_rad;
         report.tip_rotation_rad = report.rotation_rad;
         let tip = rod.positions[rod.elements()];
         report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening);
         if mesh.elements.is_empty() {
             report.energy = Energy::default();
             (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
+            if surroundings.stack.is_several() {
+                write_instruments::<C>(environment, hands, None, &[], at);
+            }
             return;
         }
         let mut contact = WallContact::new(
@@ -30,10 +41,11 @@ impl<const C: usize> Tools<C> {
             &mesh.points,
             &mut self.memory,
             &mut self.friction,
-            softest(surroundings.device),
+            surroundings.stack.softest_nmm2(),
         );
         let stored = self.newton.assembly.energy;
         report.energy = Energy { bend: stored.bend, twist: stored.twist, wall: 0.0 };
+        let mut pressed = Vec::new();
         for index in 0..mesh.points.len() {
             let Some(touch) = contact.touch(&mesh.elements, rod, index) else {
                 continue;
@@ -41,9 +53,15 @@ impl<const C: usize> Tools<C> {
             report.energy.wall += touch.energy_mj;
             report.max_penetration_mm = report.max_penetration_mm.max(touch.contact.penetration_mm);
             report.contacts.push(touch.contact);
+            if surroundings.stack.is_several() {
+                pressed.push((index, touch));
+            }
         }
 
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
+        if surroundings.stack.is_several() {
+            return write_instruments::<C>(environment, hands, Some(&clamp), &pressed, at);
+        }
         let frame = rod.material_frame(0);
         let data = &mesh.elements[0].materials[0];
         let rest = frame.u * data.rest_curvature[0][0] + frame.v * data.rest_curvature[0][1];

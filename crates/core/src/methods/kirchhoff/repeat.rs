@@ -3,13 +3,17 @@
 //!
 //! A tip that slides along a wall bends in every step by as much as in the step before, seen from the tip. Added to the
 //! slid device, that leaves the next equilibrium at second order in the step instead of first: contacts of a hard wall stay closed
-//! on the way there, and Newton's method takes half the iterations.
+//! on the way there, and Newton's method takes half the iterations. Nodes of several instruments are other marks where one has moved in
+//! another; what was learnt is read between them, at the same distance from the line's tip.
+
+use std::ops::{Add, Mul};
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
+use super::hands::Motion;
+use super::mesh::Mesh;
 use crate::Vec3;
-use crate::contact::HandMotion;
 use crate::rod::element::mid_slope;
 use crate::rod::{ElementData, Frame, RodState};
 
@@ -20,6 +24,11 @@ struct Departure {
     tangent: Vec3,
     /// Change of the direction in the middle of the element, in the triad of its first node.
     middle: Vec3,
+}
+
+/// How the angles of an instrument differed there.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct Turn {
     /// Change of the node's material angle against triads carried without twist, rad.
     angle: f64,
     /// Change of the angle bubble, rad.
@@ -29,10 +38,12 @@ struct Departure {
 /// What the last step changed on the slid device.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Correction {
-    /// Advance, mm, and turn, rad, of the step.
-    motion: [f64; 2],
+    /// What each hand did in the step.
+    motions: Vec<Motion>,
     /// From the tip.
     departures: Vec<Departure>,
+    /// Of every set of angles in each of these.
+    turns: Vec<Turn>,
 }
 
 /// Motions are the same if their parts differ by less than this, …
@@ -50,26 +61,60 @@ fn middle(state: &RodState, e: usize) -> Vec3 {
     mid_slope(&state.frames[e].t, &state.chords[e], &state.frames[e + 1].t).normalize()
 }
 
-fn motion(hand: HandMotion) -> [f64; 2] {
-    [hand.to_mm - hand.from_mm, hand.turn_rad]
+fn size(motions: impl Iterator<Item = f64>) -> f64 {
+    motions.fold(0.0, f64::hypot)
+}
+
+/// What `value` is at `x`, linear between ascending places `0..=last`, and beyond them that at the last. `k` is where to start looking:
+/// calls go on.
+fn read<T: Mul<f64, Output = T> + Add<Output = T>>(
+    x: f64,
+    (k, last): (&mut usize, usize),
+    place: impl Fn(usize) -> f64,
+    value: impl Fn(usize) -> T,
+) -> T {
+    while *k < last && place(*k) < x {
+        *k += 1;
+    }
+    let here = place(*k);
+    if *k == 0 || here <= x {
+        return value(*k);
+    }
+    let before = place(*k - 1);
+    let share = (x - before) / (here - before);
+    value(*k - 1) * (1.0 - share) + value(*k) * share
 }
 
 impl Correction {
     /// Takes memory for `elements` elements.
     pub(super) fn reserve(&mut self, elements: usize) {
+        self.motions.reserve(1);
         self.departures.reserve(elements);
+        self.turns.reserve(elements);
     }
 
     /// Forgets all. Keeps the memory.
     pub(super) fn clear(&mut self) {
-        self.motion = [0.0; 2];
+        self.motions.clear();
         self.departures.clear();
+        self.turns.clear();
+    }
+
+    /// Elements that have learnt.
+    pub(super) fn len(&self) -> usize {
+        self.departures.len()
+    }
+
+    /// Whether all of `elements` elements with so many sets of angles have learnt, or none.
+    pub(super) fn fits(&self, elements: usize, sets: usize) -> bool {
+        let n = self.len();
+        (n == 0 || n == elements) && self.turns.len() == n * sets
     }
 
     /// Remembers the way from the slid device to the equilibrium that was found.
-    pub(super) fn learn(&mut self, hand: HandMotion, slid: &RodState, found: &RodState) {
-        self.departures.clear();
-        self.motion = motion(hand);
+    pub(super) fn learn(&mut self, motions: &[Motion], slid: &RodState, found: &RodState) {
+        self.clear();
+        self.motions.extend_from_slice(motions);
         let n = slid.elements();
         let far = |i: usize| (found.frames[i].t - slid.frames[i].t).norm_squared() > LARGEST * LARGEST;
         if (0..=n).any(far) {
@@ -81,21 +126,49 @@ impl Correction {
             self.departures.push(Departure {
                 tangent: slid.frames[i].local(&(found.frames[i].t - slid.frames[i].t)),
                 middle: f.local(&(middle(found, e) - middle(slid, e))),
-                angle: found.angles[i] + twist - slid.angles[i],
-                bubble: found.bubbles[e] - slid.bubbles[e],
             });
+            let sets = found.sets();
+            self.turns.extend((0..sets).map(|set| Turn {
+                angle: found.angle(i, set) + twist - slid.angle(i, set),
+                bubble: found.bubbles[sets * e + set] - slid.bubbles[sets * e + set],
+            }));
             twist -= found.reference_twists[e];
         }
     }
 
-    /// How many of the last motions this one is; `None` if it is another one.
-    pub(super) fn repeats(&self, hand: HandMotion) -> Option<f64> {
-        let (now, last) = (motion(hand), self.motion);
-        let size = |m: [f64; 2]| m[0].hypot(m[1]);
-        let factor = size(now) / size(last);
-        let off = (now[0] - factor * last[0]).hypot(now[1] - factor * last[1]);
+    /// How many of the last motions of the hands these are; `None` if they are others.
+    pub(super) fn repeats(&self, motions: &[Motion]) -> Option<f64> {
+        let (now, last) = (motions.iter().flatten(), self.motions.iter().flatten());
+        let way = size(now.clone().copied());
+        let factor = way / size(last.clone().copied());
+        let off = size(now.zip(last).map(|(now, last)| now - factor * last));
         let known = !self.departures.is_empty() && factor.is_finite();
-        (known && off <= SAME * size(now) && (1.0 / LONGER..=LONGER).contains(&factor)).then_some(factor)
+        (known && off <= SAME * way && (1.0 / LONGER..=LONGER).contains(&factor)).then_some(factor)
+    }
+
+    /// Sets `out` to what was learnt on the nodes `from`, on the nodes `to`. What was not in then is left alone.
+    pub(super) fn transfer(&self, from: &Mesh, to: &Mesh, out: &mut Self) {
+        out.clear();
+        let n = self.departures.len();
+        let sets = self.turns.len() / n;
+        let node = |k: usize| from.from_tip_mm[n - k];
+        let middle = |k: usize| if k == n { node(n) } else { 0.5 * (node(k) + node(k + 1)) };
+        let departure =
+            |k: usize, of: fn(&Departure) -> Vec3| self.departures.get(k).map_or_else(Vec3::zeros, of);
+        let turn =
+            |k: usize, set: usize, of: fn(&Turn) -> f64| self.turns.get(sets * k + set).map_or(0.0, of);
+        let (mut k, mut m) = (0, 0);
+        for ends in to.from_tip_mm.windows(2).rev() {
+            let (x, y) = (ends[1], 0.5 * (ends[0] + ends[1]));
+            out.departures.push(Departure {
+                tangent: read(x, (&mut k, n), node, |k| departure(k, |by| by.tangent)),
+                middle: read(y, (&mut m, n), middle, |m| departure(m, |by| by.middle)),
+            });
+            out.turns.extend((0..sets).map(|set| Turn {
+                angle: read(x, (&mut k, n), node, |k| turn(k, set, |by| by.angle)),
+                bubble: read(y, (&mut m, n), middle, |m| turn(m, set, |by| by.bubble)),
+            }));
+        }
     }
 
     /// Changes the slid device in `state` by `factor` times what was learnt.
@@ -110,8 +183,11 @@ impl Correction {
             let far = state.frames[e + 1];
             let t1 = (far.t + axes(&far) * by.tangent * factor).normalize();
             state.chords[e] = (m.normalize() + (t + t1) * 0.25) / 1.5;
-            state.angles[e + 1] += factor * by.angle;
-            state.bubbles[e] += factor * by.bubble;
+            let sets = state.sets();
+            for (set, by) in self.turns[sets * (n - 1 - e)..][..sets].iter().enumerate() {
+                state.angles[sets * (e + 1) + set] += factor * by.angle;
+                state.bubbles[sets * e + set] += factor * by.bubble;
+            }
             if e > first {
                 state.frames[e].t = t;
             }

@@ -122,10 +122,8 @@ fn on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64, element: &mut us
     slope / slope.norm()
 }
 
-/// The state on the mesh `to` of the rod that was in `state` on the mesh `from`, slid along its curve.
-///
-/// Material angles stay with the device; what enters from the sheath has the angle that the tail has had.
-pub(super) fn slide(from: &Mesh, state: &RodState, extension: &Extension, to: &Mesh, out: &mut RodState) {
+/// Triads and chords on the mesh `to` of the rod that was in `state` on the mesh `from`, slid along its curve.
+fn slide_curve(from: &Mesh, state: &RodState, extension: &Extension, to: &Mesh, out: &mut RodState) {
     let inserted = to.from_tip_mm[0];
     let first = state.frames[0];
     let n = to.elements.len();
@@ -144,6 +142,19 @@ pub(super) fn slide(from: &Mesh, state: &RodState, extension: &Extension, to: &M
         out.chords.push((m + (out.frames[e].t + frame.t) * 0.25) / 1.5);
         out.frames.push(frame);
     }
+    out.reference_twists.clear();
+    out.reference_twists.resize(n, 0.0);
+    out.positions.clear();
+    out.positions.resize(n + 1, state.positions[0]);
+    out.place(&to.elements);
+}
+
+/// The state on the mesh `to` of the device that was in `state` on the mesh `from`, slid along its curve.
+///
+/// Material angles stay with the device; what enters from the sheath has the angle that the tail has had.
+pub(super) fn slide(from: &Mesh, state: &RodState, extension: &Extension, to: &Mesh, out: &mut RodState) {
+    slide_curve(from, state, extension, to, out);
+    let n = to.elements.len();
     // Axial forces, angles and bubbles of the same piece of device, by its distance from the tip.
     let old = state.elements();
     out.tensions.clear();
@@ -172,11 +183,66 @@ pub(super) fn slide(from: &Mesh, state: &RodState, extension: &Extension, to: &M
         out.angles.push(state.angles[known] + carried);
     }
     out.angles[0] = tail;
-    out.reference_twists.clear();
-    out.reference_twists.resize(n, 0.0);
-    out.positions.clear();
-    out.positions.resize(n + 1, state.positions[0]);
-    out.place(&to.elements);
+}
+
+/// As [`slide`], of several instruments, each with its set of angles if it has one: nodes are other marks than before, so that angles are
+/// read between them.
+pub(super) fn slide_together(
+    (from, state): (&Mesh, &RodState),
+    extension: &Extension,
+    to: &Mesh,
+    sets: &[Option<usize>],
+    out: &mut RodState,
+) {
+    slide_curve(from, state, extension, to, out);
+    let (n, old) = (to.elements.len(), state.elements());
+    // The first element whose far end is not before a place; elements are in order, sheath first.
+    let holding = |from_tip: f64| from.from_tip_mm[1..].partition_point(|end| *end > from_tip);
+    out.tensions.clear();
+    for ends in to.from_tip_mm.windows(2) {
+        let middle = 0.5 * (ends[0] + ends[1]);
+        let known = holding(middle);
+        let is_in = known < old && middle <= from.from_tip_mm[known];
+        out.tensions.push(if is_in { state.tensions[known] } else { 0.0 });
+    }
+    // Triads carried without twist are those that angles are counted from.
+    let carried: Vec<f64> = std::iter::once(0.0)
+        .chain(state.reference_twists.iter().scan(0.0, |sum, twist| {
+            *sum += twist;
+            Some(*sum)
+        }))
+        .collect();
+    let count = state.sets();
+    out.angles.clear();
+    out.angles.resize(count * (n + 1), 0.0);
+    out.bubbles.clear();
+    out.bubbles.resize(count * n, 0.0);
+    for (index, set) in sets.iter().enumerate() {
+        let Some(set) = *set else { continue };
+        let inserted = from.inserted_mm.get(index).copied().unwrap_or(0.0);
+        // The angle that the same piece of the instrument had.
+        let angle = |from_line_tip: f64| {
+            let from_tip = (from_line_tip - (to.from_tip_mm[0] - to.inserted_mm[index])).max(0.0);
+            let place = from.from_tip_mm[0] - (inserted - from_tip);
+            if inserted <= from_tip {
+                return state.angle(0, set);
+            }
+            let e = holding(place).min(old - 1);
+            let xi = ((from.from_tip_mm[e] - place) / from.elements[e].length).clamp(0.0, 1.0);
+            let [w0, w1, wb] = Point::at(xi, 0.0).phi;
+            w0 * (state.angle(e, set) + carried[e])
+                + w1 * (state.angle(e + 1, set) + carried[e + 1])
+                + wb * state.bubbles[count * e + set]
+        };
+        for i in 0..=n {
+            out.angles[count * i + set] = angle(to.from_tip_mm[i]);
+        }
+        for e in 0..n {
+            let middle = angle(0.5 * (to.from_tip_mm[e] + to.from_tip_mm[e + 1]));
+            let ends = out.angles[count * e + set] + out.angles[count * (e + 1) + set];
+            out.bubbles[count * e + set] = middle - 0.5 * ends;
+        }
+    }
 }
 
 /// Changes a guess of [`slide`] so that the last `shaped_mm` of the device keep the shape they had, carried along by the

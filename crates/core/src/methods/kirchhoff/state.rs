@@ -4,9 +4,11 @@ use std::fmt::Display;
 
 use serde::{Deserialize, Serialize};
 
+use super::hands::Hand;
 use super::repeat::Correction;
 use crate::contact::{FeltWall, KnownPoints, NormalForce};
-use crate::insertion::{Sheath, StepReport};
+use crate::device::Stack;
+use crate::insertion::{InstrumentReport, Sheath, StepReport, Surroundings};
 use crate::rod::{Frame, RodState};
 use crate::{Error, Result, Vec3};
 
@@ -29,23 +31,30 @@ pub(super) struct Belongs<'a> {
     /// Elements and contact points of the inserted length.
     pub(super) elements: usize,
     pub(super) points: usize,
-    pub(super) angles: bool,
+    /// Sets of angles.
+    pub(super) sets: usize,
     pub(super) rubs: bool,
 }
 
 impl KirchhoffState {
     /// Nothing inserted.
-    pub(super) fn at(sheath: &Sheath) -> Self {
+    pub(super) fn at(surroundings: &Surroundings<'_>) -> Self {
+        let (sheath, stack) = (surroundings.sheath, surroundings.stack);
         let mut rod = RodState::default();
         rod.frames.push(Frame::new(sheath.direction, None));
-        rod.angles.push(0.0);
+        rod.angles.resize(stack.sets().iter().flatten().count().max(1), 0.0);
         rod.positions.push(sheath.position_mm);
+        let instruments = if stack.is_several() {
+            vec![InstrumentReport::default(); stack.instruments().len()]
+        } else {
+            Vec::new()
+        };
         Self {
             rod,
             forces: Vec::new(),
             known: KnownPoints::default(),
             correction: Correction::default(),
-            report: StepReport { converged: true, ..StepReport::default() },
+            report: StepReport { converged: true, instruments, ..StepReport::default() },
         }
     }
 
@@ -69,13 +78,26 @@ impl KirchhoffState {
         contacts.reserve(points.saturating_sub(contacts.len()));
     }
 
-    /// Nothing is inserted any more: what is left is the angle of the tail.
-    pub(super) fn withdraw(&mut self, tail_rad: f64) {
+    /// Nothing is inserted any more: what is left are the angles of the tails.
+    pub(super) fn withdraw(&mut self, stack: &Stack, hands: &[Hand]) {
         self.rod.clear();
-        self.rod.angles[0] = tail_rad;
+        self.turn_tails(stack, hands);
         self.forces.clear();
         self.known.clear();
         self.correction.clear();
+    }
+
+    /// Gives the tails the angles that their hands have.
+    pub(super) fn turn_tails(&mut self, stack: &Stack, hands: &[Hand]) {
+        if !stack.is_several() {
+            self.rod.angles[0] = hands[0].turn_rad;
+            return;
+        }
+        for (set, hand) in stack.sets().iter().zip(hands) {
+            if let Some(set) = set {
+                self.rod.angles[*set] = hand.turn_rad;
+            }
+        }
     }
 
     /// Checks that this is a state of a simulation with such a mesh: one that was read from a file may be any.
@@ -86,12 +108,13 @@ impl KirchhoffState {
             return Err(other("elements", elements, format!("the inserted length has {n} here")));
         }
         let r = &self.rod;
-        let nodes = [r.frames.len(), r.angles.len(), r.positions.len()];
-        let each = [r.tensions.len(), r.bubbles.len(), r.reference_twists.len()];
+        let sets = belongs.sets.max(1);
+        let nodes = [r.frames.len(), r.angles.len() / sets, r.positions.len()];
+        let each = [r.tensions.len(), r.bubbles.len() / sets, r.reference_twists.len()];
         if nodes != [n + 1; 3] || each != [n; 3] {
             return Err(other("rod", format!("{nodes:?} {each:?}"), "its lists have different lengths"));
         }
-        if self.report.angles != belongs.angles {
+        if self.report.angles != (belongs.sets > 0) {
             let mend = "it has material angles where this simulation has none, or none where it has: another device or friction";
             return Err(other("angles", self.report.angles, mend));
         }
@@ -110,6 +133,13 @@ impl KirchhoffState {
                 belongs.felt.query.triangles()
             );
             return Err(other("known", self.known.len(), mend));
+        }
+        if !self.correction.fits(n, sets) {
+            return Err(other(
+                "correction",
+                self.correction.len(),
+                format!("{n} elements or none have learnt"),
+            ));
         }
         let (position, direction) = (belongs.sheath.position_mm, r.frames[0].t);
         if r.positions[0] != position || (direction - belongs.sheath.direction).norm() > SAME_DIRECTION {

@@ -4,10 +4,11 @@ use std::borrow::Cow;
 
 use super::configuration::{Configuration, Start};
 use super::guess::Quality;
+use super::hands::{Hand, motions, told};
 use super::search::Search;
-use super::slide::slide;
+use super::slide::{slide, slide_together};
 use super::workspace::Tools;
-use super::{Environment, meshed, softest};
+use super::{Environment, meshed};
 use crate::contact::{HandMotion, SETTLED, WallContact};
 use crate::insertion::StepReport;
 use crate::rod::Supports;
@@ -48,11 +49,9 @@ pub(super) struct Found {
 
 /// How far a sub-step goes, and how hard it tries.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Attempt {
-    /// Length inserted after it, mm.
-    pub(super) inserted_mm: f64,
-    /// Angle of the tail after it, rad.
-    pub(super) tail_rad: f64,
+pub(super) struct Attempt<'a> {
+    /// Where the hands are after it.
+    pub(super) hands: &'a [Hand],
     /// Whether the wall is in the tip's way.
     pub(super) blocked: bool,
     /// Whether the device is let come to rest as it can, and if so, whether that is taken whatever is left over.
@@ -66,32 +65,46 @@ impl<const C: usize> Tools<C> {
         &mut self,
         environment: &Environment<'_>,
         start: Start<'_>,
-        attempt: Attempt,
+        attempt: Attempt<'_>,
         next: &mut Configuration,
         budget: &mut usize,
     ) -> std::result::Result<Found, Cow<'static, str>> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
-        let Attempt { inserted_mm, tail_rad, blocked, resort } = attempt;
+        let Attempt { hands, blocked, resort } = attempt;
         let relax = resort.is_some();
         let (mesh, after) = next.parts();
-        meshed(environment, inserted_mm, mesh);
-        let rod = &mut after.rod;
-        slide(start.mesh, &start.state.rod, &self.extension, mesh, rod);
-        let from_mm = start.mesh.from_tip_mm[0];
-        let hand = HandMotion { from_mm, to_mm: inserted_mm, turn_rad: tail_rad - start.state.rod.angles[0] };
+        meshed(environment, hands, mesh);
+        let stack = surroundings.stack;
+        let (from_mm, to_mm) = (start.mesh.from_tip_mm[0], mesh.from_tip_mm[0]);
+        let turn_rad = if stack.is_several() {
+            slide_together(
+                (start.mesh, &start.state.rod),
+                &self.extension,
+                mesh,
+                stack.sets(),
+                &mut after.rod,
+            );
+            0.0
+        } else {
+            slide(start.mesh, &start.state.rod, &self.extension, mesh, &mut after.rod);
+            hands[0].turn_rad - start.state.rod.angles[0]
+        };
+        let hand = HandMotion { from_mm, to_mm, turn_rad };
         let before = (&start.mesh.points[..], &start.state.forces[..]);
-        self.friction.begin(&mesh.elements, rod, &mesh.points, before, hand);
-        rod.angles[0] = tail_rad;
+        self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, hand);
+        after.turn_tails(stack, hands);
+        let rod = &mut after.rod;
         let elements = mesh.elements.len();
         self.newton.resize(elements);
-        self.memory.begin(&start.state.known, &start.mesh.points, &mesh.points, inserted_mm - from_mm);
+        self.memory.begin(&start.state.known, &start.mesh.points, &mesh.points, to_mm - from_mm);
         let mut contact = WallContact::new(
             environment.felt,
             &mesh.points,
             &mut self.memory,
             &mut self.friction,
-            softest(surroundings.device),
+            stack.softest_nmm2(),
         );
+        motions(&start.state.report, hands, &mut self.guess.motions);
         let candidates = (start, &*mesh, &mut *rod);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
@@ -127,13 +140,10 @@ impl<const C: usize> Tools<C> {
         let least = if resort == Some(true) { f64::MAX } else { AT_REST };
         let at_rest = balanced || (relax && found.residual <= least);
         let passed = at_rest && contact.passes_through(&mesh.elements, rod);
-        let nodes = elements as u64 + 1;
         let counted = contact.count();
         self.counters.add(&counted);
         if iterations > 0 {
-            self.nodes_solved += nodes;
-        } else {
-            self.nodes_frozen += nodes;
+            self.nodes_solved += elements as u64 + 1;
         }
         if !at_rest {
             if found.converged {
@@ -145,14 +155,13 @@ impl<const C: usize> Tools<C> {
             return Err(PASSED.into());
         }
         let dissipated_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
-        after.report.rotation_rad = tail_rad;
-        self.write_report(environment, next);
+        self.write_report(environment, hands, next);
         let (_, after) = next.parts();
         let taken = resort == Some(true) && balanced;
         if !taken && rises(&start.state.report, &after.report, dissipated_mj) {
             return Err(STORED.into());
         }
-        self.guess.teach(hand, &after.rod, &mut after.correction);
+        self.guess.teach(&after.rod, &mut after.correction);
         self.friction.keep(&mut after.forces);
         self.memory.keep(&mut after.known);
         Ok(Found { iterations, slides, dissipated_mj, residual: found.residual, unsettled, balanced })
@@ -164,8 +173,16 @@ impl<const C: usize> Tools<C> {
 /// there from where it was; shorter steps stay on the branch on which it is.
 fn rises(before: &StepReport, after: &StepReport, dissipated_mj: f64) -> bool {
     let most = |before: f64, after: f64, way: f64| before.abs().max(after.abs()) * way.abs();
-    let work = most(before.push_force_n, after.push_force_n, after.inserted_mm - before.inserted_mm)
-        + most(before.torque_nmm, after.torque_nmm, after.rotation_rad - before.rotation_rad);
+    let mut work = 0.0;
+    for index in 0..after.instruments.len().max(1) {
+        let (was, is) = (told(before, index), told(after, index));
+        let (Some(push), Some(pushes)) = (was.push_force_n, is.push_force_n) else {
+            // At the tip of another its force jumps, and nothing can be said.
+            return false;
+        };
+        work += most(push, pushes, is.inserted_mm - was.inserted_mm)
+            + most(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
+    }
     let energy = before.energy.total();
     after.energy.total() + dissipated_mj - energy > LARGEST_RISE * work + RISE_SHARE * energy + RISE_FLOOR_MJ
 }

@@ -2,6 +2,7 @@
 
 use super::configuration::{Configuration, largest};
 use super::guess::Guess;
+use super::hands::{Hand, Way};
 use super::mesh::Mesh;
 use super::settle::Settle;
 use super::slide::Extension;
@@ -21,6 +22,10 @@ pub(super) struct Workspace<const C: usize> {
     pub(super) next: Configuration,
     /// Most elements and contact points.
     pub(super) most: (usize, usize),
+    /// Where the hands go in the command under way.
+    pub(super) way: Way,
+    /// Where they are in the sub-step under way.
+    pub(super) hands: Vec<Hand>,
 }
 
 /// What a sub-step works with.
@@ -31,10 +36,8 @@ pub(super) struct Tools<const C: usize> {
     pub(super) friction: Friction,
     pub(super) memory: WallMemory,
     pub(super) extension: Extension,
-    /// Nodes of the sub-steps of the command in which the device moved, …
+    /// Nodes of the sub-steps of the command in which the device moved.
     pub(super) nodes_solved: u64,
-    /// … and in which it was in equilibrium as it was.
-    pub(super) nodes_frozen: u64,
     /// Questions about the wall.
     pub(super) counters: Counters,
 }
@@ -43,17 +46,20 @@ impl<const C: usize> Workspace<C> {
     /// Memory for the whole device, so that steps take none.
     pub(super) fn new(environment: &Environment<'_>, state: &KirchhoffState) -> Box<Self> {
         let surroundings = environment.surroundings;
-        let (elements, points) = largest(surroundings.device, environment.options.element_mm);
-        let nothing = Configuration::at(surroundings.sheath);
+        let (elements, points) = largest(surroundings.stack, environment.options.element_mm);
+        let nothing = Configuration::at(&surroundings);
         let mut tools = Tools {
             newton: Newton::new(1),
-            guess: Guess::new(surroundings.device.shaped_mm()),
+            guess: if surroundings.stack.is_several() {
+                Guess::default()
+            } else {
+                Guess::new(surroundings.device.shaped_mm())
+            },
             settle: Settle::default(),
             friction: Friction::new(surroundings.properties.largest_friction()),
             memory: WallMemory::new(environment.felt),
             extension: Extension::default(),
             nodes_solved: 0,
-            nodes_frozen: 0,
             counters: Counters::default(),
         };
         tools.newton.reserve(elements);
@@ -62,7 +68,17 @@ impl<const C: usize> Workspace<C> {
         tools.friction.reserve(points);
         tools.memory.reserve(points);
         let mut mesh = Mesh::default();
-        meshed(environment, state.report().inserted_mm, &mut mesh);
-        Box::new(Self { tools, mesh, now: nothing.clone(), next: nothing, most: (elements, points) })
+        let mut hands = Vec::new();
+        super::hands::read(state.report(), &mut hands);
+        meshed(environment, &hands, &mut mesh);
+        Box::new(Self {
+            tools,
+            mesh,
+            now: nothing.clone(),
+            next: nothing,
+            most: (elements, points),
+            way: Way::default(),
+            hands,
+        })
     }
 }

@@ -1,0 +1,158 @@
+//! What each of several instruments does, step by step: instruments.csv, beside steps.csv.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use endowire_core::device::Stack;
+use endowire_core::insertion::{Move, Simulation};
+use endowire_core::shape::Shape;
+use serde::{Deserialize, Serialize};
+
+use crate::failure::Failure;
+
+/// The table.
+pub(crate) const INSTRUMENTS: &str = "instruments.csv";
+
+/// One line of it.
+#[derive(Debug, Serialize, Deserialize)]
+struct Row {
+    step: usize,
+    instrument: String,
+    advance_mm: f64,
+    rotate_rad: f64,
+    inserted_mm: f64,
+    rotation_rad: f64,
+    tip_rotation_rad: f64,
+    tip_x_mm: Option<f64>,
+    tip_y_mm: Option<f64>,
+    tip_z_mm: Option<f64>,
+    push_force_n: Option<f64>,
+    torque_nmm: f64,
+    /// Length beyond the instruments outside it: there the wall is felt by its radius.
+    felt_mm: f64,
+    /// Its largest radius there.
+    felt_radius_mm: f64,
+}
+
+/// Writes the table of a run; a device alone has none.
+pub(crate) struct InstrumentTable {
+    table: csv::Writer<File>,
+}
+
+impl InstrumentTable {
+    /// The table of a recording in `folder` that begins.
+    pub(crate) fn new(folder: &Path, stack: &Stack) -> io::Result<Option<Self>> {
+        if !stack.is_several() {
+            return Ok(None);
+        }
+        let table = csv::Writer::from_writer(File::create(folder.join(INSTRUMENTS))?);
+        Ok(Some(Self { table }))
+    }
+
+    /// The table of a recording that goes on after step `steps`: rows of later ones are dropped.
+    pub(crate) fn go_on(folder: &Path, stack: &Stack, steps: usize) -> io::Result<Option<Self>> {
+        let path = folder.join(INSTRUMENTS);
+        if !stack.is_several() || !path.exists() {
+            return Self::new(folder, stack);
+        }
+        let text = std::fs::read(&path)?;
+        let kept = text.split_inclusive(|byte| *byte == b'\n').enumerate().take_while(|(index, line)| {
+            let number = || std::str::from_utf8(line).ok()?.split(',').next()?.parse::<usize>().ok();
+            line.ends_with(b"\n") && (*index == 0 || number().is_some_and(|step| step <= steps))
+        });
+        let bytes: usize = kept.map(|(_, line)| line.len()).sum();
+        let file = OpenOptions::new().append(true).open(&path)?;
+        file.set_len(bytes as u64)?;
+        let table = csv::WriterBuilder::new().has_headers(bytes == 0).from_writer(file);
+        Ok(Some(Self { table }))
+    }
+
+    /// Adds the rows of a step.
+    pub(crate) fn push(&mut self, step: usize, moves: &[Move], simulation: &Simulation) -> io::Result<()> {
+        let report = simulation.report();
+        let stack = simulation.stack();
+        for (index, (instrument, told)) in stack.instruments().iter().zip(&report.instruments).enumerate() {
+            let moved = moves.iter().find(|one| one.instrument == index);
+            let command = moved.map(|one| one.command).unwrap_or_default();
+            let own = (told.inserted_mm > 0.0)
+                .then(|| simulation.shape().behind(report.inserted_mm - told.inserted_mm));
+            let tip = own.and_then(|shape| shape.tip_mm());
+            let outside = report.instruments[index + 1..].iter().map(|other| other.inserted_mm);
+            let felt_mm = (told.inserted_mm - outside.fold(0.0, f64::max)).max(0.0);
+            self.table.serialize(Row {
+                step,
+                instrument: instrument.name.clone(),
+                advance_mm: command.advance_mm,
+                rotate_rad: command.rotate_rad,
+                inserted_mm: told.inserted_mm,
+                rotation_rad: told.rotation_rad,
+                tip_rotation_rad: told.tip_rotation_rad,
+                tip_x_mm: tip.map(|tip| tip.x),
+                tip_y_mm: tip.map(|tip| tip.y),
+                tip_z_mm: tip.map(|tip| tip.z),
+                push_force_n: told.push_force_n,
+                torque_nmm: told.torque_nmm,
+                felt_mm,
+                felt_radius_mm: instrument.device.max_radius_within(felt_mm),
+            })?;
+        }
+        self.table.flush()
+    }
+
+    /// Waits until all rows are on the disk itself.
+    pub(crate) fn sync(&self) -> io::Result<()> {
+        self.table.get_ref().sync_data()
+    }
+}
+
+/// What of each instrument was in after the steps of a recording.
+pub(crate) struct Lengths {
+    folder: PathBuf,
+    /// By step; none of a device alone, which is as long as its line.
+    steps: Option<BTreeMap<usize, Vec<f64>>>,
+}
+
+impl Lengths {
+    /// Reads those of `stack` in the folder of a recording.
+    pub(crate) fn read(folder: &Path, stack: &Stack) -> Result<Self, Failure> {
+        let steps = if stack.is_several() {
+            let path = folder.join(INSTRUMENTS);
+            let read = by_step(&path, stack);
+            Some(read.map_err(|error| {
+                let text = "give the folder of a run of this scene (endowire run)";
+                Failure::Input(format!("{}: {error}; {text}", path.display()))
+            })?)
+        } else {
+            None
+        };
+        Ok(Self { folder: folder.to_path_buf(), steps })
+    }
+
+    /// Lengths in after a step that led to this shape, mm.
+    pub(crate) fn after(&self, step: usize, shape: &Shape) -> Result<Vec<f64>, Failure> {
+        let Some(steps) = &self.steps else {
+            return Ok(vec![shape.from_tip_mm.first().copied().unwrap_or(0.0)]);
+        };
+        steps.get(&step).cloned().ok_or_else(|| {
+            let path = self.folder.join(INSTRUMENTS);
+            Failure::Input(format!("{}: has no step {step}; run the scene again", path.display()))
+        })
+    }
+}
+
+/// Lengths of the instruments of `stack` by step, mm.
+fn by_step(path: &Path, stack: &Stack) -> io::Result<BTreeMap<usize, Vec<f64>>> {
+    let mut text = std::fs::read(path)?;
+    // A run may have been killed within a row.
+    text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
+    let mut steps: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for row in csv::Reader::from_reader(text.as_slice()).deserialize() {
+        let row: Row = row?;
+        let Ok(index) = stack.find(&row.instrument) else { continue };
+        steps.entry(row.step).or_insert_with(|| vec![0.0; stack.instruments().len()])[index] =
+            row.inserted_mm;
+    }
+    Ok(steps)
+}

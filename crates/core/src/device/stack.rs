@@ -1,0 +1,256 @@
+//! Instruments that lie in one another: a wire in a microcatheter in a catheter.
+
+use super::Device;
+use crate::rod::MAX_ANGLES;
+use crate::{Error, Result};
+
+/// A device by its name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instrument {
+    /// What commands and reports call it.
+    pub name: String,
+    /// Its sections.
+    pub device: Device,
+    /// Whether its tip may be farther in than that of the instrument in it; one that must not lead is pushed over that alone.
+    pub may_lead: bool,
+}
+
+/// Instruments on one line, the innermost first; those that are never in at the same time may share a place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stack {
+    instruments: Vec<Instrument>,
+    /// Set of material angles of each, where it has one.
+    sets: Vec<Option<usize>>,
+}
+
+/// Most instruments of a stack.
+const MOST: usize = 16;
+/// Slack in inserted lengths, mm: the rounding of thousands of summed increments.
+pub(crate) const LENGTH_SLACK_MM: f64 = 1e-6;
+
+impl From<Device> for Stack {
+    /// A device alone, named `device`.
+    fn from(device: Device) -> Self {
+        let sets = vec![device.is_shaped().then_some(0)];
+        Self { instruments: vec![Instrument { name: "device".to_owned(), device, may_lead: true }], sets }
+    }
+}
+
+impl Stack {
+    /// Instruments, the innermost first.
+    ///
+    /// # Errors
+    /// No instrument or more than 16, a name that is empty or given twice, and more than three instruments with a shape of their own.
+    pub fn new(instruments: Vec<Instrument>) -> Result<Self> {
+        if instruments.is_empty() || instruments.len() > MOST {
+            let mend = format!("give 1 to {MOST} instruments, the innermost first");
+            return Err(Error::parameter("instrument", instruments.len(), mend));
+        }
+        let (mut sets, mut angles) = (Vec::with_capacity(instruments.len()), 0);
+        for (index, instrument) in instruments.iter().enumerate() {
+            let name = &instrument.name;
+            if name.is_empty() || instruments[..index].iter().any(|other| other.name == *name) {
+                let mend = "every instrument has a name of its own: commands call it by that";
+                return Err(Error::parameter(format!("instrument[{index}].name"), format!("{name:?}"), mend));
+            }
+            let shaped = instrument.device.is_shaped();
+            sets.push(shaped.then_some(angles));
+            angles += usize::from(shaped);
+        }
+        if angles > MAX_ANGLES {
+            let mend = format!("at most {MAX_ANGLES} instruments on one line may have a shape of their own");
+            return Err(Error::parameter("instrument", format!("{angles} with rest curvature"), mend));
+        }
+        Ok(Self { instruments, sets })
+    }
+
+    /// The instruments, the innermost first.
+    pub fn instruments(&self) -> &[Instrument] {
+        &self.instruments
+    }
+
+    /// The innermost; of a device alone the device.
+    pub fn first(&self) -> &Device {
+        // `new` refuses stacks without instruments.
+        &self.instruments[0].device
+    }
+
+    /// Whether there is more than one instrument.
+    pub fn is_several(&self) -> bool {
+        self.instruments.len() > 1
+    }
+
+    /// The devices, the innermost first.
+    pub fn devices(&self) -> impl DoubleEndedIterator<Item = &Device> + ExactSizeIterator {
+        self.instruments.iter().map(|instrument| &instrument.device)
+    }
+
+    /// Set of material angles of each instrument: those with a shape of their own have one.
+    pub fn sets(&self) -> &[Option<usize>] {
+        &self.sets
+    }
+
+    /// Number of the instrument of that name.
+    ///
+    /// # Errors
+    /// A name that no instrument has, with the nearest one that is there.
+    pub fn find(&self, name: &str) -> Result<usize> {
+        let found = self.instruments.iter().position(|instrument| instrument.name == name);
+        found.ok_or_else(|| {
+            let alike = |instrument: &Instrument| strsim::jaro_winkler(&instrument.name, name);
+            let nearest = self.instruments.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
+            let nearest = nearest.map_or("", |instrument| &instrument.name);
+            Error::parameter("instrument", format!("{name:?}"), format!("did you mean {nearest:?}?"))
+        })
+    }
+
+    /// Length of the longest, mm.
+    pub fn length_mm(&self) -> f64 {
+        self.devices().map(Device::length_mm).fold(0.0, f64::max)
+    }
+
+    /// Smallest and largest outer radius, mm.
+    pub fn radii_mm(&self) -> (f64, f64) {
+        let thinnest = self.devices().map(Device::min_radius_mm).fold(f64::MAX, f64::min);
+        (thinnest, self.devices().map(Device::max_radius_mm).fold(0.0, f64::max))
+    }
+
+    /// Least bending stiffness, N·mm².
+    pub fn softest_nmm2(&self) -> f64 {
+        let sections = self.devices().flat_map(Device::sections);
+        sections.map(|s| s.bending_stiffness_nmm2).fold(f64::MAX, f64::min)
+    }
+
+    /// Outer radius of the outermost instrument at the tip of the line, mm, with these lengths inserted.
+    pub fn tip_radius_mm(&self, inserted_mm: impl Iterator<Item = f64>) -> f64 {
+        let farthest = self.devices().zip(inserted_mm).max_by(|a, b| a.1.total_cmp(&b.1));
+        farthest.map_or(0.0, |(device, _)| device.section_at(0.0).radius_mm)
+    }
+
+    /// Outer radius of the outermost instrument at a place so far from the tip of the line, mm, with these lengths inserted.
+    pub fn felt_radius_mm(&self, inserted_mm: &[f64], from_tip_mm: f64) -> f64 {
+        let line_mm = inserted_mm.iter().copied().fold(0.0, f64::max);
+        let own = |inserted: f64| from_tip_mm - (line_mm - inserted);
+        let there = self.devices().zip(inserted_mm).rev().find(|(_, inserted)| own(**inserted) >= 0.0);
+        there.map_or(0.0, |(device, inserted)| device.section_at(own(*inserted)).radius_mm)
+    }
+
+    /// Checks that instruments with these lengths inserted can be in together: each in the lumen of the next, with its tail out of that
+    /// one's, and behind or in front as it may be.
+    ///
+    /// # Errors
+    /// The first that does not go with the next one that is in.
+    pub fn check_places(&self, inserted_mm: impl Iterator<Item = f64>) -> Result<()> {
+        let mut inner: Option<(&Instrument, f64)> = None;
+        // What is pulled back to the mouth is out, whatever rounding leaves of it.
+        for outer in self.instruments.iter().zip(inserted_mm).filter(|(_, mm)| *mm > LENGTH_SLACK_MM) {
+            if let Some(inner) = inner.replace(outer) {
+                check_pair(inner.0, outer.0)?;
+                check_tails(inner, outer)?;
+                check_lead(inner, outer)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether the tail of an inner instrument stays out of that of the outer one, where its hand is.
+fn check_tails((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instrument, f64)) -> Result<()> {
+    let tail_mm = outer.device.length_mm() - outer_mm;
+    let most_mm = inner.device.length_mm() - tail_mm;
+    if inner_mm <= most_mm + LENGTH_SLACK_MM {
+        return Ok(());
+    }
+    let mend = format!(
+        "{tail_mm:.3} mm of {:?} are outside, and the tail of {:?} would be in them: insert at most {:.3} mm, insert {:?} farther, or \
+         use a longer instrument",
+        outer.name,
+        inner.name,
+        most_mm.max(0.0),
+        outer.name
+    );
+    Err(Error::parameter(format!("{}.inserted_mm", inner.name), inner_mm, mend))
+}
+
+/// Whether an outer instrument that must not lead is behind the inner one.
+fn check_lead((inner, inner_mm): (&Instrument, f64), (outer, outer_mm): (&Instrument, f64)) -> Result<()> {
+    if outer.may_lead || outer_mm <= inner_mm + LENGTH_SLACK_MM {
+        return Ok(());
+    }
+    let mend = format!(
+        "must not lead, and {:?} is {inner_mm:.3} mm in: advance that first, or allow it with may_lead",
+        inner.name
+    );
+    Err(Error::parameter(format!("{}.inserted_mm", outer.name), outer_mm, mend))
+}
+
+/// Whether one instrument goes into another.
+fn check_pair(inner: &Instrument, outer: &Instrument) -> Result<()> {
+    let lumen = outer.device.sections().iter().map(|s| s.inner_radius_mm);
+    let narrowest = lumen.reduce(|a, b| a.zip(b).map(|(a, b)| a.min(b))).flatten();
+    let (name, value) = (format!("{}.radius_mm", inner.name), inner.device.max_radius_mm());
+    match narrowest {
+        Some(room) if value <= room => Ok(()),
+        Some(room) => {
+            let mend = format!(
+                "the lumen of {:?} has radius {room} mm: use a thinner instrument, or withdraw one of the two first",
+                outer.name
+            );
+            Err(Error::parameter(name, value, mend))
+        }
+        None => {
+            let mend = format!(
+                "{:?} has no lumen: give inner_radius_mm in all of its sections, order instruments from the innermost, or withdraw one \
+                 of the two first",
+                outer.name
+            );
+            Err(Error::parameter(name, value, mend))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::Section;
+
+    fn instrument(name: &str, radius_mm: f64, inner_radius_mm: Option<f64>) -> Instrument {
+        let section = Section { inner_radius_mm, ..Section::straight(100.0, radius_mm, 10.0) };
+        Instrument { name: name.to_owned(), device: Device::new(vec![section]).unwrap(), may_lead: true }
+    }
+
+    #[test]
+    fn what_is_in_together_fits_and_wires_may_be_exchanged() {
+        let catheter = instrument("catheter", 0.9, Some(0.5));
+        let wires = [instrument("wire", 0.2, None), instrument("stiff wire", 0.5, None)];
+        let stack = Stack::new(wires.into_iter().chain([catheter]).collect()).unwrap();
+        let told = |mm: [f64; 3]| stack.check_places(mm.into_iter()).map_err(|e| e.to_string());
+        assert!(told([20.0, 0.0, 20.0]).is_ok() && told([0.0, 10.0, 20.0]).is_ok());
+        assert!(told([10.0, 10.0, 20.0]).unwrap_err().contains("\"stiff wire\" has no lumen"));
+        assert_eq!(stack.find("catheter").unwrap(), 2);
+        let error = stack.find("cathter").unwrap_err().to_string();
+        assert!(error.contains("did you mean \"catheter\"?"), "{error}");
+        let thick = Stack::new(vec![instrument("a", 0.6, None), instrument("b", 0.9, Some(0.5))]).unwrap();
+        let error = thick.check_places([1.0, 1.0].into_iter()).unwrap_err().to_string();
+        assert!(error.starts_with("a.radius_mm = 0.6: the lumen of \"b\" has radius 0.5 mm"), "{error}");
+        assert!(Stack::new(vec![instrument("a", 0.6, None), instrument("a", 0.9, Some(0.5))]).is_err());
+    }
+    #[test]
+    fn tails_stay_outside_and_what_must_not_lead_is_pushed_over_a_wire() {
+        let section = Section::straight(150.0, 0.2, 5.0);
+        let wire = Device::new(vec![section]).unwrap();
+        let wire = Instrument { name: "wire".to_owned(), device: wire, may_lead: true };
+        let catheter = Instrument { may_lead: false, ..instrument("catheter", 0.9, Some(0.5)) };
+        let stack = Stack::new(vec![wire, catheter]).unwrap();
+        let told = |mm: [f64; 2]| stack.check_places(mm.into_iter()).map_err(|e| e.to_string());
+        assert!(told([70.0, 20.0]).is_ok() && told([20.0, 20.0]).is_ok() && told([0.0, 20.0]).is_ok());
+        let error = told([70.1, 20.0]).unwrap_err();
+        assert!(
+            error.starts_with("wire.inserted_mm = 70.1: 80.000 mm of \"catheter\" are outside"),
+            "{error}"
+        );
+        assert!(error.contains("insert at most 70.000 mm"), "{error}");
+        let error = told([20.0, 20.1]).unwrap_err();
+        assert!(error.starts_with("catheter.inserted_mm = 20.1: must not lead"), "{error}");
+    }
+}

@@ -1,0 +1,190 @@
+//! The mesh on several instruments that lie in one another.
+//!
+//! The line is as long as the instrument that is farthest in, and its nodes are marks at whole element lengths from its tip, as those of
+//! a device alone. Where another instrument or a section ends, stiffness jumps, and a node goes with that end; a mark within half an
+//! element of it gives way, so that no sliver arises while an end slides by. Two ends that are nearer to each other than
+//! [`NEAR`] share a node, and what ends beside it counts by its share of the element.
+//!
+//! The wall is felt by the outermost instrument at a place, at the points that it would have alone: they are marks on it, and their
+//! weights end where it begins to be covered. So energies change without a jump as ends pass nodes.
+
+use super::mesh::Mesh;
+use crate::contact::ContactPoint;
+use crate::device::{Device, Section, Stack};
+use crate::rod::quadrature::GAUSS;
+use crate::rod::{ElementData, Material, shares};
+
+/// Breaks nearer to each other than this part of an element share a node: over an element that is shorter, differences of unit vectors
+/// have lost the digits that curvature is made of.
+const NEAR: f64 = 1e-3;
+
+/// What a node goes with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Anchor {
+    /// The sheath's mouth.
+    Mouth,
+    /// A mark so many elements from the tip of the line.
+    Mark(usize),
+    /// A place on an instrument, by its distance from the tip, mm.
+    Break(usize, f64),
+}
+
+/// The nodes of a line, sheath first, and what each goes with.
+#[derive(Debug, Clone)]
+pub(super) struct Nodes {
+    anchors: Vec<Anchor>,
+    element_mm: f64,
+}
+
+/// Length of the line.
+pub(super) fn line_mm(inserted_mm: &[f64]) -> f64 {
+    inserted_mm.iter().copied().fold(0.0, f64::max)
+}
+
+impl Nodes {
+    /// Nodes of these lengths inserted of the instruments, one of them above 0.
+    pub(super) fn new(stack: &Stack, inserted_mm: &[f64], element_mm: f64) -> Self {
+        let line = line_mm(inserted_mm);
+        let near = NEAR * element_mm;
+        let mut breaks: Vec<(f64, Anchor)> = Vec::new();
+        for (index, (device, inserted)) in stack.devices().zip(inserted_mm).enumerate() {
+            // Tapers of many short sections need no node for each.
+            let mut last = f64::NEG_INFINITY;
+            for begin in begins(device).take_while(|begin| begin < inserted) {
+                if begin - last < 0.5 * element_mm {
+                    continue;
+                }
+                last = begin;
+                let at = line - inserted + begin;
+                if at > near && at < line - near && breaks.iter().all(|(b, _)| (at - b).abs() > near) {
+                    breaks.push((at, Anchor::Break(index, begin)));
+                }
+            }
+        }
+        let marks = (1..).map(|k| (k as f64 * element_mm, Anchor::Mark(k)));
+        let marks = marks.take_while(|(at, _)| *at <= line - 0.5 * element_mm);
+        let free = |at: f64| breaks.iter().all(|(b, _)| (at - b).abs() >= 0.5 * element_mm);
+        let mut all: Vec<(f64, Anchor)> = marks.filter(|(at, _)| free(*at)).collect();
+        all.extend(breaks);
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let inner = all.into_iter().map(|(_, anchor)| anchor);
+        let anchors = [Anchor::Mouth].into_iter().chain(inner).chain([Anchor::Mark(0)]).collect();
+        Self { anchors, element_mm }
+    }
+
+    /// Meshes the line, with the same nodes also where other lengths are inserted than they were made for.
+    pub(super) fn mesh(&self, stack: &Stack, inserted_mm: &[f64], modulus_n_per_mm2: f64, mesh: &mut Mesh) {
+        let line = line_mm(inserted_mm);
+        mesh.from_tip_mm.clear();
+        mesh.from_tip_mm.extend(self.anchors.iter().map(|anchor| match *anchor {
+            Anchor::Mouth => line,
+            Anchor::Mark(k) => k as f64 * self.element_mm,
+            Anchor::Break(index, from_tip) => line - inserted_mm[index] + from_tip,
+        }));
+        mesh.inserted_mm.clear();
+        mesh.inserted_mm.extend_from_slice(inserted_mm);
+        mesh.elements.clear();
+        let ends = mesh.from_tip_mm.windows(2);
+        mesh.elements.extend(ends.map(|ends| element(stack, inserted_mm, line, (ends[0], ends[1]))));
+        self.feel(stack, inserted_mm, modulus_n_per_mm2, mesh);
+    }
+
+    /// Sets the contact points, tip first.
+    fn feel(&self, stack: &Stack, inserted_mm: &[f64], modulus_n_per_mm2: f64, mesh: &mut Mesh) {
+        mesh.points.clear();
+        let line = line_mm(inserted_mm);
+        let mut alone = Mesh::default();
+        let mut e = mesh.elements.len() - 1;
+        for (index, device) in stack.devices().enumerate() {
+            let inserted = inserted_mm[index];
+            let covered = line_mm(&inserted_mm[index + 1..]);
+            if inserted <= covered {
+                continue;
+            }
+            alone.build_points(device, inserted, self.element_mm, modulus_n_per_mm2);
+            cover(device, inserted, covered, &mut alone.points);
+            for point in &alone.points {
+                let from_tip_mm = line - inserted + point.from_tip_mm;
+                while e > 0 && from_tip_mm >= mesh.from_tip_mm[e] {
+                    e -= 1;
+                }
+                let xi = 1.0 - (from_tip_mm - mesh.from_tip_mm[e + 1]) / mesh.elements[e].length;
+                mesh.points.push(ContactPoint { element: e, xi: xi.clamp(0.0, 1.0), from_tip_mm, ..*point });
+            }
+        }
+    }
+}
+
+/// Where the sections of a device begin, from its tip.
+fn begins(device: &Device) -> impl Iterator<Item = f64> {
+    device.sections().iter().scan(0.0, |end, section| {
+        let begin = *end;
+        *end += section.length_mm;
+        Some(begin)
+    })
+}
+
+/// Leaves the points of an instrument that are beyond what is `covered` of the line by those outside it, and one where it comes out.
+fn cover(device: &Device, inserted_mm: f64, covered_mm: f64, points: &mut Vec<ContactPoint>) {
+    if covered_mm == 0.0 {
+        return;
+    }
+    let bare = inserted_mm - covered_mm;
+    let kept = points.iter().position(|p| p.from_tip_mm >= bare).unwrap_or(points.len());
+    let next = points.get(kept).map_or(inserted_mm, |p| p.from_tip_mm);
+    points.truncate(kept);
+    let Some(last) = points.last_mut() else { return };
+    // Half of the interval to the next point becomes half of that to the end.
+    let step = bare - last.from_tip_mm;
+    last.weight_mm -= 0.5 * (next - bare);
+    let mut end = ContactPoint { from_tip_mm: bare, weight_mm: 0.5 * step, ..*last };
+    end.potential.radius_mm = device.section_at(bare).radius_mm;
+    points.push(end);
+}
+
+/// An element between two distances from the tip of the line, of the instruments whose tips are in it or beyond.
+fn element(stack: &Stack, inserted_mm: &[f64], line: f64, (near, far): (f64, f64)) -> ElementData {
+    let mut data = ElementData::of(near - far, Material::NONE);
+    for ((device, set), inserted) in stack.devices().zip(stack.sets()).zip(inserted_mm) {
+        let behind = line - inserted;
+        if 0.5 * (near + far) <= behind {
+            continue;
+        }
+        let part = between(device, near - behind, far - behind);
+        for (sum, own) in data.bending.iter_mut().zip(part.bending) {
+            *sum += own;
+        }
+        if let Some(set) = set {
+            data.materials[*set] = part;
+        }
+    }
+    data
+}
+
+/// What lies between two distances from the tip of a device, of each section the part that is there.
+fn between(device: &Device, near: f64, far: f64) -> Material {
+    let h = near - far;
+    let mut sum = Material::NONE;
+    let last = device.sections().len() - 1;
+    for (k, (section, begin)) in device.sections().iter().zip(begins(device)).enumerate() {
+        let until = if k == last { f64::INFINITY } else { begin + section.length_mm };
+        if begin <= far && near <= until {
+            return material(section);
+        }
+        let (first, end) = (near.min(until), far.max(begin));
+        if end < first {
+            sum.add_share(&material(section), &shares((near - first) / h, (near - end) / h));
+        }
+    }
+    sum
+}
+
+/// A section, at all Gauss points.
+fn material(section: &Section) -> Material {
+    Material {
+        bending: GAUSS.map(|_| section.bending_stiffness_nmm2),
+        torsion: GAUSS.map(|_| section.torsion_nmm2()),
+        rest_curvature: GAUSS.map(|_| section.rest_curvature_per_mm),
+        rest_twist: [0.0; 3],
+    }
+}

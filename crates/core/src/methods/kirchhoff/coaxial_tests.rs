@@ -1,0 +1,253 @@
+//! Insertions of several instruments.
+
+use crate::device::{Device, Instrument, Section, Stack};
+use crate::insertion::{Command, Move, Sheath, Simulation};
+use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, anatomy};
+use crate::{Result, Vec3};
+
+const WIRE: usize = 0;
+const CATHETER: usize = 1;
+
+fn instrument(name: &str, sections: [Section; 2]) -> Instrument {
+    Instrument { name: name.to_owned(), device: Device::new(sections.to_vec()).unwrap(), may_lead: true }
+}
+
+/// A hooked wire in a bent catheter.
+fn wire_in_catheter() -> Stack {
+    let wire = Section::straight(330.0, 0.2, 20.0);
+    let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(250.0, 0.8, 60.0) };
+    let tip = |section: Section, length_mm, curvature| Section {
+        length_mm,
+        rest_curvature_per_mm: [curvature, 0.0],
+        ..section
+    };
+    Stack::new(vec![
+        instrument("wire", [tip(wire, 15.0, 0.06), wire]),
+        instrument("catheter", [tip(catheter, 30.0, 0.02), catheter]),
+    ])
+    .unwrap()
+}
+
+/// Instruments at the mouth of a straight tube.
+fn in_tube(stack: impl Into<Stack>, radius_mm: f64) -> Simulation {
+    along((0..16).map(|i| Vec3::z() * (20.0 * f64::from(i))), radius_mm, stack)
+}
+
+/// Instruments at the mouth of a tube about these points.
+fn along(axis: impl Iterator<Item = Vec3>, radius_mm: f64, stack: impl Into<Stack>) -> Simulation {
+    let node =
+        |(i, position_mm): (usize, Vec3)| CentrelineNode { position_mm, radius_mm, parent: i.checked_sub(1) };
+    let tree = CentrelineTree::new(axis.enumerate().map(node).collect()).unwrap();
+    let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.4 * radius_mm)).unwrap();
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
+    Simulation::builder(made.wall, stack, sheath).build().unwrap()
+}
+
+fn push(simulation: &mut Simulation, moves: &[(usize, f64)]) -> Result<f64> {
+    let each =
+        moves.iter().map(|(instrument, mm)| Move { instrument: *instrument, command: Command::advance(*mm) });
+    simulation.step_together(&each.collect::<Vec<_>>()).map(|report| report.energy.total())
+}
+
+/// The catheter 80 mm in and turned, the wire 1 mm farther.
+fn both_in(radius_mm: f64) -> Simulation {
+    let mut simulation = in_tube(wire_in_catheter(), radius_mm);
+    push(&mut simulation, &[(WIRE, 1.0)]).unwrap();
+    for _ in 0..20 {
+        push(&mut simulation, &[(WIRE, 4.0), (CATHETER, 4.0)]).unwrap();
+    }
+    let turn = Move { instrument: CATHETER, command: Command::rotate(0.7) };
+    simulation.step_together(&[turn]).unwrap();
+    simulation
+}
+
+/// Slope of the energy by its differences.
+fn slope(energies: &[f64], step_mm: f64) -> f64 {
+    let [a, b, _, d, e] = energies else { panic!("{energies:?}") };
+    (8.0 * (d - b) - (e - a)) / (12.0 * step_mm)
+}
+
+/// Advances the wire out of the catheter, and returns energies and the wire's push forces.
+fn advanced(simulation: &mut Simulation, step_mm: f64, count: usize) -> (Vec<f64>, Vec<f64>) {
+    let step = |_| {
+        let energy = push(simulation, &[(WIRE, step_mm)]).unwrap();
+        assert!(simulation.report().converged);
+        (energy, simulation.report().instruments[WIRE].push_force_n.unwrap())
+    };
+    (0..count).map(step).unzip()
+}
+
+/// Largest jump of five energies over their smooth trend: it is there three times in fourth differences, and what is smooth hardly at all.
+fn jump(w: &[f64]) -> f64 {
+    (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs() / 3.0
+}
+
+#[test]
+fn an_end_passes_through_the_mesh_without_a_jump_and_hands_feel_the_slope() {
+    let mut simulation = both_in(120.0);
+    let (step_mm, count) = (0.1, 400);
+    let (energies, forces) = advanced(&mut simulation, step_mm, count);
+    let largest = energies.iter().copied().fold(0.0, f64::max);
+    let strongest = forces.iter().fold(0.0f64, |most, f| most.max(f.abs()));
+    // Where the hook's end leaves the catheter the force jumps, and the energy has a kink.
+    let kink = |k: usize| (1.0 + step_mm * (k + 1) as f64 - 15.0).abs() < 1.01 * step_mm;
+    for k in (0..count - 4).filter(|first| !(*first..first + 5).any(kink)) {
+        let window = &energies[k..k + 5];
+        assert!(jump(window) <= 1e-6 * largest, "{} of {largest} after {k} steps", jump(window));
+        let off = (forces[k + 2] - slope(window, step_mm)).abs();
+        assert!(off <= 1e-3 * strongest, "{off} of {strongest} after {k} steps");
+    }
+}
+
+#[test]
+fn the_catheter_feels_the_slope_of_its_own_insertion_and_turn() {
+    let mut simulation = both_in(120.0);
+    push(&mut simulation, &[(WIRE, 12.3)]).unwrap();
+    let step_mm = 0.05;
+    let energies: Vec<f64> = (-2..=2)
+        .map(|k| push(&mut simulation.clone(), &[(CATHETER, step_mm * f64::from(k))]).unwrap())
+        .collect();
+    let told = simulation.report().instruments[CATHETER];
+    let (found, force) = (slope(&energies, step_mm), told.push_force_n.unwrap());
+    assert!((found - force).abs() < 1e-3 * force.abs(), "{found} and {force}");
+    let step_rad = 0.02;
+    let turned = |k: i32| {
+        let turn = Command::rotate(step_rad * f64::from(k));
+        let turn = Move { instrument: CATHETER, command: turn };
+        simulation.clone().step_together(&[turn]).unwrap().energy.total()
+    };
+    let found = slope(&(-2..=2).map(turned).collect::<Vec<_>>(), step_rad);
+    assert!(
+        (found - told.torque_nmm).abs() < 1e-3 * told.torque_nmm.abs(),
+        "{found} and {}",
+        told.torque_nmm
+    );
+}
+
+/// What is outermost feels the wall: the line of both is that of one device with their stiffness and the catheter's radius.
+#[test]
+fn straight_instruments_of_one_length_are_one_device() {
+    let one = |name: &str, section: Section| Instrument {
+        name: name.to_owned(),
+        device: Device::new(vec![section]).unwrap(),
+        may_lead: true,
+    };
+    let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
+    let wire = Section::straight(150.0, 0.2, 20.0);
+    let stack = Stack::new(vec![one("wire", wire), one("catheter", catheter)]).unwrap();
+    let mut both = in_tube(stack, 3.0);
+    let mut single = in_tube(Device::uniform(150.0, 0.8, 80.0).unwrap(), 3.0);
+    for _ in 0..30 {
+        push(&mut both, &[(WIRE, 2.0), (CATHETER, 2.0)]).unwrap();
+        single.step(Command::advance(2.0)).unwrap();
+    }
+    for (a, b) in both.shape().positions_mm.iter().zip(&single.shape().positions_mm) {
+        assert!((a - b).norm() < 1e-9, "{a} and {b}");
+    }
+}
+
+#[test]
+fn a_refused_command_changes_nothing_and_a_wire_is_exchanged() {
+    let mut instruments = wire_in_catheter().instruments().to_vec();
+    instruments.insert(
+        0,
+        instrument("other", [Section::straight(10.0, 0.3, 4.0), Section::straight(300.0, 0.3, 30.0)]),
+    );
+    let mut simulation = in_tube(Stack::new(instruments).unwrap(), 20.0);
+    let (other, wire, catheter) = (0, 1, 2);
+    for _ in 0..10 {
+        push(&mut simulation, &[(wire, 4.0), (catheter, 3.0)]).unwrap();
+    }
+    let bytes = |simulation: &Simulation| serde_json::to_vec(&simulation.state()).unwrap();
+    let before = bytes(&simulation);
+    for (moves, told) in [
+        (vec![(other, 1.0)], "other.radius_mm = 0.3: \"wire\" has no lumen"),
+        (vec![(wire, 1.0), (wire, 1.0)], "moved twice"),
+        (vec![(7, 1.0)], "move[0].instrument = 7"),
+        (vec![(wire, 1e3)], "wire.advance_mm = 1000"),
+        (vec![(catheter, -31.0)], "catheter.retract_mm = 31"),
+    ] {
+        let error = push(&mut simulation, &moves).unwrap_err().to_string();
+        assert!(error.contains(told), "{error}");
+        assert_eq!(bytes(&simulation), before);
+    }
+    for _ in 0..10 {
+        push(&mut simulation, &[(wire, -4.0)]).unwrap();
+    }
+    for _ in 0..9 {
+        push(&mut simulation, &[(other, 4.0)]).unwrap();
+    }
+    let told: Vec<f64> = simulation.report().instruments.iter().map(|i| i.inserted_mm.round()).collect();
+    assert_eq!(told, [36.0, 0.0, 30.0]);
+    push(&mut simulation, &[(other, -36.0), (catheter, -30.0)]).unwrap();
+    assert_eq!(simulation.report().inserted_mm, 0.0);
+    assert_eq!(simulation.shape().positions_mm.len(), 1);
+}
+/// Energy and the wire's push force.
+fn felt(simulation: &Simulation) -> (f64, f64) {
+    let report = simulation.report();
+    assert!(report.converged);
+    (report.energy.total(), report.instruments[WIRE].push_force_n.unwrap())
+}
+
+/// Largest change of the energy on the wire's way that its force does not account for, mJ. Where that is more than `bar_mj` the way is
+/// cut: what is smooth becomes less by squares, and a jump stays.
+fn unaccounted(simulation: &mut Simulation, way_mm: f64, bar_mj: f64) -> f64 {
+    let start = simulation.clone();
+    let (before, pushed) = felt(simulation);
+    push(simulation, &[(WIRE, way_mm)]).unwrap();
+    let (after, pushes) = felt(simulation);
+    let off = (after - before - 0.5 * way_mm * (pushed + pushes)).abs();
+    if off <= bar_mj || way_mm < 1e-4 {
+        return off;
+    }
+    *simulation = start;
+    let first = unaccounted(simulation, 0.5 * way_mm, bar_mj);
+    first.max(unaccounted(simulation, 0.5 * way_mm, bar_mj))
+}
+
+/// Pushes the wire on by 0.1 mm at a time: its energy has no jumps, and now and then all hands feel slopes of it.
+fn feels_slopes(simulation: &mut Simulation, steps: usize) {
+    let bar_mj = 1e-6 * felt(simulation).0;
+    for k in 0..steps {
+        let off = unaccounted(simulation, 0.1, bar_mj);
+        assert!(off <= bar_mj, "{off} of {bar_mj} mJ in step {k}");
+        // Marks change at whole millimetres, which an odd number of steps does not come to: there the energy has a jump, if a small one, and
+        // no slope.
+        for instrument in [WIRE, CATHETER].into_iter().filter(|_| k % 8 == 0) {
+            let step_mm = 0.01;
+            let at = |k: i32| push(&mut simulation.clone(), &[(instrument, step_mm * f64::from(k))]).unwrap();
+            let found = slope(&(-2..=2).map(at).collect::<Vec<_>>(), step_mm);
+            let told = simulation.report().instruments[instrument].push_force_n.unwrap();
+            assert!((found - told).abs() < 1e-3 * told.abs(), "{found} and {told} N in step {k}");
+        }
+    }
+}
+
+#[test]
+fn in_a_bend_no_energy_jumps_and_hands_feel_its_slope() {
+    // Straight for 30 mm, then an arc of radius 40 mm.
+    let place = |s: f64| {
+        let angle = (s - 30.0).max(0.0) / 40.0;
+        Vec3::new(40.0 * (1.0 - angle.cos()), 0.0, s.min(30.0) + 40.0 * angle.sin())
+    };
+    let mut simulation = along((0..36).map(|i| place(4.0 * f64::from(i))), 4.0, wire_in_catheter());
+    push(&mut simulation, &[(WIRE, 1.0)]).unwrap();
+    for _ in 0..20 {
+        push(&mut simulation, &[(WIRE, 4.0), (CATHETER, 4.0)]).unwrap();
+    }
+    feels_slopes(&mut simulation, 100);
+}
+
+#[test]
+fn in_the_arch_no_energy_jumps_and_hands_feel_its_slope() {
+    let tree = anatomy::tree("aortic_arch").unwrap();
+    let made = GeneratedWall::new(&tree, anatomy::asset_resolution("aortic_arch")).unwrap();
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0).unwrap();
+    let mut simulation = Simulation::builder(made.wall, wire_in_catheter(), sheath).build().unwrap();
+    push(&mut simulation, &[(WIRE, 20.0)]).unwrap();
+    for _ in 0..44 {
+        push(&mut simulation, &[(WIRE, 4.0), (CATHETER, 4.0)]).unwrap();
+    }
+    feels_slopes(&mut simulation, 400);
+}

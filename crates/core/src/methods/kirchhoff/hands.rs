@@ -1,0 +1,106 @@
+//! Where the hands are: of a device alone one, of several instruments one each.
+
+use crate::device::Stack;
+use crate::insertion::{Command, InstrumentReport, Move, StepReport};
+
+/// Retracting to within this of the sheath, mm, is retracting to it.
+const ZERO_LENGTH_MM: f64 = 1e-9;
+
+/// What a hand has done since the start.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Hand {
+    /// Length inserted, mm.
+    pub(super) inserted_mm: f64,
+    /// Turn, rad.
+    pub(super) turn_rad: f64,
+}
+
+/// Advance, mm, and turn, rad, of a hand.
+pub(super) type Motion = [f64; 2];
+
+/// What a report tells of one hand: of a device alone the whole.
+pub(super) fn told(report: &StepReport, index: usize) -> InstrumentReport {
+    report.instruments.get(index).copied().unwrap_or(InstrumentReport {
+        inserted_mm: report.inserted_mm,
+        rotation_rad: report.rotation_rad,
+        tip_rotation_rad: report.tip_rotation_rad,
+        push_force_n: Some(report.push_force_n),
+        torque_nmm: report.torque_nmm,
+    })
+}
+
+/// Sets `motions` to what takes the hands of a state to `hands`.
+pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<Motion>) {
+    motions.clear();
+    motions.extend(hands.iter().enumerate().map(|(index, hand)| {
+        let was = told(report, index);
+        [hand.inserted_mm - was.inserted_mm, hand.turn_rad - was.rotation_rad]
+    }));
+}
+
+/// Sets `hands` to where those of a state are.
+pub(super) fn read(report: &StepReport, hands: &mut Vec<Hand>) {
+    hands.clear();
+    hands.extend((0..report.instruments.len().max(1)).map(|index| {
+        let own = told(report, index);
+        Hand { inserted_mm: own.inserted_mm, turn_rad: own.rotation_rad }
+    }));
+}
+
+/// The lengths inserted.
+pub(super) fn lengths(hands: &[Hand]) -> Vec<f64> {
+    hands.iter().map(|hand| hand.inserted_mm).collect()
+}
+
+/// Length of the line, mm.
+pub(super) fn line_mm(hands: &[Hand]) -> f64 {
+    hands.iter().map(|hand| hand.inserted_mm).fold(0.0, f64::max)
+}
+
+/// The way of all hands in a command, which they go together.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Way {
+    /// Where it starts.
+    pub(super) start: Vec<Hand>,
+    /// Where it ends.
+    pub(super) target: Vec<Hand>,
+    /// What each hand does.
+    pub(super) commands: Vec<Command>,
+}
+
+impl Way {
+    /// Sets the way of these moves from a state.
+    pub(super) fn begin(&mut self, stack: &Stack, report: &StepReport, moves: &[Move]) {
+        read(report, &mut self.start);
+        self.commands.clear();
+        self.commands.resize(self.start.len(), Command::default());
+        for one in moves {
+            self.commands[one.instrument] = one.command;
+        }
+        self.target.clear();
+        for ((hand, command), device) in self.start.iter().zip(&self.commands).zip(stack.devices()) {
+            let target = (hand.inserted_mm + command.advance_mm).min(device.length_mm());
+            let inserted_mm = if target < ZERO_LENGTH_MM { 0.0 } else { target };
+            self.target.push(Hand { inserted_mm, turn_rad: hand.turn_rad + command.rotate_rad });
+        }
+    }
+
+    /// Sets `hands` to where they are at this part of the way, 0 to 1.
+    pub(super) fn at(&self, part: f64, hands: &mut Vec<Hand>) {
+        hands.clear();
+        for ((start, target), command) in self.start.iter().zip(&self.target).zip(&self.commands) {
+            let (from, to) = (start.inserted_mm, target.inserted_mm);
+            let inserted_mm = if part == 1.0 { to } else { from + (to - from) * part };
+            hands.push(Hand { inserted_mm, turn_rad: start.turn_rad + command.rotate_rad * part });
+        }
+    }
+
+    /// Longest way of a hand, mm, a turn of `turn_rad` counting as one.
+    pub(super) fn travel_mm(&self, turn_rad: f64) -> f64 {
+        let each =
+            self.start.iter().zip(&self.target).zip(&self.commands).map(|((start, target), command)| {
+                (target.inserted_mm - start.inserted_mm).abs().max(command.rotate_rad.abs() / turn_rad)
+            });
+        each.fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,142 @@
+//! What the hand of each of several instruments feels: slopes of the energy with respect to its own insertion and turn.
+//!
+//! By the envelope theorem the derivative of the discrete energy with respect to an inserted length is that in the mesh alone, while
+//! tangents, chords over lengths and angles stay as they are: ends of the instrument and of its sections take their nodes along, and so do
+//! its contact points. It is exact for the mesh. Few elements change with it, of which differences of energies are taken; contact points
+//! move, and do the work of the forces that they have. What the sheath no longer stores, ½EI|κ⁰|² a length, is part of it.
+
+use super::Environment;
+use super::coaxial::{Nodes, line_mm};
+use super::configuration::{Configuration, Start};
+use super::hands::{Hand, lengths};
+use super::mesh::Mesh;
+use crate::Vec3;
+use crate::contact::Touch;
+use crate::insertion::InstrumentReport;
+use crate::rod::{Clamp, RodState, element_energy};
+
+/// Step of the differences, as a part of the shortest element.
+const STEP: f64 = 1e-5;
+/// Steps within which ends meet, and by which a contact point or its weight changes at most.
+const MEET: f64 = 4.0;
+
+/// A contact point that presses on the wall, by its number.
+pub(super) type Pressed = (usize, Touch);
+
+/// Sets the reports of several instruments whose hands are there.
+pub(super) fn write_instruments<const C: usize>(
+    environment: &Environment<'_>,
+    hands: &[Hand],
+    clamp: Option<&Clamp>,
+    pressed: &[Pressed],
+    at: &mut Configuration,
+) {
+    let sets = environment.surroundings.stack.sets();
+    let inserted = lengths(hands);
+    let nodes = Nodes::new(environment.surroundings.stack, &inserted, environment.options.element_mm);
+    let mut told = Vec::with_capacity(hands.len());
+    for (index, hand) in hands.iter().enumerate() {
+        let set = sets[index].filter(|_| hand.inserted_mm > 0.0);
+        let twist = set.map_or(0.0, |set| {
+            let from_tip = line_mm(&inserted) - hand.inserted_mm;
+            let off = |i: &usize| (at.mesh.from_tip_mm[*i] - from_tip).abs();
+            let tip = (0..at.mesh.from_tip_mm.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
+            at.state.rod.twist_to(tip.unwrap_or(0), set)
+        });
+        told.push(InstrumentReport {
+            inserted_mm: hand.inserted_mm,
+            rotation_rad: hand.turn_rad,
+            tip_rotation_rad: hand.turn_rad + twist,
+            push_force_n: push_force::<C>(environment, &nodes, (index, &inserted), pressed, at.start()),
+            torque_nmm: set.zip(clamp).map_or(0.0, |(set, clamp)| clamp.torques[set]),
+        });
+    }
+    let report = &mut at.parts().1.report;
+    (report.rotation_rad, report.tip_rotation_rad) = (told[0].rotation_rad, told[0].tip_rotation_rad);
+    report.push_force_n = told.iter().filter_map(|i| i.push_force_n).sum();
+    report.torque_nmm = told.iter().map(|i| i.torque_nmm).sum();
+    report.instruments = told;
+}
+
+/// Force with which one hand pushes; none where it jumps.
+fn push_force<const C: usize>(
+    environment: &Environment<'_>,
+    nodes: &Nodes,
+    (index, inserted_mm): (usize, &[f64]),
+    pressed: &[Pressed],
+    at: Start<'_>,
+) -> Option<f64> {
+    let stack = environment.surroundings.stack;
+    let shortest = at.mesh.elements.iter().map(|e| e.length).fold(f64::INFINITY, f64::min);
+    let (own, step) = (inserted_mm[index], STEP * shortest);
+    let meets = |(other, end): (usize, &f64)| other != index && (end - own).abs() <= MEET * step;
+    if own <= MEET * step || inserted_mm.iter().enumerate().any(meets) {
+        return None;
+    }
+    let beside = |by: f64| {
+        let mut inserted = inserted_mm.to_vec();
+        inserted[index] += by;
+        Beside::new(environment, nodes, &inserted, at)
+    };
+    let (back, on) = (beside(-step), beside(step));
+    let stored = 0.5 * (on.stored_more_than::<C>(&back, at) / step);
+    // Where a point comes or goes on one side, the other tells.
+    let wall = match (back.keeps_points(at.mesh, step), on.keeps_points(at.mesh, step)) {
+        (true, true) => 0.5 * (on.wall_slope(pressed, at, step) + back.wall_slope(pressed, at, -step)),
+        (false, true) => on.wall_slope(pressed, at, step),
+        (true, false) => back.wall_slope(pressed, at, -step),
+        (false, false) if pressed.is_empty() => 0.0,
+        (false, false) => return None,
+    };
+    let mouth = stack.instruments()[index].device.section_at(own);
+    let [u, v] = mouth.rest_curvature_per_mm;
+    let straightening = 0.5 * mouth.bending_stiffness_nmm2 * (u * u + v * v);
+    Some(stored + wall - straightening)
+}
+
+/// Instruments with other lengths inserted, near by, and the unknowns as they are.
+struct Beside {
+    mesh: Mesh,
+    rod: RodState,
+}
+
+impl Beside {
+    fn new(environment: &Environment<'_>, nodes: &Nodes, inserted_mm: &[f64], at: Start<'_>) -> Self {
+        let surroundings = &environment.surroundings;
+        let mut mesh = Mesh::default();
+        nodes.mesh(surroundings.stack, inserted_mm, surroundings.properties.modulus_n_per_mm2, &mut mesh);
+        let mut rod = at.state.rod.clone();
+        rod.place(&mesh.elements);
+        Self { mesh, rod }
+    }
+
+    /// By how much more energy the rod stores than on the other side, mJ.
+    fn stored_more_than<const C: usize>(&self, other: &Self, at: Start<'_>) -> f64 {
+        let pairs = self.mesh.elements.iter().zip(&other.mesh.elements).enumerate();
+        let changed = pairs.filter(|(_, (here, there))| here != there);
+        let more = changed.map(|(e, (here, there))| {
+            let state = at.state.rod.element::<C>(e);
+            element_energy::<C>(here, &state).total() - element_energy::<C>(there, &state).total()
+        });
+        more.sum()
+    }
+
+    /// Whether contact points are the same as those `at` the place.
+    fn keeps_points(&self, at: &Mesh, step_mm: f64) -> bool {
+        let near = |a: f64, b: f64| (a - b).abs() <= MEET * step_mm;
+        let mut pairs = self.mesh.points.iter().zip(&at.points);
+        self.mesh.points.len() == at.points.len()
+            && pairs.all(|(a, b)| near(a.from_tip_mm, b.from_tip_mm) && near(a.weight_mm, b.weight_mm))
+    }
+
+    /// Slope of the wall's energy towards here, N: points that press move against their forces, and stand for more or less length.
+    fn wall_slope(&self, pressed: &[Pressed], at: Start<'_>, step_mm: f64) -> f64 {
+        let each = pressed.iter().map(|(index, touch)| {
+            let (was, is) = (&at.mesh.points[*index], &self.mesh.points[*index]);
+            let moved: Vec3 = is.position(&self.mesh.elements, &self.rod) - touch.contact.position_mm;
+            let widened = (is.weight_mm - was.weight_mm) / was.weight_mm;
+            (widened * touch.energy_mj - touch.contact.force_n * touch.contact.normal.dot(&moved)) / step_mm
+        });
+        each.sum()
+    }
+}

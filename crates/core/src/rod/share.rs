@@ -1,0 +1,35 @@
+//! An instrument that is in a part of an element: what it is made of there, as weights of the element's Gauss points.
+
+use super::element::Material;
+use super::quadrature::GAUSS;
+
+/// Weights of the Gauss points in the integral over a part of an element, in units of their weights in that over all of it.
+pub fn shares(from: f64, to: f64) -> [f64; 3] {
+    let power = |n: i32| (to.powi(n) - from.powi(n)) / f64::from(n);
+    let [a, b, c] = GAUSS.map(|point| point.xi);
+    // ∫ (ξ − p)(ξ − q) over the part.
+    let product = |p: f64, q: f64| power(3) - (p + q) * power(2) + p * q * power(1);
+    [
+        product(b, c) / ((a - b) * (a - c) * GAUSS[0].weight),
+        product(a, c) / ((b - a) * (b - c) * GAUSS[1].weight),
+        product(a, b) / ((c - a) * (c - b) * GAUSS[2].weight),
+    ]
+}
+
+impl Material {
+    /// Adds a share of a section to what else an instrument is made of there; rest states are means, weighed by stiffness.
+    pub fn add_share(&mut self, part: &Self, shares: &[f64; 3]) {
+        for k in 0..3 {
+            let (bending, torsion) = (shares[k] * part.bending[k], shares[k] * part.torsion[k]);
+            let (all_bending, all_torsion) = (self.bending[k] + bending, self.torsion[k] + torsion);
+            for a in 0..2 {
+                let moment =
+                    self.bending[k] * self.rest_curvature[k][a] + bending * part.rest_curvature[k][a];
+                self.rest_curvature[k][a] = moment / all_bending;
+            }
+            self.rest_twist[k] =
+                (self.torsion[k] * self.rest_twist[k] + torsion * part.rest_twist[k]) / all_torsion;
+            (self.bending[k], self.torsion[k]) = (all_bending, all_torsion);
+        }
+    }
+}
