@@ -47,6 +47,9 @@ const GRID_SHRINK: f64 = 0.95;
 /// Non-manifold edges that one grid may make by chance.
 const CHANCE_FAULTS: usize = 8;
 
+/// Cells before the plane of an end from which on an edge is not cut away with it.
+const CLEAR_OF_CUT: f64 = 4.0;
+
 /// Target of coarsening over edge length, so that it and the plain grid give about the same number of triangles.
 const COARSENING: f64 = 1.0;
 
@@ -251,11 +254,12 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<TrimmedNet
             attempt *= GRID_SHRINK;
             continue;
         }
-        // Cutting takes away such edges near an end only.
+        // Cutting takes away such edges near an end and beyond its plane only. Evening out moves them by a cell or so.
         let stays = |&(v, _): &(u32, u32)| {
             ends.iter().all(|end| {
-                let off = (nets.vertices[v as usize] - end.centre).norm();
-                off > 2.0 * (1.2 * end.radius + field.extension + 3.0 * attempt)
+                let offset = nets.vertices[v as usize] - end.centre;
+                offset.dot(&end.outward) < -CLEAR_OF_CUT * attempt
+                    || offset.norm() > 2.0 * (1.2 * end.radius + field.extension + 3.0 * attempt)
             })
         };
         if crowded.iter().any(stays) {
