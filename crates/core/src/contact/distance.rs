@@ -168,6 +168,7 @@ impl SmoothWall {
             passing_mm: PASSING * thickest_mm,
         };
         smooth.measure_insets(mesh);
+        smooth.lists.prepare(&smooth.quadrics);
         smooth
     }
 

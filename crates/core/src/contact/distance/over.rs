@@ -1,17 +1,19 @@
 //! Which vertices may reach a point over a triangle.
 //!
-//! Lists are made when they are first asked for: a device comes near few triangles of a fine mesh, and the thicker it is the longer
-//! they are.
+//! On a mesh of many triangles a list is made when it is first asked for: a device comes near few of them, and the finer the mesh and
+//! the thicker the device the longer are the lists.
 
 use std::collections::HashSet;
 use std::sync::OnceLock;
 
 use super::Quadric;
-use crate::Vec3;
 use crate::contact::fit::Neighbours;
+use crate::{Vec3, parallel};
 
 /// Height above the surface up to which lists are complete, in radii of the thickest device and in supports.
 const HEIGHT: (f64, f64) = (1.5, 0.5);
+/// Most triangles whose lists are all made at once.
+const AT_ONCE: usize = 100_000;
 
 /// For every triangle, the vertices whose support may reach a point over it.
 #[derive(Debug, Clone)]
@@ -29,17 +31,36 @@ impl Lists {
         Self { triangles, neighbours, height_mm: HEIGHT.0 * thickest_mm, known }
     }
 
+    /// Makes all lists of a mesh that is small enough, so that steps allocate nothing.
+    pub(super) fn prepare(&self, quadrics: &[Quadric]) {
+        if self.known.len() > AT_ONCE {
+            return;
+        }
+        parallel::parts(self.known.len(), |part| {
+            let (mut seen, mut list) = (vec![u32::MAX; quadrics.len()], Vec::new());
+            for triangle in part {
+                let is_new = marking(&mut seen, triangle);
+                self.gather(quadrics, triangle, |q| self.reach_mm(q), is_new, &mut list);
+                self.known[triangle].get_or_init(|| list.as_slice().into());
+            }
+        });
+    }
+
     /// The list of a triangle; its corners come first.
     #[inline]
     pub(super) fn of(&self, quadrics: &[Quadric], triangle: usize) -> &[u32] {
         self.known[triangle].get_or_init(|| {
-            let reach = |q: &Quadric| q.half_axes_mm.1 + self.height_mm.max(HEIGHT.1 * q.half_axes_mm.0);
             // Only asked, never iterated: its order cannot reach the result.
             let mut seen = HashSet::new();
             let mut list = Vec::new();
-            self.gather(quadrics, triangle, reach, |v| seen.insert(v), &mut list);
+            self.gather(quadrics, triangle, |q| self.reach_mm(q), |v| seen.insert(v), &mut list);
             list.into_boxed_slice()
         })
+    }
+
+    /// How far from a triangle a vertex may be that reaches points over it, mm.
+    fn reach_mm(&self, q: &Quadric) -> f64 {
+        q.half_axes_mm.1 + self.height_mm.max(HEIGHT.1 * q.half_axes_mm.0)
     }
 
     /// Puts into `list` the vertices that reach points of a triangle itself in front of the surface, for triangle after triangle: `seen`
@@ -51,8 +72,7 @@ impl Lists {
         seen: &mut [u32],
         list: &mut Vec<u32>,
     ) {
-        let is_new = |v: u32| std::mem::replace(&mut seen[v as usize], triangle as u32) != triangle as u32;
-        self.gather(quadrics, triangle, |q| q.farthest_mm, is_new, list);
+        self.gather(quadrics, triangle, |q| q.farthest_mm, marking(seen, triangle), list);
     }
 
     /// The vertices within their `reach` of a triangle, over the surface and not through space: the other side of a thin septum is
@@ -83,6 +103,12 @@ impl Lists {
     }
 }
 
+/// Whether a vertex is met for the first time from a triangle, for triangle after triangle.
+fn marking(seen: &mut [u32], triangle: usize) -> impl FnMut(u32) -> bool {
+    let mark = triangle as u32;
+    move |v| std::mem::replace(&mut seen[v as usize], mark) != mark
+}
+
 #[cfg(test)]
 mod tests {
     use crate::contact::SmoothWall;
@@ -92,7 +118,8 @@ mod tests {
     fn lists_are_the_same_whoever_asks_first_and_begin_with_the_corners() {
         let tree = anatomy::tree("aortic_arch").unwrap();
         let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(3.0)).unwrap().wall;
-        let (one, other) = (SmoothWall::new(&wall, 0.5), SmoothWall::new(&wall, 0.5));
+        let (mut one, other) = (SmoothWall::new(&wall, 0.5), SmoothWall::new(&wall, 0.5));
+        one.lists.known.iter_mut().for_each(|list| *list = std::sync::OnceLock::new());
         let triangles = wall.mesh().triangles.len();
         let length = |t: usize| one.list(t).len();
         std::thread::scope(|scope| {
