@@ -99,9 +99,7 @@ const MISFIT: f64 = 5.0;
 
 /// Refuses a device that is in the wall from the start. Further in a vessel may be narrower: there the device does not pass.
 fn check_mouth(query: &WallQuery, device: &Device, sheath: &Sheath) -> Result<()> {
-    let Some(near) = query.nearest(&sheath.position_mm, f64::MAX) else { return Ok(()) };
-    // At the rim of an opening the distance has no sign.
-    let room_mm = near.distance_mm.abs();
+    let room_mm = query.distance_mm(&sheath.position_mm);
     let thickest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
     match device.sections().iter().map(|s| s.radius_mm).enumerate().max_by(thickest) {
         Some((section, radius_mm)) if radius_mm > room_mm => Err(Error::parameter(

@@ -30,6 +30,7 @@ pub use conditioning::{Conditioned, Conditioning, condition};
 pub use generate::{GeneratedWall, Resolution};
 pub use hints::unit_hint;
 pub use mesh::SurfaceMesh;
+pub(crate) use mesh::inward_vertex_normals;
 pub use opening::Opening;
 pub use query::{Nearest, WallQuery};
 pub use recipe::{NoStore, WallRecipe, WallStore};
