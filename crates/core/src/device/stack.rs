@@ -64,6 +64,21 @@ impl Stack {
         Ok(Self { instruments, sets })
     }
 
+    /// The same instruments with a set of material angles each: friction twists straight ones too.
+    ///
+    /// # Errors
+    /// More than three instruments.
+    pub fn twisted(mut self) -> Result<Self> {
+        if self.sets.len() > MAX_ANGLES {
+            let mend = format!(
+                "friction twists every instrument, and at most {MAX_ANGLES} on one line may be twisted: leave some out, or set friction to 0"
+            );
+            return Err(Error::parameter("instrument", self.sets.len(), mend));
+        }
+        self.sets.iter_mut().enumerate().for_each(|(index, set)| *set = Some(index));
+        Ok(self)
+    }
+
     /// The instruments, the innermost first.
     pub fn instruments(&self) -> &[Instrument] {
         &self.instruments
@@ -85,7 +100,7 @@ impl Stack {
         self.instruments.iter().map(|instrument| &instrument.device)
     }
 
-    /// Set of material angles of each instrument: those with a shape of their own have one.
+    /// Set of material angles of each instrument: those with a shape of their own have one, and all where friction twists them.
     pub fn sets(&self) -> &[Option<usize>] {
         &self.sets
     }

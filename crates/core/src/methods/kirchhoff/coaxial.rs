@@ -103,13 +103,16 @@ impl Nodes {
             }
             alone.build_points(device, inserted, self.element_mm, modulus_n_per_mm2);
             cover(device, inserted, covered, &mut alone.points);
+            let set = stack.sets()[index].unwrap_or(0);
             for point in &alone.points {
                 let from_tip_mm = line - inserted + point.from_tip_mm;
                 while e > 0 && from_tip_mm >= mesh.from_tip_mm[e] {
                     e -= 1;
                 }
                 let xi = 1.0 - (from_tip_mm - mesh.from_tip_mm[e + 1]) / mesh.elements[e].length;
-                mesh.points.push(ContactPoint { element: e, xi: xi.clamp(0.0, 1.0), from_tip_mm, ..*point });
+                let (element, xi) = (e, xi.clamp(0.0, 1.0));
+                let felt = ContactPoint { element, xi, instrument: index, set, from_tip_mm, ..*point };
+                mesh.points.push(felt);
             }
         }
     }

@@ -1,19 +1,19 @@
 //! Insertions of several instruments.
 
 use crate::device::{Device, Instrument, Section, Stack};
-use crate::insertion::{Command, Move, Sheath, Simulation};
+use crate::insertion::{Command, Move, Sheath, Simulation, WallProperties};
 use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, anatomy};
 use crate::{Result, Vec3};
 
-const WIRE: usize = 0;
-const CATHETER: usize = 1;
+pub(super) const WIRE: usize = 0;
+pub(super) const CATHETER: usize = 1;
 
 fn instrument(name: &str, sections: [Section; 2]) -> Instrument {
     Instrument { name: name.to_owned(), device: Device::new(sections.to_vec()).unwrap(), may_lead: true }
 }
 
 /// A hooked wire in a bent catheter.
-fn wire_in_catheter() -> Stack {
+pub(super) fn wire_in_catheter() -> Stack {
     let wire = Section::straight(330.0, 0.2, 20.0);
     let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(250.0, 0.8, 60.0) };
     let tip = |section: Section, length_mm, curvature| Section {
@@ -35,15 +35,35 @@ fn in_tube(stack: impl Into<Stack>, radius_mm: f64) -> Simulation {
 
 /// Instruments at the mouth of a tube about these points.
 fn along(axis: impl Iterator<Item = Vec3>, radius_mm: f64, stack: impl Into<Stack>) -> Simulation {
+    rubbing(axis, radius_mm, stack, 0.0)
+}
+
+/// The same, of a wall with this coefficient of friction.
+pub(super) fn rubbing(
+    axis: impl Iterator<Item = Vec3>,
+    radius_mm: f64,
+    stack: impl Into<Stack>,
+    friction: f64,
+) -> Simulation {
     let node =
         |(i, position_mm): (usize, Vec3)| CentrelineNode { position_mm, radius_mm, parent: i.checked_sub(1) };
     let tree = CentrelineTree::new(axis.enumerate().map(node).collect()).unwrap();
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.4 * radius_mm)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
-    Simulation::builder(made.wall, stack, sheath).build().unwrap()
+    let properties = WallProperties { friction, ..WallProperties::default() };
+    Simulation::builder(made.wall, stack, sheath).properties(properties).build().unwrap()
 }
 
-fn push(simulation: &mut Simulation, moves: &[(usize, f64)]) -> Result<f64> {
+/// Straight for 30 mm, then an arc of radius 40 mm.
+pub(super) fn bend() -> impl Iterator<Item = Vec3> {
+    let place = |s: f64| {
+        let angle = (s - 30.0).max(0.0) / 40.0;
+        Vec3::new(40.0 * (1.0 - angle.cos()), 0.0, s.min(30.0) + 40.0 * angle.sin())
+    };
+    (0..36).map(move |i| place(4.0 * f64::from(i)))
+}
+
+pub(super) fn push(simulation: &mut Simulation, moves: &[(usize, f64)]) -> Result<f64> {
     let each =
         moves.iter().map(|(instrument, mm)| Move { instrument: *instrument, command: Command::advance(*mm) });
     simulation.step_together(&each.collect::<Vec<_>>()).map(|report| report.energy.total())
@@ -226,12 +246,7 @@ fn feels_slopes(simulation: &mut Simulation, steps: usize) {
 
 #[test]
 fn in_a_bend_no_energy_jumps_and_hands_feel_its_slope() {
-    // Straight for 30 mm, then an arc of radius 40 mm.
-    let place = |s: f64| {
-        let angle = (s - 30.0).max(0.0) / 40.0;
-        Vec3::new(40.0 * (1.0 - angle.cos()), 0.0, s.min(30.0) + 40.0 * angle.sin())
-    };
-    let mut simulation = along((0..36).map(|i| place(4.0 * f64::from(i))), 4.0, wire_in_catheter());
+    let mut simulation = along(bend(), 4.0, wire_in_catheter());
     push(&mut simulation, &[(WIRE, 1.0)]).unwrap();
     for _ in 0..20 {
         push(&mut simulation, &[(WIRE, 4.0), (CATHETER, 4.0)]).unwrap();

@@ -99,6 +99,8 @@ impl Mesh {
                 self.points.push(ContactPoint {
                     element: e,
                     xi: 1.0 - at / length,
+                    instrument: 0,
+                    set: 0,
                     from_tip_mm: ends[1] + at,
                     weight_mm: half_beyond + 0.5 * step,
                     potential: WallPotential { modulus_n_per_mm2, radius_mm },

@@ -16,6 +16,8 @@
 mod blocked;
 mod coaxial;
 #[cfg(test)]
+mod coaxial_friction_tests;
+#[cfg(test)]
 mod coaxial_tests;
 mod command;
 mod configuration;
@@ -93,17 +95,12 @@ impl MethodChoice for KirchhoffOptions {
     }
 }
 
-/// The method for several instruments, with a set of angles for each that has a shape of its own.
+/// The method for several instruments, with the sets of angles that they have.
 fn several(
     options: KirchhoffOptions,
     surroundings: &Surroundings<'_>,
     store: &dyn WallStore,
 ) -> Result<Box<dyn Method>> {
-    let friction = surroundings.properties.largest_friction();
-    if friction > 0.0 {
-        let mend = "several instruments slide on the wall without friction: set it to 0, or push one device";
-        return Err(Error::parameter("wall.friction", friction, mend));
-    }
     Ok(match surroundings.stack.sets().iter().flatten().count() {
         0 => Box::new(Kirchhoff::<PLAIN>::new(options, surroundings, store)?),
         1 => Box::new(Kirchhoff::<TWISTED>::new(options, surroundings, store)?),

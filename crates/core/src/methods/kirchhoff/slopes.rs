@@ -135,7 +135,10 @@ impl Beside {
             let (was, is) = (&at.mesh.points[*index], &self.mesh.points[*index]);
             let moved: Vec3 = is.position(&self.mesh.elements, &self.rod) - touch.contact.position_mm;
             let widened = (is.weight_mm - was.weight_mm) / was.weight_mm;
-            (widened * touch.energy_mj - touch.contact.force_n * touch.contact.normal.dot(&moved)) / step_mm
+            let turned = is.angle(&self.rod) - was.angle(&self.rod);
+            let rubbed = touch.contact.friction_n.dot(&moved) + touch.friction_nmm * turned;
+            let work = touch.contact.force_n * touch.contact.normal.dot(&moved) + rubbed;
+            (widened * touch.energy_mj - work) / step_mm
         });
         each.sum()
     }

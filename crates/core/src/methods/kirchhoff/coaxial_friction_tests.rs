@@ -1,0 +1,121 @@
+//! Insertions of several instruments that rub on the wall.
+
+use super::coaxial_tests::{CATHETER, WIRE, bend, push, rubbing, wire_in_catheter};
+use crate::device::{Device, Instrument, Section, Stack};
+use crate::insertion::{Command, Move, Simulation};
+use crate::methods::State;
+
+const FRICTION: f64 = 0.2;
+
+fn one(name: &str, section: Section) -> Instrument {
+    let device = Device::new(vec![section]).unwrap();
+    Instrument { name: name.to_owned(), device, may_lead: true }
+}
+
+/// The catheter 80 mm in, the wire 14 mm farther.
+fn both_in() -> Simulation {
+    let mut simulation = rubbing(bend(), 4.0, wire_in_catheter(), FRICTION);
+    push(&mut simulation, &[(WIRE, 14.0)]).unwrap();
+    for _ in 0..40 {
+        push(&mut simulation, &[(WIRE, 2.0), (CATHETER, 2.0)]).unwrap();
+    }
+    simulation
+}
+
+/// Whether all friction is within the cone of Coulomb's law, and how much of it slips.
+fn slipping(simulation: &Simulation) -> f64 {
+    let (mut slips, mut all) = (0.0, 0.0);
+    for contact in &simulation.report().contacts {
+        let most = FRICTION * contact.force_n;
+        assert!(contact.friction_n.norm() <= 1.001 * most + 1e-6, "{contact:?}");
+        all += most;
+        slips += contact.friction_n.norm();
+    }
+    slips / all
+}
+
+/// Of instruments of one length that go together the outer one rubs, and is twisted by that alone.
+#[test]
+fn a_catheter_over_a_soft_wire_is_a_catheter() {
+    let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
+    let torsional_stiffness_nmm2 = Some(catheter.torsion_nmm2());
+    let stack = vec![one("wire", Section::straight(150.0, 0.2, 0.06)), one("catheter", catheter)];
+    let both = Section { bending_stiffness_nmm2: 60.06, torsional_stiffness_nmm2, ..catheter };
+    let mut single = rubbing(bend(), 4.0, Device::new(vec![both]).unwrap(), FRICTION);
+    let mut both = rubbing(bend(), 4.0, Stack::new(stack).unwrap(), FRICTION);
+    for k in 0..70 {
+        let command = Command { advance_mm: if k < 50 { 2.0 } else { -0.5 }, rotate_rad: 0.05 };
+        let moves = [WIRE, CATHETER].map(|instrument| Move { instrument, command });
+        both.step_together(&moves).unwrap();
+        single.step(command).unwrap();
+        let (told, alone) = (both.report(), single.report());
+        assert!(told.converged && alone.converged);
+        for (a, b) in both.shape().positions_mm.iter().zip(&single.shape().positions_mm) {
+            assert!((a - b).norm() < 1e-4, "{a} and {b} in step {k}");
+        }
+        let (torque, expected) = (told.instruments[CATHETER].torque_nmm, alone.torque_nmm);
+        assert!((torque - expected).abs() <= 1e-3 * expected.abs() + 1e-9, "{torque} and {expected}: {k}");
+        assert!(told.instruments[WIRE].torque_nmm.abs() < 1e-9);
+        let (taken, expected) = (told.dissipated_mj, alone.dissipated_mj);
+        assert!((taken - expected).abs() <= 1e-3 * expected, "{taken} and {expected} mJ in step {k}");
+    }
+}
+
+#[test]
+fn hands_put_in_what_is_stored_and_rubbed_away_and_no_force_leaves_its_cone() {
+    let mut simulation = both_in();
+    // Of a tip that is pushed along the wall slip is told from the way that is traced in front of it, and a part of the work with it.
+    for moves in [&[(WIRE, -0.1)][..], &[(CATHETER, -0.1)], &[(WIRE, -0.1), (CATHETER, -0.05)]] {
+        let (mut work, mut taken) = (0.0, 0.0);
+        let felt = |simulation: &Simulation| {
+            let told = &simulation.report().instruments;
+            moves.iter().map(|(i, mm)| told[*i].push_force_n.unwrap() * mm).sum::<f64>()
+        };
+        // The first steps turn friction around.
+        for _ in 0..10 {
+            push(&mut simulation, moves).unwrap();
+        }
+        let before = simulation.report().energy.total();
+        for k in 0..50 {
+            let was = felt(&simulation);
+            push(&mut simulation, moves).unwrap();
+            assert!(simulation.report().converged, "{moves:?}, step {k}");
+            work += 0.5 * (was + felt(&simulation));
+            taken += simulation.report().dissipated_mj;
+            assert!(slipping(&simulation) > 0.5);
+        }
+        let stored = simulation.report().energy.total() - before;
+        let off = (work - stored - taken).abs();
+        assert!(off < 0.01 * taken && taken > 0.0, "{moves:?}: {work} = {stored} + {taken} mJ");
+    }
+}
+
+#[test]
+fn a_step_with_friction_can_be_taken_again_and_a_refused_one_changes_nothing() {
+    let mut simulation = both_in();
+    let bytes = |simulation: &Simulation| serde_json::to_vec(&simulation.state()).unwrap();
+    let before = bytes(&simulation);
+    let moves = |mm: f64| [(WIRE, 1.5), (CATHETER, mm)];
+    assert!(push(&mut simulation, &moves(1e3)).is_err());
+    assert_eq!(bytes(&simulation), before);
+    push(&mut simulation, &moves(-0.5)).unwrap();
+    let after = bytes(&simulation);
+    let mut other = both_in();
+    push(&mut other, &[(CATHETER, 2.0)]).unwrap();
+    let state: State = serde_json::from_slice(&before).unwrap();
+    other.restore(&state).unwrap();
+    push(&mut other, &moves(-0.5)).unwrap();
+    assert_eq!(bytes(&other), after);
+}
+
+#[test]
+fn more_than_three_instruments_that_rub_are_refused() {
+    let each = (0..4).map(|k| {
+        let radius_mm = 0.2 + 0.2 * f64::from(k);
+        let section = Section::straight(50.0, radius_mm, 1.0);
+        one(&format!("tube {k}"), Section { inner_radius_mm: Some(radius_mm - 0.1), ..section })
+    });
+    let stack = Stack::new(each.collect()).unwrap();
+    let error = stack.twisted().unwrap_err().to_string();
+    assert!(error.starts_with("instrument = 4: friction twists every instrument"), "{error}");
+}
