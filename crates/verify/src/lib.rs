@@ -11,6 +11,7 @@ mod coaxial;
 mod contact;
 pub mod crossing;
 mod cylinder;
+mod ends;
 mod insertion;
 pub mod insertion_stress;
 mod planar;
@@ -218,6 +219,11 @@ pub const FAMILIES: &[Family] = &[
         id: "D4",
         title: "Straight instruments in a close-fitting arc: what pushing costs",
         run: coaxial::straight_in_arc,
+    },
+    Family {
+        id: "D6",
+        title: "An end passes through the mesh: energy without jumps, forces its slopes",
+        run: ends::pass,
     },
 ];
 

@@ -24,6 +24,7 @@ mod configuration;
 mod guess;
 mod hands;
 mod hold;
+mod lateral;
 mod mesh;
 mod readout;
 mod repeat;
@@ -43,7 +44,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::{Counters, FeltWall};
-use crate::insertion::{Command, Move, StepReport, Surroundings};
+use crate::insertion::{Command, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
@@ -242,6 +243,16 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
     fn counters(&self) -> Counters {
         self.counters
+    }
+
+    fn lateral_forces(&self, surroundings: &Surroundings<'_>, instrument: usize) -> Vec<LateralForce> {
+        let environment =
+            Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
+        let mut hands = Vec::new();
+        hands::read(&self.state.report, &mut hands);
+        let mut mesh = Mesh::default();
+        meshed(&environment, &hands, &mut mesh);
+        lateral::lateral_forces::<C>(surroundings.stack, &mesh, &self.state, instrument)
     }
 
     fn state(&self) -> State {
