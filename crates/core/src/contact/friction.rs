@@ -138,6 +138,11 @@ impl HandMotion {
     pub fn advance_mm(&self) -> f64 {
         self.to_mm - self.from_mm
     }
+
+    /// Advance, mm, and turn, rad.
+    pub(crate) fn parts(&self) -> [f64; 2] {
+        [self.advance_mm(), self.turn_rad]
+    }
 }
 
 impl Friction {

@@ -65,6 +65,10 @@ pub struct LateralForce {
     pub force_n: Vec3,
     /// Length of it that the node stands for, mm; 0 where nothing holds it. Where one ends the force is not spread over that: it gathers there.
     pub length_mm: f64,
+    /// Axial force of the inner one, and all that lies in it, behind the node, N.
+    pub tension_n: f64,
+    /// Friction on it along the line, towards the tip, N.
+    pub friction_n: f64,
 }
 
 /// What is seen and felt of an insertion after a step.

@@ -114,6 +114,9 @@ pub struct InstrumentSpec {
     /// Whether its tip may be farther in than that of the instrument in it; it may if absent.
     #[serde(default = "yes")]
     pub may_lead: bool,
+    /// Coulomb coefficient of friction between it and the instruments outside it, along the line; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction: f64,
 }
 
 fn yes() -> bool {
@@ -318,7 +321,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// What is pushed: the device alone, or all instruments.
     ///
     /// # Errors
-    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`].
+    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`] and [`Stack::rubbing`].
     pub fn stack(&self) -> Result<Stack> {
         match (&self.device, self.instrument.is_empty()) {
             (Some(spec), true) => self.read_device("device", &spec.file, &spec.section).map(Stack::from),
@@ -328,7 +331,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                         self.read_device(&format!("instrument[{index}]"), &spec.file, &spec.section)?;
                     Ok(Instrument { name: spec.name.clone(), device, may_lead: spec.may_lead })
                 });
-                Stack::new(each.collect::<Result<_>>()?)
+                let frictions = self.instrument.iter().map(|spec| spec.friction).collect();
+                Stack::new(each.collect::<Result<_>>()?)?.rubbing(frictions)
             }
             (None, true) => {
                 let mend = "give [device], or an [[instrument]] for each of several, the innermost first";

@@ -1,6 +1,7 @@
 //! Insertions of several instruments that rub on the wall.
 
 use super::coaxial_tests::{CATHETER, WIRE, bend, push, rubbing, wire_in_catheter};
+use crate::Vec3;
 use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, Move, Simulation};
 use crate::methods::State;
@@ -118,4 +119,62 @@ fn more_than_three_instruments_that_rub_are_refused() {
     let stack = Stack::new(each.collect()).unwrap();
     let error = stack.twisted().unwrap_err().to_string();
     assert!(error.starts_with("instrument = 4: friction twists every instrument"), "{error}");
+}
+
+/// A wire curved everywhere in a straight catheter, in free space: both make an arc of 90°, in which the wire is pulled by
+/// N₁ = ½EI₁(κ₁² − κ²) where it comes out.
+fn arc(friction: f64) -> Simulation {
+    let wire = Section { rest_curvature_per_mm: [ARC_REST, 0.0], ..Section::straight(165.0, 0.2, 20.0) };
+    let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
+    let stack = Stack::new(vec![one("wire", wire), one("catheter", catheter)]).unwrap();
+    let stack = stack.rubbing(vec![friction, 0.0]).unwrap();
+    let axis = (0..16).map(|i| Vec3::z() * (20.0 * f64::from(i)));
+    let mut simulation = rubbing(axis, 120.0, stack, 0.0);
+    for _ in 0..40 {
+        push(&mut simulation, &[(WIRE, 2.075), (CATHETER, 2.0)]).unwrap();
+    }
+    simulation
+}
+
+const ARC_REST: f64 = 4.0 * std::f64::consts::FRAC_PI_2 / 80.0;
+
+/// Case D5: pulled through an arc of 90° the axial force grows by e^{μφ}, and the catheter is held by as much.
+#[test]
+fn a_wire_that_is_pulled_through_a_bend_obeys_the_capstan_law() {
+    let friction = 0.15;
+    let (mut smooth, mut rough) = (arc(0.0), arc(friction));
+    let curvature: f64 = 0.25 * ARC_REST;
+    let tension = 0.5 * 20.0 * (ARC_REST * ARC_REST - curvature * curvature);
+    for (way, sign) in [(-0.1, 1.0), (0.1, -1.0)] {
+        push(&mut smooth, &[(WIRE, way)]).unwrap();
+        push(&mut rough, &[(WIRE, way)]).unwrap();
+        let rubbed = |index: usize| {
+            let felt = |s: &Simulation| s.report().instruments[index].push_force_n.unwrap();
+            felt(&rough) - felt(&smooth)
+        };
+        let grown = 1.0 - rubbed(WIRE) / tension;
+        let expected = (sign * friction * std::f64::consts::FRAC_PI_2).exp();
+        assert!((grown - expected).abs() < 1e-2 * expected, "{grown} and {expected}");
+        assert!((rubbed(WIRE) + rubbed(CATHETER)).abs() < 1e-9);
+        let taken = rough.report().dissipated_mj - smooth.report().dissipated_mj;
+        assert!((taken - rubbed(WIRE) * way).abs() < 1e-9 && taken > 0.0, "{taken}");
+        for (a, b) in rough.shape().positions_mm.iter().zip(&smooth.shape().positions_mm) {
+            assert!((a - b).norm() < 1e-9);
+        }
+    }
+    push(&mut rough, &[(WIRE, 1.0), (CATHETER, 1.0)]).unwrap();
+    assert!(rough.lateral_forces(WIRE).iter().all(|at| at.friction_n == 0.0));
+}
+
+#[test]
+fn a_coefficient_that_is_none_is_refused() {
+    let stack = wire_in_catheter();
+    for (frictions, told) in [
+        (vec![0.1], "instrument.friction = 1: there are 2 instruments"),
+        (vec![-0.1, 0.0], "instrument[0].friction = -0.1: must be a Coulomb coefficient"),
+        (vec![0.1, 0.1], "instrument[1].friction = 0.1: the last instrument has none outside it"),
+    ] {
+        let error = stack.clone().rubbing(frictions).unwrap_err().to_string();
+        assert!(error.starts_with(told), "{error}");
+    }
 }

@@ -7,10 +7,15 @@
 //! fᵢ = ∂U_inner/∂xᵢ + ∂(N_e c_e)/∂xᵢ,    across the line
 //! ```
 //!
-//! The line knows its axial force and not that of each instrument. But an instrument slides in the others without friction: moved along the
-//! line by the virtual displacement δxᵢ = tᵢ, δtᵢ = κᵢ at one node, it does no work. From its tip on that tells the axial force of one
-//! element after the other; where its tip is not covered it is that of the line. At ends of instruments, where stiffness jumps, the others
-//! exert a couple too, as the play between them is none, and forces there stand for less length than elsewhere.
+//! The line knows its axial force and not that of each instrument. But moved along the line by the virtual displacement δxᵢ = tᵢ,
+//! δtᵢ = κᵢ at one node, an instrument does work against friction alone. From its tip on that tells the axial force of one element after the
+//! other; where its tip is not covered it is that of the line. At ends of instruments, where stiffness jumps, the others exert a couple too,
+//! as the play between them is none, and forces there stand for less length than elsewhere.
+//!
+//! Instruments keep their lengths and share the line, so that one slips in another everywhere by the difference Δ of what their hands do, and
+//! friction along the line is μ|fᵢ| against it wherever they go on slipping. It is a force within the line, and bends nothing. It is felt by both hands,
+//! and builds up in the axial force: around a bend by e^{μφ}, the capstan's law. It depends on nothing that is solved for but what presses,
+//! and is told of an equilibrium that was found without it. Instruments that go together exert none.
 
 use super::coaxial::{element, line_mm};
 use super::mesh::Mesh;
@@ -21,6 +26,11 @@ use crate::insertion::LateralForce;
 use crate::rod::element::ElementSystem;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{Layout, RodState, element_system};
+
+/// Rounds in which the axial force behind a node and the friction there are found: each is nearer by μ times half the angle of an element.
+const ROUNDS: usize = 12;
+/// Least slip between instruments, mm.
+const LEAST_SLIP_MM: f64 = 1e-9;
 
 /// A force at a node, and that in the turn of its tangent.
 #[derive(Debug, Clone, Copy, Default)]
@@ -47,11 +57,13 @@ impl NodeForce {
     }
 }
 
-/// Forces on an instrument and all that lies in it by those outside it, at every node of the line, sheath first.
+/// Forces on an instrument and all that lies in it by those outside it, at every node of the line, sheath first, after the hands have gone by
+/// `motions`.
 pub(super) fn lateral_forces<const C: usize>(
     stack: &Stack,
     mesh: &Mesh,
     state: &KirchhoffState,
+    motions: &[[f64; 2]],
     instrument: usize,
 ) -> Vec<LateralForce> {
     let mut told = vec![LateralForce::default(); mesh.from_tip_mm.len()];
@@ -75,16 +87,52 @@ pub(super) fn lateral_forces<const C: usize>(
         let [near, far, near_pull, far_pull] = parts::<C>(stack, mesh, rod, (i - 1, instrument));
         let (t, curvature) = (rod.frames[i].t, curvature(mesh, rod, i));
         let known = beyond.plus(&far, 1.0);
-        let tension = -known.along(&t, &curvature) / far_pull.along(&t, &curvature);
-        if i <= last {
+        let (along, rate) = (known.along(&t, &curvature), far_pull.along(&t, &curvature));
+        let drag = drag(stack, mesh, motions, (i, instrument));
+        let mut tension = -along / rate;
+        let across = |tension: f64| {
             let force = known.plus(&far_pull, tension).force;
+            force - t * t.dot(&force)
+        };
+        // What presses depends on the axial force behind the node, by the angle that the line turns there.
+        for _ in 0..if drag == 0.0 { 0 } else { ROUNDS } {
+            tension = (drag * across(tension).norm() - along) / rate;
+        }
+        if i <= last {
+            let force_n = across(tension);
             let after = mesh.elements.get(i).filter(|_| i < last).map_or(0.0, |data| data.length);
             let length_mm = 0.5 * (mesh.elements[i - 1].length + after);
-            told[i] = LateralForce { force_n: force - t * t.dot(&force), length_mm };
+            let friction_n = drag * force_n.norm();
+            told[i] = LateralForce { force_n, length_mm, tension_n: tension, friction_n };
         }
         beyond = near.plus(&near_pull, tension);
     }
     told
+}
+
+/// The instrument that rubs on another just behind a node, of those in `instrument` and itself, and that other.
+pub(super) fn pair(mesh: &Mesh, (i, instrument): (usize, usize)) -> Option<(usize, usize)> {
+    let place = mesh.from_tip_mm[0] - 0.5 * (mesh.from_tip_mm[i - 1] + mesh.from_tip_mm[i]);
+    let there = |k: &usize| mesh.inserted_mm[*k] > place;
+    Some(((0..=instrument).rev().find(there)?, (instrument + 1..mesh.inserted_mm.len()).find(there)?))
+}
+
+/// Slip of an instrument in one outside it, mm; what is less than the rounding of lengths is none.
+pub(super) fn slip_mm(motions: &[[f64; 2]], (inner, outer): (usize, usize)) -> f64 {
+    let advance = |k: usize| motions.get(k).map_or(0.0, |motion| motion[0]);
+    let slip = advance(inner) - advance(outer);
+    if slip.abs() > LEAST_SLIP_MM { slip } else { 0.0 }
+}
+
+/// Friction along the line on what is inside at a node, over the force across it.
+fn drag(stack: &Stack, mesh: &Mesh, motions: &[[f64; 2]], at: (usize, usize)) -> f64 {
+    let Some((inner, outer)) = pair(mesh, at).filter(|(inner, _)| stack.friction(*inner) > 0.0) else {
+        return 0.0;
+    };
+    match slip_mm(motions, (inner, outer)) {
+        0.0 => 0.0,
+        slip => -stack.friction(inner) * slip.signum(),
+    }
 }
 
 /// What element `e` of an instrument and those in it exerts at its near and its far node without axial force, and there with a unit of it.

@@ -252,7 +252,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
         hands::read(&self.state.report, &mut hands);
         let mut mesh = Mesh::default();
         meshed(&environment, &hands, &mut mesh);
-        lateral::lateral_forces::<C>(surroundings.stack, &mesh, &self.state, instrument)
+        let motions = self.state.correction.motions();
+        lateral::lateral_forces::<C>(surroundings.stack, &mesh, &self.state, motions, instrument)
     }
 
     fn state(&self) -> State {

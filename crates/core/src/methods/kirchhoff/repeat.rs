@@ -61,11 +61,6 @@ fn middle(state: &RodState, e: usize) -> Vec3 {
     mid_slope(&state.frames[e].t, &state.chords[e], &state.frames[e + 1].t).normalize()
 }
 
-/// Advance and turn of a hand.
-fn parts(motion: &HandMotion) -> [f64; 2] {
-    [motion.advance_mm(), motion.turn_rad]
-}
-
 fn size(motions: impl Iterator<Item = f64>) -> f64 {
     motions.fold(0.0, f64::hypot)
 }
@@ -105,6 +100,11 @@ impl Correction {
         self.turns.clear();
     }
 
+    /// Advance, mm, and turn, rad, of each hand in the step.
+    pub(super) fn motions(&self) -> &[[f64; 2]] {
+        &self.motions
+    }
+
     /// Elements that have learnt.
     pub(super) fn len(&self) -> usize {
         self.departures.len()
@@ -119,7 +119,7 @@ impl Correction {
     /// Remembers the way from the slid device to the equilibrium that was found.
     pub(super) fn learn(&mut self, motions: &[HandMotion], slid: &RodState, found: &RodState) {
         self.clear();
-        self.motions.extend(motions.iter().map(parts));
+        self.motions.extend(motions.iter().map(HandMotion::parts));
         let n = slid.elements();
         let far = |i: usize| (found.frames[i].t - slid.frames[i].t).norm_squared() > LARGEST * LARGEST;
         if (0..=n).any(far) {
@@ -143,7 +143,7 @@ impl Correction {
 
     /// How many of the last motions of the hands these are; `None` if they are others.
     pub(super) fn repeats(&self, motions: &[HandMotion]) -> Option<f64> {
-        let (now, last) = (motions.iter().flat_map(parts), self.motions.iter().flatten());
+        let (now, last) = (motions.iter().flat_map(HandMotion::parts), self.motions.iter().flatten());
         let way = size(now.clone());
         let factor = way / size(last.clone().copied());
         let off = size(now.zip(last).map(|(now, last)| now - factor * last));

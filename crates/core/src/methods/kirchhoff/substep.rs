@@ -152,7 +152,7 @@ impl<const C: usize> Tools<C> {
             return Err(PASSED.into());
         }
         let dissipated_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
-        self.write_report(environment, hands, next);
+        let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
         let (_, after) = next.parts();
         let taken = resort == Some(true) && balanced;
         if !taken && rises(&start.state.report, &after.report, dissipated_mj) {
