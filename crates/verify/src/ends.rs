@@ -6,8 +6,8 @@ use endowire_core::insertion::{Command, Move, Sheath, Simulation};
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, anatomy};
 use endowire_core::{Error, Result, Vec3};
 
-const WIRE: usize = 0;
-const CATHETER: usize = 1;
+pub(super) const WIRE: usize = 0;
+pub(super) const CATHETER: usize = 1;
 /// Advance of a step, mm, and steps: the wire goes through twenty elements of 2 mm.
 const STEP_MM: f64 = 0.1;
 const STEPS: usize = 400;
@@ -35,18 +35,22 @@ fn instruments() -> Result<Stack> {
     ])
 }
 
-fn push(simulation: &mut Simulation, moves: &[(usize, f64)]) -> Result<()> {
+pub(super) fn push(simulation: &mut Simulation, moves: &[(usize, f64)]) -> Result<()> {
     let each =
         moves.iter().map(|(instrument, mm)| Move { instrument: *instrument, command: Command::advance(*mm) });
     let report = simulation.step_together(&each.collect::<Vec<_>>())?;
-    if report.converged { Ok(()) } else { Err(Error::Computation("D6: no equilibrium".to_owned())) }
+    if report.converged {
+        Ok(())
+    } else {
+        Err(Error::Computation("several instruments: no equilibrium".to_owned()))
+    }
 }
 
 fn energy(simulation: &Simulation) -> f64 {
     simulation.report().energy.total()
 }
 
-fn force(simulation: &Simulation, instrument: usize) -> f64 {
+pub(super) fn force(simulation: &Simulation, instrument: usize) -> f64 {
     simulation.report().instruments[instrument].push_force_n.unwrap_or(f64::NAN)
 }
 
@@ -108,18 +112,23 @@ fn pushed_on(place: &str, wall: GeneratedWall, depth_mm: f64, both_mm: f64) -> R
     Ok(rows)
 }
 
-/// In free space and in the arch.
-pub(super) fn pass() -> Result<Vec<Row>> {
+/// A tube so wide that nothing touches it.
+pub(super) fn free_space() -> Result<GeneratedWall> {
     let node = |i: usize| CentrelineNode {
         position_mm: Vec3::z() * (20.0 * i as f64),
         radius_mm: 120.0,
         parent: i.checked_sub(1),
     };
-    let space = CentrelineTree::new((0..16).map(node).collect())?;
-    let space = GeneratedWall::new(&space, Resolution::EdgeMm(48.0))?;
-    let mut rows = pushed_on("in free space", space, 1.0, 80.0)?;
-    let arch = anatomy::tree("aortic_arch")?;
-    let arch = GeneratedWall::new(&arch, anatomy::asset_resolution("aortic_arch"))?;
+    let tree = CentrelineTree::new((0..16).map(node).collect())?;
+    GeneratedWall::new(&tree, Resolution::EdgeMm(48.0))
+}
+
+/// In free space and in the arch.
+pub(super) fn pass() -> Result<Vec<Row>> {
+    let mut rows = pushed_on("in free space", free_space()?, 1.0, 80.0)?;
+    let name = "aortic_arch";
+    let arch = anatomy::tree(name).ok_or_else(|| Error::parameter("anatomy", name, "is not built in"))?;
+    let arch = GeneratedWall::new(&arch, anatomy::asset_resolution(name))?;
     rows.extend(pushed_on("in the arch", arch, 2.0, 176.0)?);
     Ok(rows)
 }

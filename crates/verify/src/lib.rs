@@ -6,6 +6,7 @@
 
 mod bench;
 mod capstan;
+mod capstan_within;
 mod channel;
 mod coaxial;
 mod contact;
@@ -219,6 +220,11 @@ pub const FAMILIES: &[Family] = &[
         id: "D4",
         title: "Straight instruments in a close-fitting arc: what pushing costs",
         run: coaxial::straight_in_arc,
+    },
+    Family {
+        id: "D5",
+        title: "A wire pulled through a catheter that rubs on it",
+        run: capstan_within::capstan,
     },
     Family {
         id: "D6",
