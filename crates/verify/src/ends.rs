@@ -21,8 +21,8 @@ const LEAST_MM: f64 = 1e-4;
 /// A jump of the energy over its total.
 const JUMP: f64 = 1e-6;
 
-/// A hooked wire in a bent catheter.
-fn instruments() -> Result<Stack> {
+/// A wire with a hook of this length and curvature in a bent catheter.
+fn instruments((hook_mm, hook_per_mm): (f64, f64)) -> Result<Stack> {
     let one = |name: &str, section: Section, length_mm: f64, curvature: f64| -> Result<Instrument> {
         let tip = Section { length_mm, rest_curvature_per_mm: [curvature, 0.0], ..section };
         let device = Device::new(vec![tip, section])?;
@@ -30,7 +30,7 @@ fn instruments() -> Result<Stack> {
     };
     let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(250.0, 0.8, 60.0) };
     Stack::new(vec![
-        one("wire", Section::straight(330.0, 0.2, 20.0), 15.0, 0.06)?,
+        one("wire", Section::straight(330.0, 0.2, 20.0), hook_mm, hook_per_mm)?,
         one("catheter", catheter, 30.0, 0.02)?,
     ])
 }
@@ -82,12 +82,24 @@ fn slope(simulation: &Simulation, instrument: usize) -> Result<f64> {
     Ok((8.0 * near - far) / (12.0 * DIFFERENCE_MM))
 }
 
-/// Pushes both in, the wire 20 mm farther, so that its hook is out, and then the wire on.
-fn pushed_on(place: &str, wall: GeneratedWall, depth_mm: f64, both_mm: f64) -> Result<Vec<Row>> {
-    let sheath = Sheath::at_opening(&wall.wall, wall.inlet, depth_mm)?;
-    let mut simulation = Simulation::builder(wall.wall, instruments()?, sheath).build()?;
-    push(&mut simulation, &[(WIRE, 20.0)])?;
-    for _ in 0..(both_mm / 4.0) as usize {
+/// A way of the wire: where its hook leaves the catheter the force jumps, and it comes by no such place.
+struct Way {
+    place: &'static str,
+    wall: GeneratedWall,
+    depth_mm: f64,
+    /// Length and curvature of the wire's hook, mm and 1/mm.
+    hook: (f64, f64),
+    /// Length of the catheter that is in, and by how much the wire's is more, mm.
+    inserted_mm: f64,
+    ahead_mm: f64,
+}
+
+/// Pushes both in, and then the wire on.
+fn pushed_on(way: Way) -> Result<Vec<Row>> {
+    let sheath = Sheath::at_opening(&way.wall.wall, way.wall.inlet, way.depth_mm)?;
+    let mut simulation = Simulation::builder(way.wall.wall, instruments(way.hook)?, sheath).build()?;
+    push(&mut simulation, &[(WIRE, way.ahead_mm)])?;
+    for _ in 0..(way.inserted_mm / 4.0) as usize {
         push(&mut simulation, &[(WIRE, 4.0), (CATHETER, 4.0)])?;
     }
     let (mut jump, mut worst) = (0.0f64, [(0.0, 0.0, -1.0); 2]);
@@ -102,7 +114,7 @@ fn pushed_on(place: &str, wall: GeneratedWall, depth_mm: f64, both_mm: f64) -> R
             }
         }
     }
-    let name = format!("D6 {place}, 400 steps of 0.1 mm");
+    let name = format!("D6 {}, 400 steps of 0.1 mm", way.place);
     let quantity = "change of the energy that no force accounts for";
     let mut rows = vec![Row::with_error(&name, quantity, jump, 0.0, jump, JUMP)];
     for (instrument, (told, found, error)) in ["wire", "catheter"].into_iter().zip(worst) {
@@ -125,10 +137,23 @@ pub(super) fn free_space() -> Result<GeneratedWall> {
 
 /// In free space and in the arch.
 pub(super) fn pass() -> Result<Vec<Row>> {
-    let mut rows = pushed_on("in free space", free_space()?, 1.0, 80.0)?;
+    let mut rows = pushed_on(Way {
+        place: "in free space",
+        wall: free_space()?,
+        depth_mm: 1.0,
+        hook: (80.0, 0.02),
+        inserted_mm: 80.0,
+        ahead_mm: 1.0,
+    })?;
     let name = "aortic_arch";
     let arch = anatomy::tree(name).ok_or_else(|| Error::parameter("anatomy", name, "is not built in"))?;
-    let arch = GeneratedWall::new(&arch, anatomy::asset_resolution(name))?;
-    rows.extend(pushed_on("in the arch", arch, 2.0, 176.0)?);
+    rows.extend(pushed_on(Way {
+        place: "in the arch",
+        wall: GeneratedWall::new(&arch, anatomy::asset_resolution(name))?,
+        depth_mm: 2.0,
+        hook: (15.0, 0.06),
+        inserted_mm: 176.0,
+        ahead_mm: 20.0,
+    })?);
     Ok(rows)
 }
