@@ -135,6 +135,12 @@ pub struct SheathSpec {
     pub position_mm: Option<[f64; 3]>,
     /// Direction of insertion, any length.
     pub direction: Option<[f64; 3]>,
+    /// Friction of the valve, N; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction_n: f64,
+    /// Coulomb coefficient in the mouth; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction: f64,
 }
 
 /// Instruments that are in at the start are pushed there together, the farthest by so much a step, mm.
@@ -159,9 +165,9 @@ impl SheathSpec {
     /// The sheath in `wall`.
     ///
     /// # Errors
-    /// An opening that is not there, keys that contradict each other, values that are not finite.
+    /// An opening that is not there, keys that contradict each other, values that are not finite or out of range.
     pub fn place(&self, wall: &Wall) -> Result<Sheath> {
-        match (self.opening, self.position_mm, self.direction) {
+        let sheath = match (self.opening, self.position_mm, self.direction) {
             (Some(opening), None, None) => {
                 Sheath::at_opening(wall, opening, self.depth_mm.unwrap_or(DEPTH_MM))
             }
@@ -173,7 +179,8 @@ impl SheathSpec {
                 self.given(),
                 "give either opening (with depth_mm if wanted) or position_mm and direction",
             )),
-        }
+        }?;
+        sheath.rubbing(self.friction_n, self.friction)
     }
 }
 

@@ -3,8 +3,9 @@
 use super::coaxial_tests::{CATHETER, WIRE, bend, push, rubbing, wire_in_catheter};
 use crate::Vec3;
 use crate::device::{Device, Instrument, Section, Stack};
-use crate::insertion::{Command, Move, Simulation};
+use crate::insertion::{Command, Move, Sheath, Simulation};
 use crate::methods::State;
+use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution};
 
 const FRICTION: f64 = 0.2;
 
@@ -177,4 +178,48 @@ fn a_coefficient_that_is_none_is_refused() {
         let error = stack.clone().rubbing(frictions).unwrap_err().to_string();
         assert!(error.starts_with(told), "{error}");
     }
+}
+
+/// A catheter alone in a bend, pushed and turned through this sheath.
+fn through(friction_n: f64, friction: f64) -> Vec<(f64, f64, f64)> {
+    let tree = bend().enumerate().map(|(i, position_mm)| CentrelineNode {
+        position_mm,
+        radius_mm: 4.0,
+        parent: i.checked_sub(1),
+    });
+    let made = GeneratedWall::new(&CentrelineTree::new(tree.collect()).unwrap(), Resolution::EdgeMm(1.6));
+    let made = made.unwrap();
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
+    let sheath = sheath.rubbing(friction_n, friction).unwrap();
+    let device = Device::uniform(150.0, 0.8, 60.0).unwrap();
+    let mut simulation = Simulation::builder(made.wall, device, sheath).build().unwrap();
+    for _ in 0..30 {
+        simulation.step(Command::advance(2.0)).unwrap();
+    }
+    let commands = [Command::advance(1.0), Command::advance(-1.0), Command::rotate(0.5), Command::default()];
+    commands
+        .into_iter()
+        .map(|command| {
+            let told = simulation.step(command).unwrap();
+            (told.push_force_n, told.torque_nmm, told.dissipated_mj)
+        })
+        .collect()
+}
+
+#[test]
+fn a_valve_holds_against_the_hand_and_moves_nothing_inside() {
+    let (smooth, tight, rough) = (through(0.0, 0.0), through(0.3, 0.0), through(0.0, 0.2));
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    for (k, (push, torque, taken)) in
+        [(0.3, 0.0, 0.3), (-0.3, 0.0, 0.3), (0.0, 0.24, 0.12)].into_iter().enumerate()
+    {
+        near(tight[k].0 - smooth[k].0, push);
+        near(tight[k].1 - smooth[k].1, torque);
+        near(tight[k].2 - smooth[k].2, taken);
+    }
+    assert!(rough[0].0 > smooth[0].0 && rough[1].0 < smooth[1].0);
+    let told = |error: crate::Error| error.to_string();
+    let sheath = Sheath::new(Vec3::zeros(), Vec3::z()).unwrap();
+    assert!(told(sheath.rubbing(-1.0, 0.0).unwrap_err()).starts_with("sheath.friction_n = -1"));
+    assert!(told(sheath.rubbing(0.0, 3.0).unwrap_err()).starts_with("sheath.friction = 3"));
 }

@@ -29,8 +29,8 @@ use crate::rod::{Layout, RodState, element_system};
 
 /// Rounds in which the axial force behind a node and the friction there are found: each is nearer by μ times half the angle of an element.
 const ROUNDS: usize = 12;
-/// Least slip between instruments, mm.
-const LEAST_SLIP_MM: f64 = 1e-9;
+/// Least slip, mm: less is the rounding of lengths.
+pub(super) const LEAST_SLIP_MM: f64 = 1e-9;
 
 /// A force at a node, and that in the turn of its tangent.
 #[derive(Debug, Clone, Copy, Default)]

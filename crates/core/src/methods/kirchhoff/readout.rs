@@ -3,17 +3,18 @@
 use super::Environment;
 use super::configuration::Configuration;
 use super::hands::Hand;
-use super::lateral::{lateral_forces, pair, slip_mm};
+use super::lateral::{LEAST_SLIP_MM, lateral_forces, pair, slip_mm};
 use super::slopes::write_instruments;
 use super::workspace::Tools;
 use crate::contact::extension::left_through;
 use crate::contact::{HandMotion, WallContact};
 use crate::device::Stack;
-use crate::insertion::Energy;
+use crate::insertion::{Energy, Surroundings};
 use crate::rod::{Clamp, Layout};
 
 impl<const C: usize> Tools<C> {
-    /// Read-outs at a configuration, that of the last sub-step. Returns the energy that friction between instruments took, mJ.
+    /// Read-outs at a configuration, that of the last sub-step. Returns the energy that friction between instruments and in the sheath took,
+    /// mJ.
     pub(super) fn write_report(
         &mut self,
         environment: &Environment<'_>,
@@ -63,7 +64,8 @@ impl<const C: usize> Tools<C> {
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
         if surroundings.stack.is_several() {
             write_instruments::<C>(environment, hands, Some(&clamp), &pressed, at);
-            return if surroundings.stack.rubs() { self.rub(surroundings.stack, at) } else { 0.0 };
+            let taken_mj = if surroundings.stack.rubs() { self.rub(surroundings.stack, at) } else { 0.0 };
+            return taken_mj + self.rub_in_sheath(surroundings, &clamp, at);
         }
         let frame = rod.material_frame(0);
         let data = &mesh.elements[0].materials[0];
@@ -73,7 +75,37 @@ impl<const C: usize> Tools<C> {
         if Layout::<C>::ANGLES > 0 {
             report.tip_rotation_rad += rod.twist();
         }
-        0.0
+        self.rub_in_sheath(surroundings, &clamp, at)
+    }
+
+    /// What a hand feels of friction in the sheath, that of the outermost instrument in it, is added to the report; returns the energy that
+    /// it took, mJ.
+    fn rub_in_sheath(&self, surroundings: &Surroundings<'_>, clamp: &Clamp, at: &mut Configuration) -> f64 {
+        let sheath = surroundings.sheath;
+        if !sheath.rubs() {
+            return 0.0;
+        }
+        let outermost = at.mesh.inserted_mm.iter().rposition(|mm| *mm > 0.0).unwrap_or(0);
+        let inserted_mm = at.mesh.inserted_mm.get(outermost).copied().unwrap_or(at.mesh.from_tip_mm[0]);
+        let device = &surroundings.stack.instruments()[outermost].device;
+        let radius_mm = device.section_at(inserted_mm).radius_mm;
+        let [advance_mm, turn_rad] = self.guess.motions[outermost].parts();
+        let slip_mm = advance_mm.hypot(radius_mm * turn_rad);
+        if slip_mm <= LEAST_SLIP_MM {
+            return 0.0;
+        }
+        let across = clamp.force - sheath.direction * clamp.force.dot(&sheath.direction);
+        let friction_n = sheath.friction_n + sheath.friction * across.norm();
+        let push_n = friction_n * advance_mm / slip_mm;
+        let torque_nmm = friction_n * radius_mm * radius_mm * turn_rad / slip_mm;
+        let report = &mut at.parts().1.report;
+        report.push_force_n += push_n;
+        report.torque_nmm += torque_nmm;
+        if let Some(told) = report.instruments.get_mut(outermost) {
+            told.push_force_n = told.push_force_n.map(|push| push + push_n);
+            told.torque_nmm += torque_nmm;
+        }
+        friction_n * slip_mm
     }
 
     /// What hands feel of friction between instruments is added to the report; returns the energy that it took, mJ.
