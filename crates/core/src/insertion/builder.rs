@@ -55,13 +55,14 @@ impl<'a> SimulationBuilder<'a> {
     ///
     /// # Errors
     /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
-    /// tell, wall properties or method options out of range, and what the method cannot do.
+    /// tell, wall properties or method options out of range, more than three instruments with friction, and what the method cannot do.
     pub fn build(self) -> Result<Simulation> {
         let Self { wall, stack, sheath, properties, method, store } = self;
         properties.check(wall.mesh())?;
         check_inside(&wall, &sheath)?;
         let query = WallQuery::new(&wall)?;
         stack.devices().try_for_each(|device| check_mouth(&query, device, &sheath))?;
+        let stack = if stack.is_several() && properties.rubs() { stack.twisted()? } else { stack };
         let scene = Environment { wall, properties, query, sheath, stack };
         let own = KirchhoffOptions::default();
         let method = method.unwrap_or(&own);

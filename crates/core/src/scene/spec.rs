@@ -114,6 +114,9 @@ pub struct InstrumentSpec {
     /// Whether its tip may be farther in than that of the instrument in it; it may if absent.
     #[serde(default = "yes")]
     pub may_lead: bool,
+    /// Coulomb coefficient of friction between it and the instruments outside it, along the line; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction: f64,
 }
 
 fn yes() -> bool {
@@ -132,6 +135,12 @@ pub struct SheathSpec {
     pub position_mm: Option<[f64; 3]>,
     /// Direction of insertion, any length.
     pub direction: Option<[f64; 3]>,
+    /// Friction of the valve, N; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction_n: f64,
+    /// Coulomb coefficient in the mouth; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction: f64,
 }
 
 /// Instruments that are in at the start are pushed there together, the farthest by so much a step, mm.
@@ -156,9 +165,9 @@ impl SheathSpec {
     /// The sheath in `wall`.
     ///
     /// # Errors
-    /// An opening that is not there, keys that contradict each other, values that are not finite.
+    /// An opening that is not there, keys that contradict each other, values that are not finite or out of range.
     pub fn place(&self, wall: &Wall) -> Result<Sheath> {
-        match (self.opening, self.position_mm, self.direction) {
+        let sheath = match (self.opening, self.position_mm, self.direction) {
             (Some(opening), None, None) => {
                 Sheath::at_opening(wall, opening, self.depth_mm.unwrap_or(DEPTH_MM))
             }
@@ -170,7 +179,8 @@ impl SheathSpec {
                 self.given(),
                 "give either opening (with depth_mm if wanted) or position_mm and direction",
             )),
-        }
+        }?;
+        sheath.rubbing(self.friction_n, self.friction)
     }
 }
 
@@ -318,7 +328,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// What is pushed: the device alone, or all instruments.
     ///
     /// # Errors
-    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`].
+    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`] and [`Stack::rubbing`].
     pub fn stack(&self) -> Result<Stack> {
         match (&self.device, self.instrument.is_empty()) {
             (Some(spec), true) => self.read_device("device", &spec.file, &spec.section).map(Stack::from),
@@ -328,7 +338,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                         self.read_device(&format!("instrument[{index}]"), &spec.file, &spec.section)?;
                     Ok(Instrument { name: spec.name.clone(), device, may_lead: spec.may_lead })
                 });
-                Stack::new(each.collect::<Result<_>>()?)
+                let frictions = self.instrument.iter().map(|spec| spec.friction).collect();
+                Stack::new(each.collect::<Result<_>>()?)?.rubbing(frictions)
             }
             (None, true) => {
                 let mend = "give [device], or an [[instrument]] for each of several, the innermost first";
