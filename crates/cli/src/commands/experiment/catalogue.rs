@@ -86,9 +86,8 @@ pub(super) fn procedures() -> Vec<Procedure> {
         vertebral("aortic_arch", &["innominate", "left carotid", "left subclavian"]),
         vertebral("aortic_arch_ii", &["innominate", "left subclavian"]),
         simmons("aortic_arch_ii", &["left carotid"], 72.0),
-        vertebral("aortic_arch_iii", &["left subclavian"]),
+        vertebral("aortic_arch_iii", &["innominate", "left subclavian"]),
         simmons("aortic_arch_iii", &["left carotid"], 72.0),
-        simmons("aortic_arch_iii", &["innominate"], 58.0),
         Procedure {
             anatomy: "hepatic",
             targets: &["right hepatic", "left hepatic"],
