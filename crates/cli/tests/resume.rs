@@ -96,7 +96,9 @@ fn a_run_goes_on_in_the_middle_of_a_line_with_a_condition() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let until = |mm: u32| {
-        format!("advance_mm = {mm}.0\nstep_mm = 4.0\nspeed_mm_per_s = 8.0\nuntil = {{ push_force_n = 0.002 }}")
+        format!(
+            "advance_mm = {mm}.0\nstep_mm = 4.0\nspeed_mm_per_s = 8.0\nuntil = {{ push_force_n = 0.002 }}"
+        )
     };
     let (long, short) = (until(256), until(64));
     let back = "retract_mm = 5.0\nstep_mm = 0.5\nspeed_mm_per_s = 8.0";
