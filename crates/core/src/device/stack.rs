@@ -2,6 +2,7 @@
 
 use super::Device;
 use crate::contact::check_friction;
+use crate::error::nearest_name;
 use crate::rod::MAX_ANGLES;
 use crate::{Error, Result};
 
@@ -149,9 +150,8 @@ impl Stack {
     pub fn find(&self, name: &str) -> Result<usize> {
         let found = self.instruments.iter().position(|instrument| instrument.name == name);
         found.ok_or_else(|| {
-            let alike = |instrument: &Instrument| strsim::jaro_winkler(&instrument.name, name);
-            let nearest = self.instruments.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
-            let nearest = nearest.map_or("", |instrument| &instrument.name);
+            let names = self.instruments.iter().map(|instrument| instrument.name.as_str());
+            let nearest = nearest_name(names, name).unwrap_or_default();
             Error::parameter("instrument", format!("{name:?}"), format!("did you mean {nearest:?}?"))
         })
     }
