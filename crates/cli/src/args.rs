@@ -355,12 +355,23 @@ pub(crate) struct NavigationArgs {
     /// Targets to steer to; all if absent
     #[arg(long, visible_alias = "target", value_delimiter = ',', value_name = "TARGET,…", value_parser = PossibleValuesParser::new(targets()))]
     pub(crate) targets: Vec<String>,
+    /// Steer devices of the catalogue in this folder (assets/devices), wires in catheters: to the branches of three types of the aortic
+    /// arch and to both hepatic arteries
+    #[arg(long, value_name = "DIR")]
+    pub(crate) catalogue: Option<PathBuf>,
     /// Folder for navigation.csv, navigation.json and frames of both views
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the rows as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+impl NavigationArgs {
+    /// Whether a target is asked for.
+    pub(crate) fn wants(&self, target: &str) -> bool {
+        self.targets.is_empty() || self.targets.iter().any(|name| name == target)
+    }
 }
 
 #[derive(Debug, clap::Args)]

@@ -24,11 +24,16 @@ const STEPS: [usize; 5] = [0, 30, 50, 60, 72];
 
 /// A wire with friction in the curved tube, and the first `lines` lines of the script.
 fn scene(folder: &Path, name: &str, lines: usize, views: &str) -> PathBuf {
+    scene_of(folder, name, &SCRIPT[..lines], views)
+}
+
+/// The same with these lines.
+fn scene_of(folder: &Path, name: &str, lines: &[&str], views: &str) -> PathBuf {
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap();
     let text = std::fs::read_to_string(assets.join("scenes/curved_tube_friction.toml")).unwrap();
     let (head, rest) = text.split_once("[[script]]").unwrap();
     let view = &rest[rest.find("[view]").unwrap()..];
-    let script: String = SCRIPT[..lines].iter().map(|line| format!("[[script]]\n{line}\n\n")).collect();
+    let script: String = lines.iter().map(|line| format!("[[script]]\n{line}\n\n")).collect();
     let text = format!("{head}{script}{view}")
         .replace("\"../", &format!("\"{}/", assets.display()))
         .replace("size_px = [640, 640]", "size_px = [24, 16]")
@@ -84,6 +89,41 @@ fn same(a: &Path, b: &Path) {
     for (name, bytes) in &a {
         assert!(bytes == &b[name], "{name} differs");
     }
+}
+
+#[test]
+fn a_run_goes_on_in_the_middle_of_a_line_with_a_condition() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let until = |mm: u32| {
+        format!(
+            "advance_mm = {mm}.0\nstep_mm = 4.0\nspeed_mm_per_s = 8.0\nuntil = {{ push_force_n = 0.002 }}"
+        )
+    };
+    let (long, short) = (until(256), until(64));
+    let back = "retract_mm = 5.0\nstep_mm = 0.5\nspeed_mm_per_s = 8.0";
+    let whole = scene_of(folder.path(), "whole.toml", &[&long, back], "[\"3d\"]");
+    done(&run(&whole, &at("whole"), &[]));
+    let summary: Value = serde_json::from_slice(&std::fs::read(at("whole/summary.json")).unwrap()).unwrap();
+    let line = &summary["until"][0];
+    assert_eq!((&line["line"], &line["met"]), (&"script[0]".into(), &"push_force_n".into()), "{summary}");
+    let steps = line["steps"].as_u64().unwrap();
+    assert!((17..64).contains(&steps), "{summary}");
+    assert_eq!((summary["steps"].as_u64(), summary["steps_asked"].as_u64()), (Some(steps + 10), Some(74)));
+    // One that stops short of the condition, and says so.
+    let part = scene_of(folder.path(), "part.toml", &[&short], "[\"3d\"]");
+    let (out, state) = (at("out"), at("state"));
+    let short = run(&part, &out, &["--save-state".as_ref(), &state]);
+    done(&short);
+    assert!(said(&short).contains("script[0]: its condition (until) was not met"), "{}", said(&short));
+    let rest = at("rest");
+    done(&run(&whole, &rest, &["--resume".as_ref(), &state]));
+    let rows = |out: &Path| std::fs::read_to_string(out.join("steps.csv")).unwrap();
+    let (whole, rest) = (rows(&at("whole")), rows(&rest));
+    assert_eq!(rest.lines().skip(1).collect::<Vec<_>>(), whole.lines().skip(1 + 16).collect::<Vec<_>>());
+    assert!(
+        whole.lines().next().unwrap().ends_with(",time_s") && whole.lines().nth(2).unwrap().ends_with(",1.0")
+    );
 }
 
 #[test]

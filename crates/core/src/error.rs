@@ -130,6 +130,12 @@ pub fn number(value: f64) -> String {
     }
 }
 
+/// The name most like one that is not there; none where there are no names.
+pub(crate) fn nearest_name<'a>(known: impl Iterator<Item = &'a str>, wrong: &str) -> Option<&'a str> {
+    let alike = |name: &str| strsim::jaro_winkler(name, wrong);
+    known.max_by(|a, b| alike(a).total_cmp(&alike(b)))
+}
+
 /// A vector for people.
 pub(crate) fn vector(v: &Vec3) -> String {
     format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))

@@ -10,6 +10,7 @@
 
 pub mod banded;
 pub mod contact;
+pub mod control;
 pub mod device;
 pub mod error;
 pub mod file;

@@ -114,7 +114,7 @@ impl Simulation {
             method.map(|table| document::read("method", table)).transpose()?.unwrap_or_default();
         let nowhere = opening.is_none() && position_mm.is_none() && direction.is_none();
         let opening = opening.or_else(|| nowhere.then(|| vessel.inlet().unwrap_or(0)));
-        let sheath = SheathSpec { opening, depth_mm, position_mm, direction };
+        let sheath = SheathSpec { opening, depth_mm, position_mm, direction, ..SheathSpec::default() };
         let wall = Arc::clone(&vessel.wall);
         let built = interruptible(py, move || -> Result<insertion::Simulation> {
             let sheath = sheath.place(&wall)?;

@@ -6,11 +6,13 @@
 
 mod bench;
 mod capstan;
+mod capstan_within;
 mod channel;
 mod coaxial;
 mod contact;
 pub mod crossing;
 mod cylinder;
+mod ends;
 mod insertion;
 pub mod insertion_stress;
 mod planar;
@@ -218,6 +220,16 @@ pub const FAMILIES: &[Family] = &[
         id: "D4",
         title: "Straight instruments in a close-fitting arc: what pushing costs",
         run: coaxial::straight_in_arc,
+    },
+    Family {
+        id: "D5",
+        title: "A wire pulled through a catheter that rubs on it",
+        run: capstan_within::capstan,
+    },
+    Family {
+        id: "D6",
+        title: "An end passes through the mesh: energy without jumps, forces its slopes",
+        run: ends::pass,
     },
 ];
 

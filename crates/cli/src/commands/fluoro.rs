@@ -32,10 +32,14 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         Studio::new("fluoro", &args.frames, &args.scene, &scene, ViewChoice::Fluoro, folder, frames)?;
     let mut simulation = scene.simulation(&Cache::new(&args.frames.cache)).map_err(in_scene)?;
     let bar = progress::bar(steps, "step");
-    for (index, moves) in script.steps().take(steps).enumerate() {
-        simulation.step_together(moves).map_err(|e| {
+    let mut run = script.begin();
+    for index in 0..steps {
+        // A condition may have ended the script before.
+        let Some(step) = run.next(&simulation)? else { break };
+        simulation.step_together(step.moves).map_err(|e| {
             Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), index + 1))
         })?;
+        run.carried_out();
         bar.inc(1);
     }
     bar.finish_and_clear();

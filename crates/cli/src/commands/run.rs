@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use endowire_core::insertion::Simulation;
+use endowire_core::insertion::{Move, ScriptCourse, ScriptRun, Simulation, Step};
 use endowire_core::methods::MethodChoice;
 use endowire_methods::Scene;
 
@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::output::instruments::Lengths;
 use crate::output::progress;
 use crate::output::provenance::{Provenance, read_input};
-use crate::output::recorder::{InstrumentSummary, Recorder, StepFailure, Summary};
+use crate::output::recorder::{InstrumentSummary, Recorder, StepFailure, Summary, UntilSummary};
 use crate::output::recording::Recording;
 use crate::output::saved::{Course, Saved, Saver};
 use crate::output::{frames::FrameWriter, print_json, tell, whole};
@@ -33,10 +33,15 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
     let mut simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
     let mut saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
-    if let Some(saved) = &saved {
-        saved.restore(&scene, &mut simulation, &script)?;
-    }
     let mut frames = FrameWriter::new(&args.scene, &scene, &simulation)?;
+    let mut times_s = Vec::new();
+    let mut hand = match &saved {
+        Some(saved) => saved.restore(&scene, &mut simulation, &script, |step| {
+            times_s.push(step.time_s.unwrap_or_else(|| frames.time_s(times_s.len() + 1)));
+        })?,
+        None => script.begin(),
+    };
+    let mut next = own(hand.next(&simulation)?);
     let mut inputs = vec![scene.text().as_bytes().to_vec()];
     for path in scene.input_paths() {
         inputs.push(read_input(&path)?);
@@ -46,7 +51,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let mut course = saved.map_or_else(Course::begin, |saved| saved.course());
     let mut recorder = if args.resume.is_some() {
         let (mut recorder, earlier) = Recorder::go_on(&folder, args.force, course.steps, &simulation)?;
-        draw_again(&mut frames, earlier.as_ref(), (&folder, &simulation), script.len(), &mut recorder)?;
+        let times = (times_s.as_slice(), next.is_none());
+        draw_again(&mut frames, earlier.as_ref(), (&folder, &simulation), times, &mut recorder)?;
         recorder
     } else {
         let recorder = Recorder::new(&folder, args.force, simulation.stack())?;
@@ -65,7 +71,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let mut ahead = false;
     let summary = |course: &Course,
                    failure: &Option<StepFailure>,
-                   simulation: &Simulation,
+                   (simulation, hand): (&Simulation, &ScriptRun<'_>),
                    frames: &FrameWriter,
                    recorder: &Recorder| {
         let report = simulation.report();
@@ -84,6 +90,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
             tip_mm: simulation.shape().tip_mm().map(Into::into),
             push_force_n: report.push_force_n,
             torque_nmm: report.torque_nmm,
+            until: until(hand),
             instruments: instruments(simulation),
             energy_mj: report.energy,
             max_penetration_mm: course.max_penetration_mm,
@@ -94,20 +101,25 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
             frames: recorder.frames.clone(),
         }
     };
-    let save = |saver: &mut Option<Saver>, simulation: &Simulation, course: Course, recorder: &Recorder| {
+    let save = |saver: &mut Option<Saver>,
+                simulation: &Simulation,
+                lines: &ScriptCourse,
+                course: Course,
+                recorder: &Recorder| {
         let Some(saver) = saver else { return Ok(()) };
-        saver.save(simulation, &script, course, || recorder.sync())
+        saver.save(simulation, (&script, lines), course, || recorder.sync())
     };
-    recorder.checkpoint(|recorder| summary(&course, &failure, &simulation, &frames, recorder))?;
-    save(&mut saver, &simulation, course, &recorder)?;
-    for (index, moves) in script.steps().enumerate().skip(course.steps) {
+    recorder.checkpoint(|recorder| summary(&course, &failure, (&simulation, &hand), &frames, recorder))?;
+    save(&mut saver, &simulation, hand.course(), course, &recorder)?;
+    while let Some((moves, time_s)) = next.take() {
+        let index = course.steps;
         let failed = |reason: String| Some(StepFailure { step: index + 1, reason });
         if interrupted.load(Ordering::Relaxed) {
             failure = failed("interrupted before it".to_owned());
             break;
         }
         let clock = Instant::now();
-        let result = simulation.step_together(moves);
+        let result = simulation.step_together(&moves);
         course.step_time_s += clock.elapsed().as_secs_f64();
         match result {
             Ok(report) => {
@@ -119,20 +131,27 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
                 break;
             }
         }
-        let last = index + 1 == script.len();
+        hand.carried_out();
+        let time_s = time_s.unwrap_or_else(|| frames.time_s(index + 1));
+        match hand.next(&simulation) {
+            Ok(step) => next = own(step),
+            Err(error) => failure = failed(error.to_string()),
+        }
+        let last = next.is_none();
         let lengths_mm = simulation.report().lengths_mm();
         let seen = (simulation.shape(), lengths_mm.as_slice());
         let recorded = recorder
-            .record(moves, &simulation)
+            .record(&moves, time_s, &simulation)
             .and_then(|()| {
                 course.steps = index + 1;
-                frames.step(index + 1, last, seen, &mut recorder)
+                frames.step((index + 1, time_s), last, seen, &mut recorder)
             })
             .and_then(|()| {
-                recorder.checkpoint(|recorder| summary(&course, &failure, &simulation, &frames, recorder))
+                let now = (&simulation, &hand);
+                recorder.checkpoint(|recorder| summary(&course, &failure, now, &frames, recorder))
             })
             .and_then(|()| match saver.as_ref().is_some_and(Saver::is_due) {
-                true => save(&mut saver, &simulation, course, &recorder),
+                true => save(&mut saver, &simulation, hand.course(), course, &recorder),
                 false => Ok(()),
             });
         if let Err(error) = recorded {
@@ -140,20 +159,26 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
             ahead = recorder.steps() == index;
             break;
         }
+        times_s.push(time_s);
         bar.set_message(format!("{:.1} mm inserted", simulation.report().inserted_mm));
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let saved = if ahead { Ok(()) } else { save(&mut saver, &simulation, course, &recorder) };
+    let saved = if ahead { Ok(()) } else { save(&mut saver, &simulation, hand.course(), course, &recorder) };
     if failure.is_some() && recorder.steps() > 0 {
         // The picture of the end is a help; the first failure is the one to tell.
         let lengths_mm = simulation.report().lengths_mm();
         let seen = (simulation.shape(), lengths_mm.as_slice());
-        let _ = frames.step(recorder.steps(), true, seen, &mut recorder);
+        let now = (recorder.steps(), times_s.last().copied().unwrap_or_default());
+        let _ = frames.step(now, true, seen, &mut recorder);
     }
 
-    let mut summary = summary(&course, &failure, &simulation, &frames, &recorder);
+    let mut summary = summary(&course, &failure, (&simulation, &hand), &frames, &recorder);
     let finished = recorder.finish(&mut summary).and(saved).map_err(Failure::into_computation);
+    for line in summary.until.iter().filter(|line| line.met.is_none()) {
+        let what = "its condition (until) was not met on all of its way";
+        tell(format_args!("{}: {}: {what}, {} steps", args.scene.display(), line.line, line.steps));
+    }
     if args.json {
         print_json(&summary)?;
     } else {
@@ -171,6 +196,18 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
 }
 
+/// The moves of a step and its time, on their own.
+fn own(step: Option<Step<'_>>) -> Option<(Vec<Move>, Option<f64>)> {
+    step.map(|step| (step.moves.to_vec(), step.time_s))
+}
+
+/// How lines with a condition have ended.
+fn until(hand: &ScriptRun<'_>) -> Vec<UntilSummary> {
+    let each = hand.conditions();
+    each.map(|(line, course)| UntilSummary { line: line.to_owned(), steps: course.steps, met: course.met })
+        .collect()
+}
+
 /// What each of several instruments has come to.
 fn instruments(simulation: &Simulation) -> Vec<InstrumentSummary> {
     let each = simulation.stack().instruments().iter().zip(&simulation.report().instruments);
@@ -182,12 +219,12 @@ fn forget_state(path: &Path) -> Result<(), Failure> {
     whole::remove(path).map_err(|e| Failure::write(path, &e))
 }
 
-/// Draws the frames of a recording that goes on once more: the detector remembers those before.
+/// Draws the frames of a recording that goes on once more: the detector remembers those before. `times_s` are those of all steps so far.
 fn draw_again(
     frames: &mut FrameWriter,
     earlier: Option<&Recording>,
     (folder, simulation): (&Path, &Simulation),
-    steps_asked: usize,
+    (times_s, ended): (&[f64], bool),
     recorder: &mut Recorder,
 ) -> Result<(), Failure> {
     let Some(earlier) = earlier else { return Ok(()) };
@@ -197,7 +234,8 @@ fn draw_again(
         let step = before + row;
         let shape = earlier.shape(row);
         let lengths_mm = lengths.after(step, &shape)?;
-        frames.step(step, step == steps_asked, (&shape, &lengths_mm), recorder)?;
+        let last = ended && step == times_s.len();
+        frames.step((step, times_s[step - 1]), last, (&shape, &lengths_mm), recorder)?;
     }
     Ok(())
 }

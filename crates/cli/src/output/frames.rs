@@ -48,10 +48,15 @@ impl FrameWriter {
         self.renderer.as_ref().map(|r| r.backend().to_owned())
     }
 
-    /// Writes the frames of step `step` if they are due; the last step always is.
+    /// Time at the end of a step whose script has no speeds, s: that of its frame.
+    pub(crate) fn time_s(&self, step: usize) -> f64 {
+        step as f64 / self.spec.frames_per_s
+    }
+
+    /// Writes the frames of step `step`, which ends at `time_s`, if they are due; the last step always is.
     pub(crate) fn step(
         &mut self,
-        step: usize,
+        (step, time_s): (usize, f64),
         last: bool,
         (shape, inserted_mm): (&Shape, &[f64]),
         recorder: &mut Recorder,
@@ -59,7 +64,7 @@ impl FrameWriter {
         let due = last || step.is_multiple_of(self.spec.every as usize);
         let Some(renderer) = self.renderer.as_mut().filter(|_| due) else { return Ok(()) };
         let views = self.pushed.views(shape, inserted_mm);
-        let moment = Moment { frame: step as u64, time_s: step as f64 / self.spec.frames_per_s };
+        let moment = Moment { frame: step as u64, time_s };
         let frames = renderer.render_at(&views, moment)?;
         for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {

@@ -34,6 +34,9 @@ struct Row {
     felt_mm: f64,
     /// Its largest radius there.
     felt_radius_mm: f64,
+    /// Sum of the forces across the line by which those outside hold it and what lies in it.
+    #[serde(default)]
+    lateral_n: f64,
 }
 
 /// Writes the table of a run; a device alone has none.
@@ -96,6 +99,7 @@ impl InstrumentTable {
                 torque_nmm: told.torque_nmm,
                 felt_mm,
                 felt_radius_mm: instrument.device.max_radius_within(felt_mm),
+                lateral_n: simulation.lateral_forces(index).iter().map(|at| at.force_n.norm()).sum(),
             })?;
         }
         self.table.flush()

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use endowire_core::device::Stack;
-use endowire_core::insertion::{Energy, InstrumentReport, Move, Simulation};
+use endowire_core::insertion::{Energy, InstrumentReport, Met, Move, Simulation};
 use serde::Serialize;
 
 use super::arrays::{self, ShapeArrays};
@@ -51,6 +51,9 @@ pub(crate) struct Summary {
     pub(crate) push_force_n: f64,
     /// Torque at the end, N·mm.
     pub(crate) torque_nmm: f64,
+    /// Lines of the script with a condition that have ended.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) until: Vec<UntilSummary>,
     /// Each of several instruments at the end.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) instruments: Vec<InstrumentSummary>,
@@ -68,6 +71,17 @@ pub(crate) struct Summary {
     pub(crate) renderer: Option<String>,
     /// Frames, relative to the folder of this file.
     pub(crate) frames: Vec<String>,
+}
+
+/// How a line of the script with a condition has ended.
+#[derive(Debug, Serialize)]
+pub(crate) struct UntilSummary {
+    /// The line.
+    pub(crate) line: String,
+    /// Its steps.
+    pub(crate) steps: usize,
+    /// What has ended it; none where it went all of its way.
+    pub(crate) met: Option<Met>,
 }
 
 /// One of several instruments at the end of a run.
@@ -117,6 +131,7 @@ struct Row {
     nodes_solved: u64,
     angles: bool,
     converged: bool,
+    time_s: f64,
 }
 
 /// How often a run that goes on writes its summary, and has the disk keep what a power failure would take.
@@ -216,8 +231,13 @@ impl Recorder {
         Ok((recorder, recording))
     }
 
-    /// Adds one step; where that fails, the steps before it stay.
-    pub(crate) fn record(&mut self, moves: &[Move], simulation: &Simulation) -> Result<(), Failure> {
+    /// Adds one step, which ends at `time_s`; where that fails, the steps before it stay.
+    pub(crate) fn record(
+        &mut self,
+        moves: &[Move],
+        time_s: f64,
+        simulation: &Simulation,
+    ) -> Result<(), Failure> {
         let (report, shape) = (simulation.report(), simulation.shape());
         let command = moves.first().map(|one| one.command).unwrap_or_default();
         let tip = shape.tip_mm().unwrap_or_default();
@@ -247,6 +267,7 @@ impl Recorder {
             nodes_solved: report.nodes_solved,
             angles: report.angles,
             converged: report.converged,
+            time_s,
         };
         // The row comes last: every step of the table is in the arrays.
         let write_row = || {

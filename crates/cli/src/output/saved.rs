@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use endowire_core::insertion::{Script, Simulation, State};
+use endowire_core::insertion::{Script, ScriptCourse, ScriptRun, Simulation, State, Step};
 use endowire_methods::Scene;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -15,7 +15,7 @@ use super::{seal, whole};
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 3";
+const FORMAT: &str = "endowire state 4";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// What a state belongs to: hashes of all that its steps depended on.
@@ -70,17 +70,25 @@ fn pushed(scene: &Scene, simulation: &Simulation) -> serde_json::Result<Vec<u8>>
     serde_json::to_vec(&each.map(|(one, mm)| (&one.name, one.device.sections(), mm)).collect::<Vec<_>>())
 }
 
-/// Of the first steps of a script.
-fn script_hash(script: &Script, steps: usize, several: bool) -> String {
+/// A script that has come to where a course says, and a hash of the steps up to there; `seen` is given each.
+fn replayed<'a>(
+    script: &'a Script,
+    course: &ScriptCourse,
+    several: bool,
+    mut seen: impl FnMut(Step<'_>),
+) -> endowire_core::Result<(ScriptRun<'a>, String)> {
     let mut numbers = Vec::new();
-    for one in script.steps().take(steps).flatten() {
-        if several {
-            numbers.extend((one.instrument as u64).to_le_bytes());
+    let run = script.go_on(course, |step| {
+        for one in step.moves {
+            if several {
+                numbers.extend((one.instrument as u64).to_le_bytes());
+            }
+            let command = [one.command.advance_mm, one.command.rotate_rad];
+            numbers.extend(command.into_iter().flat_map(f64::to_le_bytes));
         }
-        numbers
-            .extend([one.command.advance_mm, one.command.rotate_rad].into_iter().flat_map(f64::to_le_bytes));
-    }
-    hash(numbers)
+        seen(step);
+    })?;
+    Ok((run, hash(numbers)))
 }
 
 fn hash(bytes: Vec<u8>) -> String {
@@ -115,6 +123,8 @@ struct Header {
     course: Course,
     parts: Parts,
     script: String,
+    /// Steps of each line of the script.
+    lines: ScriptCourse,
 }
 
 /// A state that was read.
@@ -161,13 +171,15 @@ impl Saved {
         self.header.course
     }
 
-    /// Takes the simulation of a scene, at its start, to the state, if it was saved in the same scene.
-    pub(crate) fn restore(
+    /// Takes the simulation of a scene, at its start, to the state, if it was saved in the same scene; the script there. `seen` is given each
+    /// step so far.
+    pub(crate) fn restore<'a>(
         &self,
         scene: &Scene,
         simulation: &mut Simulation,
-        script: &Script,
-    ) -> Result<(), Failure> {
+        script: &'a Script,
+        seen: impl FnMut(Step<'_>),
+    ) -> Result<ScriptRun<'a>, Failure> {
         let refuse = |what: String| Failure::Input(format!("--resume {}: {what}", self.path.display()));
         let steps = self.header.course.steps;
         if steps > script.len() {
@@ -178,17 +190,22 @@ impl Saved {
             )));
         }
         let mut differing = self.header.parts.differing(&Parts::new(scene, simulation));
-        if self.header.script != script_hash(script, steps, simulation.stack().is_several()) {
+        let several = simulation.stack().is_several();
+        let run = match replayed(script, &self.header.lines, several, seen) {
+            Ok((run, hash)) if hash == self.header.script => Some(run),
+            _ => None,
+        };
+        if run.is_none() {
             differing.push("the part of the script that was carried out");
         }
-        if !differing.is_empty() {
+        let (Some(run), true) = (run, differing.is_empty()) else {
             return Err(refuse(format!(
                 "it belongs to another scene ({}): {} {} not the same; give the scene that it was saved in",
                 self.header.scene,
                 differing.join(", "),
                 if differing.len() == 1 { "is" } else { "are" }
             )));
-        }
+        };
         if self.header.git_revision != env!("ENDOWIRE_GIT_REVISION") {
             super::tell(format_args!(
                 "endowire: {} was saved by version {} ({}): steps of this one may differ in their last bits",
@@ -197,7 +214,8 @@ impl Saved {
                 self.header.git_revision
             ));
         }
-        simulation.restore(&self.state).map_err(|error| refuse(error.to_string()))
+        simulation.restore(&self.state).map_err(|error| refuse(error.to_string()))?;
+        Ok(run)
     }
 }
 
@@ -230,21 +248,24 @@ impl Saver {
     pub(crate) fn save(
         &mut self,
         simulation: &Simulation,
-        script: &Script,
+        (script, lines): (&Script, &ScriptCourse),
         course: Course,
         sync: impl FnOnce() -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let began = Instant::now();
         sync()?;
+        let failed = |what: String| Failure::Computation(format!("the state cannot be written: {what}"));
+        let several = simulation.stack().is_several();
+        let (_, hash) = replayed(script, lines, several, |_| ()).map_err(|e| failed(e.to_string()))?;
         let header = Header {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             git_revision: env!("ENDOWIRE_GIT_REVISION").to_owned(),
             scene: self.scene.clone(),
             course,
             parts: self.parts.clone(),
-            script: script_hash(script, course.steps, simulation.stack().is_several()),
+            script: hash,
+            lines: lines.clone(),
         };
-        let failed = |what: String| Failure::Computation(format!("the state cannot be written: {what}"));
         let header = serde_json::to_string(&header).map_err(|e| failed(e.to_string()))?;
         let state = postcard::to_allocvec(&simulation.state()).map_err(|e| failed(e.to_string()))?;
         let mut bytes = format!("{FORMAT}\n{header}\n").into_bytes();

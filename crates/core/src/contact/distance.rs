@@ -31,23 +31,23 @@
 //! ∇∇f = Σ [(Qᵢ − f) ∇∇wᵢ + ∇wᵢ(∇Qᵢ − ∇f)ᵀ + (∇Qᵢ − ∇f)∇wᵢᵀ + wᵢ ∇∇Qᵢ] / W
 //! ```
 
+mod over;
 mod passing;
 
-use std::collections::VecDeque;
 use std::ops::Range;
 
 use nalgebra::Matrix3;
 
-use super::fit::{fit, vertex_neighbours, vertex_normals};
+use super::fit::{Neighbours, fit};
 use super::quadric::Quadric;
-use crate::vessel::{SurfaceMesh, Wall};
+use crate::vessel::{SurfaceMesh, Wall, inward_vertex_normals};
 use crate::{Vec3, parallel};
+use over::Lists;
 use passing::PASSING;
 
 /// Sum of weights below which no vertex reaches a point.
 const LEAST_WEIGHT: f64 = 1e-9;
-/// Height above the surface up to which the lists of vertices are complete, in radii of the thickest device and in supports.
-const HEIGHT: (f64, f64) = (1.5, 0.5);
+
 /// Signed distance with derivatives; positive in the lumen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
@@ -131,10 +131,7 @@ pub struct SmoothWall {
     quadrics: Vec<Quadric>,
     /// For every vertex, a triangle that it is a corner of.
     triangles: Vec<u32>,
-    /// For every triangle, where its list of vertices begins.
-    starts: Vec<u32>,
-    /// Vertices whose support may reach a point over the triangle.
-    lists: Vec<u32>,
+    lists: Lists,
     /// How far the smooth wall lies inside each triangle and its neighbours, mm, …
     insets_mm: Vec<f32>,
     /// … and the largest inset of all.
@@ -148,11 +145,11 @@ impl SmoothWall {
     pub fn new(wall: &Wall, thickest_mm: f64) -> Self {
         let mesh = wall.mesh();
         let count = mesh.vertices_mm.len();
-        let neighbours = vertex_neighbours(&mesh.triangles, count);
-        let normals = vertex_normals(mesh);
+        let neighbours = Neighbours::new(&mesh.triangles, count);
+        let normals = inward_vertex_normals(mesh);
         let fitted = |v: usize| {
             let mut quadric = fit(v, &mesh.vertices_mm, &normals, &neighbours);
-            let around = neighbours[v].iter().any(|w| normals[v].dot(&normals[*w as usize]) < 0.0);
+            let around = neighbours.of(v as u32).iter().any(|w| normals[v].dot(&normals[*w as usize]) < 0.0);
             quadric.open_window(thickest_mm, around);
             quadric
         };
@@ -162,37 +159,32 @@ impl SmoothWall {
         for (index, triangle) in mesh.triangles.iter().enumerate() {
             triangle.iter().for_each(|v| triangles[*v as usize] = index as u32);
         }
-        let (mut starts, mut lists) = (Vec::with_capacity(mesh.triangles.len() + 1), Vec::new());
-        for (ends, list) in parallel::parts(mesh.triangles.len(), |part| {
-            listed(mesh, &quadrics, &neighbours, part, thickest_mm)
-        }) {
-            let first = lists.len() as u32;
-            starts.extend(ends.into_iter().map(|start| first + start));
-            lists.extend(list);
-        }
-        starts.push(lists.len() as u32);
         let mut smooth = Self {
             quadrics,
             triangles,
-            starts,
-            lists,
+            lists: Lists::new(mesh.triangles.clone(), neighbours, thickest_mm),
             insets_mm: Vec::new(),
             deepest_inset_mm: 0.0,
             passing_mm: PASSING * thickest_mm,
         };
         smooth.measure_insets(mesh);
+        smooth.lists.prepare(&smooth.quadrics);
         smooth
     }
 
     /// How far the smooth wall lies inside each triangle, at few points, or inside one that shares a corner with it: a point that is
     /// next to one triangle may feel the other.
     fn measure_insets(&mut self, mesh: &SurfaceMesh) {
-        let inset = |index: usize| {
-            let list = self.list(index);
-            let heights = few(&mesh.corners(index)).map(|x| self.reach(&x, list).map_or(0.0, |r| r.value_mm));
-            (-heights.into_iter().fold(0.0, f64::min)) as f32
+        let insets = |part: Range<usize>| {
+            let (mut seen, mut list) = (vec![u32::MAX; mesh.vertices_mm.len()], Vec::new());
+            let inset = |index: usize| {
+                self.lists.touching(&self.quadrics, index, &mut seen, &mut list);
+                let height = |x: Vec3| self.reach_from(&x, &list, None).map_or(0.0, |r| r.value_mm);
+                (-few(mesh, index).map(height).fold(0.0, f64::min)) as f32
+            };
+            part.map(inset).collect::<Vec<_>>()
         };
-        let own = parallel::map(mesh.triangles.len(), inset);
+        let own = parallel::parts(mesh.triangles.len(), insets).concat();
         let mut around = vec![0.0f32; mesh.vertices_mm.len()];
         for (triangle, inset) in mesh.triangles.iter().zip(&own) {
             triangle.iter().for_each(|v| around[*v as usize] = around[*v as usize].max(*inset));
@@ -214,8 +206,9 @@ impl SmoothWall {
     }
 
     /// Vertices whose support may reach a point over a triangle; the first are its corners.
+    #[inline]
     pub(super) fn list(&self, triangle: usize) -> &[u32] {
-        &self.lists[self.starts[triangle] as usize..self.starts[triangle + 1] as usize]
+        self.lists.of(&self.quadrics, triangle)
     }
 
     /// The triangle to ask for the distance of `x`, from `triangle` on along the surface: while a vertex of its list is nearer than its
@@ -349,47 +342,12 @@ impl SmoothWall {
     }
 }
 
-/// The lists of some triangles one after the other, and where each starts.
-fn listed(
-    mesh: &SurfaceMesh,
-    quadrics: &[Quadric],
-    neighbours: &[Vec<u32>],
-    part: Range<usize>,
-    thickest_mm: f64,
-) -> (Vec<u32>, Vec<u32>) {
-    let (mut starts, mut lists) = (Vec::with_capacity(part.len()), Vec::new());
-    let mut seen = vec![u32::MAX; quadrics.len()];
-    let mut queue = VecDeque::new();
-    for index in part {
-        starts.push(lists.len() as u32);
-        let (triangle, corners) = (mesh.triangles[index], mesh.corners(index));
-        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let size = corners.iter().map(|c| (c - centre).norm()).fold(0.0, f64::max);
-        queue.extend(triangle.iter().copied());
-        triangle.iter().for_each(|&v| seen[v as usize] = index as u32);
-        // Over the surface, not through space: the other side of a thin septum is another wall.
-        while let Some(v) = queue.pop_front() {
-            let q = &quadrics[v as usize];
-            let (short, long) = q.half_axes_mm;
-            let reach = long + size + (HEIGHT.0 * thickest_mm).max(HEIGHT.1 * short);
-            if (q.position - centre).norm() > reach {
-                continue;
-            }
-            lists.push(v);
-            for &w in &neighbours[v as usize] {
-                if seen[w as usize] != index as u32 {
-                    seen[w as usize] = index as u32;
-                    queue.push_back(w);
-                }
-            }
-        }
-    }
-    (starts, lists)
-}
-
-/// The middles of a triangle and its sides.
-fn few([a, b, c]: &[Vec3; 3]) -> [Vec3; 4] {
-    [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5, (a + b + c) / 3.0]
+/// The middle of a triangle, and those of its sides along which it runs upwards: of two triangles at a side one does.
+fn few(mesh: &SurfaceMesh, triangle: usize) -> impl Iterator<Item = Vec3> {
+    let (ends, [a, b, c]) = (mesh.triangles[triangle], mesh.corners(triangle));
+    let sides = [(a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5].into_iter().enumerate();
+    let upwards = sides.filter(move |(k, _)| ends[*k] < ends[(k + 1) % 3]).map(|(_, middle)| middle);
+    std::iter::once((a + b + c) / 3.0).chain(upwards)
 }
 
 #[cfg(test)]

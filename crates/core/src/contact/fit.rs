@@ -4,7 +4,6 @@ use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 use super::quadric::Quadric;
 use crate::Vec3;
-use crate::vessel::SurfaceMesh;
 
 /// Support of a vertex over its edges: every point of a triangle lies well inside that of its three corners.
 const SUPPORT: f64 = 1.1;
@@ -19,38 +18,55 @@ const NEAR: i32 = 6;
 /// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.
 const REGULAR: f64 = 1e-6;
 
-/// Vertices that share an edge with each vertex, ascending.
-pub(super) fn vertex_neighbours(triangles: &[[u32; 3]], count: usize) -> Vec<Vec<u32>> {
-    let mut neighbours = vec![Vec::new(); count];
-    for t in triangles {
-        for k in 0..3 {
-            neighbours[t[k] as usize].extend([t[(k + 1) % 3], t[(k + 2) % 3]]);
-        }
-    }
-    for list in &mut neighbours {
-        list.sort_unstable();
-        list.dedup();
-    }
-    neighbours
+/// For every vertex those that share an edge with it, ascending.
+#[derive(Debug, Clone)]
+pub(super) struct Neighbours {
+    /// Where the list of each vertex begins, and where the last one ends.
+    starts: Vec<u32>,
+    lists: Vec<u32>,
 }
 
-/// Angle-weighted inward normals.
-pub(super) fn vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
-    let mut normals = vec![Vec3::zeros(); mesh.vertices_mm.len()];
-    for (index, triangle) in mesh.triangles.iter().enumerate() {
-        let corner = mesh.corners(index);
-        let Some(outward) = (corner[1] - corner[0]).cross(&(corner[2] - corner[0])).try_normalize(0.0) else {
-            continue;
-        };
-        for k in 0..3 {
-            let (e, f) = (corner[(k + 1) % 3] - corner[k], corner[(k + 2) % 3] - corner[k]);
-            normals[triangle[k] as usize] -= outward * e.cross(&f).norm().atan2(e.dot(&f));
+impl Neighbours {
+    pub(super) fn new(triangles: &[[u32; 3]], count: usize) -> Self {
+        // Both other corners of every triangle, counted out by vertex; most come twice.
+        let mut places = vec![0_u32; count + 1];
+        triangles.iter().flatten().for_each(|v| places[*v as usize + 1] += 2);
+        for v in 0..count {
+            places[v + 1] += places[v];
         }
+        let mut ends = places.clone();
+        let mut lists = vec![0; places[count] as usize];
+        for t in triangles {
+            for k in 0..3 {
+                let end = &mut ends[t[k] as usize];
+                lists[*end as usize] = t[(k + 1) % 3];
+                lists[*end as usize + 1] = t[(k + 2) % 3];
+                *end += 2;
+            }
+        }
+        let mut starts = Vec::with_capacity(count + 1);
+        let mut kept = 0;
+        for v in 0..count {
+            starts.push(kept as u32);
+            let list = places[v] as usize..places[v + 1] as usize;
+            lists[list.clone()].sort_unstable();
+            for k in list {
+                if kept == starts[v] as usize || lists[kept - 1] != lists[k] {
+                    lists[kept] = lists[k];
+                    kept += 1;
+                }
+            }
+        }
+        starts.push(kept as u32);
+        lists.truncate(kept);
+        lists.shrink_to_fit();
+        Self { starts, lists }
     }
-    for normal in &mut normals {
-        *normal = normal.try_normalize(1e-12).unwrap_or_else(Vec3::x);
+
+    #[inline]
+    pub(super) fn of(&self, v: u32) -> &[u32] {
+        &self.lists[self.starts[v as usize] as usize..self.starts[v as usize + 1] as usize]
     }
-    normals
 }
 
 /// The smallest ellipse of its shape that holds points of a plane, as a matrix: Σ y yᵀ gives the shape.
@@ -69,8 +85,9 @@ fn ellipse(points: impl Iterator<Item = (f64, f64)> + Clone) -> Matrix2<f64> {
 }
 
 /// The quadric of vertex `v`: heights of its neighbours and theirs, g·τ + ½ τᵀSτ in its tangent plane, least squares.
-pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[Vec<u32>]) -> Quadric {
+pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &Neighbours) -> Quadric {
     let (origin, normal) = (vertices[v], normals[v]);
+    let near = neighbours.of(v as u32);
     let a = {
         let axis = Vec3::ith(normal.iamin(), 1.0);
         (axis - normal * normal.dot(&axis)).normalize()
@@ -80,12 +97,12 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[V
         let y = vertices[w as usize] - origin;
         (y.dot(&a), y.dot(&b), y.dot(&normal))
     };
-    let plane = ellipse(neighbours[v].iter().map(|&w| flat(w)).map(|(p, q, _)| (p, q))) / (SUPPORT * SUPPORT);
+    let plane = ellipse(near.iter().map(|&w| flat(w)).map(|(p, q, _)| (p, q))) / (SUPPORT * SUPPORT);
     let axes = plane.symmetric_eigenvalues();
     let half_axes_mm = (axes.max().sqrt().recip(), axes.min().sqrt().recip());
-    let mut ring: Vec<u32> = neighbours[v].clone();
-    for &w in &neighbours[v] {
-        ring.extend(neighbours[w as usize].iter().copied());
+    let mut ring = near.to_vec();
+    for &w in near {
+        ring.extend(neighbours.of(w));
     }
     ring.sort_unstable();
     ring.dedup();
@@ -145,5 +162,18 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &[V
         above_mm: (0.0, 0.0),
         below_mm: (0.0, 0.0),
         narrowing: 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_are_told_once_in_order_and_alone_there_are_none() {
+        let fan = [[4, 0, 1], [4, 1, 2], [4, 2, 0]];
+        let neighbours = Neighbours::new(&fan, 6);
+        let found: Vec<&[u32]> = (0..6).map(|v| neighbours.of(v)).collect();
+        assert_eq!(found, [&[1, 2, 4][..], &[0, 2, 4], &[0, 1, 4], &[], &[0, 1, 2], &[]]);
     }
 }

@@ -6,7 +6,7 @@
 //! u = P (x − a) + r (θ − θₐ) n × t,    P = I − n nᵀ,    a = x̄ − Δ t̄
 //! ```
 //!
-//! where x̄ and t̄ are its place and direction after the device has slid by the advance Δ along its own curve, so that a
+//! where x̄ and t̄ are its place and direction after the device has slid by the advance Δ of its hand along the line's curve, so that a
 //! device that follows its curve slips by Δ t̄ exactly, whatever the length of the step; θ is the material angle, θₐ that
 //! before the step, and n × t the direction in which a surface that touches the wall with normal n moves when the
 //! device spins. Friction is then
@@ -122,7 +122,7 @@ pub struct Friction {
     sliders: Vec<Slider>,
 }
 
-/// What the hand does in a step.
+/// What a hand does in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandMotion {
     /// Length inserted before, mm.
@@ -131,6 +131,18 @@ pub struct HandMotion {
     pub to_mm: f64,
     /// Turn, rad.
     pub turn_rad: f64,
+}
+
+impl HandMotion {
+    /// Length that is pushed in, mm.
+    pub fn advance_mm(&self) -> f64 {
+        self.to_mm - self.from_mm
+    }
+
+    /// Advance, mm, and turn, rad.
+    pub(crate) fn parts(&self) -> [f64; 2] {
+        [self.advance_mm(), self.turn_rad]
+    }
 }
 
 impl Friction {
@@ -153,14 +165,15 @@ impl Friction {
 
     /// Begins a step: `state` is the device after it has slid along its own curve, with the angles it had before.
     ///
-    /// `before` are the points of the last equilibrium and what pressed there, from which the first normal forces come.
+    /// `before` are the points of the last equilibrium and what pressed there, from which the first normal forces come. `hands` are those
+    /// of all instruments: a point slips by what its own does.
     pub fn begin(
         &mut self,
         elements: &[ElementData],
         state: &RodState,
         points: &[ContactPoint],
         before: (&[ContactPoint], &[NormalForce]),
-        hand: HandMotion,
+        hands: &[HandMotion],
     ) {
         self.sliders.clear();
         self.settled = false;
@@ -171,9 +184,12 @@ impl Friction {
         if !self.acts() {
             return;
         }
-        let advance = hand.to_mm - hand.from_mm;
+        let line_mm = |length: fn(&HandMotion) -> f64| hands.iter().map(length).fold(0.0, f64::max);
+        let advance = line_mm(|hand| hand.to_mm) - line_mm(|hand| hand.from_mm);
         let radius = points.first().map_or(0.0, |p| p.potential.radius_mm);
-        self.stick_mm = (STICK * (advance.abs() + radius * hand.turn_rad.abs())).max(LEAST_STICK_MM);
+        // An instrument that rests sticks within as much as the others move.
+        let ways = hands.iter().map(|hand| hand.advance_mm().abs() + radius * hand.turn_rad.abs());
+        self.stick_mm = (STICK * ways.fold(0.0, f64::max)).max(LEAST_STICK_MM);
         let (old_points, old) = before;
         let count = old_points.len().min(old.len());
         let near_tip = TIP_RADII * radius + advance.abs();
@@ -184,7 +200,7 @@ impl Friction {
             let slope = Point::at(point.xi, 0.0).derivatives(&state.chords[e], &t0, &t1).0;
             let along = slope / slope.norm();
             let mut slider = Slider {
-                from_mm: point.position(elements, state) - along * advance,
+                from_mm: point.position(elements, state) - along * hands[point.instrument].advance_mm(),
                 from_rad: point.angle(state),
                 along,
                 normal: Vec3::zeros(),
@@ -193,7 +209,8 @@ impl Friction {
                 seen: (Vec3::zeros(), 0.0),
                 matrix_n: 0.0,
             };
-            if point.from_tip_mm < near_tip {
+            let same = |old: &ContactPoint| old.instrument == point.instrument;
+            if point.from_tip_mm < near_tip && old_points.get(index).is_none_or(same) {
                 if index < count {
                     (slider.normal, slider.force_n) = (old[index].normal, old[index].force_n);
                 }

@@ -19,6 +19,10 @@ pub struct ContactPoint {
     pub element: usize,
     /// Local coordinate in the element.
     pub xi: f64,
+    /// Number of the instrument that feels the wall there, the outermost; 0 of a device alone.
+    pub instrument: usize,
+    /// Its set of material angles; 0 where it has none.
+    pub set: usize,
     /// Arc length from the tip, mm.
     pub from_tip_mm: f64,
     /// Length of device that the point stands for, mm.
@@ -51,8 +55,9 @@ impl ContactPoint {
     /// Material angle, rad.
     pub fn angle(&self, state: &RodState) -> f64 {
         let [w0, w1, wb] = Point::at(self.xi, 0.0).phi;
-        let e = self.element;
-        w0 * state.angles[e] + w1 * state.angles[e + 1] + wb * state.bubbles[e]
+        let sets = state.sets();
+        let e = sets * self.element + self.set;
+        w0 * state.angles[e] + w1 * state.angles[e + sets] + wb * state.bubbles[e]
     }
 }
 
@@ -88,6 +93,8 @@ pub struct Touch {
     pub energy_mj: f64,
     /// Place and forces.
     pub contact: Contact,
+    /// Moment of friction on the device about its axis, N·mm.
+    pub friction_nmm: f64,
 }
 
 /// Questions about the wall, asked and avoided. They tell of the work that was done, which hangs on what a simulation still knows of places

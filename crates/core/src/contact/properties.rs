@@ -197,7 +197,8 @@ impl WallProperties {
     }
 }
 
-fn check_friction(name: &str, friction: f64) -> Result<()> {
+/// Checks a Coulomb coefficient.
+pub(crate) fn check_friction(name: &str, friction: f64) -> Result<()> {
     if (0.0..=LARGEST_FRICTION).contains(&friction) {
         return Ok(());
     }

@@ -244,7 +244,7 @@ impl<'a> WallContact<'a> {
         self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * f.hessian.norm() * x.amax());
         let e = point.element;
         sum.add(point.xi, &f.gradient, into.wants_hessian().then_some(&f.hessian));
-        into.add_spin(state, &elements[e], (e, point.xi), &f.mixed, (f.turn, f.turn2));
+        into.add_spin(state, &elements[e], (e, point.xi, point.set), &f.mixed, (f.turn, f.turn2));
     }
 
     /// What point `index` feels at its base.
@@ -306,6 +306,7 @@ impl<'a> WallContact<'a> {
                 penetration_mm,
                 triangle: self.memory.points[index].triangle.unwrap_or(0),
             },
+            friction_nmm: rub.map_or(0.0, |f| -f.turn),
         })
     }
 

@@ -1,6 +1,8 @@
 //! Instruments that lie in one another: a wire in a microcatheter in a catheter.
 
 use super::Device;
+use crate::contact::check_friction;
+use crate::error::nearest_name;
 use crate::rod::MAX_ANGLES;
 use crate::{Error, Result};
 
@@ -21,6 +23,8 @@ pub struct Stack {
     instruments: Vec<Instrument>,
     /// Set of material angles of each, where it has one.
     sets: Vec<Option<usize>>,
+    /// Coefficient of friction between each and those outside it.
+    frictions: Vec<f64>,
 }
 
 /// Most instruments of a stack.
@@ -32,7 +36,8 @@ impl From<Device> for Stack {
     /// A device alone, named `device`.
     fn from(device: Device) -> Self {
         let sets = vec![device.is_shaped().then_some(0)];
-        Self { instruments: vec![Instrument { name: "device".to_owned(), device, may_lead: true }], sets }
+        let instruments = vec![Instrument { name: "device".to_owned(), device, may_lead: true }];
+        Self { instruments, sets, frictions: vec![0.0] }
     }
 }
 
@@ -61,7 +66,55 @@ impl Stack {
             let mend = format!("at most {MAX_ANGLES} instruments on one line may have a shape of their own");
             return Err(Error::parameter("instrument", format!("{angles} with rest curvature"), mend));
         }
-        Ok(Self { instruments, sets })
+        let frictions = vec![0.0; instruments.len()];
+        Ok(Self { instruments, sets, frictions })
+    }
+
+    /// The same instruments, rubbing in each other with these Coulomb coefficients, each between one and those outside it.
+    ///
+    /// # Errors
+    /// Another number of coefficients than instruments, one that is not from 0 to 2, and any but 0 of the outermost.
+    pub fn rubbing(mut self, frictions: Vec<f64>) -> Result<Self> {
+        if frictions.len() != self.instruments.len() {
+            let mend = format!("there are {} instruments: give one for each", self.instruments.len());
+            return Err(Error::parameter("instrument.friction", frictions.len(), mend));
+        }
+        let name = |index: usize| format!("instrument[{index}].friction");
+        for (index, friction) in frictions.iter().enumerate() {
+            check_friction(&name(index), *friction)?;
+        }
+        let last = frictions.len() - 1;
+        if frictions[last] > 0.0 {
+            let mend = "the last instrument has none outside it: the wall's friction is vessel.wall.friction";
+            return Err(Error::parameter(name(last), frictions[last], mend));
+        }
+        self.frictions = frictions;
+        Ok(self)
+    }
+
+    /// Coefficient of friction between an instrument and those outside it.
+    pub fn friction(&self, instrument: usize) -> f64 {
+        self.frictions[instrument]
+    }
+
+    /// Whether any instrument rubs in another.
+    pub fn rubs(&self) -> bool {
+        self.frictions.iter().any(|friction| *friction > 0.0)
+    }
+
+    /// The same instruments with a set of material angles each: friction twists straight ones too.
+    ///
+    /// # Errors
+    /// More than three instruments.
+    pub fn twisted(mut self) -> Result<Self> {
+        if self.sets.len() > MAX_ANGLES {
+            let mend = format!(
+                "friction twists every instrument, and at most {MAX_ANGLES} on one line may be twisted: leave some out, or set friction to 0"
+            );
+            return Err(Error::parameter("instrument", self.sets.len(), mend));
+        }
+        self.sets.iter_mut().enumerate().for_each(|(index, set)| *set = Some(index));
+        Ok(self)
     }
 
     /// The instruments, the innermost first.
@@ -85,7 +138,7 @@ impl Stack {
         self.instruments.iter().map(|instrument| &instrument.device)
     }
 
-    /// Set of material angles of each instrument: those with a shape of their own have one.
+    /// Set of material angles of each instrument: those with a shape of their own have one, and all where friction twists them.
     pub fn sets(&self) -> &[Option<usize>] {
         &self.sets
     }
@@ -97,9 +150,8 @@ impl Stack {
     pub fn find(&self, name: &str) -> Result<usize> {
         let found = self.instruments.iter().position(|instrument| instrument.name == name);
         found.ok_or_else(|| {
-            let alike = |instrument: &Instrument| strsim::jaro_winkler(&instrument.name, name);
-            let nearest = self.instruments.iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
-            let nearest = nearest.map_or("", |instrument| &instrument.name);
+            let names = self.instruments.iter().map(|instrument| instrument.name.as_str());
+            let nearest = nearest_name(names, name).unwrap_or_default();
             Error::parameter("instrument", format!("{name:?}"), format!("did you mean {nearest:?}?"))
         })
     }

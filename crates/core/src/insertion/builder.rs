@@ -55,13 +55,14 @@ impl<'a> SimulationBuilder<'a> {
     ///
     /// # Errors
     /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
-    /// tell, wall properties or method options out of range, and what the method cannot do.
+    /// tell, wall properties or method options out of range, more than three instruments with friction, and what the method cannot do.
     pub fn build(self) -> Result<Simulation> {
         let Self { wall, stack, sheath, properties, method, store } = self;
         properties.check(wall.mesh())?;
         check_inside(&wall, &sheath)?;
         let query = WallQuery::new(&wall)?;
         stack.devices().try_for_each(|device| check_mouth(&query, device, &sheath))?;
+        let stack = if stack.is_several() && properties.rubs() { stack.twisted()? } else { stack };
         let scene = Environment { wall, properties, query, sheath, stack };
         let own = KirchhoffOptions::default();
         let method = method.unwrap_or(&own);
@@ -99,9 +100,7 @@ const MISFIT: f64 = 5.0;
 
 /// Refuses a device that is in the wall from the start. Further in a vessel may be narrower: there the device does not pass.
 fn check_mouth(query: &WallQuery, device: &Device, sheath: &Sheath) -> Result<()> {
-    let Some(near) = query.nearest(&sheath.position_mm, f64::MAX) else { return Ok(()) };
-    // At the rim of an opening the distance has no sign.
-    let room_mm = near.distance_mm.abs();
+    let room_mm = query.distance_mm(&sheath.position_mm);
     let thickest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
     match device.sections().iter().map(|s| s.radius_mm).enumerate().max_by(thickest) {
         Some((section, radius_mm)) if radius_mm > room_mm => Err(Error::parameter(

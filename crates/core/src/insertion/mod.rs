@@ -15,7 +15,9 @@ pub use batch::Batch;
 pub use builder::SimulationBuilder;
 pub use command::{Command, Move};
 pub use nodes::nodes_from_tip;
-pub use report::{Energy, InstrumentReport, StepReport};
-pub use script::{Script, ScriptLine, script_commands};
+pub use report::{Energy, InstrumentReport, LateralForce, StepReport};
+pub use script::{
+    LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until, script_commands,
+};
 pub use sheath::Sheath;
 pub use simulation::{Simulation, Surroundings, check_commands};

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::Vec3;
 use crate::contact::Contact;
 
 /// The terms of the total potential energy, mJ.
@@ -55,6 +56,19 @@ pub struct InstrumentReport {
     pub push_force_n: Option<f64>,
     /// Torque with which its hand must hold it, N·mm: the slope of the energy with respect to its turn.
     pub torque_nmm: f64,
+}
+
+/// Force across the line, at a node, by which instruments that lie in one another hold each other.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LateralForce {
+    /// Force on the inner one, N.
+    pub force_n: Vec3,
+    /// Length of it that the node stands for, mm; 0 where nothing holds it. Where one ends the force is not spread over that: it gathers there.
+    pub length_mm: f64,
+    /// Axial force of the inner one, and all that lies in it, behind the node, N.
+    pub tension_n: f64,
+    /// Friction on it along the line, towards the tip, N.
+    pub friction_n: f64,
 }
 
 /// What is seen and felt of an insertion after a step.

@@ -1,18 +1,68 @@
 //! The introducer sheath: where the device comes out, and in which direction.
 
+use crate::contact::check_friction;
 use crate::vessel::Wall;
 use crate::{Error, Result, Vec3};
 
-/// The mouth of the introducer sheath. It prescribes position and tangent of the device there.
+/// Most that a valve holds a device with, N.
+const LARGEST_N: f64 = 100.0;
+
+/// The mouth of the introducer sheath. It prescribes position and tangent of the device there, and may rub on it: against its slip u, along and around,
+///
+/// ```text
+/// |f| = F₀ + μ |n⊥|
+/// ```
+///
+/// with the force n⊥ that the mouth exerts across the device. It is felt by the hand alone and moves nothing inside.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sheath {
     /// Mouth of the sheath, mm.
     pub position_mm: Vec3,
     /// Direction of insertion, unit length.
     pub direction: Vec3,
+    /// F₀: friction of the valve, N.
+    pub friction_n: f64,
+    /// μ: Coulomb coefficient of the mouth.
+    pub friction: f64,
 }
 
 impl Sheath {
+    /// The same sheath with friction, 0 for none.
+    ///
+    /// # Errors
+    /// A force that is not from 0 to 100 N, a coefficient that is not from 0 to 2.
+    pub fn rubbing(self, friction_n: f64, friction: f64) -> Result<Self> {
+        if !(0.0..=LARGEST_N).contains(&friction_n) {
+            let mend = format!("must be a force from 0 (none) to {LARGEST_N} N");
+            return Err(Error::parameter("sheath.friction_n", friction_n, mend));
+        }
+        check_friction("sheath.friction", friction)?;
+        Ok(Self { friction_n, friction, ..self })
+    }
+
+    /// Whether it has friction.
+    pub fn rubs(&self) -> bool {
+        self.friction_n > 0.0 || self.friction > 0.0
+    }
+
+    /// Refuses friction on behalf of a method that tells none.
+    ///
+    /// # Errors
+    /// A sheath with friction.
+    pub fn refuse_friction(&self, method: &str) -> Result<()> {
+        if !self.rubs() {
+            return Ok(());
+        }
+        let (name, value) = if self.friction_n > 0.0 {
+            ("sheath.friction_n", self.friction_n)
+        } else {
+            ("sheath.friction", self.friction)
+        };
+        let mend =
+            format!("{method} has no friction in the sheath: leave it out or use the method kirchhoff");
+        Err(Error::parameter(name, value, mend))
+    }
+
     /// A sheath at a point, pointing in a direction of any length.
     ///
     /// # Errors
@@ -36,7 +86,7 @@ impl Sheath {
                 "must be a direction, not all zero",
             ));
         }
-        Ok(Self { position_mm, direction: unit })
+        Ok(Self { position_mm, direction: unit, friction_n: 0.0, friction: 0.0 })
     }
 
     /// A sheath in the middle of an opening of the wall, pointing into the vessel.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::contact::Counters;
 use crate::device::{Device, LENGTH_SLACK_MM, Stack};
-use crate::insertion::{Command, Move, Sheath, SimulationBuilder, StepReport, WallProperties};
+use crate::insertion::{Command, LateralForce, Move, Sheath, SimulationBuilder, StepReport, WallProperties};
 use crate::methods::{Method, State};
 use crate::shape::Shape;
 use crate::vessel::{Wall, WallQuery};
@@ -140,6 +140,12 @@ impl Simulation {
     /// Questions about the wall since the start, of the simulation and those it was cloned from.
     pub fn counters(&self) -> Counters {
         self.method.counters()
+    }
+
+    /// What holds an instrument, and all that lies in it, on the line of those outside it: at every node of [`shape`](Simulation::shape) the
+    /// force across the line. None where nothing is outside the instrument or it has ended, at the sheath's mouth, and of a device alone.
+    pub fn lateral_forces(&self, instrument: usize) -> Vec<LateralForce> {
+        self.method.lateral_forces(&self.scene.surroundings(), instrument)
     }
 
     /// The inserted centre line, sheath to tip.

@@ -10,7 +10,7 @@ use std::fmt::Debug;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::Counters;
-use crate::insertion::{Command, Move, StepReport, Surroundings};
+use crate::insertion::{Command, LateralForce, Move, StepReport, Surroundings};
 use crate::shape::Shape;
 use crate::vessel::WallStore;
 use crate::{Error, Result};
@@ -46,6 +46,11 @@ pub trait Method: Send {
     /// Questions about the wall since the method was made; those of the one it was cloned from are among them.
     fn counters(&self) -> Counters {
         Counters::default()
+    }
+
+    /// Forces that the instruments outside one exert on it, at every node; none of methods that push one device.
+    fn lateral_forces(&self, _surroundings: &Surroundings<'_>, _instrument: usize) -> Vec<LateralForce> {
+        vec![LateralForce::default(); self.shape().len()]
     }
 
     /// All that the next step depends on.

@@ -38,14 +38,14 @@ impl<const C: usize> Stencils for Assembly<C> {
         &mut self,
         state: &RodState,
         element: &ElementData,
-        (e, xi): (usize, f64),
+        (e, xi, set): (usize, f64, usize),
         mixed: &Vec3,
         (first, second): (f64, f64),
     ) {
         if Layout::<C>::ANGLES == 0 {
             return;
         }
-        let angles = angle_weights::<C>(e, xi);
+        let angles = angle_weights::<C>(e, xi, set);
         let columns = point_columns::<C>(state, element, e, xi);
         for (i, &(row, p)) in angles.iter().enumerate() {
             self.residual[row] += first * p;
@@ -93,11 +93,11 @@ impl<const C: usize> Assembly<C> {
     }
 }
 
-/// Weights of the angles of the first set in that of the point at ξ of element `e`.
-fn angle_weights<const C: usize>(e: usize, xi: f64) -> [(usize, f64); 3] {
+/// Weights of the angles of a set in that of the point at ξ of element `e`.
+fn angle_weights<const C: usize>(e: usize, xi: f64, set: usize) -> [(usize, f64); 3] {
     let l = Layout::<C>;
     let [w0, w1, wb] = Point::at(xi, 0.0).phi;
-    [(l.angle(e, 0), w0), (l.bubble(e, 0), wb), (l.angle(e + 1, 0), w1)]
+    [(l.angle(e, set), w0), (l.bubble(e, set), wb), (l.angle(e + 1, set), w1)]
 }
 
 /// How the point at ξ of element `e` moves with the unknowns: rows and displacements,
@@ -138,13 +138,13 @@ pub(crate) fn point_step<const C: usize>(
     columns.iter().map(|(row, column)| way.dot(column) * d[*row]).sum()
 }
 
-/// Adds the derivatives of a force on the point at ξ of element `e`, and of a moment about the tangent there, in that point's position
-/// to a matrix that is not symmetric.
+/// Adds the derivatives of a force on the point at ξ of element `e`, and of a moment about the tangent there on the instrument in a `set`
+/// of angles, in that point's position to a matrix that is not symmetric.
 pub(crate) fn add_unsymmetric<const C: usize>(
     matrix: &mut BandLu<C>,
     state: &RodState,
     element: &ElementData,
-    (e, xi): (usize, f64),
+    (e, xi, set): (usize, f64, usize),
     force: &Matrix3<f64>,
     moment: &Vec3,
 ) {
@@ -156,7 +156,7 @@ pub(crate) fn add_unsymmetric<const C: usize>(
         }
     }
     if Layout::<C>::ANGLES > 0 {
-        for (row, share) in angle_weights::<C>(e, xi) {
+        for (row, share) in angle_weights::<C>(e, xi, set) {
             for (column, way) in &columns {
                 matrix.add(row, *column, share * moment.dot(way));
             }

@@ -35,13 +35,13 @@ pub trait Stencils {
     /// Adds derivatives in the positions of points of element `e`, gathered.
     fn add_points(&mut self, state: &RodState, element: &ElementData, e: usize, sum: &PointSum);
 
-    /// Adds those derivatives of the energy of a point (element and ξ) that see the material angle there: the first and second `spin`
-    /// derivatives in the angle, and the `mixed` one in angle and position.
+    /// Adds those derivatives of the energy of a point (element, ξ and set of angles) that see the material angle there: the first and
+    /// second `spin` derivatives in the angle, and the `mixed` one in angle and position.
     fn add_spin(
         &mut self,
         state: &RodState,
         element: &ElementData,
-        point: (usize, f64),
+        point: (usize, f64, usize),
         mixed: &Vec3,
         spin: (f64, f64),
     );

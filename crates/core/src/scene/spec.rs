@@ -59,8 +59,10 @@ pub struct VesselSpec {
     pub file: Option<PathBuf>,
     /// Millimetres per unit of the surface file; 1 if absent.
     pub unit_mm: Option<f64>,
-    /// Centre-line table (x y z radius parent, mm).
+    /// Centre-line table (x y z radius parent, mm) that the wall is built from; rows may name targets.
     pub tree: Option<PathBuf>,
+    /// Centre-line table beside `file`, for its targets.
+    pub centreline: Option<PathBuf>,
     /// Edge length of the wall built from the tree, mm.
     pub edge_mm: Option<f64>,
     /// Number of triangles of the wall built from the tree, in place of `edge_mm`.
@@ -114,6 +116,9 @@ pub struct InstrumentSpec {
     /// Whether its tip may be farther in than that of the instrument in it; it may if absent.
     #[serde(default = "yes")]
     pub may_lead: bool,
+    /// Coulomb coefficient of friction between it and the instruments outside it, along the line; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction: f64,
 }
 
 fn yes() -> bool {
@@ -121,7 +126,7 @@ fn yes() -> bool {
 }
 
 /// `[sheath]`: an opening of the vessel, or a point and a direction.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SheathSpec {
     /// Number of an opening; the device enters in its middle, against its outward direction.
@@ -132,6 +137,12 @@ pub struct SheathSpec {
     pub position_mm: Option<[f64; 3]>,
     /// Direction of insertion, any length.
     pub direction: Option<[f64; 3]>,
+    /// Friction of the valve, N; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction_n: f64,
+    /// Coulomb coefficient in the mouth; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction: f64,
 }
 
 /// Instruments that are in at the start are pushed there together, the farthest by so much a step, mm.
@@ -156,9 +167,9 @@ impl SheathSpec {
     /// The sheath in `wall`.
     ///
     /// # Errors
-    /// An opening that is not there, keys that contradict each other, values that are not finite.
+    /// An opening that is not there, keys that contradict each other, values that are not finite or out of range.
     pub fn place(&self, wall: &Wall) -> Result<Sheath> {
-        match (self.opening, self.position_mm, self.direction) {
+        let sheath = match (self.opening, self.position_mm, self.direction) {
             (Some(opening), None, None) => {
                 Sheath::at_opening(wall, opening, self.depth_mm.unwrap_or(DEPTH_MM))
             }
@@ -170,7 +181,8 @@ impl SheathSpec {
                 self.given(),
                 "give either opening (with depth_mm if wanted) or position_mm and direction",
             )),
-        }
+        }?;
+        sheath.rubbing(self.friction_n, self.friction)
     }
 }
 
@@ -253,7 +265,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     pub fn input_paths(&self) -> Vec<PathBuf> {
         let devices = self.device.iter().map(|device| &device.file);
         let devices = devices.chain(self.instrument.iter().map(|instrument| &instrument.file));
-        let named = [&self.vessel.file, &self.vessel.tree].into_iter().chain(devices);
+        let vessel = &self.vessel;
+        let named = [&vessel.file, &vessel.tree, &vessel.centreline].into_iter().chain(devices);
         named.flatten().map(|path| self.resolve(path)).collect()
     }
 
@@ -318,7 +331,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// What is pushed: the device alone, or all instruments.
     ///
     /// # Errors
-    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`].
+    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`] and [`Stack::rubbing`].
     pub fn stack(&self) -> Result<Stack> {
         match (&self.device, self.instrument.is_empty()) {
             (Some(spec), true) => self.read_device("device", &spec.file, &spec.section).map(Stack::from),
@@ -328,7 +341,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                         self.read_device(&format!("instrument[{index}]"), &spec.file, &spec.section)?;
                     Ok(Instrument { name: spec.name.clone(), device, may_lead: spec.may_lead })
                 });
-                Stack::new(each.collect::<Result<_>>()?)
+                let frictions = self.instrument.iter().map(|spec| spec.friction).collect();
+                Stack::new(each.collect::<Result<_>>()?)?.rubbing(frictions)
             }
             (None, true) => {
                 let mend = "give [device], or an [[instrument]] for each of several, the innermost first";
@@ -423,12 +437,35 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         script_commands(&self.script, device)
     }
 
-    /// The steps of the script, checked against what is pushed.
+    /// The script, checked against what is pushed and the targets of the vessel.
     ///
     /// # Errors
-    /// As [`Script::new`] and [`SceneOf::inserted_mm`].
+    /// As [`Script::new`], [`SceneOf::inserted_mm`] and [`SceneOf::centreline`].
     pub fn steps(&self, stack: &Stack) -> Result<Script> {
-        Script::new(&self.script, stack, &self.inserted_mm(stack)?)
+        let has_target = |line: &ScriptLine| line.until.as_ref().is_some_and(|until| until.target.is_some());
+        // A file is not opened for nothing.
+        let centreline = match self.script.iter().any(has_target) {
+            true => self.centreline()?,
+            false => None,
+        };
+        Script::new(&self.script, stack, &self.inserted_mm(stack)?, centreline.as_ref())
+    }
+
+    /// The vessel's centre line: the tree it is built from, or the one given beside its surface; none where there is neither.
+    ///
+    /// # Errors
+    /// A missing or unusable file; one given beside a tree.
+    pub fn centreline(&self) -> Result<Option<CentrelineTree>> {
+        let (key, path) = match (&self.vessel.tree, &self.vessel.centreline) {
+            (None, None) => return Ok(None),
+            (Some(path), None) => ("vessel.tree", path),
+            (None, Some(path)) => ("vessel.centreline", path),
+            (Some(_), Some(path)) => {
+                let mend = "vessel.tree is given too, and is the centre line: keep one of the two";
+                return Err(Error::parameter("vessel.centreline", path.display(), mend));
+            }
+        };
+        CentrelineTree::read(&self.resolve(path)).map(Some).map_err(|error| missing(key, error))
     }
 
     /// The simulation at the start, with walls from `store`: nothing inserted but what instruments say.

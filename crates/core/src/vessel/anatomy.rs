@@ -5,22 +5,45 @@
 
 use std::f64::consts::PI;
 
-use super::{CentrelineNode, CentrelineTree, Resolution};
+use super::{CentrelineNode, CentrelineTree, Resolution, Target};
 use crate::Vec3;
 
 /// Names of the built-in vessels, for messages.
-pub const NAMES: [&str; 4] = ["straight_tube", "curved_tube", "aortic_arch", "hepatic"];
+pub const NAMES: [&str; 6] =
+    ["straight_tube", "curved_tube", "aortic_arch", "aortic_arch_ii", "aortic_arch_iii", "hepatic"];
 
 /// The built-in vessel of that name.
 pub fn tree(name: &str) -> Option<CentrelineTree> {
     let nodes = match name {
         "straight_tube" => straight_tube(),
         "curved_tube" => curved_tube(),
-        "aortic_arch" => aortic_arch(),
+        "aortic_arch" => aortic_arch(&TYPE_I),
+        "aortic_arch_ii" => aortic_arch(&TYPE_II),
+        "aortic_arch_iii" => aortic_arch(&TYPE_III),
         "hepatic" => hepatic(),
         _ => return None,
     };
-    CentrelineTree::new(nodes).ok()
+    let tree = CentrelineTree::new(nodes).ok()?;
+    let named = targets(name).iter().map(|(row, name)| Target { name: (*name).to_owned(), row: *row });
+    tree.with_targets(named.collect()).ok()
+}
+
+/// Rows that have names: ends of branches but for the coeliac trunk, which is on the way.
+fn targets(name: &str) -> &'static [(usize, &'static str)] {
+    match name {
+        "aortic_arch" | "aortic_arch_ii" | "aortic_arch_iii" => {
+            &[(17, "ascending aorta"), (21, "innominate"), (25, "left carotid"), (29, "left subclavian")]
+        }
+        "hepatic" => &[
+            (5, "aorta"),
+            (8, "coeliac trunk"),
+            (13, "splenic"),
+            (19, "gastroduodenal"),
+            (25, "right hepatic"),
+            (28, "left hepatic"),
+        ],
+        _ => &[],
+    }
 }
 
 /// What a built-in vessel is and where its numbers come from, for the head of its table.
@@ -29,6 +52,8 @@ pub fn description(name: &str) -> Option<&'static str> {
         "straight_tube" => Some(STRAIGHT_TUBE),
         "curved_tube" => Some(CURVED_TUBE),
         "aortic_arch" => Some(AORTIC_ARCH),
+        "aortic_arch_ii" => Some(AORTIC_ARCH_II),
+        "aortic_arch_iii" => Some(AORTIC_ARCH_III),
         "hepatic" => Some(HEPATIC),
         _ => None,
     }
@@ -39,7 +64,8 @@ pub fn asset_resolution(name: &str) -> Resolution {
     match name {
         "straight_tube" => Resolution::EdgeMm(1.25),
         "curved_tube" => Resolution::EdgeMm(1.2),
-        "aortic_arch" => Resolution::EdgeMm(2.25),
+        "aortic_arch" | "aortic_arch_ii" => Resolution::EdgeMm(2.25),
+        "aortic_arch_iii" => Resolution::EdgeMm(2.4),
         _ => Resolution::EdgeMm(1.1),
     }
 }
@@ -90,25 +116,30 @@ Diameters: ascending aorta 34.6, innominate 12.5, left common carotid 8.3, left 
 arch to descending aorta 31.8 to 23.9 mm over 200 mm. Type I: all three branches leave within one carotid diameter of the top
 of the arch. Course of the axis drawn. Axes: +x left, +y posterior, +z cranial; origin at the lower end.";
 
-fn aortic_arch() -> Vec<CentrelineNode> {
-    // The arch rises from the heart in front and to the right, and comes down behind and to the left.
-    let mut course = Course::new().root(Vec3::new(0.0, 0.0, 0.0), 23.9 / 2.0);
-    for (z, diameter) in
-        [(25.0, 24.8), (50.0, 25.8), (75.0, 26.8), (100.0, 27.8), (125.0, 28.8), (150.0, 29.8), (172.0, 30.7)]
-    {
-        course = course.to(Vec3::new(0.0, 0.0, z), diameter / 2.0);
-    }
-    let descending = course.nodes.len() - 1;
-    // Half an ellipse from behind left to front right: half width 33 mm, height 40 mm.
-    let (half_width, height) = (33.0, 40.0);
-    let across = Vec3::new(-0.62, -0.785, 0.0).normalize();
-    let base = course.nodes[descending].position_mm;
-    let on_arch = |degrees: f64| {
-        let angle = degrees.to_radians();
-        base + across * (half_width * (1.0 - angle.cos())) + Vec3::z() * (height * angle.sin())
-    };
-    let mut branch_rows = [0; 3];
-    for (degrees, diameter, branch) in [
+const AORTIC_ARCH_II: &str = "aortic_arch_ii: as aortic_arch, with a type II arch: the innominate artery leaves 1.5 diameters of the left carotid below the
+top of the arch. Types by that height, less than 1, 1 to 2 and more than 2 diameters for I, II and III: Tayal et al., J. Cardiol. Curr.
+Res. 6, 00191, 2016. Course of the axis drawn.";
+
+const AORTIC_ARCH_III: &str = "aortic_arch_iii: as aortic_arch, with a type III arch: the innominate artery leaves 2.5 diameters of the left carotid below
+the top of the arch. Types by that height, less than 1, 1 to 2 and more than 2 diameters for I, II and III: Tayal et al., J. Cardiol.
+Curr. Res. 6, 00191, 2016. Course of the axis drawn.";
+
+/// Diameter of the left common carotid artery, by which types of the arch are told, mm.
+const LEFT_CAROTID_MM: f64 = 8.3;
+
+/// Where branches leave an arch that rises in the right front and comes down in the left back, and where they go.
+struct Arch {
+    /// Height above its feet, mm.
+    height_mm: f64,
+    /// Angle of each point about the middle of the arch, from behind left, degrees; diameter there, mm; number of the branch that leaves.
+    points: [(f64, f64, Option<usize>); 8],
+    /// Innominate, left carotid, left subclavian: points from where each leaves, mm.
+    branches: [[[f64; 3]; 4]; 3],
+}
+
+const TYPE_I: Arch = Arch {
+    height_mm: 40.0,
+    points: [
         (20.0, 31.2, None),
         (40.0, 31.8, None),
         (66.0, 32.2, Some(2)),
@@ -117,7 +148,72 @@ fn aortic_arch() -> Vec<CentrelineNode> {
         (140.0, 34.0, None),
         (160.0, 34.4, None),
         (180.0, 34.6, None),
-    ] {
+    ],
+    branches: [
+        [[-4., -2., 20.], [-9., -3., 34.], [-15., -3., 48.], [-21., -1., 62.]],
+        [[1., -1., 20.], [3., -2., 38.], [5., -2., 56.], [6., 0., 76.]],
+        [[4., 2., 20.], [9., 3., 36.], [17., 3., 50.], [28., 1., 60.]],
+    ],
+};
+
+/// Branches leave from the ascending part, nearer to each other, and begin along its slope.
+const TYPE_II: Arch = Arch {
+    height_mm: 46.0,
+    points: [
+        (20.0, 31.2, None),
+        (40.0, 31.5, None),
+        (62.0, 31.9, None),
+        (84.0, 32.4, Some(2)),
+        (109.0, 33.0, Some(1)),
+        (133.2, 33.8, Some(0)),
+        (157.0, 34.4, None),
+        (180.0, 34.6, None),
+    ],
+    branches: [
+        [[-8., -6., 18.], [-14., -8., 34.], [-20., -8., 48.], [-26., -6., 62.]],
+        [[-2., -3., 20.], [-2., -4., 38.], [0., -4., 56.], [2., -2., 76.]],
+        [[3., 2., 20.], [8., 3., 36.], [16., 3., 50.], [27., 1., 60.]],
+    ],
+};
+
+const TYPE_III: Arch = Arch {
+    height_mm: 52.0,
+    points: [
+        (20.0, 31.2, None),
+        (40.0, 31.5, None),
+        (60.0, 31.8, None),
+        (77.0, 32.2, None),
+        (96.0, 32.8, Some(2)),
+        (120.0, 33.4, Some(1)),
+        (143.0, 34.2, Some(0)),
+        (180.0, 34.6, None),
+    ],
+    branches: [
+        [[-12., -9., 16.], [-20., -12., 32.], [-26., -12., 48.], [-31., -10., 64.]],
+        [[-4., -5., 20.], [-5., -6., 38.], [-3., -6., 56.], [-1., -4., 76.]],
+        [[2., 1., 20.], [6., 2., 36.], [13., 2., 50.], [24., 0., 62.]],
+    ],
+};
+
+fn aortic_arch(arch: &Arch) -> Vec<CentrelineNode> {
+    // The arch rises from the heart in front and to the right, and comes down behind and to the left.
+    let mut course = Course::new().root(Vec3::new(0.0, 0.0, 0.0), 23.9 / 2.0);
+    for (z, diameter) in
+        [(25.0, 24.8), (50.0, 25.8), (75.0, 26.8), (100.0, 27.8), (125.0, 28.8), (150.0, 29.8), (172.0, 30.7)]
+    {
+        course = course.to(Vec3::new(0.0, 0.0, z), diameter / 2.0);
+    }
+    let descending = course.nodes.len() - 1;
+    // Half an ellipse from behind left to front right, of half width 33 mm.
+    let half_width = 33.0;
+    let across = Vec3::new(-0.62, -0.785, 0.0).normalize();
+    let base = course.nodes[descending].position_mm;
+    let on_arch = |degrees: f64| {
+        let angle = degrees.to_radians();
+        base + across * (half_width * (1.0 - angle.cos())) + Vec3::z() * (arch.height_mm * angle.sin())
+    };
+    let mut branch_rows = [0; 3];
+    for (degrees, diameter, branch) in arch.points {
         course = course.to(on_arch(degrees), diameter / 2.0);
         if let Some(which) = branch {
             branch_rows[which] = course.nodes.len() - 1;
@@ -127,20 +223,13 @@ fn aortic_arch() -> Vec<CentrelineNode> {
     course = course
         .to(root + Vec3::new(0.5, -1.0, -18.0), 34.6 / 2.0)
         .to(root + Vec3::new(2.5, -3.0, -36.0), 34.6 / 2.0);
-    let leave = |course: Course, row: usize, diameter: f64, path: [[f64; 3]; 4]| {
-        let from = course.nodes[row].position_mm;
-        path.iter().fold(course.at(row), |course, step| course.to(from + Vec3::from(*step), diameter / 2.0))
-    };
-    let course = leave(
-        course,
-        branch_rows[0],
-        12.5,
-        [[-4., -2., 20.], [-9., -3., 34.], [-15., -3., 48.], [-21., -1., 62.]],
-    );
-    let course =
-        leave(course, branch_rows[1], 8.3, [[1., -1., 20.], [3., -2., 38.], [5., -2., 56.], [6., 0., 76.]]);
-    let course =
-        leave(course, branch_rows[2], 10.4, [[4., 2., 20.], [9., 3., 36.], [17., 3., 50.], [28., 1., 60.]]);
+    for (branch, diameter) in [12.5, LEFT_CAROTID_MM, 10.4].into_iter().enumerate() {
+        let from = course.nodes[branch_rows[branch]].position_mm;
+        course = course.at(branch_rows[branch]);
+        for step in arch.branches[branch] {
+            course = course.to(from + Vec3::from(step), diameter / 2.0);
+        }
+    }
     course.nodes
 }
 
@@ -274,6 +363,20 @@ mod tests {
         assert_eq!(stored.triangles.len(), mesh.triangles.len(), "{name}");
         assert!(largest_difference(0.0) < 1e-4, "{name}: {}", largest_difference(0.0));
         assert!(largest_difference(2e-4) > 1e-4, "the comparison can fail");
+    }
+
+    #[test]
+    fn arches_are_of_the_types_that_they_are_called() {
+        for (name, type_range) in
+            [("aortic_arch", 0.0..1.0), ("aortic_arch_ii", 1.0..2.0), ("aortic_arch_iii", 2.0..4.0)]
+        {
+            let tree = tree(name).unwrap();
+            let top_mm = tree.nodes()[..16].iter().map(|node| node.position_mm.z).fold(0.0, f64::max);
+            let first = |name: &str| tree.target(name).unwrap().row - 3;
+            let origin = tree.nodes()[tree.nodes()[first("innominate")].parent.unwrap()].position_mm;
+            let drop = (top_mm - origin.z) / LEFT_CAROTID_MM;
+            assert!(type_range.contains(&drop), "{name}: {drop}");
+        }
     }
 
     #[test]

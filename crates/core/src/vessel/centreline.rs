@@ -1,14 +1,16 @@
 //! The centre line of a vessel tree: points with radii, each joined to its parent.
 //!
 //! As a table, one point a line: `x y z radius parent`, separated by blanks, tabs, commas or semicolons; millimetres; `parent`
-//! is the row (counted from 0, without comments and header) of an earlier point, −1 for the root. `#` starts a comment, and the
-//! first line that is not a comment may be a header of words.
+//! is the row (counted from 0, without comments and header) of an earlier point, −1 for the root. Words behind it name the point as a
+//! target. `#` starts a comment, and the first line that is not a comment may be a header of words.
 
 use std::fmt::Write;
 use std::path::Path;
 
 use serde::Serialize;
 
+use super::CentrelinePath;
+use crate::error::nearest_name;
 use crate::{Error, Result, Vec3};
 
 /// A point of a centre line.
@@ -26,6 +28,18 @@ pub struct CentrelineNode {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CentrelineTree {
     nodes: Vec<CentrelineNode>,
+    /// Not of the vessel's shape: a wall is the same by whatever names.
+    #[serde(skip)]
+    targets: Vec<Target>,
+}
+
+/// A point of a tree that has a name: a place to go to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Target {
+    /// What it is called.
+    pub name: String,
+    /// Its row.
+    pub row: usize,
 }
 
 impl CentrelineTree {
@@ -43,7 +57,59 @@ impl CentrelineTree {
         if nodes.len() < 2 {
             return Err(Error::parameter("centreline rows", nodes.len(), "a vessel needs at least 2 points"));
         }
-        Ok(Self { nodes })
+        Ok(Self { nodes, targets: Vec::new() })
+    }
+
+    /// The tree with these rows named, in place of those that were.
+    ///
+    /// # Errors
+    /// A row that is not there, and a name that a table could not hold: empty, a number, given twice, with commas, semicolons, `#` or
+    /// blanks beside others.
+    pub fn with_targets(mut self, targets: Vec<Target>) -> Result<Self> {
+        for (index, target) in targets.iter().enumerate() {
+            if target.row >= self.nodes.len() {
+                let mend = format!("the tree has {} rows, counted from 0", self.nodes.len());
+                return Err(Error::parameter(format!("target {:?}, row", target.name), target.row, mend));
+            }
+            check_name(&target.name, &targets[..index])
+                .map_err(|mend| Error::parameter("target", format!("{:?}", target.name), mend))?;
+        }
+        self.targets = targets;
+        Ok(self)
+    }
+
+    /// The named points, in the order of the table.
+    pub fn targets(&self) -> &[Target] {
+        &self.targets
+    }
+
+    /// The point of that name.
+    ///
+    /// # Errors
+    /// A name that no point has, with the nearest one that is there.
+    pub fn target(&self, name: &str) -> Result<&Target> {
+        self.targets.iter().find(|target| target.name == name).ok_or_else(|| {
+            let mend = match nearest_name(self.targets.iter().map(|target| target.name.as_str()), name) {
+                Some(nearest) => format!("did you mean {nearest:?}?"),
+                None => {
+                    "the vessel names no targets: write them behind the rows of its centre-line table".into()
+                }
+            };
+            Error::parameter("target", format!("{name:?}"), mend)
+        })
+    }
+
+    /// The way from the root to a row; `None` where the tree has no such row, or it is the root.
+    pub fn path_to(&self, row: usize) -> Option<CentrelinePath> {
+        let mut points = Vec::new();
+        let mut at = (row > 0).then_some(row);
+        while let Some(row) = at {
+            let node = self.nodes.get(row)?;
+            points.push((node.position_mm, node.radius_mm));
+            at = node.parent;
+        }
+        points.reverse();
+        CentrelinePath::new(points)
     }
 
     /// Reads a table.
@@ -67,6 +133,7 @@ impl CentrelineTree {
     /// Reads the text of a table; the error names line and value.
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut nodes: Vec<CentrelineNode> = Vec::new();
+        let mut targets: Vec<Target> = Vec::new();
         let mut may_be_header = true;
         for (index, line) in text.lines().enumerate() {
             let words: Vec<&str> = line
@@ -84,14 +151,21 @@ impl CentrelineTree {
             if is_header {
                 continue;
             }
-            nodes.push(parse_row(&words).map_err(|reason| format!("line {}: {reason}", index + 1))?);
+            let (row, name) = words.split_at(words.len().min(COLUMNS));
+            nodes.push(parse_row(row).map_err(|reason| format!("line {}: {reason}", index + 1))?);
+            if !name.is_empty() {
+                let name = name.join(" ");
+                check_name(&name, &targets)
+                    .map_err(|mend| format!("line {}: target = {name:?}: {mend}", index + 1))?;
+                targets.push(Target { name, row: nodes.len() - 1 });
+            }
             check_row(&nodes, nodes.len() - 1)
                 .map_err(|(column, value, mend)| format!("line {}: {column} = {value}: {mend}", index + 1))?;
         }
         if nodes.len() < 2 {
             return Err(format!("{} centre-line points; a vessel needs at least 2", nodes.len()));
         }
-        Ok(Self { nodes })
+        Ok(Self { nodes, targets })
     }
 
     /// Writes the table with `comment` above it. Reading it back gives the same bits.
@@ -105,11 +179,14 @@ impl CentrelineTree {
     /// The table as text.
     pub fn table(&self, comment: &str) -> String {
         let mut out: String = comment.lines().map(|line| format!("# {line}\n")).collect();
-        out.push_str("x,y,z,radius,parent\n");
-        for node in &self.nodes {
+        out.push_str("x,y,z,radius,parent");
+        out.push_str(if self.targets.is_empty() { "\n" } else { ",target\n" });
+        for (row, node) in self.nodes.iter().enumerate() {
             let (p, parent) = (node.position_mm, node.parent.map_or(-1, |row| row as i64));
+            let name = self.targets.iter().find(|target| target.row == row);
+            let name = name.map_or(String::new(), |target| format!(",{}", target.name));
             // Writing to a string cannot fail.
-            let _ = writeln!(out, "{},{},{},{},{parent}", p.x, p.y, p.z, node.radius_mm);
+            let _ = writeln!(out, "{},{},{},{},{parent}{name}", p.x, p.y, p.z, node.radius_mm);
         }
         out
     }
@@ -128,6 +205,24 @@ impl CentrelineTree {
             }
         }
         children
+    }
+}
+
+/// Values of a row without a name.
+const COLUMNS: usize = 5;
+
+/// Why a name cannot be that of a target beside others, if it cannot.
+fn check_name(name: &str, others: &[Target]) -> std::result::Result<(), String> {
+    let words = name.split(|c: char| c.is_whitespace() || c == ',' || c == ';');
+    if name.contains('#') || words.clone().any(str::is_empty) || words.collect::<Vec<_>>().join(" ") != name {
+        return Err("a name is words with a blank between them, without commas, semicolons and #".into());
+    }
+    if name.split(' ').all(|word| word.parse::<f64>().is_ok()) {
+        return Err("is a number: a row is x y z radius parent, and a name if the point has one".into());
+    }
+    match others.iter().any(|other| other.name == name) {
+        true => Err("is the name of an earlier row: names are given once".into()),
+        false => Ok(()),
     }
 }
 
@@ -222,11 +317,32 @@ mod tests {
             ("0 0 0 1 -1\n0 0 1 1 0.5", "line 2: parent = \"0.5\""),
             ("0 0 0 1 -1\n0 0 one 1 0", "line 2: z = \"one\""),
             ("0 0 0 1 -1\n0 0 1 1", "line 2: 4 values"),
+            ("0 0 0 1 -1\n0 0 1 1 0 7", "line 2: target = \"7\": is a number"),
+            ("0 0 0 1 -1 end\n0 0 1 1 0 end", "line 2: target = \"end\": is the name of an earlier row"),
             ("", "0 centre-line points"),
             ("0 0 0 1 -1", "1 centre-line points"),
         ] {
             let reason = CentrelineTree::parse(table).unwrap_err();
             assert!(reason.starts_with(expected), "{table:?}: {reason}");
+        }
+    }
+
+    #[test]
+    fn names_behind_rows_are_targets_and_unknown_ones_get_the_nearest() {
+        let table = "x,y,z,radius,parent,target\n0,0,0,2,-1\n0,0,5,1.5,0,left carotid\n0 0 9 1 1 tip of  the vessel\n";
+        let tree = CentrelineTree::parse(table).unwrap();
+        assert_eq!(tree.target("tip of the vessel").unwrap().row, 2);
+        assert_eq!(CentrelineTree::parse(&tree.table("")).unwrap(), tree);
+        let told = |tree: &CentrelineTree, name: &str| tree.target(name).unwrap_err().to_string();
+        assert_eq!(told(&tree, "left carotd"), "target = \"left carotd\": did you mean \"left carotid\"?");
+        let nameless = CentrelineTree::new(tree.nodes().to_vec()).unwrap();
+        assert!(told(&nameless, "a").contains("names no targets"));
+        // Names are no part of a wall's recipe.
+        let json = |tree: &CentrelineTree| serde_json::to_string(tree).unwrap();
+        assert_eq!(json(&nameless), json(&tree));
+        for (row, name) in [(3, "a"), (1, ""), (1, "a,b"), (1, "a  b"), (1, "1e3"), (1, "a#")] {
+            let target = Target { name: name.into(), row };
+            assert!(nameless.clone().with_targets(vec![target]).is_err(), "{row} {name:?}");
         }
     }
 

@@ -177,7 +177,7 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
         flipped_triangles: report.triangles_flipped,
         inside_out: report.inside_out,
         degenerate_triangles: (0..welded.triangles.len()).filter(degenerate).count(),
-        duplicate_triangles: duplicate_pairs(&welded.triangles).len(),
+        duplicate_triangles: duplicate_pairs(&welded.triangles, &table).len(),
         self_intersections: intersections.count,
         self_intersections_capped: intersections.capped,
         intersecting_pairs: intersections.first,

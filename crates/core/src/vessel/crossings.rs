@@ -28,7 +28,7 @@ pub(crate) struct Crossings {
 struct Tree {
     /// Triangles along the curve.
     order: Vec<u32>,
-    /// Bounds of the triangles, by number.
+    /// Bounds of the triangles, along the curve.
     boxes: Vec<[Vec3; 2]>,
     /// Bounds of the nodes: node k has children 2k and 2k + 1, leaves begin at `leaves`.
     nodes: Vec<[Vec3; 2]>,
@@ -37,7 +37,7 @@ struct Tree {
 
 const EMPTY: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
-fn join(a: &[Vec3; 2], b: &[Vec3; 2]) -> [Vec3; 2] {
+fn join(a: [Vec3; 2], b: &[Vec3; 2]) -> [Vec3; 2] {
     [a[0].inf(&b[0]), a[1].sup(&b[1])]
 }
 
@@ -53,7 +53,7 @@ impl Tree {
         };
         let boxes: Vec<[Vec3; 2]> = (0..mesh.triangles.len()).map(|i| bounds(mesh.corners(i))).collect();
         let empty = [Vec3::repeat(EMPTY[0]), Vec3::repeat(EMPTY[1])];
-        let all = members.iter().fold(empty, |all, i| join(&all, &boxes[*i as usize]));
+        let all = members.iter().fold(empty, |all, i| join(all, &boxes[*i as usize]));
         let scale =
             (all[1] - all[0]).map(|side| if side > 0.0 { f64::from((1 << 20) - 1) / side } else { 0.0 });
         let code = |i: u32| {
@@ -64,13 +64,14 @@ impl Tree {
         let mut keyed: Vec<(u64, u32)> = members.drain(..).map(|i| (code(i), i)).collect();
         keyed.sort_unstable();
         let order: Vec<u32> = keyed.into_iter().map(|(_, i)| i).collect();
+        let boxes: Vec<[Vec3; 2]> = order.iter().map(|i| boxes[*i as usize]).collect();
         let leaves = order.len().div_ceil(LEAF).next_power_of_two();
         let mut nodes = vec![empty; 2 * leaves];
-        for (leaf, inside) in order.chunks(LEAF).enumerate() {
-            nodes[leaves + leaf] = inside.iter().fold(empty, |all, i| join(&all, &boxes[*i as usize]));
+        for (leaf, inside) in boxes.chunks(LEAF).enumerate() {
+            nodes[leaves + leaf] = inside.iter().fold(empty, join);
         }
         for node in (1..leaves).rev() {
-            nodes[node] = join(&nodes[2 * node], &nodes[2 * node + 1]);
+            nodes[node] = join(nodes[2 * node], &nodes[2 * node + 1]);
         }
         Self { order, boxes, nodes, leaves }
     }
@@ -138,12 +139,14 @@ pub(crate) fn crossings(
         // Without marks each pair is met from its earlier member. A marked triangle looks at all others.
         tree.close_to(leaf, if marked.is_some() { 0 } else { leaf }, &mut stack, &mut close);
         for (place, a) in tree.leaf(leaf).filter(|(_, t)| is_marked(*t)) {
-            for (other, b) in close.iter().flat_map(|leaf| tree.leaf(*leaf)) {
+            let bounds = &tree.boxes[place];
+            let near = close.iter().filter(|leaf| meet(bounds, &tree.nodes[tree.leaves + **leaf]));
+            for (other, b) in near.flat_map(|leaf| tree.leaf(*leaf)) {
                 let again = match marked {
                     Some(_) => a == b || (is_marked(b) && b < a),
                     None => other <= place,
                 };
-                if again || !meet(&tree.boxes[a as usize], &tree.boxes[b as usize]) {
+                if again || !meet(bounds, &tree.boxes[other]) {
                     continue;
                 }
                 tried += 1;

@@ -51,3 +51,22 @@ pub(crate) fn area(corners: &[Vec3; 3]) -> f64 {
     let [a, b, c] = corners;
     (b - a).cross(&(c - a)).norm() / 2.0
 }
+
+/// Unit inward normals of vertices, weighted by angle.
+pub(crate) fn inward_vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::zeros(); mesh.vertices_mm.len()];
+    for (index, triangle) in mesh.triangles.iter().enumerate() {
+        let corner = mesh.corners(index);
+        let Some(outward) = (corner[1] - corner[0]).cross(&(corner[2] - corner[0])).try_normalize(0.0) else {
+            continue;
+        };
+        for k in 0..3 {
+            let (e, f) = (corner[(k + 1) % 3] - corner[k], corner[(k + 2) % 3] - corner[k]);
+            normals[triangle[k] as usize] -= outward * e.cross(&f).norm().atan2(e.dot(&f));
+        }
+    }
+    for normal in &mut normals {
+        *normal = normal.try_normalize(1e-12).unwrap_or_else(Vec3::x);
+    }
+    normals
+}

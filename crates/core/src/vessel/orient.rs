@@ -1,6 +1,6 @@
 //! Making neighbours agree on which side is out.
 
-use super::topology::{EdgeTable, NONE};
+use super::topology::{Edges, NONE};
 
 /// The outcome of [`make_consistent`].
 #[derive(Debug)]
@@ -18,8 +18,9 @@ pub(crate) struct Consistency {
 
 /// Turns triangles over until neighbours run along their common edge in opposite directions. In each patch the
 /// majority keeps its direction (the first triangle's side on a tie), so that a few flipped faces are the ones reported.
-pub(crate) fn make_consistent(triangles: &mut [[u32; 3]]) -> Consistency {
-    let table = EdgeTable::new(triangles);
+/// `edges` are those of the triangles.
+pub(crate) fn make_consistent(triangles: &mut [[u32; 3]], edges: &mut Edges) -> Consistency {
+    let table = edges.of(triangles);
     let across = table.neighbours(triangles.len());
     let mut agrees = vec![[true; 3]; triangles.len()];
     for uses in table.edges() {
@@ -68,6 +69,7 @@ pub(crate) fn make_consistent(triangles: &mut [[u32; 3]]) -> Consistency {
     }
     for (triangle, _) in triangles.iter_mut().zip(&flipped).filter(|(_, flip)| **flip) {
         triangle.swap(1, 2);
+        edges.changed();
     }
     // Each contradiction was met from both sides.
     Consistency {
@@ -104,7 +106,7 @@ mod tests {
         for t in [3, 4, 17] {
             dirty[t].swap(1, 2);
         }
-        let outcome = make_consistent(&mut dirty);
+        let outcome = make_consistent(&mut dirty, &mut Edges::default());
         assert_eq!(dirty, clean);
         assert_eq!((outcome.patches, outcome.contradictions), (1, 0));
         let turned: Vec<usize> = (0..clean.len()).filter(|&t| outcome.flipped[t]).collect();
@@ -113,7 +115,7 @@ mod tests {
 
     #[test]
     fn a_moebius_strip_is_reported_as_contradiction_and_a_plain_ring_is_not() {
-        assert!(make_consistent(&mut ring(20, true)).contradictions > 0);
-        assert_eq!(make_consistent(&mut ring(20, false)).contradictions, 0);
+        assert!(make_consistent(&mut ring(20, true), &mut Edges::default()).contradictions > 0);
+        assert_eq!(make_consistent(&mut ring(20, false), &mut Edges::default()).contradictions, 0);
     }
 }

@@ -4,12 +4,14 @@
 //! right also where the closest feature is an edge or a vertex (Bærentzen and Aanæs, "Signed distance computation using
 //! the angle weighted pseudonormal", IEEE TVCG 11, 2005). Types of parry and glam stay inside this file.
 
+use std::sync::OnceLock;
+
 use parry3d_f64::glamx::DVec3;
-use parry3d_f64::query::{PointQueryWithLocation, Ray, RayCast};
-use parry3d_f64::shape::{CompositeShapeRef, TriMesh, TriMeshFlags, TrianglePointLocation};
+use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
+use parry3d_f64::shape::{CompositeShapeRef, TriMesh, Triangle, TrianglePointLocation};
 
 use super::topology::{EdgeTable, NONE};
-use super::{SurfaceMesh, Wall};
+use super::{SurfaceMesh, Wall, inward_vertex_normals};
 use crate::{Error, Result, Vec3};
 
 /// Closer to the wall than this, in mm, the direction to the closest point is rounding: the triangle's normal is used.
@@ -31,21 +33,44 @@ pub struct Nearest {
     pub rim: bool,
 }
 
-/// Closest-point queries on a wall.
+/// Closest-point queries on a wall. What they need is made ready with the first of them.
 #[derive(Clone)]
 pub struct WallQuery {
+    mesh: SurfaceMesh,
+    ready: OnceLock<Option<Ready>>,
+}
+
+/// What answers queries.
+#[derive(Clone)]
+struct Ready {
     shape: TriMesh,
-    /// Inward unit normal of each triangle.
-    inward: Vec<Vec3>,
-    /// Whether each side of each triangle is open.
-    open_side: Vec<[bool; 3]>,
+    /// Inward pseudo-normal of each vertex.
+    inward_at: Vec<Vec3>,
+    /// The triangle across each side of each triangle.
+    across: Vec<[u32; 3]>,
     /// Whether each vertex is on an open side.
     open_vertex: Vec<bool>,
 }
 
+impl Ready {
+    fn new(mesh: &SurfaceMesh) -> Option<Self> {
+        let vertices = mesh.vertices_mm.iter().map(to_parry).collect();
+        let shape = TriMesh::new(vertices, mesh.triangles.clone()).ok()?;
+        let across = EdgeTable::new(&mesh.triangles).neighbours(mesh.triangles.len());
+        let mut open_vertex = vec![false; mesh.vertices_mm.len()];
+        for (triangle, across) in mesh.triangles.iter().zip(&across) {
+            for side in (0..3).filter(|&side| across[side] == NONE) {
+                open_vertex[triangle[side] as usize] = true;
+                open_vertex[triangle[(side + 1) % 3] as usize] = true;
+            }
+        }
+        Some(Self { shape, inward_at: inward_vertex_normals(mesh), across, open_vertex })
+    }
+}
+
 impl std::fmt::Debug for WallQuery {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("WallQuery").field("triangles", &self.inward.len()).finish_non_exhaustive()
+        f.debug_struct("WallQuery").field("triangles", &self.triangles()).finish_non_exhaustive()
     }
 }
 
@@ -58,36 +83,37 @@ fn from_parry(v: DVec3) -> Vec3 {
 }
 
 impl WallQuery {
-    /// Prepares queries on `wall`: O(n log n) time.
+    /// Queries on `wall`. The first takes O(n log n) time, others O(log n).
     ///
     /// # Errors
-    /// [`Error::Mesh`] if the hierarchy cannot be built.
+    /// [`Error::Mesh`] if there are no triangles.
     pub fn new(wall: &Wall) -> Result<Self> {
-        let mesh: &SurfaceMesh = wall.mesh();
-        let vertices = mesh.vertices_mm.iter().map(to_parry).collect();
-        let shape = TriMesh::with_flags(vertices, mesh.triangles.clone(), TriMeshFlags::ORIENTED)
-            .map_err(|e| Error::Mesh(format!("no wall to query: {e}")))?;
-        let inward = (0..mesh.triangles.len())
-            .map(|i| {
-                let [a, b, c] = mesh.corners(i);
-                (c - a).cross(&(b - a)).try_normalize(0.0).unwrap_or_else(Vec3::x)
-            })
-            .collect();
-        let across = EdgeTable::new(&mesh.triangles).neighbours(mesh.triangles.len());
-        let open_side: Vec<[bool; 3]> = across.iter().map(|sides| sides.map(|other| other == NONE)).collect();
-        let mut open_vertex = vec![false; mesh.vertices_mm.len()];
-        for (triangle, open) in mesh.triangles.iter().zip(&open_side) {
-            for side in (0..3).filter(|&side| open[side]) {
-                open_vertex[triangle[side] as usize] = true;
-                open_vertex[triangle[(side + 1) % 3] as usize] = true;
-            }
+        if wall.mesh().triangles.is_empty() {
+            return Err(Error::Mesh("no wall to query: it has no triangles".into()));
         }
-        Ok(Self { shape, inward, open_side, open_vertex })
+        Ok(Self { mesh: wall.mesh().clone(), ready: OnceLock::new() })
+    }
+
+    #[inline]
+    fn ready(&self) -> Option<&Ready> {
+        self.ready.get_or_init(|| Ready::new(&self.mesh)).as_ref()
     }
 
     /// Unit normal of a triangle, into the lumen. `triangle` is one that [`WallQuery::nearest`] returned.
     pub fn inward_normal(&self, triangle: u32) -> Vec3 {
-        self.inward[triangle as usize]
+        let [a, b, c] = self.mesh.corners(triangle as usize);
+        (c - a).cross(&(b - a)).try_normalize(0.0).unwrap_or_else(Vec3::x)
+    }
+
+    /// How far a point is from the wall, mm, on whichever side. For one question: it looks at all triangles, which takes less time than
+    /// to make ready for more.
+    pub(crate) fn distance_mm(&self, point_mm: &Vec3) -> f64 {
+        let point = to_parry(point_mm);
+        let from = |t: usize| {
+            let [a, b, c] = self.mesh.corners(t).map(|v| to_parry(&v));
+            Triangle::new(a, b, c).distance_to_local_point(point, false)
+        };
+        (0..self.triangles()).map(from).fold(f64::INFINITY, f64::min)
     }
 
     /// Where the straight way from one point to another first meets the wall, as a part of the way, up to `farthest` times its
@@ -98,42 +124,48 @@ impl WallQuery {
             return None;
         }
         let ray = Ray::new(to_parry(from_mm), to_parry(&(to_mm - from_mm)));
-        self.shape.cast_local_ray(&ray, farthest, true)
+        self.ready()?.shape.cast_local_ray(&ray, farthest, true)
     }
 
     /// What a ray first meets within `reach_mm`: how far it is, and the triangle. `direction` is of unit length.
     pub(crate) fn first_met(&self, from_mm: &Vec3, direction: &Vec3, reach_mm: f64) -> Option<(f64, u32)> {
         let ray = Ray::new(to_parry(from_mm), to_parry(direction));
         // The feature of a hit is that of a triangle by itself; which triangle it was the composite shape tells.
-        let (triangle, way_mm) = CompositeShapeRef(&self.shape).cast_local_ray(&ray, reach_mm, true)?;
+        let (triangle, way_mm) =
+            CompositeShapeRef(&self.ready()?.shape).cast_local_ray(&ray, reach_mm, true)?;
         Some((way_mm, triangle))
     }
 
     /// Number of triangles.
     pub fn triangles(&self) -> usize {
-        self.inward.len()
+        self.mesh.triangles.len()
     }
 
     /// The closest point of the wall if it is less than `reach_mm` away. `None` also for a point that is not finite.
     pub fn nearest(&self, point_mm: &Vec3, reach_mm: f64) -> Option<Nearest> {
         let reach = reach_mm.min(f64::MAX);
-        let (projection, (triangle, location)) = self
+        let ready = self.ready()?;
+        let (projection, (triangle, location)) = ready
             .shape
             .project_local_point_and_get_location_with_max_dist(to_parry(point_mm), false, reach)?;
         let closest = from_parry(projection.point);
         let offset = point_mm - closest;
         let length = offset.norm();
-        let side = if projection.is_inside { 1.0 } else { -1.0 };
-        let normal =
-            if length > ON_WALL_MM { offset * (side / length) } else { self.inward[triangle as usize] };
-        let rim = match location {
+        let own = self.inward_normal(triangle);
+        // The pseudo-normal of the feature, and whether that is at a rim.
+        let (inward, rim) = match location {
             TrianglePointLocation::OnVertex(corner) => {
-                let vertex = self.shape.indices()[triangle as usize][corner as usize];
-                self.open_vertex[vertex as usize]
+                let vertex = self.mesh.triangles[triangle as usize][corner as usize] as usize;
+                (ready.inward_at[vertex], ready.open_vertex[vertex])
             }
-            TrianglePointLocation::OnEdge(edge, _) => self.open_side[triangle as usize][edge as usize],
-            TrianglePointLocation::OnFace(..) | TrianglePointLocation::OnSolid => false,
+            TrianglePointLocation::OnEdge(edge, _) => match ready.across[triangle as usize][edge as usize] {
+                NONE => (own, true),
+                other => (own + self.inward_normal(other), false),
+            },
+            TrianglePointLocation::OnFace(..) | TrianglePointLocation::OnSolid => (own, false),
         };
+        let side = if offset.dot(&inward) >= 0.0 { 1.0 } else { -1.0 };
+        let normal = if length > ON_WALL_MM { offset * (side / length) } else { own };
         Some(Nearest { point_mm: closest, distance_mm: side * length, normal, triangle, rim })
     }
 }

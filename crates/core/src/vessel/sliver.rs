@@ -91,10 +91,10 @@ mod tests {
         let area = |m: &SurfaceMesh| {
             (0..m.triangles.len()).map(|i| crate::vessel::mesh::area(&m.corners(i))).sum::<f64>()
         };
-        assert_eq!(opening::boundary(&mesh).openings.len(), 1);
+        assert_eq!(opening::boundary(&mesh, &EdgeTable::new(&mesh.triangles)).openings.len(), 1);
         remove_degenerate(&mut mesh, 1e-6);
         assert!((0..mesh.triangles.len()).all(|i| !is_degenerate(&mesh.corners(i), 1e-6)));
-        assert_eq!(opening::boundary(&mesh).openings[0].boundary.len(), 4);
+        assert_eq!(opening::boundary(&mesh, &EdgeTable::new(&mesh.triangles)).openings[0].boundary.len(), 4);
         assert!((area(&mesh) - 1.0).abs() < 1e-15);
     }
 }

@@ -56,6 +56,32 @@ fn a_straight_way_is_stopped_by_the_wall_it_crosses_alone() {
 }
 
 #[test]
+fn one_question_is_answered_as_many_are() {
+    let query = WallQuery::new(&tube()).unwrap();
+    for k in 0..200 {
+        let turn = 2.4 * f64::from(k);
+        let x = Vec3::new(6.0 * turn.cos() * (0.7 * turn).sin(), 0.6 * f64::from(k) - 10.0, turn.sin());
+        let near = query.nearest(&x, f64::INFINITY).unwrap();
+        assert!((query.distance_mm(&x) - near.distance_mm.abs()).abs() < 1e-12, "{x}");
+        // Next to a vertex and next to a side as well, inside is where the axis is.
+        let inside = x.x.hypot(x.z) < 4.0 - 0.2;
+        assert!(near.rim || !inside || near.distance_mm > 0.0, "{x} {near:?}");
+    }
+    let vertex = tube().mesh().vertices_mm[200];
+    for (part, sign) in [(0.999, 1.0), (1.001, -1.0)] {
+        let x = Vec3::new(part * vertex.x, vertex.y, part * vertex.z);
+        assert_eq!(query.nearest(&x, 1.0).unwrap().distance_mm.signum(), sign);
+    }
+}
+
+#[test]
+fn the_same_triangle_is_found_again_whatever_its_winding() {
+    let triangles = [[0, 1, 2], [2, 1, 3], [2, 0, 1], [1, 4, 1], [1, 3, 2], [4, 1, 1], [3, 1, 5]];
+    let pairs = wall::duplicate_pairs(&triangles, &topology::EdgeTable::new(&triangles));
+    assert_eq!(pairs, [(0, 2), (1, 4), (3, 5)]);
+}
+
+#[test]
 fn dirt_is_removed_and_reported() {
     let clean = tube();
     let mut dirty = soup(clean.mesh());

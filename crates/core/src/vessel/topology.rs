@@ -102,6 +102,24 @@ impl EdgeTable {
     }
 }
 
+/// The edges of a mesh that is being mended, sorted anew only after a change.
+#[derive(Debug, Default)]
+pub(crate) struct Edges {
+    table: Option<EdgeTable>,
+}
+
+impl Edges {
+    /// Those of `triangles`, which must be the same since [`Edges::changed`] was last called.
+    pub(crate) fn of(&mut self, triangles: &[[u32; 3]]) -> &EdgeTable {
+        self.table.get_or_insert_with(|| EdgeTable::new(triangles))
+    }
+
+    /// To be called after a triangle has changed.
+    pub(crate) fn changed(&mut self) {
+        self.table = None;
+    }
+}
+
 /// Union–find in which the smallest member stands for its set, so that the result depends on no order.
 #[derive(Debug)]
 pub(crate) struct DisjointSets {

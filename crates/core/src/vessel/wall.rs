@@ -3,8 +3,8 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::opening::{self, Opening};
-use super::topology::EdgeTable;
 pub use super::topology::NONE as NO_NEIGHBOUR;
+use super::topology::{EdgeTable, EdgeUse, Edges};
 use super::{SurfaceMesh, orient, repair, sliver, weld};
 use crate::{Error, Result, Vec3};
 
@@ -153,7 +153,7 @@ impl Wall {
             vertices_given: mesh.vertices_mm.len(),
             ..Default::default()
         };
-        Ok(Self::finished(mesh, report))
+        Ok(Self::finished(mesh, Edges::default(), report))
     }
 
     fn mended(surface: &SurfaceMesh, whole: bool) -> Result<Self> {
@@ -171,30 +171,31 @@ impl Wall {
             triangles: surface.triangles.iter().map(|t| t.map(|v| target[v as usize])).collect(),
         };
         report.degenerate_removed = sliver::remove_degenerate(&mut mesh, tolerance_mm);
-        report.duplicates_removed = remove_duplicates(&mut mesh.triangles);
         if mesh.triangles.is_empty() {
             return Err(Error::Mesh("no triangle has an area; check the file and its unit".into()));
         }
         report.vertices_unreferenced = drop_unreferenced(&mut mesh) - report.vertices_welded;
+        let mut edges = Edges::default();
+        report.duplicates_removed = remove_duplicates(&mut mesh.triangles, &mut edges);
         if whole {
-            repair::join_sheets(&mut mesh, tolerance_mm, &mut report);
+            repair::join_sheets(&mut mesh, &mut edges, tolerance_mm, &mut report);
         }
         let before = mesh.triangles.clone();
-        let consistency = orient::make_consistent(&mut mesh.triangles);
-        turn_outward(&mut mesh, &consistency);
+        let consistency = orient::make_consistent(&mut mesh.triangles, &mut edges);
+        turn_outward(&mut mesh, &mut edges, &consistency);
         // Turning over swaps two corners; turning twice restores them exactly.
         report.triangles_flipped = before.iter().zip(&mesh.triangles).filter(|(a, b)| a != b).count();
         report.inside_out = report.triangles_flipped == mesh.triangles.len();
         report.one_sided_edges = consistency.contradictions;
         if whole {
-            repair::cure(&mut mesh, tolerance_mm, &mut report);
+            repair::cure(&mut mesh, &mut edges, tolerance_mm, &mut report);
         }
-        Ok(Self::finished(mesh, report))
+        Ok(Self::finished(mesh, edges, report))
     }
 
-    /// Counts what `mesh` is made of and finds its openings.
-    fn finished(mesh: SurfaceMesh, mut report: RepairReport) -> Self {
-        let table = EdgeTable::new(&mesh.triangles);
+    /// Counts what `mesh` is made of, whose edges these are, and finds its openings.
+    fn finished(mesh: SurfaceMesh, mut edges: Edges, mut report: RepairReport) -> Self {
+        let table = edges.of(&mesh.triangles);
         report.non_manifold_edges = table.non_manifold();
         let (component, count) = table.components(mesh.triangles.len());
         let mut sizes = vec![0; count];
@@ -203,7 +204,7 @@ impl Wall {
         }
         report.components = count;
         report.smallest_component = sizes.into_iter().min().unwrap_or(0);
-        let boundary = opening::boundary(&mesh);
+        let boundary = opening::boundary(&mesh, table);
         report.openings = boundary.openings.len();
         report.stray_edges = boundary.stray_edges;
         let caps = boundary.openings.iter().flat_map(|o| o.cap(&mesh).collect::<Vec<_>>()).collect();
@@ -265,7 +266,7 @@ impl<'de> Deserialize<'de> for Wall {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
         let (mesh, report) = Deserialize::deserialize(deserializer)?;
         validate(&mesh).map_err(de::Error::custom)?;
-        Ok(Self::finished(mesh, report))
+        Ok(Self::finished(mesh, Edges::default(), report))
     }
 }
 
@@ -313,13 +314,18 @@ pub(crate) fn validate(surface: &SurfaceMesh) -> Result<()> {
 }
 
 /// Keeps the first of all triangles on the same vertices, whatever their winding.
-pub(super) fn remove_duplicates(triangles: &mut Vec<[u32; 3]>) -> usize {
+pub(super) fn remove_duplicates(triangles: &mut Vec<[u32; 3]>, edges: &mut Edges) -> usize {
     let before = triangles.len();
+    let pairs = duplicate_pairs(triangles, edges.of(triangles));
+    if pairs.is_empty() {
+        return 0;
+    }
     let mut keep = vec![true; before];
-    for (earlier, later) in duplicate_pairs(triangles) {
+    for (earlier, later) in pairs {
         debug_assert!(earlier < later);
         keep[later] = false;
     }
+    edges.changed();
     let mut index = 0;
     triangles.retain(|_| {
         index += 1;
@@ -328,18 +334,26 @@ pub(super) fn remove_duplicates(triangles: &mut Vec<[u32; 3]>) -> usize {
     before - triangles.len()
 }
 
-/// Triangles on the same three vertices: (first, any later one), sorted.
-pub(crate) fn duplicate_pairs(triangles: &[[u32; 3]]) -> Vec<(usize, usize)> {
-    let mut order: Vec<([u32; 3], usize)> = triangles
-        .iter()
-        .enumerate()
-        .map(|(index, t)| {
-            let mut sorted = *t;
-            sorted.sort_unstable();
-            (sorted, index)
-        })
-        .collect();
+/// Triangles on the same three vertices: (first, any later one), sorted. `table` holds their edges.
+pub(crate) fn duplicate_pairs(triangles: &[[u32; 3]], table: &EdgeTable) -> Vec<(usize, usize)> {
+    let apex = |u: &EdgeUse| triangles[u.triangle as usize][(u.side as usize + 2) % 3];
+    let may_repeat = |uses: &&[EdgeUse]| match uses {
+        [_] => false,
+        [a, b] => apex(a) == apex(b),
+        _ => true,
+    };
+    let shared = table.edges().filter(may_repeat).flatten().map(|u| u.triangle as usize);
+    // Triangles with a repeated vertex are in no table.
+    let repeats = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+    let alone = (0..triangles.len()).filter(|&index| repeats(&triangles[index]));
+    let with_key = |index: usize| {
+        let mut key = triangles[index];
+        key.sort_unstable();
+        (key, index)
+    };
+    let mut order: Vec<([u32; 3], usize)> = shared.chain(alone).map(with_key).collect();
     order.sort_unstable();
+    order.dedup();
     let mut pairs: Vec<(usize, usize)> = order
         .chunk_by(|a, b| a.0 == b.0)
         .flat_map(|same| same[1..].iter().map(move |other| (same[0].1, other.1)))
@@ -369,13 +383,13 @@ pub(crate) fn drop_unreferenced(mesh: &mut SurfaceMesh) -> usize {
 }
 
 /// Turns over each patch whose volume, closed by the caps of its openings, is negative.
-fn turn_outward(mesh: &mut SurfaceMesh, consistency: &orient::Consistency) {
+fn turn_outward(mesh: &mut SurfaceMesh, edges: &mut Edges, consistency: &orient::Consistency) {
     let origin = mesh.vertices_mm[0];
     let mut volume = vec![0.0; consistency.patches];
     for (index, &patch) in consistency.patch.iter().enumerate() {
         volume[patch as usize] += signed_volume(&mesh.corners(index), origin);
     }
-    let boundary = opening::boundary(mesh);
+    let boundary = opening::boundary(mesh, edges.of(&mesh.triangles));
     for (opening, &triangle) in boundary.openings.iter().zip(&boundary.first_triangle) {
         let patch = consistency.patch[triangle as usize] as usize;
         volume[patch] += opening.cap(mesh).map(|cap| signed_volume(&cap, origin)).sum::<f64>();
@@ -384,6 +398,7 @@ fn turn_outward(mesh: &mut SurfaceMesh, consistency: &orient::Consistency) {
     for (triangle, &patch) in mesh.triangles.iter_mut().zip(&consistency.patch) {
         if volume[patch as usize] < -rounding_mm3 {
             triangle.swap(1, 2);
+            edges.changed();
         }
     }
 }

@@ -3,66 +3,48 @@
 //! STL stores every corner of every triangle anew, and exporters round them differently. Vertices closer than a
 //! tolerance are merged, transitively: chains of close vertices become one, so the result depends on no order.
 
-use std::collections::HashMap;
+use std::collections::VecDeque;
 
 use super::topology::DisjointSets;
 use crate::Vec3;
 
-/// Grid cells per tolerance. Large cells make most vertices look into their own cell only; the border test keeps
-/// pairs across cells.
-const CELL_PER_TOLERANCE: f64 = 16.0;
+/// Vertices are sorted along this vector of hardly less than unit length: across all planes that surfaces tend to have.
+const ALONG: Vec3 = Vec3::new(0.537_7, 0.371_9, 0.747_9);
+/// Largest difference along it of what is near, over the tolerance: with room for rounding.
+const SLACK: f64 = 1.001;
 
 /// For each vertex the index of the vertex it is merged into (its own index if it stays): the smallest index of
-/// all vertices linked to it by steps of at most `tolerance_mm`. Vertices that are not finite are joined to none that is.
+/// all vertices linked to it by steps of at most `tolerance_mm`. Vertices that are not finite are joined to none.
 pub(crate) fn merge_targets(vertices_mm: &[Vec3], tolerance_mm: f64) -> Vec<u32> {
+    let usable = |v: &Vec3| v.iter().all(|c| c.is_finite());
+    let mut order: Vec<(f64, u32)> =
+        (0..).zip(vertices_mm).filter(|(_, v)| usable(v)).map(|(index, v)| (ALONG.dot(v), index)).collect();
+    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let mut sets = DisjointSets::new(vertices_mm.len());
-    join_equal(vertices_mm, &mut sets);
-    // What is not finite lies nowhere, and near nothing.
-    let usable = |v: u32| vertices_mm[v as usize].iter().all(|c| c.is_finite());
-    let distinct: Vec<u32> =
-        (0..vertices_mm.len() as u32).filter(|&v| sets.find(v) == v && usable(v)).collect();
-    if tolerance_mm > 0.0 {
-        join_near(vertices_mm, &distinct, tolerance_mm, &mut sets);
-    }
-    (0..vertices_mm.len() as u32).map(|v| sets.find(v)).collect()
-}
-
-/// Joins vertices with equal coordinates, which is most of what an STL file needs.
-fn join_equal(vertices_mm: &[Vec3], sets: &mut DisjointSets) {
-    // Adding zero turns −0 into +0, which compare equal and must hash so.
-    let key = |v: &Vec3| [v.x, v.y, v.z].map(|c| (c + 0.0).to_bits());
-    let mut order: Vec<([u64; 3], u32)> =
-        vertices_mm.iter().enumerate().map(|(i, v)| (key(v), i as u32)).collect();
-    order.sort_unstable();
-    for pair in order.windows(2) {
-        if pair[0].0 == pair[1].0 {
-            sets.join(pair[0].1, pair[1].1);
+    // Distinct vertices that the next one may be near to.
+    let mut last: VecDeque<(f64, u32, Vec3)> = VecDeque::new();
+    for (at, index) in order {
+        let v = vertices_mm[index as usize];
+        let is_near = |before: &(f64, u32, Vec3)| at - before.0 <= SLACK * tolerance_mm;
+        while last.front().is_some_and(|before| !is_near(before)) {
+            last.pop_front();
         }
-    }
-}
-
-/// Joins vertices at most `tolerance` apart, by a grid in which each vertex visits the cells its tolerance ball meets.
-fn join_near(vertices_mm: &[Vec3], distinct: &[u32], tolerance: f64, sets: &mut DisjointSets) {
-    let cell = CELL_PER_TOLERANCE * tolerance;
-    let cell_of = |p: Vec3| [p.x, p.y, p.z].map(|c| (c / cell).floor() as i64);
-    // Only looked up, never iterated: its order cannot reach the result.
-    let mut grid: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(distinct.len());
-    for &v in distinct {
-        let p = vertices_mm[v as usize];
-        let (low, high) = (cell_of(p.add_scalar(-tolerance)), cell_of(p.add_scalar(tolerance)));
-        for x in low[0]..=high[0] {
-            for y in low[1]..=high[1] {
-                for z in low[2]..=high[2] {
-                    for &other in grid.get(&[x, y, z]).into_iter().flatten() {
-                        if (vertices_mm[other as usize] - p).norm() <= tolerance {
-                            sets.join(v, other);
-                        }
-                    }
-                }
+        let mut is_distinct = true;
+        for (_, other, w) in last.iter().rev() {
+            if (v - w).norm() <= tolerance_mm {
+                sets.join(index, *other);
+            }
+            // What that one was near to, this one is.
+            is_distinct = v != *w;
+            if !is_distinct {
+                break;
             }
         }
-        grid.entry(cell_of(p)).or_default().push(v);
+        if is_distinct {
+            last.push_back((at, index, v));
+        }
     }
+    (0..vertices_mm.len() as u32).map(|v| sets.find(v)).collect()
 }
 
 #[cfg(test)]
@@ -90,5 +72,30 @@ mod tests {
     #[test]
     fn negative_zero_is_zero() {
         assert_eq!(merge_targets(&[Vec3::new(0.0, 0.0, 0.0), Vec3::new(-0.0, 0.0, -0.0)], 0.0), [0, 0]);
+    }
+
+    #[test]
+    fn what_is_not_finite_stays_alone_and_equal_vertices_merge_without_a_tolerance() {
+        let far = Vec3::new(1e300, -1e300, 3.0);
+        let nowhere = Vec3::new(0.0, f64::NAN, 0.0);
+        let points = [Vec3::x(), nowhere, far, Vec3::x(), nowhere, far, Vec3::repeat(f64::INFINITY)];
+        assert_eq!(merge_targets(&points, 0.0), [0, 1, 2, 0, 4, 2, 6]);
+    }
+
+    #[test]
+    fn the_same_vertices_are_found_as_by_comparing_all() {
+        let points: Vec<Vec3> = (0..400)
+            .map(|k| f64::from(k % 150))
+            .zip([0.0, 0.004, 0.0101].into_iter().cycle())
+            .map(|(k, off)| Vec3::new((7.0 * k).sin(), k / 150.0, (3.0 * k).cos()) + Vec3::repeat(off))
+            .collect();
+        let mut sets = DisjointSets::new(points.len());
+        for a in 0..points.len() {
+            for b in (0..a).filter(|b| (points[a] - points[*b]).norm() <= 0.02) {
+                sets.join(a as u32, b as u32);
+            }
+        }
+        let all: Vec<u32> = (0..points.len() as u32).map(|v| sets.find(v)).collect();
+        assert_eq!(merge_targets(&points, 0.02), all);
     }
 }

@@ -103,7 +103,7 @@ pub(super) fn inside(wall: &Wall, query: &WallQuery, radius_mm: f64) -> Option<(
         widest = widest.or(Some(room));
         let (way, direction) = longest_way(query, position_mm, size);
         if best.is_none_or(|(longest, _)| way > longest) {
-            best = Some((way, Sheath { position_mm, direction }));
+            best = Some((way, Sheath { position_mm, direction, friction_n: 0.0, friction: 0.0 }));
         }
     }
     let (_, sheath) = best?;

@@ -1,6 +1,7 @@
 //! `endowire experiment`: the four experiments of Li et al. 2011.
 
 mod camera;
+mod catalogue;
 mod deformation;
 mod looping;
 pub(crate) mod navigation;

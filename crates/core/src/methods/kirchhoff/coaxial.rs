@@ -85,7 +85,8 @@ impl Nodes {
         mesh.inserted_mm.extend_from_slice(inserted_mm);
         mesh.elements.clear();
         let ends = mesh.from_tip_mm.windows(2);
-        mesh.elements.extend(ends.map(|ends| element(stack, inserted_mm, line, (ends[0], ends[1]))));
+        mesh.elements
+            .extend(ends.map(|ends| element(stack, inserted_mm, inserted_mm.len(), (ends[0], ends[1]))));
         self.feel(stack, inserted_mm, modulus_n_per_mm2, mesh);
     }
 
@@ -103,13 +104,16 @@ impl Nodes {
             }
             alone.build_points(device, inserted, self.element_mm, modulus_n_per_mm2);
             cover(device, inserted, covered, &mut alone.points);
+            let set = stack.sets()[index].unwrap_or(0);
             for point in &alone.points {
                 let from_tip_mm = line - inserted + point.from_tip_mm;
                 while e > 0 && from_tip_mm >= mesh.from_tip_mm[e] {
                     e -= 1;
                 }
                 let xi = 1.0 - (from_tip_mm - mesh.from_tip_mm[e + 1]) / mesh.elements[e].length;
-                mesh.points.push(ContactPoint { element: e, xi: xi.clamp(0.0, 1.0), from_tip_mm, ..*point });
+                let (element, xi) = (e, xi.clamp(0.0, 1.0));
+                let felt = ContactPoint { element, xi, instrument: index, set, from_tip_mm, ..*point };
+                mesh.points.push(felt);
             }
         }
     }
@@ -142,10 +146,16 @@ fn cover(device: &Device, inserted_mm: f64, covered_mm: f64, points: &mut Vec<Co
     points.push(end);
 }
 
-/// An element between two distances from the tip of the line, of the instruments whose tips are in it or beyond.
-fn element(stack: &Stack, inserted_mm: &[f64], line: f64, (near, far): (f64, f64)) -> ElementData {
+/// An element between two distances from the tip of the line, of those of the `inner` instruments whose tips are in it or beyond.
+pub(super) fn element(
+    stack: &Stack,
+    inserted_mm: &[f64],
+    inner: usize,
+    (near, far): (f64, f64),
+) -> ElementData {
+    let line = line_mm(inserted_mm);
     let mut data = ElementData::of(near - far, Material::NONE);
-    for ((device, set), inserted) in stack.devices().zip(stack.sets()).zip(inserted_mm) {
+    for ((device, set), inserted) in stack.devices().zip(stack.sets()).zip(inserted_mm).take(inner) {
         let behind = line - inserted;
         if 0.5 * (near + far) <= behind {
             continue;

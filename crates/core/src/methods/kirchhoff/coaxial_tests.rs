@@ -1,19 +1,19 @@
 //! Insertions of several instruments.
 
 use crate::device::{Device, Instrument, Section, Stack};
-use crate::insertion::{Command, Move, Sheath, Simulation};
+use crate::insertion::{Command, LateralForce, Move, Sheath, Simulation, WallProperties};
 use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, anatomy};
 use crate::{Result, Vec3};
 
-const WIRE: usize = 0;
-const CATHETER: usize = 1;
+pub(super) const WIRE: usize = 0;
+pub(super) const CATHETER: usize = 1;
 
 fn instrument(name: &str, sections: [Section; 2]) -> Instrument {
     Instrument { name: name.to_owned(), device: Device::new(sections.to_vec()).unwrap(), may_lead: true }
 }
 
 /// A hooked wire in a bent catheter.
-fn wire_in_catheter() -> Stack {
+pub(super) fn wire_in_catheter() -> Stack {
     let wire = Section::straight(330.0, 0.2, 20.0);
     let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(250.0, 0.8, 60.0) };
     let tip = |section: Section, length_mm, curvature| Section {
@@ -35,15 +35,35 @@ fn in_tube(stack: impl Into<Stack>, radius_mm: f64) -> Simulation {
 
 /// Instruments at the mouth of a tube about these points.
 fn along(axis: impl Iterator<Item = Vec3>, radius_mm: f64, stack: impl Into<Stack>) -> Simulation {
+    rubbing(axis, radius_mm, stack, 0.0)
+}
+
+/// The same, of a wall with this coefficient of friction.
+pub(super) fn rubbing(
+    axis: impl Iterator<Item = Vec3>,
+    radius_mm: f64,
+    stack: impl Into<Stack>,
+    friction: f64,
+) -> Simulation {
     let node =
         |(i, position_mm): (usize, Vec3)| CentrelineNode { position_mm, radius_mm, parent: i.checked_sub(1) };
     let tree = CentrelineTree::new(axis.enumerate().map(node).collect()).unwrap();
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.4 * radius_mm)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
-    Simulation::builder(made.wall, stack, sheath).build().unwrap()
+    let properties = WallProperties { friction, ..WallProperties::default() };
+    Simulation::builder(made.wall, stack, sheath).properties(properties).build().unwrap()
 }
 
-fn push(simulation: &mut Simulation, moves: &[(usize, f64)]) -> Result<f64> {
+/// Straight for 30 mm, then an arc of radius 40 mm.
+pub(super) fn bend() -> impl Iterator<Item = Vec3> {
+    let place = |s: f64| {
+        let angle = (s - 30.0).max(0.0) / 40.0;
+        Vec3::new(40.0 * (1.0 - angle.cos()), 0.0, s.min(30.0) + 40.0 * angle.sin())
+    };
+    (0..36).map(move |i| place(4.0 * f64::from(i)))
+}
+
+pub(super) fn push(simulation: &mut Simulation, moves: &[(usize, f64)]) -> Result<f64> {
     let each =
         moves.iter().map(|(instrument, mm)| Move { instrument: *instrument, command: Command::advance(*mm) });
     simulation.step_together(&each.collect::<Vec<_>>()).map(|report| report.energy.total())
@@ -226,12 +246,7 @@ fn feels_slopes(simulation: &mut Simulation, steps: usize) {
 
 #[test]
 fn in_a_bend_no_energy_jumps_and_hands_feel_its_slope() {
-    // Straight for 30 mm, then an arc of radius 40 mm.
-    let place = |s: f64| {
-        let angle = (s - 30.0).max(0.0) / 40.0;
-        Vec3::new(40.0 * (1.0 - angle.cos()), 0.0, s.min(30.0) + 40.0 * angle.sin())
-    };
-    let mut simulation = along((0..36).map(|i| place(4.0 * f64::from(i))), 4.0, wire_in_catheter());
+    let mut simulation = along(bend(), 4.0, wire_in_catheter());
     push(&mut simulation, &[(WIRE, 1.0)]).unwrap();
     for _ in 0..20 {
         push(&mut simulation, &[(WIRE, 4.0), (CATHETER, 4.0)]).unwrap();
@@ -250,4 +265,40 @@ fn in_the_arch_no_energy_jumps_and_hands_feel_its_slope() {
         push(&mut simulation, &[(WIRE, 4.0), (CATHETER, 4.0)]).unwrap();
     }
     feels_slopes(&mut simulation, 400);
+}
+
+/// Two instruments in free space, the inner one curved everywhere, each 80 or more mm in.
+fn curved_in_straight([wire_mm, catheter_mm]: [f64; 2]) -> Simulation {
+    let wire = Section { rest_curvature_per_mm: [0.02, 0.0], ..Section::straight(165.0, 0.2, 20.0) };
+    let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
+    let stack = Stack::new(vec![instrument("wire", [wire; 2]), instrument("catheter", [catheter; 2])]);
+    let mut simulation = in_tube(stack.unwrap(), 120.0);
+    for _ in 0..20 {
+        push(&mut simulation, &[(WIRE, wire_mm / 20.0), (CATHETER, catheter_mm / 20.0)]).unwrap();
+    }
+    simulation
+}
+
+/// Case D3: the outer bends the inner from κ₁ to κ = κ₁ EI₁/(EI₁ + EI₂), and the force across the line is −N₁κ a length. N₁ is that of a rod
+/// that slides without friction, N₁ + ½EI₁(κ² − κ₁²) = H along the line, with H = −F₁ − ½EI₁κ₁² of the force F₁ by which it is pushed.
+#[test]
+fn the_force_between_two_on_an_arc_is_exact() {
+    let (stiffness, rest, curvature) = (20.0, 0.02, 0.005);
+    for (lengths, potential) in [([101.0, 80.0], 0.0), ([80.0, 101.0], -0.5 * 15.0 * rest * rest)] {
+        let simulation = curved_in_straight(lengths);
+        let tension: f64 = potential + 0.5 * stiffness * (rest * rest - curvature * curvature);
+        let pushed = simulation.report().instruments[WIRE].push_force_n.unwrap();
+        assert!((pushed + potential + 0.5 * stiffness * rest * rest).abs() < 1e-6, "{pushed}");
+        let (told, shape) = (simulation.lateral_forces(WIRE), simulation.shape());
+        let compared = |i: &usize| (4.0..76.0).contains(&(shape.from_tip_mm[0] - shape.from_tip_mm[*i]));
+        for i in (0..shape.len()).filter(compared) {
+            let inwards = (shape.tangents[i + 1] - shape.tangents[i - 1]).normalize();
+            let (found, expected) = (told[i].force_n / told[i].length_mm, inwards * (-tension * curvature));
+            assert!((found - expected).norm() < 1e-3 * expected.norm(), "{found} and {expected} at {i}");
+        }
+        assert!((0..shape.len()).filter(compared).count() > 30);
+        let none = |force: &LateralForce| *force == LateralForce::default();
+        assert!(simulation.lateral_forces(CATHETER).iter().all(none));
+        assert!(none(&told[0]) && none(&told[shape.len() - 1]) || lengths[0] < lengths[1]);
+    }
 }

@@ -4,7 +4,6 @@
 //! repeated too ([`Correction`]); a tip with a shape of its own may instead be carried by the device behind it.
 
 use super::configuration::Start;
-use super::hands::Motion;
 use super::mesh::Mesh;
 use super::repeat::Correction;
 use super::slide::carry;
@@ -29,7 +28,7 @@ pub(super) struct Guess {
     /// Length from the tip within which the device has a shape of its own, mm.
     pub(super) shaped_mm: f64,
     /// What each hand does in the sub-step.
-    pub(super) motions: Vec<Motion>,
+    pub(super) motions: Vec<HandMotion>,
     /// What was learnt, on the nodes of the sub-step.
     learnt: Correction,
     slid: RodState,
@@ -55,7 +54,6 @@ impl Guess {
         newton: &Newton<C>,
         contact: &mut WallContact<'_>,
         (start, mesh, state): (Start<'_>, &Mesh, &mut RodState),
-        hand: HandMotion,
         blocked: bool,
     ) -> Quality {
         self.slid.copy_from(state);
@@ -77,7 +75,13 @@ impl Guess {
         let outside = contact.is_outside(elements, state);
         if self.shaped_mm > 0.0 {
             self.other.copy_from(state);
-            carry((start.mesh, &start.state.rod), mesh, self.shaped_mm, hand.turn_rad, &mut self.other);
+            carry(
+                (start.mesh, &start.state.rod),
+                mesh,
+                self.shaped_mm,
+                self.motions[0].turn_rad,
+                &mut self.other,
+            );
             if !contact.is_outside(elements, &self.other)
                 && (outside
                     || blocked

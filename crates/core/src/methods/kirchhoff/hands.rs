@@ -1,5 +1,6 @@
 //! Where the hands are: of a device alone one, of several instruments one each.
 
+use crate::contact::HandMotion;
 use crate::device::Stack;
 use crate::insertion::{Command, InstrumentReport, Move, StepReport};
 
@@ -15,9 +16,6 @@ pub(super) struct Hand {
     pub(super) turn_rad: f64,
 }
 
-/// Advance, mm, and turn, rad, of a hand.
-pub(super) type Motion = [f64; 2];
-
 /// What a report tells of one hand: of a device alone the whole.
 pub(super) fn told(report: &StepReport, index: usize) -> InstrumentReport {
     report.instruments.get(index).copied().unwrap_or(InstrumentReport {
@@ -30,11 +28,12 @@ pub(super) fn told(report: &StepReport, index: usize) -> InstrumentReport {
 }
 
 /// Sets `motions` to what takes the hands of a state to `hands`.
-pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<Motion>) {
+pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<HandMotion>) {
     motions.clear();
     motions.extend(hands.iter().enumerate().map(|(index, hand)| {
         let was = told(report, index);
-        [hand.inserted_mm - was.inserted_mm, hand.turn_rad - was.rotation_rad]
+        let turn_rad = hand.turn_rad - was.rotation_rad;
+        HandMotion { from_mm: was.inserted_mm, to_mm: hand.inserted_mm, turn_rad }
     }));
 }
 

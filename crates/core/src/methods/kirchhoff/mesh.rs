@@ -39,6 +39,12 @@ impl Mesh {
         self.inserted_mm.clear();
     }
 
+    /// The node nearest to a place so far from the tip, mm.
+    pub(super) fn nearest_node(&self, from_tip_mm: f64) -> usize {
+        let off = |i: &usize| (self.from_tip_mm[*i] - from_tip_mm).abs();
+        (0..self.from_tip_mm.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
+    }
+
     /// Takes memory for up to `elements` elements and `points` contact points.
     pub(super) fn reserve(&mut self, elements: usize, points: usize) {
         self.from_tip_mm.reserve((elements + 1).saturating_sub(self.from_tip_mm.len()));
@@ -99,6 +105,8 @@ impl Mesh {
                 self.points.push(ContactPoint {
                     element: e,
                     xi: 1.0 - at / length,
+                    instrument: 0,
+                    set: 0,
                     from_tip_mm: ends[1] + at,
                     weight_mm: half_beyond + 0.5 * step,
                     potential: WallPotential { modulus_n_per_mm2, radius_mm },

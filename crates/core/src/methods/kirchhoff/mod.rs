@@ -16,12 +16,15 @@
 mod blocked;
 mod coaxial;
 #[cfg(test)]
+mod coaxial_friction_tests;
+#[cfg(test)]
 mod coaxial_tests;
 mod command;
 mod configuration;
 mod guess;
 mod hands;
 mod hold;
+mod lateral;
 mod mesh;
 mod readout;
 mod repeat;
@@ -41,7 +44,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::{Counters, FeltWall};
-use crate::insertion::{Command, Move, StepReport, Surroundings};
+use crate::insertion::{Command, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
@@ -93,17 +96,12 @@ impl MethodChoice for KirchhoffOptions {
     }
 }
 
-/// The method for several instruments, with a set of angles for each that has a shape of its own.
+/// The method for several instruments, with the sets of angles that they have.
 fn several(
     options: KirchhoffOptions,
     surroundings: &Surroundings<'_>,
     store: &dyn WallStore,
 ) -> Result<Box<dyn Method>> {
-    let friction = surroundings.properties.largest_friction();
-    if friction > 0.0 {
-        let mend = "several instruments slide on the wall without friction: set it to 0, or push one device";
-        return Err(Error::parameter("wall.friction", friction, mend));
-    }
     Ok(match surroundings.stack.sets().iter().flatten().count() {
         0 => Box::new(Kirchhoff::<PLAIN>::new(options, surroundings, store)?),
         1 => Box::new(Kirchhoff::<TWISTED>::new(options, surroundings, store)?),
@@ -245,6 +243,17 @@ impl<const C: usize> Method for Kirchhoff<C> {
 
     fn counters(&self) -> Counters {
         self.counters
+    }
+
+    fn lateral_forces(&self, surroundings: &Surroundings<'_>, instrument: usize) -> Vec<LateralForce> {
+        let environment =
+            Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
+        let mut hands = Vec::new();
+        hands::read(&self.state.report, &mut hands);
+        let mut mesh = Mesh::default();
+        meshed(&environment, &hands, &mut mesh);
+        let motions = self.state.correction.motions();
+        lateral::lateral_forces::<C>(surroundings.stack, &mesh, &self.state, motions, instrument)
     }
 
     fn state(&self) -> State {

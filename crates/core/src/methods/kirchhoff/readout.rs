@@ -3,21 +3,24 @@
 use super::Environment;
 use super::configuration::Configuration;
 use super::hands::Hand;
+use super::lateral::{LEAST_SLIP_MM, lateral_forces, pair, slip_mm};
 use super::slopes::write_instruments;
 use super::workspace::Tools;
-use crate::contact::WallContact;
 use crate::contact::extension::left_through;
-use crate::insertion::Energy;
+use crate::contact::{HandMotion, WallContact};
+use crate::device::Stack;
+use crate::insertion::{Energy, Surroundings};
 use crate::rod::{Clamp, Layout};
 
 impl<const C: usize> Tools<C> {
-    /// Read-outs at a configuration, that of the last sub-step.
+    /// Read-outs at a configuration, that of the last sub-step. Returns the energy that friction between instruments and in the sheath took,
+    /// mJ.
     pub(super) fn write_report(
         &mut self,
         environment: &Environment<'_>,
         hands: &[Hand],
         at: &mut Configuration,
-    ) {
+    ) -> f64 {
         let surroundings = &environment.surroundings;
         let (mesh, state) = at.parts();
         let (rod, report) = (&state.rod, &mut state.report);
@@ -34,7 +37,7 @@ impl<const C: usize> Tools<C> {
             if surroundings.stack.is_several() {
                 write_instruments::<C>(environment, hands, None, &[], at);
             }
-            return;
+            return 0.0;
         }
         let mut contact = WallContact::new(
             environment.felt,
@@ -60,7 +63,9 @@ impl<const C: usize> Tools<C> {
 
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
         if surroundings.stack.is_several() {
-            return write_instruments::<C>(environment, hands, Some(&clamp), &pressed, at);
+            write_instruments::<C>(environment, hands, Some(&clamp), &pressed, at);
+            let taken_mj = if surroundings.stack.rubs() { self.rub(surroundings.stack, at) } else { 0.0 };
+            return taken_mj + self.rub_in_sheath(surroundings, &clamp, at);
         }
         let frame = rod.material_frame(0);
         let data = &mesh.elements[0].materials[0];
@@ -70,5 +75,57 @@ impl<const C: usize> Tools<C> {
         if Layout::<C>::ANGLES > 0 {
             report.tip_rotation_rad += rod.twist();
         }
+        self.rub_in_sheath(surroundings, &clamp, at)
+    }
+
+    /// What a hand feels of friction in the sheath, that of the outermost instrument in it, is added to the report; returns the energy that
+    /// it took, mJ.
+    fn rub_in_sheath(&self, surroundings: &Surroundings<'_>, clamp: &Clamp, at: &mut Configuration) -> f64 {
+        let sheath = surroundings.sheath;
+        if !sheath.rubs() {
+            return 0.0;
+        }
+        let outermost = at.mesh.inserted_mm.iter().rposition(|mm| *mm > 0.0).unwrap_or(0);
+        let inserted_mm = at.mesh.inserted_mm.get(outermost).copied().unwrap_or(at.mesh.from_tip_mm[0]);
+        let device = &surroundings.stack.instruments()[outermost].device;
+        let radius_mm = device.section_at(inserted_mm).radius_mm;
+        let [advance_mm, turn_rad] = self.guess.motions[outermost].parts();
+        let slip_mm = advance_mm.hypot(radius_mm * turn_rad);
+        if slip_mm <= LEAST_SLIP_MM {
+            return 0.0;
+        }
+        let across = clamp.force - sheath.direction * clamp.force.dot(&sheath.direction);
+        let friction_n = sheath.friction_n + sheath.friction * across.norm();
+        let push_n = friction_n * advance_mm / slip_mm;
+        let torque_nmm = friction_n * radius_mm * radius_mm * turn_rad / slip_mm;
+        let report = &mut at.parts().1.report;
+        report.push_force_n += push_n;
+        report.torque_nmm += torque_nmm;
+        if let Some(told) = report.instruments.get_mut(outermost) {
+            told.push_force_n = told.push_force_n.map(|push| push + push_n);
+            told.torque_nmm += torque_nmm;
+        }
+        friction_n * slip_mm
+    }
+
+    /// What hands feel of friction between instruments is added to the report; returns the energy that it took, mJ.
+    fn rub(&self, stack: &Stack, at: &mut Configuration) -> f64 {
+        let motions: Vec<[f64; 2]> = self.guess.motions.iter().map(HandMotion::parts).collect();
+        let mut taken_mj = 0.0;
+        let mut forces = vec![0.0; motions.len()];
+        for instrument in (0..motions.len()).filter(|inner| stack.friction(*inner) > 0.0) {
+            let told = lateral_forces::<C>(stack, &at.mesh, &at.state, &motions, instrument);
+            for (i, along) in told.iter().enumerate().filter(|(_, along)| along.friction_n != 0.0) {
+                let Some((inner, outer)) = pair(&at.mesh, (i, instrument)) else { continue };
+                forces[inner] -= along.friction_n;
+                forces[outer] += along.friction_n;
+                taken_mj -= along.friction_n * slip_mm(&motions, (inner, outer));
+            }
+        }
+        let report = &mut at.parts().1.report;
+        for (told, force) in report.instruments.iter_mut().zip(forces) {
+            told.push_force_n = told.push_force_n.map(|push| push + force);
+        }
+        taken_mj
     }
 }

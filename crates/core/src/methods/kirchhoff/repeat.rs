@@ -11,9 +11,9 @@ use std::ops::{Add, Mul};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
-use super::hands::Motion;
 use super::mesh::Mesh;
 use crate::Vec3;
+use crate::contact::HandMotion;
 use crate::rod::element::mid_slope;
 use crate::rod::{ElementData, Frame, RodState};
 
@@ -38,8 +38,8 @@ struct Turn {
 /// What the last step changed on the slid device.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Correction {
-    /// What each hand did in the step.
-    motions: Vec<Motion>,
+    /// Advance, mm, and turn, rad, of each hand in the step.
+    motions: Vec<[f64; 2]>,
     /// From the tip.
     departures: Vec<Departure>,
     /// Of every set of angles in each of these.
@@ -100,6 +100,11 @@ impl Correction {
         self.turns.clear();
     }
 
+    /// Advance, mm, and turn, rad, of each hand in the step.
+    pub(super) fn motions(&self) -> &[[f64; 2]] {
+        &self.motions
+    }
+
     /// Elements that have learnt.
     pub(super) fn len(&self) -> usize {
         self.departures.len()
@@ -112,9 +117,9 @@ impl Correction {
     }
 
     /// Remembers the way from the slid device to the equilibrium that was found.
-    pub(super) fn learn(&mut self, motions: &[Motion], slid: &RodState, found: &RodState) {
+    pub(super) fn learn(&mut self, motions: &[HandMotion], slid: &RodState, found: &RodState) {
         self.clear();
-        self.motions.extend_from_slice(motions);
+        self.motions.extend(motions.iter().map(HandMotion::parts));
         let n = slid.elements();
         let far = |i: usize| (found.frames[i].t - slid.frames[i].t).norm_squared() > LARGEST * LARGEST;
         if (0..=n).any(far) {
@@ -137,9 +142,9 @@ impl Correction {
     }
 
     /// How many of the last motions of the hands these are; `None` if they are others.
-    pub(super) fn repeats(&self, motions: &[Motion]) -> Option<f64> {
-        let (now, last) = (motions.iter().flatten(), self.motions.iter().flatten());
-        let way = size(now.clone().copied());
+    pub(super) fn repeats(&self, motions: &[HandMotion]) -> Option<f64> {
+        let (now, last) = (motions.iter().flat_map(HandMotion::parts), self.motions.iter().flatten());
+        let way = size(now.clone());
         let factor = way / size(last.clone().copied());
         let off = size(now.zip(last).map(|(now, last)| now - factor * last));
         let known = !self.departures.is_empty() && factor.is_finite();

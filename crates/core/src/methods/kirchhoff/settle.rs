@@ -161,7 +161,7 @@ impl<const C: usize> Settle<C> {
                 self.lu.copy_from(&newton.assembly.matrix, &self.shift, whisper + sigma);
                 contact.couplings(state, |point, more| {
                     let e = point.element;
-                    let place = (e, point.xi);
+                    let place = (e, point.xi, point.set);
                     add_unsymmetric(&mut self.lu, state, &elements[e], place, &more.force, &more.turn);
                 });
                 supports.held::<C>().into_iter().flatten().for_each(|row| self.lu.hold(row));

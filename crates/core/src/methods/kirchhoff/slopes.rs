@@ -38,10 +38,8 @@ pub(super) fn write_instruments<const C: usize>(
     for (index, hand) in hands.iter().enumerate() {
         let set = sets[index].filter(|_| hand.inserted_mm > 0.0);
         let twist = set.map_or(0.0, |set| {
-            let from_tip = line_mm(&inserted) - hand.inserted_mm;
-            let off = |i: &usize| (at.mesh.from_tip_mm[*i] - from_tip).abs();
-            let tip = (0..at.mesh.from_tip_mm.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
-            at.state.rod.twist_to(tip.unwrap_or(0), set)
+            let tip = at.mesh.nearest_node(line_mm(&inserted) - hand.inserted_mm);
+            at.state.rod.twist_to(tip, set)
         });
         told.push(InstrumentReport {
             inserted_mm: hand.inserted_mm,
@@ -135,7 +133,10 @@ impl Beside {
             let (was, is) = (&at.mesh.points[*index], &self.mesh.points[*index]);
             let moved: Vec3 = is.position(&self.mesh.elements, &self.rod) - touch.contact.position_mm;
             let widened = (is.weight_mm - was.weight_mm) / was.weight_mm;
-            (widened * touch.energy_mj - touch.contact.force_n * touch.contact.normal.dot(&moved)) / step_mm
+            let turned = is.angle(&self.rod) - was.angle(&self.rod);
+            let rubbed = touch.contact.friction_n.dot(&moved) + touch.friction_nmm * turned;
+            let work = touch.contact.force_n * touch.contact.normal.dot(&moved) + rubbed;
+            (widened * touch.energy_mj - work) / step_mm
         });
         each.sum()
     }

@@ -9,7 +9,7 @@ use super::search::Search;
 use super::slide::{slide, slide_together};
 use super::workspace::Tools;
 use super::{Environment, meshed};
-use crate::contact::{HandMotion, SETTLED, WallContact};
+use crate::contact::{SETTLED, WallContact};
 use crate::insertion::StepReport;
 use crate::rod::Supports;
 
@@ -75,8 +75,7 @@ impl<const C: usize> Tools<C> {
         let (mesh, after) = next.parts();
         meshed(environment, hands, mesh);
         let stack = surroundings.stack;
-        let (from_mm, to_mm) = (start.mesh.from_tip_mm[0], mesh.from_tip_mm[0]);
-        let turn_rad = if stack.is_several() {
+        if stack.is_several() {
             slide_together(
                 (start.mesh, &start.state.rod),
                 &self.extension,
@@ -84,19 +83,18 @@ impl<const C: usize> Tools<C> {
                 stack.sets(),
                 &mut after.rod,
             );
-            0.0
         } else {
             slide(start.mesh, &start.state.rod, &self.extension, mesh, &mut after.rod);
-            hands[0].turn_rad - start.state.rod.angles[0]
-        };
-        let hand = HandMotion { from_mm, to_mm, turn_rad };
+        }
+        motions(&start.state.report, hands, &mut self.guess.motions);
         let before = (&start.mesh.points[..], &start.state.forces[..]);
-        self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, hand);
+        self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
         after.turn_tails(stack, hands);
         let rod = &mut after.rod;
         let elements = mesh.elements.len();
         self.newton.resize(elements);
-        self.memory.begin(&start.state.known, &start.mesh.points, &mesh.points, to_mm - from_mm);
+        let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
+        self.memory.begin(&start.state.known, &start.mesh.points, &mesh.points, advance_mm);
         let mut contact = WallContact::new(
             environment.felt,
             &mesh.points,
@@ -104,9 +102,8 @@ impl<const C: usize> Tools<C> {
             &mut self.friction,
             stack.softest_nmm2(),
         );
-        motions(&start.state.report, hands, &mut self.guess.motions);
         let candidates = (start, &*mesh, &mut *rod);
-        let quality = self.guess.choose(&self.newton, &mut contact, candidates, hand, blocked);
+        let quality = self.guess.choose(&self.newton, &mut contact, candidates, blocked);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let near = quality != Quality::Beyond;
         let held = near && self.guess.hold(&mut self.newton, &mut contact, &supports, mesh, rod);
@@ -155,7 +152,7 @@ impl<const C: usize> Tools<C> {
             return Err(PASSED.into());
         }
         let dissipated_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
-        self.write_report(environment, hands, next);
+        let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
         let (_, after) = next.parts();
         let taken = resort == Some(true) && balanced;
         if !taken && rises(&start.state.report, &after.report, dissipated_mj) {

@@ -10,9 +10,9 @@ use std::collections::BTreeMap;
 use super::nets::Nets;
 use super::trim::{End, onto_rim};
 use super::{Field, project};
-use crate::Vec3;
 use crate::vessel::SurfaceMesh;
 use crate::vessel::topology::{EdgeTable, NONE};
+use crate::{Vec3, parallel};
 
 /// Rounds of collapsing, flipping and evening out. Later rounds find next to nothing to collapse.
 const ROUNDS: usize = 6;
@@ -86,13 +86,21 @@ impl Coarsener<'_> {
         (0..self.ends.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 
-    fn settle(&self, mut point: Vec3, rim: Option<usize>) -> Vec3 {
+    /// The place on the surface, or on its rim, next to `point`, and the edge length wanted there.
+    fn settle(&self, mut point: Vec3, rim: Option<usize>) -> (Vec3, f64) {
         let edge = self.nets.edge;
-        self.nets.with_local(self.field, &point.clone(), |local| match rim {
-            Some(end) => point = onto_rim(self.field, local, &self.ends[end], point, edge),
+        let value = self.nets.with_local(self.field, &point.clone(), |local| match rim {
+            Some(end) => {
+                point = onto_rim(self.field, local, &self.ends[end], point, edge);
+                None
+            }
             None => project(self.field, local, &mut point, edge),
         });
-        point
+        let target = match value {
+            Some(value) => super::local_edge(self.edge, value.radius),
+            None => self.target(&point),
+        };
+        (point, target)
     }
 
     /// One pass of collapses, shortest edges (relative to their target) first; returns how many.
@@ -128,8 +136,7 @@ impl Coarsener<'_> {
                 (None, Some(_)) => pb,
                 _ => (pa + pb) / 2.0,
             };
-            let position = self.settle(start, rim_a.or(rim_b));
-            let target = self.target(&position);
+            let (position, target) = self.settle(start, rim_a.or(rim_b));
             if !stays_sound(mesh, &ring, [a, b], &position, target) {
                 continue;
             }
@@ -166,11 +173,13 @@ impl Coarsener<'_> {
                 }
             }
         }
-        for (index, (sum, count)) in sum.into_iter().enumerate() {
-            if count > 0.0 {
-                let v = mesh.vertices_mm[index];
-                mesh.vertices_mm[index] = self.settle(v + 0.5 * (sum / count - v), info[index].rim);
-                info[index].target = self.target(&mesh.vertices_mm[index]);
+        let settled = parallel::map(sum.len(), |index| {
+            let ((sum, count), v) = (sum[index], mesh.vertices_mm[index]);
+            (count > 0.0).then(|| self.settle(v + 0.5 * (sum / count - v), info[index].rim))
+        });
+        for (index, settled) in settled.into_iter().enumerate() {
+            if let Some(settled) = settled {
+                (mesh.vertices_mm[index], info[index].target) = settled;
             }
         }
     }

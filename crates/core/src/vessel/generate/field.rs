@@ -7,6 +7,8 @@
 //! union would bulge; the width therefore fades out as the gradients align (Gourmel et al., "A gradient-based implicit blend",
 //! ACM TOG 32, 2013).
 
+use std::sync::Arc;
+
 use super::curve::Branch;
 use crate::Vec3;
 
@@ -32,6 +34,7 @@ pub(super) struct Field {
     pub(super) branches: Vec<Branch>,
     /// How far open ends go on straight before a flat end, mm. The mesh is cut at the true end.
     pub(super) extension: f64,
+    steepness: f64,
 }
 
 /// Value, gradient (approximate where branches blend) and local radius at a point.
@@ -45,16 +48,52 @@ pub(super) struct Value {
 }
 
 /// What of the tree matters near a ball: per branch the samples that can be closest to a point of the ball.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Local {
     parts: Vec<(usize, Vec<u32>)>,
+    centre: Vec3,
+    reach: f64,
+    /// Parts by their values at the centre, the least first, with those values.
+    order: Vec<(usize, f64)>,
+    /// How far blends of all but the first of them can lie below the least of these.
+    sag: f64,
+    /// What holds farther out.
+    wider: Option<Arc<Local>>,
+}
+
+impl Local {
+    fn new(parts: Vec<(usize, Vec<u32>)>, at_centre: &[Value], centre: Vec3, reach: f64) -> Self {
+        let mut order: Vec<(usize, f64)> = at_centre.iter().map(|v| v.f).enumerate().collect();
+        order.sort_by(|a, b| a.1.total_cmp(&b.1));
+        // Each blend of two of them lowers the lesser by a sixth of its width at most.
+        let widest = order.iter().skip(1).map(|&(k, _)| BLEND * at_centre[k].radius).fold(0.0, f64::max);
+        let sag = widest / 6.0 * parts.len().saturating_sub(2) as f64;
+        Self { parts, centre, reach, order, sag, wider: None }
+    }
+
+    /// The narrowest that holds at `point`.
+    fn around(&self, point: &Vec3) -> &Self {
+        let mut local = self;
+        while let Some(wider) = &local.wider {
+            if (point - local.centre).norm() <= local.reach {
+                break;
+            }
+            local = wider;
+        }
+        local
+    }
 }
 
 impl Field {
+    pub(super) fn new(branches: Vec<Branch>, extension: f64) -> Self {
+        let slopes = branches.iter().flat_map(|b| b.samples.iter().map(|s| s.slope.abs()));
+        let steepness = 1.5 + 2.0 * slopes.fold(0.0, f64::max);
+        Self { branches, extension, steepness }
+    }
+
     /// An upper bound on how fast the field changes, for culling.
     pub(super) fn steepness(&self) -> f64 {
-        let slopes = self.branches.iter().flat_map(|b| b.samples.iter().map(|s| s.slope.abs()));
-        1.5 + 2.0 * slopes.fold(0.0, f64::max)
+        self.steepness
     }
 
     /// What matters within `reach` of `centre`.
@@ -64,24 +103,36 @@ impl Field {
             parts.push((index, near(branch, centre, 2.0 * reach)));
         }
         // Branches too far off to blend with anything in the ball are left out; their samples do not change the value.
-        let all = Local { parts };
-        let here: Vec<Value> = all.parts.iter().map(|part| self.branch_value(part, centre)).collect();
+        let here: Vec<Value> = parts.iter().map(|part| self.branch_value(part, centre)).collect();
         let least = here.iter().map(|v| v.f).fold(f64::INFINITY, f64::min);
         let slack = 2.0 * self.steepness() * reach;
         let matters = |v: &Value| v.f <= least + slack + BLEND * v.radius;
-        Local {
-            parts: all
-                .parts
-                .into_iter()
-                .zip(&here)
-                .filter(|(_, v)| matters(v))
-                .map(|(part, _)| part)
-                .collect(),
-        }
+        let (parts, here): (Vec<_>, Vec<_>) = parts.into_iter().zip(here).filter(|(_, v)| matters(v)).unzip();
+        Local::new(parts, &here, *centre, reach)
     }
 
-    /// The field at `point`, which must be within the reach of `local`.
+    /// `wide` for a ball inside its own: the same branches, of which one by one is left out by the value at a point, with fewer
+    /// samples. The field has the same bits.
+    pub(super) fn narrowed(&self, wide: &Arc<Local>, centre: &Vec3, reach: f64) -> Local {
+        let here: Vec<Value> = wide.parts.iter().map(|part| self.branch_value(part, centre)).collect();
+        let nearer = |(index, samples): &(usize, Vec<u32>)| {
+            let branch = &self.branches[*index];
+            let distance = |k: u32| (branch.samples[k as usize].position - centre).norm();
+            let limit = distance(nearest_of(branch, samples, centre)) + 2.0 * reach;
+            (*index, samples.iter().copied().filter(|&k| distance(k) <= limit).collect())
+        };
+        let parts = wide.parts.iter().map(nearer).collect();
+        Local { wider: Some(Arc::clone(wide)), ..Local::new(parts, &here, *centre, reach) }
+    }
+
+    /// The field at `point`, which must be within the reach of `local` or of what is wider.
     pub(super) fn value(&self, local: &Local, point: &Vec3) -> Value {
+        let local = local.around(point);
+        self.value_of_near(local, point).unwrap_or_else(|| self.value_of_all(local, point))
+    }
+
+    /// The same from all branches of `local`.
+    pub(super) fn value_of_all(&self, local: &Local, point: &Vec3) -> Value {
         let mut values = local.parts.iter().map(|part| self.branch_value(part, point));
         let first = values.next().unwrap_or(Value {
             f: f64::INFINITY,
@@ -90,6 +141,36 @@ impl Field {
             exposure: 0.0,
         });
         values.fold(first, smooth_minimum)
+    }
+
+    /// The field from the few branches that reach `point`: where no other, and no blend of others, is near enough to blend with
+    /// these, the minimum is theirs to the bit. None where it takes more of them.
+    fn value_of_near(&self, local: &Local, point: &Vec3) -> Option<Value> {
+        let change = self.steepness * (point - local.centre).norm();
+        let mut near: [Option<(usize, Value)>; FEW] = [None; FEW];
+        let (mut count, mut highest, mut widest) = (0, f64::NEG_INFINITY, 0.0_f64);
+        let mut others = f64::INFINITY;
+        for &(k, at_centre) in &local.order {
+            let reached = |f: f64| count == 0 || f - local.sag <= highest + widest;
+            if !reached(at_centre - change) {
+                others = others.min(at_centre - change);
+                break;
+            }
+            let value = self.branch_value(&local.parts[k], point);
+            if !reached(value.f) {
+                others = others.min(value.f);
+                continue;
+            }
+            *near.get_mut(count)? = Some((k, value));
+            count += 1;
+            highest = highest.max(value.f);
+            widest = widest.max(BLEND * value.radius);
+        }
+        if others - local.sag <= highest + widest {
+            return None;
+        }
+        near[..count].sort_by_key(|kept| kept.map(|(k, _)| k));
+        near.into_iter().flatten().map(|(_, value)| value).reduce(smooth_minimum)
     }
 
     /// The field of one branch alone, all samples considered.
@@ -166,7 +247,7 @@ pub(super) fn near(branch: &Branch, centre: &Vec3, slack: f64) -> Vec<u32> {
     samples
 }
 
-/// Samples that are compared one by one.
+/// Samples that are compared, or branches that are blended, one by one.
 const FEW: usize = 4;
 
 /// The one of `samples` (ascending) nearest to `point`, the first of equals; by halves, of which those are left out that

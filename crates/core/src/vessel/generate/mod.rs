@@ -18,7 +18,7 @@ use super::check::self_intersections;
 use super::topology::EdgeTable;
 use super::wall::drop_unreferenced;
 use super::{CentrelineTree, SurfaceMesh, Wall};
-use crate::{Error, Result, Vec3};
+use crate::{Error, Result, Vec3, parallel};
 use field::Field;
 use trim::End;
 
@@ -46,6 +46,9 @@ const GRID_SHRINK: f64 = 0.95;
 
 /// Non-manifold edges that one grid may make by chance.
 const CHANCE_FAULTS: usize = 8;
+
+/// Cells before the plane of an end from which on an edge is not cut away with it.
+const CLEAR_OF_CUT: f64 = 4.0;
 
 /// Target of coarsening over edge length, so that it and the plain grid give about the same number of triangles.
 const COARSENING: f64 = 1.0;
@@ -108,15 +111,16 @@ impl GeneratedWall {
                 return Self::with_count(&branches, count);
             }
         };
-        Self::with_edge(&branches, edge_mm)
+        Self::with_edge(&branches, edge_mm, &mut None)
     }
 
     fn with_count(branches: &[curve::Branch], count: usize) -> Result<Self> {
         let mut edge = (branch_area(branches) * TRIANGLES_PER_FACE / count as f64).sqrt();
         let mut best: Option<(f64, Self)> = None;
+        let mut nets = None;
         for _ in 0..COUNT_ATTEMPTS {
             // The edge length is ours; what was asked for is the count.
-            let made = Self::with_edge(branches, edge).map_err(|error| match error {
+            let made = Self::with_edge(branches, edge, &mut nets).map_err(|error| match error {
                 Error::Parameter { name, mend, .. } if name == "edge_mm" => {
                     Error::parameter("triangles", count, format!("means edges of {edge:.1e} mm: {mend}"))
                 }
@@ -135,7 +139,8 @@ impl GeneratedWall {
         best.map(|(_, made)| made).ok_or_else(|| Error::Computation("no mesh was attempted".into()))
     }
 
-    fn with_edge(branches: &[curve::Branch], edge_mm: f64) -> Result<Self> {
+    /// `nets` keeps the nets of the last grid: in a tree of thin branches many edge lengths have the same.
+    fn with_edge(branches: &[curve::Branch], edge_mm: f64, nets: &mut Option<TrimmedNets>) -> Result<Self> {
         let largest = branches.iter().flat_map(|b| b.samples.iter().map(|s| s.radius)).fold(0.0, f64::max);
         if edge_mm.is_nan() || edge_mm <= 0.0 || edge_mm > largest {
             let mend = format!(
@@ -150,7 +155,7 @@ impl GeneratedWall {
                 format!("would need about {expected:.1e} triangles; at most {MOST_TRIANGLES:.0e} are made");
             return Err(Error::parameter("edge_mm", edge_mm, mend));
         }
-        let field = Field { branches: branches.to_vec(), extension: 4.0 * grid };
+        let field = Field::new(branches.to_vec(), 4.0 * grid);
         let ends = trim::ends(&field);
         let mesh = match branches {
             [only] if ends.len() == 2 => {
@@ -158,7 +163,7 @@ impl GeneratedWall {
                 check_apart(&mesh)?;
                 mesh
             }
-            _ => implicit_mesh(&field, &ends, edge_mm)?,
+            _ => implicit_mesh(&field, &ends, edge_mm, nets)?,
         };
         let wall = Wall::welded(&mesh)?;
         let ends = match_openings(&wall, &ends, edge_mm)?;
@@ -194,13 +199,22 @@ fn local_edge(edge: f64, radius: f64) -> f64 {
 }
 
 /// The wall of a tree with forks.
-fn implicit_mesh(field: &Field, ends: &[End], edge: f64) -> Result<SurfaceMesh> {
+fn implicit_mesh(
+    field: &Field,
+    ends: &[End],
+    edge: f64,
+    kept: &mut Option<TrimmedNets>,
+) -> Result<SurfaceMesh> {
     for end in ends {
         check_end_is_free(field, end)?;
     }
     let spacing = edge.min(GRID_PER_RADIUS * smallest_radius(&field.branches));
-    let (nets, mut mesh) = manifold_nets(field, ends, spacing)?;
-    coarsen::Coarsener { field, nets: &nets, ends, edge }.run(&mut mesh);
+    let TrimmedNets { nets, mesh, .. } = match kept.take() {
+        Some(known) if known.spacing == spacing => kept.insert(known),
+        _ => kept.insert(manifold_nets(field, ends, spacing)?),
+    };
+    let mut mesh = mesh.clone();
+    coarsen::Coarsener { field, nets, ends, edge }.run(&mut mesh);
     drop_unreferenced(&mut mesh);
     let off = |v: &Vec3| nets.with_local(field, v, |local| field.value(local, v)).f.abs();
     let worst = mesh.vertices_mm.iter().map(off).fold(0.0, f64::max);
@@ -212,9 +226,17 @@ fn implicit_mesh(field: &Field, ends: &[End], edge: f64) -> Result<SurfaceMesh> 
     Ok(mesh)
 }
 
+/// Nets and the mesh made of them.
+struct TrimmedNets {
+    /// Grid spacing asked for, mm.
+    spacing: f64,
+    nets: nets::Nets,
+    mesh: SurfaceMesh,
+}
+
 /// Surface nets, cut open, without edges of more than two triangles. Those arise where opposite corners of a grid cell are cut
 /// off in the same cell, by chance in the narrow angle of a fork; a slightly finer grid falls differently.
-fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<(nets::Nets, SurfaceMesh)> {
+fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<TrimmedNets> {
     let mut attempt = spacing;
     let mut tried = spacing;
     let mut fewest = usize::MAX;
@@ -222,12 +244,25 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<(nets::Net
         tried = attempt;
         let mut nets = nets::mesh(field, attempt)?;
         // Chance makes a few, and another grid others; many that stay are in the tree. Evening out changes none of them.
-        let many = crowded_edges(&nets.quads);
+        let crowded = crowded_edges(&nets.quads);
+        let many = crowded.len();
         if many > CHANCE_FAULTS {
             if many > fewest / 2 {
                 break;
             }
             fewest = many;
+            attempt *= GRID_SHRINK;
+            continue;
+        }
+        // Cutting takes away such edges near an end and beyond its plane only. Evening out moves them by a cell or so.
+        let stays = |&(v, _): &(u32, u32)| {
+            ends.iter().all(|end| {
+                let offset = nets.vertices[v as usize] - end.centre;
+                offset.dot(&end.outward) < -CLEAR_OF_CUT * attempt
+                    || offset.norm() > 2.0 * (1.2 * end.radius + field.extension + 3.0 * attempt)
+            })
+        };
+        if crowded.iter().any(stays) {
             attempt *= GRID_SHRINK;
             continue;
         }
@@ -244,7 +279,7 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<(nets::Net
         }
         drop_unreferenced(&mut mesh);
         if EdgeTable::new(&mesh.triangles).non_manifold() == 0 {
-            return Ok((nets, mesh));
+            return Ok(TrimmedNets { spacing, nets, mesh });
         }
         attempt *= GRID_SHRINK;
     }
@@ -254,7 +289,7 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<(nets::Net
 }
 
 /// Edges of more than two quadrilaterals.
-fn crowded_edges(quads: &[[u32; 4]]) -> usize {
+fn crowded_edges(quads: &[[u32; 4]]) -> Vec<(u32, u32)> {
     let edge = |quad: &[u32; 4], k: usize| {
         let (a, b) = (quad[k], quad[(k + 1) % 4]);
         (a.min(b), a.max(b))
@@ -262,12 +297,14 @@ fn crowded_edges(quads: &[[u32; 4]]) -> usize {
     let mut edges: Vec<(u32, u32)> =
         quads.iter().flat_map(|quad| (0..4).map(move |k| edge(quad, k))).collect();
     edges.sort_unstable();
-    edges.chunk_by(|a, b| a == b).filter(|uses| uses.len() > 2).count()
+    edges.chunk_by(|a, b| a == b).filter(|uses| uses.len() > 2).map(|uses| uses[0]).collect()
 }
 
 /// Moves vertices towards the mean of their neighbours along the surface, and back onto it.
 fn even_out(field: &Field, nets: &mut nets::Nets) {
     let mut vertices = std::mem::take(&mut nets.vertices);
+    // Gradients where vertices lie, of those known from the round before.
+    let mut gradients: Vec<Option<Vec3>> = vec![None; vertices.len()];
     for round in 0..=SMOOTHING_ROUNDS {
         let mut sum = vec![(Vec3::zeros(), 0.0); vertices.len()];
         for quad in &nets.quads {
@@ -277,30 +314,36 @@ fn even_out(field: &Field, nets: &mut nets::Nets) {
                 sum[a].1 += 1.0;
             }
         }
-        for (v, (sum, count)) in vertices.iter_mut().zip(sum) {
-            nets.with_local(field, &v.clone(), |local| {
+        let moved = parallel::map(vertices.len(), |index| {
+            let (mut v, (sum, count)) = (vertices[index], sum[index]);
+            nets.with_local(field, &vertices[index], |local| {
                 if round > 0 && count > 0.0 {
-                    let normal = field.value(local, v).gradient.try_normalize(1e-6).unwrap_or_default();
-                    let pull = sum / count - *v;
-                    *v += 0.5 * (pull - normal * normal.dot(&pull));
+                    let gradient = gradients[index].unwrap_or_else(|| field.value(local, &v).gradient);
+                    let normal = gradient.try_normalize(1e-6).unwrap_or_default();
+                    let pull = sum / count - v;
+                    v += 0.5 * (pull - normal * normal.dot(&pull));
                 }
-                project(field, local, v, nets.edge);
-            });
-        }
+                let gradient = project(field, local, &mut v, nets.edge).map(|value| value.gradient);
+                (v, gradient)
+            })
+        });
+        (vertices, gradients) = moved.into_iter().unzip();
     }
     nets.vertices = vertices;
 }
 
-/// Newton along the gradient.
-fn project(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) {
+/// Newton along the gradient. Returns the value at the end, if it is on the surface and within the reach of `local`.
+fn project(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) -> Option<field::Value> {
+    let start = *point;
     for _ in 0..PROJECTION_STEPS {
         let value = field.value(local, point);
         if value.f.abs() <= ON_SURFACE_MM {
-            break;
+            return ((*point - start).norm() <= nets::MARGIN * edge).then_some(value);
         }
         let step = value.gradient * (-value.f / value.gradient.norm_squared().max(1e-6));
         *point += step.cap_magnitude(0.5 * edge);
     }
+    None
 }
 
 /// Adds a triangle or a quadrilateral, the latter cut along its shorter diagonal.

@@ -5,19 +5,32 @@
 //! cells near the surface are sampled, in 64 bits.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use super::field::{Field, Local};
-use crate::{Error, Result, Vec3};
+use crate::{Error, Result, Vec3, parallel};
 
 /// Cells along a block. Larger blocks waste samples away from the surface, smaller ones repeat more at their faces.
 const BLOCK: usize = 8;
 const CORNERS: usize = BLOCK + 1;
 
+/// Corners of a cell, by their distance from the first in the list of a block's.
+const CELL: [usize; 8] = {
+    let (y, z) = (CORNERS, CORNERS * CORNERS);
+    [0, 1, y, y + 1, z, z + 1, z + y, z + y + 1]
+};
+
+/// Cells along the smallest part of a block that is left out as a whole.
+const LEAF: usize = 2;
+const LEAVES: usize = BLOCK / LEAF;
+
 /// Shifts the grid off round coordinates, where symmetric vessels would meet grid points exactly.
 const OFFSET: [f64; 3] = [0.3819, 0.2361, 0.1459];
 
 /// Room around a block, in cells: points are looked up by where they start from, and may move a little.
-const MARGIN: f64 = 3.0;
+pub(super) const MARGIN: f64 = 3.0;
+/// The same around a leaf; points that go farther are asked about with what matters to the block.
+const LEAF_MARGIN: f64 = 1.0;
 
 type Key = [i32; 3];
 
@@ -27,16 +40,23 @@ pub(super) struct Nets {
     pub(super) quads: Vec<[u32; 4]>,
     /// Spacing of the grid, mm.
     pub(super) edge: f64,
-    locals: BTreeMap<Key, Local>,
+    /// For blocks with surface what matters in them, and in their leaves.
+    locals: BTreeMap<Key, (Arc<Local>, Leaves)>,
 }
 
+type Leaves = Vec<Option<Local>>;
+
 impl Nets {
-    /// Calls `evaluate` with what of the field matters near `point`: from the block it is in, or looked for anew if that has no surface.
+    /// Calls `evaluate` with what of the field matters near `point`: from the leaf or block it is in, or looked for anew if that has no
+    /// surface.
     pub(super) fn with_local<T>(&self, field: &Field, point: &Vec3, evaluate: impl FnOnce(&Local) -> T) -> T {
-        let key =
-            [0, 1, 2].map(|axis| ((point[axis] / self.edge - OFFSET[axis]) / BLOCK as f64).floor() as i32);
+        let blocks = [0, 1, 2].map(|axis| (point[axis] / self.edge - OFFSET[axis]) / BLOCK as f64);
+        let key = blocks.map(|at| at.floor() as i32);
         match self.locals.get(&key) {
-            Some(local) => evaluate(local),
+            Some((block, leaves)) => {
+                let leaf = blocks.map(|at| (((at - at.floor()) * LEAVES as f64) as usize).min(LEAVES - 1));
+                evaluate(leaves[leaf_index(leaf)].as_ref().unwrap_or(block))
+            }
             None => evaluate(&field.local(point, MARGIN * self.edge)),
         }
     }
@@ -56,41 +76,125 @@ fn cell_index(at: [usize; 3]) -> usize {
     (at[2] * BLOCK + at[1]) * BLOCK + at[0]
 }
 
+fn leaf_index(at: [usize; 3]) -> usize {
+    (at[2] * LEAVES + at[1]) * LEAVES + at[0]
+}
+
+/// Samples the corners of a block near the surface; others get a value of their sign.
+struct Sampler<'a> {
+    field: &'a Field,
+    edge: f64,
+    /// First corner of the block, in cells.
+    first: [f64; 3],
+    corners: Vec<f64>,
+    leaves: Leaves,
+    /// First corner, cells along it and value of the parts without surface.
+    clear: Vec<([usize; 3], usize, f64)>,
+}
+
+impl Sampler<'_> {
+    fn block(field: &Field, edge: f64, first: [f64; 3], local: &Arc<Local>) -> (Vec<f64>, Leaves) {
+        let corners = vec![f64::NAN; CORNERS * CORNERS * CORNERS];
+        let leaves = vec![None; LEAVES * LEAVES * LEAVES];
+        let mut sampler = Sampler { field, edge, first, corners, leaves, clear: Vec::new() };
+        sampler.halve([0; 3], BLOCK, local);
+        for (from, size, value) in sampler.clear {
+            for_each_corner(from, size, |at| {
+                let corner = &mut sampler.corners[corner_index(at)];
+                if corner.is_nan() {
+                    *corner = value;
+                }
+            });
+        }
+        (sampler.corners, sampler.leaves)
+    }
+
+    /// Looks at the eight halves of a cube of `size` cells.
+    fn halve(&mut self, from: [usize; 3], size: usize, local: &Arc<Local>) {
+        let half = size / 2;
+        for octant in 0..8 {
+            let from = [0, 1, 2].map(|axis| from[axis] + half * (octant >> axis & 1));
+            self.cube(from, half, local);
+        }
+    }
+
+    fn cube(&mut self, from: [usize; 3], size: usize, wide: &Arc<Local>) {
+        let centre = self.position(from.map(|k| k + size / 2));
+        let half_diagonal = 0.75_f64.sqrt() * size as f64 * self.edge;
+        let value = self.field.value(wide, &centre).f;
+        if value.abs() > self.field.steepness() * half_diagonal {
+            self.clear.push((from, size, value));
+            return;
+        }
+        let local = self.field.narrowed(wide, &centre, half_diagonal + LEAF_MARGIN * self.edge);
+        if size > LEAF {
+            self.halve(from, size, &Arc::new(local));
+            return;
+        }
+        for_each_corner(from, size, |at| {
+            if self.corners[corner_index(at)].is_nan() {
+                self.corners[corner_index(at)] = self.field.value(&local, &self.position(at)).f;
+            }
+        });
+        self.leaves[leaf_index(from.map(|k| k / LEAF))] = Some(local);
+    }
+
+    fn position(&self, corner: [usize; 3]) -> Vec3 {
+        grid_point([0, 1, 2].map(|axis| self.first[axis] + corner[axis] as f64), self.edge)
+    }
+}
+
+fn grid_point(cell: [f64; 3], edge: f64) -> Vec3 {
+    Vec3::from_fn(|axis, _| (cell[axis] + OFFSET[axis]) * edge)
+}
+
+fn for_each_corner(from: [usize; 3], size: usize, mut visit: impl FnMut([usize; 3])) {
+    for z in from[2]..=from[2] + size {
+        for y in from[1]..=from[1] + size {
+            for x in from[0]..=from[0] + size {
+                visit([x, y, z]);
+            }
+        }
+    }
+}
+
 /// Meshes the zero set of `field` on a grid of spacing `edge`.
 pub(super) fn mesh(field: &Field, edge: f64) -> Result<Nets> {
     let width = BLOCK as f64 * edge;
-    let position = |cell: [f64; 3]| Vec3::from_fn(|axis, _| (cell[axis] + OFFSET[axis]) * edge);
     let half_diagonal = width * 0.75_f64.sqrt();
     let steepness = field.steepness();
     let mut nets = Nets { vertices: Vec::new(), quads: Vec::new(), edge, locals: BTreeMap::new() };
     let mut blocks: BTreeMap<Key, Block> = BTreeMap::new();
-    for key in candidates(field, edge) {
-        let first = key.map(|k| f64::from(k) * BLOCK as f64);
-        let centre = position(first.map(|c| c + BLOCK as f64 / 2.0));
+    let keys: Vec<Key> = candidates(field, edge).into_iter().collect();
+    let first_corner = |key: &Key| key.map(|k| f64::from(k) * BLOCK as f64);
+    let sampled = parallel::map(keys.len(), |k| {
+        let first = first_corner(&keys[k]);
+        let centre = grid_point(first.map(|c| c + BLOCK as f64 / 2.0), edge);
         let local = field.local(&centre, half_diagonal + MARGIN * edge);
         if field.value(&local, &centre).f.abs() > steepness * half_diagonal {
-            continue;
+            return None;
         }
-        let mut corners = vec![0.0; CORNERS * CORNERS * CORNERS];
-        for z in 0..CORNERS {
-            for y in 0..CORNERS {
-                for x in 0..CORNERS {
-                    let at = position([first[0] + x as f64, first[1] + y as f64, first[2] + z as f64]);
-                    corners[corner_index([x, y, z])] = field.value(&local, &at).f;
-                }
-            }
-        }
+        let local = Arc::new(local);
+        let (corners, leaves) = Sampler::block(field, edge, first, &local);
+        Some((local, corners, leaves))
+    });
+    for (key, sampled) in keys.into_iter().zip(sampled) {
+        let Some((local, corners, leaves)) = sampled else { continue };
+        let first = first_corner(&key);
         let mut cells = vec![u32::MAX; BLOCK * BLOCK * BLOCK];
         let before = nets.vertices.len();
         for_each_cell(|at| {
+            if leaves[leaf_index(at.map(|k| k / LEAF))].is_none() {
+                return;
+            }
             if let Some(inside) = crossing_mean(&corners, at) {
                 cells[cell_index(at)] = nets.vertices.len() as u32;
-                nets.vertices
-                    .push(position([0, 1, 2].map(|axis| first[axis] + at[axis] as f64 + inside[axis])));
+                let cell = [0, 1, 2].map(|axis| first[axis] + at[axis] as f64 + inside[axis]);
+                nets.vertices.push(grid_point(cell, edge));
             }
         });
         if nets.vertices.len() > before {
-            nets.locals.insert(key, local);
+            nets.locals.insert(key, (local, leaves));
             blocks.insert(key, Block { corners, cells });
         }
     }
@@ -145,6 +249,11 @@ fn candidates(field: &Field, edge: f64) -> BTreeSet<Key> {
 
 /// Mean of the points where the surface crosses the twelve edges of a cell, from its first corner, in cells.
 fn crossing_mean(corners: &[f64], cell: [usize; 3]) -> Option<[f64; 3]> {
+    let base = corner_index(cell);
+    let inside = CELL.iter().filter(|&&corner| corners[base + corner] < 0.0).count();
+    if inside == 0 || inside == CELL.len() {
+        return None;
+    }
     let value = |offset: [usize; 3]| corners[corner_index([0, 1, 2].map(|a| cell[a] + offset[a]))];
     let (mut sum, mut count) = (Vec3::zeros(), 0.0);
     for axis in 0..3 {

@@ -166,7 +166,7 @@ fn many_branches_from_one_point_end_soon_with_the_grid_that_was_tried() {
 #[test]
 fn samples_are_found_as_by_looking_at_all_of_them() {
     let curved = tree(&[([0., 0., 0.], 0.5, -1), ([5., 0., 20.], 0.7, 0), ([0., 8., 40.], 0.4, 1)]);
-    let field = Field { branches: curve::branches(&curved).unwrap(), extension: 1.0 };
+    let field = Field::new(curve::branches(&curved).unwrap(), 1.0);
     let samples = &field.branches[0].samples;
     for k in 0..300 {
         let at = f64::from(k);
@@ -181,6 +181,45 @@ fn samples_are_found_as_by_looking_at_all_of_them() {
         }
         let every: Vec<u32> = (0..samples.len() as u32).collect();
         assert_eq!(field::nearest_of(&field.branches[0], &every, &point), all(0.0)[0]);
+    }
+}
+
+#[test]
+fn what_is_left_out_changes_no_bit_of_the_field() {
+    let mut rows = vec![([0.0, 0.0, 0.0], 1.0, -1), ([0.0, 0.0, 6.0], 1.0, 0)];
+    rows.extend((0..6).map(|k| {
+        let (sin, cos) = (60.0 * f64::from(k)).to_radians().sin_cos();
+        ([9.0 * cos, 9.0 * sin, 9.0], 0.5, 1)
+    }));
+    let built_in = ["aortic_arch", "hepatic"].map(|name| crate::vessel::anatomy::tree(name).unwrap());
+    let trees = built_in.into_iter().chain([fork(35.0, 6.0, 3.0), fork(90.0, 8.0, 8.0), tree(&rows)]);
+    let bits = |v: field::Value| (v.f.to_bits(), v.gradient.map(f64::to_bits), v.radius.to_bits());
+    for tree in trees {
+        let field = Field::new(curve::branches(&tree).unwrap(), 1.0);
+        let mut turn = 0.0_f64;
+        let mut direction = || {
+            turn += 1.0;
+            Vec3::new((1.3 * turn).sin(), (2.1 * turn).cos(), (0.7 * turn * turn).sin())
+        };
+        for k in 0..2000 {
+            let branch = &field.branches[k % field.branches.len()];
+            let sample = branch.samples[31 * k % branch.samples.len()];
+            let reach = [0.2, 1.0, 4.0][k % 3] * sample.radius;
+            let wide_at = sample.position + 1.5 * sample.radius * direction();
+            let wide = std::sync::Arc::new(field.local(&wide_at, reach));
+            let narrow_at = wide_at + 0.25 * reach * direction();
+            let narrow = field.narrowed(&wide, &narrow_at, 0.5 * reach);
+            // In the narrow ball, and beyond it in the wide one.
+            for within in [0.25, 0.5] {
+                let point = narrow_at + within * 0.6 * reach * direction();
+                if (point - wide_at).norm() > reach {
+                    continue;
+                }
+                let all = bits(field.value_of_all(&wide, &point));
+                assert_eq!(bits(field.value(&wide, &point)), all, "{point}");
+                assert_eq!(bits(field.value(&narrow, &point)), all, "{point}");
+            }
+        }
     }
 }
 
@@ -200,7 +239,7 @@ fn absurd_resolutions_are_refused_with_a_reason() {
 #[test]
 fn gradients_agree_with_differences_away_from_blends() {
     let curved = tree(&[([0., 0., 0.], 3.0, -1), ([5., 0., 20.], 4.0, 0), ([0., 8., 40.], 2.0, 1)]);
-    let field = Field { branches: curve::branches(&curved).unwrap(), extension: 1.0 };
+    let field = Field::new(curve::branches(&curved).unwrap(), 1.0);
     let point = Vec3::new(4.0, 5.0, 18.0);
     let value = field.branch_alone(0, &point);
     let step = 1e-5;

@@ -12,9 +12,8 @@ use crate::vessel::topology::{DisjointSets, EdgeTable};
 /// Width of a crack over the shortest open edge beside it.
 const WIDTH: f64 = 0.05;
 
-/// Merges vertices across cracks; returns how many went. Triangles may become duplicates, none loses its area.
-pub(super) fn close_cracks(mesh: &mut SurfaceMesh) -> usize {
-    let table = EdgeTable::new(&mesh.triangles);
+/// Merges vertices across cracks of a mesh whose edges `table` holds; returns how many went. Triangles may become duplicates, none loses its area.
+pub(super) fn close_cracks(mesh: &mut SurfaceMesh, table: &EdgeTable) -> usize {
     // The shortest open edge at each vertex of one.
     let mut reach = vec![f64::INFINITY; mesh.vertices_mm.len()];
     for uses in table.edges().filter(|uses| uses.len() == 1) {

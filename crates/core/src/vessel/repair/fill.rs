@@ -183,7 +183,7 @@ mod tests {
         for n in [3, 4, 40, 500] {
             let mesh = band(n);
             let table = EdgeTable::new(&mesh.triangles);
-            for opening in opening::boundary(&mesh).openings {
+            for opening in opening::boundary(&mesh, &EdgeTable::new(&mesh.triangles)).openings {
                 let filled = fill(&mesh, &table, &opening.boundary).unwrap();
                 assert_eq!(filled.len(), n as usize - 2);
                 let mut closed = mesh.clone();
@@ -205,7 +205,7 @@ mod tests {
             triangles: vec![[0, 2, 1], [0, 1, 3]],
         };
         let table = EdgeTable::new(&mesh.triangles);
-        let rim = opening::boundary(&mesh).openings[0].boundary.clone();
+        let rim = opening::boundary(&mesh, &EdgeTable::new(&mesh.triangles)).openings[0].boundary.clone();
         let filled = fill(&mesh, &table, &rim).unwrap();
         assert_eq!(filled.len(), 2);
         let closed: Vec<[u32; 3]> = mesh.triangles.iter().chain(&filled).copied().collect();

@@ -52,13 +52,14 @@ pub(super) fn cure(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> Cured {
     if found.pairs.is_empty() || found.capped {
         return cured;
     }
-    let loops = opening::boundary(mesh).openings.len();
+    let openings = |mesh: &SurfaceMesh, table: &EdgeTable| opening::boundary(mesh, table).openings.len();
+    let loops = openings(mesh, &EdgeTable::new(&mesh.triangles));
     let mut state = State { mesh: mesh.clone(), pairs: found.pairs, removed: 0, added: 0 };
     for rings in 0..ROUNDS {
         let Some(next) = round(&state, rings, tolerance_mm) else { break };
         state = next;
-        let sound = opening::boundary(&state.mesh).openings.len() <= loops
-            && EdgeTable::new(&state.mesh.triangles).non_manifold() == 0;
+        let table = EdgeTable::new(&state.mesh.triangles);
+        let sound = openings(&state.mesh, &table) <= loops && table.non_manifold() == 0;
         if sound && state.pairs.len() < cured.left {
             (cured.left, cured.removed, cured.added) = (state.pairs.len(), state.removed, state.added);
             mesh.clone_from(&state.mesh);
@@ -243,7 +244,7 @@ fn restore_bridges(
 fn close_new(mesh: &SurfaceMesh, before: &EdgeTable) -> Option<Vec<[u32; 3]>> {
     let table = EdgeTable::new(&mesh.triangles);
     let mut filled = Vec::new();
-    for opening in opening::boundary(mesh).openings {
+    for opening in opening::boundary(mesh, &table).openings {
         let rim = &opening.boundary;
         let was_open = |k: usize| before.uses(rim[k], rim[(k + 1) % rim.len()]).len() == 1;
         // A loop that has old open edges is the rim of an opening, ragged now.

@@ -32,14 +32,13 @@ pub(super) struct Filled {
     pub(super) triangles: usize,
 }
 
-/// Closes the holes and tears of a consistently oriented mesh and leaves the ends of the vessel open.
-pub(super) fn fill_holes(mesh: &mut SurfaceMesh) -> Filled {
+/// Closes the holes and tears of a consistently oriented mesh, whose edges `table` holds, and leaves the ends of the vessel open.
+pub(super) fn fill_holes(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Filled {
     let mut filled = Filled::default();
-    let table = EdgeTable::new(&mesh.triangles);
     if table.edges().all(|uses| uses.len() != 1) {
         return filled;
     }
-    let loops = opening::boundary(mesh);
+    let loops = opening::boundary(mesh, table);
     let (piece, count) = table.components(mesh.triangles.len());
     let mut sizes = vec![0_u32; count];
     piece.iter().for_each(|p| sizes[*p as usize] += 1);
@@ -47,11 +46,11 @@ pub(super) fn fill_holes(mesh: &mut SurfaceMesh) -> Filled {
     let mut added = Vec::new();
     for (opening, triangle) in loops.openings.iter().zip(&loops.first_triangle) {
         let small = sizes[piece[*triangle as usize] as usize] < SMALLEST_PIECE;
-        let rim = Rim::of(mesh, &table, opening);
+        let rim = Rim::of(mesh, table, opening);
         if small || !rim.is_some_and(|rim| rim.is_hole(opening.boundary.len(), LARGEST * total_mm2)) {
             continue;
         }
-        if let Some(triangles) = fill(mesh, &table, &opening.boundary) {
+        if let Some(triangles) = fill(mesh, table, &opening.boundary) {
             filled.holes += 1;
             filled.triangles += triangles.len();
             added.extend(triangles);

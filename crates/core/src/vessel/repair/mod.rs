@@ -13,30 +13,41 @@ mod tests;
 
 use super::SurfaceMesh;
 use super::sliver;
+use super::topology::Edges;
 use super::wall::{RepairReport, drop_unreferenced, remove_duplicates};
 
-/// Joins cracks and takes superfluous sheets away. For a mesh of welded vertices, before its winding is made consistent.
-pub(super) fn join_sheets(mesh: &mut SurfaceMesh, tolerance_mm: f64, report: &mut RepairReport) {
-    report.cracks_closed = cracks::close_cracks(mesh);
+/// Joins cracks and takes superfluous sheets away. For a mesh of welded vertices with these edges, before its winding is made consistent.
+pub(super) fn join_sheets(
+    mesh: &mut SurfaceMesh,
+    edges: &mut Edges,
+    tolerance_mm: f64,
+    report: &mut RepairReport,
+) {
+    report.cracks_closed = cracks::close_cracks(mesh, edges.of(&mesh.triangles));
     if report.cracks_closed > 0 {
+        edges.changed();
         report.degenerate_removed += sliver::remove_degenerate(mesh, tolerance_mm);
-        report.duplicates_removed += remove_duplicates(&mut mesh.triangles);
+        report.duplicates_removed += remove_duplicates(&mut mesh.triangles, edges);
     }
-    let resolved = sheets::resolve(mesh);
+    let resolved = sheets::resolve(mesh, edges);
     report.sheets_removed = resolved.removed;
     report.edges_cut = resolved.cut;
     if report.cracks_closed + resolved.removed + resolved.cut > 0 {
+        edges.changed();
         drop_unreferenced(mesh);
     }
 }
 
-/// Drops pieces that are no vessel, closes holes and cures folds. For a mesh of consistent winding.
-pub(super) fn cure(mesh: &mut SurfaceMesh, tolerance_mm: f64, report: &mut RepairReport) {
-    let dropped = pieces::drop_pieces(mesh);
+/// Drops pieces that are no vessel, closes holes and cures folds. For a mesh of consistent winding with these edges.
+pub(super) fn cure(mesh: &mut SurfaceMesh, edges: &mut Edges, tolerance_mm: f64, report: &mut RepairReport) {
+    let dropped = pieces::drop_pieces(mesh, edges.of(&mesh.triangles));
+    if dropped.triangles > 0 {
+        edges.changed();
+    }
     report.pieces_dropped = dropped.specks;
     report.skins_dropped = dropped.skins;
     report.piece_triangles_dropped = dropped.triangles;
-    let filled = holes::fill_holes(mesh);
+    let filled = holes::fill_holes(mesh, edges.of(&mesh.triangles));
     report.holes_filled = filled.holes;
     report.triangles_added = filled.triangles;
     if filled.triangles > 0 {
@@ -56,7 +67,8 @@ pub(super) fn cure(mesh: &mut SurfaceMesh, tolerance_mm: f64, report: &mut Repai
         // Two fillings that share a chord, or a flip that met another: as rare as it is unwelcome.
         report.sheets_removed += sheets::prune(mesh);
     }
-    if dropped.triangles + filled.triangles + cured.removed > 0 {
+    if dropped.triangles + filled.triangles + cured.removed + cured.added > 0 {
+        edges.changed();
         drop_unreferenced(mesh);
     }
 }

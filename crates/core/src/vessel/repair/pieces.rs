@@ -46,15 +46,14 @@ struct Piece {
     gone: bool,
 }
 
-/// Drops the pieces of a consistently oriented mesh that are no vessel.
-pub(super) fn drop_pieces(mesh: &mut SurfaceMesh) -> Dropped {
+/// Drops the pieces of a consistently oriented mesh that are no vessel; `table` holds its edges.
+pub(super) fn drop_pieces(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Dropped {
     let mut dropped = Dropped::default();
-    let table = EdgeTable::new(&mesh.triangles);
     let (piece_of, count) = table.components(mesh.triangles.len());
     if count < 2 {
         return dropped;
     }
-    let mut pieces = measure(mesh, &table, &piece_of, count);
+    let mut pieces = measure(mesh, table, &piece_of, count);
     let main = (0..count).max_by(|a, b| pieces[*a].area_mm2.total_cmp(&pieces[*b].area_mm2).then(b.cmp(a)));
     let Some(main) = main.filter(|main| pieces[*main].triangles >= FEWEST) else { return dropped };
     let largest = pieces[main].area_mm2;
@@ -99,7 +98,7 @@ fn measure(mesh: &SurfaceMesh, table: &EdgeTable, piece_of: &[u32], count: usize
             piece.bounds = [piece.bounds[0].inf(corner), piece.bounds[1].sup(corner)];
         }
     }
-    let boundary = opening::boundary(mesh);
+    let boundary = opening::boundary(mesh, table);
     for (opening, triangle) in boundary.openings.iter().zip(&boundary.first_triangle) {
         let piece = &mut pieces[piece_of[*triangle as usize] as usize];
         piece.loops += 1;
@@ -141,8 +140,8 @@ fn is_inside(mesh: &SurfaceMesh, piece_of: &[u32], inner: usize, outer: usize, t
     let of = |p: usize| (0..piece_of.len()).filter(move |t| piece_of[*t] as usize == p);
     let mut shell = SurfaceMesh { vertices_mm: mesh.vertices_mm.clone(), triangles: Vec::new() };
     shell.triangles.extend(of(outer).map(|t| mesh.triangles[t]));
-    let caps: Vec<[Vec3; 3]> =
-        opening::boundary(&shell).openings.iter().flat_map(|o| o.cap(&shell).collect::<Vec<_>>()).collect();
+    let openings = opening::boundary(&shell, &EdgeTable::new(&shell.triangles)).openings;
+    let caps: Vec<[Vec3; 3]> = openings.iter().flat_map(|o| o.cap(&shell).collect::<Vec<_>>()).collect();
     let every = (triangles / ASKED).max(1);
     let (mut asked, mut within) = (0.0, 0.0);
     for t in of(inner).skip(every / 2).step_by(every) {

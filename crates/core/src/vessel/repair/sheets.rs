@@ -6,7 +6,7 @@
 //! vertices are doubled, nothing moves.
 
 use crate::Vec3;
-use crate::vessel::topology::{DisjointSets, EdgeTable, EdgeUse};
+use crate::vessel::topology::{DisjointSets, EdgeTable, EdgeUse, Edges};
 use crate::vessel::{SurfaceMesh, mesh};
 
 /// Rounds of removing sheets: each may lay bare the next.
@@ -26,22 +26,24 @@ pub(super) struct Resolved {
 }
 
 /// Removes superfluous sheets and cuts the other edges of more than two triangles.
-pub(super) fn resolve(mesh: &mut SurfaceMesh) -> Resolved {
+pub(super) fn resolve(mesh: &mut SurfaceMesh, edges: &mut Edges) -> Resolved {
     let mut resolved = Resolved::default();
     for _ in 0..ROUNDS {
-        let table = EdgeTable::new(&mesh.triangles);
+        let table = edges.of(&mesh.triangles);
         if table.non_manifold() == 0 {
             return resolved;
         }
-        let removed = Sheets::new(mesh, &table).remove(mesh);
+        let removed = Sheets::new(mesh, table).remove(mesh);
         resolved.removed += removed;
         if removed == 0 {
             break;
         }
+        edges.changed();
     }
-    let table = EdgeTable::new(&mesh.triangles);
-    let sheets = Sheets::new(mesh, &table);
-    resolved.cut = cut(mesh, &table, &sheets.of);
+    let table = edges.of(&mesh.triangles);
+    let sheets = Sheets::new(mesh, table);
+    resolved.cut = cut(mesh, table, &sheets.of);
+    edges.changed();
     resolved.removed += prune(mesh);
     resolved
 }

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use super::super::tests::steady;
 use super::super::*;
 use crate::Vec3;
+use crate::vessel::topology::EdgeTable;
 
 /// A forked vessel: three openings.
 fn fork() -> Wall {
@@ -198,10 +199,9 @@ fn fins_second_layers_and_membranes_go() {
 fn ring_inside(mesh: &SurfaceMesh, opening: &Opening) -> Vec<u32> {
     let at_rim = |t: &[u32; 3]| t.iter().any(|v| opening.boundary.contains(v));
     let rest: Vec<[u32; 3]> = mesh.triangles.iter().copied().filter(|t| !at_rim(t)).collect();
-    let open = super::super::opening::boundary(&SurfaceMesh {
-        vertices_mm: mesh.vertices_mm.clone(),
-        triangles: rest,
-    });
+    let table = EdgeTable::new(&rest);
+    let rest = SurfaceMesh { vertices_mm: mesh.vertices_mm.clone(), triangles: rest };
+    let open = super::super::opening::boundary(&rest, &table);
     let near = |o: &&Opening| (o.centre_mm - opening.centre_mm).norm() < 3.0;
     open.openings.iter().find(near).unwrap().boundary.clone()
 }

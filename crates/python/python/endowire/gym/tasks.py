@@ -45,7 +45,8 @@ def aortic_arch(**parts: Any) -> Task:
 def arch_variety(**parts: Any) -> Task:
     """The wire of ArchVariety (see `arches`) from the descending aorta into the branches of one of fifty arches of type I; friction 0.1.
 
-    Its wire has a soft tip: ratios of stiffness, sizes and the shape are those of the original, stiffness in its units of kPa.
+    Its wire has a soft tip: ratios of stiffness, sizes and the shape are those of the original, stiffness in its units of kPa. The wall is
+    felt as it is meshed: half of it within 0.02 mm of the arch that was drawn, 99 of 100 places within 0.2 mm.
     """
     tip = {
         "length_mm": 15.205,
@@ -64,7 +65,7 @@ def arch_variety(**parts: Any) -> Task:
             "target_mm": observations.Target(),
             "last_action": observations.LastAction(),
         },
-        "wall": {"friction": 0.1},
+        "wall": {"friction": 0.1, "deviation_mm": 0.0},
     }
     return Task(**{**defaults, **parts})
 

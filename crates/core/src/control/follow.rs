@@ -1,0 +1,169 @@
+//! A hand that follows the centre line with a shaped wire.
+//!
+//! It turns the tail until the tip points to where the way goes, pushes on, and where the tip has gone astray or makes no way it pulls
+//! back and tries another turn.
+
+use std::f64::consts::PI;
+
+use super::{Action, Controller, Team};
+use crate::insertion::{Command, Move, Simulation};
+use crate::vessel::CentrelinePath;
+use crate::{Result, Vec3};
+
+/// Advance of one command, mm.
+pub(super) const STEP_MM: f64 = 2.0;
+/// How far ahead on the way the hand aims, in radii of the vessel.
+const AHEAD_RADII: f64 = 1.5;
+const LEAST_AHEAD_MM: f64 = 15.0;
+/// Largest turn of one command, rad.
+pub(super) const TURN_RAD: f64 = 0.35;
+/// Most turns between two pushes.
+const TURNS: usize = 12;
+/// Pulled back after going astray, mm.
+const BACK_MM: f64 = 30.0;
+/// How far beyond the vessel's wall the tip has gone astray, mm. The axis is a polyline, outside of whose corners the wall bulges, and
+/// a tip that dips into the mouth of a branch slides on past it.
+const ASTRAY_MM: f64 = 3.0;
+/// Pushed in without getting farther, mm, before the hand tries something else.
+const PATIENCE_MM: f64 = 24.0;
+/// Golden angle: turns by it, one after another, fill the circle evenly.
+pub(super) const GOLDEN_RAD: f64 = PI * (3.0 - 2.236_067_977_499_79);
+
+/// Follows a path with the bent tip of the instrument that leads.
+#[derive(Debug, Clone)]
+pub struct FollowPath {
+    path: CentrelinePath,
+    team: Team,
+    arrived_mm: f64,
+    /// Farthest point on the way so far, mm, and the insertion then.
+    best_mm: f64,
+    best_inserted_mm: f64,
+    /// Length that is still to be pulled back, mm, and turn to go with it, rad.
+    back_mm: f64,
+    turn_rad: f64,
+    retries: usize,
+    /// Until so much is inserted again, mm, the other turn is kept.
+    keep_until_mm: f64,
+    /// Turns since the last push.
+    turns: usize,
+    /// Where on the way the tip of the whole line was at first, mm: that of a wire over which the lead follows.
+    held_mm: Option<f64>,
+}
+
+impl FollowPath {
+    /// Leads a team along a path until the tip is no more than `arrived_mm` before its end.
+    pub fn new(path: CentrelinePath, team: Team, arrived_mm: f64) -> Self {
+        Self {
+            path,
+            team,
+            arrived_mm,
+            best_mm: 0.0,
+            best_inserted_mm: 0.0,
+            back_mm: 0.0,
+            turn_rad: 0.0,
+            retries: 0,
+            keep_until_mm: 0.0,
+            turns: 0,
+            held_mm: None,
+        }
+    }
+
+    /// The wire over which the lead follows is held where it is: what the lead straightens would push it on, so it is drawn back by as much.
+    fn hold(&mut self, simulation: &Simulation, moves: &mut Vec<Move>) {
+        let lengths_mm = simulation.report().lengths_mm();
+        let Some(farthest) = (0..lengths_mm.len()).max_by(|a, b| lengths_mm[*a].total_cmp(&lengths_mm[*b]))
+        else {
+            return;
+        };
+        if lengths_mm[farthest] <= lengths_mm[self.team.lead]
+            || moves.iter().any(|m| m.instrument == farthest)
+        {
+            return;
+        }
+        let on = self.path.nearest(&simulation.shape().tip_mm().unwrap_or_default());
+        // Beyond the end of the way arc lengths end, and the distance goes on.
+        let tip_mm = on.arc_mm + (on.distance_mm - on.radius_mm).max(0.0);
+        let beyond_mm = tip_mm - *self.held_mm.get_or_insert(tip_mm);
+        if beyond_mm > 0.0 {
+            moves.push(Move { instrument: farthest, command: Command::retract(beyond_mm.min(STEP_MM)) });
+        }
+    }
+
+    fn command(&mut self, simulation: &Simulation, tip_mm: f64) -> Command {
+        let inserted = self.team.inserted_mm(simulation);
+        if self.back_mm > 0.0 {
+            self.back_mm -= STEP_MM;
+            if self.back_mm <= 0.0 {
+                (self.best_mm, self.best_inserted_mm) = (0.0, inserted - STEP_MM);
+            }
+            let parts = BACK_MM / STEP_MM;
+            return Command { advance_mm: -STEP_MM, rotate_rad: self.turn_rad / parts };
+        }
+        let on = self.team.on_path(simulation, &self.path);
+        if on.arc_mm > self.best_mm + 1.0 {
+            (self.best_mm, self.best_inserted_mm) = (on.arc_mm, inserted);
+        }
+        let astray = on.distance_mm > on.radius_mm + ASTRAY_MM;
+        let stuck = inserted - self.best_inserted_mm > PATIENCE_MM;
+        if (astray || stuck) && inserted > BACK_MM + tip_mm {
+            self.retries += 1;
+            self.keep_until_mm = inserted + STEP_MM;
+            self.back_mm = BACK_MM;
+            self.turn_rad = GOLDEN_RAD;
+            return Command::rotate(0.0);
+        }
+        let kept = inserted < self.keep_until_mm;
+        let turn = if kept { 0.0 } else { self.aim(simulation, on.arc_mm, on.radius_mm, tip_mm) };
+        // Far off the mark, the hand turns before it pushes on.
+        if turn.abs() > 0.5 * TURN_RAD && self.turns < TURNS {
+            self.turns += 1;
+            return Command::rotate(turn);
+        }
+        self.turns = 0;
+        Command { advance_mm: STEP_MM, rotate_rad: turn }
+    }
+
+    /// Turn of the tail that brings the bend of the tip towards the way ahead.
+    fn aim(&self, simulation: &Simulation, reached_mm: f64, radius_mm: f64, tip_mm: f64) -> f64 {
+        if tip_mm == 0.0 || self.team.inserted_mm(simulation) < tip_mm + 2.0 * STEP_MM {
+            return 0.0;
+        }
+        let shape = self.team.shape(simulation);
+        let tip = shape.tip_mm().unwrap_or_default();
+        // The line from which the tip bends away.
+        let at = |from_tip_mm: f64| shape.position_at(from_tip_mm).unwrap_or_default();
+        let root = at(tip_mm);
+        let axis = (root - at(tip_mm + 2.0)).normalize();
+        let across = |v: Vec3| v - axis * axis.dot(&v);
+        let ahead = (AHEAD_RADII * radius_mm).max(LEAST_AHEAD_MM);
+        let (bend, wish) = (across(tip - root), across(self.path.at(reached_mm + ahead) - root));
+        // A way that goes straight on needs no turn.
+        if wish.norm() < 0.15 * (ahead + tip_mm) || bend.norm() < 1e-3 {
+            return 0.0;
+        }
+        let angle = axis.dot(&bend.cross(&wish)).atan2(bend.dot(&wish));
+        angle.clamp(-TURN_RAD, TURN_RAD)
+    }
+}
+
+impl Controller for FollowPath {
+    fn next(&mut self, simulation: &Simulation) -> Result<Action> {
+        self.team.check(simulation)?;
+        let on = self.team.on_path(simulation, &self.path);
+        if on.arc_mm > self.path.length_mm() - self.arrived_mm && on.distance_mm < on.radius_mm {
+            return Ok(Action::Arrived);
+        }
+        let command = self.command(simulation, self.team.bent_mm(simulation));
+        let room_mm = simulation.stack().instruments()[self.team.lead].device.length_mm();
+        if self.team.inserted_mm(simulation) + command.advance_mm > room_mm {
+            return Ok(Action::GivenUp);
+        }
+        let mut moves = self.team.moves(simulation, command);
+        self.hold(simulation, &mut moves);
+        Ok(Action::Move(moves))
+    }
+
+    fn retries(&self) -> usize {
+        self.retries
+    }
+}

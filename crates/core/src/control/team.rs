@@ -1,0 +1,87 @@
+//! Instruments that go together: one leads, and others follow over it or in it.
+
+use crate::insertion::{Command, Move, Simulation};
+use crate::shape::Shape;
+use crate::vessel::{CentrelinePath, OnPath};
+use crate::{Error, Result};
+
+/// An instrument whose tip stays behind that of the one that leads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Follower {
+    /// Its number.
+    pub instrument: usize,
+    /// How far behind, mm.
+    pub behind_mm: f64,
+}
+
+/// One instrument that is steered, and those that follow.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Team {
+    /// Number of the instrument that leads; a device alone is 0.
+    pub lead: usize,
+    /// Those that follow.
+    pub followers: Vec<Follower>,
+}
+
+impl Team {
+    /// Refuses instruments that are not there or twice in the team.
+    pub(super) fn check(&self, simulation: &Simulation) -> Result<()> {
+        let count = simulation.stack().instruments().len();
+        let mut members = vec![self.lead];
+        members.extend(self.followers.iter().map(|follower| follower.instrument));
+        for (index, member) in members.iter().enumerate() {
+            if *member >= count || members[..index].contains(member) {
+                let mend = format!("there are {count}, the innermost is 0, and each is in a team once");
+                return Err(Error::parameter("team, instrument", member, mend));
+            }
+        }
+        Ok(())
+    }
+
+    /// Length in of the one that leads, mm.
+    pub(super) fn inserted_mm(&self, simulation: &Simulation) -> f64 {
+        simulation.report().lengths_mm()[self.lead]
+    }
+
+    /// The line up to the tip of the one that leads.
+    pub(super) fn shape(&self, simulation: &Simulation) -> Shape {
+        simulation.shape().behind(simulation.report().inserted_mm - self.inserted_mm(simulation))
+    }
+
+    /// Where on a path the tip of the one that leads is.
+    pub(super) fn on_path(&self, simulation: &Simulation, path: &CentrelinePath) -> OnPath {
+        path.nearest(&self.shape(simulation).tip_mm().unwrap_or_default())
+    }
+
+    /// Length of the tip of the one that leads, up to where its last bend ends, mm; 0 of a straight one.
+    pub(super) fn bent_mm(&self, simulation: &Simulation) -> f64 {
+        let (mut end_mm, mut bent_mm) = (0.0, 0.0);
+        for section in simulation.stack().instruments()[self.lead].device.sections() {
+            end_mm += section.length_mm;
+            if section.rest_curvature_per_mm != [0.0; 2] {
+                bent_mm = end_mm;
+            }
+        }
+        bent_mm
+    }
+
+    /// The moves with which the one that leads goes by `command`, and the others to their places behind it: by no more than it on the
+    /// way forwards, and by no more than twice of it on the way back.
+    pub(super) fn moves(&self, simulation: &Simulation, command: Command) -> Vec<Move> {
+        let lengths_mm = simulation.report().lengths_mm();
+        let lead_mm = lengths_mm[self.lead] + command.advance_mm;
+        let mut moves = vec![Move { instrument: self.lead, command }];
+        for follower in &self.followers {
+            let to_go = (lead_mm - follower.behind_mm).max(0.0) - lengths_mm[follower.instrument];
+            let advance_mm = match command.advance_mm {
+                forwards if forwards > 0.0 => to_go.clamp(-forwards, forwards),
+                back if back < 0.0 => to_go.clamp(2.0 * back, 0.0),
+                _ => 0.0,
+            };
+            if advance_mm != 0.0 {
+                moves.push(Move { instrument: follower.instrument, command: Command::advance(advance_mm) });
+            }
+        }
+        moves
+    }
+}

@@ -1,0 +1,190 @@
+//! Lines of a script as they are written, and the motions that they mean.
+
+use serde::{Deserialize, Serialize};
+
+use super::Until;
+use super::motion::{Motion, Part, Travel};
+use super::until::Condition;
+use crate::device::Stack;
+use crate::vessel::CentrelineTree;
+use crate::{Error, Result};
+
+/// One line of a script: a motion and the increments it is cut into.
+///
+/// `advance_mm`, `retract_mm` or `withdraw`, with or without `rotate_deg`; given together they happen together. `exchange` is two motions.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ScriptLine {
+    /// Name of the instrument that moves; a device alone need not be named.
+    pub instrument: Option<String>,
+    /// Length to push in, mm.
+    pub advance_mm: Option<f64>,
+    /// Length to pull back, mm.
+    pub retract_mm: Option<f64>,
+    /// Whether all that is in is pulled back.
+    pub withdraw: bool,
+    /// Turn of the tail, degrees, of either sign.
+    pub rotate_deg: Option<f64>,
+    /// Largest increment of length, mm; 1 if absent.
+    pub step_mm: Option<f64>,
+    /// Largest increment of turn, degrees; 5 if absent.
+    pub step_deg: Option<f64>,
+    /// Name of the instrument that takes the place of this one, which is withdrawn first: over a catheter that stays. It goes in by
+    /// `advance_mm`, or as far as this one was.
+    pub exchange: Option<String>,
+    /// Speed of pushing and pulling, mm/s; where it is given steps have times.
+    pub speed_mm_per_s: Option<f64>,
+    /// Speed of turning, degrees/s.
+    pub speed_deg_per_s: Option<f64>,
+    /// What ends the line before it has gone all of its way, which is the most that it goes then.
+    pub until: Option<Until>,
+    /// Lines of other instruments, which move at the same time; increments are as many as the one that needs most of them has.
+    pub with: Vec<ScriptLine>,
+}
+
+impl ScriptLine {
+    /// The motions that the line means, one after another; `name` is what messages call it.
+    ///
+    /// # Errors
+    /// Names the key of what is not finite, contradictory or not there.
+    pub(super) fn motions(
+        &self,
+        name: &str,
+        stack: &Stack,
+        centreline: Option<&CentrelineTree>,
+    ) -> Result<Vec<Motion>> {
+        let mut parts: Vec<Part> = Vec::new();
+        for (name, line) in self.together(name)? {
+            let part = line.part(name, stack)?;
+            if parts.iter().any(|other| other.instrument == part.instrument) {
+                let value = format!("{:?}", stack.instruments()[part.instrument].name);
+                let mend = "moves in this line already: split the line in two";
+                return Err(Error::parameter(format!("{}.instrument", part.name), value, mend));
+            }
+            parts.push(part);
+        }
+        let lead = parts[0].instrument;
+        let until = |until: &Until| Condition::new(&format!("{name}.until"), until, lead, centreline);
+        let until = self.until.as_ref().map(until).transpose()?;
+        let Some(other) = &self.exchange else {
+            return Ok(vec![Motion { name: name.to_owned(), parts, until }]);
+        };
+        // The line's own part is that of the instrument which comes in: its keys are those of the way in.
+        let key = format!("{name}.exchange");
+        let instrument = find(stack, other, &key)?;
+        if parts.len() > 1 || instrument == lead {
+            let mend = "one instrument takes the place of another: name that one, and leave with out";
+            return Err(Error::parameter(key, format!("{other:?}"), mend));
+        }
+        let into = match self.advance_mm {
+            Some(mm) => Travel::By(mm),
+            None => Travel::AsFarAs(lead),
+        };
+        let mut withdrawn = parts[0].clone();
+        (withdrawn.travel, withdrawn.turn_rad) = (Travel::Out, 0.0);
+        let inserted = Part { instrument, travel: into, ..parts.swap_remove(0) };
+        let until = until.map(|condition| Condition { instrument, ..condition });
+        Ok(vec![
+            Motion { name: name.to_owned(), parts: vec![withdrawn], until: None },
+            Motion { name: name.to_owned(), parts: vec![inserted], until },
+        ])
+    }
+
+    /// What the hand of this line's instrument does.
+    fn part(&self, name: String, stack: &Stack) -> Result<Part> {
+        for (field, value) in [("advance_mm", self.advance_mm), ("retract_mm", self.retract_mm)] {
+            if let Some(v) = value.filter(|v| !(v.is_finite() && *v >= 0.0)) {
+                let mend =
+                    "must be a number of 0 or more; the direction is in the key (advance_mm, retract_mm)";
+                return Err(Error::parameter(format!("{name}.{field}"), v, mend));
+            }
+        }
+        let steps = [("step_mm", self.step_mm.unwrap_or(1.0)), ("step_deg", self.step_deg.unwrap_or(5.0))];
+        let speeds = [("speed_mm_per_s", self.speed_mm_per_s), ("speed_deg_per_s", self.speed_deg_per_s)];
+        let given = speeds.iter().filter_map(|(field, speed)| speed.map(|speed| (*field, speed)));
+        for (field, value) in steps.into_iter().chain(given) {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::parameter(format!("{name}.{field}"), value, "must be a number above 0"));
+            }
+        }
+        let rotate = self.rotate_deg.unwrap_or(0.0);
+        if !rotate.is_finite() {
+            return Err(Error::parameter(format!("{name}.rotate_deg"), rotate, "must be a finite number"));
+        }
+        Ok(Part {
+            instrument: self.number(&name, stack)?,
+            travel: self.travel(&name)?,
+            turn_rad: rotate.to_radians(),
+            step_mm: steps[0].1,
+            step_deg: steps[1].1,
+            speed_mm_per_s: self.speed_mm_per_s,
+            speed_deg_per_s: self.speed_deg_per_s,
+            name,
+        })
+    }
+
+    /// How far it goes.
+    fn travel(&self, name: &str) -> Result<Travel> {
+        match (self.advance_mm, self.retract_mm, self.withdraw) {
+            (Some(a), Some(_), _) => {
+                let mend = "a line either advances or retracts: split it in two";
+                Err(Error::parameter(format!("{name}.advance_mm"), a, mend))
+            }
+            (a, r, true) if a.is_some() || r.is_some() => {
+                let mend = "pulls back all that is in: leave advance_mm and retract_mm out";
+                Err(Error::parameter(format!("{name}.withdraw"), true, mend))
+            }
+            (_, Some(r), _) if self.exchange.is_some() => {
+                let mend = "exchange withdraws all of the instrument: leave retract_mm out";
+                Err(Error::parameter(format!("{name}.retract_mm"), r, mend))
+            }
+            (None, None, false) if self.rotate_deg.is_none() && self.exchange.is_none() => {
+                let mend = "give advance_mm, retract_mm, withdraw, rotate_deg or exchange";
+                Err(Error::parameter(name, "{}", mend))
+            }
+            (_, _, true) => Ok(Travel::Out),
+            (a, r, false) => Ok(Travel::By(a.unwrap_or(0.0) - r.unwrap_or(0.0))),
+        }
+    }
+
+    /// Number of the instrument.
+    fn number(&self, name: &str, stack: &Stack) -> Result<usize> {
+        match &self.instrument {
+            Some(instrument) => find(stack, instrument, &format!("{name}.instrument")),
+            None if stack.is_several() => {
+                let names: Vec<&str> = stack.instruments().iter().map(|one| one.name.as_str()).collect();
+                let mend = format!("say which one moves: {}", names.join(", "));
+                Err(Error::parameter(format!("{name}.instrument"), "none", mend))
+            }
+            None => Ok(0),
+        }
+    }
+
+    /// This line and those with it, each with its name in messages.
+    fn together(&self, name: &str) -> Result<Vec<(String, &Self)>> {
+        let mut lines = vec![(name.to_owned(), self)];
+        for (index, line) in self.with.iter().enumerate() {
+            let name = format!("{name}.with[{index}]");
+            if !line.with.is_empty() {
+                let mend = "is with another line already: list all of them there";
+                return Err(Error::parameter(format!("{name}.with"), line.with.len(), mend));
+            }
+            for (key, given) in [("until", line.until.is_some()), ("exchange", line.exchange.is_some())] {
+                if given {
+                    let mend = "belongs to the line itself, not to those with it";
+                    return Err(Error::parameter(format!("{name}.{key}"), "given", mend));
+                }
+            }
+            lines.push((name, line));
+        }
+        Ok(lines)
+    }
+}
+
+/// Number of an instrument that a key names.
+fn find(stack: &Stack, instrument: &str, key: &str) -> Result<usize> {
+    stack.find(instrument).map_err(|error| match error {
+        Error::Parameter { value, mend, .. } => Error::Parameter { name: key.to_owned(), value, mend },
+        other => other,
+    })
+}

@@ -1,0 +1,215 @@
+//! Scripts: lines of motion that are cut into steps.
+//!
+//! Where a line ends is known beforehand unless it has a condition ([`Until`]). So a script is carried out step by step ([`ScriptRun`]):
+//! what it has come to is told by the steps of each line begun ([`ScriptCourse`]), and from those and the script alone all moves so far, and
+//! lengths and times, are had again to the bit.
+
+mod line;
+mod motion;
+mod run;
+#[cfg(test)]
+mod tests;
+mod until;
+
+pub use line::ScriptLine;
+pub use run::{LineCourse, ScriptCourse, ScriptRun, Step};
+pub use until::{Met, Until};
+
+use super::Command;
+use super::simulation::check_command;
+use crate::device::{Device, LENGTH_SLACK_MM, Stack};
+use crate::vessel::CentrelineTree;
+use crate::{Error, Result};
+use motion::{Lengths, Motion, Part, STEP_LIMIT, Steps, Travel};
+
+/// What hands do, one motion after another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Script {
+    motions: Vec<Motion>,
+    /// What is in of each instrument at the start, mm.
+    start_mm: Vec<f64>,
+    /// Steps if no condition is met.
+    most_steps: usize,
+}
+
+impl Script {
+    /// The script of these lines, checked before the first step as far as it is known by then; `inserted_mm` is what is in of each
+    /// instrument at the start, and targets are those of `centreline`.
+    ///
+    /// Lengths after a line with a condition are known within bounds, and what is beyond the ends of an instrument for all of them is refused
+    /// too; what is left is found when its step is carried out.
+    ///
+    /// # Errors
+    /// Names the line and key of what is not finite, contradictory or absurd, moves an instrument beyond its ends, or leads to where
+    /// instruments cannot be together; targets and instruments that are not there, with the nearest name; speeds in some lines and not in
+    /// others.
+    pub fn new(
+        lines: &[ScriptLine],
+        stack: &Stack,
+        inserted_mm: &[f64],
+        centreline: Option<&CentrelineTree>,
+    ) -> Result<Self> {
+        let mut script = Self { motions: Vec::new(), start_mm: inserted_mm.to_vec(), most_steps: 0 };
+        for (index, line) in lines.iter().enumerate() {
+            script.motions.extend(line.motions(&format!("script[{index}]"), stack, centreline)?);
+        }
+        script.check_speeds()?;
+        let mut bounds = Bounds::at(inserted_mm);
+        for motion in &script.motions {
+            script.most_steps += bounds.go(motion, stack)?;
+            if script.most_steps as f64 > STEP_LIMIT {
+                let mend = format!("at most {STEP_LIMIT} steps in all");
+                return Err(Error::parameter("script", script.most_steps, mend));
+            }
+        }
+        Ok(script)
+    }
+
+    /// Number of steps; of a script with conditions that if none of them is met.
+    pub fn len(&self) -> usize {
+        self.most_steps
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.motions.is_empty()
+    }
+
+    /// Whether steps have times: a script has speeds in all of its lines or in none.
+    pub fn is_timed(&self) -> bool {
+        self.motions.iter().any(Motion::is_timed)
+    }
+
+    /// The first line with a condition, as messages call it; none where all steps are known beforehand.
+    pub fn conditional(&self) -> Option<&str> {
+        self.motions.iter().find(|motion| motion.until.is_some()).map(|motion| motion.name.as_str())
+    }
+
+    fn check_speeds(&self) -> Result<()> {
+        match self.motions.iter().find(|motion| !motion.is_timed()) {
+            Some(motion) if self.is_timed() => {
+                let mend = "another line has a speed: give speed_mm_per_s or speed_deg_per_s in all of them, or in none";
+                Err(Error::parameter(&motion.name, "no speed", mend))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What is known beforehand of lengths, mm.
+struct Bounds {
+    low: Lengths,
+    high: Lengths,
+}
+
+impl Bounds {
+    fn at(inserted_mm: &[f64]) -> Self {
+        let lengths = Lengths { now_mm: inserted_mm.to_vec(), before_mm: inserted_mm.to_vec() };
+        Self { low: lengths.clone(), high: lengths }
+    }
+
+    /// Goes through a motion; the number of its steps at most.
+    fn go(&mut self, motion: &Motion, stack: &Stack) -> Result<usize> {
+        let steps = motion.steps(&self.high)?;
+        let (low, high) = (self.low.clone(), self.high.clone());
+        if low == high {
+            self.high.before_mm.clone_from(&high.now_mm);
+            for step in 1..=steps.count {
+                go(stack, &mut self.high.now_mm, motion, &steps, step)?;
+            }
+            self.low = self.high.clone();
+            if motion.until.is_some() {
+                // It may end at once.
+                let ends = self.low.now_mm.iter_mut().zip(&mut self.high.now_mm);
+                ends.zip(&low.now_mm).for_each(|((a, b), start)| (*a, *b) = (a.min(*start), b.max(*start)));
+            }
+            return Ok(steps.count);
+        }
+        self.low.before_mm.clone_from(&low.now_mm);
+        self.high.before_mm.clone_from(&high.now_mm);
+        for part in &motion.parts {
+            let device_mm = stack.instruments()[part.instrument].device.length_mm();
+            let (mut a, mut b) = (part.end_mm(&low), part.end_mm(&high));
+            if motion.until.is_none() {
+                check_ends(part, [a, b], device_mm)?;
+            } else {
+                (a, b) = (a.min(low.now_mm[part.instrument]), b.max(high.now_mm[part.instrument]));
+            }
+            self.low.now_mm[part.instrument] = a.clamp(0.0, device_mm);
+            self.high.now_mm[part.instrument] = b.clamp(0.0, device_mm);
+        }
+        Ok(steps.count)
+    }
+}
+
+impl Part {
+    /// What is in when it is done, mm.
+    fn end_mm(&self, lengths: &Lengths) -> f64 {
+        match self.travel {
+            // Not by a difference, of which rounding would be left.
+            Travel::Out => 0.0,
+            _ => lengths.now_mm[self.instrument] + self.travel_mm(lengths),
+        }
+    }
+}
+
+/// Refuses a motion that ends beyond an end of its instrument wherever between these lengths it does.
+fn check_ends(part: &Part, [low_mm, high_mm]: [f64; 2], device_mm: f64) -> Result<()> {
+    let Travel::By(mm) = part.travel else { return Ok(()) };
+    if low_mm > device_mm + LENGTH_SLACK_MM {
+        let least_mm = low_mm - mm;
+        let mend = format!(
+            "the device is {device_mm} mm long and at least {least_mm} mm are inserted: advance less"
+        );
+        return Err(Error::parameter(format!("{}.advance_mm", part.name), mm, mend));
+    }
+    if high_mm < -LENGTH_SLACK_MM {
+        let mend = format!("at most {} mm are inserted: retract less", high_mm - mm);
+        return Err(Error::parameter(format!("{}.retract_mm", part.name), -mm, mend));
+    }
+    Ok(())
+}
+
+/// Adds a step to what is in, if it can be carried out.
+fn go(stack: &Stack, inserted_mm: &mut [f64], motion: &Motion, steps: &Steps, step: usize) -> Result<()> {
+    for (one, part) in steps.moves.iter().zip(&motion.parts) {
+        let device = &stack.instruments()[one.instrument].device;
+        let inserted = &mut inserted_mm[one.instrument];
+        check_command(one.command, *inserted, device.length_mm()).map_err(|error| match error {
+            Error::Parameter { name: key, mend, .. } => {
+                let value = match part.travel {
+                    Travel::By(mm) => mm.abs(),
+                    _ => (one.command.advance_mm * steps.count as f64).abs(),
+                };
+                Error::parameter(format!("{}.{key}", part.name), value, format!("in its step {step}, {mend}"))
+            }
+            other => other,
+        })?;
+        *inserted += one.command.advance_mm;
+    }
+    stack.check_places(inserted_mm.iter().copied()).map_err(|error| match error {
+        Error::Parameter { name, value, mend } => {
+            Error::Parameter { name: format!("{}: in its step {step}, {name}", motion.name), value, mend }
+        }
+        other => other,
+    })
+}
+
+/// The commands of a script of a device alone, checked before the first is carried out.
+///
+/// # Errors
+/// As [`Script::new`], and a line with a condition: where it ends is known only when it is carried out.
+pub fn script_commands(script: &[ScriptLine], device: &Device) -> Result<Vec<Command>> {
+    if let Some(index) = script.iter().position(|line| line.until.is_some()) {
+        let mend = "where the line ends is not known beforehand: carry the script out step by step";
+        return Err(Error::parameter(format!("script[{index}].until"), "given", mend));
+    }
+    let script = Script::new(script, &Stack::from(device.clone()), &[0.0], None)?;
+    let mut run = script.begin();
+    let mut commands = Vec::with_capacity(script.len());
+    while let Some(step) = run.next_where(|_| None)? {
+        commands.extend(step.moves.iter().map(|one| one.command));
+        run.carried_out();
+    }
+    Ok(commands)
+}

@@ -1,0 +1,121 @@
+//! A motion of one or several hands at the same time, and the steps it is cut into.
+
+use super::until::Condition;
+use crate::insertion::{Command, Move};
+use crate::{Error, Result};
+
+/// Most steps of one script: at one kilohertz, over 2 hours of manipulation.
+pub(super) const STEP_LIMIT: f64 = 1e7;
+
+/// How far a hand goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Travel {
+    /// By so much, mm; negative pulls back.
+    By(f64),
+    /// Back by all that is in.
+    Out,
+    /// In as far as this instrument was before the motion before.
+    AsFarAs(usize),
+}
+
+/// What one hand does.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Part {
+    /// What messages call its line.
+    pub(super) name: String,
+    pub(super) instrument: usize,
+    pub(super) travel: Travel,
+    pub(super) turn_rad: f64,
+    pub(super) step_mm: f64,
+    pub(super) step_deg: f64,
+    pub(super) speed_mm_per_s: Option<f64>,
+    pub(super) speed_deg_per_s: Option<f64>,
+}
+
+/// What hands do at the same time.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Motion {
+    /// What messages call its line.
+    pub(super) name: String,
+    /// The line's own instrument first.
+    pub(super) parts: Vec<Part>,
+    pub(super) until: Option<Condition>,
+}
+
+/// A motion cut into equal steps.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Steps {
+    /// The moves of each.
+    pub(super) moves: Vec<Move>,
+    /// How many there are.
+    pub(super) count: usize,
+    /// How long each takes, s; 0 where no speed is given.
+    pub(super) step_s: f64,
+}
+
+/// Lengths in of all instruments, mm: at the start of a motion, and at that of the one before.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Lengths {
+    pub(super) now_mm: Vec<f64>,
+    pub(super) before_mm: Vec<f64>,
+}
+
+impl Part {
+    /// How far it goes from there, mm.
+    pub(super) fn travel_mm(&self, lengths: &Lengths) -> f64 {
+        match self.travel {
+            Travel::By(mm) => mm,
+            Travel::Out => -lengths.now_mm[self.instrument],
+            Travel::AsFarAs(other) => lengths.before_mm[other],
+        }
+    }
+
+    /// Number of equal increments of a travel.
+    fn increments(&self, mm: f64) -> Result<usize> {
+        let mut count: f64 = 1.0;
+        for (step, travel) in [(self.step_mm, mm.abs()), (self.step_deg, self.turn_rad.to_degrees().abs())] {
+            // The tolerance keeps 0.3 mm in steps of 0.1 mm at three increments, not four.
+            count = count.max((travel / step - 1e-9).ceil());
+        }
+        if count > STEP_LIMIT {
+            let steps = format!("{} steps", crate::error::number(count));
+            let mend = format!("at most {STEP_LIMIT} steps in a line: use larger increments");
+            return Err(Error::parameter(&self.name, steps, mend));
+        }
+        Ok(count as usize)
+    }
+
+    /// How long it takes, s.
+    fn duration_s(&self, mm: f64) -> f64 {
+        let length_s = self.speed_mm_per_s.map_or(0.0, |speed| mm.abs() / speed);
+        length_s.max(self.speed_deg_per_s.map_or(0.0, |speed| self.turn_rad.to_degrees().abs() / speed))
+    }
+}
+
+impl Motion {
+    /// Whether it has a speed.
+    pub(super) fn is_timed(&self) -> bool {
+        self.parts.iter().any(|part| part.speed_mm_per_s.is_some() || part.speed_deg_per_s.is_some())
+    }
+
+    /// The steps of the whole motion from there.
+    ///
+    /// # Errors
+    /// More steps than a script may have.
+    pub(super) fn steps(&self, lengths: &Lengths) -> Result<Steps> {
+        let (mut count, mut duration_s) = (1, 0.0_f64);
+        for part in &self.parts {
+            let mm = part.travel_mm(lengths);
+            count = count.max(part.increments(mm)?);
+            duration_s = duration_s.max(part.duration_s(mm));
+        }
+        let share = 1.0 / count as f64;
+        let command = |part: &Part| Command {
+            advance_mm: part.travel_mm(lengths) * share,
+            rotate_rad: part.turn_rad * share,
+        };
+        let moves =
+            self.parts.iter().map(|part| Move { instrument: part.instrument, command: command(part) });
+        Ok(Steps { moves: moves.collect(), count, step_s: duration_s * share })
+    }
+}

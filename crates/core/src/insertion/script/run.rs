@@ -1,0 +1,151 @@
+//! A script that is carried out.
+
+use serde::{Deserialize, Serialize};
+
+use super::motion::{Lengths, Steps};
+use super::until::Condition;
+use super::{Met, Script};
+use crate::insertion::{Move, Simulation};
+use crate::{Error, Result};
+
+/// What a script has come to: all that is needed, beside the script, to go on.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ScriptCourse {
+    /// The motions begun so far, in their order; an exchange is two.
+    pub motions: Vec<LineCourse>,
+}
+
+/// What a motion of a script has come to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct LineCourse {
+    /// Steps carried out.
+    pub steps: usize,
+    /// What of its condition has ended it.
+    pub met: Option<Met>,
+}
+
+/// A step of a script.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step<'a> {
+    /// What moves.
+    pub moves: &'a [Move],
+    /// Time at its end since the start of the script, s; none where the script has no speeds.
+    pub time_s: Option<f64>,
+}
+
+/// A script that is carried out step by step.
+#[derive(Debug, Clone)]
+pub struct ScriptRun<'a> {
+    script: &'a Script,
+    course: ScriptCourse,
+    lengths: Lengths,
+    /// Of the motion that goes on.
+    steps: Option<Steps>,
+    time_s: f64,
+}
+
+impl Script {
+    /// The script at its start.
+    pub fn begin(&self) -> ScriptRun<'_> {
+        let lengths = Lengths { now_mm: self.start_mm.clone(), before_mm: self.start_mm.clone() };
+        ScriptRun { script: self, course: ScriptCourse::default(), lengths, steps: None, time_s: 0.0 }
+    }
+
+    /// The script where it has come to; `seen` is given each step so far.
+    ///
+    /// # Errors
+    /// A course that this script cannot have taken.
+    pub fn go_on(&self, course: &ScriptCourse, mut seen: impl FnMut(Step<'_>)) -> Result<ScriptRun<'_>> {
+        let mut run = self.begin();
+        for (index, line) in course.motions.iter().enumerate() {
+            let other = |what: String| {
+                let mend = "the steps are those of another script";
+                Error::parameter(format!("motion {} of the script", index + 1), what, mend)
+            };
+            for _ in 0..line.steps {
+                let told = run.next_where(|_| None)?.map(&mut seen).is_some();
+                if !told || run.course.motions.len() != index + 1 {
+                    return Err(other(format!("{} steps", line.steps)));
+                }
+                run.carried_out();
+            }
+            // One that has ended without a step, by its condition, has not been begun yet.
+            if line.steps == 0 && run.course.motions.len() <= index && !run.begin_motion()? {
+                return Err(other("none".to_owned()));
+            }
+            // Without a condition a line ends where all of it is done: a later script may have a longer one.
+            if line.met.is_some() {
+                run.end_motion(line.met);
+            }
+        }
+        Ok(run)
+    }
+}
+
+impl ScriptRun<'_> {
+    /// The next step; none at the end of the script. Conditions are looked at in `simulation`.
+    ///
+    /// # Errors
+    /// More steps than a script may have.
+    pub fn next(&mut self, simulation: &Simulation) -> Result<Option<Step<'_>>> {
+        self.next_where(|condition| condition.met(simulation))
+    }
+
+    /// The next step, with conditions looked at by `met`.
+    pub(super) fn next_where(&mut self, met: impl Fn(&Condition) -> Option<Met>) -> Result<Option<Step<'_>>> {
+        loop {
+            if self.steps.is_none() && !self.begin_motion()? {
+                return Ok(None);
+            }
+            let index = self.course.motions.len() - 1;
+            let met = self.script.motions[index].until.as_ref().and_then(&met);
+            let count = self.steps.as_ref().map_or(0, |steps| steps.count);
+            if met.is_none() && self.course.motions[index].steps < count {
+                break;
+            }
+            self.end_motion(met);
+        }
+        let time_s =
+            self.script.is_timed().then(|| self.time_s + self.steps.as_ref().map_or(0.0, |s| s.step_s));
+        Ok(self.steps.as_ref().map(|steps| Step { moves: &steps.moves, time_s }))
+    }
+
+    /// Says that the step that was told last has been carried out.
+    pub fn carried_out(&mut self) {
+        let (Some(steps), Some(line)) = (&self.steps, self.course.motions.last_mut()) else { return };
+        line.steps += 1;
+        self.time_s += steps.step_s;
+        for one in &steps.moves {
+            self.lengths.now_mm[one.instrument] += one.command.advance_mm;
+        }
+    }
+
+    /// What the script has come to.
+    pub fn course(&self) -> &ScriptCourse {
+        &self.course
+    }
+
+    /// Lines with a condition that have ended: how messages call each, and what it has come to.
+    pub fn conditions(&self) -> impl Iterator<Item = (&str, LineCourse)> {
+        let begun = self.script.motions.iter().zip(&self.course.motions);
+        let ended = self.course.motions.len() - usize::from(self.steps.is_some());
+        let ended = begun.take(ended).filter(|(motion, _)| motion.until.is_some());
+        ended.map(|(motion, line)| (motion.name.as_str(), *line))
+    }
+
+    /// Begins the next motion; whether there is one.
+    fn begin_motion(&mut self) -> Result<bool> {
+        let Some(motion) = self.script.motions.get(self.course.motions.len()) else { return Ok(false) };
+        self.steps = Some(motion.steps(&self.lengths)?);
+        self.lengths.before_mm.clone_from(&self.lengths.now_mm);
+        self.course.motions.push(LineCourse::default());
+        Ok(true)
+    }
+
+    fn end_motion(&mut self, met: Option<Met>) {
+        if let Some(line) = self.course.motions.last_mut() {
+            line.met = met;
+        }
+        self.steps = None;
+    }
+}

@@ -1,0 +1,243 @@
+//! Scripts: what is refused, and what they are cut into.
+
+use super::*;
+use crate::device::{Instrument, Section};
+use crate::insertion::Move;
+
+fn advance(mm: f64, step: f64) -> ScriptLine {
+    ScriptLine { advance_mm: Some(mm), step_mm: Some(step), ..Default::default() }
+}
+
+/// The commands of a device of 100 mm.
+fn commands(script: &[ScriptLine]) -> Result<Vec<Command>> {
+    script_commands(script, &Device::uniform(100.0, 0.4, 10.0)?)
+}
+
+#[test]
+fn a_line_is_cut_into_equal_increments_no_larger_than_its_step() {
+    let list = commands(&[advance(0.3, 0.1)]).unwrap();
+    assert_eq!(list.len(), 3);
+    assert!((list.iter().map(|c| c.advance_mm).sum::<f64>() - 0.3).abs() < 1e-15);
+    assert_eq!(commands(&[advance(1.05, 0.5)]).unwrap().len(), 3);
+}
+
+#[test]
+fn turning_and_pushing_in_one_line_happen_together() {
+    let line = ScriptLine {
+        retract_mm: Some(4.0),
+        rotate_deg: Some(90.0),
+        step_mm: Some(1.0),
+        step_deg: Some(10.0),
+        ..Default::default()
+    };
+    let list = commands(&[advance(4.0, 4.0), line]).unwrap();
+    assert_eq!(list.len(), 10);
+    assert!(list[1..].iter().all(|c| c.advance_mm < 0.0 && c.rotate_rad > 0.0));
+}
+
+#[test]
+fn a_bad_line_is_named_with_its_key() {
+    for (line, key) in [
+        (advance(-1.0, 1.0), "script[1].advance_mm = -1"),
+        (advance(f64::NAN, 1.0), "script[1].advance_mm = NaN"),
+        (advance(1.0, 0.0), "script[1].step_mm = 0"),
+        (advance(1e9, 1e-9), "script[1]"),
+        (ScriptLine::default(), "script[1]"),
+        (ScriptLine { retract_mm: Some(1.0), ..advance(1.0, 1.0) }, "script[1].advance_mm = 1"),
+    ] {
+        let message = commands(&[advance(1.0, 1.0), line]).unwrap_err().to_string();
+        assert!(message.starts_with(key), "{message}");
+    }
+}
+
+/// The moves of every step, where no condition is met.
+fn steps(script: &Script) -> Vec<Vec<Move>> {
+    let (mut run, mut steps) = (script.begin(), Vec::new());
+    while let Some(step) = run.next_where(|_| None).unwrap() {
+        steps.push(step.moves.to_vec());
+        run.carried_out();
+    }
+    steps
+}
+
+/// Two wires that take turns in a catheter.
+fn stack() -> Stack {
+    let one = |name: &str, section: Section| Instrument {
+        name: name.to_owned(),
+        device: Device::new(vec![section]).unwrap(),
+        may_lead: true,
+    };
+    let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(100.0, 0.8, 60.0) };
+    Stack::new(vec![
+        one("wire", Section::straight(200.0, 0.3, 20.0)),
+        one("stiff wire", Section::straight(200.0, 0.4, 90.0)),
+        one("catheter", catheter),
+    ])
+    .unwrap()
+}
+
+fn line(instrument: &str) -> ScriptLine {
+    ScriptLine { instrument: Some(instrument.to_owned()), ..Default::default() }
+}
+
+#[test]
+fn instruments_move_together_and_a_wire_is_exchanged() {
+    let script = [
+        ScriptLine {
+            advance_mm: Some(30.0),
+            with: vec![ScriptLine { advance_mm: Some(60.0), step_mm: Some(20.0), ..line("catheter") }],
+            ..line("wire")
+        },
+        ScriptLine { withdraw: true, step_mm: Some(20.0), ..line("wire") },
+        ScriptLine { advance_mm: Some(70.0), step_mm: Some(70.0), ..line("stiff wire") },
+    ];
+    let script = Script::new(&script, &stack(), &[10.0, 0.0, 0.0], None).unwrap();
+    let steps = steps(&script);
+    assert_eq!((script.len(), steps.len()), (33, 33));
+    let told = |step: usize| -> Vec<(usize, f64)> {
+        steps[step].iter().map(|one| (one.instrument, one.command.advance_mm)).collect()
+    };
+    assert_eq!(told(0), [(0, 1.0), (2, 2.0)]);
+    assert_eq!((told(30), told(32)), (vec![(0, -20.0)], vec![(1, 70.0)]));
+}
+
+#[test]
+fn a_script_says_which_instrument_moves_and_what_does_not_go_is_told_before_it_begins() {
+    let advance = |name: &str, mm| ScriptLine { advance_mm: Some(mm), ..line(name) };
+    let both = ScriptLine { with: vec![advance("wire", 1.0)], ..advance("wire", 1.0) };
+    let deep = ScriptLine { with: vec![both.clone()], ..advance("catheter", 1.0) };
+    for (script, told) in [
+        (vec![advance("cathter", 1.0)], "script[0].instrument = \"cathter\": did you mean \"catheter\"?"),
+        (vec![self::advance(1.0, 1.0)], "script[0].instrument = none: say which one moves: wire, stiff wire"),
+        (vec![both], "script[0].with[0].instrument = \"wire\": moves in this line already"),
+        (vec![deep], "script[0].with[0].with = 1: is with another line already"),
+        (
+            vec![ScriptLine { withdraw: true, ..advance("wire", 1.0) }],
+            "script[0].withdraw = true: pulls back all",
+        ),
+        (vec![advance("wire", 201.0)], "script[0].advance_mm = 201: in its step 201, the device is 200 mm"),
+        (
+            vec![advance("wire", 5.0), advance("stiff wire", 5.0)],
+            "script[1]: in its step 1, wire.radius_mm = 0.3: \"stiff wire\" has no lumen",
+        ),
+        (
+            vec![advance("catheter", 20.0), advance("wire", 130.0)],
+            "script[1]: in its step 121, wire.inserted_mm = 121: 80.000 mm of \"catheter\" are outside",
+        ),
+    ] {
+        let error = Script::new(&script, &stack(), &[0.0; 3], None).unwrap_err().to_string();
+        assert!(error.starts_with(told), "{error}");
+    }
+}
+
+#[test]
+fn a_wire_is_exchanged_in_one_line_as_far_as_the_one_before() {
+    let exchange = |advance_mm| ScriptLine {
+        exchange: Some("stiff wire".to_owned()),
+        advance_mm,
+        step_mm: Some(10.0),
+        ..line("wire")
+    };
+    let script =
+        |advance_mm| Script::new(&[exchange(advance_mm)], &stack(), &[30.0, 0.0, 40.0], None).unwrap();
+    let told = |advance_mm| -> Vec<(usize, f64)> {
+        let steps = steps(&script(advance_mm));
+        steps.iter().map(|moves| (moves[0].instrument, moves[0].command.advance_mm)).collect()
+    };
+    assert_eq!(told(None), [(0, -10.0), (0, -10.0), (0, -10.0), (1, 10.0), (1, 10.0), (1, 10.0)]);
+    assert_eq!(told(Some(10.0)), [(0, -10.0), (0, -10.0), (0, -10.0), (1, 10.0)]);
+    for (line, told) in [
+        (
+            ScriptLine { retract_mm: Some(1.0), ..exchange(None) },
+            "script[0].retract_mm = 1: exchange withdraws",
+        ),
+        (
+            ScriptLine { exchange: Some("wire".into()), ..exchange(None) },
+            "script[0].exchange = \"wire\": one",
+        ),
+        (
+            ScriptLine { exchange: Some("stif wire".into()), ..exchange(None) },
+            "script[0].exchange = \"stif wire\": did",
+        ),
+    ] {
+        let error = Script::new(&[line], &stack(), &[0.0; 3], None).unwrap_err().to_string();
+        assert!(error.starts_with(told), "{error}");
+    }
+}
+
+#[test]
+fn a_script_with_speeds_has_times_and_all_of_its_lines_have_one() {
+    let timed = |mm: f64, speed| ScriptLine { speed_mm_per_s: speed, step_mm: Some(5.0), ..advance(mm, 5.0) };
+    let turn = ScriptLine { speed_deg_per_s: Some(10.0), rotate_deg: Some(20.0), ..Default::default() };
+    let stack = Stack::from(Device::uniform(100.0, 0.4, 10.0).unwrap());
+    let lines = [timed(10.0, Some(2.0)), turn];
+    let script = Script::new(&lines, &stack, &[0.0], None).unwrap();
+    let (mut run, mut times) = (script.begin(), Vec::new());
+    while let Some(step) = run.next_where(|_| None).unwrap() {
+        times.push(step.time_s.unwrap());
+        run.carried_out();
+    }
+    assert_eq!(times, [2.5, 5.0, 5.5, 6.0, 6.5, 7.0]);
+    let told = |lines: &[ScriptLine]| Script::new(lines, &stack, &[0.0], None).unwrap_err().to_string();
+    assert!(told(&[timed(1.0, Some(2.0)), timed(1.0, None)]).starts_with("script[1] = no speed"));
+    assert!(told(&[timed(1.0, Some(0.0))]).starts_with("script[0].speed_mm_per_s = 0: must be"));
+}
+
+#[test]
+fn what_ends_a_line_is_checked_and_lengths_after_it_are_known_within_bounds() {
+    let tree = crate::vessel::anatomy::tree("aortic_arch").unwrap();
+    let until = |until: Until, mm| ScriptLine { until: Some(until), ..advance(mm, 1.0) };
+    let near = |target: &str| Until {
+        tip_within_mm: Some(2.0),
+        target: Some(target.to_owned()),
+        ..Until::default()
+    };
+    let force = Until { push_force_n: Some(0.5), ..Until::default() };
+    let stack = Stack::from(Device::uniform(100.0, 0.4, 10.0).unwrap());
+    let script = |lines: &[ScriptLine]| Script::new(lines, &stack, &[0.0], Some(&tree));
+    let told = |lines: &[ScriptLine]| script(lines).unwrap_err().to_string();
+    let unknown = told(&[until(near("left carotd"), 5.0)]);
+    assert_eq!(unknown, "script[0].until.target = \"left carotd\": did you mean \"left carotid\"?");
+    assert!(told(&[until(Until::default(), 5.0)]).starts_with("script[0].until = {}: give"));
+    let half = Until { target: None, ..near("left carotid") };
+    assert!(told(&[until(half, 5.0)]).starts_with("script[0].until.tip_within_mm = 2: of which target"));
+    // After at most 40 mm, 60 may be too many and 101 are.
+    assert!(script(&[until(force.clone(), 40.0), advance(70.0, 1.0)]).is_ok());
+    assert!(
+        told(&[until(force.clone(), 40.0), advance(101.0, 1.0)]).starts_with("script[1].advance_mm = 101")
+    );
+    assert!(told(&[until(force.clone(), 101.0)]).starts_with("script[0].advance_mm = 101: in its step 101"));
+    let back = ScriptLine { withdraw: true, ..Default::default() };
+    let lines = [until(force, 40.0), back, advance(100.0, 1.0)];
+    assert_eq!(script(&lines).unwrap().len(), 40 + 40 + 100);
+    assert!(script_commands(&lines, stack.first()).unwrap_err().to_string().starts_with("script[0].until"));
+}
+
+#[test]
+fn a_script_goes_on_from_its_course_in_the_middle_of_a_line_with_a_condition() {
+    let force = Until { push_force_n: Some(0.5), ..Until::default() };
+    let back = ScriptLine { withdraw: true, step_mm: Some(0.7), ..Default::default() };
+    let lines = [ScriptLine { until: Some(force), ..advance(40.0, 0.3) }, back, advance(10.0, 0.7)];
+    let stack = Stack::from(Device::uniform(100.0, 0.4, 10.0).unwrap());
+    let script = Script::new(&lines, &stack, &[0.0], None).unwrap();
+    // The condition is met after so many steps.
+    for met_after in [0, 1, 50, 134] {
+        let (mut run, mut seen, mut k) = (script.begin(), Vec::new(), 0);
+        while let Some(step) = run.next_where(|_| (k >= met_after).then_some(Met::PushForceN)).unwrap() {
+            let step = (step.moves.to_vec(), step.time_s);
+            let mut before = Vec::new();
+            let mut again = script.go_on(run.course(), |step| before.push(step.moves.to_vec())).unwrap();
+            let told = again.next_where(|_| (k >= met_after).then_some(Met::PushForceN)).unwrap().unwrap();
+            assert_eq!((told.moves.to_vec(), told.time_s), step, "{met_after} {k}");
+            assert!(before.iter().eq(seen.iter()), "{met_after} {k}");
+            run.carried_out();
+            seen.push(step.0);
+            k += 1;
+        }
+        let told: Vec<LineCourse> = run.conditions().map(|(_, line)| line).collect();
+        let met = (met_after <= 134).then_some(Met::PushForceN);
+        assert_eq!(told, [LineCourse { steps: met_after, met }]);
+        let wrong = ScriptCourse { motions: vec![LineCourse { steps: 1000, met: None }] };
+        assert!(script.go_on(&wrong, |_| ()).is_err());
+    }
+}

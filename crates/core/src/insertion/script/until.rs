@@ -1,0 +1,111 @@
+//! What ends a line of a script before it has gone all of its way.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::in_range;
+use crate::insertion::Simulation;
+use crate::vessel::CentrelineTree;
+use crate::{Error, Result, Vec3};
+
+/// Ends a line as soon as one of these is so; looked at before each of its steps, and after the last.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Until {
+    /// The tip of the line's instrument is so near to the target, mm.
+    pub tip_within_mm: Option<f64>,
+    /// Name of a point of the vessel's centre line.
+    pub target: Option<String>,
+    /// The hand of the line's instrument must push with so much, N.
+    pub push_force_n: Option<f64>,
+}
+
+/// What has ended a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Met {
+    /// The tip is near to the target.
+    TipWithinMm,
+    /// The hand pushes as hard as was said.
+    PushForceN,
+}
+
+/// [`Until`] with its target looked up.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Condition {
+    /// The instrument that is looked at.
+    pub(super) instrument: usize,
+    /// Target and distance, mm.
+    pub(super) near: Option<(Vec3, f64)>,
+    pub(super) push_force_n: Option<f64>,
+}
+
+/// Largest distance, mm, and force, N, that can be meant.
+const LARGEST: f64 = 1e6;
+
+impl Condition {
+    /// # Errors
+    /// Values out of range, a distance without a target or the other way round, a target that the vessel does not name.
+    pub(super) fn new(
+        name: &str,
+        until: &Until,
+        instrument: usize,
+        centreline: Option<&CentrelineTree>,
+    ) -> Result<Self> {
+        let near = match (until.tip_within_mm, &until.target) {
+            (Some(mm), Some(target)) => {
+                in_range(&format!("{name}.tip_within_mm"), mm, LARGEST)?;
+                Some((place(&format!("{name}.target"), target, centreline)?, mm))
+            }
+            (Some(mm), None) => {
+                let mend = "of which target? give target, a name of the vessel's centre line";
+                return Err(Error::parameter(format!("{name}.tip_within_mm"), mm, mend));
+            }
+            (None, Some(target)) => {
+                let mend = "how near to it? give tip_within_mm";
+                return Err(Error::parameter(format!("{name}.target"), format!("{target:?}"), mend));
+            }
+            (None, None) => None,
+        };
+        if let Some(force) = until.push_force_n {
+            in_range(&format!("{name}.push_force_n"), force, LARGEST)?;
+        } else if near.is_none() {
+            return Err(Error::parameter(name, "{}", "give tip_within_mm with target, or push_force_n"));
+        }
+        Ok(Self { instrument, near, push_force_n: until.push_force_n })
+    }
+
+    /// What of it is so, if anything is.
+    pub(super) fn met(&self, simulation: &Simulation) -> Option<Met> {
+        let report = simulation.report();
+        let inserted_mm = report.lengths_mm()[self.instrument];
+        let tip = || {
+            let own =
+                (inserted_mm > 0.0).then(|| simulation.shape().behind(report.inserted_mm - inserted_mm));
+            own.and_then(|shape| shape.tip_mm())
+        };
+        if self.near.is_some_and(|(target, mm)| tip().is_some_and(|tip| (tip - target).norm() <= mm)) {
+            return Some(Met::TipWithinMm);
+        }
+        let push_n = match report.instruments.get(self.instrument) {
+            Some(instrument) => instrument.push_force_n,
+            None => Some(report.push_force_n),
+        };
+        let pushed = |least: f64| push_n.is_some_and(|push_n| push_n >= least);
+        self.push_force_n.is_some_and(pushed).then_some(Met::PushForceN)
+    }
+}
+
+/// Where a target is.
+fn place(key: &str, target: &str, centreline: Option<&CentrelineTree>) -> Result<Vec3> {
+    let Some(tree) = centreline else {
+        let mend = "the vessel has no centre line that names targets: give vessel.tree, or vessel.centreline beside vessel.file";
+        return Err(Error::parameter(key, format!("{target:?}"), mend));
+    };
+    match tree.target(target) {
+        Ok(target) => Ok(tree.nodes()[target.row].position_mm),
+        Err(Error::Parameter { value, mend, .. }) => {
+            Err(Error::Parameter { name: key.to_owned(), value, mend })
+        }
+        Err(other) => Err(other),
+    }
+}

@@ -1,0 +1,225 @@
+//! Insertions of several instruments that rub on the wall.
+
+use super::coaxial_tests::{CATHETER, WIRE, bend, push, rubbing, wire_in_catheter};
+use crate::Vec3;
+use crate::device::{Device, Instrument, Section, Stack};
+use crate::insertion::{Command, Move, Sheath, Simulation};
+use crate::methods::State;
+use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution};
+
+const FRICTION: f64 = 0.2;
+
+fn one(name: &str, section: Section) -> Instrument {
+    let device = Device::new(vec![section]).unwrap();
+    Instrument { name: name.to_owned(), device, may_lead: true }
+}
+
+/// The catheter 80 mm in, the wire 14 mm farther.
+fn both_in() -> Simulation {
+    let mut simulation = rubbing(bend(), 4.0, wire_in_catheter(), FRICTION);
+    push(&mut simulation, &[(WIRE, 14.0)]).unwrap();
+    for _ in 0..40 {
+        push(&mut simulation, &[(WIRE, 2.0), (CATHETER, 2.0)]).unwrap();
+    }
+    simulation
+}
+
+/// Whether all friction is within the cone of Coulomb's law, and how much of it slips.
+fn slipping(simulation: &Simulation) -> f64 {
+    let (mut slips, mut all) = (0.0, 0.0);
+    for contact in &simulation.report().contacts {
+        let most = FRICTION * contact.force_n;
+        assert!(contact.friction_n.norm() <= 1.001 * most + 1e-6, "{contact:?}");
+        all += most;
+        slips += contact.friction_n.norm();
+    }
+    slips / all
+}
+
+/// Of instruments of one length that go together the outer one rubs, and is twisted by that alone.
+#[test]
+fn a_catheter_over_a_soft_wire_is_a_catheter() {
+    let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
+    let torsional_stiffness_nmm2 = Some(catheter.torsion_nmm2());
+    let stack = vec![one("wire", Section::straight(150.0, 0.2, 0.06)), one("catheter", catheter)];
+    let both = Section { bending_stiffness_nmm2: 60.06, torsional_stiffness_nmm2, ..catheter };
+    let mut single = rubbing(bend(), 4.0, Device::new(vec![both]).unwrap(), FRICTION);
+    let mut both = rubbing(bend(), 4.0, Stack::new(stack).unwrap(), FRICTION);
+    for k in 0..70 {
+        let command = Command { advance_mm: if k < 50 { 2.0 } else { -0.5 }, rotate_rad: 0.05 };
+        let moves = [WIRE, CATHETER].map(|instrument| Move { instrument, command });
+        both.step_together(&moves).unwrap();
+        single.step(command).unwrap();
+        let (told, alone) = (both.report(), single.report());
+        assert!(told.converged && alone.converged);
+        for (a, b) in both.shape().positions_mm.iter().zip(&single.shape().positions_mm) {
+            assert!((a - b).norm() < 1e-4, "{a} and {b} in step {k}");
+        }
+        let (torque, expected) = (told.instruments[CATHETER].torque_nmm, alone.torque_nmm);
+        assert!((torque - expected).abs() <= 1e-3 * expected.abs() + 1e-9, "{torque} and {expected}: {k}");
+        assert!(told.instruments[WIRE].torque_nmm.abs() < 1e-9);
+        let (taken, expected) = (told.dissipated_mj, alone.dissipated_mj);
+        assert!((taken - expected).abs() <= 1e-3 * expected, "{taken} and {expected} mJ in step {k}");
+    }
+}
+
+#[test]
+fn hands_put_in_what_is_stored_and_rubbed_away_and_no_force_leaves_its_cone() {
+    let mut simulation = both_in();
+    // Of a tip that is pushed along the wall slip is told from the way that is traced in front of it, and a part of the work with it.
+    for moves in [&[(WIRE, -0.1)][..], &[(CATHETER, -0.1)], &[(WIRE, -0.1), (CATHETER, -0.05)]] {
+        let (mut work, mut taken) = (0.0, 0.0);
+        let felt = |simulation: &Simulation| {
+            let told = &simulation.report().instruments;
+            moves.iter().map(|(i, mm)| told[*i].push_force_n.unwrap() * mm).sum::<f64>()
+        };
+        // The first steps turn friction around.
+        for _ in 0..10 {
+            push(&mut simulation, moves).unwrap();
+        }
+        let before = simulation.report().energy.total();
+        for k in 0..50 {
+            let was = felt(&simulation);
+            push(&mut simulation, moves).unwrap();
+            assert!(simulation.report().converged, "{moves:?}, step {k}");
+            work += 0.5 * (was + felt(&simulation));
+            taken += simulation.report().dissipated_mj;
+            assert!(slipping(&simulation) > 0.5);
+        }
+        let stored = simulation.report().energy.total() - before;
+        let off = (work - stored - taken).abs();
+        assert!(off < 0.01 * taken && taken > 0.0, "{moves:?}: {work} = {stored} + {taken} mJ");
+    }
+}
+
+#[test]
+fn a_step_with_friction_can_be_taken_again_and_a_refused_one_changes_nothing() {
+    let mut simulation = both_in();
+    let bytes = |simulation: &Simulation| serde_json::to_vec(&simulation.state()).unwrap();
+    let before = bytes(&simulation);
+    let moves = |mm: f64| [(WIRE, 1.5), (CATHETER, mm)];
+    assert!(push(&mut simulation, &moves(1e3)).is_err());
+    assert_eq!(bytes(&simulation), before);
+    push(&mut simulation, &moves(-0.5)).unwrap();
+    let after = bytes(&simulation);
+    let mut other = both_in();
+    push(&mut other, &[(CATHETER, 2.0)]).unwrap();
+    let state: State = serde_json::from_slice(&before).unwrap();
+    other.restore(&state).unwrap();
+    push(&mut other, &moves(-0.5)).unwrap();
+    assert_eq!(bytes(&other), after);
+}
+
+#[test]
+fn more_than_three_instruments_that_rub_are_refused() {
+    let each = (0..4).map(|k| {
+        let radius_mm = 0.2 + 0.2 * f64::from(k);
+        let section = Section::straight(50.0, radius_mm, 1.0);
+        one(&format!("tube {k}"), Section { inner_radius_mm: Some(radius_mm - 0.1), ..section })
+    });
+    let stack = Stack::new(each.collect()).unwrap();
+    let error = stack.twisted().unwrap_err().to_string();
+    assert!(error.starts_with("instrument = 4: friction twists every instrument"), "{error}");
+}
+
+/// A wire curved everywhere in a straight catheter, in free space: both make an arc of 90°, in which the wire is pulled by
+/// N₁ = ½EI₁(κ₁² − κ²) where it comes out.
+fn arc(friction: f64) -> Simulation {
+    let wire = Section { rest_curvature_per_mm: [ARC_REST, 0.0], ..Section::straight(165.0, 0.2, 20.0) };
+    let catheter = Section { inner_radius_mm: Some(0.5), ..Section::straight(150.0, 0.8, 60.0) };
+    let stack = Stack::new(vec![one("wire", wire), one("catheter", catheter)]).unwrap();
+    let stack = stack.rubbing(vec![friction, 0.0]).unwrap();
+    let axis = (0..16).map(|i| Vec3::z() * (20.0 * f64::from(i)));
+    let mut simulation = rubbing(axis, 120.0, stack, 0.0);
+    for _ in 0..40 {
+        push(&mut simulation, &[(WIRE, 2.075), (CATHETER, 2.0)]).unwrap();
+    }
+    simulation
+}
+
+const ARC_REST: f64 = 4.0 * std::f64::consts::FRAC_PI_2 / 80.0;
+
+/// Case D5: pulled through an arc of 90° the axial force grows by e^{μφ}, and the catheter is held by as much.
+#[test]
+fn a_wire_that_is_pulled_through_a_bend_obeys_the_capstan_law() {
+    let friction = 0.15;
+    let (mut smooth, mut rough) = (arc(0.0), arc(friction));
+    let curvature: f64 = 0.25 * ARC_REST;
+    let tension = 0.5 * 20.0 * (ARC_REST * ARC_REST - curvature * curvature);
+    for (way, sign) in [(-0.1, 1.0), (0.1, -1.0)] {
+        push(&mut smooth, &[(WIRE, way)]).unwrap();
+        push(&mut rough, &[(WIRE, way)]).unwrap();
+        let rubbed = |index: usize| {
+            let felt = |s: &Simulation| s.report().instruments[index].push_force_n.unwrap();
+            felt(&rough) - felt(&smooth)
+        };
+        let grown = 1.0 - rubbed(WIRE) / tension;
+        let expected = (sign * friction * std::f64::consts::FRAC_PI_2).exp();
+        assert!((grown - expected).abs() < 1e-2 * expected, "{grown} and {expected}");
+        assert!((rubbed(WIRE) + rubbed(CATHETER)).abs() < 1e-9);
+        let taken = rough.report().dissipated_mj - smooth.report().dissipated_mj;
+        assert!((taken - rubbed(WIRE) * way).abs() < 1e-9 && taken > 0.0, "{taken}");
+        for (a, b) in rough.shape().positions_mm.iter().zip(&smooth.shape().positions_mm) {
+            assert!((a - b).norm() < 1e-9);
+        }
+    }
+    push(&mut rough, &[(WIRE, 1.0), (CATHETER, 1.0)]).unwrap();
+    assert!(rough.lateral_forces(WIRE).iter().all(|at| at.friction_n == 0.0));
+}
+
+#[test]
+fn a_coefficient_that_is_none_is_refused() {
+    let stack = wire_in_catheter();
+    for (frictions, told) in [
+        (vec![0.1], "instrument.friction = 1: there are 2 instruments"),
+        (vec![-0.1, 0.0], "instrument[0].friction = -0.1: must be a Coulomb coefficient"),
+        (vec![0.1, 0.1], "instrument[1].friction = 0.1: the last instrument has none outside it"),
+    ] {
+        let error = stack.clone().rubbing(frictions).unwrap_err().to_string();
+        assert!(error.starts_with(told), "{error}");
+    }
+}
+
+/// A catheter alone in a bend, pushed and turned through this sheath.
+fn through(friction_n: f64, friction: f64) -> Vec<(f64, f64, f64)> {
+    let tree = bend().enumerate().map(|(i, position_mm)| CentrelineNode {
+        position_mm,
+        radius_mm: 4.0,
+        parent: i.checked_sub(1),
+    });
+    let made = GeneratedWall::new(&CentrelineTree::new(tree.collect()).unwrap(), Resolution::EdgeMm(1.6));
+    let made = made.unwrap();
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
+    let sheath = sheath.rubbing(friction_n, friction).unwrap();
+    let device = Device::uniform(150.0, 0.8, 60.0).unwrap();
+    let mut simulation = Simulation::builder(made.wall, device, sheath).build().unwrap();
+    for _ in 0..30 {
+        simulation.step(Command::advance(2.0)).unwrap();
+    }
+    let commands = [Command::advance(1.0), Command::advance(-1.0), Command::rotate(0.5), Command::default()];
+    commands
+        .into_iter()
+        .map(|command| {
+            let told = simulation.step(command).unwrap();
+            (told.push_force_n, told.torque_nmm, told.dissipated_mj)
+        })
+        .collect()
+}
+
+#[test]
+fn a_valve_holds_against_the_hand_and_moves_nothing_inside() {
+    let (smooth, tight, rough) = (through(0.0, 0.0), through(0.3, 0.0), through(0.0, 0.2));
+    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    for (k, (push, torque, taken)) in
+        [(0.3, 0.0, 0.3), (-0.3, 0.0, 0.3), (0.0, 0.24, 0.12)].into_iter().enumerate()
+    {
+        near(tight[k].0 - smooth[k].0, push);
+        near(tight[k].1 - smooth[k].1, torque);
+        near(tight[k].2 - smooth[k].2, taken);
+    }
+    assert!(rough[0].0 > smooth[0].0 && rough[1].0 < smooth[1].0);
+    let told = |error: crate::Error| error.to_string();
+    let sheath = Sheath::new(Vec3::zeros(), Vec3::z()).unwrap();
+    assert!(told(sheath.rubbing(-1.0, 0.0).unwrap_err()).starts_with("sheath.friction_n = -1"));
+    assert!(told(sheath.rubbing(0.0, 3.0).unwrap_err()).starts_with("sheath.friction = 3"));
+}

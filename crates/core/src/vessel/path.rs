@@ -1,0 +1,86 @@
+//! The way along a centre line from the inlet to a place of the vessel.
+
+use crate::Vec3;
+
+/// A polyline of centre-line points with the vessel's radius at each, from the inlet on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CentrelinePath {
+    points: Vec<(Vec3, f64)>,
+}
+
+/// The nearest point of a path to a point in space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnPath {
+    /// Arc length from the inlet, mm.
+    pub arc_mm: f64,
+    /// Distance from the path, mm.
+    pub distance_mm: f64,
+    /// The vessel's radius there, the larger of those at the ends of the piece, mm.
+    pub radius_mm: f64,
+}
+
+impl CentrelinePath {
+    /// The way through these points with the vessel's radius in mm at each; none of fewer than two, or where two that follow coincide.
+    pub fn new(points: Vec<(Vec3, f64)>) -> Option<Self> {
+        let apart = points.windows(2).all(|pair| (pair[1].0 - pair[0].0).norm() > 0.0);
+        (points.len() > 1 && apart).then_some(Self { points })
+    }
+
+    /// Its length, mm.
+    pub fn length_mm(&self) -> f64 {
+        self.points.windows(2).map(|pair| (pair[1].0 - pair[0].0).norm()).sum()
+    }
+
+    /// Where it ends, mm.
+    pub fn end_mm(&self) -> Vec3 {
+        self.points[self.points.len() - 1].0
+    }
+
+    /// The point of the path nearest to `x`.
+    pub fn nearest(&self, x: &Vec3) -> OnPath {
+        let mut best = OnPath { arc_mm: 0.0, distance_mm: f64::MAX, radius_mm: 0.0 };
+        let mut before = 0.0;
+        for pair in self.points.windows(2) {
+            let piece = pair[1].0 - pair[0].0;
+            let length = piece.norm();
+            let u = ((x - pair[0].0).dot(&piece) / (length * length)).clamp(0.0, 1.0);
+            let distance_mm = (x - pair[0].0 - piece * u).norm();
+            if distance_mm < best.distance_mm {
+                let radius_mm = pair[0].1.max(pair[1].1);
+                best = OnPath { arc_mm: before + u * length, distance_mm, radius_mm };
+            }
+            before += length;
+        }
+        best
+    }
+
+    /// The point at an arc length from the inlet; beyond the end the end.
+    pub fn at(&self, mut arc_mm: f64) -> Vec3 {
+        for pair in self.points.windows(2) {
+            let piece = pair[1].0 - pair[0].0;
+            let length = piece.norm();
+            if arc_mm <= length {
+                return pair[0].0 + piece * (arc_mm / length);
+            }
+            arc_mm -= length;
+        }
+        self.end_mm()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::vessel::anatomy;
+
+    #[test]
+    fn points_of_a_path_are_found_on_it() {
+        let tree = anatomy::tree("aortic_arch").unwrap();
+        let path = tree.path_to(tree.target("left carotid").unwrap().row).unwrap();
+        for arc_mm in [0.0, 13.0, 150.0, path.length_mm()] {
+            let on = path.nearest(&path.at(arc_mm));
+            assert!((on.arc_mm - arc_mm).abs() < 1e-9 && on.distance_mm < 1e-9, "{arc_mm} {on:?}");
+        }
+        assert_eq!(path.at(1e9), path.end_mm());
+        assert!(tree.path_to(0).is_none() && tree.path_to(1_000).is_none());
+    }
+}
