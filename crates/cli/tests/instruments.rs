@@ -93,6 +93,10 @@ fn a_run_of_several_instruments_goes_on_as_if_it_had_been_one() {
         &state,
     ]);
     assert!(output.status.success(), "{}", said(&output));
+    let rubbing = scene(folder.path(), &[("inserted_mm = 60.0", "friction = 0.1\ninserted_mm = 60.0")]);
+    let output = run(&[&rubbing, "--out".as_ref(), &at("none"), "--resume".as_ref(), &state]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("the device is not the same"), "{}", said(&output));
     let scene = scene(folder.path(), &[]);
     assert!(run(&[&scene, "--out".as_ref(), &whole]).status.success());
     let output = run(&[&scene, "--out".as_ref(), &part, "--resume".as_ref(), &state]);

@@ -172,6 +172,7 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
         ("radius_mm = 0.445", "radius_mm = 0.4", "the device is not the same"),
         ("friction = 0.1", "friction = 0.2", "the properties of its wall (vessel.wall) is not"),
         ("position_mm = [0.0, 0.0, 1.0]", "position_mm = [0.0, 0.0, 1.5]", "the sheath is not"),
+        ("direction = [0.0, 0.0, 1.0]", "direction = [0.0, 0.0, 1.0]\nfriction_n = 0.2", "the sheath is not"),
         ("element_mm = 2.0", "element_mm = 3.0", "the method or its options is not"),
         ("retract_mm", "advance_mm", "the script"),
         ("advance_mm = 120.0", "advance_mm = 100.0", "step 50, and the script has 45"),

@@ -73,6 +73,8 @@ impl Scene {
     }
 
     /// The commands of its script, shape (steps, n_instruments, 2): advance_mm and rotate_rad.
+    ///
+    /// Raises InputError where a line has `until`: how many steps there are is not known beforehand.
     #[getter]
     fn moves<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let device = self.scene.device().map_err(exception)?;

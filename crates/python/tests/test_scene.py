@@ -25,6 +25,26 @@ def test_a_scene_of_text_has_the_words_of_files():
         endowire.Scene(ASSETS / "vessels" / "scene.toml", text)
 
 
+def test_moves_of_a_script_that_ends_on_a_condition_are_refused():
+    text = '''
+[vessel]
+file = "curved_tube.stl"
+[device]
+file = "../devices/wire_035_soft.toml"
+[sheath]
+opening = 0
+friction_n = 0.1
+[[script]]
+advance_mm = 10.0
+[[script]]
+advance_mm = 10.0
+until = { push_force_n = 0.5 }
+'''
+    scene = endowire.Scene(ASSETS / "vessels" / "scene.toml", text)
+    with pytest.raises(endowire.InputError, match=r"script\[1\]\.until.*not known beforehand"):
+        _ = scene.moves
+
+
 def test_rod_cases_are_solved():
     solution = endowire.solve_rod(ASSETS / "cases" / "tip_force.toml")
     assert solution["converged"] and np.asarray(solution["nodes"]).shape[1] == 3

@@ -36,12 +36,13 @@ impl Parts {
         let numbers = mesh.vertices_mm.iter().flat_map(|v| v.iter().flat_map(|c| c.to_le_bytes()));
         let indices = mesh.triangles.iter().flatten().flat_map(|index| index.to_le_bytes());
         let sheath = simulation.sheath();
-        let place = sheath.position_mm.iter().chain(&sheath.direction).flat_map(|c| c.to_le_bytes());
+        let place = sheath.position_mm.iter().chain(&sheath.direction);
+        let sheath = place.chain([&sheath.friction_n, &sheath.friction]).flat_map(|c| c.to_le_bytes());
         Self {
             vessel: hash(numbers.chain(indices).collect()),
             wall: json(serde_json::to_vec(&scene.vessel.wall)),
             device: json(pushed(scene, simulation)),
-            sheath: hash(place.collect()),
+            sheath: hash(sheath.collect()),
             method: json(serde_json::to_vec(&scene.method)),
         }
     }
@@ -59,15 +60,16 @@ impl Parts {
     }
 }
 
-/// The device, or instruments with their names, and what of them is in at the start.
+/// The device, or instruments with their names, friction in each other, and what of them is in at the start.
 fn pushed(scene: &Scene, simulation: &Simulation) -> serde_json::Result<Vec<u8>> {
     let stack = simulation.stack();
     if !stack.is_several() {
         return serde_json::to_vec(simulation.device().sections());
     }
     let start_mm = scene.instrument.iter().map(|spec| spec.inserted_mm);
-    let each = stack.instruments().iter().zip(start_mm);
-    serde_json::to_vec(&each.map(|(one, mm)| (&one.name, one.device.sections(), mm)).collect::<Vec<_>>())
+    let each = stack.instruments().iter().zip(start_mm).enumerate();
+    let each = each.map(|(i, (one, mm))| (&one.name, one.device.sections(), stack.friction(i), mm));
+    serde_json::to_vec(&each.collect::<Vec<_>>())
 }
 
 /// A script that has come to where a course says, and a hash of the steps up to there; `seen` is given each.

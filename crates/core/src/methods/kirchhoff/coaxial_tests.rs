@@ -282,7 +282,7 @@ fn curved_in_straight([wire_mm, catheter_mm]: [f64; 2]) -> Simulation {
 /// Case D3: the outer bends the inner from κ₁ to κ = κ₁ EI₁/(EI₁ + EI₂), and the force across the line is −N₁κ a length. N₁ is that of a rod
 /// that slides without friction, N₁ + ½EI₁(κ² − κ₁²) = H along the line, with H = −F₁ − ½EI₁κ₁² of the force F₁ by which it is pushed.
 #[test]
-fn the_force_between_two_on_an_arc_is_exact() {
+fn the_force_between_two_on_an_arc_is_that_of_the_rods() {
     let (stiffness, rest, curvature) = (20.0, 0.02, 0.005);
     for (lengths, potential) in [([101.0, 80.0], 0.0), ([80.0, 101.0], -0.5 * 15.0 * rest * rest)] {
         let simulation = curved_in_straight(lengths);
