@@ -164,8 +164,8 @@ pub(super) fn helix() -> Result<Vec<Row>> {
     let found = rows[3].error;
     let at = |hardness: f64| error(Fineness { hardness, ..fine });
     rows.push(falling(name, "error of thrust, r/p = 10² … 10⁴", &[at(1e2)?, at(1e3)?, found], 0.5));
-    let coarse = error(Fineness { around: 32, ..fine })?;
-    rows.push(falling(name, "error of thrust, 32, 64 around", &[coarse, found], 0.5));
+    let coarse = error(Fineness { around: 16, ..fine })?;
+    rows.push(falling(name, "error of thrust, 16, 64 around", &[coarse, found], 0.5));
     Ok(rows)
 }
 
