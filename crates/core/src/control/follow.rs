@@ -149,8 +149,7 @@ impl FollowPath {
 impl Controller for FollowPath {
     fn next(&mut self, simulation: &Simulation) -> Result<Action> {
         self.team.check(simulation)?;
-        let on = self.team.on_path(simulation, &self.path);
-        if on.arc_mm > self.path.length_mm() - self.arrived_mm && on.distance_mm < on.radius_mm {
+        if self.team.has_arrived(simulation, &self.path, self.arrived_mm) {
             return Ok(Action::Arrived);
         }
         let command = self.command(simulation, self.team.bent_mm(simulation));

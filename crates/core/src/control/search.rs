@@ -58,11 +58,6 @@ impl SearchAhead {
         Self { path, team, turned, arrived_mm, plan, best_mm: f64::MIN, backs: 0, retries: 0 }
     }
 
-    fn has_arrived(&self, simulation: &Simulation) -> bool {
-        let on = self.team.on_path(simulation, &self.path);
-        on.arc_mm > self.path.length_mm() - self.arrived_mm && on.distance_mm < on.radius_mm
-    }
-
     /// How far along the way the tip is, mm, less for what is beside it.
     fn progress_mm(&self, simulation: &Simulation) -> f64 {
         let on = self.team.on_path(simulation, &self.path);
@@ -103,7 +98,7 @@ impl SearchAhead {
             if worth > worth_mm {
                 (worth_mm, worthy) = (worth, plan.len());
             }
-            if self.has_arrived(&copy) {
+            if self.team.has_arrived(&copy, &self.path, self.arrived_mm) {
                 break;
             }
         }
@@ -141,7 +136,7 @@ impl SearchAhead {
 impl Controller for SearchAhead {
     fn next(&mut self, simulation: &Simulation) -> Result<Action> {
         self.team.check(simulation)?;
-        if self.has_arrived(simulation) {
+        if self.team.has_arrived(simulation, &self.path, self.arrived_mm) {
             return Ok(Action::Arrived);
         }
         if let Some(moves) = self.plan.pop_front() {

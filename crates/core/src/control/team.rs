@@ -53,6 +53,17 @@ impl Team {
         path.nearest(&self.shape(simulation).tip_mm().unwrap_or_default())
     }
 
+    /// Whether the tip of the one that leads is in the vessel and no more than `arrived_mm` before the end of a path.
+    pub(super) fn has_arrived(
+        &self,
+        simulation: &Simulation,
+        path: &CentrelinePath,
+        arrived_mm: f64,
+    ) -> bool {
+        let on = self.on_path(simulation, path);
+        on.arc_mm > path.length_mm() - arrived_mm && on.distance_mm < on.radius_mm
+    }
+
     /// Length of the tip of the one that leads, up to where its last bend ends, mm; 0 of a straight one.
     pub(super) fn bent_mm(&self, simulation: &Simulation) -> f64 {
         let (mut end_mm, mut bent_mm) = (0.0, 0.0);
