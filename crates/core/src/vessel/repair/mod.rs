@@ -3,6 +3,7 @@
 //! Every step leaves what is not faulty as it is, and a surface without its fault untouched.
 
 mod cracks;
+mod doubles;
 mod fill;
 mod folds;
 mod holes;
@@ -23,6 +24,11 @@ pub(super) fn join_sheets(
     tolerance_mm: f64,
     report: &mut RepairReport,
 ) {
+    (report.pieces_dropped, report.piece_triangles_dropped) =
+        doubles::drop_doubles(mesh, edges.of(&mesh.triangles));
+    if report.pieces_dropped > 0 {
+        edges.changed();
+    }
     report.cracks_closed = cracks::close_cracks(mesh, edges.of(&mesh.triangles));
     if report.cracks_closed > 0 {
         edges.changed();
@@ -32,7 +38,7 @@ pub(super) fn join_sheets(
     let resolved = sheets::resolve(mesh, edges);
     report.sheets_removed = resolved.removed;
     report.edges_cut = resolved.cut;
-    if report.cracks_closed + resolved.removed + resolved.cut > 0 {
+    if report.pieces_dropped + report.cracks_closed + resolved.removed + resolved.cut > 0 {
         edges.changed();
         drop_unreferenced(mesh);
     }
@@ -44,9 +50,9 @@ pub(super) fn cure(mesh: &mut SurfaceMesh, edges: &mut Edges, tolerance_mm: f64,
     if dropped.triangles > 0 {
         edges.changed();
     }
-    report.pieces_dropped = dropped.specks;
+    report.pieces_dropped += dropped.specks;
     report.skins_dropped = dropped.skins;
-    report.piece_triangles_dropped = dropped.triangles;
+    report.piece_triangles_dropped += dropped.triangles;
     let filled = holes::fill_holes(mesh, edges.of(&mesh.triangles));
     report.holes_filled = filled.holes;
     report.triangles_added = filled.triangles;

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::super::tests::steady;
 use super::super::*;
+use super::doubles;
 use crate::Vec3;
 use crate::vessel::topology::EdgeTable;
 
@@ -123,6 +124,27 @@ fn a_tear_along_the_vessel_is_sewn_up() {
     assert!(double.len() > 5);
     let report = repaired(&torn, &clean, 1e-2);
     assert!(report.cracks_closed + report.holes_filled > 0, "{report:?}");
+}
+
+#[test]
+fn a_curved_patch_on_the_surface_is_no_vessel() {
+    // Around the fork's crotch, 0.05 mm off to either side: its rim reads like the opening of a vessel.
+    let clean = fork();
+    let patch = around(clean.mesh(), [0.0, 34.0, 0.0], 6.0);
+    for off_mm in [0.05, -0.05] {
+        let mut doubled = clean.mesh().clone();
+        add(&mut doubled, clean.mesh(), &patch, |v| v + Vec3::y() * off_mm);
+        let report = repaired(&doubled, &clean, 1e-12);
+        assert_eq!((report.pieces_dropped, report.piece_triangles_dropped), (1, patch.len()));
+        assert_eq!((report.cracks_closed, report.fold_triangles_removed), (0, 0));
+    }
+    // Far from it the same piece is one that something may be made of.
+    let mut apart = clean.mesh().clone();
+    add(&mut apart, clean.mesh(), &patch, |v| v + Vec3::y() * 3.0);
+    let before = apart.triangles.len();
+    let table = EdgeTable::new(&apart.triangles);
+    assert_eq!(doubles::drop_doubles(&mut apart, &table), (0, 0));
+    assert_eq!(apart.triangles.len(), before);
 }
 
 #[test]

@@ -1,0 +1,63 @@
+//! Patches that lie on the surface a second time.
+//!
+//! Segmentations that were joined by hand, or scans of two views, hold pieces of the same wall twice, a little apart. A patch that is
+//! strongly curved, as around a fork, has a rim that reads like the opening of a vessel; taken for one it would let devices out. They go
+//! before cracks are closed, which would sew them to the rim of what they lie on.
+
+use parry3d_f64::glamx::DVec3;
+use parry3d_f64::query::PointQuery;
+use parry3d_f64::shape::TriMesh;
+
+use crate::Vec3;
+use crate::vessel::topology::EdgeTable;
+use crate::vessel::{SurfaceMesh, mesh};
+
+/// Part of the largest piece's area below which an open piece can be a patch on it.
+const PATCH: f64 = 0.3;
+/// Farthest that a patch is from what it lies on, as a part of the square root of its area. A stub of a vessel of its own, as long as
+/// wide, is off by a tenth or more.
+const BESIDE: f64 = 0.05;
+
+/// Drops open pieces that lie on larger ones everywhere, and tells how many pieces and triangles they were.
+pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
+    let (piece_of, count) = table.components(mesh.triangles.len());
+    if count < 2 {
+        return (0, 0);
+    }
+    let mut area_mm2 = vec![0.0; count];
+    let mut open = vec![false; count];
+    for (index, across) in table.neighbours(mesh.triangles.len()).iter().enumerate() {
+        area_mm2[piece_of[index] as usize] += mesh::area(&mesh.corners(index));
+        open[piece_of[index] as usize] |= across.contains(&crate::vessel::topology::NONE);
+    }
+    let largest = area_mm2.iter().copied().fold(0.0, f64::max);
+    let mut patch: Vec<bool> = (0..count).map(|p| open[p] && area_mm2[p] < PATCH * largest).collect();
+    let Some(ground) = ground(mesh, &piece_of, &patch).filter(|_| patch.contains(&true)) else {
+        return (0, 0);
+    };
+    for (index, piece) in piece_of.iter().enumerate().map(|(index, p)| (index, *p as usize)) {
+        if patch[piece] {
+            let corners = mesh.corners(index);
+            let middle = corners.iter().sum::<Vec3>() / 3.0;
+            let reach_mm = BESIDE * area_mm2[piece].sqrt();
+            patch[piece] = [middle]
+                .iter()
+                .chain(&corners)
+                .all(|at| ground.distance_to_local_point(DVec3::new(at.x, at.y, at.z), false) <= reach_mm);
+        }
+    }
+    let before = mesh.triangles.len();
+    let mut index = 0;
+    mesh.triangles.retain(|_| {
+        index += 1;
+        !patch[piece_of[index - 1] as usize]
+    });
+    (patch.iter().filter(|patch| **patch).count(), before - mesh.triangles.len())
+}
+
+/// What patches may lie on: all other pieces.
+fn ground(mesh: &SurfaceMesh, piece_of: &[u32], patch: &[bool]) -> Option<TriMesh> {
+    let triangles = mesh.triangles.iter().zip(piece_of).filter(|(_, piece)| !patch[**piece as usize]);
+    let vertices = mesh.vertices_mm.iter().map(|v| DVec3::new(v.x, v.y, v.z)).collect();
+    TriMesh::new(vertices, triangles.map(|(triangle, _)| *triangle).collect()).ok()
+}
