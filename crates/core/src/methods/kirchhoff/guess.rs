@@ -8,7 +8,7 @@ use super::mesh::Mesh;
 use super::repeat::Correction;
 use super::slide::carry;
 use crate::contact::{HandMotion, WallContact};
-use crate::rod::RodState;
+use crate::rod::{ElementData, RodState};
 use crate::solve::Newton;
 
 /// How good a guess is.
@@ -101,7 +101,7 @@ impl Guess {
     }
 
     /// What an equilibrium that was found teaches.
-    pub(super) fn teach(&self, found: &RodState, correction: &mut Correction) {
-        correction.learn(&self.motions, &self.slid, found);
+    pub(super) fn teach(&self, elements: &[ElementData], found: &RodState, correction: &mut Correction) {
+        correction.learn(&self.motions, elements, &self.slid, found);
     }
 }

@@ -50,7 +50,8 @@ pub(super) struct Correction {
 const SAME: f64 = 1e-6;
 /// … times a factor of at most this, or over it.
 const LONGER: f64 = 5.0;
-/// Nothing is learnt where a tangent turned by more than this, rad: the device let go of something.
+/// Nothing is learnt where a tangent turned by more than this, rad, beside what the curve turns by over the advance: the device let go of
+/// something. A hook that keeps its shape departs from the slid device by the latter.
 const LARGEST: f64 = 0.2;
 
 fn axes(f: &Frame) -> Matrix3<f64> {
@@ -117,12 +118,23 @@ impl Correction {
     }
 
     /// Remembers the way from the slid device to the equilibrium that was found.
-    pub(super) fn learn(&mut self, motions: &[HandMotion], slid: &RodState, found: &RodState) {
+    pub(super) fn learn(
+        &mut self,
+        motions: &[HandMotion],
+        elements: &[ElementData],
+        slid: &RodState,
+        found: &RodState,
+    ) {
         self.clear();
         self.motions.extend(motions.iter().map(HandMotion::parts));
         let n = slid.elements();
-        let far = |i: usize| (found.frames[i].t - slid.frames[i].t).norm_squared() > LARGEST * LARGEST;
-        if (0..=n).any(far) {
+        let advance_mm = self.motions.iter().fold(0.0f64, |most, motion| most.max(motion[0].abs()));
+        let changed = |a: &Vec3, b: &Vec3| (a - b).norm();
+        let far = |(e, data): (usize, &ElementData)| {
+            let bent_per_mm = changed(&slid.frames[e + 1].t, &slid.frames[e].t) / data.length;
+            changed(&found.frames[e + 1].t, &slid.frames[e + 1].t) > LARGEST + bent_per_mm * advance_mm
+        };
+        if elements.iter().enumerate().any(far) {
             return;
         }
         let mut twist: f64 = found.reference_twists.iter().sum();
@@ -203,5 +215,47 @@ impl Correction {
             state.frames[e + 1] = state.frames[e].transported_to(&state.frames[e + 1].t);
         }
         state.place(elements);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ELEMENT_MM: f64 = 2.0;
+    const NODES: usize = 12;
+
+    /// Straight, and bent by 0.3 rad/mm over the last `hook_mm`.
+    fn hooked(elements: &[ElementData], hook_mm: f64) -> RodState {
+        let length_mm = ELEMENT_MM * elements.len() as f64;
+        let angle = |i: usize| 0.3 * (ELEMENT_MM * i as f64 - length_mm + hook_mm).max(0.0);
+        let tangent = |i: usize| Vec3::new(angle(i).sin(), 0.0, angle(i).cos());
+        let mut frames = vec![Frame::new(tangent(0), Some(Vec3::y()))];
+        for i in 1..=elements.len() {
+            frames.push(frames[i - 1].transported_to(&tangent(i)));
+        }
+        RodState::from_frames(elements, Vec3::zeros(), frames)
+    }
+
+    #[test]
+    fn a_hook_that_keeps_its_shape_is_learnt_and_a_snap_is_not() {
+        let elements = [ElementData::plain(ELEMENT_MM, 1.0); NODES];
+        let motions = [HandMotion { from_mm: 20.0, to_mm: 21.0, turn_rad: 0.0 }];
+        // Slid along its own curve the hook begins 1 mm farther from the tip than it does in its shape.
+        let (slid, found) = (hooked(&elements, 7.0), hooked(&elements, 6.0));
+        let mut correction = Correction::default();
+        correction.learn(&motions, &elements, &slid, &found);
+        assert_eq!(correction.len(), NODES);
+        assert_eq!(correction.repeats(&motions), Some(1.0));
+        let mut guess = slid.clone();
+        correction.apply(1.0, &elements, &mut guess);
+        assert!(guess.farthest_mm(&found) < 0.05 * slid.farthest_mm(&found));
+        // The same change in a step that is far too short for it.
+        let short = [HandMotion { from_mm: 20.0, to_mm: 20.1, turn_rad: 0.0 }];
+        correction.learn(&short, &elements, &slid, &found);
+        assert_eq!(correction.len(), 0);
+        // A hook that has sprung open.
+        correction.learn(&motions, &elements, &slid, &hooked(&elements, 3.0));
+        assert_eq!(correction.len(), 0);
     }
 }

@@ -153,12 +153,12 @@ impl<const C: usize> Tools<C> {
         }
         let dissipated_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
         let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
-        let (_, after) = next.parts();
+        let (mesh, after) = next.parts();
         let taken = resort == Some(true) && balanced;
         if !taken && rises(&start.state.report, &after.report, dissipated_mj) {
             return Err(STORED.into());
         }
-        self.guess.teach(&after.rod, &mut after.correction);
+        self.guess.teach(&mesh.elements, &after.rod, &mut after.correction);
         self.friction.keep(&mut after.forces);
         self.memory.keep(&mut after.known);
         Ok(Found { iterations, slides, dissipated_mj, residual: found.residual, unsettled, balanced })
