@@ -9,6 +9,7 @@ mod render;
 mod rod;
 mod run;
 mod surfaces;
+mod sweep;
 mod verify;
 mod vessel;
 
@@ -19,6 +20,7 @@ use crate::failure::Failure;
 pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Run(args) => run::run(args),
+        Command::Sweep(args) => sweep::sweep(args),
         Command::Render(args) => render::render(args),
         Command::Fluoro(args) => fluoro::fluoro(args),
         Command::Rod(args) => rod::rod(args),
