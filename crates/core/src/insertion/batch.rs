@@ -4,7 +4,7 @@ use rayon::iter::{
     IndexedParallelIterator, IntoParallelRefIterator, IntoParallelRefMutIterator, ParallelIterator,
 };
 
-use crate::insertion::{Command, Simulation};
+use crate::insertion::{Command, Move, Simulation};
 use crate::{Error, Result};
 
 /// Simulations that are stepped on all cores, or on as many threads as `RAYON_NUM_THREADS` says.
@@ -40,17 +40,35 @@ impl Batch {
     /// # Errors
     /// As many commands as simulations are wanted ([`Error::Parameter`]); otherwise nothing is stepped.
     pub fn step(&mut self, commands: &[Command]) -> Result<Vec<Result<()>>> {
-        if commands.len() != self.simulations.len() {
+        self.each("commands", commands, |simulation, command| simulation.step(*command).map(drop))
+    }
+
+    /// As [`Batch::step`], for several instruments: moves for each simulation ([`Simulation::step_together`]).
+    ///
+    /// # Errors
+    /// As [`Batch::step`].
+    pub fn step_together(&mut self, moves: &[Vec<Move>]) -> Result<Vec<Result<()>>> {
+        self.each("moves", moves, |simulation, moves| simulation.step_together(moves).map(drop))
+    }
+
+    /// Does something with each simulation and what is given for it.
+    fn each<T: Sync>(
+        &mut self,
+        name: &str,
+        given: &[T],
+        work: impl Fn(&mut Simulation, &T) -> Result<()> + Sync,
+    ) -> Result<Vec<Result<()>>> {
+        if given.len() != self.simulations.len() {
             let mend = format!("give one for each of the {} simulations", self.simulations.len());
-            return Err(Error::parameter("commands", commands.len(), mend));
+            return Err(Error::parameter(name, given.len(), mend));
         }
         // Threads are started for many, and not for one: a program may have to fork.
-        if let ([simulation], [command]) = (&mut self.simulations[..], commands) {
-            return Ok(vec![simulation.step(*command).map(drop)]);
+        if let ([simulation], [one]) = (&mut self.simulations[..], given) {
+            return Ok(vec![work(simulation, one)]);
         }
         // Steps differ in length by orders of magnitude: each is a piece of work of its own.
-        let each = self.simulations.par_iter_mut().zip(commands.par_iter()).with_max_len(1);
-        Ok(each.map(|(simulation, command)| simulation.step(*command).map(drop)).collect())
+        let each = self.simulations.par_iter_mut().zip(given.par_iter()).with_max_len(1);
+        Ok(each.map(|(simulation, one)| work(simulation, one)).collect())
     }
 }
 
