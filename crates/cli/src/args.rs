@@ -29,6 +29,8 @@ pub(crate) enum Command {
     Sweep(SweepArgs),
     /// Draw frames of a recorded run, from any position of the C-arm
     Render(RenderArgs),
+    /// Write a recorded run for other programs: a series for ParaView and 3D Slicer (VTK)
+    Export(ExportArgs),
     /// Draw fluoroscopic frames of a scene: after its script, or of a contrast injection
     Fluoro(FluoroArgs),
     /// Solve one static rod: sections, supports and loads in, shape, energy and reactions out
@@ -215,6 +217,21 @@ pub(crate) struct RenderArgs {
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) frames: FrameArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct ExportArgs {
+    /// Folder of a recorded run
+    pub(crate) dir: PathBuf,
+    /// Folder for run.pvd, which lists the steps with their times, step_*.vtp (instruments as lines, contacts as points with their forces)
+    /// and vessel.vtp; files of these names are replaced
+    #[arg(long, value_name = "DIR")]
+    pub(crate) vtk: PathBuf,
+    /// Scene file of the run, if it is no longer where it was
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
 }
 
 #[derive(Debug, clap::Args)]

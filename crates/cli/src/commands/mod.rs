@@ -3,6 +3,7 @@
 pub(crate) mod compare;
 mod device;
 pub(crate) mod experiment;
+mod export;
 mod felt;
 mod fluoro;
 mod render;
@@ -22,6 +23,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Run(args) => run::run(args),
         Command::Sweep(args) => sweep::sweep(args),
         Command::Render(args) => render::render(args),
+        Command::Export(args) => export::export(args),
         Command::Fluoro(args) => fluoro::fluoro(args),
         Command::Rod(args) => rod::rod(args),
         Command::Verify(args) => verify::verify(args),

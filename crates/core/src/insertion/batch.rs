@@ -75,7 +75,7 @@ impl Batch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::{Device, Section};
+    use crate::device::{Device, Instrument, Section, Stack};
     use crate::insertion::{Sheath, WallProperties};
     use crate::vessel::{GeneratedWall, Resolution, anatomy};
 
@@ -109,6 +109,37 @@ mod tests {
             }
         }
         assert!(alone.iter().any(|one| !one.report().contacts.is_empty()));
+    }
+
+    #[test]
+    fn several_instruments_move_together_to_the_bits_of_one_by_one() {
+        let one = simulation();
+        let hollow = |bore: Option<f64>, radius_mm: f64, length_mm: f64| {
+            let section = Section::straight(length_mm, radius_mm, 10.0);
+            Device::new(vec![Section { inner_radius_mm: bore, ..section }]).unwrap()
+        };
+        let each = [("wire", hollow(None, 0.2, 300.0)), ("catheter", hollow(Some(0.3), 0.5, 200.0))];
+        let each = each.map(|(name, device)| Instrument { name: name.to_owned(), device, may_lead: true });
+        let stack = Stack::new(each.into()).unwrap();
+        let start = Simulation::builder(one.wall().clone(), stack, *one.sheath()).build().unwrap();
+        let moves = |k: usize| -> Vec<Move> {
+            let command = |mm: f64| Command::advance(mm * (1.0 + 0.2 * k as f64));
+            vec![Move { instrument: 0, command: command(3.0) }, Move { instrument: 1, command: command(2.0) }]
+        };
+        let mut alone = vec![start.clone(); 3];
+        let mut batch = Batch::new(alone.clone());
+        for _ in 0..15 {
+            let all: Vec<Vec<Move>> = (0..3).map(moves).collect();
+            batch.step_together(&all).unwrap().into_iter().for_each(|told| told.unwrap());
+            for (one, moves) in alone.iter_mut().zip(&all) {
+                one.step_together(moves).unwrap();
+            }
+        }
+        for (one, other) in alone.iter().zip(batch.simulations()) {
+            assert_eq!((one.shape(), one.report()), (other.shape(), other.report()));
+        }
+        let refused = batch.step_together(&[]).unwrap_err().to_string();
+        assert!(refused.contains("moves = 0"), "{refused}");
     }
 
     #[test]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import base64
-import xml.etree.ElementTree as ElementTree
 import zlib
 from os import PathLike
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
