@@ -1,4 +1,4 @@
-//! Tells the program which revision of its source it was built from.
+//! Tells the program, and the Python package, which revision of its source it was built from.
 
 use std::process::Command;
 
@@ -9,7 +9,7 @@ fn main() {
     for path in watched.into_iter().flatten().filter(|path| std::path::Path::new(path).exists()) {
         println!("cargo:rerun-if-changed={path}");
     }
-    for path in ["src", "../core/src", "../methods/src", "../viewer/src", "build.rs"] {
+    for path in ["src", "../core/src", "../methods/src", "../sweep/src", "../viewer/src", "../cli/build.rs"] {
         println!("cargo:rerun-if-changed={path}");
     }
     println!("cargo:rustc-env=ENDOWIRE_GIT_REVISION={}", revision().unwrap_or_else(|| "unknown".to_owned()));

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::builder::PossibleValuesParser;
 use clap::{Parser, Subcommand, ValueEnum};
 use endowire_methods::NAMES;
+use endowire_sweep::Shard;
 use endowire_viewer::{Mode, Pose};
 
 use crate::commands::compare::case::CASES;
@@ -24,8 +25,12 @@ pub(crate) struct Args {
 pub(crate) enum Command {
     /// Run the scripted insertion of a scene and record it: summary.json, steps.csv, shapes.npz, frames/*.png
     Run(RunArgs),
+    /// Run a scene many times with other values of its keys: one Parquet row a run. Killed at any moment, the same command goes on
+    Sweep(SweepArgs),
     /// Draw frames of a recorded run, from any position of the C-arm
     Render(RenderArgs),
+    /// Write a recorded run for other programs: a series for ParaView and 3D Slicer (VTK)
+    Export(ExportArgs),
     /// Draw fluoroscopic frames of a scene: after its script, or of a contrast injection
     Fluoro(FluoroArgs),
     /// Solve one static rod: sections, supports and loads in, shape, energy and reactions out
@@ -70,6 +75,43 @@ pub(crate) struct RunArgs {
     /// Print the summary as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct SweepArgs {
+    /// Sweep file (TOML): a scene, and an axis for each key that varies
+    #[arg(required = true)]
+    pub(crate) sweep: Option<PathBuf>,
+    /// Folder for rows as they come (runs.jsonl), the table of all (runs.parquet), and recordings where they are asked for
+    #[arg(long, value_name = "DIR", required = true)]
+    pub(crate) out: Option<PathBuf>,
+    /// Do one of several parts: the first of four is 1/4. Parts may go into one folder or into several, on one machine or on many
+    #[arg(long, value_name = "I/N", default_value = "1/1")]
+    pub(crate) shard: Shard,
+    /// Runs at the same time; the number of cores if absent
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) jobs: Option<u16>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Print what has come of it as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(subcommand)]
+    pub(crate) merge: Option<SweepCommand>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum SweepCommand {
+    /// Make one table of the rows in the folders of shards, in whatever order they are given
+    Merge {
+        /// Folders of endowire sweep --out
+        #[arg(required = true, value_name = "DIR")]
+        folders: Vec<PathBuf>,
+        /// Table to write (Parquet)
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+    },
 }
 
 /// Whether walls are kept from run to run.
@@ -175,6 +217,21 @@ pub(crate) struct RenderArgs {
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) frames: FrameArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct ExportArgs {
+    /// Folder of a recorded run
+    pub(crate) dir: PathBuf,
+    /// Folder for run.pvd, which lists the steps with their times, step_*.vtp (instruments as lines, contacts as points with their forces)
+    /// and vessel.vtp; files of these names are replaced
+    #[arg(long, value_name = "DIR")]
+    pub(crate) vtk: PathBuf,
+    /// Scene file of the run, if it is no longer where it was
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
 }
 
 #[derive(Debug, clap::Args)]

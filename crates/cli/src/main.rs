@@ -16,6 +16,7 @@ fn main() -> ExitCode {
     if matches!(
         args.command,
         args::Command::Run(_)
+            | args::Command::Sweep(_)
             | args::Command::Render(_)
             | args::Command::Fluoro(_)
             | args::Command::Experiment(_)

@@ -152,7 +152,19 @@ fn every_command_of_the_guide_works() {
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
     // That nothing is run would also be no failure.
-    let all = ["compare", "device", "experiment", "fluoro", "render", "rod", "run", "verify", "vessel"];
+    let all = [
+        "compare",
+        "device",
+        "experiment",
+        "export",
+        "fluoro",
+        "render",
+        "rod",
+        "run",
+        "sweep",
+        "verify",
+        "vessel",
+    ];
     assert_eq!(commands.into_iter().collect::<Vec<_>>(), all);
 }
 

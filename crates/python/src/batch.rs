@@ -2,17 +2,18 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use endowire_core::insertion;
+use endowire_core::insertion::{self, InstrumentReport};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{Numbers, array, numbers, points};
-use crate::error::exception;
+use crate::error::{exception, refuse};
 use crate::instrument::Instrument;
-use crate::moves::{INSTRUMENTS, Moves, commands};
-use crate::simulation::{Simulation, points_at, tip_mm};
+use crate::moves::Moves;
+use crate::report::{hands, push_force_n};
+use crate::simulation::{Simulation, points_at, tip_mm, tips_mm};
 use crate::state::State;
 
 /// Simulations stepped side by side on all cores (or on RAYON_NUM_THREADS threads), each to the bit as if it were alone.
@@ -69,26 +70,47 @@ impl Batch {
     fn of_hands<'py>(
         &self,
         py: Python<'py>,
-        of: impl Fn(&insertion::StepReport) -> f64 + Send + Sync,
+        of: impl Fn(&InstrumentReport) -> f64 + Send + Sync,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let list: Vec<f64> =
-            self.with(py, |members| members.batch.simulations().iter().map(|s| of(s.report())).collect());
-        let rows = list.len();
-        array(py, list, [rows, INSTRUMENTS])
+        let (rows, hands, list) = self.with(py, |members| {
+            let reports = members.batch.simulations().iter().map(insertion::Simulation::report);
+            let list: Vec<f64> = reports.flat_map(hands).map(|hand| of(&hand)).collect();
+            (members.instruments.len(), members.hands(), list)
+        });
+        array(py, list, [rows, hands])
+    }
+}
+
+impl Members {
+    /// Instruments of each.
+    fn hands(&self) -> usize {
+        self.instruments.first().map_or(1, |instruments| instruments.len())
+    }
+
+    /// Refuses a simulation with another number of instruments.
+    fn check_hands(&self, instruments: &[Instrument]) -> PyResult<()> {
+        let hands = self.hands();
+        if self.instruments.is_empty() || instruments.len() == hands {
+            return Ok(());
+        }
+        let mend = format!("a batch has simulations of the same number of instruments, here {hands}");
+        Err(refuse("instruments", instruments.len(), &mend))
     }
 }
 
 #[pymethods]
 impl Batch {
-    /// A batch of copies of simulations, in this order. They may differ in everything.
+    /// A batch of copies of simulations, in this order. They may differ in everything but the number of instruments.
     #[new]
-    fn new(py: Python<'_>, simulations: Vec<Py<Simulation>>) -> Self {
+    fn new(py: Python<'_>, simulations: Vec<Py<Simulation>>) -> PyResult<Self> {
         let copied = simulations.iter().map(|one| {
             let one = one.get();
             (one.with(py, |simulation| simulation.clone()), std::sync::Arc::clone(&one.instruments))
         });
         let (list, instruments): (Vec<_>, Vec<_>) = copied.unzip();
-        Self { inner: Mutex::new(Members { batch: insertion::Batch::new(list), instruments }) }
+        let members = Members { batch: insertion::Batch::new(list), instruments };
+        members.instruments.iter().try_for_each(|instruments| members.check_hands(instruments))?;
+        Ok(Self { inner: Mutex::new(members) })
     }
 
     fn __len__(&self, py: Python<'_>) -> usize {
@@ -101,9 +123,9 @@ impl Batch {
     /// Returns the failures: a dictionary from the index of a simulation to the exception that `Simulation.step` would have raised; empty
     /// where all went well. Those that failed are as before, and do not concern the others.
     fn step<'py>(&self, py: Python<'py>, moves: Moves<'_>) -> PyResult<Bound<'py, PyDict>> {
-        let count = self.__len__(py);
-        let commands = commands(&moves, Some(count))?;
-        let told = self.with(py, |members| members.batch.step(&commands)).map_err(exception)?;
+        let (count, hands) = self.with(py, |members| (members.instruments.len(), members.hands()));
+        let moves = crate::moves::moves(&moves, Some(count), hands)?;
+        let told = self.with(py, |members| members.batch.step_together(&moves)).map_err(exception)?;
         let failures = PyDict::new(py);
         for (index, failed) in told.into_iter().enumerate().filter_map(|(k, told)| told.err().map(|e| (k, e)))
         {
@@ -124,6 +146,7 @@ impl Batch {
     fn replace(&self, py: Python<'_>, index: isize, simulation: &Simulation) -> PyResult<()> {
         let new = simulation.with(py, |simulation| simulation.clone());
         self.at(py, index, |members, k| {
+            members.check_hands(&simulation.instruments)?;
             members.batch.simulations_mut()[k] = new;
             members.instruments[k] = std::sync::Arc::clone(&simulation.instruments);
             Ok(())
@@ -142,11 +165,21 @@ impl Batch {
         })
     }
 
-    /// Positions of the tips, mm, shape (n, 3).
+    /// Positions of the tips, mm, shape (n, 3); of several instruments that of the farthest.
     #[getter]
     fn tip_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let tips: Vec<_> = self.with(py, |members| members.batch.simulations().iter().map(tip_mm).collect());
         points(py, tips)
+    }
+
+    /// Positions of the tips of all instruments, mm, shape (n, n_instruments, 3); what is not in is in the sheath's mouth.
+    #[getter]
+    fn tips_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let (rows, hands, list) = self.with(py, |members| {
+            let tips = members.batch.simulations().iter().flat_map(tips_mm).flat_map(|p| [p.x, p.y, p.z]);
+            (members.instruments.len(), members.hands(), tips.collect::<Vec<f64>>())
+        });
+        array(py, list, [rows, hands, 3])
     }
 
     /// Points of the centre lines at these arc lengths from the tip, mm: shape (m,) to (n, m, 3).
@@ -167,25 +200,25 @@ impl Batch {
     /// Lengths inside the sheath's mouth, mm, shape (n, n_instruments).
     #[getter]
     fn inserted_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.of_hands(py, |report| report.inserted_mm)
+        self.of_hands(py, |hand| hand.inserted_mm)
     }
 
     /// Turns of the tails since the start, rad, shape (n, n_instruments).
     #[getter]
     fn rotation_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.of_hands(py, |report| report.rotation_rad)
+        self.of_hands(py, |hand| hand.rotation_rad)
     }
 
-    /// Forces with which the hands push, N, shape (n, n_instruments).
+    /// Forces with which the hands push, N, shape (n, n_instruments); NaN where a force jumps.
     #[getter]
     fn push_force_n<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.of_hands(py, |report| report.push_force_n)
+        self.of_hands(py, push_force_n)
     }
 
     /// Torques with which the hands hold the tails, N·mm, shape (n, n_instruments).
     #[getter]
     fn torque_nmm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.of_hands(py, |report| report.torque_nmm)
+        self.of_hands(py, |hand| hand.torque_nmm)
     }
 
     /// Largest normal forces of the wall at a contact, N, shape (n,); 0 without contact.

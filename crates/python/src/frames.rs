@@ -11,7 +11,7 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::array;
 use crate::document;
-use crate::error::exception;
+use crate::error::{exception, refuse};
 use crate::interrupt::interruptible;
 use crate::simulation::Simulation;
 use crate::vessel::Vessel;
@@ -53,13 +53,18 @@ impl Renderer {
     }
 
     /// The instruments, made of what the table of the view says, if it says so.
-    fn views(&self, py: Python<'_>, simulation: &Simulation) -> Vec<viewer::DeviceView> {
+    fn views(&self, py: Python<'_>, simulation: &Simulation) -> PyResult<Vec<viewer::DeviceView>> {
         let mut views = simulation.views(py);
         let parts = self.with(py, |renderer| renderer.spec().device.clone());
-        if !parts.is_empty() {
-            views.iter_mut().for_each(|view| view.parts.clone_from(&parts));
+        match (parts.is_empty(), &mut views[..]) {
+            (true, _) => {}
+            (false, [view]) => view.parts = parts,
+            (false, _) => {
+                let mend = "describes one device, and there are several instruments: leave it out, and give materials in their files";
+                return Err(refuse("view.device", format!("{} parts", parts.len()), mend));
+            }
         }
-        views
+        Ok(views)
     }
 }
 
@@ -84,7 +89,7 @@ impl Renderer {
     /// unless told.
     #[pyo3(signature = (simulation, frame=None))]
     fn render(&self, py: Python<'_>, simulation: &Simulation, frame: Option<u64>) -> PyResult<Frames> {
-        let views = self.views(py, simulation);
+        let views = self.views(py, simulation)?;
         let frames = self
             .with(py, |renderer| match frame {
                 None => renderer.render(&views),
@@ -101,7 +106,7 @@ impl Renderer {
     /// What the fluoroscopic view shows, without noise: a dictionary of `mask` (height, width; k + 1 where instrument k is seen), `devices`
     /// (centre_line_px, tip_px, tip_visible) and `contacts` (pixel, visible). Pixel coordinates are x and y from the top left.
     fn labels<'py>(&self, py: Python<'py>, simulation: &Simulation) -> PyResult<Bound<'py, PyDict>> {
-        let views = self.views(py, simulation);
+        let views = self.views(py, simulation)?;
         let contacts: Vec<Vec3> = simulation
             .with(py, |simulation| simulation.report().contacts.iter().map(|c| c.position_mm).collect());
         let labels = self.with(py, |renderer| renderer.labels(&views, &contacts)).map_err(exception)?;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use endowire_core::device::{Device, DeviceFile, Section};
-use endowire_viewer::{DevicePart, device_parts};
+use endowire_viewer::{DevicePart, device_parts, section_parts};
 use pyo3::prelude::*;
 
 use crate::document;
@@ -30,7 +30,7 @@ impl Instrument {
     #[new]
     fn new(sections: &Bound<'_, PyAny>) -> PyResult<Self> {
         let sections: Vec<Section> = document::read("sections", sections)?;
-        Ok(Self { device: Device::new(sections).map_err(exception)?, parts: vec![] })
+        Ok(Self::of_device(Device::new(sections).map_err(exception)?))
     }
 
     /// An instrument that is the same everywhere: lengths in mm, bending stiffness EI in N·mm².
@@ -91,6 +91,11 @@ impl Instrument {
 }
 
 impl Instrument {
+    /// A device without a file: tubes of no material.
+    pub(crate) fn of_device(device: Device) -> Self {
+        Self { parts: section_parts(&device), device }
+    }
+
     pub(crate) fn of_file(file: DeviceFile) -> PyResult<Self> {
         let parts = device_parts(&file).map_err(exception)?;
         Ok(Self { device: file.device, parts })

@@ -1,5 +1,6 @@
 //! Work that Ctrl-C ends.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::thread;
 use std::time::Duration;
@@ -20,16 +21,45 @@ pub(crate) fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
+    waited_for(py, None, work)
+}
+
+/// As [`interruptible`], for work that looks at `stop`: after a signal that is set, and the end of the work is waited for.
+///
+/// # Errors
+/// As [`interruptible`].
+pub(crate) fn stoppable<T: Send + 'static>(
+    py: Python<'_>,
+    stop: &AtomicBool,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    waited_for(py, Some(stop), work)
+}
+
+fn waited_for<T: Send + 'static>(
+    py: Python<'_>,
+    stop: Option<&AtomicBool>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
     let (sender, mut receiver) = sync_channel(1);
     thread::Builder::new().name("endowire".to_owned()).spawn(move || {
-        // Nobody listens after a signal.
+        // Nobody may listen after a signal.
         let _ = sender.send(work());
     })?;
     loop {
         let listening = &mut receiver;
         match py.detach(move || listening.recv_timeout(PATIENCE)) {
             Ok(made) => return Ok(made),
-            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Timeout) => {
+                let Err(signal) = py.check_signals() else { continue };
+                if let Some(stop) = stop {
+                    stop.store(true, Ordering::Relaxed);
+                    let listening = &mut receiver;
+                    // What it made is not wanted any more.
+                    let _ = py.detach(move || listening.recv());
+                }
+                return Err(signal);
+            }
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(ComputationError::new_err("the computation ended without a result"));
             }

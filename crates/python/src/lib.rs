@@ -18,6 +18,7 @@ mod rod;
 mod scene;
 mod simulation;
 mod state;
+mod sweep;
 mod vessel;
 
 use pyo3::prelude::*;
@@ -41,6 +42,8 @@ mod _endowire {
     use super::simulation::Simulation;
     #[pymodule_export]
     use super::state::State;
+    #[pymodule_export]
+    use super::sweep::{merge_sweeps, sweep};
     #[pymodule_export]
     use super::vessel::{Vessel, check_vessel};
 }

@@ -1,6 +1,6 @@
-//! What the hand does, as arrays: for each instrument the length pushed in, mm, and the turn, rad.
+//! What hands do, as arrays: for each instrument the length pushed in, mm, and the turn, rad.
 
-use endowire_core::insertion::Command;
+use endowire_core::insertion::{Command, Move};
 use numpy::{AllowTypeChange, PyArrayLikeDyn};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -10,14 +10,11 @@ use crate::error::refuse;
 /// Moves of anything like an array, of shape (…, n_instruments, 2).
 pub(crate) type Moves<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
 
-/// Instruments of a simulation.
-pub(crate) const INSTRUMENTS: usize = 1;
-
-/// The commands of an array of shape (`count`, n_instruments, 2), or of any count.
-pub(crate) fn commands(moves: &Moves<'_>, count: Option<usize>) -> PyResult<Vec<Command>> {
+/// What all of `instruments` do, for each of `count`, or of any count: an array of shape (count, instruments, 2).
+pub(crate) fn moves(moves: &Moves<'_>, count: Option<usize>, instruments: usize) -> PyResult<Vec<Vec<Move>>> {
     let view = moves.as_array();
     let fits = match view.shape() {
-        [given, instruments, 2] => *instruments == INSTRUMENTS && count.is_none_or(|count| count == *given),
+        [given, hands, 2] => *hands == instruments && count.is_none_or(|count| count == *given),
         _ => false,
     };
     if !fits {
@@ -26,24 +23,39 @@ pub(crate) fn commands(moves: &Moves<'_>, count: Option<usize>) -> PyResult<Vec<
             "moves",
             format!("an array of shape {:?}", view.shape()),
             &format!(
-                "must have the shape ({first}, {INSTRUMENTS}, 2): advance_mm and rotate_rad of each instrument"
+                "must have the shape ({first}, {instruments}, 2): advance_mm and rotate_rad of each instrument"
             ),
         ));
     }
     let numbers: Vec<f64> = view.iter().copied().collect();
-    Ok(numbers.chunks_exact(2).map(|pair| Command { advance_mm: pair[0], rotate_rad: pair[1] }).collect())
+    let hands = |row: &[f64]| {
+        let pairs = row.chunks_exact(2).map(|pair| Command { advance_mm: pair[0], rotate_rad: pair[1] });
+        together(pairs)
+    };
+    Ok(numbers.chunks_exact(2 * instruments).map(hands).collect())
 }
 
-/// One number, or one for each instrument: that of the only instrument.
-pub(crate) fn of_only(name: &str, value: Option<&Bound<'_, PyAny>>) -> PyResult<f64> {
-    let Some(value) = value else { return Ok(0.0) };
-    if let Ok(number) = value.extract::<f64>() {
-        return Ok(number);
-    }
-    let wanted = format!("must be a number, or {INSTRUMENTS}: one for each instrument");
-    match value.extract::<Vec<f64>>() {
-        Ok(list) if list.len() == INSTRUMENTS => Ok(list[0]),
-        Ok(list) => Err(refuse(name, format!("{} numbers", list.len()), &wanted)),
-        Err(_) => Err(PyTypeError::new_err(format!("{name} = {}: {wanted}", value.repr()?))),
+/// Commands of instruments in their order, as moves at the same time.
+pub(crate) fn together(commands: impl Iterator<Item = Command>) -> Vec<Move> {
+    commands.enumerate().map(|(instrument, command)| Move { instrument, command }).collect()
+}
+
+/// A number for each of `instruments`: a list of them, or of an only instrument one number; zeros where nothing is given.
+pub(crate) fn of_each(
+    name: &str,
+    value: Option<&Bound<'_, PyAny>>,
+    instruments: usize,
+) -> PyResult<Vec<f64>> {
+    let Some(value) = value else { return Ok(vec![0.0; instruments]) };
+    let wanted = match instruments {
+        1 => "must be a number, or 1: one for each instrument".to_owned(),
+        count => format!("must be {count} numbers: one for each instrument, the innermost first"),
+    };
+    match (value.extract::<f64>(), value.extract::<Vec<f64>>()) {
+        (Ok(number), _) if instruments == 1 => Ok(vec![number]),
+        (_, Ok(list)) if list.len() == instruments => Ok(list),
+        (Ok(number), _) => Err(refuse(name, number, &wanted)),
+        (_, Ok(list)) => Err(refuse(name, format!("{} numbers", list.len()), &wanted)),
+        _ => Err(PyTypeError::new_err(format!("{name} = {}: {wanted}", value.repr()?))),
     }
 }

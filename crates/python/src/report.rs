@@ -1,13 +1,13 @@
 //! What a step tells.
 
-use endowire_core::insertion;
+use endowire_core::insertion::{self, InstrumentReport};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
 use crate::arrays::points;
 use crate::document;
 
-/// What is seen and felt after a step. Quantities of the hand are arrays of shape (n_instruments,).
+/// What is seen and felt after a step. Quantities of hands are arrays of shape (n_instruments,), the innermost instrument first.
 #[pyclass(frozen, module = "endowire", name = "StepReport")]
 pub(crate) struct StepReport {
     report: insertion::StepReport,
@@ -16,6 +16,14 @@ pub(crate) struct StepReport {
 impl StepReport {
     pub(crate) fn new(report: insertion::StepReport) -> Self {
         Self { report }
+    }
+
+    fn of_hands<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&InstrumentReport) -> f64,
+    ) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, hands(&self.report).iter().map(of).collect())
     }
 
     fn of_contacts<'py>(
@@ -27,36 +35,56 @@ impl StepReport {
     }
 }
 
+/// What each hand has done and feels: of several instruments, or of a device alone.
+pub(crate) fn hands(report: &insertion::StepReport) -> Vec<InstrumentReport> {
+    if !report.instruments.is_empty() {
+        return report.instruments.clone();
+    }
+    vec![InstrumentReport {
+        inserted_mm: report.inserted_mm,
+        rotation_rad: report.rotation_rad,
+        tip_rotation_rad: report.tip_rotation_rad,
+        push_force_n: Some(report.push_force_n),
+        torque_nmm: report.torque_nmm,
+    }]
+}
+
+/// The force of a hand; NaN where it jumps.
+pub(crate) fn push_force_n(hand: &InstrumentReport) -> f64 {
+    hand.push_force_n.unwrap_or(f64::NAN)
+}
+
 #[pymethods]
 impl StepReport {
     /// Length of each instrument inside the sheath's mouth, mm.
     #[getter]
     fn inserted_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, vec![self.report.inserted_mm])
+        self.of_hands(py, |hand| hand.inserted_mm)
     }
 
     /// Turn of each tail since the start, rad.
     #[getter]
     fn rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, vec![self.report.rotation_rad])
+        self.of_hands(py, |hand| hand.rotation_rad)
     }
 
     /// Turn of each tip since the start, carried along the axis without twist, rad.
     #[getter]
     fn tip_rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, vec![self.report.tip_rotation_rad])
+        self.of_hands(py, |hand| hand.tip_rotation_rad)
     }
 
-    /// Force with which the hand pushes each instrument, N; negative where it must pull.
+    /// Force with which the hand pushes each instrument, N; negative where it must pull, NaN where it jumps: the tip is at that of another,
+    /// or nothing is in.
     #[getter]
     fn push_force_n<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, vec![self.report.push_force_n])
+        self.of_hands(py, push_force_n)
     }
 
     /// Torque with which the hand holds each tail, N·mm.
     #[getter]
     fn torque_nmm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, vec![self.report.torque_nmm])
+        self.of_hands(py, |hand| hand.torque_nmm)
     }
 
     /// Energy of bending, mJ.

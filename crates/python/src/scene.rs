@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use endowire_core::vessel::NoStore;
+use endowire_core::{Error, insertion};
 use endowire_methods::Scene as SceneFile;
 use endowire_viewer::ViewSpec;
 use numpy::PyArray3;
@@ -14,7 +15,7 @@ use crate::error::exception;
 use crate::frames::Renderer;
 use crate::instrument::Instrument;
 use crate::interrupt::interruptible;
-use crate::moves::INSTRUMENTS;
+use crate::report::StepReport;
 use crate::simulation::Simulation;
 use crate::vessel::Vessel;
 
@@ -52,17 +53,17 @@ impl Scene {
         self.scene.seed
     }
 
-    /// The simulation, nothing inserted yet.
+    /// The simulation, nothing inserted but what its instruments say.
     fn simulation(&self, py: Python<'_>) -> PyResult<Simulation> {
-        // Several instruments are refused.
-        self.scene.device().map_err(exception)?;
         let scene = Arc::clone(&self.scene);
         let built = interruptible(py, move || scene.simulation(&NoStore))?.map_err(exception)?;
-        let instrument = match self.scene.device_files().map_err(exception)?.into_iter().flatten().next() {
-            Some((_, file)) => Instrument::of_file(file)?,
-            None => Instrument { device: built.device().clone(), parts: vec![] },
-        };
-        Ok(Simulation::new(built, vec![instrument]))
+        let files = self.scene.device_files().map_err(exception)?;
+        let instruments = files.into_iter().zip(built.stack().devices()).map(|(file, device)| match file {
+            Some((_, file)) => Instrument::of_file(file),
+            None => Ok(Instrument::of_device(device.clone())),
+        });
+        let instruments = instruments.collect::<PyResult<_>>()?;
+        Ok(Simulation::new(built, instruments))
     }
 
     /// Its vessel.
@@ -72,15 +73,47 @@ impl Scene {
         Ok(Vessel::of_wall(wall))
     }
 
-    /// The commands of its script, shape (steps, n_instruments, 2): advance_mm and rotate_rad.
+    /// The moves of its script, shape (steps, n_instruments, 2): advance_mm and rotate_rad.
     ///
-    /// Raises InputError where a line has `until`: how many steps there are is not known beforehand.
+    /// Raises InputError where a line has `until`: how many steps there are is not known beforehand. `run` carries such a script out.
     #[getter]
     fn moves<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let device = self.scene.device().map_err(exception)?;
-        let commands = self.scene.commands(&device).map_err(exception)?;
-        let numbers: Vec<f64> = commands.iter().flat_map(|c| [c.advance_mm, c.rotate_rad]).collect();
-        array(py, numbers, [commands.len(), INSTRUMENTS, 2])
+        let stack = self.scene.stack().map_err(exception)?;
+        let steps = self.scene.steps(&stack).and_then(|script| script.moves());
+        let steps = steps.map_err(|error| match error {
+            Error::Parameter { name, value, mend } => {
+                exception(Error::Parameter { name, value, mend: mend + " (Scene.run)" })
+            }
+            other => exception(other),
+        })?;
+        let hands = stack.instruments().len();
+        let mut numbers = vec![0.0; steps.len() * hands * 2];
+        for (row, moves) in numbers.chunks_exact_mut(2 * hands).zip(&steps) {
+            for one in moves {
+                let place = 2 * one.instrument;
+                (row[place], row[place + 1]) = (one.command.advance_mm, one.command.rotate_rad);
+            }
+        }
+        array(py, numbers, [steps.len(), hands, 2])
+    }
+
+    /// Carries its script out in a simulation of it at the start, lines with `until` among them. Returns the last StepReport. Ctrl-C ends it
+    /// between two steps.
+    ///
+    /// Raises what `Simulation.step` raises, after the steps before.
+    fn run(&self, py: Python<'_>, simulation: &Simulation) -> PyResult<StepReport> {
+        let script = self.scene.stack().and_then(|stack| self.scene.steps(&stack)).map_err(exception)?;
+        let mut hand = script.begin();
+        let mut step = |simulation: &mut insertion::Simulation| -> endowire_core::Result<bool> {
+            let Some(next) = hand.next(simulation)? else { return Ok(false) };
+            simulation.step_together(next.moves)?;
+            hand.carried_out();
+            Ok(true)
+        };
+        while simulation.with(py, &mut step).map_err(exception)? {
+            py.check_signals()?;
+        }
+        Ok(simulation.report(py))
     }
 
     /// What draws the views of its `[view]` table, in which `view` says otherwise, in `vessel` if it is at hand.

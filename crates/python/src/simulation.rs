@@ -2,7 +2,8 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use endowire_core::insertion::{self, Command, WallProperties};
+use endowire_core::device::{self, Stack};
+use endowire_core::insertion::{self, Command, InstrumentReport, LateralForce, WallProperties};
 use endowire_core::scene::SheathSpec;
 use endowire_core::vessel::NoStore;
 use endowire_core::{Result, Vec3};
@@ -10,14 +11,15 @@ use endowire_methods::AnyMethod;
 use endowire_viewer::DeviceView;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays::{Numbers, numbers, points};
 use crate::document;
 use crate::error::{exception, refuse};
 use crate::instrument::Instrument;
 use crate::interrupt::interruptible;
-use crate::moves::{INSTRUMENTS, Moves, commands, of_only};
-use crate::report::StepReport;
+use crate::moves::{Moves, of_each, together};
+use crate::report::{StepReport, hands};
 use crate::state::State;
 use crate::vessel::Vessel;
 
@@ -62,18 +64,26 @@ impl Simulation {
         py.detach(|| work(&mut self.lock()))
     }
 
-    /// The instruments as the viewer sees them.
+    /// The instruments as the viewer sees them; nothing of those that are out.
     pub(crate) fn views(&self, py: Python<'_>) -> Vec<DeviceView> {
-        let shape = self.with(py, |simulation| simulation.shape().clone());
-        self.instruments.iter().map(|i| DeviceView::of_device(&shape, &i.device, &i.parts)).collect()
+        let (shape, lengths_mm) =
+            self.with(py, |simulation| (simulation.shape().clone(), simulation.report().lengths_mm()));
+        let line_mm = lengths_mm.iter().copied().fold(0.0, f64::max);
+        let each = self.instruments.iter().zip(lengths_mm);
+        each.map(|(instrument, mm)| match mm {
+            0.0 => DeviceView::default(),
+            mm => DeviceView::of_device(&shape.behind(line_mm - mm), &instrument.device, &instrument.parts),
+        })
+        .collect()
     }
 
-    fn of_hand<'py>(
+    fn of_hands<'py>(
         &self,
         py: Python<'py>,
-        of: impl Fn(&insertion::StepReport) -> f64 + Send + Sync,
+        of: impl Fn(&InstrumentReport) -> f64 + Send + Sync,
     ) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, vec![self.with(py, |simulation| of(simulation.report()))])
+        let list = self.with(py, |simulation| hands(simulation.report()).iter().map(of).collect());
+        PyArray1::from_vec(py, list)
     }
 }
 
@@ -83,11 +93,15 @@ impl Simulation {
     ///
     /// The sheath is at an `opening` of the vessel, `depth_mm` inside it (1 unless told), or at `position_mm` with a `direction`; told
     /// nothing, at the opening at the root of a generated vessel, and at the largest of any other. `wall` has the keys of `[vessel.wall]`
-    /// of a scene file (modulus_n_per_mm2, friction, region), `method` those of `[method]` (name, element_mm, …).
+    /// of a scene file (modulus_n_per_mm2, friction, region), `method` those of `[method]` (name, element_mm, …). `sheath_friction_n` is the
+    /// friction of the sheath's valve, N, and `sheath_friction` the coefficient in its mouth.
+    ///
+    /// Several instruments lie in one another, the innermost first. For each of them may be told `names`, for messages; `friction` between it
+    /// and those outside it; and `may_lead`, whether its tip may be farther in than that of the instrument in it.
     ///
     /// Raises InputError for values that are out of range or do not belong together.
     #[new]
-    #[pyo3(signature = (vessel, instruments, *, opening=None, depth_mm=None, position_mm=None, direction=None, wall=None, method=None))]
+    #[pyo3(signature = (vessel, instruments, *, opening=None, depth_mm=None, position_mm=None, direction=None, wall=None, method=None, sheath_friction_n=0.0, sheath_friction=0.0, names=None, friction=None, may_lead=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords of Python")]
     fn py_new(
         py: Python<'_>,
@@ -99,26 +113,35 @@ impl Simulation {
         direction: Option<[f64; 3]>,
         wall: Option<&Bound<'_, PyAny>>,
         method: Option<&Bound<'_, PyAny>>,
+        sheath_friction_n: f64,
+        sheath_friction: f64,
+        names: Option<Vec<String>>,
+        friction: Option<Vec<f64>>,
+        may_lead: Option<Vec<bool>>,
     ) -> PyResult<Self> {
         let instruments = match instruments {
             Instruments::One(instrument) => vec![instrument],
             Instruments::List(list) => list,
         };
-        if instruments.len() != INSTRUMENTS {
-            return Err(refuse("instruments", instruments.len(), "give one"));
-        }
-        let device = instruments[0].device.clone();
+        let stack = stack(&instruments, names, friction, may_lead)?;
         let properties: WallProperties =
             wall.map(|table| document::read("wall", table)).transpose()?.unwrap_or_default();
         let method: AnyMethod =
             method.map(|table| document::read("method", table)).transpose()?.unwrap_or_default();
         let nowhere = opening.is_none() && position_mm.is_none() && direction.is_none();
         let opening = opening.or_else(|| nowhere.then(|| vessel.inlet().unwrap_or(0)));
-        let sheath = SheathSpec { opening, depth_mm, position_mm, direction, ..SheathSpec::default() };
+        let sheath = SheathSpec {
+            opening,
+            depth_mm,
+            position_mm,
+            direction,
+            friction_n: sheath_friction_n,
+            friction: sheath_friction,
+        };
         let wall = Arc::clone(&vessel.wall);
         let built = interruptible(py, move || -> Result<insertion::Simulation> {
             let sheath = sheath.place(&wall)?;
-            insertion::Simulation::builder((*wall).clone(), device, sheath)
+            insertion::Simulation::builder((*wall).clone(), stack, sheath)
                 .properties(properties)
                 .method(&method)
                 .store(&NoStore)
@@ -127,8 +150,8 @@ impl Simulation {
         Ok(Self::new(built.map_err(exception)?, instruments))
     }
 
-    /// Carries out one command: the length pushed in (negative: pulled back), mm, and the turn of the tail, rad; a number, or one for each
-    /// instrument. Returns the StepReport.
+    /// Carries out one command: the length pushed in (negative: pulled back), mm, and the turn of the tail, rad; one for each
+    /// instrument, and of an only instrument a number. Returns the StepReport.
     ///
     /// Raises InputError for a command that cannot be followed, EndOfWay where the way ends, ComputationError where no equilibrium was found;
     /// then everything is as before.
@@ -139,11 +162,13 @@ impl Simulation {
         advance_mm: Option<&Bound<'_, PyAny>>,
         rotate_rad: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<StepReport> {
-        let command = Command {
-            advance_mm: of_only("advance_mm", advance_mm)?,
-            rotate_rad: of_only("rotate_rad", rotate_rad)?,
-        };
-        self.with(py, |simulation| simulation.step(command).cloned()).map(StepReport::new).map_err(exception)
+        let hands = self.instruments.len();
+        let lengths_mm = of_each("advance_mm", advance_mm, hands)?;
+        let turns_rad = of_each("rotate_rad", rotate_rad, hands)?;
+        let commands = lengths_mm.into_iter().zip(turns_rad);
+        let moves = together(commands.map(|(advance_mm, rotate_rad)| Command { advance_mm, rotate_rad }));
+        let stepped = self.with(py, |simulation| simulation.step_together(&moves).cloned());
+        stepped.map(StepReport::new).map_err(exception)
     }
 
     /// Carries out commands one after the other: an array of shape (steps, n_instruments, 2) of advance_mm and rotate_rad. Returns the last
@@ -151,8 +176,8 @@ impl Simulation {
     ///
     /// Raises what `step` raises, after the steps before.
     fn run(&self, py: Python<'_>, moves: Moves<'_>) -> PyResult<StepReport> {
-        for command in commands(&moves, None)? {
-            self.with(py, |simulation| simulation.step(command).map(drop)).map_err(exception)?;
+        for moves in crate::moves::moves(&moves, None, self.instruments.len())? {
+            self.with(py, |simulation| simulation.step_together(&moves).map(drop)).map_err(exception)?;
             py.check_signals()?;
         }
         Ok(self.report(py))
@@ -160,7 +185,7 @@ impl Simulation {
 
     /// What the last step told.
     #[getter]
-    fn report(&self, py: Python<'_>) -> StepReport {
+    pub(crate) fn report(&self, py: Python<'_>) -> StepReport {
         StepReport::new(self.with(py, |simulation| simulation.report().clone()))
     }
 
@@ -196,23 +221,49 @@ impl Simulation {
         PyArray1::from_vec(py, self.with(py, |simulation| simulation.shape().from_tip_mm.clone()))
     }
 
-    /// Position of the tip, mm, shape (3,).
+    /// Position of the tip, mm, shape (3,); of several instruments that of the farthest.
     #[getter]
     fn tip_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let tip = self.with(py, |simulation| tip_mm(simulation));
         PyArray1::from_vec(py, vec![tip.x, tip.y, tip.z])
     }
 
+    /// Positions of the tips of all instruments, mm, shape (n_instruments, 3); what is not in is in the sheath's mouth.
+    #[getter]
+    fn tips_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        points(py, self.with(py, |simulation| tips_mm(simulation)))
+    }
+
+    /// What holds an instrument, and all that lies in it, on the line of those outside it: a dictionary of `force_n`, the force across the
+    /// line, shape (n, 3), `tension_n`, the axial force behind, and `friction_n` along the line towards the tip, shape (n,), at the points of
+    /// `positions_mm`; `length_mm` is the length that each of them stands for.
+    ///
+    /// Raises InputError for an instrument that is not there.
+    fn lateral_forces<'py>(&self, py: Python<'py>, instrument: usize) -> PyResult<Bound<'py, PyDict>> {
+        if instrument >= self.instruments.len() {
+            let mend = format!("there are {}, the innermost is 0", self.instruments.len());
+            return Err(refuse("instrument", instrument, &mend));
+        }
+        let forces = self.with(py, |simulation| simulation.lateral_forces(instrument));
+        let told = PyDict::new(py);
+        let list = |of: fn(&LateralForce) -> f64| PyArray1::from_vec(py, forces.iter().map(of).collect());
+        told.set_item("force_n", points(py, forces.iter().map(|at| at.force_n))?)?;
+        told.set_item("tension_n", list(|at| at.tension_n))?;
+        told.set_item("friction_n", list(|at| at.friction_n))?;
+        told.set_item("length_mm", list(|at| at.length_mm))?;
+        Ok(told)
+    }
+
     /// Length of each instrument inside the sheath's mouth, mm, shape (n_instruments,).
     #[getter]
     fn inserted_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.of_hand(py, |report| report.inserted_mm)
+        self.of_hands(py, |hand| hand.inserted_mm)
     }
 
     /// Turn of each tail since the start, rad, shape (n_instruments,).
     #[getter]
     fn rotation_rad<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.of_hand(py, |report| report.rotation_rad)
+        self.of_hands(py, |hand| hand.rotation_rad)
     }
 
     /// Points of the centre line at these arc lengths from the tip, mm: shape (n,) to (n, 3). Lengths that are not inserted are in the
@@ -260,6 +311,46 @@ impl Simulation {
 /// The tip; before anything is inserted it is in the sheath's mouth.
 pub(crate) fn tip_mm(simulation: &insertion::Simulation) -> Vec3 {
     simulation.shape().tip_mm().unwrap_or(simulation.sheath().position_mm)
+}
+
+/// The tip of each instrument.
+pub(crate) fn tips_mm(simulation: &insertion::Simulation) -> Vec<Vec3> {
+    let lengths_mm = simulation.report().lengths_mm();
+    let line_mm = lengths_mm.iter().copied().fold(0.0, f64::max);
+    points_at(simulation, &lengths_mm.iter().map(|mm| line_mm - mm).collect::<Vec<f64>>())
+}
+
+/// Instruments as the library has them.
+fn stack(
+    instruments: &[Instrument],
+    names: Option<Vec<String>>,
+    friction: Option<Vec<f64>>,
+    may_lead: Option<Vec<bool>>,
+) -> PyResult<Stack> {
+    let count = instruments.len();
+    let told = [
+        ("names", names.as_ref().map(Vec::len)),
+        ("friction", friction.as_ref().map(Vec::len)),
+        ("may_lead", may_lead.as_ref().map(Vec::len)),
+    ];
+    for (name, given) in told {
+        if let Some(given) = given.filter(|given| *given != count) {
+            return Err(refuse(name, given, &format!("there are {count} instruments: give one for each")));
+        }
+    }
+    let names = names.unwrap_or_else(|| (0..count).map(|index| format!("instrument {index}")).collect());
+    let may_lead = may_lead.unwrap_or_else(|| vec![true; count]);
+    let each = instruments.iter().zip(names).zip(may_lead);
+    let each =
+        each.map(|((one, name), may_lead)| device::Instrument { name, device: one.device.clone(), may_lead });
+    let stack = match instruments {
+        [only] => Stack::from(only.device.clone()),
+        _ => Stack::new(each.collect()).map_err(exception)?,
+    };
+    match friction {
+        Some(friction) => stack.rubbing(friction).map_err(exception),
+        None => Ok(stack),
+    }
 }
 
 /// Points at arc lengths from the tip.

@@ -1,11 +1,12 @@
 //! What instruments are pushed into.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use endowire_core::Vec3;
 use endowire_core::vessel::{
-    CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Wall, anatomy, check_with,
+    CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Target, Wall, anatomy, check_with,
 };
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -25,8 +26,9 @@ pub(crate) struct Vessel {
     tree: Option<(CentrelineTree, usize)>,
 }
 
-/// The bytes of a wall, its centre line and its inlet.
-type Pickled<'py> = (Bound<'py, PyBytes>, Option<Bound<'py, PyArray2<f64>>>, Option<usize>);
+/// The bytes of a wall, its centre line, its inlet, and names with their rows.
+type Pickled<'py> =
+    (Bound<'py, PyBytes>, Option<Bound<'py, PyArray2<f64>>>, Option<usize>, Vec<(String, usize)>);
 
 /// A centre-line tree: the path of its table or the name of a built-in anatomy, or an array.
 #[derive(FromPyObject)]
@@ -146,6 +148,14 @@ impl Vessel {
         self.tree.as_ref().map(|(_, inlet)| *inlet)
     }
 
+    /// Named points of the centre line it was generated from: positions in mm by name; empty without one.
+    #[getter]
+    fn targets(&self) -> BTreeMap<String, [f64; 3]> {
+        let Some((tree, _)) = &self.tree else { return BTreeMap::new() };
+        let place = |target: &Target| tree.nodes()[target.row].position_mm.into();
+        tree.targets().iter().map(|target| (target.name.clone(), place(target))).collect()
+    }
+
     /// Whether points (mm, shape (n, 3)) are inside: booleans of shape (n,).
     fn contains<'py>(
         &self,
@@ -177,15 +187,24 @@ impl Vessel {
         let (py, vessel) = (slf.py(), slf.get());
         let wall = postcard::to_allocvec(&*vessel.wall)
             .map_err(|e| InputError::new_err(format!("the vessel cannot be written: {e}")))?;
-        let parts = (PyBytes::new(py, &wall), vessel.centreline(py)?, vessel.inlet());
+        let targets = vessel.tree.iter().flat_map(|(tree, _)| tree.targets());
+        let targets = targets.map(|target| (target.name.clone(), target.row)).collect();
+        let parts = (PyBytes::new(py, &wall), vessel.centreline(py)?, vessel.inlet(), targets);
         Ok((slf.get_type().getattr("_unpickled")?, parts))
     }
 
     #[staticmethod]
-    fn _unpickled(wall: &[u8], centreline: Option<Table<'_, f64>>, inlet: Option<usize>) -> PyResult<Self> {
+    fn _unpickled(
+        wall: &[u8],
+        centreline: Option<Table<'_, f64>>,
+        inlet: Option<usize>,
+        targets: Vec<(String, usize)>,
+    ) -> PyResult<Self> {
         let wall = postcard::from_bytes(wall)
             .map_err(|e| InputError::new_err(format!("the bytes of a vessel: {e}")))?;
-        let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?.zip(inlet);
+        let targets: Vec<Target> = targets.into_iter().map(|(name, row)| Target { name, row }).collect();
+        let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?;
+        let tree = tree.map(|tree| tree.with_targets(targets)).transpose().map_err(exception)?.zip(inlet);
         Ok(Self { wall: Arc::new(wall), tree })
     }
 

@@ -86,8 +86,8 @@ def test_wrong_parts_are_named(vessel, wire):
         endowire.Simulation(vessel, wire, wall={"friction": float("inf")})
     with pytest.raises(endowire.InputError, match="sheath.opening = 7"):
         endowire.Simulation(vessel, wire, opening=7)
-    with pytest.raises(endowire.InputError, match="instruments = 2"):
-        endowire.Simulation(vessel, [wire, wire])
+    with pytest.raises(endowire.InputError, match="give 1 to 16 instruments"):
+        endowire.Simulation(vessel, [])
     with pytest.raises(endowire.InputError, match="no_such.stl"):
         endowire.Vessel.read("no_such.stl")
     with pytest.raises(endowire.InputError, match=r"triangles = 9"):

@@ -1,6 +1,6 @@
 //! What a device file says of radiopacity, as parts to draw.
 
-use endowire_core::device::{DeviceFile, Part, Section};
+use endowire_core::device::{Device, DeviceFile, Part, Section};
 use endowire_core::{Error, Result};
 
 use crate::device::DevicePart;
@@ -31,6 +31,22 @@ pub fn device_parts(file: &DeviceFile) -> Result<Vec<DevicePart>> {
         }
     }
     Ok(drawn)
+}
+
+/// The sections of a device without a file, as tubes to draw; none where all are solid.
+pub fn section_parts(device: &Device) -> Vec<DevicePart> {
+    if device.sections().iter().all(|section| section.inner_radius_mm.is_none()) {
+        return Vec::new();
+    }
+    let mut begin = 0.0;
+    let part = |section: &Section| {
+        let from = begin;
+        begin += section.length_mm;
+        let from_tip_mm = Some([from, begin]);
+        let inner_radius_mm = section.inner_radius_mm.unwrap_or(0.0);
+        DevicePart { from_tip_mm, inner_radius_mm, ..DevicePart::default() }
+    };
+    device.sections().iter().map(part).collect()
 }
 
 /// Adds a stretch of a layer; where it only goes on, the layer grows.

@@ -47,7 +47,7 @@ mod xray;
 
 pub use c_arm::CArm;
 pub use device::{DevicePart, DevicePoint, DeviceView};
-pub use device_file::device_parts;
+pub use device_file::{device_parts, section_parts};
 pub use fluoro::Moment;
 pub use output::{Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, PixelFormat};
 pub use renderer::{Frames, Renderer};

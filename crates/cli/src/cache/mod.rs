@@ -7,8 +7,8 @@ mod entry;
 mod place;
 mod room;
 
-use std::cell::Cell;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use std::{io, io::Write};
 
@@ -26,14 +26,14 @@ const LEAST: Duration = Duration::from_millis(5);
 pub(crate) struct Cache {
     folder: Option<PathBuf>,
     /// Whether it was told that the folder cannot be written.
-    told: Cell<bool>,
+    told: AtomicBool,
 }
 
 impl Cache {
     /// The user's, unless the command line asks for none.
     pub(crate) fn new(args: &CacheArgs) -> Self {
         let folder = if args.no_cache { None } else { place::folder() };
-        Self { folder, told: Cell::new(false) }
+        Self { folder, told: AtomicBool::new(false) }
     }
 
     fn read(&self, folder: &Path, key: &Key) -> Option<Wall> {
@@ -45,7 +45,7 @@ impl Cache {
 
     fn keep(&self, folder: &Path, key: &Key, wall: &Wall) {
         if let Err(error) = write(folder, key, wall)
-            && !self.told.replace(true)
+            && !self.told.swap(true, Ordering::Relaxed)
         {
             tell(format_args!(
                 "endowire: the wall is not kept for the next run: {}: {error} (set ENDOWIRE_CACHE to a folder that can be \

@@ -3,12 +3,14 @@
 pub(crate) mod compare;
 mod device;
 pub(crate) mod experiment;
+mod export;
 mod felt;
 mod fluoro;
 mod render;
 mod rod;
 mod run;
 mod surfaces;
+mod sweep;
 mod verify;
 mod vessel;
 
@@ -19,7 +21,9 @@ use crate::failure::Failure;
 pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Run(args) => run::run(args),
+        Command::Sweep(args) => sweep::sweep(args),
         Command::Render(args) => render::render(args),
+        Command::Export(args) => export::export(args),
         Command::Fluoro(args) => fluoro::fluoro(args),
         Command::Rod(args) => rod::rod(args),
         Command::Verify(args) => verify::verify(args),

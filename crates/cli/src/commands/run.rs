@@ -8,6 +8,7 @@ use std::time::Instant;
 use endowire_core::insertion::{Move, ScriptCourse, ScriptRun, Simulation, Step};
 use endowire_core::methods::MethodChoice;
 use endowire_methods::Scene;
+use endowire_sweep::{RunOutcome, StepFailure};
 
 use crate::args::RunArgs;
 use crate::cache::Cache;
@@ -15,7 +16,7 @@ use crate::failure::Failure;
 use crate::output::instruments::Lengths;
 use crate::output::progress;
 use crate::output::provenance::{Provenance, read_input};
-use crate::output::recorder::{InstrumentSummary, Recorder, StepFailure, Summary, UntilSummary};
+use crate::output::recorder::{Recorder, Summary};
 use crate::output::recording::Recording;
 use crate::output::saved::{Course, Saved, Saver};
 use crate::output::{frames::FrameWriter, print_json, tell, whole};
@@ -33,7 +34,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
     let mut simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
     let mut saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
-    let mut frames = FrameWriter::new(&args.scene, &scene, &simulation)?;
+    let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation))?;
     let mut times_s = Vec::new();
     let mut hand = match &saved {
         Some(saved) => saved.restore(&scene, &mut simulation, &script, |step| {
@@ -74,27 +75,15 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
                    (simulation, hand): (&Simulation, &ScriptRun<'_>),
                    frames: &FrameWriter,
                    recorder: &Recorder| {
-        let report = simulation.report();
+        let steps = (recorder.steps(), script.len());
+        let so_far = (course.converged, course.max_penetration_mm);
         Summary {
             provenance: provenance.clone(),
             complete: false,
             scene: scene.name.clone(),
             scene_file: std::path::absolute(&args.scene).unwrap_or_else(|_| args.scene.clone()),
             method: scene.method.name(),
-            steps: recorder.steps(),
-            steps_asked: script.len(),
-            converged: course.converged && failure.is_none(),
-            failure: failure.clone(),
-            inserted_mm: report.inserted_mm,
-            rotation_rad: report.rotation_rad,
-            tip_mm: simulation.shape().tip_mm().map(Into::into),
-            push_force_n: report.push_force_n,
-            torque_nmm: report.torque_nmm,
-            until: until(hand),
-            instruments: instruments(simulation),
-            energy_mj: report.energy,
-            max_penetration_mm: course.max_penetration_mm,
-            left_through: report.left_through,
+            outcome: RunOutcome::new(simulation, hand, steps, so_far, failure.clone()),
             step_time_s: course.step_time_s,
             wall_time_s: started.elapsed().as_secs_f64(),
             renderer: frames.renderer(),
@@ -175,7 +164,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
 
     let mut summary = summary(&course, &failure, (&simulation, &hand), &frames, &recorder);
     let finished = recorder.finish(&mut summary).and(saved).map_err(Failure::into_computation);
-    for line in summary.until.iter().filter(|line| line.met.is_none()) {
+    for line in summary.outcome.until.iter().filter(|line| line.met.is_none()) {
         let what = "its condition (until) was not met on all of its way";
         tell(format_args!("{}: {}: {what}, {} steps", args.scene.display(), line.line, line.steps));
     }
@@ -187,7 +176,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     match failure {
         Some(StepFailure { step, reason }) => {
             let kept = match finished {
-                Ok(()) => format!("{} steps are kept in {}", summary.steps, folder.display()),
+                Ok(()) => format!("{} steps are kept in {}", summary.outcome.steps, folder.display()),
                 Err(error) => error.to_string(),
             };
             Err(Failure::Computation(format!("{}: step {step}: {reason} ({kept})", args.scene.display())))
@@ -199,19 +188,6 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
 /// The moves of a step and its time, on their own.
 fn own(step: Option<Step<'_>>) -> Option<(Vec<Move>, Option<f64>)> {
     step.map(|step| (step.moves.to_vec(), step.time_s))
-}
-
-/// How lines with a condition have ended.
-fn until(hand: &ScriptRun<'_>) -> Vec<UntilSummary> {
-    let each = hand.conditions();
-    each.map(|(line, course)| UntilSummary { line: line.to_owned(), steps: course.steps, met: course.met })
-        .collect()
-}
-
-/// What each of several instruments has come to.
-fn instruments(simulation: &Simulation) -> Vec<InstrumentSummary> {
-    let each = simulation.stack().instruments().iter().zip(&simulation.report().instruments);
-    each.map(|(one, report)| InstrumentSummary { name: one.name.clone(), report: *report }).collect()
 }
 
 /// Removes the state of an earlier run: until this one has saved its own, there is none to go on from.
@@ -241,7 +217,7 @@ fn draw_again(
 }
 
 /// Set by Ctrl-C, or by a request to terminate: the step under way is finished and recorded. A second one ends at once.
-fn interrupts() -> Arc<AtomicBool> {
+pub(crate) fn interrupts() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let heard = Arc::clone(&flag);
     // Without a handler an interrupt ends the program at once, as elsewhere.
@@ -255,25 +231,26 @@ fn interrupts() -> Arc<AtomicBool> {
 
 /// The summary for a person, for stderr: stdout is for documents.
 fn text(summary: &Summary, folder: &Path, simulation: &Simulation) -> String {
-    let tip = summary.tip_mm.unwrap_or_default();
+    let outcome = &summary.outcome;
+    let tip = outcome.tip_mm.unwrap_or_default();
     format!(
         "{}: {} of {} steps by {} in {:.2} s ({:.2} s simulating)\n\
          inserted {:.2} mm, tip at [{:.2}, {:.2}, {:.2}] mm, push force {:.4} N, {} contacts, \
          deepest penetration {:.3} mm\n\
          {} frames{} in {}",
         summary.scene,
-        summary.steps,
-        summary.steps_asked,
+        outcome.steps,
+        outcome.steps_asked,
         summary.method,
         summary.wall_time_s,
         summary.step_time_s,
-        summary.inserted_mm,
+        outcome.inserted_mm,
         tip[0],
         tip[1],
         tip[2],
-        summary.push_force_n,
+        outcome.push_force_n,
         simulation.report().contacts.len(),
-        summary.max_penetration_mm,
+        outcome.max_penetration_mm,
         summary.frames.len(),
         summary.renderer.as_ref().map_or(String::new(), |r| format!(" by {r}")),
         folder.display()

@@ -81,6 +81,28 @@ pub(crate) fn is_recording(folder: &Path) -> bool {
     begins.is_ok_and(|begins| TABLE_BEGINS.starts_with(&begins))
 }
 
+/// Numbers of the steps of a recording, and the times at which they end, s.
+pub(crate) fn step_times(folder: &Path) -> Result<Vec<(usize, f64)>, Failure> {
+    #[derive(serde::Deserialize)]
+    struct Row {
+        step: usize,
+        time_s: f64,
+    }
+    let path = folder.join(TABLE);
+    let refuse = |what: String| {
+        Failure::Input(format!(
+            "{}: {what}; give the folder of a recorded run (endowire run)",
+            path.display()
+        ))
+    };
+    let mut text = std::fs::read(&path).map_err(|e| refuse(e.to_string()))?;
+    // A run may have been killed within a row.
+    text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
+    let rows = csv::Reader::from_reader(text.as_slice()).into_deserialize();
+    let times = rows.map(|row| row.map(|row: Row| (row.step, row.time_s)));
+    times.collect::<Result<_, _>>().map_err(|e| refuse(e.to_string()))
+}
+
 /// A file that is not ours.
 fn first_file(folder: &Path) -> Option<std::ffi::OsString> {
     let names = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.file_name());

@@ -30,16 +30,14 @@ pub(crate) struct FrameWriter {
 }
 
 impl FrameWriter {
-    /// Prepares what the scene file asks for.
-    pub(crate) fn new(path: &Path, scene: &Scene, simulation: &Simulation) -> Result<Self, Failure> {
+    /// Prepares what the scene file asks for; without a simulation nothing is drawn.
+    pub(crate) fn new(path: &Path, scene: &Scene, drawn: Option<&Simulation>) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         let spec = ViewSpec::of_scene(scene, path)?;
         spec.validate().map_err(in_scene)?;
-        let renderer = if spec.views.is_empty() {
-            None
-        } else {
-            Some(Renderer::new(&spec, &simulation.wall().closed_mesh()).map_err(in_scene)?)
-        };
+        let drawn = drawn.filter(|_| !spec.views.is_empty());
+        let renderer = drawn.map(|simulation| Renderer::new(&spec, &simulation.wall().closed_mesh()));
+        let renderer = renderer.transpose().map_err(in_scene)?;
         Ok(Self { pushed: Pushed::new(path, scene, &spec)?, spec, renderer })
     }
 

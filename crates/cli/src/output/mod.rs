@@ -2,7 +2,7 @@
 
 mod arrays;
 pub(crate) mod chart;
-mod folder;
+pub(crate) mod folder;
 pub(crate) mod frames;
 pub(crate) mod instruments;
 mod manifest;
@@ -14,6 +14,7 @@ pub(crate) mod recorder;
 pub(crate) mod recording;
 pub(crate) mod saved;
 pub(crate) mod seal;
+pub(crate) mod vtk;
 pub(crate) mod whole;
 
 use std::fmt::Display;

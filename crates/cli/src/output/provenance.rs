@@ -2,11 +2,14 @@
 
 use std::path::Path;
 
+use endowire_sweep::{Program, hash_inputs};
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
-use super::seal;
 use crate::failure::Failure;
+
+/// This program.
+pub(crate) const PROGRAM: Program =
+    Program { version: env!("CARGO_PKG_VERSION"), git_revision: env!("ENDOWIRE_GIT_REVISION") };
 
 /// Version, revision, input and seed of a result.
 #[derive(Debug, Clone, Serialize)]
@@ -21,17 +24,10 @@ pub(crate) struct Provenance {
 impl Provenance {
     /// For a result of `inputs`: file contents, in order.
     pub(crate) fn new(inputs: &[impl AsRef<[u8]>], seed: u64) -> Self {
-        let mut hash = Sha256::new();
-        for input in inputs.iter().map(AsRef::as_ref) {
-            // Lengths keep two inputs from hashing like their concatenation cut elsewhere.
-            hash.update((input.len() as u64).to_le_bytes());
-            hash.update(input);
-        }
-        let scene_hash = seal::hex(&hash.finalize());
         Self {
-            version: env!("CARGO_PKG_VERSION"),
-            git_revision: env!("ENDOWIRE_GIT_REVISION"),
-            scene_hash,
+            version: PROGRAM.version,
+            git_revision: PROGRAM.git_revision,
+            scene_hash: hash_inputs(inputs),
             seed,
         }
     }

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use endowire_core::device::{Device, Section, Stack};
+use endowire_core::device::{Device, Stack};
 use endowire_core::shape::Shape;
 use endowire_methods::Scene;
-use endowire_viewer::{DevicePart, DeviceView, ViewSpec, device_parts};
+use endowire_viewer::{DevicePart, DeviceView, ViewSpec, device_parts, section_parts};
 
 use crate::failure::Failure;
 
@@ -25,7 +25,7 @@ impl Pushed {
         for (file, device) in scene.device_files().map_err(in_scene)?.iter().zip(stack.devices()) {
             parts.push(match file {
                 Some((path, file)) => device_parts(file).map_err(|e| Failure::from(e).at(path.display()))?,
-                None => tubes(device),
+                None => section_parts(device),
             });
         }
         match (spec.device.is_empty(), stack.is_several()) {
@@ -49,23 +49,4 @@ impl Pushed {
         };
         each.map(view).collect()
     }
-}
-
-/// Sections of a scene as tubes; none where all are solid.
-fn tubes(device: &Device) -> Vec<DevicePart> {
-    if device.sections().iter().all(|section| section.inner_radius_mm.is_none()) {
-        return Vec::new();
-    }
-    let mut begin = 0.0;
-    let part = |section: &Section| {
-        let from = begin;
-        begin += section.length_mm;
-        let from_tip_mm = Some([from, begin]);
-        DevicePart {
-            from_tip_mm,
-            inner_radius_mm: section.inner_radius_mm.unwrap_or(0.0),
-            ..DevicePart::default()
-        }
-    };
-    device.sections().iter().map(part).collect()
 }

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use endowire_core::device::Stack;
-use endowire_core::insertion::{Energy, InstrumentReport, Met, Move, Simulation};
+use endowire_core::insertion::{Move, Simulation};
+use endowire_sweep::RunOutcome;
 use serde::Serialize;
 
 use super::arrays::{self, ShapeArrays};
@@ -33,36 +34,9 @@ pub(crate) struct Summary {
     pub(crate) scene_file: PathBuf,
     /// Name of the method.
     pub(crate) method: &'static str,
-    /// Steps carried out.
-    pub(crate) steps: usize,
-    /// Steps of the script.
-    pub(crate) steps_asked: usize,
-    /// Whether all steps were carried out and every one met its convergence test.
-    pub(crate) converged: bool,
-    /// The step that failed and why, if one did.
-    pub(crate) failure: Option<StepFailure>,
-    /// Length inserted at the end, mm.
-    pub(crate) inserted_mm: f64,
-    /// Turn of the tail at the end, rad.
-    pub(crate) rotation_rad: f64,
-    /// Tip at the end, mm.
-    pub(crate) tip_mm: Option<[f64; 3]>,
-    /// Push force at the end, N.
-    pub(crate) push_force_n: f64,
-    /// Torque at the end, N·mm.
-    pub(crate) torque_nmm: f64,
-    /// Lines of the script with a condition that have ended.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(crate) until: Vec<UntilSummary>,
-    /// Each of several instruments at the end.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(crate) instruments: Vec<InstrumentSummary>,
-    /// Energy at the end, mJ.
-    pub(crate) energy_mj: Energy,
-    /// Deepest penetration of the wall in any step, mm.
-    pub(crate) max_penetration_mm: f64,
-    /// The opening through which the tip has left the vessel at the end.
-    pub(crate) left_through: Option<usize>,
+    /// What it has come to.
+    #[serde(flatten)]
+    pub(crate) outcome: RunOutcome,
     /// Time of the simulation, s, without recording and frames.
     pub(crate) step_time_s: f64,
     /// Time of the whole run, s.
@@ -71,36 +45,6 @@ pub(crate) struct Summary {
     pub(crate) renderer: Option<String>,
     /// Frames, relative to the folder of this file.
     pub(crate) frames: Vec<String>,
-}
-
-/// How a line of the script with a condition has ended.
-#[derive(Debug, Serialize)]
-pub(crate) struct UntilSummary {
-    /// The line.
-    pub(crate) line: String,
-    /// Its steps.
-    pub(crate) steps: usize,
-    /// What has ended it; none where it went all of its way.
-    pub(crate) met: Option<Met>,
-}
-
-/// One of several instruments at the end of a run.
-#[derive(Debug, Serialize)]
-pub(crate) struct InstrumentSummary {
-    /// Its name.
-    pub(crate) name: String,
-    /// What its hand has done and feels.
-    #[serde(flatten)]
-    pub(crate) report: InstrumentReport,
-}
-
-/// What ended a run early: no equilibrium, a recording or frame that could not be written, or an interrupt.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct StepFailure {
-    /// Number of the step, from 1.
-    pub(crate) step: usize,
-    /// What was said.
-    pub(crate) reason: String,
 }
 
 /// One line of steps.csv.

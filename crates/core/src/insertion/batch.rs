@@ -4,7 +4,7 @@ use rayon::iter::{
     IndexedParallelIterator, IntoParallelRefIterator, IntoParallelRefMutIterator, ParallelIterator,
 };
 
-use crate::insertion::{Command, Simulation};
+use crate::insertion::{Command, Move, Simulation};
 use crate::{Error, Result};
 
 /// Simulations that are stepped on all cores, or on as many threads as `RAYON_NUM_THREADS` says.
@@ -40,24 +40,42 @@ impl Batch {
     /// # Errors
     /// As many commands as simulations are wanted ([`Error::Parameter`]); otherwise nothing is stepped.
     pub fn step(&mut self, commands: &[Command]) -> Result<Vec<Result<()>>> {
-        if commands.len() != self.simulations.len() {
+        self.each("commands", commands, |simulation, command| simulation.step(*command).map(drop))
+    }
+
+    /// As [`Batch::step`], for several instruments: moves for each simulation ([`Simulation::step_together`]).
+    ///
+    /// # Errors
+    /// As [`Batch::step`].
+    pub fn step_together(&mut self, moves: &[Vec<Move>]) -> Result<Vec<Result<()>>> {
+        self.each("moves", moves, |simulation, moves| simulation.step_together(moves).map(drop))
+    }
+
+    /// Does something with each simulation and what is given for it.
+    fn each<T: Sync>(
+        &mut self,
+        name: &str,
+        given: &[T],
+        work: impl Fn(&mut Simulation, &T) -> Result<()> + Sync,
+    ) -> Result<Vec<Result<()>>> {
+        if given.len() != self.simulations.len() {
             let mend = format!("give one for each of the {} simulations", self.simulations.len());
-            return Err(Error::parameter("commands", commands.len(), mend));
+            return Err(Error::parameter(name, given.len(), mend));
         }
         // Threads are started for many, and not for one: a program may have to fork.
-        if let ([simulation], [command]) = (&mut self.simulations[..], commands) {
-            return Ok(vec![simulation.step(*command).map(drop)]);
+        if let ([simulation], [one]) = (&mut self.simulations[..], given) {
+            return Ok(vec![work(simulation, one)]);
         }
         // Steps differ in length by orders of magnitude: each is a piece of work of its own.
-        let each = self.simulations.par_iter_mut().zip(commands.par_iter()).with_max_len(1);
-        Ok(each.map(|(simulation, command)| simulation.step(*command).map(drop)).collect())
+        let each = self.simulations.par_iter_mut().zip(given.par_iter()).with_max_len(1);
+        Ok(each.map(|(simulation, one)| work(simulation, one)).collect())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::{Device, Section};
+    use crate::device::{Device, Instrument, Section, Stack};
     use crate::insertion::{Sheath, WallProperties};
     use crate::vessel::{GeneratedWall, Resolution, anatomy};
 
@@ -91,6 +109,37 @@ mod tests {
             }
         }
         assert!(alone.iter().any(|one| !one.report().contacts.is_empty()));
+    }
+
+    #[test]
+    fn several_instruments_move_together_to_the_bits_of_one_by_one() {
+        let one = simulation();
+        let hollow = |bore: Option<f64>, radius_mm: f64, length_mm: f64| {
+            let section = Section::straight(length_mm, radius_mm, 10.0);
+            Device::new(vec![Section { inner_radius_mm: bore, ..section }]).unwrap()
+        };
+        let each = [("wire", hollow(None, 0.2, 300.0)), ("catheter", hollow(Some(0.3), 0.5, 200.0))];
+        let each = each.map(|(name, device)| Instrument { name: name.to_owned(), device, may_lead: true });
+        let stack = Stack::new(each.into()).unwrap();
+        let start = Simulation::builder(one.wall().clone(), stack, *one.sheath()).build().unwrap();
+        let moves = |k: usize| -> Vec<Move> {
+            let command = |mm: f64| Command::advance(mm * (1.0 + 0.2 * k as f64));
+            vec![Move { instrument: 0, command: command(3.0) }, Move { instrument: 1, command: command(2.0) }]
+        };
+        let mut alone = vec![start.clone(); 3];
+        let mut batch = Batch::new(alone.clone());
+        for _ in 0..15 {
+            let all: Vec<Vec<Move>> = (0..3).map(moves).collect();
+            batch.step_together(&all).unwrap().into_iter().for_each(|told| told.unwrap());
+            for (one, moves) in alone.iter_mut().zip(&all) {
+                one.step_together(moves).unwrap();
+            }
+        }
+        for (one, other) in alone.iter().zip(batch.simulations()) {
+            assert_eq!((one.shape(), one.report()), (other.shape(), other.report()));
+        }
+        let refused = batch.step_together(&[]).unwrap_err().to_string();
+        assert!(refused.contains("moves = 0"), "{refused}");
     }
 
     #[test]

@@ -109,8 +109,10 @@ impl Simulation {
                 let mend = format!("{:?} is moved twice: add its motions up", instrument.name);
                 return Err(Error::parameter(format!("move[{index}].instrument"), one.instrument, mend));
             }
-            check_command(one.command, inserted(one.instrument), instrument.device.length_mm())
-                .map_err(|error| within(&instrument.name, error))?;
+            let checked = check_command(one.command, inserted(one.instrument), instrument.device.length_mm());
+            // A device alone has no name that a user has given it.
+            let several = instruments.len() > 1;
+            checked.map_err(|error| if several { within(&instrument.name, error) } else { error })?;
         }
         let by =
             |index: usize| moves.iter().find(|m| m.instrument == index).map_or(0.0, |m| m.command.advance_mm);

@@ -14,7 +14,9 @@ from ._endowire import (
     StepReport,
     Vessel,
     check_vessel,
+    merge_sweeps,
     solve_rod,
+    sweep,
 )
 from .errors import ComputationError, EndOfWay, EndowireError, InputError
 
@@ -33,5 +35,7 @@ __all__ = [
     "StepReport",
     "Vessel",
     "check_vessel",
+    "merge_sweeps",
     "solve_rod",
+    "sweep",
 ]

@@ -15,8 +15,8 @@ pub use line::ScriptLine;
 pub use run::{LineCourse, ScriptCourse, ScriptRun, Step};
 pub use until::{Met, Until};
 
-use super::Command;
 use super::simulation::check_command;
+use super::{Command, Move};
 use crate::device::{Device, LENGTH_SLACK_MM, Stack};
 use crate::vessel::CentrelineTree;
 use crate::{Error, Result};
@@ -83,6 +83,24 @@ impl Script {
     /// The first line with a condition, as messages call it; none where all steps are known beforehand.
     pub fn conditional(&self) -> Option<&str> {
         self.motions.iter().find(|motion| motion.until.is_some()).map(|motion| motion.name.as_str())
+    }
+
+    /// The moves of all steps, where they are known beforehand.
+    ///
+    /// # Errors
+    /// A line with a condition: where it ends is known only when it is carried out.
+    pub fn moves(&self) -> Result<Vec<Vec<Move>>> {
+        if let Some(line) = self.conditional() {
+            let mend = "where the line ends is not known beforehand: carry the script out step by step";
+            return Err(Error::parameter(format!("{line}.until"), "given", mend));
+        }
+        let mut run = self.begin();
+        let mut moves = Vec::with_capacity(self.len());
+        while let Some(step) = run.next_where(|_| None)? {
+            moves.push(step.moves.to_vec());
+            run.carried_out();
+        }
+        Ok(moves)
     }
 
     fn check_speeds(&self) -> Result<()> {
@@ -200,16 +218,6 @@ fn go(stack: &Stack, inserted_mm: &mut [f64], motion: &Motion, steps: &Steps, st
 /// # Errors
 /// As [`Script::new`], and a line with a condition: where it ends is known only when it is carried out.
 pub fn script_commands(script: &[ScriptLine], device: &Device) -> Result<Vec<Command>> {
-    if let Some(index) = script.iter().position(|line| line.until.is_some()) {
-        let mend = "where the line ends is not known beforehand: carry the script out step by step";
-        return Err(Error::parameter(format!("script[{index}].until"), "given", mend));
-    }
-    let script = Script::new(script, &Stack::from(device.clone()), &[0.0], None)?;
-    let mut run = script.begin();
-    let mut commands = Vec::with_capacity(script.len());
-    while let Some(step) = run.next_where(|_| None)? {
-        commands.extend(step.moves.iter().map(|one| one.command));
-        run.carried_out();
-    }
-    Ok(commands)
+    let moves = Script::new(script, &Stack::from(device.clone()), &[0.0], None)?.moves()?;
+    Ok(moves.into_iter().flatten().map(|one| one.command).collect())
 }

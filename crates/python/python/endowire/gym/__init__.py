@@ -1,12 +1,12 @@
 """Environments for Gymnasium 1.0 and later, composed of parts that can be replaced.
 
-``import endowire.gym`` registers the ids ``endowire/CurvedTube-v0``, ``endowire/AorticArch-v0`` and ``endowire/ArchVariety-v0``; ``gymnasium.make`` and
+``import endowire.gym`` registers ``endowire/CurvedTube-v0``, ``AorticArch``, ``ArchVariety``, ``BasicWireNav``, ``DualDeviceNav``, ``CathSim`` and ``Navigation``; ``gymnasium.make`` and
 ``gymnasium.make_vec`` take every part of a `Task` as a keyword.
 """
 
 from gymnasium import register as _register
 
-from . import arches, ends, observations, rewards, targets, vessels
+from . import arches, ends, observations, originals, rewards, targets, vessels
 from .centreline import Centreline
 from .environment import InsertionEnv
 from .episodes import Episodes
@@ -23,6 +23,7 @@ __all__ = [
     "arches",
     "ends",
     "observations",
+    "originals",
     "rewards",
     "targets",
     "vessels",

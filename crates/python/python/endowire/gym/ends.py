@@ -50,3 +50,15 @@ class StepLimit:
 
     def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
         return episodes.steps >= self.steps
+
+
+class ForceLimit:
+    """A contact presses harder than it may."""
+
+    terminates = True
+
+    def __init__(self, limit_n: float = 1.5) -> None:
+        self.limit_n = limit_n
+
+    def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
+        return episodes.batch.largest_contact_force_n > self.limit_n

@@ -40,6 +40,8 @@ class Episodes:
         self.reached = np.zeros(n, dtype=bool)
         #: Steps made, shape (n,).
         self.steps = np.zeros(n, dtype=int)
+        #: Steps after which no contact pressed harder than the task's limit, shape (n,).
+        self.safe_steps = np.zeros(n, dtype=int)
         #: Number of the frame that shows it, shape (n,): seeds the noise of pictures.
         self.frame = np.zeros(n, dtype=np.int64)
         #: Last actions within the limits, shape (n, n_instruments, 2).
@@ -64,7 +66,7 @@ class Episodes:
             self.target_mm[k] = self.task.target.sample(rng, site, starts[k])
             self._ways_mm[k] = site.centreline.ways_mm(self.target_mm[k])
             self.frame[k] = int(rng.integers(1 << 30)) * _FRAMES
-            self.steps[k], self.action[k] = 0, 0.0
+            self.steps[k], self.safe_steps[k], self.action[k] = 0, 0, 0.0
             self.failures.pop(k, None)
         self._look()
         for k in generators:
@@ -83,6 +85,7 @@ class Episodes:
         # Where the way ends an instrument stays, and may be pulled back.
         self.failures = {k: failure for k, failure in told.items() if not isinstance(failure, EndOfWay)}
         self.steps += moving
+        self.safe_steps += moving & (self.batch.largest_contact_force_n <= self.task.force_limit_n)
         self.frame += moving
         self.way_before_mm = self.way_mm.copy()
         self._look()
@@ -116,7 +119,9 @@ class Episodes:
     def info(self) -> dict[str, NDArray[Any]]:
         """What is told beside the observations, a row for each environment."""
         failed = np.array([str(self.failures.get(k, "")) for k in range(len(self.sites))], dtype=object)
-        return {"reached": self.reached.copy(), "way_mm": self.way_mm.copy(), "failure": failed}
+        safety = np.where(self.steps > 0, self.safe_steps / np.maximum(self.steps, 1), 1.0)
+        told = {"reached": self.reached.copy(), "way_mm": self.way_mm.copy()}
+        return {**told, "safety": safety, "failure": failed}
 
     def _look(self) -> None:
         self.tip_mm = self.batch.tip_mm

@@ -81,7 +81,7 @@ class Hands:
 class Forces:
     """Push force in N and torque in N·mm of each hand, and the largest force of a contact in N: shape (2 n_instruments + 1,).
 
-    Values beyond ``largest`` are shown as it.
+    Values beyond ``largest`` are shown as it, and a push force that jumps as 0.
     """
 
     def __init__(self, largest: float = 100.0) -> None:
@@ -93,7 +93,8 @@ class Forces:
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         batch = episodes.batch
         contact = batch.largest_contact_force_n[:, None]
-        return np.concatenate([batch.push_force_n, batch.torque_nmm, contact], axis=1)
+        push_force_n = np.nan_to_num(batch.push_force_n, nan=0.0)
+        return np.concatenate([push_force_n, batch.torque_nmm, contact], axis=1)
 
 
 class LastAction:

@@ -49,6 +49,16 @@ class Approach:
         return self.worth_per_mm * (episodes.way_before_mm - episodes.way_mm)
 
 
+class Distance:
+    """So much for every millimetre between tip and target."""
+
+    def __init__(self, worth_per_mm: float = -0.001) -> None:
+        self.worth_per_mm = worth_per_mm
+
+    def reward(self, episodes: Episodes) -> NDArray[np.float64]:
+        return self.worth_per_mm * np.linalg.norm(episodes.tip_mm - episodes.target_mm, axis=1)
+
+
 class ContactForce:
     """So much for every newton by which the largest force of a contact is beyond a limit."""
 

@@ -53,3 +53,13 @@ class FixedTarget:
 
     def sample(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
         return self.position_mm
+
+
+class NamedTarget:
+    """One of these named points of a generated vessel, all alike likely."""
+
+    def __init__(self, *names: str) -> None:
+        self.names = names
+
+    def sample(self, rng: np.random.Generator, site: Site, start: Simulation) -> NDArray[np.float64]:
+        return np.asarray(site.vessel.targets[self.names[int(rng.integers(len(self.names)))]])

@@ -44,6 +44,8 @@ class Task:
     ends: Sequence[ends.End] = field(default_factory=_ends)
     #: How near the tip comes to a target that it reaches, mm.
     threshold_mm: float = 5.0
+    #: Force of a contact beyond which a step is not safe, N.
+    force_limit_n: float = 1.5
     #: Time between two actions, s.
     control_period_s: float = 1.0 / 7.5
     #: Fastest push in mm/s and turn in rad/s of a hand.
@@ -52,6 +54,8 @@ class Task:
     wall: Mapping[str, Any] = field(default_factory=dict)
     #: Keys of `[method]` of a scene file.
     method: Mapping[str, Any] = field(default_factory=lambda: {"name": "kirchhoff", "element_mm": 5.0})
+    #: Keywords of `endowire.Simulation` for several instruments: names, friction, may_lead.
+    coupling: Mapping[str, Any] = field(default_factory=dict)
     #: Keys of `[view]` of a scene file for `render()`.
     view: Mapping[str, Any] = field(default_factory=lambda: {"views": ["3d"], "size_px": [480, 480]})
 
@@ -72,6 +76,7 @@ class Task:
                 list(self.instruments),
                 wall=dict(self.wall),
                 method=dict(self.method),
+                **self.coupling,
                 **site.sheath,
             )
         return site.starts[self]

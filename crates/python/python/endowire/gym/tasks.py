@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from typing import Any
 
-from .. import Instrument, Vessel
-from . import observations
+import numpy as np
+
+from .. import InputError, Instrument, Vessel
+from . import ends, observations, originals, rewards, targets
 from .arches import ArchVariety
 from .environment import InsertionEnv
 from .targets import CentrelineTarget
@@ -70,7 +73,110 @@ def arch_variety(**parts: Any) -> Task:
     return Task(**{**defaults, **parts})
 
 
-TASKS = {"CurvedTube": curved_tube, "AorticArch": aortic_arch, "ArchVariety": arch_variety}
+def basic_wire_nav(data: str | PathLike[str] | None = None, **parts: Any) -> Task:
+    """The wire of ArchVariety in the vessel of BasicWireNav, read from the folder ``data``; without one in the built-in arch instead."""
+    vessels = originals.basic_wire_nav(data) if data is not None else _arch()
+    return arch_variety(**{"vessels": vessels, **parts})
+
+
+def dual_device_nav(data: str | PathLike[str] | None = None, **parts: Any) -> Task:
+    """A microwire in a microcatheter in the vessel of DualDeviceNav, read from the folder ``data`` (``data/dualdevicenav`` of
+    stEVE_bench); without one in the built-in arch instead.
+
+    Ratios of stiffness and sizes are those of the original. The wire is twice as long, or its tail would slip into the catheter's.
+    """
+
+    def device(
+        length_mm: float, tip: tuple[float, float], shaft: tuple[float, float], bore: Any
+    ) -> Instrument:
+        bent = {"length_mm": 15.205, "rest_curvature_per_mm": [1 / 12.1, 0.0]}
+        sections = [bent, {"length_mm": length_mm - 15.205}]
+        keys = ("radius_mm", "bending_stiffness_nmm2")
+        return Instrument(
+            [
+                {**s, **dict(zip(keys, values, strict=True)), **bore}
+                for s, values in zip(sections, (tip, shaft), strict=True)
+            ]
+        )
+
+    wire = device(1800.0, (0.18, 8.2448e-4), (0.18, 8.2448e-4), {})
+    catheter = device(900.0, (0.3, 6.362e-3), (0.35, 1.179e-2), {"inner_radius_mm": 0.285})
+    defaults = {
+        "instruments": [wire, catheter],
+        "coupling": {"names": ["wire", "catheter"]},
+        "vessels": originals.dual_device_nav(data) if data is not None else _arch(),
+        "wall": {"friction": 0.001},
+    }
+    return arch_variety(**{**defaults, **parts})
+
+
+def cath_sim(**parts: Any) -> Task:
+    """Navigation in the arch after CathSim: its wire's size and tip, its reward and end, 300 steps, no friction; its arch is the built-in one."""
+    tip = {
+        "length_mm": 8.0,
+        "radius_mm": 0.5,
+        "bending_stiffness_nmm2": 1.0,
+        "rest_curvature_per_mm": [np.pi / 3 / 8.0, 0.0],
+    }
+    wire = Instrument([tip, {"length_mm": 492.0, "radius_mm": 0.5, "bending_stiffness_nmm2": 20.0}])
+    defaults = {
+        "instruments": [wire],
+        "vessels": _arch(),
+        "target": targets.NamedTarget("innominate", "left carotid"),
+        "rewards": [rewards.Distance(-0.001), rewards.Reached(10.0)],
+        "ends": [ends.TargetReached(), ends.LeftVessel(), ends.StepLimit(300)],
+        "threshold_mm": 4.0,
+        "control_period_s": 0.012,
+        # The fastest that its actuators move the wire without a load.
+        "speed_limits": (714.0, 20.0),
+    }
+    return Task(**{**defaults, **parts})
+
+
+def navigation(vessel: str = "aortic_arch", target: str | None = None, **parts: Any) -> Task:
+    """A shaped wire to the named targets of a built-in vessel (``aortic_arch``, ``aortic_arch_ii``, ``aortic_arch_iii`` or ``hepatic``): all of them,
+    or one. No contact may press harder than 1.5 N: an episode ends there. ``info["safety"]`` tells the share of steps without.
+    """
+    is_fine = vessel == "hepatic"
+    made = Vessel.generate(vessel, edge_mm=1.1 if is_fine else 3.0)
+    if not made.targets:
+        raise InputError(f"vessel = {vessel!r}: names no targets: give aortic_arch or hepatic")
+    if target is not None and target not in made.targets:
+        raise InputError(f"target = {target!r}: {vessel} has {', '.join(sorted(made.targets))}")
+    curvature, tip_mm, radius_mm = (0.07, 22.0, 0.25) if is_fine else (0.06, 25.0, 0.445)
+    tip = {"length_mm": tip_mm, "radius_mm": radius_mm, "rest_curvature_per_mm": [curvature, 0.0]}
+    wire = Instrument(
+        [
+            {**tip, "bending_stiffness_nmm2": 1.0},
+            {"length_mm": 575.0 - tip_mm, "radius_mm": radius_mm, "bending_stiffness_nmm2": 12.0},
+        ]
+    )
+    limit = ends.ForceLimit(1.5)
+    defaults = {
+        "instruments": [wire],
+        "vessels": FixedVessel(made),
+        "target": targets.NamedTarget(*([target] if target else sorted(made.targets))),
+        "ends": [ends.TargetReached(), ends.LeftVessel(), limit, ends.StepLimit()],
+        "force_limit_n": limit.limit_n,
+        "threshold_mm": 6.0,
+        "wall": {"friction": 0.05},
+    }
+    return Task(**{**defaults, **parts})
+
+
+def _arch() -> FixedVessel:
+    return FixedVessel(Vessel.generate("aortic_arch", edge_mm=3.0))
+
+
+TASKS = {
+    "CurvedTube": curved_tube,
+    "AorticArch": aortic_arch,
+    "ArchVariety": arch_variety,
+    "BasicWireNav": basic_wire_nav,
+    "DualDeviceNav": dual_device_nav,
+    "CathSim": cath_sim,
+    "Navigation": navigation,
+}
 
 
 def make_env(task: str, render_mode: str | None = None, **parts: Any) -> InsertionEnv:

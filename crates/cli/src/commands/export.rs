@@ -1,0 +1,101 @@
+//! `endowire export`: a recorded run for other programs.
+
+use endowire_core::Vec3;
+use endowire_core::device::Stack;
+use endowire_methods::Scene;
+
+use crate::args::ExportArgs;
+use crate::cache::Cache;
+use crate::failure::Failure;
+use crate::output::instruments::Lengths;
+use crate::output::recording::Recording;
+use crate::output::vtk::{PointArray, PolyData, write_series};
+use crate::output::{folder, progress, tell};
+
+/// Number that points of contacts have in place of an instrument's.
+const CONTACT: f64 = -1.0;
+
+/// Writes the vessel, a file for each step, and the list of them.
+pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
+    let recording = Recording::read(&args.dir, args.scene.as_deref())?;
+    let path = args.scene.as_ref().unwrap_or(&recording.summary.scene_file);
+    let scene = Scene::read(path)?;
+    let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
+    let stack = scene.stack().map_err(in_scene)?;
+    let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?;
+    let lengths = Lengths::read(&args.dir, &stack)?;
+    let steps = folder::step_times(&args.dir)?;
+    let out = &args.vtk;
+    std::fs::create_dir_all(out).map_err(|e| Failure::write(out, &e))?;
+    let write = |name: &str, data: &PolyData| {
+        let path = out.join(name);
+        data.write(&path).map_err(|e| Failure::write(&path, &e))
+    };
+    let mesh = wall.mesh();
+    let vessel = PolyData {
+        points_mm: mesh.vertices_mm.clone(),
+        triangles: mesh.triangles.clone(),
+        ..PolyData::default()
+    };
+    write("vessel.vtp", &vessel)?;
+    let bar = progress::bar(recording.steps(), "step");
+    let mut files = Vec::new();
+    for (row, (step, time_s)) in (1..=recording.steps()).zip(steps) {
+        let lengths_mm = lengths.after(step, &recording.shape(row))?;
+        let name = format!("step_{step:06}.vtp");
+        write(&name, &step_data(&recording, row, &stack, &lengths_mm))?;
+        files.push((time_s, name));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let series = out.join("run.pvd");
+    write_series(&series, &files).map_err(|e| Failure::write(&series, &e))?;
+    tell(format_args!("{} steps and the vessel in {}", files.len(), series.display()));
+    Ok(())
+}
+
+/// The line of each instrument that is in, and the contacts.
+fn step_data(recording: &Recording, row: usize, stack: &Stack, lengths_mm: &[f64]) -> PolyData {
+    let line = recording.shape(row);
+    let line_mm = lengths_mm.iter().copied().fold(0.0, f64::max);
+    let mut data = PolyData::default();
+    let (mut of, mut from_tip_mm, mut radius_mm) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut tangents, mut forces_n) = (Vec::new(), Vec::new());
+    for (index, (device, mm)) in stack.devices().zip(lengths_mm).enumerate().filter(|(_, (_, mm))| **mm > 0.0)
+    {
+        let shape = line.behind(line_mm - mm);
+        let first = data.points_mm.len();
+        data.lines.push((first..first + shape.len()).collect());
+        data.points_mm.extend_from_slice(&shape.positions_mm);
+        tangents.extend_from_slice(&shape.tangents);
+        for own_mm in &shape.from_tip_mm {
+            of.push(index as f64);
+            from_tip_mm.push(*own_mm);
+            radius_mm.push(device.section_at(*own_mm).radius_mm);
+            forces_n.push(Vec3::zeros());
+        }
+    }
+    for contact in recording.contacts(row) {
+        data.vertices.push(data.points_mm.len());
+        data.points_mm.push(contact.position_mm);
+        of.push(CONTACT);
+        from_tip_mm.push(0.0);
+        radius_mm.push(0.0);
+        tangents.push(Vec3::zeros());
+        forces_n.push(contact.force_n);
+    }
+    let number = |name, numbers| PointArray { name, components: 1, numbers };
+    let vector = |name, vectors: Vec<Vec3>| PointArray {
+        name,
+        components: 3,
+        numbers: vectors.iter().flat_map(|v| [v.x, v.y, v.z]).collect(),
+    };
+    data.arrays = vec![
+        number("instrument", of),
+        number("from_tip_mm", from_tip_mm),
+        number("radius_mm", radius_mm),
+        vector("tangent", tangents),
+        vector("contact_force_n", forces_n),
+    ];
+    data
+}

@@ -1,0 +1,187 @@
+//! `endowire sweep`: a scene, run many times with other values of its keys.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use endowire_core::insertion::{Move, Simulation};
+use endowire_core::methods::MethodChoice;
+use endowire_methods::Scene;
+use endowire_sweep::{Order, Progress, Record, Recorded, Run, RunOutcome, Sweep, merge};
+use indicatif::ProgressBar;
+use serde::Serialize;
+
+use super::run::interrupts;
+use crate::args::{SweepArgs, SweepCommand};
+use crate::cache::Cache;
+use crate::failure::Failure;
+use crate::output::frames::FrameWriter;
+use crate::output::provenance::{PROGRAM, Provenance, read_input};
+use crate::output::recorder::{Recorder, Summary};
+use crate::output::{print_json, progress, tell, whole};
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Document {
+    runs: usize,
+    /// Runs that have a row.
+    done: usize,
+    /// Those that had one before.
+    earlier: usize,
+    /// Those that did not do all of their script.
+    failed: usize,
+    table: Option<PathBuf>,
+}
+
+/// Carries out a sweep, or merges shards.
+pub(crate) fn sweep(args: &SweepArgs) -> Result<(), Failure> {
+    match (&args.merge, &args.sweep, &args.out) {
+        (Some(SweepCommand::Merge { folders, out }), ..) => {
+            let runs = merge(folders, out)?;
+            tell(format_args!("{runs} runs in {}", out.display()));
+            Ok(())
+        }
+        (None, Some(file), Some(out)) => carry_out(args, file, out),
+        // The parser asks for both.
+        _ => Err(Failure::Input("give a sweep file and --out DIR".to_owned())),
+    }
+}
+
+fn carry_out(args: &SweepArgs, file: &Path, folder: &Path) -> Result<(), Failure> {
+    let sweep = Sweep::read(file)?;
+    let recordings = sweep.recorded().map(|what| Recordings { folder: folder.join("recordings"), what });
+    let stop = interrupts();
+    let bar = progress::bar(sweep.len(), "run");
+    let order = Order {
+        folder,
+        shard: args.shard,
+        jobs: args.jobs.map(usize::from),
+        store: &Cache::new(&args.cache),
+        program: PROGRAM,
+        record: recordings.as_ref().map(|recordings| recordings as &dyn Record),
+        stop: &stop,
+        progress: &|progress| show(&bar, progress),
+    };
+    let told = sweep.carry_out(&order)?;
+    bar.finish_and_clear();
+    let Progress { runs, done, failed } = told.progress;
+    if args.json {
+        print_json(&Document { runs, done, earlier: told.earlier, failed, table: told.table.clone() })?;
+    }
+    match told.table {
+        Some(table) => {
+            tell(format_args!("{runs} runs in {}, {failed} of them failed", table.display()));
+            Ok(())
+        }
+        None => Err(Failure::Computation(format!(
+            "{}: interrupted with {done} of {runs} runs done: the same command goes on",
+            file.display()
+        ))),
+    }
+}
+
+/// Runs that had a row before say nothing of the time that is left.
+fn show(bar: &ProgressBar, progress: Progress) {
+    let begins = bar.position() == 0;
+    bar.set_length(progress.runs as u64);
+    bar.set_position(progress.done as u64);
+    if begins {
+        bar.reset_eta();
+    }
+    if progress.failed > 0 {
+        bar.set_message(format!("{} failed", progress.failed));
+    }
+}
+
+/// Recordings of all runs: each a folder as `endowire run` makes it, and its scene beside it.
+struct Recordings {
+    folder: PathBuf,
+    what: Recorded,
+}
+
+/// That of one run.
+struct Recording {
+    scene_file: PathBuf,
+    scene: Scene,
+    provenance: Provenance,
+    frames: FrameWriter,
+    recorder: Recorder,
+    started: Instant,
+    /// When the last step was recorded.
+    recorded: Instant,
+    /// Time between recordings of steps.
+    steps: Duration,
+}
+
+impl Record for Recordings {
+    fn begin(
+        &self,
+        run: &Run<'_>,
+        simulation: &Simulation,
+    ) -> Result<Box<dyn endowire_sweep::Recorder>, String> {
+        self.recording(run, simulation)
+            .map(|recording| Box::new(recording) as Box<dyn endowire_sweep::Recorder>)
+            .map_err(|failure| failure.to_string())
+    }
+}
+
+impl Recordings {
+    fn recording(&self, run: &Run<'_>, simulation: &Simulation) -> Result<Recording, Failure> {
+        let name = format!("{:06}", run.number());
+        let (folder, scene_file) = (self.folder.join(&name), self.folder.join(name + ".toml"));
+        let recorder = Recorder::new(&folder, false, simulation.stack())?;
+        let text = run.standalone()?;
+        whole::write_bytes(&scene_file, text.as_bytes()).map_err(|e| Failure::write(&scene_file, &e))?;
+        let scene = Scene::read(&scene_file)?;
+        let mut inputs = vec![text.into_bytes()];
+        for path in scene.input_paths() {
+            inputs.push(read_input(&path)?);
+        }
+        let drawn = (self.what == Recorded::Frames).then_some(simulation);
+        Ok(Recording {
+            frames: FrameWriter::new(&scene_file, &scene, drawn)?,
+            provenance: Provenance::new(&inputs, scene.seed),
+            scene_file,
+            scene,
+            recorder,
+            started: Instant::now(),
+            recorded: Instant::now(),
+            steps: Duration::ZERO,
+        })
+    }
+}
+
+impl endowire_sweep::Recorder for Recording {
+    fn step(
+        &mut self,
+        moves: &[Move],
+        time_s: Option<f64>,
+        last: bool,
+        simulation: &Simulation,
+    ) -> Result<(), String> {
+        self.steps += self.recorded.elapsed();
+        let step = self.recorder.steps() + 1;
+        let time_s = time_s.unwrap_or_else(|| self.frames.time_s(step));
+        let lengths_mm = simulation.report().lengths_mm();
+        let seen = (simulation.shape(), lengths_mm.as_slice());
+        let recorded = self.recorder.record(moves, time_s, simulation);
+        let drawn = recorded.and_then(|()| self.frames.step((step, time_s), last, seen, &mut self.recorder));
+        self.recorded = Instant::now();
+        drawn.map_err(|failure| failure.to_string())
+    }
+
+    fn end(self: Box<Self>, outcome: &RunOutcome) -> Result<(), String> {
+        let mut summary = Summary {
+            provenance: self.provenance,
+            complete: false,
+            scene: self.scene.name.clone(),
+            scene_file: std::path::absolute(&self.scene_file).unwrap_or(self.scene_file),
+            method: self.scene.method.name(),
+            outcome: outcome.clone(),
+            step_time_s: self.steps.as_secs_f64(),
+            wall_time_s: self.started.elapsed().as_secs_f64(),
+            renderer: self.frames.renderer(),
+            frames: self.recorder.frames.clone(),
+        };
+        self.recorder.finish(&mut summary).map_err(|failure| failure.to_string())
+    }
+}

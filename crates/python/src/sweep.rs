@@ -1,0 +1,67 @@
+//! Sweeps, as the program carries them out.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use endowire_core::vessel::NoStore;
+use endowire_sweep::{Order, Program, Shard, Sweep, merge};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::error::{exception, refuse};
+use crate::interrupt::{interruptible, stoppable};
+
+const PROGRAM: Program =
+    Program { version: env!("CARGO_PKG_VERSION"), git_revision: env!("ENDOWIRE_GIT_REVISION") };
+
+/// Does the runs of a sweep file that have no row in the folder `out` yet, `jobs` at the same time (the number of cores unless told), and writes
+/// runs.parquet there when all have one, as `endowire sweep` does. `shard` is the part to do: "1/4" is the first of four.
+///
+/// Returns a dictionary of `runs`, `earlier` (those that had a row before), `failed` and `table` (its path). Ctrl-C stops it; the same call goes on.
+/// Raises InputError for a sweep that does not fit, for `record` in it, and for a folder that holds another sweep. What fails in a run is in its row.
+#[pyfunction]
+#[pyo3(signature = (path, out, *, jobs=None, shard="1/1"))]
+pub(crate) fn sweep<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    out: PathBuf,
+    jobs: Option<usize>,
+    shard: &str,
+) -> PyResult<Bound<'py, PyDict>> {
+    let shard: Shard = shard.parse().map_err(|mend: String| refuse("shard", format!("{shard:?}"), &mend))?;
+    let sweep = Sweep::read(&path).map_err(exception)?;
+    if sweep.recorded().is_some() {
+        let mend = "recordings are made by the program, endowire sweep: leave it out, or use that";
+        return Err(refuse("record", "given", mend));
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&stop);
+    let told = stoppable(py, &stop, move || {
+        sweep.carry_out(&Order {
+            folder: &out,
+            shard,
+            jobs,
+            store: &NoStore,
+            program: PROGRAM,
+            record: None,
+            stop: &seen,
+            progress: &|_| (),
+        })
+    })?;
+    let told = told.map_err(exception)?;
+    let document = PyDict::new(py);
+    document.set_item("runs", told.progress.runs)?;
+    document.set_item("earlier", told.earlier)?;
+    document.set_item("failed", told.progress.failed)?;
+    document.set_item("table", told.table)?;
+    Ok(document)
+}
+
+/// Makes one table of the rows in the folders of shards, in whatever order they are given; its number of runs.
+///
+/// Raises InputError for rows of different sweeps, and where runs are missing.
+#[pyfunction]
+pub(crate) fn merge_sweeps(py: Python<'_>, folders: Vec<PathBuf>, out: PathBuf) -> PyResult<usize> {
+    interruptible(py, move || merge(&folders, &out))?.map_err(exception)
+}

@@ -1,0 +1,271 @@
+//! Axes: a key of the scene and the values that it takes.
+
+use endowire_core::{Error, Result};
+use serde::Deserialize;
+use toml::Value;
+
+use crate::draw::Stream;
+use crate::key::Key;
+
+/// Most values of one axis, and most runs of a sweep.
+pub(crate) const RUN_LIMIT: usize = 1_000_000;
+
+/// `[[axis]]` of a sweep file: a key, and one of list, grid, random and latin.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisSpec {
+    /// The key of the scene.
+    pub key: String,
+    /// These values as they stand; each with all values of all other lists and grids.
+    pub list: Option<Vec<Value>>,
+    /// Numbers in even steps; each with all values of all other lists and grids.
+    pub grid: Option<Grid>,
+    /// A number drawn for each sample, evenly from a range.
+    pub random: Option<Range>,
+    /// A number drawn for each sample, one in each of as many equal parts of a range as there are samples: together with the other axes of
+    /// this kind a Latin hypercube.
+    pub latin: Option<Range>,
+}
+
+/// Numbers in even steps from one to another.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// The first.
+    pub from: f64,
+    /// The last.
+    pub to: f64,
+    /// How many, 2 or more.
+    pub count: usize,
+    /// Whether steps are factors.
+    #[serde(default)]
+    pub log: bool,
+}
+
+/// A range to draw from.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// Its lower end.
+    pub from: f64,
+    /// Its upper end.
+    pub to: f64,
+    /// Whether logarithms are drawn evenly.
+    #[serde(default)]
+    pub log: bool,
+    /// Whether whole numbers are drawn, both ends among them.
+    #[serde(default)]
+    pub integer: bool,
+}
+
+/// A key with its values.
+#[derive(Debug, Clone)]
+pub struct Axis {
+    pub(crate) key: Key,
+    values: Values,
+}
+
+#[derive(Debug, Clone)]
+enum Values {
+    Listed(Vec<Value>),
+    Random(Range, Stream),
+    Latin(Range, Stream, Vec<u32>),
+}
+
+impl Axis {
+    /// The axis number `index` of a sweep with this seed and so many samples.
+    ///
+    /// # Errors
+    /// Names the key of the sweep file that is missing, out of range or contradicts another.
+    pub(crate) fn new(spec: &AxisSpec, index: usize, seed: u64, samples: usize) -> Result<Self> {
+        let name = format!("axis[{index}]");
+        let key = Key::parse(&spec.key).map_err(|error| inside(&name, error))?;
+        let stream = Stream::new(seed, index);
+        let values = match (&spec.list, &spec.grid, &spec.random, &spec.latin) {
+            (Some(list), None, None, None) => Values::Listed(list.clone()),
+            (None, Some(grid), None, None) => Values::Listed(grid.values(&format!("{name}.grid"))?),
+            (None, None, Some(range), None) => {
+                range.check(&format!("{name}.random"))?;
+                Values::Random(*range, stream)
+            }
+            (None, None, None, Some(range)) => {
+                range.check(&format!("{name}.latin"))?;
+                Values::Latin(*range, stream, stream.shuffled(samples))
+            }
+            _ => {
+                let mend = "give one of list, grid, random and latin";
+                return Err(Error::parameter(name, format!("{{key = {:?}}}", spec.key), mend));
+            }
+        };
+        if matches!(&values, Values::Listed(list) if list.is_empty()) {
+            return Err(Error::parameter(format!("{name}.list"), "[]", "give at least one value"));
+        }
+        Ok(Self { key, values })
+    }
+
+    /// Number of its values that are crossed with those of other axes: 1 where it is drawn.
+    pub(crate) fn crossed(&self) -> usize {
+        match &self.values {
+            Values::Listed(list) => list.len(),
+            Values::Random(..) | Values::Latin(..) => 1,
+        }
+    }
+
+    /// Its value in a run: `place` of those that are crossed, or that of `sample`.
+    pub(crate) fn value(&self, place: usize, sample: usize) -> Value {
+        match &self.values {
+            Values::Listed(list) => list[place].clone(),
+            Values::Random(range, stream) => range.at(stream.unit(sample)),
+            Values::Latin(range, stream, strata) => {
+                let within = stream.unit(sample);
+                range.at((f64::from(strata[sample]) + within) / strata.len() as f64)
+            }
+        }
+    }
+
+    /// Values that stand for all of them: each one of a list, the ends of a range.
+    pub(crate) fn examples(&self) -> Vec<Value> {
+        match &self.values {
+            Values::Listed(list) => list.clone(),
+            Values::Random(range, _) | Values::Latin(range, ..) => vec![range.at(0.0), range.at(1.0)],
+        }
+    }
+}
+
+/// The same error, of a key of that table.
+fn inside(table: &str, error: Error) -> Error {
+    match error {
+        Error::Parameter { name, value, mend } => {
+            Error::Parameter { name: format!("{table}.{name}"), value, mend }
+        }
+        other => other,
+    }
+}
+
+/// Between two numbers, `t` from 0 to 1 of the way.
+fn between(from: f64, to: f64, log: bool, t: f64) -> f64 {
+    match t {
+        // Ends are met to the bit.
+        0.0 => from,
+        1.0 => to,
+        _ if log => from * (t * (to / from).ln()).exp(),
+        _ => from + t * (to - from),
+    }
+}
+
+fn check_ends(name: &str, from: f64, to: f64, log: bool) -> Result<()> {
+    for (end, value) in [("from", from), ("to", to)] {
+        if !value.is_finite() {
+            return Err(Error::parameter(format!("{name}.{end}"), value, "must be a finite number"));
+        }
+        if log && value <= 0.0 {
+            let mend = "must be above 0 where log = true";
+            return Err(Error::parameter(format!("{name}.{end}"), value, mend));
+        }
+    }
+    Ok(())
+}
+
+impl Grid {
+    fn values(&self, name: &str) -> Result<Vec<Value>> {
+        check_ends(name, self.from, self.to, self.log)?;
+        if !(2..=RUN_LIMIT).contains(&self.count) {
+            let mend = format!("must be 2 to {RUN_LIMIT}; for one value give list");
+            return Err(Error::parameter(format!("{name}.count"), self.count, mend));
+        }
+        let last = (self.count - 1) as f64;
+        let value = |k: usize| Value::Float(between(self.from, self.to, self.log, k as f64 / last));
+        Ok((0..self.count).map(value).collect())
+    }
+}
+
+/// Whole numbers below this are all to be had.
+const INTEGER_LIMIT: f64 = 9e15;
+
+impl Range {
+    fn check(&self, name: &str) -> Result<()> {
+        check_ends(name, self.from, self.to, self.log)?;
+        if self.from >= self.to {
+            let mend = format!("must be above {name}.from, {}", self.from);
+            return Err(Error::parameter(format!("{name}.to"), self.to, mend));
+        }
+        for (end, value) in [("from", self.from), ("to", self.to)] {
+            if self.integer && (value.fract() != 0.0 || value.abs() > INTEGER_LIMIT) {
+                let mend = format!("must be a whole number up to {INTEGER_LIMIT:e} where integer = true");
+                return Err(Error::parameter(format!("{name}.{end}"), value, mend));
+            }
+        }
+        Ok(())
+    }
+
+    /// The value `unit` of the way along it.
+    fn at(&self, unit: f64) -> Value {
+        if self.integer {
+            // Each whole number has a stretch of the same length: one more than the way.
+            let value = between(self.from, self.to + 1.0, self.log, unit).floor();
+            return Value::Integer(value.min(self.to) as i64);
+        }
+        Value::Float(between(self.from, self.to, self.log, unit))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis(text: &str, samples: usize) -> Result<Axis> {
+        Axis::new(&toml::from_str(&format!("key = \"a.b\"\n{text}")).unwrap(), 2, 7, samples)
+    }
+
+    fn floats(axis: &Axis, count: usize) -> Vec<f64> {
+        (0..count).map(|k| axis.value(k, k).as_float().unwrap()).collect()
+    }
+
+    #[test]
+    fn grids_have_their_ends_and_even_steps() {
+        let even = axis("grid = { from = 0.0, to = 1.0, count = 5 }", 1).unwrap();
+        assert_eq!(floats(&even, 5), [0.0, 0.25, 0.5, 0.75, 1.0]);
+        let log = axis("grid = { from = 1, to = 100, count = 3, log = true }", 1).unwrap();
+        let values = floats(&log, 3);
+        assert!((values[1] - 10.0).abs() < 1e-12 && values[0] == 1.0 && values[2] == 100.0, "{values:?}");
+    }
+
+    #[test]
+    fn a_latin_axis_has_one_value_in_each_part_of_its_range() {
+        let axis = axis("latin = { from = -1.0, to = 3.0 }", 40).unwrap();
+        let mut parts: Vec<usize> =
+            floats(&axis, 40).iter().map(|v| ((v + 1.0) / 4.0 * 40.0).floor() as usize).collect();
+        assert_ne!(parts, (0..40).collect::<Vec<_>>());
+        parts.sort_unstable();
+        assert_eq!(parts, (0..40).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn whole_numbers_are_drawn_with_both_ends() {
+        let axis = axis("random = { from = 3, to = 5, integer = true }", 900).unwrap();
+        let mut counts = [0; 3];
+        for sample in 0..900 {
+            counts[usize::try_from(axis.value(0, sample).as_integer().unwrap() - 3).unwrap()] += 1;
+        }
+        // Four standard deviations of 300 in 900.
+        assert!(counts.iter().all(|count| (300 - 57..300 + 57).contains(count)), "{counts:?}");
+        assert_eq!(axis.examples(), [Value::Integer(3), Value::Integer(5)]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_key_value_and_mend() {
+        for (text, told) in [
+            ("", "axis[2] = {key = \"a.b\"}: give one of list, grid, random and latin"),
+            ("list = []", "axis[2].list = []: give at least one value"),
+            ("list = [1]\ngrid = { from = 0, to = 1, count = 2 }", "give one of"),
+            ("grid = { from = 0, to = 1, count = 1 }", "axis[2].grid.count = 1: must be 2 to"),
+            ("grid = { from = 0, to = 1, count = 3, log = true }", "axis[2].grid.from = 0: must be above 0"),
+            ("random = { from = 2, to = 1 }", "axis[2].random.to = 1: must be above axis[2].random.from, 2"),
+            ("random = { from = nan, to = 1 }", "axis[2].random.from = NaN: must be a finite number"),
+            ("latin = { from = 0.5, to = 3, integer = true }", "axis[2].latin.from = 0.5: must be a whole"),
+        ] {
+            let error = axis(text, 4).unwrap_err().to_string();
+            assert!(error.contains(told), "{error}");
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! What is drawn: numbers that depend on the seed, the axis and the sample alone, in whatever order they are asked for.
+
+/// The output function of SplitMix64 (Steele, Lea, Flood 2014): neighbours in, numbers out that have nothing in common.
+fn mixed(state: u64) -> u64 {
+    let z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// Its increment.
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// Where the numbers of an axis come from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stream(u64);
+
+impl Stream {
+    /// That of one axis.
+    pub(crate) fn new(seed: u64, axis: usize) -> Self {
+        Self(mixed(mixed(seed.wrapping_add(GOLDEN)).wrapping_add((axis as u64 + 1).wrapping_mul(GOLDEN))))
+    }
+
+    fn bits(self, index: usize) -> u64 {
+        mixed(self.0.wrapping_add((index as u64 + 1).wrapping_mul(GOLDEN)))
+    }
+
+    /// The number of that index, evenly distributed from 0 to 1, without 1.
+    pub(crate) fn unit(self, index: usize) -> f64 {
+        const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
+        (self.bits(index) >> 11) as f64 * UNIT
+    }
+
+    /// The numbers from 0 to `count` − 1, shuffled (Fisher and Yates).
+    pub(crate) fn shuffled(self, count: usize) -> Vec<u32> {
+        let mut order: Vec<u32> = (0..count as u32).collect();
+        // A stream of its own: the same indices of this one are drawn within the strata.
+        let places = Self(mixed(self.0));
+        for last in (1..count).rev() {
+            let place = (places.unit(last) * (last + 1) as f64) as usize;
+            order.swap(last, place.min(last));
+        }
+        order
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_even_and_streams_differ() {
+        let mean = |stream: Stream| (0..10_000).map(|k| stream.unit(k)).sum::<f64>() / 1e4;
+        let streams = [Stream::new(0, 0), Stream::new(0, 1), Stream::new(1, 0), Stream::new(u64::MAX, 0)];
+        for (k, stream) in streams.iter().enumerate() {
+            // Three standard deviations of a mean of ten thousand.
+            assert!((mean(*stream) - 0.5).abs() < 3.0 * (1.0 / 12.0f64 / 1e4).sqrt(), "{}", mean(*stream));
+            assert!(streams[..k].iter().all(|other| other.unit(0) != stream.unit(0)));
+        }
+        // They never change: tables that were made tell their seeds.
+        assert_eq!(Stream::new(1, 0).bits(0), Stream::new(1, 0).bits(0));
+    }
+
+    #[test]
+    fn a_shuffle_has_each_number_once() {
+        let order = Stream::new(3, 0).shuffled(1000);
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..1000).collect::<Vec<u32>>());
+        let still = order.iter().enumerate().filter(|(k, n)| *k as u32 == **n).count();
+        assert!(still < 10, "{still} stay where they were");
+        assert_eq!(Stream::new(3, 0).shuffled(0), Vec::<u32>::new());
+    }
+}

@@ -1,0 +1,238 @@
+//! Sweep files.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use endowire_core::input::from_toml;
+use endowire_core::{Error, Result};
+use endowire_methods::Scene;
+use serde::Deserialize;
+use toml::Value;
+
+use crate::axis::{Axis, AxisSpec, RUN_LIMIT};
+use crate::key::Key;
+use crate::provenance::hash_inputs;
+use crate::row::{Columns, ParameterKind};
+use crate::run::Run;
+
+/// A sweep file as it is written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SweepSpec {
+    scene: PathBuf,
+    #[serde(default)]
+    seed: u64,
+    samples: Option<usize>,
+    record: Option<Recorded>,
+    #[serde(default)]
+    set: BTreeMap<String, Value>,
+    #[serde(default)]
+    axis: Vec<AxisSpec>,
+}
+
+/// What is kept of each run beside its row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Recorded {
+    /// Its recording without frames.
+    Shapes,
+    /// Its recording with the frames that `[view]` of the scene asks for.
+    Frames,
+}
+
+/// One scene and the values that its keys take.
+#[derive(Debug)]
+pub struct Sweep {
+    scene_path: PathBuf,
+    /// The scene with what `[set]` says.
+    base: Value,
+    axes: Vec<Axis>,
+    samples: usize,
+    recorded: Option<Recorded>,
+    columns: Columns,
+    hash: String,
+}
+
+impl Sweep {
+    /// Reads a sweep file and its scene; every value of a list and the ends of every range are tried in the scene.
+    ///
+    /// # Errors
+    /// Names file, key and value of what does not fit: a key that the scene does not know, a value that its key does not take, an axis
+    /// without values, more than a million runs.
+    pub fn read(path: &Path) -> Result<Self> {
+        let (spec, text): (SweepSpec, String) = from_toml(path)?;
+        let at_path = |error: Error| match error {
+            Error::Parameter { .. } => Error::content(path, error.to_string()),
+            other => other,
+        };
+        let scene_path = path.parent().unwrap_or(Path::new("")).join(&spec.scene);
+        let scene = Scene::read(&scene_path).map_err(|error| match error {
+            Error::File { source, .. } => {
+                Error::content(path, format!("scene = {}: {source}", scene_path.display()))
+            }
+            other => other,
+        })?;
+        let mut base = toml::from_str::<Value>(scene.text())
+            .map_err(|error| Error::content(&scene_path, error.message().to_owned()))?;
+        for (key, value) in &spec.set {
+            let key = Key::parse(key).map_err(at_path)?;
+            try_in(&scene_path, &base, &key, value).map_err(|e| in_table(path, "[set]", &e))?;
+            key.set(&mut base, value.clone()).map_err(at_path)?;
+        }
+        let samples = samples(&spec).map_err(at_path)?;
+        let axes = spec.axis.iter().enumerate();
+        let axes = axes.map(|(index, axis)| Axis::new(axis, index, spec.seed, samples));
+        let axes: Vec<Axis> = axes.collect::<Result<_>>().map_err(at_path)?;
+        check_axes(&axes, &spec).map_err(at_path)?;
+        for (index, axis) in axes.iter().enumerate() {
+            for value in axis.examples() {
+                let tried = try_in(&scene_path, &base, &axis.key, &value);
+                tried.map_err(|e| in_table(path, &format!("axis[{index}]"), &e))?;
+            }
+        }
+        let base_scene = scene_of(&scene_path, &base)?;
+        if base_scene.script.is_empty() && axes.iter().all(|axis| axis.key.begins() != "script") {
+            let reason = "script = []: give at least one [[script]] table, what the hand does";
+            return Err(Error::content(&scene_path, reason));
+        }
+        let mut inputs = vec![text.into_bytes(), scene.text().as_bytes().to_vec()];
+        for input in base_scene.input_paths() {
+            inputs.push(endowire_core::file::read(&input, u64::MAX)?);
+        }
+        let parameters = axes.iter().map(|axis| (axis.key.to_string(), ParameterKind::of(&axis.examples())));
+        let instruments = base_scene.instrument.iter().map(|one| one.name.clone());
+        let columns = Columns { parameters: parameters.collect(), instruments: instruments.collect() };
+        let recorded = spec.record;
+        Ok(Self { scene_path, base, axes, samples, recorded, columns, hash: hash_inputs(&inputs) })
+    }
+
+    /// Number of runs.
+    pub fn len(&self) -> usize {
+        self.axes.iter().map(Axis::crossed).product::<usize>() * self.samples
+    }
+
+    /// Whether there are none; there is always one.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// What is kept of each run beside its row.
+    pub fn recorded(&self) -> Option<Recorded> {
+        self.recorded
+    }
+
+    /// SHA-256 of the sweep, its scene and the files that the scene names.
+    pub(crate) fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    pub(crate) fn columns(&self) -> &Columns {
+        &self.columns
+    }
+
+    /// The run of that number, from 0: the last axis goes fastest, and samples faster still.
+    pub fn run(&self, number: usize) -> Run<'_> {
+        let (mut rest, sample) = (number / self.samples, number % self.samples);
+        let mut values: Vec<Value> = Vec::with_capacity(self.axes.len());
+        for axis in self.axes.iter().rev() {
+            values.push(axis.value(rest % axis.crossed(), sample));
+            rest /= axis.crossed();
+        }
+        values.reverse();
+        Run { sweep: self, number, values }
+    }
+
+    /// The scene with these values of the axes.
+    pub(crate) fn scene(&self, values: &[Value]) -> Result<Value> {
+        let mut scene = self.base.clone();
+        for (axis, value) in self.axes.iter().zip(values) {
+            axis.key.set(&mut scene, value.clone())?;
+        }
+        Ok(scene)
+    }
+
+    /// The file that all scenes are variants of: paths start from its folder.
+    pub(crate) fn scene_path(&self) -> &Path {
+        &self.scene_path
+    }
+}
+
+/// Number of samples: 1 where nothing is drawn.
+fn samples(spec: &SweepSpec) -> Result<usize> {
+    let drawn = spec.axis.iter().any(|axis| axis.random.is_some() || axis.latin.is_some());
+    match (spec.samples, drawn) {
+        (None, false) => Ok(1),
+        (Some(samples), true) if (1..=RUN_LIMIT).contains(&samples) => Ok(samples),
+        (Some(samples), true) => {
+            Err(Error::parameter("samples", samples, format!("must be 1 to {RUN_LIMIT}")))
+        }
+        (Some(samples), false) => {
+            let mend = "nothing is drawn: leave it out, or give an axis random or latin";
+            Err(Error::parameter("samples", samples, mend))
+        }
+        (None, true) => {
+            let mend = "an axis is drawn: say how many runs each combination of lists and grids has";
+            Err(Error::parameter("samples", "none", mend))
+        }
+    }
+}
+
+fn check_axes(axes: &[Axis], spec: &SweepSpec) -> Result<()> {
+    for (index, axis) in axes.iter().enumerate() {
+        let name = format!("axis[{index}].key");
+        if axes[..index].iter().any(|other| other.key == axis.key) {
+            return Err(Error::parameter(
+                name,
+                &axis.key,
+                "is the key of another axis too: keep one of them",
+            ));
+        }
+        if spec.set.contains_key(&axis.key.to_string()) {
+            return Err(Error::parameter(name, &axis.key, "is given in [set] too: keep one of the two"));
+        }
+        if axis.key.begins() == "view" && spec.record != Some(Recorded::Frames) {
+            let mend = "a view changes no row: give record = \"frames\", or leave the axis out";
+            return Err(Error::parameter(name, &axis.key, mend));
+        }
+    }
+    let runs = axes.iter().try_fold(1usize, |runs, axis| runs.checked_mul(axis.crossed()));
+    let runs = runs.and_then(|runs| runs.checked_mul(spec.samples.unwrap_or(1)));
+    match runs {
+        Some(runs) if runs <= RUN_LIMIT => Ok(()),
+        _ => {
+            let runs = runs.map_or("more than can be counted".to_owned(), |runs| runs.to_string());
+            Err(Error::parameter("axis", format!("{runs} runs"), format!("at most {RUN_LIMIT} in all")))
+        }
+    }
+}
+
+/// The scene that a document says.
+pub(crate) fn scene_of(path: &Path, document: &Value) -> Result<Scene> {
+    Scene::from_toml(&text_of(path, document)?, path)
+}
+
+/// A document as the text of a scene file.
+pub(crate) fn text_of(path: &Path, document: &Value) -> Result<String> {
+    toml::to_string(document).map_err(|error| Error::content(path, error.to_string()))
+}
+
+/// Whether the scene takes this value.
+fn try_in(scene_path: &Path, base: &Value, key: &Key, value: &Value) -> Result<()> {
+    let mut tried = base.clone();
+    key.set(&mut tried, value.clone())?;
+    scene_of(scene_path, &tried).map(drop).map_err(|error| match error {
+        Error::Content { reason, .. } => Error::parameter(key, value, without_line(&reason)),
+        other => other,
+    })
+}
+
+/// The reason without the number of a line that nobody has written.
+fn without_line(reason: &str) -> &str {
+    let rest = reason.strip_prefix("line ").and_then(|rest| rest.split_once(": "));
+    rest.filter(|(number, _)| number.parse::<usize>().is_ok()).map_or(reason, |(_, rest)| rest)
+}
+
+/// The same error, of a table of the sweep file.
+fn in_table(path: &Path, table: &str, error: &Error) -> Error {
+    Error::content(path, format!("{table}: {error}"))
+}

@@ -1,0 +1,137 @@
+//! Keys of a scene file, and giving them values.
+
+use std::fmt;
+
+use endowire_core::{Error, Result};
+use toml::{Table, Value};
+
+/// A key of a scene file as it is written in a sweep: names with dots between them, and the number of one of several tables in brackets, as
+/// in `device.section[0].radius_mm`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Key {
+    text: String,
+    parts: Vec<Part>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Part {
+    Name(String),
+    Index(usize),
+}
+
+impl Key {
+    /// Reads a key.
+    ///
+    /// # Errors
+    /// Text that is no key ([`Error::Parameter`]).
+    pub fn parse(text: &str) -> Result<Self> {
+        let parts: Option<Vec<Vec<Part>>> = text.split('.').map(part).collect();
+        match parts {
+            Some(parts) => Ok(Self { text: text.to_owned(), parts: parts.concat() }),
+            None => {
+                let mend =
+                    "write a key of the scene as in vessel.wall.friction or device.section[0].radius_mm";
+                Err(Error::parameter("key", format!("{text:?}"), mend))
+            }
+        }
+    }
+
+    /// The first name: that of a table or key of the scene itself.
+    pub(crate) fn begins(&self) -> &str {
+        match self.parts.first() {
+            Some(Part::Name(name)) => name,
+            _ => "",
+        }
+    }
+
+    /// Gives the key of `scene` a value; tables on the way that are not there are made.
+    ///
+    /// # Errors
+    /// A way through what is no table, or to one of several that is not there ([`Error::Parameter`]).
+    pub fn set(&self, scene: &mut Value, value: Value) -> Result<()> {
+        let mut place = scene;
+        for part in &self.parts {
+            place = match (part, place) {
+                (Part::Name(name), Value::Table(table)) => {
+                    table.entry(name.as_str()).or_insert_with(|| Value::Table(Table::new()))
+                }
+                (Part::Index(index), Value::Array(list)) => {
+                    let count = list.len();
+                    list.get_mut(*index).ok_or_else(|| {
+                        let mend = format!("the scene has {count} in that list, and [0] is the first");
+                        Error::parameter(&self.text, &value, mend)
+                    })?
+                }
+                (Part::Name(name), _) => {
+                    let mend = format!("what {name} should lie in is no table of the scene");
+                    return Err(Error::parameter(&self.text, &value, mend));
+                }
+                (Part::Index(index), _) => {
+                    let mend = format!("the scene has no list where [{index}] is asked for");
+                    return Err(Error::parameter(&self.text, &value, mend));
+                }
+            };
+        }
+        *place = value;
+        Ok(())
+    }
+}
+
+/// The name of one part of a key, and the numbers behind it.
+fn part(text: &str) -> Option<Vec<Part>> {
+    let (name, numbers) = text.find('[').map_or((text, ""), |at| text.split_at(at));
+    let is_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+    if name.is_empty() || !name.chars().all(is_name) {
+        return None;
+    }
+    let mut parts = vec![Part::Name(name.to_owned())];
+    let mut rest = numbers;
+    while !rest.is_empty() {
+        let (number, behind) = rest.strip_prefix('[')?.split_once(']')?;
+        parts.push(Part::Index(number.parse().ok()?));
+        rest = behind;
+    }
+    Some(parts)
+}
+
+impl fmt::Display for Key {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene() -> Value {
+        Value::Table(toml::from_str("seed = 1\n[[script]]\nadvance_mm = 1.0\n[[script]]\n").unwrap())
+    }
+
+    #[test]
+    fn a_key_is_set_where_it_is_and_made_where_it_is_not() {
+        let mut scene = scene();
+        for (key, value) in [("seed", 7), ("script[1].rotate_deg", 8), ("vessel.wall.friction", 9)] {
+            Key::parse(key).unwrap().set(&mut scene, value.into()).unwrap();
+        }
+        assert_eq!(scene["seed"].as_integer(), Some(7));
+        assert_eq!(scene["script"][0]["advance_mm"].as_float(), Some(1.0));
+        assert_eq!(scene["script"][1]["rotate_deg"].as_integer(), Some(8));
+        assert_eq!(scene["vessel"]["wall"]["friction"].as_integer(), Some(9));
+    }
+
+    #[test]
+    fn what_is_no_key_or_leads_nowhere_is_refused() {
+        for wrong in ["", "a..b", "a[", "a[x]", "a[1", "[0]", "a b", "a[0]b"] {
+            assert!(Key::parse(wrong).unwrap_err().to_string().contains("vessel.wall.friction"), "{wrong}");
+        }
+        for (key, told) in [
+            ("script[2].advance_mm", "script[2].advance_mm = 1: the scene has 2"),
+            ("seed.first", "seed.first = 1: what first should lie in is no table"),
+            ("device.section[0]", "device.section[0] = 1: the scene has no list"),
+        ] {
+            let error = Key::parse(key).unwrap().set(&mut scene(), 1.into()).unwrap_err().to_string();
+            assert!(error.starts_with(told), "{error}");
+        }
+    }
+}

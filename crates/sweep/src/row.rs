@@ -1,0 +1,88 @@
+//! Rows: what is kept of each run.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value as Json;
+use toml::Value;
+
+use crate::outcome::RunOutcome;
+
+/// What is kept of a run: its parameters, what it has come to, and where that comes from. There are no times in it, so that a run that is
+/// done again gives the same bytes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Number of the run, from 0.
+    pub run: usize,
+    /// Values of the axes, in their order.
+    pub parameters: Vec<Json>,
+    /// What the run has come to; none where it could not begin.
+    pub outcome: Option<RunOutcome>,
+    /// Why it could not begin.
+    pub refused: Option<String>,
+    /// SHA-256 of the scene as it was run and of the files that it names.
+    pub scene_hash: String,
+    /// Seed of the scene.
+    pub seed: u64,
+    /// Version of the program.
+    pub version: String,
+    /// Revision of its source.
+    pub git_revision: String,
+}
+
+impl Row {
+    /// Why the run did not do all of its script.
+    pub fn failure(&self) -> Option<&str> {
+        let step = self.outcome.as_ref().and_then(|outcome| outcome.failure.as_ref());
+        self.refused.as_deref().or(step.map(|failure| failure.reason.as_str()))
+    }
+}
+
+/// What of its columns a table has from its sweep.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Columns {
+    /// Keys of the axes, and what their values are.
+    pub(crate) parameters: Vec<(String, ParameterKind)>,
+    /// Names of several instruments.
+    pub(crate) instruments: Vec<String>,
+}
+
+/// What the values of an axis are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum ParameterKind {
+    Boolean,
+    Integer,
+    Number,
+    Text,
+    /// Lists, tables, or values of several kinds: as JSON.
+    Json,
+}
+
+impl ParameterKind {
+    pub(crate) fn of(values: &[Value]) -> Self {
+        let all = |is: fn(&Value) -> bool| values.iter().all(is);
+        if all(Value::is_bool) {
+            Self::Boolean
+        } else if all(Value::is_integer) {
+            Self::Integer
+        } else if all(|value| value.is_integer() || value.is_float()) {
+            Self::Number
+        } else if all(Value::is_str) {
+            Self::Text
+        } else {
+            Self::Json
+        }
+    }
+}
+
+/// A value of a scene file as JSON.
+pub(crate) fn json(value: &Value) -> Json {
+    match value {
+        Value::String(text) => Json::from(text.as_str()),
+        Value::Integer(number) => Json::from(*number),
+        Value::Float(number) => Json::from(*number),
+        Value::Boolean(truth) => Json::from(*truth),
+        Value::Datetime(time) => Json::from(time.to_string()),
+        Value::Array(list) => list.iter().map(json).collect(),
+        Value::Table(table) => table.iter().map(|(key, value)| (key.clone(), json(value))).collect(),
+    }
+}

@@ -1,0 +1,205 @@
+//! Rows as one Parquet file.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use endowire_core::{Error, Result};
+use parquet::basic::{LogicalType, Repetition, Type as PhysicalType};
+use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use parquet::errors::Result as ParquetResult;
+use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
+use parquet::schema::types::{Type, TypePtr};
+use serde_json::Value as Json;
+
+use crate::outcome::{InstrumentOutcome, RunOutcome};
+use crate::row::{Columns, ParameterKind, Row};
+
+/// The values of a column, one a row.
+enum Cells {
+    Booleans(Vec<Option<bool>>),
+    Integers(Vec<Option<i64>>),
+    Numbers(Vec<Option<f64>>),
+    Texts(Vec<Option<String>>),
+}
+
+struct Column {
+    name: String,
+    cells: Cells,
+}
+
+/// Writes rows in the order of their runs into a file that is there whole or not at all.
+///
+/// # Errors
+/// A file that cannot be written.
+pub(crate) fn write(path: &Path, columns: &Columns, rows: &[Row]) -> Result<()> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let part = Path::new(&part);
+    let columns = self::columns(columns, rows);
+    let written = File::create(part)
+        .map_err(|e| Error::file(path, e))
+        .and_then(|file| write_to(file, &columns).map_err(|e| Error::content(path, e.to_string())))
+        .and_then(|()| std::fs::rename(part, path).map_err(|e| Error::file(path, e)));
+    if written.is_err() {
+        // What is left of it is of no use, and the first failure is the one to tell.
+        let _ = std::fs::remove_file(part);
+    }
+    written
+}
+
+/// All columns of a table.
+fn columns(columns: &Columns, rows: &[Row]) -> Vec<Column> {
+    let mut all = vec![integers("run", rows, |row| Some(row.run as i64))];
+    for (index, (key, kind)) in columns.parameters.iter().enumerate() {
+        all.push(parameter(key, *kind, rows, index));
+    }
+    all.extend(results(rows));
+    for (index, name) in columns.instruments.iter().enumerate() {
+        all.extend(instrument(name, index, rows));
+    }
+    all.push(texts("scene_hash", rows, |row| Some(row.scene_hash.clone())));
+    // An axis may be the scene's seed.
+    if columns.parameters.iter().all(|(key, _)| key != "seed") {
+        all.push(integers("seed", rows, |row| i64::try_from(row.seed).ok()));
+    }
+    all.push(texts("version", rows, |row| Some(row.version.clone())));
+    all.push(texts("git_revision", rows, |row| Some(row.git_revision.clone())));
+    all
+}
+
+/// The values of an axis.
+fn parameter(key: &str, kind: ParameterKind, rows: &[Row], index: usize) -> Column {
+    let value = |row: &Row| row.parameters[index].clone();
+    match kind {
+        ParameterKind::Boolean => Column {
+            name: key.to_owned(),
+            cells: Cells::Booleans(rows.iter().map(|row| value(row).as_bool()).collect()),
+        },
+        ParameterKind::Integer => integers(key, rows, |row| value(row).as_i64()),
+        ParameterKind::Number => numbers(key, rows, |row| value(row).as_f64()),
+        ParameterKind::Text => texts(key, rows, |row| value(row).as_str().map(str::to_owned)),
+        ParameterKind::Json => texts(key, rows, |row| Some(value(row).to_string())),
+    }
+}
+
+/// What runs have come to.
+fn results(rows: &[Row]) -> Vec<Column> {
+    let integer = |name: &str, of: fn(&RunOutcome) -> Option<i64>| {
+        integers(name, rows, |row| row.outcome.as_ref().and_then(of))
+    };
+    let number = |name: &str, of: fn(&RunOutcome) -> Option<f64>| {
+        numbers(name, rows, |row| row.outcome.as_ref().and_then(of))
+    };
+    let count = |number: usize| Some(number as i64);
+    let converged = |row: &Row| Some(row.outcome.as_ref().is_some_and(|outcome| outcome.converged));
+    let until = |row: &Row| {
+        let lines = row.outcome.as_ref().filter(|outcome| !outcome.until.is_empty())?;
+        serde_json::to_value(&lines.until).ok().as_ref().map(Json::to_string)
+    };
+    vec![
+        integers("steps", rows, |row| count(row.outcome.as_ref().map_or(0, |o| o.steps))),
+        integer("steps_asked", |o| Some(o.steps_asked as i64)),
+        Column { name: "converged".to_owned(), cells: Cells::Booleans(rows.iter().map(converged).collect()) },
+        integer("failed_step", |o| o.failure.as_ref().map(|failure| failure.step as i64)),
+        texts("failure", rows, |row| row.failure().map(str::to_owned)),
+        number("inserted_mm", |o| Some(o.inserted_mm)),
+        number("rotation_rad", |o| Some(o.rotation_rad)),
+        number("tip_x_mm", |o| o.tip_mm.map(|tip| tip[0])),
+        number("tip_y_mm", |o| o.tip_mm.map(|tip| tip[1])),
+        number("tip_z_mm", |o| o.tip_mm.map(|tip| tip[2])),
+        number("push_force_n", |o| Some(o.push_force_n)),
+        number("torque_nmm", |o| Some(o.torque_nmm)),
+        number("bend_mj", |o| Some(o.energy_mj.bend)),
+        number("twist_mj", |o| Some(o.energy_mj.twist)),
+        number("wall_mj", |o| Some(o.energy_mj.wall)),
+        number("max_penetration_mm", |o| Some(o.max_penetration_mm)),
+        integer("left_through", |o| o.left_through.map(|opening| opening as i64)),
+        texts("until", rows, until),
+    ]
+}
+
+/// What one of several instruments has come to.
+fn instrument(name: &str, index: usize, rows: &[Row]) -> Vec<Column> {
+    let number = |what: &str, of: fn(&InstrumentOutcome) -> Option<f64>| {
+        let one =
+            |row: &Row| row.outcome.as_ref().and_then(|outcome| outcome.instruments.get(index)).and_then(of);
+        numbers(&format!("{name}.{what}"), rows, one)
+    };
+    vec![
+        number("inserted_mm", |one| Some(one.report.inserted_mm)),
+        number("rotation_rad", |one| Some(one.report.rotation_rad)),
+        number("tip_rotation_rad", |one| Some(one.report.tip_rotation_rad)),
+        number("push_force_n", |one| one.report.push_force_n),
+        number("torque_nmm", |one| Some(one.report.torque_nmm)),
+    ]
+}
+
+fn integers(name: &str, rows: &[Row], of: impl Fn(&Row) -> Option<i64>) -> Column {
+    Column { name: name.to_owned(), cells: Cells::Integers(rows.iter().map(of).collect()) }
+}
+
+fn numbers(name: &str, rows: &[Row], of: impl Fn(&Row) -> Option<f64>) -> Column {
+    Column { name: name.to_owned(), cells: Cells::Numbers(rows.iter().map(of).collect()) }
+}
+
+fn texts(name: &str, rows: &[Row], of: impl Fn(&Row) -> Option<String>) -> Column {
+    Column { name: name.to_owned(), cells: Cells::Texts(rows.iter().map(of).collect()) }
+}
+
+/// Writes one group of rows.
+fn write_to(file: File, columns: &[Column]) -> ParquetResult<()> {
+    let types = columns.iter().map(Column::parquet_type).collect::<ParquetResult<Vec<TypePtr>>>()?;
+    let schema = Type::group_type_builder("runs").with_fields(types).build()?;
+    let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::default())?;
+    let mut group = writer.next_row_group()?;
+    for column in columns {
+        if let Some(writer) = group.next_column()? {
+            column.write(writer)?;
+        }
+    }
+    group.close()?;
+    // Ends the file with its footer.
+    writer.into_inner()?.sync_all()?;
+    Ok(())
+}
+
+impl Column {
+    fn parquet_type(&self) -> ParquetResult<TypePtr> {
+        let (physical, logical) = match self.cells {
+            Cells::Booleans(_) => (PhysicalType::BOOLEAN, None),
+            Cells::Integers(_) => (PhysicalType::INT64, None),
+            Cells::Numbers(_) => (PhysicalType::DOUBLE, None),
+            Cells::Texts(_) => (PhysicalType::BYTE_ARRAY, Some(LogicalType::String)),
+        };
+        Type::primitive_type_builder(&self.name, physical)
+            .with_repetition(Repetition::OPTIONAL)
+            .with_logical_type(logical)
+            .build()
+            .map(Arc::new)
+    }
+
+    fn write(&self, writer: SerializedColumnWriter<'_>) -> ParquetResult<()> {
+        match &self.cells {
+            Cells::Booleans(cells) => write_cells::<BoolType>(writer, cells.iter().copied()),
+            Cells::Integers(cells) => write_cells::<Int64Type>(writer, cells.iter().copied()),
+            Cells::Numbers(cells) => write_cells::<DoubleType>(writer, cells.iter().copied()),
+            Cells::Texts(cells) => {
+                let texts = cells.iter().map(|cell| cell.as_deref().map(ByteArray::from));
+                write_cells::<ByteArrayType>(writer, texts)
+            }
+        }
+    }
+}
+
+/// Writes the values that are there, and where they are.
+fn write_cells<T: DataType>(
+    mut writer: SerializedColumnWriter<'_>,
+    cells: impl Iterator<Item = Option<T::T>>,
+) -> ParquetResult<()> {
+    let cells: Vec<Option<T::T>> = cells.collect();
+    let there: Vec<i16> = cells.iter().map(|cell| i16::from(cell.is_some())).collect();
+    let values: Vec<T::T> = cells.into_iter().flatten().collect();
+    writer.typed::<T>().write_batch(&values, Some(&there), None)?;
+    writer.close()
+}
