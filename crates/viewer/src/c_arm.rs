@@ -26,6 +26,7 @@
 use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result, Vec3};
 
+use crate::fingerprint::fingerprint;
 use crate::spec::{CArmSpec, PITCH_MM};
 
 /// Part of the half frame that the vessel fills where the pixel pitch is left to us.
@@ -232,6 +233,46 @@ impl CArm {
             let [x, y] = self.slopes(pixel);
             self.source_mm() + (self.axes[0] * x + self.axes[1] * y + self.axes[2]) * self.sid_mm
         })
+    }
+
+    /// A number of the geometry, blades apart: what they leave open stays as it is when they move.
+    pub(crate) fn fingerprint(&self) -> u128 {
+        let axes = self.axes.iter().flatten();
+        let places = axes.chain(&self.isocentre_mm).copied().chain([self.sid_mm, self.sod_mm, self.pixel_mm]);
+        // 0 and -0 are one place.
+        let bytes = places.flat_map(|x| (x + 0.0).to_bits().to_le_bytes());
+        fingerprint(bytes.chain(self.size_px.into_iter().flat_map(u32::to_le_bytes)))
+    }
+
+    /// The 3 × 4 matrix, row by row, that takes (x, y, z, 1) in mm to (u w, v w, w): pixel coordinates times the depth from the source in
+    /// mm.
+    pub fn matrix(&self) -> [[f64; 4]; 3] {
+        let [w, h] = self.size_px.map(f64::from);
+        let [across, down, depth] = self.axes;
+        let rows =
+            [across * self.focal_px() + depth * (w / 2.0), down * self.focal_px() + depth * (h / 2.0), depth];
+        rows.map(|row| [row.x, row.y, row.z, -row.dot(&self.source_mm())])
+    }
+
+    /// Where columns and rows run in the words of DICOM (L, R, A, P, H, F), the strongest first.
+    pub(crate) fn directions(&self) -> [String; 2] {
+        // Parts of less than the sine of about a degree are not told.
+        const LEAST: f64 = 0.02;
+        [0, 1].map(|k| {
+            let axis = &self.axes[k];
+            let names = [['L', 'R'], ['P', 'A'], ['H', 'F']].into_iter().zip(axis.iter());
+            let mut parts: Vec<(f64, char)> = names
+                .map(|([plus, minus], x)| (x.abs(), if *x > 0.0 { plus } else { minus }))
+                .filter(|part| part.0 > LEAST)
+                .collect();
+            parts.sort_by(|a, b| b.0.total_cmp(&a.0));
+            parts.into_iter().map(|part| part.1).collect()
+        })
+    }
+
+    /// Depth of a point from the source along the central ray, mm.
+    pub fn depth_mm(&self, point_mm: &Vec3) -> f64 {
+        self.sod_mm + self.in_beam(point_mm).z
     }
 
     /// The point that all rotations leave in place.

@@ -8,7 +8,8 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree};
 use endowire_viewer::{
-    Backend, DetectorSpec, DeviceView, Image, InjectionSpec, Mode, Moment, Renderer, TorsoSpec, ViewSpec,
+    Backend, DetectorSpec, DeviceView, Image, InjectionSpec, Material, Mode, Moment, Renderer, TorsoSpec,
+    ViewSpec,
 };
 
 /// A straight vessel along z with its centre line, blood rising; contrast medium from 1 s to 2 s.
@@ -235,6 +236,39 @@ fn an_injection_without_a_centre_line_and_a_missing_tomogram_are_refused_by_key(
 }
 
 #[test]
+fn path_lengths_know_the_contrast_medium_of_a_moment_and_add_up() {
+    let folder = folder("raw");
+    let (mut view, wall) = scene(&folder, Mode::Fluoro);
+    view.xray.energy_kev = Some(60.0);
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    let before = renderer.path_lengths(&[wire()]).unwrap();
+    assert!(before.contrast_mm.is_empty());
+    let paths = renderer.path_lengths_at(&[wire()], 1.9).unwrap();
+    let injected: f32 = paths.contrast_mm.iter().sum();
+    assert!(injected > 100.0, "{injected}");
+    let line: Vec<f64> = renderer.transmission(&paths).unwrap().iter().map(|t| -f64::from(*t).ln()).collect();
+    let mu = |material: Material| material.attenuation_per_mm(60.0).unwrap();
+    let sum = |i: usize| {
+        let devices: f64 = paths.devices_mm.iter().map(|(m, map)| mu(*m) * f64::from(map[i])).sum();
+        let inside: f64 = paths.devices_mm.iter().map(|map| f64::from(map.1[i])).sum();
+        let [body, lumen, contrast] =
+            [paths.body_mm[i], paths.lumen_mm[i], paths.contrast_mm[i]].map(f64::from);
+        mu(Material::SoftTissue) * (body - lumen).max(0.0)
+            + mu(Material::Blood) * (lumen - inside - contrast)
+            + mu(Material::Contrast370) * contrast
+            + devices
+    };
+    for (i, line) in line.iter().enumerate() {
+        assert!((line - sum(i)).abs() < 1e-5 * sum(i).max(1.0), "{i}: {line} {}", sum(i));
+    }
+    // The twin: without the medium the sum is another.
+    let without = renderer.transmission(&before).unwrap();
+    let most = without.iter().zip(&line).map(|(t, line)| line + f64::from(*t).ln()).fold(0.0, f64::max);
+    assert!(most > 0.05, "{most}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn labels_say_where_the_device_is_in_the_frame() {
     let folder = folder("labels");
     let (mut view, wall) = scene(&folder, Mode::Fluoro);
@@ -249,7 +283,7 @@ fn labels_say_where_the_device_is_in_the_frame() {
     assert!(labels.contacts[0].visible && !labels.contacts[1].visible, "the blades hide the second");
     // The mask is the wire: its columns are within the wire's width of the centre line.
     let marked: Vec<usize> = (0..labels.mask.data().len()).filter(|&i| labels.mask.data()[i] == 1).collect();
-    assert!(marked.len() > 60);
+    assert!(marked.len() > 50);
     for i in marked {
         let pixel = pixel_centre(i, 160);
         let nearest = label.centre_line_px.windows(2).map(|p| {

@@ -8,7 +8,9 @@ use endowire_core::insertion::Simulation;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_methods::Scene;
-use endowire_viewer::{Angiogram, Animation, ContactView, Frames, Image, Moment, Renderer, View, ViewSpec};
+use endowire_viewer::{
+    Angiogram, Animation, ContactView, Frames, Image, Labels, Mask, Moment, Renderer, View, ViewSpec,
+};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -258,11 +260,15 @@ impl<'a> Studio<'a> {
             let labels = self.renderer.labels(&device, &contacts)?;
             let path = self.file(&format!("{}_mask.png", still.name))?;
             labels.mask.write_png(&path)?;
+            for (name, mask) in masks(&labels) {
+                let path = self.file(&format!("{}_{name}.png", still.name))?;
+                mask.image().write_png(&path)?;
+            }
             let path = self.file(&format!("{}_labels.json", still.name))?;
             std::fs::write(&path, to_json(&labels)? + "\n").map_err(|e| Failure::write(&path, &e))?;
         }
         if self.args.raw {
-            let paths = self.renderer.path_lengths(&device)?;
+            let paths = self.renderer.path_lengths_at(&device, still.moment.time_s)?;
             let line: Vec<f32> = self.renderer.transmission(&paths)?.iter().map(|t| -t.ln()).collect();
             let mut maps = vec![("line_integral".to_owned(), &line)];
             for (name, map) in [
@@ -270,6 +276,7 @@ impl<'a> Studio<'a> {
                 ("bone_mm", &paths.bone_mm),
                 ("lung_mm", &paths.lung_mm),
                 ("lumen_mm", &paths.lumen_mm),
+                ("contrast_mm", &paths.contrast_mm),
             ] {
                 if !map.is_empty() {
                     maps.push((name.to_owned(), map));
@@ -306,6 +313,8 @@ impl<'a> Studio<'a> {
                 c_arm,
                 kvp: self.spec.xray.kvp,
                 frames_per_s: self.spec.frames_per_s,
+                mode: self.spec.xray.mode,
+                contrast: !self.spec.injection.is_empty() || self.spec.xray.contrast_fraction > 0.0,
                 description: "endowire",
             };
             angiogram.write(path, &self.series)?;
@@ -313,6 +322,19 @@ impl<'a> Studio<'a> {
         }
         Ok(Written { renderer: self.renderer.backend().to_owned(), folder: self.folder, files: self.files })
     }
+}
+
+/// Masks of a frame: the vessel, each of several instruments, and each part of one.
+fn masks(labels: &Labels) -> Vec<(String, &Mask)> {
+    let mut named: Vec<(String, &Mask)> =
+        labels.vessel.iter().map(|mask| ("mask_vessel".to_owned(), mask)).collect();
+    for (k, device) in (1..).zip(&labels.devices) {
+        if labels.devices.len() > 1 {
+            named.push((format!("mask_{k}"), &device.mask));
+        }
+        named.extend((1..).zip(&device.parts).map(|(j, part)| (format!("mask_{k}_part_{j}"), &part.mask)));
+    }
+    named
 }
 
 /// A `[view]` table with the wishes of the command line.

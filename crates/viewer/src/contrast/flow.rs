@@ -15,7 +15,7 @@
 use endowire_core::vessel::CentrelineTree;
 use endowire_core::{Error, Result, Vec3};
 
-use crate::spec::{FlowSpec, InjectionSpec};
+use crate::spec::{FlowSpec, InjectionSpec, ViewSpec};
 
 /// Points of the tree are set at most this far apart, mm.
 const SPACING_MM: f64 = 2.0;
@@ -49,13 +49,34 @@ struct Bolus {
 
 /// The tree directed from its inlet, with its injections.
 #[derive(Debug, Clone)]
-pub(super) struct Flow {
+pub(crate) struct Flow {
     pub(super) nodes: Vec<Node>,
     boluses: Vec<Bolus>,
     dispersion: f64,
 }
 
 impl Flow {
+    /// The flow that the injections of `spec` go with; `None` where there are none.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] without a centre line or for one that cannot be followed; [`Error::Content`] for its file.
+    pub(crate) fn of_view(spec: &ViewSpec) -> Result<Option<Self>> {
+        if spec.injection.is_empty() {
+            return Ok(None);
+        }
+        let Some(path) = &spec.flow.tree else {
+            let mend = "contrast medium flows along a centre line; give view.flow.tree";
+            return Err(Error::parameter("view.injection", format!("{} tables", spec.injection.len()), mend));
+        };
+        let tree = CentrelineTree::read(path).map_err(|error| match error {
+            Error::File { path, source } => {
+                Error::parameter("view.flow.tree", path.display(), source.to_string())
+            }
+            other => other,
+        })?;
+        Self::new(&tree, &spec.flow, &spec.injection).map(Some)
+    }
+
     pub(super) fn new(tree: &CentrelineTree, spec: &FlowSpec, injections: &[InjectionSpec]) -> Result<Self> {
         let nodes = directed(tree, spec)?;
         let flow_mm3 = spec.inflow_ml_per_s * 1000.0;

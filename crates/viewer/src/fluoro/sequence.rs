@@ -60,7 +60,7 @@ impl Sequence {
         let share = spec.xray.harmonised as f32;
         let mask: Option<Vec<f32>> = (matches!(mode, Mode::Fluoro | Mode::Cine) && share > 0.0).then(|| {
             // Relative to the reference, whose logarithm is zero: the middle keeps its grey.
-            let values = logarithm(fluoroscope.still.signal.clone());
+            let values = logarithm(fluoroscope.unblocked().signal.clone());
             shading(&values, c_arm).iter().map(|v| share * v).collect()
         });
         let window = match (mode, spec.xray.window) {
@@ -80,10 +80,14 @@ impl Sequence {
             }
             (Mode::Roadmap, None) => ROADMAP_WINDOW,
         };
+        let kev = fluoroscope.beam.kev(c_arm.pixel_mm(), dose);
+        // n quanta of the energy ε vary by √n ε.
+        let electronic = fluoroscope.beam.kev(c_arm.pixel_mm(), spec.detector.electronic_ngy);
+        let electronic_kev = (electronic * fluoroscope.beam.quantum_kev()).sqrt();
         Self {
-            detector: Detector::new(&spec.detector, spec.detector.seed, c_arm.size_px(), c_arm.pixel_mm()),
+            detector: Detector::new(&spec.detector, &spec.xray, c_arm, electronic_kev),
             mode,
-            kev: fluoroscope.beam.kev(c_arm.pixel_mm(), dose),
+            kev,
             window,
             bits: spec.bits,
             noisy: spec.detector.noise,
@@ -110,8 +114,7 @@ impl Sequence {
         // The injections of a roadmap are those of its angiogram.
         let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
         let signal = fluoroscope.signal(engine, devices, time)?;
-        let read = self.detector.read(&signal.signal, &signal.energy, self.kev, moment.frame);
-        drop(signal);
+        let read = self.detector.read(signal.signal, signal.energy, self.kev, moment.frame);
         let mut values = logarithm(read);
         if let Some(mask) = &self.mask {
             values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
@@ -163,7 +166,8 @@ impl Sequence {
         let mut mean = vec![0.0; signal.signal.len()];
         for k in 0..MASK_FRAMES {
             self.detector.reset();
-            let read = self.detector.read(&signal.signal, &signal.energy, kev, MASK_NUMBERS + k);
+            let read =
+                self.detector.read(signal.signal.clone(), signal.energy.clone(), kev, MASK_NUMBERS + k);
             mean.iter_mut().zip(read).for_each(|(mean, v)| *mean += v / MASK_FRAMES as f32);
         }
         self.detector.reset();
@@ -182,4 +186,54 @@ fn strongest(fluoroscope: &Fluoroscope) -> f32 {
     }
     let place = ((values.len() - 1) as f64 * (1.0 - DSA_OUTLIERS)).round() as usize;
     values.select_nth_unstable_by(place, f32::total_cmp).1.max(FAINTEST)
+}
+
+#[cfg(test)]
+mod tests {
+    use endowire_core::Vec3;
+    use endowire_core::vessel::SurfaceMesh;
+
+    use super::*;
+    use crate::cpu;
+    use crate::scene::Setup;
+    use crate::spec::{DetectorSpec, TorsoSpec, View};
+
+    /// What a frame of a trunk shows of each pixel, the mask of that display, and where the blades leave all open.
+    fn shown(collimation_mm: Option<[f64; 2]>) -> (Vec<f32>, Vec<f32>, Vec<bool>) {
+        let wall = SurfaceMesh {
+            vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        };
+        let mut spec = ViewSpec { views: vec![View::Fluoro], size_px: [128, 128], ..ViewSpec::default() };
+        spec.detector = DetectorSpec::ideal();
+        spec.patient.torso = Some(TorsoSpec::default());
+        spec.c_arm.field_mm = Some(200.0);
+        spec.c_arm.collimation_mm = collimation_mm;
+        let setup = Setup::new(&spec, &wall).unwrap();
+        let mut engine = cpu::CpuPaths;
+        let scope = Fluoroscope::new(&setup, setup.c_arm.as_ref().unwrap(), &mut engine).unwrap();
+        let sequence = Sequence::new(&spec, &scope);
+        let mask = sequence.mask.unwrap();
+        let values = logarithm(scope.still.signal.clone()).iter().zip(&mask).map(|(v, m)| v - m).collect();
+        (values, mask, (0..128 * 128).map(|i| scope.c_arm.openness(i) == 1.0).collect())
+    }
+
+    #[test]
+    fn blades_that_close_elsewhere_change_no_open_pixel() {
+        let (whole, _, _) = shown(None);
+        let (closed, mask, open) = shown(Some([90.0, 70.0]));
+        let most = |values: &[f32]| {
+            let open = (0..whole.len()).filter(|&i| open[i]);
+            open.map(|i| f64::from((values[i] - whole[i]) / whole[i]).abs()).fold(0.0, f64::max)
+        };
+        assert!(most(&closed) <= 1e-6, "{}", most(&closed));
+        // The twin: shading of the picture with its blades brightens what is beside them.
+        let with_blades: Vec<f32> = closed.iter().zip(&mask).map(|(v, m)| v + m).collect();
+        let wall = SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::repeat(40.0)], triangles: vec![] };
+        let spec = crate::CArmSpec { field_mm: Some(200.0), ..crate::CArmSpec::default() };
+        let arm = crate::CArm::new(&spec, [128, 128], &wall).unwrap();
+        let leaking = shading(&with_blades, &arm);
+        let leaking: Vec<f32> = with_blades.iter().zip(leaking).map(|(v, m)| v - 0.55 * m).collect();
+        assert!(most(&leaking) > 0.1, "{}", most(&leaking));
+    }
 }

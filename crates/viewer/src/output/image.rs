@@ -126,6 +126,8 @@ impl Image {
             PixelFormat::Gray16 => (png::ColorType::Grayscale, png::BitDepth::Sixteen),
             PixelFormat::Rgba8 => (png::ColorType::Rgba, png::BitDepth::Eight),
         };
+        // Noise does not compress: the fast mode takes a fourth of the time for files of much the same size.
+        encoder.set_compression(png::Compression::Fast);
         encoder.set_color(colour);
         encoder.set_depth(depth);
         Ok(encoder)

@@ -20,6 +20,8 @@ pub struct PathLengths {
     pub lung_mm: Vec<f32>,
     /// Length inside the closed wall.
     pub lumen_mm: Vec<f32>,
+    /// Length of undiluted contrast medium in the lumen, beside devices; empty where there is none.
+    pub contrast_mm: Vec<f32>,
     /// Length inside devices, one map per material, in order of first appearance.
     pub devices_mm: Vec<(Material, Vec<f32>)>,
 }
