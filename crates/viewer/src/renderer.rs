@@ -11,7 +11,7 @@ use crate::gpu;
 use crate::output::{Image, Labels};
 use crate::scene::Setup;
 use crate::spec::{Backend, Mode, ViewSpec};
-use crate::three_d::{ContactView, Solids, draw_scale_bar};
+use crate::three_d::{ContactView, Solids, draw_legend, draw_markers, draw_scale_bar};
 use crate::xray::{Material, PathLengths};
 
 /// Draws 3D frames of one set-up.
@@ -44,6 +44,8 @@ pub struct Renderer {
     fluoro: Option<(Fluoroscope, Sequence)>,
     /// Lengths of the central rays, with the first that are asked for.
     central: Option<Anatomy>,
+    /// The last path lengths with what they transmit.
+    transmitted: Option<(PathLengths, Vec<f32>)>,
     contacts: Vec<ContactView>,
     is_cpu: bool,
     next_frame: u64,
@@ -80,7 +82,16 @@ impl Renderer {
         if let Some(reason) = refused {
             engines.name = format!("{} ({reason})", engines.name);
         }
-        Ok(Self { setup, engines, fluoro: None, central: None, contacts: vec![], is_cpu, next_frame: 0 })
+        Ok(Self {
+            setup,
+            engines,
+            fluoro: None,
+            central: None,
+            transmitted: None,
+            contacts: vec![],
+            is_cpu,
+            next_frame: 0,
+        })
     }
 
     /// What computes the frames, for people: "CPU reference", or the graphics interface and adapter. Says why where a
@@ -126,15 +137,23 @@ impl Renderer {
             let c_arm = setup.c_arm.as_ref().filter(|_| setup.spec.camera.c_arm);
             let solids = Solids { devices: &devices, contacts: &contacts, c_arm };
             let mut three_d = engines.three_d.as_mut().map(|engine| engine.frame(&solids)).transpose()?;
-            if let (Some(image), Some(camera), true) =
-                (&mut three_d, &setup.camera, setup.spec.camera.scale_bar)
-            {
-                draw_scale_bar(image, camera);
+            if let (Some(image), Some(camera)) = (&mut three_d, &setup.camera) {
+                if setup.spec.camera.scale_bar {
+                    draw_scale_bar(image, camera);
+                }
+                if setup.spec.camera.markers {
+                    draw_markers(image, camera.right_and_up());
+                    draw_legend(image, &contacts);
+                }
             }
             let fluoro = match &setup.c_arm {
-                Some(_) => {
+                Some(c_arm) => {
                     let (scope, sequence, paths) = prepared(setup, engines, fluoro)?;
-                    Some(sequence.next(scope, paths, &devices, moment)?)
+                    let mut image = sequence.next(scope, paths, &devices, moment)?;
+                    if setup.spec.c_arm.markers {
+                        draw_markers(&mut image, c_arm.right_and_up());
+                    }
+                    Some(image)
                 }
                 None => None,
             };
@@ -259,7 +278,12 @@ impl Renderer {
     /// # Errors
     /// [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn transmission(&mut self, paths: &PathLengths) -> Result<Vec<f32>> {
-        self.with_fallback(|setup, engines, fluoro| prepared(setup, engines, fluoro)?.0.transmission(paths))
+        let before = self.transmitted.take();
+        let left = self.with_fallback(|setup, engines, fluoro| {
+            prepared(setup, engines, fluoro)?.0.transmission(paths, before.as_ref())
+        })?;
+        self.transmitted = Some((paths.clone(), left.clone()));
+        Ok(left)
     }
 
     /// Runs `job`; where an adapter fails in it, hands over to the CPU and runs it again.

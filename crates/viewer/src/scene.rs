@@ -58,7 +58,8 @@ impl Setup {
         }
         let beam: Vec<_> = match &setup.c_arm {
             Some(c_arm) if spec.camera.c_arm => {
-                c_arm.detector_corners_mm().into_iter().chain([c_arm.source_mm()]).collect()
+                // Source and detector are a metre apart: a frame that held them would show the vessel as a speck.
+                c_arm.field_corners_mm(c_arm.sod_mm()).to_vec()
             }
             _ => vec![],
         };

@@ -196,11 +196,10 @@ impl<'a> Studio<'a> {
 
     /// Draws a moment and writes what is wanted of it.
     pub(crate) fn draw(&mut self, still: &Still) -> Result<(), Failure> {
-        if let (Some(orbit), true) = (self.args.orbit, self.drawn > 0) {
+        if let (Some(orbit), true) = (self.args.orbit, self.spec.wants(View::ThreeD)) {
             let mut spec = ViewSpec { views: vec![View::ThreeD], ..self.spec.clone() };
             let part = self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64;
-            let azimuth = spec.camera.azimuth_deg.unwrap_or(0.0) + orbit * part;
-            spec.camera.azimuth_deg = Some(azimuth % 360.0);
+            (spec.camera.turn_deg, spec.camera.orbit_deg) = (orbit * part, Some(orbit));
             let views = self.pushed.views(still.shape, still.inserted_mm);
             let mut orbiting = Renderer::new(&spec, &self.wall)?;
             orbiting.show_contacts(still.contacts);

@@ -262,8 +262,12 @@ impl Fluoroscope {
         self.contrast.as_ref().map_or_else(Vec::new, |contrast| contrast.fractions(time_s))
     }
 
-    /// Signal behind path lengths over that of the open beam.
-    pub(crate) fn transmission(&self, paths: &PathLengths) -> Result<Vec<f32>> {
+    /// Signal behind path lengths over that of the open beam. Where they are those of `before`, its transmission is taken.
+    pub(crate) fn transmission(
+        &self,
+        paths: &PathLengths,
+        before: Option<&(PathLengths, Vec<f32>)>,
+    ) -> Result<Vec<f32>> {
         let mut devices = Vec::with_capacity(paths.devices_mm.len());
         for (material, lengths) in &paths.devices_mm {
             devices.push((self.beam.excess(*material, None)?, lengths));
@@ -271,7 +275,13 @@ impl Fluoroscope {
         let at = |map: &[f32], i: usize| map.get(i).copied().unwrap_or(0.0);
         let open = self.beam.ln_reference().exp() as f32;
         let rays = (0..paths.lumen_mm.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
+        let before = before.filter(|before| before.0.is_like(paths));
         let behind = rays.map_init(Lanes::new, |room, i| {
+            if let Some((before, left)) = before
+                && before.is_same_at(paths, i)
+            {
+                return left[i];
+            }
             let [bone, lung, lumen] = [&paths.bone_mm, &paths.lung_mm, &paths.lumen_mm].map(|map| at(map, i));
             let tissue = (at(&paths.body_mm, i) - bone - lung - lumen).max(0.0);
             let inside: f32 = devices.iter().map(|(_, map)| at(map, i)).sum();

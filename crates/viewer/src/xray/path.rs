@@ -31,4 +31,21 @@ impl PathLengths {
     pub fn index(&self, x: u32, y: u32) -> usize {
         y as usize * self.width as usize + x as usize
     }
+
+    /// Whether it has the same maps of the same size.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let materials = |paths: &Self| paths.devices_mm.iter().map(|map| map.0).collect::<Vec<_>>();
+        let sizes = |paths: &Self| paths.maps().map(<[f32]>::len).collect::<Vec<_>>();
+        materials(self) == materials(other) && sizes(self) == sizes(other)
+    }
+
+    /// Whether the lengths on a ray are those of another that is like it.
+    pub(crate) fn is_same_at(&self, other: &Self, i: usize) -> bool {
+        self.maps().zip(other.maps()).all(|(a, b)| a.get(i) == b.get(i))
+    }
+
+    fn maps(&self) -> impl Iterator<Item = &[f32]> {
+        let fixed = [&self.body_mm, &self.bone_mm, &self.lung_mm, &self.lumen_mm, &self.contrast_mm];
+        fixed.into_iter().chain(self.devices_mm.iter().map(|map| &map.1)).map(Vec::as_slice)
+    }
 }
