@@ -3,6 +3,8 @@
 //! The rays of a pixel are the bits of a word. Most pixels near a piece are told by the distance of their centre from the projected
 //! axis: those well inside the silhouette are covered, those well outside are not, and only what is between asks all its rays.
 
+use std::ops::Range;
+
 use endowire_core::Vec3;
 
 use crate::c_arm::CArm;
@@ -45,13 +47,24 @@ impl Coverage {
                 let covered = match silhouette.covers([x as f64 + 0.5, y as f64 + 0.5]) {
                     Some(true) => u64::MAX,
                     Some(false) => 0,
-                    None => rays_that_meet(c_arm, piece, [x, y]),
+                    None => rays_that_meet(c_arm, piece, &silhouette, [x, y]),
                 };
                 if word == 0 && covered != 0 {
                     self.touched.push(index as u32);
                 }
                 self.words[index] = word | covered;
             }
+        }
+    }
+
+    /// Adds what another covers.
+    pub(crate) fn join(&mut self, other: &Self) {
+        for &pixel in &other.touched {
+            let word = &mut self.words[pixel as usize];
+            if *word == 0 {
+                self.touched.push(pixel);
+            }
+            *word |= other.words[pixel as usize];
         }
     }
 
@@ -67,18 +80,52 @@ impl Coverage {
     }
 }
 
-/// The rays of a pixel that meet a piece.
-fn rays_that_meet(c_arm: &CArm, piece: &Piece, [x, y]: [usize; 2]) -> u64 {
-    let mut word = 0;
-    for ray in 0..RAYS * RAYS {
+/// The rays of a pixel that meet a piece. A frustum is convex, and so is what it covers: of a row of rays a run, and all where the four
+/// corners are covered.
+fn rays_that_meet(c_arm: &CArm, piece: &Piece, silhouette: &Silhouette, [x, y]: [usize; 2]) -> u64 {
+    let meets = |column: u32, row: u32| {
         let within = |k: u32| (f64::from(k) + 0.5) / f64::from(RAYS);
-        let [sx, sy] = c_arm.slopes([x as f64 + within(ray % RAYS), y as f64 + within(ray / RAYS)]);
-        let origin = Vec3::new(sx, sy, 0.0) * c_arm.sod_mm();
-        if chord(piece, &origin, &Vec3::new(sx, sy, 1.0)) > 0.0 {
-            word |= 1 << ray;
+        let at = [x as f64 + within(column), y as f64 + within(row)];
+        if silhouette.is_beyond(at, 0.0) {
+            return false;
         }
+        let [sx, sy] = c_arm.slopes(at);
+        let origin = Vec3::new(sx, sy, 0.0) * c_arm.sod_mm();
+        chord(piece, &origin, &Vec3::new(sx, sy, 1.0)) > 0.0
+    };
+    const LAST: u32 = RAYS - 1;
+    const ROW: u64 = (1 << RAYS) - 1;
+    let ends = [0, LAST].map(|row| [meets(0, row), meets(LAST, row)]);
+    if ends == [[true; 2]; 2] {
+        return u64::MAX;
+    }
+    let mut word = 0;
+    for row in 0..RAYS {
+        let ends = match row {
+            0 => ends[0],
+            LAST => ends[1],
+            row => [meets(0, row), meets(LAST, row)],
+        };
+        let run = match ends {
+            [true, true] => ROW,
+            // The first ray that is not covered after ones that are, and the other way round.
+            [true, false] => (1_u64 << first_in(1..LAST, |column| !meets(column, row))) - 1,
+            [false, true] => ROW & !((1_u64 << first_in(1..LAST, |column| meets(column, row))) - 1),
+            [false, false] => (1..LAST).filter(|&column| meets(column, row)).fold(0, |run, c| run | 1 << c),
+        };
+        word |= run << (row * RAYS);
     }
     word
+}
+
+/// The first number of a range from which on `is` holds, or its end.
+fn first_in(range: Range<u32>, is: impl Fn(u32) -> bool) -> u32 {
+    let (mut low, mut high) = (range.start, range.end);
+    while low < high {
+        let middle = (low + high) / 2;
+        if is(middle) { high = middle } else { low = middle + 1 }
+    }
+    low
 }
 
 /// The projected axis of a piece, with what is surely covered and what surely not.
@@ -86,11 +133,11 @@ struct Silhouette {
     start: [f64; 2],
     along: [f64; 2],
     length_px: f64,
-    /// A pixel whose centre is nearer to the axis and between the ends by more than `ends_px` is covered.
+    /// A ray farther from the axis than this meets nothing.
+    outer_px: f64,
+    /// A pixel whose centre is nearer to the axis and farther from both ends than these is covered.
     inner_px: f64,
     ends_px: f64,
-    /// One whose centre is farther from the axis than this is not.
-    outer_px: f64,
 }
 
 impl Silhouette {
@@ -109,19 +156,29 @@ impl Silhouette {
             length_px,
             inner_px: least * scale(far) * 0.98 - CORNER_PX,
             ends_px: outer_px + CORNER_PX,
-            outer_px: outer_px + CORNER_PX,
+            outer_px,
         }
+    }
+
+    /// Place along the projected axis and distance across it.
+    fn place(&self, at: [f64; 2]) -> [f64; 2] {
+        let [x, y] = [at[0] - self.start[0], at[1] - self.start[1]];
+        [x * self.along[0] + y * self.along[1], (y * self.along[0] - x * self.along[1]).abs()]
+    }
+
+    /// Whether a place is farther from the projection than some pixels.
+    fn is_beyond(&self, at: [f64; 2], more_px: f64) -> bool {
+        let [along, across] = self.place(at);
+        let beyond = (-along).max(along - self.length_px).max(0.0);
+        across * across + beyond * beyond > (self.outer_px + more_px).powi(2)
     }
 
     /// Whether all or none of a pixel is covered, where its centre tells.
     fn covers(&self, centre: [f64; 2]) -> Option<bool> {
-        let [x, y] = [centre[0] - self.start[0], centre[1] - self.start[1]];
-        let along = x * self.along[0] + y * self.along[1];
-        let across = (y * self.along[0] - x * self.along[1]).abs();
-        let beyond = (-along).max(along - self.length_px).max(0.0);
-        if across.hypot(beyond) > self.outer_px {
+        if self.is_beyond(centre, CORNER_PX) {
             return Some(false);
         }
+        let [along, across] = self.place(centre);
         let between = along > self.ends_px && along < self.length_px - self.ends_px;
         (between && across < self.inner_px).then_some(true)
     }

@@ -26,10 +26,11 @@ pub(crate) fn labels(
     };
     let [width, height] = c_arm.size_px();
     let mut mask = vec![0_u8; width as usize * height as usize];
-    let mut coverage = Coverage::new(c_arm);
+    // Of a whole device, and of a part.
+    let mut room = [Coverage::new(c_arm), Coverage::new(c_arm)];
     let mut labelled = Vec::with_capacity(devices.len());
     for (number, device) in (1_u8..=u8::MAX).zip(devices) {
-        let label = device_label(c_arm, device, material, &mut coverage)?;
+        let label = device_label(c_arm, device, material, &mut room)?;
         label.mask.pixels().iter().for_each(|&pixel| mask[pixel as usize] = number);
         labelled.push(label);
     }
@@ -52,7 +53,7 @@ fn device_label(
     c_arm: &CArm,
     device: &DeviceView,
     material: Material,
-    coverage: &mut Coverage,
+    [whole, one]: &mut [Coverage; 2],
 ) -> Result<DeviceLabel> {
     let mut parts = Vec::new();
     let mut mask = Mask::new(c_arm.size_px(), vec![]);
@@ -60,19 +61,16 @@ fn device_label(
     let points = refined.first().map_or(&[][..], |device| &device.points);
     for device in &refined {
         let layers = layers_in_beam(c_arm, device);
-        let outside = |pieces: &[_], coverage: &mut Coverage| {
-            pieces.iter().filter(|(_, sign)| *sign > 0.0).for_each(|(piece, _)| coverage.add(c_arm, piece));
-        };
-        if layers.iter().any(|(layer, _)| layer.part.is_some()) {
-            for (layer, pieces) in &layers {
-                outside(pieces, coverage);
-                let from_tip_mm = layer.part.flatten();
+        for (layer, pieces) in &layers {
+            pieces.iter().filter(|(_, sign)| *sign > 0.0).for_each(|(piece, _)| one.add(c_arm, piece));
+            whole.join(one);
+            let covered = one.take(c_arm);
+            if let Some(from_tip_mm) = layer.part {
                 let material = layer.material.unwrap_or(material);
-                parts.push(PartLabel { material, from_tip_mm, mask: coverage.take(c_arm) });
+                parts.push(PartLabel { material, from_tip_mm, mask: covered });
             }
         }
-        layers.iter().for_each(|(_, pieces)| outside(pieces, coverage));
-        mask = coverage.take(c_arm);
+        mask = whole.take(c_arm);
     }
     let shown = points.iter().map(|p| p.position_mm).filter_map(|p| Some((seen(c_arm, &p)?, p)));
     let (centre_line_px, places): (Vec<[f64; 2]>, Vec<Vec3>) = shown.unzip();
