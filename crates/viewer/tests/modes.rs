@@ -24,6 +24,7 @@ fn scene(folder: &std::path::Path, mode: Mode) -> (ViewSpec, endowire_core::vess
     view.xray.mode = mode;
     view.detector = DetectorSpec { seed: 3, lag: 0.0, ..DetectorSpec::default() };
     view.flow.tree = Some(path);
+    view.flow.inlet_mm = Some([0.0, 0.0, -50.0]);
     view.flow.inflow_ml_per_s = 20.0;
     view.injection = vec![InjectionSpec { start_s: 1.0, duration_s: 1.0, rate_ml_per_s: 8.0, at_mm: None }];
     (view, cylinder(6.0, 50.0, 64, Vec3::zeros()))
@@ -265,6 +266,29 @@ fn path_lengths_know_the_contrast_medium_of_a_moment_and_add_up() {
     let without = renderer.transmission(&before).unwrap();
     let most = without.iter().zip(&line).map(|(t, line)| line + f64::from(*t).ln()).fold(0.0, f64::max);
     assert!(most > 0.05, "{most}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn contrast_medium_is_not_saturated_in_live_pictures() {
+    let folder = folder("saturated");
+    let (mut view, wall) = scene(&folder, Mode::Fluoro);
+    view.detector = DetectorSpec::ideal();
+    let black = |view: &ViewSpec| {
+        let mut renderer = Renderer::new(view, &wall).unwrap();
+        let image = renderer.render_at(&[], at(0, 1.9)).unwrap().fluoro.unwrap();
+        let vessel = (74..86).flat_map(|x| (20..140).map(move |y| (x, y)));
+        vessel.filter(|&(x, y)| image.pixel(x, y).unwrap()[0] == 0).count()
+    };
+    let left_alone = black(&view);
+    assert!(left_alone < 12 * 120 / 20, "{left_alone}");
+    // The twin: a window as wide as one for this slab alone, 0.12 below and 0.4 above what it attenuates.
+    view.xray.harmonised = 0.0;
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    let paths = renderer.path_lengths(&[]).unwrap();
+    let slab = -f64::from(renderer.transmission(&paths).unwrap()[0]).ln();
+    view.xray.window = Some([slab - 0.12, slab + 0.4]);
+    assert!(black(&view) > 12 * 120 / 2, "{}", black(&view));
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -20,6 +20,8 @@ const HOLD_WEIGHT: f32 = 0.4;
 const DSA_SHARES: Window = [-0.15, 1.05];
 /// Share of the pixels with contrast medium that may be darker than black.
 const DSA_OUTLIERS: f64 = 0.02;
+/// Opacities below this are no contrast medium.
+const LEAST_OPACITY: f32 = 0.02;
 /// Strongest opacification that a window assumes where nothing is ever injected.
 const FAINTEST: f32 = 0.3;
 /// Roadmap values shown white and black, around a grey background, and that of the strongest vessel.
@@ -71,7 +73,8 @@ impl Sequence {
                 if let Some(mask) = &mask {
                     values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
                 }
-                fitted(&values, c_arm.size_px(), |pixel| c_arm.openness(pixel) == 1.0)
+                let [white, black] = fitted(&values, c_arm.size_px(), |pixel| c_arm.openness(pixel) == 1.0);
+                [white, black.max(densest(fluoroscope, mask.as_deref()))]
             }
             (_, Some(window)) => window.map(|p| p as f32),
             (Mode::Dsa, None) => {
@@ -175,17 +178,29 @@ impl Sequence {
     }
 }
 
+/// Densest shown value where contrast medium ever comes, but for the darkest few pixels; a vessel full of it keeps its shades.
+fn densest(fluoroscope: &Fluoroscope, mask: Option<&[f32]>) -> f32 {
+    let Ok(full) = fluoroscope.opacified() else { return f32::MIN };
+    let still = logarithm(fluoroscope.still.signal.clone());
+    let full = logarithm(full.signal);
+    let filled = (0..full.len()).filter(|&i| full[i] - still[i] > LEAST_OPACITY);
+    let values = filled.map(|i| full[i] - mask.map_or(0.0, |mask| mask[i])).collect();
+    but_for_outliers(values).unwrap_or(f32::MIN)
+}
+
 /// Strongest subtracted value that contrast medium ever brings, but for the darkest few pixels.
 fn strongest(fluoroscope: &Fluoroscope) -> f32 {
     let Ok(full) = fluoroscope.opacified() else { return FAINTEST };
     let still = logarithm(fluoroscope.still.signal.clone());
-    let mut values: Vec<f32> =
-        logarithm(full.signal).iter().zip(still).map(|(v, still)| v - still).filter(|v| *v > 0.02).collect();
-    if values.is_empty() {
-        return FAINTEST;
-    }
-    let place = ((values.len() - 1) as f64 * (1.0 - DSA_OUTLIERS)).round() as usize;
-    values.select_nth_unstable_by(place, f32::total_cmp).1.max(FAINTEST)
+    let opacities = logarithm(full.signal).into_iter().zip(still).map(|(v, still)| v - still);
+    but_for_outliers(opacities.filter(|v| *v > LEAST_OPACITY).collect()).map_or(FAINTEST, |v| v.max(FAINTEST))
+}
+
+/// The largest value but for the outliers.
+fn but_for_outliers(mut values: Vec<f32>) -> Option<f32> {
+    let last = values.len().checked_sub(1)?;
+    let place = (last as f64 * (1.0 - DSA_OUTLIERS)).round() as usize;
+    Some(*values.select_nth_unstable_by(place, f32::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -87,7 +87,7 @@ pub(super) fn annotations(image: usize, labels: &Labels, instruments: &[String])
             id: image * MOST + rows.len(),
             image_id: image,
             category_id,
-            iscrowd: 1,
+            iscrowd: 0,
             area: mask.pixels().len(),
             bbox,
             segmentation,
