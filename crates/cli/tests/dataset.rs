@@ -34,7 +34,7 @@ fn specification(folder: &Path, more: &str) -> std::path::PathBuf {
     let text = format!(
         "scenes = [\"scene.toml\"]\ndevices = [\"{assets}/devices/wire_035_soft.toml\", \
          \"{assets}/devices/catheter_4f_vertebral.toml\"]\nposes = 2\nmoments = 3\nbiplane_deg = 90.0\n{more}\n[vary]\n\
-         dose_ngy = [20.0, 90.0]\nkvp = [70.0, 80.0]\nprogress = [0.5, 1.0]\n[view]\nsize_px = [96, 80]\nbackend = \"cpu\"\n"
+         dose_ngy = [20.0, 90.0]\nkvp = [70.0, 80.0]\nprogress = [0.5, 1.0]\n[view]\nsize_px = [256, 192]\nbackend = \"cpu\"\n"
     );
     std::fs::write(&spec, text).unwrap();
     spec
@@ -116,7 +116,7 @@ fn annotations_are_those_of_coco_and_planes_know_each_other() {
     for row in annotations {
         let counts: Vec<u64> =
             row["segmentation"]["counts"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).collect();
-        assert_eq!(counts.iter().sum::<u64>(), 96 * 80);
+        assert_eq!(counts.iter().sum::<u64>(), 256 * 192);
         assert_eq!(counts.iter().skip(1).step_by(2).sum::<u64>(), row["area"].as_u64().unwrap());
     }
     // The tip projects by the matrix of its picture to where its picture says.
@@ -150,7 +150,7 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
     for (from, to, named) in [
         ("dose_ngy = [20.0, 90.0]", "dose_ngy = [90.0, 20.0]", "vary.dose_ngy"),
         ("moments = 3", "moments = 0", "moments"),
-        ("size_px = [96, 80]", "size_px = [0, 80]", "size_px"),
+        ("size_px = [256, 192]", "size_px = [0, 192]", "size_px"),
         ("kvp = [70.0, 80.0]", "kvp = [71.0]", "kvp"),
     ] {
         std::fs::write(&spec, whole.replace(from, to)).unwrap();
