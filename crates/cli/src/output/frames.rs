@@ -20,7 +20,6 @@ use super::pushed::Pushed;
 use super::recorder::Recorder;
 use super::{print_json, tell, to_json};
 use crate::args::{FrameArgs, ViewChoice};
-use crate::cache::Cache;
 use crate::failure::Failure;
 
 /// Draws the steps of a run that the scene wants to see.
@@ -138,19 +137,17 @@ pub(crate) struct Studio<'a> {
 }
 
 impl<'a> Studio<'a> {
-    /// Prepares `frames` frames of a scene, in `folder`, where they replace those of an earlier call of the same command.
+    /// Prepares `frames` frames of a scene with its closed wall, in `folder`, where they replace those of an earlier call of the same command.
     pub(crate) fn new(
         command: &str,
         args: &'a FrameArgs,
-        path: &Path,
-        scene: &Scene,
+        (path, scene, wall): (&Path, &Scene, SurfaceMesh),
         default: ViewChoice,
         folder: PathBuf,
         frames: usize,
     ) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         let spec = wished(ViewSpec::of_scene(scene, path)?, args, default)?;
-        let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
         let pushed = Pushed::new(path, scene, &spec)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
         if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {
