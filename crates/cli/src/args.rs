@@ -33,6 +33,8 @@ pub(crate) enum Command {
     Export(ExportArgs),
     /// Draw fluoroscopic frames of a scene: after its script, or of a contrast injection
     Fluoro(FluoroArgs),
+    /// Draw labelled fluoroscopic pictures of many scenes, devices, poses, doses and moments, for learning
+    Dataset(DatasetArgs),
     /// Solve one static rod: sections, supports and loads in, shape, energy and reactions out
     Rod(RodArgs),
     /// Compare every reference case with its exact or independently computed answer
@@ -252,6 +254,20 @@ pub(crate) struct FluoroArgs {
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) frames: FrameArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct DatasetArgs {
+    /// Specification (TOML)
+    pub(crate) spec: PathBuf,
+    /// Folder for images, arrays and annotations.json; a call that was ended goes on in it
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Print what was written as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, clap::Args)]

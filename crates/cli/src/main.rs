@@ -19,6 +19,7 @@ fn main() -> ExitCode {
             | args::Command::Sweep(_)
             | args::Command::Render(_)
             | args::Command::Fluoro(_)
+            | args::Command::Dataset(_)
             | args::Command::Experiment(_)
     ) {
         environment::without_desktop();

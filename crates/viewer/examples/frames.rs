@@ -112,8 +112,14 @@ fn main() -> Result<()> {
         let mut animation = Animation::new(folder.join("angiogram.png"), first, series.len() as u32, 15.0)?;
         series.iter().try_for_each(|frame| animation.push(frame))?;
         animation.finish()?;
-        let angiogram =
-            Angiogram { c_arm, kvp: spec.xray.kvp, frames_per_s: 15.0, description: "aortic arch" };
+        let angiogram = Angiogram {
+            c_arm,
+            kvp: spec.xray.kvp,
+            frames_per_s: 15.0,
+            mode: Mode::Dsa,
+            contrast: true,
+            description: "aortic arch",
+        };
         angiogram.write(folder.join("angiogram.dcm"), &series)?;
     }
 

@@ -26,6 +26,7 @@
 use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result, Vec3};
 
+use crate::fingerprint::fingerprint;
 use crate::spec::{CArmSpec, PITCH_MM};
 
 /// Part of the half frame that the vessel fills where the pixel pitch is left to us.
@@ -87,20 +88,23 @@ impl CArm {
         Ok(arm)
     }
 
+    /// The pitch at which a ball about the isocentre that holds the vessel fills the frame: the same from every side.
     fn fitting_pitch(&self, wall: &SurfaceMesh) -> Result<f64> {
-        let pitch = wall.vertices_mm.iter().map(|v| self.in_beam(v)).fold(0.0_f64, |pitch, b| {
-            let magnification = self.sid_mm / (self.sod_mm + b.z);
-            let half = self.size_px.map(|n| f64::from(n) / 2.0 * FILL);
-            pitch.max(b.x.abs() * magnification / half[0]).max(b.y.abs() * magnification / half[1])
-        });
-        if pitch > 0.0 {
-            return Ok(pitch);
+        let squares = wall.vertices_mm.iter().map(|v| (v - self.isocentre_mm).norm_squared());
+        let radius_mm = squares.fold(0.0, f64::max).sqrt();
+        let refuse = |mend: &str| Err(Error::parameter("view.c_arm.pixel_mm", "absent", mend));
+        if radius_mm == 0.0 {
+            return refuse("the vessel has no extent to fit; give a pitch");
         }
-        Err(Error::parameter(
-            "view.c_arm.pixel_mm",
-            "absent",
-            "the vessel has no extent to fit; give a pitch",
-        ))
+        if radius_mm >= self.sod_mm {
+            return refuse(
+                "the vessel reaches as far from the isocentre as the source is, so no field holds it from every side; give a pitch",
+            );
+        }
+        // Rays that touch the ball leave the axis by its radius over √(SOD² − r²).
+        let half_mm = self.sid_mm * radius_mm / (self.sod_mm.powi(2) - radius_mm.powi(2)).sqrt();
+        let half_px = f64::from(self.size_px[0].min(self.size_px[1])) / 2.0 * FILL;
+        Ok(half_mm / half_px)
     }
 
     /// Whether a point given by [`Self::in_beam`] is between source and detector.
@@ -225,13 +229,58 @@ impl CArm {
         self.isocentre_mm - self.axes[2] * self.sod_mm
     }
 
-    /// Corners of the detector, around.
-    pub(crate) fn detector_corners_mm(&self) -> [Vec3; 4] {
+    /// Corners of what the detector sees at a depth from the source, around.
+    pub(crate) fn field_corners_mm(&self, depth_mm: f64) -> [Vec3; 4] {
         let [w, h] = self.size_px.map(f64::from);
         [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]].map(|pixel| {
             let [x, y] = self.slopes(pixel);
-            self.source_mm() + (self.axes[0] * x + self.axes[1] * y + self.axes[2]) * self.sid_mm
+            self.source_mm() + (self.axes[0] * x + self.axes[1] * y + self.axes[2]) * depth_mm
         })
+    }
+
+    /// Directions in patient axes that run to the right and upwards in the picture.
+    pub(crate) fn right_and_up(&self) -> [Vec3; 2] {
+        [self.axes[0], -self.axes[1]]
+    }
+
+    /// A number of the geometry, blades apart: what they leave open stays as it is when they move.
+    pub(crate) fn fingerprint(&self) -> u128 {
+        let axes = self.axes.iter().flatten();
+        let places = axes.chain(&self.isocentre_mm).copied().chain([self.sid_mm, self.sod_mm, self.pixel_mm]);
+        // 0 and -0 are one place.
+        let bytes = places.flat_map(|x| (x + 0.0).to_bits().to_le_bytes());
+        fingerprint(bytes.chain(self.size_px.into_iter().flat_map(u32::to_le_bytes)))
+    }
+
+    /// The 3 × 4 matrix, row by row, that takes (x, y, z, 1) in mm to (u w, v w, w): pixel coordinates times the depth from the source in
+    /// mm.
+    pub fn matrix(&self) -> [[f64; 4]; 3] {
+        let [w, h] = self.size_px.map(f64::from);
+        let [across, down, depth] = self.axes;
+        let rows =
+            [across * self.focal_px() + depth * (w / 2.0), down * self.focal_px() + depth * (h / 2.0), depth];
+        rows.map(|row| [row.x, row.y, row.z, -row.dot(&self.source_mm())])
+    }
+
+    /// Where columns and rows run in the words of DICOM (L, R, A, P, H, F), the strongest first.
+    pub(crate) fn directions(&self) -> [String; 2] {
+        // Parts of less than the sine of about a degree are not told.
+        const LEAST: f64 = 0.02;
+        [0, 1].map(|k| {
+            let axis = &self.axes[k];
+            let names = [['L', 'R'], ['P', 'A'], ['H', 'F']].into_iter().zip(axis.iter());
+            let mut parts: Vec<(f64, char)> = names
+                .map(|([plus, minus], x)| (x.abs(), if *x > 0.0 { plus } else { minus }))
+                .filter(|part| part.0 > LEAST)
+                .collect();
+            parts.sort_by(|a, b| b.0.total_cmp(&a.0));
+            parts.into_iter().map(|part| part.1).collect()
+        })
+    }
+
+    /// Depth of a point from the source along the central ray, mm.
+    pub fn depth_mm(&self, point_mm: &Vec3) -> f64 {
+        self.sod_mm + self.in_beam(point_mm).z
     }
 
     /// The point that all rotations leave in place.
@@ -383,14 +432,26 @@ mod tests {
     }
 
     #[test]
-    fn left_alone_the_pitch_lets_the_vessel_fill_the_frame() {
+    fn left_alone_the_field_holds_the_vessel_and_is_the_same_from_every_side() {
         let wall = SurfaceMesh {
             vertices_mm: vec![Vec3::new(-50.0, -40.0, -30.0), Vec3::new(50.0, 40.0, 30.0)],
             triangles: vec![],
         };
-        let arm = CArm::new(&CArmSpec::default(), [600, 600], &wall).unwrap();
-        let widest = wall.vertices_mm.iter().map(|v| (arm.project(v)[0] - 300.0).abs()).fold(0.0, f64::max);
-        assert!((widest - 300.0 * FILL).abs() < 1e-9, "{widest}");
+        let mut widest = 0.0_f64;
+        let mut pitches = Vec::new();
+        for primary_deg in (-180..180).step_by(5) {
+            for secondary_deg in (-90..=90).step_by(5) {
+                let [primary_deg, secondary_deg] = [primary_deg, secondary_deg].map(f64::from);
+                let spec = CArmSpec { primary_deg, secondary_deg, ..CArmSpec::default() };
+                let arm = CArm::new(&spec, [800, 600], &wall).unwrap();
+                pitches.push(arm.pixel_mm());
+                for [u, v] in wall.vertices_mm.iter().map(|vertex| arm.project(vertex)) {
+                    widest = widest.max((u - 400.0).hypot(v - 300.0));
+                }
+            }
+        }
+        assert!(pitches.iter().all(|pitch| *pitch == pitches[0]));
+        assert!(widest <= 300.0 * FILL && widest > 0.99 * 300.0 * FILL, "{widest}");
     }
 
     #[test]

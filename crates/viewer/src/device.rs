@@ -178,6 +178,8 @@ fn hermite(pair: &[DevicePoint], d: [Vec3; 2], w: f64) -> DevicePoint {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layer {
     pub(crate) material: Option<Material>,
+    /// Stretch of the part that it is, from the tip in mm, if that says one; `None` of a device without parts.
+    pub(crate) part: Option<Option<[f64; 2]>>,
     /// Pieces between consecutive points.
     pieces: Range<usize>,
     outer_radius_mm: Option<f64>,
@@ -213,8 +215,13 @@ impl RefinedDevice {
     fn cut(mut points: Vec<DevicePoint>, device: &DeviceView) -> Result<Self> {
         if device.parts.is_empty() {
             let pieces = 0..points.len() - 1;
-            let layer =
-                Layer { material: device.material, pieces, outer_radius_mm: None, inner_radius_mm: 0.0 };
+            let layer = Layer {
+                material: device.material,
+                part: None,
+                pieces,
+                outer_radius_mm: None,
+                inner_radius_mm: 0.0,
+            };
             return Ok(Self { points, layers: vec![layer] });
         }
         // Arc length from the tip, which is the last point.
@@ -252,6 +259,7 @@ impl RefinedDevice {
             if first < last {
                 layers.push(Layer {
                     material: part.material.or(device.material),
+                    part: Some(part.from_tip_mm),
                     pieces: first..last,
                     outer_radius_mm: part.outer_radius_mm,
                     inner_radius_mm: part.inner_radius_mm,

@@ -31,6 +31,7 @@ mod contrast;
 mod cpu;
 mod device;
 mod device_file;
+mod fingerprint;
 mod fluoro;
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -49,7 +50,9 @@ pub use c_arm::CArm;
 pub use device::{DevicePart, DevicePoint, DeviceView};
 pub use device_file::{device_parts, section_parts};
 pub use fluoro::Moment;
-pub use output::{Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, PixelFormat};
+pub use output::{
+    Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, PartLabel, PixelFormat,
+};
 pub use renderer::{Frames, Renderer};
 pub use spec::{
     Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, FlowSpec, InjectionSpec, Mode, PatientSpec, Pose,

@@ -6,12 +6,12 @@ use endowire_core::{Error, Result, Vec3};
 use crate::c_arm::CArm;
 use crate::cpu;
 use crate::device::{DeviceView, RefinedDevice};
-use crate::fluoro::{Anatomy, Fluoroscope, Moment, PathEngine, SUBRAYS, Sequence};
+use crate::fluoro::{Anatomy, Fluoroscope, Moment, PathEngine, Sequence, labels};
 use crate::gpu;
-use crate::output::{ContactLabel, DeviceLabel, Image, Labels, PixelFormat};
+use crate::output::{Image, Labels};
 use crate::scene::Setup;
-use crate::spec::{Backend, ViewSpec};
-use crate::three_d::{ContactView, Solids, draw_scale_bar};
+use crate::spec::{Backend, Mode, ViewSpec};
+use crate::three_d::{ContactView, Solids, draw_legend, draw_markers, draw_scale_bar};
 use crate::xray::{Material, PathLengths};
 
 /// Draws 3D frames of one set-up.
@@ -40,7 +40,12 @@ pub struct Frames {
 pub struct Renderer {
     setup: Setup,
     engines: Engines,
+    /// Made with the first frame.
     fluoro: Option<(Fluoroscope, Sequence)>,
+    /// Lengths of the central rays, with the first that are asked for.
+    central: Option<Anatomy>,
+    /// The last path lengths with what they transmit.
+    transmitted: Option<(PathLengths, Vec<f32>)>,
     contacts: Vec<ContactView>,
     is_cpu: bool,
     next_frame: u64,
@@ -53,7 +58,7 @@ impl std::fmt::Debug for Renderer {
 }
 
 impl Renderer {
-    /// Prepares the views that `spec` asks for, and nothing else. The fluoroscopic view needs a **closed**
+    /// Prepares the views that `spec` asks for, and nothing else; what stays from frame to frame is computed with the first. The fluoroscopic view needs a **closed**
     /// wall with outward triangles (cap the openings); the 3D view shows any.
     ///
     /// # Errors
@@ -77,16 +82,16 @@ impl Renderer {
         if let Some(reason) = refused {
             engines.name = format!("{} ({reason})", engines.name);
         }
-        let mut renderer = Self { setup, engines, fluoro: None, contacts: vec![], is_cpu, next_frame: 0 };
-        if let Some(c_arm) = renderer.setup.c_arm.clone() {
-            let fluoroscope = renderer.with_fallback(|setup, engines, _| {
-                let paths = engines.paths.as_mut().ok_or_else(no_fluoro)?;
-                Fluoroscope::new(setup, &c_arm, paths.as_mut())
-            })?;
-            let sequence = Sequence::new(&renderer.setup.spec, &fluoroscope);
-            renderer.fluoro = Some((fluoroscope, sequence));
-        }
-        Ok(renderer)
+        Ok(Self {
+            setup,
+            engines,
+            fluoro: None,
+            central: None,
+            transmitted: None,
+            contacts: vec![],
+            is_cpu,
+            next_frame: 0,
+        })
     }
 
     /// What computes the frames, for people: "CPU reference", or the graphics interface and adapter. Says why where a
@@ -132,16 +137,25 @@ impl Renderer {
             let c_arm = setup.c_arm.as_ref().filter(|_| setup.spec.camera.c_arm);
             let solids = Solids { devices: &devices, contacts: &contacts, c_arm };
             let mut three_d = engines.three_d.as_mut().map(|engine| engine.frame(&solids)).transpose()?;
-            if let (Some(image), Some(camera), true) =
-                (&mut three_d, &setup.camera, setup.spec.camera.scale_bar)
-            {
-                draw_scale_bar(image, camera);
-            }
-            let fluoro = match (fluoro, &mut engines.paths) {
-                (Some((scope, sequence)), Some(paths)) => {
-                    Some(sequence.next(scope, paths.as_mut(), &devices, moment)?)
+            if let (Some(image), Some(camera)) = (&mut three_d, &setup.camera) {
+                if setup.spec.camera.scale_bar {
+                    draw_scale_bar(image, camera);
                 }
-                _ => None,
+                if setup.spec.camera.markers {
+                    draw_markers(image, camera.right_and_up());
+                    draw_legend(image, &contacts);
+                }
+            }
+            let fluoro = match &setup.c_arm {
+                Some(c_arm) => {
+                    let (scope, sequence, paths) = prepared(setup, engines, fluoro)?;
+                    let mut image = sequence.next(scope, paths, &devices, moment)?;
+                    if setup.spec.c_arm.markers {
+                        draw_markers(&mut image, c_arm.right_and_up());
+                    }
+                    Some(image)
+                }
+                None => None,
             };
             Ok(Frames { three_d, fluoro })
         });
@@ -163,10 +177,9 @@ impl Renderer {
     /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn take_mask(&mut self, devices: &[DeviceView]) -> Result<()> {
         let devices = RefinedDevice::all(devices)?;
-        self.with_fallback(|_, engines, fluoro| {
-            let (scope, sequence) = fluoro.as_mut().ok_or_else(no_fluoro)?;
-            let paths = engines.paths.as_mut().ok_or_else(no_fluoro)?;
-            sequence.take_mask(scope, paths.as_mut(), &devices)
+        self.with_fallback(|setup, engines, fluoro| {
+            let (scope, sequence, paths) = prepared(setup, engines, fluoro)?;
+            sequence.take_mask(scope, paths, &devices)
         })
     }
 
@@ -181,71 +194,72 @@ impl Renderer {
     /// # Errors
     /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn labels(&mut self, devices: &[DeviceView], contacts_mm: &[Vec3]) -> Result<Labels> {
-        let c_arm = self.setup.c_arm.clone().ok_or_else(no_fluoro)?;
-        let seen = |point: &Vec3| c_arm.is_between(&c_arm.in_beam(point)).then(|| c_arm.project(point));
-        let contacts = contacts_mm
-            .iter()
-            .map(|point| {
-                let pixel = seen(point);
-                ContactLabel { pixel, visible: pixel.is_some_and(|p| c_arm.sees(p)) }
-            })
-            .collect();
-        let [width, height] = c_arm.size_px();
-        let rays = c_arm.refined(SUBRAYS);
-        let mut mask = vec![0_u8; width as usize * height as usize];
-        let mut labels = Vec::with_capacity(devices.len());
-        for (number, device) in (1_u8..=u8::MAX).zip(devices) {
-            let refined = RefinedDevice::all(std::slice::from_ref(device))?;
-            let touched = self.with_fallback(|_, engines, _| {
-                let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
-                let mut lengths = vec![0.0; mask.len() * (SUBRAYS * SUBRAYS) as usize];
-                let mut touched = Vec::new();
-                for device in &refined {
-                    for (_, pieces) in cpu::layers_in_beam(&rays, device) {
-                        engine.pieces(&rays, &pieces, &mut lengths, &mut touched)?;
-                    }
-                }
-                Ok(touched)
-            })?;
-            for ray in touched {
-                let (x, y) = (ray % (width * SUBRAYS) / SUBRAYS, ray / (width * SUBRAYS) / SUBRAYS);
-                mask[(y * width + x) as usize] = number;
-            }
-            let points = refined.first().map_or(&[][..], |device| &device.points);
-            let centre_line_px: Vec<[f64; 2]> = points.iter().filter_map(|p| seen(&p.position_mm)).collect();
-            let tip_px = points.last().and_then(|p| seen(&p.position_mm));
-            let tip_visible = tip_px.is_some_and(|p| c_arm.sees(p));
-            labels.push(DeviceLabel { centre_line_px, tip_px, tip_visible });
-        }
-        let mask = Image::new(width, height, PixelFormat::Gray8, mask);
-        Ok(Labels { size_px: [width, height], devices: labels, contacts, mask })
+        let vessel = self.with_fallback(|setup, engines, fluoro| {
+            let (scope, _, _) = prepared(setup, engines, fluoro)?;
+            Ok(setup.lumen.then(|| scope.vessel()))
+        })?;
+        let c_arm = self.setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
+        labels(c_arm, devices, contacts_mm, self.setup.spec.xray.device_material, vessel)
     }
 
-    /// Path lengths of the rays through the pixel centres.
+    /// Path lengths of the rays through the pixel centres, before any injection.
     ///
     /// # Errors
     /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn path_lengths(&mut self, devices: &[DeviceView]) -> Result<PathLengths> {
+        self.lengths(devices, None)
+    }
+
+    /// The same with the contrast medium of a moment, in s.
+    ///
+    /// # Errors
+    /// As [`Self::path_lengths`].
+    pub fn path_lengths_at(&mut self, devices: &[DeviceView], time_s: f64) -> Result<PathLengths> {
+        self.lengths(devices, Some(time_s))
+    }
+
+    fn lengths(&mut self, devices: &[DeviceView], time_s: Option<f64>) -> Result<PathLengths> {
         let c_arm = self.setup.c_arm.clone().ok_or_else(no_fluoro)?;
         let [width, height] = c_arm.size_px();
+        let pixels = width as usize * height as usize;
         let default = self.setup.spec.xray.device_material;
         let devices = RefinedDevice::all(devices)?;
-        let (anatomy, devices_mm) = self.with_fallback(|setup, engines, _| {
+        if self.central.is_none() {
+            self.central = Some(self.with_fallback(|setup, engines, _| {
+                let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
+                Anatomy::new(setup, &c_arm, engine.as_mut())
+            })?);
+        }
+        let (devices_mm, injected) = self.with_fallback(|setup, engines, fluoro| {
             let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
             let mut maps: Vec<(Material, Vec<f32>)> = Vec::new();
             for device in &devices {
                 for (layer, pieces) in cpu::layers_in_beam(&c_arm, device) {
                     let material = layer.material.unwrap_or(default);
                     let place = maps.iter().position(|map| map.0 == material).unwrap_or_else(|| {
-                        maps.push((material, vec![0.0; width as usize * height as usize]));
+                        maps.push((material, vec![0.0; pixels]));
                         maps.len() - 1
                     });
                     engine.pieces(&c_arm, &pieces, &mut maps[place].1, &mut Vec::new())?;
                 }
             }
-            Ok((Anatomy::new(setup, &c_arm, engine.as_mut())?, maps))
+            // A roadmap's injections are those of its angiogram.
+            let injecting = setup.flow.is_some() && setup.spec.xray.mode != Mode::Roadmap;
+            let injected = match time_s.filter(|_| injecting) {
+                Some(time_s) => prepared(setup, engines, fluoro)?.0.injected(time_s),
+                None => vec![],
+            };
+            Ok((maps, injected))
         })?;
-        let Anatomy { body, bone, lung, lumen } = anatomy;
+        let Anatomy { body, bone, lung, lumen } = self.central.clone().unwrap_or_default();
+        let fraction = self.setup.spec.xray.contrast_fraction as f32;
+        let mut contrast_mm = vec![];
+        if fraction > 0.0 || !injected.is_empty() {
+            let mut fractions = vec![fraction; pixels];
+            injected.iter().for_each(|&(i, more)| fractions[i as usize] = (fraction + more).min(1.0));
+            let filling = |i: usize| lumen[i] - devices_mm.iter().map(|map| map.1[i]).sum::<f32>();
+            contrast_mm = fractions.iter().enumerate().map(|(i, fraction)| fraction * filling(i)).collect();
+        }
         Ok(PathLengths {
             width,
             height,
@@ -253,36 +267,23 @@ impl Renderer {
             bone_mm: bone,
             lung_mm: lung,
             lumen_mm: lumen,
+            contrast_mm,
             devices_mm,
         })
     }
 
-    /// Transmitted share of the absorbed energy behind the given path lengths, with this scene's spectrum, detector and
-    /// fillings: the signal over that of the open beam. −ln of it is the line integral.
+    /// Transmitted share of the absorbed energy behind the given path lengths, with this scene's spectrum and detector: the signal
+    /// over that of the open beam. −ln of it is the line integral.
     ///
     /// # Errors
     /// [`Error::Parameter`] where the fluoroscopic view was not asked for.
-    pub fn transmission(&self, paths: &PathLengths) -> Result<Vec<f32>> {
-        let (scope, _) = self.fluoro.as_ref().ok_or_else(no_fluoro)?;
-        let fraction = self.setup.spec.xray.contrast_fraction;
-        let at = |map: &[f32], i: usize| f64::from(map.get(i).copied().unwrap_or(0.0));
-        (0..paths.lumen_mm.len())
-            .map(|i| {
-                let [bone, lung, lumen] =
-                    [&paths.bone_mm, &paths.lung_mm, &paths.lumen_mm].map(|map| at(map, i));
-                let inside: f64 = paths.devices_mm.iter().map(|map| at(&map.1, i)).sum();
-                let tissue = (at(&paths.body_mm, i) - bone - lung - lumen).max(0.0);
-                let lengths = [
-                    (Material::SoftTissue, tissue),
-                    (Material::CorticalBone, bone),
-                    (Material::Lung, lung),
-                    (Material::Blood, (lumen - inside) * (1.0 - fraction)),
-                    (Material::Contrast370, (lumen - inside) * fraction),
-                ];
-                let devices = paths.devices_mm.iter().map(|(material, map)| (*material, at(map, i)));
-                Ok(scope.beam.transmission(lengths.into_iter().chain(devices))? as f32)
-            })
-            .collect()
+    pub fn transmission(&mut self, paths: &PathLengths) -> Result<Vec<f32>> {
+        let before = self.transmitted.take();
+        let left = self.with_fallback(|setup, engines, fluoro| {
+            prepared(setup, engines, fluoro)?.0.transmission(paths, before.as_ref())
+        })?;
+        self.transmitted = Some((paths.clone(), left.clone()));
+        Ok(left)
     }
 
     /// Runs `job`; where an adapter fails in it, hands over to the CPU and runs it again.
@@ -301,6 +302,25 @@ impl Renderer {
             done => done,
         }
     }
+}
+
+/// The fluoroscopic view, made where it is not yet, and what casts its rays.
+fn prepared<'a>(
+    setup: &Setup,
+    engines: &'a mut Engines,
+    fluoro: &'a mut Option<(Fluoroscope, Sequence)>,
+) -> Result<(&'a mut Fluoroscope, &'a mut Sequence, &'a mut dyn PathEngine)> {
+    let paths = engines.paths.as_mut().ok_or_else(no_fluoro)?.as_mut();
+    let (scope, sequence) = match fluoro {
+        Some(made) => made,
+        none => {
+            let c_arm = setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
+            let scope = Fluoroscope::new(setup, c_arm, paths)?;
+            let sequence = Sequence::new(&setup.spec, &scope);
+            none.insert((scope, sequence))
+        }
+    };
+    Ok((scope, sequence, paths))
 }
 
 fn no_fluoro() -> Error {

@@ -6,6 +6,7 @@ use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 
 use crate::c_arm::CArm;
+use crate::contrast::Flow;
 use crate::cpu::{check_closed, check_drawable};
 use crate::patient::Patient;
 use crate::spec::{View, ViewSpec};
@@ -17,6 +18,8 @@ pub(crate) struct Setup {
     pub(crate) spec: ViewSpec,
     pub(crate) wall: Arc<SurfaceMesh>,
     pub(crate) patient: Patient,
+    /// What carries contrast medium, where any is injected.
+    pub(crate) flow: Option<Arc<Flow>>,
     /// Whether the wall is closed, so that lengths inside it are known; else blood counts as the tissue around it.
     pub(crate) lumen: bool,
     pub(crate) c_arm: Option<CArm>,
@@ -30,6 +33,7 @@ impl Setup {
             spec: spec.clone(),
             wall: Arc::default(),
             patient: Patient::Slab { tissue_mm: spec.xray.tissue_mm },
+            flow: None,
             lumen: true,
             c_arm: None,
             camera: None,
@@ -50,10 +54,12 @@ impl Setup {
             spec.detector.check_blur(c_arm.pixel_mm())?;
             setup.c_arm = Some(c_arm);
             setup.patient = Patient::new(spec, wall)?;
+            setup.flow = Flow::of_view(spec)?.map(Arc::new);
         }
         let beam: Vec<_> = match &setup.c_arm {
             Some(c_arm) if spec.camera.c_arm => {
-                c_arm.detector_corners_mm().into_iter().chain([c_arm.source_mm()]).collect()
+                // Source and detector are a metre apart: a frame that held them would show the vessel as a speck.
+                c_arm.field_corners_mm(c_arm.sod_mm()).to_vec()
             }
             _ => vec![],
         };

@@ -8,7 +8,8 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree};
 use endowire_viewer::{
-    Backend, DetectorSpec, DeviceView, Image, InjectionSpec, Mode, Moment, Renderer, TorsoSpec, ViewSpec,
+    Backend, DetectorSpec, DeviceView, Image, InjectionSpec, Material, Mode, Moment, Renderer, TorsoSpec,
+    ViewSpec,
 };
 
 /// A straight vessel along z with its centre line, blood rising; contrast medium from 1 s to 2 s.
@@ -23,6 +24,7 @@ fn scene(folder: &std::path::Path, mode: Mode) -> (ViewSpec, endowire_core::vess
     view.xray.mode = mode;
     view.detector = DetectorSpec { seed: 3, lag: 0.0, ..DetectorSpec::default() };
     view.flow.tree = Some(path);
+    view.flow.inlet_mm = Some([0.0, 0.0, -50.0]);
     view.flow.inflow_ml_per_s = 20.0;
     view.injection = vec![InjectionSpec { start_s: 1.0, duration_s: 1.0, rate_ml_per_s: 8.0, at_mm: None }];
     (view, cylinder(6.0, 50.0, 64, Vec3::zeros()))
@@ -235,6 +237,62 @@ fn an_injection_without_a_centre_line_and_a_missing_tomogram_are_refused_by_key(
 }
 
 #[test]
+fn path_lengths_know_the_contrast_medium_of_a_moment_and_add_up() {
+    let folder = folder("raw");
+    let (mut view, wall) = scene(&folder, Mode::Fluoro);
+    view.xray.energy_kev = Some(60.0);
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    let before = renderer.path_lengths(&[wire()]).unwrap();
+    assert!(before.contrast_mm.is_empty());
+    let paths = renderer.path_lengths_at(&[wire()], 1.9).unwrap();
+    let injected: f32 = paths.contrast_mm.iter().sum();
+    assert!(injected > 100.0, "{injected}");
+    let line: Vec<f64> = renderer.transmission(&paths).unwrap().iter().map(|t| -f64::from(*t).ln()).collect();
+    let mu = |material: Material| material.attenuation_per_mm(60.0).unwrap();
+    let sum = |i: usize| {
+        let devices: f64 = paths.devices_mm.iter().map(|(m, map)| mu(*m) * f64::from(map[i])).sum();
+        let inside: f64 = paths.devices_mm.iter().map(|map| f64::from(map.1[i])).sum();
+        let [body, lumen, contrast] =
+            [paths.body_mm[i], paths.lumen_mm[i], paths.contrast_mm[i]].map(f64::from);
+        mu(Material::SoftTissue) * (body - lumen).max(0.0)
+            + mu(Material::Blood) * (lumen - inside - contrast)
+            + mu(Material::Contrast370) * contrast
+            + devices
+    };
+    for (i, line) in line.iter().enumerate() {
+        assert!((line - sum(i)).abs() < 1e-5 * sum(i).max(1.0), "{i}: {line} {}", sum(i));
+    }
+    // The twin: without the medium the sum is another.
+    let without = renderer.transmission(&before).unwrap();
+    let most = without.iter().zip(&line).map(|(t, line)| line + f64::from(*t).ln()).fold(0.0, f64::max);
+    assert!(most > 0.05, "{most}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn contrast_medium_is_not_saturated_in_live_pictures() {
+    let folder = folder("saturated");
+    let (mut view, wall) = scene(&folder, Mode::Fluoro);
+    view.detector = DetectorSpec::ideal();
+    let black = |view: &ViewSpec| {
+        let mut renderer = Renderer::new(view, &wall).unwrap();
+        let image = renderer.render_at(&[], at(0, 1.9)).unwrap().fluoro.unwrap();
+        let vessel = (74..86).flat_map(|x| (20..140).map(move |y| (x, y)));
+        vessel.filter(|&(x, y)| image.pixel(x, y).unwrap()[0] == 0).count()
+    };
+    let left_alone = black(&view);
+    assert!(left_alone < 12 * 120 / 20, "{left_alone}");
+    // The twin: a window as wide as one for this slab alone, 0.12 below and 0.4 above what it attenuates.
+    view.xray.harmonised = 0.0;
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    let paths = renderer.path_lengths(&[]).unwrap();
+    let slab = -f64::from(renderer.transmission(&paths).unwrap()[0]).ln();
+    view.xray.window = Some([slab - 0.12, slab + 0.4]);
+    assert!(black(&view) > 12 * 120 / 2, "{}", black(&view));
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn labels_say_where_the_device_is_in_the_frame() {
     let folder = folder("labels");
     let (mut view, wall) = scene(&folder, Mode::Fluoro);
@@ -249,7 +307,7 @@ fn labels_say_where_the_device_is_in_the_frame() {
     assert!(labels.contacts[0].visible && !labels.contacts[1].visible, "the blades hide the second");
     // The mask is the wire: its columns are within the wire's width of the centre line.
     let marked: Vec<usize> = (0..labels.mask.data().len()).filter(|&i| labels.mask.data()[i] == 1).collect();
-    assert!(marked.len() > 60);
+    assert!(marked.len() > 50);
     for i in marked {
         let pixel = pixel_centre(i, 160);
         let nearest = label.centre_line_px.windows(2).map(|p| {

@@ -28,9 +28,10 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     }
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let frames = args.count as usize;
-    let mut studio =
-        Studio::new("fluoro", &args.frames, &args.scene, &scene, ViewChoice::Fluoro, folder, frames)?;
     let mut simulation = scene.simulation(&Cache::new(&args.frames.cache)).map_err(in_scene)?;
+    let wall = simulation.wall().closed_mesh();
+    let mut studio =
+        Studio::new("fluoro", &args.frames, (&args.scene, &scene, wall), ViewChoice::Fluoro, folder, frames)?;
     let bar = progress::bar(steps, "step");
     let mut run = script.begin();
     for index in 0..steps {

@@ -1,6 +1,7 @@
 //! One file a command.
 
 pub(crate) mod compare;
+mod dataset;
 mod device;
 pub(crate) mod experiment;
 mod export;
@@ -25,6 +26,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Render(args) => render::render(args),
         Command::Export(args) => export::export(args),
         Command::Fluoro(args) => fluoro::fluoro(args),
+        Command::Dataset(args) => dataset::dataset(args),
         Command::Rod(args) => rod::rod(args),
         Command::Verify(args) => verify::verify(args),
         Command::Vessel(VesselCommand::Check { file, unit_mm, septum_mm, felt, json }) => {

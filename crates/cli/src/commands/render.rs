@@ -4,6 +4,7 @@ use endowire_methods::Scene;
 use endowire_viewer::Moment;
 
 use crate::args::{RenderArgs, ViewChoice};
+use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::frames::{Still, Studio};
 use crate::output::instruments::Lengths;
@@ -56,8 +57,10 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         steps.push(last);
     }
     let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
-    let mut studio =
-        Studio::new("render", &args.frames, path, &scene, ViewChoice::Both, folder, steps.len())?;
+    let wall =
+        scene.wall(&Cache::new(&args.frames.cache)).map_err(|e| Failure::from(e).at(path.display()))?;
+    let seen = (path.as_path(), &scene, wall.closed_mesh());
+    let mut studio = Studio::new("render", &args.frames, seen, ViewChoice::Both, folder, steps.len())?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
     let bar = progress::bar(steps.len(), "frame");

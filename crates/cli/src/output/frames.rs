@@ -8,7 +8,9 @@ use endowire_core::insertion::Simulation;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_methods::Scene;
-use endowire_viewer::{Angiogram, Animation, ContactView, Frames, Image, Moment, Renderer, View, ViewSpec};
+use endowire_viewer::{
+    Angiogram, Animation, ContactView, Frames, Image, Labels, Mask, Moment, Renderer, View, ViewSpec,
+};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -18,7 +20,6 @@ use super::pushed::Pushed;
 use super::recorder::Recorder;
 use super::{print_json, tell, to_json};
 use crate::args::{FrameArgs, ViewChoice};
-use crate::cache::Cache;
 use crate::failure::Failure;
 
 /// Draws the steps of a run that the scene wants to see.
@@ -134,19 +135,17 @@ pub(crate) struct Studio<'a> {
 }
 
 impl<'a> Studio<'a> {
-    /// Prepares `frames` frames of a scene, in `folder`, where they replace those of an earlier call of the same command.
+    /// Prepares `frames` frames of a scene with its closed wall, in `folder`, where they replace those of an earlier call of the same command.
     pub(crate) fn new(
         command: &str,
         args: &'a FrameArgs,
-        path: &Path,
-        scene: &Scene,
+        (path, scene, wall): (&Path, &Scene, SurfaceMesh),
         default: ViewChoice,
         folder: PathBuf,
         frames: usize,
     ) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         let spec = wished(ViewSpec::of_scene(scene, path)?, args, default)?;
-        let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
         let pushed = Pushed::new(path, scene, &spec)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
         if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {
@@ -192,11 +191,10 @@ impl<'a> Studio<'a> {
 
     /// Draws a moment and writes what is wanted of it.
     pub(crate) fn draw(&mut self, still: &Still) -> Result<(), Failure> {
-        if let (Some(orbit), true) = (self.args.orbit, self.drawn > 0) {
+        if let (Some(orbit), true) = (self.args.orbit, self.spec.wants(View::ThreeD)) {
             let mut spec = ViewSpec { views: vec![View::ThreeD], ..self.spec.clone() };
             let part = self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64;
-            let azimuth = spec.camera.azimuth_deg.unwrap_or(0.0) + orbit * part;
-            spec.camera.azimuth_deg = Some(azimuth % 360.0);
+            (spec.camera.turn_deg, spec.camera.orbit_deg) = (orbit * part, Some(orbit));
             let views = self.pushed.views(still.shape, still.inserted_mm);
             let mut orbiting = Renderer::new(&spec, &self.wall)?;
             orbiting.show_contacts(still.contacts);
@@ -256,11 +254,15 @@ impl<'a> Studio<'a> {
             let labels = self.renderer.labels(&device, &contacts)?;
             let path = self.file(&format!("{}_mask.png", still.name))?;
             labels.mask.write_png(&path)?;
+            for (name, mask) in masks(&labels) {
+                let path = self.file(&format!("{}_{name}.png", still.name))?;
+                mask.image().write_png(&path)?;
+            }
             let path = self.file(&format!("{}_labels.json", still.name))?;
             std::fs::write(&path, to_json(&labels)? + "\n").map_err(|e| Failure::write(&path, &e))?;
         }
         if self.args.raw {
-            let paths = self.renderer.path_lengths(&device)?;
+            let paths = self.renderer.path_lengths_at(&device, still.moment.time_s)?;
             let line: Vec<f32> = self.renderer.transmission(&paths)?.iter().map(|t| -t.ln()).collect();
             let mut maps = vec![("line_integral".to_owned(), &line)];
             for (name, map) in [
@@ -268,6 +270,7 @@ impl<'a> Studio<'a> {
                 ("bone_mm", &paths.bone_mm),
                 ("lung_mm", &paths.lung_mm),
                 ("lumen_mm", &paths.lumen_mm),
+                ("contrast_mm", &paths.contrast_mm),
             ] {
                 if !map.is_empty() {
                     maps.push((name.to_owned(), map));
@@ -304,6 +307,8 @@ impl<'a> Studio<'a> {
                 c_arm,
                 kvp: self.spec.xray.kvp,
                 frames_per_s: self.spec.frames_per_s,
+                mode: self.spec.xray.mode,
+                contrast: !self.spec.injection.is_empty() || self.spec.xray.contrast_fraction > 0.0,
                 description: "endowire",
             };
             angiogram.write(path, &self.series)?;
@@ -311,6 +316,19 @@ impl<'a> Studio<'a> {
         }
         Ok(Written { renderer: self.renderer.backend().to_owned(), folder: self.folder, files: self.files })
     }
+}
+
+/// Masks of a frame: the vessel, each of several instruments, and each part of one.
+fn masks(labels: &Labels) -> Vec<(String, &Mask)> {
+    let mut named: Vec<(String, &Mask)> =
+        labels.vessel.iter().map(|mask| ("mask_vessel".to_owned(), mask)).collect();
+    for (k, device) in (1..).zip(&labels.devices) {
+        if labels.devices.len() > 1 {
+            named.push((format!("mask_{k}"), &device.mask));
+        }
+        named.extend((1..).zip(&device.parts).map(|(j, part)| (format!("mask_{k}_part_{j}"), &part.mask)));
+    }
+    named
 }
 
 /// A `[view]` table with the wishes of the command line.

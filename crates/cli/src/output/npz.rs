@@ -140,6 +140,41 @@ pub(crate) fn write_map(path: &Path, width: usize, values: &[f32]) -> io::Result
     file.flush()
 }
 
+/// A small array that is held in memory.
+pub(crate) struct Array {
+    name: String,
+    kind: &'static str,
+    shape: Vec<usize>,
+    bytes: Vec<u8>,
+}
+
+impl Array {
+    /// Bytes of a shape.
+    pub(crate) fn of_bytes(name: &str, shape: Vec<usize>, bytes: Vec<u8>) -> Self {
+        Self { name: name.to_owned(), kind: "|u1", shape, bytes }
+    }
+
+    /// Floats of a shape.
+    pub(crate) fn of_floats(name: &str, shape: Vec<usize>, values: impl Iterator<Item = f64>) -> Self {
+        Self { name: name.to_owned(), kind: "<f8", shape, bytes: values.flat_map(f64::to_le_bytes).collect() }
+    }
+}
+
+/// Packs arrays that are held in memory into a `.npz` file.
+pub(crate) fn write_arrays(path: &Path, arrays: &[Array]) -> io::Result<()> {
+    let mut archive = ZipWriter::new(BufWriter::new(File::create(path)?));
+    let options = SimpleFileOptions::default()
+        .compression_method(zip::CompressionMethod::Stored)
+        .last_modified_time(zip::DateTime::default());
+    for array in arrays {
+        archive.start_file(format!("{}.npy", array.name), options)?;
+        let sides: Vec<String> = array.shape.iter().map(|n| format!("{n},")).collect();
+        archive.write_all(&header(array.kind, &format!("({})", sides.join(" "))))?;
+        archive.write_all(&array.bytes)?;
+    }
+    archive.finish()?.flush()
+}
+
 /// The numbers of an array of 8-byte numbers that [`write()`] has packed, as little-endian bytes.
 pub(crate) fn read(path: &Path, name: &str) -> io::Result<Vec<[u8; 8]>> {
     let bad = |what: String| io::Error::new(io::ErrorKind::InvalidData, what);

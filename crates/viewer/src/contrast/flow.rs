@@ -12,15 +12,17 @@
 //!
 //! with the logistic distribution G of deviation one. Nothing flows upstream.
 
-use endowire_core::vessel::CentrelineTree;
+use endowire_core::vessel::{CentrelineNode, CentrelineTree};
 use endowire_core::{Error, Result, Vec3};
 
-use crate::spec::{FlowSpec, InjectionSpec};
+use crate::spec::{FlowSpec, InjectionSpec, ViewSpec};
 
 /// Points of the tree are set at most this far apart, mm.
 const SPACING_MM: f64 = 2.0;
 /// Most points: every cell of the lumen asks all of them which is nearest.
 const MOST_NODES: f64 = 50_000.0;
+/// Ends of at least this part of the widest's radius are about as wide.
+const ABOUT_AS_WIDE: f64 = 0.95;
 /// Deviation of a front where it is injected, s.
 const FIRST_SPREAD_S: f64 = 0.05;
 
@@ -49,13 +51,34 @@ struct Bolus {
 
 /// The tree directed from its inlet, with its injections.
 #[derive(Debug, Clone)]
-pub(super) struct Flow {
+pub(crate) struct Flow {
     pub(super) nodes: Vec<Node>,
     boluses: Vec<Bolus>,
     dispersion: f64,
 }
 
 impl Flow {
+    /// The flow that the injections of `spec` go with; `None` where there are none.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] without a centre line or for one that cannot be followed; [`Error::Content`] for its file.
+    pub(crate) fn of_view(spec: &ViewSpec) -> Result<Option<Self>> {
+        if spec.injection.is_empty() {
+            return Ok(None);
+        }
+        let Some(path) = &spec.flow.tree else {
+            let mend = "contrast medium flows along a centre line; give view.flow.tree";
+            return Err(Error::parameter("view.injection", format!("{} tables", spec.injection.len()), mend));
+        };
+        let tree = CentrelineTree::read(path).map_err(|error| match error {
+            Error::File { path, source } => {
+                Error::parameter("view.flow.tree", path.display(), source.to_string())
+            }
+            other => other,
+        })?;
+        Self::new(&tree, &spec.flow, &spec.injection).map(Some)
+    }
+
     pub(super) fn new(tree: &CentrelineTree, spec: &FlowSpec, injections: &[InjectionSpec]) -> Result<Self> {
         let nodes = directed(tree, spec)?;
         let flow_mm3 = spec.inflow_ml_per_s * 1000.0;
@@ -128,6 +151,13 @@ pub(super) fn nearest(nodes: &[Node], point: &Vec3) -> usize {
     (0..nodes.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
 }
 
+/// The end where an artery is supplied: the widest, and of those about as wide the one nearest to the head.
+fn supplying(points: &[CentrelineNode], ends: impl Iterator<Item = usize> + Clone) -> Option<usize> {
+    let widest = ends.clone().map(|i| points[i].radius_mm).fold(0.0, f64::max);
+    let wide = ends.filter(|&i| points[i].radius_mm >= ABOUT_AS_WIDE * widest);
+    wide.max_by(|&a, &b| points[a].position_mm.z.total_cmp(&points[b].position_mm.z))
+}
+
 /// The tree's points and some between them, from the inlet downstream, with the shares of the flow.
 fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
     let points = tree.nodes();
@@ -150,17 +180,22 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
             neighbours[parent].push(i);
         }
     }
+    let ends = (0..points.len()).filter(|&i| neighbours[i].len() == 1);
     let inlet = match spec.inlet_mm {
-        None => 0,
+        None => supplying(points, ends),
         Some(near) => {
             let near = Vec3::from(near);
-            let ends = (0..points.len()).filter(|&i| neighbours[i].len() == 1);
             let distance = |i: &usize| (points[*i].position_mm - near).norm();
-            ends.min_by(|a, b| distance(a).total_cmp(&distance(b))).ok_or_else(|| {
-                Error::parameter("view.flow.inlet_mm", format!("{near:?}"), "the tree has no end")
-            })?
+            ends.min_by(|a, b| distance(a).total_cmp(&distance(b)))
         }
     };
+    let inlet = inlet.ok_or_else(|| {
+        Error::parameter(
+            "view.flow.tree",
+            format!("{} rows", points.len()),
+            "has no end where blood comes in",
+        )
+    })?;
     let place = |i: usize| (points[i].position_mm, points[i].radius_mm);
     let (position_mm, radius_mm) = place(inlet);
     let mut nodes = vec![Node { position_mm, radius_mm, upstream: None, share: 1.0, volume_mm3: 0.0 }];
@@ -202,8 +237,6 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
 
 #[cfg(test)]
 mod tests {
-    use endowire_core::vessel::CentrelineNode;
-
     use super::*;
 
     /// A trunk of 100 mm and radius 5 that divides into radii 4 and 2.
@@ -282,6 +315,31 @@ mod tests {
         let long = CentrelineTree::new(vec![node(0.0, None), node(9e5, Some(0))]).unwrap();
         let error = Flow::new(&long, &FlowSpec::default(), &[injection(None)]).unwrap_err().to_string();
         assert!(error.contains("view.flow.tree") && error.contains("450000"), "{error}");
+    }
+
+    #[test]
+    fn left_alone_blood_comes_in_at_the_widest_end_nearest_to_the_head() {
+        let node = |z: f64, radius_mm: f64, parent| CentrelineNode {
+            position_mm: Vec3::new(if radius_mm < 5.0 { 30.0 } else { 0.0 }, 0.0, z),
+            radius_mm,
+            parent,
+        };
+        // An aorta from its lower end, with a branch to the liver.
+        let tree = |lower: f64, upper: f64| {
+            let nodes = vec![
+                node(0.0, lower, None),
+                node(60.0, 9.0, Some(0)),
+                node(120.0, upper, Some(1)),
+                node(140.0, 3.0, Some(1)),
+            ];
+            CentrelineTree::new(nodes).unwrap()
+        };
+        let first = |tree: &CentrelineTree| {
+            Flow::new(tree, &FlowSpec::default(), &[injection(None)]).unwrap().nodes[0].position_mm.z
+        };
+        assert_eq!(first(&tree(9.0, 9.0)), 120.0);
+        assert_eq!(first(&tree(9.1, 9.0)), 120.0);
+        assert_eq!(first(&tree(12.0, 9.0)), 0.0, "the twin: a wider lower end supplies");
     }
 
     #[test]

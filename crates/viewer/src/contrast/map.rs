@@ -6,14 +6,14 @@
 //! with the nodes' fractions.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
-use endowire_core::vessel::{CentrelineTree, SurfaceMesh};
-use endowire_core::{Error, Result, Vec3};
+use endowire_core::Vec3;
+use endowire_core::vessel::SurfaceMesh;
 
 use super::flow::{Flow, Node};
 use crate::c_arm::CArm;
 use crate::cpu::wall_crossings;
-use crate::spec::ViewSpec;
 
 /// Length of a step and side of the cells that remember their nearest node, mm.
 const STEP_MM: f64 = 1.25;
@@ -21,27 +21,17 @@ const STEP_MM: f64 = 1.25;
 /// The share of each node in the lumen of each pixel.
 #[derive(Debug)]
 pub(crate) struct ContrastMap {
-    flow: Flow,
+    flow: Arc<Flow>,
     /// Pixels inside the wall, rising, and where their shares end.
     pixels: Vec<(u32, u32)>,
     shares: Vec<(u32, f32)>,
 }
 
 impl ContrastMap {
-    pub(crate) fn new(spec: &ViewSpec, c_arm: &CArm, wall: &SurfaceMesh) -> Result<Self> {
-        let Some(path) = &spec.flow.tree else {
-            let mend = "contrast medium flows along a centre line; give view.flow.tree";
-            return Err(Error::parameter("view.injection", format!("{} tables", spec.injection.len()), mend));
-        };
-        let tree = CentrelineTree::read(path).map_err(|error| match error {
-            Error::File { path, source } => {
-                Error::parameter("view.flow.tree", path.display(), source.to_string())
-            }
-            other => other,
-        })?;
-        let flow = Flow::new(&tree, &spec.flow, &spec.injection)?;
-        let mut map = Self { flow, pixels: vec![], shares: vec![] };
-        let mut near = Nearest::new(&map.flow.nodes);
+    /// The shares of `flow` in the lumen that `wall` encloses.
+    pub(crate) fn new(flow: &Arc<Flow>, c_arm: &CArm, wall: &SurfaceMesh) -> Self {
+        let mut map = Self { flow: Arc::clone(flow), pixels: vec![], shares: vec![] };
+        let mut near = Nearest::new(&flow.nodes);
         let mut crossings = wall_crossings(c_arm, wall);
         crossings.sort_unstable_by(|a, b| {
             (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
@@ -82,7 +72,7 @@ impl ContrastMap {
         }
         map.shares.shrink_to_fit();
         map.pixels.shrink_to_fit();
-        Ok(map)
+        map
     }
 
     /// Mean fraction of contrast medium along the lumen of each pixel that has any lumen, pixels rising.

@@ -3,4 +3,5 @@
 mod flow;
 mod map;
 
+pub(crate) use flow::Flow;
 pub(crate) use map::ContrastMap;

@@ -1,5 +1,6 @@
 //! Frames without any adapter: the exact fluoroscopic reference and a software rasteriser for the 3D view.
 
+mod coverage;
 mod devices;
 mod fluoro;
 mod piece;
@@ -7,6 +8,7 @@ mod raster;
 mod view3d;
 mod wall;
 
+pub(crate) use coverage::Coverage;
 pub(crate) use devices::layers_in_beam;
 #[cfg(feature = "gpu")]
 pub(crate) use devices::pixels_of;

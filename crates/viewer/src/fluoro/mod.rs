@@ -15,13 +15,16 @@
 
 mod anatomy;
 mod display;
+mod labels;
 mod scatter;
 mod sequence;
 
 use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result};
+use rayon::prelude::*;
 
 pub(crate) use anatomy::Anatomy;
+pub(crate) use labels::labels;
 use scatter::Scatter;
 pub use sequence::Moment;
 pub(crate) use sequence::Sequence;
@@ -30,16 +33,23 @@ use crate::c_arm::CArm;
 use crate::contrast::ContrastMap;
 use crate::cpu::layers_in_beam;
 use crate::device::{Piece, RefinedDevice};
+use crate::output::Mask;
 use crate::scene::Setup;
 use crate::spec::ViewSpec;
-use crate::xray::{Beam, LANES, Lanes, Material};
+use crate::xray::{Beam, LANES, Lanes, Material, PathLengths};
 
 /// Rays across a pixel in each direction. Two give four grey levels of edge smoothing, enough beside a real
 /// detector's blur, at four times the cost of one.
 pub(crate) const SUBRAYS: u32 = 2;
 
+/// Lengths inside the lumen below this are rounding, mm.
+const LEAST_LUMEN_MM: f32 = 1e-3;
+
 /// Fractions of contrast medium below this are blood.
 const LEAST_FRACTION: f32 = 1e-4;
+
+/// Fewest pixels worth handing to another thread.
+const FEWEST_PIXELS: usize = 1024;
 
 /// Computes lengths of rays inside things: the one task that processors differ in.
 pub(crate) trait PathEngine: Send {
@@ -81,6 +91,8 @@ pub(crate) struct Fluoroscope {
     scatter: Scatter,
     /// Signal of the anatomy without devices and injections.
     pub(crate) still: Signal,
+    /// The same with the blades wide open, where there are any.
+    unblocked: Option<Signal>,
     /// Lengths inside devices by material, all zero between frames.
     devices: Vec<(Material, Lanes, Vec<f32>)>,
     /// Rays and pixels that devices touch in this frame.
@@ -102,10 +114,7 @@ impl Fluoroscope {
             beam.excess(Material::Blood, None)?,
             beam.excess(Material::Contrast370, Some(Material::Blood))?,
         ];
-        let contrast = match spec.injection.is_empty() {
-            true => None,
-            false => Some(ContrastMap::new(spec, c_arm, &setup.wall)?),
-        };
+        let contrast = setup.flow.as_ref().map(|flow| ContrastMap::new(flow, c_arm, &setup.wall));
         let pixels = c_arm.size_px().map(|n| n as usize).iter().product();
         let still = Signal { signal: vec![0.0; pixels], energy: vec![0.0; pixels] };
         let mut fluoroscope = Self {
@@ -119,20 +128,48 @@ impl Fluoroscope {
             default_material: spec.xray.device_material,
             scatter: Scatter::new(&still, c_arm, spec.detector.scatter_fraction),
             still,
+            unblocked: None,
             devices: vec![],
             touched: vec![],
             pixels: vec![],
             listed: vec![false; pixels],
         };
-        let mut room = Lanes::new();
-        for pixel in 0..pixels {
-            let [signal, energy] = fluoroscope.primary(pixel, fluoroscope.fraction, &mut room);
-            fluoroscope.still.signal[pixel] = signal;
-            fluoroscope.still.energy[pixel] = energy;
-        }
-        fluoroscope.scatter = Scatter::new(&fluoroscope.still, c_arm, spec.detector.scatter_fraction);
-        fluoroscope.scatter.add_still(&mut fluoroscope.still);
+        let whole = (0..pixels).into_par_iter().with_min_len(FEWEST_PIXELS);
+        let whole =
+            whole.map_init(Lanes::new, |room, pixel| fluoroscope.primary(pixel, fluoroscope.fraction, room));
+        let whole: Vec<[f32; 2]> = whole.collect();
+        let scattered = |primary: Signal| {
+            let scatter = Scatter::new(&primary, c_arm, spec.detector.scatter_fraction);
+            let mut all = primary;
+            scatter.add_still(&mut all);
+            (scatter, all)
+        };
+        let behind = |openness: &dyn Fn(usize) -> f32| {
+            let of = |i: usize| whole.iter().enumerate().map(|(pixel, v)| v[i] * openness(pixel)).collect();
+            scattered(Signal { signal: of(0), energy: of(1) })
+        };
+        (fluoroscope.scatter, fluoroscope.still) = behind(&|pixel| c_arm.openness(pixel) as f32);
+        fluoroscope.unblocked = c_arm.opening_px().map(|_| behind(&|_| 1.0).1);
         Ok(fluoroscope)
+    }
+
+    /// Signal of the anatomy alone with the blades wide open: what the display adapts to, so that nothing open changes where they
+    /// close.
+    pub(crate) fn unblocked(&self) -> &Signal {
+        self.unblocked.as_ref().unwrap_or(&self.still)
+    }
+
+    /// Pixels at least half of whose rays meet the lumen, under no blade.
+    pub(crate) fn vessel(&self) -> Mask {
+        let inside = |pixel: u32| {
+            let (first, stride) = self.first_ray(pixel as usize);
+            let rays = (0..SUBRAYS as usize)
+                .flat_map(|row| first + row * stride..first + row * stride + SUBRAYS as usize);
+            let met = rays.filter(|&ray| self.anatomy.lumen[ray] > LEAST_LUMEN_MM).count();
+            2 * met >= (SUBRAYS * SUBRAYS) as usize && self.c_arm.openness(pixel as usize) >= 0.5
+        };
+        let size_px = self.c_arm.size_px();
+        Mask::new(size_px, (0..size_px[0] * size_px[1]).filter(|&pixel| inside(pixel)).collect())
     }
 
     /// First ray of a pixel, and rays a row.
@@ -141,13 +178,9 @@ impl Fluoroscope {
         (pixel / width * sub * width * sub + pixel % width * sub, width * sub)
     }
 
-    /// Signal and energy of the unscattered quanta of a pixel whose lumen has the given fraction of contrast medium; `room` is to
-    /// work in.
+    /// Signal and energy of the unscattered quanta of a pixel without blades whose lumen has the given fraction of contrast medium;
+    /// `room` is to work in.
     fn primary(&self, pixel: usize, fraction: f32, room: &mut Lanes) -> [f32; 2] {
-        let open = self.c_arm.openness(pixel) as f32;
-        if open == 0.0 {
-            return [0.0; 2];
-        }
         let (first, stride) = self.first_ray(pixel);
         let mut sum = [[0.0; LANES]; 2];
         for row in 0..SUBRAYS as usize {
@@ -155,7 +188,7 @@ impl Fluoroscope {
                 self.ray(ray, fraction, room, &mut sum);
             }
         }
-        sum.map(|lanes| lanes.iter().sum::<f32>() * open / (SUBRAYS * SUBRAYS) as f32)
+        sum.map(|lanes| lanes.iter().sum::<f32>() / (SUBRAYS * SUBRAYS) as f32)
     }
 
     #[inline]
@@ -224,6 +257,45 @@ impl Fluoroscope {
         Ok(())
     }
 
+    /// Fraction of contrast medium in the lumen of each pixel that has any injected by then, pixels rising.
+    pub(crate) fn injected(&self, time_s: f64) -> Vec<(u32, f32)> {
+        self.contrast.as_ref().map_or_else(Vec::new, |contrast| contrast.fractions(time_s))
+    }
+
+    /// Signal behind path lengths over that of the open beam. Where they are those of `before`, its transmission is taken.
+    pub(crate) fn transmission(
+        &self,
+        paths: &PathLengths,
+        before: Option<&(PathLengths, Vec<f32>)>,
+    ) -> Result<Vec<f32>> {
+        let mut devices = Vec::with_capacity(paths.devices_mm.len());
+        for (material, lengths) in &paths.devices_mm {
+            devices.push((self.beam.excess(*material, None)?, lengths));
+        }
+        let at = |map: &[f32], i: usize| map.get(i).copied().unwrap_or(0.0);
+        let open = self.beam.ln_reference().exp() as f32;
+        let rays = (0..paths.lumen_mm.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
+        let before = before.filter(|before| before.0.is_like(paths));
+        let behind = rays.map_init(Lanes::new, |room, i| {
+            if let Some((before, left)) = before
+                && before.is_same_at(paths, i)
+            {
+                return left[i];
+            }
+            let [bone, lung, lumen] = [&paths.bone_mm, &paths.lung_mm, &paths.lumen_mm].map(|map| at(map, i));
+            let tissue = (at(&paths.body_mm, i) - bone - lung - lumen).max(0.0);
+            let inside: f32 = devices.iter().map(|(_, map)| at(map, i)).sum();
+            let lengths =
+                [tissue - self.beam.reference_mm(), bone, lung, lumen - inside, at(&paths.contrast_mm, i)];
+            let layers =
+                self.lanes.iter().zip(lengths).chain(devices.iter().map(|(mu, map)| (mu, at(map, i))));
+            let mut sum = [[0.0; LANES]; 2];
+            self.beam.add(layers.filter(|layer| layer.1 != 0.0), room, &mut sum);
+            sum[0].iter().sum::<f32>() * open
+        });
+        Ok(behind.collect())
+    }
+
     /// Largest fraction of contrast medium at any time and place shown together: what a roadmap is made of.
     pub(crate) fn opacified(&self) -> Result<Signal> {
         let contrast = self.contrast.as_ref().ok_or_else(|| {
@@ -237,15 +309,21 @@ impl Fluoroscope {
 
     /// Draws pixels that devices touch and those with contrast medium, both rising, over the still picture.
     fn draw(&self, pixels: &[u32], fractions: &[(u32, f32)], now: &mut Signal) {
-        let mut room = Lanes::new();
         let mut lost = Vec::with_capacity(fractions.len());
-        let (mut pixels, mut fractions) = (pixels.iter().peekable(), fractions.iter().peekable());
-        while let Some(pixel) = pixels.peek().copied().into_iter().chain(fractions.peek().map(|f| &f.0)).min()
-        {
-            pixels.next_if_eq(&pixel);
-            let more = fractions.next_if(|f| f.0 == *pixel).map(|f| f.1);
-            let pixel = *pixel as usize;
-            let primary = self.primary(pixel, (self.fraction + more.unwrap_or(0.0)).min(1.0), &mut room);
+        let anew = merged(pixels, fractions);
+        let drawn =
+            anew.par_iter().with_min_len(FEWEST_PIXELS).map_init(Lanes::new, |room, (pixel, more)| {
+                let pixel = *pixel as usize;
+                match self.c_arm.openness(pixel) as f32 {
+                    0.0 => [0.0; 2],
+                    open => self
+                        .primary(pixel, (self.fraction + more.unwrap_or(0.0)).min(1.0), room)
+                        .map(|primary| primary * open),
+                }
+            });
+        let drawn: Vec<[f32; 2]> = drawn.collect();
+        for ((pixel, more), primary) in anew.into_iter().zip(drawn) {
+            let pixel = pixel as usize;
             let scattered = self.scatter.still(pixel);
             if more.is_some() {
                 let still = [self.still.signal[pixel], self.still.energy[pixel]];
@@ -258,4 +336,15 @@ impl Fluoroscope {
             self.scatter.add_change(lost.into_iter(), now);
         }
     }
+}
+
+/// Pixels of both lists, each rising, with what the second says of them.
+fn merged(pixels: &[u32], fractions: &[(u32, f32)]) -> Vec<(u32, Option<f32>)> {
+    let mut all = Vec::with_capacity(pixels.len() + fractions.len());
+    let (mut pixels, mut fractions) = (pixels.iter().peekable(), fractions.iter().peekable());
+    while let Some(pixel) = pixels.peek().copied().into_iter().chain(fractions.peek().map(|f| &f.0)).min() {
+        pixels.next_if_eq(&pixel);
+        all.push((*pixel, fractions.next_if(|f| f.0 == *pixel).map(|f| f.1)));
+    }
+    all
 }

@@ -20,6 +20,8 @@ const HOLD_WEIGHT: f32 = 0.4;
 const DSA_SHARES: Window = [-0.15, 1.05];
 /// Share of the pixels with contrast medium that may be darker than black.
 const DSA_OUTLIERS: f64 = 0.02;
+/// Opacities below this are no contrast medium.
+const LEAST_OPACITY: f32 = 0.02;
 /// Strongest opacification that a window assumes where nothing is ever injected.
 const FAINTEST: f32 = 0.3;
 /// Roadmap values shown white and black, around a grey background, and that of the strongest vessel.
@@ -60,7 +62,7 @@ impl Sequence {
         let share = spec.xray.harmonised as f32;
         let mask: Option<Vec<f32>> = (matches!(mode, Mode::Fluoro | Mode::Cine) && share > 0.0).then(|| {
             // Relative to the reference, whose logarithm is zero: the middle keeps its grey.
-            let values = logarithm(fluoroscope.still.signal.clone());
+            let values = logarithm(fluoroscope.unblocked().signal.clone());
             shading(&values, c_arm).iter().map(|v| share * v).collect()
         });
         let window = match (mode, spec.xray.window) {
@@ -71,7 +73,8 @@ impl Sequence {
                 if let Some(mask) = &mask {
                     values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
                 }
-                fitted(&values, c_arm.size_px(), |pixel| c_arm.openness(pixel) == 1.0)
+                let [white, black] = fitted(&values, c_arm.size_px(), |pixel| c_arm.openness(pixel) == 1.0);
+                [white, black.max(densest(fluoroscope, mask.as_deref()))]
             }
             (_, Some(window)) => window.map(|p| p as f32),
             (Mode::Dsa, None) => {
@@ -80,10 +83,14 @@ impl Sequence {
             }
             (Mode::Roadmap, None) => ROADMAP_WINDOW,
         };
+        let kev = fluoroscope.beam.kev(c_arm.pixel_mm(), dose);
+        // n quanta of the energy ε vary by √n ε.
+        let electronic = fluoroscope.beam.kev(c_arm.pixel_mm(), spec.detector.electronic_ngy);
+        let electronic_kev = (electronic * fluoroscope.beam.quantum_kev()).sqrt();
         Self {
-            detector: Detector::new(&spec.detector, spec.detector.seed, c_arm.size_px(), c_arm.pixel_mm()),
+            detector: Detector::new(&spec.detector, &spec.xray, c_arm, electronic_kev),
             mode,
-            kev: fluoroscope.beam.kev(c_arm.pixel_mm(), dose),
+            kev,
             window,
             bits: spec.bits,
             noisy: spec.detector.noise,
@@ -110,8 +117,7 @@ impl Sequence {
         // The injections of a roadmap are those of its angiogram.
         let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
         let signal = fluoroscope.signal(engine, devices, time)?;
-        let read = self.detector.read(&signal.signal, &signal.energy, self.kev, moment.frame);
-        drop(signal);
+        let read = self.detector.read(signal.signal, signal.energy, self.kev, moment.frame);
         let mut values = logarithm(read);
         if let Some(mask) = &self.mask {
             values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
@@ -163,7 +169,8 @@ impl Sequence {
         let mut mean = vec![0.0; signal.signal.len()];
         for k in 0..MASK_FRAMES {
             self.detector.reset();
-            let read = self.detector.read(&signal.signal, &signal.energy, kev, MASK_NUMBERS + k);
+            let read =
+                self.detector.read(signal.signal.clone(), signal.energy.clone(), kev, MASK_NUMBERS + k);
             mean.iter_mut().zip(read).for_each(|(mean, v)| *mean += v / MASK_FRAMES as f32);
         }
         self.detector.reset();
@@ -171,15 +178,77 @@ impl Sequence {
     }
 }
 
+/// Densest shown value where contrast medium ever comes, but for the darkest few pixels; a vessel full of it keeps its shades.
+fn densest(fluoroscope: &Fluoroscope, mask: Option<&[f32]>) -> f32 {
+    let Ok(full) = fluoroscope.opacified() else { return f32::MIN };
+    let still = logarithm(fluoroscope.still.signal.clone());
+    let full = logarithm(full.signal);
+    let filled = (0..full.len()).filter(|&i| full[i] - still[i] > LEAST_OPACITY);
+    let values = filled.map(|i| full[i] - mask.map_or(0.0, |mask| mask[i])).collect();
+    but_for_outliers(values).unwrap_or(f32::MIN)
+}
+
 /// Strongest subtracted value that contrast medium ever brings, but for the darkest few pixels.
 fn strongest(fluoroscope: &Fluoroscope) -> f32 {
     let Ok(full) = fluoroscope.opacified() else { return FAINTEST };
     let still = logarithm(fluoroscope.still.signal.clone());
-    let mut values: Vec<f32> =
-        logarithm(full.signal).iter().zip(still).map(|(v, still)| v - still).filter(|v| *v > 0.02).collect();
-    if values.is_empty() {
-        return FAINTEST;
+    let opacities = logarithm(full.signal).into_iter().zip(still).map(|(v, still)| v - still);
+    but_for_outliers(opacities.filter(|v| *v > LEAST_OPACITY).collect()).map_or(FAINTEST, |v| v.max(FAINTEST))
+}
+
+/// The largest value but for the outliers.
+fn but_for_outliers(mut values: Vec<f32>) -> Option<f32> {
+    let last = values.len().checked_sub(1)?;
+    let place = (last as f64 * (1.0 - DSA_OUTLIERS)).round() as usize;
+    Some(*values.select_nth_unstable_by(place, f32::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use endowire_core::Vec3;
+    use endowire_core::vessel::SurfaceMesh;
+
+    use super::*;
+    use crate::cpu;
+    use crate::scene::Setup;
+    use crate::spec::{DetectorSpec, TorsoSpec, View};
+
+    /// What a frame of a trunk shows of each pixel, the mask of that display, and where the blades leave all open.
+    fn shown(collimation_mm: Option<[f64; 2]>) -> (Vec<f32>, Vec<f32>, Vec<bool>) {
+        let wall = SurfaceMesh {
+            vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        };
+        let mut spec = ViewSpec { views: vec![View::Fluoro], size_px: [128, 128], ..ViewSpec::default() };
+        spec.detector = DetectorSpec::ideal();
+        spec.patient.torso = Some(TorsoSpec::default());
+        spec.c_arm.field_mm = Some(200.0);
+        spec.c_arm.collimation_mm = collimation_mm;
+        let setup = Setup::new(&spec, &wall).unwrap();
+        let mut engine = cpu::CpuPaths;
+        let scope = Fluoroscope::new(&setup, setup.c_arm.as_ref().unwrap(), &mut engine).unwrap();
+        let sequence = Sequence::new(&spec, &scope);
+        let mask = sequence.mask.unwrap();
+        let values = logarithm(scope.still.signal.clone()).iter().zip(&mask).map(|(v, m)| v - m).collect();
+        (values, mask, (0..128 * 128).map(|i| scope.c_arm.openness(i) == 1.0).collect())
     }
-    let place = ((values.len() - 1) as f64 * (1.0 - DSA_OUTLIERS)).round() as usize;
-    values.select_nth_unstable_by(place, f32::total_cmp).1.max(FAINTEST)
+
+    #[test]
+    fn blades_that_close_elsewhere_change_no_open_pixel() {
+        let (whole, _, _) = shown(None);
+        let (closed, mask, open) = shown(Some([90.0, 70.0]));
+        let most = |values: &[f32]| {
+            let open = (0..whole.len()).filter(|&i| open[i]);
+            open.map(|i| f64::from((values[i] - whole[i]) / whole[i]).abs()).fold(0.0, f64::max)
+        };
+        assert!(most(&closed) <= 1e-6, "{}", most(&closed));
+        // The twin: shading of the picture with its blades brightens what is beside them.
+        let with_blades: Vec<f32> = closed.iter().zip(&mask).map(|(v, m)| v + m).collect();
+        let wall = SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::repeat(40.0)], triangles: vec![] };
+        let spec = crate::CArmSpec { field_mm: Some(200.0), ..crate::CArmSpec::default() };
+        let arm = crate::CArm::new(&spec, [128, 128], &wall).unwrap();
+        let leaking = shading(&with_blades, &arm);
+        let leaking: Vec<f32> = with_blades.iter().zip(leaking).map(|(v, m)| v - 0.55 * m).collect();
+        assert!(most(&leaking) > 0.1, "{}", most(&leaking));
+    }
 }

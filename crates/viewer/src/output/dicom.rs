@@ -1,10 +1,12 @@
-//! X-ray angiographic images as DICOM: one multi-frame file with the geometry of the C-arm.
+//! X-ray angiographic images as DICOM: one multi-frame file a plane, with the geometry of the C-arm.
 //!
-//! The object follows the XA Image IOD (DICOM PS3.3, A.14), explicit VR little endian. Identifiers are made from the content, so
-//! the same frames give the same file; a simulation has no date of study.
+//! The object follows the XA Image IOD (DICOM PS3.3, A.14), explicit VR little endian. Frames are as displayed, so their intensities
+//! have no physical meaning (`DISP`), and no modality LUT belongs to them; subtracted ones are derived. Identifiers are made from
+//! pixels and geometry, so the same frames give the same file and others never its name; a simulation has no date of study.
 
 use std::path::Path;
 
+use dicom_core::value::DataSetSequence;
 use dicom_core::{DataElement, PrimitiveValue, Tag, VR, smallvec::SmallVec};
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
@@ -12,6 +14,8 @@ use endowire_core::{Error, Result};
 
 use super::{Image, PixelFormat};
 use crate::c_arm::CArm;
+use crate::fingerprint::fingerprint;
+use crate::spec::Mode;
 
 /// What a file of angiographic frames tells beside the pixels.
 #[derive(Debug, Clone)]
@@ -22,8 +26,20 @@ pub struct Angiogram<'a> {
     pub kvp: f64,
     /// Frames a second.
     pub frames_per_s: f64,
+    /// What is shown.
+    pub mode: Mode,
+    /// Whether contrast medium is injected.
+    pub contrast: bool,
     /// What the series is called.
     pub description: &'a str,
+}
+
+/// Which plane of a pair a file is, with the number of the other's content.
+#[derive(Debug, Clone, Copy)]
+enum Plane {
+    Single,
+    A(u128),
+    B(u128),
 }
 
 impl Angiogram<'_> {
@@ -32,7 +48,20 @@ impl Angiogram<'_> {
     /// # Errors
     /// [`Error::Parameter`] without frames or for frames that differ, [`Error::File`] where the file cannot be written.
     pub fn write(&self, path: impl AsRef<Path>, frames: &[Image]) -> Result<()> {
-        let path = path.as_ref();
+        self.write_plane(path.as_ref(), frames, Plane::Single)
+    }
+
+    /// Writes the two planes of a biplane system, each into its own file; they refer to each other.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn write_biplane(planes: [&Self; 2], paths: [&Path; 2], frames: [&[Image]; 2]) -> Result<()> {
+        let [a, b] = [0, 1].map(|k| planes[k].content(frames[k]));
+        planes[0].write_plane(paths[0], frames[0], Plane::A(b))?;
+        planes[1].write_plane(paths[1], frames[1], Plane::B(a))
+    }
+
+    fn write_plane(&self, path: &Path, frames: &[Image], plane: Plane) -> Result<()> {
         let first =
             frames.first().ok_or_else(|| Error::parameter("frames", 0, "a file needs at least one"))?;
         let shape = |i: &Image| (i.width(), i.height(), i.format());
@@ -43,7 +72,7 @@ impl Angiogram<'_> {
                 "must all be grey and alike",
             ));
         }
-        let object = self.object(frames, first);
+        let object = self.object(frames, first, plane);
         let failed =
             |error: &dyn std::fmt::Display| Error::file(path, std::io::Error::other(error.to_string()));
         let meta = FileMetaTableBuilder::new()
@@ -53,24 +82,40 @@ impl Angiogram<'_> {
         file.write_to_file(path).map_err(|e| failed(&e))
     }
 
-    fn object(&self, frames: &[Image], first: &Image) -> InMemDicomObject {
-        let sixteen = first.format() == PixelFormat::Gray16;
-        let bits: u16 = if sixteen { 16 } else { 8 };
-        let content = frames.iter().flat_map(|f| f.data().iter().copied());
-        let hash = fingerprint(content.chain(self.description.bytes()));
-        let uid = |salt: u128| format!("2.25.{}", hash.wrapping_add(salt));
+    /// A number of pixels, geometry and what else is told.
+    fn content(&self, frames: &[Image]) -> u128 {
+        let opening = self.c_arm.opening_px().into_iter().flatten();
+        let numbers = opening.chain([self.kvp, self.frames_per_s]).flat_map(f64::to_le_bytes);
+        let size = frames.first().map_or([0; 2], |f| [f.width(), f.height()]);
+        let told = numbers
+            .chain(self.c_arm.fingerprint().to_le_bytes())
+            .chain(size.into_iter().flat_map(u32::to_le_bytes))
+            .chain([self.mode as u8, u8::from(self.contrast)])
+            .chain(self.description.bytes());
+        fingerprint(frames.iter().flat_map(|f| f.data().iter().copied()).chain(told))
+    }
+
+    fn object(&self, frames: &[Image], first: &Image, plane: Plane) -> InMemDicomObject {
+        let own = self.content(frames);
         let mut object = InMemDicomObject::new_empty();
-        let mut text = |tag: Tag, vr: VR, value: &str| {
-            object.put(DataElement::new(tag, vr, PrimitiveValue::from(value)));
+        identify(&mut object, own, plane);
+        self.describe(&mut object, plane);
+        self.place(&mut object, first);
+        self.time(&mut object, frames.len());
+        pixels(&mut object, frames, first);
+        object
+    }
+
+    /// Patient, study, series, equipment, image, contrast medium.
+    fn describe(&self, object: &mut InMemDicomObject, plane: Plane) {
+        let origin = if self.mode == Mode::Dsa { "DERIVED" } else { "ORIGINAL" };
+        let (planes, number) = match plane {
+            Plane::Single => ("SINGLE PLANE", "1"),
+            Plane::A(_) => ("BIPLANE A", "1"),
+            Plane::B(_) => ("BIPLANE B", "2"),
         };
-        text(tags::SOP_CLASS_UID, VR::UI, uids::X_RAY_ANGIOGRAPHIC_IMAGE_STORAGE);
-        for (tag, salt) in
-            [(tags::SOP_INSTANCE_UID, 0), (tags::SERIES_INSTANCE_UID, 1), (tags::STUDY_INSTANCE_UID, 2)]
-        {
-            text(tag, VR::UI, &uid(salt));
-        }
         for (tag, vr, value) in [
-            (tags::IMAGE_TYPE, VR::CS, "ORIGINAL\\PRIMARY\\SINGLE PLANE"),
+            (tags::IMAGE_TYPE, VR::CS, format!("{origin}\\PRIMARY\\{planes}").as_str()),
             (tags::MODALITY, VR::CS, "XA"),
             (tags::MANUFACTURER, VR::LO, "endowire (simulation)"),
             (tags::SERIES_DESCRIPTION, VR::LO, self.description),
@@ -78,22 +123,41 @@ impl Angiogram<'_> {
             (tags::PATIENT_ID, VR::LO, "SIMULATION"),
             (tags::PATIENT_BIRTH_DATE, VR::DA, ""),
             (tags::PATIENT_SEX, VR::CS, ""),
-            (tags::PATIENT_POSITION, VR::CS, "HFS"),
             (tags::STUDY_DATE, VR::DA, ""),
             (tags::STUDY_TIME, VR::TM, ""),
             (tags::STUDY_ID, VR::SH, ""),
             (tags::ACCESSION_NUMBER, VR::SH, ""),
             (tags::REFERRING_PHYSICIAN_NAME, VR::PN, ""),
-            (tags::RADIATION_SETTING, VR::CS, "GR"),
-            (tags::POSITIONER_MOTION, VR::CS, "STATIC"),
-            (tags::PHOTOMETRIC_INTERPRETATION, VR::CS, "MONOCHROME2"),
-            (tags::PIXEL_INTENSITY_RELATIONSHIP, VR::CS, "LOG"),
-            (tags::LOSSY_IMAGE_COMPRESSION, VR::CS, "00"),
+            (tags::LATERALITY, VR::CS, ""),
+            (tags::CONTENT_DATE, VR::DA, ""),
+            (tags::CONTENT_TIME, VR::TM, ""),
             (tags::SERIES_NUMBER, VR::IS, "1"),
-            (tags::INSTANCE_NUMBER, VR::IS, "1"),
+            (tags::INSTANCE_NUMBER, VR::IS, number),
+            (tags::LOSSY_IMAGE_COMPRESSION, VR::CS, "00"),
+            (tags::BURNED_IN_ANNOTATION, VR::CS, "NO"),
         ] {
-            text(tag, vr, value);
+            put(object, tag, vr, value);
         }
+        if self.mode == Mode::Dsa {
+            put(object, tags::DERIVATION_DESCRIPTION, VR::ST, "ln(mask) - ln(frame)");
+            let mut mask = InMemDicomObject::new_empty();
+            put(&mut mask, tags::MASK_OPERATION, VR::CS, "NONE");
+            put(
+                &mut mask,
+                tags::MASK_OPERATION_EXPLANATION,
+                VR::ST,
+                "The mask is subtracted from the stored frames.",
+            );
+            sequence(object, tags::MASK_SUBTRACTION_SEQUENCE, mask);
+            put(object, tags::RECOMMENDED_VIEWING_MODE, VR::CS, "NAT");
+        }
+        if self.contrast {
+            put(object, tags::CONTRAST_BOLUS_AGENT, VR::LO, "Iodine, 370 mg/ml");
+        }
+    }
+
+    /// Tube, positioner, blades and detector.
+    fn place(&self, object: &mut InMemDicomObject, first: &Image) {
         let [primary, secondary] = self.c_arm.angles_deg();
         let pitch = decimal(self.c_arm.pixel_mm());
         for (tag, value) in [
@@ -107,71 +171,127 @@ impl Angiogram<'_> {
             (tags::POSITIONER_PRIMARY_ANGLE, decimal(primary)),
             (tags::POSITIONER_SECONDARY_ANGLE, decimal(secondary)),
             (tags::IMAGER_PIXEL_SPACING, format!("{pitch}\\{pitch}")),
-            (tags::FRAME_TIME, decimal(1000.0 / self.frames_per_s)),
-            (tags::WINDOW_CENTER, decimal(f64::from(1_u32 << (bits - 1)))),
-            (tags::WINDOW_WIDTH, decimal(f64::from(1_u32 << bits))),
         ] {
-            text(tag, VR::DS, &value);
+            put(object, tag, VR::DS, &value);
         }
-        let rate = self.frames_per_s.round().max(1.0).to_string();
-        text(tags::NUMBER_OF_FRAMES, VR::IS, &frames.len().to_string());
-        text(tags::CINE_RATE, VR::IS, &rate);
-        text(tags::RECOMMENDED_DISPLAY_FRAME_RATE, VR::IS, &rate);
-        if let Some(opening) = self.c_arm.opening_px() {
-            let size = [first.width(), first.height()].map(f64::from);
-            let edge = |k: usize, sign: f64| {
-                (size[k] / 2.0 + sign * opening[k] / 2.0).clamp(0.0, size[k]).round().to_string()
-            };
-            text(tags::COLLIMATOR_SHAPE, VR::CS, "RECTANGULAR");
-            text(tags::COLLIMATOR_LEFT_VERTICAL_EDGE, VR::IS, &edge(0, -1.0));
-            text(tags::COLLIMATOR_RIGHT_VERTICAL_EDGE, VR::IS, &edge(0, 1.0));
-            text(tags::COLLIMATOR_UPPER_HORIZONTAL_EDGE, VR::IS, &edge(1, -1.0));
-            text(tags::COLLIMATOR_LOWER_HORIZONTAL_EDGE, VR::IS, &edge(1, 1.0));
+        let [columns, rows] = self.c_arm.directions();
+        let turn = self.c_arm.rotation_deg();
+        for (tag, vr, value) in [
+            (tags::PATIENT_POSITION, VR::CS, "HFS"),
+            (tags::PATIENT_ORIENTATION, VR::CS, &format!("{columns}\\{rows}")),
+            (tags::RADIATION_SETTING, VR::CS, if self.mode == Mode::Fluoro { "SC" } else { "GR" }),
+            (tags::X_RAY_TUBE_CURRENT, VR::IS, ""),
+            (tags::EXPOSURE_TIME, VR::IS, ""),
+            (tags::EXPOSURE, VR::IS, ""),
+            (tags::POSITIONER_MOTION, VR::CS, "STATIC"),
+            (tags::FIELD_OF_VIEW_SHAPE, VR::CS, "RECTANGLE"),
+        ] {
+            put(object, tag, vr, value);
         }
-        let mut number = |tag: Tag, value: u16| {
-            object.put(DataElement::new(tag, VR::US, PrimitiveValue::from(value)));
+        if turn % 90.0 == 0.0 {
+            put(object, tags::FIELD_OF_VIEW_ROTATION, VR::DS, &decimal(turn.rem_euclid(360.0)));
+        }
+        let Some(opening) = self.c_arm.opening_px() else { return };
+        let size = [first.width(), first.height()].map(f64::from);
+        let edge = |k: usize, sign: f64| {
+            (size[k] / 2.0 + sign * opening[k] / 2.0).clamp(0.0, size[k]).round().to_string()
         };
+        put(object, tags::COLLIMATOR_SHAPE, VR::CS, "RECTANGULAR");
         for (tag, value) in [
-            (tags::SAMPLES_PER_PIXEL, 1),
-            (tags::ROWS, first.height() as u16),
-            (tags::COLUMNS, first.width() as u16),
-            (tags::BITS_ALLOCATED, bits),
-            (tags::BITS_STORED, bits),
-            (tags::HIGH_BIT, bits - 1),
-            (tags::PIXEL_REPRESENTATION, 0),
+            (tags::COLLIMATOR_LEFT_VERTICAL_EDGE, edge(0, -1.0)),
+            (tags::COLLIMATOR_RIGHT_VERTICAL_EDGE, edge(0, 1.0)),
+            (tags::COLLIMATOR_UPPER_HORIZONTAL_EDGE, edge(1, -1.0)),
+            (tags::COLLIMATOR_LOWER_HORIZONTAL_EDGE, edge(1, 1.0)),
         ] {
-            number(tag, value);
+            put(object, tag, VR::IS, &value);
         }
+    }
+
+    /// Cine and multi-frame.
+    fn time(&self, object: &mut InMemDicomObject, frames: usize) {
+        let rate = self.frames_per_s.round().max(1.0).to_string();
+        put(object, tags::FRAME_TIME, VR::DS, &decimal(1000.0 / self.frames_per_s));
+        put(object, tags::NUMBER_OF_FRAMES, VR::IS, &frames.to_string());
+        put(object, tags::CINE_RATE, VR::IS, &rate);
+        put(object, tags::RECOMMENDED_DISPLAY_FRAME_RATE, VR::IS, &rate);
         let pointer = PrimitiveValue::Tags(SmallVec::from_slice(&[tags::FRAME_TIME]));
         object.put(DataElement::new(tags::FRAME_INCREMENT_POINTER, VR::AT, pointer));
-        let pixels = if sixteen {
-            let words = frames.iter().flat_map(|f| f.data().chunks_exact(2));
-            let words = words.map(|b| u16::from_be_bytes([b[0], b[1]])).collect::<Vec<_>>();
-            DataElement::new(tags::PIXEL_DATA, VR::OW, PrimitiveValue::U16(words.into()))
-        } else {
-            let mut bytes: Vec<u8> = frames.iter().flat_map(|f| f.data().iter().copied()).collect();
-            // Values have an even number of bytes.
-            if !bytes.len().is_multiple_of(2) {
-                bytes.push(0);
-            }
-            DataElement::new(tags::PIXEL_DATA, VR::OB, PrimitiveValue::U8(bytes.into()))
-        };
-        object.put(pixels);
-        object
     }
+}
+
+/// Identifiers, and the reference to the other plane.
+fn identify(object: &mut InMemDicomObject, own: u128, plane: Plane) {
+    // What both planes of a pair share.
+    let common = match plane {
+        Plane::Single => own,
+        Plane::A(other) | Plane::B(other) => own ^ other,
+    };
+    put(object, tags::SOP_CLASS_UID, VR::UI, uids::X_RAY_ANGIOGRAPHIC_IMAGE_STORAGE);
+    put(object, tags::SOP_INSTANCE_UID, VR::UI, &uid(own));
+    put(object, tags::SERIES_INSTANCE_UID, VR::UI, &uid(common.wrapping_add(1)));
+    put(object, tags::STUDY_INSTANCE_UID, VR::UI, &uid(common.wrapping_add(2)));
+    if let Plane::A(other) | Plane::B(other) = plane {
+        let mut purpose = InMemDicomObject::new_empty();
+        put(&mut purpose, tags::CODE_VALUE, VR::SH, "121314");
+        put(&mut purpose, tags::CODING_SCHEME_DESIGNATOR, VR::SH, "DCM");
+        put(&mut purpose, tags::CODE_MEANING, VR::LO, "Other image of biplane pair");
+        let mut reference = InMemDicomObject::new_empty();
+        put(&mut reference, tags::REFERENCED_SOP_CLASS_UID, VR::UI, uids::X_RAY_ANGIOGRAPHIC_IMAGE_STORAGE);
+        put(&mut reference, tags::REFERENCED_SOP_INSTANCE_UID, VR::UI, &uid(other));
+        sequence(&mut reference, tags::PURPOSE_OF_REFERENCE_CODE_SEQUENCE, purpose);
+        sequence(object, tags::REFERENCED_IMAGE_SEQUENCE, reference);
+    }
+}
+
+/// Pixels, and the window that shows them as they are.
+fn pixels(object: &mut InMemDicomObject, frames: &[Image], first: &Image) {
+    let sixteen = first.format() == PixelFormat::Gray16;
+    let bits: u16 = if sixteen { 16 } else { 8 };
+    put(object, tags::PHOTOMETRIC_INTERPRETATION, VR::CS, "MONOCHROME2");
+    put(object, tags::PIXEL_INTENSITY_RELATIONSHIP, VR::CS, "DISP");
+    put(object, tags::WINDOW_CENTER, VR::DS, &decimal(f64::from(1_u32 << (bits - 1))));
+    put(object, tags::WINDOW_WIDTH, VR::DS, &decimal(f64::from(1_u32 << bits)));
+    for (tag, value) in [
+        (tags::SAMPLES_PER_PIXEL, 1),
+        (tags::ROWS, first.height() as u16),
+        (tags::COLUMNS, first.width() as u16),
+        (tags::BITS_ALLOCATED, bits),
+        (tags::BITS_STORED, bits),
+        (tags::HIGH_BIT, bits - 1),
+        (tags::PIXEL_REPRESENTATION, 0),
+    ] {
+        object.put(DataElement::new(tag, VR::US, PrimitiveValue::from(value)));
+    }
+    object.put(if sixteen {
+        let words = frames.iter().flat_map(|f| f.data().chunks_exact(2));
+        let words = words.map(|b| u16::from_be_bytes([b[0], b[1]])).collect::<Vec<_>>();
+        DataElement::new(tags::PIXEL_DATA, VR::OW, PrimitiveValue::U16(words.into()))
+    } else {
+        let mut bytes: Vec<u8> = frames.iter().flat_map(|f| f.data().iter().copied()).collect();
+        // Values have an even number of bytes.
+        if !bytes.len().is_multiple_of(2) {
+            bytes.push(0);
+        }
+        DataElement::new(tags::PIXEL_DATA, VR::OB, PrimitiveValue::U8(bytes.into()))
+    });
+}
+
+fn put(object: &mut InMemDicomObject, tag: Tag, vr: VR, value: &str) {
+    object.put(DataElement::new(tag, vr, PrimitiveValue::from(value)));
+}
+
+fn sequence(object: &mut InMemDicomObject, tag: Tag, item: InMemDicomObject) {
+    object.put(DataElement::new(tag, VR::SQ, DataSetSequence::from(vec![item])));
+}
+
+fn uid(number: u128) -> String {
+    format!("2.25.{number}")
 }
 
 /// A decimal string of at most 16 characters.
 fn decimal(value: f64) -> String {
     let whole = format!("{value}");
     if whole.len() <= 16 { whole } else { format!("{value:.9e}") }
-}
-
-/// 128-bit FNV-1a.
-fn fingerprint(bytes: impl Iterator<Item = u8>) -> u128 {
-    bytes.fold(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d, |hash, byte| {
-        (hash ^ u128::from(byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b)
-    })
 }
 
 #[cfg(test)]
@@ -195,7 +315,7 @@ mod tests {
         let c_arm = CArm::new(&spec, [4, 2], &wall).unwrap();
         let frame = |k: u8| Image::new(4, 2, PixelFormat::Gray16, (0..16).map(|i| 16 * k + i).collect());
         let frames = [frame(1), frame(2), frame(3)];
-        let angiogram = Angiogram { c_arm: &c_arm, kvp: 80.0, frames_per_s: 12.5, description: "test" };
+        let angiogram = angiogram(&c_arm, Mode::Cine);
         let path = std::env::temp_dir().join(format!("endowire-{}.dcm", std::process::id()));
         angiogram.write(&path, &frames).unwrap();
         let read = dicom_object::open_file(&path).unwrap();
@@ -213,5 +333,103 @@ mod tests {
         assert_eq!(pixels.len(), 24);
         assert_eq!(pixels[9], u16::from_be_bytes([34, 35]));
         assert!(angiogram.write(&path, &[]).is_err());
+    }
+
+    fn angiogram(c_arm: &CArm, mode: Mode) -> Angiogram<'_> {
+        Angiogram {
+            c_arm,
+            kvp: 80.0,
+            frames_per_s: 12.5,
+            mode,
+            contrast: mode == Mode::Dsa,
+            description: "test",
+        }
+    }
+
+    fn arm(primary_deg: f64, rotation_deg: f64) -> CArm {
+        let wall = SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::repeat(10.0)], triangles: vec![] };
+        let spec = CArmSpec {
+            primary_deg,
+            rotation_deg,
+            pixel_mm: Some(0.3),
+            collimation_mm: Some([3.0, 5.0]),
+            ..CArmSpec::default()
+        };
+        CArm::new(&spec, [16, 16], &wall).unwrap()
+    }
+
+    fn frames(format: PixelFormat) -> Vec<Image> {
+        let frame = |k: usize| {
+            let bytes = (0..256 * format.bytes()).map(|i| (i * 7 + k) as u8).collect();
+            Image::new(16, 16, format, bytes)
+        };
+        vec![frame(1), frame(2), frame(3)]
+    }
+
+    /// Errors that the validator of dicom3tools prints; `None` where it is not installed.
+    fn errors(path: &Path) -> Option<Vec<String>> {
+        let output = std::process::Command::new("dciodvfy").arg(path).output().ok()?;
+        let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+        assert!(text.contains("XAImage"), "{text}");
+        Some(text.lines().filter(|line| line.starts_with("Error")).map(str::to_owned).collect())
+    }
+
+    #[test]
+    fn a_validator_finds_no_error_in_any_mode_and_in_both_planes() {
+        let folder = tempfile::tempdir().unwrap();
+        let [arm_a, arm_b] = [arm(-30.0, 0.0), arm(60.0, 90.0)];
+        let mut paths = Vec::new();
+        for (name, mode) in
+            [("live", Mode::Fluoro), ("cine", Mode::Cine), ("dsa", Mode::Dsa), ("roadmap", Mode::Roadmap)]
+        {
+            for format in [PixelFormat::Gray8, PixelFormat::Gray16] {
+                let path = folder.path().join(format!("{name}_{}.dcm", format.bytes()));
+                angiogram(&arm_a, mode).write(&path, &frames(format)).unwrap();
+                paths.push(path);
+            }
+        }
+        let pair = ["a.dcm", "b.dcm"].map(|name| folder.path().join(name));
+        let pixels = frames(PixelFormat::Gray8);
+        let planes = [angiogram(&arm_a, Mode::Cine), angiogram(&arm_b, Mode::Cine)];
+        Angiogram::write_biplane([&planes[0], &planes[1]], [&pair[0], &pair[1]], [&pixels, &pixels]).unwrap();
+        paths.extend(pair);
+        for path in &paths {
+            match errors(path) {
+                Some(errors) => assert!(errors.is_empty(), "{}: {errors:#?}", path.display()),
+                None => {
+                    assert!(std::env::var_os("ENDOWIRE_REQUIRE_DCIODVFY").is_none(), "install dicom3tools");
+                    eprintln!("skipped: dciodvfy (dicom3tools) is not installed");
+                    return;
+                }
+            }
+        }
+        // The twin: a file that does not say what image it is.
+        let mut object = planes[0].object(&pixels, &pixels[0], Plane::Single);
+        object.remove_element(tags::IMAGE_TYPE);
+        let meta = FileMetaTableBuilder::new()
+            .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
+            .media_storage_sop_class_uid(uids::X_RAY_ANGIOGRAPHIC_IMAGE_STORAGE);
+        let path = folder.path().join("twin.dcm");
+        object.with_meta(meta).unwrap().write_to_file(&path).unwrap();
+        assert!(!errors(&path).unwrap().is_empty());
+    }
+
+    #[test]
+    fn what_has_the_same_name_has_the_same_pixels_and_geometry() {
+        let [one, other, turned] = [arm(-30.0, 0.0), arm(-30.1, 0.0), arm(-30.0, 90.0)];
+        let pixels = frames(PixelFormat::Gray8);
+        let uid = |arm: &CArm, mode: Mode, frames: &[Image]| {
+            let object = angiogram(arm, mode).object(frames, &frames[0], Plane::Single);
+            object.element(tags::SOP_INSTANCE_UID).unwrap().to_str().unwrap().into_owned()
+        };
+        let own = uid(&one, Mode::Cine, &pixels);
+        assert_eq!(own, uid(&one, Mode::Cine, &pixels));
+        let others = [
+            uid(&other, Mode::Cine, &pixels),
+            uid(&turned, Mode::Cine, &pixels),
+            uid(&one, Mode::Fluoro, &pixels),
+            uid(&one, Mode::Cine, &pixels[1..]),
+        ];
+        assert!(others.iter().all(|uid| *uid != own) && others[0] != others[1]);
     }
 }

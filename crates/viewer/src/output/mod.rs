@@ -4,8 +4,10 @@ mod animation;
 mod dicom;
 mod image;
 mod labels;
+mod mask;
 
 pub use animation::Animation;
 pub use dicom::Angiogram;
 pub use image::{Image, PixelFormat};
-pub use labels::{ContactLabel, DeviceLabel, Labels};
+pub use labels::{ContactLabel, DeviceLabel, Labels, PartLabel};
+pub use mask::Mask;

@@ -92,7 +92,8 @@ impl PatientSpec {
 pub struct FlowSpec {
     /// Centre-line table of the vessel (x y z radius parent, mm), of at most 50,000 points 2 mm apart or nearer.
     pub tree: Option<PathBuf>,
-    /// A point near the end of the tree where the blood comes in, each coordinate -100,000 to 100,000; absent: the root.
+    /// A point near the end of the tree where the blood comes in, each coordinate -100,000 to 100,000; absent: the widest end, and of
+    /// those about as wide the one nearest to the head.
     pub inlet_mm: Option<[f64; 3]>,
     /// Blood flow there, 0.001 to 100,000.
     pub inflow_ml_per_s: f64,

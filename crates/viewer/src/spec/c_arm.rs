@@ -21,8 +21,8 @@ pub struct CArmSpec {
     pub sid_mm: f64,
     /// Source to isocentre: the height of the table decides it. 1 to 100,000, and less than `sid_mm`.
     pub sod_mm: f64,
-    /// Pixel pitch at the detector, 0.0001 to 1000, after magnification too; absent: from `field_mm`, or else the vessel fills the
-    /// frame.
+    /// Pixel pitch at the detector, 0.0001 to 1000, after magnification too; absent: from `field_mm`, or else a ball
+    /// about the isocentre that holds the vessel fills the frame, the same from every side.
     pub pixel_mm: Option<f64>,
     /// Longer side of the detector's field of view, 0.01 to 100,000. In place of `pixel_mm`, whose limits a pixel must keep.
     pub field_mm: Option<f64>,
@@ -32,6 +32,8 @@ pub struct CArmSpec {
     pub rotation_deg: f64,
     /// Blades: width and height of what they leave open, at the detector, each 0.01 to 100,000. Absent: the whole field.
     pub collimation_mm: Option<[f64; 2]>,
+    /// Whether letters at the borders of the picture tell directions: L left, R right, H head, F feet, A front, P back.
+    pub markers: bool,
     /// Centre of rotation, seen in the middle of the frame, each coordinate -100,000 to 100,000; absent: the centre of the vessel's
     /// bounding box.
     pub isocentre_mm: Option<[f64; 3]>,
@@ -51,6 +53,7 @@ impl Default for CArmSpec {
             magnification: 1.0,
             rotation_deg: 0.0,
             collimation_mm: None,
+            markers: false,
             isocentre_mm: None,
         }
     }

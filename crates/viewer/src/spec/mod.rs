@@ -24,6 +24,9 @@ const LARGEST_SIDE_PX: u32 = 4096;
 /// Coordinates of places, mm: vessels are below ten metres, and digits are left for a pixel.
 const COORDINATE_MM: [f64; 2] = [-1e5, 1e5];
 
+/// A hundred turns.
+const MOST_TURN_DEG: f64 = 36_000.0;
+
 /// Most tables of injections and of parts.
 const MOST_TABLES: usize = 1000;
 
@@ -125,15 +128,30 @@ pub struct CameraSpec {
     pub azimuth_deg: Option<f64>,
     /// Above the transverse plane, towards the head; -360 to 360.
     pub elevation_deg: Option<f64>,
+    /// Turn about the long axis of the patient from the direction that the angles say, -36,000 to 36,000.
+    pub turn_deg: f64,
+    /// The camera stands where it sees all through such a turn, -36,000 to 36,000; absent: where it sees all from its own direction.
+    pub orbit_deg: Option<f64>,
     /// Whether a scale bar is drawn.
     pub scale_bar: bool,
-    /// Whether the beam of the C-arm is drawn, if there is a fluoroscopic view; the camera then steps back to show it.
+    /// Whether letters at the borders tell directions (L left, R right, H head, F feet, A front, P back), and a legend the strongest force.
+    pub markers: bool,
+    /// Whether the beam of the C-arm is drawn, if there is a fluoroscopic view; the camera then steps back to show the field at the
+    /// isocentre.
     pub c_arm: bool,
 }
 
 impl Default for CameraSpec {
     fn default() -> Self {
-        Self { azimuth_deg: None, elevation_deg: None, scale_bar: true, c_arm: false }
+        Self {
+            azimuth_deg: None,
+            elevation_deg: None,
+            turn_deg: 0.0,
+            orbit_deg: None,
+            scale_bar: true,
+            markers: true,
+            c_arm: false,
+        }
     }
 }
 
@@ -185,6 +203,11 @@ impl ViewSpec {
             [("azimuth_deg", self.camera.azimuth_deg), ("elevation_deg", self.camera.elevation_deg)]
         {
             finite_within(&format!("view.camera.{key}"), angle.unwrap_or(0.0), [-360.0, 360.0])?;
+        }
+        for (key, turn) in
+            [("turn_deg", self.camera.turn_deg), ("orbit_deg", self.camera.orbit_deg.unwrap_or(0.0))]
+        {
+            finite_within(&format!("view.camera.{key}"), turn, [-MOST_TURN_DEG, MOST_TURN_DEG])?;
         }
         Ok(())
     }

@@ -57,6 +57,8 @@ pub struct XRaySpec {
     pub tissue_mm: f64,
     /// Scintillator: solid caesium iodide, 0.001 to 10.
     pub csi_mm: f64,
+    /// Focal spot, 0 to 3: 0.3 to 1.2 mm are usual, 0 is a point. Its penumbra is that of things at the isocentre.
+    pub focal_spot_mm: f64,
     /// Material of devices that do not name their own.
     pub device_material: Material,
     /// Share of the anatomy's coarse shading that the display takes out in fluoroscopy and cine, so that lungs and spine are both
@@ -80,6 +82,7 @@ impl Default for XRaySpec {
             tissue_mm: 200.0,
             // Absorbs 88 % at 57.8 keV.
             csi_mm: 0.6,
+            focal_spot_mm: 0.0,
             device_material: Material::Steel316L,
             harmonised: 0.55,
             window: None,
@@ -101,6 +104,7 @@ impl XRaySpec {
         finite_within("view.xray.contrast_fraction", self.contrast_fraction, [0.0, 1.0])?;
         finite_within("view.xray.tissue_mm", self.tissue_mm, [0.0, 1000.0])?;
         finite_within("view.xray.csi_mm", self.csi_mm, [0.001, 10.0])?;
+        finite_within("view.xray.focal_spot_mm", self.focal_spot_mm, [0.0, 3.0])?;
         finite_within("view.xray.harmonised", self.harmonised, [0.0, 1.0])?;
         if let Some([white, black]) = self.window
             && !(white >= -100.0 && black <= 100.0 && black - white >= 1e-4)
@@ -124,10 +128,12 @@ pub struct DetectorSpec {
     pub dose_ngy: Option<f64>,
     /// Whether quanta are counted; without, frames are smooth.
     pub noise: bool,
-    /// Seed of the noise, any whole number from 0: the same seed, the same frames.
+    /// Seed of the noise, any whole number from 0: the same seed, the same frames. Another pose or plane has another noise.
     pub seed: u64,
     /// Spread of the scintillator's light: standard deviation of a Gaussian at the detector, 0 to 10 and no more than 50 pixels.
     pub blur_mm: f64,
+    /// Dose whose quanta are as noisy as the electronics that read a pixel, 0 to 10,000: flat detectors have 1 to 10 nGy, 0 is none.
+    pub electronic_ngy: f64,
     /// Share of the last frame that is read again, 0 to 0.99.
     pub lag: f64,
     /// Share of scattered quanta in all, behind the grid, 0 to 0.95.
@@ -136,7 +142,15 @@ pub struct DetectorSpec {
 
 impl Default for DetectorSpec {
     fn default() -> Self {
-        Self { dose_ngy: None, noise: true, seed: 1, blur_mm: 0.15, lag: 0.04, scatter_fraction: 0.15 }
+        Self {
+            dose_ngy: None,
+            noise: true,
+            seed: 1,
+            blur_mm: 0.15,
+            electronic_ngy: 0.0,
+            lag: 0.04,
+            scatter_fraction: 0.15,
+        }
     }
 }
 
@@ -151,6 +165,7 @@ impl DetectorSpec {
             finite_within("view.detector.dose_ngy", dose, [0.001, 1e6])?;
         }
         finite_within("view.detector.blur_mm", self.blur_mm, [0.0, 10.0])?;
+        finite_within("view.detector.electronic_ngy", self.electronic_ngy, [0.0, 1e4])?;
         finite_within("view.detector.lag", self.lag, [0.0, 0.99])?;
         finite_within("view.detector.scatter_fraction", self.scatter_fraction, [0.0, 0.95])
     }

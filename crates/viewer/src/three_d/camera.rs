@@ -15,6 +15,8 @@ const ELEVATION_DEG: f64 = 18.0;
 /// A view that shows less than this part of the largest possible spread of the vessel is exchanged for one
 /// across its plane.
 const LEAST_SPREAD: f64 = 0.6;
+/// Places of an orbit from which the vessel is to fit.
+const ORBIT_PLACES: u32 = 36;
 /// Part of the distance to the vessel that is kept free in front of the camera.
 const NEAR: f64 = 0.02;
 
@@ -35,16 +37,16 @@ pub(crate) struct Camera {
 impl Camera {
     /// Fits a camera to a wall with at least one vertex, and to points beside it.
     pub(crate) fn new(spec: &CameraSpec, size_px: [u32; 2], wall: &SurfaceMesh, beside: &[Vec3]) -> Self {
-        let back = match (spec.azimuth_deg, spec.elevation_deg) {
+        let first = match (spec.azimuth_deg, spec.elevation_deg) {
             (None, None) => natural_direction(wall),
             (azimuth, elevation) => from_angles(azimuth.unwrap_or(0.0), elevation.unwrap_or(0.0)),
         };
-        // Head up; looking along the body, the front is up.
-        let upright = if back.z.abs() > 0.999 { -Vec3::y() } else { Vec3::z() };
-        let right = upright.cross(&back).normalize();
-        let axes = [right, back.cross(&right), back];
+        let axes = axes_from(&turned(&first, spec.turn_deg));
         let longer = f64::from(size_px[0].max(size_px[1]));
         let tangents = size_px.map(|n| HALF_ANGLE_DEG.to_radians().tan() * f64::from(n) / longer);
+        if let Some(orbit_deg) = spec.orbit_deg {
+            return Self::orbiting(&first, axes, orbit_deg, (tangents, size_px), wall, beside);
+        }
 
         // A vertex at (x, y, z) is in the frame of an eye at (cx, cy, D) when |x − cx| ≤ k (D − z): the
         // extremes of x + kz and −x + kz give the tightest D and the centre that goes with it, for each
@@ -75,6 +77,46 @@ impl Camera {
         }
     }
 
+    /// A camera at the distance from which it sees all on every place of an orbit that begins at `first`.
+    fn orbiting(
+        first: &Vec3,
+        axes: [Vec3; 3],
+        orbit_deg: f64,
+        (tangents, size_px): ([f64; 2], [u32; 2]),
+        wall: &SurfaceMesh,
+        beside: &[Vec3],
+    ) -> Self {
+        let all = || wall.vertices_mm.iter().chain(beside);
+        let low = all().fold(Vec3::repeat(f64::MAX), |low, v| low.inf(v));
+        let high = all().fold(Vec3::repeat(f64::MIN), |high, v| high.sup(v));
+        let centre = (low + high) / 2.0;
+        let (mut distance, mut reach) = (0.0_f64, 0.0_f64);
+        for place in 0..=ORBIT_PLACES {
+            let axes = axes_from(&turned(first, orbit_deg * f64::from(place) / f64::from(ORBIT_PLACES)));
+            for v in all() {
+                let [x, y, z] = axes.map(|axis| (v - centre).dot(&axis));
+                let wide = (x.abs() / tangents[0]).max(y.abs() / tangents[1]) / FILL;
+                distance = distance.max(wide + z);
+                reach = reach.max(z.abs());
+            }
+        }
+        let distance = distance.max(reach + 1.0);
+        Self {
+            eye_mm: centre + axes[2] * distance,
+            axes,
+            tangents,
+            size_px,
+            wall_range: [distance - reach, distance + reach],
+            near: NEAR * (distance - reach),
+            far: 3.0 * (distance + reach),
+        }
+    }
+
+    /// Directions that run to the right and upwards in the picture.
+    pub(crate) fn right_and_up(&self) -> [Vec3; 2] {
+        [self.axes[0], self.axes[1]]
+    }
+
     /// View coordinates of a point.
     pub(crate) fn in_view(&self, point_mm: &Vec3) -> [f64; 3] {
         let r = point_mm - self.eye_mm;
@@ -99,6 +141,20 @@ impl Camera {
     pub(crate) fn pixel_mm_at(&self, distance: f64) -> f64 {
         2.0 * self.tangents[0] * distance / f64::from(self.size_px[0])
     }
+}
+
+/// A direction turned about the long axis of the patient.
+fn turned(direction: &Vec3, degrees: f64) -> Vec3 {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    Vec3::new(cos * direction.x - sin * direction.y, sin * direction.x + cos * direction.y, direction.z)
+}
+
+/// Rightwards, upwards and backwards for a direction to the camera.
+fn axes_from(back: &Vec3) -> [Vec3; 3] {
+    // Head up; looking along the body, the front is up.
+    let upright = if back.z.abs() > 0.999 { -Vec3::y() } else { Vec3::z() };
+    let right = upright.cross(back).normalize();
+    [right, back.cross(&right), *back]
 }
 
 /// Unit vector from the vessel to the camera.
@@ -182,6 +238,34 @@ mod tests {
         assert!(flat.z > 0.8, "{flat}");
         let upright = natural_direction(&cloud(80.0, 3.0, 60.0));
         assert!((upright - from_angles(AZIMUTH_DEG, ELEVATION_DEG)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn an_orbit_begins_where_the_view_is_and_goes_on_evenly() {
+        let wall = cloud(80.0, 20.0, 50.0);
+        let at = |turn_deg: f64| {
+            let spec = CameraSpec { turn_deg, orbit_deg: Some(90.0), ..CameraSpec::default() };
+            Camera::new(&spec, [320, 320], &wall, &[])
+        };
+        let places: Vec<Camera> = (0..=9).map(|k| at(10.0 * f64::from(k))).collect();
+        let usual = Camera::new(&CameraSpec::default(), [320, 320], &wall, &[]);
+        assert!((places[0].axes[2] - usual.axes[2]).norm() < 1e-12, "the first frame looks as any other");
+        let step = |pair: &[Camera]| (pair[1].eye_mm - pair[0].eye_mm).norm();
+        let steps: Vec<f64> = places.windows(2).map(step).collect();
+        assert!(steps.iter().all(|s| (s / steps[0] - 1.0).abs() < 1e-9), "{steps:?}");
+        // The twin: fitted anew each time, the camera comes and goes.
+        let fitted: Vec<Camera> = (0..=9)
+            .map(|k| CameraSpec { turn_deg: 10.0 * f64::from(k), ..CameraSpec::default() })
+            .map(|spec| Camera::new(&spec, [320, 320], &wall, &[]))
+            .collect();
+        let steps: Vec<f64> = fitted.windows(2).map(step).collect();
+        assert!(steps.iter().any(|s| (s / steps[0] - 1.0).abs() > 0.05), "{steps:?}");
+        for camera in &places {
+            for v in &wall.vertices_mm {
+                let pixel = camera.pixel_of(camera.in_view(v), 1);
+                assert!(pixel.iter().all(|p| (0.0..=320.0).contains(p)));
+            }
+        }
     }
 
     #[test]

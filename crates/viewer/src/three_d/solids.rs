@@ -20,9 +20,11 @@ const LEAST_WIDTH_PX: f64 = 2.4;
 const DOT_PX: f64 = 3.2;
 const SHAFT_PX: f64 = 1.1;
 /// Length of the longest arrow, pixels of a frame of 640.
-const ARROW_PX: f64 = 60.0;
+pub(crate) const ARROW_PX: f64 = 60.0;
+/// Pieces of an edge of the beam.
+const BEAM_PIECES: u32 = 48;
 const CONTACT: [u8; 4] = [236, 132, 20, 255];
-const FORCE: [u8; 4] = [196, 30, 40, 255];
+pub(crate) const FORCE: [u8; 4] = [196, 30, 40, 255];
 const FRAME: [u8; 4] = [110, 124, 140, 255];
 
 /// A place where the wall holds a device.
@@ -166,21 +168,28 @@ fn contacts(camera: &Camera, contacts: &[ContactView], vertices: &mut Vec<Vertex
     }
 }
 
-/// The beam: from the source to the corners of the detector, and around it.
+/// The beam: from the source to the corners of the detector, around it, and around the field at the isocentre.
 fn frustum(camera: &Camera, c_arm: &CArm, vertices: &mut Vec<Vertex>) {
-    let corners = c_arm.detector_corners_mm();
+    let corners = c_arm.field_corners_mm(c_arm.sid_mm());
+    let field = c_arm.field_corners_mm(c_arm.sod_mm());
     let source = c_arm.source_mm();
     for k in 0..4 {
-        for [a, b] in [[source, corners[k]], [corners[k], corners[(k + 1) % 4]]] {
+        let next = (k + 1) % 4;
+        for [a, b] in [[source, corners[k]], [corners[k], corners[next]], [field[k], field[next]]] {
             let along = (b - a).normalize();
-            let end = |centre: Vec3| Section {
-                centre,
-                radius: px(camera, &centre, LEAST_WIDTH_PX / 2.0),
-                along,
-                tilt: [0.0, 1.0],
-                colour: FRAME,
-            };
-            tube(camera, &[end(a), end(b)], vertices);
+            // In pieces, so that only what is behind the camera is left out.
+            for piece in 0..BEAM_PIECES {
+                let [a, b] =
+                    [piece, piece + 1].map(|i| a + (b - a) * (f64::from(i) / f64::from(BEAM_PIECES)));
+                let end = |centre: Vec3| Section {
+                    centre,
+                    radius: px(camera, &centre, LEAST_WIDTH_PX / 2.0),
+                    along,
+                    tilt: [0.0, 1.0],
+                    colour: FRAME,
+                };
+                tube(camera, &[end(a), end(b)], vertices);
+            }
         }
     }
 }

@@ -154,19 +154,15 @@ impl Beam {
         }
     }
 
-    /// Signal behind the given materials over that of the open beam: the transmitted fraction.
-    pub(crate) fn transmission(&self, lengths: impl Iterator<Item = (Material, f64)>) -> Result<f64> {
-        let mut p = self.mu(Material::SoftTissue)?;
-        p.iter_mut().for_each(|p| *p *= -self.reference_mm);
-        for (material, length) in lengths {
-            p.iter_mut().zip(self.mu(material)?).for_each(|(p, mu)| *p += mu * length);
-        }
-        Ok(p.iter().zip(&self.nodes).map(|(p, node)| node.1 * (-p).exp()).sum::<f64>() / self.open)
-    }
-
     /// Natural logarithm of the transmission at the reference.
     pub(crate) fn ln_reference(&self) -> f64 {
         -self.open.ln()
+    }
+
+    /// Energy in keV of the quanta that vary as the signal at the reference does: ∫NηE² / ∫NηE.
+    pub(crate) fn quantum_kev(&self) -> f64 {
+        self.nodes.iter().map(|node| node.0 * node.1).sum::<f64>()
+            / self.nodes.iter().map(|node| node.1).sum::<f64>()
     }
 
     /// Absorbed energy in keV of a pixel at the reference.
@@ -206,6 +202,18 @@ fn reduced(lines: &[(f64, f64)], count: usize) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl Beam {
+        /// Signal behind the given materials over that of the open beam: the transmitted fraction.
+        fn transmission(&self, lengths: impl Iterator<Item = (Material, f64)>) -> Result<f64> {
+            let mut p = self.mu(Material::SoftTissue)?;
+            p.iter_mut().for_each(|p| *p *= -self.reference_mm);
+            for (material, length) in lengths {
+                p.iter_mut().zip(self.mu(material)?).for_each(|(p, mu)| *p += mu * length);
+            }
+            Ok(p.iter().zip(&self.nodes).map(|(p, node)| node.1 * (-p).exp()).sum::<f64>() / self.open)
+        }
+    }
 
     /// Direct sum over the table, written without the code above.
     fn tabulated(kvp: f64, lengths: &[(Material, f64)]) -> f64 {

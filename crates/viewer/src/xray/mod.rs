@@ -1,6 +1,7 @@
 //! X-ray physics: what attenuates how much, what the detector absorbs, and how noisy that is.
 
 mod beam;
+mod blur;
 mod detector;
 mod exp;
 mod material;

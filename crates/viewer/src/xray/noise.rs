@@ -1,6 +1,6 @@
 //! Counted quanta: Poisson numbers from a counter-based generator.
 //!
-//! Random words are a function of (seed, frame, pixel) alone: no order of computation, number of threads or backend can change
+//! Random words are a function of (key, frame, pixel) alone: no order of computation, number of threads or backend can change
 //! them, and a frame can be drawn again without those before it. The generator is Philox4x32-10 (Salmon et al., Parallel Random
 //! Numbers: As Easy as 1, 2, 3, SC 2011).
 //!
@@ -57,11 +57,18 @@ static NORMAL: LazyLock<Vec<f32>> = LazyLock::new(|| {
     lower.chain(upper.iter().map(|z| z * scale)).map(|z| z as f32).collect()
 });
 
-/// The table that [`poisson`] wants.
+/// The table that [`normal`] and [`poisson`] want.
 pub(super) fn normal_table() -> &'static [f32; QUANTILES] {
     static ZERO: [f32; QUANTILES] = [0.0; QUANTILES];
     // The length is right by construction.
     NORMAL.as_slice().try_into().unwrap_or(&ZERO)
+}
+
+/// A standard normal number from a random word: the sum of two independent quantiles reaches further into the tails than one of so
+/// few.
+#[inline]
+pub(super) fn normal(word: u32, table: &[f32; QUANTILES]) -> f32 {
+    (table[(word >> 20) as usize] + table[(word & 0xFFF) as usize]) * std::f32::consts::FRAC_1_SQRT_2
 }
 
 /// A Poisson number of mean `mean` from a random word; not whole for large means.
@@ -70,9 +77,7 @@ pub(super) fn poisson(mean: f32, word: u32, normal: &[f32; QUANTILES]) -> f32 {
     if mean < FEW {
         return few(mean, word);
     }
-    // The sum of two independent quantiles reaches further into the tails than one of so few.
-    let z =
-        (normal[(word >> 20) as usize] + normal[(word & 0xFFF) as usize]) * std::f32::consts::FRAC_1_SQRT_2;
+    let z = self::normal(word, normal);
     mean + mean.sqrt() * z + (z * z - 1.0) * (1.0 / 6.0)
 }
 

@@ -20,6 +20,8 @@ pub struct PathLengths {
     pub lung_mm: Vec<f32>,
     /// Length inside the closed wall.
     pub lumen_mm: Vec<f32>,
+    /// Length of undiluted contrast medium in the lumen, beside devices; empty where there is none.
+    pub contrast_mm: Vec<f32>,
     /// Length inside devices, one map per material, in order of first appearance.
     pub devices_mm: Vec<(Material, Vec<f32>)>,
 }
@@ -28,5 +30,22 @@ impl PathLengths {
     /// Index of the pixel in column `x` and row `y`.
     pub fn index(&self, x: u32, y: u32) -> usize {
         y as usize * self.width as usize + x as usize
+    }
+
+    /// Whether it has the same maps of the same size.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let materials = |paths: &Self| paths.devices_mm.iter().map(|map| map.0).collect::<Vec<_>>();
+        let sizes = |paths: &Self| paths.maps().map(<[f32]>::len).collect::<Vec<_>>();
+        materials(self) == materials(other) && sizes(self) == sizes(other)
+    }
+
+    /// Whether the lengths on a ray are those of another that is like it.
+    pub(crate) fn is_same_at(&self, other: &Self, i: usize) -> bool {
+        self.maps().zip(other.maps()).all(|(a, b)| a.get(i) == b.get(i))
+    }
+
+    fn maps(&self) -> impl Iterator<Item = &[f32]> {
+        let fixed = [&self.body_mm, &self.bone_mm, &self.lung_mm, &self.lumen_mm, &self.contrast_mm];
+        fixed.into_iter().chain(self.devices_mm.iter().map(|map| &map.1)).map(Vec::as_slice)
     }
 }

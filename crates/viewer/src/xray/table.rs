@@ -59,11 +59,14 @@ impl Table {
     }
 }
 
-/// Linear attenuation coefficients in 1/cm and, in the column `air_kerma`, mass energy absorption of air in cm²/g.
+/// Linear attenuation coefficients in 1/cm.
 pub(super) static ATTENUATION: LazyLock<Table> =
     LazyLock::new(|| Table::parse(include_str!("data/attenuation.csv")));
 
-/// Photons per keV of a tungsten anode by peak voltage, unfiltered.
+/// Mass energy-absorption coefficient of dry air in cm²/g, by which dose is told in air kerma.
+pub(super) static AIR: LazyLock<Table> = LazyLock::new(|| Table::parse(include_str!("data/air.csv")));
+
+/// Photons of a tungsten anode in bins that end at K-edges, by peak voltage, unfiltered.
 pub(super) static ANODE: LazyLock<Table> =
     LazyLock::new(|| Table::parse(include_str!("data/tungsten_anode.csv")));
 
@@ -73,8 +76,8 @@ mod tests {
 
     #[test]
     fn the_files_hold_finite_numbers_at_rising_energies() {
-        for table in [&*ATTENUATION, &*ANODE] {
-            assert!(table.energies_kev.len() > 40 && table.energies_kev.is_sorted());
+        for table in [&*ATTENUATION, &*ANODE, &*AIR] {
+            assert!(table.energies_kev.len() >= 10 && table.energies_kev.is_sorted());
             for (name, column) in table.names.iter().zip(&table.values) {
                 assert_eq!(column.len(), table.energies_kev.len(), "{name}");
                 assert!(column.iter().all(|v| v.is_finite() && *v >= 0.0), "{name}");
@@ -82,6 +85,8 @@ mod tests {
         }
         assert!(ATTENUATION.values.iter().flatten().all(|v| *v > 0.0));
         assert_eq!(ATTENUATION.edges_kev().len(), 5, "I, Cs, Ba, W and Pt");
+        let [low, high] = ATTENUATION.range_kev();
+        assert!(AIR.range_kev()[0] <= low && AIR.range_kev()[1] >= high);
     }
 
     #[test]

@@ -1,0 +1,134 @@
+//! One scene with one device, and all that its script does.
+
+use std::path::Path;
+
+use endowire_core::shape::Shape;
+use endowire_core::vessel::SurfaceMesh;
+use endowire_methods::Scene;
+use endowire_viewer::{ContactView, View, ViewSpec};
+use serde_json::{Map, Value};
+
+use super::spec::Spec;
+use crate::cache::Cache;
+use crate::failure::Failure;
+use crate::output::pushed::Pushed;
+use crate::output::tell;
+
+/// What is in after a step.
+pub(super) struct Moment {
+    pub(super) step: usize,
+    pub(super) shape: Shape,
+    pub(super) inserted_mm: Vec<f64>,
+    pub(super) contacts: Vec<ContactView>,
+}
+
+/// A scene with a device, carried out.
+pub(super) struct Course {
+    pub(super) scene: String,
+    pub(super) device: Option<String>,
+    pub(super) instruments: Vec<String>,
+    pub(super) view: ViewSpec,
+    pub(super) wall: SurfaceMesh,
+    pub(super) pushed: Pushed,
+    /// By step; the first is before the script.
+    pub(super) moments: Vec<Moment>,
+}
+
+impl Course {
+    /// Carries a scene out. A step that fails ends it; what came before is kept.
+    pub(super) fn run(
+        spec: &Spec,
+        file: &Path,
+        device: Option<&Path>,
+        cache: &Cache,
+    ) -> Result<Self, Failure> {
+        let failed = |e: endowire_core::Error| Failure::from(e).at(file.display());
+        let scene = match device {
+            None => Scene::read(file)?,
+            Some(device) => with_device(file, device)?,
+        };
+        let view = view(spec, &scene, file)?;
+        let pushed = Pushed::new(file, &scene, &view)?;
+        let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(failed)?;
+        let mut simulation = scene.simulation(cache).map_err(failed)?;
+        let instruments = simulation.stack().instruments().iter().map(|i| i.name.clone()).collect();
+        let mut moments = Vec::new();
+        let mut run = script.begin();
+        loop {
+            let report = simulation.report();
+            let contacts = report.contacts.iter();
+            let contacts = contacts.map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() });
+            moments.push(Moment {
+                step: moments.len(),
+                shape: simulation.shape().clone(),
+                inserted_mm: report.lengths_mm(),
+                contacts: contacts.collect(),
+            });
+            let Some(step) = run.next(&simulation)? else { break };
+            if let Err(error) = simulation.step_together(step.moves) {
+                let step = moments.len();
+                tell(format_args!(
+                    "endowire: {}: step {step}: {error}; pictures are of those before",
+                    file.display()
+                ));
+                break;
+            }
+            run.carried_out();
+        }
+        Ok(Self {
+            scene: scene.name.clone(),
+            device: device.and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned()),
+            instruments,
+            view,
+            wall: simulation.wall().closed_mesh(),
+            pushed,
+            moments,
+        })
+    }
+}
+
+/// A scene with another device.
+fn with_device(file: &Path, device: &Path) -> Result<Scene, Failure> {
+    let bad = |text: String| Failure::Input(text).at(file.display());
+    let text = std::fs::read_to_string(file).map_err(|e| bad(e.to_string()))?;
+    let mut table: toml::Table = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
+    if table.contains_key("instrument") {
+        return Err(bad(
+            "devices are given, and the scene has instruments of its own: give it without devices".to_owned(),
+        ));
+    }
+    let device = std::path::absolute(device).map_err(|e| bad(e.to_string()))?;
+    let named = toml::Table::from_iter([(
+        "file".to_owned(),
+        toml::Value::from(device.to_string_lossy().into_owned()),
+    )]);
+    table.insert("device".to_owned(), named.into());
+    let text = toml::to_string(&table).map_err(|e| bad(e.to_string()))?;
+    Ok(Scene::from_toml(&text, file)?)
+}
+
+/// The view of a scene with the keys of the specification in their places.
+fn view(spec: &Spec, scene: &Scene, file: &Path) -> Result<ViewSpec, Failure> {
+    let bad = |e: serde_json::Error| Failure::Input(format!("view: {e}")).at(file.display());
+    let mut table = serde_json::to_value(ViewSpec::of_scene(scene, file)?).map_err(bad)?;
+    merge(&mut table, &spec.view);
+    let mut view: ViewSpec = serde_json::from_value(table).map_err(bad)?;
+    view.views = vec![View::Fluoro];
+    // Moments are drawn at random: what was before one is not before it.
+    view.detector.lag = 0.0;
+    view.c_arm.pose = None;
+    view.validate().map_err(|e| Failure::from(e).at(file.display()))?;
+    Ok(view)
+}
+
+fn merge(into: &mut Value, from: &Map<String, Value>) {
+    if !into.is_object() {
+        *into = Value::Object(Map::new());
+    }
+    for (key, value) in from {
+        match value {
+            Value::Object(inner) => merge(&mut into[key.as_str()], inner),
+            other => into[key.as_str()] = other.clone(),
+        }
+    }
+}

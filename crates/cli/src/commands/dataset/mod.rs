@@ -1,0 +1,186 @@
+//! `endowire dataset`: labelled pictures of many scenes, devices, poses, doses and moments.
+//!
+//! A *course* is a scene with a device, carried out once; a *shot* is a pose of a course, with its moments. Shots are drawn by all
+//! cores; each keeps a list of what it has written, so that a call that was ended goes on where it was. Everything that is
+//! drawn at random depends on the seed and on the number of the shot alone.
+
+mod coco;
+mod course;
+mod draw;
+mod shot;
+mod spec;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use endowire_methods::Scene;
+use rayon::prelude::*;
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::args::DatasetArgs;
+use crate::cache::Cache;
+use crate::failure::Failure;
+use crate::output::provenance::{Provenance, read_input};
+use crate::output::{print_json, progress, tell, to_json, whole};
+use coco::{Annotation, Category, ImageRow, categories};
+use course::Course;
+use shot::Part;
+use spec::Spec;
+
+/// Annotations of all pictures.
+#[derive(Debug, Serialize)]
+struct Document {
+    info: Info,
+    images: Vec<ImageRow>,
+    categories: [Category; 3],
+    annotations: Vec<Annotation>,
+}
+
+#[derive(Debug, Serialize)]
+struct Info {
+    description: &'static str,
+    #[serde(flatten)]
+    provenance: Provenance,
+}
+
+/// What was written: the JSON document on stdout.
+#[derive(Debug, Serialize)]
+struct Written {
+    #[serde(flatten)]
+    provenance: Provenance,
+    folder: PathBuf,
+    pictures: usize,
+    /// Pictures of this call; the others were there.
+    drawn: usize,
+    courses: usize,
+    simulation_time_s: f64,
+    drawing_time_s: f64,
+    pictures_per_s: f64,
+}
+
+/// Draws what is not there yet.
+pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
+    let spec = Spec::read(&args.spec)?;
+    let provenance = provenance(args, &spec)?;
+    let folder = &args.out;
+    for name in ["images", "arrays", "parts"] {
+        let path = folder.join(name);
+        std::fs::create_dir_all(&path).map_err(|e| Failure::write(&path, &e))?;
+    }
+    claim(&provenance, folder)?;
+    let pairs: Vec<_> = spec
+        .scenes
+        .iter()
+        .flat_map(|scene| match spec.devices.is_empty() {
+            true => vec![(scene, None)],
+            false => spec.devices.iter().map(|device| (scene, Some(device.as_path()))).collect(),
+        })
+        .collect();
+    let shots = pairs.len() * spec.poses;
+    let missing = |shot: &usize| read_part(&shot::list(folder, *shot)).is_none();
+    let open: Vec<usize> = (0..shots).filter(missing).collect();
+
+    let start = Instant::now();
+    let bar = progress::bar(pairs.len(), "scene");
+    let run = |(k, (scene, device)): (usize, &(&PathBuf, Option<&Path>))| {
+        let wanted = open.iter().any(|shot| shot / spec.poses == k);
+        let course = wanted.then(|| Course::run(&spec, scene, *device, &Cache::new(&args.cache))).transpose();
+        bar.inc(1);
+        course
+    };
+    let courses: Vec<Option<Course>> = pairs.par_iter().enumerate().map(run).collect::<Result<_, _>>()?;
+    bar.finish_and_clear();
+    let simulation_time_s = start.elapsed().as_secs_f64();
+
+    let start = Instant::now();
+    let bar = progress::bar(open.len(), "pose");
+    open.par_iter().try_for_each(|&shot| {
+        if let Some(course) = &courses[shot / spec.poses] {
+            shot::draw(&spec, course, shot, folder)?;
+        }
+        bar.inc(1);
+        Ok::<(), Failure>(())
+    })?;
+    bar.finish_and_clear();
+    let drawing_time_s = start.elapsed().as_secs_f64();
+
+    join(folder, shots, &provenance)?;
+    let each = spec.moments * spec.views();
+    let drawn = open.len() * each;
+    let written = Written {
+        provenance,
+        folder: folder.clone(),
+        pictures: shots * each,
+        drawn,
+        courses: pairs.len(),
+        simulation_time_s,
+        drawing_time_s,
+        pictures_per_s: if drawn > 0 { drawn as f64 / drawing_time_s } else { 0.0 },
+    };
+    if args.json {
+        return print_json(&written);
+    }
+    tell(format_args!(
+        "{} pictures in {}, {} of them drawn now: {:.1} a second (simulations took {:.1} s before)",
+        written.pictures,
+        folder.display(),
+        drawn,
+        written.pictures_per_s,
+        simulation_time_s
+    ));
+    Ok(())
+}
+
+/// What the dataset is made of.
+fn provenance(args: &DatasetArgs, spec: &Spec) -> Result<Provenance, Failure> {
+    let mut paths = vec![args.spec.clone()];
+    for scene in &spec.scenes {
+        paths.push(scene.clone());
+        paths.extend(Scene::read(scene)?.input_paths());
+    }
+    paths.extend(spec.devices.iter().cloned());
+    let inputs = paths.iter().map(|path| read_input(path)).collect::<Result<Vec<_>, _>>()?;
+    Ok(Provenance::new(&inputs, spec.seed))
+}
+
+/// Takes a folder for a dataset; one that holds another is refused.
+fn claim(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
+    let path = folder.join("dataset.json");
+    let told = to_json(provenance)?;
+    match std::fs::read_to_string(&path) {
+        Ok(text) => {
+            let there: Value = serde_json::from_str(&text).unwrap_or_default();
+            if there["scene_hash"] == provenance.scene_hash() {
+                return Ok(());
+            }
+            Err(Failure::Input(format!(
+                "--out {}: holds another dataset, or this one before its specification or a file it names was changed; give another folder",
+                folder.display()
+            )))
+        }
+        Err(_) => whole::write_bytes(&path, told.as_bytes()).map_err(|e| Failure::write(&path, &e)),
+    }
+}
+
+/// What a shot has written, if it is whole.
+fn read_part(path: &Path) -> Option<Part> {
+    serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+}
+
+/// Writes the annotations of all shots.
+fn join(folder: &Path, shots: usize, provenance: &Provenance) -> Result<(), Failure> {
+    let info = Info { description: "endowire: simulated fluoroscopy", provenance: provenance.clone() };
+    let mut document = Document { info, images: vec![], categories: categories(), annotations: vec![] };
+    for path in (0..shots).map(|shot| shot::list(folder, shot)) {
+        let part = read_part(&path).ok_or_else(|| {
+            Failure::Computation(format!("{}: is not there any more; run the command again", path.display()))
+        })?;
+        document.images.extend(part.images);
+        document.annotations.extend(part.annotations);
+    }
+    let text = serde_json::to_string(&document)
+        .map_err(|e| Failure::Computation(format!("annotations cannot be written as JSON: {e}")))?;
+    let path = folder.join("annotations.json");
+    whole::write_bytes(&path, text.as_bytes()).map_err(|e| Failure::write(&path, &e))
+}

@@ -1,0 +1,130 @@
+//! The pictures of one pose of one course, with their labels.
+
+use std::path::{Path, PathBuf};
+
+use endowire_core::Vec3;
+use endowire_viewer::{Labels, Renderer, ViewSpec};
+use serde::{Deserialize, Serialize};
+
+use super::coco::{Annotation, ImageRow, annotations};
+use super::course::Course;
+use super::draw::{Draw, What};
+use super::spec::Spec;
+use crate::failure::Failure;
+use crate::output::npz::{Array, write_arrays};
+use crate::output::whole;
+
+/// What a shot has written, kept beside the pictures until all are there.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Part {
+    pub(super) images: Vec<ImageRow>,
+    pub(super) annotations: Vec<Annotation>,
+}
+
+/// Where the list of a shot is.
+pub(super) fn list(folder: &Path, shot: usize) -> PathBuf {
+    folder.join("parts").join(format!("{shot:06}.json"))
+}
+
+/// Draws the pictures of shot number `shot`, pose number `pose` of a course.
+pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> Result<Part, Failure> {
+    let draw = Draw::new(spec.seed).of(shot);
+    let views = planes(spec, course, draw);
+    let mut renderers = Vec::with_capacity(views.len());
+    for view in &views {
+        renderers.push(Renderer::new(view, &course.wall)?);
+    }
+    let mut part = Part { images: vec![], annotations: vec![] };
+    for m in 0..spec.moments {
+        let of = draw.of(m);
+        let last = course.moments.len() - 1;
+        let progress = of.within(What::Progress, spec.vary.progress);
+        let moment = &course.moments[(progress * last as f64).round() as usize];
+        let time_s = of.within(What::Time, spec.vary.time_s);
+        let devices = course.pushed.views(&moment.shape, &moment.inserted_mm);
+        let in_line = course.instruments.iter().zip(&moment.inserted_mm).filter(|one| *one.1 > 0.0);
+        let names: Vec<String> = in_line.map(|one| one.0.clone()).collect();
+        let contacts: Vec<Vec3> = moment.contacts.iter().map(|c| c.position_mm).collect();
+        for (plane, (renderer, view)) in renderers.iter_mut().zip(&views).enumerate() {
+            let id = (shot * spec.moments + m) * spec.views() + plane;
+            let frame = endowire_viewer::Moment { frame: m as u64, time_s };
+            let Some(image) = renderer.render_at(&devices, frame)?.fluoro else { continue };
+            let labels = renderer.labels(&devices, &contacts)?;
+            let [file_name, arrays] = [format!("images/{id:07}.png"), format!("arrays/{id:07}.npz")];
+            image.write_png(folder.join(&file_name))?;
+            let path = folder.join(&arrays);
+            write_arrays(&path, &label_arrays(&labels)).map_err(|e| Failure::write(&path, &e))?;
+            part.annotations.extend(annotations(id, &labels, &names));
+            let angles = view.c_arm.angles_deg();
+            part.images.push(ImageRow {
+                id,
+                file_name,
+                arrays,
+                width: image.width(),
+                height: image.height(),
+                scene: course.scene.clone(),
+                device: course.device.clone(),
+                instruments: names.clone(),
+                step: moment.step,
+                time_s,
+                plane,
+                pair: (spec.views() == 2).then_some(id - plane + (1 - plane)),
+                primary_deg: angles[0],
+                secondary_deg: angles[1],
+                kvp: view.xray.kvp,
+                dose_ngy: view.detector.dose_ngy.unwrap_or_else(|| view.xray.mode.dose_ngy()),
+                camera_matrix: labels.camera_matrix,
+            });
+        }
+    }
+    let text = serde_json::to_string(&part)
+        .map_err(|e| Failure::Computation(format!("labels cannot be written as JSON: {e}")))?;
+    let path = list(folder, shot);
+    whole::write_bytes(&path, text.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
+    Ok(part)
+}
+
+/// The views of a shot's planes.
+fn planes(spec: &Spec, course: &Course, draw: Draw) -> Vec<ViewSpec> {
+    let vary = &spec.vary;
+    let mut view = course.view.clone();
+    view.c_arm.primary_deg = draw.within(What::Primary, vary.primary_deg);
+    view.c_arm.secondary_deg = draw.within(What::Secondary, vary.secondary_deg);
+    view.detector.seed = draw.word(What::Noise);
+    if let Some(&kvp) = vary.kvp.get((draw.unit(What::Voltage) * vary.kvp.len() as f64) as usize) {
+        view.xray.kvp = kvp;
+    }
+    if let Some(range) = vary.dose_ngy {
+        view.detector.dose_ngy = Some(draw.within(What::Dose, range.map(f64::ln)).exp());
+    }
+    let second = spec.biplane_deg.map(|turn| {
+        let mut second = view.clone();
+        second.c_arm.primary_deg += turn;
+        second
+    });
+    std::iter::once(view).chain(second).collect()
+}
+
+/// Labels as arrays.
+fn label_arrays(labels: &Labels) -> Vec<Array> {
+    let [width, height] = labels.size_px.map(|n| n as usize);
+    let bytes = |name: &str, data: Vec<u8>| Array::of_bytes(name, vec![height, width], data);
+    let mut arrays = vec![
+        bytes("mask", labels.mask.data().to_vec()),
+        Array::of_floats("camera_matrix", vec![3, 4], labels.camera_matrix.iter().flatten().copied()),
+    ];
+    arrays.extend(labels.vessel.as_ref().map(|mask| bytes("vessel", mask.image().into_data())));
+    for (k, device) in (1..).zip(&labels.devices) {
+        let points = device.centre_line_px.len();
+        let line_px = device.centre_line_px.iter().flatten().copied();
+        let line_mm = device.centre_line_mm.iter().flatten().copied();
+        arrays.push(Array::of_floats(&format!("line_{k}_px"), vec![points, 2], line_px));
+        arrays.push(Array::of_floats(&format!("line_{k}_mm"), vec![points, 3], line_mm));
+        arrays.push(Array::of_floats(
+            &format!("depth_{k}_mm"),
+            vec![points],
+            device.depth_mm.iter().copied(),
+        ));
+    }
+    arrays
+}

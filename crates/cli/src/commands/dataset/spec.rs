@@ -1,0 +1,137 @@
+//! What a dataset is made of: a TOML file.
+
+use std::path::{Path, PathBuf};
+
+use endowire_core::input::parse_toml;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::failure::Failure;
+
+/// Most pictures of one dataset.
+const MOST_PICTURES: usize = 10_000_000;
+
+/// A specification. Paths start from its folder.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Spec {
+    /// Seed of all that is drawn.
+    #[serde(default = "one")]
+    pub(super) seed: u64,
+    /// Scene files: vessels, sheaths, scripts and views.
+    pub(super) scenes: Vec<PathBuf>,
+    /// Device files, each in place of the device of every scene that has one alone; absent: the scenes' own.
+    #[serde(default)]
+    pub(super) devices: Vec<PathBuf>,
+    /// Poses drawn for each scene with each device.
+    #[serde(default = "eight")]
+    pub(super) poses: usize,
+    /// Moments drawn for each pose: a picture each, or one of each plane.
+    #[serde(default = "sixteen")]
+    pub(super) moments: usize,
+    /// Positioner primary angle of the second plane from that of the first; absent: one plane.
+    pub(super) biplane_deg: Option<f64>,
+    /// Ranges that are drawn from.
+    #[serde(default)]
+    pub(super) vary: Vary,
+    /// Keys of `[view]` that take the place of the scenes'.
+    #[serde(default)]
+    pub(super) view: Map<String, Value>,
+}
+
+/// Ranges, even between their ends.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Vary {
+    /// Of a pose.
+    pub(super) primary_deg: [f64; 2],
+    pub(super) secondary_deg: [f64; 2],
+    /// Of a pose, one of these; absent: the scene's.
+    pub(super) kvp: Vec<f64>,
+    /// Of a pose, even on a logarithmic scale; absent: usual for the mode.
+    pub(super) dose_ngy: Option<[f64; 2]>,
+    /// Of a picture: time of injections.
+    pub(super) time_s: [f64; 2],
+    /// Of a picture: part of the script that has been carried out.
+    pub(super) progress: [f64; 2],
+}
+
+impl Default for Vary {
+    fn default() -> Self {
+        Self {
+            primary_deg: [-45.0, 45.0],
+            secondary_deg: [-25.0, 25.0],
+            kvp: vec![],
+            dose_ngy: None,
+            time_s: [0.0, 0.0],
+            progress: [0.2, 1.0],
+        }
+    }
+}
+
+fn one() -> u64 {
+    1
+}
+
+fn eight() -> usize {
+    8
+}
+
+fn sixteen() -> usize {
+    16
+}
+
+impl Spec {
+    /// Reads and checks a file.
+    pub(super) fn read(path: &Path) -> Result<Self, Failure> {
+        let text =
+            std::fs::read_to_string(path).map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+        let mut spec: Self = parse_toml(&text, path)?;
+        spec.check().map_err(|failure| failure.at(path.display()))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        spec.scenes.iter_mut().chain(&mut spec.devices).for_each(|file| *file = folder.join(&*file));
+        Ok(spec)
+    }
+
+    /// Pictures of each plane.
+    pub(super) fn views(&self) -> usize {
+        if self.biplane_deg.is_some() { 2 } else { 1 }
+    }
+
+    fn check(&self) -> Result<(), Failure> {
+        let refuse = |text: String| Err(Failure::Input(text));
+        if self.scenes.is_empty() {
+            return refuse("scenes = []: name at least one scene file".to_owned());
+        }
+        let courses = self.scenes.len() * self.devices.len().max(1);
+        let pictures =
+            courses.saturating_mul(self.poses).saturating_mul(self.moments).saturating_mul(self.views());
+        if !(1..=MOST_PICTURES).contains(&pictures) {
+            return refuse(format!(
+                "poses = {} and moments = {} make {pictures} pictures: they must be 1 to {MOST_PICTURES}",
+                self.poses, self.moments
+            ));
+        }
+        let vary = &self.vary;
+        let dose = vary.dose_ngy.unwrap_or([1.0; 2]);
+        for (key, [low, high], [least, most]) in [
+            ("primary_deg", vary.primary_deg, [-180.0, 180.0]),
+            ("secondary_deg", vary.secondary_deg, [-90.0, 90.0]),
+            ("dose_ngy", dose, [0.001, 1e6]),
+            ("time_s", vary.time_s, [-1e4, 1e4]),
+            ("progress", vary.progress, [0.0, 1.0]),
+        ] {
+            if !(least <= low && low <= high && high <= most) {
+                return refuse(format!(
+                    "vary.{key} = [{low}, {high}]: must be two numbers from {least} to {most}, the first not above the second"
+                ));
+            }
+        }
+        match self.biplane_deg {
+            Some(turn) if !(-180.0..=180.0).contains(&turn) => {
+                refuse(format!("biplane_deg = {turn}: must be a number from -180 to 180"))
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! What a view shows of devices and contacts.
+
+use endowire_core::{Result, Vec3};
+
+use crate::c_arm::CArm;
+use crate::cpu::{Coverage, layers_in_beam};
+use crate::device::{DeviceView, RefinedDevice};
+use crate::output::{ContactLabel, DeviceLabel, Image, Labels, Mask, PartLabel, PixelFormat};
+use crate::xray::Material;
+
+/// Labels of a frame of `devices`; those without a material of their own are made of `material`.
+///
+/// # Errors
+/// [`endowire_core::Error::Parameter`] for a device with values that are not finite.
+pub(crate) fn labels(
+    c_arm: &CArm,
+    devices: &[DeviceView],
+    contacts_mm: &[Vec3],
+    material: Material,
+    vessel: Option<Mask>,
+) -> Result<Labels> {
+    let contact = |point: &Vec3| {
+        let pixel = seen(c_arm, point);
+        let visible = pixel.is_some_and(|pixel| c_arm.sees(pixel));
+        ContactLabel { pixel, position_mm: (*point).into(), visible }
+    };
+    let [width, height] = c_arm.size_px();
+    let mut mask = vec![0_u8; width as usize * height as usize];
+    // Of a whole device, and of a part.
+    let mut room = [Coverage::new(c_arm), Coverage::new(c_arm)];
+    let mut labelled = Vec::with_capacity(devices.len());
+    for (number, device) in (1_u8..=u8::MAX).zip(devices) {
+        let label = device_label(c_arm, device, material, &mut room)?;
+        label.mask.pixels().iter().for_each(|&pixel| mask[pixel as usize] = number);
+        labelled.push(label);
+    }
+    Ok(Labels {
+        size_px: [width, height],
+        camera_matrix: c_arm.matrix(),
+        devices: labelled,
+        contacts: contacts_mm.iter().map(contact).collect(),
+        mask: Image::new(width, height, PixelFormat::Gray8, mask),
+        vessel,
+    })
+}
+
+/// Where a point is seen, if it is between source and detector.
+fn seen(c_arm: &CArm, point: &Vec3) -> Option<[f64; 2]> {
+    c_arm.is_between(&c_arm.in_beam(point)).then(|| c_arm.project(point))
+}
+
+fn device_label(
+    c_arm: &CArm,
+    device: &DeviceView,
+    material: Material,
+    [whole, one]: &mut [Coverage; 2],
+) -> Result<DeviceLabel> {
+    let mut parts = Vec::new();
+    let mut mask = Mask::new(c_arm.size_px(), vec![]);
+    let refined = RefinedDevice::all(std::slice::from_ref(device))?;
+    let points = refined.first().map_or(&[][..], |device| &device.points);
+    for device in &refined {
+        let layers = layers_in_beam(c_arm, device);
+        for (layer, pieces) in &layers {
+            pieces.iter().filter(|(_, sign)| *sign > 0.0).for_each(|(piece, _)| one.add(c_arm, piece));
+            whole.join(one);
+            let covered = one.take(c_arm);
+            if let Some(from_tip_mm) = layer.part {
+                let material = layer.material.unwrap_or(material);
+                parts.push(PartLabel { material, from_tip_mm, mask: covered });
+            }
+        }
+        mask = whole.take(c_arm);
+    }
+    let shown = points.iter().map(|p| p.position_mm).filter_map(|p| Some((seen(c_arm, &p)?, p)));
+    let (centre_line_px, places): (Vec<[f64; 2]>, Vec<Vec3>) = shown.unzip();
+    let tip = points.last().map(|p| p.position_mm);
+    let tip_px = tip.and_then(|tip| seen(c_arm, &tip));
+    Ok(DeviceLabel {
+        centre_line_px,
+        depth_mm: places.iter().map(|p| c_arm.depth_mm(p)).collect(),
+        centre_line_mm: places.into_iter().map(Into::into).collect(),
+        tip_px,
+        tip_mm: tip.map(Into::into),
+        tip_visible: tip_px.is_some_and(|p| c_arm.sees(p)),
+        parts,
+        mask,
+    })
+}

@@ -1,0 +1,63 @@
+//! Letters that tell directions, and a legend of forces.
+
+use endowire_core::Vec3;
+
+use crate::output::{Image, PixelFormat};
+use crate::three_d::scale_bar::INK;
+use crate::three_d::solids::{ARROW_PX, ContactView, FORCE};
+use crate::three_d::text::{ROWS, columns, text};
+
+const WHITE: [u8; 4] = [255; 4];
+
+/// Pixels of a dot.
+fn dot(image: &Image) -> u32 {
+    (image.height() / 320).max(1)
+}
+
+/// The letter of the patient axis that a direction is nearest to.
+fn letter(direction: &Vec3) -> &'static str {
+    let names = [["L", "R"], ["P", "A"], ["H", "F"]];
+    let most = direction.iamax();
+    names[most][usize::from(direction[most] < 0.0)]
+}
+
+/// Letters in the middles of the borders of a picture whose columns and rows run along these directions.
+pub(crate) fn draw(image: &mut Image, [right, up]: [Vec3; 2]) {
+    let dot = 2 * dot(image);
+    let ink = if image.format() == PixelFormat::Rgba8 { INK } else { WHITE };
+    let [width, height] = [image.width(), image.height()];
+    let [across, down] = [3 * dot, ROWS * dot];
+    let middle = [width.saturating_sub(across) / 2, height.saturating_sub(down) / 2];
+    let far = [width.saturating_sub(across + 2 * dot), height.saturating_sub(down + 2 * dot)];
+    for (at, direction) in [
+        ([2 * dot, middle[1]], -right),
+        ([far[0], middle[1]], right),
+        ([middle[0], 2 * dot], up),
+        ([middle[0], far[1]], -up),
+    ] {
+        text(image, at, dot, letter(&direction), ink);
+    }
+}
+
+/// An arrow as long as that of the strongest force, with its strength.
+pub(crate) fn legend(image: &mut Image, contacts: &[ContactView]) {
+    let strongest = contacts.iter().map(|contact| contact.force_n.norm()).fold(0.0, f64::max);
+    if strongest == 0.0 {
+        return;
+    }
+    let label =
+        if strongest < 0.1 { format!("{:.2} mN", 1e3 * strongest) } else { format!("{strongest:.2} N") };
+    let dot = dot(image);
+    let longer = f64::from(image.width().max(image.height()));
+    let length = (ARROW_PX * longer / 640.0).round() as u32;
+    let wide = length.max(columns(&label) * dot);
+    let [left, bottom] =
+        [image.width().saturating_sub(wide + 8 * dot), image.height().saturating_sub(8 * dot)];
+    image.fill([left, bottom.saturating_sub(dot)], [length, dot], FORCE);
+    for back in 0..3 * dot {
+        let x = left + length.saturating_sub(back);
+        let half = back / 2;
+        image.fill([x, bottom.saturating_sub(dot + half)], [1, 2 * half + dot], FORCE);
+    }
+    text(image, [left, bottom.saturating_sub(10 * dot)], dot, &label, INK);
+}

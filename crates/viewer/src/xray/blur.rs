@@ -1,0 +1,78 @@
+//! Blurs by a Gaussian, along rows and then along columns.
+
+/// The kernel ends at this many deviations.
+const KERNEL_REACH: f64 = 3.0;
+/// Deviations below this many pixels change nothing visible.
+const LEAST_PX: f64 = 0.05;
+
+/// A Gaussian over pixels of one size of picture.
+#[derive(Debug)]
+pub(super) struct Blur {
+    size_px: [usize; 2],
+    /// Symmetric kernel: the middle and one side.
+    kernel: Vec<f32>,
+    padded: Vec<f32>,
+}
+
+impl Blur {
+    /// That of a deviation in pixels.
+    pub(super) fn new(deviation_px: f64, size_px: [u32; 2]) -> Self {
+        let reach = if deviation_px < LEAST_PX { 0 } else { (KERNEL_REACH * deviation_px).ceil() as usize };
+        // Integrals of the Gaussian over pixels tend to samples of it; a slim one is summed over parts of pixels.
+        const PARTS: i32 = 16;
+        let weight = |k: usize| -> f64 {
+            (0..PARTS)
+                .map(|part| {
+                    let x = k as f64 + (f64::from(part) + 0.5) / f64::from(PARTS) - 0.5;
+                    (-0.5 * (x / deviation_px.max(LEAST_PX)).powi(2)).exp()
+                })
+                .sum()
+        };
+        let side: Vec<f64> = (0..=reach).map(weight).collect();
+        let total = side[0] + 2.0 * side[1..].iter().sum::<f64>();
+        Self {
+            size_px: size_px.map(|n| n as usize),
+            kernel: side.iter().map(|w| (w / total) as f32).collect(),
+            padded: vec![],
+        }
+    }
+
+    /// Whether it changes anything.
+    pub(super) fn is_visible(&self) -> bool {
+        self.kernel.len() > 1
+    }
+
+    /// Spreads a picture; borders repeat.
+    pub(super) fn spread(&mut self, image: &mut [f32]) {
+        if !self.is_visible() {
+            return;
+        }
+        let [width, height] = self.size_px;
+        let reach = self.kernel.len() - 1;
+        let mut line = vec![0.0; width + 2 * reach];
+        for row in image.chunks_exact_mut(width) {
+            line[reach..reach + width].copy_from_slice(row);
+            line[..reach].fill(row[0]);
+            line[reach + width..].fill(row[width - 1]);
+            row.iter_mut().zip(&line[reach..]).for_each(|(out, v)| *out = v * self.kernel[0]);
+            for k in 1..=reach {
+                let sides = line[reach - k..].iter().zip(&line[reach + k..]);
+                row.iter_mut().zip(sides).for_each(|(out, (a, b))| *out += self.kernel[k] * (a + b));
+            }
+        }
+        self.padded.clear();
+        self.padded.extend_from_slice(image);
+        let source = |y: isize| {
+            let y = y.clamp(0, height as isize - 1) as usize;
+            &self.padded[y * width..][..width]
+        };
+        for (y, row) in (0..).zip(image.chunks_exact_mut(width)) {
+            row.iter_mut().zip(source(y)).for_each(|(out, v)| *out = v * self.kernel[0]);
+            for k in 1..=reach as isize {
+                let sides = source(y - k).iter().zip(source(y + k));
+                let weight = self.kernel[k as usize];
+                row.iter_mut().zip(sides).for_each(|(out, (a, b))| *out += weight * (a + b));
+            }
+        }
+    }
+}
