@@ -103,8 +103,10 @@ impl Renderer {
         Ok(Frames { three_d: of(frames.three_d)?, fluoro: of(frames.fluoro)? })
     }
 
-    /// What the fluoroscopic view shows, without noise: a dictionary of `mask` (height, width; k + 1 where instrument k is seen), `devices`
-    /// (centre_line_px, tip_px, tip_visible) and `contacts` (pixel, visible). Pixel coordinates are x and y from the top left.
+    /// What the fluoroscopic view shows, without noise: a dictionary of `mask` (height, width; k + 1 where instrument k covers half of the pixel),
+    /// `vessel` (the same of the lumen, 255; None where the wall is not closed), `devices` (centre_line_px, centre_line_mm, depth_mm, tip_px,
+    /// tip_mm, tip_visible), `contacts` (pixel, position_mm, visible) and `camera_matrix` (3, 4), which takes (x, y, z, 1) in mm to pixel
+    /// coordinates times the depth from the source. Pixel coordinates are x and y from the top left.
     fn labels<'py>(&self, py: Python<'py>, simulation: &Simulation) -> PyResult<Bound<'py, PyDict>> {
         let views = self.views(py, simulation)?;
         let contacts: Vec<Vec3> = simulation
@@ -116,6 +118,11 @@ impl Renderer {
             let one = PyDict::new(py);
             let line = device.centre_line_px;
             one.set_item("centre_line_px", array(py, line.as_flattened().to_vec(), [line.len(), 2])?)?;
+            let line = device.centre_line_mm;
+            one.set_item("centre_line_mm", array(py, line.as_flattened().to_vec(), [line.len(), 3])?)?;
+            let depths = device.depth_mm.len();
+            one.set_item("depth_mm", array(py, device.depth_mm, [depths])?)?;
+            one.set_item("tip_mm", device.tip_mm)?;
             one.set_item("tip_px", device.tip_px)?;
             one.set_item("tip_visible", device.tip_visible)?;
             devices.append(one)?;
@@ -123,6 +130,8 @@ impl Renderer {
         told.set_item("devices", devices)?;
         told.set_item("contacts", document::write(py, &labels.contacts)?)?;
         told.set_item("mask", pixels(py, labels.mask)?)?;
+        told.set_item("vessel", labels.vessel.map(|mask| pixels(py, mask.image())).transpose()?)?;
+        told.set_item("camera_matrix", array(py, labels.camera_matrix.as_flattened().to_vec(), [3, 4])?)?;
         Ok(told)
     }
 }

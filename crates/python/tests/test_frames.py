@@ -12,12 +12,18 @@ def test_both_views_and_labels_are_arrays(vessel, simulation):
     frames = renderer.render(simulation, frame=3)
     assert frames.three_d.shape == (32, 48, 4) and frames.three_d.dtype == np.uint8
     assert frames.fluoro.shape == (32, 48) and frames.fluoro.dtype == np.uint8
+    # Pixels much smaller than the wire: a mask is what it covers by half.
+    renderer = endowire.Renderer(vessel, {**VIEW, "views": ["fluoro"], "size_px": [640, 640]})
     labels = renderer.labels(simulation)
     device = labels["devices"][0]
     assert labels["mask"].max() == 1 and device["tip_visible"]
     x, y = device["tip_px"]
     near = labels["mask"][max(int(y) - 1, 0) : int(y) + 2, max(int(x) - 1, 0) : int(x) + 2]
     assert near.any() and device["centre_line_px"].shape[1] == 2
+    assert labels["vessel"].shape == (640, 640) and labels["vessel"].any()
+    u, v, w = labels["camera_matrix"] @ [*device["tip_mm"], 1.0]
+    assert np.allclose([u / w, v / w], [x, y]) and np.isclose(w, device["depth_mm"][-1])
+    assert device["centre_line_mm"].shape == (len(device["centre_line_px"]), 3)
 
 
 def test_sixteen_bits_and_one_view(vessel, simulation):
