@@ -24,6 +24,8 @@ pub(crate) struct Args {
 pub(crate) enum Command {
     /// Run the scripted insertion of a scene and record it: summary.json, steps.csv, shapes.npz, frames/*.png
     Run(RunArgs),
+    /// Move the instruments of a scene by hand, under fluoroscopy: a window, or a protocol of JSON lines; what is done is recorded as a script
+    Play(PlayArgs),
     /// Draw frames of a recorded run, from any position of the C-arm
     Render(RenderArgs),
     /// Draw fluoroscopic frames of a scene: after its script, or of a contrast injection
@@ -49,6 +51,9 @@ pub(crate) enum Command {
 pub(crate) struct RunArgs {
     /// Scene file (TOML)
     pub(crate) scene: PathBuf,
+    /// Carry out the script of this file, [[script]] tables alone, in place of the scene's own: what `play` has recorded
+    #[arg(long, value_name = "FILE")]
+    pub(crate) script: Option<PathBuf>,
     /// Folder for the recording; out/NAME OF THE SCENE if absent. An earlier recording in it is replaced
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -68,6 +73,39 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
     /// Print the summary as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct PlayArgs {
+    /// Scene file (TOML); its script is not carried out
+    pub(crate) scene: PathBuf,
+    /// File for what hands have done: a script that `endowire run SCENE --script FILE` carries out to the bit; out/NAME OF THE
+    /// SCENE/played.toml if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
+    /// Without a window: inputs are lines of JSON on stdin, answers lines of JSON on stdout, and time goes by as inputs say
+    #[arg(long)]
+    pub(crate) headless: bool,
+    /// With --headless: time goes by as on a clock, and pictures are drawn as for the window
+    #[arg(long, requires = "headless")]
+    pub(crate) realtime: bool,
+    /// Take inputs, lines of JSON, also from programs that connect to this address, such as 127.0.0.1:7000
+    #[arg(long, value_name = "ADDRESS")]
+    pub(crate) listen: Option<std::net::SocketAddr>,
+    /// Width and height of the fluoroscopic picture in pixels, 64 to 1024
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(64..=1024))]
+    pub(crate) size: u32,
+    /// Warn where a hand pushes or pulls harder than this
+    #[arg(long, default_value_t = 1.0, value_name = "N")]
+    pub(crate) warn_n: f64,
+    /// Warn where a hand holds a greater torque than this
+    #[arg(long, default_value_t = 5.0, value_name = "N·MM")]
+    pub(crate) warn_nmm: f64,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Print at the end what was done, and how fast, as one JSON document on stdout; not without a window and a clock, where stdout is for answers
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -17,6 +17,7 @@ fn main() -> ExitCode {
         args.command,
         args::Command::Run(_)
             | args::Command::Render(_)
+            | args::Command::Play(_)
             | args::Command::Fluoro(_)
             | args::Command::Experiment(_)
     ) {

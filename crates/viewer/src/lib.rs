@@ -39,6 +39,7 @@ mod gpu;
 mod gpu;
 mod output;
 mod patient;
+mod pushed;
 mod renderer;
 mod scene;
 mod spec;
@@ -50,6 +51,7 @@ pub use device::{DevicePart, DevicePoint, DeviceView};
 pub use device_file::device_parts;
 pub use fluoro::Moment;
 pub use output::{Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, PixelFormat};
+pub use pushed::Pushed;
 pub use renderer::{Frames, Renderer};
 pub use spec::{
     Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, FlowSpec, InjectionSpec, Mode, PatientSpec, Pose,

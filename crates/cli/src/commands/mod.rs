@@ -5,6 +5,7 @@ mod device;
 pub(crate) mod experiment;
 mod felt;
 mod fluoro;
+mod play;
 mod render;
 mod rod;
 mod run;
@@ -19,6 +20,7 @@ use crate::failure::Failure;
 pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Run(args) => run::run(args),
+        Command::Play(args) => play::play(args),
         Command::Render(args) => render::render(args),
         Command::Fluoro(args) => fluoro::fluoro(args),
         Command::Rod(args) => rod::rod(args),

@@ -23,7 +23,9 @@ use crate::output::{frames::FrameWriter, print_json, tell, whole};
 /// Runs the scene's script and records every step.
 pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let started = Instant::now();
-    let scene = Scene::read(&args.scene)?;
+    let mut scene = Scene::read(&args.scene)?;
+    args.script.as_deref().map_or(Ok(()), |path| scene.take_script(path))?;
+    let scene = scene;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
     let saved = args.resume.as_deref().map(Saved::read).transpose()?;
     let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(in_scene)?;
@@ -241,7 +243,7 @@ fn draw_again(
 }
 
 /// Set by Ctrl-C, or by a request to terminate: the step under way is finished and recorded. A second one ends at once.
-fn interrupts() -> Arc<AtomicBool> {
+pub(crate) fn interrupts() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let heard = Arc::clone(&flag);
     // Without a handler an interrupt ends the program at once, as elsewhere.

@@ -8,13 +8,14 @@ use endowire_core::insertion::Simulation;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_methods::Scene;
-use endowire_viewer::{Angiogram, Animation, ContactView, Frames, Image, Moment, Renderer, View, ViewSpec};
+use endowire_viewer::{
+    Angiogram, Animation, ContactView, Frames, Image, Moment, Pushed, Renderer, View, ViewSpec,
+};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::manifest::Manifest;
 use super::npz::write_map;
-use super::pushed::Pushed;
 use super::recorder::Recorder;
 use super::{print_json, tell, to_json};
 use crate::args::{FrameArgs, ViewChoice};
@@ -40,7 +41,7 @@ impl FrameWriter {
         } else {
             Some(Renderer::new(&spec, &simulation.wall().closed_mesh()).map_err(in_scene)?)
         };
-        Ok(Self { pushed: Pushed::new(path, scene, &spec)?, spec, renderer })
+        Ok(Self { pushed: Pushed::new(scene, &spec).map_err(in_scene)?, spec, renderer })
     }
 
     /// What draws, for the summary.
@@ -149,7 +150,7 @@ impl<'a> Studio<'a> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         let spec = wished(ViewSpec::of_scene(scene, path)?, args, default)?;
         let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
-        let pushed = Pushed::new(path, scene, &spec)?;
+        let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
         if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {
             let text = format!("--orbit {orbit:e}: give -{MOST_ORBIT_DEG} to {MOST_ORBIT_DEG} degrees");

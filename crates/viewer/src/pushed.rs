@@ -1,30 +1,40 @@
 //! What is pushed, as the viewer sees it: the device, or each of several instruments.
 
-use std::path::Path;
-
 use endowire_core::device::{Device, Section, Stack};
+use endowire_core::methods::MethodChoice;
+use endowire_core::scene::SceneOf;
 use endowire_core::shape::Shape;
-use endowire_methods::Scene;
-use endowire_viewer::{DevicePart, DeviceView, ViewSpec, device_parts};
+use endowire_core::{Error, Result};
+use serde::de::DeserializeOwned;
 
-use crate::failure::Failure;
+use crate::device::{DevicePart, DeviceView};
+use crate::device_file::device_parts;
+use crate::spec::ViewSpec;
 
-/// Instruments and what they are made of.
-pub(crate) struct Pushed {
+/// Instruments of a scene and what they are made of.
+#[derive(Debug, Clone)]
+pub struct Pushed {
     stack: Stack,
     /// Parts to draw of each.
     parts: Vec<Vec<DevicePart>>,
 }
 
 impl Pushed {
-    /// Those of the scene in a file. A device alone is made of what the `[view]` table says, if it says so, and else everything of what its file says.
-    pub(crate) fn new(path: &Path, scene: &Scene, spec: &ViewSpec) -> Result<Self, Failure> {
-        let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
-        let stack = scene.stack().map_err(in_scene)?;
+    /// Those of a scene. A device alone is made of what the `[view]` table says, if it says so, and else everything of what its file says.
+    ///
+    /// # Errors
+    /// As [`SceneOf::stack`]; materials of a device file that are not known; a `[view]` table that describes one device where there are several.
+    pub fn new<M: MethodChoice + DeserializeOwned + Default>(
+        scene: &SceneOf<M>,
+        spec: &ViewSpec,
+    ) -> Result<Self> {
+        let stack = scene.stack()?;
         let mut parts = Vec::new();
-        for (file, device) in scene.device_files().map_err(in_scene)?.iter().zip(stack.devices()) {
+        for (file, device) in scene.device_files()?.iter().zip(stack.devices()) {
             parts.push(match file {
-                Some((path, file)) => device_parts(file).map_err(|e| Failure::from(e).at(path.display()))?,
+                Some((path, file)) => {
+                    device_parts(file).map_err(|error| Error::content(path, error.to_string()))?
+                }
                 None => tubes(device),
             });
         }
@@ -32,16 +42,15 @@ impl Pushed {
             (true, _) => {}
             (false, false) => parts[0].clone_from(&spec.device),
             (false, true) => {
-                let text = "view.device describes one device, and the scene has several instruments: leave it out, and give materials in \
-                            their files";
-                return Err(Failure::Input(text.to_owned()).at(path.display()));
+                let mend = "describes one device, and the scene has several instruments: leave it out, and give materials in their files";
+                return Err(Error::parameter("view.device", spec.device.len(), mend));
             }
         }
         Ok(Self { stack, parts })
     }
 
     /// Views of all that is in on this line, where these lengths are.
-    pub(crate) fn views(&self, shape: &Shape, inserted_mm: &[f64]) -> Vec<DeviceView> {
+    pub fn views(&self, shape: &Shape, inserted_mm: &[f64]) -> Vec<DeviceView> {
         let line_mm = inserted_mm.iter().copied().fold(0.0, f64::max);
         let each = self.stack.devices().zip(&self.parts).zip(inserted_mm).filter(|(_, mm)| **mm > 0.0);
         let view = |((device, parts), mm): ((&Device, &Vec<DevicePart>), &f64)| {
