@@ -28,6 +28,8 @@ pub(crate) enum Command {
     Play(PlayArgs),
     /// Draw frames of a recorded run, from any position of the C-arm
     Render(RenderArgs),
+    /// Write a recorded run as one page for a browser: the shape to turn and to scrub through time, forces, events, frames
+    Report(ReportArgs),
     /// Draw fluoroscopic frames of a scene: after its script, or of a contrast injection
     Fluoro(FluoroArgs),
     /// Solve one static rod: sections, supports and loads in, shape, energy and reactions out
@@ -45,6 +47,24 @@ pub(crate) enum Command {
     /// Repeat an experiment of Li et al. 2011
     #[command(subcommand)]
     Experiment(ExperimentCommand),
+    /// Make a folder with a scene to start from: vessel, device, script, views. It runs at once
+    New(NewArgs),
+    /// Say what this machine has and what of it is used: adapter, display, threads, cache
+    Doctor {
+        /// Print it as one JSON document on stdout
+        #[arg(long)]
+        json: bool,
+    },
+    /// Print the completions of a shell on stdout
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page on stdout (roff); of a command if one is named
+    Man {
+        /// Command
+        command: Option<String>,
+    },
 }
 
 #[derive(Debug, clap::Args)]
@@ -75,6 +95,35 @@ pub(crate) struct RunArgs {
     /// Print the summary as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
+    /// Print neither progress nor summary; failures are told
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct ReportArgs {
+    /// Folder of a recorded run
+    pub(crate) dir: PathBuf,
+    /// File of the page; DIR/report.html if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Scene file, where it is not the one that summary.json names
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct NewArgs {
+    /// Folder to make; it must not be there, or be empty
+    pub(crate) dir: PathBuf,
+    /// Surface of a vessel (STL, OBJ or PLY, in mm), which is copied, or a built-in anatomy
+    #[arg(long, default_value = "aortic_arch", value_name = "FILE|NAME")]
+    pub(crate) vessel: PathBuf,
+    /// Device file, such as one of the catalogue in assets/devices, which is copied; an angled hydrophilic wire of 0.035 in if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) device: Option<PathBuf>,
 }
 
 #[derive(Debug, clap::Args)]
@@ -88,6 +137,9 @@ pub(crate) struct PlayArgs {
     /// Without a window: inputs are lines of JSON on stdin, answers lines of JSON on stdout, and time goes by as inputs say
     #[arg(long)]
     pub(crate) headless: bool,
+    /// With --headless: take the lines of this file in place of stdin
+    #[arg(long, requires = "headless", value_name = "FILE")]
+    pub(crate) inputs: Option<PathBuf>,
     /// With --headless: time goes by as on a clock, and pictures are drawn as for the window
     #[arg(long, requires = "headless")]
     pub(crate) realtime: bool,
@@ -153,7 +205,7 @@ pub(crate) struct FrameArgs {
     /// Turn the camera of the 3D view by so many degrees from the first frame to the last
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub(crate) orbit: Option<f64>,
-    /// Write one animated PNG of the views side by side
+    /// Write one moving picture of the views side by side: an animated PNG (.png, .apng) or a GIF (.gif)
     #[arg(long, value_name = "FILE")]
     pub(crate) animate: Option<PathBuf>,
     /// Write the fluoroscopic frames as one DICOM file (X-ray angiographic image)

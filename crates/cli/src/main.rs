@@ -19,6 +19,7 @@ fn main() -> ExitCode {
             | args::Command::Render(_)
             | args::Command::Play(_)
             | args::Command::Fluoro(_)
+            | args::Command::Doctor { .. }
             | args::Command::Experiment(_)
     ) {
         environment::without_desktop();

@@ -164,3 +164,65 @@ fn without_a_display_it_says_so_and_names_run() {
     assert_eq!(said.lines().count(), 1, "{said}");
     assert!(said.contains("no display") && said.contains("endowire run"), "{said}");
 }
+
+/// A display that nobody sees; none where there is no such program.
+#[cfg(all(target_os = "linux", feature = "window"))]
+struct Display(Child, String);
+
+#[cfg(all(target_os = "linux", feature = "window"))]
+impl Display {
+    fn open() -> Option<Self> {
+        let mut command = Command::new("Xvfb");
+        command.args(["-displayfd", "1", "-screen", "0", "1400x1000x24"]);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().ok()?;
+        let mut number = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut number).ok()?;
+        Some(Self(child, format!(":{}", number.trim())))
+    }
+}
+
+#[cfg(all(target_os = "linux", feature = "window"))]
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+#[cfg(all(target_os = "linux", feature = "window"))]
+fn a_window_shows_inputs_soon_and_physics_keeps_its_pace() {
+    let Some(display) = Display::open() else {
+        eprintln!("skipped: there is no Xvfb to open a window on");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("played.toml");
+    let mut command = play("arch_vertebral.toml", &record, &["--listen", "127.0.0.1:0", "--json"]);
+    let mut child = command.env("DISPLAY", &display.1).env_remove("WAYLAND_DISPLAY").spawn().unwrap();
+    let mut said = BufReader::new(child.stderr.take().unwrap());
+    let mut stream = TcpStream::connect(address(&mut said)).unwrap();
+    let mut answers = BufReader::new(stream.try_clone().unwrap());
+    let mut say = |line: Value| {
+        writeln!(stream, "{line}").unwrap();
+        let mut answer = String::new();
+        answers.read_line(&mut answer).unwrap();
+        assert_eq!(serde_json::from_str::<Value>(&answer).unwrap()["ok"], true, "{answer}");
+    };
+    let pause = |ms: u64| std::thread::sleep(std::time::Duration::from_millis(ms));
+    say(json!({"do": "pedal", "down": true, "mode": "fluoro"}));
+    pause(3000);
+    say(json!({"do": "move", "instrument": "catheter", "mm_per_s": 10, "deg_per_s": 20}));
+    for turn in 0..40 {
+        let mm = if turn % 3 == 0 { -0.5 } else { 0.75 };
+        say(json!({"do": "nudge", "instrument": "wire", "mm": mm, "deg": 4}));
+        pause(110);
+    }
+    say(json!({"do": "quit"}));
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    let pace: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(pace["ticks_per_s"].as_f64().unwrap() > 55.0, "{pace}");
+    assert!(pace["input_to_picture_ms"][0].as_f64().unwrap() <= 100.0, "{pace}");
+    assert!(std::fs::read_to_string(&record).unwrap().contains("[[script]]"));
+}

@@ -2,13 +2,17 @@
 
 pub(crate) mod compare;
 mod device;
+mod doctor;
 pub(crate) mod experiment;
 mod felt;
 mod fluoro;
+mod new;
 mod play;
 mod render;
+mod report;
 mod rod;
 mod run;
+mod shell;
 mod surfaces;
 mod verify;
 mod vessel;
@@ -34,6 +38,11 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
             device::list(folder, out.as_deref(), *json)
         }
         Command::Compare(args) => compare::compare(args),
+        Command::Report(args) => report::report(args),
+        Command::New(args) => new::new(args),
+        Command::Doctor { json } => doctor::doctor(*json),
+        Command::Completions { shell } => shell::completions(*shell),
+        Command::Man { command } => shell::man(command.as_deref()),
         Command::Experiment(command) => experiment::experiment(command),
     }
 }

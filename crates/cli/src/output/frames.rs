@@ -148,6 +148,7 @@ impl<'a> Studio<'a> {
         frames: usize,
     ) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
+        args.animate.as_deref().map_or(Ok(()), Animation::check_name)?;
         let spec = wished(ViewSpec::of_scene(scene, path)?, args, default)?;
         let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?.closed_mesh();
         let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;

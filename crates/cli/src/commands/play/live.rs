@@ -27,6 +27,7 @@ const LATE: Duration = Duration::from_millis(100);
 
 /// What the session's thread hears.
 #[derive(Debug)]
+#[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window reads or sends it"))]
 pub(crate) enum Message {
     /// From the window.
     Input(Input),
@@ -39,6 +40,7 @@ pub(crate) enum Message {
 }
 
 /// A moment, and when the oldest input came in that no earlier picture shows.
+#[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window reads or sends it"))]
 pub(crate) struct Moment {
     pub(crate) snapshot: Snapshot,
     pub(crate) input_at: Option<Instant>,
@@ -88,6 +90,7 @@ impl Newest {
 }
 
 /// What is shown of a moment.
+#[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window reads or sends it"))]
 pub(crate) struct Shown<'a> {
     pub(crate) moment: &'a Moment,
     pub(crate) fluoro: Option<&'a Image>,
@@ -98,7 +101,7 @@ pub(crate) struct Shown<'a> {
 }
 
 /// How fast it went.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub(crate) struct Pace {
     /// Length of the session, s.
     pub(crate) wall_time_s: f64,

@@ -7,7 +7,9 @@ mod record;
 #[cfg(feature = "window")]
 mod window;
 
-use std::io::BufReader;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
 use std::sync::mpsc;
 
 use endowire_methods::Scene;
@@ -36,8 +38,7 @@ pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
         lines::listen(address, &sender)?;
     }
     if args.headless {
-        let input = sender.clone();
-        std::thread::spawn(move || lines::read(BufReader::new(std::io::stdin()), &input, lines::to_stdout));
+        read_inputs(args.inputs.as_deref(), sender.clone())?;
     }
     if args.headless && !args.realtime {
         let session = lockstep::run(session, pictures, &messages, &mut record)?;
@@ -53,6 +54,18 @@ pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
         return print_json(&pace);
     }
     tell(pace);
+    Ok(())
+}
+
+/// Has lines read on a thread of their own: from a file, or from stdin.
+fn read_inputs(file: Option<&Path>, to: mpsc::Sender<Message>) -> Result<(), Failure> {
+    let lines: Box<dyn Read + Send> = match file {
+        Some(path) => Box::new(
+            File::open(path).map_err(|e| Failure::Input(format!("--inputs {}: {e}", path.display())))?,
+        ),
+        None => Box::new(std::io::stdin()),
+    };
+    std::thread::spawn(move || lines::read(BufReader::new(lines), &to, lines::to_stdout));
     Ok(())
 }
 

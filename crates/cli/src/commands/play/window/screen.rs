@@ -56,7 +56,7 @@ pub(super) fn compose(writer: &mut Writer, shown: &Shown<'_>, size: [usize; 2], 
         let (corner, [width, height]) = layout.three_d;
         let side = width.min(height);
         let middle = [corner[0] + (width - side) / 2, corner[1] + (height - side) / 2];
-        canvas.fill(corner, [width, height], 0xff_ffff);
+        canvas.fill(corner, [width, height], background(image));
         paint(&mut canvas, image, middle, [side; 2]);
     }
     over_picture(writer, &mut canvas, readout, layout);
@@ -171,6 +171,14 @@ fn shadowed(
 ) {
     writer.write(canvas, [x + 1, y + 1], size, 0, text);
     writer.write(canvas, [x, y], size, colour, text);
+}
+
+/// The colour of a picture's first pixel: its background.
+fn background(image: &Image) -> u32 {
+    image.pixel(0, 0).map_or(BACK, |bytes| match bytes {
+        [red, green, blue, _] => u32::from(*red) << 16 | u32::from(*green) << 8 | u32::from(*blue),
+        grey => u32::from(grey[0]) * 0x01_0101,
+    })
 }
 
 /// Paints a picture, larger or smaller, with values between its pixels.
