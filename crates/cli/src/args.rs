@@ -28,7 +28,8 @@ pub(crate) enum Command {
     Play(PlayArgs),
     /// Draw frames of a recorded run, from any position of the C-arm
     Render(RenderArgs),
-    /// Write a recorded run as one page for a browser: the shape to turn and to scrub through time, forces, events, frames
+    /// Write a recorded run as one page for a browser: the shape to turn and to scrub through time, forces, events, frames; or the tables
+    /// and pictures of an experiment
     Report(ReportArgs),
     /// Draw fluoroscopic frames of a scene: after its script, or of a contrast injection
     Fluoro(FluoroArgs),
@@ -102,7 +103,7 @@ pub(crate) struct RunArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct ReportArgs {
-    /// Folder of a recorded run
+    /// Folder of a recorded run, or of an experiment or comparison
     pub(crate) dir: PathBuf,
     /// File of the page; DIR/report.html if absent
     #[arg(long, value_name = "FILE")]
@@ -205,7 +206,8 @@ pub(crate) struct FrameArgs {
     /// Turn the camera of the 3D view by so many degrees from the first frame to the last
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub(crate) orbit: Option<f64>,
-    /// Write one moving picture of the views side by side: an animated PNG (.png, .apng) or a GIF (.gif)
+    /// Write one moving picture of the views side by side: an animated PNG (.png, .apng), a GIF (.gif), or a film (.mp4) where the program
+    /// was built with the feature mp4
     #[arg(long, value_name = "FILE")]
     pub(crate) animate: Option<PathBuf>,
     /// Write the fluoroscopic frames as one DICOM file (X-ray angiographic image)

@@ -44,6 +44,18 @@ fn a_page_is_whole_and_names_where_it_comes_from() {
     assert!(String::from_utf8_lossy(&none.stderr).contains("recorded run"));
 }
 
+#[test]
+fn an_experiment_has_a_page_of_its_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("timing");
+    let few = ["experiment", "timing", "--nodes", "20", "--repeats", "1", "--methods", "kirchhoff", "--out"];
+    assert_eq!(endowire().args(few).arg(&out).output().unwrap().status.code(), Some(0));
+    assert_eq!(endowire().arg("report").arg(&out).output().unwrap().status.code(), Some(0));
+    let text = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(text.contains("\"columns\":[\"method\"") && text.contains("\"git_revision\""), "{text}");
+    assert!(!text.contains("http"));
+}
+
 /// A browser that can do without a window.
 fn browser() -> Option<&'static str> {
     let names = ["chromium", "chromium-browser", "google-chrome"];

@@ -105,10 +105,10 @@ fn moving_pictures_are_named_for_what_they_are() {
             .output()
             .unwrap()
     };
-    let output = draw("x.mp4");
+    let output = draw("x.mpg");
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains(".gif"));
-    assert!(!folder.path().join("x.mp4").exists());
+    assert!(!folder.path().join("x.mpg").exists());
     assert_eq!(draw("x.gif").status.code(), Some(0));
     assert!(std::fs::read(folder.path().join("x.gif")).unwrap().starts_with(b"GIF89a"));
 }

@@ -1,4 +1,4 @@
-//! Moving pictures: animated PNG, lossless, 8 or 16 bits, read by browsers; or GIF, 256 colours, read by everything.
+//! Moving pictures: animated PNG, lossless, 8 or 16 bits, read by browsers; GIF, 256 colours, read by everything; films with the feature `mp4`.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use endowire_core::{Error, Result};
 
+#[cfg(feature = "mp4")]
+use super::film::Film;
 use super::{Image, PixelFormat};
 
 /// Effort of choosing 256 colours, 1 to 30: the crate's own middle.
@@ -22,6 +24,17 @@ pub struct Animation {
 enum Writer {
     Png(png::Writer<BufWriter<File>>),
     Gif(gif::Encoder<BufWriter<File>>, u16),
+    #[cfg(feature = "mp4")]
+    Film(Box<Film>),
+}
+
+/// What a file is by its extension.
+#[derive(Clone, Copy)]
+enum Kind {
+    Png,
+    Gif,
+    #[cfg(feature = "mp4")]
+    Film,
 }
 
 impl std::fmt::Debug for Animation {
@@ -31,12 +44,12 @@ impl std::fmt::Debug for Animation {
 }
 
 impl Animation {
-    /// Whether a file of this name can be one, by its extension: `png`, `apng` or `gif`.
+    /// Whether a file of this name can be one, by its extension: `png`, `apng` or `gif`, and `mp4` with the feature of that name.
     ///
     /// # Errors
     /// [`Error::Parameter`] naming what can be.
     pub fn check_name(path: &Path) -> Result<()> {
-        is_gif(path).map(drop)
+        kind(path).map(drop)
     }
 
     /// Begins an endless loop of `frames` frames of the size and format of `like`.
@@ -48,22 +61,30 @@ impl Animation {
         if frames == 0 {
             return Err(Error::parameter("frames", frames, "an animation needs at least one frame"));
         }
-        let writer = if is_gif(path)? {
-            let (width, height) = (like.width() as u16, like.height() as u16);
-            let file = File::create(path).map_err(|source| Error::file(path, source))?;
-            let failed = |error: gif::EncodingError| Error::file(path, std::io::Error::other(error));
-            let mut encoder = gif::Encoder::new(BufWriter::new(file), width, height, &[]).map_err(failed)?;
-            encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
-            // In hundredths of a second; most programs show less than 2 as 10.
-            Writer::Gif(encoder, (100.0 / frames_per_s).round().clamp(2.0, 65_535.0) as u16)
-        } else {
-            let failed = |error: png::EncodingError| Error::file(path, std::io::Error::other(error));
-            let mut encoder = like.png_encoder(path)?;
-            encoder.set_animated(frames, 0).map_err(failed)?;
-            // In thousandths of a second.
-            let delay = (1000.0 / frames_per_s).round().clamp(1.0, 65_535.0) as u16;
-            encoder.set_frame_delay(delay, 1000).map_err(failed)?;
-            Writer::Png(encoder.write_header().map_err(failed)?)
+        let writer = match kind(path)? {
+            Kind::Png => {
+                let failed = |error: png::EncodingError| Error::file(path, std::io::Error::other(error));
+                let mut encoder = like.png_encoder(path)?;
+                encoder.set_animated(frames, 0).map_err(failed)?;
+                // In thousandths of a second.
+                let delay = (1000.0 / frames_per_s).round().clamp(1.0, 65_535.0) as u16;
+                encoder.set_frame_delay(delay, 1000).map_err(failed)?;
+                Writer::Png(encoder.write_header().map_err(failed)?)
+            }
+            Kind::Gif => {
+                let (width, height) = (like.width() as u16, like.height() as u16);
+                let file = File::create(path).map_err(|source| Error::file(path, source))?;
+                let failed = |error: gif::EncodingError| Error::file(path, std::io::Error::other(error));
+                let mut encoder =
+                    gif::Encoder::new(BufWriter::new(file), width, height, &[]).map_err(failed)?;
+                encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
+                // In hundredths of a second; most programs show less than 2 as 10.
+                Writer::Gif(encoder, (100.0 / frames_per_s).round().clamp(2.0, 65_535.0) as u16)
+            }
+            #[cfg(feature = "mp4")]
+            Kind::Film => Writer::Film(Box::new(
+                Film::new(path, like, frames_per_s).map_err(|source| Error::file(path, source))?,
+            )),
         };
         Ok(Self { path: path.to_path_buf(), writer, like: like.clone() })
     }
@@ -83,6 +104,8 @@ impl Animation {
             Writer::Gif(encoder, delay) => {
                 encoder.write_frame(&gif_frame(image, *delay)).map_err(std::io::Error::other)
             }
+            #[cfg(feature = "mp4")]
+            Writer::Film(film) => film.push(image),
         };
         written.map_err(|error| Error::file(&self.path, error))
     }
@@ -99,19 +122,24 @@ impl Animation {
                 Ok(file) => file.into_inner().map(drop).map_err(std::io::IntoInnerError::into_error),
                 Err(error) => Err(std::io::Error::other(error)),
             },
+            #[cfg(feature = "mp4")]
+            Writer::Film(film) => film.finish(),
         };
         finished.map_err(|error| Error::file(&path, error))
     }
 }
 
-/// Whether a name is that of a GIF, or else of a PNG.
-fn is_gif(path: &Path) -> Result<bool> {
+/// What a name stands for.
+fn kind(path: &Path) -> Result<Kind> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     match extension.as_str() {
-        "gif" => Ok(true),
-        "png" | "apng" => Ok(false),
+        "gif" => Ok(Kind::Gif),
+        "png" | "apng" => Ok(Kind::Png),
+        #[cfg(feature = "mp4")]
+        "mp4" => Ok(Kind::Film),
         _ => {
-            let mend = "is no moving picture that is written: end its name in .png, .apng or .gif (other programs make films of these)";
+            let mend = "is no moving picture that is written: end its name in .png, .apng or .gif, or in .mp4 where the program was built with \
+                        the feature \"mp4\"";
             Err(Error::parameter("animate", path.display(), mend))
         }
     }
@@ -162,7 +190,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_written_is_told_before_anything_is() {
-        for name in ["a.mp4", "a", "a.avi"] {
+        for name in ["a.mpg", "a", "a.avi"] {
             let told = Animation::check_name(Path::new(name)).unwrap_err().to_string();
             assert!(told.contains(name) && told.contains(".gif"), "{told}");
         }

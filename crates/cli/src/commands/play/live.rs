@@ -255,7 +255,7 @@ impl Frames {
 pub(crate) fn draw(mut pictures: Pictures, newest: &Newest, mut show: impl FnMut(&Shown<'_>)) -> Frames {
     let mut times = Frames::default();
     let (mut number, mut due, mut was_live) = (0_u64, Instant::now(), None::<Instant>);
-    let mut three_d: Option<Image> = None;
+    let (mut three_d, mut drawn_3d) = (None::<Image>, None);
     while let Some(moment) = newest.take() {
         let clock = Instant::now();
         let snapshot = &moment.snapshot;
@@ -263,7 +263,9 @@ pub(crate) fn draw(mut pictures: Pictures, newest: &Newest, mut show: impl FnMut
         let drawn: Result<Option<Image>> = pictures.fluoro(snapshot).map(Option::<&Image>::cloned);
         let live = snapshot.lab.is_live();
         let frame_ms = ms(clock.elapsed());
-        if number.is_multiple_of(THREE_D_EVERY) {
+        let seen = (snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1]);
+        if number.is_multiple_of(THREE_D_EVERY) && drawn_3d != Some(seen) {
+            drawn_3d = Some(seen);
             match pictures.three_d(snapshot) {
                 Ok(image) => three_d = Some(image),
                 Err(error) => failure = Some(error.to_string()),
