@@ -9,7 +9,7 @@ use std::process::Command;
 
 use common::endowire;
 
-/// A run of 45 steps in the curved tube with two frames, and its page.
+/// A run in the curved tube with two frames, and its page.
 fn page(folder: &Path) -> PathBuf {
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap();
     let text = std::fs::read_to_string(assets.join("scenes/curved_tube.toml")).unwrap();
@@ -95,7 +95,7 @@ fn a_browser_draws_the_page_soon_and_follows_the_slider() {
     let page = page(folder.path());
     let url = |step: usize| format!("file://{}#step={step}", page.display());
     let mut pictures = Vec::new();
-    for (step, said) in [(20, "step 20: 40.0 mm inserted"), (45, "step 45: 90.0 mm inserted")] {
+    for (step, said) in [(40, "step 40: 20.0 mm inserted"), (160, "step 160: 80.0 mm inserted")] {
         let document = shown(browser, folder.path(), &url(step), "--dump-dom");
         assert!(document.contains(said), "{said}");
         let (_, rest) = document.split_once("data-drawn-ms=\"").unwrap();
