@@ -5,15 +5,13 @@ use std::io::{BufWriter, Error, Result, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use openh264::OpenH264API;
-use openh264::encoder::{BitRate, Encoder, EncoderConfig, FrameRate, FrameType, RateControlMode};
+use openh264::encoder::{Encoder, EncoderConfig, FrameRate, FrameType, RateControlMode};
 use openh264::formats::{RgbSliceU8, YUVBuffer};
 
 use super::{Image, PixelFormat};
 
 /// Time units a second.
 const TIMESCALE: u32 = 90_000;
-/// Bits a pixel: the noise of quanta takes more than what a camera films.
-const BITS_PER_PIXEL: f64 = 0.35;
 /// Kinds of units of a stream: parameters of the sequence and of pictures.
 const SPS: u8 = 7;
 const PPS: u8 = 8;
@@ -38,11 +36,10 @@ impl Film {
     pub(super) fn new(path: &Path, like: &Image, frames_per_s: f64) -> Result<Self> {
         // Colours are coded for two by two pixels.
         let size = [like.width(), like.height()].map(|side| side.next_multiple_of(2) as usize);
-        let bits_per_s = BITS_PER_PIXEL * frames_per_s * (size[0] * size[1]) as f64;
         let config = EncoderConfig::new()
-            .bitrate(BitRate::from_bps(bits_per_s as u32))
             .max_frame_rate(FrameRate::from_hz(frames_per_s as f32))
-            .rate_control_mode(RateControlMode::Quality)
+            // All frames of one quality: the noise of quanta would use up any rate.
+            .rate_control_mode(RateControlMode::Off)
             .skip_frames(false)
             // The same film on every machine.
             .num_threads(1);
