@@ -27,8 +27,13 @@ pub(crate) enum Command {
     Run(RunArgs),
     /// Run a scene many times with other values of its keys: one Parquet row a run. Killed at any moment, the same command goes on
     Sweep(SweepArgs),
+    /// Move the instruments of a scene by hand, under fluoroscopy: a window, or a protocol of JSON lines; what is done is recorded as a script
+    Play(PlayArgs),
     /// Draw frames of a recorded run, from any position of the C-arm
     Render(RenderArgs),
+    /// Write a recorded run as one page for a browser: the shape to turn and to scrub through time, forces, events, frames; or the tables
+    /// and pictures of an experiment
+    Report(ReportArgs),
     /// Write a recorded run for other programs: a series for ParaView and 3D Slicer (VTK)
     Export(ExportArgs),
     /// Draw fluoroscopic frames of a scene: after its script, or of a contrast injection
@@ -50,12 +55,33 @@ pub(crate) enum Command {
     /// Repeat an experiment of Li et al. 2011
     #[command(subcommand)]
     Experiment(ExperimentCommand),
+    /// Make a folder with a scene to start from: vessel, device, script, views. It runs at once
+    New(NewArgs),
+    /// Say what this machine has and what of it is used: adapter, display, threads, cache
+    Doctor {
+        /// Print it as one JSON document on stdout
+        #[arg(long)]
+        json: bool,
+    },
+    /// Print the completions of a shell on stdout
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page on stdout (roff); of a command if one is named
+    Man {
+        /// Command
+        command: Option<String>,
+    },
 }
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct RunArgs {
     /// Scene file (TOML)
     pub(crate) scene: PathBuf,
+    /// Carry out the script of this file, [[script]] tables alone, in place of the scene's own: what `play` has recorded
+    #[arg(long, value_name = "FILE")]
+    pub(crate) script: Option<PathBuf>,
     /// Folder for the recording; out/NAME OF THE SCENE if absent. An earlier recording in it is replaced
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -75,6 +101,71 @@ pub(crate) struct RunArgs {
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
     /// Print the summary as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print neither progress nor summary; failures are told
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct ReportArgs {
+    /// Folder of a recorded run, or of an experiment or comparison
+    pub(crate) dir: PathBuf,
+    /// File of the page; DIR/report.html if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Scene file, where it is not the one that summary.json names
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct NewArgs {
+    /// Folder to make; it must not be there, or be empty
+    pub(crate) dir: PathBuf,
+    /// Surface of a vessel (STL, OBJ or PLY, in mm), which is copied, or a built-in anatomy
+    #[arg(long, default_value = "aortic_arch", value_name = "FILE|NAME")]
+    pub(crate) vessel: PathBuf,
+    /// Device file, such as one of the catalogue in assets/devices, which is copied; an angled hydrophilic wire of 0.035 in if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) device: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct PlayArgs {
+    /// Scene file (TOML); its script is not carried out
+    pub(crate) scene: PathBuf,
+    /// File for what hands have done: a script that `endowire run SCENE --script FILE` carries out to the bit; out/NAME OF THE
+    /// SCENE/played.toml if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
+    /// Without a window: inputs are lines of JSON on stdin, answers lines of JSON on stdout, and time goes by as inputs say
+    #[arg(long)]
+    pub(crate) headless: bool,
+    /// With --headless: take the lines of this file in place of stdin
+    #[arg(long, requires = "headless", value_name = "FILE")]
+    pub(crate) inputs: Option<PathBuf>,
+    /// With --headless: time goes by as on a clock, and pictures are drawn as for the window
+    #[arg(long, requires = "headless")]
+    pub(crate) realtime: bool,
+    /// Take inputs, lines of JSON, also from programs that connect to this address, such as 127.0.0.1:7000
+    #[arg(long, value_name = "ADDRESS")]
+    pub(crate) listen: Option<std::net::SocketAddr>,
+    /// Width and height of the fluoroscopic picture in pixels, 64 to 1024
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(64..=1024))]
+    pub(crate) size: u32,
+    /// Warn where a hand pushes or pulls harder than this
+    #[arg(long, default_value_t = 1.0, value_name = "N")]
+    pub(crate) warn_n: f64,
+    /// Warn where a hand holds a greater torque than this
+    #[arg(long, default_value_t = 5.0, value_name = "N·MM")]
+    pub(crate) warn_nmm: f64,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Print at the end what was done, and how fast, as one JSON document on stdout; not without a window and a clock, where stdout is for answers
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -159,7 +250,8 @@ pub(crate) struct FrameArgs {
     /// Turn the camera of the 3D view by so many degrees from the first frame to the last
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub(crate) orbit: Option<f64>,
-    /// Write one animated PNG of the views side by side
+    /// Write one moving picture of the views side by side: an animated PNG (.png, .apng), a GIF (.gif), or a film (.mp4) where the program
+    /// was built with the feature mp4
     #[arg(long, value_name = "FILE")]
     pub(crate) animate: Option<PathBuf>,
     /// Write the fluoroscopic frames as one DICOM file (X-ray angiographic image)

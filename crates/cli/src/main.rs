@@ -18,8 +18,10 @@ fn main() -> ExitCode {
         args::Command::Run(_)
             | args::Command::Sweep(_)
             | args::Command::Render(_)
+            | args::Command::Play(_)
             | args::Command::Fluoro(_)
             | args::Command::Dataset(_)
+            | args::Command::Doctor { .. }
             | args::Command::Experiment(_)
     ) {
         environment::without_desktop();

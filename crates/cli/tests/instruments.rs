@@ -144,7 +144,7 @@ fn what_instruments_cannot_do_is_told_before_anything_moves() {
             "name = \"wire\"",
             "instrument[1].name = \"wire\": every instrument has a name of its own",
         ),
-        ("[view.xray]", "[[view.device]]\n[view.xray]", "view.device describes one device"),
+        ("[view.xray]", "[[view.device]]\n[view.xray]", "view.device = 1: describes one device"),
         ("name = \"kirchhoff\"", "name = \"mass-spring\"", "pushes one device and no more"),
     ] {
         let output = run(&[&scene(folder.path(), &[(piece, other)]), "--out".as_ref(), &out]);

@@ -40,6 +40,7 @@ mod gpu;
 mod gpu;
 mod output;
 mod patient;
+mod pushed;
 mod renderer;
 mod scene;
 mod spec;
@@ -53,6 +54,7 @@ pub use fluoro::Moment;
 pub use output::{
     Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, PartLabel, PixelFormat,
 };
+pub use pushed::Pushed;
 pub use renderer::{Frames, Renderer};
 pub use spec::{
     Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, FlowSpec, InjectionSpec, Mode, PatientSpec, Pose,

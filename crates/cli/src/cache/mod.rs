@@ -36,6 +36,11 @@ impl Cache {
         Self { folder, told: AtomicBool::new(false) }
     }
 
+    /// Where walls are kept, if they are.
+    pub(crate) fn folder(&self) -> Option<&Path> {
+        self.folder.as_deref()
+    }
+
     fn read(&self, folder: &Path, key: &Key) -> Option<Wall> {
         let path = path(folder, key);
         let wall = entry::read(&path, key)?;

@@ -3,13 +3,18 @@
 pub(crate) mod compare;
 mod dataset;
 mod device;
+mod doctor;
 pub(crate) mod experiment;
 mod export;
 mod felt;
 mod fluoro;
+mod new;
+mod play;
 mod render;
+mod report;
 mod rod;
 mod run;
+mod shell;
 mod surfaces;
 mod sweep;
 mod verify;
@@ -23,6 +28,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
     match &args.command {
         Command::Run(args) => run::run(args),
         Command::Sweep(args) => sweep::sweep(args),
+        Command::Play(args) => play::play(args),
         Command::Render(args) => render::render(args),
         Command::Export(args) => export::export(args),
         Command::Fluoro(args) => fluoro::fluoro(args),
@@ -38,6 +44,11 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
             device::list(folder, out.as_deref(), *json)
         }
         Command::Compare(args) => compare::compare(args),
+        Command::Report(args) => report::report(args),
+        Command::New(args) => new::new(args),
+        Command::Doctor { json } => doctor::doctor(*json),
+        Command::Completions { shell } => shell::completions(*shell),
+        Command::Man { command } => shell::man(command.as_deref()),
         Command::Experiment(command) => experiment::experiment(command),
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use endowire_core::insertion::{Move, ScriptCourse, ScriptRun, Simulation, Step};
+use endowire_core::insertion::{Move, ScriptCourse, ScriptRun, Simulation, Step, StepReport};
 use endowire_core::methods::MethodChoice;
 use endowire_methods::Scene;
 use endowire_sweep::{RunOutcome, StepFailure};
@@ -24,7 +24,9 @@ use crate::output::{frames::FrameWriter, print_json, tell, whole};
 /// Runs the scene's script and records every step.
 pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let started = Instant::now();
-    let scene = Scene::read(&args.scene)?;
+    let mut scene = Scene::read(&args.scene)?;
+    args.script.as_deref().map_or(Ok(()), |path| scene.take_script(path))?;
+    let scene = scene;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
     let saved = args.resume.as_deref().map(Saved::read).transpose()?;
     let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(in_scene)?;
@@ -65,7 +67,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
 
     // From here on something is recorded: whatever happens, it is kept.
     let interrupted = interrupts();
-    let bar = progress::bar(script.len(), "step");
+    let bar = if args.quiet { progress::hidden() } else { progress::bar(script.len(), "step") };
+    let mut jumps = 0;
     bar.inc(course.steps as u64);
     let mut failure: Option<StepFailure> = None;
     // Whether a step was taken that could not be recorded.
@@ -114,6 +117,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
             Ok(report) => {
                 course.max_penetration_mm = course.max_penetration_mm.max(report.max_penetration_mm);
                 course.converged &= report.converged;
+                jumps += usize::from(report.jumped);
             }
             Err(error) => {
                 failure = failed(error.to_string());
@@ -149,7 +153,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
             break;
         }
         times_s.push(time_s);
-        bar.set_message(format!("{:.1} mm inserted", simulation.report().inserted_mm));
+        bar.set_message(live(simulation.report(), jumps));
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -170,7 +174,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
     if args.json {
         print_json(&summary)?;
-    } else {
+    } else if !args.quiet {
         tell(text(&summary, &folder, &simulation));
     }
     match failure {
@@ -183,6 +187,18 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         }
         None => finished,
     }
+}
+
+/// What a person wants to see while it goes on.
+fn live(report: &StepReport, jumps: usize) -> String {
+    let mut line = format!("{:.1} mm in, push {:.3} N", report.inserted_mm, report.push_force_n);
+    if jumps > 0 {
+        line += &format!(", {jumps} jumped");
+    }
+    if report.left_through.is_some() {
+        line += ", tip outside";
+    }
+    line
 }
 
 /// The moves of a step and its time, on their own.
@@ -233,26 +249,34 @@ pub(crate) fn interrupts() -> Arc<AtomicBool> {
 fn text(summary: &Summary, folder: &Path, simulation: &Simulation) -> String {
     let outcome = &summary.outcome;
     let tip = outcome.tip_mm.unwrap_or_default();
-    format!(
-        "{}: {} of {} steps by {} in {:.2} s ({:.2} s simulating)\n\
-         inserted {:.2} mm, tip at [{:.2}, {:.2}, {:.2}] mm, push force {:.4} N, {} contacts, \
-         deepest penetration {:.3} mm\n\
-         {} frames{} in {}",
-        summary.scene,
-        outcome.steps,
-        outcome.steps_asked,
-        summary.method,
-        summary.wall_time_s,
-        summary.step_time_s,
-        outcome.inserted_mm,
-        tip[0],
-        tip[1],
-        tip[2],
-        outcome.push_force_n,
-        simulation.report().contacts.len(),
-        outcome.max_penetration_mm,
-        summary.frames.len(),
-        summary.renderer.as_ref().map_or(String::new(), |r| format!(" by {r}")),
-        folder.display()
-    )
+    let mut lines = vec![
+        format!(
+            "{}: {} of {} steps by {} in {:.2} s ({:.2} s simulating)",
+            summary.scene,
+            outcome.steps,
+            outcome.steps_asked,
+            summary.method,
+            summary.wall_time_s,
+            summary.step_time_s
+        ),
+        format!("  inserted       {:.2} mm", outcome.inserted_mm),
+        format!("  tip            [{:.2}, {:.2}, {:.2}] mm", tip[0], tip[1], tip[2]),
+        format!("  push force     {:.4} N, torque {:.4} N·mm", outcome.push_force_n, outcome.torque_nmm),
+    ];
+    lines.extend(outcome.instruments.iter().map(|one| {
+        let push = one.report.push_force_n.map_or_else(|| "jumps".to_owned(), |n| format!("{n:.4} N"));
+        let (mm, torque) = (one.report.inserted_mm, one.report.torque_nmm);
+        format!("    {:<12} {mm:.2} mm, push {push}, torque {torque:.4} N·mm", one.name)
+    }));
+    let contacts = simulation.report().contacts.len();
+    lines.push(format!(
+        "  wall           {contacts} contacts, deepest penetration {:.3} mm",
+        outcome.max_penetration_mm
+    ));
+    if let Some(opening) = outcome.left_through {
+        lines.push(format!("  left           the tip is out of opening {opening}"));
+    }
+    let renderer = summary.renderer.as_ref().map_or(String::new(), |r| format!(" by {r}"));
+    lines.push(format!("  recorded       {} frames{renderer} in {}", summary.frames.len(), folder.display()));
+    lines.join("\n")
 }

@@ -9,14 +9,13 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_methods::Scene;
 use endowire_viewer::{
-    Angiogram, Animation, ContactView, Frames, Image, Labels, Mask, Moment, Renderer, View, ViewSpec,
+    Angiogram, Animation, ContactView, Frames, Image, Labels, Mask, Moment, Pushed, Renderer, View, ViewSpec,
 };
 use serde::Serialize;
 use serde_json::Value;
 
 use super::manifest::Manifest;
 use super::npz::write_map;
-use super::pushed::Pushed;
 use super::recorder::Recorder;
 use super::{print_json, tell, to_json};
 use crate::args::{FrameArgs, ViewChoice};
@@ -39,7 +38,7 @@ impl FrameWriter {
         let drawn = drawn.filter(|_| !spec.views.is_empty());
         let renderer = drawn.map(|simulation| Renderer::new(&spec, &simulation.wall().closed_mesh()));
         let renderer = renderer.transpose().map_err(in_scene)?;
-        Ok(Self { pushed: Pushed::new(path, scene, &spec)?, spec, renderer })
+        Ok(Self { pushed: Pushed::new(scene, &spec).map_err(in_scene)?, spec, renderer })
     }
 
     /// What draws, for the summary.
@@ -145,8 +144,9 @@ impl<'a> Studio<'a> {
         frames: usize,
     ) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
+        args.animate.as_deref().map_or(Ok(()), Animation::check_name)?;
         let spec = wished(ViewSpec::of_scene(scene, path)?, args, default)?;
-        let pushed = Pushed::new(path, scene, &spec)?;
+        let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
         let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
         if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {
             let text = format!("--orbit {orbit:e}: give -{MOST_ORBIT_DEG} to {MOST_ORBIT_DEG} degrees");

@@ -9,7 +9,6 @@ mod manifest;
 pub(crate) mod npz;
 pub(crate) mod progress;
 pub(crate) mod provenance;
-pub(crate) mod pushed;
 pub(crate) mod recorder;
 pub(crate) mod recording;
 pub(crate) mod saved;

@@ -5,8 +5,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// A bar of `length` steps on stderr; invisible where stderr is no terminal.
 pub(crate) fn bar(length: usize, what: &'static str) -> ProgressBar {
     let bar = ProgressBar::new(length as u64).with_prefix(what);
-    if let Ok(style) = ProgressStyle::with_template("{prefix} {bar:40} {pos}/{len} {msg} [{elapsed}<{eta}]") {
+    if let Ok(style) =
+        ProgressStyle::with_template("{prefix} {bar:30} {pos}/{len} {msg} [{elapsed}, {eta} left]")
+    {
         bar.set_style(style);
     }
     bar
+}
+
+/// No bar: nobody wants to see it.
+pub(crate) fn hidden() -> ProgressBar {
+    ProgressBar::hidden()
 }

@@ -45,10 +45,21 @@ pub struct SceneOf<M> {
     /// Left to the viewer.
     #[serde(default, rename = "view")]
     _view: IgnoredAny,
+    /// The file that the script comes from, where it is not the scene's.
+    #[serde(skip)]
+    script_file: Option<PathBuf>,
     #[serde(skip)]
     folder: PathBuf,
     #[serde(skip)]
     text: String,
+}
+
+/// A file of `[[script]]` tables alone.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ScriptFile {
+    #[serde(default)]
+    script: Vec<ScriptLine>,
 }
 
 /// `[vessel]`: a surface file, or a centre-line tree to build the surface from.
@@ -235,6 +246,16 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         Ok(self)
     }
 
+    /// Takes the script of a file of `[[script]]` tables in place of the scene's own.
+    ///
+    /// # Errors
+    /// Names file, line and key of what does not fit.
+    pub fn take_script(&mut self, path: &Path) -> Result<()> {
+        let (file, _): (ScriptFile, String) = from_toml(path)?;
+        (self.script, self.script_file) = (file.script, Some(path.to_owned()));
+        Ok(())
+    }
+
     /// The text the scene was read from.
     pub fn text(&self) -> &str {
         &self.text
@@ -261,13 +282,14 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
     }
 
-    /// The files that the scene names, in the order of its tables: with [`SceneOf::text`] all that it is made of.
+    /// The files that the scene names, in the order of its tables, and that of a script in place of its own: with [`SceneOf::text`] all that
+    /// it is made of.
     pub fn input_paths(&self) -> Vec<PathBuf> {
         let devices = self.device.iter().map(|device| &device.file);
         let devices = devices.chain(self.instrument.iter().map(|instrument| &instrument.file));
         let vessel = &self.vessel;
         let named = [&vessel.file, &vessel.tree, &vessel.centreline].into_iter().chain(devices);
-        named.flatten().map(|path| self.resolve(path)).collect()
+        named.flatten().map(|path| self.resolve(path)).chain(self.script_file.clone()).collect()
     }
 
     /// Reads the vessel wall or builds it, or has it from `store` ([`NoStore`](crate::vessel::NoStore) keeps nothing).

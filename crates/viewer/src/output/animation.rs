@@ -1,4 +1,4 @@
-//! Moving pictures as animated PNG: lossless, 8 or 16 bits, read by browsers.
+//! Moving pictures: animated PNG, lossless, 8 or 16 bits, read by browsers; GIF, 256 colours, read by everything; films with the feature `mp4`.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -6,13 +6,35 @@ use std::path::{Path, PathBuf};
 
 use endowire_core::{Error, Result};
 
-use super::Image;
+#[cfg(feature = "mp4")]
+use super::film::Film;
+use super::{Image, PixelFormat};
 
-/// Writes frames into one animated PNG as they come.
+/// Effort of choosing 256 colours, 1 to 30: the crate's own middle.
+const GIF_SPEED: i32 = 10;
+
+/// Writes frames into one moving picture as they come.
 pub struct Animation {
     path: PathBuf,
-    writer: png::Writer<BufWriter<File>>,
+    writer: Writer,
     like: Image,
+}
+
+/// What a picture is written with; a GIF with the hundredths of a second that each frame stays.
+enum Writer {
+    Png(png::Writer<BufWriter<File>>),
+    Gif(gif::Encoder<BufWriter<File>>, u16),
+    #[cfg(feature = "mp4")]
+    Film(Box<Film>),
+}
+
+/// What a file is by its extension.
+#[derive(Clone, Copy)]
+enum Kind {
+    Png,
+    Gif,
+    #[cfg(feature = "mp4")]
+    Film,
 }
 
 impl std::fmt::Debug for Animation {
@@ -22,22 +44,48 @@ impl std::fmt::Debug for Animation {
 }
 
 impl Animation {
+    /// Whether a file of this name can be one, by its extension: `png`, `apng` or `gif`, and `mp4` with the feature of that name.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming what can be.
+    pub fn check_name(path: &Path) -> Result<()> {
+        kind(path).map(drop)
+    }
+
     /// Begins an endless loop of `frames` frames of the size and format of `like`.
     ///
     /// # Errors
-    /// [`Error::File`] naming `path`; [`Error::Parameter`] without frames.
+    /// [`Error::File`] naming `path`; [`Error::Parameter`] without frames, or as [`Animation::check_name`].
     pub fn new(path: impl AsRef<Path>, like: &Image, frames: u32, frames_per_s: f64) -> Result<Self> {
         let path = path.as_ref();
         if frames == 0 {
             return Err(Error::parameter("frames", frames, "an animation needs at least one frame"));
         }
-        let failed = |error: png::EncodingError| Error::file(path, std::io::Error::other(error));
-        let mut encoder = like.png_encoder(path)?;
-        encoder.set_animated(frames, 0).map_err(failed)?;
-        // In thousandths of a second.
-        let delay = (1000.0 / frames_per_s).round().clamp(1.0, 65_535.0) as u16;
-        encoder.set_frame_delay(delay, 1000).map_err(failed)?;
-        let writer = encoder.write_header().map_err(failed)?;
+        let writer = match kind(path)? {
+            Kind::Png => {
+                let failed = |error: png::EncodingError| Error::file(path, std::io::Error::other(error));
+                let mut encoder = like.png_encoder(path)?;
+                encoder.set_animated(frames, 0).map_err(failed)?;
+                // In thousandths of a second.
+                let delay = (1000.0 / frames_per_s).round().clamp(1.0, 65_535.0) as u16;
+                encoder.set_frame_delay(delay, 1000).map_err(failed)?;
+                Writer::Png(encoder.write_header().map_err(failed)?)
+            }
+            Kind::Gif => {
+                let (width, height) = (like.width() as u16, like.height() as u16);
+                let file = File::create(path).map_err(|source| Error::file(path, source))?;
+                let failed = |error: gif::EncodingError| Error::file(path, std::io::Error::other(error));
+                let mut encoder =
+                    gif::Encoder::new(BufWriter::new(file), width, height, &[]).map_err(failed)?;
+                encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
+                // In hundredths of a second; most programs show less than 2 as 10.
+                Writer::Gif(encoder, (100.0 / frames_per_s).round().clamp(2.0, 65_535.0) as u16)
+            }
+            #[cfg(feature = "mp4")]
+            Kind::Film => Writer::Film(Box::new(
+                Film::new(path, like, frames_per_s).map_err(|source| Error::file(path, source))?,
+            )),
+        };
         Ok(Self { path: path.to_path_buf(), writer, like: like.clone() })
     }
 
@@ -51,8 +99,15 @@ impl Animation {
             let mend = format!("all frames of an animation are alike: {:?}", shape(&self.like));
             return Err(Error::parameter("frame", format!("{:?}", shape(image)), mend));
         }
-        let failed = |error| Error::file(&self.path, std::io::Error::other(error));
-        self.writer.write_image_data(image.data()).map_err(failed)
+        let written = match &mut self.writer {
+            Writer::Png(writer) => writer.write_image_data(image.data()).map_err(std::io::Error::other),
+            Writer::Gif(encoder, delay) => {
+                encoder.write_frame(&gif_frame(image, *delay)).map_err(std::io::Error::other)
+            }
+            #[cfg(feature = "mp4")]
+            Writer::Film(film) => film.push(image),
+        };
+        written.map_err(|error| Error::file(&self.path, error))
     }
 
     /// Ends the file; it must have all its frames.
@@ -61,14 +116,86 @@ impl Animation {
     /// [`Error::File`] where that fails.
     pub fn finish(self) -> Result<()> {
         let Self { path, writer, .. } = self;
-        writer.finish().map_err(|error| Error::file(&path, std::io::Error::other(error)))
+        let finished = match writer {
+            Writer::Png(writer) => writer.finish().map_err(std::io::Error::other),
+            Writer::Gif(encoder, _) => match encoder.into_inner() {
+                Ok(file) => file.into_inner().map(drop).map_err(std::io::IntoInnerError::into_error),
+                Err(error) => Err(std::io::Error::other(error)),
+            },
+            #[cfg(feature = "mp4")]
+            Writer::Film(film) => film.finish(),
+        };
+        finished.map_err(|error| Error::file(&path, error))
     }
+}
+
+/// What a name stands for.
+fn kind(path: &Path) -> Result<Kind> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    match extension.as_str() {
+        "gif" => Ok(Kind::Gif),
+        "png" | "apng" => Ok(Kind::Png),
+        #[cfg(feature = "mp4")]
+        "mp4" => Ok(Kind::Film),
+        _ => {
+            let mend = "is no moving picture that is written: end its name in .png, .apng or .gif, or in .mp4 where the program was built with \
+                        the feature \"mp4\"";
+            Err(Error::parameter("animate", path.display(), mend))
+        }
+    }
+}
+
+/// A frame of 256 colours: all greys, or those that fit.
+fn gif_frame(image: &Image, delay: u16) -> gif::Frame<'static> {
+    let (width, height) = (image.width() as u16, image.height() as u16);
+    let greys = || (0..=255_u8).flat_map(|grey| [grey; 3]).collect::<Vec<u8>>();
+    let mut frame = match image.format() {
+        PixelFormat::Gray8 => gif::Frame::from_palette_pixels(width, height, image.data(), greys(), None),
+        PixelFormat::Gray16 => {
+            let high: Vec<u8> = image.data().iter().copied().step_by(2).collect();
+            gif::Frame::from_palette_pixels(width, height, high, greys(), None)
+        }
+        PixelFormat::Rgba8 => {
+            gif::Frame::from_rgba_speed(width, height, &mut image.data().to_vec(), GIF_SPEED)
+        }
+    };
+    frame.delay = delay;
+    frame
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::output::PixelFormat;
+
+    #[test]
+    fn a_gif_reads_back_frame_by_frame() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.gif");
+        let frame = |k: u8| Image::new(2, 2, PixelFormat::Gray8, vec![k, 100, 200, 255]);
+        let mut animation = Animation::new(&path, &frame(0), 3, 15.0).unwrap();
+        (0..3).for_each(|k| animation.push(&frame(k)).unwrap());
+        animation.finish().unwrap();
+        let mut options = gif::DecodeOptions::new();
+        options.set_color_output(gif::ColorOutput::RGBA);
+        let mut reader = options.read_info(File::open(&path).unwrap()).unwrap();
+        for k in 0..3 {
+            let read = reader.read_next_frame().unwrap().unwrap();
+            assert_eq!(read.delay, 7);
+            let greys: Vec<u8> = read.buffer.iter().copied().step_by(4).collect();
+            assert_eq!(greys, frame(k).data());
+        }
+        assert!(reader.read_next_frame().unwrap().is_none());
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_told_before_anything_is() {
+        for name in ["a.mpg", "a", "a.avi"] {
+            let told = Animation::check_name(Path::new(name)).unwrap_err().to_string();
+            assert!(told.contains(name) && told.contains(".gif"), "{told}");
+        }
+        assert!(Animation::check_name(Path::new("A.GIF")).is_ok());
+    }
 
     #[test]
     fn an_animation_reads_back_frame_by_frame() {

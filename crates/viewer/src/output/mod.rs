@@ -2,6 +2,8 @@
 
 mod animation;
 mod dicom;
+#[cfg(feature = "mp4")]
+mod film;
 mod image;
 mod labels;
 mod mask;

@@ -5,13 +5,12 @@ use std::path::Path;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_methods::Scene;
-use endowire_viewer::{ContactView, View, ViewSpec};
+use endowire_viewer::{ContactView, Pushed, View, ViewSpec};
 use serde_json::{Map, Value};
 
 use super::spec::Spec;
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::pushed::Pushed;
 use crate::output::tell;
 
 /// What is in after a step.
@@ -48,7 +47,7 @@ impl Course {
             Some(device) => with_device(file, device)?,
         };
         let view = view(spec, &scene, file)?;
-        let pushed = Pushed::new(file, &scene, &view)?;
+        let pushed = Pushed::new(&scene, &view).map_err(|e| Failure::from(e).at(file.display()))?;
         let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(failed)?;
         let mut simulation = scene.simulation(cache).map_err(failed)?;
         let instruments = simulation.stack().instruments().iter().map(|i| i.name.clone()).collect();

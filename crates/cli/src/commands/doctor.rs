@@ -1,0 +1,87 @@
+//! `endowire doctor`: what this machine has, and what of it is used.
+
+use std::path::PathBuf;
+
+use endowire_core::Vec3;
+use endowire_core::vessel::SurfaceMesh;
+use endowire_viewer::{Renderer, View, ViewSpec};
+use serde::Serialize;
+
+use crate::args::CacheArgs;
+use crate::cache::Cache;
+use crate::failure::Failure;
+use crate::output::answer;
+use crate::output::provenance::Provenance;
+
+/// What was found.
+#[derive(Serialize)]
+struct Findings {
+    #[serde(flatten)]
+    provenance: Provenance,
+    /// What draws frames; where a graphics processor is not used, why.
+    renderer: String,
+    /// Where a window can be opened; none without a display, or in a program without a window.
+    display: Option<String>,
+    /// Whether the program has a window.
+    window: bool,
+    /// Cores that batches of simulations use. One simulation uses one.
+    threads: usize,
+    /// Where walls are kept from run to run.
+    cache: Option<PathBuf>,
+}
+
+/// Looks at the machine.
+pub(crate) fn doctor(json: bool) -> Result<(), Failure> {
+    let findings = Findings {
+        provenance: Provenance::of_program("doctor"),
+        renderer: renderer()?,
+        display: display().filter(|_| cfg!(feature = "window")),
+        window: cfg!(feature = "window"),
+        threads: std::thread::available_parallelism().map_or(1, usize::from),
+        cache: Cache::new(&CacheArgs { no_cache: false }).folder().map(PathBuf::from),
+    };
+    answer(&findings, json, || text(&findings))
+}
+
+fn text(findings: &Findings) -> String {
+    let display = match (&findings.display, findings.window) {
+        (Some(display), _) => format!("{display}: endowire play opens a window"),
+        (None, true) => {
+            "none: endowire play needs --headless here; all other commands need no display".to_owned()
+        }
+        (None, false) => "not used: this program was built without a window".to_owned(),
+    };
+    let cache = findings.cache.as_ref().map_or_else(
+        || "none: set ENDOWIRE_CACHE to a folder for walls that take long to make".to_owned(),
+        |folder| folder.display().to_string(),
+    );
+    format!(
+        "endowire {}\n  frames    {}\n  display   {display}\n  threads   {} for batches; a simulation takes one\n  walls     {cache}",
+        env!("CARGO_PKG_VERSION"),
+        findings.renderer,
+        findings.threads
+    )
+}
+
+/// What a small picture of both views is drawn by.
+fn renderer() -> Result<String, Failure> {
+    let wall = SurfaceMesh {
+        vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    };
+    let views = vec![View::ThreeD, View::Fluoro];
+    let spec = ViewSpec { views, size_px: [16, 16], ..ViewSpec::default() };
+    Ok(Renderer::new(&spec, &wall)?.backend().to_owned())
+}
+
+#[cfg(all(unix, not(target_os = "macos")))]
+fn display() -> Option<String> {
+    let named = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    let told = |name: &str| named(name).map(|value| format!("{name}={}", value.to_string_lossy()));
+    told("WAYLAND_DISPLAY").or_else(|| told("DISPLAY"))
+}
+
+#[cfg(not(all(unix, not(target_os = "macos"))))]
+fn display() -> Option<String> {
+    Some("the desktop".to_owned())
+}

@@ -1,0 +1,69 @@
+//! A session in which time goes by as inputs say: the same lines, the same bits.
+
+use std::path::Path;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::Duration;
+
+use endowire_play::{Pictures, Session};
+
+use super::lines::{self, Line, Order};
+use super::live::Message;
+use super::record::Record;
+use crate::commands::run::interrupts;
+use crate::failure::Failure;
+
+/// How soon an interrupt is heard.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// Answers lines until their end.
+pub(crate) fn run(
+    mut session: Session,
+    mut pictures: Pictures,
+    messages: &Receiver<Message>,
+    record: &mut Record,
+) -> Result<Session, Failure> {
+    let interrupted = interrupts();
+    while !interrupted.load(Ordering::Relaxed) {
+        match messages.recv_timeout(PATIENCE) {
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) | Ok(Message::Ended | Message::Quit) => break,
+            Ok(Message::Input(input)) => {
+                // What is refused is an event of the session.
+                let _ = session.apply(&input);
+            }
+            Ok(Message::Line(text, reply)) => {
+                let line = lines::parse(&text);
+                let quits = matches!(line, Ok(Line::Order(Order::Quit {})));
+                let done = line.and_then(|line| match line {
+                    Line::Input(input) => session.apply(&input).map_err(|e| e.to_string()),
+                    Line::Order(order) => carry_out(order, &mut session, &mut pictures),
+                });
+                let _ = reply.send(lines::answer(done, &session.readout()));
+                if quits {
+                    break;
+                }
+            }
+        }
+        record.keep(&session)?;
+    }
+    Ok(session)
+}
+
+fn carry_out(order: Order, session: &mut Session, pictures: &mut Pictures) -> Result<(), String> {
+    match order {
+        Order::Read {} | Order::Quit {} => {}
+        Order::Wait { ticks } => (0..ticks).for_each(|_| session.tick()),
+        Order::Picture { file } => picture(&file, session, pictures).map_err(|e| e.to_string())?,
+    }
+    Ok(())
+}
+
+fn picture(file: &Path, session: &Session, pictures: &mut Pictures) -> endowire_core::Result<()> {
+    let snapshot = session.snapshot();
+    let three_d = pictures.three_d(&snapshot)?;
+    match pictures.fluoro(&snapshot)? {
+        Some(fluoro) => fluoro.beside(&three_d).write_png(file),
+        None => three_d.write_png(file),
+    }
+}

@@ -1,0 +1,96 @@
+//! `endowire play`: instruments moved by hand.
+
+mod lines;
+mod live;
+mod lockstep;
+mod record;
+#[cfg(feature = "window")]
+mod window;
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+use std::sync::mpsc;
+
+use endowire_methods::Scene;
+use endowire_play::{Limits, Pictures, Session};
+use endowire_viewer::ViewSpec;
+
+use crate::args::PlayArgs;
+use crate::cache::Cache;
+use crate::failure::Failure;
+use crate::output::{print_json, tell};
+use live::Message;
+use record::Record;
+
+/// Opens a session in the way that was asked for, and records what was done.
+pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
+    let scene = Scene::read(&args.scene)?;
+    let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
+    let view = ViewSpec::of_scene(&scene, &args.scene)?;
+    let simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
+    let limits = Limits { push_n: args.warn_n, torque_nmm: args.warn_nmm };
+    let session = Session::new(simulation, view, args.size, limits).map_err(in_scene)?;
+    let pictures = Pictures::new(&scene, &session.snapshot(), session.closed_wall()).map_err(in_scene)?;
+    let mut record = Record::new(args, &scene);
+    let (sender, messages) = mpsc::channel();
+    if let Some(address) = args.listen {
+        lines::listen(address, &sender)?;
+    }
+    if args.headless {
+        read_inputs(args.inputs.as_deref(), sender.clone())?;
+    }
+    if args.headless && !args.realtime {
+        let session = lockstep::run(session, pictures, &messages, &mut record)?;
+        return record.finish(&session);
+    }
+    let (session, pace) = if args.headless {
+        live::without_window(session, pictures, (sender, messages), &mut record)?
+    } else {
+        in_window(args, session, pictures, (sender, messages), &mut record)?
+    };
+    record.finish(&session)?;
+    if args.json && !args.headless {
+        return print_json(&pace);
+    }
+    tell(pace);
+    Ok(())
+}
+
+/// Has lines read on a thread of their own: from a file, or from stdin.
+fn read_inputs(file: Option<&Path>, to: mpsc::Sender<Message>) -> Result<(), Failure> {
+    let lines: Box<dyn Read + Send> = match file {
+        Some(path) => Box::new(
+            File::open(path).map_err(|e| Failure::Input(format!("--inputs {}: {e}", path.display())))?,
+        ),
+        None => Box::new(std::io::stdin()),
+    };
+    std::thread::spawn(move || lines::read(BufReader::new(lines), &to, lines::to_stdout));
+    Ok(())
+}
+
+type Channel = (mpsc::Sender<Message>, mpsc::Receiver<Message>);
+
+#[cfg(feature = "window")]
+fn in_window(
+    args: &PlayArgs,
+    session: Session,
+    pictures: Pictures,
+    channel: Channel,
+    record: &mut Record,
+) -> Result<(Session, live::Pace), Failure> {
+    window::run(args, session, pictures, channel, record)
+}
+
+#[cfg(not(feature = "window"))]
+fn in_window(
+    _: &PlayArgs,
+    _: Session,
+    _: Pictures,
+    _: Channel,
+    _: &mut Record,
+) -> Result<(Session, live::Pace), Failure> {
+    let text = "play: this program was built without a window: give --headless, or build it with the feature \"window\"; endowire run SCENE \
+                carries out a script";
+    Err(Failure::Input(text.to_owned()))
+}

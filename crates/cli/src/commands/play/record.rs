@@ -1,0 +1,60 @@
+//! What hands have done, on disk.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use endowire_methods::Scene;
+use endowire_play::Session;
+
+use crate::args::PlayArgs;
+use crate::failure::Failure;
+use crate::output::{tell, whole};
+
+/// How often a session that goes on is written.
+const EVERY: Duration = Duration::from_secs(2);
+
+/// The file of a session's script.
+pub(crate) struct Record {
+    path: PathBuf,
+    head: String,
+    written: Instant,
+}
+
+impl Record {
+    pub(crate) fn new(args: &PlayArgs, scene: &Scene) -> Self {
+        let path =
+            args.record.clone().unwrap_or_else(|| Path::new("out").join(&scene.name).join("played.toml"));
+        // A name with a line break would end the comment.
+        let shown = |path: &Path| path.display().to_string().replace(char::is_control, " ");
+        let head = format!(
+            "# What hands have done in {0}; carried out again by\n# endowire run {0} --script {1}\n\n",
+            shown(&args.scene),
+            shown(&path)
+        );
+        Self { path, head, written: Instant::now() }
+    }
+
+    /// Writes the session now and then: what a kill leaves.
+    pub(crate) fn keep(&mut self, session: &Session) -> Result<(), Failure> {
+        if self.written.elapsed() < EVERY {
+            return Ok(());
+        }
+        self.written = Instant::now();
+        self.write(session)
+    }
+
+    fn write(&self, session: &Session) -> Result<(), Failure> {
+        if let Some(folder) = self.path.parent() {
+            std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
+        }
+        let text = format!("{}{}", self.head, session.script());
+        whole::write_bytes(&self.path, text.as_bytes()).map_err(|e| Failure::write(&self.path, &e))
+    }
+
+    /// Writes the whole session and says where.
+    pub(crate) fn finish(&self, session: &Session) -> Result<(), Failure> {
+        self.write(session)?;
+        tell(format_args!("{} steps are recorded in {}", session.steps(), self.path.display()));
+        Ok(())
+    }
+}

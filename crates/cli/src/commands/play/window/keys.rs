@@ -1,0 +1,225 @@
+//! What keys do.
+
+use std::collections::HashSet;
+
+use endowire_play::Input;
+use endowire_viewer::Mode;
+use winit::keyboard::{KeyCode, ModifiersState};
+
+/// Keys and what they do.
+pub(super) const HELP: &[(&str, &str)] = &[
+    ("up, down", "push, pull (hold)"),
+    ("left, right", "turn (hold)"),
+    ("Shift / Ctrl with these", "coarse (four times) / fine (a fifth)"),
+    ("Tab, 1 to 9", "next instrument, instrument by number"),
+    ("0", "all instruments together"),
+    ("Space, C, V, B (hold)", "fluoroscopy, cine, DSA, roadmap"),
+    ("Enter", "fluoroscopy on or off without holding"),
+    ("I, Shift I", "inject 5 ml, 20 ml of contrast medium"),
+    ("J L, O K", "C-arm RAO LAO, cranial caudal, by 5°"),
+    ("drag the live picture", "move the table"),
+    ("+ -, wheel", "magnify"),
+    ("Q E", "blades in and out"),
+    ("drag the 3D view", "turn it"),
+    ("Backspace", "undo the last motion"),
+    ("F1, Esc", "this help, end"),
+];
+
+/// Speeds of a hand, mm/s and degrees/s.
+const MM_PER_S: f64 = 10.0;
+const DEG_PER_S: f64 = 90.0;
+
+/// What a key asks of the window itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Asked {
+    Help,
+    Quit,
+}
+
+/// Keys that are down, and what they have come to.
+pub(super) struct Keys {
+    instruments: Vec<String>,
+    /// The chosen one; none for all.
+    chosen: Option<usize>,
+    down: HashSet<KeyCode>,
+    modifiers: ModifiersState,
+    /// Whether the beam stays on.
+    locked: bool,
+    open: f64,
+}
+
+impl Keys {
+    pub(super) fn new(instruments: Vec<String>) -> Self {
+        Self {
+            instruments,
+            chosen: Some(0),
+            down: HashSet::new(),
+            modifiers: ModifiersState::empty(),
+            locked: false,
+            open: 1.0,
+        }
+    }
+
+    /// Hears that Shift and their like have changed: hands go faster or slower.
+    pub(super) fn modify(&mut self, modifiers: ModifiersState) -> Vec<Input> {
+        self.modifiers = modifiers;
+        self.moving()
+    }
+
+    /// Lets go of everything: the window has lost the keyboard.
+    pub(super) fn let_go(&mut self) -> Vec<Input> {
+        self.down.clear();
+        self.locked = false;
+        vec![Input::Stop {}, Input::Pedal { down: false, mode: None }]
+    }
+
+    /// What a key does that goes down, once more while it is held, or up.
+    pub(super) fn key(&mut self, key: KeyCode, down: bool, again: bool) -> (Vec<Input>, Option<Asked>) {
+        if down {
+            self.down.insert(key);
+        } else {
+            self.down.remove(&key);
+        }
+        let asked = match (key, down && !again) {
+            (KeyCode::F1, true) => Some(Asked::Help),
+            (KeyCode::Escape, true) => Some(Asked::Quit),
+            _ => None,
+        };
+        (self.inputs(key, down, again), asked)
+    }
+
+    fn inputs(&mut self, key: KeyCode, down: bool, again: bool) -> Vec<Input> {
+        let press = down && !again;
+        match key {
+            KeyCode::ArrowUp | KeyCode::ArrowDown | KeyCode::ArrowLeft | KeyCode::ArrowRight if !again => {
+                self.moving()
+            }
+            KeyCode::Space | KeyCode::KeyC | KeyCode::KeyV | KeyCode::KeyB if !again => {
+                self.locked = false;
+                let mode = match key {
+                    KeyCode::Space => Mode::Fluoro,
+                    KeyCode::KeyC => Mode::Cine,
+                    KeyCode::KeyV => Mode::Dsa,
+                    _ => Mode::Roadmap,
+                };
+                vec![Input::Pedal { down, mode: Some(mode) }]
+            }
+            KeyCode::Enter if press => {
+                self.locked = !self.locked;
+                vec![Input::Pedal { down: self.locked, mode: Some(Mode::Fluoro) }]
+            }
+            KeyCode::Tab if press => {
+                self.choose(Some(self.chosen.map_or(0, |index| (index + 1) % self.instruments.len())))
+            }
+            KeyCode::Backspace if press => vec![Input::Undo {}],
+            KeyCode::KeyI if press => {
+                let ml = if self.modifiers.shift_key() { 20.0 } else { 5.0 };
+                vec![Input::Inject { ml, ml_per_s: ml }]
+            }
+            KeyCode::KeyJ if down => vec![Input::TurnCArm { lao_deg: -5.0, cra_deg: 0.0 }],
+            KeyCode::KeyL if down => vec![Input::TurnCArm { lao_deg: 5.0, cra_deg: 0.0 }],
+            KeyCode::KeyO if down => vec![Input::TurnCArm { lao_deg: 0.0, cra_deg: 5.0 }],
+            KeyCode::KeyK if down => vec![Input::TurnCArm { lao_deg: 0.0, cra_deg: -5.0 }],
+            KeyCode::Equal | KeyCode::NumpadAdd if down => vec![Input::Zoom { factor: 1.25 }],
+            KeyCode::Minus | KeyCode::NumpadSubtract if down => vec![Input::Zoom { factor: 0.8 }],
+            KeyCode::KeyQ if down => self.blades(-0.1),
+            KeyCode::KeyE if down => self.blades(0.1),
+            _ if press => digit(key).map_or_else(Vec::new, |number| self.choose_number(number)),
+            _ => vec![],
+        }
+    }
+
+    fn blades(&mut self, by: f64) -> Vec<Input> {
+        self.open = (self.open + by).clamp(0.2, 1.0);
+        vec![Input::Collimate { width: self.open, height: self.open }]
+    }
+
+    fn choose_number(&mut self, number: usize) -> Vec<Input> {
+        match number {
+            0 => self.choose(None),
+            _ if number <= self.instruments.len() => self.choose(Some(number - 1)),
+            _ => vec![],
+        }
+    }
+
+    /// Takes another instrument in the hand; that before rests.
+    fn choose(&mut self, index: Option<usize>) -> Vec<Input> {
+        self.chosen = index;
+        let select = index.map(|index| Input::Select { instrument: self.instruments[index].clone() });
+        std::iter::once(Input::Stop {}).chain(select).chain(self.moving()).collect()
+    }
+
+    /// What the arrows have hands do now.
+    fn moving(&self) -> Vec<Input> {
+        let axis = |plus, minus| f64::from(self.down.contains(&plus)) - f64::from(self.down.contains(&minus));
+        let scale = match (self.modifiers.shift_key(), self.modifiers.control_key()) {
+            (true, false) => 4.0,
+            (false, true) => 0.2,
+            _ => 1.0,
+        };
+        let mm_per_s = scale * MM_PER_S * axis(KeyCode::ArrowUp, KeyCode::ArrowDown);
+        let deg_per_s = scale * DEG_PER_S * axis(KeyCode::ArrowRight, KeyCode::ArrowLeft);
+        let hands =
+            self.instruments.iter().enumerate().filter(|(index, _)| self.chosen.is_none_or(|c| c == *index));
+        hands.map(|(_, name)| Input::Move { instrument: Some(name.clone()), mm_per_s, deg_per_s }).collect()
+    }
+}
+
+fn digit(key: KeyCode) -> Option<usize> {
+    let digits = [
+        KeyCode::Digit0,
+        KeyCode::Digit1,
+        KeyCode::Digit2,
+        KeyCode::Digit3,
+        KeyCode::Digit4,
+        KeyCode::Digit5,
+        KeyCode::Digit6,
+        KeyCode::Digit7,
+        KeyCode::Digit8,
+        KeyCode::Digit9,
+    ];
+    digits.iter().position(|digit| *digit == key)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moved(name: &str, mm_per_s: f64, deg_per_s: f64) -> Input {
+        Input::Move { instrument: Some(name.to_owned()), mm_per_s, deg_per_s }
+    }
+
+    #[test]
+    fn arrows_move_what_is_chosen_as_long_as_they_are_down() {
+        let mut keys = Keys::new(vec!["wire".to_owned(), "catheter".to_owned()]);
+        assert_eq!(keys.key(KeyCode::ArrowUp, true, false).0, [moved("wire", 10.0, 0.0)]);
+        assert!(keys.key(KeyCode::ArrowUp, true, true).0.is_empty());
+        assert_eq!(keys.modify(ModifiersState::CONTROL), [moved("wire", 2.0, 0.0)]);
+        assert_eq!(keys.key(KeyCode::ArrowLeft, true, false).0, [moved("wire", 2.0, -18.0)]);
+        // Changing hands leaves nothing behind that moves.
+        let changed = keys.key(KeyCode::Tab, true, false).0;
+        let select = Input::Select { instrument: "catheter".to_owned() };
+        assert_eq!(changed, [Input::Stop {}, select, moved("catheter", 2.0, -18.0)]);
+        keys.modify(ModifiersState::empty());
+        keys.key(KeyCode::ArrowLeft, false, false);
+        let all = keys.key(KeyCode::Digit0, true, false).0;
+        assert_eq!(all, [Input::Stop {}, moved("wire", 10.0, 0.0), moved("catheter", 10.0, 0.0)]);
+        assert_eq!(keys.let_go()[0], Input::Stop {});
+        assert_eq!(
+            keys.modify(ModifiersState::SHIFT),
+            [moved("wire", 0.0, 0.0), moved("catheter", 0.0, 0.0)]
+        );
+    }
+
+    #[test]
+    fn pedals_are_held_or_locked() {
+        let mut keys = Keys::new(vec!["device".to_owned()]);
+        let pedal = |down, mode| [Input::Pedal { down, mode: Some(mode) }];
+        assert_eq!(keys.key(KeyCode::KeyC, true, false).0, pedal(true, Mode::Cine));
+        assert_eq!(keys.key(KeyCode::KeyC, false, false).0, pedal(false, Mode::Cine));
+        assert_eq!(keys.key(KeyCode::Enter, true, false).0, pedal(true, Mode::Fluoro));
+        assert_eq!(keys.key(KeyCode::Enter, true, false).0, pedal(false, Mode::Fluoro));
+        assert_eq!(keys.key(KeyCode::Digit7, true, false).0, []);
+        assert_eq!(keys.key(KeyCode::F1, true, false).1, Some(Asked::Help));
+    }
+}

@@ -1,0 +1,282 @@
+//! The window: a thin shell that turns keys and mouse into inputs and shows what was drawn.
+
+mod keys;
+mod screen;
+mod text;
+
+use std::num::NonZeroU32;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use endowire_play::{Input, Pictures, Session};
+use winit::application::ApplicationHandler;
+use winit::dpi::LogicalSize;
+use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, EventLoop, EventLoopProxy, OwnedDisplayHandle};
+use winit::keyboard::PhysicalKey;
+use winit::window::{Window, WindowId};
+
+use super::Channel;
+use super::live::{self, Message, Newest, Pace};
+use super::record::Record;
+use crate::args::PlayArgs;
+use crate::failure::Failure;
+use crate::output::tell;
+use keys::{Asked, Keys};
+use screen::Layout;
+use text::{Canvas, Writer};
+
+/// Size of the window when it opens.
+const SIZE: [u32; 2] = [1280, 860];
+/// Turn of the 3D view by a drag, degrees a pixel.
+const DEG_PER_PX: f64 = 0.4;
+
+/// What the window is told by other threads.
+#[derive(Debug)]
+enum Told {
+    /// A picture is there.
+    Picture,
+    /// The session has ended.
+    Ended,
+}
+
+/// What the window and the thread that draws for it share.
+#[derive(Default)]
+struct Shared {
+    size: [AtomicUsize; 2],
+    help: AtomicBool,
+    picture: Mutex<Option<Picture>>,
+}
+
+/// The newest picture of the whole window.
+struct Picture {
+    canvas: Canvas,
+    /// When the oldest input came in that it is the first to show.
+    input_at: Option<Instant>,
+    /// Width of the fluoroscopic field at the isocentre, mm.
+    field_mm: f64,
+}
+
+struct Shell {
+    title: String,
+    shared: Arc<Shared>,
+    to: Sender<Message>,
+    keys: Keys,
+    surface: Option<softbuffer::Surface<OwnedDisplayHandle, Arc<Window>>>,
+    cursor: [f64; 2],
+    dragging: bool,
+    /// Width of the fluoroscopic field at the isocentre, mm.
+    field_mm: f64,
+    /// From inputs to the pictures that show them, ms.
+    inputs_ms: Vec<f64>,
+    failure: Option<String>,
+}
+
+/// Opens the window and runs the session until it is closed.
+pub(super) fn run(
+    args: &PlayArgs,
+    session: Session,
+    pictures: Pictures,
+    (sender, messages): Channel,
+    record: &mut Record,
+) -> Result<(Session, Pace), Failure> {
+    let no_display = |reason: String| {
+        Failure::Input(format!(
+            "play: no display to open a window on ({reason}): give --headless for the protocol alone, or carry out a script with \
+             endowire run {}",
+            args.scene.display()
+        ))
+    };
+    let events = EventLoop::<Told>::with_user_event().build().map_err(|e| no_display(e.to_string()))?;
+    let writer = Writer::new().ok_or_else(|| no_display("the font cannot be read".to_owned()))?;
+    let names = session.simulation().stack().instruments().iter().map(|one| one.name.clone()).collect();
+    let shared = Arc::new(Shared::default());
+    let mut shell = Shell {
+        title: format!("endowire: {}", args.scene.display()),
+        shared: Arc::clone(&shared),
+        to: sender,
+        keys: Keys::new(names),
+        surface: None,
+        cursor: [0.0; 2],
+        dragging: false,
+        field_mm: 0.0,
+        inputs_ms: Vec::new(),
+        failure: None,
+    };
+    let newest = Newest::default();
+    let (drawn_for, proxy) = (events.create_proxy(), events.create_proxy());
+    std::thread::scope(|scope| {
+        let newest = &newest;
+        let drawing = scope.spawn(move || draw(pictures, newest, &shared, writer, &drawn_for));
+        let simulating = scope.spawn(move || {
+            let done = live::physics(session, &messages, newest, record, false);
+            live::end(newest);
+            // A window that is gone need not be told.
+            let _ = proxy.send_event(Told::Ended);
+            done
+        });
+        let shown = events.run_app(&mut shell);
+        let _ = shell.to.send(Message::Quit);
+        let failed = |what: &str| Failure::Computation(format!("play: {what}"));
+        let (session, pace) = simulating.join().map_err(|_| failed("the simulation stopped"))??;
+        let frames = drawing.join().map_err(|_| failed("the pictures stopped"))?;
+        if let Some(reason) = shell.failure {
+            // What was done is kept all the same.
+            tell(format_args!("endowire: the window was closed: {reason}"));
+        }
+        shown.map_err(|e| no_display(e.to_string()))?;
+        Ok((session, frames.into_pace(pace).presented(shell.inputs_ms)))
+    })
+}
+
+/// Draws whole windows on this thread, and has each shown.
+fn draw(
+    pictures: Pictures,
+    newest: &Newest,
+    shared: &Shared,
+    mut writer: Writer,
+    proxy: &EventLoopProxy<Told>,
+) -> live::Frames {
+    live::draw(pictures, newest, |shown| {
+        let size = [0, 1].map(|side| shared.size[side].load(Ordering::Relaxed));
+        if size.contains(&0) {
+            return;
+        }
+        let canvas = screen::compose(&mut writer, shown, size, shared.help.load(Ordering::Relaxed));
+        let mut picture = shared.picture.lock().unwrap_or_else(PoisonError::into_inner);
+        let unseen = picture.take().and_then(|before| before.input_at);
+        let field_mm = shown.moment.snapshot.readout.lab.field_mm;
+        *picture = Some(Picture { canvas, input_at: unseen.or(shown.moment.input_at), field_mm });
+        let _ = proxy.send_event(Told::Picture);
+    })
+}
+
+impl Shell {
+    fn send(&self, inputs: impl IntoIterator<Item = Input>) {
+        for input in inputs {
+            let _ = self.to.send(Message::Input(input));
+        }
+    }
+
+    /// Opens window and surface.
+    fn open(&mut self, events: &ActiveEventLoop) -> Result<(), String> {
+        let attributes = Window::default_attributes()
+            .with_title(&self.title)
+            .with_inner_size(LogicalSize::new(SIZE[0], SIZE[1]));
+        let window = Arc::new(events.create_window(attributes).map_err(|e| e.to_string())?);
+        let size = window.inner_size();
+        self.resized(size.width, size.height);
+        let context = softbuffer::Context::new(events.owned_display_handle()).map_err(|e| e.to_string())?;
+        self.surface = Some(softbuffer::Surface::new(&context, window).map_err(|e| e.to_string())?);
+        Ok(())
+    }
+
+    fn resized(&self, width: u32, height: u32) {
+        for (side, length) in self.shared.size.iter().zip([width, height]) {
+            side.store(length as usize, Ordering::Relaxed);
+        }
+    }
+
+    /// Puts the newest picture into the window.
+    fn present(&mut self) -> Result<(), String> {
+        let Some(surface) = &mut self.surface else { return Ok(()) };
+        let mut picture = self.shared.picture.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(Picture { canvas, input_at, field_mm }) = picture.as_mut() else { return Ok(()) };
+        self.field_mm = *field_mm;
+        let [width, height] = canvas.size.map(|side| NonZeroU32::new(side as u32));
+        let (Some(width), Some(height)) = (width, height) else { return Ok(()) };
+        surface.resize(width, height).map_err(|e| e.to_string())?;
+        let mut buffer = surface.buffer_mut().map_err(|e| e.to_string())?;
+        buffer.copy_from_slice(&canvas.pixels);
+        buffer.present().map_err(|e| e.to_string())?;
+        self.inputs_ms.extend(input_at.take().map(|at| at.elapsed().as_secs_f64() * 1e3));
+        Ok(())
+    }
+
+    fn key(&mut self, events: &ActiveEventLoop, event: &KeyEvent) {
+        let PhysicalKey::Code(code) = event.physical_key else { return };
+        let (inputs, asked) = self.keys.key(code, event.state == ElementState::Pressed, event.repeat);
+        self.send(inputs);
+        match asked {
+            Some(Asked::Help) => {
+                self.shared.help.fetch_xor(true, Ordering::Relaxed);
+            }
+            Some(Asked::Quit) => events.exit(),
+            None => {}
+        }
+    }
+
+    /// A drag moves what it began on: the table under the live picture, or the camera of the 3D view.
+    fn dragged(&mut self, x: f64, y: f64) {
+        let by = [x - self.cursor[0], y - self.cursor[1]];
+        let size = [0, 1].map(|side| self.shared.size[side].load(Ordering::Relaxed));
+        let layout = Layout::of(size);
+        let on_fluoro = self.cursor[0] < layout.fluoro.1 as f64;
+        self.cursor = [x, y];
+        if !self.dragging || by == [0.0; 2] {
+            return;
+        }
+        self.send([if on_fluoro {
+            // The picture goes with the mouse.
+            let mm_per_px = self.field_mm / layout.fluoro.1.max(1) as f64;
+            Input::Table { right_mm: -by[0] * mm_per_px, down_mm: -by[1] * mm_per_px }
+        } else {
+            Input::TurnCamera { azimuth_deg: -by[0] * DEG_PER_PX, elevation_deg: by[1] * DEG_PER_PX }
+        }]);
+    }
+}
+
+impl ApplicationHandler<Told> for Shell {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        if self.surface.is_none()
+            && let Err(reason) = self.open(events)
+        {
+            self.failure = Some(reason);
+            events.exit();
+        }
+    }
+
+    fn user_event(&mut self, events: &ActiveEventLoop, told: Told) {
+        match (told, &self.surface) {
+            (Told::Ended, _) => events.exit(),
+            (Told::Picture, Some(surface)) => surface.window().request_redraw(),
+            (Told::Picture, None) => {}
+        }
+    }
+
+    fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        match event {
+            WindowEvent::CloseRequested => events.exit(),
+            WindowEvent::Resized(size) => self.resized(size.width, size.height),
+            WindowEvent::RedrawRequested => {
+                if let Err(reason) = self.present() {
+                    self.failure = Some(reason);
+                    events.exit();
+                }
+            }
+            WindowEvent::KeyboardInput { event, .. } => self.key(events, &event),
+            WindowEvent::ModifiersChanged(modifiers) => {
+                let inputs = self.keys.modify(modifiers.state());
+                self.send(inputs);
+            }
+            WindowEvent::Focused(false) => {
+                let inputs = self.keys.let_go();
+                self.send(inputs);
+            }
+            WindowEvent::CursorMoved { position, .. } => self.dragged(position.x, position.y),
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. } => {
+                self.dragging = state == ElementState::Pressed;
+            }
+            WindowEvent::MouseWheel { delta, .. } => {
+                let lines = match delta {
+                    MouseScrollDelta::LineDelta(_, y) => f64::from(y),
+                    MouseScrollDelta::PixelDelta(by) => by.y / 40.0,
+                };
+                self.send([Input::Zoom { factor: 1.1_f64.powf(lines.clamp(-5.0, 5.0)) }]);
+            }
+            _ => {}
+        }
+    }
+}

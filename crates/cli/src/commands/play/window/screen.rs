@@ -1,0 +1,238 @@
+//! What stands where in the window: the live picture, the 3D view, what the hands feel, help.
+
+use endowire_play::{InstrumentReadout, Readout};
+use endowire_viewer::{Image, Mode, PixelFormat};
+
+use super::super::live::Shown;
+use super::keys::HELP;
+use super::text::{Canvas, Writer};
+
+const BACK: u32 = 0x10_1418;
+const PANEL: u32 = 0x1a_2026;
+const TEXT: u32 = 0xd8_dee4;
+const FAINT: u32 = 0x86_9098;
+const WARN: u32 = 0xff_5a4a;
+const LIVE: u32 = 0xff_c020;
+const CHOSEN: u32 = 0x5a_c8fa;
+/// Height of what is below the pictures, and of a line of text, at the usual size.
+const PANEL_PX: usize = 172;
+
+/// Where the pictures are: corner and side of the live one, corner and size of the 3D view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Layout {
+    pub(super) fluoro: ([usize; 2], usize),
+    pub(super) three_d: ([usize; 2], [usize; 2]),
+    panel: usize,
+}
+
+impl Layout {
+    pub(super) fn of([width, height]: [usize; 2]) -> Self {
+        let panel = PANEL_PX.min(height / 3);
+        let side = (height - panel).min(width * 3 / 5);
+        Self {
+            fluoro: ([0, 0], side),
+            three_d: ([side, 0], [width - side, height - panel]),
+            panel: height - panel,
+        }
+    }
+}
+
+/// Draws all of a window.
+pub(super) fn compose(writer: &mut Writer, shown: &Shown<'_>, size: [usize; 2], help: bool) -> Canvas {
+    let mut canvas = Canvas::new(size);
+    canvas.fill([0, 0], size, BACK);
+    let layout = Layout::of(size);
+    let readout = &shown.moment.snapshot.readout;
+    let (corner, side) = layout.fluoro;
+    match shown.fluoro {
+        Some(image) => paint(&mut canvas, image, corner, [side; 2]),
+        None => {
+            canvas.fill(corner, [side; 2], 0);
+            let at = [corner[0] + side / 2 - 150.min(side / 2), corner[1] + side / 2];
+            writer.write(&mut canvas, at, 16, FAINT, "hold SPACE for fluoroscopy, F1 for help");
+        }
+    }
+    if let Some(image) = shown.three_d {
+        let (corner, [width, height]) = layout.three_d;
+        let side = width.min(height);
+        let middle = [corner[0] + (width - side) / 2, corner[1] + (height - side) / 2];
+        canvas.fill(corner, [width, height], background(image));
+        paint(&mut canvas, image, middle, [side; 2]);
+    }
+    over_picture(writer, &mut canvas, readout, layout);
+    canvas.fill([0, layout.panel], [size[0], size[1] - layout.panel], PANEL);
+    panel(writer, &mut canvas, shown, layout);
+    if help {
+        show_help(writer, &mut canvas);
+    }
+    canvas
+}
+
+/// What a cath lab writes into the picture.
+fn over_picture(writer: &mut Writer, canvas: &mut Canvas, readout: &Readout, layout: Layout) {
+    let ([left, top], side) = layout.fluoro;
+    let lab = &readout.lab;
+    let mode = match lab.mode {
+        Mode::Fluoro => "FLUORO",
+        Mode::Cine => "CINE",
+        Mode::Dsa => "DSA",
+        Mode::Roadmap => "ROADMAP",
+    };
+    let angle = |deg: f64, plus: &str, minus: &str| {
+        format!("{} {:.0}°", if deg < 0.0 { minus } else { plus }, deg.abs())
+    };
+    let pose = format!("{}  {}", angle(lab.lao_deg, "LAO", "RAO"), angle(lab.cra_deg, "CRA", "CAU"));
+    let (state, colour) = if lab.live { (mode.to_owned(), LIVE) } else { (format!("{mode} held"), TEXT) };
+    shadowed(writer, canvas, [left + 12, top + 26], 18, colour, &state);
+    if lab.live {
+        canvas.fill([left + side.saturating_sub(28), top + 12], [16, 16], LIVE);
+    }
+    shadowed(writer, canvas, [left + 12, top + side.saturating_sub(14)], 16, TEXT, &pose);
+    let zoom = format!("{:.0} mm", lab.field_mm);
+    shadowed(
+        writer,
+        canvas,
+        [left + side.saturating_sub(90), top + side.saturating_sub(14)],
+        16,
+        TEXT,
+        &zoom,
+    );
+}
+
+fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, layout: Layout) {
+    let readout = &shown.moment.snapshot.readout;
+    let (width, top) = (canvas.size[0], layout.panel);
+    for (line, one) in readout.instruments.iter().rev().enumerate() {
+        let y = top + 28 + 26 * line;
+        let chosen = one.name == readout.selected;
+        if chosen {
+            canvas.fill([0, y - 19], [width, 25], 0x26_3440);
+        }
+        instrument(writer, canvas, one, y, chosen);
+    }
+    let lab = &readout.lab;
+    let beam = format!(
+        "beam {:02.0}:{:04.1}   detector {:.1} µGy   contacts {} (most {:.3} N)",
+        (lab.beam_s / 60.0).floor(),
+        lab.beam_s % 60.0,
+        lab.dose_ugy,
+        readout.contacts,
+        readout.wall_force_n
+    );
+    let y = top + 28 + 26 * readout.instruments.len() + 8;
+    writer.write(canvas, [12, y], 15, TEXT, &beam);
+    let times = format!(
+        "step {}   {:.1} ms a step   {:.1} ms a frame   F1 help",
+        readout.step, shown.moment.step_ms, shown.frame_ms
+    );
+    writer.write(canvas, [12, y + 24], 15, FAINT, &times);
+    let told = shown.failure.map(str::to_owned).or_else(|| {
+        let recent = |event: &&endowire_play::Event| readout.time_s - event.time_s < 6.0;
+        readout.event.as_ref().filter(recent).map(|event| event.text.clone())
+    });
+    if let Some(text) = told {
+        writer.write(canvas, [12, y + 48], 15, WARN, &text);
+    }
+}
+
+fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout, y: usize, chosen: bool) {
+    let colour = if chosen { CHOSEN } else { TEXT };
+    let mark = if chosen { ">" } else { " " };
+    let length =
+        format!("{mark} {:<12} {:>7.1} mm in  {:>8.0}°", one.name, one.inserted_mm, one.rotation_deg);
+    let x = writer.write(canvas, [12, y], 16, colour, &length);
+    let push = one.push_force_n.map_or_else(|| "   --  ".to_owned(), |n| format!("{n:>7.3}"));
+    let force = format!("  push {push} N  torque {:>7.3} N·mm", one.torque_nmm);
+    let colour = if one.warns { WARN } else { TEXT };
+    let x = writer.write(canvas, [x, y], 16, colour, &force);
+    if one.warns {
+        writer.write(canvas, [x + 20, y], 16, WARN, "LIMIT");
+    }
+}
+
+fn show_help(writer: &mut Writer, canvas: &mut Canvas) {
+    let size = [620, 22 * HELP.len() + 24];
+    canvas.fill([24, 24], size, 0x08_0c10);
+    for (line, (keys, what)) in HELP.iter().enumerate() {
+        let y = 52 + 22 * line;
+        writer.write(canvas, [40, y], 15, CHOSEN, keys);
+        writer.write(canvas, [270, y], 15, TEXT, what);
+    }
+}
+
+/// Text that can be read on black and white.
+fn shadowed(
+    writer: &mut Writer,
+    canvas: &mut Canvas,
+    [x, y]: [usize; 2],
+    size: u32,
+    colour: u32,
+    text: &str,
+) {
+    writer.write(canvas, [x + 1, y + 1], size, 0, text);
+    writer.write(canvas, [x, y], size, colour, text);
+}
+
+/// The colour of a picture's first pixel: its background.
+fn background(image: &Image) -> u32 {
+    image.pixel(0, 0).map_or(BACK, |bytes| match bytes {
+        [red, green, blue, _] => u32::from(*red) << 16 | u32::from(*green) << 8 | u32::from(*blue),
+        grey => u32::from(grey[0]) * 0x01_0101,
+    })
+}
+
+/// Paints a picture, larger or smaller, with values between its pixels.
+fn paint(canvas: &mut Canvas, image: &Image, [left, top]: [usize; 2], [width, height]: [usize; 2]) {
+    let (columns, rows) = (image.width() as usize, image.height() as usize);
+    let places = |length: usize, pixels: usize| -> Vec<(usize, usize, u32)> {
+        let at = |k: usize| {
+            let place =
+                ((k as f64 + 0.5) * pixels as f64 / length as f64 - 0.5).clamp(0.0, (pixels - 1) as f64);
+            let low = place as usize;
+            (low, (low + 1).min(pixels - 1), ((place - low as f64) * 256.0) as u32)
+        };
+        (0..length).map(at).collect()
+    };
+    let (across, down) = (places(width, columns), places(height, rows));
+    let bytes = image.format().bytes();
+    let data = image.data();
+    for (row, (y0, y1, fy)) in down.into_iter().enumerate().take(canvas.size[1].saturating_sub(top)) {
+        let (first, second) = (y0 * columns * bytes, y1 * columns * bytes);
+        for (column, (x0, x1, fx)) in across.iter().enumerate().take(canvas.size[0].saturating_sub(left)) {
+            let value = |channel: usize| {
+                let at = |start: usize, x: usize| u32::from(data[start + x * bytes + channel]);
+                let mix = |a: u32, b: u32, f: u32| (a * (256 - f) + b * f) >> 8;
+                mix(mix(at(first, *x0), at(first, *x1), *fx), mix(at(second, *x0), at(second, *x1), *fx), fy)
+            };
+            let colour = match image.format() {
+                PixelFormat::Rgba8 => value(0) << 16 | value(1) << 8 | value(2),
+                PixelFormat::Gray8 | PixelFormat::Gray16 => value(0) * 0x01_0101,
+            };
+            canvas.pixels[(top + row) * canvas.size[0] + left + column] = colour;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_of_any_size_have_a_place_for_all() {
+        for size in [[1280, 800], [1, 1], [3, 900], [900, 3], [4000, 2000]] {
+            let layout = Layout::of(size);
+            assert!(layout.fluoro.1 <= size[0] && layout.fluoro.1 <= size[1], "{layout:?}");
+            assert!(layout.three_d.0[0] + layout.three_d.1[0] <= size[0], "{layout:?}");
+        }
+    }
+
+    #[test]
+    fn text_and_boxes_at_the_edge_do_not_leave_the_picture() {
+        let mut canvas = Canvas::new([20, 10]);
+        let mut writer = Writer::new().unwrap();
+        canvas.fill([15, 5], [100, 100], 0xff_ffff);
+        assert_eq!(canvas.pixels.iter().filter(|pixel| **pixel != 0).count(), 25);
+        let end = writer.write(&mut canvas, [2, 8], 15, 0xff_0000, "wire 12.5 mm");
+        assert!(end > 50 && canvas.pixels.iter().any(|pixel| pixel & 0xff_0000 != 0));
+    }
+}

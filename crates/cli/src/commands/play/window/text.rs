@@ -1,0 +1,105 @@
+//! Text in a picture of pixels.
+
+use std::collections::HashMap;
+
+use ab_glyph::{Font, FontRef, ScaleFont, point};
+
+/// A picture in memory, 0x00RRGGBB a pixel.
+pub(super) struct Canvas {
+    pub(super) size: [usize; 2],
+    pub(super) pixels: Vec<u32>,
+}
+
+impl Canvas {
+    pub(super) fn new(size: [usize; 2]) -> Self {
+        Self { size, pixels: vec![0; size[0] * size[1]] }
+    }
+
+    /// Fills a rectangle, as far as it is in the picture.
+    pub(super) fn fill(&mut self, [x, y]: [usize; 2], [width, height]: [usize; 2], colour: u32) {
+        let right = (x + width).min(self.size[0]);
+        for row in y..(y + height).min(self.size[1]) {
+            if x < right {
+                self.pixels[row * self.size[0] + x..row * self.size[0] + right].fill(colour);
+            }
+        }
+    }
+
+    /// Lets a colour shine through by a share.
+    fn blend(&mut self, x: usize, y: usize, colour: u32, share: f32) {
+        if x >= self.size[0] || y >= self.size[1] {
+            return;
+        }
+        let pixel = &mut self.pixels[y * self.size[0] + x];
+        let part = |shift: u32| {
+            let (old, new) = ((*pixel >> shift & 255) as f32, (colour >> shift & 255) as f32);
+            ((old + (new - old) * share.clamp(0.0, 1.0)) as u32) << shift
+        };
+        *pixel = part(16) | part(8) | part(0);
+    }
+}
+
+/// A drawn glyph: its corner from the pen, its width, shares of its pixels, and how far the pen goes.
+struct Glyph {
+    corner: [i64; 2],
+    width: usize,
+    shares: Vec<f32>,
+    advance: f32,
+}
+
+/// Draws text, and remembers its glyphs.
+pub(super) struct Writer {
+    font: FontRef<'static>,
+    glyphs: HashMap<(char, u32), Glyph>,
+}
+
+impl Writer {
+    /// With the font that is in the program: a bare machine has none. None where it cannot be read.
+    pub(super) fn new() -> Option<Self> {
+        let font = FontRef::try_from_slice(epaint_default_fonts::HACK_REGULAR).ok()?;
+        Some(Self { font, glyphs: HashMap::new() })
+    }
+
+    /// Writes a line with its left end and base line there; where it ends.
+    pub(super) fn write(
+        &mut self,
+        canvas: &mut Canvas,
+        [x, y]: [usize; 2],
+        size_px: u32,
+        colour: u32,
+        text: &str,
+    ) -> usize {
+        let mut pen = x as f32;
+        for c in text.chars() {
+            let font = &self.font;
+            let glyph = self.glyphs.entry((c, size_px)).or_insert_with(|| outlined(font, c, size_px));
+            for (index, share) in glyph.shares.iter().enumerate().filter(|(_, share)| **share > 0.0) {
+                let column = pen as i64 + glyph.corner[0] + (index % glyph.width) as i64;
+                let row = y as i64 + glyph.corner[1] + (index / glyph.width) as i64;
+                if let (Ok(column), Ok(row)) = (usize::try_from(column), usize::try_from(row)) {
+                    canvas.blend(column, row, colour, *share);
+                }
+            }
+            pen += glyph.advance;
+        }
+        pen as usize
+    }
+}
+
+fn outlined(font: &FontRef<'_>, c: char, size_px: u32) -> Glyph {
+    let scaled = font.as_scaled(size_px as f32);
+    let glyph = font.glyph_id(c).with_scale_and_position(size_px as f32, point(0.0, 0.0));
+    let advance = scaled.h_advance(glyph.id);
+    let Some(outline) = font.outline_glyph(glyph) else {
+        return Glyph { corner: [0; 2], width: 1, shares: vec![], advance };
+    };
+    let bounds = outline.px_bounds();
+    let width = bounds.width().max(1.0) as usize;
+    let mut shares = vec![0.0; width * bounds.height().max(1.0) as usize];
+    outline.draw(|x, y, share| {
+        if let Some(place) = shares.get_mut(y as usize * width + x as usize) {
+            *place = share;
+        }
+    });
+    Glyph { corner: [bounds.min.x as i64, bounds.min.y as i64], width, shares, advance }
+}

@@ -1,0 +1,81 @@
+//! A page of tables: what an experiment, a comparison or a sweep has left in a folder.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::base64::base64;
+use crate::failure::Failure;
+
+/// Most rows of a table that a page shows, most pictures, and most bytes of all of them.
+const MOST_ROWS: usize = 2000;
+const MOST_PICTURES: usize = 24;
+const MOST_PICTURE_BYTES: usize = 2_500_000;
+/// Columns that say where a result comes from: for the foot of the page.
+const SOURCE: [&str; 4] = ["version", "git_revision", "scene_hash", "seed"];
+
+/// The document in the page.
+#[derive(Serialize)]
+pub(super) struct Tables {
+    name: String,
+    tables: Vec<Table>,
+    pictures: Vec<(String, String)>,
+    source: Vec<(String, Value)>,
+}
+
+#[derive(Serialize)]
+struct Table {
+    name: String,
+    columns: Vec<String>,
+    rows: Vec<Vec<String>>,
+    /// Rows of the file.
+    count: usize,
+}
+
+/// Gathers the tables (CSV), pictures (PNG) and sources (JSON) of a folder; none where it has no table.
+pub(super) fn collect(folder: &Path) -> Result<Option<Tables>, Failure> {
+    let files = |extension: &str| -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        let mut found: Vec<_> =
+            entries.filter(|path| path.extension().is_some_and(|e| e == extension)).collect();
+        found.sort();
+        found
+    };
+    let tables = files("csv").iter().map(|path| table(path)).collect::<Result<Vec<_>, _>>()?;
+    if tables.is_empty() {
+        return Ok(None);
+    }
+    let mut left = MOST_PICTURE_BYTES;
+    let mut pictures = Vec::new();
+    for path in files("png").iter().take(MOST_PICTURES) {
+        let Ok(bytes) = std::fs::read(path) else { continue };
+        if let Some(rest) = left.checked_sub(bytes.len()) {
+            left = rest;
+            pictures.push((stem(path), base64(&bytes)));
+        }
+    }
+    let documents = files("json").into_iter().filter_map(|path| std::fs::read(path).ok());
+    let told = documents.filter_map(|bytes| serde_json::from_slice::<Value>(&bytes).ok()).next();
+    let told = told.unwrap_or(Value::Null);
+    let source = SOURCE.iter().filter(|key| !told[**key].is_null());
+    let source = source.map(|key| ((*key).to_owned(), told[*key].clone())).collect();
+    Ok(Some(Tables { name: stem(folder), tables, pictures, source }))
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+fn table(path: &Path) -> Result<Table, Failure> {
+    let unreadable = |e: csv::Error| Failure::Input(format!("{}: {e}", path.display()));
+    let mut reader = csv::ReaderBuilder::new().flexible(true).from_path(path).map_err(unreadable)?;
+    let words = |record: &csv::StringRecord| record.iter().map(str::to_owned).collect::<Vec<_>>();
+    let columns = words(reader.headers().map_err(unreadable)?);
+    let rows = reader.records().map(|row| row.as_ref().map(words).map_err(|e| e.to_string()));
+    let rows = rows.collect::<Result<Vec<_>, _>>();
+    let mut rows = rows.map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
+    let count = rows.len();
+    rows.truncate(MOST_ROWS);
+    Ok(Table { name: stem(path), columns, rows, count })
+}

@@ -1,0 +1,49 @@
+//! The vessel for a page: few triangles, since it is drawn again with every turn.
+
+use std::collections::HashMap;
+
+use endowire_core::Vec3;
+use endowire_core::vessel::SurfaceMesh;
+
+/// Most triangles that a page draws.
+const MOST: usize = 6000;
+
+/// The mesh with vertices that are near each other made one, until it has few triangles.
+pub(super) fn simplified(mesh: &SurfaceMesh) -> SurfaceMesh {
+    let Some((low, high)) = mesh.bounds_mm() else { return mesh.clone() };
+    if mesh.triangles.len() <= MOST {
+        return mesh.clone();
+    }
+    let mut cell_mm = (high - low).amax() / 150.0;
+    loop {
+        let coarse = clustered(mesh, &low, cell_mm);
+        if coarse.triangles.len() <= MOST {
+            return coarse;
+        }
+        cell_mm *= 1.2;
+    }
+}
+
+fn clustered(mesh: &SurfaceMesh, low: &Vec3, cell_mm: f64) -> SurfaceMesh {
+    let mut cells: HashMap<[i64; 3], u32> = HashMap::new();
+    let mut sums: Vec<(Vec3, f64)> = Vec::new();
+    let of: Vec<u32> = mesh
+        .vertices_mm
+        .iter()
+        .map(|vertex| {
+            let place = (vertex - low) / cell_mm;
+            let cell = [place.x as i64, place.y as i64, place.z as i64];
+            let number = *cells.entry(cell).or_insert_with(|| {
+                sums.push((Vec3::zeros(), 0.0));
+                sums.len() as u32 - 1
+            });
+            let (sum, count) = &mut sums[number as usize];
+            *sum += vertex;
+            *count += 1.0;
+            number
+        })
+        .collect();
+    let triangles = mesh.triangles.iter().map(|t| t.map(|v| of[v as usize]));
+    let triangles = triangles.filter(|[a, b, c]| a != b && b != c && a != c).collect();
+    SurfaceMesh { vertices_mm: sums.into_iter().map(|(sum, count)| sum / count).collect(), triangles }
+}

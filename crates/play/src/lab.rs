@@ -1,0 +1,260 @@
+//! The room: C-arm, table, blades, pedal, injector, camera.
+
+use endowire_core::vessel::SurfaceMesh;
+use endowire_core::{Error, Result, Vec3};
+use endowire_viewer::{CameraSpec, InjectionSpec, Mode, Pose, View, ViewSpec};
+
+use crate::TICKS_PER_S;
+
+/// Part of the field that the vessel fills where the scene leaves the field open.
+const FILL: f64 = 0.92;
+/// Magnification modes of detectors reach from about 48 cm down to 11 cm.
+const MAGNIFICATION: [f64; 2] = [0.5, 8.0];
+/// Angles that C-arms reach, degrees: LAO and RAO, cranial and caudal.
+const MOST_LAO_DEG: f64 = 120.0;
+const MOST_CRA_DEG: f64 = 60.0;
+/// Least share of the field that blades leave open.
+const LEAST_SHARE: f64 = 0.1;
+/// Frames a second: what fluoroscopy of an intervention has, unless the scene says less.
+const FRAMES_PER_S: f64 = 30.0;
+/// Energies that stand for the spectrum unless the scene says otherwise: within a ten-thousandth, at an eighth of the work.
+const ENERGY_BINS: u32 = 8;
+/// Injections that a session remembers; earlier ones have long been washed out.
+const MOST_INJECTIONS: usize = 8;
+
+/// What stands around the patient, and what it has cost in dose.
+#[derive(Debug, Clone)]
+pub struct Lab {
+    fluoro: ViewSpec,
+    three_d: ViewSpec,
+    /// Shares of the field that the blades leave open.
+    open: [f64; 2],
+    bounds_mm: [Vec3; 2],
+    down: bool,
+    /// Changes with `fluoro` and with `three_d`.
+    revisions: [u64; 2],
+    beam_ticks: u64,
+    dose_ngy: f64,
+}
+
+impl Lab {
+    /// The room of a scene, with a square picture of `side_px` pixels.
+    ///
+    /// # Errors
+    /// As [`ViewSpec::validate`].
+    pub(crate) fn new(spec: ViewSpec, side_px: u32, wall: &SurfaceMesh) -> Result<Self> {
+        let (low, high) = wall.bounds_mm().ok_or_else(|| Error::Mesh("the wall has no vertices".into()))?;
+        let mut fluoro = ViewSpec { views: vec![View::Fluoro], bits: 8, ..spec };
+        let before_px = f64::from(fluoro.size_px[0].max(fluoro.size_px[1]));
+        fluoro.size_px = [side_px; 2];
+        fluoro.frames_per_s = FRAMES_PER_S;
+        fluoro.xray.energy_bins = fluoro.xray.energy_bins.or(Some(ENERGY_BINS));
+        let arm = &mut fluoro.c_arm;
+        [arm.primary_deg, arm.secondary_deg] = arm.angles_deg();
+        arm.pose = None;
+        arm.isocentre_mm = arm.isocentre_mm.or(Some(((low + high) / 2.0).into()));
+        // A field that does not change with the pose, as a detector's does not.
+        let fitting_mm = (high - low).amax() / FILL * arm.sid_mm / arm.sod_mm;
+        let field_mm = arm.field_mm.or(arm.pixel_mm.map(|pitch| pitch * before_px)).unwrap_or(fitting_mm);
+        (arm.field_mm, arm.pixel_mm) = (Some(field_mm), None);
+        let three_d = ViewSpec { views: vec![View::ThreeD], ..fluoro.clone() };
+        let lab = Self {
+            fluoro,
+            three_d,
+            open: [1.0; 2],
+            bounds_mm: [low, high],
+            down: false,
+            revisions: [0; 2],
+            beam_ticks: 0,
+            dose_ngy: 0.0,
+        };
+        lab.fluoro.validate()?;
+        Ok(lab)
+    }
+
+    /// What fluoroscopy shows.
+    pub fn fluoro(&self) -> &ViewSpec {
+        &self.fluoro
+    }
+
+    /// What the 3D view shows.
+    pub fn three_d(&self) -> &ViewSpec {
+        &self.three_d
+    }
+
+    /// Numbers that change with [`Lab::fluoro`] and with [`Lab::three_d`].
+    pub fn revisions(&self) -> [u64; 2] {
+        self.revisions
+    }
+
+    /// Whether the beam is on.
+    pub fn is_live(&self) -> bool {
+        self.down
+    }
+
+    /// How long the beam was on, s.
+    pub fn beam_s(&self) -> f64 {
+        self.beam_ticks as f64 / TICKS_PER_S
+    }
+
+    /// Air kerma at the detector so far, µGy.
+    pub fn dose_ugy(&self) -> f64 {
+        self.dose_ngy / 1000.0
+    }
+
+    /// Magnification.
+    pub fn magnification(&self) -> f64 {
+        self.fluoro.c_arm.magnification
+    }
+
+    /// Width of what is seen at the isocentre, mm.
+    pub fn field_mm(&self) -> f64 {
+        let arm = &self.fluoro.c_arm;
+        arm.field_mm.unwrap_or(0.0) / arm.magnification * arm.sod_mm / arm.sid_mm
+    }
+
+    /// A sixtieth of a second goes by.
+    pub(crate) fn tick(&mut self) {
+        if self.down {
+            let frame_ngy = self.fluoro.detector.dose_ngy.unwrap_or_else(|| self.fluoro.xray.mode.dose_ngy());
+            self.beam_ticks += 1;
+            self.dose_ngy += frame_ngy * self.fluoro.frames_per_s / TICKS_PER_S;
+        }
+    }
+
+    /// Presses the pedal, in a mode, or releases it.
+    pub(crate) fn pedal(&mut self, down: bool, mode: Option<Mode>) -> Result<()> {
+        let mode = mode.unwrap_or(self.fluoro.xray.mode);
+        if mode == Mode::Roadmap && self.fluoro.injection.is_empty() {
+            let mend = "a roadmap shows an angiogram: inject contrast medium first";
+            return Err(Error::parameter("mode", "roadmap", mend));
+        }
+        // Each run of subtraction takes its own mask.
+        if self.fluoro.xray.mode != mode || (mode == Mode::Dsa && down && !self.down) {
+            self.change(|spec| spec.xray.mode = mode)?;
+        }
+        self.down = down;
+        Ok(())
+    }
+
+    /// Injects `ml` at `at_mm` from `time_s` on.
+    pub(crate) fn inject(
+        &mut self,
+        (ml, ml_per_s): (f64, f64),
+        at_mm: Option<Vec3>,
+        time_s: f64,
+    ) -> Result<()> {
+        for (name, value) in [("ml", ml), ("ml_per_s", ml_per_s)] {
+            if !(0.1..=100.0).contains(&value) {
+                return Err(Error::parameter(name, value, "must be a number from 0.1 to 100"));
+            }
+        }
+        if self.fluoro.flow.tree.is_none() {
+            let mend = "contrast medium flows along a centre line: give view.flow.tree in the scene";
+            return Err(Error::parameter("inject", format!("{ml} ml"), mend));
+        }
+        let bolus = InjectionSpec {
+            start_s: time_s,
+            duration_s: ml / ml_per_s,
+            rate_ml_per_s: ml_per_s,
+            at_mm: at_mm.map(Into::into),
+        };
+        self.change(|spec| {
+            let first = (spec.injection.len() + 1).saturating_sub(MOST_INJECTIONS);
+            spec.injection.drain(..first);
+            spec.injection.push(bolus);
+        })
+    }
+
+    pub(crate) fn pose(&mut self, pose: Pose) -> Result<()> {
+        self.angles([pose.primary_deg(), pose.secondary_deg()])
+    }
+
+    pub(crate) fn turn_c_arm(&mut self, by_deg: [f64; 2]) -> Result<()> {
+        finite(["lao_deg", "cra_deg"], by_deg)?;
+        let [lao, cra] = self.fluoro.c_arm.angles_deg();
+        self.angles([lao + by_deg[0], cra + by_deg[1]])
+    }
+
+    fn angles(&mut self, [lao, cra]: [f64; 2]) -> Result<()> {
+        let lao = lao.clamp(-MOST_LAO_DEG, MOST_LAO_DEG);
+        let cra = cra.clamp(-MOST_CRA_DEG, MOST_CRA_DEG);
+        self.change(|spec| (spec.c_arm.primary_deg, spec.c_arm.secondary_deg) = (lao, cra))
+    }
+
+    /// Moves the middle of the picture over the patient, as far as the vessel goes.
+    pub(crate) fn table(&mut self, right_mm: f64, down_mm: f64) -> Result<()> {
+        finite(["right_mm", "down_mm"], [right_mm, down_mm])?;
+        let [lao, cra] = self.fluoro.c_arm.angles_deg().map(f64::to_radians);
+        let right = Vec3::new(lao.cos(), lao.sin(), 0.0);
+        let detector = Vec3::new(lao.sin(), -lao.cos(), 0.0) * cra.cos() + Vec3::z() * cra.sin();
+        let down = -detector.cross(&right);
+        let before = self.fluoro.c_arm.isocentre_mm.map_or_else(Vec3::zeros, Vec3::from);
+        let [low, high] = self.bounds_mm;
+        let at = (before + right * right_mm + down * down_mm).sup(&low.inf(&before)).inf(&high.sup(&before));
+        self.change(|spec| spec.c_arm.isocentre_mm = Some(at.into()))
+    }
+
+    pub(crate) fn zoom(&mut self, factor: f64) -> Result<()> {
+        if !(0.1..=10.0).contains(&factor) {
+            return Err(Error::parameter("factor", factor, "must be a number from 0.1 to 10"));
+        }
+        let magnification = (self.magnification() * factor).clamp(MAGNIFICATION[0], MAGNIFICATION[1]);
+        let open = self.open;
+        self.change(|spec| {
+            spec.c_arm.magnification = magnification;
+            collimate(spec, open);
+        })
+    }
+
+    pub(crate) fn collimate(&mut self, open: [f64; 2]) -> Result<()> {
+        for (name, share) in [("width", open[0]), ("height", open[1])] {
+            if !(LEAST_SHARE..=1.0).contains(&share) {
+                let mend = format!("must be a share of the field from {LEAST_SHARE} to 1");
+                return Err(Error::parameter(name, share, mend));
+            }
+        }
+        self.change(|spec| collimate(spec, open))?;
+        self.open = open;
+        Ok(())
+    }
+
+    /// Shares of the field that the blades leave open.
+    pub fn open(&self) -> [f64; 2] {
+        self.open
+    }
+
+    pub(crate) fn turn_camera(&mut self, by_deg: [f64; 2]) -> Result<()> {
+        finite(["azimuth_deg", "elevation_deg"], by_deg)?;
+        let camera: &mut CameraSpec = &mut self.three_d.camera;
+        let azimuth = camera.azimuth_deg.unwrap_or(25.0) + by_deg[0];
+        camera.azimuth_deg = Some((azimuth + 180.0).rem_euclid(360.0) - 180.0);
+        camera.elevation_deg = Some((camera.elevation_deg.unwrap_or(18.0) + by_deg[1]).clamp(-89.0, 89.0));
+        self.revisions[1] += 1;
+        Ok(())
+    }
+
+    /// Changes what fluoroscopy shows, if that can be.
+    fn change(&mut self, with: impl FnOnce(&mut ViewSpec)) -> Result<()> {
+        let mut spec = self.fluoro.clone();
+        with(&mut spec);
+        spec.validate()?;
+        self.fluoro = spec;
+        self.revisions[0] += 1;
+        Ok(())
+    }
+}
+
+/// Sets the blades at the detector; at a magnification, shares are of what is seen of it.
+fn collimate(spec: &mut ViewSpec, open: [f64; 2]) {
+    let seen_mm = spec.c_arm.field_mm.map(|field| field / spec.c_arm.magnification);
+    spec.c_arm.collimation_mm =
+        seen_mm.filter(|_| open != [1.0; 2]).map(|seen| open.map(|share| share * seen));
+}
+
+fn finite(names: [&str; 2], values: [f64; 2]) -> Result<()> {
+    match names.into_iter().zip(values).find(|(_, value)| !(-360.0..=360.0).contains(value)) {
+        None => Ok(()),
+        Some((name, value)) => Err(Error::parameter(name, value, "must be a number from -360 to 360")),
+    }
+}

@@ -1,0 +1,23 @@
+//! Instruments moved by hand under fluoroscopy: a session as a state machine, without a window, a thread or a clock.
+//!
+//! A [`Session`] takes [`Input`]s (one line of JSON each, if they come from outside) and ticks of a sixtieth of a second. It tells its
+//! [`Readout`], and a [`Snapshot`] of which [`Pictures`] draws what a cath lab shows. All motions are kept, so that a session can go back to any
+//! moment and becomes a script that carries the same motions out to the bit ([`Session::script`]).
+
+mod hand;
+mod history;
+mod input;
+mod lab;
+mod pictures;
+mod readout;
+mod session;
+
+pub use hand::Motion;
+pub use input::Input;
+pub use lab::Lab;
+pub use pictures::Pictures;
+pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Readout};
+pub use session::{Limits, Session, Snapshot};
+
+/// Ticks of a session in a second.
+pub const TICKS_PER_S: f64 = 60.0;

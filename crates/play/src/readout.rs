@@ -1,0 +1,100 @@
+//! What the operator reads.
+
+use endowire_viewer::Mode;
+use serde::Serialize;
+
+/// What has happened that an operator must know.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Event {
+    /// Steps carried out before it.
+    pub step: usize,
+    /// Time of the session, s.
+    pub time_s: f64,
+    /// What kind.
+    pub kind: EventKind,
+    /// For people.
+    pub text: String,
+}
+
+/// Kinds of events.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EventKind {
+    /// A device let go of energy and jumped.
+    Jumped,
+    /// A step that the vessel does not allow, or that found no equilibrium.
+    Blocked,
+    /// An input or a step beyond what there is.
+    Refused,
+    /// The tip has left the vessel.
+    Left,
+    /// A force or torque of a hand is beyond its limit.
+    Limit,
+}
+
+/// One instrument.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InstrumentReadout {
+    /// Its name.
+    pub name: String,
+    /// Its own length, mm.
+    pub length_mm: f64,
+    /// Length inserted, mm.
+    pub inserted_mm: f64,
+    /// Turn of the hand, degrees.
+    pub rotation_deg: f64,
+    /// Force with which the hand pushes, N; none where it jumps.
+    pub push_force_n: Option<f64>,
+    /// Torque with which the hand holds it, N·mm.
+    pub torque_nmm: f64,
+    /// Whether force or torque are beyond the limits.
+    pub warns: bool,
+}
+
+/// The room.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LabReadout {
+    /// Whether the beam is on.
+    pub live: bool,
+    /// What is shown.
+    pub mode: Mode,
+    /// Positioner primary angle, LAO positive.
+    pub lao_deg: f64,
+    /// Positioner secondary angle, cranial positive.
+    pub cra_deg: f64,
+    /// Magnification.
+    pub magnification: f64,
+    /// Width of what is seen at the isocentre, mm.
+    pub field_mm: f64,
+    /// Shares of the field that the blades leave open.
+    pub open: [f64; 2],
+    /// How long the beam was on, s.
+    pub beam_s: f64,
+    /// Air kerma at the detector so far, µGy.
+    pub dose_ugy: f64,
+}
+
+/// All that is read at one moment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Readout {
+    /// Steps carried out.
+    pub step: usize,
+    /// Time of the session, s.
+    pub time_s: f64,
+    /// Name of the instrument that is in the hand.
+    pub selected: String,
+    /// Each instrument, the innermost first.
+    pub instruments: Vec<InstrumentReadout>,
+    /// Tip of the farthest, mm.
+    pub tip_mm: Option<[f64; 3]>,
+    /// Wall contacts.
+    pub contacts: usize,
+    /// Largest force on the wall at one contact, N.
+    pub wall_force_n: f64,
+    /// The room.
+    pub lab: LabReadout,
+    /// What has happened last.
+    pub event: Option<Event>,
+    /// How many events there were.
+    pub events: usize,
+}

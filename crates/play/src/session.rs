@@ -1,0 +1,348 @@
+//! The state machine: inputs and ticks in, readouts and snapshots out.
+
+use endowire_core::insertion::{InstrumentReport, Simulation};
+use endowire_core::shape::Shape;
+use endowire_core::vessel::SurfaceMesh;
+use endowire_core::{Error, PhysicalEnd, Result, Vec3};
+use endowire_viewer::{ContactView, Moment, ViewSpec};
+
+use crate::TICKS_PER_S;
+use crate::hand::{Hand, Motion};
+use crate::history::{self, History};
+use crate::input::Input;
+use crate::lab::Lab;
+use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Readout};
+
+/// Events that are kept.
+const MOST_EVENTS: usize = 1000;
+
+/// Beyond these a hand is warned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Push force, N, of either sign.
+    pub push_n: f64,
+    /// Torque, N·mm, of either sign.
+    pub torque_nmm: f64,
+}
+
+impl Default for Limits {
+    /// 1 N and 5 N·mm.
+    fn default() -> Self {
+        Self { push_n: 1.0, torque_nmm: 5.0 }
+    }
+}
+
+/// A session of instruments moved by hand.
+pub struct Session {
+    simulation: Simulation,
+    hands: Vec<Hand>,
+    selected: usize,
+    history: History,
+    lab: Lab,
+    limits: Limits,
+    ticks: u64,
+    /// Whether a hand moved in the last tick.
+    moving: bool,
+    events: Vec<Event>,
+    events_in_all: usize,
+}
+
+/// What is drawn of a moment.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    /// The line of all instruments.
+    pub shape: Shape,
+    /// Inserted length of each.
+    pub inserted_mm: Vec<f64>,
+    /// Contacts with the wall.
+    pub contacts: Vec<ContactView>,
+    /// The room.
+    pub lab: Lab,
+    /// Number and time of the frame.
+    pub moment: Moment,
+    /// What is read.
+    pub readout: Readout,
+}
+
+impl std::fmt::Debug for Session {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Session").field("steps", &self.history.steps()).finish_non_exhaustive()
+    }
+}
+
+impl Session {
+    /// A session of a simulation as it is, in the room that `view` describes, with a square fluoroscopic picture of `side_px` pixels.
+    ///
+    /// # Errors
+    /// Limits that are not above 0; as [`ViewSpec::validate`].
+    pub fn new(simulation: Simulation, view: ViewSpec, side_px: u32, limits: Limits) -> Result<Self> {
+        for (name, limit) in [("warn_n", limits.push_n), ("warn_nmm", limits.torque_nmm)] {
+            endowire_core::error::in_range(name, limit, 1e6)?;
+        }
+        let lab = Lab::new(view, side_px, simulation.wall().mesh())?;
+        let hands = vec![Hand::default(); simulation.stack().instruments().len()];
+        let history = History::new(&simulation);
+        Ok(Self {
+            simulation,
+            hands,
+            selected: 0,
+            history,
+            lab,
+            limits,
+            ticks: 0,
+            moving: false,
+            events: Vec::new(),
+            events_in_all: 0,
+        })
+    }
+
+    /// Takes an input. What is refused is an event too, and changes nothing else.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] with what is out of range or not there.
+    pub fn apply(&mut self, input: &Input) -> Result<()> {
+        let done = self.carry_out(input);
+        if let Err(error) = &done {
+            self.happened(EventKind::Refused, error.to_string());
+        }
+        done
+    }
+
+    fn carry_out(&mut self, input: &Input) -> Result<()> {
+        match input {
+            Input::Select { instrument } => self.selected = self.simulation.stack().find(instrument)?,
+            Input::Move { instrument, mm_per_s, deg_per_s } => {
+                let index = self.index(instrument.as_deref())?;
+                self.hands[index].hold(*mm_per_s, *deg_per_s)?;
+            }
+            Input::Nudge { instrument, mm, deg } => {
+                let index = self.index(instrument.as_deref())?;
+                self.hands[index].nudge(*mm, *deg)?;
+            }
+            Input::Stop {} => self.stop(),
+            Input::Pedal { down, mode } => self.lab.pedal(*down, *mode)?,
+            Input::Inject { ml, ml_per_s } => {
+                let at_mm = self.injection_mm();
+                self.lab.inject((*ml, *ml_per_s), at_mm, self.time_s())?;
+            }
+            Input::CArm { pose } => self.lab.pose(*pose)?,
+            Input::TurnCArm { lao_deg, cra_deg } => self.lab.turn_c_arm([*lao_deg, *cra_deg])?,
+            Input::Table { right_mm, down_mm } => self.lab.table(*right_mm, *down_mm)?,
+            Input::Zoom { factor } => self.lab.zoom(*factor)?,
+            Input::Collimate { width, height } => self.lab.collimate([*width, *height])?,
+            Input::TurnCamera { azimuth_deg, elevation_deg } => {
+                self.lab.turn_camera([*azimuth_deg, *elevation_deg])?;
+            }
+            Input::Undo {} => self.go_to(self.history.last_motion().unwrap_or(0))?,
+            Input::GoTo { step } => self.go_to(*step)?,
+        }
+        Ok(())
+    }
+
+    fn stop(&mut self) {
+        self.hands.iter_mut().for_each(|hand| *hand = Hand::default());
+    }
+
+    fn go_to(&mut self, step: usize) -> Result<()> {
+        if step > self.history.steps() {
+            let mend = format!("{} steps were carried out", self.history.steps());
+            return Err(Error::parameter("step", step, mend));
+        }
+        self.stop();
+        self.moving = false;
+        self.history.go_back(step, &mut self.simulation)
+    }
+
+    fn index(&self, instrument: Option<&str>) -> Result<usize> {
+        instrument.map_or(Ok(self.selected), |name| self.simulation.stack().find(name))
+    }
+
+    /// A sixtieth of a second goes by: hands that move carry out one step.
+    pub fn tick(&mut self) {
+        self.ticks += 1;
+        self.lab.tick();
+        let lengths_mm = self.simulation.report().lengths_mm();
+        let instruments = self.simulation.stack().instruments();
+        let mut motions = Vec::new();
+        for (index, hand) in self.hands.iter_mut().enumerate() {
+            let (in_mm, all_mm) = (lengths_mm[index], instruments[index].device.length_mm());
+            let (advance_mm, rotate_deg) = hand.tick([-in_mm.max(0.0), (all_mm - in_mm).max(0.0)]);
+            if advance_mm != 0.0 || rotate_deg != 0.0 {
+                motions.push(Motion { instrument: index, advance_mm, rotate_deg });
+            }
+        }
+        let moving = !motions.is_empty();
+        if moving {
+            if !self.moving {
+                self.history.begin_motion();
+            }
+            self.step(motions);
+        }
+        self.moving = moving;
+    }
+
+    fn step(&mut self, motions: Vec<Motion>) {
+        let before = self.simulation.report();
+        let (was_out, warned) = (before.left_through, self.warns());
+        match self.simulation.step_together(&history::moves(&motions)) {
+            Ok(report) => {
+                let (jumped, out) = (report.jumped, report.left_through);
+                self.history.push(motions, &self.simulation);
+                if jumped {
+                    self.happened(EventKind::Jumped, "jumped: it let go of energy".to_owned());
+                }
+                if let (Some(opening), None) = (out, was_out) {
+                    self.happened(EventKind::Left, format!("the tip has left through opening {opening}"));
+                }
+                if self.warns() && !warned {
+                    self.happened(EventKind::Limit, "force or torque is beyond its limit".to_owned());
+                }
+            }
+            Err(error) => {
+                let kind = match &error {
+                    Error::End(PhysicalEnd::Left { .. }) => EventKind::Left,
+                    error if error.is_input() => EventKind::Refused,
+                    _ => EventKind::Blocked,
+                };
+                self.happened(kind, error.to_string());
+            }
+        }
+    }
+
+    /// Notes an event; one that goes on is noted once.
+    fn happened(&mut self, kind: EventKind, text: String) {
+        let step = self.history.steps();
+        let alike = |last: &Event| last.step == step && last.kind == kind && last.text == text;
+        if self.events.last().is_some_and(alike) {
+            return;
+        }
+        if self.events.len() == MOST_EVENTS {
+            self.events.remove(0);
+        }
+        self.events.push(Event { step, time_s: self.time_s(), kind, text });
+        self.events_in_all += 1;
+    }
+
+    /// Time of the session, s.
+    pub fn time_s(&self) -> f64 {
+        self.ticks as f64 / TICKS_PER_S
+    }
+
+    /// Steps carried out, less those taken back.
+    pub fn steps(&self) -> usize {
+        self.history.steps()
+    }
+
+    /// The last events, at most a thousand.
+    pub fn events(&self) -> &[Event] {
+        &self.events
+    }
+
+    /// The simulation as it is.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// All motions as `[[script]]` tables of a scene file, which carry them out to the bit.
+    pub fn script(&self) -> String {
+        self.history.script(self.simulation.stack())
+    }
+
+    /// The vessel, closed, as pictures need it.
+    pub fn closed_wall(&self) -> SurfaceMesh {
+        self.simulation.wall().closed_mesh()
+    }
+
+    /// What is drawn of this moment.
+    pub fn snapshot(&self) -> Snapshot {
+        let report = self.simulation.report();
+        let contact = |c: &endowire_core::insertion::Contact| ContactView {
+            position_mm: c.position_mm,
+            force_n: c.total_n(),
+        };
+        let frame = self.ticks * self.lab.fluoro().frames_per_s as u64 / TICKS_PER_S as u64;
+        Snapshot {
+            shape: self.simulation.shape().clone(),
+            inserted_mm: report.lengths_mm(),
+            contacts: report.contacts.iter().map(contact).collect(),
+            lab: self.lab.clone(),
+            moment: Moment { frame, time_s: self.time_s() },
+            readout: self.readout(),
+        }
+    }
+
+    /// What the operator reads.
+    pub fn readout(&self) -> Readout {
+        let report = self.simulation.report();
+        let spec = self.lab.fluoro();
+        let forces = report.contacts.iter().map(|contact| contact.total_n().norm());
+        Readout {
+            step: self.history.steps(),
+            time_s: self.time_s(),
+            selected: self.simulation.stack().instruments()[self.selected].name.clone(),
+            instruments: self.instruments(),
+            tip_mm: self.simulation.shape().tip_mm().map(Into::into),
+            contacts: report.contacts.len(),
+            wall_force_n: forces.fold(0.0, f64::max),
+            lab: LabReadout {
+                live: self.lab.is_live(),
+                mode: spec.xray.mode,
+                lao_deg: spec.c_arm.primary_deg,
+                cra_deg: spec.c_arm.secondary_deg,
+                magnification: self.lab.magnification(),
+                field_mm: self.lab.field_mm(),
+                open: self.lab.open(),
+                beam_s: self.lab.beam_s(),
+                dose_ugy: self.lab.dose_ugy(),
+            },
+            event: self.events.last().cloned(),
+            events: self.events_in_all,
+        }
+    }
+
+    /// Reports of all instruments; of a device alone its own.
+    fn reports(&self) -> Vec<InstrumentReport> {
+        let report = self.simulation.report();
+        if !report.instruments.is_empty() {
+            return report.instruments.clone();
+        }
+        vec![InstrumentReport {
+            inserted_mm: report.inserted_mm,
+            rotation_rad: report.rotation_rad,
+            tip_rotation_rad: report.tip_rotation_rad,
+            push_force_n: Some(report.push_force_n),
+            torque_nmm: report.torque_nmm,
+        }]
+    }
+
+    fn beyond(&self, report: &InstrumentReport) -> bool {
+        report.push_force_n.is_some_and(|force| force.abs() > self.limits.push_n)
+            || report.torque_nmm.abs() > self.limits.torque_nmm
+    }
+
+    fn warns(&self) -> bool {
+        self.reports().iter().any(|report| self.beyond(report))
+    }
+
+    fn instruments(&self) -> Vec<InstrumentReadout> {
+        let each = self.simulation.stack().instruments().iter().zip(self.reports());
+        each.map(|(one, report)| InstrumentReadout {
+            name: one.name.clone(),
+            length_mm: one.device.length_mm(),
+            inserted_mm: report.inserted_mm,
+            rotation_deg: report.rotation_rad.to_degrees(),
+            push_force_n: report.push_force_n,
+            torque_nmm: report.torque_nmm,
+            warns: self.beyond(&report),
+        })
+        .collect()
+    }
+
+    /// Where contrast medium comes out: at the tip of the outermost instrument that is in.
+    fn injection_mm(&self) -> Option<Vec3> {
+        let lengths_mm = self.simulation.report().lengths_mm();
+        let line_mm = self.simulation.report().inserted_mm;
+        let outermost_mm = lengths_mm.into_iter().rev().find(|mm| *mm > 0.0)?;
+        self.simulation.shape().behind(line_mm - outermost_mm).tip_mm()
+    }
+}

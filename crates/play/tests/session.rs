@@ -1,0 +1,240 @@
+//! Sessions of thousands of inputs: what is recorded has the same bits, nothing panics, nothing is lost.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::path::{Path, PathBuf};
+
+use endowire_core::insertion::Simulation;
+use endowire_core::vessel::NoStore;
+use endowire_methods::Scene;
+use endowire_play::{EventKind, Input, Limits, Pictures, Session};
+use endowire_viewer::{Mode, ViewSpec};
+
+fn scene(name: &str) -> (PathBuf, Scene) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/scenes").join(name);
+    let scene = Scene::read(&path).unwrap();
+    (path, scene)
+}
+
+fn session(name: &str) -> (Scene, Session) {
+    let (path, scene) = scene(name);
+    let view = ViewSpec::of_scene(&scene, &path).unwrap();
+    let simulation = scene.simulation(&NoStore).unwrap();
+    let session = Session::new(simulation, view, 64, Limits::default()).unwrap();
+    (scene, session)
+}
+
+/// Numbers that look random, the same every time.
+struct Dice(u64);
+
+impl Dice {
+    fn below(&mut self, n: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % n
+    }
+
+    fn one<T: Copy>(&mut self, of: &[T]) -> T {
+        of[self.below(of.len() as u64) as usize]
+    }
+
+    /// An input as hands and protocols give it; `wild` ones have values that are none.
+    fn input(&mut self, instruments: &[&str], wild: bool) -> Input {
+        let odd = [f64::NAN, f64::INFINITY, -1e308, 1e-308, 1e9, 0.0, -0.0];
+        let mut number =
+            |usual: &[f64]| if wild && self.below(4) == 0 { self.one(&odd) } else { self.one(usual) };
+        let (speed, turn) =
+            (number(&[-40.0, -20.0, 2.0, 20.0, 20.0, 40.0]), number(&[-90.0, 0.0, 0.0, 36.0]));
+        let (step, share) = (number(&[-3.0, -0.5, 0.25, 0.7, 5.0]), number(&[0.2, 0.5, 1.0]));
+        let instrument = (self.below(3) > 0).then(|| self.one(instruments).to_owned());
+        match self.below(16) {
+            0..=4 => Input::Move { instrument, mm_per_s: speed, deg_per_s: turn },
+            5 => Input::Nudge { instrument, mm: step, deg: turn },
+            6 => Input::Stop {},
+            7 => Input::Select { instrument: instrument.unwrap_or_else(|| "nobody".to_owned()) },
+            8 => {
+                let mode = self.one(&[
+                    None,
+                    Some(Mode::Fluoro),
+                    Some(Mode::Cine),
+                    Some(Mode::Dsa),
+                    Some(Mode::Roadmap),
+                ]);
+                Input::Pedal { down: self.below(2) == 0, mode }
+            }
+            9 => Input::Inject { ml: 5.0 * share, ml_per_s: 10.0 * share },
+            10 => Input::TurnCArm { lao_deg: step, cra_deg: turn },
+            11 => Input::Table { right_mm: 10.0 * step, down_mm: 5.0 * step },
+            12 => Input::Zoom { factor: 1.0 + share },
+            13 => Input::Collimate { width: share, height: share },
+            14 => Input::TurnCamera { azimuth_deg: step, elevation_deg: turn },
+            _ if self.below(8) == 0 => Input::Undo {},
+            _ if wild && self.below(8) == 0 => Input::GoTo { step: self.below(1000) as usize },
+            _ => Input::Stop {},
+        }
+    }
+}
+
+/// The motions of a session, carried out by the scene as its script.
+fn replayed(mut scene: Scene, session: &Session) -> Simulation {
+    let file =
+        std::env::temp_dir().join(format!("endowire-played-{}-{}.toml", scene.name, std::process::id()));
+    std::fs::write(&file, session.script()).unwrap();
+    scene.take_script(&file).unwrap();
+    std::fs::remove_file(&file).unwrap();
+    let mut simulation = scene.simulation(&NoStore).unwrap();
+    let script = scene.steps(simulation.stack()).unwrap();
+    assert_eq!(script.len(), session.steps());
+    let mut run = script.begin();
+    while let Some(step) = run.next(&simulation).unwrap().map(|step| step.moves.to_vec()) {
+        simulation.step_together(&step).unwrap();
+        run.carried_out();
+    }
+    simulation
+}
+
+#[test]
+fn two_thousand_inputs_replay_with_the_same_bits() {
+    let (scene, mut session) = session("arch_vertebral.toml");
+    let mut dice = Dice(1);
+    for _ in 0..2000 {
+        let _ = session.apply(&dice.input(&["wire", "catheter"], false));
+        for _ in 0..=dice.below(3) {
+            session.tick();
+        }
+    }
+    assert!(session.steps() > 500, "{} steps", session.steps());
+    let simulation = replayed(scene, &session);
+    assert_eq!(simulation.shape(), session.simulation().shape());
+    assert_eq!(simulation.report(), session.simulation().report());
+}
+
+#[test]
+fn ten_thousand_wild_inputs_do_no_harm() {
+    let (scene, mut session) = session("curved_tube.toml");
+    let mut dice = Dice(7);
+    let mut refused = 0;
+    for _ in 0..10_000 {
+        let before = session.steps();
+        refused += usize::from(session.apply(&dice.input(&["device", "nothing"], true)).is_err());
+        assert!(session.steps() <= before);
+        if dice.below(4) == 0 {
+            session.tick();
+        }
+    }
+    assert!(refused > 500, "{refused} refused");
+    assert!(session.simulation().shape().tip_mm().is_none_or(|tip| tip.iter().all(|x| x.is_finite())));
+    assert_eq!(replayed(scene, &session).shape(), session.simulation().shape());
+}
+
+#[test]
+fn any_earlier_moment_can_be_had_again() {
+    let (_, mut session) = session("curved_tube.toml");
+    let mut shapes = vec![session.simulation().shape().clone()];
+    session.apply(&Input::Move { instrument: None, mm_per_s: 20.0, deg_per_s: 45.0 }).unwrap();
+    for _ in 0..150 {
+        session.tick();
+        shapes.push(session.simulation().shape().clone());
+    }
+    for step in [149, 130, 128, 64, 3, 0] {
+        session.apply(&Input::GoTo { step }).unwrap();
+        assert_eq!((session.steps(), session.simulation().shape()), (step, &shapes[step]));
+    }
+    let told = session.apply(&Input::GoTo { step: 1 }).unwrap_err().to_string();
+    assert_eq!(told, "step = 1: 0 steps were carried out");
+    // Undo takes one motion back: what was done between two rests.
+    for mm_per_s in [10.0, 0.0, 30.0, 0.0] {
+        session.apply(&Input::Move { instrument: None, mm_per_s, deg_per_s: 0.0 }).unwrap();
+        (0..6).for_each(|_| session.tick());
+    }
+    assert_eq!(session.steps(), 12);
+    for steps in [6, 0, 0] {
+        session.apply(&Input::Undo {}).unwrap();
+        assert_eq!(session.steps(), steps);
+    }
+}
+
+#[test]
+fn hands_stop_at_the_ends_and_limits_warn() {
+    let (path, scene) = scene("curved_tube.toml");
+    let view = ViewSpec::of_scene(&scene, &path).unwrap();
+    let limits = Limits { push_n: 1e-6, torque_nmm: 1.0 };
+    let mut session = Session::new(scene.simulation(&NoStore).unwrap(), view, 64, limits).unwrap();
+    session.apply(&Input::Nudge { instrument: None, mm: 30.5, deg: 0.0 }).unwrap();
+    (0..40).for_each(|_| session.tick());
+    assert_eq!((session.steps(), session.readout().instruments[0].inserted_mm), (31, 30.5));
+    session.apply(&Input::Move { instrument: None, mm_per_s: 180.0, deg_per_s: 0.0 }).unwrap();
+    (0..40).for_each(|_| session.tick());
+    assert!(session.readout().instruments[0].warns);
+    assert!(session.events().iter().any(|event| event.kind == EventKind::Limit));
+    session.apply(&Input::Move { instrument: None, mm_per_s: -300.0, deg_per_s: 0.0 }).unwrap();
+    (0..60).for_each(|_| session.tick());
+    assert_eq!(session.readout().instruments[0].inserted_mm, 0.0);
+    assert!(
+        Session::new(
+            scene.simulation(&NoStore).unwrap(),
+            ViewSpec::default(),
+            64,
+            Limits { push_n: 0.0, ..limits }
+        )
+        .is_err()
+    );
+}
+
+#[test]
+fn pictures_follow_the_pedal() {
+    let (scene, mut session) = session("arch_angiography.toml");
+    let mut pictures = Pictures::new(&scene, &session.snapshot(), session.closed_wall()).unwrap();
+    assert!(pictures.fluoro(&session.snapshot()).unwrap().is_none());
+    let show = |session: &mut Session, pictures: &mut Pictures, input: Input| {
+        session.apply(&input).unwrap();
+        session.tick();
+        session.tick();
+        pictures.fluoro(&session.snapshot()).unwrap().unwrap().clone()
+    };
+    let fluoro = Input::Pedal { down: true, mode: Some(Mode::Fluoro) };
+    let first = show(&mut session, &mut pictures, fluoro.clone());
+    assert_eq!((first.width(), first.height()), (64, 64));
+    let turned = show(&mut session, &mut pictures, Input::TurnCArm { lao_deg: -30.0, cra_deg: 10.0 });
+    assert_ne!(first, turned);
+    let held = show(&mut session, &mut pictures, Input::Pedal { down: false, mode: None });
+    assert_eq!(held, turned);
+    assert_eq!(session.readout().lab.beam_s, 4.0 / 60.0);
+    assert!((session.readout().lab.dose_ugy - 2.0 * 0.03).abs() < 1e-12);
+    assert_ne!(show(&mut session, &mut pictures, fluoro), turned);
+    let three_d = pictures.three_d(&session.snapshot()).unwrap();
+    session.apply(&Input::TurnCamera { azimuth_deg: 40.0, elevation_deg: 0.0 }).unwrap();
+    assert_ne!(pictures.three_d(&session.snapshot()).unwrap(), three_d);
+    // Contrast medium is seen, and then leaves.
+    show(&mut session, &mut pictures, Input::Pedal { down: true, mode: Some(Mode::Dsa) });
+    show(&mut session, &mut pictures, Input::Inject { ml: 15.0, ml_per_s: 15.0 });
+    (0..60).for_each(|_| session.tick());
+    let dark = |pictures: &mut Pictures, session: &Session| {
+        let image = pictures.fluoro(&session.snapshot()).unwrap().unwrap();
+        image.data().iter().filter(|pixel| **pixel < 100).count()
+    };
+    let filled = dark(&mut pictures, &session);
+    (0..1200).for_each(|_| session.tick());
+    let empty = dark(&mut pictures, &session);
+    assert!(filled > 4 * empty + 40, "{filled} {empty}");
+}
+
+#[test]
+fn inputs_are_read_as_they_are_documented() {
+    let read = |text: &str| serde_json::from_str::<Input>(text);
+    assert_eq!(
+        read(r#"{"do": "move", "instrument": "wire", "mm_per_s": 20}"#).unwrap(),
+        Input::Move { instrument: Some("wire".to_owned()), mm_per_s: 20.0, deg_per_s: 0.0 }
+    );
+    assert_eq!(
+        read(r#"{"do": "pedal", "down": true, "mode": "cine"}"#).unwrap(),
+        Input::Pedal { down: true, mode: Some(Mode::Cine) }
+    );
+    assert!(matches!(read(r#"{"do": "c_arm", "pose": "LAO 40"}"#), Ok(Input::CArm { .. })));
+    assert_eq!(
+        read(r#"{"do": "turn_c_arm", "lao_deg": 5}"#).unwrap(),
+        Input::TurnCArm { lao_deg: 5.0, cra_deg: 0.0 }
+    );
+    for wrong in [r#"{"do": "mve"}"#, r#"{"do": "stop", "now": 1}"#, r#"{"do": "zoom"}"#, "[]", "{"] {
+        read(wrong).unwrap_err();
+    }
+}

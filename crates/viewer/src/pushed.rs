@@ -1,0 +1,61 @@
+//! What is pushed, as the viewer sees it: the device, or each of several instruments.
+
+use endowire_core::device::{Device, Stack};
+use endowire_core::methods::MethodChoice;
+use endowire_core::scene::SceneOf;
+use endowire_core::shape::Shape;
+use endowire_core::{Error, Result};
+use serde::de::DeserializeOwned;
+
+use crate::device::{DevicePart, DeviceView};
+use crate::device_file::{device_parts, section_parts};
+use crate::spec::ViewSpec;
+
+/// Instruments of a scene and what they are made of.
+#[derive(Debug, Clone)]
+pub struct Pushed {
+    stack: Stack,
+    /// Parts to draw of each.
+    parts: Vec<Vec<DevicePart>>,
+}
+
+impl Pushed {
+    /// Those of a scene. A device alone is made of what the `[view]` table says, if it says so, and else everything of what its file says.
+    ///
+    /// # Errors
+    /// As [`SceneOf::stack`]; materials of a device file that are not known; a `[view]` table that describes one device where there are several.
+    pub fn new<M: MethodChoice + DeserializeOwned + Default>(
+        scene: &SceneOf<M>,
+        spec: &ViewSpec,
+    ) -> Result<Self> {
+        let stack = scene.stack()?;
+        let mut parts = Vec::new();
+        for (file, device) in scene.device_files()?.iter().zip(stack.devices()) {
+            parts.push(match file {
+                Some((path, file)) => {
+                    device_parts(file).map_err(|error| Error::content(path, error.to_string()))?
+                }
+                None => section_parts(device),
+            });
+        }
+        match (spec.device.is_empty(), stack.is_several()) {
+            (true, _) => {}
+            (false, false) => parts[0].clone_from(&spec.device),
+            (false, true) => {
+                let mend = "describes one device, and the scene has several instruments: leave it out, and give materials in their files";
+                return Err(Error::parameter("view.device", spec.device.len(), mend));
+            }
+        }
+        Ok(Self { stack, parts })
+    }
+
+    /// Views of all that is in on this line, where these lengths are.
+    pub fn views(&self, shape: &Shape, inserted_mm: &[f64]) -> Vec<DeviceView> {
+        let line_mm = inserted_mm.iter().copied().fold(0.0, f64::max);
+        let each = self.stack.devices().zip(&self.parts).zip(inserted_mm).filter(|(_, mm)| **mm > 0.0);
+        let view = |((device, parts), mm): ((&Device, &Vec<DevicePart>), &f64)| {
+            DeviceView::of_device(&shape.behind(line_mm - mm), device, parts)
+        };
+        each.map(view).collect()
+    }
+}
