@@ -79,7 +79,7 @@ pub(crate) enum Command {
 pub(crate) struct RunArgs {
     /// Scene file (TOML)
     pub(crate) scene: PathBuf,
-    /// Carry out the script of this file, [[script]] tables alone, in place of the scene's own: what `play` has recorded
+    /// Carry out the script of this file, tables `script` alone, in place of the scene's own: what `play` has recorded
     #[arg(long, value_name = "FILE")]
     pub(crate) script: Option<PathBuf>,
     /// Folder for the recording; out/NAME OF THE SCENE if absent. An earlier recording in it is replaced
