@@ -100,8 +100,14 @@ impl Guess {
         state.copy_from(&self.slid);
     }
 
-    /// What an equilibrium that was found teaches.
-    pub(super) fn teach(&self, elements: &[ElementData], found: &RodState, correction: &mut Correction) {
-        correction.learn(&self.motions, elements, &self.slid, found);
+    /// What an equilibrium that was found teaches, of `hooks` too.
+    pub(super) fn teach(
+        &self,
+        elements: &[ElementData],
+        found: &RodState,
+        hooks: bool,
+        correction: &mut Correction,
+    ) {
+        correction.learn(&self.motions, elements, (&self.slid, found), hooks);
     }
 }

@@ -117,13 +117,14 @@ impl Correction {
         (n == 0 || n == elements) && self.turns.len() == n * sets
     }
 
-    /// Remembers the way from the slid device to the equilibrium that was found.
+    /// Remembers the way from the slid device to the equilibrium that was found, also of `hooks`. Repeated, a hook's is right to second
+    /// order in its turn: near enough for a wall that yields, not for a rigid one, where contacts are lost by less.
     pub(super) fn learn(
         &mut self,
         motions: &[HandMotion],
         elements: &[ElementData],
-        slid: &RodState,
-        found: &RodState,
+        (slid, found): (&RodState, &RodState),
+        hooks: bool,
     ) {
         self.clear();
         self.motions.extend(motions.iter().map(HandMotion::parts));
@@ -132,7 +133,8 @@ impl Correction {
         let changed = |a: &Vec3, b: &Vec3| (a - b).norm();
         let far = |(e, data): (usize, &ElementData)| {
             let bent_per_mm = changed(&slid.frames[e + 1].t, &slid.frames[e].t) / data.length;
-            changed(&found.frames[e + 1].t, &slid.frames[e + 1].t) > LARGEST + bent_per_mm * advance_mm
+            changed(&found.frames[e + 1].t, &slid.frames[e + 1].t)
+                > LARGEST + if hooks { bent_per_mm * advance_mm } else { 0.0 }
         };
         if elements.iter().enumerate().any(far) {
             return;
@@ -244,7 +246,9 @@ mod tests {
         // Slid along its own curve the hook begins 1 mm farther from the tip than it does in its shape.
         let (slid, found) = (hooked(&elements, 7.0), hooked(&elements, 6.0));
         let mut correction = Correction::default();
-        correction.learn(&motions, &elements, &slid, &found);
+        correction.learn(&motions, &elements, (&slid, &found), false);
+        assert_eq!(correction.len(), 0);
+        correction.learn(&motions, &elements, (&slid, &found), true);
         assert_eq!(correction.len(), NODES);
         assert_eq!(correction.repeats(&motions), Some(1.0));
         let mut guess = slid.clone();
@@ -252,10 +256,10 @@ mod tests {
         assert!(guess.farthest_mm(&found) < 0.05 * slid.farthest_mm(&found));
         // The same change in a step that is far too short for it.
         let short = [HandMotion { from_mm: 20.0, to_mm: 20.1, turn_rad: 0.0 }];
-        correction.learn(&short, &elements, &slid, &found);
+        correction.learn(&short, &elements, (&slid, &found), true);
         assert_eq!(correction.len(), 0);
         // A hook that has sprung open.
-        correction.learn(&motions, &elements, &slid, &hooked(&elements, 3.0));
+        correction.learn(&motions, &elements, (&slid, &hooked(&elements, 3.0)), true);
         assert_eq!(correction.len(), 0);
     }
 }

@@ -15,6 +15,8 @@ use crate::rod::Supports;
 
 /// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, …
 const SOFTEST: f64 = 30.0;
+/// A wall that yields: one that is approached from this part of its modulus, or more.
+const YIELDING: f64 = 0.1;
 /// Residual over force scale above which the last resort has found nothing.
 pub(super) const AT_REST: f64 = 0.05;
 /// What is the matter where an equilibrium is on the other side of the wall.
@@ -158,7 +160,7 @@ impl<const C: usize> Tools<C> {
         if !taken && rises(&start.state.report, &after.report, dissipated_mj) {
             return Err(STORED.into());
         }
-        self.guess.teach(&mesh.elements, &after.rod, &mut after.correction);
+        self.guess.teach(&mesh.elements, &after.rod, softest >= YIELDING, &mut after.correction);
         self.friction.keep(&mut after.forces);
         self.memory.keep(&mut after.known);
         Ok(Found { iterations, slides, dissipated_mj, residual: found.residual, unsettled, balanced })
