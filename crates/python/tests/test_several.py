@@ -184,8 +184,9 @@ def test_a_scene_of_several_is_stepped_run_and_drawn():
     scene.run(other)
     assert np.array_equal(simulation.positions_mm, other.positions_mm)
     assert simulation.inserted_mm.tolist() == pytest.approx([70.0, 60.0])
-    renderer = scene.renderer({"views": ["3d", "fluoro"], "size_px": [160, 160], "backend": "cpu"})
-    assert renderer.render(simulation).three_d.shape == (160, 160, 4)
+    # Large enough that the wire covers pixels by half: those are its mask.
+    renderer = scene.renderer({"views": ["3d", "fluoro"], "size_px": [512, 512], "backend": "cpu"})
+    assert renderer.render(simulation).three_d.shape == (512, 512, 4)
     labels = renderer.labels(simulation)
     assert len(labels["devices"]) == 2 and {1, 2} <= set(np.unique(labels["mask"]).tolist())
     # What is out is not seen.
