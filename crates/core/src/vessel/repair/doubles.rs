@@ -9,7 +9,7 @@ use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::TriMesh;
 
 use crate::Vec3;
-use crate::vessel::topology::EdgeTable;
+use crate::vessel::topology::{EdgeTable, NONE};
 use crate::vessel::{SurfaceMesh, mesh};
 
 /// Part of the largest piece's area below which an open piece can be a patch on it.
@@ -28,13 +28,15 @@ pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize,
     let mut open = vec![false; count];
     for (index, across) in table.neighbours(mesh.triangles.len()).iter().enumerate() {
         area_mm2[piece_of[index] as usize] += mesh::area(&mesh.corners(index));
-        open[piece_of[index] as usize] |= across.contains(&crate::vessel::topology::NONE);
+        open[piece_of[index] as usize] |= across.contains(&NONE);
     }
     let largest = area_mm2.iter().copied().fold(0.0, f64::max);
     let mut patch: Vec<bool> = (0..count).map(|p| open[p] && area_mm2[p] < PATCH * largest).collect();
-    let Some(ground) = ground(mesh, &piece_of, &patch).filter(|_| patch.contains(&true)) else {
+    // Pieces are rare that could be one, and a hierarchy of all others is not for nothing.
+    if !patch.contains(&true) {
         return (0, 0);
-    };
+    }
+    let Some(ground) = ground(mesh, &piece_of, &patch) else { return (0, 0) };
     for (index, piece) in piece_of.iter().enumerate().map(|(index, p)| (index, *p as usize)) {
         if patch[piece] {
             let corners = mesh.corners(index);
