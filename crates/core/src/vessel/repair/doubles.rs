@@ -8,6 +8,7 @@ use parry3d_f64::glamx::DVec3;
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::TriMesh;
 
+use super::pieces::drop_triangles;
 use crate::Vec3;
 use crate::vessel::topology::{EdgeTable, NONE};
 use crate::vessel::{SurfaceMesh, mesh};
@@ -48,13 +49,8 @@ pub(super) fn drop_doubles(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize,
                 .all(|at| ground.distance_to_local_point(DVec3::new(at.x, at.y, at.z), false) <= reach_mm);
         }
     }
-    let before = mesh.triangles.len();
-    let mut index = 0;
-    mesh.triangles.retain(|_| {
-        index += 1;
-        !patch[piece_of[index - 1] as usize]
-    });
-    (patch.iter().filter(|patch| **patch).count(), before - mesh.triangles.len())
+    let triangles = drop_triangles(mesh, &piece_of, |piece| patch[piece]);
+    (patch.iter().filter(|patch| **patch).count(), triangles)
 }
 
 /// What patches may lie on: all other pieces.

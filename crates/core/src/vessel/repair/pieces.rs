@@ -66,14 +66,20 @@ pub(super) fn drop_pieces(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Dropped 
         dropped.specks += usize::from(piece.gone);
     }
     dropped.skins = drop_skins(mesh, &piece_of, &mut pieces);
-    let before = mesh.triangles.len();
-    let mut index = 0;
-    mesh.triangles.retain(|_| {
-        index += 1;
-        !pieces[piece_of[index - 1] as usize].gone
-    });
-    dropped.triangles = before - mesh.triangles.len();
+    dropped.triangles = drop_triangles(mesh, &piece_of, |piece| pieces[piece].gone);
     dropped
+}
+
+/// Drops the triangles of some pieces, and tells how many they were; `piece_of` has the piece of each.
+pub(super) fn drop_triangles(
+    mesh: &mut SurfaceMesh,
+    piece_of: &[u32],
+    gone: impl Fn(usize) -> bool,
+) -> usize {
+    let before = mesh.triangles.len();
+    let mut pieces = piece_of.iter();
+    mesh.triangles.retain(|_| pieces.next().is_none_or(|piece| !gone(*piece as usize)));
+    before - mesh.triangles.len()
 }
 
 fn measure(mesh: &SurfaceMesh, table: &EdgeTable, piece_of: &[u32], count: usize) -> Vec<Piece> {
