@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use endowire_core::input::parse_toml;
+use endowire_core::input::from_toml;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -84,9 +84,7 @@ fn sixteen() -> usize {
 impl Spec {
     /// Reads and checks a file.
     pub(super) fn read(path: &Path) -> Result<Self, Failure> {
-        let text =
-            std::fs::read_to_string(path).map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
-        let mut spec: Self = parse_toml(&text, path)?;
+        let (mut spec, _): (Self, String) = from_toml(path)?;
         spec.check().map_err(|failure| failure.at(path.display()))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         spec.scenes.iter_mut().chain(&mut spec.devices).for_each(|file| *file = folder.join(&*file));
