@@ -300,32 +300,17 @@ impl Session {
         }
     }
 
-    /// Reports of all instruments; of a device alone its own.
-    fn reports(&self) -> Vec<InstrumentReport> {
-        let report = self.simulation.report();
-        if !report.instruments.is_empty() {
-            return report.instruments.clone();
-        }
-        vec![InstrumentReport {
-            inserted_mm: report.inserted_mm,
-            rotation_rad: report.rotation_rad,
-            tip_rotation_rad: report.tip_rotation_rad,
-            push_force_n: Some(report.push_force_n),
-            torque_nmm: report.torque_nmm,
-        }]
-    }
-
     fn beyond(&self, report: &InstrumentReport) -> bool {
         report.push_force_n.is_some_and(|force| force.abs() > self.limits.push_n)
             || report.torque_nmm.abs() > self.limits.torque_nmm
     }
 
     fn warns(&self) -> bool {
-        self.reports().iter().any(|report| self.beyond(report))
+        self.simulation.report().hands().iter().any(|report| self.beyond(report))
     }
 
     fn instruments(&self) -> Vec<InstrumentReadout> {
-        let each = self.simulation.stack().instruments().iter().zip(self.reports());
+        let each = self.simulation.stack().instruments().iter().zip(self.simulation.report().hands());
         each.map(|(one, report)| InstrumentReadout {
             name: one.name.clone(),
             length_mm: one.device.length_mm(),

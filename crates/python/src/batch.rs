@@ -12,7 +12,7 @@ use crate::arrays::{Numbers, array, numbers, points};
 use crate::error::{exception, refuse};
 use crate::instrument::Instrument;
 use crate::moves::Moves;
-use crate::report::{hands, push_force_n};
+use crate::report::push_force_n;
 use crate::simulation::{Simulation, points_at, tip_mm, tips_mm};
 use crate::state::State;
 
@@ -74,7 +74,8 @@ impl Batch {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (rows, hands, list) = self.with(py, |members| {
             let reports = members.batch.simulations().iter().map(insertion::Simulation::report);
-            let list: Vec<f64> = reports.flat_map(hands).map(|hand| of(&hand)).collect();
+            let list: Vec<f64> =
+                reports.flat_map(insertion::StepReport::hands).map(|hand| of(&hand)).collect();
             (members.instruments.len(), members.hands(), list)
         });
         array(py, list, [rows, hands])

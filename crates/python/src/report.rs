@@ -23,7 +23,7 @@ impl StepReport {
         py: Python<'py>,
         of: impl Fn(&InstrumentReport) -> f64,
     ) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_vec(py, hands(&self.report).iter().map(of).collect())
+        PyArray1::from_vec(py, self.report.hands().iter().map(of).collect())
     }
 
     fn of_contacts<'py>(
@@ -33,20 +33,6 @@ impl StepReport {
     ) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.report.contacts.iter().map(of).collect())
     }
-}
-
-/// What each hand has done and feels: of several instruments, or of a device alone.
-pub(crate) fn hands(report: &insertion::StepReport) -> Vec<InstrumentReport> {
-    if !report.instruments.is_empty() {
-        return report.instruments.clone();
-    }
-    vec![InstrumentReport {
-        inserted_mm: report.inserted_mm,
-        rotation_rad: report.rotation_rad,
-        tip_rotation_rad: report.tip_rotation_rad,
-        push_force_n: Some(report.push_force_n),
-        torque_nmm: report.torque_nmm,
-    }]
 }
 
 /// The force of a hand; NaN where it jumps.

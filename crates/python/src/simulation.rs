@@ -19,7 +19,7 @@ use crate::error::{exception, refuse};
 use crate::instrument::Instrument;
 use crate::interrupt::interruptible;
 use crate::moves::{Moves, of_each, together};
-use crate::report::{StepReport, hands};
+use crate::report::StepReport;
 use crate::state::State;
 use crate::vessel::Vessel;
 
@@ -82,7 +82,7 @@ impl Simulation {
         py: Python<'py>,
         of: impl Fn(&InstrumentReport) -> f64 + Send + Sync,
     ) -> Bound<'py, PyArray1<f64>> {
-        let list = self.with(py, |simulation| hands(simulation.report()).iter().map(of).collect());
+        let list = self.with(py, |simulation| simulation.report().hands().iter().map(of).collect());
         PyArray1::from_vec(py, list)
     }
 }

@@ -33,12 +33,29 @@ impl StepReport {
 }
 
 impl StepReport {
+    /// What one hand has done and feels: that of an instrument, or of a device alone the whole.
+    pub fn hand(&self, index: usize) -> InstrumentReport {
+        self.instruments.get(index).copied().unwrap_or(InstrumentReport {
+            inserted_mm: self.inserted_mm,
+            rotation_rad: self.rotation_rad,
+            tip_rotation_rad: self.tip_rotation_rad,
+            push_force_n: Some(self.push_force_n),
+            torque_nmm: self.torque_nmm,
+        })
+    }
+
+    /// What every hand has done and feels: of several instruments, or of a device alone.
+    pub fn hands(&self) -> Vec<InstrumentReport> {
+        self.each_hand().collect()
+    }
+
     /// Length inserted of each instrument, or of the device alone, mm.
     pub fn lengths_mm(&self) -> Vec<f64> {
-        if self.instruments.is_empty() {
-            return vec![self.inserted_mm];
-        }
-        self.instruments.iter().map(|instrument| instrument.inserted_mm).collect()
+        self.each_hand().map(|hand| hand.inserted_mm).collect()
+    }
+
+    fn each_hand(&self) -> impl Iterator<Item = InstrumentReport> {
+        (0..self.instruments.len().max(1)).map(|index| self.hand(index))
     }
 }
 

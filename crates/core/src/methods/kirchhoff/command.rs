@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use super::Environment;
 use super::configuration::Start;
-use super::hands::{Way, line_mm, told};
+use super::hands::{Way, line_mm};
 use super::slide::Extension;
 use super::state::KirchhoffState;
 use super::substep::{AT_REST, Attempt};
@@ -174,7 +174,7 @@ fn jumped(before: &StepReport, after: &StepReport, way: &Way) -> bool {
     let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
     let mut work = 0.0;
     for (index, (start, target)) in way.start.iter().zip(&way.target).enumerate() {
-        let (was, is) = (told(before, index), told(after, index));
+        let (was, is) = (before.hand(index), after.hand(index));
         let push = |hand: &InstrumentReport| hand.push_force_n.unwrap_or(0.0);
         work += least(push(&was), push(&is), target.inserted_mm - start.inserted_mm)
             + least(was.torque_nmm, is.torque_nmm, way.commands[index].rotate_rad);

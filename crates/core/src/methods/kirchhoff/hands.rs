@@ -2,7 +2,7 @@
 
 use crate::contact::HandMotion;
 use crate::device::Stack;
-use crate::insertion::{Command, InstrumentReport, Move, StepReport};
+use crate::insertion::{Command, Move, StepReport};
 
 /// Retracting to within this of the sheath, mm, is retracting to it.
 const ZERO_LENGTH_MM: f64 = 1e-9;
@@ -16,22 +16,11 @@ pub(super) struct Hand {
     pub(super) turn_rad: f64,
 }
 
-/// What a report tells of one hand: of a device alone the whole.
-pub(super) fn told(report: &StepReport, index: usize) -> InstrumentReport {
-    report.instruments.get(index).copied().unwrap_or(InstrumentReport {
-        inserted_mm: report.inserted_mm,
-        rotation_rad: report.rotation_rad,
-        tip_rotation_rad: report.tip_rotation_rad,
-        push_force_n: Some(report.push_force_n),
-        torque_nmm: report.torque_nmm,
-    })
-}
-
 /// Sets `motions` to what takes the hands of a state to `hands`.
 pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<HandMotion>) {
     motions.clear();
     motions.extend(hands.iter().enumerate().map(|(index, hand)| {
-        let was = told(report, index);
+        let was = report.hand(index);
         let turn_rad = hand.turn_rad - was.rotation_rad;
         HandMotion { from_mm: was.inserted_mm, to_mm: hand.inserted_mm, turn_rad }
     }));
@@ -41,7 +30,7 @@ pub(super) fn motions(report: &StepReport, hands: &[Hand], motions: &mut Vec<Han
 pub(super) fn read(report: &StepReport, hands: &mut Vec<Hand>) {
     hands.clear();
     hands.extend((0..report.instruments.len().max(1)).map(|index| {
-        let own = told(report, index);
+        let own = report.hand(index);
         Hand { inserted_mm: own.inserted_mm, turn_rad: own.rotation_rad }
     }));
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::configuration::{Configuration, Start};
 use super::guess::Quality;
-use super::hands::{Hand, motions, told};
+use super::hands::{Hand, motions};
 use super::search::Search;
 use super::slide::{slide, slide_together};
 use super::workspace::Tools;
@@ -174,7 +174,7 @@ fn rises(before: &StepReport, after: &StepReport, dissipated_mj: f64) -> bool {
     let most = |before: f64, after: f64, way: f64| before.abs().max(after.abs()) * way.abs();
     let mut work = 0.0;
     for index in 0..after.instruments.len().max(1) {
-        let (was, is) = (told(before, index), told(after, index));
+        let (was, is) = (before.hand(index), after.hand(index));
         let (Some(push), Some(pushes)) = (was.push_force_n, is.push_force_n) else {
             // At the tip of another its force jumps, and nothing can be said.
             return false;
