@@ -185,6 +185,19 @@ impl Device {
         shaped_mm
     }
 
+    /// Energy that straightens so much of the device from its tip on, ∫ ½ EI |κ⁰|² ds, mJ. When that much is out of a sheath, this is
+    /// what it stores less of a shape than when nothing is.
+    pub fn straightening_mj(&self, from_tip_mm: f64) -> f64 {
+        let mut left_mm = from_tip_mm;
+        let each = self.sections.iter().map(|section| {
+            let length_mm = left_mm.clamp(0.0, section.length_mm);
+            left_mm -= section.length_mm;
+            let [u, v] = section.rest_curvature_per_mm;
+            0.5 * section.bending_stiffness_nmm2 * (u * u + v * v) * length_mm
+        });
+        each.sum()
+    }
+
     /// Smallest outer radius, mm.
     pub fn min_radius_mm(&self) -> f64 {
         self.sections.iter().map(|s| s.radius_mm).fold(f64::MAX, f64::min)

@@ -8,15 +8,11 @@
 //! The wall is felt by the outermost instrument at a place, at the points that it would have alone: they are marks on it, and their
 //! weights end where it begins to be covered. So energies change without a jump as ends pass nodes.
 
-use super::mesh::Mesh;
+use super::mesh::{Mesh, NEAR, section_ends};
 use crate::contact::ContactPoint;
 use crate::device::{Device, Section, Stack};
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Material, shares};
-
-/// Breaks nearer to each other than this part of an element share a node: over an element that is shorter, differences of unit vectors
-/// have lost the digits that curvature is made of.
-const NEAR: f64 = 1e-3;
 
 /// What a node goes with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,13 +44,8 @@ impl Nodes {
         let near = NEAR * element_mm;
         let mut breaks: Vec<(f64, Anchor)> = Vec::new();
         for (index, (device, inserted)) in stack.devices().zip(inserted_mm).enumerate() {
-            // Tapers of many short sections need no node for each.
-            let mut last = f64::NEG_INFINITY;
-            for begin in begins(device).take_while(|begin| begin < inserted) {
-                if begin - last < 0.5 * element_mm {
-                    continue;
-                }
-                last = begin;
+            let begins = std::iter::once(0.0).chain(section_ends(device, element_mm));
+            for begin in begins.take_while(|begin| begin < inserted) {
                 let at = line - inserted + begin;
                 if at > near && at < line - near && breaks.iter().all(|(b, _)| (at - b).abs() > near) {
                     breaks.push((at, Anchor::Break(index, begin)));

@@ -8,9 +8,10 @@ use super::configuration::Start;
 use super::hands::{Way, line_mm};
 use super::slide::Extension;
 use super::state::KirchhoffState;
-use super::substep::{AT_REST, Attempt};
+use super::substep::{AT_REST, Attempt, gained_mj};
 use super::workspace::{Tools, Workspace};
 use crate::contact::extension::{LEAVE_MM, left_through};
+use crate::device::Stack;
 use crate::insertion::{InstrumentReport, Move, StepReport};
 use crate::{Error, PhysicalEnd, Result};
 
@@ -162,13 +163,13 @@ impl<const C: usize> Workspace<C> {
         report.converged = balanced;
         report.angles = from.report.angles;
         report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
-        report.jumped = jumped(&from.report, report, way);
+        report.jumped = jumped(surroundings.stack, &from.report, report, way);
         Ok(())
     }
 }
 
 /// Whether energy was set free that the hand had put in.
-fn jumped(before: &StepReport, after: &StepReport, way: &Way) -> bool {
+fn jumped(stack: &Stack, before: &StepReport, after: &StepReport, way: &Way) -> bool {
     // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between
     // what it is at the ends.
     let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
@@ -180,7 +181,7 @@ fn jumped(before: &StepReport, after: &StepReport, way: &Way) -> bool {
             + least(was.torque_nmm, is.torque_nmm, way.commands[index].rotate_rad);
     }
     let (energy, now) = (before.energy.total(), after.energy.total());
-    let lost = work - after.dissipated_mj - (now - energy);
+    let lost = work - after.dissipated_mj - gained_mj(stack, before, after);
     lost > JUMP * energy.max(now).max(JUMP_FLOOR_MJ)
 }
 

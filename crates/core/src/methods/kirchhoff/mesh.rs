@@ -12,6 +12,11 @@ const SPACING_RADII: f64 = 2.0;
 const TIP_SPACING_RADII: f64 = 1.0 / 256.0;
 /// Fewest and most intervals between contact points in an element.
 const INTERVALS: (f64, f64) = (2.0, 8.0);
+/// Ends of sections nearer to each other than this part of an element share a node: over an element that is shorter, differences of unit
+/// vectors have lost the digits that curvature is made of.
+pub(super) const NEAR: f64 = 1e-3;
+/// Most that the rest shape turns by over an element, rad.
+const LARGEST_TURN: f64 = 0.75;
 /// No element has more contact points: at the tip of the thinnest device they double from 4·10⁻⁹ mm up to half of the longest element,
 /// ten metres, 42 times at most.
 pub(super) const MOST_POINTS: usize = 64;
@@ -27,6 +32,73 @@ pub struct Mesh {
     pub points: Vec<ContactPoint>,
     /// Lengths inserted of several instruments; empty for a device alone.
     pub(super) inserted_mm: Vec<f64>,
+}
+
+/// A length of device between ends of sections.
+struct Stretch {
+    /// Its end, from the device's tip, mm.
+    end_mm: f64,
+    /// Largest rest curvature in it, 1/mm.
+    curvature_per_mm: f64,
+}
+
+/// The stretches of a device from its tip on, none shorter than half an element but the last: tapers of many short sections need no node
+/// for each.
+fn stretches(device: &Device, element_mm: f64) -> impl Iterator<Item = Stretch> {
+    let mut left = device.sections().iter();
+    let (mut begin, mut end) = (0.0, 0.0);
+    std::iter::from_fn(move || {
+        let mut curvature_per_mm: f64 = 0.0;
+        for section in left.by_ref() {
+            end += section.length_mm;
+            let [u, v] = section.rest_curvature_per_mm;
+            curvature_per_mm = curvature_per_mm.max(u.hypot(v));
+            if end - begin >= 0.5 * element_mm {
+                break;
+            }
+        }
+        let is_one = end > begin;
+        begin = end;
+        is_one.then_some(Stretch { end_mm: end, curvature_per_mm })
+    })
+}
+
+/// Where stretches of a device begin behind its tip, mm.
+pub(super) fn section_ends(device: &Device, element_mm: f64) -> impl Iterator<Item = f64> {
+    let ends = stretches(device, element_mm).map(|stretch| stretch.end_mm);
+    ends.take_while(|end| *end < device.length_mm())
+}
+
+/// Writes the arc lengths from the tip of the nodes of `inserted_mm` (above 0) of `device`, sheath first, tip (0) last.
+///
+/// Nodes are marks on the device and enter with it: the ends of its sections, and between them marks that are one element apart, or as
+/// near to that as even pieces allow; nearer where a rest shape turns by more than [`LARGEST_TURN`] over an element. Over an element that
+/// held the end of a section stiffness and rest curvature would jump, and one that is too long for its shape stores energy where the
+/// device stores none: both hang on how far the element is out of the sheath, and a hook on its way out had to be pushed. The first
+/// element is no shorter than half of one where a mark enters, and as short as [`NEAR`] where the end of a section does.
+fn nodes_from_tip(device: &Device, inserted_mm: f64, element_mm: f64, from_tip_mm: &mut Vec<f64>) {
+    from_tip_mm.clear();
+    from_tip_mm.push(0.0);
+    let mut from = 0.0;
+    for Stretch { end_mm, curvature_per_mm } in stretches(device, element_mm) {
+        let longest_mm = element_mm.min(LARGEST_TURN / curvature_per_mm);
+        let is_last = end_mm >= device.length_mm();
+        let length_mm = end_mm - from;
+        let pieces = (length_mm / longest_mm).round().max(1.0);
+        // Where nothing follows elements are as long as they are asked for.
+        let piece_mm = if is_last { longest_mm } else { length_mm / pieces };
+        let marks = (1..).map(|k| (k as f64, from + k as f64 * piece_mm));
+        let inner =
+            marks.take_while(|(k, at)| (is_last || *k < pieces) && *at <= inserted_mm - 0.5 * piece_mm);
+        from_tip_mm.extend(inner.map(|(_, at)| at));
+        if is_last || end_mm >= inserted_mm - NEAR * element_mm {
+            break;
+        }
+        from_tip_mm.push(end_mm);
+        from = end_mm;
+    }
+    from_tip_mm.push(inserted_mm);
+    from_tip_mm.reverse();
 }
 
 impl Mesh {
@@ -54,8 +126,7 @@ impl Mesh {
 
     /// Meshes `inserted_mm` (above 0) of `device` with elements of `element_mm`.
     ///
-    /// Nodes are marks on the device, at whole element lengths from the tip; the first element is between half and one
-    /// and a half elements long, shorter only where that is all there is.
+    /// Its nodes are those of [`nodes_from_tip`].
     pub fn build(&mut self, device: &Device, inserted_mm: f64, element_mm: f64, modulus_n_per_mm2: f64) {
         self.build_points(device, inserted_mm, element_mm, modulus_n_per_mm2);
         // Only what one device needs is written: of elements that were here before the rest is empty.
@@ -83,7 +154,7 @@ impl Mesh {
         element_mm: f64,
         modulus_n_per_mm2: f64,
     ) {
-        crate::insertion::nodes_from_tip(inserted_mm, element_mm, &mut self.from_tip_mm);
+        nodes_from_tip(device, inserted_mm, element_mm, &mut self.from_tip_mm);
         self.points.clear();
         // Half of the interval beyond the point at hand; beyond the tip there is its cap.
         let mut half_beyond = device.section_at(0.0).radius_mm;

@@ -11,7 +11,7 @@ use super::configuration::{Configuration, Start};
 use super::hands::{Hand, lengths};
 use super::mesh::Mesh;
 use crate::Vec3;
-use crate::contact::Touch;
+use crate::contact::{ContactPoint, Touch};
 use crate::insertion::InstrumentReport;
 use crate::rod::{Clamp, RodState, element_energy};
 
@@ -78,13 +78,10 @@ fn push_force<const C: usize>(
     };
     let (back, on) = (beside(-step), beside(step));
     let stored = 0.5 * (on.stored_more_than::<C>(&back, at) / step);
-    // Where a point comes or goes on one side, the other tells.
-    let wall = match (back.keeps_points(at.mesh, step), on.keeps_points(at.mesh, step)) {
-        (true, true) => 0.5 * (on.wall_slope(pressed, at, step) + back.wall_slope(pressed, at, -step)),
-        (false, true) => on.wall_slope(pressed, at, step),
-        (true, false) => back.wall_slope(pressed, at, -step),
-        (false, false) if pressed.is_empty() => 0.0,
-        (false, false) => return None,
+    // Where a point that presses comes or goes on one side, the other tells.
+    let wall = match (on.wall_slope(pressed, at, step), back.wall_slope(pressed, at, -step)) {
+        (Some(on), Some(back)) => 0.5 * (on + back),
+        (one, other) => one.or(other)?,
     };
     let mouth = stack.instruments()[index].device.section_at(own);
     let [u, v] = mouth.rest_curvature_per_mm;
@@ -119,24 +116,27 @@ impl Beside {
         more.sum()
     }
 
-    /// Whether contact points are the same as those `at` the place.
-    fn keeps_points(&self, at: &Mesh, step_mm: f64) -> bool {
-        let near = |a: f64, b: f64| (a - b).abs() <= MEET * step_mm;
-        let mut pairs = self.mesh.points.iter().zip(&at.points);
-        self.mesh.points.len() == at.points.len()
-            && pairs.all(|(a, b)| near(a.from_tip_mm, b.from_tip_mm) && near(a.weight_mm, b.weight_mm))
+    /// The contact point that is another one `at` the place.
+    fn same_point(&self, was: &ContactPoint, step_mm: f64) -> Option<&ContactPoint> {
+        let within = MEET * step_mm;
+        let first = self.mesh.points.partition_point(|p| p.from_tip_mm < was.from_tip_mm - within);
+        let mut near =
+            self.mesh.points[first..].iter().take_while(|p| p.from_tip_mm <= was.from_tip_mm + within);
+        near.find(|p| p.instrument == was.instrument && (p.weight_mm - was.weight_mm).abs() <= within)
     }
 
-    /// Slope of the wall's energy towards here, N: points that press move against their forces, and stand for more or less length.
-    fn wall_slope(&self, pressed: &[Pressed], at: Start<'_>, step_mm: f64) -> f64 {
+    /// Slope of the wall's energy towards here, N: points that press move against their forces, and stand for more or less length. `None`
+    /// where one of them is not here.
+    fn wall_slope(&self, pressed: &[Pressed], at: Start<'_>, step_mm: f64) -> Option<f64> {
         let each = pressed.iter().map(|(index, touch)| {
-            let (was, is) = (&at.mesh.points[*index], &self.mesh.points[*index]);
+            let was = &at.mesh.points[*index];
+            let is = self.same_point(was, step_mm.abs())?;
             let moved: Vec3 = is.position(&self.mesh.elements, &self.rod) - touch.contact.position_mm;
             let widened = (is.weight_mm - was.weight_mm) / was.weight_mm;
             let turned = is.angle(&self.rod) - was.angle(&self.rod);
             let rubbed = touch.contact.friction_n.dot(&moved) + touch.friction_nmm * turned;
             let work = touch.contact.force_n * touch.contact.normal.dot(&moved) + rubbed;
-            (widened * touch.energy_mj - work) / step_mm
+            Some((widened * touch.energy_mj - work) / step_mm)
         });
         each.sum()
     }

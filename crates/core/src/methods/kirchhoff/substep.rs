@@ -10,6 +10,7 @@ use super::slide::{slide, slide_together};
 use super::workspace::Tools;
 use super::{Environment, meshed};
 use crate::contact::{SETTLED, WallContact};
+use crate::device::Stack;
 use crate::insertion::StepReport;
 use crate::rod::Supports;
 
@@ -157,7 +158,7 @@ impl<const C: usize> Tools<C> {
         let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
         let (mesh, after) = next.parts();
         let taken = resort == Some(true) && balanced;
-        if !taken && rises(&start.state.report, &after.report, dissipated_mj) {
+        if !taken && rises(stack, &start.state.report, &after.report, dissipated_mj) {
             return Err(STORED.into());
         }
         self.guess.teach(&mesh.elements, &after.rod, softest >= YIELDING, &mut after.correction);
@@ -167,10 +168,19 @@ impl<const C: usize> Tools<C> {
     }
 }
 
+/// Energy stored more than before, mJ: in the vessel, and as the shape of what is straight in the sheath.
+pub(super) fn gained_mj(stack: &Stack, before: &StepReport, after: &StepReport) -> f64 {
+    let released = stack.devices().enumerate().map(|(index, device)| {
+        let straightening = |report: &StepReport| device.straightening_mj(report.hand(index).inserted_mm);
+        straightening(after) - straightening(before)
+    });
+    after.energy.total() - before.energy.total() - released.sum::<f64>()
+}
+
 /// Whether more energy is stored, or taken by friction, than the hand can have put in. A device that was led to the far side of a
 /// crest, or into a corner of the wall that holds it from both sides, is in equilibrium there, at any energy, and nothing leads
 /// there from where it was; shorter steps stay on the branch on which it is.
-fn rises(before: &StepReport, after: &StepReport, dissipated_mj: f64) -> bool {
+fn rises(stack: &Stack, before: &StepReport, after: &StepReport, dissipated_mj: f64) -> bool {
     let most = |before: f64, after: f64, way: f64| before.abs().max(after.abs()) * way.abs();
     let mut work = 0.0;
     for index in 0..after.instruments.len().max(1) {
@@ -182,6 +192,6 @@ fn rises(before: &StepReport, after: &StepReport, dissipated_mj: f64) -> bool {
         work += most(push, pushes, is.inserted_mm - was.inserted_mm)
             + most(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
     }
-    let energy = before.energy.total();
-    after.energy.total() + dissipated_mj - energy > LARGEST_RISE * work + RISE_SHARE * energy + RISE_FLOOR_MJ
+    let stored = gained_mj(stack, before, after) + dissipated_mj;
+    stored > LARGEST_RISE * work + RISE_SHARE * before.energy.total() + RISE_FLOOR_MJ
 }
