@@ -225,6 +225,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn straightening_counts_what_is_bent_and_out() {
+        let bent = Section { rest_curvature_per_mm: [0.3, 0.4], ..Section::straight(4.0, 0.5, 8.0) };
+        let device = Device::new(vec![bent, Section::straight(10.0, 0.5, 8.0)]).unwrap();
+        // ½ · 8 N·mm² · 0.25/mm² on each mm of the first section.
+        for (out_mm, expected_mj) in [(0.0, 0.0), (1.5, 1.5), (4.0, 4.0), (9.0, 4.0), (100.0, 4.0)] {
+            assert!((device.straightening_mj(out_mm) - expected_mj).abs() < 1e-12);
+        }
+    }
+
+    #[test]
     fn a_lumen_is_narrower_than_its_device() {
         let tube = |inner_radius_mm| {
             Device::new(vec![Section { inner_radius_mm, ..Section::straight(10.0, 1.0, 1.0) }])

@@ -2,6 +2,7 @@
 
 use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, LateralForce, Move, Sheath, Simulation, WallProperties};
+use crate::methods::kirchhoff::KirchhoffOptions;
 use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, anatomy};
 use crate::{Result, Vec3};
 
@@ -145,6 +146,30 @@ fn the_catheter_feels_the_slope_of_its_own_insertion_and_turn() {
 }
 
 /// What is outermost feels the wall: the line of both is that of one device with their stiffness and the catheter's radius.
+/// A hook of 7 mm and a radius of 3 mm: what the sheath stores of it less is what is stored outside, and nothing there is to be pushed.
+#[test]
+fn a_hook_goes_out_and_in_freely_and_no_jump_is_told() {
+    let wire = Section::straight(200.0, 0.4, 5.0);
+    let hook = Section { length_mm: 7.0, rest_curvature_per_mm: [1.0 / 3.0, 0.0], ..wire };
+    let device = Device::new(vec![hook, Section::straight(25.0, 0.4, 5.0), wire]).unwrap();
+    for element_mm in [1.0, 2.0, 4.0] {
+        let made =
+            GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(2.0)).unwrap();
+        let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
+        let properties = WallProperties { friction: 0.1, ..WallProperties::default() };
+        let options = KirchhoffOptions { element_mm, ..KirchhoffOptions::default() };
+        let builder = Simulation::builder(made.wall, device.clone(), sheath).properties(properties);
+        let mut simulation = builder.method(&options).build().unwrap();
+        for k in 0..116 {
+            let advance_mm = if k < 60 { 0.25 } else { -0.25 };
+            let report = simulation.step(Command { advance_mm, rotate_rad: 0.0 }).unwrap();
+            let what = format!("{element_mm} mm elements, {} mm in: {report:?}", report.inserted_mm);
+            assert!(report.converged && !report.jumped && report.relaxations == 0, "{what}");
+            assert!(report.substeps == 1, "{what}");
+        }
+    }
+}
+
 #[test]
 fn straight_instruments_of_one_length_are_one_device() {
     let one = |name: &str, section: Section| Instrument {

@@ -196,6 +196,35 @@ mod tests {
     use crate::device::Section;
 
     #[test]
+    fn ends_of_sections_are_nodes_and_elements_turn_little_in_their_rest_shape() {
+        let wire = Section::straight(100.0, 0.4, 5.0);
+        let hook = Section { length_mm: 7.0, rest_curvature_per_mm: [1.0 / 3.0, 0.0], ..wire };
+        let short = Section { length_mm: 0.5, ..wire };
+        let device = Device::new(vec![hook, Section::straight(10.0, 0.4, 5.0), short, wire]).unwrap();
+        let mut nodes = Vec::new();
+        for element_mm in [1.0, 2.0, 4.0] {
+            for k in 1..=400 {
+                let inserted_mm = 0.1 * f64::from(k);
+                nodes_from_tip(&device, inserted_mm, element_mm, &mut nodes);
+                assert_eq!((nodes[0], *nodes.last().unwrap()), (inserted_mm, 0.0));
+                for end in [7.0, 17.0] {
+                    assert_eq!(
+                        nodes.contains(&end),
+                        inserted_mm > end + NEAR * element_mm,
+                        "{inserted_mm}: {nodes:?}"
+                    );
+                }
+                for (index, ends) in nodes.windows(2).enumerate() {
+                    let length = ends[0] - ends[1];
+                    assert!(length <= 1.5 * element_mm + 1e-9, "{inserted_mm}: {nodes:?}");
+                    assert!(index == 0 || length >= 0.5 * element_mm.min(2.25), "{inserted_mm}: {nodes:?}");
+                    assert!(ends[0] > 7.0 || length / 3.0 <= 1.5 * LARGEST_TURN, "{inserted_mm}: {nodes:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn devices_of_mixed_scales_have_few_contact_points() {
         let (thin, thick) = (Section::straight(1.0, 1e-6, 10.0), Section::straight(9999.0, 1.0, 10.0));
         for sections in [vec![thin, thick], vec![thick, thin], vec![Section { length_mm: 1e4, ..thin }]] {
