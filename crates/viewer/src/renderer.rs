@@ -347,7 +347,7 @@ mod tests {
         fn pieces(
             &mut self,
             _: &CArm,
-            _: &[(crate::device::Piece, f64)],
+            _: &[(crate::piece::Piece, f64)],
             _: &mut [f32],
             _: &mut Vec<u32>,
         ) -> Result<()> {

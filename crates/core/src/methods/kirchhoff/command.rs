@@ -5,12 +5,13 @@ use std::borrow::Cow;
 
 use super::Environment;
 use super::configuration::Start;
-use super::hands::{Way, line_mm};
+use super::hands::{Way, lengths};
 use super::slide::Extension;
 use super::state::KirchhoffState;
 use super::substep::{AT_REST, Attempt};
 use super::workspace::{Tools, Workspace};
 use crate::contact::extension::{LEAVE_MM, left_through};
+use crate::device::line_mm;
 use crate::insertion::{InstrumentReport, Move, StepReport};
 use crate::{Error, PhysicalEnd, Result};
 
@@ -52,7 +53,7 @@ impl<const C: usize> Workspace<C> {
         next.own(*elements, *points);
         let surroundings = &environment.surroundings;
         way.begin(surroundings.stack, &from.report, moves);
-        let (start, target) = (line_mm(&way.start), line_mm(&way.target));
+        let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
         if target > start
             && let Some((opening, beyond)) = left_through(surroundings.wall, &from.tip_mm())
             && beyond + (target - start) > LEAVE_MM
@@ -101,7 +102,7 @@ impl<const C: usize> Workspace<C> {
             let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
             way.at(to, hands);
             substeps += 1;
-            if line_mm(hands) == 0.0 {
+            if line_mm(lengths(hands)) == 0.0 {
                 now.withdraw(surroundings.stack, hands);
                 tools.write_report(environment, hands, now);
                 break;
