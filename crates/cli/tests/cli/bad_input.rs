@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use crate::common::said;
+
 /// A working scene in a folder of its own, to be spoilt one value at a time.
 struct Scene {
     folder: tempfile::TempDir,
@@ -65,7 +67,7 @@ impl Scene {
     /// Runs, expects exit code 2 and a single line with all of `words`.
     fn is_refused(&self, words: &[&str]) {
         let output = self.run();
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let text = said(&output);
         assert_eq!(output.status.code(), Some(2), "{text}");
         assert_eq!(text.trim_end().lines().count(), 1, "one line is wanted: {text}");
         for word in words {
@@ -81,14 +83,14 @@ fn endowire(args: &[&Path]) -> Output {
 #[test]
 fn the_scene_that_is_spoilt_below_is_good() {
     let output = Scene::good().run();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
 }
 
 #[test]
 fn a_missing_scene_is_named() {
     let output = endowire(&["run".as_ref(), "no/such/scene.toml".as_ref()]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("no/such/scene.toml"));
+    assert!(said(&output).contains("no/such/scene.toml"));
 }
 
 #[test]
@@ -246,7 +248,7 @@ fn a_folder_that_cannot_be_written_is_named() {
         scene.path("taken").as_ref(),
     ]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("taken"));
+    assert!(said(&output).contains("taken"));
 }
 
 #[test]
@@ -288,7 +290,7 @@ fn a_device_thicker_than_the_vessel_at_the_sheath_is_refused() {
     // Further in the vessel may be narrower: then the device stops there.
     let narrowing = Scene::good().file("tube.csv", b"0 0 0 4 -1\n40 0 0 1 0\n80 0 0 1 1\n");
     let output = narrowing.with("radius_mm = 0.5", "radius_mm = 1.5").run();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
 }
 
 #[test]
@@ -331,7 +333,7 @@ fn arguments_are_named_by_their_flag() {
     ] {
         let args: Vec<&Path> = args.iter().map(Path::new).collect();
         let output = endowire(&args);
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let text = said(&output);
         assert_eq!(output.status.code(), Some(2), "{text}");
         assert!(text.contains(words) && text.trim_end().lines().count() == 1, "{text}");
     }
@@ -352,7 +354,7 @@ fn a_run_needs_no_folder_for_temporary_files() {
         ])
         .output()
         .unwrap();
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    let text = said(&output);
     assert_eq!(output.status.code(), Some(0), "{text}");
     assert!(scene.path("out/shapes.npz").exists());
 }
@@ -367,7 +369,7 @@ fn devices_and_pipes_are_no_input_files() {
         .is_refused(&["endless.stl", "regular file"]);
     let output = endowire(&["run".as_ref(), "/dev/zero".as_ref()]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("regular file"));
+    assert!(said(&output).contains("regular file"));
 }
 
 #[test]
@@ -378,7 +380,7 @@ fn a_region_of_the_wall_that_cannot_be_is_refused_by_its_key() {
     };
     let good = "centre_mm = [40, 4, 0]\nradius_mm = 5.0\nmodulus_n_per_mm2 = 20.0\nfriction = 0.3\ntransition_mm = 1.0";
     let output = scene(good).run();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     for (from, to, words) in [
         ("[40, 4, 0]", "[40, nan, 0]", &["region[1].centre_mm = [40, NaN, 0]"][..]),
         ("[40, 4, 0]", "[40, 4]", &["line 11", "centre_mm"]),

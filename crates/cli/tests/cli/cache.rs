@@ -4,11 +4,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::common::endowire;
+use crate::common::{assets, endowire, said};
 
 /// A few steps into the wall of a tree with forks, which takes long to make.
 fn scene(folder: &Path) -> PathBuf {
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap();
     let text = format!(
         "name = \"arch\"\n\
          [vessel]\ntree = \"{}\"\nedge_mm = 3.0\n\
@@ -17,7 +16,7 @@ fn scene(folder: &Path) -> PathBuf {
          [method]\nname = \"kirchhoff\"\nelement_mm = 4.0\n\
          [[script]]\nadvance_mm = 40.0\nstep_mm = 8.0\n\
          [view]\nsize_px = [24, 16]\nviews = [\"3d\", \"fluoro\"]\nevery = 3\n",
-        assets.join("vessels/aortic_arch.csv").display()
+        assets().join("vessels/aortic_arch.csv").display()
     );
     let path = folder.join("arch.toml");
     std::fs::write(&path, text).unwrap();
@@ -28,7 +27,7 @@ fn run(scene: &Path, cache: &Path, out: &Path, more: &[&str]) -> Output {
     let mut command = endowire();
     command.args(["run".as_ref(), scene, "--out".as_ref(), out]).args(more).env("ENDOWIRE_CACHE", cache);
     let output = command.output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{}", said(&output));
     output
 }
 
@@ -66,7 +65,7 @@ fn a_recording_has_the_same_bytes_with_and_without_kept_walls() {
         let mut command = endowire();
         command.args(["render".as_ref(), out("warm").as_path(), "--out".as_ref(), out(frames).as_path()]);
         let output = command.args(more).env("ENDOWIRE_CACHE", &cache).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{}", said(&output));
         files(&out(frames))
     };
     let drawn = render("drawn", &[]);

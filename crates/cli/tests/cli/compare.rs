@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::endowire;
+use crate::common::{endowire, said};
 use serde_json::Value;
 
 fn compare(out: &Path, args: &[&str]) -> Output {
@@ -18,7 +18,7 @@ fn command(out: &Path, args: &[&str]) -> Command {
 }
 
 fn document(output: &Output) -> Value {
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{}", said(output));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
@@ -166,7 +166,7 @@ fn wrong_names_are_answered_with_the_nearest_right_one() {
         (["--limit-s", "0"], "--limit-s 0: give a time above 0"),
     ] {
         let output = compare(folder.path(), &args);
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let text = said(&output);
         assert_eq!(output.status.code(), Some(2), "{args:?}: {text}");
         assert!(text.contains(says), "{args:?}: {text}");
     }

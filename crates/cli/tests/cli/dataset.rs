@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Output;
 
+use crate::common::{SHORT, assets, said, scene_text};
 use serde_json::Value;
 
 fn endowire(args: &[&str], threads: &str) -> Output {
@@ -14,17 +15,10 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-fn assets() -> String {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap().display().to_string()
-}
-
 /// A specification of a short course in the curved tube with two devices.
 fn specification(folder: &Path, more: &str) -> std::path::PathBuf {
-    let assets = assets();
-    let scene = std::fs::read_to_string(format!("{assets}/scenes/curved_tube.toml"))
-        .unwrap()
-        .replace("\"../", &format!("\"{assets}/"))
-        .replace("advance_mm = 220.0", "advance_mm = 30.0");
+    let assets = assets().display().to_string();
+    let scene = scene_text("curved_tube.toml", &SHORT);
     std::fs::write(folder.join("scene.toml"), scene).unwrap();
     let spec = folder.join("spec.toml");
     let text = format!(
@@ -52,7 +46,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 fn told(output: &Output) -> Value {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{}", said(output));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
@@ -76,7 +70,7 @@ fn a_dataset_is_the_same_with_any_threads_and_goes_on_where_it_was() {
     let spec = specification(folder.path(), "seed = 2");
     let refused = endowire(&["dataset", text(&spec), "--out", text(&two)], "2");
     assert_eq!(refused.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("another dataset"));
+    assert!(said(&refused).contains("another dataset"));
     let other = folder.path().join("other");
     told(&endowire(&["dataset", text(&spec), "--out", text(&other), "--json"], "2"));
     assert!(files(&other)["images/0000000.png"] != whole["images/0000000.png"]);
@@ -138,7 +132,7 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
     for (more, named) in [("pose = 3", "poses"), ("biplane = 1", "biplane_deg"), ("seed = -1", "seed")] {
         let spec = specification(folder.path(), more);
         let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join("out"))], "1");
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        let told = said(&output);
         assert!(output.status.code() == Some(2) && told.contains(named), "{told}");
     }
     let spec = specification(folder.path(), "");
@@ -151,7 +145,7 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
     ] {
         std::fs::write(&spec, whole.replace(from, to)).unwrap();
         let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join(to))], "1");
-        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        let told = said(&output);
         assert!(output.status.code() == Some(2) && told.contains(named), "{to}: {told}");
     }
 }

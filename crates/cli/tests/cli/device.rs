@@ -5,6 +5,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use crate::common::{said, workspace};
 use npyz::NpyFile;
 use serde_json::Value;
 
@@ -13,12 +14,8 @@ fn endowire(args: &[&str]) -> Output {
     crate::common::endowire().args(args).current_dir(workspace()).output().unwrap()
 }
 
-fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
-}
-
 fn told(output: &Output) -> String {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{}", said(output));
     String::from_utf8(output.stdout.clone()).unwrap()
 }
 
@@ -77,7 +74,7 @@ fn what_cannot_be_shown_is_told_in_one_line() {
         (vec!["list", empty.to_str().unwrap()], vec!["no device files"]),
     ] {
         let output = endowire(&[&["device"], &args[..]].concat());
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        let error = said(&output);
         assert_eq!(output.status.code(), Some(2), "{args:?}: {error}");
         assert_eq!(error.trim_end().lines().count(), 1, "{error}");
         assert!(words.iter().all(|word| error.contains(word)), "{error}");
@@ -139,7 +136,7 @@ fn fluoroscopy_draws_the_materials_of_the_catalogue() {
     std::fs::write(&spoilt, text).unwrap();
     let output = endowire(&["fluoro", &scene(folder.path(), spoilt.to_str().unwrap(), "")]);
     assert_eq!(output.status.code(), Some(2));
-    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    let error = said(&output);
     assert!(
         error.contains("part \"marker\".coat.material = \"platinun\"") && error.contains("spoilt.toml"),
         "{error}"

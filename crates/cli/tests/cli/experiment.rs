@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Output;
 
-use crate::common::endowire;
+use crate::common::{endowire, said};
 use serde_json::Value;
 
 fn experiment(args: &[&str]) -> Output {
@@ -11,7 +11,7 @@ fn experiment(args: &[&str]) -> Output {
 }
 
 fn document(output: &Output) -> Value {
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{}", said(output));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
@@ -131,7 +131,7 @@ fn wrong_names_and_points_are_bad_input() {
     let path = points.to_str().unwrap();
     let refused = |args: &[&str], says: &str| {
         let output = experiment(args);
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        let text = said(&output);
         assert_eq!(output.status.code(), Some(2), "{args:?}: {text}");
         assert!(text.contains(says), "{args:?}: {text}");
     };

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::common::endowire;
+use crate::common::{assets, endowire, said};
 use npyz::NpyFile;
 
 /// Two instruments pushed into a tube.
@@ -55,14 +55,13 @@ fn recorded(folder: &Path, name: &str) -> Vec<f64> {
 #[test]
 fn a_run_is_exported_as_it_was_recorded() {
     let folder = tempfile::tempdir().unwrap();
-    let vessel = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels/curved_tube.stl");
+    let vessel = assets().join("vessels/curved_tube.stl");
     let scene = folder.path().join("scene.toml");
-    std::fs::write(&scene, SCENE.replace("VESSEL", vessel.canonicalize().unwrap().to_str().unwrap()))
-        .unwrap();
+    std::fs::write(&scene, SCENE.replace("VESSEL", vessel.to_str().unwrap())).unwrap();
     let (run, out) = (folder.path().join("run"), folder.path().join("vtk"));
     let command = |arguments: &[&std::ffi::OsStr]| {
         let output = endowire().args(arguments).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{}", said(&output));
     };
     command(&["run".as_ref(), scene.as_ref(), "--out".as_ref(), run.as_ref()]);
     command(&["export".as_ref(), run.as_ref(), "--vtk".as_ref(), out.as_ref()]);
@@ -97,6 +96,6 @@ fn a_run_is_exported_as_it_was_recorded() {
     let output =
         endowire().args(["export".as_ref(), out.as_os_str(), "--vtk".as_ref(), out.as_ref()]).output();
     let output = output.unwrap();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = said(&output);
     assert!(output.status.code() == Some(2) && said.contains("folder of a recorded run"), "{said}");
 }

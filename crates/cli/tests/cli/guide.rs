@@ -8,15 +8,13 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::common::{said, workspace};
+
 /// What a chapter has its reader do.
 #[derive(Debug, PartialEq)]
 enum Action {
     Write { name: String, text: String },
     Run { line: usize, arguments: Vec<String> },
-}
-
-fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
 }
 
 /// The chapters of the guide, in their order.
@@ -128,7 +126,7 @@ fn follow(chapter: &str) -> Result<Vec<Vec<String>>, String> {
                         "line {line}: endowire {}: {}\n{}",
                         arguments.join(" "),
                         output.status,
-                        String::from_utf8_lossy(&output.stderr)
+                        said(&output)
                     ));
                 }
                 run.push(arguments);

@@ -3,14 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::common::endowire;
+use crate::common::{endowire, said, scene_text};
 use serde_json::Value;
 
 /// The wire in the vertebral catheter, with small pictures of the end alone; each change replaces a piece of the text.
 fn scene(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap();
-    let mut text = std::fs::read_to_string(assets.join("scenes/arch_vertebral.toml")).unwrap();
-    text = text.replace("\"../", &format!("\"{}/", assets.display())).replace("[320, 320]", "[32, 24]");
+    let mut text = scene_text("arch_vertebral.toml", &[("[320, 320]", "[32, 24]")]);
     for (piece, other) in changes {
         assert!(text.contains(piece), "{piece}");
         text = text.replacen(piece, other, 1);
@@ -22,10 +20,6 @@ fn scene(folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
 
 fn run(arguments: &[&Path]) -> Output {
     endowire().arg("run").args(arguments).output().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// Rows of a table, each a list of texts, without the head.

@@ -4,19 +4,18 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};
 use std::time::Duration;
 
-use crate::common::endowire;
+use crate::common::{endowire, said, scene_text};
 use serde_json::Value;
 
 /// A run in the curved tube of so many steps that it never ends by itself, without frames unless `views` asks for them.
 fn endless_scene(folder: &Path, views: &str) -> PathBuf {
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap();
-    let text = std::fs::read_to_string(assets.join("scenes/curved_tube.toml"))
-        .unwrap()
-        .replace("\"../", &format!("\"{}/", assets.display()))
-        .replace("step_mm = 0.5", "step_mm = 0.001")
-        .replace("size_px = [640, 640]", "size_px = [24, 16]")
-        .replace("every = 40", "every = 1")
-        .replace("views = [\"3d\", \"fluoro\"]", &format!("views = {views}"));
+    let changes = [
+        ("step_mm = 0.5", "step_mm = 0.001"),
+        ("size_px = [640, 640]", "size_px = [24, 16]"),
+        ("every = 40", "every = 1"),
+        ("[\"3d\", \"fluoro\"]", views),
+    ];
+    let text = scene_text("curved_tube.toml", &changes);
     let path = folder.join("endless.toml");
     std::fs::write(&path, text).unwrap();
     path
@@ -82,7 +81,7 @@ fn a_run_that_is_killed_keeps_every_step_and_is_drawn() {
         assert!(summary["steps"].as_u64().unwrap() as usize <= recorded);
 
         let drawn = render(&out);
-        let said = String::from_utf8_lossy(&drawn.stderr).into_owned();
+        let said = said(&drawn);
         assert!(drawn.status.success(), "{said}");
         let steps = offsets.len() - 1;
         assert!(said.contains(&format!("{steps} steps of it are recorded")), "{said}");
@@ -120,9 +119,9 @@ fn a_second_run_into_the_same_folder_stops_until_the_first_is_gone() {
     let first = start(&scene, &out);
     wait_until(|| rows(&out) >= 5);
     let second = start(&scene, &out).wait_with_output().unwrap();
-    let said = String::from_utf8_lossy(&second.stderr).into_owned();
-    assert_eq!(second.status.code(), Some(2), "{said}");
-    assert!(said.contains("another run is recording") && said.trim_end().lines().count() == 1, "{said}");
+    let told = said(&second);
+    assert_eq!(second.status.code(), Some(2), "{told}");
+    assert!(told.contains("another run is recording") && told.trim_end().lines().count() == 1, "{told}");
     // The first goes on, is drawn meanwhile, and its death frees the folder.
     let before = rows(&out);
     assert!(render(&out).status.success());
@@ -131,8 +130,8 @@ fn a_second_run_into_the_same_folder_stops_until_the_first_is_gone() {
     let text = std::fs::read_to_string(&scene).unwrap().replace("step_mm = 0.001", "step_mm = 5.0");
     std::fs::write(&scene, text).unwrap();
     let third = start(&scene, &out).wait_with_output().unwrap();
-    let said = String::from_utf8_lossy(&third.stderr).into_owned();
-    assert_eq!(third.status.code(), Some(0), "{said}");
-    assert!(said.contains("replaces the earlier recording") && said.contains("shapes.part/"), "{said}");
+    let told = said(&third);
+    assert_eq!(third.status.code(), Some(0), "{told}");
+    assert!(told.contains("replaces the earlier recording") && told.contains("shapes.part/"), "{told}");
     assert!(out.join("shapes.npz").exists() && !out.join("shapes.part").exists());
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::common::endowire;
+use crate::common::{endowire, said};
 use endowire_methods::NAMES;
 use serde_json::Value;
 
@@ -44,11 +44,11 @@ fn run(folder: &Path, method: &str, script: &str, out: &Path, more: &[&Path]) ->
 }
 
 fn done(output: &Output) {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{}", said(output));
 }
 
 fn refused(output: &Output, words: &[&str]) {
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    let text = said(output);
     assert_eq!(output.status.code(), Some(2), "{text}");
     assert_eq!(text.trim_end().lines().count(), 1, "one line is wanted: {text}");
     for word in words {

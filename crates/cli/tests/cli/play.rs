@@ -5,11 +5,11 @@ use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, Command, Stdio};
 
-use crate::common::endowire;
+use crate::common::{assets, endowire};
 use serde_json::{Value, json};
 
 fn scene(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/scenes").join(name).canonicalize().unwrap()
+    assets().join("scenes").join(name)
 }
 
 fn play(name: &str, record: &Path, more: &[&str]) -> Command {

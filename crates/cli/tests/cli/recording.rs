@@ -4,21 +4,16 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::common::endowire;
+use crate::common::{SHORT, endowire, said, scene_text};
 use npyz::NpyFile;
 use serde_json::Value;
 use zip::ZipArchive;
 
-fn assets() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets")
-}
-
 fn run(scene: &Path, out: &Path) -> (Option<i32>, Value) {
     let output =
         endowire().args(["run".as_ref(), scene, "--out".as_ref(), out, "--json".as_ref()]).output().unwrap();
-    let stdout = String::from_utf8(output.stdout).unwrap();
-    let summary = serde_json::from_str(&stdout)
-        .unwrap_or_else(|e| panic!("{e}: {stdout}{}", String::from_utf8_lossy(&output.stderr)));
+    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+    let summary = serde_json::from_str(&stdout).unwrap_or_else(|e| panic!("{e}: {stdout}{}", said(&output)));
     (output.status.code(), summary)
 }
 
@@ -39,14 +34,8 @@ fn integers(path: &Path, name: &str) -> Vec<i64> {
 
 /// A short run in the curved tube with two frames of each view.
 fn short_scene(folder: &Path) -> PathBuf {
-    let text = std::fs::read_to_string(assets().join("scenes/curved_tube.toml")).unwrap();
-    let assets = assets().canonicalize().unwrap();
-    let text = text
-        .replace("\"../", &format!("\"{}/", assets.display()))
-        .replace("advance_mm = 220.0", "advance_mm = 30.0")
-        .replace("size_px = [640, 640]", "size_px = [96, 64]");
     let path = folder.join("short.toml");
-    std::fs::write(&path, text).unwrap();
+    std::fs::write(&path, scene_text("curved_tube.toml", &SHORT)).unwrap();
     path
 }
 
@@ -147,7 +136,7 @@ fn recording_anew_replaces_the_old_recording_and_nothing_else() {
             .output()
             .unwrap();
         assert!(output.status.success());
-        String::from_utf8_lossy(&output.stderr).into_owned()
+        said(&output)
     };
     assert!(!told(&[]).contains("replaces"));
     let mine = ["notes.txt", "frames/step_by_step.png", "frames/step_000040_3d.png.bak", "frames/best.png"];
@@ -175,7 +164,7 @@ fn a_folder_with_other_files_is_used_only_by_force_and_keeps_them() {
         let mut command = endowire();
         command.args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()]);
         let output = command.args(more).output().unwrap();
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        (output.status.code(), said(&output))
     };
     let (code, said) = run(&[]);
     assert!(code == Some(2) && said.contains("--force"), "{said}");
@@ -199,7 +188,7 @@ fn a_folder_with_other_files_is_refused_and_left_as_it_is() {
     std::fs::write(out.join("steps.csv"), "left,right\n1,2\n").unwrap();
     let output =
         endowire().args(["run".as_ref(), scene.as_path(), "--out".as_ref(), out.as_path()]).output().unwrap();
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    let told = said(&output);
     assert_eq!(output.status.code(), Some(2), "{told}");
     assert!(told.contains("no earlier recording") && told.contains("recording"), "{told}");
     assert_eq!(std::fs::read_to_string(out.join("summary.json")).unwrap(), "mine");
@@ -265,10 +254,10 @@ fn a_reader_that_leaves_is_no_failure_and_a_full_disk_is() {
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let output = command(writer.into()).output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     let full = File::options().write(true).open("/dev/full").unwrap();
     let output = command(full.into()).output().unwrap();
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    let text = said(&output);
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(text.contains("standard output") && text.trim_end().lines().count() == 1, "{text}");
     // Nobody hears what is said: the exit code still tells.
@@ -296,7 +285,7 @@ fn an_interrupt_ends_the_run_after_the_step_under_way_and_keeps_the_recording() 
     }
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    let text = said(&output);
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(text.contains("interrupted"), "{text}");
     let told = summary(&out);
@@ -319,6 +308,6 @@ fn without_a_desktop_nothing_but_the_summary_is_said() {
         ])
         .output()
         .unwrap();
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    let text = said(&output);
     assert!(text.starts_with("curved_tube: 106 of 106 steps") && !text.contains("XDG"), "{text}");
 }

@@ -5,6 +5,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use crate::common::{SHORT, said, scene_text};
 use npyz::NpyFile;
 use serde_json::Value;
 
@@ -18,13 +19,7 @@ fn text(path: &Path) -> &str {
 
 /// A short run in the curved tube, recorded without frames.
 fn recorded(folder: &Path) -> (PathBuf, PathBuf) {
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap();
-    let scene = std::fs::read_to_string(assets.join("scenes/curved_tube.toml"))
-        .unwrap()
-        .replace("\"../", &format!("\"{}/", assets.display()))
-        .replace("advance_mm = 220.0", "advance_mm = 30.0")
-        .replace("size_px = [640, 640]", "size_px = [96, 64]")
-        .replace("views = [\"3d\", \"fluoro\"]", "views = []");
+    let scene = scene_text("curved_tube.toml", &SHORT).replace("[\"3d\", \"fluoro\"]", "[]");
     let path = folder.join("scene.toml");
     std::fs::write(&path, scene).unwrap();
     let run = folder.join("run");
@@ -33,7 +28,7 @@ fn recorded(folder: &Path) -> (PathBuf, PathBuf) {
 }
 
 fn written(output: &Output) -> Value {
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{}", said(output));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
@@ -144,8 +139,8 @@ fn drawing_anew_replaces_what_was_drawn_before_and_nothing_else() {
     let (_, run) = recorded(folder.path());
     let draw = |more: &[&str]| {
         let output = endowire(&[&["render", text(&run), "--view", "3d", "--every", "40"], more].concat());
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8_lossy(&output.stderr).into_owned()
+        assert!(output.status.success(), "{}", said(&output));
+        said(&output)
     };
     let said = draw(&["--from", "26", "--size", "48x32"]);
     assert!(!said.contains("replaces"), "{said}");
@@ -233,7 +228,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
     ];
     for (args, words) in cases {
         let output = endowire(&args);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let said = said(&output);
         assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
         assert!(!said.contains("panicked"), "{args:?}: {said}");
         for word in words {

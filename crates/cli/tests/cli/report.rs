@@ -3,16 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::common::endowire;
+use crate::common::{endowire, said, scene_text};
 
 /// A run in the curved tube with two frames, and its page.
 fn page(folder: &Path) -> PathBuf {
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap();
-    let text = std::fs::read_to_string(assets.join("scenes/curved_tube.toml")).unwrap();
-    let text = text
-        .replace("\"../", &format!("\"{}/", assets.display()))
-        .replace("advance_mm = 220.0", "advance_mm = 90.0")
-        .replace("size_px = [640, 640]", "size_px = [96, 64]");
+    let changes =
+        [("advance_mm = 220.0", "advance_mm = 90.0"), ("size_px = [640, 640]", "size_px = [96, 64]")];
+    let text = scene_text("curved_tube.toml", &changes);
     let (scene, run) = (folder.join("short.toml"), folder.join("run"));
     std::fs::write(&scene, text).unwrap();
     let done = endowire().arg("run").arg(&scene).arg("--quiet").arg("--out").arg(&run).output().unwrap();
@@ -37,7 +34,7 @@ fn a_page_is_whole_and_names_where_it_comes_from() {
     // A folder without a run is told.
     let none = endowire().arg("report").arg(folder.path()).output().unwrap();
     assert_eq!(none.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&none.stderr).contains("recorded run"));
+    assert!(said(&none).contains("recorded run"));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
-use crate::common::endowire;
+use crate::common::{endowire, said, scene_text};
 use serde_json::Value;
 
 /// The lines of the script, each of several steps: pushing, turning, pulling back.
@@ -25,18 +25,17 @@ fn scene(folder: &Path, name: &str, lines: usize, views: &str) -> PathBuf {
 
 /// The same with these lines.
 fn scene_of(folder: &Path, name: &str, lines: &[&str], views: &str) -> PathBuf {
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap();
-    let text = std::fs::read_to_string(assets.join("scenes/curved_tube_friction.toml")).unwrap();
+    let changes = [
+        ("size_px = [640, 640]", "size_px = [24, 16]"),
+        ("every = 40", "every = 7"),
+        ("[\"3d\", \"fluoro\"]", views),
+    ];
+    let text = scene_text("curved_tube_friction.toml", &changes);
     let (head, rest) = text.split_once("[[script]]").unwrap();
     let view = &rest[rest.find("[view]").unwrap()..];
     let script: String = lines.iter().map(|line| format!("[[script]]\n{line}\n\n")).collect();
-    let text = format!("{head}{script}{view}")
-        .replace("\"../", &format!("\"{}/", assets.display()))
-        .replace("size_px = [640, 640]", "size_px = [24, 16]")
-        .replace("every = 40", "every = 7")
-        .replace("views = [\"3d\", \"fluoro\"]", &format!("views = {views}"));
     let path = folder.join(name);
-    std::fs::write(&path, text).unwrap();
+    std::fs::write(&path, format!("{head}{script}{view}")).unwrap();
     path
 }
 
@@ -48,10 +47,6 @@ fn command(scene: &Path, out: &Path, more: &[&Path]) -> Command {
 
 fn run(scene: &Path, out: &Path, more: &[&Path]) -> Output {
     command(scene, out, more).output().unwrap()
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 fn done(output: &Output) {

@@ -1,8 +1,9 @@
 //! `endowire rod` and `endowire verify` as a user meets them: documents, exit codes, errors.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Output;
 
+use crate::common::{assets, said};
 use serde_json::Value;
 
 fn endowire(args: &[&str]) -> Output {
@@ -10,13 +11,12 @@ fn endowire(args: &[&str]) -> Output {
 }
 
 fn cases() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/cases")
+    assets().join("cases")
 }
 
 fn document(output: &Output) -> Value {
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|e| {
-        panic!("{e}: {}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
-    })
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|e| panic!("{e}: {}{}", String::from_utf8_lossy(&output.stdout), said(output)))
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -105,7 +105,7 @@ fn is_refused(case: &str, from: &str, to: &str, words: &[&str]) {
     let path = folder.path().join("spoilt.toml");
     std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
     let output = endowire(&["rod", path.to_str().unwrap(), "--json"]);
-    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    let message = said(&output);
     assert_eq!(output.status.code(), Some(2), "{to}: {message}");
     assert!(output.stdout.is_empty());
     assert_eq!(message.trim_end().lines().count(), 1, "one line is wanted: {message}");
@@ -147,14 +147,14 @@ fn bad_cases_are_refused_with_one_clear_line() {
 fn a_missing_case_is_named() {
     let output = endowire(&["rod", "no/such/case.toml"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("no/such/case.toml"));
+    assert!(said(&output).contains("no/such/case.toml"));
 }
 
 #[test]
 fn verify_tells_every_row_and_counts_them() {
     // The stress tables take minutes; they are run by hand.
     let output = endowire(&["verify", "--json"]);
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
     let table = document(&output);
     has_provenance(&table);
     let rows = table["cases"].as_array().unwrap();

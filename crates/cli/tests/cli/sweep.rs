@@ -5,18 +5,17 @@ use std::path::{Path, PathBuf};
 use std::process::{Output, Stdio};
 use std::time::Instant;
 
-use crate::common::endowire;
+use crate::common::{assets, endowire, said};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 
 /// A wire pushed a little way into a tube, and a sweep of 24 runs of it, some of which must fail: a device as thick as the tube.
 fn small(folder: &Path) -> PathBuf {
-    let vessel = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels/curved_tube.stl");
+    let vessel = assets().join("vessels/curved_tube.stl");
     let scene = format!(
-        "[vessel]\nfile = {:?}\n[[device.section]]\nlength_mm = 100.0\nradius_mm = 0.445\nbending_stiffness_nmm2 = 5.0\n\
+        "[vessel]\nfile = {vessel:?}\n[[device.section]]\nlength_mm = 100.0\nradius_mm = 0.445\nbending_stiffness_nmm2 = 5.0\n\
          [sheath]\nposition_mm = [0.0, 0.0, 1.0]\ndirection = [0.0, 0.0, 1.0]\n[method]\nname = \"kirchhoff\"\nelement_mm = 4.0\n\
-         [[script]]\nadvance_mm = 60.0\nstep_mm = 2.0\n",
-        vessel.canonicalize().unwrap()
+         [[script]]\nadvance_mm = 60.0\nstep_mm = 2.0\n"
     );
     std::fs::write(folder.join("scene.toml"), scene).unwrap();
     let sweep = "scene = \"scene.toml\"\nseed = 5\nsamples = 4\n\
@@ -40,7 +39,7 @@ fn sweep(file: &Path, out: &Path, more: &[&str]) -> Output {
 
 fn table(file: &Path, out: &Path, more: &[&str]) -> Vec<u8> {
     let output = sweep(file, out, more);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{}", said(&output));
     std::fs::read(out.join("runs.parquet")).unwrap()
 }
 
@@ -56,8 +55,7 @@ fn blocks(info: &str) -> Vec<String> {
 fn the_recipes_of_the_guide_give_the_table_of_one_piece() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
-    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap();
-    std::os::unix::fs::symlink(assets, root.join("assets")).unwrap();
+    std::os::unix::fs::symlink(assets(), root.join("assets")).unwrap();
     for (name, info) in [("tube.toml", "toml"), ("sweep.toml", "toml"), ("array.sh", "text")] {
         std::fs::write(root.join(name), &blocks(&format!("{info} file={name}"))[0]).unwrap();
     }
@@ -69,7 +67,7 @@ fn the_recipes_of_the_guide_give_the_table_of_one_piece() {
         shell.args(["-c", command]).current_dir(root).env("PATH", &path);
         shell.env("SLURM_ARRAY_TASK_ID", task).env("SLURM_ARRAY_TASK_COUNT", "4");
         let output = shell.output().unwrap();
-        assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{command}: {}", said(&output));
     };
     let consoles = blocks("console").join("\n");
     let merge = |out: &str| {
@@ -180,7 +178,7 @@ fn a_line_without_an_end_is_done_again() {
     // What is damaged otherwise is told.
     std::fs::write(&journal, [&text[..head + 1], b"{}\n"].concat()).unwrap();
     let output = sweep(&file, &out, &[]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = said(&output);
     assert!(output.status.code() == Some(2) && said.contains("line 2: missing field"), "{said}");
 }
 
@@ -192,7 +190,7 @@ fn shards_in_any_order_give_the_same_file() {
     let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
     for (shard, out) in [("1/3", &a), ("2/3", &b), ("3/3", &a)] {
         let output = sweep(&file, out, &["--shard", shard]);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{}", said(&output));
     }
     assert!(a.join("runs-1-of-3.parquet").exists() && a.join("runs-3-of-3.jsonl").exists());
     let merged = folder.path().join("merged.parquet");
@@ -201,11 +199,11 @@ fn shards_in_any_order_give_the_same_file() {
     };
     for order in [[&a, &b], [&b, &a]] {
         let output = merge(&order);
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{}", said(&output));
         assert!(std::fs::read(&merged).unwrap() == whole);
     }
     let output = merge(&[&b]);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = said(&output);
     assert!(output.status.code() == Some(2), "{said}");
     assert!(said.contains("16 of 24 runs are missing, run 0 the first"), "{said}");
 }
@@ -223,7 +221,7 @@ fn recordings_are_those_of_run() {
     let scene = out.join("recordings/000003.toml");
     let output =
         endowire().args(["run".as_ref(), scene.as_path(), "--out".as_ref(), &alone]).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{}", said(&output));
     for name in ["steps.csv", "shapes.npz"] {
         assert!(
             std::fs::read(ours.join(name)).unwrap() == std::fs::read(alone.join(name)).unwrap(),
@@ -278,7 +276,7 @@ fn what_is_wrong_with_a_sweep_is_told_on_one_line() {
         assert!(good.contains(from), "{from}");
         std::fs::write(&file, good.replacen(from, to, 1)).unwrap();
         let output = sweep(&file, &folder.path().join("out"), &[]);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let said = said(&output);
         assert_eq!(output.status.code(), Some(2), "{said}");
         assert!(said.contains(told) && said.trim_end().lines().count() == 1, "{told}: {said}");
     }

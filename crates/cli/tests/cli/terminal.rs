@@ -3,12 +3,8 @@
 use std::path::Path;
 use std::process::Output;
 
-use crate::common::endowire;
+use crate::common::{assets, endowire, said};
 use serde_json::Value;
-
-fn assets() -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets").canonicalize().unwrap()
-}
 
 fn told(output: &Output) -> String {
     String::from_utf8(output.stdout.clone()).unwrap()
@@ -44,7 +40,7 @@ fn a_new_scene_runs_at_once() {
     let wrong =
         endowire().arg("new").arg(folder.path().join("x")).args(["--vessel", "aortic_arc"]).output().unwrap();
     assert_eq!(wrong.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&wrong.stderr).contains("aortic_arch_ii"));
+    assert!(said(&wrong).contains("aortic_arch_ii"));
 }
 
 #[test]
@@ -103,7 +99,7 @@ fn moving_pictures_are_named_for_what_they_are() {
     };
     let output = draw("x.mpg");
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains(".gif"));
+    assert!(said(&output).contains(".gif"));
     assert!(!folder.path().join("x.mpg").exists());
     assert_eq!(draw("x.gif").status.code(), Some(0));
     assert!(std::fs::read(folder.path().join("x.gif")).unwrap().starts_with(b"GIF89a"));
