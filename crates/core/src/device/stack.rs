@@ -168,13 +168,13 @@ impl Stack {
     }
 
     /// Least bending stiffness, N·mm².
-    pub fn softest_nmm2(&self) -> f64 {
+    pub(crate) fn softest_nmm2(&self) -> f64 {
         let sections = self.devices().flat_map(Device::sections);
         sections.map(|s| s.bending_stiffness_nmm2).fold(f64::MAX, f64::min)
     }
 
     /// Outer radius of the outermost instrument at the tip of the line, mm, with these lengths inserted.
-    pub fn tip_radius_mm(&self, inserted_mm: impl Iterator<Item = f64>) -> f64 {
+    pub(crate) fn tip_radius_mm(&self, inserted_mm: impl Iterator<Item = f64>) -> f64 {
         let farthest = self.devices().zip(inserted_mm).max_by(|a, b| a.1.total_cmp(&b.1));
         farthest.map_or(0.0, |(device, _)| device.section_at(0.0).radius_mm)
     }

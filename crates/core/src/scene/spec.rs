@@ -137,7 +137,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     ///
     /// # Errors
     /// None or two of `vessel.file` and `vessel.tree`.
-    pub fn vessel_path(&self) -> Result<PathBuf> {
+    pub(crate) fn vessel_path(&self) -> Result<PathBuf> {
         match (&self.vessel.file, &self.vessel.tree) {
             (Some(path), None) | (None, Some(path)) => Ok(self.resolve(path)),
             (None, None) => Err(Error::parameter("vessel", "{}", "give vessel.file or vessel.tree")),

@@ -50,7 +50,7 @@ impl VesselSpec {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DeviceSpec {
-    /// A [`DeviceFile`].
+    /// A [`DeviceFile`](crate::device::DeviceFile).
     pub file: Option<PathBuf>,
     /// Sections, tip first.
     #[serde(default)]
@@ -63,7 +63,7 @@ pub struct DeviceSpec {
 pub struct InstrumentSpec {
     /// What script and recording call it.
     pub name: String,
-    /// A [`DeviceFile`].
+    /// A [`DeviceFile`](crate::device::DeviceFile).
     pub file: Option<PathBuf>,
     /// Sections, tip first.
     #[serde(default)]
