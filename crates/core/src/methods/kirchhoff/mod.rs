@@ -31,6 +31,8 @@ mod repeat;
 mod search;
 mod settle;
 mod slide;
+#[cfg(test)]
+mod slide_tests;
 mod slopes;
 mod state;
 mod substep;
