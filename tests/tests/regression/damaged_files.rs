@@ -146,20 +146,6 @@ fn damaged_sidecars() {
 }
 
 #[test]
-fn damaged_sweeps() {
-    let files = [
-        "scene = \"curved_tube.toml\"\nseed = 5\nsamples = 4\n[set]\n\"method.element_mm\" = 4.0\n\
-         [[axis]]\nkey = \"vessel.wall.friction\"\ngrid = { from = 0.0, to = 0.2, count = 3 }\n\
-         [[axis]]\nkey = \"device.section[0].bending_stiffness_nmm2\"\nlatin = { from = 1.0, to = 100.0, log = true }\n",
-        "scene = \"curved_tube.toml\"\nrecord = \"shapes\"\n\
-         [[axis]]\nkey = \"device.section[0].radius_mm\"\nlist = [0.3, 0.445]\n\
-         [[axis]]\nkey = \"seed\"\nrandom = { from = 1, to = 1000, integer = true }\n",
-    ];
-    let files = files.map(|text| text.as_bytes().to_vec());
-    reads_or_refuses(&files, &TOML, readers::sweep);
-}
-
-#[test]
 fn damaged_states() {
     let mut simulation = readers::simulation().unwrap();
     (0..10).for_each(|_| drop(simulation.step(Command::advance(2.0)).unwrap().clone()));
