@@ -8,6 +8,7 @@ use endowire_core::statics::{StaticCase, StaticProblem};
 use endowire_core::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, anatomy};
 use endowire_core::{Error, Result};
 use endowire_methods::Scene;
+use endowire_sweep::Sweep;
 use endowire_verify::surfaces::Sidecar;
 
 fn surface(bytes: &[u8], name: &str) -> Result<()> {
@@ -74,6 +75,15 @@ pub fn rod_case(bytes: &[u8]) -> Result<()> {
 /// As [`Sidecar::from_toml`].
 pub fn sidecar(bytes: &[u8]) -> Result<()> {
     Sidecar::from_toml(text(bytes)?, Path::new("a.toml")).map(drop)
+}
+
+/// A sweep; its scene is one of the assets.
+///
+/// # Errors
+/// As [`Sweep::from_toml`].
+pub fn sweep(bytes: &[u8]) -> Result<()> {
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/scenes/a.toml"));
+    Sweep::from_toml(text(bytes)?, path).map(drop)
 }
 
 /// The state of a simulation, restored into one of the same scene.

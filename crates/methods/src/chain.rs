@@ -47,7 +47,7 @@ impl Chain {
 
     /// Stiffness, N·mm/rad, of the joint at node `i`: half a segment on either side bends in series. Before the clamp there
     /// is nothing that bends, so that its joint stands for half a segment; a chain is then of second order.
-    pub fn joint_stiffness(&self, i: usize) -> f64 {
+    pub(crate) fn joint_stiffness(&self, i: usize) -> f64 {
         1.0 / (self.half_flexibility(i)
             + i.checked_sub(1).map_or(0.0, |before| self.half_flexibility(before)))
     }
@@ -57,7 +57,7 @@ impl Chain {
     }
 
     /// The force unit EI/L², N, of tolerances; of the stiffest segment.
-    pub fn force_unit(&self) -> f64 {
+    pub(crate) fn force_unit(&self) -> f64 {
         self.bending_nmm2.iter().fold(0.0, |a: f64, b| a.max(*b)) / self.length_mm().powi(2)
     }
 
@@ -74,7 +74,7 @@ impl Chain {
     }
 
     /// The clamp's triad, turned: tangent, first and second material direction as columns.
-    pub fn clamp_frame(&self) -> Rotation3<f64> {
+    pub(crate) fn clamp_frame(&self) -> Rotation3<f64> {
         let t = self.direction;
         // As core's rods have it: the axis farthest from the tangent, y for a tangent along x.
         let axis = if t.y.abs() <= t.x.abs().max(t.z.abs()) { Vec3::y() } else { Vec3::z() };

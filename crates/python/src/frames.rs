@@ -4,14 +4,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use endowire_core::Vec3;
 use endowire_core::vessel::Wall;
-use endowire_viewer::{self as viewer, Image, Moment, PixelFormat, ViewSpec};
+use endowire_viewer::{self as viewer, DevicePart, Image, Moment, PixelFormat, ViewSpec};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::array;
 use crate::document;
-use crate::error::{exception, refuse};
+use crate::error::exception;
 use crate::interrupt::interruptible;
 use crate::simulation::Simulation;
 use crate::vessel::Vessel;
@@ -55,14 +55,12 @@ impl Renderer {
     /// The instruments, made of what the table of the view says, if it says so.
     fn views(&self, py: Python<'_>, simulation: &Simulation) -> PyResult<Vec<viewer::DeviceView>> {
         let mut views = simulation.views(py);
-        let parts = self.with(py, |renderer| renderer.spec().device.clone());
-        match (parts.is_empty(), &mut views[..]) {
-            (true, _) => {}
-            (false, [view]) => view.parts = parts,
-            (false, _) => {
-                let mend = "describes one device, and there are several instruments: leave it out, and give materials in their files";
-                return Err(refuse("view.device", format!("{} parts", parts.len()), mend));
-            }
+        let several = views.len() > 1;
+        let own = self.with(py, |renderer| {
+            renderer.spec().own_parts(several).map(|parts| parts.map(<[DevicePart]>::to_vec))
+        });
+        if let Some(own) = own.map_err(exception)? {
+            views[0].parts = own;
         }
         Ok(views)
     }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use endowire_core::device::{self, Stack};
+use endowire_core::device::{self, Stack, line_mm};
 use endowire_core::insertion::{self, Command, InstrumentReport, LateralForce, WallProperties};
 use endowire_core::scene::SheathSpec;
 use endowire_core::vessel::NoStore;
@@ -68,7 +68,7 @@ impl Simulation {
     pub(crate) fn views(&self, py: Python<'_>) -> Vec<DeviceView> {
         let (shape, lengths_mm) =
             self.with(py, |simulation| (simulation.shape().clone(), simulation.report().lengths_mm()));
-        let line_mm = lengths_mm.iter().copied().fold(0.0, f64::max);
+        let line_mm = line_mm(lengths_mm.iter().copied());
         let each = self.instruments.iter().zip(lengths_mm);
         each.map(|(instrument, mm)| match mm {
             0.0 => DeviceView::default(),
@@ -316,7 +316,7 @@ pub(crate) fn tip_mm(simulation: &insertion::Simulation) -> Vec3 {
 /// The tip of each instrument.
 pub(crate) fn tips_mm(simulation: &insertion::Simulation) -> Vec<Vec3> {
     let lengths_mm = simulation.report().lengths_mm();
-    let line_mm = lengths_mm.iter().copied().fold(0.0, f64::max);
+    let line_mm = simulation.report().inserted_mm;
     points_at(simulation, &lengths_mm.iter().map(|mm| line_mm - mm).collect::<Vec<f64>>())
 }
 

@@ -194,7 +194,7 @@ def test_a_scene_of_several_is_stepped_run_and_drawn():
     labels = renderer.labels(simulation)
     assert len(labels["devices"]) == 2 and set(np.unique(labels["mask"]).tolist()) == {0, 1}
     made_of = scene.renderer({"device": [{"material": "platinum"}], "size_px": [16, 16], "backend": "cpu"})
-    with pytest.raises(endowire.InputError, match="view.device = 1 parts: describes one device"):
+    with pytest.raises(endowire.InputError, match="view.device = 1: describes one device"):
         made_of.render(simulation)
 
 

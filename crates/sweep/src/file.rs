@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use endowire_core::input::from_toml;
+use endowire_core::input::{from_toml, parse_toml};
 use endowire_core::{Error, Result};
 use endowire_methods::Scene;
 use serde::Deserialize;
@@ -60,7 +60,19 @@ impl Sweep {
     /// Names file, key and value of what does not fit: a key that the scene does not know, a value that its key does not take, an axis
     /// without values, more than a million runs.
     pub fn read(path: &Path) -> Result<Self> {
-        let (spec, text): (SweepSpec, String) = from_toml(path)?;
+        let (spec, text) = from_toml(path)?;
+        Self::of_spec(&spec, text, path)
+    }
+
+    /// Reads a sweep from the text of a file, from whose folder the path of its scene starts; errors call it `path`.
+    ///
+    /// # Errors
+    /// As [`Self::read`], less those of reading the file.
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
+        Self::of_spec(&parse_toml(text, path)?, text.to_owned(), path)
+    }
+
+    fn of_spec(spec: &SweepSpec, text: String, path: &Path) -> Result<Self> {
         let at_path = |error: Error| match error {
             Error::Parameter { .. } => Error::content(path, error.to_string()),
             other => other,
@@ -79,11 +91,11 @@ impl Sweep {
             try_in(&scene_path, &base, &key, value).map_err(|e| in_table(path, "[set]", &e))?;
             key.set(&mut base, value.clone()).map_err(at_path)?;
         }
-        let samples = samples(&spec).map_err(at_path)?;
+        let samples = samples(spec).map_err(at_path)?;
         let axes = spec.axis.iter().enumerate();
         let axes = axes.map(|(index, axis)| Axis::new(axis, index, spec.seed, samples));
         let axes: Vec<Axis> = axes.collect::<Result<_>>().map_err(at_path)?;
-        check_axes(&axes, &spec).map_err(at_path)?;
+        check_axes(&axes, spec).map_err(at_path)?;
         for (index, axis) in axes.iter().enumerate() {
             for value in axis.examples() {
                 let tried = try_in(&scene_path, &base, &axis.key, &value);

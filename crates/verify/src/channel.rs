@@ -30,7 +30,7 @@ pub(super) fn with_regions(
     let aside = cell * (6.0 * (radius / cell).max(1.0)).ceil();
     let low = Vec3::new(-aside, floor, -aside);
     let high = Vec3::new(length + aside, ceiling, aside);
-    let wall = Wall::from_surface(&cuboid(low, high, cell))?;
+    let wall = Wall::from_surface(&SurfaceMesh::cuboid(low, high, cell))?;
     // Planes need no other mesh, and the box's edges are not to be rounded.
     let properties = WallProperties {
         modulus_n_per_mm2: setup.modulus,
@@ -43,39 +43,4 @@ pub(super) fn with_regions(
     let h = bench.elements()[0].length;
     bench.plates = PLATES * setup.bending / (h * h * h);
     Ok(bench)
-}
-
-/// The six faces of a box, in cells of about `cell`.
-fn cuboid(low: Vec3, high: Vec3, cell: f64) -> SurfaceMesh {
-    let mut mesh = SurfaceMesh::default();
-    let size = high - low;
-    for axis in 0..3 {
-        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-        let count = |k: usize| (size[k] / cell).round().max(1.0) as u32;
-        let (m, n) = (count(a), count(b));
-        for side in [low[axis], high[axis]] {
-            let first = mesh.vertices_mm.len() as u32;
-            for i in 0..=m {
-                for j in 0..=n {
-                    let mut x = low;
-                    x[axis] = side;
-                    x[a] += size[a] * f64::from(i) / f64::from(m);
-                    x[b] += size[b] * f64::from(j) / f64::from(n);
-                    mesh.vertices_mm.push(x);
-                }
-            }
-            for i in 0..m {
-                for j in 0..n {
-                    let at = |i: u32, j: u32| first + i * (n + 1) + j;
-                    let (p, q, r, s) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
-                    if side == high[axis] {
-                        mesh.triangles.extend([[p, q, r], [p, r, s]]);
-                    } else {
-                        mesh.triangles.extend([[p, r, q], [p, s, r]]);
-                    }
-                }
-            }
-        }
-    }
-    mesh
 }

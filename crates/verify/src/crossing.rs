@@ -136,7 +136,7 @@ impl CrossingTest {
     }
 
     /// Whether the curve of a device passes through a triangle.
-    pub fn crosses_curve(&self, shape: &Shape) -> bool {
+    pub(crate) fn crosses_curve(&self, shape: &Shape) -> bool {
         self.crosses(&curve(shape))
     }
 }

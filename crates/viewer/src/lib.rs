@@ -40,6 +40,7 @@ mod gpu;
 mod gpu;
 mod output;
 mod patient;
+mod piece;
 mod pushed;
 mod renderer;
 mod scene;

@@ -1,6 +1,6 @@
 //! What is pushed, as the viewer sees it: the device, or each of several instruments.
 
-use endowire_core::device::{Device, Stack};
+use endowire_core::device::{Device, Stack, line_mm};
 use endowire_core::methods::MethodChoice;
 use endowire_core::scene::SceneOf;
 use endowire_core::shape::Shape;
@@ -38,20 +38,15 @@ impl Pushed {
                 None => section_parts(device),
             });
         }
-        match (spec.device.is_empty(), stack.is_several()) {
-            (true, _) => {}
-            (false, false) => parts[0].clone_from(&spec.device),
-            (false, true) => {
-                let mend = "describes one device, and the scene has several instruments: leave it out, and give materials in their files";
-                return Err(Error::parameter("view.device", spec.device.len(), mend));
-            }
+        if let Some(own) = spec.own_parts(stack.is_several())? {
+            parts[0] = own.to_vec();
         }
         Ok(Self { stack, parts })
     }
 
     /// Views of all that is in on this line, where these lengths are.
     pub fn views(&self, shape: &Shape, inserted_mm: &[f64]) -> Vec<DeviceView> {
-        let line_mm = inserted_mm.iter().copied().fold(0.0, f64::max);
+        let line_mm = line_mm(inserted_mm.iter().copied());
         let each = self.stack.devices().zip(&self.parts).zip(inserted_mm).filter(|(_, mm)| **mm > 0.0);
         let view = |((device, parts), mm): ((&Device, &Vec<DevicePart>), &f64)| {
             DeviceView::of_device(&shape.behind(line_mm - mm), device, parts)

@@ -22,6 +22,7 @@ pub(crate) trait ThreeDEngine: Send {
 /// The engines of the wanted views, all on the same processor.
 pub(crate) struct Engines {
     pub(crate) paths: Option<Box<dyn PathEngine>>,
+    /// That of the CPU is made with the first frame.
     pub(crate) three_d: Option<Box<dyn ThreeDEngine>>,
     /// Name for people.
     pub(crate) name: String,
@@ -136,6 +137,9 @@ impl Renderer {
         let frames = self.with_fallback(|setup, engines, fluoro| {
             let c_arm = setup.c_arm.as_ref().filter(|_| setup.spec.camera.c_arm);
             let solids = Solids { devices: &devices, contacts: &contacts, c_arm };
+            if engines.three_d.is_none() {
+                engines.three_d = cpu::three_d(setup);
+            }
             let mut three_d = engines.three_d.as_mut().map(|engine| engine.frame(&solids)).transpose()?;
             if let (Some(image), Some(camera)) = (&mut three_d, &setup.camera) {
                 if setup.spec.camera.scale_bar {
@@ -347,7 +351,7 @@ mod tests {
         fn pieces(
             &mut self,
             _: &CArm,
-            _: &[(crate::device::Piece, f64)],
+            _: &[(crate::piece::Piece, f64)],
             _: &mut [f32],
             _: &mut Vec<u32>,
         ) -> Result<()> {

@@ -1,7 +1,7 @@
 //! `endowire export`: a recorded run for other programs.
 
 use endowire_core::Vec3;
-use endowire_core::device::Stack;
+use endowire_core::device::{Stack, line_mm};
 use endowire_methods::Scene;
 
 use crate::args::ExportArgs;
@@ -57,7 +57,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
 /// The line of each instrument that is in, and the contacts.
 fn step_data(recording: &Recording, row: usize, stack: &Stack, lengths_mm: &[f64]) -> PolyData {
     let line = recording.shape(row);
-    let line_mm = lengths_mm.iter().copied().fold(0.0, f64::max);
+    let line_mm = line_mm(lengths_mm.iter().copied());
     let mut data = PolyData::default();
     let (mut of, mut from_tip_mm, mut radius_mm) = (Vec::new(), Vec::new(), Vec::new());
     let (mut tangents, mut forces_n) = (Vec::new(), Vec::new());

@@ -86,7 +86,7 @@ impl<const C: usize> Factor<C> {
     }
 
     /// Factors `matrix` with `factor` times `shift` and returns its inertia.
-    pub fn factor_shifted(
+    pub(crate) fn factor_shifted(
         &mut self,
         matrix: &BandMatrix<C>,
         shift: &Shift,
@@ -104,7 +104,7 @@ impl<const C: usize> Factor<C> {
     }
 
     /// As [`Self::factor_solve`] with `factor` times `shift` added to the matrix.
-    pub fn factor_solve_shifted(
+    pub(crate) fn factor_solve_shifted(
         &mut self,
         matrix: &BandMatrix<C>,
         shift: &Shift,

@@ -25,7 +25,7 @@ impl<const C: usize> BandLu<C> {
     const STRIDE: usize = 3 * (C - 1) + 1;
 
     /// Takes memory for matrices of this dimension.
-    pub fn reserve(&mut self, dimension: usize) {
+    pub(crate) fn reserve(&mut self, dimension: usize) {
         self.rows.reserve((dimension * Self::STRIDE).saturating_sub(self.rows.len()));
         self.pivots.reserve(dimension.saturating_sub(self.pivots.len()));
     }

@@ -49,7 +49,7 @@ impl<const C: usize> BandMatrix<C> {
     }
 
     /// Begins a matrix that is put together with [`Self::lay_blocks`]: clears the first block and the last.
-    pub fn begin_blocks(&mut self) {
+    pub(crate) fn begin_blocks(&mut self) {
         let last = self.rows.len() - Self::BLOCK;
         self.rows[..Self::BLOCK].fill([0.0; C]);
         self.rows[last..].fill([0.0; C]);
@@ -58,7 +58,7 @@ impl<const C: usize> BandMatrix<C> {
     /// Adds the upper triangle of the rows of two blocks, the first of which begins at row `at`: what couples one node with the
     /// next, node by node. What was in the second block before is overwritten.
     #[inline]
-    pub fn lay_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
+    pub(crate) fn lay_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
         let targets = &mut self.rows[at..at + C];
         for i in 0..Self::BLOCK {
             for k in 0..C {
@@ -74,7 +74,7 @@ impl<const C: usize> BandMatrix<C> {
     }
 
     /// Adds the upper triangle of the rows of two blocks, the first of which begins at row `at`.
-    pub fn add_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
+    pub(crate) fn add_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
         let (first, second) = self.rows[at..at + C].split_at_mut(Self::BLOCK);
         for (target, row) in first.iter_mut().zip(rows) {
             target.iter_mut().zip(row).for_each(|(t, r)| *t += r);
@@ -98,19 +98,6 @@ impl<const C: usize> BandMatrix<C> {
     pub fn add_shift(&mut self, shift: &Shift, factor: f64) {
         for (i, row) in self.rows.iter_mut().enumerate() {
             shift.add_to(i, factor, row);
-        }
-    }
-
-    /// `y = A x`.
-    pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
-        y.fill(0.0);
-        for (i, row) in self.rows.iter().enumerate() {
-            let begin = i / Self::BLOCK * Self::BLOCK;
-            y[i] += row[i - begin] * x[i];
-            for j in i + 1..(begin + C).min(self.rows.len()) {
-                y[i] += row[j - begin] * x[j];
-                y[j] += row[j - begin] * x[i];
-            }
         }
     }
 }

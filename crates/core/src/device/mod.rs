@@ -14,7 +14,7 @@ mod stack;
 pub use file::{DeviceFile, Kind};
 pub use part::{Coat, CutError, Part};
 pub(crate) use stack::LENGTH_SLACK_MM;
-pub use stack::{Instrument, Stack};
+pub use stack::{Instrument, Stack, line_mm};
 
 use serde::{Deserialize, Serialize};
 

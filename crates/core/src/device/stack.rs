@@ -168,20 +168,20 @@ impl Stack {
     }
 
     /// Least bending stiffness, N·mm².
-    pub fn softest_nmm2(&self) -> f64 {
+    pub(crate) fn softest_nmm2(&self) -> f64 {
         let sections = self.devices().flat_map(Device::sections);
         sections.map(|s| s.bending_stiffness_nmm2).fold(f64::MAX, f64::min)
     }
 
     /// Outer radius of the outermost instrument at the tip of the line, mm, with these lengths inserted.
-    pub fn tip_radius_mm(&self, inserted_mm: impl Iterator<Item = f64>) -> f64 {
+    pub(crate) fn tip_radius_mm(&self, inserted_mm: impl Iterator<Item = f64>) -> f64 {
         let farthest = self.devices().zip(inserted_mm).max_by(|a, b| a.1.total_cmp(&b.1));
         farthest.map_or(0.0, |(device, _)| device.section_at(0.0).radius_mm)
     }
 
     /// Outer radius of the outermost instrument at a place so far from the tip of the line, mm, with these lengths inserted.
     pub fn felt_radius_mm(&self, inserted_mm: &[f64], from_tip_mm: f64) -> f64 {
-        let line_mm = inserted_mm.iter().copied().fold(0.0, f64::max);
+        let line_mm = line_mm(inserted_mm.iter().copied());
         let own = |inserted: f64| from_tip_mm - (line_mm - inserted);
         let there = self.devices().zip(inserted_mm).rev().find(|(_, inserted)| own(**inserted) >= 0.0);
         there.map_or(0.0, |(device, inserted)| device.section_at(own(*inserted)).radius_mm)
@@ -204,6 +204,11 @@ impl Stack {
         }
         Ok(())
     }
+}
+
+/// Length of the line that instruments with these lengths inserted make, mm: that of the one that is farthest in.
+pub fn line_mm(inserted_mm: impl IntoIterator<Item = f64>) -> f64 {
+    inserted_mm.into_iter().fold(0.0, f64::max)
 }
 
 /// Whether the tail of an inner instrument stays out of that of the outer one, where its hand is.

@@ -20,4 +20,4 @@ pub use script::{
     LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until, script_commands,
 };
 pub use sheath::Sheath;
-pub use simulation::{Simulation, Surroundings, check_commands};
+pub use simulation::{Simulation, Surroundings};

@@ -231,24 +231,6 @@ pub(super) fn check_command(command: Command, inserted_mm: f64, device_mm: f64) 
     Ok(())
 }
 
-/// Checks a whole list of commands against a device before the first is carried out.
-///
-/// # Errors
-/// As [`Simulation::step`], naming the command's number.
-pub fn check_commands(list: &[Command], device: &Device) -> Result<()> {
-    let mut inserted_mm = 0.0;
-    for (index, command) in list.iter().enumerate() {
-        check_command(*command, inserted_mm, device.length_mm()).map_err(|error| match error {
-            Error::Parameter { name, value, mend } => {
-                Error::Parameter { name: format!("script step {}: {name}", index + 1), value, mend }
-            }
-            other => other,
-        })?;
-        inserted_mm += command.advance_mm;
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

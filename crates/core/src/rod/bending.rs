@@ -37,7 +37,7 @@ pub struct Partials {
 
 /// The density alone.
 #[inline]
-pub fn bending_value(y: &Vec3, z: &Vec3) -> f64 {
+pub(crate) fn bending_value(y: &Vec3, z: &Vec3) -> f64 {
     let a = 1.0 / y.dot(y);
     // The cross product keeps digits where z is nearly along y; AC − B² would lose them.
     0.5 * y.cross(z).norm_squared() * a * a * a.sqrt()

@@ -26,7 +26,7 @@ impl Material {
 
     /// Whether there is an instrument.
     #[inline]
-    pub fn is_present(&self) -> bool {
+    pub(crate) fn is_present(&self) -> bool {
         self.torsion != [0.0; 3]
     }
 
@@ -68,7 +68,7 @@ pub struct ElementData {
 
 impl ElementData {
     /// No instrument and no length.
-    pub const EMPTY: Self =
+    pub(crate) const EMPTY: Self =
         Self { length: 0.0, bending: [0.0; 3], flexibility: 0.0, materials: [Material::NONE; MAX_ANGLES] };
 
     /// An inextensible element of one instrument.

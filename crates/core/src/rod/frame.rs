@@ -47,7 +47,7 @@ impl Frame {
     }
 
     /// The smallest rotation that takes this triad's tangent to `t`, applied to it.
-    pub fn transported_to(&self, t: &Vec3) -> Self {
+    pub(crate) fn transported_to(&self, t: &Vec3) -> Self {
         let c = 1.0 + self.t.dot(t);
         let u = self.u - (self.t + t) * (self.u.dot(t) / c);
         Self::new(*t, Some(u))
@@ -104,7 +104,7 @@ pub(super) fn normalised(w: &Vec3) -> Vec3 {
 ///
 /// With Q the components of `second` in `first`: atan2(Q₃₂ − Q₂₃, Q₂₂ + Q₃₃), the twist of the swing–twist
 /// decomposition; the reference twist of Bergou et al. 2010, sec. 6.
-pub fn reference_twist(first: &Frame, second: &Frame) -> f64 {
+pub(crate) fn reference_twist(first: &Frame, second: &Frame) -> f64 {
     let (u, v) = (first.local(&second.u), first.local(&second.v));
     (u.z - v.y).atan2(u.y + v.z)
 }

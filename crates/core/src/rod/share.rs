@@ -18,7 +18,7 @@ pub fn shares(from: f64, to: f64) -> [f64; 3] {
 
 impl Material {
     /// Adds a share of a section to what else an instrument is made of there; rest states are means, weighed by stiffness.
-    pub fn add_share(&mut self, part: &Self, shares: &[f64; 3]) {
+    pub(crate) fn add_share(&mut self, part: &Self, shares: &[f64; 3]) {
         for k in 0..3 {
             let (bending, torsion) = (shares[k] * part.bending[k], shares[k] * part.torsion[k]);
             let (all_bending, all_torsion) = (self.bending[k] + bending, self.torsion[k] + torsion);

@@ -70,7 +70,7 @@ impl RodState {
     }
 
     /// The same centre line with room for `sets` of angles, at least one, all of them those of the first.
-    pub fn with_sets(mut self, sets: usize) -> Self {
+    pub(crate) fn with_sets(mut self, sets: usize) -> Self {
         let repeat = |list: &[f64]| list.iter().flat_map(|angle| std::iter::repeat_n(*angle, sets)).collect();
         self.angles = repeat(&self.angles);
         self.bubbles = repeat(&self.bubbles);
@@ -111,12 +111,12 @@ impl RodState {
     }
 
     /// Twist of the instrument in a `set` of angles from the first node to node `i`, rad, any number of turns.
-    pub fn twist_to(&self, i: usize, set: usize) -> f64 {
+    pub(crate) fn twist_to(&self, i: usize, set: usize) -> f64 {
         self.angle(i, set) - self.angle(0, set) + self.reference_twists[..i].iter().sum::<f64>()
     }
 
     /// The material triad (t, d₁, d₂) of node `i`, of the first instrument that has angles.
-    pub fn material_frame(&self, i: usize) -> Frame {
+    pub(crate) fn material_frame(&self, i: usize) -> Frame {
         self.frames[i].turned(self.angle(i, 0))
     }
 
@@ -132,7 +132,7 @@ impl RodState {
     }
 
     /// Takes memory for `elements` elements, so that a rod may grow to them without allocating.
-    pub fn reserve(&mut self, elements: usize) {
+    pub(crate) fn reserve(&mut self, elements: usize) {
         let more = |len: usize| (elements + 1).saturating_sub(len);
         self.frames.reserve(more(self.frames.len()));
         self.angles.reserve((self.sets().max(1) * (elements + 1)).saturating_sub(self.angles.len()));
@@ -144,7 +144,7 @@ impl RodState {
     }
 
     /// Largest distance of a node from where it is in another state of the same size, mm.
-    pub fn farthest_mm(&self, other: &Self) -> f64 {
+    pub(crate) fn farthest_mm(&self, other: &Self) -> f64 {
         self.positions.iter().zip(&other.positions).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
     }
 
@@ -209,7 +209,7 @@ impl RodState {
 
     /// Axial forces of inextensible elements after the Newton step `d` from `base`: they are multipliers and take their full step,
     /// however far the state moves. (Those of stretchable elements move with the state.)
-    pub fn take_tensions<const C: usize>(&mut self, elements: &[ElementData], base: &Self, d: &[f64]) {
+    pub(crate) fn take_tensions<const C: usize>(&mut self, elements: &[ElementData], base: &Self, d: &[f64]) {
         for (e, data) in elements.iter().enumerate() {
             if data.flexibility == 0.0 {
                 self.tensions[e] = base.tensions[e] + d[Layout::<C>.tension(e)];

@@ -54,7 +54,7 @@ pub struct TorsionDensity {
 
 /// The two energies alone: (bend, twist).
 #[inline]
-pub fn torsion_value(y: &Vec3, z: &Vec3, phi: f64, dphi: f64, p: &TorsionInput) -> (f64, f64) {
+pub(crate) fn torsion_value(y: &Vec3, z: &Vec3, phi: f64, dphi: f64, p: &TorsionInput) -> (f64, f64) {
     let a = y.norm();
     let g = 1.0 / (a * (a + y.x));
     let (sin, cos) = phi.sin_cos();

@@ -51,5 +51,7 @@
 //! ```
 
 mod spec;
+mod tables;
 
-pub use spec::{DeviceSpec, InstrumentSpec, Scene, SceneOf, SheathSpec, VesselSpec};
+pub use spec::{Scene, SceneOf};
+pub use tables::{DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};

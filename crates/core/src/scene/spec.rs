@@ -1,18 +1,17 @@
-//! The tables of a scene file and what they build.
+//! A scene file and what it builds.
 
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-use crate::device::{Device, DeviceFile, Instrument, Section, Stack};
+use super::tables::{DEPTH_MM, DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};
+use crate::device::{Device, DeviceFile, Instrument, Section, Stack, line_mm};
 use crate::input::{from_toml, parse_toml};
-use crate::insertion::{
-    Command, Move, Script, ScriptLine, Sheath, Simulation, WallProperties, script_commands,
-};
+use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
-use crate::vessel::{CentrelineTree, Resolution, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint};
-use crate::{Error, Result, Vec3};
+use crate::vessel::{CentrelineTree, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint};
+use crate::{Error, Result};
 
 /// A scene whose `[method]` is one of this crate's: the exact rod.
 pub type Scene = SceneOf<OwnMethod>;
@@ -62,140 +61,8 @@ struct ScriptFile {
     script: Vec<ScriptLine>,
 }
 
-/// `[vessel]`: a surface file, or a centre-line tree to build the surface from.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct VesselSpec {
-    /// Surface mesh (STL, OBJ or PLY).
-    pub file: Option<PathBuf>,
-    /// Millimetres per unit of the surface file; 1 if absent.
-    pub unit_mm: Option<f64>,
-    /// Centre-line table (x y z radius parent, mm) that the wall is built from; rows may name targets.
-    pub tree: Option<PathBuf>,
-    /// Centre-line table beside `file`, for its targets.
-    pub centreline: Option<PathBuf>,
-    /// Edge length of the wall built from the tree, mm.
-    pub edge_mm: Option<f64>,
-    /// Number of triangles of the wall built from the tree, in place of `edge_mm`.
-    pub triangles: Option<usize>,
-    /// How the wall yields and rubs.
-    #[serde(default)]
-    pub wall: WallProperties,
-}
-
-impl VesselSpec {
-    /// How fine the wall is built from `tree`.
-    fn resolution(&self, tree: &CentrelineTree) -> Result<Resolution> {
-        match (self.edge_mm, self.triangles) {
-            (Some(edge_mm), None) => Ok(Resolution::EdgeMm(edge_mm)),
-            (None, Some(triangles)) => Ok(Resolution::Triangles(triangles)),
-            (None, None) => Ok(Resolution::fitting(tree)),
-            (Some(edge_mm), Some(_)) => Err(Error::parameter(
-                "vessel.edge_mm",
-                edge_mm,
-                "vessel.triangles is given too: keep one of the two",
-            )),
-        }
-    }
-}
-
-/// `[device]`: sections here, or a file that has them.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct DeviceSpec {
-    /// A [`DeviceFile`].
-    pub file: Option<PathBuf>,
-    /// Sections, tip first.
-    #[serde(default)]
-    pub section: Vec<Section>,
-}
-
-/// `[[instrument]]`: one of several that lie in one another, with sections here, or a file that has them.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct InstrumentSpec {
-    /// What script and recording call it.
-    pub name: String,
-    /// A [`DeviceFile`].
-    pub file: Option<PathBuf>,
-    /// Sections, tip first.
-    #[serde(default)]
-    pub section: Vec<Section>,
-    /// Length that is in at the start, mm.
-    #[serde(default)]
-    pub inserted_mm: f64,
-    /// Whether its tip may be farther in than that of the instrument in it; it may if absent.
-    #[serde(default = "yes")]
-    pub may_lead: bool,
-    /// Coulomb coefficient of friction between it and the instruments outside it, along the line; 0 is none and costs nothing.
-    #[serde(default)]
-    pub friction: f64,
-}
-
-fn yes() -> bool {
-    true
-}
-
-/// `[sheath]`: an opening of the vessel, or a point and a direction.
-#[derive(Debug, Clone, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SheathSpec {
-    /// Number of an opening; the device enters in its middle, against its outward direction.
-    pub opening: Option<usize>,
-    /// How far inside the opening the mouth lies, mm; 1 if absent.
-    pub depth_mm: Option<f64>,
-    /// Mouth of the sheath, mm.
-    pub position_mm: Option<[f64; 3]>,
-    /// Direction of insertion, any length.
-    pub direction: Option<[f64; 3]>,
-    /// Friction of the valve, N; 0 is none and costs nothing.
-    #[serde(default)]
-    pub friction_n: f64,
-    /// Coulomb coefficient in the mouth; 0 is none and costs nothing.
-    #[serde(default)]
-    pub friction: f64,
-}
-
 /// Instruments that are in at the start are pushed there together, the farthest by so much a step, mm.
 const START_MM: f64 = 1.0;
-
-/// Depth of the sheath's mouth inside an opening, mm, unless the scene says otherwise: clear of the rim.
-const DEPTH_MM: f64 = 1.0;
-
-impl SheathSpec {
-    /// The keys that are given, for messages.
-    fn given(&self) -> String {
-        let keys = [
-            ("opening", self.opening.is_some()),
-            ("depth_mm", self.depth_mm.is_some()),
-            ("position_mm", self.position_mm.is_some()),
-            ("direction", self.direction.is_some()),
-        ];
-        let given: Vec<&str> = keys.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
-        format!("{{{}}}", given.join(", "))
-    }
-
-    /// The sheath in `wall`.
-    ///
-    /// # Errors
-    /// An opening that is not there, keys that contradict each other, values that are not finite or out of range.
-    pub fn place(&self, wall: &Wall) -> Result<Sheath> {
-        let sheath = match (self.opening, self.position_mm, self.direction) {
-            (Some(opening), None, None) => {
-                Sheath::at_opening(wall, opening, self.depth_mm.unwrap_or(DEPTH_MM))
-            }
-            (None, Some(position), Some(direction)) if self.depth_mm.is_none() => {
-                Sheath::new(Vec3::from(position), Vec3::from(direction))
-            }
-            _ => Err(Error::parameter(
-                "sheath",
-                self.given(),
-                "give either opening (with depth_mm if wanted) or position_mm and direction",
-            )),
-        }?;
-        sheath.rubbing(self.friction_n, self.friction)
-    }
-}
 
 /// A file that cannot be read, with the key that names it in front.
 fn missing(key: &str, error: Error) -> Error {
@@ -270,7 +137,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     ///
     /// # Errors
     /// None or two of `vessel.file` and `vessel.tree`.
-    pub fn vessel_path(&self) -> Result<PathBuf> {
+    pub(crate) fn vessel_path(&self) -> Result<PathBuf> {
         match (&self.vessel.file, &self.vessel.tree) {
             (Some(path), None) | (None, Some(path)) => Ok(self.resolve(path)),
             (None, None) => Err(Error::parameter("vessel", "{}", "give vessel.file or vessel.tree")),
@@ -549,7 +416,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
 
 /// Pushes these lengths in together, from nothing inserted.
 fn push_in(simulation: &mut Simulation, lengths_mm: &[f64]) -> Result<()> {
-    let steps = (lengths_mm.iter().copied().fold(0.0, f64::max) / START_MM).ceil();
+    let steps = (line_mm(lengths_mm.iter().copied()) / START_MM).ceil();
     let part = |(instrument, mm): (usize, &f64)| Move { instrument, command: Command::advance(mm / steps) };
     let moves: Vec<Move> = lengths_mm.iter().enumerate().filter(|(_, mm)| **mm > 0.0).map(part).collect();
     for _ in 0..steps as usize {

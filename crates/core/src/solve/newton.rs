@@ -62,7 +62,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Takes memory for rods of up to `elements` elements.
-    pub fn reserve(&mut self, elements: usize) {
+    pub(crate) fn reserve(&mut self, elements: usize) {
         let now = self.trial.elements();
         self.resize(elements);
         self.resize(now);

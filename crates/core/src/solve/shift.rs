@@ -34,7 +34,11 @@ impl<const C: usize> Newton<C> {
 
     /// Newton's step from the assembled state, with the shift that is always on, and the inertia of its matrix; `None` where that
     /// cannot be factored.
-    pub fn full_step(&mut self, elements: &[ElementData], supports: &Supports) -> Option<(Inertia, &[f64])> {
+    pub(crate) fn full_step(
+        &mut self,
+        elements: &[ElementData],
+        supports: &Supports,
+    ) -> Option<(Inertia, &[f64])> {
         let inertia = self.factor(elements, supports)?;
         self.right_hand_side();
         self.factor.solve(&mut self.step);
@@ -51,7 +55,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// The shift that is always on.
-    pub fn whisper(elements: &[ElementData]) -> f64 {
+    pub(crate) fn whisper(elements: &[ElementData]) -> f64 {
         let length: f64 = elements.iter().map(|e| e.length).sum();
         // EI averaged as springs in series: the stiffness the whole rod shows.
         let soft: f64 = elements.iter().map(|e| e.length / e.bending[1]).sum();

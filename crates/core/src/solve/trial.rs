@@ -28,7 +28,12 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Potential energy of any state.
-    pub fn energy_at(&self, elements: &[ElementData], external: &mut dyn External, state: &RodState) -> f64 {
+    pub(crate) fn energy_at(
+        &self,
+        elements: &[ElementData],
+        external: &mut dyn External,
+        state: &RodState,
+    ) -> f64 {
         let mut stored = 0.0;
         for (e, data) in elements.iter().enumerate() {
             stored += element_energy::<C>(data, &state.element::<C>(e)).total();

@@ -231,7 +231,7 @@ impl Default for Solver {
 
 impl Rod {
     /// Length of the centre line.
-    pub fn line_length(&self) -> f64 {
+    pub(crate) fn line_length(&self) -> f64 {
         self.instrument.iter().map(|i| i.inserted).fold(self.length, f64::max)
     }
 }

@@ -19,6 +19,38 @@ impl SurfaceMesh {
         self.triangles[index].map(|v| self.vertices_mm[v as usize])
     }
 
+    /// The six faces of a box between two corners, in cells of about `cell_mm`, outwards. Faces share no vertices: weld them where they must.
+    pub fn cuboid(low: Vec3, high: Vec3, cell_mm: f64) -> Self {
+        let mut mesh = Self::default();
+        let size = high - low;
+        for axis in 0..3 {
+            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+            let count = |k: usize| (size[k] / cell_mm).round().max(1.0) as u32;
+            let (m, n) = (count(a), count(b));
+            for far in [false, true] {
+                let first = mesh.vertices_mm.len() as u32;
+                for i in 0..=m {
+                    for j in 0..=n {
+                        let mut x = low;
+                        x[axis] = if far { high[axis] } else { low[axis] };
+                        x[a] += size[a] * f64::from(i) / f64::from(m);
+                        x[b] += size[b] * f64::from(j) / f64::from(n);
+                        mesh.vertices_mm.push(x);
+                    }
+                }
+                for i in 0..m {
+                    for j in 0..n {
+                        let at = |i: u32, j: u32| first + i * (n + 1) + j;
+                        let (p, q, r, s) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+                        let both = if far { [[p, q, r], [p, r, s]] } else { [[p, r, q], [p, s, r]] };
+                        mesh.triangles.extend(both);
+                    }
+                }
+            }
+        }
+        mesh
+    }
+
     /// Smallest and largest coordinates, or `None` without vertices.
     pub fn bounds_mm(&self) -> Option<(Vec3, Vec3)> {
         let first = *self.vertices_mm.first()?;

@@ -83,7 +83,7 @@ mod tests {
         let wall = tube();
         let mut moved = wall.mesh().clone();
         moved.vertices_mm[7].x = f64::from_bits(moved.vertices_mm[7].x.to_bits() + 1);
-        let moved_wall = Wall::from_sound(moved.clone()).unwrap();
+        let moved_wall = Wall::welded(&moved).unwrap();
         let coarse = Conditioning { deviation_mm: 0.2, ..Conditioning::default() };
         let fewer = Conditioning { most_triangles: 1000, ..Conditioning::default() };
         let generated = |tree, resolution| WallRecipe::Generated { tree, resolution };

@@ -141,21 +141,6 @@ impl Wall {
         Self::mended(surface, false)
     }
 
-    /// A wall of a surface that is sound already: triangles and vertices keep their numbers. For surfaces that the program
-    /// makes; one that was given may be faulty.
-    ///
-    /// # Errors
-    /// [`Error::Mesh`] without triangles, for an index that is out of range or a coordinate that is not finite.
-    pub fn from_sound(mesh: SurfaceMesh) -> Result<Self> {
-        validate(&mesh)?;
-        let report = RepairReport {
-            triangles_given: mesh.triangles.len(),
-            vertices_given: mesh.vertices_mm.len(),
-            ..Default::default()
-        };
-        Ok(Self::finished(mesh, Edges::default(), report))
-    }
-
     fn mended(surface: &SurfaceMesh, whole: bool) -> Result<Self> {
         validate(surface)?;
         let mut report = RepairReport {

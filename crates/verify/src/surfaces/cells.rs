@@ -3,15 +3,15 @@
 use serde::Serialize;
 
 /// Increments of the hand, mm.
-pub const INCREMENTS_MM: [f64; 3] = [0.5, 1.0, 2.0];
+const INCREMENTS_MM: [f64; 3] = [0.5, 1.0, 2.0];
 /// Element lengths, mm.
-pub const ELEMENTS_MM: [f64; 3] = [1.0, 2.0, 4.0];
+const ELEMENTS_MM: [f64; 3] = [1.0, 2.0, 4.0];
 /// Coefficients of friction: none, hydrophilic, bare.
-pub const FRICTIONS: [f64; 3] = [0.0, 0.1, 0.3];
+const FRICTIONS: [f64; 3] = [0.0, 0.1, 0.3];
 /// Moduli of the wall, N/mm²: an artery's, a phantom's, and one that is rigid to a wire.
-pub const MODULI_N_PER_MM2: [f64; 3] = [1.0, 100.0, 1e4];
+const MODULI_N_PER_MM2: [f64; 3] = [1.0, 100.0, 1e4];
 /// Turns of the hand with every command, degrees.
-pub const TURNS_DEG: [f64; 2] = [0.0, 5.0];
+const TURNS_DEG: [f64; 2] = [0.0, 5.0];
 
 /// One insertion of the matrix, into any surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

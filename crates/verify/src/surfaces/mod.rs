@@ -21,7 +21,7 @@ mod summary;
 mod surface;
 mod wire;
 
-pub use cells::{Cell, ELEMENTS_MM, FRICTIONS, INCREMENTS_MM, MODULI_N_PER_MM2, TURNS_DEG, cells, matches};
+pub use cells::{Cell, cells, matches};
 pub use run::{CellRow, Ending, run};
 pub use sidecar::{Sidecar, SurfaceFile, surfaces_in};
 pub use start::Found;

@@ -39,7 +39,7 @@ pub struct Sidecar {
 
 impl Sidecar {
     /// `unit_mm`: millimetres per unit of the file, a number or a list; 1 if absent.
-    pub fn units_mm(&self) -> Vec<f64> {
+    pub(crate) fn units_mm(&self) -> Vec<f64> {
         self.unit_mm.as_ref().map_or_else(|| vec![1.0], OneOrMore::list)
     }
 

@@ -37,7 +37,7 @@ pub const WIRES: [Wire; 2] = [
 impl Wire {
     /// The wire of another radius: built like the one of [`WIRES`] nearest to it, its stiffness that of a solid wire, with the fourth
     /// power of the radius.
-    pub fn of_radius(radius_mm: f64) -> Self {
+    pub(crate) fn of_radius(radius_mm: f64) -> Self {
         let away = |w: &Self| (w.radius_mm / radius_mm).ln().abs();
         let [thin, thick] = WIRES;
         let like = if away(&thin) <= away(&thick) { thin } else { thick };

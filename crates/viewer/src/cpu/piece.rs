@@ -13,7 +13,7 @@
 
 use endowire_core::Vec3;
 
-use crate::device::Piece;
+use crate::piece::Piece;
 
 /// Below this share of D·D, A is taken as zero: the ray runs along the flank.
 const ALONG: f64 = 1e-13;
@@ -74,7 +74,8 @@ pub(crate) fn chord(piece: &Piece, origin: &Vec3, direction: &Vec3) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::{DevicePoint, pieces};
+    use crate::device::DevicePoint;
+    use crate::piece::pieces;
 
     fn rod(points: &[(f64, f64, f64, f64)]) -> Vec<Piece> {
         let points: Vec<DevicePoint> = points

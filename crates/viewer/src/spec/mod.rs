@@ -168,6 +168,19 @@ impl ViewSpec {
         self.views.contains(&view)
     }
 
+    /// The parts of the `[[view.device]]` tables, if there are any.
+    ///
+    /// # Errors
+    /// Tables where there are `several` instruments: they describe one.
+    pub fn own_parts(&self, several: bool) -> Result<Option<&[DevicePart]>> {
+        let own = Some(&self.device[..]).filter(|parts| !parts.is_empty());
+        if several && own.is_some() {
+            let mend = "describes one device, and there are several instruments: leave it out, and give materials in their files";
+            return Err(Error::parameter("view.device", self.device.len(), mend));
+        }
+        Ok(own)
+    }
+
     /// Checks every value on its own and against the others.
     ///
     /// # Errors

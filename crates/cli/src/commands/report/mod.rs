@@ -16,8 +16,8 @@ use crate::output::recording::Recording;
 use crate::output::{tell, whole};
 
 /// The pages; their scripts read the data where this mark is.
-const RUN: &str = include_str!("page.html");
-const TABLES: &str = include_str!("tables.html");
+const RUN: &str = concat!(include_str!("head.html"), include_str!("page.html"));
+const TABLES: &str = concat!(include_str!("head.html"), include_str!("tables.html"));
 const MARK: &str = "/*DATA*/null";
 
 /// Writes the page of a folder.

@@ -10,7 +10,7 @@
 
 use super::mesh::{Mesh, NEAR, section_ends};
 use crate::contact::ContactPoint;
-use crate::device::{Device, Section, Stack};
+use crate::device::{Device, Section, Stack, line_mm};
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Material, shares};
 
@@ -32,15 +32,10 @@ pub(super) struct Nodes {
     element_mm: f64,
 }
 
-/// Length of the line.
-pub(super) fn line_mm(inserted_mm: &[f64]) -> f64 {
-    inserted_mm.iter().copied().fold(0.0, f64::max)
-}
-
 impl Nodes {
     /// Nodes of these lengths inserted of the instruments, one of them above 0.
     pub(super) fn new(stack: &Stack, inserted_mm: &[f64], element_mm: f64) -> Self {
-        let line = line_mm(inserted_mm);
+        let line = line_mm(inserted_mm.iter().copied());
         let near = NEAR * element_mm;
         let mut breaks: Vec<(f64, Anchor)> = Vec::new();
         for (index, (device, inserted)) in stack.devices().zip(inserted_mm).enumerate() {
@@ -65,7 +60,7 @@ impl Nodes {
 
     /// Meshes the line, with the same nodes also where other lengths are inserted than they were made for.
     pub(super) fn mesh(&self, stack: &Stack, inserted_mm: &[f64], modulus_n_per_mm2: f64, mesh: &mut Mesh) {
-        let line = line_mm(inserted_mm);
+        let line = line_mm(inserted_mm.iter().copied());
         mesh.from_tip_mm.clear();
         mesh.from_tip_mm.extend(self.anchors.iter().map(|anchor| match *anchor {
             Anchor::Mouth => line,
@@ -84,12 +79,12 @@ impl Nodes {
     /// Sets the contact points, tip first.
     fn feel(&self, stack: &Stack, inserted_mm: &[f64], modulus_n_per_mm2: f64, mesh: &mut Mesh) {
         mesh.points.clear();
-        let line = line_mm(inserted_mm);
+        let line = line_mm(inserted_mm.iter().copied());
         let mut alone = Mesh::default();
         let mut e = mesh.elements.len() - 1;
         for (index, device) in stack.devices().enumerate() {
             let inserted = inserted_mm[index];
-            let covered = line_mm(&inserted_mm[index + 1..]);
+            let covered = line_mm(inserted_mm[index + 1..].iter().copied());
             if inserted <= covered {
                 continue;
             }
@@ -144,7 +139,7 @@ pub(super) fn element(
     inner: usize,
     (near, far): (f64, f64),
 ) -> ElementData {
-    let line = line_mm(inserted_mm);
+    let line = line_mm(inserted_mm.iter().copied());
     let mut data = ElementData::of(near - far, Material::NONE);
     for ((device, set), inserted) in stack.devices().zip(stack.sets()).zip(inserted_mm).take(inner) {
         let behind = line - inserted;

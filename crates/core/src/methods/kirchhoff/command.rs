@@ -5,15 +5,16 @@ use std::borrow::Cow;
 
 use super::Environment;
 use super::configuration::Start;
-use super::hands::{Way, line_mm};
+use super::hands::{Hand, Way, lengths};
 use super::slide::Extension;
 use super::state::KirchhoffState;
-use super::substep::{AT_REST, Attempt, gained_mj};
+use super::substep::{AT_REST, Attempt, Found, gained_mj};
 use super::workspace::{Tools, Workspace};
 use crate::contact::extension::{LEAVE_MM, left_through};
-use crate::device::Stack;
+use crate::device::{Stack, line_mm};
 use crate::insertion::{InstrumentReport, Move, StepReport};
-use crate::{Error, PhysicalEnd, Result};
+use crate::vessel::Wall;
+use crate::{Error, PhysicalEnd, Result, Vec3};
 
 /// Most sub-steps that one command may be cut into, …
 const SUBSTEP_LIMIT: usize = 4096;
@@ -37,6 +38,36 @@ const JUMP: f64 = 0.02;
 /// Stored energy below which nothing is called a jump, mJ.
 const JUMP_FLOOR_MJ: f64 = 1e-6;
 
+/// What the sub-steps of a command come to.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sum {
+    iterations: usize,
+    substeps: usize,
+    relaxations: u32,
+    slides: u32,
+    imbalance: f64,
+    dissipated_mj: f64,
+}
+
+impl Sum {
+    /// Adds a sub-step, in which the device may have come to rest as it can.
+    fn add(&mut self, found: &Found, relaxed: bool) {
+        self.iterations += found.iterations;
+        self.slides += found.slides;
+        self.dissipated_mj += found.dissipated_mj;
+        if relaxed {
+            self.relaxations += 1;
+            self.imbalance = self.imbalance.max(found.residual.max(found.unsettled));
+        }
+    }
+
+    fn write(&self, report: &mut StepReport) {
+        (report.iterations, report.substeps) = (self.iterations as u32, self.substeps as u32);
+        (report.relaxations, report.slides) = (self.relaxations, self.slides);
+        (report.imbalance, report.dissipated_mj) = (self.imbalance, self.dissipated_mj);
+    }
+}
+
 impl<const C: usize> Workspace<C> {
     /// Carries out a command from the state `from`, and leaves the new state in `now`.
     ///
@@ -53,15 +84,11 @@ impl<const C: usize> Workspace<C> {
         next.own(*elements, *points);
         let surroundings = &environment.surroundings;
         way.begin(surroundings.stack, &from.report, moves);
-        let (start, target) = (line_mm(&way.start), line_mm(&way.target));
-        if target > start
-            && let Some((opening, beyond)) = left_through(surroundings.wall, &from.tip_mm())
-            && beyond + (target - start) > LEAVE_MM
-        {
-            return Err(left(opening, beyond));
+        let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
+        if target > start {
+            check_inside(surroundings.wall, &from.tip_mm(), target - start)?;
         }
-        let (mut iterations, mut substeps, mut dissipated_mj) = (0, 0, 0.0);
-        let (mut relaxations, mut slides, mut imbalance, mut balanced) = (0, 0, 0.0f64, true);
+        let (mut sum, mut balanced) = (Sum::default(), true);
         tools.nodes_solved = 0;
         let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD).max(1.0);
@@ -87,22 +114,12 @@ impl<const C: usize> Workspace<C> {
                 share = rest;
             }
             let part = rest.min(share);
-            let wanted = (target - start) * part;
-            let mut blocked = false;
-            let Tools { extension, memory, .. } = &mut *tools;
-            *extension = Extension::default();
-            if wanted > 0.0 {
-                let tangent = here.state.rod.frames[here.state.rod.elements()].t;
-                let radius = surroundings.stack.tip_radius_mm(way.target.iter().map(|hand| hand.inserted_mm));
-                let tip_mm = here.state.tip_mm();
-                let way = extension.trace((environment.felt, memory), tip_mm, tangent, radius, wanted);
-                blocked = way < (1.0 - 1e-9) * wanted;
-            }
+            let blocked = tools.look_ahead(environment, here, &way.target, (target - start) * part);
             // A rest that is rounding is none.
             let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
             way.at(to, hands);
-            substeps += 1;
-            if line_mm(hands) == 0.0 {
+            sum.substeps += 1;
+            if line_mm(lengths(hands)) == 0.0 {
                 now.withdraw(surroundings.stack, hands);
                 tools.write_report(environment, hands, now);
                 break;
@@ -111,24 +128,14 @@ impl<const C: usize> Workspace<C> {
             let attempt = Attempt { hands, blocked, resort };
             match tools.try_step(environment, here, attempt, next, &mut budget) {
                 Ok(found) => {
-                    iterations += found.iterations;
-                    relaxations += u32::from(relax);
-                    slides += found.slides;
-                    if relax {
-                        imbalance = imbalance.max(found.residual.max(found.unsettled));
-                    }
+                    sum.add(&found, relax);
                     // At a crease of the wall forces are those of one side or the other and never in balance; where nothing moves
                     // any more the device is at rest all the same.
                     let rests = done >= 1.0
                         && found.residual <= AT_REST
                         && here.state.rod.farthest_mm(&next.state.rod) <= REST_RADII * thinnest_mm;
                     balanced = found.balanced || rests;
-                    dissipated_mj += found.dissipated_mj;
-                    if let Some((opening, beyond)) = left_through(surroundings.wall, &next.state.tip_mm())
-                        && beyond > LEAVE_MM
-                    {
-                        return Err(left(opening, beyond));
-                    }
+                    check_inside(surroundings.wall, &next.state.tip_mm(), 0.0)?;
                     std::mem::swap(now, next);
                     moved = true;
                     done = to;
@@ -146,7 +153,7 @@ impl<const C: usize> Workspace<C> {
                 }
             }
             // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
-            if done < 1.0 && (failures > RESORTS || substeps > SUBSTEP_LIMIT) {
+            if done < 1.0 && (failures > RESORTS || sum.substeps > SUBSTEP_LIMIT) {
                 tools.refuse_narrower(environment, now, &way.commands)?;
                 return Err(Error::Computation(format!(
                     "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
@@ -157,14 +164,33 @@ impl<const C: usize> Workspace<C> {
             tools.refuse_narrower(environment, now, &way.commands)?;
         }
         let report = &mut now.parts().1.report;
-        report.iterations = iterations as u32;
-        (report.substeps, report.dissipated_mj) = (substeps as u32, dissipated_mj);
-        (report.relaxations, report.slides, report.imbalance) = (relaxations, slides, imbalance);
+        sum.write(report);
         report.converged = balanced;
         report.angles = from.report.angles;
         report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
         report.jumped = jumped(surroundings.stack, &from.report, report, way);
         Ok(())
+    }
+}
+
+impl<const C: usize> Tools<C> {
+    /// Traces the way of `wanted_mm` in front of the tip, towards where the hands will be; tells whether the wall is in it.
+    fn look_ahead(
+        &mut self,
+        environment: &Environment<'_>,
+        here: Start<'_>,
+        target: &[Hand],
+        wanted_mm: f64,
+    ) -> bool {
+        self.extension = Extension::default();
+        if wanted_mm <= 0.0 {
+            return false;
+        }
+        let tangent = here.state.rod.frames[here.state.rod.elements()].t;
+        let radius_mm = environment.surroundings.stack.tip_radius_mm(lengths(target));
+        let felt = (environment.felt, &mut self.memory);
+        let way_mm = self.extension.trace(felt, here.state.tip_mm(), tangent, radius_mm, wanted_mm);
+        way_mm < (1.0 - 1e-9) * wanted_mm
     }
 }
 
@@ -185,7 +211,12 @@ fn jumped(stack: &Stack, before: &StepReport, after: &StepReport, way: &Way) -> 
     lost > JUMP * energy.max(now).max(JUMP_FLOOR_MJ)
 }
 
-/// The tip would be farther beyond an opening than anything is known.
-fn left(opening: usize, beyond_mm: f64) -> Error {
-    Error::End(PhysicalEnd::Left { opening, beyond_mm, limit_mm: LEAVE_MM })
+/// Refuses a tip that, `ahead_mm` farther, would be beyond an opening where nothing is known any more.
+fn check_inside(wall: &Wall, tip_mm: &Vec3, ahead_mm: f64) -> Result<()> {
+    match left_through(wall, tip_mm) {
+        Some((opening, beyond_mm)) if beyond_mm + ahead_mm > LEAVE_MM => {
+            Err(Error::End(PhysicalEnd::Left { opening, beyond_mm, limit_mm: LEAVE_MM }))
+        }
+        _ => Ok(()),
+    }
 }

@@ -35,14 +35,9 @@ pub(super) fn read(report: &StepReport, hands: &mut Vec<Hand>) {
     }));
 }
 
-/// The lengths inserted.
-pub(super) fn lengths(hands: &[Hand]) -> Vec<f64> {
-    hands.iter().map(|hand| hand.inserted_mm).collect()
-}
-
-/// Length of the line, mm.
-pub(super) fn line_mm(hands: &[Hand]) -> f64 {
-    hands.iter().map(|hand| hand.inserted_mm).fold(0.0, f64::max)
+/// The lengths inserted, mm.
+pub(super) fn lengths(hands: &[Hand]) -> impl Iterator<Item = f64> {
+    hands.iter().map(|hand| hand.inserted_mm)
 }
 
 /// The way of all hands in a command, which they go together.

@@ -17,11 +17,11 @@
 //! and builds up in the axial force: around a bend by e^{μφ}, the capstan's law. It depends on nothing that is solved for but what presses,
 //! and is told of an equilibrium that was found without it. Instruments that go together exert none.
 
-use super::coaxial::{element, line_mm};
+use super::coaxial::element;
 use super::mesh::Mesh;
 use super::state::KirchhoffState;
 use crate::Vec3;
-use crate::device::Stack;
+use crate::device::{Stack, line_mm};
 use crate::insertion::LateralForce;
 use crate::rod::element::ElementSystem;
 use crate::rod::quadrature::{Point, hermite};
@@ -68,7 +68,8 @@ pub(super) fn lateral_forces<const C: usize>(
 ) -> Vec<LateralForce> {
     let mut told = vec![LateralForce::default(); mesh.from_tip_mm.len()];
     let Some((own, outside)) = mesh.inserted_mm.split_at_checked(instrument + 1) else { return told };
-    let (inside_mm, outside_mm, line) = (line_mm(own), line_mm(outside), line_mm(&mesh.inserted_mm));
+    let [inside_mm, outside_mm, line] =
+        [own, outside, &mesh.inserted_mm].map(|all| line_mm(all.iter().copied()));
     let reach_mm = own[instrument].min(outside_mm);
     if reach_mm == 0.0 {
         return told;

@@ -31,6 +31,8 @@ mod repeat;
 mod search;
 mod settle;
 mod slide;
+#[cfg(test)]
+mod slide_tests;
 mod slopes;
 mod state;
 mod substep;
@@ -44,6 +46,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::{Counters, FeltWall};
+use crate::device::line_mm;
 use crate::insertion::{Command, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
@@ -51,7 +54,7 @@ use crate::shape::Shape;
 use crate::vessel::WallStore;
 use crate::{Error, Result};
 use coaxial::Nodes;
-use hands::Hand;
+use hands::{Hand, lengths};
 use state::Belongs;
 use workspace::Workspace;
 
@@ -309,11 +312,11 @@ const NAME: &str = "kirchhoff";
 fn meshed(environment: &Environment<'_>, hands: &[Hand], mesh: &mut Mesh) {
     let Surroundings { device, stack, properties, .. } = environment.surroundings;
     let (element_mm, modulus) = (environment.options.element_mm, properties.modulus_n_per_mm2);
-    let line_mm = hands::line_mm(hands);
+    let line_mm = line_mm(lengths(hands));
     if line_mm == 0.0 {
         mesh.clear();
     } else if stack.is_several() {
-        let inserted_mm = hands::lengths(hands);
+        let inserted_mm: Vec<f64> = lengths(hands).collect();
         Nodes::new(stack, &inserted_mm, element_mm).mesh(stack, &inserted_mm, modulus, mesh);
     } else {
         mesh.build(device, line_mm, element_mm, modulus);

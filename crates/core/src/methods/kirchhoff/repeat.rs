@@ -262,4 +262,83 @@ mod tests {
         correction.learn(&motions, &elements, (&slid, &hooked(&elements, 3.0)), true);
         assert_eq!(correction.len(), 0);
     }
+
+    fn learnt(
+        motions: &[HandMotion],
+        elements: &[ElementData],
+        slid: &RodState,
+        found: &RodState,
+    ) -> Correction {
+        let mut correction = Correction::default();
+        correction.learn(motions, elements, (slid, found), true);
+        correction
+    }
+
+    fn advance(mm: f64, turn_rad: f64) -> HandMotion {
+        HandMotion { from_mm: 20.0, to_mm: 20.0 + mm, turn_rad }
+    }
+
+    #[test]
+    fn motions_repeat_by_a_factor_or_not_at_all() {
+        let elements = [ElementData::plain(ELEMENT_MM, 1.0); NODES];
+        let (slid, found) = (hooked(&elements, 6.0), hooked(&elements, 6.1));
+        let known = learnt(&[advance(1.0, 0.2)], &elements, &slid, &found);
+        let factor = |mm: f64, rad: f64| known.repeats(&[advance(mm, rad)]);
+        assert!((factor(1.0, 0.2).unwrap() - 1.0).abs() < 1e-12);
+        assert!((factor(0.5, 0.1).unwrap() - 0.5).abs() < 1e-12);
+        assert!((factor(4.0, 0.8).unwrap() - 4.0).abs() < 1e-12);
+        // Back, turned the other way, turned more, and much farther.
+        for (mm, rad) in [(-1.0, -0.2), (1.0, -0.2), (1.0, 0.21), (10.0, 2.0), (0.1, 0.02), (0.0, 0.0)] {
+            assert_eq!(factor(mm, rad), None, "{mm} mm, {rad} rad");
+        }
+        assert_eq!(Correction::default().repeats(&[advance(1.0, 0.2)]), None);
+        // Of two hands each must repeat its own.
+        let both = learnt(&[advance(1.0, 0.0), advance(0.5, 0.0)], &elements, &slid, &found);
+        assert!((both.repeats(&[advance(2.0, 0.0), advance(1.0, 0.0)]).unwrap() - 2.0).abs() < 1e-12);
+        assert_eq!(both.repeats(&[advance(1.0, 0.0), advance(1.0, 0.0)]), None);
+    }
+
+    #[test]
+    fn a_change_that_goes_on_is_foreseen_to_second_order_at_least() {
+        let elements = [ElementData::plain(ELEMENT_MM, 1.0); NODES];
+        let motions = [advance(1.0, 0.0)];
+        // A hook that gets longer by as much in each step.
+        let off = |by_mm: f64| {
+            let [before, now, next] = [0.0, 1.0, 2.0].map(|k| hooked(&elements, 6.0 + k * by_mm));
+            let mut guess = now.clone();
+            learnt(&motions, &elements, &before, &now).apply(1.0, &elements, &mut guess);
+            (guess.farthest_mm(&next), now.farthest_mm(&next))
+        };
+        let ((coarse, without), (fine, _)) = (off(0.1), off(0.05));
+        assert!(coarse < 0.1 * without, "{coarse} of {without}");
+        let order = (coarse / fine).log2();
+        assert!(order > 1.9, "order {order}");
+    }
+
+    #[test]
+    fn what_was_learnt_is_the_same_on_the_same_nodes_and_between_them_on_others() {
+        let device = crate::device::Device::uniform(100.0, 0.5, 1.0).unwrap();
+        let mesh = |element_mm: f64| {
+            let mut mesh = Mesh::default();
+            mesh.build(&device, ELEMENT_MM * NODES as f64, element_mm, 1.0);
+            mesh
+        };
+        let (from, fine) = (mesh(ELEMENT_MM), mesh(0.5 * ELEMENT_MM));
+        let (slid, found) = (hooked(&from.elements, 6.0), hooked(&from.elements, 6.1));
+        let known = learnt(&[advance(1.0, 0.0)], &from.elements, &slid, &found);
+        let mut out = Correction::default();
+        known.transfer(&from, &from, &mut out);
+        for (a, b) in out.departures.iter().zip(&known.departures) {
+            assert!((a.tangent - b.tangent).norm() < 1e-15 && (a.middle - b.middle).norm() < 1e-15);
+        }
+        known.transfer(&from, &fine, &mut out);
+        assert_eq!((out.len(), known.len()), (2 * NODES, NODES));
+        for k in 0..NODES {
+            assert!((out.departures[2 * k].tangent - known.departures[k].tangent).norm() < 1e-15);
+            if k + 1 < NODES {
+                let mean = (known.departures[k].tangent + known.departures[k + 1].tangent) * 0.5;
+                assert!((out.departures[2 * k + 1].tangent - mean).norm() < 1e-15);
+            }
+        }
+    }
 }

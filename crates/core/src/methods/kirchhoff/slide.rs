@@ -152,7 +152,7 @@ fn slide_curve(from: &Mesh, state: &RodState, extension: &Extension, to: &Mesh, 
 /// The state on the mesh `to` of the device that was in `state` on the mesh `from`, slid along its curve.
 ///
 /// Material angles stay with the device; what enters from the sheath has the angle that the tail has had.
-pub(super) fn slide(from: &Mesh, state: &RodState, extension: &Extension, to: &Mesh, out: &mut RodState) {
+pub(super) fn slide((from, state): (&Mesh, &RodState), extension: &Extension, to: &Mesh, out: &mut RodState) {
     slide_curve(from, state, extension, to, out);
     let n = to.elements.len();
     // Axial forces, angles and bubbles of the same piece of device, by its distance from the tip.

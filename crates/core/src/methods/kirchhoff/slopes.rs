@@ -6,12 +6,13 @@
 //! move, and do the work of the forces that they have. What the sheath no longer stores, ½EI|κ⁰|² a length, is part of it.
 
 use super::Environment;
-use super::coaxial::{Nodes, line_mm};
+use super::coaxial::Nodes;
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, lengths};
 use super::mesh::Mesh;
 use crate::Vec3;
 use crate::contact::{ContactPoint, Touch};
+use crate::device::line_mm;
 use crate::insertion::InstrumentReport;
 use crate::rod::{Clamp, RodState, element_energy};
 
@@ -32,13 +33,14 @@ pub(super) fn write_instruments<const C: usize>(
     at: &mut Configuration,
 ) {
     let sets = environment.surroundings.stack.sets();
-    let inserted = lengths(hands);
+    let inserted: Vec<f64> = lengths(hands).collect();
+    let line = line_mm(lengths(hands));
     let nodes = Nodes::new(environment.surroundings.stack, &inserted, environment.options.element_mm);
     let mut told = Vec::with_capacity(hands.len());
     for (index, hand) in hands.iter().enumerate() {
         let set = sets[index].filter(|_| hand.inserted_mm > 0.0);
         let twist = set.map_or(0.0, |set| {
-            let tip = at.mesh.nearest_node(line_mm(&inserted) - hand.inserted_mm);
+            let tip = at.mesh.nearest_node(line - hand.inserted_mm);
             at.state.rod.twist_to(tip, set)
         });
         told.push(InstrumentReport {

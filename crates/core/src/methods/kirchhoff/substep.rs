@@ -62,6 +62,32 @@ pub(super) struct Attempt<'a> {
 }
 
 impl<const C: usize> Tools<C> {
+    /// Slides the device at `start` to where the hands are, on the mesh of what is in then, with its friction and what is known of the wall.
+    fn slide_to(
+        &mut self,
+        environment: &Environment<'_>,
+        start: Start<'_>,
+        hands: &[Hand],
+        next: &mut Configuration,
+    ) {
+        let (mesh, after) = next.parts();
+        meshed(environment, hands, mesh);
+        let stack = environment.surroundings.stack;
+        let from = (start.mesh, &start.state.rod);
+        if stack.is_several() {
+            slide_together(from, &self.extension, mesh, stack.sets(), &mut after.rod);
+        } else {
+            slide(from, &self.extension, mesh, &mut after.rod);
+        }
+        motions(&start.state.report, hands, &mut self.guess.motions);
+        let before = (&start.mesh.points[..], &start.state.forces[..]);
+        self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
+        after.turn_tails(stack, hands);
+        self.newton.resize(mesh.elements.len());
+        let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
+        self.memory.begin(&start.state.known, &start.mesh.points, &mesh.points, advance_mm);
+    }
+
     /// One sub-step from `start`: slides and solves on `next`, which is worth nothing if that fails. Newton iterations are taken from
     /// `budget`.
     pub(super) fn try_step(
@@ -75,35 +101,17 @@ impl<const C: usize> Tools<C> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
         let Attempt { hands, blocked, resort } = attempt;
         let relax = resort.is_some();
+        self.slide_to(environment, start, hands, next);
         let (mesh, after) = next.parts();
-        meshed(environment, hands, mesh);
-        let stack = surroundings.stack;
-        if stack.is_several() {
-            slide_together(
-                (start.mesh, &start.state.rod),
-                &self.extension,
-                mesh,
-                stack.sets(),
-                &mut after.rod,
-            );
-        } else {
-            slide(start.mesh, &start.state.rod, &self.extension, mesh, &mut after.rod);
-        }
-        motions(&start.state.report, hands, &mut self.guess.motions);
-        let before = (&start.mesh.points[..], &start.state.forces[..]);
-        self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
-        after.turn_tails(stack, hands);
         let rod = &mut after.rod;
         let elements = mesh.elements.len();
-        self.newton.resize(elements);
-        let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
-        self.memory.begin(&start.state.known, &start.mesh.points, &mesh.points, advance_mm);
+        let softest_nmm2 = surroundings.stack.softest_nmm2();
         let mut contact = WallContact::new(
             environment.felt,
             &mesh.points,
             &mut self.memory,
             &mut self.friction,
-            stack.softest_nmm2(),
+            softest_nmm2,
         );
         let candidates = (start, &*mesh, &mut *rod);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, blocked);

@@ -182,35 +182,9 @@ fn options_out_of_range_are_named() {
     assert!(with(0.0).is_err() && with(f64::NAN).is_err() && with(0.05).is_ok());
 }
 
-/// A closed box whose faces have cells of about `cell`, away from the origin by `at`.
-fn cuboid(size: Vec3, cell: f64, at: Vec3) -> SurfaceMesh {
-    let mut mesh = SurfaceMesh::default();
-    for axis in 0..3 {
-        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-        let count = |k: usize| (size[k] / cell).round().max(1.0) as u32;
-        let (m, n) = (count(a), count(b));
-        for side in [0.0, size[axis]] {
-            let first = mesh.vertices_mm.len() as u32;
-            for i in 0..=m {
-                for j in 0..=n {
-                    let mut x = at;
-                    x[axis] += side;
-                    x[a] += size[a] * f64::from(i) / f64::from(m);
-                    x[b] += size[b] * f64::from(j) / f64::from(n);
-                    mesh.vertices_mm.push(x);
-                }
-            }
-            for i in 0..m {
-                for j in 0..n {
-                    let at = |i: u32, j: u32| first + i * (n + 1) + j;
-                    let (p, q, r, s) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
-                    let both = if side > 0.0 { [[p, q, r], [p, r, s]] } else { [[p, r, q], [p, s, r]] };
-                    mesh.triangles.extend(both);
-                }
-            }
-        }
-    }
-    Wall::welded(&mesh).unwrap().mesh().clone()
+/// A closed box.
+fn cuboid(low: Vec3, size: Vec3, cell: f64) -> SurfaceMesh {
+    Wall::welded(&SurfaceMesh::cuboid(low, low + size, cell)).unwrap().mesh().clone()
 }
 
 fn joined(a: &SurfaceMesh, b: &SurfaceMesh) -> SurfaceMesh {
@@ -224,8 +198,8 @@ fn joined(a: &SurfaceMesh, b: &SurfaceMesh) -> SurfaceMesh {
 fn two_components_are_as_far_apart_as_they_were() {
     // Two lumens beside each other: a septum of 0.15 mm between parallel sheets.
     let size = Vec3::new(10.0, 6.0, 4.0);
-    let mesh =
-        joined(&cuboid(size, 3.0, Vec3::zeros()), &cuboid(size, 2.0, Vec3::new(0.0, 0.0, size.z + 0.15)));
+    let above = Vec3::new(0.0, 0.0, size.z + 0.15);
+    let mesh = joined(&cuboid(Vec3::zeros(), size, 3.0), &cuboid(above, size, 2.0));
     let found = conditioned(&mesh);
     let report = check(&found.mesh).unwrap();
     assert!(found.changed && report.components == 2 && report.self_intersections == 0, "{report:?}");

@@ -80,8 +80,7 @@ fn a_clean_fork_comes_out_bit_for_bit() {
     let again = Wall::from_surface(clean.mesh()).unwrap();
     assert_eq!(again.mesh(), clean.mesh());
     assert!(again.report().notes().is_empty(), "{:?}", again.report().notes());
-    let kept = Wall::from_sound(clean.mesh().clone()).unwrap();
-    assert_eq!((kept.mesh(), kept.openings()), (clean.mesh(), clean.openings()));
+    assert_eq!(again.openings(), clean.openings());
 }
 
 #[test]

@@ -1,0 +1,86 @@
+//! Arguments of the commands that look at what goes into a scene: vessels and devices.
+
+use std::path::PathBuf;
+
+use clap::Subcommand;
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum VesselCommand {
+    /// Report on a surface: openings, flipped and degenerate triangles, self-intersections, volume
+    Check {
+        /// Surface mesh (STL, OBJ or PLY)
+        file: PathBuf,
+        /// Millimetres per unit of the file
+        #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
+        unit_mm: f64,
+        /// Count septa between lumens that are thinner than so many mm
+        #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
+        septum_mm: f64,
+        #[command(flatten)]
+        felt: FeltArgs,
+        /// Print the report as one JSON document on stdout
+        #[arg(long)]
+        json: bool,
+    },
+    /// Build a wall from a centre-line tree
+    Generate(GenerateArgs),
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum DeviceCommand {
+    /// One device, part by part
+    Show {
+        /// Device file (TOML)
+        file: PathBuf,
+        /// Draw its shape at rest (.svg or .png)
+        #[arg(long, value_name = "PICTURE")]
+        out: Option<PathBuf>,
+        /// Print the parts as one JSON document on stdout
+        #[arg(long)]
+        json: bool,
+    },
+    /// The devices of a folder, one a line
+    List {
+        /// Folder of device files (TOML)
+        #[arg(default_value = "assets/devices")]
+        folder: PathBuf,
+        /// Draw all shapes at rest on one sheet, to one scale (.svg or .png)
+        #[arg(long, value_name = "PICTURE")]
+        out: Option<PathBuf>,
+        /// Print the devices as one JSON document on stdout
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// What is wanted of the wall that devices feel; with none of these it is not made.
+#[derive(Debug, Default, clap::Args)]
+pub(crate) struct FeltArgs {
+    /// Write the evenly meshed wall that devices feel (.ply, .obj or .stl) and report on it
+    #[arg(long, value_name = "FILE")]
+    pub(crate) felt: Option<PathBuf>,
+    /// How far that wall may be from the surface, mm, as vessel.wall.deviation_mm of a scene; 0.1 if absent
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) deviation_mm: Option<f64>,
+    /// Draw that wall (PNG): red where it is inside the surface by that distance, blue where it is outside
+    #[arg(long, value_name = "FILE")]
+    pub(crate) picture: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct GenerateArgs {
+    /// Centre-line table (x y z radius parent, mm), or the name of a built-in anatomy
+    pub(crate) tree: PathBuf,
+    /// Surface file to write (.stl, .obj or .ply)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// Length of the triangles' edges; a quarter of the smallest radius if absent
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with = "triangles")]
+    pub(crate) edge_mm: Option<f64>,
+    /// Number of triangles, met within a few percent
+    #[arg(long, value_name = "COUNT")]
+    pub(crate) triangles: Option<usize>,
+    /// Print the report as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}

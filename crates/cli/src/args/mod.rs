@@ -1,0 +1,260 @@
+//! Command line arguments.
+
+mod inputs;
+mod pictures;
+mod studies;
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+use endowire_sweep::Shard;
+
+pub(crate) use inputs::{DeviceCommand, FeltArgs, GenerateArgs, VesselCommand};
+pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
+pub(crate) use studies::{
+    CompareArgs, DeformationArgs, ExperimentCommand, LoopArgs, NavigationArgs, TimingArgs,
+};
+
+/// Simulates catheters and guidewires in blood vessels: scripted insertions, experiments, 3D and fluoroscopic frames.
+///
+/// Exit codes: 0 done; 1 the computation failed or was interrupted (Ctrl-C; what was recorded is kept); 2 bad input or usage.
+#[derive(Debug, Parser)]
+#[command(name = "endowire", version, propagate_version = true)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run the scripted insertion of a scene and record it: summary.json, steps.csv, shapes.npz, frames/*.png
+    Run(RunArgs),
+    /// Run a scene many times with other values of its keys: one Parquet row a run. Killed at any moment, the same command goes on
+    Sweep(SweepArgs),
+    /// Move the instruments of a scene by hand, under fluoroscopy: a window, or a protocol of JSON lines; what is done is recorded as a script
+    Play(PlayArgs),
+    /// Draw frames of a recorded run, from any position of the C-arm
+    Render(RenderArgs),
+    /// Write a recorded run as one page for a browser: the shape to turn and to scrub through time, forces, events, frames; or the tables
+    /// and pictures of an experiment
+    Report(ReportArgs),
+    /// Write a recorded run for other programs: a series for ParaView and 3D Slicer (VTK)
+    Export(ExportArgs),
+    /// Draw fluoroscopic frames of a scene: after its script, or of a contrast injection
+    Fluoro(FluoroArgs),
+    /// Draw labelled fluoroscopic pictures of many scenes, devices, poses, doses and moments, for learning
+    Dataset(DatasetArgs),
+    /// Solve one static rod: sections, supports and loads in, shape, energy and reactions out
+    Rod(RodArgs),
+    /// Compare every reference case with its exact or independently computed answer
+    Verify(VerifyArgs),
+    /// Check or generate vessel walls
+    #[command(subcommand)]
+    Vessel(VesselCommand),
+    /// Show device files: parts, sizes in all units, stiffnesses, materials, sources, and the shape at rest
+    #[command(subcommand)]
+    Device(DeviceCommand),
+    /// Run time against error, method by method: tables and a work–precision picture
+    Compare(CompareArgs),
+    /// Repeat an experiment of Li et al. 2011
+    #[command(subcommand)]
+    Experiment(ExperimentCommand),
+    /// Make a folder with a scene to start from: vessel, device, script, views. It runs at once
+    New(NewArgs),
+    /// Say what this machine has and what of it is used: adapter, display, threads, cache
+    Doctor {
+        /// Print it as one JSON document on stdout
+        #[arg(long)]
+        json: bool,
+    },
+    /// Print the completions of a shell on stdout
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page on stdout (roff); of a command if one is named
+    Man {
+        /// Command
+        command: Option<String>,
+    },
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct RunArgs {
+    /// Scene file (TOML)
+    pub(crate) scene: PathBuf,
+    /// Carry out the script of this file, tables `script` alone, in place of the scene's own: what `play` has recorded
+    #[arg(long, value_name = "FILE")]
+    pub(crate) script: Option<PathBuf>,
+    /// Folder for the recording; out/NAME OF THE SCENE if absent. An earlier recording in it is replaced
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Record also into a folder that holds other files; of these, summary.json, steps.csv, instruments.csv,
+    /// shapes.npz and frames/step_*.png of the same name are replaced
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Save the state of the run into a file, again and again while it goes on and at its end. The file is whole at any moment, also after
+    /// the run was killed
+    #[arg(long, value_name = "FILE")]
+    pub(crate) save_state: Option<PathBuf>,
+    /// Go on from a saved state of the same scene. The recording in DIR goes on after the step the state was saved at: what was recorded
+    /// later is dropped, and what follows has the bits of a run that was never interrupted. A new or empty DIR gets the steps from
+    /// there on. With --save-state of the same file a run can be killed and resumed any number of times
+    #[arg(long, value_name = "FILE")]
+    pub(crate) resume: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Print the summary as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Print neither progress nor summary; failures are told
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct ReportArgs {
+    /// Folder of a recorded run, or of an experiment or comparison
+    pub(crate) dir: PathBuf,
+    /// File of the page; DIR/report.html if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Scene file, where it is not the one that summary.json names
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct NewArgs {
+    /// Folder to make; it must not be there, or be empty
+    pub(crate) dir: PathBuf,
+    /// Surface of a vessel (STL, OBJ or PLY, in mm), which is copied, or a built-in anatomy
+    #[arg(long, default_value = "aortic_arch", value_name = "FILE|NAME")]
+    pub(crate) vessel: PathBuf,
+    /// Device file, such as one of the catalogue in assets/devices, which is copied; an angled hydrophilic wire of 0.035 in if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) device: Option<PathBuf>,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct PlayArgs {
+    /// Scene file (TOML); its script is not carried out
+    pub(crate) scene: PathBuf,
+    /// File for what hands have done: a script that `endowire run SCENE --script FILE` carries out to the bit; out/NAME OF THE
+    /// SCENE/played.toml if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
+    /// Without a window: inputs are lines of JSON on stdin, answers lines of JSON on stdout, and time goes by as inputs say
+    #[arg(long)]
+    pub(crate) headless: bool,
+    /// With --headless: take the lines of this file in place of stdin
+    #[arg(long, requires = "headless", value_name = "FILE")]
+    pub(crate) inputs: Option<PathBuf>,
+    /// With --headless: time goes by as on a clock, and pictures are drawn as for the window
+    #[arg(long, requires = "headless")]
+    pub(crate) realtime: bool,
+    /// Take inputs, lines of JSON, also from programs that connect to this address, such as 127.0.0.1:7000
+    #[arg(long, value_name = "ADDRESS")]
+    pub(crate) listen: Option<std::net::SocketAddr>,
+    /// Width and height of the fluoroscopic picture in pixels, 64 to 1024
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(64..=1024))]
+    pub(crate) size: u32,
+    /// Warn where a hand pushes or pulls harder than this
+    #[arg(long, default_value_t = 1.0, value_name = "N")]
+    pub(crate) warn_n: f64,
+    /// Warn where a hand holds a greater torque than this
+    #[arg(long, default_value_t = 5.0, value_name = "N·MM")]
+    pub(crate) warn_nmm: f64,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Print at the end what was done, and how fast, as one JSON document on stdout; not without a window and a clock, where stdout is for answers
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct SweepArgs {
+    /// Sweep file (TOML): a scene, and an axis for each key that varies
+    #[arg(required = true)]
+    pub(crate) sweep: Option<PathBuf>,
+    /// Folder for rows as they come (runs.jsonl), the table of all (runs.parquet), and recordings where they are asked for
+    #[arg(long, value_name = "DIR", required = true)]
+    pub(crate) out: Option<PathBuf>,
+    /// Do one of several parts: the first of four is 1/4. Parts may go into one folder or into several, on one machine or on many
+    #[arg(long, value_name = "I/N", default_value = "1/1")]
+    pub(crate) shard: Shard,
+    /// Runs at the same time; the number of cores if absent
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) jobs: Option<u16>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Print what has come of it as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+    #[command(subcommand)]
+    pub(crate) merge: Option<SweepCommand>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum SweepCommand {
+    /// Make one table of the rows in the folders of shards, in whatever order they are given
+    Merge {
+        /// Folders of endowire sweep --out
+        #[arg(required = true, value_name = "DIR")]
+        folders: Vec<PathBuf>,
+        /// Table to write (Parquet)
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+    },
+}
+
+/// Whether walls are kept from run to run.
+#[derive(Debug, clap::Args)]
+pub(crate) struct CacheArgs {
+    /// Make the vessel's wall anew and keep nothing of it. Otherwise a wall that takes long to make is kept, up to 1 GiB in all, in the
+    /// folder walls of $ENDOWIRE_CACHE, or of endowire where the system has the caches of a user (Linux: $XDG_CACHE_HOME or ~/.cache;
+    /// macOS: ~/Library/Caches; Windows: %LOCALAPPDATA%). It may be removed at any time
+    #[arg(long)]
+    pub(crate) no_cache: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct RodArgs {
+    /// Case file (TOML)
+    pub(crate) case: PathBuf,
+    /// Print the solution as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct VerifyArgs {
+    /// Add the numerical stress table: stiffness, loads, meshes and shapes far from the ordinary
+    #[arg(long)]
+    pub(crate) stress: bool,
+    /// Instead of the reference cases, run a matrix of insertions into every surface of a folder (STL, OBJ, PLY; NAME.toml beside a
+    /// surface may give unit_mm, a table sheath, length_mm and device_radius_mm)
+    #[arg(long, value_name = "DIR", conflicts_with = "stress")]
+    pub(crate) surfaces: Option<PathBuf>,
+    /// Every combination of the matrix: 162 cells a wire instead of 18
+    #[arg(long, requires = "surfaces")]
+    pub(crate) full: bool,
+    /// Only cells whose name has all of these words, as in "phantom* 0.035 mu0.3"
+    #[arg(long, value_name = "PATTERN", requires = "surfaces")]
+    pub(crate) cells: Option<String>,
+    /// Print the cells as scene files instead of running them
+    #[arg(long, requires = "surfaces", conflicts_with = "json")]
+    pub(crate) scene: bool,
+    /// Cells that run at the same time; the number of cores if absent
+    #[arg(long, value_name = "N", requires = "surfaces")]
+    pub(crate) jobs: Option<usize>,
+    /// Longest time of a cell: one that takes longer fails
+    #[arg(long, default_value_t = 120.0, value_name = "S", requires = "surfaces")]
+    pub(crate) limit_s: f64,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}

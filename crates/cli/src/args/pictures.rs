@@ -1,0 +1,140 @@
+//! Arguments of the commands that draw: frames of runs and scenes, labelled pictures, files for other programs.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use endowire_viewer::{Mode, Pose};
+
+use super::CacheArgs;
+
+/// Which views are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+pub(crate) enum ViewChoice {
+    #[value(name = "3d")]
+    ThreeD,
+    Fluoro,
+    Both,
+}
+
+/// What is drawn and written, whatever it is drawn of.
+#[derive(Debug, clap::Args)]
+pub(crate) struct FrameArgs {
+    /// Views to draw; the scene's if absent
+    #[arg(long)]
+    pub(crate) view: Option<ViewChoice>,
+    /// Angles of the C-arm: "LAO 40", "RAO 30 CAU 20", "AP"
+    #[arg(long, value_name = "ANGLES")]
+    pub(crate) pose: Option<Pose>,
+    /// What fluoroscopy shows: fluoro, cine, dsa or roadmap
+    #[arg(long, value_parser = mode)]
+    pub(crate) mode: Option<Mode>,
+    /// Width and height in pixels
+    #[arg(long, value_delimiter = 'x', num_args = 1, value_name = "W[xH]")]
+    pub(crate) size: Option<Vec<u32>>,
+    /// Bits a pixel of fluoroscopic frames, 8 or 16
+    #[arg(long)]
+    pub(crate) bits: Option<u32>,
+    /// Set any other key of the scene's view table, as in c_arm.sid_mm=1000 (repeatable)
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Turn the camera of the 3D view by so many degrees from the first frame to the last
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    pub(crate) orbit: Option<f64>,
+    /// Write one moving picture of the views side by side: an animated PNG (.png, .apng), a GIF (.gif), or a film (.mp4) where the program
+    /// was built with the feature mp4
+    #[arg(long, value_name = "FILE")]
+    pub(crate) animate: Option<PathBuf>,
+    /// Write the fluoroscopic frames as one DICOM file (X-ray angiographic image)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) dicom: Option<PathBuf>,
+    /// Write labels for learning beside each fluoroscopic frame: device mask (PNG), centre line, tip and contacts (JSON)
+    #[arg(long)]
+    pub(crate) labels: bool,
+    /// Write path lengths and line integrals as float arrays (npy) beside each fluoroscopic frame
+    #[arg(long)]
+    pub(crate) raw: bool,
+    /// Write the last image hold, the mean of the last fluoroscopic frames
+    #[arg(long)]
+    pub(crate) hold: bool,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Print what was written as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn mode(text: &str) -> Result<Mode, String> {
+    serde_json::from_value(serde_json::Value::from(text)).map_err(|e| e.to_string())
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct RenderArgs {
+    /// Folder of a recorded run
+    pub(crate) dir: PathBuf,
+    /// Scene file of the run, if it is no longer where it was
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    /// First recorded step to draw
+    #[arg(long, default_value_t = 1, value_name = "STEP")]
+    pub(crate) from: usize,
+    /// Last recorded step to draw; the last one if absent
+    #[arg(long, value_name = "STEP")]
+    pub(crate) to: Option<usize>,
+    /// Draw every so many steps, and the last; every step if absent
+    #[arg(long, default_value_t = 1, value_name = "STEPS")]
+    pub(crate) every: usize,
+    /// Folder for the frames; DIR/render if absent
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) frames: FrameArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct FluoroArgs {
+    /// Scene file (TOML)
+    pub(crate) scene: PathBuf,
+    /// Steps of the script to carry out before; 0 leaves the vessel without a device
+    #[arg(long, value_name = "STEPS")]
+    pub(crate) steps: Option<usize>,
+    /// Time of the first frame in seconds, for injections
+    #[arg(long, default_value_t = 0.0, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) time: f64,
+    /// Number of frames, at the scene's frames_per_s
+    #[arg(long, default_value_t = 1, value_name = "COUNT")]
+    pub(crate) count: u32,
+    /// Folder for the frames; out/NAME OF THE SCENE if absent
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) frames: FrameArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct DatasetArgs {
+    /// Specification (TOML)
+    pub(crate) spec: PathBuf,
+    /// Folder for images, arrays and annotations.json; a call that was ended goes on in it
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Print what was written as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct ExportArgs {
+    /// Folder of a recorded run
+    pub(crate) dir: PathBuf,
+    /// Folder for run.pvd, which lists the steps with their times, step_*.vtp (instruments as lines, contacts as points with their forces)
+    /// and vessel.vtp; files of these names are replaced
+    #[arg(long, value_name = "DIR")]
+    pub(crate) vtk: PathBuf,
+    /// Scene file of the run, if it is no longer where it was
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+}

@@ -1,0 +1,135 @@
+//! Arguments of comparisons and experiments.
+
+use std::path::PathBuf;
+
+use clap::Subcommand;
+use clap::builder::PossibleValuesParser;
+use endowire_methods::NAMES;
+
+use crate::commands::compare::case::CASES;
+use crate::commands::experiment::navigation::targets;
+
+/// The methods that are compared. A wrong name is answered with the nearest right one.
+fn method_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(NAMES)
+}
+
+fn all_or_method_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(std::iter::once("all").chain(NAMES))
+}
+
+fn case_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(CASES.map(|case| case.0))
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct CompareArgs {
+    /// Folder for compare.csv, .json, .svg and .png; rows that compare.csv already has are not run again
+    #[arg(long, default_value = "out/compare", value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Cases to run; all if absent
+    #[arg(long, visible_alias = "case", value_delimiter = ',', value_name = "CASE,…", value_parser = case_names())]
+    pub(crate) cases: Vec<String>,
+    /// Methods to run; all if absent
+    #[arg(long, visible_alias = "method", value_delimiter = ',', value_name = "METHOD,…", value_parser = method_names())]
+    pub(crate) methods: Vec<String>,
+    /// Numbers of elements to run, as 8,16,32; those that show each method best if absent
+    #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    pub(crate) elements: Vec<usize>,
+    /// Longest time of one solve or insertion
+    #[arg(long, default_value_t = 30.0, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) limit_s: f64,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum ExperimentCommand {
+    /// Experiment 1: time per calculation against the number of nodes (the paper's Table 1)
+    Timing(TimingArgs),
+    /// Experiment 2: a shaped wire steered to every named target of the aortic arch and the hepatic arteries
+    Navigation(NavigationArgs),
+    /// Experiment 3: a soft tip stopped in a tube, and the loop that grows (the paper's figure 4)
+    Loop(LoopArgs),
+    /// Experiment 4: shape in the curved tube against a ground truth (the paper's Table 2)
+    Deformation(DeformationArgs),
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct NavigationArgs {
+    /// Targets to steer to; all if absent
+    #[arg(long, visible_alias = "target", value_delimiter = ',', value_name = "TARGET,…", value_parser = PossibleValuesParser::new(targets()))]
+    pub(crate) targets: Vec<String>,
+    /// Steer devices of the catalogue in this folder (assets/devices), wires in catheters: to the branches of three types of the aortic
+    /// arch and to both hepatic arteries
+    #[arg(long, value_name = "DIR")]
+    pub(crate) catalogue: Option<PathBuf>,
+    /// Folder for navigation.csv, navigation.json and frames of both views
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl NavigationArgs {
+    /// Whether a target is asked for.
+    pub(crate) fn wants(&self, target: &str) -> bool {
+        self.targets.is_empty() || self.targets.iter().any(|name| name == target)
+    }
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct LoopArgs {
+    /// Folder for loop.csv, loop.json, four frames of both views, and loop.svg and .png
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct DeformationArgs {
+    /// Measured points (CSV: x_mm,y_mm,z_mm from the sheath to the tip) instead of the computed ground truth
+    #[arg(long, value_name = "FILE")]
+    pub(crate) measured: Option<PathBuf>,
+    /// Method
+    #[arg(long, default_value = "kirchhoff", value_name = "METHOD", value_parser = method_names())]
+    pub(crate) method: String,
+    /// Segment lengths of Table 2 to run (1, 2, 3); all if absent
+    #[arg(long, value_delimiter = ',', value_name = "L,…")]
+    pub(crate) l_mm: Vec<f64>,
+    /// Increments a segment of Table 2 to run (40, 20, 10, 5, 3); all if absent
+    #[arg(long, value_delimiter = ',', value_name = "COUNT,…")]
+    pub(crate) l_over_h: Vec<u32>,
+    /// Folder for deformation.csv and deformation.json
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct TimingArgs {
+    /// Numbers of nodes
+    #[arg(long, value_delimiter = ',', default_values_t = [50, 100, 150, 200, 300], value_name = "N,N,…")]
+    pub(crate) nodes: Vec<usize>,
+    /// Timed calculations for each number of nodes
+    #[arg(long, default_value_t = 15, value_name = "COUNT")]
+    pub(crate) repeats: usize,
+    /// Methods: all, or some of them
+    #[arg(long, visible_alias = "method", value_delimiter = ',', default_values_t = ["li2011-dense", "li2011-banded", "kirchhoff"].map(String::from), value_name = "METHOD,…", value_parser = all_or_method_names())]
+    pub(crate) methods: Vec<String>,
+    /// Longest time for a method to be brought in position; one that takes longer is told in a note
+    #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) limit_s: f64,
+    /// Folder for timing.csv and timing.json
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Print the rows as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}

@@ -1,0 +1,40 @@
+//! The program under test, and scenes of the assets for it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// `endowire`, with a cache of walls that is the tests' and not the user's.
+pub(crate) fn endowire() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_endowire"));
+    command.env("ENDOWIRE_CACHE", concat!(env!("CARGO_TARGET_TMPDIR"), "/cache"));
+    command
+}
+
+/// The folder of the workspace.
+pub(crate) fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+}
+
+/// The folder of vessels, devices and scenes.
+pub(crate) fn assets() -> PathBuf {
+    workspace().join("assets")
+}
+
+/// The text of a scene of the assets that can lie anywhere. Each change replaces a piece of it, which must be there.
+pub(crate) fn scene_text(name: &str, changes: &[(&str, &str)]) -> String {
+    let text = std::fs::read_to_string(assets().join("scenes").join(name)).unwrap();
+    let text = text.replace("\"../", &format!("\"{}/", assets().display()));
+    changes.iter().fold(text, |text, (piece, other)| {
+        assert!(text.contains(piece), "{piece} is not in {name}");
+        text.replace(piece, other)
+    })
+}
+
+/// The curved tube pushed into for 30 mm, with small pictures.
+pub(crate) const SHORT: [(&str, &str); 2] =
+    [("advance_mm = 220.0", "advance_mm = 30.0"), ("size_px = [640, 640]", "size_px = [96, 64]")];
+
+/// What the program says on stderr.
+pub(crate) fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}

@@ -1,0 +1,151 @@
+//! Datasets as a user gets them: the same whatever the threads, in both planes, gone on with where they were.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Output;
+
+use crate::common::{SHORT, assets, said, scene_text};
+use serde_json::Value;
+
+fn endowire(args: &[&str], threads: &str) -> Output {
+    crate::common::endowire().env("RAYON_NUM_THREADS", threads).args(args).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A specification of a short course in the curved tube with two devices.
+fn specification(folder: &Path, more: &str) -> std::path::PathBuf {
+    let assets = assets().display().to_string();
+    let scene = scene_text("curved_tube.toml", &SHORT);
+    std::fs::write(folder.join("scene.toml"), scene).unwrap();
+    let spec = folder.join("spec.toml");
+    let text = format!(
+        "scenes = [\"scene.toml\"]\ndevices = [\"{assets}/devices/wire_035_soft.toml\", \
+         \"{assets}/devices/catheter_4f_vertebral.toml\"]\nposes = 2\nmoments = 3\nbiplane_deg = 90.0\n{more}\n[vary]\n\
+         dose_ngy = [20.0, 90.0]\nkvp = [70.0, 80.0]\nprogress = [0.5, 1.0]\n[view]\nsize_px = [256, 192]\nbackend = \"cpu\"\n"
+    );
+    std::fs::write(&spec, text).unwrap();
+    spec
+}
+
+/// All files of a folder and its folders, with what is in them.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if path.is_dir() {
+            all.extend(files(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
+        } else {
+            all.insert(name, std::fs::read(&path).unwrap());
+        }
+    }
+    all
+}
+
+fn told(output: &Output) -> Value {
+    assert!(output.status.success(), "{}", said(output));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn a_dataset_is_the_same_with_any_threads_and_goes_on_where_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = specification(folder.path(), "");
+    let [one, two] = ["one", "two"].map(|name| folder.path().join(name));
+    let first = told(&endowire(&["dataset", text(&spec), "--out", text(&one), "--json"], "1"));
+    assert_eq!((first["pictures"].as_u64(), first["drawn"].as_u64()), (Some(24), Some(24)));
+    told(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
+    let whole = files(&one);
+    assert!(whole == files(&two));
+    // What a call that was ended has left: a shot without its list, and a picture that is half there.
+    std::fs::remove_file(two.join("parts/000001.json")).unwrap();
+    std::fs::write(two.join("images/0000007.png"), "half").unwrap();
+    let again = told(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
+    assert_eq!(again["drawn"].as_u64(), Some(6));
+    assert!(whole == files(&two));
+    // The twin: another seed is another dataset, and is not mixed with this one.
+    let spec = specification(folder.path(), "seed = 2");
+    let refused = endowire(&["dataset", text(&spec), "--out", text(&two)], "2");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(said(&refused).contains("another dataset"));
+    let other = folder.path().join("other");
+    told(&endowire(&["dataset", text(&spec), "--out", text(&other), "--json"], "2"));
+    assert!(files(&other)["images/0000000.png"] != whole["images/0000000.png"]);
+}
+
+#[test]
+fn annotations_are_those_of_coco_and_planes_know_each_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = specification(folder.path(), "");
+    let out = folder.path().join("out");
+    told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+    let document: Value =
+        serde_json::from_slice(&std::fs::read(out.join("annotations.json")).unwrap()).unwrap();
+    let images = document["images"].as_array().unwrap();
+    assert_eq!(images.len(), 24);
+    for (id, image) in images.iter().enumerate() {
+        assert_eq!(image["id"], id);
+        assert!(out.join(image["file_name"].as_str().unwrap()).exists());
+        let other = &images[image["pair"].as_u64().unwrap() as usize];
+        let turn = other["primary_deg"].as_f64().unwrap() - image["primary_deg"].as_f64().unwrap();
+        assert!((turn.abs() - 90.0).abs() < 1e-9 && other["step"] == image["step"]);
+        assert!(other["camera_matrix"] != image["camera_matrix"]);
+    }
+    let annotations = document["annotations"].as_array().unwrap();
+    let categories = document["categories"].as_array().unwrap();
+    let name = |row: &Value| {
+        let category = categories.iter().find(|c| c["id"] == row["category_id"]).unwrap();
+        category["name"].as_str().unwrap().to_owned()
+    };
+    for kind in ["vessel", "instrument", "part"] {
+        assert!(annotations.iter().any(|row| name(row) == kind), "{kind}");
+    }
+    for row in annotations {
+        let counts: Vec<u64> =
+            row["segmentation"]["counts"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).collect();
+        assert_eq!(counts.iter().sum::<u64>(), 256 * 192);
+        assert_eq!(counts.iter().skip(1).step_by(2).sum::<u64>(), row["area"].as_u64().unwrap());
+    }
+    // The tip projects by the matrix of its picture to where its picture says.
+    let tips = annotations.iter().filter(|row| name(row) == "instrument");
+    let mut compared = 0;
+    for row in tips {
+        let image = &images[row["image_id"].as_u64().unwrap() as usize];
+        let tip: Vec<f64> = row["tip_mm"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+        let [u, v, w] = [0, 1, 2].map(|k| {
+            let m = |j: usize| image["camera_matrix"][k][j].as_f64().unwrap();
+            m(0) * tip[0] + m(1) * tip[1] + m(2) * tip[2] + m(3)
+        });
+        let at = |k: usize| row["keypoints"][k].as_f64().unwrap();
+        assert!((u / w - at(0)).abs() < 1e-9 && (v / w - at(1)).abs() < 1e-9);
+        compared += 1;
+    }
+    assert!(compared > 12);
+}
+
+#[test]
+fn a_specification_that_does_not_fit_is_refused_by_its_key() {
+    let folder = tempfile::tempdir().unwrap();
+    for (more, named) in [("pose = 3", "poses"), ("biplane = 1", "biplane_deg"), ("seed = -1", "seed")] {
+        let spec = specification(folder.path(), more);
+        let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join("out"))], "1");
+        let told = said(&output);
+        assert!(output.status.code() == Some(2) && told.contains(named), "{told}");
+    }
+    let spec = specification(folder.path(), "");
+    let whole = std::fs::read_to_string(&spec).unwrap();
+    for (from, to, named) in [
+        ("dose_ngy = [20.0, 90.0]", "dose_ngy = [90.0, 20.0]", "vary.dose_ngy"),
+        ("moments = 3", "moments = 0", "moments"),
+        ("size_px = [256, 192]", "size_px = [0, 192]", "size_px"),
+        ("kvp = [70.0, 80.0]", "kvp = [71.0]", "kvp"),
+    ] {
+        std::fs::write(&spec, whole.replace(from, to)).unwrap();
+        let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join(to))], "1");
+        let told = said(&output);
+        assert!(output.status.code() == Some(2) && told.contains(named), "{to}: {told}");
+    }
+}

@@ -1,0 +1,101 @@
+//! A recorded run as files of VTK, read back.
+
+use std::path::Path;
+
+use crate::common::{assets, endowire, said};
+use npyz::NpyFile;
+
+/// Two instruments pushed into a tube.
+const SCENE: &str = r#"
+[vessel]
+file = "VESSEL"
+[[instrument]]
+name = "wire"
+[[instrument.section]]
+length_mm = 300.0
+radius_mm = 0.2
+bending_stiffness_nmm2 = 5.0
+[[instrument]]
+name = "catheter"
+[[instrument.section]]
+length_mm = 200.0
+radius_mm = 0.6
+inner_radius_mm = 0.3
+bending_stiffness_nmm2 = 15.0
+[sheath]
+position_mm = [0.0, 0.0, 1.0]
+direction = [0.0, 0.0, 1.0]
+[method]
+name = "kirchhoff"
+element_mm = 5.0
+[[script]]
+instrument = "wire"
+advance_mm = 150.0
+step_mm = 10.0
+speed_mm_per_s = 20.0
+with = [{ instrument = "catheter", advance_mm = 120.0, step_mm = 10.0 }]
+[view]
+views = []
+"#;
+
+/// Numbers of an array of a file.
+fn array(text: &str, name: &str, after: &str) -> Vec<f64> {
+    let behind = text.split_once(&format!("<{after}>")).unwrap().1;
+    let begin = behind.split_once(&format!("Name=\"{name}\"")).unwrap().1.split_once('>').unwrap().1;
+    let numbers = begin.split_once("</DataArray>").unwrap().0;
+    numbers.split_whitespace().map(|number| number.parse().unwrap()).collect()
+}
+
+fn recorded(folder: &Path, name: &str) -> Vec<f64> {
+    let mut archive = zip::ZipArchive::new(std::fs::File::open(folder.join("shapes.npz")).unwrap()).unwrap();
+    let file = archive.by_name(&format!("{name}.npy")).unwrap();
+    NpyFile::new(std::io::BufReader::new(file)).unwrap().into_vec().unwrap()
+}
+
+#[test]
+fn a_run_is_exported_as_it_was_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let vessel = assets().join("vessels/curved_tube.stl");
+    let scene = folder.path().join("scene.toml");
+    std::fs::write(&scene, SCENE.replace("VESSEL", vessel.to_str().unwrap())).unwrap();
+    let (run, out) = (folder.path().join("run"), folder.path().join("vtk"));
+    let command = |arguments: &[&std::ffi::OsStr]| {
+        let output = endowire().args(arguments).output().unwrap();
+        assert!(output.status.success(), "{}", said(&output));
+    };
+    command(&["run".as_ref(), scene.as_ref(), "--out".as_ref(), run.as_ref()]);
+    command(&["export".as_ref(), run.as_ref(), "--vtk".as_ref(), out.as_ref()]);
+
+    let series = std::fs::read_to_string(out.join("run.pvd")).unwrap();
+    assert_eq!(series.matches("<DataSet ").count(), 15);
+    assert!(series.contains("timestep=\"0.5\" part=\"0\" file=\"step_000001.vtp\""), "{series}");
+    let text = std::fs::read_to_string(out.join("step_000015.vtp")).unwrap();
+    let points = array(&text, "points_mm", "Points");
+    let of = array(&text, "instrument", "PointData");
+    let offsets = array(&text, "offsets", "Lines");
+    assert_eq!((points.len(), offsets.len()), (3 * of.len(), 2));
+    // The wire is the whole line, to the bit; the catheter a part of it.
+    let positions = recorded(&run, "positions_mm");
+    let wire = &points[..3 * offsets[0] as usize];
+    assert!(positions.ends_with(wire) && of[..offsets[0] as usize].iter().all(|number| *number == 0.0));
+    let radii = array(&text, "radius_mm", "PointData");
+    let catheter = offsets[0] as usize..offsets[1] as usize;
+    assert!(catheter.clone().all(|k| of[k] == 1.0 && radii[k] == 0.6));
+    assert_eq!(array(&text, "from_tip_mm", "PointData")[catheter.start], 120.0);
+    // Contacts with their forces.
+    let contacts = array(&text, "connectivity", "Verts");
+    let forces = array(&text, "contact_force_n", "PointData");
+    let wanted = recorded(&run, "contact_forces_n");
+    assert!(!contacts.is_empty() && wanted.ends_with(&forces[3 * contacts[0] as usize..]));
+    assert!(contacts.iter().all(|k| of[*k as usize] == -1.0));
+    let vessel = std::fs::read_to_string(out.join("vessel.vtp")).unwrap();
+    let triangles = array(&vessel, "connectivity", "Polys");
+    let vertices = array(&vessel, "points_mm", "Points").len() / 3;
+    assert!(triangles.len() > 3000 && triangles.iter().all(|k| (*k as usize) < vertices));
+
+    let output =
+        endowire().args(["export".as_ref(), out.as_os_str(), "--vtk".as_ref(), out.as_ref()]).output();
+    let output = output.unwrap();
+    let said = said(&output);
+    assert!(output.status.code() == Some(2) && said.contains("folder of a recorded run"), "{said}");
+}

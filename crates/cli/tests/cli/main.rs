@@ -1,0 +1,25 @@
+//! `endowire` as a user meets it, in one program, which is linked once: `cargo test -p endowire-cli --test cli guide::` runs one file of it.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod bad_input;
+mod cache;
+mod common;
+mod compare;
+mod dataset;
+mod device;
+mod experiment;
+mod export;
+mod guide;
+mod instruments;
+mod killed;
+mod methods;
+mod packages;
+mod play;
+mod recording;
+mod render;
+mod report;
+mod resume;
+mod rod;
+mod sweep;
+mod terminal;

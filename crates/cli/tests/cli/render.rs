@@ -1,0 +1,238 @@
+//! Frames of a recorded run and of a scene, as a user gets them.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use crate::common::{SHORT, said, scene_text};
+use npyz::NpyFile;
+use serde_json::Value;
+
+fn endowire(args: &[&str]) -> Output {
+    crate::common::endowire().args(args).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A short run in the curved tube, recorded without frames.
+fn recorded(folder: &Path) -> (PathBuf, PathBuf) {
+    let scene = scene_text("curved_tube.toml", &SHORT).replace("[\"3d\", \"fluoro\"]", "[]");
+    let path = folder.join("scene.toml");
+    std::fs::write(&path, scene).unwrap();
+    let run = folder.join("run");
+    assert!(endowire(&["run", text(&path), "--out", text(&run)]).status.success());
+    (path, run)
+}
+
+fn written(output: &Output) -> Value {
+    assert!(output.status.success(), "{}", said(output));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn png_size(path: &Path) -> (u32, u32) {
+    let reader = png::Decoder::new(BufReader::new(File::open(path).unwrap())).read_info().unwrap();
+    (reader.info().width, reader.info().height)
+}
+
+#[test]
+fn a_recorded_run_is_drawn_from_any_angle_with_all_that_belongs_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, run) = recorded(folder.path());
+    let [out, animation, dicom] = ["out", "turn.png", "run.dcm"].map(|name| folder.path().join(name));
+    let output = endowire(&[
+        "render",
+        text(&run),
+        "--from",
+        "40",
+        "--every",
+        "40",
+        "--pose",
+        "RAO 30 CAU 20",
+        "--view",
+        "both",
+        "--set",
+        "c_arm.sid_mm=1000",
+        "--labels",
+        "--raw",
+        "--orbit",
+        "30",
+        "--animate",
+        text(&animation),
+        "--dicom",
+        text(&dicom),
+        "--out",
+        text(&out),
+        "--json",
+    ]);
+    let document = written(&output);
+    let files: Vec<&str> =
+        document["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
+    // Steps 40 and 80, and the last one.
+    for step in ["step_000040", "step_000080", "step_000106"] {
+        for rest in [
+            "3d.png",
+            "fluoro.png",
+            "both.png",
+            "mask.png",
+            "labels.json",
+            "line_integral.npy",
+            "lumen_mm.npy",
+        ] {
+            let name = format!("{step}_{rest}");
+            assert!(files.contains(&name.as_str()) && out.join(&name).exists(), "{name}");
+        }
+    }
+    assert_eq!(png_size(&out.join("step_000040_both.png")), (192, 64));
+    let mut animated =
+        png::Decoder::new(BufReader::new(File::open(&animation).unwrap())).read_info().unwrap();
+    assert_eq!(animated.info().animation_control.unwrap().num_frames, 3);
+    let mut data = vec![0; animated.output_buffer_size().unwrap()];
+    animated.next_frame(&mut data).unwrap();
+
+    // The tip of the labels is the recorded one, seen by a pinhole at 1000 mm; the device attenuates there.
+    let labels: Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("step_000106_labels.json")).unwrap()).unwrap();
+    let tip: Vec<f64> =
+        labels["devices"][0]["tip_px"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
+    assert!(labels["devices"][0]["tip_visible"].as_bool().unwrap(), "{tip:?}");
+    let map = |name: &str| {
+        let file = NpyFile::new(BufReader::new(File::open(out.join(name)).unwrap())).unwrap();
+        assert_eq!(file.shape(), [64, 96]);
+        file.into_vec::<f32>().unwrap()
+    };
+    let steel = map("step_000106_steel_316l_mm.npy");
+    let near = (0..steel.len())
+        .filter(|&i| steel[i] > 0.0)
+        .map(|i| (((i % 96) as f64 + 0.5 - tip[0]).powi(2) + ((i / 96) as f64 + 0.5 - tip[1]).powi(2)).sqrt())
+        .fold(f64::MAX, f64::min);
+    assert!(near < 2.0, "{near}");
+    let line = map("step_000106_line_integral.npy");
+    assert!(line.iter().all(|p| p.is_finite() && *p > 0.5));
+    let bytes = std::fs::read(&dicom).unwrap();
+    assert_eq!(&bytes[128..132], b"DICM");
+}
+
+#[test]
+fn a_scene_is_drawn_without_a_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, _) = recorded(folder.path());
+    let out = folder.path().join("out");
+    let draw = |more: &[&str]| {
+        let mut args = vec!["fluoro", text(&scene), "--out", text(&out), "--json", "--size", "48x32"];
+        args.extend(more);
+        written(&endowire(&args))
+    };
+    assert_eq!(draw(&["--steps", "0"])["files"].as_array().unwrap().len(), 1);
+    let bare = std::fs::read(out.join("frame_000000_fluoro.png")).unwrap();
+    assert_eq!(png_size(&out.join("frame_000000_fluoro.png")), (48, 32));
+    assert_eq!(draw(&["--count", "2", "--bits", "16", "--hold"])["files"].as_array().unwrap().len(), 3);
+    assert_eq!(png_size(&out.join("hold.png")), (48, 32));
+    assert_ne!(std::fs::read(out.join("frame_000000_fluoro.png")).unwrap(), bare);
+}
+
+#[test]
+fn drawing_anew_replaces_what_was_drawn_before_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, run) = recorded(folder.path());
+    let draw = |more: &[&str]| {
+        let output = endowire(&[&["render", text(&run), "--view", "3d", "--every", "40"], more].concat());
+        assert!(output.status.success(), "{}", said(&output));
+        said(&output)
+    };
+    let said = draw(&["--from", "26", "--size", "48x32"]);
+    assert!(!said.contains("replaces"), "{said}");
+    let frames = run.join("render");
+    assert_eq!(png_size(&frames.join("step_000066_3d.png")), (48, 32));
+    std::fs::write(frames.join("step_000099_3d.png"), "mine").unwrap();
+    let said = draw(&["--from", "30", "--size", "24x16"]);
+    assert!(said.contains("replaces 3 files of an earlier endowire render"), "{said}");
+    let mut names: Vec<String> = std::fs::read_dir(&frames)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| !name.starts_with('.'))
+        .collect();
+    names.sort();
+    let ours = ["step_000030_3d.png", "step_000070_3d.png", "step_000099_3d.png", "step_000106_3d.png"];
+    assert_eq!(names, ours);
+    assert_eq!(png_size(&frames.join("step_000070_3d.png")), (24, 16));
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, run) = recorded(folder.path());
+    let nothing = folder.path().join("nothing");
+    let far = folder.path().join("no/such/folder/labels.png");
+    let labels = folder.path().join("labels");
+    std::fs::create_dir_all(labels.join("frame_000000_labels.json")).unwrap();
+    let nan = folder.path().join("nan.toml");
+    let pose = std::fs::read_to_string(&scene).unwrap().replace("[view]", "[view]\nc_arm.primary_deg = nan");
+    std::fs::write(&nan, pose).unwrap();
+    let still = |more: &[&'static str]| [&["fluoro", text(&scene), "--steps", "0"], more].concat();
+    // Each message names key, value and mend.
+    let cases: [(Vec<&str>, &[&str]); 20] = [
+        (vec!["render", text(&nothing)], &["nothing", "recorded run"]),
+        (vec!["render", text(&run), "--pose", "north 3"], &["north 3", "say angles as in \"LAO 40\""]),
+        (
+            vec!["render", text(&run), "--set", "c_arm.sid_mm=0"],
+            &["view.c_arm.sid_mm = 0: must be a number from 10 to 100000"],
+        ),
+        (
+            vec!["render", text(&run), "--set", "c_arm.nothing=0"],
+            &["c_arm.nothing=0", "expected one of", "sid_mm"],
+        ),
+        (vec!["render", text(&run), "--from", "900"], &["--from 900", "steps 1 to 106"]),
+        (vec!["render", text(&run), "--view", "3d", "--labels"], &["--labels", "use --view fluoro"]),
+        (vec!["render", text(&run), "--view", "fluoro", "--animate", text(&far)], &["no/such/folder"]),
+        (
+            still(&["--set", "c_arm.primary_deg=nan"]),
+            &["view.c_arm.primary_deg = nan: must be a finite number"],
+        ),
+        (
+            vec!["fluoro", text(&nan), "--steps", "0"],
+            &["view.c_arm.primary_deg = NaN: must be a number from"],
+        ),
+        (still(&["--set", "c_arm.sid_mm=0"]), &["view.c_arm.sid_mm = 0: must be a number from 10 to 100000"]),
+        (
+            still(&["--set", "patient.ct={\"file\":\"none.nii\"}"]),
+            &["view.patient.ct.file = ", "none.nii", "No such file"],
+        ),
+        (still(&["--size", "5000"]), &["view.size_px = [5000, 5000]: each side must be 1 to 4096 pixels"]),
+        (
+            [&still(&["--labels", "--out"])[..], &[text(&nan)]].concat(),
+            &["--out", "nan.toml", "name a folder that can be made"],
+        ),
+        (
+            [&still(&["--labels", "--out"])[..], &[text(&labels)]].concat(),
+            &["cannot write", "frame_000000_labels.json", "directory"],
+        ),
+        // Pixels, kernels and volumes of numbers that nobody means: told before anything is computed.
+        (
+            still(&["--set", "c_arm.field_mm=1e-308"]),
+            &["view.c_arm.field_mm = 1e-308: must be a number from 0.01 to 100000"],
+        ),
+        (
+            still(&["--set", "c_arm.field_mm=0.01", "--size", "4096"]),
+            &["view.c_arm.field_mm = 0.01: with 4096 pixels", "must be 0.0001 to 1000 mm"],
+        ),
+        (
+            still(&["--set", "c_arm.pixel_mm=0.001"]),
+            &["view.detector.blur_mm = 0.15: is 150 pixels", "give at most 0.05 mm"],
+        ),
+        (still(&["--orbit", "1e300", "--view", "both"]), &["--orbit 1", "give -36000 to 36000 degrees"]),
+        (still(&["--set", "detector.seed=-1"]), &["detector.seed=-1", "u64"]),
+        (still(&["--mode", "roadmap"]), &["view.xray.mode = roadmap", "give a [[view.injection]]"]),
+    ];
+    for (args, words) in cases {
+        let output = endowire(&args);
+        let said = said(&output);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+        assert!(!said.contains("panicked"), "{args:?}: {said}");
+        for word in words {
+            assert!(said.contains(word), "{args:?}: `{word}` is missing in: {said}");
+        }
+    }
+}

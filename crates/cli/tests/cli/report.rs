@@ -1,0 +1,105 @@
+//! The page of a run: all in one file, and what a browser shows of it.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::common::{endowire, said, scene_text};
+
+/// A run in the curved tube with two frames, and its page.
+fn page(folder: &Path) -> PathBuf {
+    let changes =
+        [("advance_mm = 220.0", "advance_mm = 90.0"), ("size_px = [640, 640]", "size_px = [96, 64]")];
+    let text = scene_text("curved_tube.toml", &changes);
+    let (scene, run) = (folder.join("short.toml"), folder.join("run"));
+    std::fs::write(&scene, text).unwrap();
+    let done = endowire().arg("run").arg(&scene).arg("--quiet").arg("--out").arg(&run).output().unwrap();
+    assert_eq!((done.status.code(), done.stderr.len()), (Some(0), 0), "{done:?}");
+    let told = endowire().arg("report").arg(&run).output().unwrap();
+    assert_eq!(told.status.code(), Some(0), "{told:?}");
+    run.join("report.html")
+}
+
+#[test]
+fn a_page_is_whole_and_names_where_it_comes_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = page(folder.path());
+    let text = std::fs::read_to_string(&page).unwrap();
+    assert!(text.len() < 5_000_000, "{} bytes", text.len());
+    for outside in ["http:", "https:", "src=\"", "@import", "/*DATA*/"] {
+        assert!(!text.contains(outside), "{outside}");
+    }
+    let summary = std::fs::read_to_string(folder.path().join("run/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    assert!(text.contains(summary["scene_hash"].as_str().unwrap()));
+    // A folder without a run is told.
+    let none = endowire().arg("report").arg(folder.path()).output().unwrap();
+    assert_eq!(none.status.code(), Some(2));
+    assert!(said(&none).contains("recorded run"));
+}
+
+#[test]
+fn an_experiment_has_a_page_of_its_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("timing");
+    let few = ["experiment", "timing", "--nodes", "20", "--repeats", "1", "--methods", "kirchhoff", "--out"];
+    assert_eq!(endowire().args(few).arg(&out).output().unwrap().status.code(), Some(0));
+    assert_eq!(endowire().arg("report").arg(&out).output().unwrap().status.code(), Some(0));
+    let text = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(text.contains("\"columns\":[\"method\"") && text.contains("\"git_revision\""), "{text}");
+    assert!(!text.contains("http"));
+}
+
+/// A browser that can do without a window.
+fn browser() -> Option<&'static str> {
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    names
+        .into_iter()
+        .find(|name| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success()))
+}
+
+/// Runs the browser on a page.
+fn shown(browser: &str, folder: &Path, url: &str, what: &str) -> String {
+    let mut command = Command::new(browser);
+    command.args(["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1000,900"]);
+    let profile = format!("--user-data-dir={}", folder.join("profile").display());
+    let output = command.args([&profile, what, url]).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Pixels of a picture that are more red than blue: the vessel and contacts.
+fn red_pixels(path: &Path) -> (usize, Vec<u8>) {
+    let decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    let mut data = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut data).unwrap();
+    let bytes = info.color_type.samples();
+    let red = data.chunks_exact(bytes).filter(|pixel| pixel[0] > pixel[2].saturating_add(4)).count();
+    (red, data)
+}
+
+#[test]
+fn a_browser_draws_the_page_soon_and_follows_the_slider() {
+    let Some(browser) = browser() else {
+        eprintln!("skipped: there is no Chromium to open the page in");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let page = page(folder.path());
+    let url = |step: usize| format!("file://{}#step={step}", page.display());
+    let mut pictures = Vec::new();
+    for (step, said) in [(40, "step 40: 20.0 mm inserted"), (160, "step 160: 80.0 mm inserted")] {
+        let document = shown(browser, folder.path(), &url(step), "--dump-dom");
+        assert!(document.contains(said), "{said}");
+        let (_, rest) = document.split_once("data-drawn-ms=\"").unwrap();
+        let drawn_ms: f64 = rest.split('"').next().unwrap().parse().unwrap();
+        assert!(drawn_ms < 2000.0, "{drawn_ms} ms");
+        let picture = folder.path().join(format!("{step}.png"));
+        shown(browser, folder.path(), &url(step), &format!("--screenshot={}", picture.display()));
+        let (red, data) = red_pixels(&picture);
+        assert!(red > 3000, "{red} pixels of the vessel");
+        pictures.push(data);
+    }
+    let differ = pictures[0].iter().zip(&pictures[1]).filter(|(a, b)| a != b).count();
+    assert!(differ > 500, "{differ} values differ");
+}

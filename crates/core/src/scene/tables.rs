@@ -1,0 +1,142 @@
+//! Vessel, devices and sheath as a scene file has them.
+
+use std::path::PathBuf;
+
+use serde::Deserialize;
+
+use crate::device::Section;
+use crate::insertion::{Sheath, WallProperties};
+use crate::vessel::{CentrelineTree, Resolution, Wall};
+use crate::{Error, Result, Vec3};
+
+/// `[vessel]`: a surface file, or a centre-line tree to build the surface from.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VesselSpec {
+    /// Surface mesh (STL, OBJ or PLY).
+    pub file: Option<PathBuf>,
+    /// Millimetres per unit of the surface file; 1 if absent.
+    pub unit_mm: Option<f64>,
+    /// Centre-line table (x y z radius parent, mm) that the wall is built from; rows may name targets.
+    pub tree: Option<PathBuf>,
+    /// Centre-line table beside `file`, for its targets.
+    pub centreline: Option<PathBuf>,
+    /// Edge length of the wall built from the tree, mm.
+    pub edge_mm: Option<f64>,
+    /// Number of triangles of the wall built from the tree, in place of `edge_mm`.
+    pub triangles: Option<usize>,
+    /// How the wall yields and rubs.
+    #[serde(default)]
+    pub wall: WallProperties,
+}
+
+impl VesselSpec {
+    /// How fine the wall is built from `tree`.
+    pub(super) fn resolution(&self, tree: &CentrelineTree) -> Result<Resolution> {
+        match (self.edge_mm, self.triangles) {
+            (Some(edge_mm), None) => Ok(Resolution::EdgeMm(edge_mm)),
+            (None, Some(triangles)) => Ok(Resolution::Triangles(triangles)),
+            (None, None) => Ok(Resolution::fitting(tree)),
+            (Some(edge_mm), Some(_)) => Err(Error::parameter(
+                "vessel.edge_mm",
+                edge_mm,
+                "vessel.triangles is given too: keep one of the two",
+            )),
+        }
+    }
+}
+
+/// `[device]`: sections here, or a file that has them.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DeviceSpec {
+    /// A [`DeviceFile`](crate::device::DeviceFile).
+    pub file: Option<PathBuf>,
+    /// Sections, tip first.
+    #[serde(default)]
+    pub section: Vec<Section>,
+}
+
+/// `[[instrument]]`: one of several that lie in one another, with sections here, or a file that has them.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstrumentSpec {
+    /// What script and recording call it.
+    pub name: String,
+    /// A [`DeviceFile`](crate::device::DeviceFile).
+    pub file: Option<PathBuf>,
+    /// Sections, tip first.
+    #[serde(default)]
+    pub section: Vec<Section>,
+    /// Length that is in at the start, mm.
+    #[serde(default)]
+    pub inserted_mm: f64,
+    /// Whether its tip may be farther in than that of the instrument in it; it may if absent.
+    #[serde(default = "yes")]
+    pub may_lead: bool,
+    /// Coulomb coefficient of friction between it and the instruments outside it, along the line; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction: f64,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// `[sheath]`: an opening of the vessel, or a point and a direction.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SheathSpec {
+    /// Number of an opening; the device enters in its middle, against its outward direction.
+    pub opening: Option<usize>,
+    /// How far inside the opening the mouth lies, mm; 1 if absent.
+    pub depth_mm: Option<f64>,
+    /// Mouth of the sheath, mm.
+    pub position_mm: Option<[f64; 3]>,
+    /// Direction of insertion, any length.
+    pub direction: Option<[f64; 3]>,
+    /// Friction of the valve, N; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction_n: f64,
+    /// Coulomb coefficient in the mouth; 0 is none and costs nothing.
+    #[serde(default)]
+    pub friction: f64,
+}
+
+/// Depth of the sheath's mouth inside an opening, mm, unless the scene says otherwise: clear of the rim.
+pub(super) const DEPTH_MM: f64 = 1.0;
+
+impl SheathSpec {
+    /// The keys that are given, for messages.
+    fn given(&self) -> String {
+        let keys = [
+            ("opening", self.opening.is_some()),
+            ("depth_mm", self.depth_mm.is_some()),
+            ("position_mm", self.position_mm.is_some()),
+            ("direction", self.direction.is_some()),
+        ];
+        let given: Vec<&str> = keys.iter().filter(|(_, given)| *given).map(|(key, _)| *key).collect();
+        format!("{{{}}}", given.join(", "))
+    }
+
+    /// The sheath in `wall`.
+    ///
+    /// # Errors
+    /// An opening that is not there, keys that contradict each other, values that are not finite or out of range.
+    pub fn place(&self, wall: &Wall) -> Result<Sheath> {
+        let sheath = match (self.opening, self.position_mm, self.direction) {
+            (Some(opening), None, None) => {
+                Sheath::at_opening(wall, opening, self.depth_mm.unwrap_or(DEPTH_MM))
+            }
+            (None, Some(position), Some(direction)) if self.depth_mm.is_none() => {
+                Sheath::new(Vec3::from(position), Vec3::from(direction))
+            }
+            _ => Err(Error::parameter(
+                "sheath",
+                self.given(),
+                "give either opening (with depth_mm if wanted) or position_mm and direction",
+            )),
+        }?;
+        sheath.rubbing(self.friction_n, self.friction)
+    }
+}

@@ -1,0 +1,154 @@
+//! Every reader of files, given valid files with faults from a seed: it reads them or says on one line what is wrong and where,
+//! and never panics.
+
+use std::path::{Path, PathBuf};
+
+use endowire_core::Result;
+use endowire_core::insertion::Command;
+use endowire_core::vessel::SurfaceMesh;
+use endowire_tests::damage::damaged;
+use endowire_tests::noise::Noise;
+use endowire_tests::readers;
+
+/// Damaged files in all from each kind of file.
+const ROUNDS: usize = 5_000;
+
+/// Longest message: a few lines of a terminal.
+const LONGEST: usize = 1_000;
+
+/// Reads `ROUNDS` damaged copies of `files`. `places`: one of these is in every message, and tells where the fault is.
+fn reads_or_refuses(files: &[Vec<u8>], places: &[&str], mut read: impl FnMut(&[u8]) -> Result<()>) {
+    let mut noise = Noise::new(1);
+    for file in files {
+        read(file).unwrap();
+    }
+    let mut refused = 0;
+    for round in 0..ROUNDS {
+        let bytes = damaged(&files[round % files.len()], &mut noise);
+        let Err(error) = read(&bytes) else { continue };
+        refused += 1;
+        let message = error.to_string();
+        let shown = String::from_utf8_lossy(&bytes[..bytes.len().min(2_000)]).into_owned();
+        assert!(error.is_input(), "round {round}: {message}\n{shown}");
+        assert!(!message.contains('\n'), "round {round}: several lines: {message}\n{shown}");
+        assert!(message.len() <= LONGEST, "round {round}: {} bytes: {message}\n{shown}", message.len());
+        assert!(
+            places.iter().any(|place| message.contains(place)),
+            "round {round}: no place: {message}\n{shown}"
+        );
+    }
+    // The twin: most damage is noticed somewhere, else nothing was tried.
+    println!("{refused} of {ROUNDS} refused");
+    assert!(refused > ROUNDS / 20, "{refused} of {ROUNDS} refused");
+}
+
+/// The files of a folder in assets/ with an extension, in the order of their names.
+fn assets(folder: &str, extension: &str) -> Vec<Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join(folder);
+    let mut paths: Vec<PathBuf> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|e| e == extension));
+    paths.sort();
+    assert!(!paths.is_empty());
+    paths.iter().map(|path| std::fs::read(path).unwrap()).collect()
+}
+
+/// The first triangles of a vessel: faults should hit headers too, and whole vessels have hundreds of kilobytes of numbers.
+fn patch() -> SurfaceMesh {
+    let stl = &assets("vessels", "stl")[0];
+    let mut mesh = SurfaceMesh::from_bytes(stl, Path::new("a.stl"), 1.0).unwrap();
+    mesh.triangles.truncate(20);
+    mesh.vertices_mm.truncate(60);
+    mesh
+}
+
+/// A patch as the program writes it.
+fn written(extension: &str) -> Vec<u8> {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("damaged.{extension}"));
+    patch().write(&path).unwrap();
+    std::fs::read(path).unwrap()
+}
+
+#[test]
+fn damaged_obj_files() {
+    let places = ["line ", "vertex ", "no triangles", "is empty", "mm across"];
+    reads_or_refuses(&[written("obj")], &places, readers::obj);
+}
+
+#[test]
+fn damaged_stl_files() {
+    let mut text = String::from("solid a\n");
+    let mesh = patch();
+    for triangle in 0..mesh.triangles.len() {
+        text += "facet normal 0 0 1\nouter loop\n";
+        for v in mesh.corners(triangle) {
+            text += &format!("vertex {} {} {}\n", v.x, v.y, v.z);
+        }
+        text += "endloop\nendfacet\n";
+    }
+    text += "endsolid a\n";
+    let places = [
+        "line ",
+        "vertex ",
+        "no triangles",
+        "is empty",
+        "mm across",
+        "declares ",
+        "not an STL",
+        "the last facet",
+    ];
+    reads_or_refuses(&[written("stl"), text.into_bytes()], &places, readers::stl);
+}
+
+#[test]
+fn damaged_ply_files() {
+    let mesh = patch();
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        mesh.vertices_mm.len(),
+        mesh.triangles.len()
+    );
+    mesh.vertices_mm.iter().for_each(|v| text += &format!("{} {} {}\n", v.x, v.y, v.z));
+    mesh.triangles.iter().for_each(|[a, b, c]| text += &format!("3 {a} {b} {c}\n"));
+    // A fault between the rows of a binary file has no line; its cause and mend are told.
+    let places =
+        ["line ", "vertex ", "face ", "no triangles", "is empty", "mm across", "declares ", "mend it"];
+    reads_or_refuses(&[written("ply"), text.into_bytes()], &places, readers::ply);
+}
+
+#[test]
+fn damaged_centre_lines() {
+    let places = ["line ", "centre-line points"];
+    reads_or_refuses(&assets("vessels", "csv"), &places, readers::centreline);
+}
+
+/// A line, or a key with its value.
+const TOML: [&str; 3] = ["line ", " = ", "is no text"];
+
+#[test]
+fn damaged_scenes() {
+    reads_or_refuses(&assets("scenes", "toml"), &TOML, readers::scene);
+}
+
+#[test]
+fn damaged_rod_cases() {
+    reads_or_refuses(&assets("cases", "toml"), &TOML, readers::rod_case);
+}
+
+#[test]
+fn damaged_sidecars() {
+    let files = [
+        "unit_mm = [1, 3.0]\nlength_mm = 20.0\ndevice_radius_mm = 0.3\n[sheath]\nopening = 2\ndepth_mm = 1.5\n",
+        "unit_mm = 10\ndevice_radius_mm = [0.2, 0.45]\n[sheath]\nposition_mm = [0, 1.5, -2]\ndirection = [0, 0, 1]\n",
+    ];
+    reads_or_refuses(&files.map(|text| text.as_bytes().to_vec()), &TOML, readers::sidecar);
+}
+
+#[test]
+fn damaged_states() {
+    let mut simulation = readers::simulation().unwrap();
+    (0..10).for_each(|_| drop(simulation.step(Command::advance(2.0)).unwrap().clone()));
+    let saved = postcard::to_allocvec(&simulation.state()).unwrap();
+    reads_or_refuses(&[saved], &["state"], |bytes| readers::state(&mut simulation, bytes));
+}

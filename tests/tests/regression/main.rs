@@ -1,0 +1,10 @@
+//! What the libraries do and must go on doing.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod catalogue;
+mod damaged_files;
+mod instruments;
+mod robust_insertion;
+mod state;
+mod wedged;

@@ -1,0 +1,6 @@
+//! Speed bars. Timing: run by hand, alone, with `--release -- --ignored --nocapture`.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod insertion;
+mod rod;

@@ -1,0 +1,9 @@
+//! What has an exact or independently computed answer.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod curved_tube;
+mod insertion;
+mod rod;
+mod spoiled_surfaces;
+mod wall_regions;
