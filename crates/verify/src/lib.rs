@@ -1,7 +1,7 @@
 //! Reference cases with exact or independently computed answers: what `endowire verify` runs.
 //!
 //! Each case is data and a function; nothing here knows what the solver returns. Beside the cases stand the [`stress`] table of
-//! rods, that of insertions ([`insertion_stress`]), the insertions into the [`surfaces`] of a folder, and the exact test for a device
+//! rods, that of insertions ([`insertion_stress`]), random commands on several instruments ([`instrument_stress`]), the insertions into the [`surfaces`] of a folder, and the exact test for a device
 //! that [crosses](crossing) its wall.
 
 mod bench;
@@ -15,6 +15,8 @@ mod cylinder;
 mod ends;
 mod insertion;
 pub mod insertion_stress;
+pub mod instrument_stress;
+pub mod noise;
 mod planar;
 mod quadratic;
 mod regions;
