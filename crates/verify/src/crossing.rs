@@ -90,7 +90,13 @@ impl CrossingTest {
         let (shape, stack) = (simulation.shape(), simulation.stack());
         let inserted_mm = simulation.report().lengths_mm();
         let contacts = &simulation.report().contacts;
-        let points = curve(shape);
+        let mut points = curve(shape);
+        // Beyond an opening there is no wall to be behind.
+        if let Some(opening) = simulation.report().left_through.and_then(|number| wall.openings().get(number))
+        {
+            let is_within = |x: &Vec3| (x - opening.centre_mm).dot(&opening.direction) <= 0.0;
+            points.truncate(points.iter().rposition(is_within).map_or(0, |last| last + 1));
+        }
         let missing = |x: &Vec3, behind_mm: f64, (piece, part): (usize, f64)| {
             // An instrument may end at the element's first node: the radius is that of the place itself.
             let (e, within) = (piece / CHORDS, ((piece % CHORDS) as f64 + part) / CHORDS as f64);
