@@ -233,6 +233,7 @@ pub const FAMILIES: &[Family] = &[
         title: "An end passes through the mesh: energy without jumps, forces its slopes",
         run: ends::pass,
     },
+    Family { id: "D7", title: "A wire in the valve of a catheter's hub", run: capstan_within::valve },
 ];
 
 /// A straight inextensible rod of length 1 and EI 1 along x, clamped at the origin, free at its end.

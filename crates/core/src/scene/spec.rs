@@ -130,6 +130,9 @@ pub struct InstrumentSpec {
     /// Coulomb coefficient of friction between it and the instruments outside it, along the line; 0 is none and costs nothing.
     #[serde(default)]
     pub friction: f64,
+    /// Friction of the valve on its hub, which seals what lies in it, N; 0 is none and costs nothing.
+    #[serde(default)]
+    pub valve_n: f64,
 }
 
 fn yes() -> bool {
@@ -353,7 +356,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// What is pushed: the device alone, or all instruments.
     ///
     /// # Errors
-    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`] and [`Stack::rubbing`].
+    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`], [`Stack::rubbing`] and
+    /// [`Stack::sealed`].
     pub fn stack(&self) -> Result<Stack> {
         match (&self.device, self.instrument.is_empty()) {
             (Some(spec), true) => self.read_device("device", &spec.file, &spec.section).map(Stack::from),
@@ -364,7 +368,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                     Ok(Instrument { name: spec.name.clone(), device, may_lead: spec.may_lead })
                 });
                 let frictions = self.instrument.iter().map(|spec| spec.friction).collect();
-                Stack::new(each.collect::<Result<_>>()?)?.rubbing(frictions)
+                let valves_n = self.instrument.iter().map(|spec| spec.valve_n).collect();
+                Stack::new(each.collect::<Result<_>>()?)?.rubbing(frictions)?.sealed(valves_n)
             }
             (None, true) => {
                 let mend = "give [device], or an [[instrument]] for each of several, the innermost first";
