@@ -8,6 +8,7 @@ mod bench;
 mod capstan;
 mod capstan_within;
 mod channel;
+mod clearance;
 mod coaxial;
 mod contact;
 pub mod crossing;
@@ -234,6 +235,11 @@ pub const FAMILIES: &[Family] = &[
         run: ends::pass,
     },
     Family { id: "D7", title: "A wire in the valve of a catheter's hub", run: capstan_within::valve },
+    Family {
+        id: "D8",
+        title: "A wire in a catheter with play: the tilt where it comes out",
+        run: clearance::clearance,
+    },
 ];
 
 /// A straight inextensible rod of length 1 and EI 1 along x, clamped at the origin, free at its end.
