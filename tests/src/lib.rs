@@ -2,13 +2,12 @@
 
 pub mod bent_rod;
 pub mod damage;
-pub mod noise;
 pub mod readers;
 pub mod spoiled;
 pub mod sweep;
 pub mod twin;
 
-pub use endowire_verify::crossing;
+pub use endowire_verify::{crossing, noise};
 
 /// The guide's example is compiled and run with the tests.
 #[cfg(doctest)]

@@ -7,17 +7,6 @@ use endowire_core::insertion::{Command, Simulation};
 
 use crate::crossing::CrossingTest;
 
-/// How far the wall that is felt may be from the triangles, mm, …
-const FELT_MM: f64 = 0.1;
-/// … and in edges: a smooth wall that turns by a radian along an edge is an eighth of it away from its middle.
-const FELT_EDGES: f64 = 0.125;
-
-/// Whether the device is behind the triangles without having sunk in there as deep as it is.
-pub fn crosses(crossing: &CrossingTest, simulation: &Simulation) -> bool {
-    let felt_mm = FELT_MM.max(FELT_EDGES * crossing.edge_mm);
-    crossing.missing_mm(simulation.wall(), simulation).is_some_and(|missing_mm| missing_mm > felt_mm)
-}
-
 /// What became of a list of commands.
 #[derive(Debug, Default)]
 pub struct Tally {
@@ -74,7 +63,7 @@ impl Tally {
         if !report.converged {
             self.unconverged.push(number);
         }
-        if crosses(crossing, simulation) {
+        if crossing.is_crossed_by(simulation) {
             self.crossings.push(number);
         }
         true

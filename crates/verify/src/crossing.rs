@@ -27,6 +27,11 @@ const APART_RADII: f64 = 1.5;
 /// A device farther behind the triangles is told to be as far as this, mm.
 const FARTHEST_MM: f64 = 20.0;
 
+/// How far the wall that is felt may be from the triangles, mm, …
+const FELT_MM: f64 = 0.1;
+/// … and in edges: a smooth wall that turns by a radian along an edge is an eighth of it away from its middle.
+const FELT_EDGES: f64 = 0.125;
+
 /// The triangles of a mesh in the cells of a grid, for testing lines against them.
 #[derive(Debug)]
 pub struct CrossingTest {
@@ -85,9 +90,18 @@ impl CrossingTest {
         let (shape, stack) = (simulation.shape(), simulation.stack());
         let inserted_mm = simulation.report().lengths_mm();
         let contacts = &simulation.report().contacts;
-        let points = curve(shape);
-        let missing = |x: &Vec3, behind_mm: f64, piece: usize| {
-            let radius_mm = stack.felt_radius_mm(&inserted_mm, shape.from_tip_mm[piece / CHORDS]);
+        let mut points = curve(shape);
+        // Beyond an opening there is no wall to be behind.
+        if let Some(opening) = simulation.report().left_through.and_then(|number| wall.openings().get(number))
+        {
+            let is_within = |x: &Vec3| (x - opening.centre_mm).dot(&opening.direction) <= 0.0;
+            points.truncate(points.iter().rposition(is_within).map_or(0, |last| last + 1));
+        }
+        let missing = |x: &Vec3, behind_mm: f64, (piece, part): (usize, f64)| {
+            // An instrument may end at the element's first node: the radius is that of the place itself.
+            let (e, within) = (piece / CHORDS, ((piece % CHORDS) as f64 + part) / CHORDS as f64);
+            let (near, far) = (shape.from_tip_mm[e], shape.from_tip_mm[e + 1]);
+            let radius_mm = stack.felt_radius_mm(&inserted_mm, near + (far - near) * within);
             let near = contacts.iter().map(|c| ((c.position_mm - x).norm(), c.penetration_mm));
             let next = near.min_by(|a, b| a.0.total_cmp(&b.0));
             // Next to a place without a contact the device does not press at all.
@@ -100,16 +114,22 @@ impl CrossingTest {
         let mut behind = false;
         for (piece, ends) in points.windows(2).enumerate() {
             if let Some(part) = self.first_met(ends[0], ends[1]) {
-                note(missing(&ends[0].lerp(&ends[1], part), 0.0, piece));
+                note(missing(&ends[0].lerp(&ends[1], part), 0.0, (piece, part)));
                 behind = true;
             }
             behind = behind && wall.winding_number(&ends[1]) < 0.5;
             if behind {
                 let distance_mm = self.distance_mm(&ends[1], FARTHEST_MM).unwrap_or(FARTHEST_MM);
-                note(missing(&ends[1], distance_mm, piece));
+                note(missing(&ends[1], distance_mm, (piece, 1.0)));
             }
         }
         most
+    }
+
+    /// Whether the device of a simulation is behind the triangles without having sunk in there as deep as it is.
+    pub fn is_crossed_by(&self, simulation: &Simulation) -> bool {
+        let felt_mm = FELT_MM.max(FELT_EDGES * self.edge_mm);
+        self.missing_mm(simulation.wall(), simulation).is_some_and(|missing_mm| missing_mm > felt_mm)
     }
 
     /// Distance of a point from the nearest triangle, mm, if one is within `reach_mm`.

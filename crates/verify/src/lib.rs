@@ -1,13 +1,14 @@
 //! Reference cases with exact or independently computed answers: what `endowire verify` runs.
 //!
 //! Each case is data and a function; nothing here knows what the solver returns. Beside the cases stand the [`stress`] table of
-//! rods, that of insertions ([`insertion_stress`]), the insertions into the [`surfaces`] of a folder, and the exact test for a device
+//! rods, that of insertions ([`insertion_stress`]), random commands on several instruments ([`instrument_stress`]), the insertions into the [`surfaces`] of a folder, and the exact test for a device
 //! that [crosses](crossing) its wall.
 
 mod bench;
 mod capstan;
 mod capstan_within;
 mod channel;
+mod clearance;
 mod coaxial;
 mod contact;
 pub mod crossing;
@@ -15,6 +16,8 @@ mod cylinder;
 mod ends;
 mod insertion;
 pub mod insertion_stress;
+pub mod instrument_stress;
+pub mod noise;
 mod planar;
 mod quadratic;
 mod regions;
@@ -230,6 +233,12 @@ pub const FAMILIES: &[Family] = &[
         id: "D6",
         title: "An end passes through the mesh: energy without jumps, forces its slopes",
         run: ends::pass,
+    },
+    Family { id: "D7", title: "A wire in the valve of a catheter's hub", run: capstan_within::valve },
+    Family {
+        id: "D8",
+        title: "A wire in a catheter with play: the tilt where it comes out",
+        run: clearance::clearance,
     },
 ];
 

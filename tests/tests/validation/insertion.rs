@@ -6,7 +6,6 @@ use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 use endowire_tests::crossing::CrossingTest;
-use endowire_tests::sweep::crosses;
 
 fn kirchhoff(element_mm: f64) -> KirchhoffOptions {
     KirchhoffOptions { element_mm, ..Default::default() }
@@ -35,7 +34,7 @@ fn the_result_does_not_depend_on_the_increment() {
         for _ in 0..(200.0 / step_mm).round() as usize {
             simulation.step(Command::advance(step_mm)).unwrap();
         }
-        assert!(!crosses(&CrossingTest::new(simulation.wall().mesh()), &simulation));
+        assert!(!CrossingTest::new(simulation.wall().mesh()).is_crossed_by(&simulation));
         (simulation.shape().tip_mm().unwrap(), simulation.report().push_force_n)
     };
     let (tip, force) = run(1.0);
@@ -132,7 +131,7 @@ fn walls_of_any_stiffness_are_met_and_never_passed_through() {
         let crossing = CrossingTest::new(simulation.wall().mesh());
         for _ in 0..50 {
             simulation.step(Command::advance(4.0)).unwrap_or_else(|e| panic!("{modulus} N/mm²: {e}"));
-            assert!(!crosses(&crossing, &simulation), "{modulus} N/mm²");
+            assert!(!crossing.is_crossed_by(&simulation), "{modulus} N/mm²");
         }
         // Only into the softest the axis itself sinks.
         let deepest = simulation.report().max_penetration_mm;
@@ -167,7 +166,7 @@ fn a_shaped_tip_turns_with_the_tail_and_finds_its_way_through_the_arch() {
     for _ in 0..50 {
         let report = simulation.step(Command { advance_mm: 5.0, rotate_rad: 0.1 }).unwrap();
         assert!(report.converged);
-        assert!(!crosses(&crossing, &simulation));
+        assert!(!crossing.is_crossed_by(&simulation));
     }
     // The free tip of a wire in air would have turned with the hand: the torque is the wall's doing.
     assert!(simulation.report().torque_nmm.abs() > 1e-6);

@@ -7,7 +7,6 @@ use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, StepReport, WallProperties, WallRegion};
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 use endowire_tests::crossing::CrossingTest;
-use endowire_tests::sweep::crosses;
 
 /// Where the tip passes along the outer side of the curved tube between 150 and 170 mm inserted.
 const OUTER: [f64; 3] = [41.0, 0.0, 146.0];
@@ -123,7 +122,7 @@ fn patches_of_any_stiffness_are_met_and_never_passed_through() {
         for _ in 0..50 {
             let stepped = simulation.step(Command::advance(4.0));
             assert!(stepped.is_ok(), "{outside} and {inside} N/mm²: {}", stepped.unwrap_err());
-            assert!(!crosses(&crossing, &simulation), "{outside} and {inside} N/mm²");
+            assert!(!crossing.is_crossed_by(&simulation), "{outside} and {inside} N/mm²");
         }
     }
 }

@@ -235,6 +235,9 @@ pub(crate) struct VerifyArgs {
     /// Add the numerical stress table: stiffness, loads, meshes and shapes far from the ordinary
     #[arg(long)]
     pub(crate) stress: bool,
+    /// Random commands on instruments in one another in each case of the stress table
+    #[arg(long, default_value_t = 1_000, value_name = "COUNT", requires = "stress")]
+    pub(crate) commands: usize,
     /// Instead of the reference cases, run a matrix of insertions into every surface of a folder (STL, OBJ, PLY; NAME.toml beside a
     /// surface may give unit_mm, a table sheath, length_mm and device_radius_mm)
     #[arg(long, value_name = "DIR", conflicts_with = "stress")]

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use endowire_verify::insertion_stress::{InsertionRow, InsertionStress};
+use endowire_verify::instrument_stress::{self, InstrumentRow, InstrumentStress};
 use endowire_verify::{FAMILIES, Row, stress};
 use serde::Serialize;
 
@@ -23,6 +24,16 @@ struct Document {
     stress: Option<Vec<Stress>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     insertion_stress: Option<Vec<InsertionRow>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    instrument_stress: Option<Vec<Instruments>>,
+}
+
+/// Random commands on several instruments, and the time they took.
+#[derive(Serialize)]
+struct Instruments {
+    #[serde(flatten)]
+    row: InstrumentRow,
+    time_s: f64,
 }
 
 /// A stressed case and the time it took.
@@ -41,7 +52,9 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
     let stressed = if args.stress { stress::cases() } else { Vec::new() };
     let insertion = args.stress.then(InsertionStress::new).transpose()?;
     let combinations = insertion.as_ref().map_or_else(Vec::new, InsertionStress::cases);
-    let bar = progress::bar(FAMILIES.len() + stressed.len() + combinations.len(), "case");
+    let together = if args.stress { instrument_stress::cases() } else { Vec::new() };
+    let count = FAMILIES.len() + stressed.len() + combinations.len() + together.len();
+    let bar = progress::bar(count, "case");
     let mut cases = Vec::new();
     for family in FAMILIES {
         bar.set_message(family.id);
@@ -65,6 +78,14 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
         };
         combinations.iter().map(run).collect::<Vec<InsertionRow>>()
     });
+    let mut instruments = Vec::with_capacity(together.len());
+    for case in &together {
+        bar.set_message(format!("instruments in {}", case.vessel));
+        let clock = Instant::now();
+        let row = InstrumentStress::run(case, args.commands);
+        instruments.push(Instruments { row, time_s: clock.elapsed().as_secs_f64() });
+        bar.inc(1);
+    }
     bar.finish_and_clear();
 
     let passed = cases.iter().filter(|row| row.pass).count();
@@ -75,6 +96,7 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
         cases,
         stress: args.stress.then_some(rows),
         insertion_stress: insertions,
+        instrument_stress: args.stress.then_some(instruments),
     };
     if args.json {
         print_json(&document)?;
@@ -82,7 +104,8 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
         print_cases(&document);
     }
     let unexplained = document.stress.iter().flatten().filter(|s| !s.row.pass).count()
-        + document.insertion_stress.iter().flatten().filter(|row| !row.pass).count();
+        + document.insertion_stress.iter().flatten().filter(|row| !row.pass).count()
+        + document.instrument_stress.iter().flatten().filter(|one| !one.row.pass).count();
     if document.failed > 0 || unexplained > 0 {
         return Err(Failure::Computation(format!(
             "{} of {} reference rows and {unexplained} stressed cases fail",
@@ -119,6 +142,49 @@ fn print_cases(document: &Document) {
     }
     if let Some(rows) = &document.insertion_stress {
         print_insertions(rows);
+    }
+    if let Some(rows) = &document.instrument_stress {
+        print_instruments(rows);
+    }
+}
+
+/// What became of random commands on several instruments.
+fn print_instruments(rows: &[Instruments]) {
+    println!();
+    println!(
+        "{:<16} {:>8} {:>10} {:>10} {:>8} {:>8} {:>11} {:>7} {:>11} {:>7} {:>6} {:>6} {:>7}  first",
+        "three in",
+        "edge mm",
+        "element mm",
+        "rubbing",
+        "commands",
+        "refused",
+        "unconverged",
+        "crossed",
+        "unexplained",
+        "changed",
+        "iter.",
+        "parts",
+        "time s"
+    );
+    for Instruments { row, time_s } in rows {
+        println!(
+            "{:<16} {:>8} {:>10} {:>10} {:>8} {:>8} {:>11} {:>7} {:>11} {:>7} {:>6} {:>6} {:>7.1}  {}",
+            row.case.vessel,
+            row.case.edge_mm,
+            row.case.element_mm,
+            format!("{:?}", row.case.rubbing).to_lowercase(),
+            row.commands,
+            row.refused,
+            row.unconverged,
+            row.crossed,
+            row.unexplained,
+            row.changed,
+            row.most_iterations,
+            row.most_substeps,
+            time_s,
+            row.first
+        );
     }
 }
 

@@ -23,6 +23,6 @@ pub use grading::Grading;
 pub use memory::{KnownPoints, WallMemory};
 pub use point::{Contact, ContactPoint, Counters, Touch};
 pub use potential::WallPotential;
-pub(crate) use properties::check_friction;
 pub use properties::{WallProperties, WallRegion};
+pub(crate) use properties::{check_friction, check_valve};
 pub use wall::WallContact;

@@ -197,6 +197,18 @@ impl WallProperties {
     }
 }
 
+/// Most that a valve holds an instrument with, N.
+const LARGEST_VALVE_N: f64 = 100.0;
+
+/// Checks the force of a valve.
+pub(crate) fn check_valve(name: &str, force_n: f64) -> Result<()> {
+    if (0.0..=LARGEST_VALVE_N).contains(&force_n) {
+        return Ok(());
+    }
+    let mend = format!("must be a force from 0 (none) to {LARGEST_VALVE_N} N");
+    Err(Error::parameter(name, force_n, mend))
+}
+
 /// Checks a Coulomb coefficient.
 pub(crate) fn check_friction(name: &str, friction: f64) -> Result<()> {
     if (0.0..=LARGEST_FRICTION).contains(&friction) {

@@ -1,7 +1,7 @@
 //! Instruments that lie in one another: a wire in a microcatheter in a catheter.
 
 use super::Device;
-use crate::contact::check_friction;
+use crate::contact::{check_friction, check_valve};
 use crate::error::nearest_name;
 use crate::rod::MAX_ANGLES;
 use crate::{Error, Result};
@@ -25,6 +25,8 @@ pub struct Stack {
     sets: Vec<Option<usize>>,
     /// Coefficient of friction between each and those outside it.
     frictions: Vec<f64>,
+    /// Friction of the valve on the hub of each, by which what lies in it is sealed, N.
+    valves_n: Vec<f64>,
 }
 
 /// Most instruments of a stack.
@@ -37,7 +39,7 @@ impl From<Device> for Stack {
     fn from(device: Device) -> Self {
         let sets = vec![device.is_shaped().then_some(0)];
         let instruments = vec![Instrument { name: "device".to_owned(), device, may_lead: true }];
-        Self { instruments, sets, frictions: vec![0.0] }
+        Self { instruments, sets, frictions: vec![0.0], valves_n: vec![0.0] }
     }
 }
 
@@ -66,8 +68,8 @@ impl Stack {
             let mend = format!("at most {MAX_ANGLES} instruments on one line may have a shape of their own");
             return Err(Error::parameter("instrument", format!("{angles} with rest curvature"), mend));
         }
-        let frictions = vec![0.0; instruments.len()];
-        Ok(Self { instruments, sets, frictions })
+        let (frictions, valves_n) = (vec![0.0; instruments.len()], vec![0.0; instruments.len()]);
+        Ok(Self { instruments, sets, frictions, valves_n })
     }
 
     /// The same instruments, rubbing in each other with these Coulomb coefficients, each between one and those outside it.
@@ -90,6 +92,32 @@ impl Stack {
         }
         self.frictions = frictions;
         Ok(self)
+    }
+
+    /// The same instruments, with a valve on the hub of each that rubs with this force, N, on what slips and turns in it; 0 for none.
+    ///
+    /// # Errors
+    /// Another number of forces than instruments, one that is not from 0 to 100 N, and any but 0 of the innermost.
+    pub fn sealed(mut self, valves_n: Vec<f64>) -> Result<Self> {
+        if valves_n.len() != self.instruments.len() {
+            let mend = format!("there are {} instruments: give one for each", self.instruments.len());
+            return Err(Error::parameter("instrument.valve_n", valves_n.len(), mend));
+        }
+        let name = |index: usize| format!("instrument[{index}].valve_n");
+        for (index, valve_n) in valves_n.iter().enumerate() {
+            check_valve(&name(index), *valve_n)?;
+        }
+        if valves_n[0] > 0.0 {
+            let mend = "nothing lies in the first instrument: the valve of the introducer sheath is sheath.friction_n";
+            return Err(Error::parameter(name(0), valves_n[0], mend));
+        }
+        self.valves_n = valves_n;
+        Ok(self)
+    }
+
+    /// Friction of the valve on the hub of an instrument, N.
+    pub fn valve_n(&self, instrument: usize) -> f64 {
+        self.valves_n[instrument]
     }
 
     /// Coefficient of friction between an instrument and those outside it.

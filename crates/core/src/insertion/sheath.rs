@@ -1,11 +1,8 @@
 //! The introducer sheath: where the device comes out, and in which direction.
 
-use crate::contact::check_friction;
+use crate::contact::{check_friction, check_valve};
 use crate::vessel::Wall;
 use crate::{Error, Result, Vec3};
-
-/// Most that a valve holds a device with, N.
-const LARGEST_N: f64 = 100.0;
 
 /// The mouth of the introducer sheath. It prescribes position and tangent of the device there, and may rub on it: against its slip u, along and around,
 ///
@@ -32,10 +29,7 @@ impl Sheath {
     /// # Errors
     /// A force that is not from 0 to 100 N, a coefficient that is not from 0 to 2.
     pub fn rubbing(self, friction_n: f64, friction: f64) -> Result<Self> {
-        if !(0.0..=LARGEST_N).contains(&friction_n) {
-            let mend = format!("must be a force from 0 (none) to {LARGEST_N} N");
-            return Err(Error::parameter("sheath.friction_n", friction_n, mend));
-        }
+        check_valve("sheath.friction_n", friction_n)?;
         check_friction("sheath.friction", friction)?;
         Ok(Self { friction_n, friction, ..self })
     }

@@ -2,7 +2,8 @@
 //!
 //! Instruments that share the centre line share its geometry, each turned against it by an angle of its own. In the first node's triad
 //! the energy depends on the chord, on the far tangent, and on (φ₀, φ₁, b) of every instrument, φ₁ = θ₁ + reference twist: local
-//! unknowns, of which energies and derivatives are sums over instruments and Gauss points. Then comes the chain rule. Turns of either
+//! unknowns, of which energies and derivatives are sums over Gauss points and instruments; at a point the twist of the reference triad, its
+//! derivatives and what they are multiplied with, the sum of torques, are those of all instruments. Then comes the chain rule. Turns of either
 //! tangent move all local unknowns, and every φ₁ by the same; displacements move the chord alone and angles themselves. So it needs
 //! products with four columns, not with all unknowns, and is gone through once, however many instruments there are.
 
@@ -10,7 +11,7 @@ use super::element::{ElementData, ElementState, ElementSystem, Energy, Material,
 use super::frame::Frame;
 use super::layout::{Layout, MAX_ANGLES};
 use super::quadrature::GAUSS;
-use super::torsion::torsion;
+use super::torsion::{AngleDensity, PointDerivatives, ReferenceTwist};
 use crate::Vec3;
 use nalgebra::Matrix3;
 
@@ -88,14 +89,17 @@ pub(super) fn add_torsion<const C: usize, const HESSIAN: bool>(
     energy: &mut Energy,
 ) {
     let l = Layout::<C>;
+    if !data.materials[..Layout::<C>::ANGLES].iter().any(Material::is_present) {
+        return;
+    }
     let geometry = Geometry::new(s);
     let mut shape = ShapeDerivatives::default();
     let mut spins = [AngleDerivatives::default(); MAX_ANGLES];
-    for set in 0..Layout::<C>::ANGLES {
-        let material = &data.materials[set];
-        if material.is_present() {
-            spins[set] = gather(material, &s.angles[set], data.length, &geometry, &mut shape, energy);
-        }
+    for k in 0..GAUSS.len() {
+        add_point::<C>(k, data, s, &geometry, &mut shape, &mut spins, energy);
+    }
+    for material in data.materials[..Layout::<C>::ANGLES].iter().filter(|material| material.is_present()) {
+        energy.bend += material.rest_energy(data.length);
     }
     let ih = 1.0 / data.length;
     // From the first triad back to space.
@@ -138,42 +142,61 @@ const fn angle_rows<const C: usize>(set: usize) -> [usize; 3] {
     [l.angle(0, set), l.angle(1, set), l.bubble(0, set)]
 }
 
-/// Adds one instrument's energy and its derivatives in chord and far tangent, and returns those in its angles.
+/// Adds the energy of all instruments at a Gauss point, and its derivatives in chord, far tangent and angles.
 #[inline(always)]
-fn gather(
-    material: &Material,
-    of: &[f64; 3],
-    length: f64,
+fn add_point<const C: usize>(
+    k: usize,
+    data: &ElementData,
+    s: &ElementState,
     geometry: &Geometry,
     shape: &mut ShapeDerivatives,
+    spins: &mut [AngleDerivatives; MAX_ANGLES],
     energy: &mut Energy,
-) -> AngleDerivatives {
-    let mut spin = AngleDerivatives::default();
-    for (k, point) in GAUSS.iter().enumerate() {
-        let (y, z) = point.derivatives(&geometry.chord, &Vec3::x(), &geometry.end);
-        let (phi, dphi) = angles(of, point);
-        let f = torsion(&y, &z, phi, dphi, &material.torsion_input(k, length));
-        energy.bend += f.bend;
-        energy.twist += f.twist;
-        let ([yc, _, ye], [zc, _, ze]) = (point.y, point.z);
-        shape.chord += f.gy * yc + f.gz * zc;
-        shape.end += f.gy * ye + f.gz * ze;
-        let hzy = f.hyz.transpose();
-        // Half products: derivative along y and z of the gradient in each vector.
-        let (cy, cz) = (f.hyy * yc + hzy * zc, f.hyz * yc + f.hzz * zc);
-        shape.chord_chord += cy * yc + cz * zc;
-        shape.chord_end += cy * ye + cz * ze;
-        shape.end_end += f.hyy * (ye * ye) + (f.hyz + hzy) * (ye * ze) + f.hzz * (ze * ze);
-        let (weight, slope) = (Vec3::from(point.phi), Vec3::from(point.dphi));
-        let both = |p: &[Vec3; 2]| p[0] * weight.transpose() + p[1] * slope.transpose();
-        let (hya, hza) = (both(&f.hyp), both(&f.hzp));
+) {
+    let point = &GAUSS[k];
+    let (y, z) = point.derivatives(&geometry.chord, &Vec3::x(), &geometry.end);
+    let twist = ReferenceTwist::new(&y, &z);
+    let (weight, slope) = (Vec3::from(point.phi), Vec3::from(point.dphi));
+    let ([yc, _, ye], [zc, _, ze]) = (point.y, point.z);
+    let (mut torques, mut stiffness) = (0.0, 0.0);
+    let (mut rest, mut f) = (PointDerivatives::default(), PointDerivatives::default());
+    for set in 0..Layout::<C>::ANGLES {
+        let material = &data.materials[set];
+        if !material.is_present() {
+            continue;
+        }
+        let input = material.torsion_input(k, data.length);
+        let (phi, dphi) = angles(&s.angles[set], point);
+        let torque = twist.torque(dphi, &input);
+        energy.twist += twist.energy(dphi, &input);
+        torques += torque;
+        stiffness += input.stiffness;
+        let mut own = AngleDensity::default();
+        if input.moment != [0.0; 2] {
+            let bend;
+            (bend, own) = twist.add_rest_curvature(phi, input.moment, &mut rest);
+            energy.bend += bend;
+        }
+        let both = |p: Vec3, q: Vec3| p * weight.transpose() + q * slope.transpose();
+        let hya = both(own.along_y, twist.along_y * input.stiffness);
+        let hza = both(own.along_z, twist.along_z * input.stiffness);
+        let spin = &mut spins[set];
         spin.chord_angles += hya * yc + hza * zc;
         spin.end_angles += hya * ye + hza * ze;
-        spin.angles += weight * f.gp[0] + slope * f.gp[1];
-        spin.angles_angles += weight * weight.transpose() * f.hpp[0] + slope * slope.transpose() * f.hpp[1];
+        spin.angles += weight * own.first + slope * torque;
+        spin.angles_angles +=
+            weight * weight.transpose() * own.second + slope * slope.transpose() * input.stiffness;
     }
-    energy.bend += material.rest_energy(length);
-    spin
+    twist.add_twist(torques, stiffness, &mut f);
+    f.add(&rest);
+    shape.chord += f.gy * yc + f.gz * zc;
+    shape.end += f.gy * ye + f.gz * ze;
+    let hzy = f.hyz.transpose();
+    // Half products: derivative along y and z of the gradient in each vector.
+    let (cy, cz) = (f.hyy * yc + hzy * zc, f.hyz * yc + f.hzz * zc);
+    shape.chord_chord += cy * yc + cz * zc;
+    shape.chord_end += cy * ye + cz * ze;
+    shape.end_end += f.hyy * (ye * ye) + (f.hyz + hzy) * (ye * ze) + f.hzz * (ze * ze);
 }
 
 /// Adds the Hessian in displacements and angles.

@@ -25,31 +25,69 @@ pub struct TorsionInput {
     pub rest_twist: f64,
 }
 
-/// Value, gradient and Hessian in (y, z, φ, hφ′).
+/// What all instruments have in common at a Gauss point: the twist −DG of the reference triad with its derivatives in y and z.
 #[derive(Debug, Clone, Copy)]
-pub struct TorsionDensity {
-    /// Part of the energy that belongs to bending: −EI κ⁰·t′ (without the constant).
-    pub bend: f64,
-    /// Twist energy.
-    pub twist: f64,
+pub struct ReferenceTwist {
+    y: Vec3,
+    z: Vec3,
+    /// 1/a and y·z.
+    ia: f64,
+    b: f64,
+    /// G with its derivatives in y.
+    g: f64,
+    dg: Vec3,
+    hg: Matrix3<f64>,
+    /// −DG.
+    value: f64,
+    /// Gradients of −DG in y …
+    pub along_y: Vec3,
+    /// … and z.
+    pub along_z: Vec3,
+    /// Its second derivatives: y, y, …
+    yy: Matrix3<f64>,
+    /// … y (rows), z (columns).
+    yz: Matrix3<f64>,
+}
+
+/// Derivatives in y and z.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PointDerivatives {
     /// Gradient in y.
     pub gy: Vec3,
     /// Gradient in z.
     pub gz: Vec3,
-    /// Derivatives in φ and hφ′.
-    pub gp: [f64; 2],
     /// y, y.
     pub hyy: Matrix3<f64>,
     /// y (rows), z (columns).
     pub hyz: Matrix3<f64>,
     /// z, z.
     pub hzz: Matrix3<f64>,
-    /// y with φ and with hφ′.
-    pub hyp: [Vec3; 2],
-    /// z with φ and with hφ′.
-    pub hzp: [Vec3; 2],
-    /// (φ, φ) and (hφ′, hφ′); the mixed one is zero.
-    pub hpp: [f64; 2],
+}
+
+impl PointDerivatives {
+    /// Adds others.
+    #[inline(always)]
+    pub fn add(&mut self, other: &Self) {
+        self.gy += other.gy;
+        self.gz += other.gz;
+        self.hyy += other.hyy;
+        self.hyz += other.hyz;
+        self.hzz += other.hzz;
+    }
+}
+
+/// Derivatives of an instrument's energy in φ, alone and mixed with y and z; those in hφ′ are the torque, GJ, and GJ times the gradients of
+/// the [`ReferenceTwist`].
+#[derive(Debug, Clone, Copy, Default)]
+pub struct AngleDensity {
+    /// In φ.
+    pub first: f64,
+    /// In φ twice.
+    pub second: f64,
+    /// In y and φ.
+    pub along_y: Vec3,
+    /// In z and φ.
+    pub along_z: Vec3,
 }
 
 /// The two energies alone: (bend, twist).
@@ -66,95 +104,120 @@ pub(crate) fn torsion_value(y: &Vec3, z: &Vec3, phi: f64, dphi: f64, p: &Torsion
     (n * g * (z.x + y.dot(z) / a) - m / a, 0.5 * p.stiffness * tau * tau)
 }
 
-/// The energies with their derivatives.
-// Always inlined: where no Hessian is wanted the compiler leaves its half out.
-#[inline(always)]
-pub fn torsion(y: &Vec3, z: &Vec3, phi: f64, dphi: f64, p: &TorsionInput) -> TorsionDensity {
-    let a = y.norm();
-    let ia = 1.0 / a;
-    let ia3 = ia * ia * ia;
-    let g = ia / (a + y.x);
-    let b = y.dot(z);
-    let e1 = Vec3::x();
-    let eye = Matrix3::identity();
-    let yy = y * y.transpose();
+impl ReferenceTwist {
+    /// That of y and z.
+    // Always inlined: where no Hessian is wanted the compiler leaves its half out.
+    #[inline(always)]
+    pub fn new(y: &Vec3, z: &Vec3) -> Self {
+        let a = y.norm();
+        let ia = 1.0 / a;
+        let ia3 = ia * ia * ia;
+        let g = ia / (a + y.x);
+        let e1 = Vec3::x();
+        let eye = Matrix3::identity();
+        let yy = y * y.transpose();
 
-    // G: 1/G = A + a y₁, its gradient is `slope`.
-    let slope = y * (2.0 + y.x * ia) + e1 * a;
-    let ey = e1 * y.transpose();
-    let bend_slope = eye * (2.0 + y.x * ia) + (ey + ey.transpose()) * ia - yy * (y.x * ia3);
-    let dg = slope * (-g * g);
-    let hg = slope * slope.transpose() * (2.0 * g * g * g) - bend_slope * (g * g);
+        // G: 1/G = A + a y₁, its gradient is `slope`.
+        let slope = y * (2.0 + y.x * ia) + e1 * a;
+        let ey = e1 * y.transpose();
+        let bend_slope = eye * (2.0 + y.x * ia) + (ey + ey.transpose()) * ia - yy * (y.x * ia3);
+        let dg = slope * (-g * g);
+        let hg = slope * slope.transpose() * (2.0 * g * g * g) - bend_slope * (g * g);
 
-    // Twist.
-    let d = y.y * z.z - y.z * z.y;
-    let dy = Vec3::new(0.0, z.z, -z.y);
-    let dz = Vec3::new(0.0, -y.z, y.y);
-    let tau = dphi - d * g - p.rest_twist;
-    let torque = p.stiffness * tau;
-    let ty = -(dy * g + dg * d);
-    let tz = -dz * g;
-    let dyg = dy * dg.transpose();
-    let mut tyz = -(dg * dz.transpose());
-    tyz[(1, 2)] -= g;
-    tyz[(2, 1)] += g;
-    let mut hyy = ty * ty.transpose() * p.stiffness - (dyg + dyg.transpose() + hg * d) * torque;
-    let mut hyz = ty * tz.transpose() * p.stiffness + tyz * torque;
-    let hzz = tz * tz.transpose() * p.stiffness;
-    let mut gy = ty * torque;
-    let mut gz = tz * torque;
+        let d = y.y * z.z - y.z * z.y;
+        let dy = Vec3::new(0.0, z.z, -z.y);
+        let dz = Vec3::new(0.0, -y.z, y.y);
+        let dyg = dy * dg.transpose();
+        let mut yz = -(dg * dz.transpose());
+        yz[(1, 2)] -= g;
+        yz[(2, 1)] += g;
+        Self {
+            y: *y,
+            z: *z,
+            ia,
+            b: y.dot(z),
+            g,
+            dg,
+            hg,
+            value: -(d * g),
+            along_y: -(dy * g + dg * d),
+            along_z: -dz * g,
+            yy: -(dyg + dyg.transpose() + hg * d),
+            yz,
+        }
+    }
 
-    // Rest curvature: P = (z·w)/a − (y·w) G q with q = z₁ + b/a; the energy is −P.
-    let mut bend = 0.0;
-    let (mut gphi, mut hphi) = (0.0, 0.0);
-    let (mut hyphi, mut hzphi) = (Vec3::zeros(), Vec3::zeros());
-    if p.moment != [0.0; 2] {
+    /// The torque of an instrument.
+    #[inline(always)]
+    pub fn torque(&self, dphi: f64, p: &TorsionInput) -> f64 {
+        p.stiffness * self.tau(dphi, p)
+    }
+
+    /// Its twist energy.
+    #[inline(always)]
+    pub fn energy(&self, dphi: f64, p: &TorsionInput) -> f64 {
+        0.5 * self.torque(dphi, p) * self.tau(dphi, p)
+    }
+
+    #[inline(always)]
+    fn tau(&self, dphi: f64, p: &TorsionInput) -> f64 {
+        dphi + self.value - p.rest_twist
+    }
+
+    /// Adds the derivatives of all twist energies: they need the sums of torques and of stiffnesses alone.
+    #[inline(always)]
+    pub fn add_twist(&self, torque: f64, stiffness: f64, to: &mut PointDerivatives) {
+        let (ty, tz) = (&self.along_y, &self.along_z);
+        to.gy += ty * torque;
+        to.gz += tz * torque;
+        to.hyy += ty * ty.transpose() * stiffness + self.yy * torque;
+        to.hyz += ty * tz.transpose() * stiffness + self.yz * torque;
+        to.hzz += tz * tz.transpose() * stiffness;
+    }
+
+    /// Adds the derivatives of an instrument's rest curvature, −P with P = (z·w)/a − (y·w) G q and q = z₁ + b/a, and returns −P with those in
+    /// φ.
+    #[inline(always)]
+    pub fn add_rest_curvature(
+        &self,
+        phi: f64,
+        moment: [f64; 2],
+        to: &mut PointDerivatives,
+    ) -> (f64, AngleDensity) {
+        let Self { y, z, ia, b, g, dg, hg, .. } = self;
+        let ia3 = ia * ia * ia;
+        let e1 = Vec3::x();
+        let eye = Matrix3::identity();
+        let yy = y * y.transpose();
         let (sin, cos) = phi.sin_cos();
-        let w = Vec3::new(0.0, p.moment[0] * cos - p.moment[1] * sin, p.moment[0] * sin + p.moment[1] * cos);
+        let w = Vec3::new(0.0, moment[0] * cos - moment[1] * sin, moment[0] * sin + moment[1] * cos);
         let wp = Vec3::new(0.0, -w.z, w.y);
         let q = z.x + b * ia;
-        let dq = z * ia - y * (ia3 * b);
-        let lift = e1 + y * ia;
-        let gq = dg * q + dq * g;
+        let dq = z * *ia - y * (ia3 * b);
+        let lift = e1 + y * *ia;
+        let gq = dg * q + dq * *g;
         let first = |w: &Vec3| {
             let (m, n) = (z.dot(w), y.dot(w));
             let value = m * ia - n * g * q;
-            let pz = w * ia - lift * (n * g);
+            let pz = w * *ia - lift * (n * g);
             let py = -y * (ia3 * m) - w * (g * q) - gq * n;
             (m, n, value, py, pz)
         };
         let (m, n, value, py, pz) = first(&w);
         let (_, _, value_p, py_p, pz_p) = first(&wp);
-        bend = -value;
-        gphi = -value_p;
-        hphi = value;
-        gy -= py;
-        gz -= pz;
-        hyphi = -py_p;
-        hzphi = -pz_p;
+        to.gy -= py;
+        to.gz -= pz;
         let yz = y * z.transpose();
-        let hq = (yz + yz.transpose() + eye * b) * (-ia3) + yy * (3.0 * ia3 * ia * ia * b);
+        let hq = (yz + yz.transpose() + eye * *b) * (-ia3) + yy * (3.0 * ia3 * ia * ia * b);
         let wgq = w * gq.transpose();
         let gd = dg * dq.transpose();
-        hyy += (eye * ia3 - yy * (3.0 * ia3 * ia * ia)) * m
+        to.hyy += (eye * ia3 - yy * (3.0 * ia3 * ia * ia)) * m
             + wgq
             + wgq.transpose()
-            + (hg * q + gd + gd.transpose() + hq * g) * n;
+            + (hg * q + gd + gd.transpose() + hq * *g) * n;
         // Rows y, columns z.
-        hyz +=
-            y * w.transpose() * ia3 + (w * g + dg * n) * lift.transpose() + (eye * ia - yy * ia3) * (n * g);
-    }
-    TorsionDensity {
-        bend,
-        twist: 0.5 * torque * tau,
-        gy,
-        gz,
-        gp: [gphi, torque],
-        hyy,
-        hyz,
-        hzz,
-        hyp: [hyphi, ty * p.stiffness],
-        hzp: [hzphi, tz * p.stiffness],
-        hpp: [hphi, p.stiffness],
+        to.hyz +=
+            y * w.transpose() * ia3 + (w * *g + dg * n) * lift.transpose() + (eye * *ia - yy * ia3) * (n * g);
+        (-value, AngleDensity { first: -value_p, second: value, along_y: -py_p, along_z: -pz_p })
     }
 }

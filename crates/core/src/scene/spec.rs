@@ -220,7 +220,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// What is pushed: the device alone, or all instruments.
     ///
     /// # Errors
-    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`] and [`Stack::rubbing`].
+    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`], [`Stack::rubbing`] and
+    /// [`Stack::sealed`].
     pub fn stack(&self) -> Result<Stack> {
         match (&self.device, self.instrument.is_empty()) {
             (Some(spec), true) => self.read_device("device", &spec.file, &spec.section).map(Stack::from),
@@ -231,7 +232,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                     Ok(Instrument { name: spec.name.clone(), device, may_lead: spec.may_lead })
                 });
                 let frictions = self.instrument.iter().map(|spec| spec.friction).collect();
-                Stack::new(each.collect::<Result<_>>()?)?.rubbing(frictions)
+                let valves_n = self.instrument.iter().map(|spec| spec.valve_n).collect();
+                Stack::new(each.collect::<Result<_>>()?)?.rubbing(frictions)?.sealed(valves_n)
             }
             (None, true) => {
                 let mend = "give [device], or an [[instrument]] for each of several, the innermost first";

@@ -77,6 +77,9 @@ pub struct InstrumentSpec {
     /// Coulomb coefficient of friction between it and the instruments outside it, along the line; 0 is none and costs nothing.
     #[serde(default)]
     pub friction: f64,
+    /// Friction of the valve on its hub, which seals what lies in it, N; 0 is none and costs nothing.
+    #[serde(default)]
+    pub valve_n: f64,
 }
 
 fn yes() -> bool {

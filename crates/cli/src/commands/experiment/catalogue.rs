@@ -43,15 +43,16 @@ fn over_the_wire() -> Vec<Stage> {
     ]
 }
 
-/// The catheter goes past the branches into the ascending aorta with the wire in it, and is pulled back until it hooks the branch, its tip no
-/// more than `hooked_mm` before the target; the wire goes out of it, and the catheter follows.
+/// The catheter goes past the branches into the ascending aorta with the wire in it, where its limb turns back, and is pulled back until its
+/// tip is in the branch's mouth, no more than `hooked_mm` before the target. There it is held while the wire goes out of it to the target. A catheter that is bent back is not simply
+/// pushed after it, which would drive its knee into the ascending aorta: it is turned, pushed and pulled.
 fn pulled_back(hooked_mm: f64) -> Vec<Stage> {
     let (past, hooked) = (Until::Before("ascending aorta", 40.0), Until::BeforeTarget(hooked_mm));
     vec![
         Stage { lead: 1, followers: &[(0, 5.0)], until: past, searched: None },
         Stage { lead: 1, followers: &[(0, 5.0)], until: hooked, searched: Some(&[1]) },
-        Stage { lead: 0, followers: &[(1, 20.0)], until: Until::BeforeTarget(6.0), searched: None },
-        Stage { lead: 1, followers: &[], until: Until::BeforeTarget(25.0), searched: None },
+        Stage { lead: 0, followers: &[], until: Until::BeforeTarget(6.0), searched: None },
+        Stage { lead: 1, followers: &[], until: Until::BeforeTarget(25.0), searched: Some(&[1]) },
     ]
 }
 
@@ -86,12 +87,13 @@ pub(super) fn procedures() -> Vec<Procedure> {
         vertebral("aortic_arch", &["innominate", "left carotid", "left subclavian"]),
         vertebral("aortic_arch_ii", &["innominate", "left subclavian"]),
         simmons("aortic_arch_ii", &["left carotid"], 72.0),
-        vertebral("aortic_arch_iii", &["innominate", "left subclavian"]),
+        vertebral("aortic_arch_iii", &["left subclavian"]),
+        simmons("aortic_arch_iii", &["innominate"], 48.0),
         simmons("aortic_arch_iii", &["left carotid"], 72.0),
         Procedure {
             anatomy: "hepatic",
             targets: &["right hepatic", "left hepatic"],
-            devices: &["microwire_014", "microcatheter_27f", "catheter_5f_cobra_c2"],
+            devices: &["microwire_014_shaped", "microcatheter_27f", "catheter_5f_cobra_c2"],
             element_mm: 2.0,
             stages: coaxial(),
         },

@@ -65,6 +65,7 @@ impl<const C: usize> Tools<C> {
         if surroundings.stack.is_several() {
             write_instruments::<C>(environment, hands, Some(&clamp), &pressed, at);
             let taken_mj = if surroundings.stack.rubs() { self.rub(surroundings.stack, at) } else { 0.0 };
+            let taken_mj = taken_mj + self.rub_in_valves(surroundings.stack, at);
             return taken_mj + self.rub_in_sheath(surroundings, &clamp, at);
         }
         let frame = rod.material_frame(0);
@@ -106,6 +107,38 @@ impl<const C: usize> Tools<C> {
             told.torque_nmm += torque_nmm;
         }
         friction_n * slip_mm
+    }
+
+    /// What hands feel of valves on the hubs of instruments is added to the report; returns the energy that it took, mJ.
+    ///
+    /// An instrument is held by the valve of the next one outside it that is in, F₀ against its slip u = (Δ, r θ) in that one, and holds the
+    /// other with as much: outside of the body both are straight, and nothing inside moves.
+    fn rub_in_valves(&self, stack: &Stack, at: &mut Configuration) -> f64 {
+        let (mesh, state) = at.parts();
+        let report = &mut state.report;
+        let is_in = |index: &usize| mesh.inserted_mm[*index] > 0.0;
+        let mut taken_mj = 0.0;
+        for outer in (1..mesh.inserted_mm.len()).filter(|index| stack.valve_n(*index) > 0.0 && is_in(index)) {
+            let Some(inner) = (0..outer).rev().find(is_in) else { continue };
+            let radius_mm = stack.instruments()[inner].device.section_at(f64::INFINITY).radius_mm;
+            let [[advance, turn], [outer_advance, outer_turn]] =
+                [inner, outer].map(|index| self.guess.motions[index].parts());
+            let (advance_mm, turn_rad) = (advance - outer_advance, turn - outer_turn);
+            let slip_mm = advance_mm.hypot(radius_mm * turn_rad);
+            if slip_mm <= LEAST_SLIP_MM {
+                continue;
+            }
+            let force_n = stack.valve_n(outer);
+            let push_n = force_n * advance_mm / slip_mm;
+            let torque_nmm = force_n * radius_mm * radius_mm * turn_rad / slip_mm;
+            for (index, sign) in [(inner, 1.0), (outer, -1.0)] {
+                let told = &mut report.instruments[index];
+                told.push_force_n = told.push_force_n.map(|push| push + sign * push_n);
+                told.torque_nmm += sign * torque_nmm;
+            }
+            taken_mj += force_n * slip_mm;
+        }
+        taken_mj
     }
 
     /// What hands feel of friction between instruments is added to the report; returns the energy that it took, mJ.

@@ -166,7 +166,8 @@ impl<const C: usize> Tools<C> {
         let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
         let (mesh, after) = next.parts();
         let taken = resort == Some(true) && balanced;
-        if !taken && rises(stack, &start.state.report, &after.report, dissipated_mj) {
+        if !taken && rises(environment.surroundings.stack, &start.state.report, &after.report, dissipated_mj)
+        {
             return Err(STORED.into());
         }
         self.guess.teach(&mesh.elements, &after.rod, softest >= YIELDING, &mut after.correction);
