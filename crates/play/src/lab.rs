@@ -158,6 +158,7 @@ impl Lab {
             duration_s: ml / ml_per_s,
             rate_ml_per_s: ml_per_s,
             at_mm: at_mm.map(Into::into),
+            at_tip: false,
         };
         self.change(|spec| {
             let first = (spec.injection.len() + 1).saturating_sub(MOST_INJECTIONS);

@@ -44,7 +44,7 @@ impl Renderer {
             Some(table) => document::read_over("view", spec, table)?,
             None => spec.clone(),
         };
-        let made = interruptible(py, move || viewer::Renderer::new(&spec, &wall.closed_mesh()))?;
+        let made = interruptible(py, move || viewer::Renderer::of_wall(&spec, &wall))?;
         Ok(Self { inner: Mutex::new(made.map_err(exception)?) })
     }
 

@@ -74,7 +74,13 @@ fn main() -> Result<()> {
     // Contrast medium into the ascending aorta, where the blood comes in.
     spec.flow.tree = Some(vessels.join("aortic_arch.csv"));
     spec.flow.inlet_mm = Some([-38.4, -54.8, 136.0]);
-    spec.injection = vec![InjectionSpec { start_s: 0.2, duration_s: 1.2, rate_ml_per_s: 20.0, at_mm: None }];
+    spec.injection = vec![InjectionSpec {
+        start_s: 0.2,
+        duration_s: 1.2,
+        rate_ml_per_s: 20.0,
+        at_mm: None,
+        at_tip: false,
+    }];
 
     let devices = devices();
     for (name, mode, time_s) in [

@@ -146,6 +146,7 @@ impl CArm {
     }
 
     /// Slopes (x, y) of the ray through a pixel coordinate.
+    #[inline]
     pub(crate) fn slopes(&self, pixel: [f64; 2]) -> [f64; 2] {
         let [w, h] = self.size_px.map(f64::from);
         [(pixel[0] - w / 2.0) / self.focal_px(), (pixel[1] - h / 2.0) / self.focal_px()]
@@ -153,15 +154,17 @@ impl CArm {
 
     /// Obliquity of the central ray of each pixel, row by row.
     pub(crate) fn obliquities(&self) -> impl Iterator<Item = f64> + use<> {
-        let [width, height] = self.size_px;
-        let squares = |n: u32, k: usize| -> Vec<f64> {
-            (0..n).map(|i| self.slopes([f64::from(i) + 0.5; 2])[k].powi(2)).collect()
-        };
-        let (columns, rows) = (squares(width, 0), squares(height, 1));
+        let [columns, rows] = self.squared_slopes();
         rows.into_iter().flat_map(move |y| {
             let columns = columns.clone();
             columns.into_iter().map(move |x| (1.0 + x + y).sqrt())
         })
+    }
+
+    /// Squared slopes of the central rays of each column and of each row.
+    pub(crate) fn squared_slopes(&self) -> [Vec<f64>; 2] {
+        [0, 1]
+            .map(|k| (0..self.size_px[k]).map(|i| self.slopes([f64::from(i) + 0.5; 2])[k].powi(2)).collect())
     }
 
     /// Obliquity of the central ray of pixel number `index`, counted row by row.

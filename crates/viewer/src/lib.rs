@@ -45,6 +45,7 @@ mod pushed;
 mod renderer;
 mod scene;
 mod spec;
+mod tails;
 mod three_d;
 mod xray;
 

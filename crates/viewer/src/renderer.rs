@@ -1,6 +1,8 @@
 //! From a scene to frames: chooses an engine, prepares what the wanted views need, draws.
 
-use endowire_core::vessel::SurfaceMesh;
+use std::sync::Arc;
+
+use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Error, Result, Vec3};
 
 use crate::c_arm::CArm;
@@ -11,6 +13,7 @@ use crate::gpu;
 use crate::output::{Image, Labels};
 use crate::scene::Setup;
 use crate::spec::{Backend, Mode, ViewSpec};
+use crate::tails::with_tails;
 use crate::three_d::{ContactView, Solids, draw_legend, draw_markers, draw_scale_bar};
 use crate::xray::{Material, PathLengths};
 
@@ -67,7 +70,21 @@ impl Renderer {
     /// `backend = gpu` without a fitting adapter; [`Error::Mesh`] for a wall that is open, wound inconsistently or
     /// inside out; [`Error::Content`] for a centre line or a tomogram that cannot be used.
     pub fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
-        let setup = Setup::new(spec, wall)?;
+        Self::of_setup(Setup::new(spec, wall)?)
+    }
+
+    /// The same for a wall with openings: the 3D view shows them closed, and in the beam vessels taper off there, as if they went on
+    /// into branches too fine to be seen.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_wall(spec: &ViewSpec, wall: &Wall) -> Result<Self> {
+        let closed = Arc::new(wall.closed_mesh());
+        Self::of_setup(Setup::filled(spec, closed, Arc::new(with_tails(wall)))?)
+    }
+
+    fn of_setup(setup: Setup) -> Result<Self> {
+        let spec = &setup.spec;
         let nothing = setup.c_arm.is_none() && setup.camera.is_none();
         let mut refused = None;
         let on_gpu = match spec.backend {
@@ -231,7 +248,7 @@ impl Renderer {
         if self.central.is_none() {
             self.central = Some(self.with_fallback(|setup, engines, _| {
                 let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
-                Anatomy::new(setup, &c_arm, engine.as_mut())
+                Anatomy::new(setup, &c_arm, 1, engine.as_mut())
             })?);
         }
         let (devices_mm, injected) = self.with_fallback(|setup, engines, fluoro| {
@@ -250,7 +267,10 @@ impl Renderer {
             // A roadmap's injections are those of its angiogram.
             let injecting = setup.flow.is_some() && setup.spec.xray.mode != Mode::Roadmap;
             let injected = match time_s.filter(|_| injecting) {
-                Some(time_s) => prepared(setup, engines, fluoro)?.0.injected(time_s),
+                Some(time_s) => {
+                    let tip = devices.first().and_then(|device| device.points.last());
+                    prepared(setup, engines, fluoro)?.0.injected(time_s, tip.map(|point| point.position_mm))
+                }
                 None => vec![],
             };
             Ok((maps, injected))
@@ -259,10 +279,12 @@ impl Renderer {
         let fraction = self.setup.spec.xray.contrast_fraction as f32;
         let mut contrast_mm = vec![];
         if fraction > 0.0 || !injected.is_empty() {
-            let mut fractions = vec![fraction; pixels];
-            injected.iter().for_each(|&(i, more)| fractions[i as usize] = (fraction + more).min(1.0));
             let filling = |i: usize| lumen[i] - devices_mm.iter().map(|map| map.1[i]).sum::<f32>();
-            contrast_mm = fractions.iter().enumerate().map(|(i, fraction)| fraction * filling(i)).collect();
+            contrast_mm = (0..pixels).map(|i| fraction * filling(i)).collect();
+            for medium in injected {
+                let i = medium.pixel as usize;
+                contrast_mm[i] = (fraction + medium.fraction).min(1.0) * filling(i) + medium.tissue_mm;
+            }
         }
         Ok(PathLengths {
             width,

@@ -17,6 +17,8 @@ use crate::three_d::Camera;
 pub(crate) struct Setup {
     pub(crate) spec: ViewSpec,
     pub(crate) wall: Arc<SurfaceMesh>,
+    /// The surface of what blood fills, as the beam meets it.
+    pub(crate) filled: Arc<SurfaceMesh>,
     pub(crate) patient: Patient,
     /// What carries contrast medium, where any is injected.
     pub(crate) flow: Option<Arc<Flow>>,
@@ -27,11 +29,19 @@ pub(crate) struct Setup {
 }
 
 impl Setup {
+    /// A set-up with a closed wall, which blood fills to its ends.
     pub(crate) fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
+        let wall = Arc::new(wall.clone());
+        Self::filled(spec, Arc::clone(&wall), wall)
+    }
+
+    /// A set-up with a closed wall and what blood fills.
+    pub(crate) fn filled(spec: &ViewSpec, wall: Arc<SurfaceMesh>, filled: Arc<SurfaceMesh>) -> Result<Self> {
         spec.validate()?;
         let mut setup = Self {
             spec: spec.clone(),
             wall: Arc::default(),
+            filled: Arc::default(),
             patient: Patient::Slab { tissue_mm: spec.xray.tissue_mm },
             flow: None,
             lumen: true,
@@ -41,19 +51,19 @@ impl Setup {
         if spec.views.is_empty() {
             return Ok(setup);
         }
-        check_drawable(wall)?;
+        check_drawable(&wall)?;
         if spec.wants(View::Fluoro) {
-            let closed = check_closed(wall);
+            let closed = check_closed(&filled);
             // Only contrast medium shows what is inside the wall: blood is nearly tissue, and a device is drawn without it.
             if !spec.injection.is_empty() || spec.xray.contrast_fraction > 0.0 {
                 closed?;
             } else {
                 setup.lumen = closed.is_ok();
             }
-            let c_arm = CArm::new(&spec.c_arm, spec.size_px, wall)?;
+            let c_arm = CArm::new(&spec.c_arm, spec.size_px, &wall)?;
             spec.detector.check_blur(c_arm.pixel_mm())?;
             setup.c_arm = Some(c_arm);
-            setup.patient = Patient::new(spec, wall)?;
+            setup.patient = Patient::new(spec, &wall)?;
             setup.flow = Flow::of_view(spec)?.map(Arc::new);
         }
         let beam: Vec<_> = match &setup.c_arm {
@@ -63,8 +73,9 @@ impl Setup {
             }
             _ => vec![],
         };
-        setup.camera = spec.wants(View::ThreeD).then(|| Camera::new(&spec.camera, spec.size_px, wall, &beam));
-        setup.wall = Arc::new(wall.clone());
+        setup.camera =
+            spec.wants(View::ThreeD).then(|| Camera::new(&spec.camera, spec.size_px, &wall, &beam));
+        (setup.wall, setup.filled) = (wall, filled);
         Ok(setup)
     }
 }

@@ -43,7 +43,13 @@ fn view(mode: Mode) -> ViewSpec {
     view.xray.mode = mode;
     view.flow.tree = Some(assets().join("aortic_arch.csv"));
     view.flow.inlet_mm = Some([-38.4, -54.8, 136.0]);
-    view.injection = vec![InjectionSpec { start_s: 0.0, duration_s: 1.5, rate_ml_per_s: 20.0, at_mm: None }];
+    view.injection = vec![InjectionSpec {
+        start_s: 0.0,
+        duration_s: 1.5,
+        rate_ml_per_s: 20.0,
+        at_mm: None,
+        at_tip: false,
+    }];
     view
 }
 

@@ -26,7 +26,9 @@ fn scene(folder: &std::path::Path, mode: Mode) -> (ViewSpec, endowire_core::vess
     view.flow.tree = Some(path);
     view.flow.inlet_mm = Some([0.0, 0.0, -50.0]);
     view.flow.inflow_ml_per_s = 20.0;
-    view.injection = vec![InjectionSpec { start_s: 1.0, duration_s: 1.0, rate_ml_per_s: 8.0, at_mm: None }];
+    view.flow.pulsatility = 0.0;
+    view.injection =
+        vec![InjectionSpec { start_s: 1.0, duration_s: 1.0, rate_ml_per_s: 8.0, at_mm: None, at_tip: false }];
     (view, cylinder(6.0, 50.0, 64, Vec3::zeros()))
 }
 
@@ -140,6 +142,26 @@ fn bones_vanish_from_a_subtraction_of_one_energy_and_scatter_brings_them_back() 
     );
     assert!(alone < 1e-3, "{alone}");
     assert!(hardened > 2.0 * alone && scattered > 5.0 * alone, "{alone} {hardened} {scattered}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn any_number_of_threads_draws_the_same_bits() {
+    let folder = folder("threads");
+    let (mut view, wall) = scene(&folder, Mode::Dsa);
+    view.patient.torso = Some(TorsoSpec::default());
+    view.detector.electronic_ngy = 1.0;
+    view.bits = 16;
+    let drawn = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut renderer = Renderer::new(&view, &wall).unwrap();
+            let frames = [0.0, 1.5].map(|time| renderer.render_at(&[wire()], at(0, time)).unwrap());
+            (frames, renderer.path_lengths_at(&[wire()], 1.5).unwrap())
+        })
+    };
+    let one = drawn(1);
+    assert!([2, 3, 8].into_iter().all(|threads| drawn(threads) == one));
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -40,6 +40,10 @@ pub(crate) struct FrameArgs {
     /// Turn the camera of the 3D view by so many degrees from the first frame to the last
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub(crate) orbit: Option<f64>,
+    /// Draw fluoroscopy in a second plane as well, turned by so many degrees (towards LAO) from the first: frames NAME_fluoro_b.png, and a
+    /// second DICOM file FILE_b of the pair. Labels, arrays and moving pictures are of the first plane
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    pub(crate) biplane: Option<f64>,
     /// Write one moving picture of the views side by side: an animated PNG (.png, .apng), a GIF (.gif), or a film (.mp4) where the program
     /// was built with the feature mp4
     #[arg(long, value_name = "FILE")]

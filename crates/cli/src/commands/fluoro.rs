@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use endowire_core::insertion::{Script, Simulation};
+use endowire_core::shape::Shape;
 use endowire_methods::Scene;
 use endowire_viewer::{ContactView, Moment};
 
@@ -28,15 +30,56 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     }
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let frames = args.count as usize;
-    let mut simulation = scene.simulation(&Cache::new(&args.frames.cache)).map_err(in_scene)?;
-    let wall = simulation.wall().closed_mesh();
+    let cache = Cache::new(&args.frames.cache);
+    // An empty vessel needs no wall that can be felt, which takes far longer to make than a picture.
+    let mut simulation = match steps {
+        0 => None,
+        _ => Some(scene.simulation(&cache).map_err(in_scene)?),
+    };
+    let wall = match &simulation {
+        Some(simulation) => simulation.wall().clone(),
+        None => scene.wall(&cache).map_err(in_scene)?,
+    };
     let mut studio =
         Studio::new("fluoro", &args.frames, (&args.scene, &scene, wall), ViewChoice::Fluoro, folder, frames)?;
+    let now = match &mut simulation {
+        Some(simulation) => after(simulation, &script, steps, args)?,
+        None => Now::default(),
+    };
+    for k in 0..args.count {
+        let time_s = args.time + f64::from(k) / studio.frames_per_s();
+        let moment = Moment { frame: u64::from(k), time_s };
+        studio.draw(&Still {
+            name: format!("frame_{k:06}"),
+            moment,
+            shape: &now.shape,
+            inserted_mm: &now.inserted_mm,
+            contacts: &now.contacts,
+        })?;
+    }
+    studio.finish()?.tell(args.frames.json)
+}
+
+/// What is in the vessel when frames are drawn.
+#[derive(Default)]
+struct Now {
+    shape: Shape,
+    inserted_mm: Vec<f64>,
+    contacts: Vec<ContactView>,
+}
+
+/// Carries out the first steps of the script.
+fn after(
+    simulation: &mut Simulation,
+    script: &Script,
+    steps: usize,
+    args: &FluoroArgs,
+) -> Result<Now, Failure> {
     let bar = progress::bar(steps, "step");
     let mut run = script.begin();
     for index in 0..steps {
         // A condition may have ended the script before.
-        let Some(step) = run.next(&simulation)? else { break };
+        let Some(step) = run.next(simulation)? else { break };
         simulation.step_together(step.moves).map_err(|e| {
             Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), index + 1))
         })?;
@@ -44,19 +87,13 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let contacts: Vec<ContactView> = simulation
-        .report()
-        .contacts
-        .iter()
-        .map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() })
-        .collect();
-    let inserted_mm = simulation.report().lengths_mm();
-    for k in 0..args.count {
-        let time_s = args.time + f64::from(k) / studio.frames_per_s();
-        let moment = Moment { frame: u64::from(k), time_s };
-        let name = format!("frame_{k:06}");
-        let shape = simulation.shape();
-        studio.draw(&Still { name, moment, shape, inserted_mm: &inserted_mm, contacts: &contacts })?;
-    }
-    studio.finish()?.tell(args.frames.json)
+    let report = simulation.report();
+    let contacts = report.contacts.iter();
+    Ok(Now {
+        shape: simulation.shape().clone(),
+        inserted_mm: report.lengths_mm(),
+        contacts: contacts
+            .map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() })
+            .collect(),
+    })
 }

@@ -59,7 +59,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
     let wall =
         scene.wall(&Cache::new(&args.frames.cache)).map_err(|e| Failure::from(e).at(path.display()))?;
-    let seen = (path.as_path(), &scene, wall.closed_mesh());
+    let seen = (path.as_path(), &scene, wall);
     let mut studio = Studio::new("render", &args.frames, seen, ViewChoice::Both, folder, steps.len())?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;

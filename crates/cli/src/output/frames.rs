@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use endowire_core::Error;
 use endowire_core::insertion::Simulation;
 use endowire_core::shape::Shape;
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::Wall;
 use endowire_methods::Scene;
 use endowire_viewer::{
-    Angiogram, Animation, ContactView, Frames, Image, Labels, Mask, Moment, Pushed, Renderer, View, ViewSpec,
+    Angiogram, Animation, CArm, ContactView, Frames, Image, Labels, Mask, Moment, Pushed, Renderer, View,
+    ViewSpec,
 };
 use serde::Serialize;
 use serde_json::Value;
@@ -36,7 +37,7 @@ impl FrameWriter {
         let spec = ViewSpec::of_scene(scene, path)?;
         spec.validate().map_err(in_scene)?;
         let drawn = drawn.filter(|_| !spec.views.is_empty());
-        let renderer = drawn.map(|simulation| Renderer::new(&spec, &simulation.wall().closed_mesh()));
+        let renderer = drawn.map(|simulation| Renderer::of_wall(&spec, simulation.wall()));
         let renderer = renderer.transpose().map_err(in_scene)?;
         Ok(Self { pushed: Pushed::new(scene, &spec).map_err(in_scene)?, spec, renderer })
     }
@@ -121,9 +122,10 @@ const MOST_ORBIT_DEG: f64 = 36_000.0;
 pub(crate) struct Studio<'a> {
     args: &'a FrameArgs,
     spec: ViewSpec,
-    wall: SurfaceMesh,
+    wall: Wall,
     pushed: Pushed,
     renderer: Renderer,
+    second: Option<SecondPlane>,
     folder: PathBuf,
     frames: usize,
     drawn: usize,
@@ -133,12 +135,29 @@ pub(crate) struct Studio<'a> {
     files: Vec<PathBuf>,
 }
 
+/// The other plane of a biplane system.
+struct SecondPlane {
+    renderer: Renderer,
+    series: Vec<Image>,
+}
+
+impl SecondPlane {
+    /// The plane turned by `turn_deg` from that of `spec`.
+    fn new(spec: &ViewSpec, turn_deg: f64, wall: &Wall) -> Result<Self, Error> {
+        let mut spec = ViewSpec { views: vec![View::Fluoro], ..spec.clone() };
+        let [primary_deg, secondary_deg] = spec.c_arm.angles_deg();
+        spec.c_arm.pose = None;
+        (spec.c_arm.primary_deg, spec.c_arm.secondary_deg) = (primary_deg + turn_deg, secondary_deg);
+        Ok(Self { renderer: Renderer::of_wall(&spec, wall)?, series: vec![] })
+    }
+}
+
 impl<'a> Studio<'a> {
-    /// Prepares `frames` frames of a scene with its closed wall, in `folder`, where they replace those of an earlier call of the same command.
+    /// Prepares `frames` frames of a scene with its wall, in `folder`, where they replace those of an earlier call of the same command.
     pub(crate) fn new(
         command: &str,
         args: &'a FrameArgs,
-        (path, scene, wall): (&Path, &Scene, SurfaceMesh),
+        (path, scene, wall): (&Path, &Scene, Wall),
         default: ViewChoice,
         folder: PathBuf,
         frames: usize,
@@ -147,16 +166,19 @@ impl<'a> Studio<'a> {
         args.animate.as_deref().map_or(Ok(()), Animation::check_name)?;
         let spec = wished(ViewSpec::of_scene(scene, path)?, args, default)?;
         let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
-        let renderer = Renderer::new(&spec, &wall).map_err(in_scene)?;
+        let renderer = Renderer::of_wall(&spec, &wall).map_err(in_scene)?;
         if let Some(orbit) = args.orbit.filter(|orbit| !(-MOST_ORBIT_DEG..=MOST_ORBIT_DEG).contains(orbit)) {
             let text = format!("--orbit {orbit:e}: give -{MOST_ORBIT_DEG} to {MOST_ORBIT_DEG} degrees");
             return Err(Failure::Input(text));
         }
-        if !spec.wants(View::Fluoro) && (args.dicom.is_some() || args.labels || args.raw || args.hold) {
-            let text =
-                "--dicom, --labels, --raw and --hold belong to fluoroscopy: use --view fluoro or --view both";
+        let of_fluoro =
+            args.dicom.is_some() || args.labels || args.raw || args.hold || args.biplane.is_some();
+        if !spec.wants(View::Fluoro) && of_fluoro {
+            let text = "--dicom, --labels, --raw, --hold and --biplane belong to fluoroscopy: use --view fluoro or --view both";
             return Err(Failure::Input(text.to_owned()));
         }
+        let second = args.biplane.map(|turn_deg| SecondPlane::new(&spec, turn_deg, &wall));
+        let second = second.transpose().map_err(|e| Failure::from(e).at("--biplane"))?;
         std::fs::create_dir_all(&folder).map_err(|e| {
             Failure::Input(format!("--out {}: {e}; name a folder that can be made", folder.display()))
         })?;
@@ -174,6 +196,7 @@ impl<'a> Studio<'a> {
             wall,
             pushed,
             renderer,
+            second,
             folder,
             frames,
             drawn: 0,
@@ -196,7 +219,7 @@ impl<'a> Studio<'a> {
             let part = self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64;
             (spec.camera.turn_deg, spec.camera.orbit_deg) = (orbit * part, Some(orbit));
             let views = self.pushed.views(still.shape, still.inserted_mm);
-            let mut orbiting = Renderer::new(&spec, &self.wall)?;
+            let mut orbiting = Renderer::of_wall(&spec, &self.wall)?;
             orbiting.show_contacts(still.contacts);
             let three_d = orbiting.render_at(&views, still.moment)?.three_d;
             let fluoro = match self.spec.wants(View::Fluoro) {
@@ -213,6 +236,18 @@ impl<'a> Studio<'a> {
 
     fn write(&mut self, still: &Still, frames: &Frames) -> Result<(), Failure> {
         self.drawn += 1;
+        let views = self.pushed.views(still.shape, still.inserted_mm);
+        let second = match &mut self.second {
+            Some(second) => second.renderer.render_at(&views, still.moment)?.fluoro,
+            None => None,
+        };
+        if let Some(image) = second {
+            let path = self.file(&format!("{}_fluoro_b.png", still.name))?;
+            image.write_png(&path)?;
+            if let (Some(second), true) = (&mut self.second, self.args.dicom.is_some()) {
+                second.series.push(image);
+            }
+        }
         for (view, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
             if let Some(image) = image {
                 let path = self.file(&format!("{}_{view}.png", still.name))?;
@@ -303,19 +338,44 @@ impl<'a> Studio<'a> {
             image.write_png(&path)?;
         }
         if let (Some(path), Some(c_arm)) = (&self.args.dicom, self.renderer.c_arm()) {
-            let angiogram = Angiogram {
-                c_arm,
-                kvp: self.spec.xray.kvp,
-                frames_per_s: self.spec.frames_per_s,
-                mode: self.spec.xray.mode,
-                contrast: !self.spec.injection.is_empty() || self.spec.xray.contrast_fraction > 0.0,
-                description: "endowire",
-            };
-            angiogram.write(path, &self.series)?;
+            let first = angiogram(c_arm, &self.spec);
+            let second = self.second.as_ref().and_then(|s| Some((s, s.renderer.c_arm()?)));
             self.files.push(path.clone());
+            match second {
+                None => first.write(path, &self.series)?,
+                Some((plane, c_arm)) => {
+                    let other = beside(path);
+                    let planes = [&first, &angiogram(c_arm, &self.spec)];
+                    Angiogram::write_biplane(planes, [path, &other], [&self.series, &plane.series])?;
+                    self.files.push(other);
+                }
+            }
         }
         Ok(Written { renderer: self.renderer.backend().to_owned(), folder: self.folder, files: self.files })
     }
+}
+
+/// What a DICOM file says of the frames of a plane.
+fn angiogram<'a>(c_arm: &'a CArm, spec: &ViewSpec) -> Angiogram<'a> {
+    Angiogram {
+        c_arm,
+        kvp: spec.xray.kvp,
+        frames_per_s: spec.frames_per_s,
+        mode: spec.xray.mode,
+        contrast: !spec.injection.is_empty() || spec.xray.contrast_fraction > 0.0,
+        description: "endowire",
+    }
+}
+
+/// The file of the second plane: `run.dcm` has `run_b.dcm` beside it.
+fn beside(path: &Path) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push("_b");
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
 }
 
 /// Masks of a frame: the vessel, each of several instruments, and each part of one.

@@ -128,7 +128,9 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
         return Err(Error::parameter("septum_mm", septum_mm, "must be a thickness in mm, 0 or more"));
     }
     let wall = Wall::from_surface(surface)?;
-    let given = Wall::welded(surface)?;
+    // What needed no more than welding and turning over is what was given: it is neither welded nor searched again.
+    let as_given = wall.report().is_as_given();
+    let given = if as_given { wall.clone() } else { Wall::welded(surface)? };
     let tolerance_mm = weld_tolerance_mm(surface);
     let target = super::weld::merge_targets(&surface.vertices_mm, tolerance_mm);
     let welded = SurfaceMesh {
@@ -138,7 +140,10 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
     let degenerate = |i: &usize| sliver::is_degenerate(&welded.corners(*i), tolerance_mm);
     let table = EdgeTable::new(&welded.triangles);
     let open_edges = table.edges().filter(|uses| uses.len() == 1).count();
-    let intersections = self_intersections(&welded, tolerance_mm);
+    let intersections = match as_given {
+        true => Intersections::default(),
+        false => self_intersections(&welded, tolerance_mm),
+    };
     let mut edges: Vec<f64> = table
         .edges()
         .map(|uses| {
@@ -222,6 +227,7 @@ pub(crate) fn area_mm2(mesh: &SurfaceMesh) -> f64 {
 }
 
 /// What [`self_intersections`] found.
+#[derive(Default)]
 pub(crate) struct Intersections {
     /// Intersecting pairs, all or those seen before the limit.
     pub(crate) count: usize,

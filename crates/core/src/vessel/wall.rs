@@ -82,6 +82,24 @@ pub struct RepairReport {
 }
 
 impl RepairReport {
+    /// Whether the surface needed nothing but vertices welded and the winding made consistent, and no triangles of it intersect.
+    pub(crate) fn is_as_given(&self) -> bool {
+        let more = [
+            self.degenerate_removed,
+            self.duplicates_removed,
+            self.cracks_closed,
+            self.sheets_removed,
+            self.edges_cut,
+            self.pieces_dropped,
+            self.skins_dropped,
+            self.holes_filled,
+            self.triangles_added,
+            self.intersections_found,
+            self.fold_triangles_removed,
+        ];
+        more.iter().all(|count| *count == 0) && !self.intersections_capped
+    }
+
     /// One line per thing that was done or is odd; empty for a clean surface.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();

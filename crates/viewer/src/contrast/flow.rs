@@ -1,16 +1,8 @@
-//! A bolus in a vessel tree.
+//! The vessel tree that contrast medium is carried through, directed from its inlet.
 //!
 //! Blood enters the centre-line tree at its inlet and divides at bifurcations in proportion to radiusⁿ: n = 2 gives all branches
 //! the same mean velocity, as in large arteries, n = 3 is Murray's law for small ones (Proceedings of the National Academy of
-//! Sciences 12, 1926). Contrast medium injected at a rate q where the flow is Q mixes at once to the
-//! fraction q/(Q + q) and travels downstream with the mean velocity (Q + q)/πr², so it reaches a point after the transit time
-//! τ = ∫ πr²/(Q + q) ds. Fronts spread on the way (velocity profiles, curvature, pulsation): the fraction at a point is
-//!
-//! ```text
-//! f(t) = q/(Q + q) · [G((t − t₀ − τ)/σ) − G((t − t₀ − T − τ)/σ)],   σ² = σ₀² + k² τ
-//! ```
-//!
-//! with the logistic distribution G of deviation one. Nothing flows upstream.
+//! Sciences 12, 1926). It comes as the heart pumps it: a part of the flow, the pulsatility, in systole, the rest all the time.
 
 use endowire_core::vessel::{CentrelineNode, CentrelineTree};
 use endowire_core::{Error, Result, Vec3};
@@ -23,8 +15,10 @@ const SPACING_MM: f64 = 2.0;
 const MOST_NODES: f64 = 50_000.0;
 /// Ends of at least this part of the widest's radius are about as wide.
 const ABOUT_AS_WIDE: f64 = 0.95;
-/// Deviation of a front where it is injected, s.
-const FIRST_SPREAD_S: f64 = 0.05;
+/// Part of its volume that counts of a stretch of a side branch inside the trunk: the trunk has the rest.
+const LEAST_PART: f64 = 0.25;
+/// Part of a heartbeat that systole takes.
+const SYSTOLE: f64 = 0.35;
 
 /// A point of the vessel, after those upstream of it.
 #[derive(Debug, Clone, Copy)]
@@ -34,26 +28,27 @@ pub(super) struct Node {
     /// The point before it, towards the inlet.
     pub(super) upstream: Option<usize>,
     /// Share of the inflow that passes here.
-    share: f64,
+    pub(super) share: f64,
     /// Lumen between the point before and this one, mm³.
-    volume_mm3: f64,
-}
-
-/// When and how much of one injection arrives at each node.
-#[derive(Debug, Clone)]
-struct Bolus {
-    start_s: f64,
-    duration_s: f64,
-    fraction: f64,
-    /// Transit time; `None` where nothing arrives.
-    transit_s: Vec<Option<f64>>,
+    pub(super) volume_mm3: f64,
+    /// Distance from the point before, mm.
+    length_mm: f64,
+    /// Whether the tree ends here.
+    pub(super) is_end: bool,
 }
 
 /// The tree directed from its inlet, with its injections.
 #[derive(Debug, Clone)]
 pub(crate) struct Flow {
     pub(super) nodes: Vec<Node>,
-    boluses: Vec<Bolus>,
+    pub(super) injections: Vec<InjectionSpec>,
+    pub(super) mean_inflow_mm3_per_s: f64,
+    /// Mean time that medium stays in the tissue behind an end, s.
+    pub(super) tissue_s: f64,
+    /// Radius of that tissue, if it is drawn, mm.
+    pub(super) tissue_mm: Option<f64>,
+    beat_s: f64,
+    pulsatility: f64,
     dispersion: f64,
 }
 
@@ -80,70 +75,45 @@ impl Flow {
     }
 
     pub(super) fn new(tree: &CentrelineTree, spec: &FlowSpec, injections: &[InjectionSpec]) -> Result<Self> {
-        let nodes = directed(tree, spec)?;
-        let flow_mm3 = spec.inflow_ml_per_s * 1000.0;
-        let boluses = injections
-            .iter()
-            .map(|injection| {
-                let at = injection.at_mm.map_or(0, |point| nearest(&nodes, &Vec3::from(point)));
-                let q = injection.rate_ml_per_s * 1000.0;
-                let blood = flow_mm3 * nodes[at].share;
-                let mut transit_s: Vec<Option<f64>> = vec![None; nodes.len()];
-                transit_s[at] = Some(0.0);
-                for i in at + 1..nodes.len() {
-                    let Some(before) = nodes[i].upstream.and_then(|up| transit_s[up]) else {
-                        continue;
-                    };
-                    let flow = (blood + q) * nodes[i].share / nodes[at].share;
-                    transit_s[i] = Some(before + nodes[i].volume_mm3 / flow);
-                }
-                Bolus {
-                    start_s: injection.start_s,
-                    duration_s: injection.duration_s,
-                    fraction: q / (blood + q),
-                    transit_s,
-                }
-            })
-            .collect();
-        Ok(Self { nodes, boluses, dispersion: spec.dispersion })
+        Ok(Self {
+            nodes: directed(tree, spec)?,
+            injections: injections.to_vec(),
+            mean_inflow_mm3_per_s: spec.inflow_ml_per_s * 1000.0,
+            tissue_s: spec.tissue_s,
+            tissue_mm: spec.tissue_mm,
+            beat_s: 60.0 / spec.heart_rate_per_min,
+            pulsatility: spec.pulsatility,
+            dispersion: spec.dispersion,
+        })
     }
 
-    /// Fraction of contrast medium at each node.
-    pub(super) fn fractions(&self, time_s: f64) -> Vec<f32> {
-        (0..self.nodes.len())
-            .map(|node| {
-                let sum: f64 = self.boluses.iter().map(|bolus| self.fraction(bolus, node, time_s)).sum();
-                sum.min(1.0) as f32
-            })
-            .collect()
+    /// Inflow at a time over its mean: a raised cosine in systole over a steady part.
+    pub(super) fn pulse(&self, time_s: f64) -> f64 {
+        let part = (time_s / self.beat_s).rem_euclid(1.0) / SYSTOLE;
+        let systole = if part < 1.0 { (1.0 - (std::f64::consts::TAU * part).cos()) / SYSTOLE } else { 0.0 };
+        1.0 - self.pulsatility + self.pulsatility * systole
     }
 
-    fn fraction(&self, bolus: &Bolus, node: usize, time_s: f64) -> f64 {
-        let Some(transit) = bolus.transit_s[node] else { return 0.0 };
-        let spread = (FIRST_SPREAD_S.powi(2) + self.dispersion.powi(2) * transit).sqrt();
-        let passed = |since: f64| logistic(since / spread);
-        let since = time_s - bolus.start_s - transit;
-        bolus.fraction * (passed(since) - passed(since - bolus.duration_s))
+    /// The largest of [`Self::pulse`].
+    pub(super) fn highest_pulse(&self) -> f64 {
+        1.0 - self.pulsatility + self.pulsatility * 2.0 / SYSTOLE
     }
 
-    /// Largest fraction of contrast medium that each node ever sees from one injection.
-    pub(super) fn largest(&self) -> Vec<f32> {
-        (0..self.nodes.len())
-            .map(|node| {
-                let peak = |bolus: &Bolus| {
-                    let transit = bolus.transit_s[node]?;
-                    // The middle of the passage.
-                    Some(self.fraction(bolus, node, bolus.start_s + transit + bolus.duration_s / 2.0))
-                };
-                self.boluses.iter().filter_map(peak).fold(0.0, f64::max) as f32
-            })
-            .collect()
+    /// Volume that diffusion exchanges across the face upstream of a cell at a flow through it, mm³/s: what a bolus is wanted to spread
+    /// by, less what cells of this length spread it by themselves.
+    pub(super) fn exchange_mm3_per_s(&self, cell: usize, flow_mm3_per_s: f64) -> f64 {
+        let node = &self.nodes[cell];
+        if node.length_mm <= 0.0 {
+            return 0.0;
+        }
+        let area = node.volume_mm3 / node.length_mm;
+        let velocity = flow_mm3_per_s.abs() / area;
+        // Behind a transit time τ the front's deviation in time is k √τ: a diffusivity of k² v²/2.
+        let wanted = (self.dispersion * velocity).powi(2) / 2.0;
+        // More than the flow itself would not be a front any more.
+        let more = (wanted - velocity * node.length_mm / 2.0).clamp(0.0, velocity * node.length_mm);
+        more * area / node.length_mm
     }
-}
-
-/// Logistic distribution function of mean zero and deviation one.
-fn logistic(x: f64) -> f64 {
-    1.0 / (1.0 + (-x * std::f64::consts::PI / 3.0_f64.sqrt()).exp())
 }
 
 pub(super) fn nearest(nodes: &[Node], point: &Vec3) -> usize {
@@ -198,7 +168,15 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
     })?;
     let place = |i: usize| (points[i].position_mm, points[i].radius_mm);
     let (position_mm, radius_mm) = place(inlet);
-    let mut nodes = vec![Node { position_mm, radius_mm, upstream: None, share: 1.0, volume_mm3: 0.0 }];
+    let mut nodes = vec![Node {
+        position_mm,
+        radius_mm,
+        upstream: None,
+        share: 1.0,
+        volume_mm3: 0.0,
+        length_mm: 0.0,
+        is_end: false,
+    }];
     // Points whose downstream neighbours are still to come, with the point before and the node they became.
     let mut open = vec![(inlet, usize::MAX, 0_usize)];
     while let Some((at, before, becomes)) = open.pop() {
@@ -225,12 +203,21 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
                     radius_mm,
                     upstream: Some(last),
                     share,
-                    volume_mm3: if within { 0.0 } else { cone },
+                    volume_mm3: if within { LEAST_PART * cone } else { cone },
+                    length_mm: step,
+                    is_end: false,
                 });
                 last = nodes.len() - 1;
             }
             open.push((next, at, last));
         }
+    }
+    let mut is_end = vec![true; nodes.len()];
+    nodes.iter().filter_map(|node| node.upstream).for_each(|up| is_end[up] = false);
+    nodes.iter_mut().zip(is_end).for_each(|(node, end)| node.is_end = end);
+    // The inlet itself has the volume of the first stretch.
+    if let Some(first) = nodes.get(1).map(|node| node.volume_mm3) {
+        nodes[0].volume_mm3 = first;
     }
     Ok(nodes)
 }
@@ -238,6 +225,7 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contrast::transport::Transport;
 
     /// A trunk of 100 mm and radius 5 that divides into radii 4 and 2.
     fn tree() -> CentrelineTree {
@@ -256,17 +244,18 @@ mod tests {
     }
 
     fn injection(at_mm: Option<[f64; 3]>) -> InjectionSpec {
-        InjectionSpec { start_s: 1.0, duration_s: 2.0, rate_ml_per_s: 5.0, at_mm }
+        InjectionSpec { start_s: 1.0, duration_s: 2.0, rate_ml_per_s: 5.0, at_mm, at_tip: false }
     }
 
-    fn flow(at_mm: Option<[f64; 3]>) -> Flow {
-        let spec = FlowSpec { inflow_ml_per_s: 20.0, split_exponent: 3.0, ..FlowSpec::default() };
-        Flow::new(&tree(), &spec, &[injection(at_mm)]).unwrap()
+    fn flow() -> Flow {
+        let spec =
+            FlowSpec { inflow_ml_per_s: 20.0, split_exponent: 3.0, pulsatility: 0.0, ..FlowSpec::default() };
+        Flow::new(&tree(), &spec, &[injection(None)]).unwrap()
     }
 
     #[test]
     fn flow_divides_as_the_cube_of_the_radius_and_all_of_it_goes_on() {
-        let flow = flow(None);
+        let flow = flow();
         let at = |x: f64, y: f64| flow.nodes[nearest(&flow.nodes, &Vec3::new(x, y, 0.0))].share;
         assert!((at(140.0, 30.0) / at(140.0, -30.0) - 8.0).abs() < 1e-12);
         assert!((at(140.0, 30.0) + at(140.0, -30.0) - 1.0).abs() < 1e-12);
@@ -275,38 +264,24 @@ mod tests {
 
     #[test]
     fn the_bolus_arrives_after_the_volume_on_its_way_has_passed() {
-        let flow = flow(None);
+        let flow = flow();
         let end = nearest(&flow.nodes, &Vec3::new(100.0, 0.0, 0.0));
         // 100 mm of 25π mm² at 25 ml/s.
         let transit = std::f64::consts::PI * 2500.0 / 25_000.0;
-        assert!((flow.boluses[0].transit_s[end].unwrap() - transit).abs() < 1e-9);
-        let at = |t: f64| f64::from(flow.fractions(t)[end]);
-        assert!(at(0.5) < 1e-3 && (at(1.0 + transit) - 0.1).abs() < 1e-3, "half of the front has passed");
-        assert!((at(2.0 + transit) - 0.2).abs() < 1e-3 && at(5.0) < 1e-3);
-        // What passes is what was injected: ∫ f (Q + q) dt = q T.
-        let passed: f64 = (0..1000).map(|k| at(f64::from(k) * 0.01) * 0.01 * 25.0).sum();
-        assert!((passed - 10.0).abs() < 0.05, "{passed}");
-        assert!((f64::from(flow.largest()[end]) - 0.2).abs() < 1e-3);
-    }
-
-    #[test]
-    fn a_side_branch_fills_from_where_it_leaves_the_trunk() {
-        let flow = flow(None);
-        let transit =
-            |x: f64, y: f64| flow.boluses[0].transit_s[nearest(&flow.nodes, &Vec3::new(x, y, 0.0))].unwrap();
-        // 45 of the small branch's 50 mm lie outside the trunk of radius 5; a ninth of 25 ml/s flows there.
-        let outside = std::f64::consts::PI * 4.0 * 46.0 / (25_000.0 / 9.0);
-        let branch = transit(140.0, -30.0) - transit(100.0, 0.0);
-        assert!((branch / outside - 1.0).abs() < 0.05, "{branch} {outside}");
-    }
-
-    #[test]
-    fn nothing_flows_upstream_or_into_the_other_branch() {
-        let flow = flow(Some([120.0, 15.0, 0.0]));
-        let late = flow.fractions(2.0);
-        let at = |x: f64, y: f64| late[nearest(&flow.nodes, &Vec3::new(x, y, 0.0))];
-        assert!(at(140.0, 30.0) > 0.1);
-        assert_eq!((at(50.0, 0.0), at(140.0, -30.0)), (0.0, 0.0));
+        let mut transport = Transport::new(&flow);
+        let mut at = |t: f64| {
+            transport.advance(&flow, t, None);
+            f64::from(transport.at(t)[end])
+        };
+        assert!(at(0.5) < 1e-3 && (at(1.0 + transit) - 0.1).abs() < 0.02, "half of the front has passed");
+        assert!((at(2.0 + transit) - 0.2).abs() < 1e-3 && at(8.0) < 1e-3);
+        // What passes is what was injected: ∫ f F dt = q T, at 25 ml/s until the injection ends and at 20 ml/s then.
+        let passed: f64 = (0..3000)
+            .map(|k| f64::from(k) * 0.002)
+            .map(|t| at(t) * 0.002 * if t < 3.0 { 25.0 } else { 20.0 })
+            .sum();
+        assert!((passed - 10.0).abs() < 0.02, "{passed}");
+        assert!((f64::from(Transport::largest(&flow)[end]) - 0.2).abs() < 1e-3);
     }
 
     #[test]

@@ -12,25 +12,46 @@ use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
 use super::flow::{Flow, Node};
+use super::transport::Transport;
 use crate::c_arm::CArm;
 use crate::cpu::wall_crossings;
 
 /// Length of a step and side of the cells that remember their nearest node, mm.
 const STEP_MM: f64 = 1.25;
 
+/// Contrast medium that a pixel sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Medium {
+    pub(crate) pixel: u32,
+    /// Mean fraction along its lumen.
+    pub(crate) fraction: f32,
+    /// Length in tissue, mm.
+    pub(crate) tissue_mm: f32,
+}
+
+/// Distance of the middle of a tissue behind its vessel's end over its radius.
+const TISSUE_BEHIND: f64 = 0.8;
+/// Squared deviations from that middle beyond which nothing is seen.
+const TISSUE_REACH: f64 = 16.0;
+
 /// The share of each node in the lumen of each pixel.
 #[derive(Debug)]
 pub(crate) struct ContrastMap {
     flow: Arc<Flow>,
+    transport: Transport,
     /// Pixels inside the wall, rising, and where their shares end.
     pixels: Vec<(u32, u32)>,
     shares: Vec<(u32, f32)>,
+    /// Ends of the tree, with the pixels that see the tissue behind: how long, in mm, a mm³ of medium there is.
+    tissue: Vec<(usize, Vec<(u32, f32)>)>,
 }
 
 impl ContrastMap {
     /// The shares of `flow` in the lumen that `wall` encloses.
     pub(crate) fn new(flow: &Arc<Flow>, c_arm: &CArm, wall: &SurfaceMesh) -> Self {
-        let mut map = Self { flow: Arc::clone(flow), pixels: vec![], shares: vec![] };
+        let transport = Transport::new(flow);
+        let tissue = tissue(flow, c_arm);
+        let mut map = Self { flow: Arc::clone(flow), transport, pixels: vec![], shares: vec![], tissue };
         let mut near = Nearest::new(&flow.nodes);
         let mut crossings = wall_crossings(c_arm, wall);
         crossings.sort_unstable_by(|a, b| {
@@ -75,25 +96,69 @@ impl ContrastMap {
         map
     }
 
-    /// Mean fraction of contrast medium along the lumen of each pixel that has any lumen, pixels rising.
-    pub(crate) fn fractions(&self, time_s: f64) -> Vec<(u32, f32)> {
-        self.mixed(&self.flow.fractions(time_s))
+    /// What the pixels see that see any, rising. What is injected through a tip has come from `tip_mm` since the time asked for before.
+    pub(crate) fn at(&mut self, time_s: f64, tip_mm: Option<Vec3>) -> Vec<Medium> {
+        self.transport.advance(&self.flow, time_s, tip_mm);
+        let mut seen = self.mixed(&self.transport.at(time_s));
+        let volumes = self.transport.tissue_mm3();
+        let filled = self.tissue.iter().filter(|end| volumes[end.0] > 0.0);
+        for (end, pixels) in filled {
+            let volume = volumes[*end] as f32;
+            seen.extend(pixels.iter().map(|&(pixel, length)| Medium {
+                pixel,
+                fraction: 0.0,
+                tissue_mm: length * volume,
+            }));
+        }
+        // Stable: the sums run in the order of the ends.
+        seen.sort_by_key(|medium| medium.pixel);
+        let join = |all: &[Medium]| {
+            all[1..].iter().fold(all[0], |sum, one| Medium {
+                pixel: sum.pixel,
+                fraction: sum.fraction + one.fraction,
+                tissue_mm: sum.tissue_mm + one.tissue_mm,
+            })
+        };
+        seen.chunk_by(|a, b| a.pixel == b.pixel).map(join).collect()
     }
 
     /// The largest fraction that a pixel's lumen ever has, each node at its own best moment.
-    pub(crate) fn largest(&self) -> Vec<(u32, f32)> {
-        self.mixed(&self.flow.largest())
+    pub(crate) fn largest(&self) -> Vec<Medium> {
+        self.mixed(&Transport::largest(&self.flow))
     }
 
-    fn mixed(&self, of_node: &[f32]) -> Vec<(u32, f32)> {
+    fn mixed(&self, of_node: &[f32]) -> Vec<Medium> {
         let mut start = 0;
         let mix = |&(pixel, end): &(u32, u32)| {
             let shares = &self.shares[start..end as usize];
             start = end as usize;
-            (pixel, shares.iter().map(|&(node, share)| share * of_node[node as usize]).sum())
+            let fraction = shares.iter().map(|&(node, share)| share * of_node[node as usize]).sum();
+            Medium { pixel, fraction, tissue_mm: 0.0 }
         };
         self.pixels.iter().map(mix).collect()
     }
+}
+
+/// The pixels that see the tissue behind each end: a Gaussian about a place behind it, of which the radius is two deviations.
+fn tissue(flow: &Flow, c_arm: &CArm) -> Vec<(usize, Vec<(u32, f32)>)> {
+    let Some(radius_mm) = flow.tissue_mm else { return vec![] };
+    let variance = (radius_mm / 2.0).powi(2);
+    let [width, height] = c_arm.size_px();
+    let ends = flow.nodes.iter().enumerate().filter(|(_, node)| node.is_end);
+    ends.map(|(end, node)| {
+        let before = node.upstream.map_or(node.position_mm, |up| flow.nodes[up].position_mm);
+        let onwards = (node.position_mm - before).try_normalize(0.0).unwrap_or_default();
+        let middle = node.position_mm + onwards * (TISSUE_BEHIND * radius_mm);
+        let pixels = (0..width * height).filter_map(|pixel| {
+            let centre = [f64::from(pixel % width) + 0.5, f64::from(pixel / width) + 0.5];
+            let (source, direction) = c_arm.ray(centre);
+            let off = (middle - source).cross(&direction).norm_squared() / direction.norm_squared();
+            let length = (-off / (2.0 * variance)).exp() / (std::f64::consts::TAU * variance);
+            (off < TISSUE_REACH * variance).then_some((pixel, length as f32))
+        });
+        (end, pixels.collect())
+    })
+    .collect()
 }
 
 /// Nearest nodes by cells, found where they are first asked for.

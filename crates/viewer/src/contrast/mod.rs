@@ -2,6 +2,7 @@
 
 mod flow;
 mod map;
+mod transport;
 
 pub(crate) use flow::Flow;
-pub(crate) use map::ContrastMap;
+pub(crate) use map::{ContrastMap, Medium};

@@ -62,16 +62,19 @@ impl ScreenTriangle {
         });
         for y in ys {
             let py = y as f64 + 0.5;
-            let rows = edges.map(|(a, d, sign)| (d[0] * (py - a[1]), d[1], a[0], sign));
+            let rows = edges.map(|(a, d, sign)| (d[0] * (py - a[1]), d[1], a[0], sign > 0.0));
+            let (low, high) = self.extent(py);
+            let columns = span(low - 1.0, high + 1.0, width);
             let mut entered = false;
-            for x in xs.clone() {
+            for x in columns.start.max(xs.start)..columns.end.min(xs.end) {
                 let px = x as f64 + 0.5;
+                let mut e = [0.0; 3];
                 let mut inside = true;
-                let e = rows.map(|(row, dy, ax, sign)| {
+                for (e, (row, dy, ax, positive)) in e.iter_mut().zip(&rows) {
                     let ordered = row - dy * (px - ax);
-                    inside &= (ordered >= 0.0) == (sign > 0.0);
-                    ordered.abs()
-                });
+                    inside &= (ordered >= 0.0) == *positive;
+                    *e = ordered.abs();
+                }
                 if inside {
                     entered = true;
                     let sum = e[0] + e[1] + e[2];
@@ -81,6 +84,22 @@ impl ScreenTriangle {
                 }
             }
         }
+    }
+
+    /// Where the horizontal line at `y` enters and leaves, within rounding: a long slanting triangle fills little of its rectangle.
+    fn extent(&self, y: f64) -> (f64, f64) {
+        let (mut low, mut high) = (f64::MAX, f64::MIN);
+        for [i, j] in [[0, 1], [1, 2], [2, 0]] {
+            let (a, b) = (self.corners[i], self.corners[j]);
+            let crosses = a[1].min(b[1]) <= y && y <= a[1].max(b[1]);
+            if crosses && a[1] == b[1] {
+                (low, high) = (low.min(a[0]).min(b[0]), high.max(a[0]).max(b[0]));
+            } else if crosses {
+                let x = a[0] + (b[0] - a[0]) * ((y - a[1]) / (b[1] - a[1]));
+                (low, high) = (low.min(x), high.max(x));
+            }
+        }
+        (low, high)
     }
 }
 

@@ -1,12 +1,17 @@
 //! What stays in the beam: lengths of each ray in tissue, bone, lung and lumen.
 
 use endowire_core::Result;
+use endowire_core::vessel::SurfaceMesh;
+use rayon::prelude::*;
 
 use super::PathEngine;
 use crate::c_arm::CArm;
 use crate::patient::{Body, Patient};
 use crate::scene::Setup;
 use crate::xray::Material;
+
+/// Fewest rows worth handing to another thread.
+const FEWEST_ROWS: usize = 16;
 
 /// Lengths in mm on every ray. A map that would be zero everywhere is empty.
 #[derive(Debug, Clone, Default)]
@@ -19,10 +24,12 @@ pub(crate) struct Anatomy {
 }
 
 impl Anatomy {
-    /// Casts the rays of `view` through the scene.
-    pub(crate) fn new(setup: &Setup, view: &CArm, engine: &mut dyn PathEngine) -> Result<Self> {
+    /// Casts `rays` × `rays` rays for each pixel of `c_arm` through the scene. A generated body is cast with one ray a pixel and
+    /// interpolated: it is drawn, not measured, and its bones are the most of what rays meet.
+    pub(crate) fn new(setup: &Setup, c_arm: &CArm, rays: u32, engine: &mut dyn PathEngine) -> Result<Self> {
+        let view = &c_arm.refined(rays);
         let lumen = if setup.lumen {
-            engine.mesh(view, &setup.wall)?
+            engine.mesh(view, &setup.filled)?
         } else {
             view.obliquities().map(|_| 0.0).collect()
         };
@@ -32,15 +39,19 @@ impl Anatomy {
                 maps.body = view.obliquities().map(|obliquity| (tissue_mm * obliquity) as f32).collect();
             }
             Patient::Torso(body) => {
-                maps.body = engine.mesh(view, &body.skin)?;
-                if !body.bones.triangles.is_empty() {
-                    maps.bone = engine.mesh(view, &body.bones)?;
-                    let marrow = engine.mesh(view, &body.marrow)?;
-                    maps.bone.iter_mut().zip(marrow).for_each(|(b, m)| *b -= Body::NOT_BONE as f32 * m);
-                }
-                if !body.lungs.triangles.is_empty() {
-                    maps.lung = engine.mesh(view, &body.lungs)?;
-                }
+                let mut cast = |mesh: &SurfaceMesh| match mesh.triangles.is_empty() {
+                    true => Ok(vec![]),
+                    false => engine.mesh(c_arm, mesh),
+                };
+                let finer = |map: Vec<f32>| finer(map, c_arm.size_px(), rays);
+                maps.body = finer(cast(&body.skin)?);
+                let (mut bone, marrow) = (cast(&body.bones)?, cast(&body.marrow)?);
+                bone.iter_mut().zip(marrow).for_each(|(b, m)| *b = (*b - Body::NOT_BONE as f32 * m).max(0.0));
+                maps.bone = finer(bone);
+                let mut lung = cast(&body.lungs)?;
+                // Vessels of a lung overlap where they divide.
+                lung.iter_mut().for_each(|length| *length = length.max(0.0));
+                maps.lung = finer(lung);
             }
             Patient::Tomogram(volume) => {
                 let [tissue, bone] = volume.project(view);
@@ -86,5 +97,51 @@ impl Anatomy {
         let middle = depths.len() / 2;
         let (_, median, _) = depths.select_nth_unstable_by(middle, f32::total_cmp);
         f64::from(*median)
+    }
+}
+
+/// A map with `rays` × `rays` values for each one, bilinear between the middles of pixels.
+fn finer(map: Vec<f32>, size_px: [u32; 2], rays: u32) -> Vec<f32> {
+    if rays == 1 || map.is_empty() {
+        return map;
+    }
+    let [width, height] = size_px.map(|n| n as usize);
+    let rays = rays as usize;
+    // The pixels before and after a ray, and the weight of the second.
+    let place = |ray: usize, pixels: usize| {
+        let at = ((ray as f32 + 0.5) / rays as f32 - 0.5).clamp(0.0, (pixels - 1) as f32);
+        let first = at as usize;
+        (first, (first + 1).min(pixels - 1), at - first as f32)
+    };
+    let columns: Vec<_> = (0..rays * width).map(|ray| place(ray, width)).collect();
+    let mut finer = vec![0.0; map.len() * rays * rays];
+    let rows = finer.par_chunks_exact_mut(rays * width).with_min_len(FEWEST_ROWS).enumerate();
+    rows.for_each(|(ray, row)| {
+        let (above, below, v) = place(ray, height);
+        let (above, below) = (&map[above * width..][..width], &map[below * width..][..width]);
+        for (value, &(i, j, u)) in row.iter_mut().zip(&columns) {
+            let mix = |line: &[f32]| line[i] * (1.0 - u) + line[j] * u;
+            *value = mix(above) * (1.0 - v) + mix(below) * v;
+        }
+    });
+    finer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plane_stays_a_plane_between_the_middles_of_pixels() {
+        let of = |x: f32, y: f32| 3.0 + 0.5 * x - 0.25 * y;
+        let map: Vec<f32> = (0..48).map(|i| of((i % 8) as f32 + 0.5, (i / 8) as f32 + 0.5)).collect();
+        let twice = finer(map.clone(), [8, 6], 2);
+        for row in 1..11 {
+            for column in 1..15 {
+                let at = of((column as f32 + 0.5) / 2.0, (row as f32 + 0.5) / 2.0);
+                assert!((twice[row * 16 + column] - at).abs() < 1e-5, "{row} {column}");
+            }
+        }
+        assert_eq!(finer(map.clone(), [8, 6], 1), map);
     }
 }

@@ -3,6 +3,9 @@
 //! The display is the usual logarithmic one: v = −ln S is mapped linearly from white to black, so that a layer darkens by the same
 //! step wherever it lies. Subtracted pictures are differences of logarithms already.
 
+use rayon::prelude::*;
+
+use super::FEWEST_PIXELS;
 use crate::output::{Image, PixelFormat};
 use crate::xray::ln_lanes;
 
@@ -23,9 +26,11 @@ pub(super) type Window = [f32; 2];
 
 /// −ln S of each pixel.
 pub(super) fn logarithm(mut signal: Vec<f32>) -> Vec<f32> {
-    signal.iter_mut().for_each(|s| *s = s.max(DARKEST));
-    ln_lanes(&mut signal);
-    signal.iter_mut().for_each(|v| *v = -*v);
+    signal.par_chunks_mut(FEWEST_PIXELS).for_each(|signal| {
+        signal.iter_mut().for_each(|s| *s = s.max(DARKEST));
+        ln_lanes(signal);
+        signal.iter_mut().for_each(|v| *v = -*v);
+    });
     signal
 }
 
@@ -71,12 +76,13 @@ pub(super) fn picture(
         return Image::new(width, height, PixelFormat::Gray16, data);
     }
     let mut data = vec![0; values.len()];
-    let rows = data.chunks_exact_mut(width as usize).zip(values.chunks_exact(width as usize));
-    for (y, (out, values)) in rows.enumerate() {
+    let columns = width as usize;
+    let rows = data.par_chunks_exact_mut(columns).zip(values.par_chunks_exact(columns)).enumerate();
+    rows.with_min_len(FEWEST_PIXELS.div_ceil(columns)).for_each(|(y, (out, values))| {
         for (x, (out, v)) in out.iter_mut().zip(values).enumerate() {
             let level = ((black - v) * scale).clamp(0.0, 1.0) * 255.0;
             *out = (level + if dithered { dither(x, y) } else { 0.5 }) as u8;
         }
-    }
+    });
     Image::new(width, height, PixelFormat::Gray8, data)
 }

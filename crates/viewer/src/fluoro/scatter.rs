@@ -5,7 +5,9 @@
 //! than a part in a thousand, but contrast medium in a large vessel by a quarter: it is spread with what the medium takes away.
 //! Over opacified vessels scatter still fills the shadow, so a subtraction keeps edges of bones there, as real ones do.
 
-use super::Signal;
+use rayon::prelude::*;
+
+use super::{FEWEST_PIXELS, Signal};
 use crate::c_arm::CArm;
 
 /// Standard deviation of the spread at the detector, mm.
@@ -65,11 +67,12 @@ impl Scatter {
         if self.gain == 0.0 {
             return;
         }
-        for (pixel, (signal, energy)) in to.signal.iter_mut().zip(&mut to.energy).enumerate() {
+        let pixels = to.signal.par_iter_mut().zip(&mut to.energy).with_min_len(FEWEST_PIXELS).enumerate();
+        pixels.for_each(|(pixel, (signal, energy))| {
             let [more, more_energy] = self.cells.at(cells, pixel);
             *signal += more;
             *energy += more_energy;
-        }
+        });
     }
 }
 
@@ -77,7 +80,8 @@ impl Scatter {
 pub(super) fn shading(values: &[f32], c_arm: &CArm) -> Vec<f32> {
     let cells = Cells::new(c_arm, SHADING_MM);
     let coarse = cells.blurred(&cells.gathered(values.iter().map(|v| [*v]).enumerate()));
-    (0..values.len()).map(|pixel| cells.at(&coarse, pixel)[0]).collect()
+    let pixels = (0..values.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
+    pixels.map(|pixel| cells.at(&coarse, pixel)[0]).collect()
 }
 
 /// A picture in cells, a quarter of a deviation wide each.

@@ -1,13 +1,19 @@
-//! The body around the vessel: a slab, a generated trunk, or a tomogram.
+//! The body around the vessel: a slab, a generated body, or a tomogram.
 
+mod body;
+mod head;
+mod loft;
+mod lungs;
+mod pelvis;
+mod thorax;
 mod tomogram;
-mod torso;
+mod trunk;
 
 use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result};
 
+pub(crate) use body::Body;
 pub(crate) use tomogram::Volume;
-pub(crate) use torso::Body;
 
 use crate::spec::ViewSpec;
 
@@ -19,7 +25,7 @@ pub(crate) enum Patient {
         /// Its thickness along the central ray.
         tissue_mm: f64,
     },
-    /// A trunk of closed surfaces.
+    /// A body of closed surfaces.
     Torso(Body),
     /// A computed tomogram.
     Tomogram(Box<Volume>),

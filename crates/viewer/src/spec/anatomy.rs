@@ -12,13 +12,13 @@ use crate::device::DevicePart;
 #[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PatientSpec {
-    /// A generated trunk.
+    /// A generated body.
     pub torso: Option<TorsoSpec>,
     /// A computed tomogram.
     pub ct: Option<CtSpec>,
 }
 
-/// The `[view.patient.torso]` table: a trunk of soft tissue with simple bones and lungs, in patient axes.
+/// The `[view.patient.torso]` table: a generated body of soft tissue, bones and air, in patient axes.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TorsoSpec {
@@ -28,13 +28,14 @@ pub struct TorsoSpec {
     pub depth_mm: f64,
     /// Middle of the vertebral bodies, left and posterior, -100,000 to 100,000; absent: behind the vessel's centre.
     pub spine_mm: Option<[f64; 2]>,
-    /// Height of the diaphragm's domes, -100,000 to 100,000; absent: a third of the way up the vessel. Lungs and ribs are above it.
+    /// Height of the diaphragm's domes, -100,000 to 100,000; absent: a third of the way up the vessel. Chest, neck and head are above it,
+    /// abdomen and pelvis below.
     pub diaphragm_mm: Option<f64>,
-    /// Vertebrae.
+    /// Vertebrae, pelvis and skull.
     pub spine: bool,
-    /// Ribs.
+    /// Ribs, breastbone, collar bones and shoulder blades.
     pub ribs: bool,
-    /// Lungs.
+    /// Lungs, windpipe and the air of stomach and colon.
     pub lungs: bool,
 }
 
@@ -99,6 +100,14 @@ pub struct FlowSpec {
     pub inflow_ml_per_s: f64,
     /// At a bifurcation the flow divides as radiusⁿ: 2 for large arteries, 3 (Murray's law) for small ones; 0 to 10.
     pub split_exponent: f64,
+    /// Part of the flow that comes in systole, 0 (steady) to 0.95.
+    pub pulsatility: f64,
+    /// Heartbeats, 10 to 300; one begins at time zero.
+    pub heart_rate_per_min: f64,
+    /// Mean time that contrast medium stays in the tissue behind an end of the tree, 0.01 to 1000: it washes out exponentially.
+    pub tissue_s: f64,
+    /// Radius of that tissue, 1 to 200; absent: it is not drawn.
+    pub tissue_mm: Option<f64>,
     /// How fast a bolus spreads: its standard deviation in time grows as this times the square root of the transit time, s^½; 0 to 10.
     pub dispersion: f64,
 }
@@ -106,7 +115,17 @@ pub struct FlowSpec {
 impl Default for FlowSpec {
     fn default() -> Self {
         // A resting heart pumps 5 l/min.
-        Self { tree: None, inlet_mm: None, inflow_ml_per_s: 80.0, split_exponent: 2.0, dispersion: 0.12 }
+        Self {
+            tree: None,
+            inlet_mm: None,
+            inflow_ml_per_s: 80.0,
+            split_exponent: 2.0,
+            pulsatility: 0.6,
+            heart_rate_per_min: 70.0,
+            tissue_s: 4.0,
+            tissue_mm: None,
+            dispersion: 0.12,
+        }
     }
 }
 
@@ -115,6 +134,12 @@ impl FlowSpec {
         finite_within("view.flow.inflow_ml_per_s", self.inflow_ml_per_s, [0.001, 1e5])?;
         finite_within("view.flow.split_exponent", self.split_exponent, [0.0, 10.0])?;
         finite_within("view.flow.dispersion", self.dispersion, [0.0, 10.0])?;
+        finite_within("view.flow.pulsatility", self.pulsatility, [0.0, 0.95])?;
+        finite_within("view.flow.heart_rate_per_min", self.heart_rate_per_min, [10.0, 300.0])?;
+        finite_within("view.flow.tissue_s", self.tissue_s, [0.01, 1000.0])?;
+        if let Some(radius) = self.tissue_mm {
+            finite_within("view.flow.tissue_mm", radius, [1.0, 200.0])?;
+        }
         for x in self.inlet_mm.into_iter().flatten() {
             finite_within("view.flow.inlet_mm", x, COORDINATE_MM)?;
         }
@@ -134,6 +159,9 @@ pub struct InjectionSpec {
     pub rate_ml_per_s: f64,
     /// Where: the nearest point of the centre line, each coordinate -100,000 to 100,000; absent: the inlet.
     pub at_mm: Option<[f64; 3]>,
+    /// Whether it comes out of the tip of the innermost instrument, wherever that is; not with `at_mm`.
+    #[serde(default)]
+    pub at_tip: bool,
 }
 
 impl InjectionSpec {
@@ -144,6 +172,9 @@ impl InjectionSpec {
         finite_within(&key("rate_ml_per_s"), self.rate_ml_per_s, [0.001, 1e4])?;
         for x in self.at_mm.into_iter().flatten() {
             finite_within(&key("at_mm"), x, COORDINATE_MM)?;
+        }
+        if self.at_tip && self.at_mm.is_some() {
+            return Err(Error::parameter(key("at_tip"), true, "at_mm is given too: keep one of the two"));
         }
         Ok(())
     }

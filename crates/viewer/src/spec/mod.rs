@@ -288,13 +288,13 @@ mod tests {
     }
 
     fn injection(duration_s: f64, rate_ml_per_s: f64) -> InjectionSpec {
-        InjectionSpec { start_s: 0.0, duration_s, rate_ml_per_s, at_mm: None }
+        InjectionSpec { start_s: 0.0, duration_s, rate_ml_per_s, at_mm: None, at_tip: false }
     }
 
     #[test]
     fn each_bad_value_names_its_key() {
         type Spoil = fn(&mut ViewSpec);
-        let cases: [(&str, Spoil); 43] = [
+        let cases: [(&str, Spoil); 48] = [
             ("size_px", |s| s.size_px = [0, 10]),
             ("size_px", |s| s.size_px = [10, 9000]),
             ("every", |s| s.every = 0),
@@ -316,6 +316,14 @@ mod tests {
             ("magnification", |s| s.c_arm.magnification = 0.0),
             ("field_mm", |s| (s.c_arm.field_mm, s.c_arm.pixel_mm) = (Some(200.0), Some(0.2))),
             ("inflow_ml_per_s", |s| s.flow.inflow_ml_per_s = -1.0),
+            ("pulsatility", |s| s.flow.pulsatility = 1.0),
+            ("heart_rate_per_min", |s| s.flow.heart_rate_per_min = 0.0),
+            ("tissue_s", |s| s.flow.tissue_s = 0.0),
+            ("flow.tissue_mm", |s| s.flow.tissue_mm = Some(0.5)),
+            ("at_tip", |s| {
+                s.injection =
+                    vec![InjectionSpec { at_tip: true, at_mm: Some([0.0; 3]), ..injection(1.0, 1.0) }];
+            }),
             ("torso.width_mm", |s| {
                 s.patient.torso = Some(TorsoSpec { width_mm: f64::NAN, ..TorsoSpec::default() });
             }),

@@ -122,6 +122,12 @@ impl Beam {
         Ok(self.lanes(|k| mu[k]))
     }
 
+    /// Mean of an attenuation over the signal of the reference, 1/mm.
+    pub(crate) fn mean(&self, mu: &Lanes) -> f32 {
+        let lines = self.weights.iter().zip(mu).flat_map(|([weight, _], mu)| weight.iter().zip(mu));
+        lines.map(|(weight, mu)| weight * mu).sum()
+    }
+
     /// Soft tissue of the reference, whose length [`Self::add`] wants taken off.
     pub(crate) fn reference_mm(&self) -> f32 {
         self.reference_mm as f32

@@ -1,9 +1,14 @@
 //! Blurs by a Gaussian, along rows and then along columns.
 
+use rayon::prelude::*;
+
 /// The kernel ends at this many deviations.
 const KERNEL_REACH: f64 = 3.0;
 /// Deviations below this many pixels change nothing visible.
 const LEAST_PX: f64 = 0.05;
+
+/// Fewest rows worth handing to another thread.
+const FEWEST_ROWS: usize = 16;
 
 /// A Gaussian over pixels of one size of picture.
 #[derive(Debug)]
@@ -49,30 +54,37 @@ impl Blur {
         }
         let [width, height] = self.size_px;
         let reach = self.kernel.len() - 1;
-        let mut line = vec![0.0; width + 2 * reach];
-        for row in image.chunks_exact_mut(width) {
-            line[reach..reach + width].copy_from_slice(row);
-            line[..reach].fill(row[0]);
-            line[reach + width..].fill(row[width - 1]);
-            row.iter_mut().zip(&line[reach..]).for_each(|(out, v)| *out = v * self.kernel[0]);
-            for k in 1..=reach {
-                let sides = line[reach - k..].iter().zip(&line[reach + k..]);
-                row.iter_mut().zip(sides).for_each(|(out, (a, b))| *out += self.kernel[k] * (a + b));
-            }
-        }
+        let kernel = &self.kernel;
+        let rows = image.par_chunks_exact_mut(width).with_min_len(FEWEST_ROWS);
+        rows.for_each_init(
+            || vec![0.0; width + 2 * reach],
+            |line, row| {
+                line[reach..reach + width].copy_from_slice(row);
+                line[..reach].fill(row[0]);
+                line[reach + width..].fill(row[width - 1]);
+                row.iter_mut().zip(&line[reach..]).for_each(|(out, v)| *out = v * kernel[0]);
+                for k in 1..=reach {
+                    let sides = line[reach - k..].iter().zip(&line[reach + k..]);
+                    row.iter_mut().zip(sides).for_each(|(out, (a, b))| *out += kernel[k] * (a + b));
+                }
+            },
+        );
         self.padded.clear();
         self.padded.extend_from_slice(image);
+        let padded = &self.padded;
         let source = |y: isize| {
             let y = y.clamp(0, height as isize - 1) as usize;
-            &self.padded[y * width..][..width]
+            &padded[y * width..][..width]
         };
-        for (y, row) in (0..).zip(image.chunks_exact_mut(width)) {
-            row.iter_mut().zip(source(y)).for_each(|(out, v)| *out = v * self.kernel[0]);
+        let rows = image.par_chunks_exact_mut(width).with_min_len(FEWEST_ROWS).enumerate();
+        rows.for_each(|(y, row)| {
+            let y = y as isize;
+            row.iter_mut().zip(source(y)).for_each(|(out, v)| *out = v * kernel[0]);
             for k in 1..=reach as isize {
                 let sides = source(y - k).iter().zip(source(y + k));
-                let weight = self.kernel[k as usize];
+                let weight = kernel[k as usize];
                 row.iter_mut().zip(sides).for_each(|(out, (a, b))| *out += weight * (a + b));
             }
-        }
+        });
     }
 }

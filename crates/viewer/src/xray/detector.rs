@@ -8,6 +8,8 @@
 //!
 //! Random words belong to (seed, geometry, frame, pixel): every pose and plane has a noise of its own.
 
+use rayon::prelude::*;
+
 use super::blur::Blur;
 use super::noise::{normal, normal_table, philox, poisson};
 use crate::c_arm::CArm;
@@ -16,6 +18,9 @@ use crate::spec::{DetectorSpec, XRaySpec};
 /// Streams of random words.
 const QUANTA: u32 = 0;
 const ELECTRONS: u32 = 1;
+
+/// Fewest groups of four pixels worth handing to another thread.
+const FEWEST_GROUPS: usize = 2048;
 
 /// Turns signals into noisy, blurred and lagging ones.
 #[derive(Debug)]
@@ -94,26 +99,27 @@ impl Detector {
     fn count(&self, image: &mut [f32], energy: &[f32], kev: f64, frame: u64) {
         let (kev, each) = (kev as f32, 1.0 / kev as f32);
         let normal = normal_table();
-        let groups = image.chunks_mut(4).zip(energy.chunks(4));
-        for (group, (signal, energy)) in (0_u32..).zip(groups) {
-            let words = self.words(group, QUANTA, frame);
+        let groups =
+            image.par_chunks_mut(4).zip(energy.par_chunks(4)).with_min_len(FEWEST_GROUPS).enumerate();
+        groups.for_each(|(group, (signal, energy))| {
+            let words = self.words(group as u32, QUANTA, frame);
             for ((s, &e), word) in signal.iter_mut().zip(energy).zip(words) {
                 // An energy of e/s each: s·kev/(e/s) quanta.
                 let quantum = e / s.max(f32::MIN_POSITIVE);
                 let mean = *s * kev / quantum.max(1.0);
                 *s = (poisson(mean, word, normal) * quantum * each).max(0.0);
             }
-        }
+        });
     }
 
     /// Adds the noise of electronics.
     fn add_electronic(&self, image: &mut [f32], kev: f64, frame: u64) {
         let deviation = self.electronic_kev / kev as f32;
         let table = normal_table();
-        for (group, signal) in (0_u32..).zip(image.chunks_mut(4)) {
-            let words = self.words(group, ELECTRONS, frame);
+        image.par_chunks_mut(4).with_min_len(FEWEST_GROUPS).enumerate().for_each(|(group, signal)| {
+            let words = self.words(group as u32, ELECTRONS, frame);
             signal.iter_mut().zip(words).for_each(|(s, word)| *s += deviation * normal(word, table));
-        }
+        });
     }
 }
 

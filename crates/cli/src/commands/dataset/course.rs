@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use endowire_core::shape::Shape;
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::Wall;
 use endowire_methods::Scene;
 use endowire_viewer::{ContactView, Pushed, View, ViewSpec};
 use serde_json::{Map, Value};
@@ -27,7 +27,7 @@ pub(super) struct Course {
     pub(super) device: Option<String>,
     pub(super) instruments: Vec<String>,
     pub(super) view: ViewSpec,
-    pub(super) wall: SurfaceMesh,
+    pub(super) wall: Wall,
     pub(super) pushed: Pushed,
     /// By step; the first is before the script.
     pub(super) moments: Vec<Moment>,
@@ -79,7 +79,7 @@ impl Course {
             device: device.and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned()),
             instruments,
             view,
-            wall: simulation.wall().closed_mesh(),
+            wall: simulation.wall().clone(),
             pushed,
             moments,
         })

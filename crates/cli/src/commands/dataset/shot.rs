@@ -32,7 +32,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
     let views = planes(spec, course, draw);
     let mut renderers = Vec::with_capacity(views.len());
     for view in &views {
-        renderers.push(Renderer::new(view, &course.wall)?);
+        renderers.push(Renderer::of_wall(view, &course.wall)?);
     }
     let mut part = Part { images: vec![], annotations: vec![] };
     for m in 0..spec.moments {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use endowire_core::insertion::Simulation;
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::Wall;
 use endowire_viewer::{DeviceView, Renderer, View, ViewSpec};
 
 use crate::failure::Failure;
@@ -18,15 +18,10 @@ pub(super) struct Camera {
 
 impl Camera {
     /// A camera with the views, angles and sizes of `spec`; whatever its views are, both are drawn.
-    pub(super) fn new(
-        folder: &Path,
-        stem: &str,
-        spec: ViewSpec,
-        wall: &SurfaceMesh,
-    ) -> Result<Self, Failure> {
+    pub(super) fn new(folder: &Path, stem: &str, spec: ViewSpec, wall: &Wall) -> Result<Self, Failure> {
         std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
         let spec = ViewSpec { views: vec![View::ThreeD, View::Fluoro], ..spec };
-        Ok(Self { renderer: Renderer::new(&spec, wall)?, stem: folder.join(stem), frames: Vec::new() })
+        Ok(Self { renderer: Renderer::of_wall(&spec, wall)?, stem: folder.join(stem), frames: Vec::new() })
     }
 
     /// How often it was taken.

@@ -74,7 +74,7 @@ pub(super) fn looping(args: &LoopArgs) -> Result<(), Failure> {
     let mut camera = match &args.out {
         Some(folder) => {
             let spec = ViewSpec { size_px: [480, 720], ..ViewSpec::default() };
-            Some(Camera::new(folder, "loop", spec, &simulation.wall().closed_mesh())?)
+            Some(Camera::new(folder, "loop", spec, simulation.wall())?)
         }
         None => None,
     };

@@ -297,7 +297,7 @@ fn camera(folder: &Path, anatomy: &Anatomy, target: &str, made: &GeneratedWall) 
         ..ViewSpec::default()
     };
     let stem = format!("{}_{}", anatomy.name, target.replace(' ', "_"));
-    Camera::new(&folder.join("frames"), &stem, spec, &made.wall.closed_mesh())
+    Camera::new(&folder.join("frames"), &stem, spec, &made.wall)
 }
 
 fn table(rows: &[Row]) -> String {

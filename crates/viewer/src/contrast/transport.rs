@@ -1,0 +1,303 @@
+//! Contrast medium on its way through a vessel tree: one-dimensional finite volumes.
+//!
+//! The stretch from each point of the tree to the one before it is a cell. Blood comes in at the inlet as the heart pumps it, Q(t),
+//! and leaves through the ends; the resistances of what lies behind these divide it, so each end takes a fixed share s of all that
+//! comes in, injections too. An injection of q therefore pushes s q through every face and, on the way from the inlet to its place,
+//! takes q back:
+//!
+//! ```text
+//! F = s (Q + Σ q) − Σ q over injections at or below the face
+//! ```
+//!
+//! F < 0 is reflux: medium injected faster than blood arrives goes against the stream up to where a branch carries it away. Every
+//! cell is mixed, faces carry the cell upstream of them, so the medium is conserved to rounding. That spreads fronts like a
+//! dispersion of v Δx/2; what the wanted one, k² v²/2, is more is added as diffusion.
+//!
+//! Steps are those of one grid in time, so that a moment is the same whichever frames came before it.
+
+use endowire_core::Vec3;
+
+use super::flow::{Flow, nearest};
+
+/// Part of the step at which a cell would be emptied.
+const COURANT: f64 = 0.8;
+/// Longest step, s: a hundredth of a heartbeat.
+const LONGEST_S: f64 = 0.008;
+/// Part of the injected medium that may be left where all has passed, and how long that is waited for, s.
+const LEFT: f64 = 0.01;
+const WAITED_S: f64 = 20.0;
+
+/// The medium at a step of the grid.
+#[derive(Debug, Clone)]
+pub(super) struct Transport {
+    step_s: f64,
+    /// Steps since time zero.
+    steps: i64,
+    /// Fraction of each cell, and one step before.
+    fractions: Vec<f64>,
+    before: Vec<f64>,
+    /// Medium in the tissue behind each end, mm³.
+    tissue_mm3: Vec<f64>,
+    /// Medium that has left through the ends and tissues, mm³.
+    left_mm3: f64,
+    /// Flows through the faces upstream of cells, mm³/s.
+    faces: Vec<f64>,
+}
+
+impl Transport {
+    /// Before the first injection of `flow`.
+    pub(super) fn new(flow: &Flow) -> Self {
+        let step_s = step_s(flow);
+        let cells = flow.nodes.len();
+        let first = flow.injections.iter().map(|i| i.start_s).fold(f64::INFINITY, f64::min);
+        Self {
+            step_s,
+            steps: if first.is_finite() { (first / step_s).floor() as i64 } else { 0 },
+            fractions: vec![0.0; cells],
+            before: vec![0.0; cells],
+            tissue_mm3: vec![0.0; cells],
+            left_mm3: 0.0,
+            faces: vec![0.0; cells],
+        }
+    }
+
+    /// Goes on to a time; one that has passed begins anew. Where a tip injects it does so at `tip_mm` all the way.
+    pub(super) fn advance(&mut self, flow: &Flow, time_s: f64, tip_mm: Option<Vec3>) {
+        let wanted = (time_s / self.step_s).ceil() as i64;
+        if wanted < self.steps {
+            *self = Self::new(flow);
+        }
+        let places: Vec<usize> = flow.injections.iter().map(|i| place(flow, i, tip_mm)).collect();
+        let last = flow.injections.iter().map(|i| i.start_s + i.duration_s).fold(0.0, f64::max);
+        while self.steps < wanted {
+            // What has all gone does not come back.
+            if self.steps as f64 * self.step_s > last && self.all_gone() {
+                self.steps = wanted;
+                break;
+            }
+            self.step(flow, &places);
+        }
+    }
+
+    fn all_gone(&self) -> bool {
+        self.fractions.iter().all(|f| *f < 1e-6) && self.tissue_mm3.iter().all(|v| *v < 1e-3)
+    }
+
+    /// Fraction of each cell at a time within the last step.
+    pub(super) fn at(&self, time_s: f64) -> Vec<f32> {
+        let back = (self.steps as f64 - time_s / self.step_s).clamp(0.0, 1.0);
+        let mix = |(now, before): (&f64, &f64)| (now + (before - now) * back) as f32;
+        self.fractions.iter().zip(&self.before).map(mix).collect()
+    }
+
+    /// Medium in the tissue behind each end, mm³.
+    pub(super) fn tissue_mm3(&self) -> &[f64] {
+        &self.tissue_mm3
+    }
+
+    /// The largest fraction that each cell ever has.
+    pub(super) fn largest(flow: &Flow) -> Vec<f32> {
+        let mut transport = Self::new(flow);
+        let places: Vec<usize> = flow.injections.iter().map(|i| place(flow, i, None)).collect();
+        let last = flow.injections.iter().map(|i| i.start_s + i.duration_s).fold(0.0, f64::max);
+        let injected: f64 = flow.injections.iter().map(|i| i.rate_ml_per_s * i.duration_s * 1000.0).sum();
+        let mut largest = vec![0.0_f64; flow.nodes.len()];
+        loop {
+            let now_s = transport.steps as f64 * transport.step_s;
+            let over = now_s > last && transport.inside_mm3(flow) < LEFT * injected;
+            if over || now_s > last + WAITED_S {
+                return largest.into_iter().map(|f| f as f32).collect();
+            }
+            transport.step(flow, &places);
+            largest.iter_mut().zip(&transport.fractions).for_each(|(most, f)| *most = most.max(*f));
+        }
+    }
+
+    /// Medium in the tree, mm³.
+    fn inside_mm3(&self, flow: &Flow) -> f64 {
+        self.fractions.iter().zip(&flow.nodes).map(|(f, node)| f * node.volume_mm3).sum()
+    }
+
+    /// Goes on by one step, with injection k at cell `places[k]`.
+    fn step(&mut self, flow: &Flow, places: &[usize]) {
+        let [start, end] = [self.steps, self.steps + 1].map(|n| n as f64 * self.step_s);
+        let blood = flow.mean_inflow_mm3_per_s * flow.pulse(f64::midpoint(start, end));
+        // Rates are means over the step: what is injected is injected to the end.
+        let rates: Vec<f64> = flow
+            .injections
+            .iter()
+            .map(|i| {
+                let overlap = end.min(i.start_s + i.duration_s) - start.max(i.start_s);
+                1000.0 * i.rate_ml_per_s * overlap.max(0.0) / self.step_s
+            })
+            .collect();
+        let all = blood + rates.iter().sum::<f64>();
+        for (face, node) in self.faces.iter_mut().zip(&flow.nodes) {
+            *face = node.share * all;
+        }
+        for (&place, rate) in places.iter().zip(&rates) {
+            let mut cell = Some(place);
+            while let Some(at) = cell {
+                self.faces[at] -= rate;
+                cell = flow.nodes[at].upstream;
+            }
+        }
+        std::mem::swap(&mut self.before, &mut self.fractions);
+        let before = &self.before;
+        // Change of the medium in each cell, mm³.
+        let mut change = vec![0.0; before.len()];
+        for (i, node) in flow.nodes.iter().enumerate() {
+            if let Some(up) = node.upstream {
+                let face = self.faces[i];
+                let carried = face * before[if face > 0.0 { up } else { i }];
+                let spread = flow.exchange_mm3_per_s(i, face) * (before[up] - before[i]);
+                let moved = (carried + spread) * self.step_s;
+                change[i] += moved;
+                change[up] -= moved;
+            }
+            if node.is_end {
+                let out = node.share * all * before[i] * self.step_s;
+                change[i] -= out;
+                self.tissue_mm3[i] += out;
+                let washed = self.tissue_mm3[i] * (1.0 - (-self.step_s / flow.tissue_s).exp());
+                self.tissue_mm3[i] -= washed;
+                self.left_mm3 += washed;
+            }
+        }
+        places.iter().zip(&rates).for_each(|(&place, rate)| change[place] += rate * self.step_s);
+        for (((now, before), change), node) in
+            self.fractions.iter_mut().zip(before).zip(&change).zip(&flow.nodes)
+        {
+            *now = before + change / node.volume_mm3;
+        }
+        self.steps += 1;
+    }
+}
+
+/// The cell that an injection goes into.
+fn place(flow: &Flow, injection: &crate::spec::InjectionSpec, tip_mm: Option<Vec3>) -> usize {
+    let at = if injection.at_tip { tip_mm } else { injection.at_mm.map(Vec3::from) };
+    at.map_or(0, |point| nearest(&flow.nodes, &point))
+}
+
+/// The step at which no cell gives more than a part of what it holds, whatever is injected wherever.
+fn step_s(flow: &Flow) -> f64 {
+    let most: f64 = flow.injections.iter().map(|i| 1000.0 * i.rate_ml_per_s).sum();
+    let all = flow.mean_inflow_mm3_per_s * flow.highest_pulse() + most;
+    let mut given: Vec<f64> = flow.nodes.iter().map(|node| node.share * all + most).collect();
+    for (i, node) in flow.nodes.iter().enumerate() {
+        let exchanged = flow.exchange_mm3_per_s(i, node.share * all + most);
+        given[i] += exchanged;
+        if let Some(up) = node.upstream {
+            given[up] += exchanged;
+        }
+    }
+    let fastest = given.iter().zip(&flow.nodes).map(|(rate, node)| rate / node.volume_mm3);
+    (COURANT / fastest.fold(f64::MIN_POSITIVE, f64::max)).min(LONGEST_S)
+}
+
+#[cfg(test)]
+mod tests {
+    use endowire_core::vessel::{CentrelineNode, CentrelineTree};
+
+    use super::*;
+    use crate::spec::{FlowSpec, InjectionSpec};
+
+    /// A trunk of 100 mm and radius 5 that divides into radii 4 and 2, of 60 mm each.
+    fn flow(spec: &FlowSpec, at_mm: Option<[f64; 3]>, rate_ml_per_s: f64) -> Flow {
+        let node = |x: f64, y: f64, radius_mm: f64, parent: Option<usize>| CentrelineNode {
+            position_mm: Vec3::new(x, y, 0.0),
+            radius_mm,
+            parent,
+        };
+        let tree = CentrelineTree::new(vec![
+            node(0.0, 0.0, 5.0, None),
+            node(100.0, 0.0, 5.0, Some(0)),
+            node(136.0, 48.0, 4.0, Some(1)),
+            node(136.0, -48.0, 2.0, Some(1)),
+        ])
+        .unwrap();
+        let injection =
+            InjectionSpec { start_s: 1.003, duration_s: 0.517, rate_ml_per_s, at_mm, at_tip: false };
+        Flow::new(&tree, spec, &[injection]).unwrap()
+    }
+
+    fn steady() -> FlowSpec {
+        FlowSpec {
+            inflow_ml_per_s: 20.0,
+            split_exponent: 3.0,
+            pulsatility: 0.0,
+            tissue_s: 2.0,
+            ..FlowSpec::default()
+        }
+    }
+
+    const IN_SMALL: Option<[f64; 3]> = Some([127.0, -36.0, 0.0]);
+
+    #[test]
+    fn what_is_injected_is_in_the_tree_in_the_tissue_or_gone_whichever_way_it_went() {
+        for (pulsatility, at, rate) in
+            [(0.0, None, 8.0), (0.8, None, 8.0), (0.8, IN_SMALL, 1.0), (0.8, IN_SMALL, 9.0)]
+        {
+            let flow = flow(&FlowSpec { pulsatility, ..steady() }, at, rate);
+            let mut transport = Transport::new(&flow);
+            for time in [1.2, 1.6, 2.0, 3.0, 9.0, 40.0] {
+                transport.advance(&flow, time, None);
+                let until = transport.steps as f64 * transport.step_s;
+                let injected = 1000.0 * rate * (until - 1.003).clamp(0.0, 0.517);
+                let found = transport.inside_mm3(&flow)
+                    + transport.tissue_mm3.iter().sum::<f64>()
+                    + transport.left_mm3;
+                assert!((found - injected).abs() < 1e-9 * injected.max(1.0), "{time}: {found} {injected}");
+                assert!(transport.fractions.iter().all(|f| (-1e-12..=1.0 + 1e-9).contains(f)));
+            }
+            assert!(transport.inside_mm3(&flow) < 1e-6, "all has gone");
+        }
+    }
+
+    #[test]
+    fn an_injection_faster_than_the_stream_goes_against_it_and_a_slower_one_does_not() {
+        let reach = |rate| {
+            let flow = flow(&FlowSpec { dispersion: 0.0, ..steady() }, IN_SMALL, rate);
+            let mut transport = Transport::new(&flow);
+            transport.advance(&flow, 1.5, None);
+            let late = transport.at(1.5);
+            let at = |x: f64, y: f64| late[nearest(&flow.nodes, &Vec3::new(x, y, 0.0))];
+            // Before its place, in the other branch, at its end, in the trunk.
+            [at(118.0, -24.0), at(118.0, 24.0), at(136.0, -48.0), at(80.0, 0.0)]
+        };
+        // A ninth of 20 ml/s arrives there.
+        let [before, other, end, trunk] = reach(1.0);
+        assert!(before < 1e-6 && other < 1e-6 && trunk < 1e-6, "{before} {other} {trunk}");
+        // q/(F + q) with F = (20 + 1)/9 − 1.
+        assert!((end - 3.0 / 7.0).abs() < 0.01, "{end}");
+        let [before, other, end, trunk] = reach(9.0);
+        assert!(before > 0.99 && end > 0.99, "{before} {end}");
+        assert!(other > 0.05 && other < 0.4 && trunk < 1e-6, "{other} {trunk}");
+    }
+
+    #[test]
+    fn a_moment_is_the_same_whatever_was_asked_before() {
+        let flow = flow(&FlowSpec { pulsatility: 0.7, ..steady() }, None, 8.0);
+        let mut often = Transport::new(&flow);
+        for k in 0..70 {
+            often.advance(&flow, 0.04 * f64::from(k), None);
+        }
+        let mut once = Transport::new(&flow);
+        often.advance(&flow, 1.777, None);
+        once.advance(&flow, 1.777, None);
+        assert_eq!(often.at(1.777), once.at(1.777));
+        assert!(once.at(1.777).iter().any(|f| *f > 0.1));
+    }
+
+    #[test]
+    fn a_heart_beats_without_changing_what_passes() {
+        let flow = flow(&FlowSpec { pulsatility: 0.9, heart_rate_per_min: 60.0, ..steady() }, None, 8.0);
+        let pulse: Vec<f64> = (0..1000).map(|k| flow.pulse(f64::from(k) * 1e-3)).collect();
+        let mean = pulse.iter().sum::<f64>() / 1e3;
+        assert!((mean - 1.0).abs() < 1e-3, "{mean}");
+        let most = pulse.iter().copied().fold(0.0, f64::max);
+        assert!((most - flow.highest_pulse()).abs() < 1e-3 && most > 2.0, "{most}");
+        assert!(pulse.iter().all(|p| *p > 0.09));
+    }
+}

@@ -1,0 +1,88 @@
+//! A generated body of closed surfaces: skin, bones and air. Drawn, not measured: it gives frames the background that eyes and
+//! networks expect, at adult sizes.
+//!
+//! Bone is a cortical shell around marrow in which a share is bone: its length on a ray is that of the outer surface less
+//! (1 − share) of the inner one.
+
+use endowire_core::Vec3;
+use endowire_core::vessel::SurfaceMesh;
+
+use super::loft::loft;
+use super::trunk::Trunk;
+use crate::spec::TorsoSpec;
+
+/// Thickness of cortical shells, mm.
+const CORTEX_MM: f64 = 1.0;
+/// Share of bone in marrow: thoracic vertebrae have about 150 mg of mineral per cm³, a tenth of cortical bone.
+const MARROW_SHARE: f64 = 0.1;
+
+/// Closed surfaces of a body.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Body {
+    pub(crate) skin: SurfaceMesh,
+    pub(crate) bones: SurfaceMesh,
+    pub(crate) marrow: SurfaceMesh,
+    pub(crate) lungs: SurfaceMesh,
+}
+
+impl Body {
+    /// Share of the marrow's length that is not bone.
+    pub(crate) const NOT_BONE: f64 = 1.0 - MARROW_SHARE;
+
+    /// A body around a vessel with the given lowest and highest coordinates.
+    pub(crate) fn new(spec: &TorsoSpec, (low, high): (Vec3, Vec3)) -> Self {
+        let trunk = Trunk::new(spec, low, high);
+        let mut body = Self::default();
+        loft(&mut body.skin, &trunk.skin());
+        for (mesh, inset) in [(&mut body.bones, 0.0), (&mut body.marrow, CORTEX_MM)] {
+            if spec.spine {
+                trunk.spine(mesh, inset);
+                trunk.pelvis(mesh, inset);
+                trunk.head(mesh, inset);
+            }
+            if spec.ribs {
+                trunk.ribs(mesh, inset);
+                trunk.cartilages(mesh);
+                trunk.girdle(mesh, inset);
+            }
+        }
+        if spec.lungs {
+            trunk.air(&mut body.lungs);
+        }
+        body
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cpu::check_closed;
+
+    fn body() -> Body {
+        Body::new(&TorsoSpec::default(), (Vec3::new(-40.0, -50.0, 0.0), Vec3::new(40.0, 30.0, 300.0)))
+    }
+
+    #[test]
+    fn every_surface_is_closed_and_outward_and_has_an_adults_volume() {
+        let body = body();
+        for (name, mesh, litres) in [
+            ("skin", &body.skin, [35.0, 65.0]),
+            ("bones", &body.bones, [2.0, 5.0]),
+            ("marrow", &body.marrow, [1.0, 3.5]),
+            ("lungs", &body.lungs, [2.0, 7.0]),
+        ] {
+            check_closed(mesh).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let volume = mesh.signed_volume_mm3() / 1e6;
+            assert!(volume > litres[0] && volume < litres[1], "{name}: {volume} l");
+        }
+        assert!(body.marrow.signed_volume_mm3() < 0.9 * body.bones.signed_volume_mm3());
+    }
+
+    #[test]
+    fn what_is_not_wanted_is_not_there() {
+        let spec = TorsoSpec { spine: false, ribs: false, lungs: false, ..TorsoSpec::default() };
+        let body = Body::new(&spec, (Vec3::zeros(), Vec3::repeat(100.0)));
+        assert!(body.bones.triangles.is_empty() && body.lungs.triangles.is_empty());
+        assert!(!body.skin.triangles.is_empty());
+    }
+}

@@ -1,0 +1,108 @@
+//! Closed surfaces through rings of points.
+
+use std::f64::consts::TAU;
+
+use endowire_core::Vec3;
+use endowire_core::vessel::SurfaceMesh;
+
+/// Corners of tubes.
+const TUBE_SIDES: usize = 14;
+/// Points between two given ones on a smooth curve.
+const BETWEEN: usize = 6;
+/// Least radius of a tube: a tip.
+const TIP_MM: f64 = 0.05;
+
+/// Adds a closed surface through rings of equally many points, counter-clockwise seen from the last ring.
+pub(super) fn loft(mesh: &mut SurfaceMesh, rings: &[Vec<Vec3>]) {
+    let first = mesh.vertices_mm.len() as u32;
+    let sides = rings[0].len() as u32;
+    rings.iter().for_each(|ring| mesh.vertices_mm.extend(ring));
+    let corner = |ring: u32, k: u32| first + ring * sides + k % sides;
+    for ring in 0..rings.len() as u32 - 1 {
+        for k in 0..sides {
+            let [a, b, c, d] =
+                [corner(ring, k), corner(ring, k + 1), corner(ring + 1, k + 1), corner(ring + 1, k)];
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    for (ring, turned) in [(0, true), (rings.len() as u32 - 1, false)] {
+        let points = &rings[ring as usize];
+        let hub = mesh.vertices_mm.len() as u32;
+        mesh.vertices_mm.push(points.iter().sum::<Vec3>() / f64::from(sides));
+        for k in 0..sides {
+            let [a, b] = [corner(ring, k), corner(ring, k + 1)];
+            mesh.triangles.push(if turned { [hub, b, a] } else { [hub, a, b] });
+        }
+    }
+}
+
+/// Adds what `hollow` draws as a hollow: turned inside out.
+pub(super) fn hollow(mesh: &mut SurfaceMesh, draw: impl FnOnce(&mut SurfaceMesh)) {
+    let first = mesh.triangles.len();
+    draw(mesh);
+    mesh.triangles[first..].iter_mut().for_each(|t| t.swap(1, 2));
+}
+
+/// Adds a closed tube along at least two points with their radii.
+pub(super) fn tube(mesh: &mut SurfaceMesh, points: &[(Vec3, f64)]) {
+    let last = points.len() - 1;
+    let mut side = Vec3::zeros();
+    let rings: Vec<Vec<Vec3>> = (0..=last)
+        .map(|i| {
+            let along = (points[(i + 1).min(last)].0 - points[i.saturating_sub(1)].0).normalize();
+            let start = if i == 0 { Vec3::new(along.y, along.z, along.x).cross(&along) } else { side };
+            side = (start - along * start.dot(&along)).normalize();
+            let other = along.cross(&side);
+            (0..TUBE_SIDES)
+                .map(|k| {
+                    let (s, c) = (TAU * k as f64 / TUBE_SIDES as f64).sin_cos();
+                    points[i].0 + (side * c + other * s) * points[i].1.max(TIP_MM)
+                })
+                .collect()
+        })
+        .collect();
+    loft(mesh, &rings);
+}
+
+/// Adds an ellipsoid with half axes along the coordinates.
+pub(super) fn ellipsoid(mesh: &mut SurfaceMesh, centre: Vec3, half: Vec3) {
+    const RINGS: usize = 18;
+    let ring = |i: usize| -> Vec<Vec3> {
+        let (s, c) = (std::f64::consts::PI * i as f64 / RINGS as f64).sin_cos();
+        (0..2 * RINGS)
+            .map(|k| {
+                let (v, u) = (TAU * k as f64 / (2 * RINGS) as f64).sin_cos();
+                centre + half.component_mul(&Vec3::new(s * u, s * v, -c))
+            })
+            .collect()
+    };
+    loft(mesh, &(1..RINGS).map(ring).collect::<Vec<_>>());
+}
+
+/// A smooth curve through points with their radii (Catmull and Rom 1974), all made smaller by `inset`, with round ends.
+pub(super) fn smooth(points: &[(Vec3, f64)], inset: f64) -> Vec<(Vec3, f64)> {
+    let last = points.len() as isize - 1;
+    let at = |i: isize| points[i.clamp(0, last) as usize];
+    // Rings of a half ball beyond an end.
+    let cap = |from: isize, to: isize| {
+        let along = (at(to).0 - at(from).0).normalize();
+        [0.5, 1.0, 1.45].map(|angle: f64| {
+            let radius = at(to).1 - inset;
+            (at(to).0 + along * (radius.max(0.0) * angle.sin()), radius * angle.cos())
+        })
+    };
+    let mut curve: Vec<(Vec3, f64)> = cap(1, 0).into_iter().rev().collect();
+    for i in 0..last {
+        let [a, b, c, d] = [i - 1, i, i + 1, i + 2].map(at);
+        for k in 0..BETWEEN {
+            let t = k as f64 / BETWEEN as f64;
+            let bend = (c.0 - a.0) * t
+                + (a.0 * 2.0 - b.0 * 5.0 + c.0 * 4.0 - d.0) * (t * t)
+                + (b.0 * 3.0 - a.0 - c.0 * 3.0 + d.0) * (t * t * t);
+            curve.push((b.0 + bend / 2.0, b.1 + (c.1 - b.1) * t - inset));
+        }
+    }
+    curve.push((at(last).0, at(last).1 - inset));
+    curve.extend(cap(last - 1, last));
+    curve
+}

@@ -1,0 +1,136 @@
+//! Bones of the pelvis and the upper ends of the thighs'.
+
+use std::f64::consts::{PI, TAU};
+
+use endowire_core::Vec3;
+use endowire_core::vessel::SurfaceMesh;
+
+use super::loft::{ellipsoid, hollow, loft, smooth, tube};
+use super::trunk::{Trunk, step};
+
+/// Middle of a hip joint from the middle of the fifth lumbar vertebra: to its side, forward, down, mm.
+const HIP_MM: [f64; 3] = [90.0, 22.0, 112.0];
+
+impl Trunk {
+    /// The place at distances to the side, back and up from the middle of the last lumbar vertebra.
+    fn pelvic(&self, side: f64, back: f64, up: f64) -> Vec3 {
+        let z = self.vertebra(17);
+        Vec3::new(self.spine[0] + side, self.spine_y(z) + back, z + up)
+    }
+
+    /// Adds sacrum, hip bones and the upper ends of the thigh bones, all surfaces `inset` inside the bone's.
+    pub(super) fn pelvis(&self, mesh: &mut SurfaceMesh, inset: f64) {
+        self.sacrum(mesh, inset);
+        for side in [-1.0, 1.0] {
+            self.iliac_wing(mesh, side, inset);
+            self.pubic_arch(mesh, side, inset);
+            self.thigh_bone(mesh, side, inset);
+        }
+    }
+
+    fn sacrum(&self, mesh: &mut SurfaceMesh, inset: f64) {
+        // Height, half width, half depth, how far back.
+        let profile = [
+            (-136.0, 4.0, 4.0, 14.0),
+            (-118.0, 8.0, 5.0, 28.0),
+            (-100.0, 17.0, 7.0, 36.0),
+            (-76.0, 29.0, 10.0, 38.0),
+            (-52.0, 39.0, 14.0, 30.0),
+            (-34.0, 47.0, 18.0, 20.0),
+            (-22.0, 49.0, 19.0, 12.0),
+            (-17.0, 40.0, 16.0, 9.0),
+        ];
+        let ring = |(up, wide, deep, back): (f64, f64, f64, f64)| -> Vec<Vec3> {
+            (0..28)
+                .map(|k| {
+                    let (s, c) = (TAU * f64::from(k) / 28.0).sin_cos();
+                    self.pelvic((wide - inset) * c, back + (deep - inset) * s, up)
+                })
+                .collect()
+        };
+        loft(mesh, &profile.map(ring));
+        // The holes that nerves leave by; what is left of bone around them is that of the marrow.
+        for (up, out) in [(-34.0, 23.0), (-54.0, 19.0), (-72.0, 15.0), (-88.0, 11.0)] {
+            for side in [-1.0, 1.0] {
+                let back = 38.0 - 0.35 * (up + 76.0_f64).abs();
+                let hole = self.pelvic(side * out, back, up);
+                hollow(mesh, |mesh| ellipsoid(mesh, hole, Vec3::new(4.5, 6.0, 3.5).add_scalar(-0.3 * inset)));
+            }
+        }
+    }
+
+    /// A bent plate from the crest to the hip joint, which it thickens to hold.
+    fn iliac_wing(&self, mesh: &mut SurfaceMesh, side: f64, inset: f64) {
+        const SIDES: usize = 24;
+        let [hip_side, hip_front, hip_down] = HIP_MM;
+        // A point at a part of the height and of the way from the sacrum round the side to the front, on a face or between them. The
+        // wing is drawn in towards the joint; its crest is highest in the middle.
+        let point = |up: f64, part: f64, face: f64| {
+            let flare = step(up, 0.0, 1.0);
+            let [from, to] = [1.25 - 0.85 * flare, 1.75 + 0.35 * flare];
+            let angle = from + (to - from) * part;
+            let edge = (PI * part).sin().max(0.04).powf(0.4) * step(up, -0.12, 0.06).max(0.05);
+            let thick = (3.0 + 9.0 * (1.0 - step(up, 0.0, 0.45))) * edge - inset.min(2.0 * edge);
+            let [u, v] = [hip_side + 6.0 + 36.0 * flare, 58.0 + 14.0 * flare].map(|h| h + face * thick);
+            let crest = 128.0 * up - 34.0 * up * up * (2.0 * part - 0.75).powi(2);
+            let back = v * angle.cos() - hip_front * (1.0 - flare) + 8.0;
+            self.pelvic(side * u * angle.sin(), back, crest - hip_down + 6.0)
+        };
+        let ring = |k: i32| -> Vec<Vec3> {
+            let up = f64::from(k) / 16.0;
+            let mut points: Vec<Vec3> = (0..2 * SIDES)
+                .map(|k| {
+                    let t = (k % SIDES) as f64 / SIDES as f64;
+                    let (part, face) = if k < SIDES { (t, -1.0) } else { (1.0 - t, 1.0) };
+                    point(up, part, face)
+                })
+                .collect();
+            if side < 0.0 {
+                points.reverse();
+            }
+            points
+        };
+        loft(mesh, &(-2..=16).map(ring).collect::<Vec<_>>());
+        let crest: Vec<(Vec3, f64)> = (0..=8).map(|k| (point(0.99, f64::from(k) / 8.0, 0.0), 4.8)).collect();
+        tube(mesh, &smooth(&crest, inset));
+    }
+
+    /// Pubic and sitting bone: a ring in front of and below the joint.
+    fn pubic_arch(&self, mesh: &mut SurfaceMesh, side: f64, inset: f64) {
+        let [hip_side, hip_front, hip_down] = HIP_MM;
+        let at = |out: f64, back: f64, up: f64| self.pelvic(side * out, back - hip_front, up - hip_down);
+        let upper = [
+            (at(hip_side - 18.0, -6.0, -6.0), 11.0),
+            (at(48.0, -36.0, -4.0), 7.5),
+            (at(24.0, -56.0, -14.0), 7.5),
+            (at(9.0, -62.0, -26.0), 9.0),
+        ];
+        let lower = [
+            (at(hip_side - 16.0, 6.0, -8.0), 13.0),
+            (at(hip_side - 20.0, 22.0, -38.0), 12.0),
+            (at(hip_side - 30.0, 26.0, -66.0), 13.5),
+            (at(46.0, 2.0, -70.0), 8.0),
+            (at(22.0, -36.0, -50.0), 6.0),
+            (at(9.0, -58.0, -34.0), 7.0),
+        ];
+        for path in [&upper[..], &lower[..]] {
+            tube(mesh, &smooth(path, inset));
+        }
+    }
+
+    fn thigh_bone(&self, mesh: &mut SurfaceMesh, side: f64, inset: f64) {
+        let [hip_side, hip_front, hip_down] = HIP_MM;
+        let at = |out: f64, back: f64, up: f64| self.pelvic(side * out, back - hip_front, up - hip_down);
+        ellipsoid(mesh, at(hip_side, 0.0, -4.0), Vec3::repeat(23.5 - inset));
+        let neck = [
+            (at(hip_side + 14.0, 1.0, -10.0), 16.0),
+            (at(hip_side + 32.0, 4.0, -22.0), 15.0),
+            (at(hip_side + 48.0, 10.0, -34.0), 18.0),
+            (at(hip_side + 52.0, 9.0, -62.0), 18.0),
+            (at(hip_side + 46.0, 4.0, -110.0), 14.5),
+            (at(hip_side + 40.0, 0.0, -190.0), 14.0),
+        ];
+        // The shaft's wall is thick.
+        tube(mesh, &smooth(&neck, 3.0 * inset));
+    }
+}

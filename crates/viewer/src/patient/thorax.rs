@@ -1,0 +1,237 @@
+//! Bones of the chest: spine, ribs with their cartilages, breastbone, collar bones and shoulder blades.
+
+use std::f64::consts::{PI, TAU};
+
+use endowire_core::Vec3;
+use endowire_core::vessel::SurfaceMesh;
+
+use super::loft::{loft, smooth, tube};
+use super::trunk::{Trunk, step};
+
+/// Vertebrae by number: cervical from −6, thoracic from 1, lumbar to 17.
+const VERTEBRAE: std::ops::RangeInclusive<i32> = -6..=17;
+/// Half width and half depth of cervical, thoracic and lumbar bodies, mm.
+const BODIES_MM: [[f64; 2]; 3] = [[11.0, 8.5], [15.5, 13.5], [22.5, 16.0]];
+/// How far ribs lie outside the chest's inner surface, mm.
+const RIB_OUT_MM: f64 = 6.0;
+/// Anterior end of each rib, as an angle from the back, and how far it has fallen there in distances of vertebrae.
+const RIBS: [[f64; 2]; 12] = [
+    [2.45, 1.3],
+    [2.45, 2.1],
+    [2.42, 2.7],
+    [2.38, 3.2],
+    [2.34, 3.6],
+    [2.28, 3.9],
+    [2.2, 4.1],
+    [2.08, 4.1],
+    [1.97, 3.9],
+    [1.85, 3.6],
+    [1.3, 2.4],
+    [0.9, 1.4],
+];
+
+impl Trunk {
+    /// Adds the vertebrae, all surfaces `inset` inside the bone's.
+    pub(super) fn spine(&self, mesh: &mut SurfaceMesh, inset: f64) {
+        for number in VERTEBRAE {
+            let z = self.vertebra(number);
+            let body = match number {
+                ..1 => BODIES_MM[0],
+                1..=12 => BODIES_MM[1],
+                _ => BODIES_MM[2],
+            };
+            let next = (self.vertebra(number - 1) - z).min(z - self.vertebra(number + 1));
+            self.vertebral_body(mesh, z, body.map(|half| half - inset), 0.4 * next - inset);
+            let slim = if number > 12 { 0.7 } else { 1.0 };
+            self.vertebral_arch(mesh, z, [body[0] / BODIES_MM[1][0], slim], inset);
+        }
+    }
+
+    fn vertebral_body(&self, mesh: &mut SurfaceMesh, z: f64, [wide, deep]: [f64; 2], half: f64) {
+        let [x, y] = [self.spine[0], self.spine_y(z)];
+        // Wider at the end plates than between them, and the plates hollow.
+        let profile: [(f64, f64); 10] = [
+            (-0.82, 0.3),
+            (-0.88, 0.7),
+            (-1.0, 0.96),
+            (-0.85, 1.0),
+            (-0.4, 0.9),
+            (0.4, 0.9),
+            (0.85, 1.0),
+            (1.0, 0.96),
+            (0.88, 0.7),
+            (0.82, 0.3),
+        ];
+        let ring = |(h, waist): (f64, f64)| -> Vec<Vec3> {
+            let at = |k: i32| (TAU * f64::from(k) / 24.0).sin_cos();
+            (0..24)
+                .map(at)
+                .map(|(s, c)| Vec3::new(x + wide * waist * c, y + deep * waist * s, z + half * h))
+                .collect()
+        };
+        loft(mesh, &profile.map(ring));
+    }
+
+    /// Pedicles, transverse processes, those of a size and slimness, and the spinous process.
+    fn vertebral_arch(&self, mesh: &mut SurfaceMesh, z: f64, [size, slim]: [f64; 2], inset: f64) {
+        let at = |side: f64, back: f64, up: f64| {
+            Vec3::new(self.spine[0] + size * side, self.spine_y(z) + size * back, z + size * up)
+        };
+        let r = |radius: f64| size * radius - inset;
+        for side in [-1.0, 1.0] {
+            tube(mesh, &[(at(side * 11.0, 13.5, 3.0), r(4.0)), (at(side * 12.0, 25.0, 3.0), r(4.0))]);
+            let process = [
+                (at(side * 12.0, 26.0, 2.0), size * slim * 4.5),
+                (at(side * 22.0, 29.0, 4.0), size * slim * 4.2),
+                (at(side * 30.0, 31.0, 6.0), size * slim * 3.2),
+            ];
+            tube(mesh, &smooth(&process, inset));
+        }
+        let spinous = [
+            (at(0.0, 26.0, 0.0), size * 3.4),
+            (at(0.0, 35.0, -8.0), size * 3.2),
+            (at(0.0, 42.0, -16.0), size * 2.6),
+        ];
+        tube(mesh, &smooth(&spinous, inset));
+    }
+
+    /// Where rib 1 to 12 is at a part of its length.
+    fn rib(&self, number: usize, side: f64, part: f64) -> Vec3 {
+        let [end, fall] = RIBS[number - 1];
+        let z = self.vertebra(number as i32) + 0.3 * self.pitch();
+        let from = 0.36;
+        let angle = from + (end - from) * part;
+        // Out of the joint a little upwards, then down to the front.
+        let drop =
+            fall * self.pitch() * (0.25 * part + 0.75 * step(part, -0.15, 1.0)) - 4.0 * (PI * part).sin();
+        let free = self.chest_wall(side, z - drop, angle, RIB_OUT_MM);
+        let joint = Vec3::new(self.spine[0] + side * 21.0, self.spine_y(z) + 17.0, z);
+        joint + (free - joint) * step(part, -0.02, 0.16)
+    }
+
+    /// Adds the ribs.
+    pub(super) fn ribs(&self, mesh: &mut SurfaceMesh, inset: f64) {
+        for number in 1..=12 {
+            for side in [-1.0, 1.0] {
+                let floats = number > 10;
+                let path: Vec<(Vec3, f64)> = (0..=40)
+                    .map(|k| {
+                        let part = f64::from(k) / 40.0;
+                        // What floats ends in a tip.
+                        let thin = if floats { (1.0 - part.powi(6)).sqrt() } else { 1.0 };
+                        (self.rib(number, side, part), (3.9 + 1.3 * part) * thin - inset)
+                    })
+                    .collect();
+                tube(mesh, &path);
+            }
+        }
+    }
+
+    /// Adds the cartilages from the ribs to the breastbone and, of ribs 8 to 10, to the one above. They are the same in bone and in
+    /// marrow: a share of bone throughout.
+    pub(super) fn cartilages(&self, mesh: &mut SurfaceMesh) {
+        for number in 1..=10_usize {
+            for side in [-1.0, 1.0] {
+                let from = self.rib(number, side, 0.985);
+                let angle = RIBS[number - 1][0];
+                let joins = number > 7;
+                let to = match joins {
+                    false => self.sternum_z(number),
+                    true => self.sternum_z(7) - self.pitch() * 0.6 * (number - 7) as f64,
+                };
+                let reach = if joins { angle + 0.62 * (PI - 0.2 - angle) } else { PI - 0.17 };
+                let path: Vec<(Vec3, f64)> = (0..=14)
+                    .map(|k| {
+                        let part = f64::from(k) / 14.0;
+                        let z = from.z + (to - from.z) * step(part, -0.2, 1.1)
+                            - 0.1 * self.pitch() * (PI * part).sin();
+                        let on = self.chest_wall(side, z, angle + (reach - angle) * part, RIB_OUT_MM);
+                        (from + (on - from) * step(part, 0.0, 0.3), 4.4 - 0.9 * part)
+                    })
+                    .collect();
+                tube(mesh, &path);
+            }
+        }
+    }
+
+    /// Height on the breastbone where cartilage 1 to 7 joins it.
+    fn sternum_z(&self, number: usize) -> f64 {
+        let [top, length] = self.sternum();
+        top - length * (0.1 + 0.75 * (number - 1) as f64 / 6.0)
+    }
+
+    /// Upper end and length of the breastbone.
+    fn sternum(&self) -> [f64; 2] {
+        [self.vertebra(3), 7.2 * self.pitch()]
+    }
+
+    /// Adds breastbone, collar bones and shoulder blades.
+    pub(super) fn girdle(&self, mesh: &mut SurfaceMesh, inset: f64) {
+        let [top, length] = self.sternum();
+        let profile = [
+            (1.0, 4.0),
+            (0.96, 6.0),
+            (0.86, 9.0),
+            (0.78, 17.0),
+            (0.6, 17.5),
+            (0.45, 15.0),
+            (0.3, 13.0),
+            (0.27, 14.5),
+            (0.14, 23.0),
+            (0.05, 27.0),
+            (0.0, 20.0),
+        ];
+        let ring = |(down, half): (f64, f64)| -> Vec<Vec3> {
+            let z = top - length * down;
+            let front = self.chest_wall(1.0, z, PI, RIB_OUT_MM);
+            (0..20)
+                .map(|k| {
+                    let (s, c) = (TAU * f64::from(k) / 20.0).sin_cos();
+                    front + Vec3::new((half - inset) * c, (5.5 - inset) * s, 0.0)
+                })
+                .collect()
+        };
+        loft(mesh, &profile.map(ring));
+        for side in [-1.0, 1.0] {
+            let joint = self.chest_wall(1.0, top - 2.0, PI, RIB_OUT_MM);
+            let at = |u: f64, v: f64, w: f64| joint + Vec3::new(side * u, v, w);
+            let reach = 0.86 * self.half_width;
+            let clavicle = [
+                (at(19.0, 0.0, 2.0), 8.5),
+                (at(0.28 * reach, -7.0, 6.0), 6.2),
+                (at(0.55 * reach, 6.0, 12.0), 5.6),
+                (at(0.8 * reach, 26.0, 17.0), 6.0),
+                (at(reach, 38.0, 16.0), 6.5),
+            ];
+            tube(mesh, &smooth(&clavicle, inset));
+            self.shoulder_blade(mesh, side, inset);
+        }
+    }
+
+    /// A plate on the back of the ribs, with a thick edge towards the arm.
+    fn shoulder_blade(&self, mesh: &mut SurfaceMesh, side: f64, inset: f64) {
+        let [low, high] = [self.vertebra(8), self.vertebra(2)];
+        const SIDES: usize = 20;
+        let ring = |k: usize| -> Vec<Vec3> {
+            let up = k as f64 / 14.0;
+            let z = low + (high - low) * up;
+            // The medial edge is nearly straight, the other one goes out to the joint and back.
+            let medial = 0.62 - 0.08 * up;
+            let lateral = medial + 0.1 + 0.62 * step(up, 0.0, 0.9) - 0.3 * step(up, 0.88, 1.0);
+            let mut points: Vec<Vec3> = (0..2 * SIDES)
+                .map(|k| {
+                    let t = (k % SIDES) as f64 / SIDES as f64;
+                    let (part, face) = if k < SIDES { (t, -1.0) } else { (1.0 - t, 1.0) };
+                    let angle = medial + (lateral - medial) * part;
+                    let thick = 1.7 + 3.5 * step(part, 0.75, 1.0) - 0.8 * inset;
+                    self.chest_wall(side, z, angle, 17.0 + face * thick * (PI * part).sin().max(0.1).sqrt())
+                })
+                .collect();
+            if side < 0.0 {
+                points.reverse();
+            }
+            points
+        };
+        loft(mesh, &(0..=14).map(ring).collect::<Vec<_>>());
+    }
+}

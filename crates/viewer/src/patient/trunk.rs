@@ -1,0 +1,180 @@
+//! Measures of a generated body in patient axes (left, posterior, head), mm.
+//!
+//! All heights are told from two that a scene knows: the domes of the diaphragm and the tips of the lungs. Between them are the
+//! twelve thoracic vertebrae; abdomen and pelvis follow below, neck and head above, at adult sizes.
+
+use endowire_core::Vec3;
+
+use crate::spec::TorsoSpec;
+
+/// Distance of the skin of the back from the middle of the vertebral bodies.
+const BACK_MM: f64 = 62.0;
+/// Distance of the spine's middle behind the vessel's rearmost point.
+const BEHIND_MM: f64 = 20.0;
+/// How far the body goes on below vessel and diaphragm: a cone beam from any usual angle stays inside.
+const BELOW_MM: [f64; 2] = [260.0, 600.0];
+/// Least height from the diaphragm's domes to the tips of the lungs.
+const LEAST_CHEST_MM: f64 = 190.0;
+/// Thickness of the chest's wall.
+const CHEST_WALL_MM: f64 = 22.0;
+/// Half width and half depth of the ring of the first ribs.
+const FIRST_RIB_MM: [f64; 2] = [56.0, 44.0];
+/// Half width and half depth of the neck.
+const NECK_MM: [f64; 2] = [60.0, 64.0];
+/// Where the neck begins and ends above the tips of the lungs.
+const NECK_ABOVE_MM: [f64; 2] = [38.0, 105.0];
+/// Height of the head above the neck, and its half width and half depth.
+const HEAD_MM: [f64; 3] = [205.0, 78.0, 98.0];
+
+#[derive(Debug)]
+pub(super) struct Trunk {
+    /// Middle of the vertebral bodies: left, posterior.
+    pub(super) spine: [f64; 2],
+    /// Middle of the trunk: posterior.
+    pub(super) middle_y: f64,
+    pub(super) half_width: f64,
+    pub(super) half_depth: f64,
+    /// Lowest height.
+    bottom: f64,
+    pub(super) diaphragm: f64,
+    pub(super) apex: f64,
+    /// How far left and right of the spine the mediastinum reaches.
+    pub(super) mediastinum: [f64; 2],
+}
+
+/// From 0 to 1 as `x` goes from `a` to `b`, smoothly.
+pub(super) fn step(x: f64, a: f64, b: f64) -> f64 {
+    let t = ((x - a) / (b - a)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+fn mix(a: f64, b: f64, t: f64) -> f64 {
+    a + (b - a) * t
+}
+
+/// A point of a superellipse, squarer than an ellipse for powers below one, at an angle from the back towards the left.
+fn oval(half: [f64; 2], power: f64, angle: f64) -> [f64; 2] {
+    let of = |v: f64| v.signum() * v.abs().powf(power);
+    [half[0] * of(angle.sin()), half[1] * of(angle.cos())]
+}
+
+impl Trunk {
+    /// That around a vessel with the given lowest and highest coordinates.
+    pub(super) fn new(spec: &TorsoSpec, low: Vec3, high: Vec3) -> Self {
+        let spine = spec.spine_mm.unwrap_or([(low.x + high.x) / 2.0, high.y + BEHIND_MM]);
+        let half_depth = spec.depth_mm / 2.0;
+        // The vessel stays outside the lungs, within reason.
+        let side = |reach: f64| (reach + 8.0).clamp(34.0, 0.3 * spec.width_mm);
+        let diaphragm = spec.diaphragm_mm.unwrap_or(low.z + (high.z - low.z) / 3.0);
+        let apex = (high.z - 10.0).max(diaphragm + LEAST_CHEST_MM);
+        // A vessel below the diaphragm does not widen what is above it.
+        let mediastinum = match high.z > diaphragm {
+            true => [side(high.x - spine[0]), side(spine[0] - low.x)],
+            false => [side(0.0); 2],
+        };
+        Self {
+            spine,
+            middle_y: spine[1] + BACK_MM - half_depth,
+            half_width: spec.width_mm / 2.0,
+            half_depth,
+            bottom: (low.z - BELOW_MM[0]).min(diaphragm - BELOW_MM[1]),
+            diaphragm,
+            apex,
+            mediastinum,
+        }
+    }
+
+    /// Height of the chest.
+    pub(super) fn chest(&self) -> f64 {
+        self.apex - self.diaphragm
+    }
+
+    /// Distance from one thoracic vertebra to the next.
+    pub(super) fn pitch(&self) -> f64 {
+        (self.chest() + 20.0) / 11.0
+    }
+
+    /// Height of the middle of thoracic vertebra 1 to 12; those of lumbar ones go on beyond 12, of cervical ones below 1.
+    pub(super) fn vertebra(&self, number: i32) -> f64 {
+        let (first, pitch) = (self.apex - 5.0, self.pitch());
+        let lumbar = (1.32 * pitch).min(36.0);
+        match number {
+            ..1 => first + 0.85 * pitch.min(20.0) * f64::from(1 - number),
+            1..=12 => first - pitch * f64::from(number - 1),
+            _ => first - 11.0 * pitch - lumbar * (f64::from(number - 12) - 0.15),
+        }
+    }
+
+    /// Posterior coordinate of the middle of the vertebral bodies: bent back in the chest, forward in loins and neck.
+    pub(super) fn spine_y(&self, z: f64) -> f64 {
+        let s = (z - self.diaphragm) / self.chest();
+        let bent = |s: f64| (std::f64::consts::PI * s.clamp(0.0, 1.0)).sin();
+        self.spine[1] + 8.0 * bent(s) - 4.0 * bent(-s / 1.1) - 9.0 * step(s, 1.0, 1.5)
+    }
+
+    /// Half width and half depth of the skin at a height, its middle (posterior) and how square it is.
+    fn skin_at(&self, z: f64) -> ([f64; 2], f64, f64) {
+        let [neck, head] = NECK_ABOVE_MM.map(|above| self.apex + above);
+        let waist = (-((z - self.diaphragm + 120.0) / 70.0).powi(2)).exp();
+        let [mut w, mut d] = [self.half_width * (1.0 - 0.05 * waist), self.half_depth];
+        let mut y = self.middle_y;
+        let shoulder = step(z, self.apex - 30.0, neck);
+        (w, d) = (mix(w, NECK_MM[0], shoulder), mix(d, NECK_MM[1], step(z, self.apex - 70.0, neck)));
+        y = mix(y, self.spine_y(z) - 22.0, step(z, self.apex - 70.0, neck));
+        // The head: an ellipsoid, joined to the neck.
+        let up = (z - head) / HEAD_MM[0];
+        if up > -0.1 {
+            let round = (1.0 - (2.0 * up.clamp(0.0, 0.995) - 1.0).powi(2)).sqrt();
+            let joined = step(up, 0.5, 0.4);
+            let [w0, d0] = [HEAD_MM[1] * round, HEAD_MM[2] * round];
+            let blend = |head: f64, neck: f64| head.max(neck * joined);
+            (w, d) = (blend(w0, w), blend(d0, d));
+            y -= 14.0 * step(up, 0.0, 0.35);
+        }
+        w += 10.0 * step(z, head - 30.0, head + 5.0) * step(up, 0.4, 0.15);
+        // Jaw and face reach forward.
+        let face = 17.0 * step(z, head - 75.0, head - 45.0) * step(z, head + 70.0, head + 10.0);
+        (d, y) = (d + face, y - face);
+        ([w, d], y, mix(0.8, 1.0, shoulder))
+    }
+
+    /// Rings of the skin from the lowest to the top of the head, counter-clockwise seen from above.
+    pub(super) fn skin(&self) -> Vec<Vec<Vec3>> {
+        const RINGS: usize = 110;
+        const SIDES: usize = 72;
+        let top = self.apex + NECK_ABOVE_MM[1] + HEAD_MM[0];
+        let straight = self.diaphragm - 200.0;
+        let heights = std::iter::once(self.bottom)
+            .chain((0..=RINGS).map(|k| straight + (top - straight) * k as f64 / RINGS as f64));
+        let ring = |z: f64| -> Vec<Vec3> {
+            let (half, y, power) = self.skin_at(z);
+            (0..SIDES)
+                .map(|k| {
+                    let [u, v] = oval(half, power, -std::f64::consts::TAU * k as f64 / SIDES as f64);
+                    Vec3::new(self.spine[0] + u, y + v, z)
+                })
+                .collect()
+        };
+        heights.map(ring).collect()
+    }
+
+    /// Half width and half depth of the chest inside its wall at a height, and its middle (posterior): a dome that narrows to the
+    /// ring of the first ribs.
+    pub(super) fn chest_at(&self, z: f64) -> ([f64; 2], f64) {
+        let down = ((self.apex + 4.0 - z) / (0.78 * self.chest())).clamp(0.0, 1.0);
+        let full = (1.0 - (1.0 - down).powf(2.3)).powf(1.0 / 2.3);
+        let wide = [self.half_width, self.half_depth].map(|half| half - CHEST_WALL_MM);
+        let half = [0, 1].map(|k| mix(FIRST_RIB_MM[k].min(wide[k]), wide[k], full));
+        (half, mix(self.spine_y(z) - 30.0, self.middle_y, full))
+    }
+
+    /// A point on the chest's wall, `out` outside its inner surface, at a height and an angle from the back towards a side (1 the
+    /// left, −1 the right).
+    pub(super) fn chest_wall(&self, side: f64, z: f64, angle: f64, out: f64) -> Vec3 {
+        let (half, y) = self.chest_at(z);
+        // The upper ribs are round.
+        let power = mix(0.8, 1.0, step(z, self.apex - 0.35 * self.chest(), self.apex));
+        let [u, v] = oval(half.map(|h| h + out), power, angle);
+        Vec3::new(self.spine[0] + side * u, y + v, z)
+    }
+}
