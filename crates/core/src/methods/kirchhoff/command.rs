@@ -33,7 +33,7 @@ const RESORTS: usize = 6;
 const AGAIN: usize = 4;
 /// What moved by less than this in another last resort, in its least radii, is at rest.
 const REST_RADII: f64 = 1e-3;
-/// A step is a jump if more than this part of the stored energy was set free.
+/// A step is a jump if more than this part of the energy was set free that is stored, or came out of the sheath.
 const JUMP: f64 = 0.02;
 /// Stored energy below which nothing is called a jump, mJ.
 const JUMP_FLOOR_MJ: f64 = 1e-6;
@@ -124,7 +124,7 @@ impl<const C: usize> Workspace<C> {
                 tools.write_report(environment, hands, now);
                 break;
             }
-            let resort = if relax { Some(failures == RESORTS) } else { None };
+            let resort = relax.then_some(failures == RESORTS || done >= 1.0);
             let attempt = Attempt { hands, blocked, resort };
             match tools.try_step(environment, here, attempt, next, &mut budget) {
                 Ok(found) => {
@@ -207,8 +207,10 @@ fn jumped(stack: &Stack, before: &StepReport, after: &StepReport, way: &Way) -> 
             + least(was.torque_nmm, is.torque_nmm, way.commands[index].rotate_rad);
     }
     let (energy, now) = (before.energy.total(), after.energy.total());
-    let lost = work - after.dissipated_mj - gained_mj(stack, before, after);
-    lost > JUMP * energy.max(now).max(JUMP_FLOOR_MJ)
+    let gained = gained_mj(stack, before, after);
+    let from_sheath = now - energy - gained;
+    let lost = work - after.dissipated_mj - gained;
+    lost > JUMP * energy.max(now).max(from_sheath.abs()).max(JUMP_FLOOR_MJ)
 }
 
 /// Refuses a tip that, `ahead_mm` farther, would be beyond an opening where nothing is known any more.
