@@ -127,7 +127,7 @@ impl Mesh {
 
     /// Meshes `inserted_mm` (above 0) of `device` with elements of `element_mm`.
     ///
-    /// Its nodes are those of [`nodes_from_tip`].
+    /// Nodes are the ends of its sections, and even marks between them.
     pub fn build(&mut self, device: &Device, inserted_mm: f64, element_mm: f64, modulus_n_per_mm2: f64) {
         self.build_points(device, inserted_mm, element_mm, modulus_n_per_mm2);
         // Only what one device needs is written: of elements that were here before the rest is empty.
