@@ -1,7 +1,7 @@
 //! The mesh on several instruments that lie in one another.
 //!
-//! The line is as long as the instrument that is farthest in, and its nodes are marks at whole element lengths from its tip, as those of
-//! a device alone. Where another instrument or a section ends, stiffness jumps, and a node goes with that end; a mark within half an
+//! The line is as long as the instrument that is farthest in, and its nodes are marks at whole element lengths from its
+//! tip. Where another instrument or a section ends, stiffness jumps, and a node goes with that end; a mark within half an
 //! element of it gives way, so that no sliver arises while an end slides by. Two ends that are nearer to each other than
 //! [`NEAR`] share a node, and what ends beside it counts by its share of the element.
 //!
