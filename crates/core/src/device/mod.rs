@@ -59,6 +59,12 @@ impl Section {
         self.torsional_stiffness_nmm2.unwrap_or(self.bending_stiffness_nmm2 / 1.3)
     }
 
+    /// Energy a length that straightens it, ½ EI |κ⁰|², mJ/mm = N: also the force with which it comes out of a straight sheath.
+    pub fn straightening_n(&self) -> f64 {
+        let [u, v] = self.rest_curvature_per_mm;
+        0.5 * self.bending_stiffness_nmm2 * (u * u + v * v)
+    }
+
     /// Checks every value; errors begin with `name`.
     fn check(&self, name: &str) -> Result<()> {
         for (field, value, limit) in [
@@ -192,8 +198,7 @@ impl Device {
         let each = self.sections.iter().map(|section| {
             let length_mm = left_mm.clamp(0.0, section.length_mm);
             left_mm -= section.length_mm;
-            let [u, v] = section.rest_curvature_per_mm;
-            0.5 * section.bending_stiffness_nmm2 * (u * u + v * v) * length_mm
+            section.straightening_n() * length_mm
         });
         each.sum()
     }

@@ -8,7 +8,7 @@ use super::configuration::Start;
 use super::hands::{Hand, Way, lengths};
 use super::slide::Extension;
 use super::state::KirchhoffState;
-use super::substep::{AT_REST, Attempt, Found, gained_mj};
+use super::substep::{AT_REST, Attempt, Found, released_mj};
 use super::workspace::{Tools, Workspace};
 use crate::contact::extension::{LEAVE_MM, left_through};
 use crate::device::{Stack, line_mm};
@@ -207,10 +207,9 @@ fn jumped(stack: &Stack, before: &StepReport, after: &StepReport, way: &Way) -> 
             + least(was.torque_nmm, is.torque_nmm, way.commands[index].rotate_rad);
     }
     let (energy, now) = (before.energy.total(), after.energy.total());
-    let gained = gained_mj(stack, before, after);
-    let from_sheath = now - energy - gained;
-    let lost = work - after.dissipated_mj - gained;
-    lost > JUMP * energy.max(now).max(from_sheath.abs()).max(JUMP_FLOOR_MJ)
+    let released = released_mj(stack, before, after);
+    let lost = work - after.dissipated_mj - (now - energy - released);
+    lost > JUMP * energy.max(now).max(released.abs()).max(JUMP_FLOOR_MJ)
 }
 
 /// Refuses a tip that, `ahead_mm` farther, would be beyond an opening where nothing is known any more.

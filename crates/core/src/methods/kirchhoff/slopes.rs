@@ -86,9 +86,7 @@ fn push_force<const C: usize>(
         (one, other) => one.or(other)?,
     };
     let mouth = stack.instruments()[index].device.section_at(own);
-    let [u, v] = mouth.rest_curvature_per_mm;
-    let straightening = 0.5 * mouth.bending_stiffness_nmm2 * (u * u + v * v);
-    Some(stored + wall - straightening)
+    Some(stored + wall - mouth.straightening_n())
 }
 
 /// Instruments with other lengths inserted, near by, and the unknowns as they are.

@@ -177,13 +177,13 @@ impl<const C: usize> Tools<C> {
     }
 }
 
-/// Energy stored more than before, mJ: in the vessel, and as the shape of what is straight in the sheath.
-pub(super) fn gained_mj(stack: &Stack, before: &StepReport, after: &StepReport) -> f64 {
-    let released = stack.devices().enumerate().map(|(index, device)| {
+/// Energy that the sheath no longer stores, mJ: of the shape of what has come out of it, which is straight in it.
+pub(super) fn released_mj(stack: &Stack, before: &StepReport, after: &StepReport) -> f64 {
+    let each = stack.devices().enumerate().map(|(index, device)| {
         let straightening = |report: &StepReport| device.straightening_mj(report.hand(index).inserted_mm);
         straightening(after) - straightening(before)
     });
-    after.energy.total() - before.energy.total() - released.sum::<f64>()
+    each.sum()
 }
 
 /// Whether more energy is stored, or taken by friction, than the hand can have put in. A device that was led to the far side of a
@@ -201,6 +201,7 @@ fn rises(stack: &Stack, before: &StepReport, after: &StepReport, dissipated_mj: 
         work += most(push, pushes, is.inserted_mm - was.inserted_mm)
             + most(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
     }
-    let stored = gained_mj(stack, before, after) + dissipated_mj;
+    let gained = after.energy.total() - before.energy.total() - released_mj(stack, before, after);
+    let stored = gained + dissipated_mj;
     stored > LARGEST_RISE * work + RISE_SHARE * before.energy.total() + RISE_FLOOR_MJ
 }
