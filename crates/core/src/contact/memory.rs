@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::distance::{Distance, Nearness};
 use super::places::{Place, Places};
 use super::point::{FOLLOW, LOOK_AGAIN};
+use super::wall::Foreseen;
 use super::{ContactPoint, FeltWall};
 use crate::Vec3;
 
@@ -86,6 +87,8 @@ pub struct WallMemory {
     last: Place,
     /// Forces on the wall that a step leads to, N.
     pub(super) aims: Vec<f64>,
+    /// What a step does to the contacts, to first order.
+    pub(super) foreseen: Vec<Foreseen>,
 }
 
 /// What the points of a device know of the wall at an equilibrium.
@@ -127,7 +130,14 @@ impl WallMemory {
     /// Nothing is known yet of `felt`.
     pub fn new(felt: &FeltWall) -> Self {
         let places = Places::new(LOOK_AGAIN * felt.thinnest_mm, felt.reach_mm);
-        Self { points: Vec::new(), readings: Vec::new(), places, last: Place::UNKNOWN, aims: Vec::new() }
+        Self {
+            points: Vec::new(),
+            readings: Vec::new(),
+            places,
+            last: Place::UNKNOWN,
+            aims: Vec::new(),
+            foreseen: Vec::new(),
+        }
     }
 
     /// Forgets the place asked for last, so that answers hang on the places that are asked for from here on alone.
@@ -139,6 +149,7 @@ impl WallMemory {
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points.saturating_sub(self.points.len()));
         self.aims.reserve(points.saturating_sub(self.aims.len()));
+        self.foreseen.reserve(points.saturating_sub(self.foreseen.len()));
         self.readings.reserve(points.saturating_sub(self.readings.len()));
     }
 

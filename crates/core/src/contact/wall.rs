@@ -11,6 +11,7 @@
 //! its last clearance, nothing can touch it.
 
 mod coupling;
+mod foresight;
 
 use super::memory::WallMemory;
 use super::point::{Contact, ContactPoint, Counters, FOLLOW, LOOK_AGAIN, Touch};
@@ -19,6 +20,8 @@ use crate::contact::distance::{Distance, Nearness};
 use crate::contact::{FeltWall, Friction};
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::External;
+
+pub(super) use foresight::Foreseen;
 
 /// How near a point stands.
 #[derive(Debug, Clone, Copy)]
@@ -112,6 +115,12 @@ impl<'a> WallContact<'a> {
             return self.read_from_side(index, x, side, limit_mm);
         }
         self.read_known(index, x, limit_mm).unwrap_or_else(|| self.read_anew(index, x, limit_mm))
+    }
+
+    /// Below which distance a trial asks for derivatives: they serve the assembly that follows where friction acts; otherwise that
+    /// was tried first.
+    fn asked_mm(&self, radius_mm: f64) -> f64 {
+        if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY }
     }
 
     /// The reading that was taken at `x`, if it tells enough.
@@ -441,8 +450,7 @@ impl External for WallContact<'_> {
             let x = self.points[index].position(elements, state);
             let point = self.points[index];
             let radius_mm = point.potential.radius_mm;
-            // Derivatives serve the assembly that follows where friction acts; otherwise that was tried first.
-            let limit_mm = if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY };
+            let limit_mm = self.asked_mm(radius_mm);
             let value_mm = self.read_within(index, &x, limit_mm).distance_mm();
             if value_mm < radius_mm {
                 let triangle = self.memory.points[index].triangle;
@@ -454,6 +462,20 @@ impl External for WallContact<'_> {
             }
         }
         sum
+    }
+
+    fn foresee(&mut self, moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> bool {
+        self.foresee_contacts(moved)
+    }
+
+    fn stray(
+        &mut self,
+        elements: &[ElementData],
+        states: (&RodState, &RodState),
+        part: f64,
+        into: &mut dyn Stencils,
+    ) -> f64 {
+        self.stray_contacts(elements, states, part, into)
     }
 
     /// In a device that carries less, force and moment have no scale of their own to be compared with.

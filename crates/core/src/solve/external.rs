@@ -1,5 +1,6 @@
 //! Energies outside the rod, as Newton's method asks for them.
 
+use crate::Vec3;
 use crate::rod::{ElementData, RodState, Stencils};
 
 /// An energy outside the rod: loads, walls, or several of them together. It says where it acts in terms of the rod
@@ -25,6 +26,24 @@ pub trait External {
     /// Part of the straight way from the base to `to` that crosses nothing.
     fn safe_fraction(&mut self, _elements: &[ElementData], _to: &RodState) -> f64 {
         1.0
+    }
+
+    /// Notes what a step from the base does to contacts, to first order: `moved` tells how far the step moves the point at ξ of an element
+    /// along a direction. Returns whether there are any: a trial may then [`stray`](External::stray).
+    fn foresee(&mut self, _moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> bool {
+        false
+    }
+
+    /// Adds the forces, as a gradient at the base, the first of two states, by which contacts at a trial, the second, `part` of the step
+    /// from there, are off what was foreseen. Returns their size over that of the forces foreseen.
+    fn stray(
+        &mut self,
+        _elements: &[ElementData],
+        _states: (&RodState, &RodState),
+        _part: f64,
+        _into: &mut dyn Stencils,
+    ) -> f64 {
+        0.0
     }
 
     /// Whether the energy hangs on the state alone, and nothing in it is lagged.

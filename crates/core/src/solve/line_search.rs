@@ -8,6 +8,8 @@ use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::{StepRecord, StopReason};
 use super::shift::WHISPER;
 use super::stop::{SHORT, residual_alone};
+use crate::Vec3;
+use crate::rod::scatter::point_step;
 use crate::rod::{ElementData, Layout, RodState};
 
 /// Most trials.
@@ -113,9 +115,14 @@ impl<const C: usize> Newton<C> {
         for j in 0..6 {
             problem.supports.multipliers[j] += self.step[first + j];
         }
+        let step = &self.step;
+        let moved = |(e, xi): (usize, f64), way: &Vec3| {
+            point_step::<C>(state, &problem.elements[e], (e, xi), way, step)
+        };
+        let foreseen = problem.options.minimum && problem.external.foresee(&moved);
         let mut refused = None;
         for attempt in 0..TRIALS {
-            part = self.place_trial(problem, state, part);
+            part = self.place_trial(problem, state, part, foreseen);
             search.assembled = false;
             let (mut energy_change, mut change);
             if blind {
@@ -210,7 +217,13 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Sets the trial to a part of the step, at most `part`, that crosses nothing; returns the part.
-    fn place_trial(&mut self, problem: &mut Problem<'_>, state: &RodState, mut part: f64) -> f64 {
+    fn place_trial(
+        &mut self,
+        problem: &mut Problem<'_>,
+        state: &RodState,
+        mut part: f64,
+        foreseen: bool,
+    ) -> f64 {
         let Problem { elements, supports, external, .. } = problem;
         self.trial.advance::<C>(elements, state, &self.step, part);
         for _ in 0..4 {
@@ -223,7 +236,10 @@ impl<const C: usize> Newton<C> {
         }
         if supports.conditions() > 0 {
             self.correct(elements, supports, Layout::<C>.support(elements.len()));
+        } else if foreseen {
+            self.correct_contacts(problem, state, part);
         }
+        let elements = problem.elements;
         self.trial.take_tensions::<C>(elements, state, &self.step);
         part
     }

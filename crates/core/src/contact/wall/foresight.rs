@@ -1,0 +1,83 @@
+//! What a step of Newton's method does to the contacts, foreseen to first order, and how far a trial strays from that.
+//!
+//! A step δx from a base where point i presses with wᵢ k pᵢ leads to gᵢ + ∇dᵢ·δx, g = d − r, as long as that is negative. Walls and
+//! the rod are curved, and a trial ends off it by what is of second order: micrometres, where a hard wall is pressed in by nanometres.
+//! Seen from there a contact has been lost, or presses a thousand times too hard. So a trial is brought back with the matrix at hand,
+//!
+//! ```text
+//! K η = −Σ wᵢ k (gᵢ(trial) − gᵢ − ∇dᵢ·δx) ∇dᵢ    over the points that are foreseen to press,
+//! ```
+//!
+//! the second-order correction of sequential quadratic programming against the Maratos effect (Nocedal and Wright, *Numerical
+//! Optimization*, 2nd ed., section 15.6).
+
+use super::WallContact;
+use crate::Vec3;
+use crate::rod::{ElementData, PointSum, RodState, Stencils};
+
+/// A contact that presses at the base, and what a step does to it.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::contact) struct Foreseen {
+    /// Number of the point.
+    index: usize,
+    /// Gap d − r at the base, mm, and its change by the whole step, to first order, mm.
+    gap_mm: [f64; 2],
+    /// ∇d at the base.
+    gradient: Vec3,
+    /// w k, N/mm.
+    spring_n_per_mm: f64,
+}
+
+impl WallContact<'_> {
+    /// See [`External::foresee`](crate::solve::External::foresee).
+    pub(super) fn foresee_contacts(&mut self, moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> bool {
+        let mut foreseen = std::mem::take(&mut self.memory.foreseen);
+        foreseen.clear();
+        for (index, point) in self.points.iter().enumerate() {
+            let Some(d) = self.memory.pressed(index) else { continue };
+            let known = &self.memory.points[index];
+            let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
+            foreseen.push(Foreseen {
+                index,
+                gap_mm: [
+                    d.value_mm - point.potential.radius_mm,
+                    moved((point.element, point.xi), &d.gradient),
+                ],
+                gradient: d.gradient,
+                spring_n_per_mm: factor * point.weight_mm * point.potential.modulus_n_per_mm2,
+            });
+        }
+        self.memory.foreseen = foreseen;
+        !self.memory.foreseen.is_empty()
+    }
+
+    /// See [`External::stray`](crate::solve::External::stray).
+    pub(super) fn stray_contacts(
+        &mut self,
+        elements: &[ElementData],
+        (base, trial): (&RodState, &RodState),
+        part: f64,
+        into: &mut dyn Stencils,
+    ) -> f64 {
+        let (mut stray_n, mut foreseen_n) = (0.0, self.least_force_n());
+        for k in 0..self.memory.foreseen.len() {
+            let Foreseen { index, gap_mm: [gap, change], gradient, spring_n_per_mm } =
+                self.memory.foreseen[k];
+            let foreseen_mm = gap + part * change;
+            if foreseen_mm >= 0.0 {
+                continue;
+            }
+            let point = self.points[index];
+            let x = point.position(elements, trial);
+            let limit_mm = self.asked_mm(point.potential.radius_mm);
+            let gap_mm = self.read_within(index, &x, limit_mm).distance_mm() - point.potential.radius_mm;
+            let force = gradient * (spring_n_per_mm * (gap_mm - foreseen_mm));
+            stray_n += force.norm();
+            foreseen_n -= spring_n_per_mm * foreseen_mm;
+            let mut sum = PointSum::default();
+            sum.add(point.xi, &force, None);
+            into.add_points(base, &elements[point.element], point.element, &sum);
+        }
+        stray_n / foreseen_n
+    }
+}
