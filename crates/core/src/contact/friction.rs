@@ -269,18 +269,24 @@ impl Friction {
     }
 
     /// Slip begins anew at `state`, with the normal forces seen there: the hand holds still, and the device slides on to where it comes
-    /// to rest. A point that sticks creeps less than in the step itself.
+    /// to rest. What a point has slipped within ε it has slipped within the new, smaller one, in proportion: friction holds it as it did.
     pub fn anchor(&mut self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) {
-        self.taken_mj = self.dissipated_mj(elements, state, points);
-        self.stick_mm = (self.stick_mm * STICK_AT_REST).max(LEAST_STICK_MM);
-        for (slider, point) in self.sliders.iter_mut().zip(points) {
-            slider.from_mm = point.position(elements, state);
-            slider.from_rad = point.angle(state);
+        let taken_mj = self.dissipated_mj(elements, state, points);
+        let stick_mm = (self.stick_mm * STICK_AT_REST).max(LEAST_STICK_MM);
+        for (index, point) in points.iter().enumerate().take(self.sliders.len()) {
+            let (x, angle) = (point.position(elements, state), point.angle(state));
+            let slip = self.slip(index, &x, angle, point.potential.radius_mm).0;
+            let kept = slip * (stick_mm / slip.norm().max(self.stick_mm));
+            let slider = &mut self.sliders[index];
+            (slider.from_mm, slider.from_rad) = (x - kept, angle);
             slider.force_n = slider.seen.1;
             if slider.seen.1 > 0.0 {
                 slider.normal = slider.seen.0;
             }
         }
+        self.stick_mm = stick_mm;
+        self.taken_mj = 0.0;
+        self.taken_mj = taken_mj - self.dissipated_mj(elements, state, points);
     }
 
     /// φ′/y and φ″ at a slip y.

@@ -327,7 +327,8 @@ impl<'a> WallContact<'a> {
             let x = point.position(elements, state);
             let force_n = match self.read(index, &x) {
                 Reading::Pressed(d) => {
-                    let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, 1.0).factor;
+                    let triangle = self.memory.points[index].triangle;
+                    let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
                     point.pressed(&d, factor).1
                 }
                 Reading::Free(_) => 0.0,
@@ -476,6 +477,10 @@ impl External for WallContact<'_> {
         into: &mut dyn Stencils,
     ) -> f64 {
         self.stray_contacts(elements, states, part, into)
+    }
+
+    fn convexify(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> bool {
+        self.convexify_contacts(elements, base, into)
     }
 
     /// In a device that carries less, force and moment have no scale of their own to be compared with.

@@ -46,6 +46,12 @@ pub trait External {
         0.0
     }
 
+    /// Adds to the Hessian at the base what makes it that of a convex energy: less the negative curvature of contacts on crests. Returns
+    /// whether there was any.
+    fn convexify(&mut self, _elements: &[ElementData], _base: &RodState, _into: &mut dyn Stencils) -> bool {
+        false
+    }
+
     /// Whether the energy hangs on the state alone, and nothing in it is lagged.
     fn is_fixed(&self) -> bool {
         false

@@ -152,7 +152,7 @@ impl<const C: usize> Newton<C> {
                 return report.stopped(StopReason::NotFinite);
             }
             let arrived = progress.has_arrived(&size, &self.steps);
-            let natural = match self.descent_step(&problem, &mut shift, arrived) {
+            let natural = match self.descent_step(&mut problem, state, &mut shift, arrived) {
                 Ok(inertia) => inertia,
                 Err(reason) => return report.stopped(reason),
             };
@@ -215,7 +215,8 @@ impl<const C: usize> Newton<C> {
     /// without it, if that is known.
     fn descent_step(
         &mut self,
-        problem: &Problem<'_>,
+        problem: &mut Problem<'_>,
+        state: &RodState,
         shift: &mut f64,
         arrived: bool,
     ) -> Result<Option<Inertia>, StopReason> {
@@ -225,9 +226,7 @@ impl<const C: usize> Newton<C> {
             *shift = 0.0;
             return Ok(Some(self.factor.inertia()));
         }
-        let wanted = problem.minimum.then(|| problem.multipliers());
-        let (sigma, natural) =
-            self.factor_shifted(Self::whisper(problem.elements), *shift, arrived, wanted)?;
+        let (sigma, natural) = self.factor_shifted(problem, state, *shift, arrived)?;
         *shift = sigma;
         Ok(natural)
     }

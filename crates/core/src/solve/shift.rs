@@ -4,14 +4,16 @@
 //! until they are right (Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 3.4, with the inertia in the place of a
 //! failed Cholesky factorisation).
 
-use super::newton::Newton;
+use super::newton::{Newton, Problem};
 use super::report::StopReason;
 use crate::banded::{FactorError, Inertia};
-use crate::rod::{Assembly, ElementData, Supports};
+use crate::rod::{Assembly, ElementData, RodState, Supports};
 
 /// Part of EI/L² that is always added as a uniform tension.
 pub(super) const WHISPER: f64 = 1e-8;
-/// Shifts tried beyond the first before a matrix is called singular.
+/// Least shift, over the one that is always on.
+const LEAST_SHIFT: f64 = 1e5;
+/// Shifts tried before a matrix is called singular.
 const SHIFTS: usize = 60;
 
 impl<const C: usize> Newton<C> {
@@ -62,34 +64,55 @@ impl<const C: usize> Newton<C> {
         WHISPER / (length * soft)
     }
 
-    /// Factors the matrix and solves for the step, under the whisper and a shift. It begins at an eighth of the last one, or
-    /// at none if that was small or `bare` is set, and grows until there are `wanted` negative pivots, if a number is wanted.
-    /// Returns the shift, and the inertia under the whisper alone if that was tried and could be factored.
+    /// Factors the matrix and solves for the step under the whisper. Where its inertia is not that `wanted`, if one is, contacts are made
+    /// convex first, which is all that it takes where a guess presses too hard on a crest of a wall. Then a shift is added, from an
+    /// eighth of the `last` one, and grows. Returns the shift, not 0 where the matrix is not that of the state, and the inertia of that
+    /// if it could be factored.
     pub(super) fn factor_shifted(
         &mut self,
-        whisper: f64,
+        problem: &mut Problem<'_>,
+        state: &RodState,
         last: f64,
-        bare: bool,
-        wanted: Option<usize>,
+        arrived: bool,
     ) -> Result<(f64, Option<Inertia>), StopReason> {
-        let mut sigma = if bare || last < 8.0 * whisper { 0.0 } else { last / 8.0 };
-        let mut natural = None;
-        for attempt in 0..=SHIFTS {
-            self.right_hand_side();
-            let Self { assembly, unit_shift, step, .. } = self;
-            let found = self.factor.factor_solve_shifted(&assembly.matrix, unit_shift, whisper + sigma, step);
-            if sigma == 0.0 {
-                natural = found.ok();
+        let whisper = Self::whisper(problem.elements);
+        let wanted = problem.minimum.then(|| problem.multipliers());
+        let right = |found: &Result<Inertia, FactorError>| {
+            found.as_ref().is_ok_and(|inertia| wanted.is_none_or(|negative| inertia.negative == negative))
+        };
+        let found = self.factor_step(whisper);
+        let natural = found.as_ref().ok().copied();
+        if right(&found) {
+            return Ok((0.0, natural));
+        }
+        // A saddle is left along its own curvature.
+        if wanted.is_some()
+            && !arrived
+            && problem.external.convexify(problem.elements, state, &mut self.assembly)
+        {
+            let found = self.factor_step(whisper);
+            if right(&found) {
+                return Ok((whisper, natural));
             }
-            match found {
-                Ok(inertia) if wanted.is_none_or(|negative| inertia.negative == negative) => {
-                    return Ok((sigma, natural));
-                }
-                Err(FactorError::NotFinite { .. }) if attempt > 20 => return Err(StopReason::NotFinite),
-                _ => {}
+        }
+        let mut sigma = (LEAST_SHIFT * whisper).max(last / 8.0);
+        for attempt in 0..SHIFTS {
+            let found = self.factor_step(whisper + sigma);
+            if right(&found) {
+                return Ok((sigma, natural));
             }
-            sigma = if sigma == 0.0 { (1e5 * whisper).max(last / 8.0) } else { sigma * 4.0 };
+            if attempt > 20 && matches!(found, Err(FactorError::NotFinite { .. })) {
+                return Err(StopReason::NotFinite);
+            }
+            sigma *= 4.0;
         }
         Err(StopReason::Singular)
+    }
+
+    /// Factors the assembled matrix with a shift, and sets the step that it answers.
+    fn factor_step(&mut self, sigma: f64) -> Result<Inertia, FactorError> {
+        self.right_hand_side();
+        let Self { assembly, unit_shift, step, .. } = self;
+        self.factor.factor_solve_shifted(&assembly.matrix, unit_shift, sigma, step)
     }
 }

@@ -11,8 +11,11 @@
 //! the second-order correction of sequential quadratic programming against the Maratos effect (Nocedal and Wright, *Numerical
 //! Optimization*, 2nd ed., section 15.6).
 
+use nalgebra::Matrix3;
+
 use super::WallContact;
 use crate::Vec3;
+use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
 /// A contact that presses at the base, and what a step does to it.
@@ -79,5 +82,46 @@ impl WallContact<'_> {
             into.add_points(base, &elements[point.element], point.element, &sum);
         }
         stray_n / foreseen_n
+    }
+
+    /// See [`External::convexify`](crate::solve::External::convexify).
+    pub(super) fn convexify_contacts(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        into: &mut dyn Stencils,
+    ) -> bool {
+        let mut any = false;
+        for (index, point) in self.points.iter().enumerate() {
+            let Some(d) = self.memory.pressed(index) else { continue };
+            let known = &self.memory.points[index];
+            let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
+            let press = -factor * point.weight_mm * point.potential.derivatives(d.value_mm).0;
+            let curvature = d.hessian.symmetric_eigen();
+            let mut crest = Matrix3::zeros();
+            for (value, way) in curvature.eigenvalues.iter().zip(curvature.eigenvectors.column_iter()) {
+                if *value > 0.0 {
+                    crest += way * way.transpose() * (press * value);
+                }
+            }
+            let (e, h) = (point.element, elements[point.element].length);
+            if crest != Matrix3::zeros() {
+                any = true;
+                let mut sum = PointSum::default();
+                sum.add(point.xi, &Vec3::zeros(), Some(&crest));
+                into.add_points(base, &elements[e], e, &sum);
+            }
+            // A tangent that turns on its sphere moves back along itself by ½ δ² as well.
+            let [_, near, _, far] = hermite(point.xi);
+            for (node, share) in [(e, near), (e + 1, far)] {
+                let back = -press * share * h * d.gradient.dot(&base.frames[node].t);
+                if back > 0.0 {
+                    any = true;
+                    let turn = Matrix3::from_diagonal(&Vec3::new(back, back, 0.0));
+                    into.add_turn(node, &Vec3::zeros(), &turn);
+                }
+            }
+        }
+        any
     }
 }

@@ -14,9 +14,8 @@
 //! are too large by powers of ten, and of either sign. What is left is of second order in the step.
 
 use super::guess::Guess;
-use super::mesh::Mesh;
 use crate::contact::WallContact;
-use crate::rod::{RodState, Supports};
+use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::Newton;
 
 /// Part of the forces on the wall by which those of a guess may differ before it is held. One that has learnt from small steps
@@ -32,10 +31,9 @@ impl Guess {
         newton: &mut Newton<C>,
         contact: &mut WallContact<'_>,
         supports: &Supports,
-        mesh: &Mesh,
+        elements: &[ElementData],
         state: &mut RodState,
     ) -> bool {
-        let elements = &mesh.elements;
         if contact.misfit(elements, state) <= MISFIT {
             return false;
         }

@@ -126,6 +126,10 @@ impl<const C: usize> Search<'_, '_, C> {
                 return found;
             }
             self.contact.softness = (10.0 * self.contact.softness).min(1.0);
+            // What pressed on the softer wall presses as hard on this one.
+            let Self { newton, guess, contact, supports, elements, state, .. } = self;
+            let held = guess.hold(newton, contact, supports, elements, state);
+            self.take(usize::from(held));
         }
     }
 

@@ -117,7 +117,7 @@ impl<const C: usize> Tools<C> {
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, blocked);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let near = quality != Quality::Beyond;
-        let held = near && self.guess.hold(&mut self.newton, &mut contact, &supports, mesh, rod);
+        let held = near && self.guess.hold(&mut self.newton, &mut contact, &supports, &mesh.elements, rod);
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
         let data = &mesh.elements[elements - 1];
         let element_stiffness = data.bending[2] / options.element_mm.powi(4);
