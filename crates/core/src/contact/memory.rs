@@ -63,14 +63,30 @@ const NOTHING: KnownPoint = KnownPoint {
     force_n: 0.0,
 };
 
-/// The reading of a point that has never been near a wall.
-const UNREAD: (Vec3, Nearness) = (Vec3::new(f64::NAN, f64::NAN, f64::NAN), Nearness::Beyond(0.0));
+/// A distance that a point has read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TakenReading {
+    /// Where, mm.
+    pub(super) at_mm: Vec3,
+    /// The triangle about which it was read: where two pieces of wall are near, they read differently.
+    pub(super) triangle: u32,
+    /// How near the wall is.
+    pub(super) nearness: Nearness,
+}
+
+impl TakenReading {
+    /// That of a point that has never been near a wall.
+    const NONE: Self =
+        Self { at_mm: Vec3::new(f64::NAN, f64::NAN, f64::NAN), triangle: 0, nearness: Nearness::Beyond(0.0) };
+}
 
 /// What a point that is near a wall has read last, without derivatives.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct KnownDistance {
     /// Where, mm.
     at_mm: Vec3,
+    /// About which triangle.
+    triangle: u32,
     /// How near the wall was there, mm.
     distance_mm: f64,
 }
@@ -79,9 +95,11 @@ struct KnownDistance {
 #[derive(Debug, Clone)]
 pub struct WallMemory {
     pub(super) points: Vec<KnownPoint>,
+    /// What they knew before the state assembled last became the base.
+    pub(super) before: Vec<KnownPoint>,
     /// Where each point last read the distance of a near wall, and what it read. Apart from `points`: most points are free, and
     /// all of them are looked at many times a step.
-    pub(super) readings: Vec<(Vec3, Nearness)>,
+    pub(super) readings: Vec<TakenReading>,
     pub(super) places: Places,
     /// The place asked for last.
     last: Place,
@@ -132,6 +150,7 @@ impl WallMemory {
         let places = Places::new(LOOK_AGAIN * felt.thinnest_mm, felt.reach_mm);
         Self {
             points: Vec::new(),
+            before: Vec::new(),
             readings: Vec::new(),
             places,
             last: Place::UNKNOWN,
@@ -148,6 +167,7 @@ impl WallMemory {
     /// Takes memory for `points` points.
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points.saturating_sub(self.points.len()));
+        self.before.reserve(points.saturating_sub(self.before.len()));
         self.aims.reserve(points.saturating_sub(self.aims.len()));
         self.foreseen.reserve(points.saturating_sub(self.foreseen.len()));
         self.readings.reserve(points.saturating_sub(self.readings.len()));
@@ -155,12 +175,12 @@ impl WallMemory {
 
     pub(super) fn resize(&mut self, points: usize) {
         self.points.resize(points, NOTHING);
-        self.readings.resize(points, UNREAD);
+        self.readings.resize(points, TakenReading::NONE);
     }
 
     /// The distance that point `index` read at its base, if it presses on the wall there.
     pub(super) fn pressed(&self, index: usize) -> Option<&Distance> {
-        match &self.readings[index].1 {
+        match &self.readings[index].nearness {
             Nearness::Within(distance) if self.points[index].presses => Some(distance),
             _ => None,
         }
@@ -214,8 +234,10 @@ impl WallMemory {
         }
         self.readings.clear();
         let reading = |known: &Option<KnownDistance>| match known {
-            Some(KnownDistance { at_mm, distance_mm }) => (*at_mm, Nearness::Beyond(*distance_mm)),
-            None => UNREAD,
+            Some(KnownDistance { at_mm, triangle, distance_mm }) => {
+                TakenReading { at_mm: *at_mm, triangle: *triangle, nearness: Nearness::Beyond(*distance_mm) }
+            }
+            None => TakenReading::NONE,
         };
         self.readings.extend(known.distances.iter().map(reading));
     }
@@ -224,9 +246,9 @@ impl WallMemory {
     pub fn keep(&self, known: &mut KnownPoints) {
         known.points.clone_from(&self.points);
         known.distances.clear();
-        let distance = |(at_mm, nearness): &(Vec3, Nearness)| {
-            let read = !at_mm.x.is_nan();
-            read.then(|| KnownDistance { at_mm: *at_mm, distance_mm: nearness.value_mm() })
+        let distance = |reading: &TakenReading| {
+            let TakenReading { at_mm, triangle, nearness } = *reading;
+            (!at_mm.x.is_nan()).then(|| KnownDistance { at_mm, triangle, distance_mm: nearness.value_mm() })
         };
         known.distances.extend(self.readings.iter().map(distance));
     }

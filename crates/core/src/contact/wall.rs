@@ -13,7 +13,7 @@
 mod coupling;
 mod foresight;
 
-use super::memory::WallMemory;
+use super::memory::{TakenReading, WallMemory};
 use super::point::{Contact, ContactPoint, Counters, FOLLOW, LOOK_AGAIN, Touch};
 use crate::Vec3;
 use crate::contact::distance::{Distance, Nearness};
@@ -123,19 +123,15 @@ impl<'a> WallContact<'a> {
         if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY }
     }
 
-    /// The reading that was taken at `x`, if it tells enough.
-    fn read_there(&self, index: usize, x: &Vec3, limit_mm: f64) -> Option<Reading> {
-        let (place, reading) = self.memory.readings[index];
-        let told = matches!(reading, Nearness::Within(_)) || reading.value_mm() >= limit_mm;
-        (place == *x && told).then(|| Reading::of(reading, limit_mm))
+    /// The reading that was taken at `x` about `triangle`, if it tells enough.
+    fn read_there(&self, index: usize, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<Reading> {
+        let TakenReading { at_mm, triangle: about, nearness } = self.memory.readings[index];
+        let told = matches!(nearness, Nearness::Within(_)) || nearness.value_mm() >= limit_mm;
+        (at_mm == *x && about == triangle && told).then(|| Reading::of(nearness, limit_mm))
     }
 
     /// Of a point that has sunk into the wall: followed from there along the surface.
     fn read_from_side(&mut self, index: usize, x: &Vec3, side: u32, limit_mm: f64) -> Reading {
-        if let Some(reading) = self.read_there(index, x, limit_mm) {
-            self.counters.avoided += 1;
-            return reading;
-        }
         let point = &self.points[index];
         let known = &mut self.memory.points[index];
         let triangle = match known.base_triangle {
@@ -148,11 +144,15 @@ impl<'a> WallContact<'a> {
                 self.felt.smooth.walk(side, x)
             }
         };
-        let nearness = self.felt.nearness(x, triangle, limit_mm);
         known.from_tip_mm = point.from_tip_mm;
         (known.clearance_mm, known.triangle, known.free_mm) = (0.0, Some(triangle), 0.0);
+        if let Some(reading) = self.read_there(index, x, triangle, limit_mm) {
+            self.counters.avoided += 1;
+            return reading;
+        }
         self.counters.near += 1;
-        self.memory.readings[index] = (*x, nearness);
+        let nearness = self.felt.nearness(x, triangle, limit_mm);
+        self.memory.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
         Reading::of(nearness, limit_mm)
     }
 
@@ -181,14 +181,14 @@ impl<'a> WallContact<'a> {
         }
         let (triangle, looked_at) = (known.triangle?, known.looked_at);
         // Most points that are near a wall do not touch it, and are moved little.
-        let (place, reading) = self.memory.readings[index];
+        let taken = &self.memory.readings[index];
         let clear_mm = limit_mm.max(radius);
-        let spare_mm = reading.value_mm() - clear_mm - STEEPEST * (x - place).norm();
-        if spare_mm > 0.0 {
+        let spare_mm = taken.nearness.value_mm() - clear_mm - STEEPEST * (x - taken.at_mm).norm();
+        if spare_mm > 0.0 && taken.triangle == triangle {
             self.counters.avoided += 1;
             return Some(Reading::Free(clear_mm + spare_mm));
         }
-        if let Some(reading) = self.read_there(index, x, limit_mm) {
+        if let Some(reading) = self.read_there(index, x, triangle, limit_mm) {
             self.counters.avoided += 1;
             return Some(reading);
         }
@@ -200,7 +200,7 @@ impl<'a> WallContact<'a> {
             return None;
         }
         self.counters.near += 1;
-        self.memory.readings[index] = (*x, nearness);
+        self.memory.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
         Some(Reading::of(nearness, limit_mm))
     }
 
@@ -227,7 +227,7 @@ impl<'a> WallContact<'a> {
         }
         (known.triangle, known.free_mm) = (Some(triangle), 0.0);
         let nearness = self.felt.nearness(x, triangle, limit_mm);
-        self.memory.readings[index] = (*x, nearness);
+        self.memory.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
         Reading::of(nearness, limit_mm)
     }
 
@@ -397,6 +397,7 @@ impl<'a> WallContact<'a> {
 
 impl External for WallContact<'_> {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+        self.memory.before.clone_from(&self.memory.points);
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, state);
             let radius_mm = self.points[index].potential.radius_mm;
@@ -465,8 +466,32 @@ impl External for WallContact<'_> {
         sum
     }
 
+    fn return_to_base(&mut self) {
+        std::mem::swap(&mut self.memory.points, &mut self.memory.before);
+    }
+
     fn foresee(&mut self, moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> bool {
         self.foresee_contacts(moved)
+    }
+
+    fn meet(
+        &mut self,
+        elements: &[ElementData],
+        trial: &RodState,
+        part: f64,
+        moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+    ) -> bool {
+        self.meet_contacts(elements, trial, part, moved)
+    }
+
+    fn press_or_let_go(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        into: &mut dyn Stencils,
+    ) -> usize {
+        self.press_or_let_go_contacts(elements, base, moved, into)
     }
 
     fn stray(

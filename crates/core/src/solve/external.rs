@@ -28,10 +28,37 @@ pub trait External {
         1.0
     }
 
+    /// The state linearised last was a trial that is refused: the base before it is the base again, and is linearised next.
+    fn return_to_base(&mut self) {}
+
     /// Notes what a step from the base does to contacts, to first order: `moved` tells how far the step moves the point at ξ of an element
     /// along a direction. Returns whether there are any: a trial may then [`stray`](External::stray).
     fn foresee(&mut self, _moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> bool {
         false
+    }
+
+    /// Notes the contacts into which a trial, `part` of the step from the base, has run, by the plane in which each has met the wall.
+    /// Returns whether there are any that were not foreseen.
+    fn meet(
+        &mut self,
+        _elements: &[ElementData],
+        _trial: &RodState,
+        _part: f64,
+        _moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+    ) -> bool {
+        false
+    }
+
+    /// Foresees what another step does to the contacts known, and adds the springs of those that it leads to and takes away those that it
+    /// leads out of. Returns how many were changed.
+    fn press_or_let_go(
+        &mut self,
+        _elements: &[ElementData],
+        _base: &RodState,
+        _moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        _into: &mut dyn Stencils,
+    ) -> usize {
+        0
     }
 
     /// Adds the forces, as a gradient at the base, the first of two states, by which contacts at a trial, the second, `part` of the step

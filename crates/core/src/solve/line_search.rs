@@ -8,8 +8,6 @@ use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::{StepRecord, StopReason};
 use super::shift::WHISPER;
 use super::stop::{SHORT, residual_alone};
-use crate::Vec3;
-use crate::rod::scatter::point_step;
 use crate::rod::{ElementData, Layout, RodState};
 
 /// Most trials.
@@ -18,6 +16,8 @@ const TRIALS: usize = 24;
 const ARMIJO: f64 = 1e-4;
 /// A step that is not whole counts as one where axial forces changed by less than 1 / STIFFENING of its turn times EI/L².
 const STIFFENING: f64 = 1e-2;
+/// How often a step is found anew with the contacts that a trial has run into.
+const MEETINGS: usize = 3;
 /// Trials after which loads without potential may let the residual grow.
 const PATIENCE: usize = 6;
 
@@ -60,6 +60,18 @@ struct Merit {
     scale: f64,
 }
 
+/// A step as a line search takes it.
+#[derive(Debug, Clone, Copy)]
+struct Stride {
+    merit: Merit,
+    /// Part of it that is tried first.
+    part: f64,
+    /// How far it turns nodes, rad, …
+    turn: f64,
+    /// … and where it says how near the minimum is; infinite elsewhere.
+    whole_turn: f64,
+}
+
 impl Merit {
     /// What rounding leaves of a change.
     fn rounding(&self) -> f64 {
@@ -90,13 +102,8 @@ impl<const C: usize> Newton<C> {
         residual: f64,
         shift: f64,
     ) -> Result<f64, StopReason> {
-        let merit = self.merit_along(problem, state, search);
-        let (turn, _) = RodState::largest_turn::<C>(problem.elements, state, &self.step);
-        if !turn.is_finite() {
-            return Err(StopReason::NotFinite);
-        }
-        let most = problem.options.max_turn;
-        let mut part = if turn > most { most / turn } else { 1.0 };
+        let Stride { mut merit, mut part, mut whole_turn, turn } =
+            self.stride(problem, state, search, shift)?;
         let free = problem.supports.conditions() == 0;
         // What a step gains that is less than rounding, the energies need not be asked for.
         let blind = problem.minimum
@@ -104,24 +111,23 @@ impl<const C: usize> Newton<C> {
             && turn <= SHORT
             && merit.slope <= 0.0
             && -merit.slope <= merit.rounding();
-        let whole_turn = self.whole_turn(problem, turn, shift);
-        let turn_of = |part: f64| if part == 1.0 { whole_turn } else { f64::INFINITY };
+        let turn_of = |part: f64, whole_turn: f64| if part == 1.0 { whole_turn } else { f64::INFINITY };
         // Where the last step's first trial was taken this one's nearly always is: the energy is asked for together with what
         // the next iteration begins with.
-        let bold =
+        let mut bold =
             search.trusting && free && problem.external.is_conservative() && problem.external.is_fixed();
         let multipliers = problem.supports.multipliers;
         let first = Layout::<C>.support(problem.elements.len());
         for j in 0..6 {
             problem.supports.multipliers[j] += self.step[first + j];
         }
-        let step = &self.step;
-        let moved = |(e, xi): (usize, f64), way: &Vec3| {
-            point_step::<C>(state, &problem.elements[e], (e, xi), way, step)
-        };
-        let foreseen = problem.options.minimum && problem.external.foresee(&moved);
+        let foreseen = problem.minimum && free && self.foresee(problem, state);
+        // Whether the matrix is that of the base, so that contacts can be met.
+        let modelled = problem.minimum && free && self.assembly.hessian && problem.external.is_steep();
+        let mut meetings = if modelled { MEETINGS } else { 0 };
         let mut refused = None;
         for attempt in 0..TRIALS {
+            let wanted = part;
             part = self.place_trial(problem, state, part, foreseen);
             search.assembled = false;
             let (mut energy_change, mut change);
@@ -129,18 +135,40 @@ impl<const C: usize> Newton<C> {
                 change = part * (1.0 - 0.5 * part) * merit.slope;
                 energy_change = change;
             } else {
-                let bold = bold && attempt == 0;
+                let mut meets = part < wanted;
                 search.trusting = attempt == 0;
-                energy_change = if bold {
+                let assembles = bold && !meets;
+                energy_change = if assembles {
                     search.assembled = true;
-                    self.assemble_trial(problem, !residual_alone(turn_of(part), problem.options.tolerance));
+                    let near = residual_alone(turn_of(part, whole_turn), problem.options.tolerance);
+                    self.assemble_trial(problem, !near);
                     self.assembly.energy.total() + self.assembly.external_energy - merit.energy
                 } else {
                     self.energy(problem.elements, problem.external, state) - merit.energy
                 };
+                bold = false;
                 change = energy_change + search.weigh(&problem.supports.gaps(&self.trial)) - merit.gaps;
-                if !self.accepts(problem, search, &merit, (residual, change, part), attempt) {
-                    if bold {
+                let accepted = self.accepts(problem, search, &merit, (residual, change, part), attempt);
+                meets |= !accepted;
+                if meets && meetings > 0 {
+                    meetings -= 1;
+                    if assembles {
+                        problem.external.return_to_base();
+                        self.assemble_base(problem, state, shift);
+                    }
+                    if self.meet_contacts(problem, state, part, shift) {
+                        let stride = self.stride(problem, state, search, shift)?;
+                        if stride.merit.slope < 0.0 {
+                            Stride { merit, part, whole_turn, .. } = stride;
+                            refused = None;
+                            continue;
+                        }
+                        std::mem::swap(&mut self.step, &mut self.spare);
+                    }
+                }
+                if !accepted {
+                    if assembles && !modelled {
+                        problem.external.return_to_base();
                         self.assembly.hessian = false;
                         self.assemble_parts(problem.elements, problem.supports, problem.external, state);
                     }
@@ -168,10 +196,36 @@ impl<const C: usize> Newton<C> {
             });
             std::mem::swap(state, &mut self.trial);
             problem.supports.follow(state);
-            return Ok(turn_of(part));
+            return Ok(turn_of(part, whole_turn));
         }
         problem.supports.multipliers = multipliers;
         Err(StopReason::NoDescent)
+    }
+
+    /// Measures the step from the assembled state.
+    fn stride(
+        &self,
+        problem: &Problem<'_>,
+        state: &RodState,
+        search: &mut LineSearch,
+        shift: f64,
+    ) -> Result<Stride, StopReason> {
+        let merit = self.merit_along(problem, state, search);
+        let (turn, _) = RodState::largest_turn::<C>(problem.elements, state, &self.step);
+        if !turn.is_finite() {
+            return Err(StopReason::NotFinite);
+        }
+        let most = problem.options.max_turn;
+        let part = if turn > most { most / turn } else { 1.0 };
+        Ok(Stride { merit, part, turn, whole_turn: self.whole_turn(problem, turn, shift) })
+    }
+
+    /// Assembles the base with its matrix again, as it was for the step.
+    fn assemble_base(&mut self, problem: &mut Problem<'_>, state: &RodState, shift: f64) {
+        self.assemble(problem.elements, problem.supports, problem.external, state);
+        if shift > 0.0 {
+            self.convexify(problem, state);
+        }
     }
 
     /// Weighs the end conditions above the reactions that the step leads to, and measures the merit along it.

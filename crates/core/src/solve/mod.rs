@@ -1,9 +1,10 @@
 //! Newton's method on the rod's potential energy, with globalisation.
 //!
 //! [`newton`] is the iteration; [`report`] what goes in and comes out. An iteration is inertia and shift, step, line search and stop,
-//! a file each; beside them are the size of a residual, the trial state, the way out of saddle points, and stiffness that is not
+//! a file each; beside them are the size of a residual, the trial state, contacts within a step, the way out of saddle points, and stiffness that is not
 //! symmetric.
 
+mod contacts;
 pub mod external;
 mod line_search;
 pub mod newton;

@@ -86,10 +86,7 @@ impl<const C: usize> Newton<C> {
             return Ok((0.0, natural));
         }
         // A saddle is left along its own curvature.
-        if wanted.is_some()
-            && !arrived
-            && problem.external.convexify(problem.elements, state, &mut self.assembly)
-        {
+        if wanted.is_some() && !arrived && self.convexify(problem, state) {
             let found = self.factor_step(whisper);
             if right(&found) {
                 return Ok((whisper, natural));
@@ -109,8 +106,16 @@ impl<const C: usize> Newton<C> {
         Err(StopReason::Singular)
     }
 
+    /// Makes the contacts in the assembled matrix convex; returns whether some were not.
+    pub(super) fn convexify(&mut self, problem: &mut Problem<'_>, state: &RodState) -> bool {
+        let Problem { elements, supports, external, .. } = problem;
+        let any = external.convexify(elements, state, &mut self.assembly);
+        supports.hold(&mut self.assembly);
+        any
+    }
+
     /// Factors the assembled matrix with a shift, and sets the step that it answers.
-    fn factor_step(&mut self, sigma: f64) -> Result<Inertia, FactorError> {
+    pub(super) fn factor_step(&mut self, sigma: f64) -> Result<Inertia, FactorError> {
         self.right_hand_side();
         let Self { assembly, unit_shift, step, .. } = self;
         self.factor.factor_solve_shifted(&assembly.matrix, unit_shift, sigma, step)

@@ -1,18 +1,14 @@
 //! The trial state of a line search: its axial forces, its energy, and its way back to the end conditions.
 
 use super::external::External;
-use super::newton::{Newton, Problem};
+use super::newton::Newton;
 use crate::rod::{ElementData, Layout, RodState, Supports, element_energy};
 
 /// Halvings towards the minimum along a step that a wall cut short.
 const REFINEMENTS: usize = 6;
 
-/// Most corrections of the contacts at a trial.
-const CORRECTIONS: usize = 3;
-/// Forces of contacts may be off what was foreseen by this part.
-const STRAYED: f64 = 0.1;
 /// A correction that turns a node by more than this, rad, is none.
-const LARGEST_CORRECTION: f64 = 0.3;
+pub(super) const LARGEST_CORRECTION: f64 = 0.3;
 
 impl<const C: usize> Newton<C> {
     /// Undoes the change of multiplier of [`crate::rod::assembly`]: dN = m/(1 − γD).
@@ -72,42 +68,6 @@ impl<const C: usize> Newton<C> {
             self.trial.advance::<C>(elements, &self.other, &self.spare, 1.0);
             let after = supports.gaps(&self.trial).iter().fold(0.0f64, |m, g| m.max(g.abs()));
             if after.is_nan() || after >= size {
-                std::mem::swap(&mut self.trial, &mut self.other);
-                break;
-            }
-        }
-    }
-
-    /// Second-order corrections of the contacts at the trial, `part` of the step from the assembled state, with the factorisation at hand.
-    pub(super) fn correct_contacts(&mut self, problem: &mut Problem<'_>, state: &RodState, part: f64) {
-        let Problem { elements, supports, external, .. } = problem;
-        let mut last = f64::INFINITY;
-        for round in 0..=CORRECTIONS {
-            // The assembly scatters; its own residual is that of the base.
-            std::mem::swap(&mut self.assembly.residual, &mut self.spare);
-            self.assembly.residual.fill(0.0);
-            let hessian = std::mem::replace(&mut self.assembly.hessian, false);
-            let stray = external.stray(elements, (state, &self.trial), part, &mut self.assembly);
-            self.assembly.hessian = hessian;
-            std::mem::swap(&mut self.assembly.residual, &mut self.spare);
-            if round > 0 && (stray.is_nan() || stray >= last) {
-                std::mem::swap(&mut self.trial, &mut self.other);
-                break;
-            }
-            if stray.is_nan() || stray <= STRAYED || round == CORRECTIONS {
-                break;
-            }
-            last = stray;
-            self.spare.iter_mut().for_each(|r| *r = -*r);
-            supports.held::<C>().into_iter().flatten().for_each(|row| self.spare[row] = 0.0);
-            self.factor.solve(&mut self.spare);
-            let (turn, _) = RodState::largest_turn::<C>(elements, &self.trial, &self.spare);
-            if turn.is_nan() || turn > LARGEST_CORRECTION {
-                break;
-            }
-            self.other.copy_from(&self.trial);
-            self.trial.advance::<C>(elements, &self.other, &self.spare, 1.0);
-            if external.safe_fraction(elements, &self.trial) < 1.0 {
                 std::mem::swap(&mut self.trial, &mut self.other);
                 break;
             }

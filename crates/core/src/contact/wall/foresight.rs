@@ -13,22 +13,25 @@
 
 use nalgebra::Matrix3;
 
-use super::WallContact;
+use super::{Reading, WallContact};
 use crate::Vec3;
+use crate::contact::point::FOLLOW;
 use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
-/// A contact that presses at the base, and what a step does to it.
+/// A contact in a step, and what that does to it.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::contact) struct Foreseen {
     /// Number of the point.
     index: usize,
     /// Gap d − r at the base, mm, and its change by the whole step, to first order, mm.
     gap_mm: [f64; 2],
-    /// ∇d at the base.
+    /// ∇d at the base, or where a trial has met the wall.
     gradient: Vec3,
     /// w k, N/mm.
     spring_n_per_mm: f64,
+    /// Whether the matrix knows of it.
+    presses: bool,
 }
 
 impl WallContact<'_> {
@@ -48,10 +51,74 @@ impl WallContact<'_> {
                 ],
                 gradient: d.gradient,
                 spring_n_per_mm: factor * point.weight_mm * point.potential.modulus_n_per_mm2,
+                presses: true,
             });
         }
         self.memory.foreseen = foreseen;
         !self.memory.foreseen.is_empty()
+    }
+
+    /// See [`External::meet`](crate::solve::External::meet).
+    pub(super) fn meet_contacts(
+        &mut self,
+        elements: &[ElementData],
+        trial: &RodState,
+        part: f64,
+        moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+    ) -> bool {
+        let known = self.memory.foreseen.len();
+        let mut next = 0;
+        for index in 0..self.points.len() {
+            if next < known && self.memory.foreseen[next].index == index {
+                next += 1;
+                continue;
+            }
+            let point = self.points[index];
+            let (x, radius_mm) = (point.position(elements, trial), point.potential.radius_mm);
+            let limit_mm = (1.0 + FOLLOW) * radius_mm;
+            let Reading::Pressed(d) = self.read_within(index, &x, limit_mm) else { continue };
+            let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, self.softness).factor;
+            let change_mm = moved((point.element, point.xi), &d.gradient);
+            // At the base it does not press, whatever the plane says of there.
+            let plane_mm = d.value_mm - radius_mm - part * change_mm;
+            let base_mm = self.memory.points[index].base_clearance_mm - radius_mm;
+            let gap_mm = if plane_mm < 0.0 { base_mm.max(0.0) } else { plane_mm };
+            self.memory.foreseen.push(Foreseen {
+                index,
+                gap_mm: [gap_mm, change_mm],
+                gradient: d.gradient,
+                spring_n_per_mm: factor * point.weight_mm * point.potential.modulus_n_per_mm2,
+                presses: false,
+            });
+        }
+        self.memory.foreseen.sort_unstable_by_key(|contact| contact.index);
+        self.memory.foreseen.len() > known
+    }
+
+    /// See [`External::press_or_let_go`](crate::solve::External::press_or_let_go).
+    pub(super) fn press_or_let_go_contacts(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        into: &mut dyn Stencils,
+    ) -> usize {
+        let mut changed = 0;
+        for contact in &mut self.memory.foreseen {
+            let point = &self.points[contact.index];
+            contact.gap_mm[1] = moved((point.element, point.xi), &contact.gradient);
+            let presses = contact.gap_mm[0] + contact.gap_mm[1] < 0.0;
+            if presses == contact.presses {
+                continue;
+            }
+            (contact.presses, changed) = (presses, changed + 1);
+            let spring = if presses { contact.spring_n_per_mm } else { -contact.spring_n_per_mm };
+            let along = contact.gradient * spring;
+            let mut sum = PointSum::default();
+            sum.add(point.xi, &(along * contact.gap_mm[0]), Some(&(along * contact.gradient.transpose())));
+            into.add_points(base, &elements[point.element], point.element, &sum);
+        }
+        changed
     }
 
     /// See [`External::stray`](crate::solve::External::stray).
@@ -64,10 +131,10 @@ impl WallContact<'_> {
     ) -> f64 {
         let (mut stray_n, mut foreseen_n) = (0.0, self.least_force_n());
         for k in 0..self.memory.foreseen.len() {
-            let Foreseen { index, gap_mm: [gap, change], gradient, spring_n_per_mm } =
-                self.memory.foreseen[k];
+            let contact = self.memory.foreseen[k];
+            let Foreseen { index, gap_mm: [gap, change], gradient, spring_n_per_mm, presses } = contact;
             let foreseen_mm = gap + part * change;
-            if foreseen_mm >= 0.0 {
+            if !presses || foreseen_mm >= 0.0 {
                 continue;
             }
             let point = self.points[index];

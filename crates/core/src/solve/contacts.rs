@@ -1,0 +1,116 @@
+//! Contacts within a step: which of them press at its end, and how a trial is brought back to them.
+//!
+//! Newton's step knows of the contacts that press where it begins. Where a trial runs into others it is refused, and is found anew with
+//! them: each by the plane in which the trial has met the wall, and those that would pull let go, until the model
+//!
+//! ```text
+//! min  r·δ + ½ δᵀ K δ + Σ ½ wᵢ k (gᵢ + ∇dᵢ·δ)₋²
+//! ```
+//!
+//! of energy and contacts has its own active set: the semi-smooth Newton method of contact (M. Hintermüller, K. Ito, K. Kunisch, *The
+//! primal-dual active set strategy as a semismooth Newton method*, SIAM J. Optim. 13 (2002)) within the step, at the cost of
+//! a factorisation a round and no question to the wall.
+
+use super::newton::{Newton, Problem};
+use super::trial::LARGEST_CORRECTION;
+use crate::Vec3;
+use crate::rod::scatter::point_step;
+use crate::rod::{ElementData, RodState};
+
+/// Most corrections of the contacts at a trial.
+const CORRECTIONS: usize = 3;
+/// Forces of contacts may be off what was foreseen by this part.
+const STRAYED: f64 = 0.1;
+/// Most rounds in which the contacts that a step leads to are looked for.
+const ROUNDS: usize = 12;
+
+/// How far a step moves the point at ξ of an element along a direction.
+fn moved<'a, const C: usize>(
+    elements: &'a [ElementData],
+    state: &'a RodState,
+    step: &'a [f64],
+) -> impl Fn((usize, f64), &Vec3) -> f64 + 'a {
+    move |(e, xi), way| point_step::<C>(state, &elements[e], (e, xi), way, step)
+}
+
+impl<const C: usize> Newton<C> {
+    /// Has contacts foresee what the step does to them; returns whether there are any to foresee.
+    pub(super) fn foresee(&mut self, problem: &mut Problem<'_>, state: &RodState) -> bool {
+        let Problem { elements, external, .. } = problem;
+        external.foresee(&moved::<C>(elements, state, &self.step))
+    }
+
+    /// Finds the step anew with the contacts into which the trial, `part` of it, has run, under the same `shift`. Returns whether there is
+    /// such a step; otherwise the one at hand is left as it is.
+    pub(super) fn meet_contacts(
+        &mut self,
+        problem: &mut Problem<'_>,
+        state: &RodState,
+        part: f64,
+        shift: f64,
+    ) -> bool {
+        let Problem { elements, supports, external, .. } = problem;
+        let arrived = external.meet(elements, &self.trial, part, &moved::<C>(elements, state, &self.step));
+        if !arrived {
+            return false;
+        }
+        self.spare.copy_from_slice(&self.step);
+        let whisper = Self::whisper(elements);
+        let sigma = if shift > whisper { whisper + shift } else { whisper };
+        for round in 0..=ROUNDS {
+            // The slope of the energy is that at the base; what contacts change is for the right-hand side alone.
+            std::mem::swap(&mut self.assembly.residual, &mut self.assembly.correction);
+            let changed = {
+                let way = moved::<C>(elements, state, &self.step);
+                external.press_or_let_go(elements, state, &way, &mut self.assembly)
+            };
+            std::mem::swap(&mut self.assembly.residual, &mut self.assembly.correction);
+            supports.hold(&mut self.assembly);
+            if changed == 0 || round == ROUNDS {
+                break;
+            }
+            if !self.factor_step(sigma).is_ok_and(|inertia| inertia.negative == elements.len()) {
+                self.step.copy_from_slice(&self.spare);
+                return false;
+            }
+        }
+        Self::restore_tensions(elements, &mut self.step);
+        true
+    }
+
+    /// Second-order corrections of the contacts at the trial, `part` of the step from the assembled state, with the factorisation at hand.
+    pub(super) fn correct_contacts(&mut self, problem: &mut Problem<'_>, state: &RodState, part: f64) {
+        let Problem { elements, supports, external, .. } = problem;
+        let mut last = f64::INFINITY;
+        for round in 0..=CORRECTIONS {
+            // The assembly scatters; its own residual is that of the base.
+            std::mem::swap(&mut self.assembly.residual, &mut self.spare);
+            self.assembly.residual.fill(0.0);
+            let hessian = std::mem::replace(&mut self.assembly.hessian, false);
+            let stray = external.stray(elements, (state, &self.trial), part, &mut self.assembly);
+            self.assembly.hessian = hessian;
+            std::mem::swap(&mut self.assembly.residual, &mut self.spare);
+            if round > 0 && (stray.is_nan() || stray >= last) {
+                std::mem::swap(&mut self.trial, &mut self.other);
+                break;
+            }
+            if stray.is_nan() || stray <= STRAYED || round == CORRECTIONS {
+                break;
+            }
+            last = stray;
+            self.spare.iter_mut().for_each(|r| *r = -*r);
+            supports.held::<C>().into_iter().flatten().for_each(|row| self.spare[row] = 0.0);
+            self.factor.solve(&mut self.spare);
+            let (turn, _) = RodState::largest_turn::<C>(elements, &self.trial, &self.spare);
+            if turn.is_nan() || turn > LARGEST_CORRECTION {
+                break;
+            }
+            self.other.copy_from(&self.trial);
+            self.trial.advance::<C>(elements, &self.other, &self.spare, 1.0);
+            if external.safe_fraction(elements, &self.trial) < 1.0 {
+                std::mem::swap(&mut self.trial, &mut self.other);
+                break;
+            }
+        }
+    }
+}
