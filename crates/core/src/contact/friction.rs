@@ -54,7 +54,7 @@ const STEADY: f64 = 0.3;
 /// … and no more once they differ from the lagged ones by less than this part.
 pub const SETTLED: f64 = 1e-4;
 /// Renewals of a step that take the forces as they are; where they have not settled by then they overshoot, …
-const WHOLE_RENEWALS: usize = 20;
+const WHOLE_RENEWALS: usize = 8;
 /// … and from then on they take this part of the way.
 const RELAXATION: f64 = 0.1;
 
@@ -71,7 +71,7 @@ struct Slider {
     normal: Vec3,
     /// N: normal force, less where the wall is smoother.
     force_n: f64,
-    /// Normal and force with which the step began.
+    /// Normal and force with which the step began, or that were marked.
     begun: (Vec3, f64),
     /// Normal and force at the state seen last.
     seen: (Vec3, f64),
@@ -366,7 +366,12 @@ impl Friction {
         self.settled = true;
     }
 
-    /// Normal forces are again those with which the step began, and are held.
+    /// The normal forces are those that it can be rewound to.
+    pub fn mark(&mut self) {
+        self.sliders.iter_mut().for_each(|s| s.begun = (s.normal, s.force_n));
+    }
+
+    /// Normal forces are again those with which the step began, or that were marked, and are held.
     pub fn rewind(&mut self) {
         self.coupled = false;
         self.settled = true;

@@ -34,9 +34,14 @@ const PATIENT: [usize; 3] = [60, 300, 300];
 /// Newton iterations of all of it.
 const LONGEST: usize = 2000;
 /// Newton iterations for friction and wall together.
-const TOGETHER: usize = 40;
+const TOGETHER: usize = 20;
 /// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
 const ROUNDS: usize = 5;
+/// Slides that have come so near to friction with its own normal forces are followed by a solution for both together, and again where
+/// they have come `FARTHER`.
+const NEARLY: f64 = 0.05;
+/// See [`NEARLY`].
+const FARTHER: f64 = 0.1;
 /// Most slides with the hand held still, and in the last resort. Two or three are the rule.
 const SLIDES: [usize; 2] = [40, 400];
 
@@ -165,9 +170,21 @@ impl<const C: usize> Search<'_, '_, C> {
         self.contact.rewind_friction();
         found = self.newton(STUCK, self.tolerance);
         let (most, slides) = if self.budget.is_none() { (PATIENT[2], SLIDES[1]) } else { (STUCK, SLIDES[0]) };
+        let mut near = NEARLY;
         for _ in 0..slides {
             if !found.converged || self.is_settled() {
                 break;
+            }
+            if self.contact.unsettled() < near {
+                near = FARTHER * self.contact.unsettled();
+                self.guess.other.copy_from(self.state);
+                self.contact.mark_friction();
+                if let Some(found) = self.together() {
+                    return found;
+                }
+                self.state.copy_from(&self.guess.other);
+                self.contact.rewind_friction();
+                found = self.newton(STUCK, self.tolerance);
             }
             self.contact.anchor_friction(self.elements, self.state);
             self.contact.hold_friction();
