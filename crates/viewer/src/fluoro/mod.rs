@@ -199,10 +199,15 @@ impl Fluoroscope {
         let (first, stride) = self.first_ray(pixel);
         let rays: [usize; RAYS] =
             std::array::from_fn(|k| first + k / SUBRAYS as usize * stride + k % SUBRAYS as usize);
-        let layers = rays.map(|ray| self.layers(ray, medium));
+        let mut layers = [[0.0; 5]; RAYS];
+        // A loop is inlined where a map of the array is not, which is a tenth of the time of a picture.
+        layers.iter_mut().zip(rays).for_each(|(layers, ray)| *layers = self.layers(ray, medium));
         let moves = self.devices.iter().any(|device| rays.iter().any(|&ray| device.2[ray] != 0.0));
         match self.alike(&layers).filter(|_| !moves) {
-            Some((mean, more)) => self.behind(mean, None, room).map(|lanes| more * lanes.iter().sum::<f32>()),
+            Some((mean, more)) => {
+                let [signal, energy] = self.behind(mean, None, room);
+                [more * signal.iter().sum::<f32>(), more * energy.iter().sum::<f32>()]
+            }
             None => self.of_rays(rays, &layers, room),
         }
     }
