@@ -47,7 +47,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::{Counters, FeltWall};
 use crate::device::line_mm;
-use crate::insertion::{Command, LateralForce, Move, StepReport, Surroundings};
+use crate::methods::{Command, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
