@@ -10,8 +10,8 @@ use endowire_core::vessel::SurfaceMesh;
 use glam::{Vec3, Vec4};
 
 use crate::cpu::raster::ScreenTriangle;
+use crate::engine::ThreeDEngine;
 use crate::output::{Image, PixelFormat};
-use crate::renderer::ThreeDEngine;
 use crate::three_d::{Camera, Solids, Style, Vertex, solid_triangles, wall_triangles};
 
 /// Samples across a pixel: nine levels of edge smoothing.
