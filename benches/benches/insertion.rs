@@ -9,7 +9,7 @@ use endowire_core::contact::{FeltWall, SmoothWall};
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::vessel::{GeneratedWall, Resolution, WallQuery, anatomy};
+use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, WallQuery, anatomy};
 use endowire_core::{Error, Result, Vec3};
 
 /// Radius of the wire, mm.
@@ -65,13 +65,14 @@ fn queries(c: &mut Criterion) {
 }
 
 fn felt_walls(c: &mut Criterion) {
-    let Ok(wire) = Device::uniform(200.0, RADIUS_MM, 10.0) else { return };
     let mut group = c.benchmark_group("felt wall of triangles");
     group.sample_size(10);
     for triangles in [20_000, 200_000] {
         let Ok(made) = vessel(triangles) else { continue };
         group.bench_function(BenchmarkId::from_parameter(triangles), |b| {
-            b.iter(|| FeltWall::new(&made.wall, &wire, &WallProperties::default()));
+            b.iter(|| {
+                FeltWall::new(&made.wall, (RADIUS_MM, RADIUS_MM), &WallProperties::default(), &NoStore)
+            });
         });
     }
     group.finish();

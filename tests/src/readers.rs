@@ -6,10 +6,11 @@ use endowire_core::device::Device;
 use endowire_core::insertion::{Sheath, Simulation, State};
 use endowire_core::statics::{StaticCase, StaticProblem};
 use endowire_core::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, anatomy};
-use endowire_core::{Error, Result};
+use endowire_core::{Error, Result, Vec3};
 use endowire_methods::Scene;
 use endowire_sweep::Sweep;
 use endowire_verify::surfaces::Sidecar;
+use endowire_viewer::{CtSpec, Renderer, View, ViewSpec};
 
 fn surface(bytes: &[u8], name: &str) -> Result<()> {
     SurfaceMesh::from_bytes(bytes, Path::new(name), 1.0).map(drop)
@@ -106,6 +107,23 @@ pub fn simulation() -> Result<Simulation> {
     let made = GeneratedWall::new(&tree, Resolution::Triangles(1_000))?;
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0)?;
     Simulation::builder(made.wall, Device::uniform(100.0, 0.4, 10.0)?, sheath).build()
+}
+
+/// A tomogram (NIfTI), and rays through it.
+///
+/// # Errors
+/// As [`Renderer::new`], and a file that cannot be written for it.
+pub fn tomogram(bytes: &[u8]) -> Result<()> {
+    let name = format!("endowire-{}-{:?}.nii", std::process::id(), std::thread::current().id());
+    let path = std::env::temp_dir().join(name);
+    std::fs::write(&path, bytes).map_err(|e| Error::content(&path, e.to_string()))?;
+    let mut spec = ViewSpec { views: vec![View::Fluoro], size_px: [16, 12], ..ViewSpec::default() };
+    spec.patient.ct = Some(CtSpec { file: path.clone(), offset_mm: [0.0; 3] });
+    let wall = SurfaceMesh::cuboid(Vec3::zeros(), Vec3::repeat(10.0), 10.0);
+    let read = Renderer::new(&spec, &wall).and_then(|mut renderer| renderer.path_lengths(&[]).map(drop));
+    // What is left in the folder of temporary files is nobody's loss.
+    let _ = std::fs::remove_file(&path);
+    read
 }
 
 fn text(bytes: &[u8]) -> Result<&str> {

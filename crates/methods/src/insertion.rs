@@ -116,8 +116,8 @@ impl Insertion {
         let sheath = surroundings.sheath;
         let chain = Chain { start_mm: sheath.position_mm, direction: sheath.direction, ..Chain::default() };
         let progress = Progress { posture: chain.straight(), chain, from_tip_mm: vec![0.0] };
-        let wall =
-            FeltWall::from_store(surroundings.wall, surroundings.device, surroundings.properties, store)?;
+        let Surroundings { wall, stack, properties, .. } = surroundings;
+        let wall = FeltWall::new(wall, stack.radii_mm(), properties, store)?;
         let mut insertion = Self {
             model,
             options,

@@ -13,7 +13,6 @@ use crate::axis::{Axis, AxisSpec, RUN_LIMIT};
 use crate::key::Key;
 use crate::provenance::hash_inputs;
 use crate::row::{Columns, ParameterKind};
-use crate::run::Run;
 
 /// A sweep file as it is written.
 #[derive(Debug, Deserialize)]
@@ -46,8 +45,8 @@ pub struct Sweep {
     scene_path: PathBuf,
     /// The scene with what `[set]` says.
     base: Value,
-    axes: Vec<Axis>,
-    samples: usize,
+    pub(crate) axes: Vec<Axis>,
+    pub(crate) samples: usize,
     recorded: Option<Recorded>,
     columns: Columns,
     hash: String,
@@ -140,18 +139,6 @@ impl Sweep {
 
     pub(crate) fn columns(&self) -> &Columns {
         &self.columns
-    }
-
-    /// The run of that number, from 0: the last axis goes fastest, and samples faster still.
-    pub fn run(&self, number: usize) -> Run<'_> {
-        let (mut rest, sample) = (number / self.samples, number % self.samples);
-        let mut values: Vec<Value> = Vec::with_capacity(self.axes.len());
-        for axis in self.axes.iter().rev() {
-            values.push(axis.value(rest % axis.crossed(), sample));
-            rest /= axis.crossed();
-        }
-        values.reverse();
-        Run { sweep: self, number, values }
     }
 
     /// The scene with these values of the axes.

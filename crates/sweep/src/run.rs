@@ -71,6 +71,20 @@ pub(crate) struct Workshop<'a> {
     pub(crate) program: Program,
 }
 
+impl Sweep {
+    /// The run of that number, from 0: the last axis goes fastest, and samples faster still.
+    pub fn run(&self, number: usize) -> Run<'_> {
+        let (mut rest, sample) = (number / self.samples, number % self.samples);
+        let mut values: Vec<Value> = Vec::with_capacity(self.axes.len());
+        for axis in self.axes.iter().rev() {
+            values.push(axis.value(rest % axis.crossed(), sample));
+            rest /= axis.crossed();
+        }
+        values.reverse();
+        Run { sweep: self, number, values }
+    }
+}
+
 /// Tables and keys of a scene that do not touch what is there at the start.
 const LATER: [&str; 4] = ["name", "seed", "script", "view"];
 

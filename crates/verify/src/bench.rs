@@ -8,7 +8,7 @@ use endowire_core::methods::kirchhoff::Mesh;
 use endowire_core::rod::{Clamp, ElementData, PLAIN, RodState, Stencils, Supports};
 use endowire_core::solve::{External, Newton, NewtonOptions};
 use endowire_core::statics::Loads;
-use endowire_core::vessel::Wall;
+use endowire_core::vessel::{NoStore, Wall};
 use endowire_core::{Error, Result, Vec3};
 use nalgebra::Matrix3;
 
@@ -116,7 +116,7 @@ impl Bench {
         let mut mesh = Mesh::default();
         mesh.build(&device, length, length / elements as f64, modulus);
         let frames = mesh.from_tip_mm.iter().map(|from_tip| tangents(length - from_tip)).collect();
-        let felt = FeltWall::new(wall, &device, properties)?;
+        let felt = FeltWall::new(wall, (radius, radius), properties, &NoStore)?;
         Ok(Self {
             memory: WallMemory::new(&felt),
             felt,

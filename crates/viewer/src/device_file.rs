@@ -4,7 +4,7 @@ use endowire_core::device::{Device, DeviceFile, Part, Section};
 use endowire_core::{Error, Result};
 
 use crate::device::DevicePart;
-use crate::xray::Material;
+use crate::material::Material;
 
 /// The parts to draw of a device: walls of tubes and wires, and the coats upon them. None for a solid device that names no material.
 ///

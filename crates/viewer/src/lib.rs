@@ -31,6 +31,7 @@ mod contrast;
 mod cpu;
 mod device;
 mod device_file;
+mod engine;
 mod fingerprint;
 mod fluoro;
 #[cfg(feature = "gpu")]
@@ -38,9 +39,9 @@ mod gpu;
 #[cfg(not(feature = "gpu"))]
 #[path = "no_gpu.rs"]
 mod gpu;
+mod material;
 mod output;
 mod patient;
-mod piece;
 mod pushed;
 mod renderer;
 mod scene;
@@ -53,6 +54,7 @@ pub use c_arm::CArm;
 pub use device::{DevicePart, DevicePoint, DeviceView};
 pub use device_file::{device_parts, section_parts};
 pub use fluoro::Moment;
+pub use material::Material;
 pub use output::{
     Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, PartLabel, PixelFormat,
 };
@@ -63,4 +65,4 @@ pub use spec::{
     TorsoSpec, View, ViewSpec, XRaySpec,
 };
 pub use three_d::ContactView;
-pub use xray::{Material, PathLengths};
+pub use xray::PathLengths;

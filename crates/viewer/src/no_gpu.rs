@@ -1,6 +1,6 @@
 //! What a build without the feature `gpu` has in place of wgpu.
 
-use crate::renderer::Engines;
+use crate::engine::Engines;
 use crate::scene::Setup;
 
 /// No adapter ever fits.

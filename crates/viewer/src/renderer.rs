@@ -8,28 +8,16 @@ use endowire_core::{Error, Result, Vec3};
 use crate::c_arm::CArm;
 use crate::cpu;
 use crate::device::{DeviceView, RefinedDevice};
-use crate::fluoro::{Anatomy, Fluoroscope, Moment, PathEngine, Sequence, labels};
+use crate::engine::{Engines, PathEngine};
+use crate::fluoro::{Anatomy, Fluoroscope, Moment, Sequence, labels};
 use crate::gpu;
+use crate::material::Material;
 use crate::output::{Image, Labels};
 use crate::scene::Setup;
 use crate::spec::{Backend, Mode, ViewSpec};
 use crate::tails::with_tails;
 use crate::three_d::{ContactView, Solids, draw_legend, draw_markers, draw_scale_bar};
-use crate::xray::{Material, PathLengths};
-
-/// Draws 3D frames of one set-up.
-pub(crate) trait ThreeDEngine: Send {
-    fn frame(&mut self, solids: &Solids) -> Result<Image>;
-}
-
-/// The engines of the wanted views, all on the same processor.
-pub(crate) struct Engines {
-    pub(crate) paths: Option<Box<dyn PathEngine>>,
-    /// That of the CPU is made with the first frame.
-    pub(crate) three_d: Option<Box<dyn ThreeDEngine>>,
-    /// Name for people.
-    pub(crate) name: String,
-}
+use crate::xray::PathLengths;
 
 /// The frames of one moment.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -96,7 +84,7 @@ impl Renderer {
             })?),
         };
         let is_cpu = on_gpu.is_none();
-        let mut engines = on_gpu.unwrap_or_else(|| cpu::engines(&setup));
+        let mut engines = on_gpu.unwrap_or_else(|| cpu::engines(setup.c_arm.is_some()));
         if let Some(reason) = refused {
             engines.name = format!("{} ({reason})", engines.name);
         }
@@ -155,7 +143,7 @@ impl Renderer {
             let c_arm = setup.c_arm.as_ref().filter(|_| setup.spec.camera.c_arm);
             let solids = Solids { devices: &devices, contacts: &contacts, c_arm };
             if engines.three_d.is_none() {
-                engines.three_d = cpu::three_d(setup);
+                engines.three_d = setup.camera.as_ref().map(|camera| cpu::three_d(camera, &setup.wall));
             }
             let mut three_d = engines.three_d.as_mut().map(|engine| engine.frame(&solids)).transpose()?;
             if let (Some(image), Some(camera)) = (&mut three_d, &setup.camera) {
@@ -319,7 +307,7 @@ impl Renderer {
     ) -> Result<T> {
         match job(&self.setup, &mut self.engines, &mut self.fluoro) {
             Err(Error::Computation(reason)) if !self.is_cpu => {
-                let mut engines = cpu::engines(&self.setup);
+                let mut engines = cpu::engines(self.setup.c_arm.is_some());
                 engines.name = format!("{} ({} failed: {reason})", engines.name, self.engines.name);
                 self.engines = engines;
                 self.is_cpu = true;
@@ -356,6 +344,7 @@ fn no_fluoro() -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::ThreeDEngine;
     use crate::spec::View;
 
     /// An adapter that fails in every frame.
@@ -373,7 +362,7 @@ mod tests {
         fn pieces(
             &mut self,
             _: &CArm,
-            _: &[(crate::piece::Piece, f64)],
+            _: &[(crate::device::Piece, f64)],
             _: &mut [f32],
             _: &mut Vec<u32>,
         ) -> Result<()> {

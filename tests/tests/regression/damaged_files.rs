@@ -152,3 +152,31 @@ fn damaged_states() {
     let saved = postcard::to_allocvec(&simulation.state()).unwrap();
     reads_or_refuses(&[saved], &["state"], |bytes| readers::state(&mut simulation, bytes));
 }
+
+/// A tomogram of 3 × 2 × 2 voxels of 10 mm, placed by its affine or, with a code of 0, by its spacing.
+fn nifti(affine: i16, data_type: i16, voxels: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0; 352];
+    let mut put = |at: usize, data: &[u8]| bytes[at..at + data.len()].copy_from_slice(data);
+    put(0, &348_i32.to_le_bytes());
+    (0..).zip([3_i16, 3, 2, 2, 1, 1, 1, 1]).for_each(|(k, n)| put(40 + 2 * k, &n.to_le_bytes()));
+    put(70, &data_type.to_le_bytes());
+    put(72, &(voxels.len() as i16 / 12 * 8).to_le_bytes());
+    (0..4).for_each(|k| put(76 + 4 * k, &10_f32.to_le_bytes()));
+    put(108, &352_f32.to_le_bytes());
+    put(112, &1_f32.to_le_bytes());
+    put(123, &[2]);
+    put(254, &affine.to_le_bytes());
+    (0..3).for_each(|k| put(280 + 20 * k, &10_f32.to_le_bytes()));
+    put(344, b"n+1\0");
+    bytes.extend(voxels);
+    bytes
+}
+
+#[test]
+fn damaged_tomograms() {
+    let units = (0..12_i16).map(|k| 60 * k - 200);
+    let short: Vec<u8> = units.clone().flat_map(i16::to_le_bytes).collect();
+    let float: Vec<u8> = units.flat_map(|hu| f32::from(hu).to_le_bytes()).collect();
+    let places = ["is no NIfTI volume", "voxel", "bitpix", "dimensions", "its axes", "its affine"];
+    reads_or_refuses(&[nifti(1, 4, &short), nifti(0, 16, &float)], &places, readers::tomogram);
+}

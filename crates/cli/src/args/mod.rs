@@ -257,6 +257,8 @@ pub(crate) struct VerifyArgs {
     /// Longest time of a cell: one that takes longer fails
     #[arg(long, default_value_t = 120.0, value_name = "S", requires = "surfaces")]
     pub(crate) limit_s: f64,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
     /// Print the rows as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

@@ -6,8 +6,7 @@ use clap::Subcommand;
 use clap::builder::PossibleValuesParser;
 use endowire_methods::NAMES;
 
-use crate::commands::compare::case::CASES;
-use crate::commands::experiment::navigation::targets;
+use crate::studies::{CASES, targets};
 
 /// The methods that are compared. A wrong name is answered with the nearest right one.
 fn method_names() -> PossibleValuesParser {

@@ -7,10 +7,10 @@ use endowire_core::shape::Shape;
 use endowire_methods::Scene;
 use endowire_viewer::{ContactView, Moment};
 
+use super::studio::{Still, Studio};
 use crate::args::{FluoroArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::frames::{Still, Studio};
 use crate::output::progress;
 
 /// Carries out the script, then draws.

@@ -1,10 +1,10 @@
 //! One file a command.
 
-pub(crate) mod compare;
+mod compare;
 mod dataset;
 mod device;
 mod doctor;
-pub(crate) mod experiment;
+mod experiment;
 mod export;
 mod felt;
 mod fluoro;
@@ -15,6 +15,7 @@ mod report;
 mod rod;
 mod run;
 mod shell;
+mod studio;
 mod surfaces;
 mod sweep;
 mod verify;

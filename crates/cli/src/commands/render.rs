@@ -3,10 +3,10 @@
 use endowire_methods::Scene;
 use endowire_viewer::Moment;
 
+use super::studio::{Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
-use crate::output::frames::{Still, Studio};
 use crate::output::instruments::Lengths;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::recording::Recording;

@@ -13,6 +13,7 @@ use endowire_verify::surfaces::{
 use serde::Serialize;
 
 use crate::args::VerifyArgs;
+use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::{answer, print, progress};
@@ -58,12 +59,13 @@ pub(crate) fn surfaces(args: &VerifyArgs, folder: &Path) -> Result<(), Failure> 
     for file in &files {
         inputs.push(read_input(&file.path)?);
     }
+    let cache = Cache::new(&args.cache);
     let bar = progress::bar(files.len(), "surface");
     let read: Vec<(&SurfaceFile, Result<Surface, String>)> = files
         .iter()
         .map(|file| {
             bar.set_message(file.name.clone());
-            let surface = Surface::read(file).map_err(|e| e.to_string());
+            let surface = Surface::read(file, &cache).map_err(|e| e.to_string());
             bar.inc(1);
             (file, surface)
         })
@@ -88,7 +90,7 @@ pub(crate) fn surfaces(args: &VerifyArgs, folder: &Path) -> Result<(), Failure> 
         }
         return Ok(());
     }
-    let rows = run_all(&jobs, args);
+    let rows = run_all(&jobs, args, &cache);
     let document = Document {
         provenance: Provenance::new(&inputs, 0),
         surfaces: read.iter().map(|(file, surface)| surface_row(file, surface)).collect(),
@@ -115,7 +117,7 @@ fn verdict(document: &Document) -> Result<(), Failure> {
 }
 
 /// Runs the cells on several threads; the rows are in the order of the cells.
-fn run_all(jobs: &[(&Surface, Cell)], args: &VerifyArgs) -> Vec<CellRow> {
+fn run_all(jobs: &[(&Surface, Cell)], args: &VerifyArgs, cache: &Cache) -> Vec<CellRow> {
     let available = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = args.jobs.unwrap_or(available).clamp(1, jobs.len().max(1));
     let rows: Vec<OnceLock<CellRow>> = jobs.iter().map(|_| OnceLock::new()).collect();
@@ -127,7 +129,7 @@ fn run_all(jobs: &[(&Surface, Cell)], args: &VerifyArgs) -> Vec<CellRow> {
         while let Some((index, (surface, cell))) = take(&next, jobs) {
             bar.set_message(cell.name_in(surface));
             // One cell that panics must not take the others with it.
-            let row = catch_unwind(AssertUnwindSafe(|| run(surface, cell, args.limit_s, &clock)));
+            let row = catch_unwind(AssertUnwindSafe(|| run(surface, cell, cache, args.limit_s, &clock)));
             let row = row.unwrap_or_else(|_| {
                 let mut row = CellRow::new(surface, cell);
                 row.end(Ending::Failed, "panicked".to_owned());

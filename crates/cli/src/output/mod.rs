@@ -5,7 +5,7 @@ pub(crate) mod chart;
 pub(crate) mod folder;
 pub(crate) mod frames;
 pub(crate) mod instruments;
-mod manifest;
+pub(crate) mod manifest;
 pub(crate) mod npz;
 pub(crate) mod progress;
 pub(crate) mod provenance;

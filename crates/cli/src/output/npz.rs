@@ -186,7 +186,8 @@ pub(crate) fn read(path: &Path, name: &str) -> io::Result<Vec<[u8; 8]>> {
     member.read_exact(&mut text)?;
     let text = String::from_utf8_lossy(&text).into_owned();
     if !head.starts_with(b"\x93NUMPY\x01") || !(text.contains("'<f8'") || text.contains("'<i8'")) {
-        return Err(bad(format!("{name} is no array of 8-byte numbers: {text}")));
+        let begin: String = text.trim_end().chars().take(100).collect();
+        return Err(bad(format!("{name} is no array of 8-byte numbers: {begin:?}")));
     }
     let mut bytes = Vec::new();
     member.read_to_end(&mut bytes)?;

@@ -181,12 +181,14 @@ fn unreadable(path: &Path, error: &dyn std::fmt::Display) -> Failure {
 #[cfg(test)]
 mod tests {
     use endowire_core::insertion::StepReport;
+    use endowire_tests::damage::damaged;
+    use endowire_tests::noise::Noise;
 
     use super::super::arrays::ShapeArrays;
     use super::*;
 
     /// Three steps of one, two and three nodes; the number of a node is in all that is recorded of it.
-    fn killed(folder: &Path) {
+    fn killed(folder: &Path) -> ShapeArrays {
         std::fs::write(
             folder.join(SUMMARY),
             r#"{"scene_file": "a.toml", "scene_hash": "", "complete": false}"#,
@@ -201,6 +203,7 @@ mod tests {
             let shape = Shape { positions_mm: vectors.clone(), tangents: vectors, from_tip_mm: numbers };
             arrays.push(&shape, &StepReport::default(), || Ok(())).unwrap();
         }
+        arrays
     }
 
     #[test]
@@ -230,6 +233,48 @@ mod tests {
             std::fs::write(&file, whole).unwrap();
         }
         assert_eq!(seen, [true; 3]);
+    }
+
+    /// Reads 2,000 damaged copies of a file of the recording in a folder, or says what is wrong; how many were refused.
+    fn damaged_copies(folder: &Path, file: &Path, noise: &mut Noise) -> usize {
+        let whole = std::fs::read(file).unwrap();
+        let mut refused = 0;
+        for round in 0..2_000 {
+            let bytes = damaged(&whole, noise);
+            // A new file: one that is cut and written again goes to the disk at once, which takes milliseconds.
+            std::fs::remove_file(file).unwrap();
+            std::fs::write(file, &bytes).unwrap();
+            match Recording::read(folder, None) {
+                Ok(recording) => {
+                    let read: usize = (1..=recording.steps())
+                        .map(|step| 7 * recording.shape(step).len() + 6 * recording.contacts(step).len())
+                        .sum();
+                    assert!(
+                        8 * read <= whole.len().max(bytes.len()) + 1_000,
+                        "round {round}: {read} numbers"
+                    );
+                }
+                Err(error) => {
+                    let told = error.to_string();
+                    assert!(told.contains(folder.to_str().unwrap()), "round {round}: {told}");
+                    assert!(!told.contains('\n') && told.len() < 1_000, "round {round}: {told}");
+                    refused += 1;
+                }
+            }
+        }
+        refused
+    }
+
+    #[test]
+    fn damaged_arrays_are_refused_or_read_and_hold_no_more_than_their_file() {
+        let [growing, packed] = [0, 1].map(|_| tempfile::tempdir().unwrap());
+        let mut noise = Noise::new(1);
+        let _ = killed(growing.path());
+        let file = growing.path().join(arrays::GROWING).join(arrays::OFFSETS.file_name());
+        assert_eq!(damaged_copies(growing.path(), &file, &mut noise), 0, "whole steps are read");
+        killed(packed.path()).pack(packed.path()).unwrap();
+        let refused = damaged_copies(packed.path(), &packed.path().join(arrays::PACKED), &mut noise);
+        assert!(refused > 600, "{refused}: the archive's own sums find most damage");
     }
 
     #[test]

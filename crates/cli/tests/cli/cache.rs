@@ -108,3 +108,32 @@ fn runs_at_the_same_time_share_a_cache() {
     assert!(recording(&out(0)) == recording(&out(1)) && recording(&out(0)) == recording(&out(2)));
     assert_eq!(files(&cache.join("walls")).len(), 2);
 }
+
+#[test]
+fn a_matrix_of_insertions_has_the_same_rows_with_and_without_kept_walls() {
+    let folder = tempfile::tempdir().unwrap();
+    let (surfaces, cache) = (folder.path().join("surfaces"), folder.path().join("cache"));
+    std::fs::create_dir(&surfaces).unwrap();
+    std::fs::copy(assets().join("vessels/curved_tube.stl"), surfaces.join("tube.stl")).unwrap();
+    std::fs::write(surfaces.join("tube.toml"), "length_mm = 8.0\n").unwrap();
+    let rows = |more: &[&str]| {
+        let mut command = endowire();
+        command.args(["verify", "--json", "--cells", "step2 k100 turn0", "--surfaces"]).arg(&surfaces);
+        let output = command.args(more).env("ENDOWIRE_CACHE", &cache).output().unwrap();
+        assert!(output.status.success(), "{}", said(&output));
+        let mut document: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        for cell in document["cells"].as_array_mut().unwrap() {
+            let cell = cell.as_object_mut().unwrap();
+            cell.retain(|key, _| !["setup_s", "total_s", "median_ms", "slowest_ms"].contains(&key.as_str()));
+        }
+        assert!(document["cells"].as_array().unwrap().len() > 1);
+        document["cells"].take()
+    };
+    let first = rows(&["--no-cache"]);
+    assert!(!cache.exists(), "nothing was to be kept");
+    assert_eq!(rows(&[]), first);
+    let kept = files(&cache.join("walls"));
+    assert_eq!(kept.len(), 2, "the repaired surface and its even mesh");
+    assert_eq!(rows(&[]), first);
+    assert_eq!(files(&cache.join("walls")), kept);
+}

@@ -28,7 +28,7 @@ pub fn extended(wall: &Wall, radius_mm: f64) -> SurfaceMesh {
         if opening.radius_mm > radius_mm {
             extend(&mut mesh, opening);
         } else {
-            close(&mut mesh, opening);
+            opening.close(&mut mesh);
         }
     }
     mesh
@@ -86,13 +86,6 @@ fn ellipse(line: &[Vec3]) -> Vec<Vec3> {
         // A triangle without an area.
         None => line.to_vec(),
     }
-}
-
-fn close(mesh: &mut SurfaceMesh, opening: &Opening) {
-    let centre = mesh.vertices_mm.len() as u32;
-    mesh.vertices_mm.push(opening.centre_mm);
-    let next = opening.boundary.iter().cycle().skip(1);
-    mesh.triangles.extend(opening.boundary.iter().zip(next).map(|(&a, &b)| [a, b, centre]));
 }
 
 /// The opening beyond whose plane `x` lies, within its extension.

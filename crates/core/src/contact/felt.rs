@@ -10,11 +10,10 @@ use super::grading::{Grading, Stiffness};
 use super::point::{FOLLOW, LOOK_AGAIN};
 use super::properties::WallProperties;
 use super::{Distance, SmoothWall};
-use crate::device::Device;
-use crate::vessel::{Conditioning, NoStore, Wall, WallQuery, WallRecipe, WallStore};
+use crate::vessel::{Conditioning, Wall, WallQuery, WallRecipe, WallStore};
 use crate::{Result, Vec3};
 
-/// A wall prepared for the contact of one device.
+/// A wall prepared for the contact of devices.
 #[derive(Debug, Clone)]
 pub struct FeltWall {
     /// Its smooth distance.
@@ -47,32 +46,11 @@ fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) 
 }
 
 impl FeltWall {
-    /// Prepares `wall` for `device`.
+    /// Prepares `wall` for devices of this smallest and largest radius, mm, with its even mesh from `store`.
     ///
     /// # Errors
     /// A wall that has no triangles left to query.
-    pub fn new(wall: &Wall, device: &Device, properties: &WallProperties) -> Result<Self> {
-        Self::from_store(wall, device, properties, &NoStore)
-    }
-
-    /// As [`FeltWall::new`], with the even mesh from `store`.
-    ///
-    /// # Errors
-    /// As [`FeltWall::new`].
-    pub fn from_store(
-        wall: &Wall,
-        device: &Device,
-        properties: &WallProperties,
-        store: &dyn WallStore,
-    ) -> Result<Self> {
-        Self::for_radii(wall, (device.min_radius_mm(), device.max_radius_mm()), properties, store)
-    }
-
-    /// As [`FeltWall::from_store`], for devices of this smallest and largest radius, mm.
-    ///
-    /// # Errors
-    /// As [`FeltWall::new`].
-    pub fn for_radii(
+    pub fn new(
         wall: &Wall,
         (thinnest_mm, thickest_mm): (f64, f64),
         properties: &WallProperties,

@@ -2,9 +2,8 @@
 
 use super::felt::FeltWall;
 use crate::Vec3;
-use crate::device::Device;
 use crate::insertion::WallProperties;
-use crate::vessel::{SurfaceMesh, Wall};
+use crate::vessel::{NoStore, SurfaceMesh, Wall};
 
 /// Distances from the crest at which the flanks have vertices, mm: edges grow by a half from one to the next.
 const ROWS: [f64; 7] = [0.0, 0.45, 1.1, 2.1, 3.6, 5.6, 7.6];
@@ -35,9 +34,8 @@ fn ridge() -> Wall {
 }
 
 fn felt() -> FeltWall {
-    let device = Device::uniform(100.0, 0.2, 10.0).unwrap();
     let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
-    FeltWall::new(&ridge(), &device, &properties).unwrap()
+    FeltWall::new(&ridge(), (0.2, 0.2), &properties, &NoStore).unwrap()
 }
 
 /// Points up to a millimetre above the crest and the upper flanks.

@@ -163,6 +163,7 @@ fn a_file_of_sections_is_a_file_of_parts() {
 }
 
 #[test]
+#[allow(clippy::too_many_lines, reason = "a table of faults and what is said of them")]
 fn what_is_wrong_is_named_by_file_part_key_and_value() {
     let out_of_range = "must be a number above 0 and at most";
     for (from, to, told) in [

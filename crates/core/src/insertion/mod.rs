@@ -2,22 +2,18 @@
 
 mod batch;
 mod builder;
-mod command;
 mod nodes;
-mod report;
 mod script;
-mod sheath;
 mod simulation;
 
 pub use crate::contact::{Contact, WallProperties, WallRegion};
-pub use crate::methods::State;
+pub use crate::methods::{
+    Command, Energy, InstrumentReport, LateralForce, Move, Sheath, State, StepReport, Surroundings,
+};
 pub use batch::Batch;
 pub use builder::SimulationBuilder;
-pub use command::{Command, Move};
 pub use nodes::nodes_from_tip;
-pub use report::{Energy, InstrumentReport, LateralForce, StepReport};
 pub use script::{
     LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until, script_commands,
 };
-pub use sheath::Sheath;
-pub use simulation::{Simulation, Surroundings};
+pub use simulation::Simulation;

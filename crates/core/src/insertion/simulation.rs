@@ -2,30 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::contact::Counters;
+use crate::contact::{Counters, WallProperties};
 use crate::device::{Device, LENGTH_SLACK_MM, Stack};
-use crate::insertion::{Command, LateralForce, Move, Sheath, SimulationBuilder, StepReport, WallProperties};
-use crate::methods::{Method, State};
+use crate::insertion::SimulationBuilder;
+use crate::methods::{Command, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings};
 use crate::shape::Shape;
 use crate::vessel::{Wall, WallQuery};
 use crate::{Error, Result};
-
-/// What surrounds a method's unknowns: it may read all of it and change none.
-#[derive(Clone, Copy)]
-pub struct Surroundings<'a> {
-    /// The vessel.
-    pub wall: &'a Wall,
-    /// How the vessel's wall yields and rubs.
-    pub properties: &'a WallProperties,
-    /// Distance queries to the vessel wall.
-    pub query: &'a WallQuery,
-    /// Where the device comes from.
-    pub sheath: &'a Sheath,
-    /// The device; of several instruments the innermost.
-    pub device: &'a Device,
-    /// All instruments.
-    pub stack: &'a Stack,
-}
 
 /// An insertion under way.
 ///

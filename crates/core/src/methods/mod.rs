@@ -1,20 +1,44 @@
-//! Whole methods that answer a command with the next equilibrium, behind one trait.
+//! Whole methods that answer a command with the next equilibrium, behind one trait: what surrounds them, what they are told, and what
+//! they tell.
 
+mod command;
 pub mod kirchhoff;
+mod report;
+mod sheath;
 mod state;
 
+pub use command::{Command, Move};
+pub use report::{Energy, InstrumentReport, LateralForce, StepReport};
+pub use sheath::Sheath;
 pub use state::{ChainState, Content, NodesState, State, TouchedPlane, check_inserted};
 
 use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::Counters;
-use crate::insertion::{Command, LateralForce, Move, StepReport, Surroundings};
+use crate::contact::{Counters, WallProperties};
+use crate::device::{Device, Stack};
 use crate::shape::Shape;
-use crate::vessel::WallStore;
+use crate::vessel::{Wall, WallQuery, WallStore};
 use crate::{Error, Result};
 use kirchhoff::KirchhoffOptions;
+
+/// What surrounds a method's unknowns: it may read all of it and change none.
+#[derive(Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// The vessel.
+    pub wall: &'a Wall,
+    /// How the vessel's wall yields and rubs.
+    pub properties: &'a WallProperties,
+    /// Distance queries to the vessel wall.
+    pub query: &'a WallQuery,
+    /// Where the device comes from.
+    pub sheath: &'a Sheath,
+    /// The device; of several instruments the innermost.
+    pub device: &'a Device,
+    /// All instruments.
+    pub stack: &'a Stack,
+}
 
 /// A method keeps its own unknowns from step to step and moves them by commands.
 ///

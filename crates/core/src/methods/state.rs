@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::kirchhoff::KirchhoffState;
 use crate::device::Device;
-use crate::insertion::StepReport;
+use crate::methods::StepReport;
 use crate::shape::Shape;
 use crate::{Error, Result, Vec3};
 

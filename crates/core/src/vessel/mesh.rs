@@ -102,3 +102,12 @@ pub(crate) fn inward_vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
     }
     normals
 }
+
+/// Keeps what `keep` says, in its order, by its number in the list and what it is.
+pub(super) fn retain_numbered<T>(list: &mut Vec<T>, keep: impl Fn(usize, &T) -> bool) {
+    let mut next = 0;
+    list.retain(|one| {
+        next += 1;
+        keep(next - 1, one)
+    });
+}

@@ -41,6 +41,14 @@ impl Opening {
         let at = |k: usize| mesh.vertices_mm[self.boundary[k % self.boundary.len()] as usize];
         (0..self.boundary.len()).map(move |k| [at(k), at(k + 1), self.centre_mm])
     }
+
+    /// Adds that fan to the mesh whose opening it is; it shares the loop's vertices.
+    pub(crate) fn close(&self, mesh: &mut SurfaceMesh) {
+        let centre = mesh.vertices_mm.len() as u32;
+        mesh.vertices_mm.push(self.centre_mm);
+        let next = self.boundary.iter().cycle().skip(1);
+        mesh.triangles.extend(self.boundary.iter().zip(next).map(|(&a, &b)| [a, b, centre]));
+    }
 }
 
 /// Boundary loops of a consistently oriented mesh.

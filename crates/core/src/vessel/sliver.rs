@@ -1,6 +1,7 @@
 //! Removing triangles without area, without opening slits.
 
 use super::SurfaceMesh;
+use super::mesh::retain_numbered;
 use super::topology::{EdgeTable, NONE};
 use crate::Vec3;
 
@@ -45,21 +46,13 @@ pub(crate) fn remove_degenerate(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> us
             }
             touched[index] = true;
         }
-        let mut index = 0;
-        mesh.triangles.retain(|t| {
-            index += 1;
-            !gone[index - 1] && !repeated(t)
-        });
+        retain_numbered(&mut mesh.triangles, |index, t| !gone[index] && !repeated(t));
         removed = before - mesh.triangles.len();
     }
     // What is left sits in knots of slivers that flips only pass around.
     let survivors: Vec<bool> =
         (0..mesh.triangles.len()).map(|i| !is_degenerate(&mesh.corners(i), tolerance_mm)).collect();
-    let mut index = 0;
-    mesh.triangles.retain(|_| {
-        index += 1;
-        survivors[index - 1]
-    });
+    retain_numbered(&mut mesh.triangles, |index, _| survivors[index]);
     before - mesh.triangles.len()
 }
 

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
+use super::mesh::retain_numbered;
 use super::opening::{self, Opening};
 pub use super::topology::NONE as NO_NEIGHBOUR;
 use super::topology::{EdgeTable, EdgeUse, Edges};
@@ -237,12 +238,7 @@ impl Wall {
     /// The wall closed by a fan of triangles over each opening, sharing its vertices: for volumes and pictures.
     pub fn closed_mesh(&self) -> SurfaceMesh {
         let mut mesh = self.mesh.clone();
-        for opening in &self.openings {
-            let centre = mesh.vertices_mm.len() as u32;
-            mesh.vertices_mm.push(opening.centre_mm);
-            let next = opening.boundary.iter().cycle().skip(1);
-            mesh.triangles.extend(opening.boundary.iter().zip(next).map(|(&a, &b)| [a, b, centre]));
-        }
+        self.openings.iter().for_each(|opening| opening.close(&mut mesh));
         mesh
     }
 
@@ -329,11 +325,7 @@ pub(super) fn remove_duplicates(triangles: &mut Vec<[u32; 3]>, edges: &mut Edges
         keep[later] = false;
     }
     edges.changed();
-    let mut index = 0;
-    triangles.retain(|_| {
-        index += 1;
-        keep[index - 1]
-    });
+    retain_numbered(triangles, |index, _| keep[index]);
     before - triangles.len()
 }
 

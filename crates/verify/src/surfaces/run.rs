@@ -7,6 +7,7 @@ use endowire_core::insertion::{
     Command, ScriptLine, Simulation, StepReport, WallProperties, script_commands,
 };
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::vessel::WallStore;
 use endowire_core::{Error, PhysicalEnd, Result};
 
 /// How an insertion ended.
@@ -133,13 +134,14 @@ impl Cell {
         format!("{} {} {}", surface.name, surface.places[self.wire].wire.name(), self.name())
     }
 
-    fn simulation(&self, surface: &Surface) -> Result<Simulation> {
+    fn simulation(&self, surface: &Surface, store: &dyn WallStore) -> Result<Simulation> {
         let place = &surface.places[self.wire];
         let method = KirchhoffOptions { element_mm: self.element_mm, ..KirchhoffOptions::default() };
         let device = place.wire.device(surface.length_mm)?;
         Simulation::builder(surface.wall.clone(), device, place.sheath)
             .properties(self.properties())
             .method(&method)
+            .store(store)
             .build()
     }
 }
@@ -214,12 +216,20 @@ impl CellRow {
     }
 }
 
-/// Runs a cell. `clock` tells seconds since any moment; a cell that takes more than `limit_s` fails.
-pub fn run(surface: &Surface, cell: &Cell, limit_s: f64, clock: &dyn Fn() -> f64) -> CellRow {
+/// Runs a cell, with the wall that its wire feels from `store`. `clock` tells seconds since any moment; a cell that takes more than
+/// `limit_s` fails.
+pub fn run(
+    surface: &Surface,
+    cell: &Cell,
+    store: &dyn WallStore,
+    limit_s: f64,
+    clock: &dyn Fn() -> f64,
+) -> CellRow {
     let begun = clock();
     let mut row = CellRow::new(surface, cell);
     let mut times_ms = Vec::new();
-    insert(&mut row, &mut times_ms, surface, cell, (begun, limit_s), clock);
+    let simulation = cell.simulation(surface, store);
+    insert(&mut row, &mut times_ms, (surface, simulation), cell, (begun, limit_s), clock);
     times_ms.sort_by(f64::total_cmp);
     row.median_ms = times_ms.get(times_ms.len() / 2).copied().unwrap_or(0.0);
     row.slowest_ms = times_ms.last().copied().unwrap_or(0.0);
@@ -230,13 +240,12 @@ pub fn run(surface: &Surface, cell: &Cell, limit_s: f64, clock: &dyn Fn() -> f64
 fn insert(
     row: &mut CellRow,
     times_ms: &mut Vec<f64>,
-    surface: &Surface,
+    (surface, simulation): (&Surface, Result<Simulation>),
     cell: &Cell,
     (begun, limit_s): (f64, f64),
     clock: &dyn Fn() -> f64,
 ) {
-    let (mut simulation, list) = match cell
-        .simulation(surface)
+    let (mut simulation, list) = match simulation
         .and_then(|s| script_commands(&[cell.script(surface)], s.device()).map(|list| (s, list)))
     {
         Ok(ready) => ready,
@@ -283,7 +292,7 @@ mod tests {
     use super::*;
     use crate::crossing::CrossingTest;
     use crate::surfaces::{cells, surfaces_in};
-    use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
+    use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, Wall, anatomy};
 
     fn tube(sidecar: &str, closed: bool) -> Surface {
         let made =
@@ -292,12 +301,13 @@ mod tests {
         let mesh = if closed { made.wall.closed_mesh() } else { made.wall.mesh().clone() };
         mesh.write(&folder.path().join("tube.ply")).unwrap();
         std::fs::write(folder.path().join("tube.toml"), sidecar).unwrap();
-        Surface::read(&surfaces_in(folder.path()).unwrap()[0]).unwrap()
+        Surface::read(&surfaces_in(folder.path()).unwrap()[0], &NoStore).unwrap()
     }
 
     #[test]
     fn a_tube_is_gone_through_left_refused_or_too_slow() {
-        let row = |surface: &Surface, limit_s: f64| run(surface, &cells(1, false)[3], limit_s, &|| 0.5);
+        let row =
+            |surface: &Surface, limit_s: f64| run(surface, &cells(1, false)[3], &NoStore, limit_s, &|| 0.5);
         let surface = tube("length_mm = 30.0", false);
         assert_eq!((surface.places.len(), surface.skipped.len()), (2, 0));
         let arrived = row(&surface, 1.0);
@@ -326,7 +336,7 @@ mod tests {
         let start = "length_mm = 60.0\n[sheath]\nposition_mm = [0, 0, 1]\ndirection = [0, 0, 1]";
         let cell = cells(1, false)[3];
         let whole = tube(start, false);
-        let free = run(&whole, &cell, 1e9, &|| 0.0);
+        let free = run(&whole, &cell, &NoStore, 1e9, &|| 0.0);
         assert_eq!((free.ending, free.crossings, free.missing_mm), (Ending::Arrived, 0, 0.0));
         // A closed tube of 30 mm; the wire goes to 41 mm less what its tip bends back.
         let mut closed = whole.wall.closed_mesh();
@@ -336,7 +346,7 @@ mod tests {
             wall: Wall::from_surface(&closed).unwrap(),
             ..tube(start, false)
         };
-        let mut simulation = cell.simulation(&whole).unwrap();
+        let mut simulation = cell.simulation(&whole, &NoStore).unwrap();
         for (advance_mm, crossings) in [(25.0, 0), (15.0, 1)] {
             simulation.step(Command::advance(advance_mm)).unwrap();
             let mut row = CellRow::new(&checked, &cell);

@@ -61,7 +61,7 @@ mod tests {
     use crate::surfaces::{cells, surfaces_in};
     use endowire_core::insertion::script_commands;
     use endowire_core::scene::Scene;
-    use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
+    use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, anatomy};
 
     #[test]
     fn the_scene_of_a_cell_is_the_cell() {
@@ -69,7 +69,7 @@ mod tests {
             GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(2.0)).unwrap();
         let folder = tempfile::tempdir().unwrap();
         made.wall.mesh().write(&folder.path().join("tube.stl")).unwrap();
-        let surface = Surface::read(&surfaces_in(folder.path()).unwrap()[0]).unwrap();
+        let surface = Surface::read(&surfaces_in(folder.path()).unwrap()[0], &NoStore).unwrap();
         for cell in cells(surface.places.len(), false) {
             let path = folder.path().join("cell.toml");
             std::fs::write(&path, cell.scene(&surface).unwrap()).unwrap();

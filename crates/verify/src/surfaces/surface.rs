@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::crossing::CrossingTest;
 use endowire_core::insertion::Sheath;
-use endowire_core::vessel::{SurfaceMesh, Wall, WallQuery};
+use endowire_core::vessel::{SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore};
 use endowire_core::{Error, Result};
 
 use super::start::{Found, at_opening, inside};
@@ -50,13 +50,15 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Reads a surface and finds where the wires enter it.
+    /// Reads a surface, takes its wall from `store` and finds where the wires enter it.
     ///
     /// # Errors
     /// A file that cannot be read or repaired, a sheath that cannot be meant.
-    pub fn read(file: &SurfaceFile) -> Result<Self> {
+    pub fn read(file: &SurfaceFile, store: &dyn WallStore) -> Result<Self> {
         let mesh = SurfaceMesh::read(&file.path, file.unit_mm)?;
-        let wall = Wall::from_surface(&mesh).map_err(|e| Error::content(&file.path, e.to_string()))?;
+        let wall = store
+            .wall(&WallRecipe::Repaired { surface: &mesh })
+            .map_err(|e| Error::content(&file.path, e.to_string()))?;
         let (low, high) = wall.mesh().bounds_mm().unwrap_or_default();
         let size_mm = (high - low).amax();
         let mut surface = Self {

@@ -10,8 +10,8 @@ use endowire_core::Vec3;
 use crate::c_arm::CArm;
 use crate::cpu::devices::pixels_of;
 use crate::cpu::piece::chord;
+use crate::device::Piece;
 use crate::output::Mask;
-use crate::piece::Piece;
 
 /// Rays across a pixel.
 const RAYS: u32 = 8;

@@ -8,7 +8,7 @@ use crate::c_arm::CArm;
 use crate::cpu::piece::chord;
 use crate::cpu::raster::span;
 use crate::device::{DevicePoint, Layer, RefinedDevice};
-use crate::piece::{Piece, pieces};
+use crate::device::{Piece, pieces};
 
 /// The frusta of each layer of a device in beam coordinates (columns, rows, depth from the isocentre), with the signs of their
 /// lengths. Those that are not between source and detector throw no shadow: a device may go where the C-arm does not look.

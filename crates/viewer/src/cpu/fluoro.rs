@@ -6,8 +6,8 @@ use endowire_core::vessel::SurfaceMesh;
 use crate::c_arm::CArm;
 use crate::cpu::devices::cast;
 use crate::cpu::wall::wall_path_mm;
-use crate::fluoro::PathEngine;
-use crate::piece::Piece;
+use crate::device::Piece;
+use crate::engine::PathEngine;
 
 /// Casts rays one after the other.
 #[derive(Debug)]

@@ -15,23 +15,21 @@ pub(crate) use devices::pixels_of;
 pub(crate) use fluoro::CpuPaths;
 pub(crate) use wall::{check_closed, check_drawable, wall_crossings};
 
-use crate::renderer::{Engines, ThreeDEngine};
-use crate::scene::Setup;
+use endowire_core::vessel::SurfaceMesh;
+
+use crate::engine::{Engines, ThreeDEngine};
+use crate::three_d::Camera;
 use view3d::CpuView3d;
 
 /// What the CPU is called for people.
 pub(crate) const NAME: &str = "CPU reference";
 
-/// Prepares the fluoroscopic view of `setup`; the 3D view is made with the first frame ([`three_d`]).
-pub(crate) fn engines(setup: &Setup) -> Engines {
-    Engines {
-        paths: setup.c_arm.is_some().then(|| Box::new(CpuPaths) as _),
-        three_d: None,
-        name: NAME.into(),
-    }
+/// Prepares the fluoroscopic view where it is wanted; the 3D view is made with the first frame ([`three_d`]).
+pub(crate) fn engines(fluoro: bool) -> Engines {
+    Engines { paths: fluoro.then(|| Box::new(CpuPaths) as _), three_d: None, name: NAME.into() }
 }
 
-/// The 3D view of `setup`, if that is wanted, with the picture of the wall.
-pub(crate) fn three_d(setup: &Setup) -> Option<Box<dyn ThreeDEngine>> {
-    setup.camera.as_ref().map(|camera| Box::new(CpuView3d::new(camera, &setup.wall)) as _)
+/// The 3D view with the picture of the wall.
+pub(crate) fn three_d(camera: &Camera, wall: &SurfaceMesh) -> Box<dyn ThreeDEngine> {
+    Box::new(CpuView3d::new(camera, wall))
 }

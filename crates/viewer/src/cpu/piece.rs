@@ -13,7 +13,7 @@
 
 use endowire_core::Vec3;
 
-use crate::piece::Piece;
+use crate::device::Piece;
 
 /// Below this share of D·D, A is taken as zero: the ray runs along the flank.
 const ALONG: f64 = 1e-13;
@@ -75,7 +75,7 @@ pub(crate) fn chord(piece: &Piece, origin: &Vec3, direction: &Vec3) -> f64 {
 mod tests {
     use super::*;
     use crate::device::DevicePoint;
-    use crate::piece::pieces;
+    use crate::device::pieces;
 
     fn rod(points: &[(f64, f64, f64, f64)]) -> Vec<Piece> {
         let points: Vec<DevicePoint> = points

@@ -3,13 +3,15 @@
 //! The wall's fragments are made once and kept per sample. A frame draws the devices with a depth buffer and
 //! composes anew only where they are.
 
+use std::ops::Range;
+
 use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 use glam::{Vec3, Vec4};
 
 use crate::cpu::raster::ScreenTriangle;
+use crate::engine::ThreeDEngine;
 use crate::output::{Image, PixelFormat};
-use crate::renderer::ThreeDEngine;
 use crate::three_d::{Camera, Solids, Style, Vertex, solid_triangles, wall_triangles};
 
 /// Samples across a pixel: nine levels of edge smoothing.
@@ -79,9 +81,24 @@ impl CpuView3d {
             distance: vec![f32::INFINITY; samples],
             colour: vec![[0; 3]; samples],
         };
-        let [width, height] = camera.size_px.map(|n| n as usize);
-        view.still = (0..width * height).flat_map(|pixel| view.pixel(pixel)).collect();
+        view.still = view.still();
         view
+    }
+
+    /// The picture without devices. Where there is no wall every pixel is the same.
+    fn still(&self) -> Vec<u8> {
+        let [width, height] = self.camera.size_px.map(|n| n as usize);
+        let mut clear = None;
+        let mut still = Vec::with_capacity(4 * width * height);
+        for pixel in 0..width * height {
+            let mut rows = rows_of(pixel, width, self.sub as usize);
+            let rgba = match rows.all(|row| self.start(row.start) == self.start(row.end)) {
+                true => *clear.get_or_insert_with(|| self.pixel(pixel)),
+                false => self.pixel(pixel),
+            };
+            still.extend(rgba);
+        }
+        still
     }
 
     /// The finished pixel: the mean of its samples.
@@ -94,6 +111,11 @@ impl CpuView3d {
         [r, g, b, 255]
     }
 
+    /// Where the fragments of a sample begin, those of the one before end.
+    fn start(&self, sample: usize) -> usize {
+        if sample == 0 { 0 } else { self.ends[sample - 1] as usize }
+    }
+
     fn sample(&self, sample: usize) -> Vec3 {
         let nearest = self.distance[sample];
         let opaque = if nearest.is_finite() {
@@ -101,9 +123,8 @@ impl CpuView3d {
         } else {
             self.style.background()
         };
-        let start = if sample == 0 { 0 } else { self.ends[sample - 1] as usize };
         let (mut sum, mut through) = (Vec4::ZERO, 1.0);
-        for fragment in &self.fragments[start..self.ends[sample] as usize] {
+        for fragment in &self.fragments[self.start(sample)..self.ends[sample] as usize] {
             if fragment.distance < nearest {
                 let [r, g, b, a] = fragment.rgba.map(from_byte);
                 sum += Vec4::new(r, g, b, 1.0) * (a * self.style.weight(fragment.distance));
@@ -146,10 +167,15 @@ impl ThreeDEngine for CpuView3d {
     }
 }
 
+/// The samples of a pixel, row by row.
+fn rows_of(pixel: usize, width: usize, sub: usize) -> impl Iterator<Item = Range<usize>> {
+    let first = pixel / width * sub * width * sub + pixel % width * sub;
+    (0..sub).map(move |row| first + row * width * sub).map(move |first| first..first + sub)
+}
+
 /// The samples of a pixel.
 fn samples_of(pixel: usize, width: usize, sub: usize) -> impl Iterator<Item = usize> {
-    let first = pixel / width * sub * width * sub + pixel % width * sub;
-    (0..sub * sub).map(move |k| first + k / sub * width * sub + k % sub)
+    rows_of(pixel, width, sub).flatten()
 }
 
 /// Which triangles are drawn.
@@ -190,9 +216,27 @@ fn draw(
 }
 
 fn to_byte(value: f32) -> u8 {
-    (value.clamp(0.0, 1.0) * 255.0).round() as u8
+    let level = value.clamp(0.0, 1.0) * 255.0;
+    // Rounded half up without the call that `round` is on processors of old; what is left is exact.
+    let below = level as u8;
+    below + u8::from(level - f32::from(below) >= 0.5)
 }
 
 fn from_byte(value: u8) -> f32 {
     f32::from(value) / 255.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_rounded_to_the_nearest() {
+        let edges = (0..255).map(|k| (k as f32 + 0.5) / 255.0);
+        let around = edges.flat_map(|v| [v.next_down(), v, v.next_up()]);
+        for value in around.chain([-1.0, 0.0, 1.0, 2.0, 0.499_999_97 / 255.0]) {
+            assert_eq!(to_byte(value), (value.clamp(0.0, 1.0) * 255.0).round() as u8, "{value}");
+        }
+        assert_eq!(to_byte(f32::NAN), 0);
+    }
 }

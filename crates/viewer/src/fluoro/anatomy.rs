@@ -4,11 +4,11 @@ use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 use rayon::prelude::*;
 
-use super::PathEngine;
 use crate::c_arm::CArm;
+use crate::engine::PathEngine;
+use crate::material::Material;
 use crate::patient::{Body, Patient};
 use crate::scene::Setup;
-use crate::xray::Material;
 
 /// Fewest rows worth handing to another thread.
 const FEWEST_ROWS: usize = 16;

@@ -5,8 +5,8 @@ use endowire_core::{Result, Vec3};
 use crate::c_arm::CArm;
 use crate::cpu::{Coverage, layers_in_beam};
 use crate::device::{DeviceView, RefinedDevice};
+use crate::material::Material;
 use crate::output::{ContactLabel, DeviceLabel, Image, Labels, Mask, PartLabel, PixelFormat};
-use crate::xray::Material;
 
 /// Labels of a frame of `devices`; those without a material of their own are made of `material`.
 ///

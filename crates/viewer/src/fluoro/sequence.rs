@@ -4,8 +4,9 @@ use endowire_core::Result;
 
 use super::display::{Window, fitted, logarithm, picture};
 use super::scatter::shading;
-use super::{Fluoroscope, PathEngine, Signal};
+use super::{Fluoroscope, Signal};
 use crate::device::RefinedDevice;
+use crate::engine::PathEngine;
 use crate::output::Image;
 use crate::spec::{Mode, ViewSpec};
 use crate::xray::Detector;

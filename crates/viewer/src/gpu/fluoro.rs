@@ -17,9 +17,9 @@ use endowire_core::vessel::SurfaceMesh;
 
 use crate::c_arm::CArm;
 use crate::cpu::pixels_of;
-use crate::fluoro::PathEngine;
+use crate::device::Piece;
+use crate::engine::PathEngine;
 use crate::gpu::context::{Gpu, color_pass};
-use crate::piece::Piece;
 
 const PATH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
 

@@ -4,8 +4,8 @@ mod context;
 mod fluoro;
 mod view3d;
 
+use crate::engine::Engines;
 use crate::fluoro::SUBRAYS;
-use crate::renderer::Engines;
 use crate::scene::Setup;
 use context::Gpu;
 use fluoro::GpuPaths;

@@ -3,9 +3,9 @@
 use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 
+use crate::engine::ThreeDEngine;
 use crate::gpu::context::{Gpu, attachment, color_pass};
 use crate::output::{Image, PixelFormat};
-use crate::renderer::ThreeDEngine;
 use crate::three_d::{Camera, Solids, Style, Vertex, solid_triangles, wall_triangles};
 
 /// The only count every adapter has.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{Image, Mask};
-use crate::xray::Material;
+use crate::material::Material;
 
 /// Labels of one fluoroscopic frame. Pixel coordinates are those of [`crate::CArm::project`], lengths are in mm in patient axes.
 #[derive(Debug, Clone, PartialEq, Serialize)]

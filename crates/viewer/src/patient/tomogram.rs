@@ -38,8 +38,15 @@ fn materials(hu: f32) -> [f32; 2] {
     [(1.0 + SOFT_HU / 1000.0) * (1.0 - bone).max(0.0), bone]
 }
 
-/// Refuses a volume that memory may not hold.
+/// Refuses a volume that memory may not hold, and one whose header contradicts itself about the size of a voxel.
 fn check_size(header: &NiftiHeader) -> std::result::Result<(), String> {
+    let bits = header.data_type().map_or(header.bitpix, |kind| 8 * kind.size_of() as i16);
+    if header.bitpix != bits {
+        return Err(format!(
+            "says bitpix = {} of voxels that have {bits} bits; mend its header",
+            header.bitpix
+        ));
+    }
     let dims = usize::from(header.dim[0]).clamp(1, 7);
     let voxels = header.dim[1..=dims].iter().fold(1_u64, |product, n| product.saturating_mul(u64::from(*n)));
     if voxels <= MOST_VOXELS {
@@ -95,7 +102,9 @@ impl Volume {
             for y in 0..ny {
                 for x in 0..nx {
                     let place: Vec<u16> = [x, y, z].iter().chain(extra).copied().collect();
-                    let hu = volume.get_f32(&place).map_err(|e| bad(e.to_string()))?;
+                    let hu = volume
+                        .get_f32(&place)
+                        .map_err(|e| bad(format!("voxel [{x}, {y}, {z}] cannot be read: {e}")))?;
                     if !hu.is_finite() {
                         return Err(bad(format!("voxel [{x}, {y}, {z}] is {hu}")));
                     }
@@ -351,6 +360,10 @@ mod tests {
             assert!((volume.voxels[0][0] - 0.8).abs() < 1e-6 && (volume.voxels[4][0] - 1.0).abs() < 1e-6);
             assert!((volume.value([0.0, 0.0, 0.5])[0] - 0.9).abs() < 1e-6);
         }
+        let mut contradicting = file(4, &short);
+        contradicting[72] = 8;
+        std::fs::write(&path, contradicting).unwrap();
+        assert!(Volume::read(&spec).unwrap_err().to_string().contains("bitpix = 8 of voxels that have 16"));
         std::fs::write(&path, &file(4, &short)[..200]).unwrap();
         assert!(Volume::read(&spec).unwrap_err().to_string().contains("NIfTI"));
         let poisoned: Vec<u8> = (0..8).flat_map(|_| f32::NAN.to_le_bytes()).collect();

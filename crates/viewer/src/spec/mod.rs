@@ -236,7 +236,7 @@ fn finite_within(key: &str, value: f64, [low, high]: [f64; 2]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::xray::Material;
+    use crate::material::Material;
 
     fn parse(text: &str) -> std::result::Result<ViewSpec, String> {
         toml::from_str(text).map_err(|e: toml::de::Error| e.to_string())

@@ -4,7 +4,7 @@ use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 use super::finite_within;
-use crate::xray::Material;
+use crate::material::Material;
 
 /// What the fluoroscopic view shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize)]

@@ -6,8 +6,8 @@ use endowire_core::Vec3;
 
 use crate::c_arm::CArm;
 use crate::device::RefinedDevice;
+use crate::material::Material;
 use crate::three_d::{Camera, Vertex};
-use crate::xray::Material;
 
 /// Corners of a cross section.
 const SIDES: usize = 14;

@@ -22,7 +22,7 @@ use endowire_core::Result;
 use super::exp::{LANES, exp_lanes};
 use super::quadrature::gauss;
 use super::spectrum::Spectrum;
-use super::{Material, table::ATTENUATION};
+use crate::material::{Material, table::ATTENUATION};
 use crate::spec::XRaySpec;
 
 /// Least share of the signal that a stretch between edges must carry to get nodes of its own.

@@ -4,15 +4,12 @@ mod beam;
 mod blur;
 mod detector;
 mod exp;
-mod material;
 mod noise;
 mod path;
 mod quadrature;
 mod spectrum;
-mod table;
 
 pub(crate) use beam::{Beam, Lanes};
 pub(crate) use detector::Detector;
 pub(crate) use exp::{LANES, ln_lanes};
-pub use material::Material;
 pub use path::PathLengths;

@@ -1,6 +1,6 @@
 //! Path length maps: the geometry of a fluoroscopic frame before any physics.
 
-use crate::xray::Material;
+use crate::material::Material;
 
 /// Length of each pixel's central ray inside each thing, in millimetres, row by row from the top left.
 ///

@@ -2,8 +2,8 @@
 
 use endowire_core::{Error, Result};
 
-use super::Material;
-use super::table::{AIR, ANODE};
+use crate::material::Material;
+use crate::material::table::{AIR, ANODE};
 
 /// Photons by energy, normalised to one photon.
 #[derive(Debug, Clone, PartialEq)]

@@ -67,15 +67,6 @@ pub(crate) struct TruthNote {
     pub(crate) last_change_mm: Option<f64>,
 }
 
-/// Names of the cases, the unit of their errors, and the error at which speeds are compared.
-pub(crate) const CASES: [(&str, &str, f64); 5] = [
-    ("cantilever-1", "L", 1e-4),
-    ("cantilever-10", "L", 1e-4),
-    ("soft-tube", "mm", 0.1),
-    ("curved-tube", "mm", 0.1),
-    ("arch", "mm", 0.1),
-];
-
 /// Elements at the end of the insertion of the truth's mesh.
 const TRUTH_ELEMENTS: usize = 400;
 

@@ -19,7 +19,8 @@ use crate::args::CompareArgs;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, progress, to_json};
-use case::{CASES, Case, TruthNote};
+use crate::studies::CASES;
+use case::{Case, TruthNote};
 use front::Front;
 
 /// One measured cell.

@@ -4,7 +4,7 @@ mod camera;
 mod catalogue;
 mod deformation;
 mod looping;
-pub(crate) mod navigation;
+mod navigation;
 mod timing;
 
 use std::path::Path;

@@ -21,6 +21,7 @@ use crate::commands::compare::contender;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, progress};
+use crate::studies::{ARCH_TARGETS, HEPATIC_TARGETS, targets};
 
 /// An anatomy, its targets in the order of their rows in the centre-line table, and how its wall and wire are made.
 struct Anatomy {
@@ -36,7 +37,7 @@ struct Anatomy {
 const ANATOMIES: [Anatomy; 2] = [
     Anatomy {
         name: "aortic_arch",
-        targets: &["ascending aorta", "innominate", "left carotid", "left subclavian"],
+        targets: &ARCH_TARGETS,
         edge_mm: 2.25,
         radius_mm: 0.445,
         tip_curvature_per_mm: 0.06,
@@ -45,7 +46,7 @@ const ANATOMIES: [Anatomy; 2] = [
     },
     Anatomy {
         name: "hepatic",
-        targets: &["aorta", "splenic", "gastroduodenal", "right hepatic", "left hepatic"],
+        targets: &HEPATIC_TARGETS,
         edge_mm: 1.1,
         radius_mm: 0.25,
         tip_curvature_per_mm: 0.07,
@@ -98,7 +99,7 @@ pub(super) fn navigation(args: &NavigationArgs) -> Result<(), Failure> {
         return with_catalogue(args, folder);
     }
     let wanted = |target: &str| args.wants(target);
-    let asked = targets().into_iter().filter(|name| wanted(name)).count();
+    let asked = targets().filter(|name| wanted(name)).count();
     let bar = progress::bar(asked, "target");
     let (mut rows, mut frames) = (Vec::new(), Vec::new());
     for anatomy in ANATOMIES.iter().filter(|anatomy| anatomy.targets.iter().any(|name| wanted(name))) {
@@ -160,11 +161,6 @@ fn publish(args: &NavigationArgs, rows: Vec<Row>, frames: Vec<PathBuf>) -> Resul
         super::write(folder, "navigation", &document.rows, &document)?;
     }
     answer(&document, args.json, || table(&document.rows))
-}
-
-/// Names of all targets.
-pub(crate) fn targets() -> Vec<&'static str> {
-    ANATOMIES.iter().flat_map(|anatomy| anatomy.targets.iter().copied()).collect()
 }
 
 impl Row {

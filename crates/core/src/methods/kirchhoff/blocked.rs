@@ -7,7 +7,7 @@ use super::Environment;
 use super::configuration::Configuration;
 use super::workspace::Tools;
 use crate::contact::{FeltWall, WallContact};
-use crate::insertion::Command;
+use crate::methods::Command;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
 /// How far off the wall, in radii, ways across begin at most.

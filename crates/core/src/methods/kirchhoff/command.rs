@@ -12,7 +12,7 @@ use super::substep::{AT_REST, Attempt, Found, released_mj};
 use super::workspace::{Tools, Workspace};
 use crate::contact::extension::{LEAVE_MM, left_through};
 use crate::device::{Stack, line_mm};
-use crate::insertion::{InstrumentReport, Move, StepReport};
+use crate::methods::{InstrumentReport, Move, StepReport};
 use crate::vessel::Wall;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 

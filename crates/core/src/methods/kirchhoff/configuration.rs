@@ -6,7 +6,7 @@ use super::hands::Hand;
 use super::mesh::Mesh;
 use super::state::KirchhoffState;
 use crate::device::Stack;
-use crate::insertion::Surroundings;
+use crate::methods::Surroundings;
 
 /// What a sub-step ends with.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 
 use crate::contact::HandMotion;
 use crate::device::Stack;
-use crate::insertion::{Command, Move, StepReport};
+use crate::methods::{Command, Move, StepReport};
 
 /// Retracting to within this of the sheath, mm, is retracting to it.
 const ZERO_LENGTH_MM: f64 = 1e-9;

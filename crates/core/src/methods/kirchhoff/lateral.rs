@@ -22,7 +22,7 @@ use super::mesh::Mesh;
 use super::state::KirchhoffState;
 use crate::Vec3;
 use crate::device::{Stack, line_mm};
-use crate::insertion::LateralForce;
+use crate::methods::LateralForce;
 use crate::rod::element::ElementSystem;
 use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{Layout, RodState, element_system};

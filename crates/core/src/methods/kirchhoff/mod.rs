@@ -47,7 +47,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::{Counters, FeltWall};
 use crate::device::line_mm;
-use crate::insertion::{Command, LateralForce, Move, StepReport, Surroundings};
+use crate::methods::{Command, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
@@ -167,7 +167,7 @@ impl<const C: usize> Kirchhoff<C> {
         let mut state = KirchhoffState::at(surroundings);
         state.report.angles = Layout::<C>::ANGLES > 0;
         let Surroundings { wall, properties, stack, .. } = *surroundings;
-        let felt = FeltWall::for_radii(wall, stack.radii_mm(), properties, store)?;
+        let felt = FeltWall::new(wall, stack.radii_mm(), properties, store)?;
         let mut method = Self {
             options,
             felt: Arc::new(felt),

@@ -9,7 +9,7 @@ use super::workspace::Tools;
 use crate::contact::extension::left_through;
 use crate::contact::{HandMotion, WallContact};
 use crate::device::Stack;
-use crate::insertion::{Energy, Surroundings};
+use crate::methods::{Energy, Surroundings};
 use crate::rod::{Clamp, Layout};
 
 impl<const C: usize> Tools<C> {

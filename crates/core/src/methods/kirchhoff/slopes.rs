@@ -13,7 +13,7 @@ use super::mesh::Mesh;
 use crate::Vec3;
 use crate::contact::{ContactPoint, Touch};
 use crate::device::line_mm;
-use crate::insertion::InstrumentReport;
+use crate::methods::InstrumentReport;
 use crate::rod::{Clamp, RodState, element_energy};
 
 /// Step of the differences, as a part of the shortest element.

@@ -8,7 +8,7 @@ use super::hands::Hand;
 use super::repeat::Correction;
 use crate::contact::{FeltWall, KnownPoints, NormalForce};
 use crate::device::Stack;
-use crate::insertion::{InstrumentReport, Sheath, StepReport, Surroundings};
+use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
 use crate::rod::{Frame, RodState};
 use crate::{Error, Result, Vec3};
 

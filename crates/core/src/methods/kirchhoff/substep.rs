@@ -11,7 +11,7 @@ use super::workspace::Tools;
 use super::{Environment, meshed};
 use crate::contact::{SETTLED, WallContact};
 use crate::device::Stack;
-use crate::insertion::StepReport;
+use crate::methods::StepReport;
 use crate::rod::Supports;
 
 /// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, …

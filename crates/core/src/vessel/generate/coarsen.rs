@@ -11,6 +11,7 @@ use super::nets::Nets;
 use super::trim::{End, onto_rim};
 use super::{Field, project};
 use crate::vessel::SurfaceMesh;
+use crate::vessel::mesh::retain_numbered;
 use crate::vessel::topology::{EdgeTable, NONE};
 use crate::{Vec3, parallel};
 
@@ -153,11 +154,7 @@ impl Coarsener<'_> {
             info[a as usize] = Vertex { rim: rim_a.or(rim_b), target };
             count += 1;
         }
-        let mut index = 0;
-        mesh.triangles.retain(|_| {
-            index += 1;
-            !gone[index - 1]
-        });
+        retain_numbered(&mut mesh.triangles, |index, _| !gone[index]);
         count
     }
 

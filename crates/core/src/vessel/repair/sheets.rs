@@ -6,6 +6,7 @@
 //! vertices are doubled, nothing moves.
 
 use crate::Vec3;
+use crate::vessel::mesh::retain_numbered;
 use crate::vessel::topology::{DisjointSets, EdgeTable, EdgeUse, Edges};
 use crate::vessel::{SurfaceMesh, mesh};
 
@@ -109,11 +110,7 @@ impl Sheets {
         for candidates in [intruders, others] {
             let gone = self.spare(&candidates);
             let before = mesh.triangles.len();
-            let mut index = 0;
-            mesh.triangles.retain(|_| {
-                index += 1;
-                !gone[self.of[index - 1] as usize]
-            });
+            retain_numbered(&mut mesh.triangles, |index, _| !gone[self.of[index] as usize]);
             if mesh.triangles.len() < before {
                 return before - mesh.triangles.len();
             }
@@ -168,11 +165,7 @@ pub(super) fn prune(mesh: &mut SurfaceMesh) -> usize {
         if !any {
             return before - mesh.triangles.len();
         }
-        let mut index = 0;
-        mesh.triangles.retain(|_| {
-            index += 1;
-            !gone[index - 1]
-        });
+        retain_numbered(&mut mesh.triangles, |index, _| !gone[index]);
     }
 }
 

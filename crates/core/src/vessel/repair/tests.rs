@@ -8,6 +8,7 @@ use super::super::tests::steady;
 use super::super::*;
 use super::doubles;
 use crate::Vec3;
+use crate::vessel::mesh::retain_numbered;
 use crate::vessel::topology::EdgeTable;
 
 /// A forked vessel: three openings.
@@ -39,11 +40,7 @@ fn around(mesh: &SurfaceMesh, place: [f64; 3], reach: f64) -> Vec<usize> {
 
 fn without(mesh: &SurfaceMesh, gone: &[usize]) -> SurfaceMesh {
     let mut left = mesh.clone();
-    let mut index = 0;
-    left.triangles.retain(|_| {
-        index += 1;
-        !gone.contains(&(index - 1))
-    });
+    retain_numbered(&mut left.triangles, |index, _| !gone.contains(&index));
     left
 }
 

@@ -1,6 +1,8 @@
 //! Linear attenuation coefficients of what can be in the way of the rays.
 //!
-//! Values of xraylib 4.3 (see [`super::table`]) from 15 to 125 keV, K-edges included.
+//! Values of xraylib 4.3 (see [`table`]) from 15 to 125 keV, K-edges included.
+
+pub(crate) mod table;
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +10,7 @@ use std::str::FromStr;
 use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-use super::table::ATTENUATION;
+use table::ATTENUATION;
 
 /// What is in the way of the rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize)]

@@ -9,6 +9,8 @@
 //! A device is made of *parts*, tubes of one material over a stretch of arc length: a hollow catheter is its outer frustum minus
 //! its inner one, a marker band a ring around it.
 
+mod piece;
+
 use std::ops::Range;
 
 use endowire_core::device::Device;
@@ -16,8 +18,8 @@ use endowire_core::shape::Shape;
 use endowire_core::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::piece::Piece;
-use crate::xray::Material;
+use crate::material::Material;
+pub(crate) use piece::{Piece, pieces};
 
 /// Largest distance of a piece's chord from the curve, in radii.
 const SAGITTA: f64 = 0.04;
@@ -295,7 +297,6 @@ impl Layer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::piece::pieces;
 
     fn arc(radius: f64, degrees: f64, points: usize, wire: f64) -> DeviceView {
         let points = (0..points)

@@ -6,7 +6,7 @@
 
 use endowire_core::Vec3;
 
-use crate::device::DevicePoint;
+use super::DevicePoint;
 
 /// A frustum between two mitre planes.
 #[derive(Debug, Clone, Copy, PartialEq)]

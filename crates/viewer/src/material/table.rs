@@ -7,8 +7,8 @@ use std::sync::LazyLock;
 
 /// Values by energy: one column for each name.
 #[derive(Debug)]
-pub(super) struct Table {
-    pub(super) energies_kev: Vec<f64>,
+pub(crate) struct Table {
+    pub(crate) energies_kev: Vec<f64>,
     names: Vec<&'static str>,
     /// Values of column c at energy e: `values[c][e]`.
     values: Vec<Vec<f64>>,
@@ -29,22 +29,22 @@ impl Table {
     }
 
     /// The column of that name.
-    pub(super) fn column(&self, name: &str) -> Option<&[f64]> {
+    pub(crate) fn column(&self, name: &str) -> Option<&[f64]> {
         self.names.iter().position(|n| *n == name).map(|i| self.values[i].as_slice())
     }
 
     /// Names of the columns.
-    pub(super) fn names(&self) -> &[&'static str] {
+    pub(crate) fn names(&self) -> &[&'static str] {
         &self.names
     }
 
     /// Lowest and highest energy.
-    pub(super) fn range_kev(&self) -> [f64; 2] {
+    pub(crate) fn range_kev(&self) -> [f64; 2] {
         [self.energies_kev[0], self.energies_kev[self.energies_kev.len() - 1]]
     }
 
     /// Value of `column` at an energy within [`Self::range_kev`], by a power law between the entries.
-    pub(super) fn at(&self, column: &[f64], energy_kev: f64) -> f64 {
+    pub(crate) fn at(&self, column: &[f64], energy_kev: f64) -> f64 {
         // The last entry not above the energy: at an edge, the upper one.
         let after = self.energies_kev.partition_point(|&e| e <= energy_kev);
         let i = after.clamp(1, self.energies_kev.len() - 1) - 1;
@@ -54,20 +54,20 @@ impl Table {
     }
 
     /// The K-edges: energies that stand twice.
-    pub(super) fn edges_kev(&self) -> Vec<f64> {
+    pub(crate) fn edges_kev(&self) -> Vec<f64> {
         self.energies_kev.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
     }
 }
 
 /// Linear attenuation coefficients in 1/cm.
-pub(super) static ATTENUATION: LazyLock<Table> =
+pub(crate) static ATTENUATION: LazyLock<Table> =
     LazyLock::new(|| Table::parse(include_str!("data/attenuation.csv")));
 
 /// Mass energy-absorption coefficient of dry air in cm²/g, by which dose is told in air kerma.
-pub(super) static AIR: LazyLock<Table> = LazyLock::new(|| Table::parse(include_str!("data/air.csv")));
+pub(crate) static AIR: LazyLock<Table> = LazyLock::new(|| Table::parse(include_str!("data/air.csv")));
 
 /// Photons of a tungsten anode in bins that end at K-edges, by peak voltage, unfiltered.
-pub(super) static ANODE: LazyLock<Table> =
+pub(crate) static ANODE: LazyLock<Table> =
     LazyLock::new(|| Table::parse(include_str!("data/tungsten_anode.csv")));
 
 #[cfg(test)]

@@ -1,0 +1,191 @@
+//! A run that goes on: its steps, and all that is kept of them.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use endowire_core::insertion::{Move, Script, ScriptRun, Simulation, Step};
+use endowire_core::methods::MethodChoice;
+use endowire_methods::Scene;
+use endowire_sweep::{RunOutcome, StepFailure};
+use indicatif::ProgressBar;
+
+use super::told::live;
+use crate::failure::Failure;
+use crate::output::frames::FrameWriter;
+use crate::output::provenance::Provenance;
+use crate::output::recorder::{Recorder, Summary};
+use crate::output::saved::{Course, Saver};
+
+/// The moves of a step and its time.
+type OwnStep = (Vec<Move>, Option<f64>);
+
+/// The moves of a step and its time, on their own.
+pub(super) fn own(step: Option<Step<'_>>) -> Option<OwnStep> {
+    step.map(|step| (step.moves.to_vec(), step.time_s))
+}
+
+/// What has come of a run.
+pub(super) struct SoFar<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) scene_file: &'a Path,
+    pub(super) script: &'a Script,
+    pub(super) provenance: Provenance,
+    pub(super) started: Instant,
+    pub(super) simulation: Simulation,
+    pub(super) hand: ScriptRun<'a>,
+    pub(super) frames: FrameWriter,
+    pub(super) course: Course,
+    pub(super) failure: Option<StepFailure>,
+}
+
+impl SoFar<'_> {
+    fn summary(&self, recorder: &Recorder) -> Summary {
+        let Course { converged, max_penetration_mm, step_time_s, .. } = self.course;
+        let steps = (recorder.steps(), self.script.len());
+        let so_far = (converged, max_penetration_mm);
+        let failure = self.failure.clone();
+        Summary {
+            provenance: self.provenance.clone(),
+            complete: false,
+            scene: self.scene.name.clone(),
+            scene_file: std::path::absolute(self.scene_file).unwrap_or_else(|_| self.scene_file.to_owned()),
+            method: self.scene.method.name(),
+            outcome: RunOutcome::new(&self.simulation, &self.hand, steps, so_far, failure),
+            step_time_s,
+            wall_time_s: self.started.elapsed().as_secs_f64(),
+            renderer: self.frames.renderer(),
+            frames: recorder.frames.clone(),
+        }
+    }
+
+    /// Notes that the step after so many was not done, or not recorded.
+    fn fail(&mut self, after: usize, reason: String) {
+        self.failure = Some(StepFailure { step: after + 1, reason });
+    }
+
+    /// Moves the instruments.
+    fn simulate(&mut self, moves: &[Move]) -> endowire_core::Result<()> {
+        let clock = Instant::now();
+        let result = self.simulation.step_together(moves);
+        self.course.step_time_s += clock.elapsed().as_secs_f64();
+        let report = result?;
+        self.course.max_penetration_mm = self.course.max_penetration_mm.max(report.max_penetration_mm);
+        self.course.converged &= report.converged;
+        self.hand.carried_out();
+        Ok(())
+    }
+
+    /// Draws what the scene wants to see of a step.
+    fn draw(&mut self, now: (usize, f64), last: bool, recorder: &mut Recorder) -> Result<(), Failure> {
+        let lengths_mm = self.simulation.report().lengths_mm();
+        self.frames.step(now, last, (self.simulation.shape(), &lengths_mm), recorder)
+    }
+}
+
+/// A run and where it is recorded.
+pub(super) struct Going<'a> {
+    pub(super) so_far: SoFar<'a>,
+    pub(super) recorder: Recorder,
+    pub(super) saver: Option<Saver>,
+    /// At the end of each step, s.
+    pub(super) times_s: Vec<f64>,
+    /// Whether a step was taken that could not be recorded.
+    pub(super) ahead: bool,
+}
+
+/// A run that has ended.
+pub(super) struct Ended {
+    pub(super) summary: Summary,
+    pub(super) simulation: Simulation,
+    /// Whether all that was recorded is written.
+    pub(super) written: Result<(), Failure>,
+}
+
+impl Going<'_> {
+    /// Writes what there is before the first step.
+    pub(super) fn begin(&mut self) -> Result<(), Failure> {
+        self.checkpoint()?;
+        self.save()
+    }
+
+    /// Carries out `next` and all steps after it, until one fails.
+    pub(super) fn carry_out(
+        &mut self,
+        mut next: Option<OwnStep>,
+        interrupted: &AtomicBool,
+        bar: &ProgressBar,
+    ) {
+        let mut jumps = 0;
+        while let Some(step) = next.take() {
+            if interrupted.load(Ordering::Relaxed) {
+                self.so_far.fail(self.so_far.course.steps, "interrupted before it".to_owned());
+                break;
+            }
+            let recorded = self.times_s.len();
+            next = self.step(step);
+            if self.times_s.len() > recorded {
+                let report = self.so_far.simulation.report();
+                jumps += usize::from(report.jumped);
+                bar.set_message(live(report, jumps));
+                bar.inc(1);
+            }
+        }
+    }
+
+    /// Carries out a step and records it; the next one, if there is one and nothing failed.
+    fn step(&mut self, (moves, time_s): OwnStep) -> Option<OwnStep> {
+        let before = self.so_far.course.steps;
+        if let Err(error) = self.so_far.simulate(&moves) {
+            self.so_far.fail(before, error.to_string());
+            return None;
+        }
+        let time_s = time_s.unwrap_or_else(|| self.so_far.frames.time_s(before + 1));
+        let next = match self.so_far.hand.next(&self.so_far.simulation) {
+            Ok(step) => own(step),
+            Err(error) => {
+                self.so_far.fail(before, error.to_string());
+                None
+            }
+        };
+        if let Err(error) = self.record(&moves, time_s, next.is_none()) {
+            self.so_far.fail(before, error.to_string());
+            self.ahead = self.recorder.steps() == before;
+            return None;
+        }
+        self.times_s.push(time_s);
+        next
+    }
+
+    fn record(&mut self, moves: &[Move], time_s: f64, last: bool) -> Result<(), Failure> {
+        self.recorder.record(moves, time_s, &self.so_far.simulation)?;
+        self.so_far.course.steps += 1;
+        self.so_far.draw((self.so_far.course.steps, time_s), last, &mut self.recorder)?;
+        self.checkpoint()?;
+        if self.saver.as_ref().is_some_and(Saver::is_due) { self.save() } else { Ok(()) }
+    }
+
+    fn checkpoint(&mut self) -> Result<(), Failure> {
+        let so_far = &self.so_far;
+        self.recorder.checkpoint(|recorder| so_far.summary(recorder))
+    }
+
+    fn save(&mut self) -> Result<(), Failure> {
+        let Some(saver) = &mut self.saver else { return Ok(()) };
+        let SoFar { simulation, script, hand, course, .. } = &self.so_far;
+        saver.save(simulation, (script, hand.course()), *course, || self.recorder.sync())
+    }
+
+    /// Writes what is not written yet.
+    pub(super) fn end(mut self) -> Ended {
+        let saved = if self.ahead { Ok(()) } else { self.save() };
+        if self.so_far.failure.is_some() && self.recorder.steps() > 0 {
+            // The picture of the end is a help; the first failure is the one to tell.
+            let now = (self.recorder.steps(), self.times_s.last().copied().unwrap_or_default());
+            let _ = self.so_far.draw(now, true, &mut self.recorder);
+        }
+        let mut summary = self.so_far.summary(&self.recorder);
+        let written = self.recorder.finish(&mut summary).and(saved).map_err(Failure::into_computation);
+        Ended { summary, simulation: self.so_far.simulation, written }
+    }
+}

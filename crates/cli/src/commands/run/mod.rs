@@ -1,0 +1,130 @@
+//! `endowire run`: a scripted insertion, recorded.
+
+mod going;
+mod told;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use endowire_core::insertion::Simulation;
+use endowire_methods::Scene;
+
+use crate::args::RunArgs;
+use crate::cache::Cache;
+use crate::failure::Failure;
+use crate::output::instruments::Lengths;
+use crate::output::progress;
+use crate::output::provenance::{Provenance, read_input};
+use crate::output::recorder::Recorder;
+use crate::output::recording::Recording;
+use crate::output::saved::{Course, Saved, Saver};
+use crate::output::{frames::FrameWriter, whole};
+use going::{Going, SoFar, own};
+
+/// Runs the scene's script and records every step.
+pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
+    let started = Instant::now();
+    let mut scene = Scene::read(&args.scene)?;
+    args.script.as_deref().map_or(Ok(()), |path| scene.take_script(path))?;
+    let scene = scene;
+    let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
+    let saved = args.resume.as_deref().map(Saved::read).transpose()?;
+    let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(in_scene)?;
+    if script.is_empty() {
+        let text = "script = []: give at least one [[script]] table, what the hand does".to_owned();
+        return Err(Failure::Input(text).at(args.scene.display()));
+    }
+    let mut simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
+    let saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
+    let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation))?;
+    let mut times_s = Vec::new();
+    let mut hand = match &saved {
+        Some(saved) => saved.restore(&scene, &mut simulation, &script, |step| {
+            times_s.push(step.time_s.unwrap_or_else(|| frames.time_s(times_s.len() + 1)));
+        })?,
+        None => script.begin(),
+    };
+    let next = own(hand.next(&simulation)?);
+    let mut inputs = vec![scene.text().as_bytes().to_vec()];
+    for path in scene.input_paths() {
+        inputs.push(read_input(&path)?);
+    }
+    let provenance = Provenance::new(&inputs, scene.seed);
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
+    let course = saved.map_or_else(Course::begin, |saved| saved.course());
+    let recorder = if args.resume.is_some() {
+        let (mut recorder, earlier) = Recorder::go_on(&folder, args.force, course.steps, &simulation)?;
+        let times = (times_s.as_slice(), next.is_none());
+        draw_again(&mut frames, earlier.as_ref(), (&folder, &simulation), times, &mut recorder)?;
+        recorder
+    } else {
+        let recorder = Recorder::new(&folder, args.force, simulation.stack())?;
+        if let Some(path) = &args.save_state {
+            forget_state(path)?;
+        }
+        recorder
+    };
+
+    // From here on something is recorded: whatever happens, it is kept.
+    let so_far = SoFar {
+        scene: &scene,
+        scene_file: &args.scene,
+        script: &script,
+        provenance,
+        started,
+        simulation,
+        hand,
+        frames,
+        course,
+        failure: None,
+    };
+    let mut going = Going { so_far, recorder, saver, times_s, ahead: false };
+    let interrupted = interrupts();
+    let bar = if args.quiet { progress::hidden() } else { progress::bar(script.len(), "step") };
+    bar.inc(course.steps as u64);
+    going.begin()?;
+    going.carry_out(next, &interrupted, &bar);
+    bar.finish_and_clear();
+    told::tell_end(args, &folder, going.end())
+}
+
+/// Removes the state of an earlier run: until this one has saved its own, there is none to go on from.
+fn forget_state(path: &Path) -> Result<(), Failure> {
+    whole::remove(path).map_err(|e| Failure::write(path, &e))
+}
+
+/// Draws the frames of a recording that goes on once more: the detector remembers those before. `times_s` are those of all steps so far.
+fn draw_again(
+    frames: &mut FrameWriter,
+    earlier: Option<&Recording>,
+    (folder, simulation): (&Path, &Simulation),
+    (times_s, ended): (&[f64], bool),
+    recorder: &mut Recorder,
+) -> Result<(), Failure> {
+    let Some(earlier) = earlier else { return Ok(()) };
+    let before = recorder.steps() - earlier.steps();
+    let lengths = Lengths::read(folder, simulation.stack())?;
+    for row in 1..=earlier.steps() {
+        let step = before + row;
+        let shape = earlier.shape(row);
+        let lengths_mm = lengths.after(step, &shape)?;
+        let last = ended && step == times_s.len();
+        frames.step((step, times_s[step - 1]), last, (&shape, &lengths_mm), recorder)?;
+    }
+    Ok(())
+}
+
+/// Set by Ctrl-C, or by a request to terminate: the step under way is finished and recorded. A second one ends at once.
+pub(crate) fn interrupts() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let heard = Arc::clone(&flag);
+    // Without a handler an interrupt ends the program at once, as elsewhere.
+    let _ = ctrlc::set_handler(move || {
+        if heard.swap(true, Ordering::Relaxed) {
+            std::process::exit(1);
+        }
+    });
+    flag
+}

@@ -1,0 +1,101 @@
+//! Where a C-arm is put, and how wide its pixels are.
+
+use endowire_core::vessel::SurfaceMesh;
+use endowire_core::{Error, Result, Vec3};
+
+use super::CArm;
+use crate::spec::{CArmSpec, PITCH_MM};
+
+/// Part of the half frame that the vessel fills where the pixel pitch is left to us.
+pub(super) const FILL: f64 = 0.92;
+impl CArm {
+    /// Places a C-arm; what `spec` leaves open is chosen so that `wall` fills the frame.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where the vessel does not lie between source and detector. `spec` must be valid.
+    pub(crate) fn new(spec: &CArmSpec, size_px: [u32; 2], wall: &SurfaceMesh) -> Result<Self> {
+        let (low, high) = wall.bounds_mm().ok_or_else(|| Error::Mesh("the wall has no vertices".into()))?;
+        let angles_deg = spec.angles_deg();
+        let [alpha, beta] = angles_deg.map(f64::to_radians);
+        let toward_left = Vec3::new(alpha.cos(), alpha.sin(), 0.0);
+        let detector = Vec3::new(alpha.sin(), -alpha.cos(), 0.0) * beta.cos() + Vec3::z() * beta.sin();
+        let down = -detector.cross(&toward_left);
+        let (sin, cos) = spec.rotation_deg.to_radians().sin_cos();
+        let mut arm = Self {
+            isocentre_mm: spec.isocentre_mm.map_or((low + high) / 2.0, Vec3::from),
+            axes: [toward_left * cos - down * sin, toward_left * sin + down * cos, detector],
+            sid_mm: spec.sid_mm,
+            sod_mm: spec.sod_mm,
+            pixel_mm: 1.0,
+            size_px,
+            angles_deg,
+            rotation_deg: spec.rotation_deg,
+            opening_px: None,
+        };
+        for vertex in &wall.vertices_mm {
+            arm.check_between(vertex)?;
+        }
+        let whole = match (spec.pixel_mm, spec.field_mm) {
+            (Some(pitch), _) => pitch,
+            (None, Some(field)) => field / f64::from(size_px[0].max(size_px[1])),
+            (None, None) => arm.fitting_pitch(wall)?,
+        };
+        arm.pixel_mm = whole / spec.magnification;
+        check_pitch(spec, size_px, arm.pixel_mm)?;
+        arm.opening_px = spec.collimation_mm.map(|sides| sides.map(|side| side / 2.0 / arm.pixel_mm));
+        Ok(arm)
+    }
+
+    /// The pitch at which a ball about the isocentre that holds the vessel fills the frame: the same from every side.
+    fn fitting_pitch(&self, wall: &SurfaceMesh) -> Result<f64> {
+        let squares = wall.vertices_mm.iter().map(|v| (v - self.isocentre_mm).norm_squared());
+        let radius_mm = squares.fold(0.0, f64::max).sqrt();
+        let refuse = |mend: &str| Err(Error::parameter("view.c_arm.pixel_mm", "absent", mend));
+        if radius_mm == 0.0 {
+            return refuse("the vessel has no extent to fit; give a pitch");
+        }
+        if radius_mm >= self.sod_mm {
+            return refuse(
+                "the vessel reaches as far from the isocentre as the source is, so no field holds it from every side; give a pitch",
+            );
+        }
+        // Rays that touch the ball leave the axis by its radius over √(SOD² − r²).
+        let half_mm = self.sid_mm * radius_mm / (self.sod_mm.powi(2) - radius_mm.powi(2)).sqrt();
+        let half_px = f64::from(self.size_px[0].min(self.size_px[1])) / 2.0 * FILL;
+        Ok(half_mm / half_px)
+    }
+
+    /// Refuses a point of the vessel that is not between source and detector.
+    fn check_between(&self, point_mm: &Vec3) -> Result<()> {
+        let beam = self.in_beam(point_mm);
+        if self.is_between(&beam) {
+            return Ok(());
+        }
+        let depth = self.sod_mm + beam.z;
+        let mend = format!(
+            "the vessel must lie between source and detector, but its point ({:.1}, {:.1}, {:.1}) mm is {depth:.1} mm from \
+             the source along the beam while the detector is at {} mm; mend the isocentre or the distances",
+            point_mm.x, point_mm.y, point_mm.z, self.sid_mm
+        );
+        Err(Error::parameter("view.c_arm.sod_mm", self.sod_mm, mend))
+    }
+}
+
+/// Refuses pixels beyond the range in which pictures can be computed, by the key that makes them so.
+fn check_pitch(spec: &CArmSpec, size_px: [u32; 2], pixel_mm: f64) -> Result<()> {
+    let [low, high] = PITCH_MM;
+    if (low..=high).contains(&pixel_mm) {
+        return Ok(());
+    }
+    let (key, value) = match (spec.pixel_mm, spec.field_mm) {
+        (Some(pitch), _) => ("pixel_mm", pitch.to_string()),
+        (None, Some(field)) => ("field_mm", field.to_string()),
+        (None, None) => ("pixel_mm", "absent".to_owned()),
+    };
+    let mend = format!(
+        "with {} pixels and magnification {} a pixel is {pixel_mm:e} mm wide at the detector; it must be {low} to {high} mm",
+        size_px[0].max(size_px[1]),
+        spec.magnification
+    );
+    Err(Error::parameter(format!("view.c_arm.{key}"), value, mend))
+}

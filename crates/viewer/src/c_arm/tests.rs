@@ -1,0 +1,122 @@
+use endowire_core::Vec3;
+use endowire_core::vessel::SurfaceMesh;
+
+use super::CArm;
+use super::place::FILL;
+use crate::spec::CArmSpec;
+
+fn arm(primary_deg: f64, secondary_deg: f64) -> CArm {
+    let wall = SurfaceMesh {
+        vertices_mm: vec![Vec3::new(-50.0, -40.0, -30.0), Vec3::new(50.0, 40.0, 30.0)],
+        triangles: vec![],
+    };
+    let spec = CArmSpec { primary_deg, secondary_deg, pixel_mm: Some(0.25), ..CArmSpec::default() };
+    CArm::new(&spec, [600, 400], &wall).unwrap()
+}
+
+#[test]
+fn at_zero_the_source_is_posterior_and_the_patients_left_is_right_on_screen() {
+    let arm = arm(0.0, 0.0);
+    assert!((arm.source_mm() - Vec3::new(0.0, 750.0, 0.0)).norm() < 1e-12);
+    assert_eq!(arm.project(&Vec3::zeros()), [300.0, 200.0]);
+    let [u, v] = arm.project(&Vec3::new(10.0, 0.0, 0.0));
+    assert!((u - 300.0 - 10.0 * 1100.0 / 750.0 / 0.25).abs() < 1e-9 && (v - 200.0).abs() < 1e-9);
+    let [u, v] = arm.project(&Vec3::new(0.0, 0.0, 10.0));
+    assert!((u - 300.0).abs() < 1e-9 && v < 200.0 - 10.0, "the head is up: {v}");
+}
+
+#[test]
+fn lao_moves_the_detector_to_the_left_and_cranial_to_the_head() {
+    assert!((arm(90.0, 0.0).source_mm() - Vec3::new(-750.0, 0.0, 0.0)).norm() < 1e-9);
+    let source = arm(0.0, 30.0).source_mm();
+    assert!(source.z < -370.0 && source.y > 0.0, "detector to the head, source to the feet: {source}");
+    // In LAO, what is anterior moves towards the patient's right, left on screen.
+    let [u, _] = arm(30.0, 0.0).project(&Vec3::new(0.0, -20.0, 0.0));
+    assert!(u < 300.0, "{u}");
+    // Cranial view: what is anterior moves down.
+    let [_, v] = arm(0.0, 30.0).project(&Vec3::new(0.0, -20.0, 0.0));
+    assert!(v > 200.0, "{v}");
+}
+
+#[test]
+fn a_rotation_turns_the_picture_clockwise_and_magnification_enlarges_it() {
+    let wall = SurfaceMesh {
+        vertices_mm: vec![Vec3::new(-50.0, -40.0, -30.0), Vec3::new(50.0, 40.0, 30.0)],
+        triangles: vec![],
+    };
+    let spec = CArmSpec {
+        rotation_deg: 90.0,
+        magnification: 2.0,
+        field_mm: Some(150.0),
+        collimation_mm: Some([30.0, 15.0]),
+        ..CArmSpec::default()
+    };
+    let arm = CArm::new(&spec, [600, 400], &wall).unwrap();
+    assert!((arm.pixel_mm() - 0.125).abs() < 1e-12);
+    // The head, up before, is to the right.
+    let [u, v] = arm.project(&Vec3::new(0.0, 0.0, 5.0));
+    assert!(u > 350.0 && (v - 200.0).abs() < 1e-9, "{u} {v}");
+    let point = Vec3::new(3.0, -4.0, 5.0);
+    let (origin, direction) = arm.ray(arm.project(&point));
+    assert!((point - origin).cross(&direction).norm() < 1e-10);
+    assert_eq!(arm.opening_px().unwrap(), [240.0, 120.0]);
+    assert!(arm.sees([300.0, 200.0]) && arm.sees([181.0, 141.0]) && !arm.sees([179.0, 200.0]));
+    let at = |x: usize, y: usize| arm.openness(y * 600 + x);
+    assert_eq!([at(300, 200), at(180, 200), at(179, 200), at(178, 200)], [1.0, 1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn nearer_to_the_source_is_larger() {
+    let arm = arm(0.0, 0.0);
+    let at = |y| arm.project(&Vec3::new(10.0, y, 0.0))[0] - 300.0;
+    assert!(at(30.0) > at(-30.0));
+}
+
+#[test]
+fn axes_are_orthonormal_and_rays_invert_projection() {
+    let arm = arm(-37.0, 22.0);
+    for i in 0..3 {
+        for j in 0..3 {
+            let expected = if i == j { 1.0 } else { 0.0 };
+            assert!((arm.axes[i].dot(&arm.axes[j]) - expected).abs() < 1e-14);
+        }
+    }
+    // Seen from the detector the picture is not mirrored: columns × (upwards) points to the viewer.
+    assert!((arm.axes[0].cross(&-arm.axes[1]) - arm.axes[2]).norm() < 1e-14);
+    let point = Vec3::new(12.0, -34.0, 25.0);
+    let (origin, direction) = arm.ray(arm.project(&point));
+    let off = (point - origin) - direction * (point - origin).dot(&direction);
+    assert!(off.norm() < 1e-10, "{off}");
+}
+
+#[test]
+fn left_alone_the_field_holds_the_vessel_and_is_the_same_from_every_side() {
+    let wall = SurfaceMesh {
+        vertices_mm: vec![Vec3::new(-50.0, -40.0, -30.0), Vec3::new(50.0, 40.0, 30.0)],
+        triangles: vec![],
+    };
+    let mut widest = 0.0_f64;
+    let mut pitches = Vec::new();
+    for primary_deg in (-180..180).step_by(5) {
+        for secondary_deg in (-90..=90).step_by(5) {
+            let [primary_deg, secondary_deg] = [primary_deg, secondary_deg].map(f64::from);
+            let spec = CArmSpec { primary_deg, secondary_deg, ..CArmSpec::default() };
+            let arm = CArm::new(&spec, [800, 600], &wall).unwrap();
+            pitches.push(arm.pixel_mm());
+            for [u, v] in wall.vertices_mm.iter().map(|vertex| arm.project(vertex)) {
+                widest = widest.max((u - 400.0).hypot(v - 300.0));
+            }
+        }
+    }
+    assert!(pitches.iter().all(|pitch| *pitch == pitches[0]));
+    assert!(widest <= 300.0 * FILL && widest > 0.99 * 300.0 * FILL, "{widest}");
+}
+
+#[test]
+fn a_vessel_beyond_the_source_or_the_detector_is_refused() {
+    let far =
+        SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::new(0.0, 2000.0, 0.0)], triangles: vec![] };
+    let spec = CArmSpec { isocentre_mm: Some([0.0; 3]), ..CArmSpec::default() };
+    let error = CArm::new(&spec, [64, 64], &far).unwrap_err().to_string();
+    assert!(error.contains("between source and detector"), "{error}");
+}

@@ -1,0 +1,39 @@
+//! What processors differ in: the two tasks that a graphics processor, or plain Rust, carries out.
+
+use endowire_core::Result;
+use endowire_core::vessel::SurfaceMesh;
+
+use crate::c_arm::CArm;
+use crate::device::Piece;
+use crate::output::Image;
+use crate::three_d::Solids;
+
+/// Computes lengths of rays inside things: the one task that processors differ in.
+pub(crate) trait PathEngine: Send {
+    /// Length inside a closed mesh of the central ray of each pixel of `view`, row by row.
+    fn mesh(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Vec<f32>>;
+
+    /// Adds the signed lengths inside frusta in beam coordinates to those of the pixels of `view`, and tells which it touched,
+    /// some perhaps repeatedly.
+    fn pieces(
+        &mut self,
+        view: &CArm,
+        pieces: &[(Piece, f64)],
+        lengths: &mut [f32],
+        touched: &mut Vec<u32>,
+    ) -> Result<()>;
+}
+
+/// Draws 3D frames of one set-up.
+pub(crate) trait ThreeDEngine: Send {
+    fn frame(&mut self, solids: &Solids) -> Result<Image>;
+}
+
+/// The engines of the wanted views, all on the same processor.
+pub(crate) struct Engines {
+    pub(crate) paths: Option<Box<dyn PathEngine>>,
+    /// That of the CPU is made with the first frame.
+    pub(crate) three_d: Option<Box<dyn ThreeDEngine>>,
+    /// Name for people.
+    pub(crate) name: String,
+}
