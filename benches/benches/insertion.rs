@@ -6,8 +6,8 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use endowire_core::contact::{FeltWall, SmoothWall};
-use endowire_core::device::Device;
-use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
+use endowire_core::device::{Device, Instrument, Section, Stack};
+use endowire_core::insertion::{Command, Move, Sheath, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, WallQuery, anatomy};
 use endowire_core::{Error, Result, Vec3};
@@ -95,6 +95,44 @@ fn steps(c: &mut Criterion) {
     }
 }
 
+/// A straight wire that leads by 4 mm in a straight catheter, 512 elements on the line, with these coefficients of friction between them and on the wall.
+fn wire_in_catheter([between, wall]: [f64; 2]) -> Result<Simulation> {
+    let made = vessel(20_000)?;
+    let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0)?;
+    let one = |name: &str, section: Section| -> Result<Instrument> {
+        Ok(Instrument { name: name.to_owned(), device: Device::new(vec![section])?, may_lead: true })
+    };
+    let catheter = Section { inner_radius_mm: Some(0.3), ..Section::straight(200.0, RADIUS_MM, 10.0) };
+    let both = vec![one("wire", Section::straight(230.0, 0.2, 10.0))?, one("catheter", catheter)?];
+    let stack = Stack::new(both)?.rubbing(vec![between, 0.0])?;
+    let method = KirchhoffOptions { element_mm: INSERTED_MM / 512.0, ..Default::default() };
+    let properties = WallProperties { friction: wall, ..Default::default() };
+    let mut simulation =
+        Simulation::builder(made.wall, stack, sheath).properties(properties).method(&method).build()?;
+    for k in 0..82 {
+        let command = Command::advance(INSERTED_MM / 80.0);
+        let moves = [0, 1].map(|instrument| Move { instrument, command });
+        simulation.step_together(&moves[..if k < 80 { 2 } else { 1 }])?;
+    }
+    Ok(simulation)
+}
+
+fn instruments(c: &mut Criterion) {
+    let mut group =
+        c.benchmark_group("a wire in a catheter 0.25 mm in and out, friction between and on the wall");
+    group.sample_size(10);
+    for frictions in [[0.0, 0.0], [0.15, 0.0], [0.15, 0.1]] {
+        let Ok(mut simulation) = wire_in_catheter(frictions) else { continue };
+        group.bench_function(BenchmarkId::from_parameter(format!("{frictions:?}")), |b| {
+            b.iter(|| {
+                let mut go = |command| simulation.step_together(&[Move { instrument: 0, command }]).is_ok();
+                go(Command::advance(0.25)) && go(Command::retract(0.25))
+            });
+        });
+    }
+    group.finish();
+}
+
 /// A clone as a search over commands makes it, and the state alone, which is taken back by `restore`.
 fn clones(c: &mut Criterion) {
     let Ok(simulation) = inserted(199, 0.1) else { return };
@@ -108,5 +146,5 @@ fn clones(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, queries, felt_walls, steps, clones);
+criterion_group!(benches, queries, felt_walls, steps, instruments, clones);
 criterion_main!(benches);

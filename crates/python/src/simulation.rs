@@ -235,8 +235,8 @@ impl Simulation {
     }
 
     /// What holds an instrument, and all that lies in it, on the line of those outside it: a dictionary of `force_n`, the force across the
-    /// line, shape (n, 3), `tension_n`, the axial force behind, and `friction_n` along the line towards the tip, shape (n,), at the points of
-    /// `positions_mm`; `length_mm` is the length that each of them stands for.
+    /// line, shape (n, 3), `tension_n`, the axial force behind, `friction_n` along the line towards the tip and `friction_nmm` about it, shape (n,), at the
+    /// points of `positions_mm`; `length_mm` is the length that each of them stands for.
     ///
     /// Raises InputError for an instrument that is not there.
     fn lateral_forces<'py>(&self, py: Python<'py>, instrument: usize) -> PyResult<Bound<'py, PyDict>> {
@@ -250,6 +250,7 @@ impl Simulation {
         told.set_item("force_n", points(py, forces.iter().map(|at| at.force_n))?)?;
         told.set_item("tension_n", list(|at| at.tension_n))?;
         told.set_item("friction_n", list(|at| at.friction_n))?;
+        told.set_item("friction_nmm", list(|at| at.friction_nmm))?;
         told.set_item("length_mm", list(|at| at.length_mm))?;
         Ok(told)
     }

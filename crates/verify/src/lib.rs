@@ -24,6 +24,7 @@ mod regions;
 mod spatial;
 pub mod stress;
 pub mod surfaces;
+mod turned_within;
 mod whip;
 
 use endowire_core::statics::{
@@ -239,6 +240,11 @@ pub const FAMILIES: &[Family] = &[
         id: "D8",
         title: "A wire in a catheter with play: the tilt where it comes out",
         run: clearance::clearance,
+    },
+    Family {
+        id: "D9",
+        title: "A wire turned and pushed in a bent catheter that rubs on it",
+        run: turned_within::turned,
     },
 ];
 

@@ -7,6 +7,7 @@ use super::studio::{Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
+use crate::output::folder::step_times;
 use crate::output::instruments::Lengths;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::recording::Recording;
@@ -63,10 +64,11 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let mut studio = Studio::new("render", &args.frames, seen, ViewChoice::Both, folder, steps.len())?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
+    let (times_s, frame_s) = (step_times(&args.dir)?, 1.0 / studio.frames_per_s());
     let bar = progress::bar(steps.len(), "frame");
     for &step in &steps {
         let contacts = recording.contacts(step);
-        let moment = Moment { frame: step as u64, time_s: step as f64 / studio.frames_per_s() };
+        let moment = Moment { frame: step as u64, time_s: time_s(&times_s, step, frame_s) };
         let shape = recording.shape(step);
         let inserted_mm = lengths.after(step, &shape)?;
         studio.draw(&Still {
@@ -80,4 +82,27 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     }
     bar.finish_and_clear();
     studio.finish()?.tell(args.frames.json)
+}
+
+/// When a step ended, s, in the time of its script. A run that was killed may have its last step in no row yet: it is taken to be as long as that before.
+fn time_s(rows: &[(usize, f64)], step: usize, frame_s: f64) -> f64 {
+    match rows.binary_search_by_key(&step, |(number, _)| *number) {
+        Ok(row) => rows[row].1,
+        Err(_) => match rows {
+            [.., (_, before), (number, last)] => last + (last - before) * (step - number) as f64,
+            _ => step as f64 * frame_s,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::time_s;
+
+    #[test]
+    fn steps_have_the_times_of_their_script() {
+        let rows = [(1, 0.5), (2, 1.0), (3, 1.25)];
+        assert_eq!([1, 2, 3, 4].map(|step| time_s(&rows, step, 0.1)), [0.5, 1.0, 1.25, 1.5]);
+        assert_eq!(time_s(&[], 1, 0.1), 0.1);
+    }
 }

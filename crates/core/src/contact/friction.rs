@@ -26,8 +26,10 @@
 //! Where a wall is smoother in some places than in others μ is the largest coefficient, and N the normal force times the
 //! part of it that acts where the point is: the coefficient of a place is lagged with its force.
 
+mod between;
 mod coupling;
 
+pub use between::{Between, Place, Rub};
 pub use coupling::Coupling;
 
 use nalgebra::Matrix3;
@@ -120,6 +122,8 @@ pub struct Friction {
     /// Energy that was taken before the points were anchored anew, mJ.
     taken_mj: f64,
     sliders: Vec<Slider>,
+    /// That between instruments.
+    pub(crate) between: Between,
 }
 
 /// What a hand does in a step.
@@ -254,8 +258,7 @@ impl Friction {
         if force == 0.0 {
             return 0.0;
         }
-        let (y, e) = (self.slip(index, x, angle, radius_mm).0.norm(), self.stick_mm);
-        force * if y >= e { y } else { y * y / e - y * y * y / (3.0 * e * e) + e / 3.0 }
+        force * phi(self.slip(index, x, angle, radius_mm).0.norm(), self.stick_mm)
     }
 
     /// Energy that friction has taken in the step, mJ.
@@ -289,12 +292,6 @@ impl Friction {
         self.taken_mj = taken_mj - self.dissipated_mj(elements, state, points);
     }
 
-    /// φ′/y and φ″ at a slip y.
-    fn rates(&self, y: f64) -> (f64, f64) {
-        let e = self.stick_mm;
-        if y >= e { (1.0 / y, 0.0) } else { (2.0 / e - y / (e * e), 2.0 / e - 2.0 * y / (e * e)) }
-    }
-
     /// Derivatives of a point's friction energy; `None` where nothing presses.
     pub fn derivatives(
         &self,
@@ -308,7 +305,7 @@ impl Friction {
         let stiff = if self.coupled { self.coefficient * slider.matrix_n } else { force };
         let (slip, spin) = self.slip(index, x, angle, radius_mm);
         let y = slip.norm();
-        let (over, second) = self.rates(y);
+        let (over, second) = rates(y, self.stick_mm);
         let gradient = slip * (force * over);
         let unit = if y > 0.0 { slip / y } else { Vec3::zeros() };
         let plane = Matrix3::identity() - slider.normal * slider.normal.transpose();
@@ -382,6 +379,16 @@ impl Friction {
     pub fn unsettle(&mut self) {
         self.settled = false;
     }
+}
+
+/// φ(y) with its ε, `e`.
+fn phi(y: f64, e: f64) -> f64 {
+    if y >= e { y } else { y * y / e - y * y * y / (3.0 * e * e) + e / 3.0 }
+}
+
+/// φ′/y and φ″.
+fn rates(y: f64, e: f64) -> (f64, f64) {
+    if y >= e { (1.0 / y, 0.0) } else { (2.0 / e - y / (e * e), 2.0 / e - 2.0 * y / (e * e)) }
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ pub mod wall;
 
 pub use distance::{Distance, Nearness, SmoothWall};
 pub use felt::FeltWall;
-pub use friction::{Friction, HandMotion, NormalForce, SETTLED};
+pub use friction::{Between, Friction, HandMotion, NormalForce, Place, Rub, SETTLED};
 pub use grading::Grading;
 pub use memory::{KnownPoints, WallMemory};
 pub use point::{Contact, ContactPoint, Counters, Touch};

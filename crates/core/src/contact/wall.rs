@@ -17,7 +17,7 @@ use super::memory::{TakenReading, WallMemory};
 use super::point::{Contact, ContactPoint, Counters, FOLLOW, LOOK_AGAIN, Touch};
 use crate::Vec3;
 use crate::contact::distance::{Distance, Nearness};
-use crate::contact::{FeltWall, Friction};
+use crate::contact::{Between, FeltWall, Friction};
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::External;
 
@@ -231,6 +231,11 @@ impl<'a> WallContact<'a> {
         Reading::of(nearness, limit_mm)
     }
 
+    /// Friction between instruments.
+    pub(crate) fn between(&mut self) -> &mut Between {
+        &mut self.friction.between
+    }
+
     /// Work done and avoided since it was counted last, looking for the tip's way included.
     pub fn count(&mut self) -> Counters {
         self.counters.queries += std::mem::take(&mut self.memory.places.queries);
@@ -430,6 +435,7 @@ impl External for WallContact<'_> {
             });
             self.friction.follow(pressed, least_n);
         }
+        self.friction.between.add(state, into);
         self.rounding_n = 0.0;
         let mut begin = 0;
         let mut sum = PointSum::default();
@@ -447,7 +453,7 @@ impl External for WallContact<'_> {
     }
 
     fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
-        let mut sum = 0.0;
+        let mut sum = self.friction.between.taken_mj(state);
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, state);
             let point = self.points[index];

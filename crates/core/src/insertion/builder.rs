@@ -8,6 +8,7 @@ use crate::device::{Device, Stack};
 use crate::error::vector;
 use crate::methods::MethodChoice;
 use crate::methods::kirchhoff::KirchhoffOptions;
+use crate::rod::MAX_ANGLES;
 use crate::vessel::{NoStore, Wall, WallQuery, WallStore};
 use crate::{Error, Result};
 
@@ -62,7 +63,10 @@ impl<'a> SimulationBuilder<'a> {
         check_inside(&wall, &sheath)?;
         let query = WallQuery::new(&wall)?;
         stack.devices().try_for_each(|device| check_mouth(&query, device, &sheath))?;
-        let stack = if stack.is_several() && properties.rubs() { stack.twisted()? } else { stack };
+        // Of more than three those without a shape rub along the line alone.
+        let rub = stack.rubs() && stack.instruments().len() <= MAX_ANGLES;
+        let twists = stack.is_several() && (properties.rubs() || rub);
+        let stack = if twists { stack.twisted()? } else { stack };
         let scene = Environment { wall, properties, query, sheath, stack };
         let own = KirchhoffOptions::default();
         let method = method.unwrap_or(&own);

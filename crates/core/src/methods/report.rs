@@ -86,6 +86,8 @@ pub struct LateralForce {
     pub tension_n: f64,
     /// Friction on it along the line, towards the tip, N.
     pub friction_n: f64,
+    /// Couple of the friction on it about the line, N·mm.
+    pub friction_nmm: f64,
 }
 
 /// What is seen and felt of an insertion after a step.

@@ -61,6 +61,20 @@ impl<const C: usize> Stencils for Assembly<C> {
         }
     }
 
+    fn add_turning(&mut self, i: usize, (a, b): (usize, usize), (first, second): (f64, f64)) {
+        if a.max(b) >= Layout::<C>::ANGLES {
+            return;
+        }
+        let [a, b] = [a, b].map(|set| Layout::<C>.angle(i, set));
+        self.residual[a] += first;
+        self.residual[b] -= first;
+        if self.hessian {
+            self.matrix.add(a, a, second);
+            self.matrix.add(b, b, second);
+            self.matrix.add(a, b, -second);
+        }
+    }
+
     fn add_rank_one(&mut self, i: usize, rows: (Triple, [f64; 3]), columns: (Triple, [f64; 3])) {
         let place = |(triple, mut values): (Triple, [f64; 3])| match triple {
             Triple::Position => (Layout::<C>.position(i), values),

@@ -46,6 +46,9 @@ pub trait Stencils {
         spin: (f64, f64),
     );
 
+    /// Adds first and second derivative in the difference of two material angles of node `i`, that of the first set less that of the second.
+    fn add_turning(&mut self, i: usize, sets: (usize, usize), derivatives: (f64, f64));
+
     /// Adds p qᵀ to the matrix alone, p in the `rows` and q in the `columns` of node `i`: the part of the stiffness of loads that follow
     /// the rod that no energy has.
     fn add_rank_one(&mut self, i: usize, rows: (Triple, [f64; 3]), columns: (Triple, [f64; 3]));

@@ -74,7 +74,7 @@ pub struct InstrumentSpec {
     /// Whether its tip may be farther in than that of the instrument in it; it may if absent.
     #[serde(default = "yes")]
     pub may_lead: bool,
-    /// Coulomb coefficient of friction between it and the instruments outside it, along the line; 0 is none and costs nothing.
+    /// Coulomb coefficient of friction between it and the instruments outside it, along the line and around it; 0 is none and costs nothing.
     #[serde(default)]
     pub friction: f64,
     /// Friction of the valve on its hub, which seals what lies in it, N; 0 is none and costs nothing.

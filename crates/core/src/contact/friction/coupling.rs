@@ -15,7 +15,7 @@
 
 use nalgebra::Matrix3;
 
-use super::{Friction, WHOLE_RENEWALS};
+use super::{Friction, WHOLE_RENEWALS, rates};
 use crate::Vec3;
 
 /// Renewals on a hard wall, where they seldom settle and cost many iterations each.
@@ -85,7 +85,7 @@ impl Friction {
         let slider = self.sliders.get(index)?;
         let (slip, spin) = self.slip(index, x, angle, radius_mm);
         let y = slip.norm();
-        let (over, second) = self.rates(y);
+        let (over, second) = rates(y, self.stick_mm);
         let unit = if y > 0.0 { slip / y } else { Vec3::zeros() };
         let (n, force) = (slider.normal, self.coefficient * slider.matrix_n);
         // v ↦ r v × t.

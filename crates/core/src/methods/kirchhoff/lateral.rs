@@ -12,15 +12,14 @@
 //! other; where its tip is not covered it is that of the line. At ends of instruments, where stiffness jumps, the others exert a couple too,
 //! as the play between them is none, and forces there stand for less length than elsewhere.
 //!
-//! Instruments keep their lengths and share the line, so that one slips in another everywhere by the difference Δ of what their hands do, and
-//! friction along the line is μ|fᵢ| against it wherever they go on slipping. It is a force within the line, and bends nothing. It is felt by both hands,
-//! and builds up in the axial force: around a bend by e^{μφ}, the capstan's law. It depends on nothing that is solved for but what presses,
-//! and is told of an equilibrium that was found without it. Instruments that go together exert none.
+//! Friction along the line ([`crate::contact::Between`]) is a force within the line, and bends nothing. It is felt by both hands, and builds up in
+//! the axial force: around a bend by e^{μφ}, the capstan's law, of all that slips along. What presses at a node is found with it, from the tip on.
 
 use super::coaxial::element;
 use super::mesh::Mesh;
-use super::state::KirchhoffState;
+use super::rubbing::{pair, radius_mm};
 use crate::Vec3;
+use crate::contact::{Contact, ContactPoint, Rub};
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
 use crate::rod::element::ElementSystem;
@@ -29,9 +28,6 @@ use crate::rod::{Layout, RodState, element_system};
 
 /// Rounds in which the axial force behind a node and the friction there are found: each is nearer by μ times half the angle of an element.
 const ROUNDS: usize = 12;
-/// Least slip, mm: less is the rounding of lengths.
-pub(super) const LEAST_SLIP_MM: f64 = 1e-9;
-
 /// A force at a node, and that in the turn of its tangent.
 #[derive(Debug, Clone, Copy, Default)]
 struct NodeForce {
@@ -57,31 +53,64 @@ impl NodeForce {
     }
 }
 
-/// Forces on an instrument and all that lies in it by those outside it, at every node of the line, sheath first, after the hands have gone by
-/// `motions`.
-pub(super) fn lateral_forces<const C: usize>(
-    stack: &Stack,
-    mesh: &Mesh,
-    state: &KirchhoffState,
-    motions: &[[f64; 2]],
-    instrument: usize,
-) -> Vec<LateralForce> {
+/// The line as it is, with what is known of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Line<'a> {
+    pub(super) stack: &'a Stack,
+    pub(super) mesh: &'a Mesh,
+    pub(super) rod: &'a RodState,
+    /// Contact points that press on the wall, and the force of it.
+    pub(super) pressing: &'a [(usize, Vec3)],
+    /// Friction between instruments, node by node, the innermost first; empty without.
+    pub(super) rubs: &'a [Rub],
+}
+
+impl Line<'_> {
+    /// Friction along the line on what is inside at a node, and the couple around it there, mm, both over the force across it.
+    fn drag(&self, at: (usize, usize)) -> [f64; 2] {
+        let pair = pair(self.mesh, at).filter(|(inner, _)| self.stack.friction(*inner) > 0.0);
+        let Some((inner, _)) = pair.filter(|_| !self.rubs.is_empty()) else { return [0.0; 2] };
+        let rub = self.rubs[at.0 * (self.mesh.inserted_mm.len() - 1) + inner];
+        let radius_mm = radius_mm(self.stack, self.mesh, (at.0, inner));
+        [rub.along, radius_mm * rub.around].map(|part| -self.stack.friction(inner) * part)
+    }
+}
+
+/// Contact points that press among those of a mesh, which are in the same order.
+pub(super) fn pressing(mesh: &Mesh, rod: &RodState, contacts: &[Contact]) -> Vec<(usize, Vec3)> {
+    let mut contacts = contacts.iter().peekable();
+    let at = |(index, point): (usize, &ContactPoint)| {
+        let there = |contact: &&Contact| point.position(&mesh.elements, rod) == contact.position_mm;
+        contacts.next_if(there).map(|contact| (index, contact.total_n()))
+    };
+    mesh.points.iter().enumerate().filter_map(at).collect()
+}
+
+/// The node where an instrument, or one in it, comes out of those outside it; `None` where none does.
+pub(super) fn comes_out(mesh: &Mesh, instrument: usize) -> Option<usize> {
+    let (own, outside) = mesh.inserted_mm.split_at_checked(instrument + 1)?;
+    let [inside_mm, outside_mm] = [own, outside].map(|all| line_mm(all.iter().copied()));
+    (inside_mm > outside_mm).then(|| mesh.nearest_node(mesh.from_tip_mm[0] - outside_mm))
+}
+
+/// Forces on an instrument and all that lies in it by those outside it, at every node of the line, sheath first.
+pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize) -> Vec<LateralForce> {
+    let Line { stack, mesh, rod, .. } = *line;
     let mut told = vec![LateralForce::default(); mesh.from_tip_mm.len()];
     let Some((own, outside)) = mesh.inserted_mm.split_at_checked(instrument + 1) else { return told };
-    let [inside_mm, outside_mm, line] =
+    let [inside_mm, outside_mm, line_mm] =
         [own, outside, &mesh.inserted_mm].map(|all| line_mm(all.iter().copied()));
     let reach_mm = own[instrument].min(outside_mm);
     if reach_mm == 0.0 {
         return told;
     }
-    let first = mesh.nearest_node(line - inside_mm.min(outside_mm));
-    let last = mesh.nearest_node(line - reach_mm);
-    let rod = &state.rod;
+    let first = mesh.nearest_node(line_mm - inside_mm.min(outside_mm));
+    let last = mesh.nearest_node(line_mm - reach_mm);
     // Beyond the others it is alone, with the axial force of the line.
     let mut beyond = NodeForce::default();
-    if inside_mm > outside_mm && first < mesh.elements.len() {
+    if comes_out(mesh, instrument).is_some() && first < mesh.elements.len() {
         let [near, _, pull, _] = parts::<C>(stack, mesh, rod, (first, instrument));
-        let wall = wall_force(mesh, state, (first, instrument));
+        let wall = wall_force(line, (first, instrument));
         beyond = near.plus(&pull, rod.tensions[first]).plus(&wall, -1.0);
     }
     for i in (1..=first).rev() {
@@ -89,7 +118,7 @@ pub(super) fn lateral_forces<const C: usize>(
         let (t, curvature) = (rod.frames[i].t, curvature(mesh, rod, i));
         let known = beyond.plus(&far, 1.0);
         let (along, rate) = (known.along(&t, &curvature), far_pull.along(&t, &curvature));
-        let drag = drag(stack, mesh, motions, (i, instrument));
+        let [drag, couple_mm] = line.drag((i, instrument));
         let mut tension = -along / rate;
         let across = |tension: f64| {
             let force = known.plus(&far_pull, tension).force;
@@ -103,37 +132,12 @@ pub(super) fn lateral_forces<const C: usize>(
             let force_n = across(tension);
             let after = mesh.elements.get(i).filter(|_| i < last).map_or(0.0, |data| data.length);
             let length_mm = 0.5 * (mesh.elements[i - 1].length + after);
-            let friction_n = drag * force_n.norm();
-            told[i] = LateralForce { force_n, length_mm, tension_n: tension, friction_n };
+            let [friction_n, friction_nmm] = [drag, couple_mm].map(|part| part * force_n.norm());
+            told[i] = LateralForce { force_n, length_mm, tension_n: tension, friction_n, friction_nmm };
         }
         beyond = near.plus(&near_pull, tension);
     }
     told
-}
-
-/// The instrument that rubs on another just behind a node, of those in `instrument` and itself, and that other.
-pub(super) fn pair(mesh: &Mesh, (i, instrument): (usize, usize)) -> Option<(usize, usize)> {
-    let place = mesh.from_tip_mm[0] - 0.5 * (mesh.from_tip_mm[i - 1] + mesh.from_tip_mm[i]);
-    let there = |k: &usize| mesh.inserted_mm[*k] > place;
-    Some(((0..=instrument).rev().find(there)?, (instrument + 1..mesh.inserted_mm.len()).find(there)?))
-}
-
-/// Slip of an instrument in one outside it, mm; what is less than the rounding of lengths is none.
-pub(super) fn slip_mm(motions: &[[f64; 2]], (inner, outer): (usize, usize)) -> f64 {
-    let advance = |k: usize| motions.get(k).map_or(0.0, |motion| motion[0]);
-    let slip = advance(inner) - advance(outer);
-    if slip.abs() > LEAST_SLIP_MM { slip } else { 0.0 }
-}
-
-/// Friction along the line on what is inside at a node, over the force across it.
-fn drag(stack: &Stack, mesh: &Mesh, motions: &[[f64; 2]], at: (usize, usize)) -> f64 {
-    let Some((inner, outer)) = pair(mesh, at).filter(|(inner, _)| stack.friction(*inner) > 0.0) else {
-        return 0.0;
-    };
-    match slip_mm(motions, (inner, outer)) {
-        0.0 => 0.0,
-        slip => -stack.friction(inner) * slip.signum(),
-    }
 }
 
 /// What element `e` of an instrument and those in it exerts at its near and its far node without axial force, and there with a unit of it.
@@ -168,17 +172,10 @@ fn curvature(mesh: &Mesh, rod: &RodState, i: usize) -> [f64; 2] {
 }
 
 /// What the wall exerts at a node on an instrument and those in it, where it comes out of the others.
-fn wall_force(mesh: &Mesh, state: &KirchhoffState, (i, instrument): (usize, usize)) -> NodeForce {
-    let (rod, mut sum) = (&state.rod, NodeForce::default());
-    let mut contacts = state.report.contacts.iter().peekable();
-    for point in &mesh.points {
-        let Some(contact) = contacts.peek() else { break };
-        // Contacts are in the order of points.
-        if point.position(&mesh.elements, rod) != contact.position_mm {
-            continue;
-        }
-        let force = contact.total_n();
-        contacts.next();
+fn wall_force(line: &Line<'_>, (i, instrument): (usize, usize)) -> NodeForce {
+    let mut sum = NodeForce::default();
+    for (index, force) in line.pressing {
+        let point = &line.mesh.points[*index];
         let [w0, s0, w1, s1] = hermite(point.xi);
         let (weight, slope) = match point.element {
             e if e == i => (w0, s0),
@@ -186,8 +183,9 @@ fn wall_force(mesh: &Mesh, state: &KirchhoffState, (i, instrument): (usize, usiz
             _ => continue,
         };
         if point.instrument <= instrument {
-            let slope = slope * mesh.elements[point.element].length;
-            let turn = [rod.frames[i].u, rod.frames[i].v].map(|axis| axis.dot(&force) * slope);
+            let slope = slope * line.mesh.elements[point.element].length;
+            let frame = &line.rod.frames[i];
+            let turn = [frame.u, frame.v].map(|axis| axis.dot(force) * slope);
             sum = sum.plus(&NodeForce { force: force * weight, turn }, 1.0);
         }
     }

@@ -28,6 +28,9 @@ mod lateral;
 mod mesh;
 mod readout;
 mod repeat;
+mod rubbing;
+#[cfg(test)]
+mod rubbing_tests;
 mod search;
 mod settle;
 mod slide;
@@ -55,6 +58,7 @@ use crate::vessel::WallStore;
 use crate::{Error, Result};
 use coaxial::Nodes;
 use hands::{Hand, lengths};
+use lateral::Line;
 use state::Belongs;
 use workspace::Workspace;
 
@@ -255,8 +259,10 @@ impl<const C: usize> Method for Kirchhoff<C> {
         hands::read(&self.state.report, &mut hands);
         let mut mesh = Mesh::default();
         meshed(&environment, &hands, &mut mesh);
-        let motions = self.state.correction.motions();
-        lateral::lateral_forces::<C>(surroundings.stack, &mesh, &self.state, motions, instrument)
+        let KirchhoffState { rod, rubs, report, .. } = &*self.state;
+        let pressing = lateral::pressing(&mesh, rod, &report.contacts);
+        let line = Line { stack: surroundings.stack, mesh: &mesh, rod, pressing: &pressing, rubs };
+        lateral::lateral_forces::<C>(&line, instrument)
     }
 
     fn state(&self) -> State {
@@ -287,6 +293,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
             points: mesh.points.len(),
             sets: Layout::<C>::ANGLES,
             rubs: surroundings.properties.rubs(),
+            inner: if surroundings.stack.rubs() { hands.len() - 1 } else { 0 },
         })?;
         self.state = Arc::clone(state);
         self.write_shape(&mesh.from_tip_mm);

@@ -3,18 +3,17 @@
 use super::Environment;
 use super::configuration::Configuration;
 use super::hands::Hand;
-use super::lateral::{LEAST_SLIP_MM, lateral_forces, pair, slip_mm};
+use super::rubbing::LEAST_SLIP_MM;
 use super::slopes::write_instruments;
 use super::workspace::Tools;
+use crate::contact::WallContact;
 use crate::contact::extension::left_through;
-use crate::contact::{HandMotion, WallContact};
 use crate::device::Stack;
 use crate::methods::{Energy, Surroundings};
 use crate::rod::{Clamp, Layout};
 
 impl<const C: usize> Tools<C> {
-    /// Read-outs at a configuration, that of the last sub-step. Returns the energy that friction between instruments and in the sheath took,
-    /// mJ.
+    /// Read-outs at a configuration, that of the last sub-step. Returns the energy that friction in hubs and in the sheath took, mJ.
     pub(super) fn write_report(
         &mut self,
         environment: &Environment<'_>,
@@ -35,7 +34,8 @@ impl<const C: usize> Tools<C> {
             report.energy = Energy::default();
             (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
             if surroundings.stack.is_several() {
-                write_instruments::<C>(environment, hands, None, &[], at);
+                let (pressed, between) = (&[], &[]);
+                write_instruments::<C>(environment, hands, None, (pressed, between), at);
             }
             return 0.0;
         }
@@ -63,9 +63,10 @@ impl<const C: usize> Tools<C> {
 
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
         if surroundings.stack.is_several() {
-            write_instruments::<C>(environment, hands, Some(&clamp), &pressed, at);
-            let taken_mj = if surroundings.stack.rubs() { self.rub(surroundings.stack, at) } else { 0.0 };
-            let taken_mj = taken_mj + self.rub_in_valves(surroundings.stack, at);
+            let between = self.friction.between.places();
+            write_instruments::<C>(environment, hands, Some(&clamp), (&pressed, between), at);
+            self.rub(at);
+            let taken_mj = self.rub_in_valves(surroundings.stack, at);
             return taken_mj + self.rub_in_sheath(surroundings, &clamp, at);
         }
         let frame = rod.material_frame(0);
@@ -141,24 +142,15 @@ impl<const C: usize> Tools<C> {
         taken_mj
     }
 
-    /// What hands feel of friction between instruments is added to the report; returns the energy that it took, mJ.
-    fn rub(&self, stack: &Stack, at: &mut Configuration) -> f64 {
-        let motions: Vec<[f64; 2]> = self.guess.motions.iter().map(HandMotion::parts).collect();
-        let mut taken_mj = 0.0;
-        let mut forces = vec![0.0; motions.len()];
-        for instrument in (0..motions.len()).filter(|inner| stack.friction(*inner) > 0.0) {
-            let told = lateral_forces::<C>(stack, &at.mesh, &at.state, &motions, instrument);
-            for (i, along) in told.iter().enumerate().filter(|(_, along)| along.friction_n != 0.0) {
-                let Some((inner, outer)) = pair(&at.mesh, (i, instrument)) else { continue };
-                forces[inner] -= along.friction_n;
-                forces[outer] += along.friction_n;
-                taken_mj -= along.friction_n * slip_mm(&motions, (inner, outer));
+    /// What hands feel of friction along the line between instruments is added to the report; couples about it they feel anyway.
+    fn rub(&self, at: &mut Configuration) {
+        let state = at.parts().1;
+        for place in self.friction.between.places() {
+            let friction_n = place.coefficient * place.force_n * place.parts(&state.rod)[0];
+            for (index, sign) in [(place.inner, 1.0), (place.outer, -1.0)] {
+                let told = &mut state.report.instruments[index];
+                told.push_force_n = told.push_force_n.map(|push| push + sign * friction_n);
             }
         }
-        let report = &mut at.parts().1.report;
-        for (told, force) in report.instruments.iter_mut().zip(forces) {
-            told.push_force_n = told.push_force_n.map(|push| push + force);
-        }
-        taken_mj
     }
 }

@@ -101,11 +101,6 @@ impl Correction {
         self.turns.clear();
     }
 
-    /// Advance, mm, and turn, rad, of each hand in the step.
-    pub(super) fn motions(&self) -> &[[f64; 2]] {
-        &self.motions
-    }
-
     /// Elements that have learnt.
     pub(super) fn len(&self) -> usize {
         self.departures.len()

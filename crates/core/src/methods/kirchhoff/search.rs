@@ -88,6 +88,12 @@ impl<const C: usize> Search<'_, '_, C> {
         if found.converged { self.settled(found) } else { found }
     }
 
+    /// From an equilibrium to the next one nearby, where something has changed that is lagged.
+    pub(super) fn on(&mut self) -> NewtonReport {
+        let found = self.newton(STUCK, self.tolerance);
+        if found.converged { self.settled(found) } else { found }
+    }
+
     /// Newton's method from the state on.
     fn newton(&mut self, most: usize, tolerance: f64) -> NewtonReport {
         let left = match &self.budget {

@@ -3,7 +3,8 @@
 //! By the envelope theorem the derivative of the discrete energy with respect to an inserted length is that in the mesh alone, while
 //! tangents, chords over lengths and angles stay as they are: ends of the instrument and of its sections take their nodes along, and so do
 //! its contact points. It is exact for the mesh. Few elements change with it, of which differences of energies are taken; contact points
-//! move, and do the work of the forces that they have. What the sheath no longer stores, ½EI|κ⁰|² a length, is part of it.
+//! move, and do the work of the forces that they have. Where an instrument is twisted, what comes to lie at a node has another angle than what was there:
+//! unless the node goes with it, it turns on the way by τ a length, against the couples of friction between instruments. What the sheath no longer stores, ½EI|κ⁰|² a length, is part of it.
 
 use super::Environment;
 use super::coaxial::Nodes;
@@ -11,7 +12,7 @@ use super::configuration::{Configuration, Start};
 use super::hands::{Hand, lengths};
 use super::mesh::Mesh;
 use crate::Vec3;
-use crate::contact::{ContactPoint, Touch};
+use crate::contact::{ContactPoint, Place, Touch};
 use crate::device::line_mm;
 use crate::methods::InstrumentReport;
 use crate::rod::{Clamp, RodState, element_energy};
@@ -29,7 +30,7 @@ pub(super) fn write_instruments<const C: usize>(
     environment: &Environment<'_>,
     hands: &[Hand],
     clamp: Option<&Clamp>,
-    pressed: &[Pressed],
+    touching: (&[Pressed], &[Place]),
     at: &mut Configuration,
 ) {
     let sets = environment.surroundings.stack.sets();
@@ -47,7 +48,7 @@ pub(super) fn write_instruments<const C: usize>(
             inserted_mm: hand.inserted_mm,
             rotation_rad: hand.turn_rad,
             tip_rotation_rad: hand.turn_rad + twist,
-            push_force_n: push_force::<C>(environment, &nodes, (index, &inserted), pressed, at.start()),
+            push_force_n: push_force::<C>(environment, &nodes, (index, &inserted), touching, at.start()),
             torque_nmm: set.zip(clamp).map_or(0.0, |(set, clamp)| clamp.torques[set]),
         });
     }
@@ -63,7 +64,7 @@ fn push_force<const C: usize>(
     environment: &Environment<'_>,
     nodes: &Nodes,
     (index, inserted_mm): (usize, &[f64]),
-    pressed: &[Pressed],
+    (pressed, between): (&[Pressed], &[Place]),
     at: Start<'_>,
 ) -> Option<f64> {
     let stack = environment.surroundings.stack;
@@ -85,8 +86,22 @@ fn push_force<const C: usize>(
         (Some(on), Some(back)) => 0.5 * (on + back),
         (one, other) => one.or(other)?,
     };
+    let turned = (on.turning_against(between, at) - back.turning_against(between, at)) / (2.0 * step);
     let mouth = stack.instruments()[index].device.section_at(own);
-    Some(stored + wall - mouth.straightening_n())
+    Some(stored + wall + turned - mouth.straightening_n())
+}
+
+/// Twist of the instrument in a `set` of angles at node `i`, towards the tip: the mean of the elements beside it that it is in.
+fn twist_per_mm(at: Start<'_>, i: usize, set: usize) -> f64 {
+    let is_in = |e: &usize| at.mesh.elements.get(*e).is_some_and(|data| data.materials[set].is_present());
+    let (mut sum, mut count) = (0.0, 0.0);
+    for e in [i - 1, i].into_iter().filter(is_in) {
+        let rod = &at.state.rod;
+        let turned = rod.angle(e + 1, set) - rod.angle(e, set) + rod.reference_twists[e];
+        sum += turned / at.mesh.elements[e].length;
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
 }
 
 /// Instruments with other lengths inserted, near by, and the unknowns as they are.
@@ -114,6 +129,22 @@ impl Beside {
             element_energy::<C>(here, &state).total() - element_energy::<C>(there, &state).total()
         });
         more.sum()
+    }
+
+    /// Work against the couples of friction between instruments on the way here, on which what lies at a node turns with its twist, mJ.
+    fn turning_against(&self, between: &[Place], at: Start<'_>) -> f64 {
+        let each = between.iter().filter_map(|place| {
+            let sets = place.sets?;
+            let couple = place.couple(&at.state.rod).0;
+            // By how much farther from its tip is what lies there now.
+            let label = |mesh: &Mesh, k: usize| {
+                mesh.from_tip_mm[place.node] - (mesh.from_tip_mm[0] - mesh.inserted_mm[k])
+            };
+            let moved = |k: usize| label(&self.mesh, k) - label(at.mesh, k);
+            let twist = |set: usize| twist_per_mm(at, place.node, set);
+            Some(couple * (moved(place.inner) * twist(sets.0) - moved(place.outer) * twist(sets.1)))
+        });
+        each.sum()
     }
 
     /// The contact point that is another one `at` the place.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::hands::Hand;
 use super::repeat::Correction;
-use crate::contact::{FeltWall, KnownPoints, NormalForce};
+use crate::contact::{FeltWall, KnownPoints, NormalForce, Rub};
 use crate::device::Stack;
 use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
 use crate::rod::{Frame, RodState};
@@ -19,6 +19,8 @@ pub struct KirchhoffState {
     pub(super) rod: RodState,
     /// What presses at each contact point, tip first; empty without friction.
     pub(super) forces: Vec<NormalForce>,
+    /// Friction between instruments: for each node those that have one outside them, the innermost first; empty without.
+    pub(super) rubs: Vec<Rub>,
     pub(super) known: KnownPoints,
     pub(super) correction: Correction,
     pub(super) report: StepReport,
@@ -34,6 +36,8 @@ pub(super) struct Belongs<'a> {
     /// Sets of angles.
     pub(super) sets: usize,
     pub(super) rubs: bool,
+    /// Instruments that have one outside them, if any of them rubs in that.
+    pub(super) inner: usize,
 }
 
 impl KirchhoffState {
@@ -52,6 +56,7 @@ impl KirchhoffState {
         Self {
             rod,
             forces: Vec::new(),
+            rubs: Vec::new(),
             known: KnownPoints::default(),
             correction: Correction::default(),
             report: StepReport { converged: true, instruments, ..StepReport::default() },
@@ -83,6 +88,7 @@ impl KirchhoffState {
         self.rod.clear();
         self.turn_tails(stack, hands);
         self.forces.clear();
+        self.rubs.clear();
         self.known.clear();
         self.correction.clear();
     }
@@ -126,6 +132,10 @@ impl KirchhoffState {
                 format!("{forces} contact points feel friction here"),
             ));
         }
+        if !self.rubs.is_empty() && self.rubs.len() != belongs.inner * (n + 1) {
+            let mend = format!("at {} nodes {} instruments may rub in others here", n + 1, belongs.inner);
+            return Err(other("rubs", self.rubs.len(), mend));
+        }
         if !self.known.fits(belongs.points, belongs.felt.query.triangles()) {
             let mend = format!(
                 "{} contact points on {} triangles are felt here: another vessel, device or wall",
@@ -152,7 +162,8 @@ impl KirchhoffState {
         let vectors =
             r.positions.iter().chain(&r.chords).chain(r.frames.iter().flat_map(|f| [&f.t, &f.u, &f.v]));
         let numbers = [&r.tensions, &r.angles, &r.bubbles, &r.reference_twists].into_iter().flatten();
-        if !vectors.flat_map(|v| v.iter()).chain(numbers).all(|x| x.is_finite()) {
+        let rubs = self.rubs.iter().flat_map(|rub| [&rub.along, &rub.around, &rub.pressure_n_per_mm]);
+        if !vectors.flat_map(|v| v.iter()).chain(numbers).chain(rubs).all(|x| x.is_finite()) {
             return Err(other("rod", "not finite", "all its numbers must be finite"));
         }
         Ok(())

@@ -8,7 +8,7 @@ use super::hands::{Hand, motions};
 use super::search::Search;
 use super::slide::{slide, slide_together};
 use super::workspace::Tools;
-use super::{Environment, meshed};
+use super::{Environment, meshed, rubbing};
 use crate::contact::{SETTLED, WallContact};
 use crate::device::Stack;
 use crate::methods::StepReport;
@@ -82,6 +82,8 @@ impl<const C: usize> Tools<C> {
         motions(&start.state.report, hands, &mut self.guess.motions);
         let before = (&start.mesh.points[..], &start.state.forces[..]);
         self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
+        let (places, moves) = (&mut self.friction.between, &self.guess.motions);
+        rubbing::begin(stack, start, (mesh, &after.rod), moves, places);
         after.turn_tails(stack, hands);
         self.newton.resize(mesh.elements.len());
         let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
@@ -141,8 +143,10 @@ impl<const C: usize> Tools<C> {
         };
         // A guess that has learnt from the last step or kept its contacts is near.
         let found = search.run(quality == Quality::Learnt || held);
+        let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
         let (iterations, slides) = (search.iterations, search.slides);
         let unsettled = if surroundings.properties.rubs() { contact.unsettled() } else { 0.0 };
+        let unsettled = unsettled.max(lagging);
         // What comes to rest as it can is in equilibrium as exactly as friction is with the wall elsewhere.
         let balanced = (found.converged || (relax && found.residual < SETTLED)) && unsettled < SETTLED;
         let least = if resort == Some(true) { f64::MAX } else { AT_REST };
@@ -163,6 +167,7 @@ impl<const C: usize> Tools<C> {
             return Err(PASSED.into());
         }
         let dissipated_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
+        let dissipated_mj = dissipated_mj + self.friction.between.taken_mj(rod);
         let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
         let (mesh, after) = next.parts();
         let taken = resort == Some(true) && balanced;
@@ -172,6 +177,7 @@ impl<const C: usize> Tools<C> {
         }
         self.guess.teach(&mesh.elements, &after.rod, softest >= YIELDING, &mut after.correction);
         self.friction.keep(&mut after.forces);
+        rubbing::keep(&self.friction.between, &after.rod, mesh, &mut after.rubs);
         self.memory.keep(&mut after.known);
         Ok(Found { iterations, slides, dissipated_mj, residual: found.residual, unsettled, balanced })
     }

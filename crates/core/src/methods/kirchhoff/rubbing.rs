@@ -1,0 +1,162 @@
+//! Friction between instruments in a sub-step: where it acts, and what presses there.
+//!
+//! The force across the line follows from the equilibrium ([`super::lateral`]), and the couples of friction move the line; they are lagged. A solution takes
+//! the forces of the last one: at first those of the last equilibrium at the same distance from the sheath, and then its own, until the couples
+//! change by less than 10⁻⁴ of what they may be. Where nothing turns there is nothing to renew, whatever presses: friction along the line is read off.
+
+use super::configuration::Start;
+use super::lateral::{Line, comes_out, lateral_forces};
+use super::mesh::Mesh;
+use super::search::Search;
+use crate::contact::{Between, HandMotion, Place, Rub, SETTLED};
+use crate::device::{Stack, line_mm};
+use crate::insertion::LateralForce;
+use crate::rod::RodState;
+use crate::solve::NewtonReport;
+
+/// Most renewals of what presses; two or three are the rule.
+const RENEWALS: usize = 20;
+/// Least slip, mm: less is the rounding of lengths.
+pub(super) const LEAST_SLIP_MM: f64 = 1e-9;
+
+/// The instrument that rubs on another just behind a node, of those in `instrument` and itself, and that other.
+pub(super) fn pair(mesh: &Mesh, (i, instrument): (usize, usize)) -> Option<(usize, usize)> {
+    let place = mesh.from_tip_mm[0] - 0.5 * (mesh.from_tip_mm[i - 1] + mesh.from_tip_mm[i]);
+    let there = |k: &usize| mesh.inserted_mm[*k] > place;
+    Some(((0..=instrument).rev().find(there)?, (instrument + 1..mesh.inserted_mm.len()).find(there)?))
+}
+
+/// Radius of an instrument just behind a node, mm.
+pub(super) fn radius_mm(stack: &Stack, mesh: &Mesh, (i, instrument): (usize, usize)) -> f64 {
+    let place = 0.5 * (mesh.from_tip_mm[i - 1] + mesh.from_tip_mm[i]);
+    let from_tip_mm = place - (mesh.from_tip_mm[0] - mesh.inserted_mm[instrument]);
+    stack.instruments()[instrument].device.section_at(from_tip_mm).radius_mm
+}
+
+/// Sets the places where instruments may rub in each other in a step from `start` to the mesh `mesh`, on which `slid` is the line that has slid along
+/// its curve.
+pub(super) fn begin(
+    stack: &Stack,
+    start: Start<'_>,
+    (mesh, slid): (&Mesh, &RodState),
+    motions: &[HandMotion],
+    between: &mut Between,
+) {
+    between.clear();
+    let line = mesh.from_tip_mm[0];
+    let motion = |k: usize| motions.get(k).map_or([0.0; 2], HandMotion::parts);
+    let rub = 0..motions.len().saturating_sub(1);
+    for instrument in rub.filter(|inner| stack.friction(*inner) > 0.0) {
+        let outside_mm = line_mm(mesh.inserted_mm[instrument + 1..].iter().copied());
+        let reach_mm = mesh.inserted_mm[instrument].min(outside_mm);
+        let last = if reach_mm > 0.0 { mesh.nearest_node(line - reach_mm) } else { 0 };
+        let mut known = 0;
+        for i in 1..=last {
+            let Some((inner, outer)) = pair(mesh, (i, instrument)).filter(|(inner, _)| *inner == instrument)
+            else {
+                continue;
+            };
+            let radius_mm = radius_mm(stack, mesh, (i, inner));
+            let ([advance, turn], [outer_advance, outer_turn]) = (motion(inner), motion(outer));
+            let advance_mm = advance - outer_advance;
+            let mut place = Place {
+                sets: stack.sets()[inner].zip(stack.sets()[outer]),
+                advance_mm: if advance_mm.abs() > LEAST_SLIP_MM { advance_mm } else { 0.0 },
+                turn_rad: turn - outer_turn,
+                ..Place::new((i, inner, outer), stack.friction(inner), radius_mm)
+            };
+            place.from_rad = place.turned_rad(slid);
+            let after = if i < last { mesh.from_tip_mm[i + 1] } else { mesh.from_tip_mm[i] };
+            place.length_mm = 0.5 * (mesh.from_tip_mm[i - 1] - after);
+            place.force_n = place.length_mm * pressure(start, line - mesh.from_tip_mm[i], inner, &mut known);
+            let way_mm = |k: &HandMotion| k.advance_mm().abs() + radius_mm * k.turn_rad.abs();
+            between.push(place, motions.iter().map(way_mm).fold(0.0, f64::max));
+        }
+    }
+}
+
+/// What pressed on an instrument in the last equilibrium, N/mm, so far from the sheath. `known` is where to start looking: calls go from the sheath
+/// to the tip.
+fn pressure(start: Start<'_>, from_sheath_mm: f64, inner: usize, known: &mut usize) -> f64 {
+    let (mesh, rubs) = (start.mesh, &start.state.rubs);
+    let most = mesh.inserted_mm.len().saturating_sub(1);
+    if rubs.is_empty() || mesh.elements.is_empty() {
+        return 0.0;
+    }
+    let place = |i: usize| mesh.from_tip_mm[0] - mesh.from_tip_mm[i];
+    while *known + 1 < mesh.elements.len() && place(*known + 1) < from_sheath_mm {
+        *known += 1;
+    }
+    let share = (from_sheath_mm - place(*known)) / (place(*known + 1) - place(*known));
+    let at = |i: usize| rubs[most * i + inner].pressure_n_per_mm;
+    // In the sheath's mouth nothing is told.
+    let near = if *known == 0 { at(1) } else { at(*known) };
+    near + (at(*known + 1) - near) * share.clamp(0.0, 1.0)
+}
+
+impl<const C: usize> Search<'_, '_, C> {
+    /// From an equilibrium with what pressed between instruments in another to one with its own. Returns it with the part by which the couples of friction differ
+    /// from what they were solved for with.
+    pub(super) fn rubbed(
+        &mut self,
+        mut found: NewtonReport,
+        stack: &Stack,
+        mesh: &Mesh,
+    ) -> (NewtonReport, f64) {
+        let mut change = 0.0;
+        if self.contact.between().places().is_empty() {
+            return (found, change);
+        }
+        let mut rubs = Vec::new();
+        for round in 0..=RENEWALS {
+            change = self.press(stack, mesh, &mut rubs);
+            if !found.converged || change < SETTLED || round == RENEWALS {
+                break;
+            }
+            found = self.on();
+        }
+        (found, change)
+    }
+
+    /// Renews what presses between instruments; returns by what part the couples change.
+    fn press(&mut self, stack: &Stack, mesh: &Mesh, rubs: &mut Vec<Rub>) -> f64 {
+        let state = &*self.state;
+        keep(self.contact.between(), state, mesh, rubs);
+        // The wall is asked where an instrument comes out of another alone.
+        let ends: Vec<usize> = (0..mesh.inserted_mm.len()).filter_map(|k| comes_out(mesh, k)).collect();
+        let beside = |e: usize| ends.iter().any(|node| e == *node || e + 1 == *node);
+        let near = (0..mesh.points.len()).filter(|index| beside(mesh.points[*index].element));
+        let pressing: Vec<_> = near
+            .filter_map(|index| {
+                Some((index, self.contact.touch(&mesh.elements, state, index)?.contact.total_n()))
+            })
+            .collect();
+        let line = Line { stack, mesh, rod: state, pressing: &pressing, rubs };
+        let told: Vec<Vec<LateralForce>> = (0..mesh.inserted_mm.len())
+            .map(|inner| match stack.friction(inner) {
+                0.0 => Vec::new(),
+                _ => lateral_forces::<C>(&line, inner),
+            })
+            .collect();
+        let force = |place: &Place| {
+            let at = &told[place.inner][place.node];
+            (at.force_n.norm(), at.length_mm)
+        };
+        self.contact.between().renew(state, force)
+    }
+}
+
+/// Writes what friction between instruments does at the nodes of the line, for the next step and for those who ask.
+pub(super) fn keep(between: &Between, rod: &RodState, mesh: &Mesh, rubs: &mut Vec<Rub>) {
+    rubs.clear();
+    if between.places().is_empty() {
+        return;
+    }
+    let most = mesh.inserted_mm.len() - 1;
+    rubs.resize(most * mesh.from_tip_mm.len(), Rub::default());
+    for place in between.places() {
+        let [along, around] = place.parts(rod);
+        let pressure_n_per_mm = place.force_n / place.length_mm;
+        rubs[most * place.node + place.inner] = Rub { along, around, pressure_n_per_mm };
+    }
+}
