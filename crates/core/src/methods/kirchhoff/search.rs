@@ -190,7 +190,8 @@ impl<const C: usize> Search<'_, '_, C> {
                 }
                 self.state.copy_from(&self.guess.other);
                 self.contact.rewind_friction();
-                found = self.newton(STUCK, self.tolerance);
+                // What presses there is seen again.
+                self.newton(STUCK, self.tolerance);
             }
             self.contact.anchor_friction(self.elements, self.state);
             self.contact.hold_friction();
