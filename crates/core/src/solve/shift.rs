@@ -1,8 +1,9 @@
 //! Inertia and shift: a matrix that is not that of a minimum is made one by a uniform tension.
 //!
-//! A minimum has one negative pivot for each multiplier. With more, the stiffness of a uniform tension ([`Assembly::unit_shift`]) is added
-//! until they are right (Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 3.4, with the inertia in the place of a
-//! failed Cholesky factorisation).
+//! A minimum has one negative pivot for each multiplier. With more, contacts that press on crests are made convex first: where a guess
+//! presses too hard, −F ∇∇d is too large by as much, and is local (J. Teran et al., *Robust quasistatic finite elements and flesh
+//! simulation*, SCA 2005, for elements). Then the stiffness of a uniform tension ([`Assembly::unit_shift`]) is added until they are right
+//! (Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 3.4, with the inertia in the place of a failed Cholesky factorisation).
 
 use super::newton::{Newton, Problem};
 use super::report::StopReason;

@@ -6,14 +6,15 @@
 //!
 //! There the wall presses otherwise than friction believes. Where renewing the normal forces does not settle, friction and wall are
 //! solved for together ([`super::settle`]). Where that finds nothing, the hand holds still and the device slides on: slip begins anew
-//! where it is, with the normal forces that are felt there, until they no longer change. Each slide begins at rest, so that it ends
+//! where it is, with the normal forces that are felt there, until they no longer change. Each slide begins all but at rest, so that it ends
 //! lower than it began by what friction took,
 //!
 //! ```text
-//! E(xₖ₊₁) + Dₖ(xₖ₊₁) ≤ E(xₖ) + Dₖ(xₖ),    Dₖ(x) = Σ μ Nᵢ(xₖ) φ(|uᵢ(x; xₖ)|)
+//! E(xₖ₊₁) + Dₖ(xₖ₊₁) ≤ E(xₖ) + Dₖ(xₖ),    Dₖ(x) = Σ μ Nᵢ(xₖ) φ(|uᵢ(x; xₖ)|),    Dₖ(xₖ) ≤ Σ μ Nᵢ εₖ
 //! ```
 //!
-//! and as E is bounded below what friction takes comes to an end, and with it the slip. The limit is in equilibrium with forces within
+//! with the slip that is kept within εₖ, which shrinks tenfold from slide to slide; and as E is bounded below what friction takes comes
+//! to an end, and with it the slip. The limit is in equilibrium with forces within
 //! the cones of Coulomb's law of its own normal forces: where a slow motion with friction comes to rest, in a few steps of it where
 //! elsewhere there is one.
 
