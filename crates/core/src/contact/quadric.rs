@@ -133,7 +133,12 @@ impl Quadric {
         let tau = Vector2::new(self.axes[0].dot(&y), self.axes[1].dot(&y));
         let spread = [Spread::at(rise, k), Spread::at(rise, l)];
         let sigma = Vector2::new(spread[0].value * tau.x, spread[1].value * tau.y);
-        let across = self.support * sigma;
+        // Written out: it is the innermost product of all.
+        let s = &self.support;
+        let across = Vector2::new(
+            s[(0, 0)] * sigma.x + s[(0, 1)] * sigma.y,
+            s[(1, 0)] * sigma.x + s[(1, 1)] * sigma.y,
+        );
         let u = sigma.dot(&across);
         let value = rise - 0.5 * (k * sigma.x * tau.x + l * sigma.y * tau.y);
         (u < 1.0).then_some(Local { tau, spread, across, u, value })

@@ -71,6 +71,8 @@ pub struct WallContact<'a> {
     least_moment_nmm: f64,
     /// Part of the (stiffest) modulus that acts: a rigid wall is approached from a softer one.
     pub softness: f64,
+    /// Whether the wall is stiffer than an element of the rod. A trial that runs into a softer one costs less than finding the step anew.
+    pub stiff: bool,
     /// Whether points that pressed in the last equilibrium are held to the wall, should they have come off it.
     pub holding: bool,
     memory: &'a mut WallMemory,
@@ -96,6 +98,7 @@ impl<'a> WallContact<'a> {
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
             softness: 1.0,
+            stiff: true,
             holding: false,
             memory,
             friction,
@@ -487,7 +490,7 @@ impl External for WallContact<'_> {
         part: f64,
         moved: &dyn Fn((usize, f64), &Vec3) -> f64,
     ) -> bool {
-        self.meet_contacts(elements, trial, part, moved)
+        self.stiff && self.meet_contacts(elements, trial, part, moved)
     }
 
     fn press_or_let_go(

@@ -125,6 +125,7 @@ impl<const C: usize> Tools<C> {
         let element_stiffness = data.bending[2] / options.element_mm.powi(4);
         let stiffest = surroundings.properties.stiffest_n_per_mm2();
         let softest = (SOFTEST * element_stiffness / stiffest).min(1.0);
+        contact.stiff = stiffest > element_stiffness;
         let mut search = Search {
             newton: &mut self.newton,
             settle: &mut self.settle,
