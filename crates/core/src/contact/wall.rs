@@ -12,45 +12,18 @@
 
 mod coupling;
 mod foresight;
+mod reading;
 
-use super::memory::{TakenReading, WallMemory};
-use super::point::{Contact, ContactPoint, Counters, FOLLOW, LOOK_AGAIN, Touch};
+use super::memory::WallMemory;
+use super::point::{Contact, ContactPoint, Counters, FOLLOW, Touch};
 use crate::Vec3;
-use crate::contact::distance::{Distance, Nearness};
 use crate::contact::{Between, FeltWall, Friction};
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::External;
 
 pub(super) use foresight::Foreseen;
+use reading::Reading;
 
-/// How near a point stands.
-#[derive(Debug, Clone, Copy)]
-enum Reading {
-    /// No wall is nearer than this, mm; or, where derivatives are not wanted, it is as near as this.
-    Free(f64),
-    /// It presses, or is as near as was asked.
-    Pressed(Distance),
-}
-
-impl Reading {
-    /// A distance with derivatives may have been asked for from farther away than `limit_mm` before.
-    fn of(nearness: Nearness, limit_mm: f64) -> Self {
-        match nearness {
-            Nearness::Within(d) if d.value_mm < limit_mm => Self::Pressed(d),
-            near => Self::Free(near.value_mm()),
-        }
-    }
-
-    /// Distance, mm, or less.
-    fn distance_mm(&self) -> f64 {
-        match self {
-            Self::Free(value_mm) | Self::Pressed(Distance { value_mm, .. }) => *value_mm,
-        }
-    }
-}
-
-/// The smooth distance changes by less than this part of the way.
-const STEEPEST: f64 = 2.0;
 /// Radius of the gentlest bend worth a number, mm.
 const LEAST_BEND_MM: f64 = 100.0;
 /// Part of its clearance that a point may move in one step of Newton's method.
@@ -105,133 +78,6 @@ impl<'a> WallContact<'a> {
             rounding_n: 0.0,
             counters: Counters::default(),
         }
-    }
-
-    /// How near the wall point `index` would be at `x`.
-    fn read(&mut self, index: usize, x: &Vec3) -> Reading {
-        self.read_within(index, x, self.points[index].potential.radius_mm)
-    }
-
-    /// The same, with derivatives nearer than `limit_mm`.
-    fn read_within(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
-        if let Some(side) = self.memory.points[index].side {
-            return self.read_from_side(index, x, side, limit_mm);
-        }
-        self.read_known(index, x, limit_mm).unwrap_or_else(|| self.read_anew(index, x, limit_mm))
-    }
-
-    /// Below which distance a trial asks for derivatives: they serve the assembly that follows where friction acts; otherwise that
-    /// was tried first.
-    fn asked_mm(&self, radius_mm: f64) -> f64 {
-        if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY }
-    }
-
-    /// The reading that was taken at `x` about `triangle`, if it tells enough.
-    fn read_there(&self, index: usize, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<Reading> {
-        let TakenReading { at_mm, triangle: about, nearness } = self.memory.readings[index];
-        let told = matches!(nearness, Nearness::Within(_)) || nearness.value_mm() >= limit_mm;
-        (at_mm == *x && about == triangle && told).then(|| Reading::of(nearness, limit_mm))
-    }
-
-    /// Of a point that has sunk into the wall: followed from there along the surface.
-    fn read_from_side(&mut self, index: usize, x: &Vec3, side: u32, limit_mm: f64) -> Reading {
-        let point = &self.points[index];
-        let known = &mut self.memory.points[index];
-        let triangle = match known.base_triangle {
-            Some(triangle) if (x - known.base_looked_at).norm() < LOOK_AGAIN * point.potential.radius_mm => {
-                known.looked_at = known.base_looked_at;
-                triangle
-            }
-            _ => {
-                known.looked_at = *x;
-                self.felt.smooth.walk(side, x)
-            }
-        };
-        known.from_tip_mm = point.from_tip_mm;
-        (known.clearance_mm, known.triangle, known.free_mm) = (0.0, Some(triangle), 0.0);
-        if let Some(reading) = self.read_there(index, x, triangle, limit_mm) {
-            self.counters.avoided += 1;
-            return reading;
-        }
-        self.counters.near += 1;
-        let nearness = self.felt.nearness(x, triangle, limit_mm);
-        self.memory.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
-        Reading::of(nearness, limit_mm)
-    }
-
-    /// What clearances and the last triangle say without a query.
-    fn read_known(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Option<Reading> {
-        let radius = self.points[index].potential.radius_mm;
-        let near = radius * (1.0 + FOLLOW);
-        let known = &mut self.memory.points[index];
-        let moved = (x - known.base_looked_at).norm();
-        if moved < known.base_free_mm {
-            self.counters.avoided += 1;
-            (known.looked_at, known.triangle) = (known.base_looked_at, None);
-            (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, known.base_free_mm);
-            return Some(Reading::Free(known.clearance_mm - moved));
-        }
-        let moved = (x - known.looked_at).norm();
-        let free_mm = known.clearance_mm - near - self.felt.smooth.deepest_inset_mm();
-        if moved < free_mm {
-            self.counters.avoided += 1;
-            known.free_mm = free_mm;
-            return Some(Reading::Free(known.clearance_mm - moved));
-        }
-        if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius && known.base_triangle.is_some() {
-            (known.looked_at, known.triangle) = (known.base_looked_at, known.base_triangle);
-            (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, 0.0);
-        }
-        let (triangle, looked_at) = (known.triangle?, known.looked_at);
-        // Most points that are near a wall do not touch it, and are moved little.
-        let taken = &self.memory.readings[index];
-        let clear_mm = limit_mm.max(radius);
-        let spare_mm = taken.nearness.value_mm() - clear_mm - STEEPEST * (x - taken.at_mm).norm();
-        if spare_mm > 0.0 && taken.triangle == triangle {
-            self.counters.avoided += 1;
-            return Some(Reading::Free(clear_mm + spare_mm));
-        }
-        if let Some(reading) = self.read_there(index, x, triangle, limit_mm) {
-            self.counters.avoided += 1;
-            return Some(reading);
-        }
-        if (x - looked_at).norm() >= LOOK_AGAIN * radius {
-            return None;
-        }
-        let nearness = self.felt.nearness(x, triangle, limit_mm);
-        if nearness.value_mm() <= 0.0 {
-            return None;
-        }
-        self.counters.near += 1;
-        self.memory.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
-        Some(Reading::of(nearness, limit_mm))
-    }
-
-    /// From the triangle that is nearest through space.
-    fn read_anew(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
-        let radius = self.points[index].potential.radius_mm;
-        let near = radius * (1.0 + FOLLOW);
-        let known = &mut self.memory.points[index];
-        let places = &mut self.memory.places;
-        let asked = places.queries;
-        let place = places.around(&self.felt.query, x);
-        self.counters.avoided += u64::from(places.queries == asked);
-        (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
-        (known.clearance_mm, known.triangle) = (place.clearance_mm, None);
-        let clearance = place.clearance(x);
-        let Some(triangle) = place.triangle else {
-            // Past an opening there is no wall.
-            known.free_mm = (x - place.middle).norm() + LOOK_AGAIN * radius;
-            return Reading::Free(clearance);
-        };
-        known.free_mm = place.clearance_mm - near - self.felt.smooth.inset_mm(triangle);
-        if (x - place.middle).norm() < known.free_mm {
-            return Reading::Free(clearance);
-        }
-        (known.triangle, known.free_mm) = (Some(triangle), 0.0);
-        let nearness = self.felt.nearness(x, triangle, limit_mm);
-        self.memory.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
-        Reading::of(nearness, limit_mm)
     }
 
     /// Friction between instruments.
