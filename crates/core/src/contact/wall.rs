@@ -556,3 +556,6 @@ impl External for WallContact<'_> {
         fraction
     }
 }
+
+#[cfg(test)]
+mod tests;
