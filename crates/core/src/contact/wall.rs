@@ -405,3 +405,6 @@ impl External for WallContact<'_> {
         fraction
     }
 }
+
+#[cfg(test)]
+mod tests;
