@@ -349,6 +349,10 @@ impl External for WallContact<'_> {
         self.press_or_let_go_contacts(elements, base, moved, into)
     }
 
+    fn forget(&mut self) {
+        self.memory.foreseen.clear();
+    }
+
     fn stray(
         &mut self,
         elements: &[ElementData],

@@ -66,11 +66,16 @@ impl<const C: usize> Newton<C> {
             };
             std::mem::swap(&mut self.assembly.residual, &mut self.assembly.correction);
             supports.hold(&mut self.assembly);
+            // The step at hand is the one that these contacts give.
+            if changed == 0 && round == 0 {
+                return false;
+            }
             if changed == 0 || round == ROUNDS {
                 break;
             }
             if !self.factor_step(sigma).is_ok_and(|inertia| inertia.negative == elements.len()) {
                 self.step.copy_from_slice(&self.spare);
+                external.forget();
                 return false;
             }
         }

@@ -61,6 +61,9 @@ pub trait External {
         0
     }
 
+    /// Nothing is foreseen any more: the step that was is not taken.
+    fn forget(&mut self) {}
+
     /// Adds the forces, as a gradient at the base, the first of two states, by which contacts at a trial, the second, `part` of the step
     /// from there, are off what was foreseen. Returns their size over that of the forces foreseen.
     fn stray(
@@ -73,8 +76,8 @@ pub trait External {
         0.0
     }
 
-    /// Adds to the Hessian at the base what makes it that of a convex energy: less the negative curvature of contacts on crests. Returns
-    /// whether there was any.
+    /// Takes the negative curvature of contacts on crests out of the Hessian at the base; what the modulus of the wall does from place to
+    /// place stays. Returns whether there was any.
     fn convexify(&mut self, _elements: &[ElementData], _base: &RodState, _into: &mut dyn Stencils) -> bool {
         false
     }

@@ -164,6 +164,7 @@ impl<const C: usize> Newton<C> {
                             continue;
                         }
                         std::mem::swap(&mut self.step, &mut self.spare);
+                        problem.external.forget();
                     }
                 }
                 if !accepted {

@@ -19,6 +19,9 @@ use crate::contact::point::FOLLOW;
 use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
+/// A wall that bends away from the lumen by less than this, 1/mm, has no crest.
+const CREST_PER_MM: f64 = 1e-3;
+
 /// A contact in a step, and what that does to it.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::contact) struct Foreseen {
@@ -167,7 +170,7 @@ impl WallContact<'_> {
             let curvature = d.hessian.symmetric_eigen();
             let mut crest = Matrix3::zeros();
             for (value, way) in curvature.eigenvalues.iter().zip(curvature.eigenvectors.column_iter()) {
-                if *value > 0.0 {
+                if *value > CREST_PER_MM {
                     crest += way * way.transpose() * (press * value);
                 }
             }

@@ -192,7 +192,10 @@ impl<const C: usize> Search<'_, '_, C> {
                 self.state.copy_from(&self.guess.other);
                 self.contact.rewind_friction();
                 // What presses there is seen again.
-                self.newton(STUCK, self.tolerance);
+                let again = self.newton(STUCK, self.tolerance);
+                if !again.converged {
+                    return again;
+                }
             }
             self.contact.anchor_friction(self.elements, self.state);
             self.contact.hold_friction();
