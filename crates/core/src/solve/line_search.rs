@@ -166,6 +166,7 @@ impl<const C: usize> Newton<C> {
                         std::mem::swap(&mut self.step, &mut self.spare);
                         problem.external.forget();
                     }
+                    meetings = 0;
                 }
                 if !accepted {
                     if assembles && !modelled {

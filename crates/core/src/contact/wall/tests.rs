@@ -1,5 +1,6 @@
 //! The wall's energy as Newton's method asks for it, in small pieces of vessel.
 
+use crate::contact::memory::TakenReading;
 use nalgebra::SMatrix;
 
 use super::*;
