@@ -64,7 +64,7 @@ pub struct Place {
     pub length_mm: f64,
     /// N.
     pub force_n: f64,
-    /// ε, mm, as [`Between::push`] sets it.
+    /// ε, mm, as `Between::push` sets it.
     pub stick_mm: f64,
 }
 
