@@ -170,12 +170,12 @@ impl WallContact<'_> {
             let curvature = d.hessian.symmetric_eigen();
             let mut crest = Matrix3::zeros();
             for (value, way) in curvature.eigenvalues.iter().zip(curvature.eigenvectors.column_iter()) {
-                if *value > CREST_PER_MM {
+                if *value > 0.0 {
                     crest += way * way.transpose() * (press * value);
                 }
             }
             let (e, h) = (point.element, elements[point.element].length);
-            if crest != Matrix3::zeros() {
+            if curvature.eigenvalues.max() > CREST_PER_MM {
                 any = true;
                 let mut sum = PointSum::default();
                 sum.add(point.xi, &Vec3::zeros(), Some(&crest));
