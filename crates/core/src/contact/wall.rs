@@ -139,6 +139,13 @@ impl<'a> WallContact<'a> {
         sum.add(point.xi, &gradient, into.wants_hessian().then_some(&hessian));
     }
 
+    /// Length that point `index` stands for at its base, times the part of the modulus that acts there, mm.
+    fn weight_mm(&self, index: usize) -> f64 {
+        let known = &self.memory.points[index];
+        let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
+        factor * self.points[index].weight_mm
+    }
+
     /// A device bent to a radius of 100 mm carries this.
     fn least_force_n(&self) -> f64 {
         self.least_moment_nmm / LEAST_BEND_MM

@@ -63,7 +63,7 @@ impl WallContact<'_> {
             let Some(d) = self.memory.pressed(index) else { continue };
             let known = &self.memory.points[index];
             let x = &known.base;
-            let w = self.felt.stiffness(x, known.triangle, self.softness).factor * point.weight_mm;
+            let w = self.weight_mm(index);
             let rough = self.felt.rough(x, known.triangle);
             let (size, n) = (d.gradient.norm(), d.gradient / d.gradient.norm());
             let second = point.potential.holding(d.value_mm).1;
@@ -100,11 +100,9 @@ impl WallContact<'_> {
         self.memory.aims.clear();
         for (index, point) in self.points.iter().enumerate() {
             let force = self.memory.pressed(index).map_or(0.0, |d| {
-                let known = &self.memory.points[index];
-                let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
                 let (first, second) = point.potential.holding(d.value_mm);
                 let along = moved(point, &d.gradient);
-                -factor * point.weight_mm * (first + second * along) * d.gradient.norm()
+                -self.weight_mm(index) * (first + second * along) * d.gradient.norm()
             });
             self.memory.aims.push(force);
         }
@@ -125,8 +123,7 @@ impl WallContact<'_> {
         let (mut pull, mut press) = (0.0, 0.0);
         for (index, point) in self.points.iter().enumerate() {
             let Some(d) = self.memory.pressed(index) else { continue };
-            let known = &self.memory.points[index];
-            let w = self.felt.stiffness(&known.base, known.triangle, self.softness).factor * point.weight_mm;
+            let w = self.weight_mm(index);
             let force = -w * point.potential.holding(d.value_mm).0;
             if force < 0.0 {
                 pull -= force;

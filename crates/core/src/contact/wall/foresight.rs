@@ -44,8 +44,6 @@ impl WallContact<'_> {
         foreseen.clear();
         for (index, point) in self.points.iter().enumerate() {
             let Some(d) = self.memory.pressed(index) else { continue };
-            let known = &self.memory.points[index];
-            let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
             foreseen.push(Foreseen {
                 index,
                 gap_mm: [
@@ -53,7 +51,7 @@ impl WallContact<'_> {
                     moved((point.element, point.xi), &d.gradient),
                 ],
                 gradient: d.gradient,
-                spring_n_per_mm: factor * point.weight_mm * point.potential.modulus_n_per_mm2,
+                spring_n_per_mm: self.weight_mm(index) * point.potential.modulus_n_per_mm2,
                 presses: true,
             });
         }
@@ -164,9 +162,7 @@ impl WallContact<'_> {
         let mut any = false;
         for (index, point) in self.points.iter().enumerate() {
             let Some(d) = self.memory.pressed(index) else { continue };
-            let known = &self.memory.points[index];
-            let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
-            let press = -factor * point.weight_mm * point.potential.derivatives(d.value_mm).0;
+            let press = -self.weight_mm(index) * point.potential.derivatives(d.value_mm).0;
             let curvature = d.hessian.symmetric_eigen();
             let mut crest = Matrix3::zeros();
             for (value, way) in curvature.eigenvalues.iter().zip(curvature.eigenvectors.column_iter()) {
