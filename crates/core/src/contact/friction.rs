@@ -17,7 +17,7 @@
 //!
 //! of Li et al., *Incremental potential contact*, SIGGRAPH 2020 (eq. 14): twice continuously differentiable, with a force
 //! μN against the slip wherever the point slips farther than ε, and less where it sticks. A stuck point creeps
-//! by less than ε a step, and ε is a thousandth of what the hand moved in it.
+//! by less than ε a step, and ε is a thousandth of what the hand moved in it, or of the radius where it rests.
 //!
 //! The normal force N and the normal n are lagged: within one step of Newton's method D has fixed ones, so the energy keeps
 //! a symmetric Hessian and steps that descend; between steps they are renewed until they no longer change
@@ -40,10 +40,11 @@ use crate::Vec3;
 use crate::rod::quadrature::Point;
 use crate::rod::{ElementData, RodState};
 
-/// Slip below which a point sticks, as a part of the motion of the hand: what the regularisation gives away.
+/// Slip below which a point sticks, as a part of the motion of the hand, or of the radius of a device whose hand rests: what the
+/// regularisation gives away.
 const STICK: f64 = 1e-3;
 /// In every slide while the hand holds still it shrinks to this part.
-const STICK_AT_REST: f64 = 0.1;
+const STICK_AT_REST: f64 = 0.3;
 /// Least slip length, mm: below it steps are lost in the rounding of positions.
 const LEAST_STICK_MM: f64 = 1e-8;
 /// Points nearer to the tip than this many radii (beside the advance) bring their normal force along; the others find the
@@ -193,7 +194,8 @@ impl Friction {
         let radius = points.first().map_or(0.0, |p| p.potential.radius_mm);
         // An instrument that rests sticks within as much as the others move.
         let ways = hands.iter().map(|hand| hand.advance_mm().abs() + radius * hand.turn_rad.abs());
-        self.stick_mm = (STICK * ways.fold(0.0, f64::max)).max(LEAST_STICK_MM);
+        let way = ways.fold(0.0, f64::max);
+        self.stick_mm = (STICK * if way > 0.0 { way } else { radius }).max(LEAST_STICK_MM);
         let (old_points, old) = before;
         let count = old_points.len().min(old.len());
         let near_tip = TIP_RADII * radius + advance.abs();
