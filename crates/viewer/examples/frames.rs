@@ -120,6 +120,7 @@ fn main() -> Result<()> {
         animation.finish()?;
         let angiogram = Angiogram {
             c_arm,
+            turn_deg: 0.0,
             kvp: spec.xray.kvp,
             frames_per_s: 15.0,
             mode: Mode::Dsa,

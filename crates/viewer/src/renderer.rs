@@ -14,7 +14,7 @@ use crate::gpu;
 use crate::material::Material;
 use crate::output::{Image, Labels};
 use crate::scene::Setup;
-use crate::spec::{Backend, Mode, ViewSpec};
+use crate::spec::{Backend, CArmSpec, Mode, View, ViewSpec};
 use crate::tails::with_tails;
 use crate::three_d::{ContactView, Solids, draw_legend, draw_markers, draw_scale_bar};
 use crate::xray::PathLengths;
@@ -172,6 +172,38 @@ impl Renderer {
         let frames = frames?;
         self.next_frame = moment.frame + 1;
         Ok(frames)
+    }
+
+    /// Moves the C-arm: frames from now on are of where it is, those of a subtraction against a mask that is taken there with the next frame,
+    /// or by [`Self::take_mask`]. Body and flow stay, and so does what the detector still holds of the last frame.
+    ///
+    /// # Errors
+    /// As [`Self::new`] for the place, and [`Error::Parameter`] where the fluoroscopic view was not asked for. The C-arm then stays where it was.
+    pub fn move_c_arm(&mut self, place: &CArmSpec) -> Result<()> {
+        let spec = ViewSpec { c_arm: place.clone(), ..self.setup.spec.clone() };
+        self.c_arm().ok_or_else(no_fluoro)?;
+        if spec.camera.c_arm && spec.wants(View::ThreeD) {
+            // The camera stands where it sees the beam.
+            let filled = Setup::filled(&spec, Arc::clone(&self.setup.wall), Arc::clone(&self.setup.filled))?;
+            let stored = self.fluoro.take().map(|(_, sequence)| sequence.into_stored());
+            let contacts = std::mem::take(&mut self.contacts);
+            *self = Self { contacts, next_frame: self.next_frame, ..Self::of_setup(filled)? };
+            return self.go_on_from(stored);
+        }
+        self.setup.c_arm = Some(self.setup.placed(&spec)?);
+        self.setup.spec = spec;
+        (self.central, self.transmitted) = (None, None);
+        let stored = self.fluoro.take().map(|(_, sequence)| sequence.into_stored());
+        self.go_on_from(stored)
+    }
+
+    /// Prepares the next frame of a detector that holds what another place has left, if there was one.
+    fn go_on_from(&mut self, stored: Option<Vec<f32>>) -> Result<()> {
+        let Some(stored) = stored else { return Ok(()) };
+        self.with_fallback(|setup, engines, fluoro| {
+            prepared(setup, engines, fluoro)?.1.go_on_from(stored.clone());
+            Ok(())
+        })
     }
 
     /// Shows contacts and their forces in the 3D frames from now on.

@@ -57,23 +57,38 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     if steps.last() != Some(&last) {
         steps.push(last);
     }
+    let frames = match (steps.len(), args.count.map(|count| count as usize)) {
+        (1, count) => count.unwrap_or(1),
+        (several, None) if args.frames.deg_per_s.is_none() => several,
+        (several, _) => {
+            let text = format!(
+                "--count and --deg-per-s belong to one step, and {several} are drawn: give it as --from and --to"
+            );
+            return Err(Failure::Input(text));
+        }
+    };
     let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
     let wall =
         scene.wall(&Cache::new(&args.frames.cache)).map_err(|e| Failure::from(e).at(path.display()))?;
     let seen = (path.as_path(), &scene, wall);
-    let mut studio = Studio::new("render", &args.frames, seen, ViewChoice::Both, folder, steps.len())?;
+    let mut studio = Studio::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
     let (times_s, frame_s) = (step_times(&args.dir)?, 1.0 / studio.frames_per_s());
-    let bar = progress::bar(steps.len(), "frame");
-    for &step in &steps {
+    let frames = studio.frames();
+    let bar = progress::bar(frames, "frame");
+    // Of one step all frames are, which may be several, or one of each step.
+    let one = steps.len() == 1 && frames > 1;
+    for k in 0..frames {
+        let step = if one { steps[0] } else { steps[k] };
+        let (ending, later) = if one { (format!("_frame_{k:06}"), k) } else { (String::new(), 0) };
         let contacts = recording.contacts(step);
-        let moment = Moment { frame: step as u64, time_s: time_s(&times_s, step, frame_s) };
+        let time_s = time_s(&times_s, step, frame_s) + later as f64 * frame_s;
         let shape = recording.shape(step);
         let inserted_mm = lengths.after(step, &shape)?;
         studio.draw(&Still {
-            name: format!("step_{step:06}"),
-            moment,
+            name: format!("step_{step:06}{ending}"),
+            moment: Moment { frame: (step + later) as u64, time_s },
             shape: &shape,
             inserted_mm: &inserted_mm,
             contacts: &contacts,

@@ -100,6 +100,16 @@ impl Sequence {
         }
     }
 
+    /// What the detector holds of the last frame.
+    pub(crate) fn into_stored(mut self) -> Vec<f32> {
+        self.detector.take_stored()
+    }
+
+    /// Goes on with what a detector holds.
+    pub(crate) fn go_on_from(&mut self, stored: Vec<f32>) {
+        self.detector.store(stored);
+    }
+
     /// Reads the next frame and shows it in the scene's mode. The first one of a subtraction takes its mask itself.
     pub(crate) fn next(
         &mut self,
@@ -168,13 +178,15 @@ impl Sequence {
     /// −ln of a signal's mean over a few frames.
     fn stored(&mut self, signal: &Signal, kev: f64) -> Vec<f32> {
         let mut mean = vec![0.0; signal.signal.len()];
+        // Of the last frame, which a mask has nothing of.
+        let held = self.detector.take_stored();
         for k in 0..MASK_FRAMES {
-            self.detector.reset();
+            self.detector.take_stored();
             let read =
                 self.detector.read(signal.signal.clone(), signal.energy.clone(), kev, MASK_NUMBERS + k);
             mean.iter_mut().zip(read).for_each(|(mean, v)| *mean += v / MASK_FRAMES as f32);
         }
-        self.detector.reset();
+        self.detector.store(held);
         logarithm(mean)
     }
 }

@@ -20,8 +20,10 @@ use crate::spec::Mode;
 /// What a file of angiographic frames tells beside the pixels.
 #[derive(Debug, Clone)]
 pub struct Angiogram<'a> {
-    /// The geometry all frames share.
+    /// The geometry of all frames, or of the first where the C-arm turns.
     pub c_arm: &'a CArm,
+    /// By how much it has turned towards LAO from one frame to the next.
+    pub turn_deg: f64,
     /// Peak voltage of the tube.
     pub kvp: f64,
     /// Frames a second.
@@ -85,7 +87,7 @@ impl Angiogram<'_> {
     /// A number of pixels, geometry and what else is told.
     fn content(&self, frames: &[Image]) -> u128 {
         let opening = self.c_arm.opening_px().into_iter().flatten();
-        let numbers = opening.chain([self.kvp, self.frames_per_s]).flat_map(f64::to_le_bytes);
+        let numbers = opening.chain([self.kvp, self.frames_per_s, self.turn_deg]).flat_map(f64::to_le_bytes);
         let size = frames.first().map_or([0; 2], |f| [f.width(), f.height()]);
         let told = numbers
             .chain(self.c_arm.fingerprint().to_le_bytes())
@@ -174,6 +176,11 @@ impl Angiogram<'_> {
         ] {
             put(object, tag, VR::DS, &value);
         }
+        if self.turn_deg != 0.0 {
+            // One value: the same from each frame to the next.
+            put(object, tags::POSITIONER_PRIMARY_ANGLE_INCREMENT, VR::DS, &decimal(self.turn_deg));
+            put(object, tags::POSITIONER_SECONDARY_ANGLE_INCREMENT, VR::DS, "0");
+        }
         let [columns, rows] = self.c_arm.directions();
         let turn = self.c_arm.rotation_deg();
         for (tag, vr, value) in [
@@ -183,7 +190,7 @@ impl Angiogram<'_> {
             (tags::X_RAY_TUBE_CURRENT, VR::IS, ""),
             (tags::EXPOSURE_TIME, VR::IS, ""),
             (tags::EXPOSURE, VR::IS, ""),
-            (tags::POSITIONER_MOTION, VR::CS, "STATIC"),
+            (tags::POSITIONER_MOTION, VR::CS, if self.turn_deg == 0.0 { "STATIC" } else { "DYNAMIC" }),
             (tags::FIELD_OF_VIEW_SHAPE, VR::CS, "RECTANGLE"),
         ] {
             put(object, tag, vr, value);
@@ -338,6 +345,7 @@ mod tests {
     fn angiogram(c_arm: &CArm, mode: Mode) -> Angiogram<'_> {
         Angiogram {
             c_arm,
+            turn_deg: 0.0,
             kvp: 80.0,
             frames_per_s: 12.5,
             mode,
@@ -393,6 +401,16 @@ mod tests {
         let planes = [angiogram(&arm_a, Mode::Cine), angiogram(&arm_b, Mode::Cine)];
         Angiogram::write_biplane([&planes[0], &planes[1]], [&pair[0], &pair[1]], [&pixels, &pixels]).unwrap();
         paths.extend(pair);
+        let turning = folder.path().join("turning.dcm");
+        let turn = Angiogram { turn_deg: 1.5, ..angiogram(&arm_a, Mode::Dsa) };
+        turn.write(&turning, &pixels).unwrap();
+        let read = dicom_object::open_file(&turning).unwrap();
+        let told = read.element(tags::POSITIONER_PRIMARY_ANGLE_INCREMENT).unwrap().to_float64().unwrap();
+        assert_eq!(
+            (told, read.element(tags::POSITIONER_MOTION).unwrap().to_str().unwrap().trim()),
+            (1.5, "DYNAMIC")
+        );
+        paths.push(turning);
         for path in &paths {
             match errors(path) {
                 Some(errors) => assert!(errors.is_empty(), "{}: {errors:#?}", path.display()),

@@ -77,6 +77,9 @@ pub struct ViewSpec {
     pub backend: Backend,
     /// Position of the C-arm.
     pub c_arm: CArmSpec,
+    /// A second plane of fluoroscopy, turned by so much (towards LAO) from the first, -180 to 180. A [`crate::Renderer`] draws one plane:
+    /// [`Self::planes`] has the view of each.
+    pub biplane_deg: Option<f64>,
     /// X-ray physics.
     pub xray: XRaySpec,
     /// The detector.
@@ -106,6 +109,7 @@ impl Default for ViewSpec {
             every: 10,
             backend: Backend::Auto,
             c_arm: CArmSpec::default(),
+            biplane_deg: None,
             xray: XRaySpec::default(),
             detector: DetectorSpec::default(),
             patient: PatientSpec::default(),
@@ -168,6 +172,17 @@ impl ViewSpec {
         self.views.contains(&view)
     }
 
+    /// The view of each plane: this one, and with `biplane_deg` the fluoroscopy of the second.
+    pub fn planes(&self) -> Vec<Self> {
+        let first = Self { biplane_deg: None, ..self.clone() };
+        let second = self.biplane_deg.filter(|_| self.wants(View::Fluoro)).map(|turn_deg| Self {
+            views: vec![View::Fluoro],
+            c_arm: first.c_arm.turned(turn_deg),
+            ..first.clone()
+        });
+        std::iter::once(first).chain(second).collect()
+    }
+
     /// The parts of the `[[view.device]]` tables, if there are any.
     ///
     /// # Errors
@@ -196,6 +211,9 @@ impl ViewSpec {
             return Err(Error::parameter("view.every", 0, "must be at least 1"));
         }
         self.c_arm.validate()?;
+        if let Some(turn_deg) = self.biplane_deg {
+            finite_within("view.biplane_deg", turn_deg, [-180.0, 180.0])?;
+        }
         self.xray.validate()?;
         self.detector.validate()?;
         self.patient.validate()?;

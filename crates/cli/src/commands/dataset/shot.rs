@@ -97,12 +97,8 @@ fn planes(spec: &Spec, course: &Course, draw: Draw) -> Vec<ViewSpec> {
     if let Some(range) = vary.dose_ngy {
         view.detector.dose_ngy = Some(draw.within(What::Dose, range.map(f64::ln)).exp());
     }
-    let second = spec.biplane_deg.map(|turn| {
-        let mut second = view.clone();
-        second.c_arm.primary_deg += turn;
-        second
-    });
-    std::iter::once(view).chain(second).collect()
+    view.biplane_deg = spec.biplane_deg;
+    view.planes()
 }
 
 /// Labels as arrays.
