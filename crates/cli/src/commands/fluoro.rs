@@ -55,6 +55,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
             shape: &now.shape,
             inserted_mm: &now.inserted_mm,
             contacts: &now.contacts,
+            before: None,
         })?;
     }
     studio.finish()?.tell(args.frames.json)

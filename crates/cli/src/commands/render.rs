@@ -1,7 +1,7 @@
 //! `endowire render`: frames of a recorded run.
 
 use endowire_methods::Scene;
-use endowire_viewer::Moment;
+use endowire_viewer::{Moment, Seen};
 
 use super::studio::{Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
@@ -83,15 +83,25 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         let step = if one { steps[0] } else { steps[k] };
         let (ending, later) = if one { (format!("_frame_{k:06}"), k) } else { (String::new(), 0) };
         let contacts = recording.contacts(step);
-        let time_s = time_s(&times_s, step, frame_s) + later as f64 * frame_s;
+        let ended_s = |step: usize| time_s(&times_s, step, frame_s);
         let shape = recording.shape(step);
         let inserted_mm = lengths.after(step, &shape)?;
+        // A step that is drawn several times rests.
+        let before = match step.checked_sub(1).filter(|before| *before > 0 && !one) {
+            Some(before) => {
+                let shape = recording.shape(before);
+                Some((lengths.after(before, &shape)?, shape, ended_s(before)))
+            }
+            None => None,
+        };
+        let before = before.as_ref();
         studio.draw(&Still {
             name: format!("step_{step:06}{ending}"),
-            moment: Moment { frame: (step + later) as u64, time_s },
+            moment: Moment { frame: (step + later) as u64, time_s: ended_s(step) + later as f64 * frame_s },
             shape: &shape,
             inserted_mm: &inserted_mm,
             contacts: &contacts,
+            before: before.map(|(inserted_mm, shape, time_s)| Seen { shape, inserted_mm, time_s: *time_s }),
         })?;
         bar.inc(1);
     }

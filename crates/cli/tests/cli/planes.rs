@@ -211,3 +211,31 @@ fn a_state_of_a_run_is_drawn_all_around_in_two_planes() {
     let several = endowire(&["render", text(&run), "--from", "1", "--count", "3"]);
     assert!(said(&several).contains("belong to one step"), "{}", said(&several));
 }
+
+#[test]
+fn a_pulse_shows_the_way_of_a_device_in_a_run_and_afterwards_alike() {
+    let folder = tempfile::tempdir().unwrap();
+    // A step is a fifteenth of a second; pulses last for 60 ms of it, and the tube's voltage follows the patient.
+    let run = |name: &str, pulse_ms: &str| {
+        let views = "views = [\"fluoro\"]\nexposure.current_ma = [0.1, 1000.0]\ndetector.lag = 0.0";
+        let pulse = format!("contrast_fraction = 0.05\npulse_ms = {pulse_ms}");
+        let more = [("views = [\"3d\", \"fluoro\"]", views), ("contrast_fraction = 0.05", pulse.as_str())];
+        let changes = [&SHORT[..], &more].concat();
+        let path = folder.path().join(format!("{name}.toml"));
+        std::fs::write(&path, scene_text("curved_tube.toml", &changes)).unwrap();
+        let run = folder.path().join(name);
+        let output = endowire(&["run", text(&path), "--out", text(&run)]);
+        assert!(output.status.success(), "{}", said(&output));
+        run
+    };
+    let [long, short] = [run("long", "60.0"), run("short", "0.1")];
+    let frame = |run: &Path| bytes(run.join("frames/step_000106_fluoro.png"));
+    let render = ["render", text(&long), "--from", "105", "--view", "fluoro", "--json", "--labels"];
+    written(&endowire(&render));
+    assert!(frame(&long) == bytes(long.join("render/step_000106_fluoro.png")));
+    assert!(frame(&long) != frame(&short), "the twin: a pulse that is over at once");
+    let exposure = &document(long.join("summary.json"))["planes"][0]["exposure"];
+    assert_eq!(exposure["pulse"]["pulse_ms"], 60.0);
+    assert_eq!(exposure["kvp"], 60.0, "10 cm of tissue");
+    assert_eq!(&document(long.join("render/step_000106_labels.json"))["exposure"], exposure);
+}

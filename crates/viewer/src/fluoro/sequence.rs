@@ -58,7 +58,7 @@ impl Sequence {
     pub(crate) fn new(spec: &ViewSpec, fluoroscope: &Fluoroscope) -> Self {
         let c_arm = &fluoroscope.c_arm;
         let mode = spec.xray.mode;
-        let dose = spec.detector.dose_ngy.unwrap_or_else(|| mode.dose_ngy());
+        let dose = fluoroscope.exposure.dose_ngy;
         let offset = fluoroscope.beam.ln_reference();
         let share = spec.xray.harmonised as f32;
         let mask: Option<Vec<f32>> = (matches!(mode, Mode::Fluoro | Mode::Cine) && share > 0.0).then(|| {
@@ -115,19 +115,19 @@ impl Sequence {
         &mut self,
         fluoroscope: &mut Fluoroscope,
         engine: &mut dyn PathEngine,
-        devices: &[RefinedDevice],
+        pulse: &[Vec<RefinedDevice>],
         moment: Moment,
     ) -> Result<Image> {
         if self.mask.is_none() {
             match self.mode {
                 Mode::Fluoro | Mode::Cine => {}
-                Mode::Dsa => self.take_mask(fluoroscope, engine, devices)?,
+                Mode::Dsa => self.take_mask(fluoroscope, engine, pulse)?,
                 Mode::Roadmap => self.store_roadmap(fluoroscope)?,
             }
         }
         // The injections of a roadmap are those of its angiogram.
         let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
-        let signal = fluoroscope.signal(engine, devices, time)?;
+        let signal = fluoroscope.signal(engine, pulse, time)?;
         let read = self.detector.read(signal.signal, signal.energy, self.kev, moment.frame);
         let mut values = logarithm(read);
         if let Some(mask) = &self.mask {
@@ -155,9 +155,9 @@ impl Sequence {
         &mut self,
         fluoroscope: &mut Fluoroscope,
         engine: &mut dyn PathEngine,
-        devices: &[RefinedDevice],
+        pulse: &[Vec<RefinedDevice>],
     ) -> Result<()> {
-        let signal = fluoroscope.signal(engine, devices, None)?;
+        let signal = fluoroscope.signal(engine, pulse, None)?;
         self.mask = Some(self.stored(&signal, self.kev));
         Ok(())
     }

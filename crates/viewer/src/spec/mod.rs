@@ -2,6 +2,7 @@
 
 mod anatomy;
 mod c_arm;
+mod exposure;
 mod of_scene;
 mod xray;
 
@@ -13,9 +14,11 @@ use serde::{Deserialize, Serialize};
 pub use anatomy::{CtSpec, FlowSpec, InjectionSpec, PatientSpec, TorsoSpec};
 pub(crate) use c_arm::PITCH_MM;
 pub use c_arm::{CArmSpec, Pose};
+pub use exposure::ExposureSpec;
 pub use xray::{DetectorSpec, Mode, XRaySpec};
 
 use crate::device::DevicePart;
+use crate::xray::check_exposure;
 
 /// Largest side of a frame. Flat detectors have up to about 3000 pixels a side, and with two rays across a
 /// pixel this is the texture size that every adapter offers.
@@ -82,6 +85,8 @@ pub struct ViewSpec {
     pub biplane_deg: Option<f64>,
     /// X-ray physics.
     pub xray: XRaySpec,
+    /// Exposure control; absent: the voltage and the dose as they are given.
+    pub exposure: Option<ExposureSpec>,
     /// The detector.
     pub detector: DetectorSpec,
     /// Who lies in the beam.
@@ -111,6 +116,7 @@ impl Default for ViewSpec {
             c_arm: CArmSpec::default(),
             biplane_deg: None,
             xray: XRaySpec::default(),
+            exposure: None,
             detector: DetectorSpec::default(),
             patient: PatientSpec::default(),
             flow: FlowSpec::default(),
@@ -227,6 +233,11 @@ impl ViewSpec {
         self.injection.iter().enumerate().try_for_each(|(i, injection)| injection.validate(i))?;
         anatomy::validate_parts(&self.device)?;
         finite_within("view.frames_per_s", self.frames_per_s, [0.01, 1000.0])?;
+        // Rounded, for the message.
+        let most_ms = (1e4 / self.frames_per_s).round() / 10.0;
+        finite_within("view.xray.pulse_ms", self.xray.pulse_ms, [0.0, most_ms])?;
+        self.exposure.as_ref().map_or(Ok(()), ExposureSpec::validate)?;
+        check_exposure(self)?;
         if ![8, 16].contains(&self.bits) {
             return Err(Error::parameter("view.bits", self.bits, "must be 8 or 16"));
         }

@@ -9,8 +9,8 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::Wall;
 use endowire_methods::Scene;
 use endowire_viewer::{
-    Animation, ContactView, DeviceView, Frames, Labels, Mask, Moment, PathLengths, Pushed, Renderer, View,
-    ViewSpec,
+    Animation, ContactView, DeviceView, Frames, Labels, Mask, Moment, PathLengths, Pushed, Renderer, Seen,
+    View, ViewSpec,
 };
 use serde::Serialize;
 
@@ -30,6 +30,8 @@ pub(super) struct Still<'a> {
     /// Length in of the device, or of each instrument, mm.
     pub(super) inserted_mm: &'a [f64],
     pub(super) contacts: &'a [ContactView],
+    /// What was recorded before, where pulses show the way from there.
+    pub(super) before: Option<Seen<'a>>,
 }
 
 /// What was written: the JSON document of `render` and `fluoro`.
@@ -141,10 +143,14 @@ impl<'a> Studio<'a> {
         let wanted = orbited.is_none() || self.spec.wants(View::Fluoro);
         for plane in self.planes.iter_mut().filter(|_| wanted) {
             plane.renderer.show_contacts(still.contacts);
-            let frames = plane.draw(&views, still.moment, turn_deg)?;
+            plane.turn(&views, turn_deg)?;
+            let now =
+                Seen { shape: still.shape, inserted_mm: still.inserted_mm, time_s: still.moment.time_s };
+            let pulse = self.pushed.pulse(still.before, now, &plane.renderer);
+            let frames = plane.renderer.render_pulse(&views, &pulse, still.moment)?;
             three_d = three_d.or(frames.three_d);
             if let (Some(image), true) = (&frames.fluoro, self.args.dicom.is_some()) {
-                plane.series.push(image.clone());
+                plane.keep(image.clone());
             }
             fluoro.push((plane.ending, frames.fluoro));
         }

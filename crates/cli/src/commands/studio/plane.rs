@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result};
-use endowire_viewer::{
-    Angiogram, CArm, CArmSpec, DeviceView, Frames, Image, Mode, Moment, Renderer, ViewSpec,
-};
+use endowire_viewer::{Angiogram, CArm, CArmSpec, DeviceView, Exposure, Image, Mode, Renderer, ViewSpec};
 
 /// A plane.
 pub(super) struct Plane {
@@ -16,10 +14,12 @@ pub(super) struct Plane {
     /// Where the C-arm stands in the first frame, as said and as it is.
     start: CArmSpec,
     arm: Option<CArm>,
+    /// Of the first frame.
+    exposure: Option<Exposure>,
     /// Devices in the first frame: those of the masks of a C-arm that turns.
     first: Option<Vec<DeviceView>>,
     /// Its frames, where they are kept.
-    pub(super) series: Vec<Image>,
+    series: Vec<Image>,
 }
 
 impl Plane {
@@ -29,27 +29,27 @@ impl Plane {
         let plane = |(spec, ending): (ViewSpec, &'static str)| {
             let renderer = Renderer::of_wall(&spec, wall)?;
             let arm = renderer.c_arm().cloned();
-            Ok(Self { ending, renderer, start: spec.c_arm, arm, first: None, series: vec![] })
+            Ok(Self { ending, renderer, start: spec.c_arm, arm, exposure: None, first: None, series: vec![] })
         };
         spec.planes().into_iter().zip(endings).map(plane).collect()
     }
 
-    /// Draws a moment, where `turn_deg` says it with the C-arm turned by so much from where it stood first. Masks of a subtraction are of the
-    /// first frame's devices, as those of a run without medium that turned alike before.
-    pub(super) fn draw(
-        &mut self,
-        views: &[DeviceView],
-        moment: Moment,
-        turn_deg: Option<f64>,
-    ) -> Result<Frames> {
-        if let Some(turn_deg) = turn_deg {
-            let first = self.first.get_or_insert_with(|| views.to_vec());
-            self.renderer.move_c_arm(&self.start.turned(turn_deg))?;
-            if self.renderer.spec().xray.mode == Mode::Dsa {
-                self.renderer.take_mask(first)?;
-            }
+    /// Turns the C-arm by so much from where it stood first, if it is to turn. Masks of a subtraction are then of the first frame's devices, as
+    /// those of a run without medium that turned alike before.
+    pub(super) fn turn(&mut self, views: &[DeviceView], turn_deg: Option<f64>) -> Result<()> {
+        let Some(turn_deg) = turn_deg else { return Ok(()) };
+        let first = self.first.get_or_insert_with(|| views.to_vec());
+        self.renderer.move_c_arm(&self.start.turned(turn_deg))?;
+        match self.renderer.spec().xray.mode {
+            Mode::Dsa => self.renderer.take_mask(first),
+            _ => Ok(()),
         }
-        self.renderer.render_at(views, moment)
+    }
+
+    /// Keeps a frame for DICOM.
+    pub(super) fn keep(&mut self, frame: Image) {
+        self.exposure = self.exposure.or(self.renderer.exposure());
+        self.series.push(frame);
     }
 
     /// What a DICOM file says of the frames, which turned by `turn_deg` from one to the next.
@@ -59,7 +59,7 @@ impl Plane {
         Ok(Angiogram {
             c_arm: self.arm.as_ref().ok_or_else(none)?,
             turn_deg,
-            kvp: spec.xray.kvp,
+            exposure: self.exposure.ok_or_else(none)?,
             frames_per_s: spec.frames_per_s,
             mode: spec.xray.mode,
             contrast: !spec.injection.is_empty() || spec.xray.contrast_fraction > 0.0,
