@@ -188,7 +188,7 @@ fn a_state_of_a_run_is_drawn_all_around_in_two_planes() {
         let name = format!("step_000106_frame_{frame:06}_labels{ending}.json");
         assert!(files.contains(&name.as_str()), "{name}: {files:?}");
         let matrix = document(out.join(name))["camera_matrix"].clone();
-        matrix.as_array().unwrap().iter().flat_map(|row| numbers(row)).collect::<Vec<f64>>()
+        matrix.as_array().unwrap().iter().flat_map(numbers).collect::<Vec<f64>>()
     };
     // The first plane stands after 60 degrees and a half where the second, 90 degrees on, never does, and at the end opposite to its beginning.
     let [first, last] = [matrix(0, ""), matrix(3, "")];
@@ -217,7 +217,8 @@ fn a_pulse_shows_the_way_of_a_device_in_a_run_and_afterwards_alike() {
     let folder = tempfile::tempdir().unwrap();
     // A step is a fifteenth of a second; pulses last for 60 ms of it, and the tube's voltage follows the patient.
     let run = |name: &str, pulse_ms: &str| {
-        let views = "views = [\"fluoro\"]\nexposure.current_ma = [0.1, 1000.0]\ndetector.lag = 0.0";
+        let views =
+            "views = [\"fluoro\"]\nexposure.current_ma = [0.1, 1000.0]\ndetector.lag = 0.0\nbits = 16";
         let pulse = format!("contrast_fraction = 0.05\npulse_ms = {pulse_ms}");
         let more = [("views = [\"3d\", \"fluoro\"]", views), ("contrast_fraction = 0.05", pulse.as_str())];
         let changes = [&SHORT[..], &more].concat();
