@@ -11,7 +11,8 @@
 //! that no point of a device moves by more than half a pixel of the picture from one to the next, as far apart as the rays of a pixel are; at most 32.
 //!
 //! **Motion.** Between two recorded moments each point of a device goes straight and evenly. Points are counted from the tip of their instrument, so they are
-//! the same at both: x(s, w) = (1 − w) x₀(s) + w x₁(s). What was still in the sheath at the first came out of it along its tangent. At a time before the
+//! the same at both: x(s, w) = (1 − w) x₀(s) + w x₁(s). What is still, or
+//! again, in the sheath at one of them lies there along the tangent of its mouth. At a time before the
 //! first moment devices are as they were then. Contrast medium rests within a pulse.
 
 use endowire_core::Vec3;
@@ -83,28 +84,35 @@ impl Pushed {
             } else {
                 Shape::default()
             };
-            Way::new(&begin, end)
+            Way::new(&begin, &end)
         };
         lengths.map(way).collect()
     }
 }
 
-/// Where the points of an instrument were, and where they are.
+/// Where the points of an instrument were, and where they are: those that are in at either moment.
 struct Way {
     from: Vec<(Vec3, Vec3)>,
-    to: Shape,
+    to: Vec<(Vec3, Vec3)>,
+    from_tip_mm: Vec<f64>,
 }
 
 impl Way {
-    fn new(before: &Shape, to: Shape) -> Self {
-        let nodes = to.from_tip_mm.iter().zip(to.positions_mm.iter().zip(&to.tangents));
-        let from = nodes.map(|(&s, (x, t))| place(before, s).unwrap_or((*x, *t))).collect();
-        Self { from, to }
+    fn new(before: &Shape, now: &Shape) -> Self {
+        let in_now = now.from_tip_mm.first().copied().unwrap_or(0.0);
+        // What has been withdrawn since.
+        let gone = before.from_tip_mm.iter().filter(|s| **s > in_now);
+        let from_tip_mm: Vec<f64> = gone.chain(&now.from_tip_mm).copied().collect();
+        let places = |shape: &Shape, other: &Shape| {
+            let at = |&s: &f64| place(shape, s).or_else(|| place(other, s)).unwrap_or_default();
+            from_tip_mm.iter().map(at).collect::<Vec<_>>()
+        };
+        Self { from: places(before, now), to: places(now, before), from_tip_mm }
     }
 
     /// The longest way of a point on the detector, pixels.
     fn px(&self, arm: &CArm) -> f64 {
-        let ways = self.from.iter().zip(&self.to.positions_mm).map(|((from, _), to)| {
+        let ways = self.from.iter().zip(&self.to).map(|((from, _), (to, _))| {
             let [a, b] = [arm.project(from), arm.project(to)];
             (a[0] - b[0]).hypot(a[1] - b[1])
         });
@@ -112,10 +120,11 @@ impl Way {
     }
 
     fn at(&self, w: f64) -> Shape {
-        let both = self.from.iter().zip(self.to.positions_mm.iter().zip(&self.to.tangents));
-        let (positions_mm, tangents) =
-            both.map(|((x0, t0), (x1, t1))| (x0 * (1.0 - w) + x1 * w, t0 * (1.0 - w) + t1 * w)).unzip();
-        Shape { positions_mm, tangents, from_tip_mm: self.to.from_tip_mm.clone() }
+        let mix = |(from, to): (&(Vec3, Vec3), &(Vec3, Vec3))| {
+            (from.0 * (1.0 - w) + to.0 * w, from.1 * (1.0 - w) + to.1 * w)
+        };
+        let (positions_mm, tangents) = self.from.iter().zip(&self.to).map(mix).unzip();
+        Shape { positions_mm, tangents, from_tip_mm: self.from_tip_mm.clone() }
     }
 }
 
@@ -151,7 +160,7 @@ mod tests {
     #[test]
     fn points_of_a_device_that_is_pushed_along_its_arc_go_along_it() {
         // A point goes 2 mm along the arc: half of its way is the middle of a chord, 2²/8·30 mm beside it.
-        let way = Way::new(&arc(20.0), arc(22.0));
+        let way = Way::new(&arc(20.0), &arc(22.0));
         let (half, expected) = (way.at(0.5), arc(21.0));
         let tip = half.positions_mm[10];
         assert!((tip - expected.positions_mm[10]).norm() < 0.017 + 1e-3, "{tip}");
@@ -165,8 +174,25 @@ mod tests {
             assert!((half.tangents[k].norm() - 1.0).abs() < 1e-3);
         }
         // At the ends it is what was recorded; the twin: half of the way is neither.
-        assert_eq!(way.at(1.0).positions_mm, arc(22.0).positions_mm);
+        let off = |a: &Shape, b: &Shape| {
+            a.positions_mm.iter().zip(&b.positions_mm).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+        };
+        assert!(off(&way.at(1.0), &arc(22.0)) < 1e-9);
         assert!((way.at(0.0).positions_mm[10] - arc(20.0).positions_mm[10]).norm() < 1e-9);
         assert!((tip - arc(22.0).positions_mm[10]).norm() > 0.9);
+    }
+
+    #[test]
+    fn what_is_withdrawn_is_still_in_before_its_end() {
+        let way = Way::new(&arc(22.0), &arc(20.0));
+        let half = way.at(0.5);
+        // 21 mm are in, and what is behind the mouth lies on its line.
+        let mouth = half.position_at(21.0).unwrap();
+        assert!(mouth.norm() < 0.02, "{mouth}");
+        assert!(half.positions_mm.iter().zip(&half.from_tip_mm).all(|(x, s)| *s <= 21.0 || x.z < 0.01));
+        assert!(half.from_tip_mm.windows(2).all(|pair| pair[1] < pair[0]));
+        // The twin: without them a millimetre at the mouth would be missing.
+        let first = half.from_tip_mm.iter().position(|s| *s <= 20.0).unwrap();
+        assert!(half.positions_mm[first].norm() > 0.9);
     }
 }

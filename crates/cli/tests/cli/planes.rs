@@ -217,8 +217,7 @@ fn a_pulse_shows_the_way_of_a_device_in_a_run_and_afterwards_alike() {
     let folder = tempfile::tempdir().unwrap();
     // A step is a fifteenth of a second; pulses last for 60 ms of it, and the tube's voltage follows the patient.
     let run = |name: &str, pulse_ms: &str| {
-        let views =
-            "views = [\"fluoro\"]\nexposure.current_ma = [0.1, 1000.0]\ndetector.lag = 0.0\nbits = 16";
+        let views = "views = [\"fluoro\"]\nexposure.current_ma = [0.1, 1000.0]\ndetector.lag = 0.0\nbits = 16\nc_arm = { field_mm = 30.0, isocentre_mm = [0.0, 0.0, 10.0] }";
         let pulse = format!("contrast_fraction = 0.05\npulse_ms = {pulse_ms}");
         let more = [("views = [\"3d\", \"fluoro\"]", views), ("contrast_fraction = 0.05", pulse.as_str())];
         let changes = [&SHORT[..], &more].concat();
