@@ -9,7 +9,7 @@ use crate::c_arm::CArm;
 use crate::cpu;
 use crate::device::{DeviceView, RefinedDevice};
 use crate::engine::{Engines, PathEngine};
-use crate::fluoro::{Anatomy, Fluoroscope, Moment, Sequence, labels};
+use crate::fluoro::{Afterglow, Anatomy, Fluoroscope, Moment, Sequence, labels};
 use crate::gpu;
 use crate::material::Material;
 use crate::output::{Image, Labels};
@@ -192,18 +192,18 @@ impl Renderer {
         Ok(frames)
     }
 
-    /// Moves the C-arm: frames from now on are of where it is, those of a subtraction against a mask that is taken there with the next frame,
-    /// or by [`Self::take_mask`]. Body and flow stay, and so does what the detector still holds of the last frame.
+    /// Turns the C-arm in a run: the next frame is of another place, in a subtraction against a mask that is taken there with it, or by
+    /// [`Self::take_mask`], as one of a run that came the same way. Body and flow stay, and so does what the detector holds of the last frame.
     ///
     /// # Errors
     /// As [`Self::new`] for the place, and [`Error::Parameter`] where the fluoroscopic view was not asked for. The C-arm then stays where it was.
-    pub fn move_c_arm(&mut self, place: &CArmSpec) -> Result<()> {
+    pub fn turn_c_arm(&mut self, place: &CArmSpec) -> Result<()> {
         let spec = ViewSpec { c_arm: place.clone(), ..self.setup.spec.clone() };
         self.c_arm().ok_or_else(no_fluoro)?;
         if spec.camera.c_arm && spec.wants(View::ThreeD) {
             // The camera stands where it sees the beam.
             let filled = Setup::filled(&spec, Arc::clone(&self.setup.wall), Arc::clone(&self.setup.filled))?;
-            let stored = self.fluoro.take().map(|(_, sequence)| sequence.into_stored());
+            let stored = self.fluoro.take().map(|(_, sequence)| sequence.into_afterglow());
             let contacts = std::mem::take(&mut self.contacts);
             *self = Self { contacts, next_frame: self.next_frame, ..Self::of_setup(filled)? };
             return self.go_on_from(stored);
@@ -211,12 +211,12 @@ impl Renderer {
         self.setup.c_arm = Some(self.setup.placed(&spec)?);
         self.setup.spec = spec;
         (self.central, self.transmitted) = (None, None);
-        let stored = self.fluoro.take().map(|(_, sequence)| sequence.into_stored());
+        let stored = self.fluoro.take().map(|(_, sequence)| sequence.into_afterglow());
         self.go_on_from(stored)
     }
 
     /// Prepares the next frame of a detector that holds what another place has left, if there was one.
-    fn go_on_from(&mut self, stored: Option<Vec<f32>>) -> Result<()> {
+    fn go_on_from(&mut self, stored: Option<Afterglow>) -> Result<()> {
         let Some(stored) = stored else { return Ok(()) };
         self.with_fallback(|setup, engines, fluoro| {
             prepared(setup, engines, fluoro)?.1.go_on_from(stored.clone());

@@ -26,7 +26,7 @@ pub(crate) use anatomy::Anatomy;
 pub(crate) use labels::labels;
 use scatter::Scatter;
 pub use sequence::Moment;
-pub(crate) use sequence::Sequence;
+pub(crate) use sequence::{Afterglow, Sequence};
 
 use crate::c_arm::CArm;
 use crate::contrast::{ContrastMap, Medium};

@@ -52,6 +52,16 @@ pub(crate) struct Sequence {
     mask: Option<Vec<f32>>,
     /// Values of the last frames, the newest weighing most.
     held: Vec<f32>,
+    /// Signal of the mask that was taken last, and of that where the C-arm was before.
+    mask_read: Vec<f32>,
+    mask_before: Vec<f32>,
+}
+
+/// What a detector has of the frame before, and of the mask before, where the C-arm stood then.
+#[derive(Debug, Clone)]
+pub(crate) struct Afterglow {
+    frame: Vec<f32>,
+    mask: Vec<f32>,
 }
 
 impl Sequence {
@@ -97,17 +107,20 @@ impl Sequence {
             noisy: spec.detector.noise,
             mask,
             held: vec![],
+            mask_read: vec![],
+            mask_before: vec![],
         }
     }
 
     /// What the detector holds of the last frame.
-    pub(crate) fn into_stored(mut self) -> Vec<f32> {
-        self.detector.take_stored()
+    pub(crate) fn into_afterglow(mut self) -> Afterglow {
+        Afterglow { frame: self.detector.take_stored(), mask: self.mask_read }
     }
 
-    /// Goes on with what a detector holds.
-    pub(crate) fn go_on_from(&mut self, stored: Vec<f32>) {
-        self.detector.store(stored);
+    /// Goes on with what a detector holds: the next mask is that of a run which came the same way.
+    pub(crate) fn go_on_from(&mut self, afterglow: Afterglow) {
+        self.detector.store(afterglow.frame);
+        self.mask_before = afterglow.mask;
     }
 
     /// Reads the next frame and shows it in the scene's mode. The first one of a subtraction takes its mask itself.
@@ -167,8 +180,8 @@ impl Sequence {
         let full = fluoroscope.opacified()?;
         let kev = self.kev * Mode::Dsa.dose_ngy() / self.mode.dose_ngy();
         let scale = ROADMAP_VESSEL / strongest(fluoroscope);
-        let mut map = self.stored(&fluoroscope.still, kev);
         let full = self.stored(&full, kev);
+        let mut map = self.stored(&fluoroscope.still, kev);
         // A frame less this is −scale in the vessel.
         map.iter_mut().zip(full).for_each(|(map, full)| *map -= scale * (full - *map));
         self.mask = Some(map);
@@ -178,15 +191,16 @@ impl Sequence {
     /// −ln of a signal's mean over a few frames.
     fn stored(&mut self, signal: &Signal, kev: f64) -> Vec<f32> {
         let mut mean = vec![0.0; signal.signal.len()];
-        // Of the last frame, which a mask has nothing of.
+        // Of the last frame, which a mask has nothing of: it has its share of the mask before.
         let held = self.detector.take_stored();
         for k in 0..MASK_FRAMES {
-            self.detector.take_stored();
+            self.detector.store(self.mask_before.clone());
             let read =
                 self.detector.read(signal.signal.clone(), signal.energy.clone(), kev, MASK_NUMBERS + k);
             mean.iter_mut().zip(read).for_each(|(mean, v)| *mean += v / MASK_FRAMES as f32);
         }
         self.detector.store(held);
+        self.mask_read.clone_from(&mean);
         logarithm(mean)
     }
 }

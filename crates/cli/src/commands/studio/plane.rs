@@ -39,7 +39,7 @@ impl Plane {
     pub(super) fn turn(&mut self, views: &[DeviceView], turn_deg: Option<f64>) -> Result<()> {
         let Some(turn_deg) = turn_deg else { return Ok(()) };
         let first = self.first.get_or_insert_with(|| views.to_vec());
-        self.renderer.move_c_arm(&self.start.turned(turn_deg))?;
+        self.renderer.turn_c_arm(&self.start.turned(turn_deg))?;
         match self.renderer.spec().xray.mode {
             Mode::Dsa => self.renderer.take_mask(first),
             _ => Ok(()),
