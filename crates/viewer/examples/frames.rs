@@ -114,13 +114,16 @@ fn main() -> Result<()> {
     for frame in 0..45 {
         series.extend(renderer.render_at(&devices, Moment { frame, time_s: frame as f64 / 15.0 })?.fluoro);
     }
-    if let (Some(first), Some(c_arm)) = (series.first(), renderer.c_arm()) {
+    if let (Some(first), Some(c_arm), Some(exposure)) =
+        (series.first(), renderer.c_arm(), renderer.exposure())
+    {
         let mut animation = Animation::new(folder.join("angiogram.png"), first, series.len() as u32, 15.0)?;
         series.iter().try_for_each(|frame| animation.push(frame))?;
         animation.finish()?;
         let angiogram = Angiogram {
             c_arm,
-            kvp: spec.xray.kvp,
+            turn_deg: 0.0,
+            exposure,
             frames_per_s: 15.0,
             mode: Mode::Dsa,
             contrast: true,

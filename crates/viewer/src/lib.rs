@@ -42,6 +42,7 @@ mod gpu;
 mod material;
 mod output;
 mod patient;
+mod pulse;
 mod pushed;
 mod renderer;
 mod scene;
@@ -58,11 +59,12 @@ pub use material::Material;
 pub use output::{
     Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, PartLabel, PixelFormat,
 };
+pub use pulse::Seen;
 pub use pushed::Pushed;
 pub use renderer::{Frames, Renderer};
 pub use spec::{
-    Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, FlowSpec, InjectionSpec, Mode, PatientSpec, Pose,
-    TorsoSpec, View, ViewSpec, XRaySpec,
+    Backend, CArmSpec, CameraSpec, CtSpec, DetectorSpec, ExposureSpec, FlowSpec, InjectionSpec, Mode,
+    PatientSpec, Pose, TorsoSpec, View, ViewSpec, XRaySpec,
 };
 pub use three_d::ContactView;
-pub use xray::PathLengths;
+pub use xray::{Exposure, PathLengths, Pulse};

@@ -47,10 +47,16 @@ impl Pushed {
     /// Views of all that is in on this line, where these lengths are.
     pub fn views(&self, shape: &Shape, inserted_mm: &[f64]) -> Vec<DeviceView> {
         let line_mm = line_mm(inserted_mm.iter().copied());
+        let behind = inserted_mm.iter().filter(|mm| **mm > 0.0).map(|mm| shape.behind(line_mm - mm));
+        self.views_of(&behind.collect::<Vec<_>>(), inserted_mm)
+    }
+
+    /// Views of all that is in, on lines of their own.
+    pub(crate) fn views_of(&self, shapes: &[Shape], inserted_mm: &[f64]) -> Vec<DeviceView> {
         let each = self.stack.devices().zip(&self.parts).zip(inserted_mm).filter(|(_, mm)| **mm > 0.0);
-        let view = |((device, parts), mm): ((&Device, &Vec<DevicePart>), &f64)| {
-            DeviceView::of_device(&shape.behind(line_mm - mm), device, parts)
+        let view = |(((device, parts), _), shape): (((&Device, &Vec<DevicePart>), &f64), &Shape)| {
+            DeviceView::of_device(shape, device, parts)
         };
-        each.map(view).collect()
+        each.zip(shapes).map(view).collect()
     }
 }

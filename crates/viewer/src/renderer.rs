@@ -9,15 +9,15 @@ use crate::c_arm::CArm;
 use crate::cpu;
 use crate::device::{DeviceView, RefinedDevice};
 use crate::engine::{Engines, PathEngine};
-use crate::fluoro::{Anatomy, Fluoroscope, Moment, Sequence, labels};
+use crate::fluoro::{Afterglow, Anatomy, Fluoroscope, Moment, Sequence, labels};
 use crate::gpu;
 use crate::material::Material;
 use crate::output::{Image, Labels};
 use crate::scene::Setup;
-use crate::spec::{Backend, Mode, ViewSpec};
+use crate::spec::{Backend, CArmSpec, Mode, View, ViewSpec};
 use crate::tails::with_tails;
 use crate::three_d::{ContactView, Solids, draw_legend, draw_markers, draw_scale_bar};
-use crate::xray::PathLengths;
+use crate::xray::{Exposure, PathLengths};
 
 /// The frames of one moment.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -134,10 +134,28 @@ impl Renderer {
     /// # Errors
     /// [`Error::Parameter`] for a device with values that are not finite, a time that is not, or a roadmap without an injection.
     pub fn render_at(&mut self, devices: &[DeviceView], moment: Moment) -> Result<Frames> {
+        self.render_pulse(devices, &[], moment)
+    }
+
+    /// The same with devices that move while the beam is on: fluoroscopy is the mean of what the detector gets at the instants of `pulse`
+    /// ([`crate::Pushed::pulse`]), or as `devices` are if there are none; the 3D view shows `devices`.
+    ///
+    /// # Errors
+    /// As [`Self::render_at`].
+    pub fn render_pulse(
+        &mut self,
+        devices: &[DeviceView],
+        pulse: &[Vec<DeviceView>],
+        moment: Moment,
+    ) -> Result<Frames> {
         if !moment.time_s.is_finite() {
             return Err(Error::parameter("time_s", moment.time_s, "must be finite"));
         }
         let devices = RefinedDevice::all(devices)?;
+        let mut pulse: Vec<_> = pulse.iter().map(|views| RefinedDevice::all(views)).collect::<Result<_>>()?;
+        if pulse.is_empty() {
+            pulse.push(devices.clone());
+        }
         let contacts = std::mem::take(&mut self.contacts);
         let frames = self.with_fallback(|setup, engines, fluoro| {
             let c_arm = setup.c_arm.as_ref().filter(|_| setup.spec.camera.c_arm);
@@ -158,7 +176,7 @@ impl Renderer {
             let fluoro = match &setup.c_arm {
                 Some(c_arm) => {
                     let (scope, sequence, paths) = prepared(setup, engines, fluoro)?;
-                    let mut image = sequence.next(scope, paths, &devices, moment)?;
+                    let mut image = sequence.next(scope, paths, &pulse, moment)?;
                     if setup.spec.c_arm.markers {
                         draw_markers(&mut image, c_arm.right_and_up());
                     }
@@ -174,6 +192,38 @@ impl Renderer {
         Ok(frames)
     }
 
+    /// Turns the C-arm in a run: the next frame is of another place, in a subtraction against a mask that is taken there with it, or by
+    /// [`Self::take_mask`], as one of a run that came the same way. Body and flow stay, and so does what the detector holds of the last frame.
+    ///
+    /// # Errors
+    /// As [`Self::new`] for the place, and [`Error::Parameter`] where the fluoroscopic view was not asked for. The C-arm then stays where it was.
+    pub fn turn_c_arm(&mut self, place: &CArmSpec) -> Result<()> {
+        let spec = ViewSpec { c_arm: place.clone(), ..self.setup.spec.clone() };
+        self.c_arm().ok_or_else(no_fluoro)?;
+        if spec.camera.c_arm && spec.wants(View::ThreeD) {
+            // The camera stands where it sees the beam.
+            let filled = Setup::filled(&spec, Arc::clone(&self.setup.wall), Arc::clone(&self.setup.filled))?;
+            let stored = self.fluoro.take().map(|(_, sequence)| sequence.into_afterglow());
+            let contacts = std::mem::take(&mut self.contacts);
+            *self = Self { contacts, next_frame: self.next_frame, ..Self::of_setup(filled)? };
+            return self.go_on_from(stored);
+        }
+        self.setup.c_arm = Some(self.setup.placed(&spec)?);
+        self.setup.spec = spec;
+        (self.central, self.transmitted) = (None, None);
+        let stored = self.fluoro.take().map(|(_, sequence)| sequence.into_afterglow());
+        self.go_on_from(stored)
+    }
+
+    /// Prepares the next frame of a detector that holds what another place has left, if there was one.
+    fn go_on_from(&mut self, stored: Option<Afterglow>) -> Result<()> {
+        let Some(stored) = stored else { return Ok(()) };
+        self.with_fallback(|setup, engines, fluoro| {
+            prepared(setup, engines, fluoro)?.1.go_on_from(stored.clone());
+            Ok(())
+        })
+    }
+
     /// Shows contacts and their forces in the 3D frames from now on.
     pub fn show_contacts(&mut self, contacts: &[ContactView]) {
         self.contacts.clear();
@@ -185,11 +235,16 @@ impl Renderer {
     /// # Errors
     /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn take_mask(&mut self, devices: &[DeviceView]) -> Result<()> {
-        let devices = RefinedDevice::all(devices)?;
+        let devices = [RefinedDevice::all(devices)?];
         self.with_fallback(|setup, engines, fluoro| {
             let (scope, sequence, paths) = prepared(setup, engines, fluoro)?;
             sequence.take_mask(scope, paths, &devices)
         })
+    }
+
+    /// How fluoroscopy is exposed; `None` before its first frame.
+    pub fn exposure(&self) -> Option<Exposure> {
+        self.fluoro.as_ref().map(|(scope, _)| scope.exposure)
     }
 
     /// The last image hold: the last frames as one, the newest weighing most. `None` before the first frame.
@@ -203,12 +258,12 @@ impl Renderer {
     /// # Errors
     /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn labels(&mut self, devices: &[DeviceView], contacts_mm: &[Vec3]) -> Result<Labels> {
-        let vessel = self.with_fallback(|setup, engines, fluoro| {
+        let of_scope = self.with_fallback(|setup, engines, fluoro| {
             let (scope, _, _) = prepared(setup, engines, fluoro)?;
-            Ok(setup.lumen.then(|| scope.vessel()))
+            Ok((setup.lumen.then(|| scope.vessel()), scope.exposure))
         })?;
         let c_arm = self.setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
-        labels(c_arm, devices, contacts_mm, self.setup.spec.xray.device_material, vessel)
+        labels(c_arm, devices, contacts_mm, self.setup.spec.xray.device_material, of_scope)
     }
 
     /// Path lengths of the rays through the pixel centres, before any injection.
@@ -342,73 +397,5 @@ fn no_fluoro() -> Error {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::engine::ThreeDEngine;
-    use crate::spec::View;
-
-    /// An adapter that fails in every frame.
-    struct Broken;
-
-    fn lost<T>() -> Result<T> {
-        Err(Error::Computation("the device was lost".into()))
-    }
-
-    impl PathEngine for Broken {
-        fn mesh(&mut self, _: &CArm, _: &SurfaceMesh) -> Result<Vec<f32>> {
-            lost()
-        }
-
-        fn pieces(
-            &mut self,
-            _: &CArm,
-            _: &[(crate::device::Piece, f64)],
-            _: &mut [f32],
-            _: &mut Vec<u32>,
-        ) -> Result<()> {
-            lost()
-        }
-    }
-
-    impl ThreeDEngine for Broken {
-        fn frame(&mut self, _: &Solids) -> Result<Image> {
-            lost()
-        }
-    }
-
-    #[test]
-    fn a_lost_adapter_hands_over_to_the_cpu_and_says_so() {
-        let wall = SurfaceMesh {
-            vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
-        };
-        let spec = ViewSpec {
-            views: vec![View::ThreeD, View::Fluoro],
-            size_px: [32, 32],
-            backend: Backend::Cpu,
-            ..ViewSpec::default()
-        };
-        let mut whole = Renderer::new(&spec, &wall).unwrap();
-        let point = |x: f64| crate::DevicePoint {
-            position_mm: Vec3::new(x, 5.0, 5.0),
-            tangent: Vec3::x(),
-            radius_mm: 0.4,
-        };
-        let wire = [DeviceView { points: vec![point(1.0), point(20.0)], ..DeviceView::default() }];
-        let broken = || {
-            let mut renderer = Renderer::new(&spec, &wall).unwrap();
-            renderer.engines = Engines {
-                paths: Some(Box::new(Broken)),
-                three_d: Some(Box::new(Broken)),
-                name: "adapter".into(),
-            };
-            renderer
-        };
-        let mut renderer = Renderer { is_cpu: false, ..broken() };
-        assert_eq!(renderer.render(&wire).unwrap(), whole.render(&wire).unwrap());
-        assert_eq!(renderer.backend(), "CPU reference (adapter failed: the device was lost)");
-        assert_eq!(renderer.path_lengths(&wire).unwrap(), whole.path_lengths(&wire).unwrap());
-        // The twin: without anything to fall back on, the failure is reported.
-        assert!(broken().render(&wire).is_err());
-    }
-}
+#[path = "renderer_tests.rs"]
+mod tests;

@@ -60,9 +60,7 @@ impl Setup {
             } else {
                 setup.lumen = closed.is_ok();
             }
-            let c_arm = CArm::new(&spec.c_arm, spec.size_px, &wall)?;
-            spec.detector.check_blur(c_arm.pixel_mm())?;
-            setup.c_arm = Some(c_arm);
+            setup.c_arm = Some(placed(spec, &wall)?);
             setup.patient = Patient::new(spec, &wall)?;
             setup.flow = Flow::of_view(spec)?.map(Arc::new);
         }
@@ -78,4 +76,16 @@ impl Setup {
         (setup.wall, setup.filled) = (wall, filled);
         Ok(setup)
     }
+
+    /// The C-arm where `spec` has it, which is to differ in nothing else.
+    pub(crate) fn placed(&self, spec: &ViewSpec) -> Result<CArm> {
+        spec.validate()?;
+        placed(spec, &self.wall)
+    }
+}
+
+fn placed(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<CArm> {
+    let c_arm = CArm::new(&spec.c_arm, spec.size_px, wall)?;
+    spec.detector.check_blur(c_arm.pixel_mm())?;
+    Ok(c_arm)
 }

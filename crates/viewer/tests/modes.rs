@@ -340,3 +340,29 @@ fn labels_say_where_the_device_is_in_the_frame() {
     }
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+#[test]
+fn a_subtraction_that_turns_is_even_though_the_detector_remembers_the_angle_before() {
+    let folder = folder("turn");
+    let (mut view, wall) = scene(&folder, Mode::Dsa);
+    view.patient.torso = Some(TorsoSpec::default());
+    view.c_arm.pixel_mm = Some(1.6);
+    view.detector = DetectorSpec { lag: 0.3, ..DetectorSpec::ideal() };
+    view.xray.window = Some([-0.5, 0.5]);
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    let mut spread = |turn_deg: Option<f64>| {
+        if let Some(turn_deg) = turn_deg {
+            renderer.turn_c_arm(&view.c_arm.turned(turn_deg)).unwrap();
+        }
+        let image = renderer.render_at(&[wire()], at(0, 0.0)).unwrap().fluoro.unwrap();
+        let [low, high] =
+            [image.data().iter().min(), image.data().iter().max()].map(|v| i32::from(*v.unwrap()));
+        high - low
+    };
+    let turning = [None, Some(10.0), Some(20.0)].map(&mut spread);
+    assert!(turning.iter().all(|levels| *levels <= 1), "{turning:?}");
+    // The twin: an arm that stops, whose mask is one of an arm that turned.
+    let stopped = spread(None);
+    assert!(stopped > 10, "{stopped}");
+    std::fs::remove_dir_all(folder).unwrap();
+}

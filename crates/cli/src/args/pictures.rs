@@ -40,8 +40,16 @@ pub(crate) struct FrameArgs {
     /// Turn the camera of the 3D view by so many degrees from the first frame to the last
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub(crate) orbit: Option<f64>,
-    /// Draw fluoroscopy in a second plane as well, turned by so many degrees (towards LAO) from the first: frames NAME_fluoro_b.png, and a
-    /// second DICOM file FILE_b of the pair. Labels, arrays and moving pictures are of the first plane
+    /// Turn the C-arm by so many degrees (towards LAO) from the first frame to the last; a subtraction has a mask of every angle, of the
+    /// first frame's devices. Not where one frame is drawn
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    pub(crate) turn: Option<f64>,
+    /// Speed of that turn, in place of a number of frames, which follows from it and the scene's frames_per_s
+    #[arg(long, requires = "turn", value_name = "SPEED")]
+    pub(crate) deg_per_s: Option<f64>,
+    /// Draw fluoroscopy in a second plane as well, turned by so many degrees (towards LAO) from the first; the scene's biplane_deg if
+    /// absent. What is of it has _b at the end of its name: frames, masks, labels, arrays, the second DICOM file of the pair. Moving
+    /// pictures are of the first plane
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     pub(crate) biplane: Option<f64>,
     /// Write one moving picture of the views side by side: an animated PNG (.png, .apng), a GIF (.gif), or a film (.mp4) where the program
@@ -87,6 +95,10 @@ pub(crate) struct RenderArgs {
     /// Draw every so many steps, and the last; every step if absent
     #[arg(long, default_value_t = 1, value_name = "STEPS")]
     pub(crate) every: usize,
+    /// Frames of the step, where one is drawn: its device rests, at the scene's frames_per_s, while the C-arm or the camera turns and contrast
+    /// medium goes on
+    #[arg(long, value_name = "COUNT", conflicts_with = "deg_per_s", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) count: Option<u32>,
     /// Folder for the frames; DIR/render if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -105,7 +117,7 @@ pub(crate) struct FluoroArgs {
     #[arg(long, default_value_t = 0.0, value_name = "S", allow_negative_numbers = true)]
     pub(crate) time: f64,
     /// Number of frames, at the scene's frames_per_s
-    #[arg(long, default_value_t = 1, value_name = "COUNT")]
+    #[arg(long, default_value_t = 1, value_name = "COUNT", conflicts_with = "deg_per_s")]
     pub(crate) count: u32,
     /// Folder for the frames; out/NAME OF THE SCENE if absent
     #[arg(long, value_name = "DIR")]

@@ -46,15 +46,16 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         Some(simulation) => after(simulation, &script, steps, args)?,
         None => Now::default(),
     };
-    for k in 0..args.count {
-        let time_s = args.time + f64::from(k) / studio.frames_per_s();
-        let moment = Moment { frame: u64::from(k), time_s };
+    for k in 0..studio.frames() {
+        let time_s = args.time + k as f64 / studio.frames_per_s();
+        let moment = Moment { frame: k as u64, time_s };
         studio.draw(&Still {
             name: format!("frame_{k:06}"),
             moment,
             shape: &now.shape,
             inserted_mm: &now.inserted_mm,
             contacts: &now.contacts,
+            before: None,
         })?;
     }
     studio.finish()?.tell(args.frames.json)

@@ -1,7 +1,7 @@
 //! `endowire render`: frames of a recorded run.
 
 use endowire_methods::Scene;
-use endowire_viewer::Moment;
+use endowire_viewer::{Moment, Seen};
 
 use super::studio::{Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
@@ -57,26 +57,51 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     if steps.last() != Some(&last) {
         steps.push(last);
     }
+    let frames = match (steps.len(), args.count.map(|count| count as usize)) {
+        (1, count) => count.unwrap_or(1),
+        (several, None) if args.frames.deg_per_s.is_none() => several,
+        (several, _) => {
+            let text = format!(
+                "--count and --deg-per-s belong to one step, and {several} are drawn: give it as --from and --to"
+            );
+            return Err(Failure::Input(text));
+        }
+    };
     let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
     let wall =
         scene.wall(&Cache::new(&args.frames.cache)).map_err(|e| Failure::from(e).at(path.display()))?;
     let seen = (path.as_path(), &scene, wall);
-    let mut studio = Studio::new("render", &args.frames, seen, ViewChoice::Both, folder, steps.len())?;
+    let mut studio = Studio::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
     let (times_s, frame_s) = (step_times(&args.dir)?, 1.0 / studio.frames_per_s());
-    let bar = progress::bar(steps.len(), "frame");
-    for &step in &steps {
+    let frames = studio.frames();
+    let bar = progress::bar(frames, "frame");
+    // Of one step all frames are, which may be several, or one of each step.
+    let one = steps.len() == 1 && frames > 1;
+    for k in 0..frames {
+        let step = if one { steps[0] } else { steps[k] };
+        let (ending, later) = if one { (format!("_frame_{k:06}"), k) } else { (String::new(), 0) };
         let contacts = recording.contacts(step);
-        let moment = Moment { frame: step as u64, time_s: time_s(&times_s, step, frame_s) };
+        let ended_s = |step: usize| time_s(&times_s, step, frame_s);
         let shape = recording.shape(step);
         let inserted_mm = lengths.after(step, &shape)?;
+        // A step that is drawn several times rests.
+        let before = match step.checked_sub(1).filter(|before| *before > 0 && !one) {
+            Some(before) => {
+                let shape = recording.shape(before);
+                Some((lengths.after(before, &shape)?, shape, ended_s(before)))
+            }
+            None => None,
+        };
+        let before = before.as_ref();
         studio.draw(&Still {
-            name: format!("step_{step:06}"),
-            moment,
+            name: format!("step_{step:06}{ending}"),
+            moment: Moment { frame: (step + later) as u64, time_s: ended_s(step) + later as f64 * frame_s },
             shape: &shape,
             inserted_mm: &inserted_mm,
             contacts: &contacts,
+            before: before.map(|(inserted_mm, shape, time_s)| Seen { shape, inserted_mm, time_s: *time_s }),
         })?;
         bar.inc(1);
     }

@@ -180,6 +180,7 @@ impl endowire_sweep::Recorder for Recording {
             step_time_s: self.steps.as_secs_f64(),
             wall_time_s: self.started.elapsed().as_secs_f64(),
             renderer: self.frames.renderer(),
+            planes: self.frames.planes(),
             frames: self.recorder.frames.clone(),
         };
         self.recorder.finish(&mut summary).map_err(|failure| failure.to_string())

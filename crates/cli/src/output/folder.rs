@@ -165,7 +165,7 @@ fn is_frame_name(name: &str) -> bool {
     let Some((digits, view)) = name.strip_prefix("step_").and_then(|rest| rest.split_once('_')) else {
         return false;
     };
-    let view = view.strip_suffix(".png").filter(|view| ["3d", "fluoro"].contains(view));
+    let view = view.strip_suffix(".png").filter(|view| ["3d", "fluoro", "fluoro_b"].contains(view));
     view.zip(digits.parse().ok()).is_some_and(|(view, step)| frame_name(step, view) == name)
 }
 
@@ -175,7 +175,12 @@ mod tests {
 
     #[test]
     fn only_names_of_frames_are_names_of_frames() {
-        for ours in ["step_000001_3d.png", "step_1234567_fluoro.png", "step_000040_fluoro.png.part"] {
+        for ours in [
+            "step_000001_3d.png",
+            "step_1234567_fluoro.png",
+            "step_000040_fluoro.png.part",
+            "step_000040_fluoro_b.png",
+        ] {
             assert!(is_frame_name(ours), "{ours}");
         }
         for theirs in

@@ -7,17 +7,38 @@ use endowire_core::Error;
 use endowire_core::insertion::Simulation;
 use endowire_core::shape::Shape;
 use endowire_methods::Scene;
-use endowire_viewer::{Moment, Pushed, Renderer, ViewSpec};
+use endowire_viewer::{Exposure, Moment, Pushed, Renderer, Seen, ViewSpec};
+use serde::Serialize;
 
 use super::recorder::Recorder;
 use crate::failure::Failure;
+
+/// Where the C-arm stands in a plane.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct PlaneTold {
+    primary_deg: f64,
+    secondary_deg: f64,
+    /// Takes (x, y, z, 1) in mm to pixel coordinates times the depth.
+    camera_matrix: [[f64; 4]; 3],
+    /// Of its frames; none before the first.
+    exposure: Option<Exposure>,
+}
 
 /// Draws the steps of a run that the scene wants to see.
 pub(crate) struct FrameWriter {
     spec: ViewSpec,
     pushed: Pushed,
-    /// None where no view is asked for: then nothing is built.
-    renderer: Option<Renderer>,
+    /// That of the first plane, and of the second of two; none where no view is asked for: then nothing is built.
+    planes: Vec<Renderer>,
+    /// What was in after the step before, where pulses show its way from there.
+    before: Option<Before>,
+}
+
+/// What was in after a step, and when.
+struct Before {
+    shape: Shape,
+    inserted_mm: Vec<f64>,
+    time_s: f64,
 }
 
 impl FrameWriter {
@@ -27,14 +48,28 @@ impl FrameWriter {
         let spec = ViewSpec::of_scene(scene, path)?;
         spec.validate().map_err(in_scene)?;
         let drawn = drawn.filter(|_| !spec.views.is_empty());
-        let renderer = drawn.map(|simulation| Renderer::of_wall(&spec, simulation.wall()));
-        let renderer = renderer.transpose().map_err(in_scene)?;
-        Ok(Self { pushed: Pushed::new(scene, &spec).map_err(in_scene)?, spec, renderer })
+        let mut planes = Vec::new();
+        for (simulation, plane) in
+            drawn.into_iter().flat_map(|drawn| spec.planes().into_iter().map(move |p| (drawn, p)))
+        {
+            planes.push(Renderer::of_wall(&plane, simulation.wall()).map_err(in_scene)?);
+        }
+        Ok(Self { pushed: Pushed::new(scene, &spec).map_err(in_scene)?, spec, planes, before: None })
     }
 
     /// What draws, for the summary.
     pub(crate) fn renderer(&self) -> Option<String> {
-        self.renderer.as_ref().map(|r| r.backend().to_owned())
+        self.planes.first().map(|r| r.backend().to_owned())
+    }
+
+    /// Where the C-arm stands in each plane of fluoroscopy, for the summary.
+    pub(crate) fn planes(&self) -> Vec<PlaneTold> {
+        let arms = self.planes.iter().filter_map(|plane| Some((plane.c_arm()?, plane.exposure())));
+        let told = arms.map(|(arm, exposure)| {
+            let [primary_deg, secondary_deg] = arm.angles_deg();
+            PlaneTold { primary_deg, secondary_deg, camera_matrix: arm.matrix(), exposure }
+        });
+        told.collect()
     }
 
     /// Time at the end of a step whose script has no speeds, s: that of its frame.
@@ -47,17 +82,39 @@ impl FrameWriter {
         &mut self,
         (step, time_s): (usize, f64),
         last: bool,
-        (shape, inserted_mm): (&Shape, &[f64]),
+        seen: (&Shape, &[f64]),
         recorder: &mut Recorder,
     ) -> Result<(), Failure> {
         let due = last || step.is_multiple_of(self.spec.every as usize);
-        let Some(renderer) = self.renderer.as_mut().filter(|_| due) else { return Ok(()) };
+        let drawn = if due { self.draw((step, time_s), seen, recorder) } else { Ok(()) };
+        self.stood(seen, time_s);
+        drawn
+    }
+
+    /// Notes what is in at a moment: a pulse of the next step begins on the way from there.
+    pub(crate) fn stood(&mut self, (shape, inserted_mm): (&Shape, &[f64]), time_s: f64) {
+        if self.spec.xray.pulse_ms > 0.0 && !self.planes.is_empty() {
+            self.before = Some(Before { shape: shape.clone(), inserted_mm: inserted_mm.to_vec(), time_s });
+        }
+    }
+
+    fn draw(
+        &mut self,
+        (step, time_s): (usize, f64),
+        (shape, inserted_mm): (&Shape, &[f64]),
+        recorder: &mut Recorder,
+    ) -> Result<(), Failure> {
         let views = self.pushed.views(shape, inserted_mm);
         let moment = Moment { frame: step as u64, time_s };
-        let frames = renderer.render_at(&views, moment)?;
-        for (name, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
-            if let Some(image) = image {
-                recorder.frame(step, name, |path| image.write_png(path).map_err(bare))?;
+        let before = self.before.as_ref();
+        let before = before.map(|b| Seen { shape: &b.shape, inserted_mm: &b.inserted_mm, time_s: b.time_s });
+        for (plane, names) in self.planes.iter_mut().zip([["3d", "fluoro"], ["3d_b", "fluoro_b"]]) {
+            let pulse = self.pushed.pulse(before, Seen { shape, inserted_mm, time_s }, plane);
+            let frames = plane.render_pulse(&views, &pulse, moment)?;
+            for (name, image) in names.into_iter().zip([&frames.three_d, &frames.fluoro]) {
+                if let Some(image) = image {
+                    recorder.frame(step, name, |path| image.write_png(path).map_err(bare))?;
+                }
             }
         }
         Ok(())

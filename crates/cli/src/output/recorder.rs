@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use super::arrays::{self, ShapeArrays};
 use super::folder::{self, Claim};
+use super::frames::PlaneTold;
 use super::instruments::InstrumentTable;
 use super::provenance::Provenance;
 use super::recording::Recording;
@@ -43,6 +44,8 @@ pub(crate) struct Summary {
     pub(crate) wall_time_s: f64,
     /// What drew the frames.
     pub(crate) renderer: Option<String>,
+    /// Planes of fluoroscopy.
+    pub(crate) planes: Vec<PlaneTold>,
     /// Frames, relative to the folder of this file.
     pub(crate) frames: Vec<String>,
 }

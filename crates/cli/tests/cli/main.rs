@@ -15,6 +15,7 @@ mod instruments;
 mod killed;
 mod methods;
 mod packages;
+mod planes;
 mod play;
 mod recording;
 mod render;

@@ -236,28 +236,3 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
         }
     }
 }
-
-#[test]
-fn two_planes_are_drawn_at_once_and_each_is_what_it_is_alone() {
-    let folder = tempfile::tempdir().unwrap();
-    let (_, run) = recorded(folder.path());
-    let [both, alone, dicom] = ["both", "alone", "pair.dcm"].map(|name| folder.path().join(name));
-    let draw = |args: &[&str]| {
-        let mut all = vec!["render", text(&run), "--from", "30", "--view", "fluoro", "--json"];
-        all.extend(args);
-        written(&endowire(&all))
-    };
-    let pair = draw(&["--pose", "RAO 20", "--biplane", "90", "--dicom", text(&dicom), "--out", text(&both)]);
-    draw(&["--pose", "LAO 70", "--out", text(&alone)]);
-    let bytes = |path: PathBuf| std::fs::read(path).unwrap();
-    let [first, second] =
-        ["step_000030_fluoro.png", "step_000030_fluoro_b.png"].map(|name| bytes(both.join(name)));
-    assert_eq!(second, bytes(alone.join("step_000030_fluoro.png")));
-    assert_ne!(first, second, "the twin: the planes differ");
-    let files: Vec<&str> = pair["files"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
-    let other = folder.path().join("pair_b.dcm");
-    assert!(files.contains(&text(&dicom)) && files.contains(&text(&other)), "{files:?}");
-    assert!(bytes(dicom).len() > 1000 && bytes(other).len() > 1000);
-    let refused = endowire(&["render", text(&run), "--view", "3d", "--biplane", "90"]);
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("--biplane"));
-}

@@ -7,6 +7,7 @@ use crate::cpu::{Coverage, layers_in_beam};
 use crate::device::{DeviceView, RefinedDevice};
 use crate::material::Material;
 use crate::output::{ContactLabel, DeviceLabel, Image, Labels, Mask, PartLabel, PixelFormat};
+use crate::xray::Exposure;
 
 /// Labels of a frame of `devices`; those without a material of their own are made of `material`.
 ///
@@ -17,7 +18,7 @@ pub(crate) fn labels(
     devices: &[DeviceView],
     contacts_mm: &[Vec3],
     material: Material,
-    vessel: Option<Mask>,
+    (vessel, exposure): (Option<Mask>, Exposure),
 ) -> Result<Labels> {
     let contact = |point: &Vec3| {
         let pixel = seen(c_arm, point);
@@ -37,6 +38,7 @@ pub(crate) fn labels(
     Ok(Labels {
         size_px: [width, height],
         camera_matrix: c_arm.matrix(),
+        exposure,
         devices: labelled,
         contacts: contacts_mm.iter().map(contact).collect(),
         mask: Image::new(width, height, PixelFormat::Gray8, mask),

@@ -26,7 +26,7 @@ pub(crate) use anatomy::Anatomy;
 pub(crate) use labels::labels;
 use scatter::Scatter;
 pub use sequence::Moment;
-pub(crate) use sequence::Sequence;
+pub(crate) use sequence::{Afterglow, Sequence};
 
 use crate::c_arm::CArm;
 use crate::contrast::{ContrastMap, Medium};
@@ -36,8 +36,8 @@ use crate::engine::PathEngine;
 use crate::material::Material;
 use crate::output::Mask;
 use crate::scene::Setup;
-use crate::spec::ViewSpec;
-use crate::xray::{Beam, LANES, Lanes, PathLengths};
+use crate::spec::{ViewSpec, XRaySpec};
+use crate::xray::{Beam, Exposure, LANES, Lanes, PathLengths};
 
 /// Rays across a pixel in each direction. Two give four grey levels of edge smoothing, enough beside a real
 /// detector's blur, at four times the cost of one.
@@ -74,6 +74,7 @@ pub(crate) struct Fluoroscope {
     pub(crate) c_arm: CArm,
     /// The same view with one pixel a ray.
     rays: CArm,
+    pub(crate) exposure: Exposure,
     pub(crate) beam: Beam,
     anatomy: Anatomy,
     /// Attenuation of tissue, bone, lung, blood and contrast medium less blood.
@@ -102,7 +103,8 @@ impl Fluoroscope {
         let spec: &ViewSpec = &setup.spec;
         let rays = c_arm.refined(SUBRAYS);
         let anatomy = Anatomy::new(setup, c_arm, SUBRAYS, engine)?;
-        let beam = Beam::new(&spec.xray, anatomy.reference_mm(&rays))?;
+        let exposure = Exposure::new(spec, anatomy.reference_mm(&rays))?;
+        let beam = Beam::new(&XRaySpec { kvp: exposure.kvp, ..spec.xray.clone() }, exposure.tissue_mm)?;
         let lanes = [
             beam.excess(Material::SoftTissue, None)?,
             beam.excess(Material::CorticalBone, None)?,
@@ -117,6 +119,7 @@ impl Fluoroscope {
         let mut fluoroscope = Self {
             c_arm: c_arm.clone(),
             rays,
+            exposure,
             beam,
             anatomy,
             mu,
@@ -249,24 +252,45 @@ impl Fluoroscope {
         Some((mean, 1.0 + variance / 2.0))
     }
 
-    /// Signal with devices and the contrast medium of a time; without a time, before any injection.
+    /// Signal with devices, the mean over the instants of a pulse, and the contrast medium of a time; without a time, before any injection.
     pub(crate) fn signal(
         &mut self,
         engine: &mut dyn PathEngine,
-        devices: &[RefinedDevice],
+        pulse: &[Vec<RefinedDevice>],
         time_s: Option<f64>,
+    ) -> Result<Signal> {
+        let tip = pulse.last().and_then(|devices| devices.first()).and_then(|device| device.points.last());
+        let mut medium = match (&mut self.contrast, time_s) {
+            (Some(contrast), Some(time)) => contrast.at(time, tip.map(|point| point.position_mm)),
+            _ => vec![],
+        };
+        medium.retain(|m| m.fraction > LEAST_FRACTION || m.tissue_mm > LEAST_MEDIUM_MM);
+        let Some((first, others)) = pulse.split_first() else { return self.instant(engine, &[], &medium) };
+        let mut sum = self.instant(engine, first, &medium)?;
+        for devices in others {
+            let more = self.instant(engine, devices, &medium)?;
+            sum.signal.iter_mut().zip(more.signal).for_each(|(sum, v)| *sum += v);
+            sum.energy.iter_mut().zip(more.energy).for_each(|(sum, v)| *sum += v);
+        }
+        if !others.is_empty() {
+            let each = 1.0 / pulse.len() as f32;
+            sum.signal.iter_mut().chain(&mut sum.energy).for_each(|v| *v *= each);
+        }
+        Ok(sum)
+    }
+
+    /// Signal with devices where they are at one instant.
+    fn instant(
+        &mut self,
+        engine: &mut dyn PathEngine,
+        devices: &[RefinedDevice],
+        medium: &[Medium],
     ) -> Result<Signal> {
         let cast = self.cast(engine, devices);
         let mut now = self.still.clone();
         if cast.is_ok() {
-            let tip = devices.first().and_then(|device| device.points.last()).map(|point| point.position_mm);
-            let mut medium = match (&mut self.contrast, time_s) {
-                (Some(contrast), Some(time)) => contrast.at(time, tip),
-                _ => vec![],
-            };
-            medium.retain(|m| m.fraction > LEAST_FRACTION || m.tissue_mm > LEAST_MEDIUM_MM);
             self.pixels.sort_unstable();
-            self.draw(&self.pixels, &medium, &mut now);
+            self.draw(&self.pixels, medium, &mut now);
         }
         for (_, _, lengths) in &mut self.devices {
             self.touched.iter().for_each(|&ray| lengths[ray as usize] = 0.0);
@@ -399,39 +423,4 @@ fn merged(pixels: &[u32], medium: &[Medium]) -> Vec<(u32, Option<Medium>)> {
 }
 
 #[cfg(test)]
-mod tests {
-    use endowire_core::vessel::SurfaceMesh;
-
-    use super::*;
-    use crate::cpu;
-    use crate::spec::{TorsoSpec, View};
-
-    #[test]
-    fn mean_lengths_of_rays_that_are_alike_tell_their_mean_signal() {
-        let wall = SurfaceMesh {
-            vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
-        };
-        let mut spec = ViewSpec { views: vec![View::Fluoro], size_px: [128, 128], ..ViewSpec::default() };
-        spec.patient.torso = Some(TorsoSpec::default());
-        spec.c_arm.field_mm = Some(100.0);
-        let setup = Setup::new(&spec, &wall).unwrap();
-        let scope = Fluoroscope::new(&setup, setup.c_arm.as_ref().unwrap(), &mut cpu::CpuPaths).unwrap();
-        let (mut alike, mut worst, mut without) = (0, 0.0_f64, 0.0_f64);
-        let room = &mut Lanes::new();
-        for pixel in 0..128 * 128 {
-            let (first, stride) = scope.first_ray(pixel);
-            let rays = [first, first + 1, first + stride, first + stride + 1];
-            let layers = rays.map(|ray| scope.layers(ray, [0.0; 2]));
-            let Some((_, more)) = scope.alike(&layers) else { continue };
-            alike += 1;
-            let [every, mean] =
-                [scope.of_rays(rays, &layers, room)[0], scope.primary(pixel, [0.0; 2], room)[0]];
-            worst = worst.max((f64::from(mean) / f64::from(every) - 1.0).abs());
-            without = without.max((f64::from(mean / more) / f64::from(every) - 1.0).abs());
-        }
-        assert!(alike > 128 * 128 / 3, "{alike}");
-        assert!(worst < 1e-5, "{worst}");
-        assert!(without > 2e-5, "the twin: without the variance {without}");
-    }
-}
+mod tests;

@@ -52,13 +52,23 @@ pub(crate) struct Sequence {
     mask: Option<Vec<f32>>,
     /// Values of the last frames, the newest weighing most.
     held: Vec<f32>,
+    /// Signal of the mask that was taken last, and of that where the C-arm was before.
+    mask_read: Vec<f32>,
+    mask_before: Vec<f32>,
+}
+
+/// What a detector has of the frame before, and of the mask before, where the C-arm stood then.
+#[derive(Debug, Clone)]
+pub(crate) struct Afterglow {
+    frame: Vec<f32>,
+    mask: Vec<f32>,
 }
 
 impl Sequence {
     pub(crate) fn new(spec: &ViewSpec, fluoroscope: &Fluoroscope) -> Self {
         let c_arm = &fluoroscope.c_arm;
         let mode = spec.xray.mode;
-        let dose = spec.detector.dose_ngy.unwrap_or_else(|| mode.dose_ngy());
+        let dose = fluoroscope.exposure.dose_ngy;
         let offset = fluoroscope.beam.ln_reference();
         let share = spec.xray.harmonised as f32;
         let mask: Option<Vec<f32>> = (matches!(mode, Mode::Fluoro | Mode::Cine) && share > 0.0).then(|| {
@@ -97,7 +107,20 @@ impl Sequence {
             noisy: spec.detector.noise,
             mask,
             held: vec![],
+            mask_read: vec![],
+            mask_before: vec![],
         }
+    }
+
+    /// What the detector holds of the last frame.
+    pub(crate) fn into_afterglow(mut self) -> Afterglow {
+        Afterglow { frame: self.detector.take_stored(), mask: self.mask_read }
+    }
+
+    /// Goes on with what a detector holds: the next mask is that of a run which came the same way.
+    pub(crate) fn go_on_from(&mut self, afterglow: Afterglow) {
+        self.detector.store(afterglow.frame);
+        self.mask_before = afterglow.mask;
     }
 
     /// Reads the next frame and shows it in the scene's mode. The first one of a subtraction takes its mask itself.
@@ -105,19 +128,19 @@ impl Sequence {
         &mut self,
         fluoroscope: &mut Fluoroscope,
         engine: &mut dyn PathEngine,
-        devices: &[RefinedDevice],
+        pulse: &[Vec<RefinedDevice>],
         moment: Moment,
     ) -> Result<Image> {
         if self.mask.is_none() {
             match self.mode {
                 Mode::Fluoro | Mode::Cine => {}
-                Mode::Dsa => self.take_mask(fluoroscope, engine, devices)?,
+                Mode::Dsa => self.take_mask(fluoroscope, engine, pulse)?,
                 Mode::Roadmap => self.store_roadmap(fluoroscope)?,
             }
         }
         // The injections of a roadmap are those of its angiogram.
         let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
-        let signal = fluoroscope.signal(engine, devices, time)?;
+        let signal = fluoroscope.signal(engine, pulse, time)?;
         let read = self.detector.read(signal.signal, signal.energy, self.kev, moment.frame);
         let mut values = logarithm(read);
         if let Some(mask) = &self.mask {
@@ -145,9 +168,9 @@ impl Sequence {
         &mut self,
         fluoroscope: &mut Fluoroscope,
         engine: &mut dyn PathEngine,
-        devices: &[RefinedDevice],
+        pulse: &[Vec<RefinedDevice>],
     ) -> Result<()> {
-        let signal = fluoroscope.signal(engine, devices, None)?;
+        let signal = fluoroscope.signal(engine, pulse, None)?;
         self.mask = Some(self.stored(&signal, self.kev));
         Ok(())
     }
@@ -157,8 +180,8 @@ impl Sequence {
         let full = fluoroscope.opacified()?;
         let kev = self.kev * Mode::Dsa.dose_ngy() / self.mode.dose_ngy();
         let scale = ROADMAP_VESSEL / strongest(fluoroscope);
-        let mut map = self.stored(&fluoroscope.still, kev);
         let full = self.stored(&full, kev);
+        let mut map = self.stored(&fluoroscope.still, kev);
         // A frame less this is −scale in the vessel.
         map.iter_mut().zip(full).for_each(|(map, full)| *map -= scale * (full - *map));
         self.mask = Some(map);
@@ -168,13 +191,16 @@ impl Sequence {
     /// −ln of a signal's mean over a few frames.
     fn stored(&mut self, signal: &Signal, kev: f64) -> Vec<f32> {
         let mut mean = vec![0.0; signal.signal.len()];
+        // Of the last frame, which a mask has nothing of: it has its share of the mask before.
+        let held = self.detector.take_stored();
         for k in 0..MASK_FRAMES {
-            self.detector.reset();
+            self.detector.store(self.mask_before.clone());
             let read =
                 self.detector.read(signal.signal.clone(), signal.energy.clone(), kev, MASK_NUMBERS + k);
             mean.iter_mut().zip(read).for_each(|(mean, v)| *mean += v / MASK_FRAMES as f32);
         }
-        self.detector.reset();
+        self.detector.store(held);
+        self.mask_read.clone_from(&mean);
         logarithm(mean)
     }
 }

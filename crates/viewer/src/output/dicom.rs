@@ -16,14 +16,17 @@ use super::{Image, PixelFormat};
 use crate::c_arm::CArm;
 use crate::fingerprint::fingerprint;
 use crate::spec::Mode;
+use crate::xray::{Exposure, Pulse};
 
 /// What a file of angiographic frames tells beside the pixels.
 #[derive(Debug, Clone)]
 pub struct Angiogram<'a> {
-    /// The geometry all frames share.
+    /// The geometry of all frames, or of the first where the C-arm turns.
     pub c_arm: &'a CArm,
-    /// Peak voltage of the tube.
-    pub kvp: f64,
+    /// By how much it has turned towards LAO from one frame to the next.
+    pub turn_deg: f64,
+    /// How frames are exposed, the first where the C-arm turns.
+    pub exposure: Exposure,
     /// Frames a second.
     pub frames_per_s: f64,
     /// What is shown.
@@ -85,7 +88,10 @@ impl Angiogram<'_> {
     /// A number of pixels, geometry and what else is told.
     fn content(&self, frames: &[Image]) -> u128 {
         let opening = self.c_arm.opening_px().into_iter().flatten();
-        let numbers = opening.chain([self.kvp, self.frames_per_s]).flat_map(f64::to_le_bytes);
+        let [current_ma, pulse_ms] = self.exposure.pulse.map_or([0.0; 2], |p| [p.current_ma, p.pulse_ms]);
+        let numbers = opening
+            .chain([self.exposure.kvp, current_ma, pulse_ms, self.frames_per_s, self.turn_deg])
+            .flat_map(f64::to_le_bytes);
         let size = frames.first().map_or([0; 2], |f| [f.width(), f.height()]);
         let told = numbers
             .chain(self.c_arm.fingerprint().to_le_bytes())
@@ -161,7 +167,7 @@ impl Angiogram<'_> {
         let [primary, secondary] = self.c_arm.angles_deg();
         let pitch = decimal(self.c_arm.pixel_mm());
         for (tag, value) in [
-            (tags::KVP, decimal(self.kvp)),
+            (tags::KVP, decimal(self.exposure.kvp)),
             (tags::DISTANCE_SOURCE_TO_DETECTOR, decimal(self.c_arm.sid_mm())),
             (tags::DISTANCE_SOURCE_TO_PATIENT, decimal(self.c_arm.sod_mm())),
             (
@@ -174,16 +180,34 @@ impl Angiogram<'_> {
         ] {
             put(object, tag, VR::DS, &value);
         }
+        if self.turn_deg != 0.0 {
+            // One value: the same from each frame to the next.
+            put(object, tags::POSITIONER_PRIMARY_ANGLE_INCREMENT, VR::DS, &decimal(self.turn_deg));
+            put(object, tags::POSITIONER_SECONDARY_ANGLE_INCREMENT, VR::DS, "0");
+        }
         let [columns, rows] = self.c_arm.directions();
         let turn = self.c_arm.rotation_deg();
+        let pulse = self.exposure.pulse;
+        let whole = |of: fn(&Pulse) -> f64| pulse.map_or_else(String::new, |p| of(&p).round().to_string());
+        if let Some(Pulse { current_ma, pulse_ms }) = pulse {
+            for (tag, value) in [
+                (tags::X_RAY_TUBE_CURRENT_INU_A, current_ma * 1000.0),
+                (tags::EXPOSURE_TIME_INU_S, pulse_ms * 1000.0),
+                (tags::AVERAGE_PULSE_WIDTH, pulse_ms),
+            ] {
+                put(object, tag, VR::DS, &decimal(value));
+            }
+            let in_u_as = (current_ma * pulse_ms).round().to_string();
+            put(object, tags::EXPOSURE_INU_AS, VR::IS, &in_u_as);
+        }
         for (tag, vr, value) in [
             (tags::PATIENT_POSITION, VR::CS, "HFS"),
             (tags::PATIENT_ORIENTATION, VR::CS, &format!("{columns}\\{rows}")),
             (tags::RADIATION_SETTING, VR::CS, if self.mode == Mode::Fluoro { "SC" } else { "GR" }),
-            (tags::X_RAY_TUBE_CURRENT, VR::IS, ""),
-            (tags::EXPOSURE_TIME, VR::IS, ""),
-            (tags::EXPOSURE, VR::IS, ""),
-            (tags::POSITIONER_MOTION, VR::CS, "STATIC"),
+            (tags::X_RAY_TUBE_CURRENT, VR::IS, &whole(|p| p.current_ma)),
+            (tags::EXPOSURE_TIME, VR::IS, &whole(|p| p.pulse_ms)),
+            (tags::EXPOSURE, VR::IS, &whole(|p| p.current_ma * p.pulse_ms / 1000.0)),
+            (tags::POSITIONER_MOTION, VR::CS, if self.turn_deg == 0.0 { "STATIC" } else { "DYNAMIC" }),
             (tags::FIELD_OF_VIEW_SHAPE, VR::CS, "RECTANGLE"),
         ] {
             put(object, tag, vr, value);
@@ -295,141 +319,5 @@ fn decimal(value: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use endowire_core::Vec3;
-    use endowire_core::vessel::SurfaceMesh;
-
-    use super::*;
-    use crate::spec::CArmSpec;
-
-    #[test]
-    fn geometry_and_pixels_read_back() {
-        let wall = SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::repeat(10.0)], triangles: vec![] };
-        let spec = CArmSpec {
-            primary_deg: -30.0,
-            secondary_deg: 20.0,
-            pixel_mm: Some(0.3),
-            collimation_mm: Some([0.6, 5.0]),
-            ..CArmSpec::default()
-        };
-        let c_arm = CArm::new(&spec, [4, 2], &wall).unwrap();
-        let frame = |k: u8| Image::new(4, 2, PixelFormat::Gray16, (0..16).map(|i| 16 * k + i).collect());
-        let frames = [frame(1), frame(2), frame(3)];
-        let angiogram = angiogram(&c_arm, Mode::Cine);
-        let path = std::env::temp_dir().join(format!("endowire-{}.dcm", std::process::id()));
-        angiogram.write(&path, &frames).unwrap();
-        let read = dicom_object::open_file(&path).unwrap();
-        std::fs::remove_file(&path).unwrap();
-        let float = |tag| read.element(tag).unwrap().to_float64().unwrap();
-        assert_eq!(float(tags::POSITIONER_PRIMARY_ANGLE), -30.0);
-        assert_eq!(float(tags::POSITIONER_SECONDARY_ANGLE), 20.0);
-        assert_eq!(float(tags::DISTANCE_SOURCE_TO_DETECTOR), 1100.0);
-        assert_eq!(float(tags::DISTANCE_SOURCE_TO_PATIENT), 750.0);
-        assert_eq!(float(tags::FRAME_TIME), 80.0);
-        assert_eq!(read.element(tags::IMAGER_PIXEL_SPACING).unwrap().to_multi_float64().unwrap(), [0.3, 0.3]);
-        assert_eq!(float(tags::NUMBER_OF_FRAMES), 3.0);
-        assert_eq!(float(tags::COLLIMATOR_LEFT_VERTICAL_EDGE), 1.0);
-        let pixels = read.element(tags::PIXEL_DATA).unwrap().to_multi_int::<u16>().unwrap();
-        assert_eq!(pixels.len(), 24);
-        assert_eq!(pixels[9], u16::from_be_bytes([34, 35]));
-        assert!(angiogram.write(&path, &[]).is_err());
-    }
-
-    fn angiogram(c_arm: &CArm, mode: Mode) -> Angiogram<'_> {
-        Angiogram {
-            c_arm,
-            kvp: 80.0,
-            frames_per_s: 12.5,
-            mode,
-            contrast: mode == Mode::Dsa,
-            description: "test",
-        }
-    }
-
-    fn arm(primary_deg: f64, rotation_deg: f64) -> CArm {
-        let wall = SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::repeat(10.0)], triangles: vec![] };
-        let spec = CArmSpec {
-            primary_deg,
-            rotation_deg,
-            pixel_mm: Some(0.3),
-            collimation_mm: Some([3.0, 5.0]),
-            ..CArmSpec::default()
-        };
-        CArm::new(&spec, [16, 16], &wall).unwrap()
-    }
-
-    fn frames(format: PixelFormat) -> Vec<Image> {
-        let frame = |k: usize| {
-            let bytes = (0..256 * format.bytes()).map(|i| (i * 7 + k) as u8).collect();
-            Image::new(16, 16, format, bytes)
-        };
-        vec![frame(1), frame(2), frame(3)]
-    }
-
-    /// Errors that the validator of dicom3tools prints; `None` where it is not installed.
-    fn errors(path: &Path) -> Option<Vec<String>> {
-        let output = std::process::Command::new("dciodvfy").arg(path).output().ok()?;
-        let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
-        assert!(text.contains("XAImage"), "{text}");
-        Some(text.lines().filter(|line| line.starts_with("Error")).map(str::to_owned).collect())
-    }
-
-    #[test]
-    fn a_validator_finds_no_error_in_any_mode_and_in_both_planes() {
-        let folder = tempfile::tempdir().unwrap();
-        let [arm_a, arm_b] = [arm(-30.0, 0.0), arm(60.0, 90.0)];
-        let mut paths = Vec::new();
-        for (name, mode) in
-            [("live", Mode::Fluoro), ("cine", Mode::Cine), ("dsa", Mode::Dsa), ("roadmap", Mode::Roadmap)]
-        {
-            for format in [PixelFormat::Gray8, PixelFormat::Gray16] {
-                let path = folder.path().join(format!("{name}_{}.dcm", format.bytes()));
-                angiogram(&arm_a, mode).write(&path, &frames(format)).unwrap();
-                paths.push(path);
-            }
-        }
-        let pair = ["a.dcm", "b.dcm"].map(|name| folder.path().join(name));
-        let pixels = frames(PixelFormat::Gray8);
-        let planes = [angiogram(&arm_a, Mode::Cine), angiogram(&arm_b, Mode::Cine)];
-        Angiogram::write_biplane([&planes[0], &planes[1]], [&pair[0], &pair[1]], [&pixels, &pixels]).unwrap();
-        paths.extend(pair);
-        for path in &paths {
-            match errors(path) {
-                Some(errors) => assert!(errors.is_empty(), "{}: {errors:#?}", path.display()),
-                None => {
-                    assert!(std::env::var_os("ENDOWIRE_REQUIRE_DCIODVFY").is_none(), "install dicom3tools");
-                    eprintln!("skipped: dciodvfy (dicom3tools) is not installed");
-                    return;
-                }
-            }
-        }
-        // The twin: a file that does not say what image it is.
-        let mut object = planes[0].object(&pixels, &pixels[0], Plane::Single);
-        object.remove_element(tags::IMAGE_TYPE);
-        let meta = FileMetaTableBuilder::new()
-            .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
-            .media_storage_sop_class_uid(uids::X_RAY_ANGIOGRAPHIC_IMAGE_STORAGE);
-        let path = folder.path().join("twin.dcm");
-        object.with_meta(meta).unwrap().write_to_file(&path).unwrap();
-        assert!(!errors(&path).unwrap().is_empty());
-    }
-
-    #[test]
-    fn what_has_the_same_name_has_the_same_pixels_and_geometry() {
-        let [one, other, turned] = [arm(-30.0, 0.0), arm(-30.1, 0.0), arm(-30.0, 90.0)];
-        let pixels = frames(PixelFormat::Gray8);
-        let uid = |arm: &CArm, mode: Mode, frames: &[Image]| {
-            let object = angiogram(arm, mode).object(frames, &frames[0], Plane::Single);
-            object.element(tags::SOP_INSTANCE_UID).unwrap().to_str().unwrap().into_owned()
-        };
-        let own = uid(&one, Mode::Cine, &pixels);
-        assert_eq!(own, uid(&one, Mode::Cine, &pixels));
-        let others = [
-            uid(&other, Mode::Cine, &pixels),
-            uid(&turned, Mode::Cine, &pixels),
-            uid(&one, Mode::Fluoro, &pixels),
-            uid(&one, Mode::Cine, &pixels[1..]),
-        ];
-        assert!(others.iter().all(|uid| *uid != own) && others[0] != others[1]);
-    }
-}
+#[path = "dicom_tests.rs"]
+mod tests;

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::{Image, Mask};
 use crate::material::Material;
+use crate::xray::Exposure;
 
 /// Labels of one fluoroscopic frame. Pixel coordinates are those of [`crate::CArm::project`], lengths are in mm in patient axes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -12,6 +13,8 @@ pub struct Labels {
     pub size_px: [u32; 2],
     /// [`crate::CArm::matrix`]: takes (x, y, z, 1) to pixel coordinates times the depth.
     pub camera_matrix: [[f64; 4]; 3],
+    /// How the frame is exposed.
+    pub exposure: Exposure,
     /// The devices in order.
     pub devices: Vec<DeviceLabel>,
     /// Places where the wall holds a device.

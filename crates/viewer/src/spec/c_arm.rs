@@ -153,6 +153,12 @@ impl CArmSpec {
         self.pose.map_or([self.primary_deg, self.secondary_deg], |p| [p.primary_deg, p.secondary_deg])
     }
 
+    /// The same C-arm, turned by so much towards LAO.
+    pub fn turned(&self, by_deg: f64) -> Self {
+        let [primary_deg, secondary_deg] = self.angles_deg();
+        Self { pose: None, primary_deg: primary_deg + by_deg, secondary_deg, ..self.clone() }
+    }
+
     pub(super) fn validate(&self) -> Result<()> {
         finite_within("view.c_arm.primary_deg", self.primary_deg, [-360.0, 360.0])?;
         finite_within("view.c_arm.secondary_deg", self.secondary_deg, [-90.0, 90.0])?;

@@ -2,6 +2,7 @@
 
 mod anatomy;
 mod c_arm;
+mod exposure;
 mod of_scene;
 mod xray;
 
@@ -13,9 +14,11 @@ use serde::{Deserialize, Serialize};
 pub use anatomy::{CtSpec, FlowSpec, InjectionSpec, PatientSpec, TorsoSpec};
 pub(crate) use c_arm::PITCH_MM;
 pub use c_arm::{CArmSpec, Pose};
+pub use exposure::ExposureSpec;
 pub use xray::{DetectorSpec, Mode, XRaySpec};
 
 use crate::device::DevicePart;
+use crate::xray::check_exposure;
 
 /// Largest side of a frame. Flat detectors have up to about 3000 pixels a side, and with two rays across a
 /// pixel this is the texture size that every adapter offers.
@@ -77,8 +80,13 @@ pub struct ViewSpec {
     pub backend: Backend,
     /// Position of the C-arm.
     pub c_arm: CArmSpec,
+    /// A second plane of fluoroscopy, turned by so much (towards LAO) from the first, -180 to 180. A [`crate::Renderer`] draws one plane:
+    /// [`Self::planes`] has the view of each.
+    pub biplane_deg: Option<f64>,
     /// X-ray physics.
     pub xray: XRaySpec,
+    /// Exposure control; absent: the voltage and the dose as they are given.
+    pub exposure: Option<ExposureSpec>,
     /// The detector.
     pub detector: DetectorSpec,
     /// Who lies in the beam.
@@ -106,7 +114,9 @@ impl Default for ViewSpec {
             every: 10,
             backend: Backend::Auto,
             c_arm: CArmSpec::default(),
+            biplane_deg: None,
             xray: XRaySpec::default(),
+            exposure: None,
             detector: DetectorSpec::default(),
             patient: PatientSpec::default(),
             flow: FlowSpec::default(),
@@ -168,6 +178,17 @@ impl ViewSpec {
         self.views.contains(&view)
     }
 
+    /// The view of each plane: this one, and with `biplane_deg` the fluoroscopy of the second.
+    pub fn planes(&self) -> Vec<Self> {
+        let first = Self { biplane_deg: None, ..self.clone() };
+        let second = self.biplane_deg.filter(|_| self.wants(View::Fluoro)).map(|turn_deg| Self {
+            views: vec![View::Fluoro],
+            c_arm: first.c_arm.turned(turn_deg),
+            ..first.clone()
+        });
+        std::iter::once(first).chain(second).collect()
+    }
+
     /// The parts of the `[[view.device]]` tables, if there are any.
     ///
     /// # Errors
@@ -196,6 +217,9 @@ impl ViewSpec {
             return Err(Error::parameter("view.every", 0, "must be at least 1"));
         }
         self.c_arm.validate()?;
+        if let Some(turn_deg) = self.biplane_deg {
+            finite_within("view.biplane_deg", turn_deg, [-180.0, 180.0])?;
+        }
         self.xray.validate()?;
         self.detector.validate()?;
         self.patient.validate()?;
@@ -209,6 +233,11 @@ impl ViewSpec {
         self.injection.iter().enumerate().try_for_each(|(i, injection)| injection.validate(i))?;
         anatomy::validate_parts(&self.device)?;
         finite_within("view.frames_per_s", self.frames_per_s, [0.01, 1000.0])?;
+        // Rounded, for the message.
+        let most_ms = (1e4 / self.frames_per_s).round() / 10.0;
+        finite_within("view.xray.pulse_ms", self.xray.pulse_ms, [0.0, most_ms])?;
+        self.exposure.as_ref().map_or(Ok(()), ExposureSpec::validate)?;
+        check_exposure(self)?;
         if ![8, 16].contains(&self.bits) {
             return Err(Error::parameter("view.bits", self.bits, "must be 8 or 16"));
         }

@@ -38,8 +38,11 @@ impl Mode {
 pub struct XRaySpec {
     /// What is shown.
     pub mode: Mode,
-    /// Peak voltage of the tube in kV, 50 to 125 in steps of 5.
+    /// Peak voltage of the tube in kV, 50 to 125 in steps of 5; `[view.exposure]` takes its place.
     pub kvp: f64,
+    /// Length of a pulse: a frame shows what moves within it as long as it lasts, up to the frame's moment. From 0, at once, to the time between
+    /// two frames.
+    pub pulse_ms: f64,
     /// Filtration, aluminium; 0 to 20.
     pub aluminium_mm: f64,
     /// Filtration, copper; 0 to 5.
@@ -74,6 +77,7 @@ impl Default for XRaySpec {
         Self {
             mode: Mode::Fluoro,
             kvp: 80.0,
+            pulse_ms: 0.0,
             aluminium_mm: 2.5,
             copper_mm: 0.2,
             energy_bins: None,

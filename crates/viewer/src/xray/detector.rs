@@ -55,9 +55,14 @@ impl Detector {
         }
     }
 
-    /// Forgets what was stored.
-    pub(crate) fn reset(&mut self) {
-        self.stored.clear();
+    /// Takes what is stored of the last frame; the next one has nothing of it.
+    pub(crate) fn take_stored(&mut self) -> Vec<f32> {
+        std::mem::take(&mut self.stored)
+    }
+
+    /// Stores what the next frame is to have its share of.
+    pub(crate) fn store(&mut self, signal: Vec<f32>) {
+        self.stored = signal;
     }
 
     /// Reads one frame. `signal` and `energy` (signal times keV a quantum) are those of the pixels; `kev` is the energy that a
@@ -275,7 +280,7 @@ mod tests {
         let mut detector = detector(&spec);
         assert_eq!(detector.read(vec![1.0; 256], vec![60.0; 256], 1.0, 0), [1.0; 256]);
         assert_eq!(detector.read(vec![2.0; 256], vec![60.0; 256], 1.0, 1), [1.75; 256]);
-        detector.reset();
+        detector.take_stored();
         assert_eq!(detector.read(vec![2.0; 256], vec![60.0; 256], 1.0, 2), [2.0; 256]);
     }
 }

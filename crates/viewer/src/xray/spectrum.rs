@@ -23,6 +23,11 @@ impl Spectrum {
     /// # Errors
     /// [`Error::Parameter`] for a voltage that is not in the table.
     pub(crate) fn tube(kvp: f64, aluminium_mm: f64, copper_mm: f64) -> Result<Self> {
+        Ok(Self::filtered(kvp, aluminium_mm, copper_mm)?.0)
+    }
+
+    /// The same, and what share of the anode's photons the filters let through.
+    pub(crate) fn filtered(kvp: f64, aluminium_mm: f64, copper_mm: f64) -> Result<(Self, f64)> {
         let anode = ANODE.column(&format!("{kvp}")).ok_or_else(|| {
             let mend = format!("the table has {} kV", ANODE.names().join(", "));
             Error::parameter("view.xray.kvp", kvp, mend)
@@ -37,7 +42,7 @@ impl Spectrum {
         }
         let total: f64 = lines.iter().map(|line| line.1).sum();
         lines.iter_mut().for_each(|line| line.1 /= total);
-        Ok(Self { lines })
+        Ok((Self { lines }, total))
     }
 
     /// The spectrum behind something with the given line integral at each energy, not normalised.

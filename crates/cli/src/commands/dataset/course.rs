@@ -116,6 +116,10 @@ fn view(spec: &Spec, scene: &Scene, file: &Path) -> Result<ViewSpec, Failure> {
     // Moments are drawn at random: what was before one is not before it.
     view.detector.lag = 0.0;
     view.c_arm.pose = None;
+    if view.exposure.is_some() && !spec.vary.kvp.is_empty() {
+        let text = "vary.kvp and [view.exposure] both say the voltage: leave out one of them";
+        return Err(Failure::Input(text.to_owned()).at(file.display()));
+    }
     view.validate().map_err(|e| Failure::from(e).at(file.display()))?;
     Ok(view)
 }

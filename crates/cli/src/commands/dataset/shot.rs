@@ -71,8 +71,8 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
                 pair: (spec.views() == 2).then_some(id - plane + (1 - plane)),
                 primary_deg: angles[0],
                 secondary_deg: angles[1],
-                kvp: view.xray.kvp,
-                dose_ngy: view.detector.dose_ngy.unwrap_or_else(|| view.xray.mode.dose_ngy()),
+                kvp: labels.exposure.kvp,
+                dose_ngy: labels.exposure.dose_ngy,
                 camera_matrix: labels.camera_matrix,
             });
         }
@@ -97,12 +97,8 @@ fn planes(spec: &Spec, course: &Course, draw: Draw) -> Vec<ViewSpec> {
     if let Some(range) = vary.dose_ngy {
         view.detector.dose_ngy = Some(draw.within(What::Dose, range.map(f64::ln)).exp());
     }
-    let second = spec.biplane_deg.map(|turn| {
-        let mut second = view.clone();
-        second.c_arm.primary_deg += turn;
-        second
-    });
-    std::iter::once(view).chain(second).collect()
+    view.biplane_deg = spec.biplane_deg;
+    view.planes()
 }
 
 /// Labels as arrays.

@@ -125,6 +125,9 @@ impl Spec {
                 ));
             }
         }
+        if let Some(turn) = self.view.get("biplane_deg") {
+            return refuse(format!("view.biplane_deg = {turn}: a dataset has biplane_deg beside its seed"));
+        }
         match self.biplane_deg {
             Some(turn) if !(-180.0..=180.0).contains(&turn) => {
                 refuse(format!("biplane_deg = {turn}: must be a number from -180 to 180"))

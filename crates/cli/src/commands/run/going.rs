@@ -55,6 +55,7 @@ impl SoFar<'_> {
             step_time_s,
             wall_time_s: self.started.elapsed().as_secs_f64(),
             renderer: self.frames.renderer(),
+            planes: self.frames.planes(),
             frames: recorder.frames.clone(),
         }
     }

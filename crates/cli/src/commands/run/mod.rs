@@ -103,7 +103,12 @@ fn draw_again(
     (times_s, ended): (&[f64], bool),
     recorder: &mut Recorder,
 ) -> Result<(), Failure> {
-    let Some(earlier) = earlier else { return Ok(()) };
+    let Some(earlier) = earlier else {
+        if let Some(&time_s) = times_s.last() {
+            frames.stood((simulation.shape(), &simulation.report().lengths_mm()), time_s);
+        }
+        return Ok(());
+    };
     let before = recorder.steps() - earlier.steps();
     let lengths = Lengths::read(folder, simulation.stack())?;
     for row in 1..=earlier.steps() {

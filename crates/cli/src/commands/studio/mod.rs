@@ -1,0 +1,301 @@
+//! Frames with the wishes of the command line: of a recording, or of a scene.
+
+mod plane;
+mod wishes;
+
+use std::path::{Path, PathBuf};
+
+use endowire_core::shape::Shape;
+use endowire_core::vessel::Wall;
+use endowire_methods::Scene;
+use endowire_viewer::{
+    Animation, ContactView, DeviceView, Frames, Labels, Mask, Moment, PathLengths, Pushed, Renderer, Seen,
+    View, ViewSpec,
+};
+use serde::Serialize;
+
+use crate::args::{FrameArgs, ViewChoice};
+use crate::failure::Failure;
+use crate::output::manifest::Manifest;
+use crate::output::npz::write_map;
+use crate::output::{print_json, tell, to_json};
+use plane::{Plane, write_dicom};
+
+/// One moment to draw.
+pub(super) struct Still<'a> {
+    /// Begins the names of its files.
+    pub(super) name: String,
+    pub(super) moment: Moment,
+    pub(super) shape: &'a Shape,
+    /// Length in of the device, or of each instrument, mm.
+    pub(super) inserted_mm: &'a [f64],
+    pub(super) contacts: &'a [ContactView],
+    /// What was recorded before, where pulses show the way from there.
+    pub(super) before: Option<Seen<'a>>,
+}
+
+/// What was written: the JSON document of `render` and `fluoro`.
+#[derive(Debug, Serialize)]
+pub(super) struct Written {
+    /// What drew.
+    pub(super) renderer: String,
+    /// Folder of the frames.
+    pub(super) folder: PathBuf,
+    /// Every file, relative to the folder where it lies there.
+    pub(super) files: Vec<PathBuf>,
+}
+
+impl Written {
+    /// Says what was written: the document on stdout, or a line beside it.
+    pub(super) fn tell(&self, json: bool) -> Result<(), Failure> {
+        if json {
+            return print_json(self);
+        }
+        tell(format_args!("{} files by {} in {}", self.files.len(), self.renderer, self.folder.display()));
+        Ok(())
+    }
+}
+
+/// Draws frames with the wishes of the command line.
+pub(super) struct Studio<'a> {
+    args: &'a FrameArgs,
+    spec: ViewSpec,
+    wall: Wall,
+    pushed: Pushed,
+    /// That of fluoroscopy and of the 3D view, and the second of two.
+    planes: Vec<Plane>,
+    folder: PathBuf,
+    frames: usize,
+    drawn: usize,
+    animation: Option<Animation>,
+    manifest: Manifest,
+    files: Vec<PathBuf>,
+}
+
+impl<'a> Studio<'a> {
+    /// Prepares `frames` frames, or those of a turn whose speed is given, of a scene with its wall, in `folder`, where they replace those of an earlier call of the same command.
+    pub(super) fn new(
+        command: &str,
+        args: &'a FrameArgs,
+        (path, scene, wall): (&Path, &Scene, Wall),
+        default: ViewChoice,
+        folder: PathBuf,
+        frames: usize,
+    ) -> Result<Self, Failure> {
+        let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
+        args.animate.as_deref().map_or(Ok(()), Animation::check_name)?;
+        let spec = wishes::wished(ViewSpec::of_scene(scene, path)?, args, default)?;
+        let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
+        let frames = wishes::frames_of_turn(args, spec.frames_per_s)?.unwrap_or(frames);
+        wishes::check(args, &spec, frames)?;
+        let planes = Plane::all(&spec, &wall).map_err(in_scene)?;
+        std::fs::create_dir_all(&folder).map_err(|e| {
+            Failure::Input(format!("--out {}: {e}; name a folder that can be made", folder.display()))
+        })?;
+        let begun = Manifest::begin(&folder, command);
+        let (manifest, replaced) = begun.map_err(|e| Failure::write(&folder, &e))?;
+        if replaced > 0 {
+            tell(format_args!(
+                "endowire: replaces {replaced} files of an earlier endowire {command} in {}",
+                folder.display()
+            ));
+        }
+        Ok(Self {
+            args,
+            spec,
+            wall,
+            pushed,
+            planes,
+            folder,
+            frames,
+            drawn: 0,
+            animation: None,
+            manifest,
+            files: vec![],
+        })
+    }
+
+    /// Frames to draw.
+    pub(super) fn frames(&self) -> usize {
+        self.frames
+    }
+
+    /// Frames a second.
+    pub(super) fn frames_per_s(&self) -> f64 {
+        self.spec.frames_per_s
+    }
+
+    /// What part of the way from the first frame to the last the next one is.
+    fn part(&self) -> f64 {
+        self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64
+    }
+
+    /// Draws a moment and writes what is wanted of it.
+    pub(super) fn draw(&mut self, still: &Still) -> Result<(), Failure> {
+        let views = self.pushed.views(still.shape, still.inserted_mm);
+        let orbited = match self.args.orbit.filter(|_| self.spec.wants(View::ThreeD)) {
+            Some(orbit_deg) => Some(self.orbited(orbit_deg, &views, still)?),
+            None => None,
+        };
+        let turn_deg = self.args.turn.map(|turn_deg| turn_deg * self.part());
+        let mut three_d = None;
+        let mut fluoro = Vec::with_capacity(self.planes.len());
+        let wanted = orbited.is_none() || self.spec.wants(View::Fluoro);
+        for plane in self.planes.iter_mut().filter(|_| wanted) {
+            plane.renderer.show_contacts(still.contacts);
+            plane.turn(&views, turn_deg)?;
+            let now =
+                Seen { shape: still.shape, inserted_mm: still.inserted_mm, time_s: still.moment.time_s };
+            let pulse = self.pushed.pulse(still.before, now, &plane.renderer);
+            let frames = plane.renderer.render_pulse(&views, &pulse, still.moment)?;
+            three_d = three_d.or(frames.three_d);
+            if let (Some(image), true) = (&frames.fluoro, self.args.dicom.is_some()) {
+                plane.keep(image.clone());
+            }
+            fluoro.push((plane.ending, frames.fluoro));
+        }
+        for (ending, image) in fluoro.iter().skip(1) {
+            if let Some(image) = image {
+                let path = self.file(&format!("{}_fluoro{ending}.png", still.name))?;
+                image.write_png(&path)?;
+            }
+        }
+        let first = fluoro.into_iter().next().and_then(|(_, image)| image);
+        let three_d = orbited.flatten().or(three_d);
+        self.write(still, &Frames { three_d, fluoro: first })?;
+        for plane in 0..self.planes.len() {
+            self.write_data(still, plane, &views)?;
+        }
+        self.drawn += 1;
+        Ok(())
+    }
+
+    /// The 3D view of a camera that goes around.
+    fn orbited(
+        &self,
+        orbit_deg: f64,
+        views: &[DeviceView],
+        still: &Still,
+    ) -> Result<Option<endowire_viewer::Image>, Failure> {
+        let mut spec = ViewSpec { views: vec![View::ThreeD], ..self.spec.clone() };
+        (spec.camera.turn_deg, spec.camera.orbit_deg) = (orbit_deg * self.part(), Some(orbit_deg));
+        let mut orbiting = Renderer::of_wall(&spec, &self.wall)?;
+        orbiting.show_contacts(still.contacts);
+        Ok(orbiting.render_at(views, still.moment)?.three_d)
+    }
+
+    /// The frames of the first plane, beside each other, and in the moving picture.
+    fn write(&mut self, still: &Still, frames: &Frames) -> Result<(), Failure> {
+        for (view, image) in [("3d", &frames.three_d), ("fluoro", &frames.fluoro)] {
+            if let Some(image) = image {
+                let path = self.file(&format!("{}_{view}.png", still.name))?;
+                image.write_png(&path)?;
+            }
+        }
+        let both = match (&frames.three_d, &frames.fluoro) {
+            (Some(left), Some(right)) => Some(left.beside(right)),
+            _ => None,
+        };
+        if let Some(both) = &both {
+            let path = self.file(&format!("{}_both.png", still.name))?;
+            both.write_png(&path)?;
+        }
+        if let (Some(path), Some(shown)) =
+            (&self.args.animate, both.as_ref().or(frames.three_d.as_ref()).or(frames.fluoro.as_ref()))
+        {
+            let mut animation = match self.animation.take() {
+                Some(animation) => animation,
+                None => Animation::new(path, shown, self.frames as u32, self.spec.frames_per_s)?,
+            };
+            animation.push(shown)?;
+            self.animation = Some(animation);
+        }
+        Ok(())
+    }
+
+    /// Labels and arrays of a plane.
+    fn write_data(&mut self, still: &Still, plane: usize, views: &[DeviceView]) -> Result<(), Failure> {
+        let ending = self.planes[plane].ending;
+        if self.args.labels {
+            let contacts: Vec<_> = still.contacts.iter().map(|c| c.position_mm).collect();
+            let labels = self.planes[plane].renderer.labels(views, &contacts)?;
+            let path = self.file(&format!("{}_mask{ending}.png", still.name))?;
+            labels.mask.write_png(&path)?;
+            for (name, mask) in masks(&labels) {
+                let path = self.file(&format!("{}_{name}{ending}.png", still.name))?;
+                mask.image().write_png(&path)?;
+            }
+            let path = self.file(&format!("{}_labels{ending}.json", still.name))?;
+            std::fs::write(&path, to_json(&labels)? + "\n").map_err(|e| Failure::write(&path, &e))?;
+        }
+        if self.args.raw {
+            let renderer = &mut self.planes[plane].renderer;
+            let paths = renderer.path_lengths_at(views, still.moment.time_s)?;
+            let line: Vec<f32> = renderer.transmission(&paths)?.iter().map(|t| -t.ln()).collect();
+            for (name, map) in maps(&paths, &line) {
+                let path = self.file(&format!("{}_{name}{ending}.npy", still.name))?;
+                write_map(&path, paths.width as usize, map).map_err(|e| Failure::write(&path, &e))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A file of the folder, noted.
+    fn file(&mut self, name: &str) -> Result<PathBuf, Failure> {
+        self.manifest.add(name).map_err(|e| Failure::write(&self.folder, &e))?;
+        self.files.push(name.into());
+        Ok(self.folder.join(name))
+    }
+
+    /// Ends animation and series.
+    pub(super) fn finish(mut self) -> Result<Written, Failure> {
+        if let (Some(animation), Some(path)) = (self.animation.take(), &self.args.animate) {
+            animation.finish()?;
+            self.files.push(path.clone());
+        }
+        for plane in 0..self.planes.len() {
+            let held = self.planes[plane].renderer.last_image_hold().filter(|_| self.args.hold);
+            if let Some(image) = held {
+                let path = self.file(&format!("hold{}.png", self.planes[plane].ending))?;
+                image.write_png(&path)?;
+            }
+        }
+        if let Some(path) = &self.args.dicom {
+            let step_deg = self.args.turn.unwrap_or(0.0) / self.frames.max(2).saturating_sub(1) as f64;
+            self.files.extend(write_dicom(&self.planes, path, step_deg)?);
+        }
+        let renderer = self.planes.first().map(|plane| plane.renderer.backend().to_owned());
+        Ok(Written { renderer: renderer.unwrap_or_default(), folder: self.folder, files: self.files })
+    }
+}
+
+/// Arrays of a frame by name: what there is of them.
+fn maps<'a>(paths: &'a PathLengths, line: &'a Vec<f32>) -> Vec<(String, &'a Vec<f32>)> {
+    let mut maps = vec![("line_integral".to_owned(), line)];
+    for (name, map) in [
+        ("body_mm", &paths.body_mm),
+        ("bone_mm", &paths.bone_mm),
+        ("lung_mm", &paths.lung_mm),
+        ("lumen_mm", &paths.lumen_mm),
+        ("contrast_mm", &paths.contrast_mm),
+    ] {
+        if !map.is_empty() {
+            maps.push((name.to_owned(), map));
+        }
+    }
+    maps.extend(paths.devices_mm.iter().map(|(material, map)| (format!("{material}_mm"), map)));
+    maps
+}
+
+/// Masks of a frame: the vessel, each of several instruments, and each part of one.
+fn masks(labels: &Labels) -> Vec<(String, &Mask)> {
+    let mut named: Vec<(String, &Mask)> =
+        labels.vessel.iter().map(|mask| ("mask_vessel".to_owned(), mask)).collect();
+    for (k, device) in (1..).zip(&labels.devices) {
+        if labels.devices.len() > 1 {
+            named.push((format!("mask_{k}"), &device.mask));
+        }
+        named.extend((1..).zip(&device.parts).map(|(j, part)| (format!("mask_{k}_part_{j}"), &part.mask)));
+    }
+    named
+}

@@ -1,0 +1,97 @@
+//! One plane of fluoroscopy: what draws it, and its frames for DICOM.
+
+use std::path::{Path, PathBuf};
+
+use endowire_core::vessel::Wall;
+use endowire_core::{Error, Result};
+use endowire_viewer::{Angiogram, CArm, CArmSpec, DeviceView, Exposure, Image, Mode, Renderer, ViewSpec};
+
+/// A plane.
+pub(super) struct Plane {
+    /// Ends the names of its files.
+    pub(super) ending: &'static str,
+    pub(super) renderer: Renderer,
+    /// Where the C-arm stands in the first frame, as said and as it is.
+    start: CArmSpec,
+    arm: Option<CArm>,
+    /// Of the first frame.
+    exposure: Option<Exposure>,
+    /// Devices in the first frame: those of the masks of a C-arm that turns.
+    first: Option<Vec<DeviceView>>,
+    /// Its frames, where they are kept.
+    series: Vec<Image>,
+}
+
+impl Plane {
+    /// Those of a view, each with its renderer.
+    pub(super) fn all(spec: &ViewSpec, wall: &Wall) -> Result<Vec<Self>> {
+        let endings = ["", "_b"].into_iter();
+        let plane = |(spec, ending): (ViewSpec, &'static str)| {
+            let renderer = Renderer::of_wall(&spec, wall)?;
+            let arm = renderer.c_arm().cloned();
+            Ok(Self { ending, renderer, start: spec.c_arm, arm, exposure: None, first: None, series: vec![] })
+        };
+        spec.planes().into_iter().zip(endings).map(plane).collect()
+    }
+
+    /// Turns the C-arm by so much from where it stood first, if it is to turn. Masks of a subtraction are then of the first frame's devices, as
+    /// those of a run without medium that turned alike before.
+    pub(super) fn turn(&mut self, views: &[DeviceView], turn_deg: Option<f64>) -> Result<()> {
+        let Some(turn_deg) = turn_deg else { return Ok(()) };
+        let first = self.first.get_or_insert_with(|| views.to_vec());
+        self.renderer.turn_c_arm(&self.start.turned(turn_deg))?;
+        match self.renderer.spec().xray.mode {
+            Mode::Dsa => self.renderer.take_mask(first),
+            _ => Ok(()),
+        }
+    }
+
+    /// Keeps a frame for DICOM.
+    pub(super) fn keep(&mut self, frame: Image) {
+        self.exposure = self.exposure.or(self.renderer.exposure());
+        self.series.push(frame);
+    }
+
+    /// What a DICOM file says of the frames, which turned by `turn_deg` from one to the next.
+    fn angiogram(&self, turn_deg: f64) -> Result<Angiogram<'_>> {
+        let spec = self.renderer.spec();
+        let none = || Error::parameter("view.views", "without fluoro", "add \"fluoro\"");
+        Ok(Angiogram {
+            c_arm: self.arm.as_ref().ok_or_else(none)?,
+            turn_deg,
+            exposure: self.exposure.ok_or_else(none)?,
+            frames_per_s: spec.frames_per_s,
+            mode: spec.xray.mode,
+            contrast: !spec.injection.is_empty() || spec.xray.contrast_fraction > 0.0,
+            description: "endowire",
+        })
+    }
+}
+
+/// Writes the frames of one plane, or of two that refer to each other, and tells the files.
+pub(super) fn write_dicom(planes: &[Plane], path: &Path, turn_deg: f64) -> Result<Vec<PathBuf>> {
+    match planes {
+        [first, second] => {
+            let other = beside(path);
+            let told = [first.angiogram(turn_deg)?, second.angiogram(turn_deg)?];
+            Angiogram::write_biplane([&told[0], &told[1]], [path, &other], [&first.series, &second.series])?;
+            Ok(vec![path.to_owned(), other])
+        }
+        [one, ..] => {
+            one.angiogram(turn_deg)?.write(path, &one.series)?;
+            Ok(vec![path.to_owned()])
+        }
+        [] => Ok(vec![]),
+    }
+}
+
+/// The file of the second plane: `run.dcm` has `run_b.dcm` beside it.
+fn beside(path: &Path) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push("_b");
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
