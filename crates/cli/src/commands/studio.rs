@@ -7,8 +7,8 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::Wall;
 use endowire_methods::Scene;
 use endowire_viewer::{
-    Angiogram, Animation, CArm, ContactView, Frames, Image, Labels, Mask, Moment, Pushed, Renderer, View,
-    ViewSpec,
+    Angiogram, Animation, CArm, ContactView, Frames, Image, InjectionSpec, Labels, Mask, Moment, Pushed,
+    Renderer, View, ViewSpec,
 };
 use serde::Serialize;
 use serde_json::Value;
@@ -147,6 +147,22 @@ impl<'a> Studio<'a> {
     /// Frames a second.
     pub(super) fn frames_per_s(&self) -> f64 {
         self.spec.frames_per_s
+    }
+
+    /// Lets medium flow beside that of the scene, before the first frame is drawn.
+    pub(super) fn inject(
+        &mut self,
+        injections: impl IntoIterator<Item = InjectionSpec>,
+    ) -> Result<(), Failure> {
+        let known = self.spec.injection.len();
+        self.spec.injection.extend(injections);
+        if self.spec.injection.len() == known || !self.spec.wants(View::Fluoro) {
+            return Ok(());
+        }
+        self.renderer = Renderer::of_wall(&self.spec, &self.wall)?;
+        let second = self.args.biplane.map(|turn_deg| SecondPlane::new(&self.spec, turn_deg, &self.wall));
+        self.second = second.transpose()?;
+        Ok(())
     }
 
     /// Draws a moment and writes what is wanted of it.
