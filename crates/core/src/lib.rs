@@ -18,6 +18,7 @@ pub mod input;
 pub mod insertion;
 pub mod methods;
 mod parallel;
+mod products;
 pub mod random;
 pub mod rod;
 pub mod scene;

@@ -325,9 +325,6 @@ impl Session {
 
     /// Where contrast medium comes out: at the tip of the outermost instrument that is in.
     fn injection_mm(&self) -> Option<Vec3> {
-        let lengths_mm = self.simulation.report().lengths_mm();
-        let line_mm = self.simulation.report().inserted_mm;
-        let outermost_mm = lengths_mm.into_iter().rev().find(|mm| *mm > 0.0)?;
-        self.simulation.shape().behind(line_mm - outermost_mm).tip_mm()
+        (0..self.simulation.stack().instruments().len()).rev().find_map(|one| self.simulation.tip_of_mm(one))
     }
 }

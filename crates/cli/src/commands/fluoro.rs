@@ -11,6 +11,7 @@ use super::studio::{Still, Studio};
 use crate::args::{FluoroArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
+use crate::output::injections::Injected;
 use crate::output::progress;
 
 /// Carries out the script, then draws.
@@ -43,9 +44,10 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     let mut studio =
         Studio::new("fluoro", &args.frames, (&args.scene, &scene, wall), ViewChoice::Fluoro, folder, frames)?;
     let now = match &mut simulation {
-        Some(simulation) => after(simulation, &script, steps, args)?,
+        Some(simulation) => after(simulation, &script, steps, args, 1.0 / studio.frames_per_s())?,
         None => Now::default(),
     };
+    studio.inject(now.injections.iter().map(Injected::spec))?;
     for k in 0..studio.frames() {
         let time_s = args.time + k as f64 / studio.frames_per_s();
         let moment = Moment { frame: k as u64, time_s };
@@ -67,6 +69,7 @@ struct Now {
     shape: Shape,
     inserted_mm: Vec<f64>,
     contacts: Vec<ContactView>,
+    injections: Vec<Injected>,
 }
 
 /// Carries out the first steps of the script.
@@ -75,13 +78,20 @@ fn after(
     script: &Script,
     steps: usize,
     args: &FluoroArgs,
+    frame_s: f64,
 ) -> Result<Now, Failure> {
     let bar = progress::bar(steps, "step");
     let mut run = script.begin();
-    for index in 0..steps {
+    let mut injections = Vec::new();
+    for index in 0..=steps {
+        let moves = run.next(simulation)?.map(|step| step.moves.to_vec());
+        for one in &run.injections()[injections.len()..] {
+            let time_s = one.time_s.unwrap_or(one.after_step as f64 * frame_s);
+            injections.push(Injected::new(one, time_s, simulation));
+        }
         // A condition may have ended the script before.
-        let Some(step) = run.next(simulation)? else { break };
-        simulation.step_together(step.moves).map_err(|e| {
+        let Some(moves) = moves.filter(|_| index < steps) else { break };
+        simulation.step_together(&moves).map_err(|e| {
             Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), index + 1))
         })?;
         run.carried_out();
@@ -96,5 +106,6 @@ fn after(
         contacts: contacts
             .map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() })
             .collect(),
+        injections,
     })
 }

@@ -8,6 +8,7 @@ use crate::args::{RenderArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::folder::step_times;
+use crate::output::injections::{self, Injected};
 use crate::output::instruments::Lengths;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::recording::Recording;
@@ -72,6 +73,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         scene.wall(&Cache::new(&args.frames.cache)).map_err(|e| Failure::from(e).at(path.display()))?;
     let seen = (path.as_path(), &scene, wall);
     let mut studio = Studio::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
+    studio.inject(injections::read(&args.dir)?.iter().map(Injected::spec))?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
     let (times_s, frame_s) = (step_times(&args.dir)?, 1.0 / studio.frames_per_s());

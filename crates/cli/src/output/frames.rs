@@ -4,12 +4,14 @@ use std::io;
 use std::path::Path;
 
 use endowire_core::Error;
-use endowire_core::insertion::Simulation;
+use endowire_core::insertion::{Script, Simulation};
 use endowire_core::shape::Shape;
+use endowire_core::vessel::Wall;
 use endowire_methods::Scene;
-use endowire_viewer::{Exposure, Moment, Pushed, Renderer, Seen, ViewSpec};
+use endowire_viewer::{Exposure, Moment, Pushed, Renderer, Seen, View, ViewSpec};
 use serde::Serialize;
 
+use super::injections::Injected;
 use super::recorder::Recorder;
 use crate::failure::Failure;
 
@@ -28,10 +30,14 @@ pub(crate) struct PlaneTold {
 pub(crate) struct FrameWriter {
     spec: ViewSpec,
     pushed: Pushed,
+    /// Of the vessel, if any view is asked for: else nothing is built.
+    wall: Option<Wall>,
     /// That of the first plane, and of the second of two; none where no view is asked for: then nothing is built.
     planes: Vec<Renderer>,
     /// What was in after the step before, where pulses show its way from there.
     before: Option<Before>,
+    /// Whether medium flows that the renderers do not know.
+    injected: bool,
 }
 
 /// What was in after a step, and when.
@@ -41,6 +47,11 @@ struct Before {
     time_s: f64,
 }
 
+/// One renderer for each plane.
+fn planes(spec: &ViewSpec, wall: &Wall) -> Result<Vec<Renderer>, Error> {
+    spec.planes().iter().map(|plane| Renderer::of_wall(plane, wall)).collect()
+}
+
 impl FrameWriter {
     /// Prepares what the scene file asks for; without a simulation nothing is drawn.
     pub(crate) fn new(path: &Path, scene: &Scene, drawn: Option<&Simulation>) -> Result<Self, Failure> {
@@ -48,13 +59,10 @@ impl FrameWriter {
         let spec = ViewSpec::of_scene(scene, path)?;
         spec.validate().map_err(in_scene)?;
         let drawn = drawn.filter(|_| !spec.views.is_empty());
-        let mut planes = Vec::new();
-        for (simulation, plane) in
-            drawn.into_iter().flat_map(|drawn| spec.planes().into_iter().map(move |p| (drawn, p)))
-        {
-            planes.push(Renderer::of_wall(&plane, simulation.wall()).map_err(in_scene)?);
-        }
-        Ok(Self { pushed: Pushed::new(scene, &spec).map_err(in_scene)?, spec, planes, before: None })
+        let wall = drawn.map(|simulation| simulation.wall().clone());
+        let planes = wall.as_ref().map_or(Ok(Vec::new()), |wall| planes(&spec, wall)).map_err(in_scene)?;
+        let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
+        Ok(Self { spec, pushed, wall, planes, before: None, injected: false })
     }
 
     /// What draws, for the summary.
@@ -70,6 +78,21 @@ impl FrameWriter {
             PlaneTold { primary_deg, secondary_deg, camera_matrix: arm.matrix(), exposure }
         });
         told.collect()
+    }
+
+    /// Refuses a script that injects where its frames could not show it.
+    pub(crate) fn check(&self, script: &Script) -> Result<(), Error> {
+        if script.injects() && self.spec.wants(View::Fluoro) && self.spec.flow.tree.is_none() {
+            let mend = "a line of the script injects, and contrast medium flows along a centre line: give the vessel's";
+            return Err(Error::parameter("view.flow.tree", "none", mend));
+        }
+        Ok(())
+    }
+
+    /// Lets medium flow in the frames from the next on.
+    pub(crate) fn inject(&mut self, injected: &Injected) {
+        self.spec.injection.push(injected.spec());
+        self.injected = true;
     }
 
     /// Time at the end of a step whose script has no speeds, s: that of its frame.
@@ -104,6 +127,11 @@ impl FrameWriter {
         (shape, inserted_mm): (&Shape, &[f64]),
         recorder: &mut Recorder,
     ) -> Result<(), Failure> {
+        if let (true, Some(wall)) = (self.injected, &self.wall) {
+            // What they remember is of a vessel without: masks are taken anew, as for every injection in a room.
+            self.planes = planes(&self.spec, wall)?;
+            self.injected = false;
+        }
         let views = self.pushed.views(shape, inserted_mm);
         let moment = Moment { frame: step as u64, time_s };
         let before = self.before.as_ref();

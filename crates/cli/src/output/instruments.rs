@@ -79,9 +79,7 @@ impl InstrumentTable {
         for (index, (instrument, told)) in stack.instruments().iter().zip(&report.instruments).enumerate() {
             let moved = moves.iter().find(|one| one.instrument == index);
             let command = moved.map(|one| one.command).unwrap_or_default();
-            let own = (told.inserted_mm > 0.0)
-                .then(|| simulation.shape().behind(report.inserted_mm - told.inserted_mm));
-            let tip = own.and_then(|shape| shape.tip_mm());
+            let tip = simulation.tip_of_mm(index);
             let outside = report.instruments[index + 1..].iter().map(|other| other.inserted_mm);
             let felt_mm = (told.inserted_mm - outside.fold(0.0, f64::max)).max(0.0);
             self.table.serialize(Row {

@@ -4,6 +4,7 @@ mod arrays;
 pub(crate) mod chart;
 pub(crate) mod folder;
 pub(crate) mod frames;
+pub(crate) mod injections;
 pub(crate) mod instruments;
 pub(crate) mod manifest;
 pub(crate) mod npz;

@@ -265,6 +265,11 @@ impl Recorder {
         Ok(())
     }
 
+    /// Where it is recorded.
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// Steps recorded so far.
     pub(crate) fn steps(&self) -> usize {
         self.steps

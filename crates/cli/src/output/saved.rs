@@ -11,6 +11,7 @@ use endowire_methods::Scene;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::injections::Injected;
 use super::{seal, whole};
 use crate::failure::Failure;
 
@@ -90,6 +91,10 @@ fn replayed<'a>(
         }
         seen(step);
     })?;
+    for one in run.injections() {
+        numbers.extend([one.instrument, one.after_step].into_iter().flat_map(|n| (n as u64).to_le_bytes()));
+        numbers.extend([one.ml, one.ml_per_s].into_iter().flat_map(f64::to_le_bytes));
+    }
     Ok((run, hash(numbers)))
 }
 
@@ -98,7 +103,7 @@ fn hash(bytes: Vec<u8>) -> String {
 }
 
 /// What is known of a run while it goes on, beside the state.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Course {
     /// Steps carried out.
     pub(crate) steps: usize,
@@ -108,12 +113,15 @@ pub(crate) struct Course {
     pub(crate) max_penetration_mm: f64,
     /// Whether every step met its convergence test.
     pub(crate) converged: bool,
+    /// What was injected.
+    #[serde(default)]
+    pub(crate) injected: Vec<Injected>,
 }
 
 impl Course {
     /// Of a run that begins.
     pub(crate) fn begin() -> Self {
-        Self { steps: 0, step_time_s: 0.0, max_penetration_mm: 0.0, converged: true }
+        Self { steps: 0, step_time_s: 0.0, max_penetration_mm: 0.0, converged: true, injected: vec![] }
     }
 }
 
@@ -170,7 +178,7 @@ impl Saved {
 
     /// What is known of the run up to the state.
     pub(crate) fn course(&self) -> Course {
-        self.header.course
+        self.header.course.clone()
     }
 
     /// Takes the simulation of a scene, at its start, to the state, if it was saved in the same scene; the script there. `seen` is given each
@@ -251,7 +259,7 @@ impl Saver {
         &mut self,
         simulation: &Simulation,
         (script, lines): (&Script, &ScriptCourse),
-        course: Course,
+        course: &Course,
         sync: impl FnOnce() -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let began = Instant::now();
@@ -263,7 +271,7 @@ impl Saver {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             git_revision: env!("ENDOWIRE_GIT_REVISION").to_owned(),
             scene: self.scene.clone(),
-            course,
+            course: course.clone(),
             parts: self.parts.clone(),
             script: hash,
             lines: lines.clone(),

@@ -285,3 +285,87 @@ fn two_hundred_kills_leave_no_trace() {
     kills_leave_no_trace(150, "[]");
     kills_leave_no_trace(50, "[\"3d\", \"fluoro\"]");
 }
+
+#[test]
+fn what_a_script_injects_is_recorded_drawn_and_goes_on_as_if_nothing_had_been_between() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let lines = |ml: &str| {
+        [
+            "advance_mm = 40.0\nstep_mm = 4.0\nspeed_mm_per_s = 40.0".to_owned(),
+            format!("inject = {{ ml = {ml}, ml_per_s = 4.0 }}"),
+            "advance_mm = 16.0\nstep_mm = 1.0\nspeed_mm_per_s = 40.0".to_owned(),
+            "advance_mm = 8.0\nstep_mm = 1.0\nspeed_mm_per_s = 40.0\ninject = { ml = 2.0, ml_per_s = 8.0 }"
+                .to_owned(),
+        ]
+    };
+    let scene = |name: &str, lines: &[String]| {
+        let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+        let path = scene_of(folder.path(), name, &lines, "[\"fluoro\"]");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let tree = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/vessels/curved_tube.csv");
+        let flow = format!("[view.flow]\ntree = {tree:?}\n\n[view.xray]");
+        std::fs::write(&path, text.replacen("[view.xray]", &flow, 1)).unwrap();
+        path
+    };
+    let all = lines("6.0");
+    let whole = scene("whole.toml", &all);
+    done(&run(&whole, &at("whole"), &[]));
+    let table = |out: &str| std::fs::read_to_string(at(out).join("injections.csv")).unwrap();
+    let rows = table("whole");
+    let rows: Vec<Vec<&str>> = rows.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows[0][..6].join(","), "after_step,time_s,instrument,volume_ml,rate_ml_per_s,inserted_mm");
+    assert_eq!((rows[2][0], rows[2][3], rows[2][4], rows.len()), ("26", "2.0", "8.0", 3));
+    let steps = std::fs::read_to_string(at("whole/steps.csv")).unwrap();
+    assert_eq!(rows[1][..6], ["10", &end_s(&steps, 10), "device", "6.0", "4.0", "40.0"]);
+    let tips = |step: usize| steps.lines().nth(step).unwrap().split(',').skip(7).take(3).collect::<Vec<_>>();
+    assert_eq!((&rows[1][6..], &rows[2][6..]), (&tips(10)[..], &tips(26)[..]), "from the tip as it was then");
+    // Medium is in the frames from then on: a run without has the same before, and another after.
+    let dry = scene("dry.toml", &[all[0].clone(), all[2].clone(), all[2].replace("16.0", "8.0")]);
+    done(&run(&dry, &at("dry"), &[]));
+    assert!(!at("dry/injections.csv").exists());
+    let frame = |out: &str, step: usize| {
+        std::fs::read(at(out).join(format!("frames/step_{step:06}_fluoro.png"))).unwrap()
+    };
+    assert_eq!(frame("whole", 7), frame("dry", 7));
+    assert_ne!(frame("whole", 21), frame("dry", 21));
+    // Saved before, within and behind what is injected.
+    for count in 1..=3 {
+        let part = scene("part.toml", &all[..count]);
+        let (out, branch, state) = (format!("out{count}"), format!("branch{count}"), at("state"));
+        done(&run(&part, &at(&out), &["--save-state".as_ref(), &state]));
+        done(&run(&whole, &at(&branch), &["--resume".as_ref(), &state]));
+        assert_eq!(table(&branch), table("whole"), "a branch knows what flows already");
+        done(&run(&whole, &at(&out), &["--resume".as_ref(), &state]));
+        same(&at("whole"), &at(&out));
+    }
+    // The twin: of another volume the state knows nothing.
+    let other = run(&scene("other.toml", &lines("7.0")), &at("other"), &["--resume".as_ref(), &at("state")]);
+    assert_eq!(other.status.code(), Some(2), "{}", said(&other));
+    assert!(said(&other).contains("the part of the script that was carried out is not"), "{}", said(&other));
+    // Rendered afterwards, and without a recording, it is there as well.
+    let medium_mm = |words: &[&str], of: &Path, name: &str| {
+        let mut command = endowire();
+        command.arg(words[0]).arg(of).args(&words[1..]).args(["--set", "xray.contrast_fraction=0"]);
+        done(&command.args(["--view", "fluoro", "--raw", "--out"]).arg(at(name)).output().unwrap());
+        let mut files = std::fs::read_dir(at(name)).unwrap().flatten().map(|e| e.path());
+        let map = files.find(|path| path.to_string_lossy().ends_with("_contrast_mm.npy"))?;
+        let bytes = std::fs::read(map).unwrap();
+        let floats = bytes[bytes.len() % 4..].chunks_exact(4).rev().take(24 * 16);
+        Some(floats.map(|b| f32::from_le_bytes(b.try_into().unwrap())).sum::<f32>())
+    };
+    let render = ["render", "--from", "21", "--to", "21"];
+    let rendered = medium_mm(&render, &at("whole"), "rendered").unwrap();
+    assert!(rendered > 1.0, "{rendered}");
+    assert_eq!(medium_mm(&render, &at("dry"), "rendered_dry"), None, "the twin");
+    let time = end_s(&steps, 21);
+    let fluoro = ["fluoro", "--steps", "21", "--time", &time];
+    let drawn = medium_mm(&fluoro, &whole, "fluoro").unwrap();
+    // What is still to be injected makes the steps of the flow shorter.
+    assert!((drawn / rendered - 1.0).abs() < 1e-3, "{drawn} {rendered}");
+}
+
+/// When a step of the table ended.
+fn end_s(steps: &str, step: usize) -> String {
+    steps.lines().nth(step).unwrap().rsplit(',').next().unwrap().to_owned()
+}

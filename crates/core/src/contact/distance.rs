@@ -40,6 +40,7 @@ use nalgebra::Matrix3;
 
 use super::fit::{Neighbours, fit};
 use super::quadric::Quadric;
+use crate::products::{outer, product, times};
 use crate::vessel::{SurfaceMesh, Wall, inward_vertex_normals};
 use crate::{Vec3, parallel};
 use over::Lists;
@@ -311,29 +312,31 @@ impl SmoothWall {
             let w = a * opened.value;
             let (in_u, in_q) = (a1 * opened.value + a * opened.in_u, a * opened.in_q);
             let in_uu = a2 * opened.value + 2.0 * a1 * opened.in_u + a * opened.in_uu;
-            let turned = u1 * f1.transpose() * (a1 * opened.in_q + a * opened.in_qu);
+            let turned = outer(&u1, &f1) * (a1 * opened.in_q + a * opened.in_qu);
             let w1 = u1 * in_u + f1 * in_q;
-            let w2 = (u1 * u1.transpose() * in_uu + u2 * in_u)
-                + (turned + turned.transpose() + f2 * in_q + f1 * f1.transpose() * (a * opened.in_qq));
+            let w2 = (outer(&u1, &u1) * in_uu + u2 * in_u)
+                + (turned + turned.transpose() + f2 * in_q + outer(&f1, &f1) * (a * opened.in_qq));
             let frame = Matrix3::from_columns(&[q.axes[0], q.axes[1], q.normal]);
-            let turned1 = frame * w1;
+            let back = frame.transpose();
+            let turned1 = times(&frame, &w1);
             also(&Reaching {
                 vertex: v,
                 weight: w,
                 gradient: turned1,
-                hessian: frame * w2 * frame.transpose(),
+                hessian: product(&product(&frame, &w2), &back),
                 support: a,
-                support_gradient: frame * u1 * a1,
+                support_gradient: times(&frame, &u1) * a1,
             });
             let above = f - reached.value_mm;
-            let mixed = w1 * f1.transpose();
+            let mixed = outer(&w1, &f1);
             slope += turned1;
-            gradient += frame * (w1 * above + f1 * w);
-            hessian += frame * (w2 * above + mixed + mixed.transpose() + f2 * w) * frame.transpose();
+            gradient += times(&frame, &(w1 * above + f1 * w));
+            let bend = w2 * above + mixed + mixed.transpose() + f2 * w;
+            hessian += product(&product(&frame, &bend), &back);
         }
         let inverse = 1.0 / reached.weight;
         let gradient = gradient * inverse;
-        let mixed = slope * gradient.transpose();
+        let mixed = outer(&slope, &gradient);
         Distance {
             value_mm: reached.value_mm,
             gradient,

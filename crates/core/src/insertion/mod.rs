@@ -14,6 +14,7 @@ pub use batch::Batch;
 pub use builder::SimulationBuilder;
 pub use nodes::nodes_from_tip;
 pub use script::{
-    LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until, script_commands,
+    Inject, Injection, LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until,
+    script_commands,
 };
 pub use simulation::Simulation;

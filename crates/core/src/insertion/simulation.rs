@@ -8,7 +8,7 @@ use crate::insertion::SimulationBuilder;
 use crate::methods::{Command, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings};
 use crate::shape::Shape;
 use crate::vessel::{Wall, WallQuery};
-use crate::{Error, Result};
+use crate::{Error, Result, Vec3};
 
 /// An insertion under way.
 ///
@@ -136,6 +136,13 @@ impl Simulation {
     /// The inserted centre line, sheath to tip.
     pub fn shape(&self) -> &Shape {
         self.method.shape()
+    }
+
+    /// Position of the tip of an instrument; none while it is not in.
+    pub fn tip_of_mm(&self, instrument: usize) -> Option<Vec3> {
+        let report = self.report();
+        let inserted_mm = report.lengths_mm().get(instrument).copied().filter(|mm| *mm > 0.0)?;
+        self.shape().behind(report.inserted_mm - inserted_mm).tip_mm()
     }
 
     /// What the last step found.

@@ -13,6 +13,7 @@ use super::layout::{Layout, MAX_ANGLES};
 use super::quadrature::GAUSS;
 use super::torsion::{AngleDensity, PointDerivatives, ReferenceTwist};
 use crate::Vec3;
+use crate::products::{outer, product, times, transposed_times};
 use nalgebra::Matrix3;
 
 /// Derivatives in the chord and the far tangent, both in the first triad.
@@ -105,7 +106,7 @@ pub(super) fn add_torsion<const C: usize, const HESSIAN: bool>(
     // From the first triad back to space.
     let axes = Matrix3::from_columns(&[s.first.t, s.first.u, s.first.v]);
     let turns = geometry.turns();
-    let force = axes * shape.chord * ih;
+    let force = times(&axes, &shape.chord) * ih;
     for i in 0..3 {
         out.gradient[l.position(0) + i] -= force[i];
         out.gradient[l.position(1) + i] += force[i];
@@ -177,15 +178,14 @@ fn add_point<const C: usize>(
             (bend, own) = twist.add_rest_curvature(phi, input.moment, &mut rest);
             energy.bend += bend;
         }
-        let both = |p: Vec3, q: Vec3| p * weight.transpose() + q * slope.transpose();
+        let both = |p: Vec3, q: Vec3| outer(&p, &weight) + outer(&q, &slope);
         let hya = both(own.along_y, twist.along_y * input.stiffness);
         let hza = both(own.along_z, twist.along_z * input.stiffness);
         let spin = &mut spins[set];
         spin.chord_angles += hya * yc + hza * zc;
         spin.end_angles += hya * ye + hza * ze;
         spin.angles += weight * own.first + slope * torque;
-        spin.angles_angles +=
-            weight * weight.transpose() * own.second + slope * slope.transpose() * input.stiffness;
+        spin.angles_angles += outer(&weight, &weight) * own.second + outer(&slope, &slope) * input.stiffness;
     }
     twist.add_twist(torques, stiffness, &mut f);
     f.add(&rest);
@@ -210,7 +210,7 @@ fn add_displacements<const C: usize>(
 ) {
     let l = Layout::<C>;
     let (x0, x1) = (l.position(0), l.position(1));
-    let stiffness = axes * shape.chord_chord * axes.transpose() * (ih * ih);
+    let stiffness = product(&product(axes, &shape.chord_chord), &axes.transpose()) * (ih * ih);
     for i in 0..3 {
         for j in 0..3 {
             out.rows[x0 + i][x1 + j] -= stiffness[(i, j)];
@@ -223,7 +223,7 @@ fn add_displacements<const C: usize>(
     for (set, spin) in spins.iter().enumerate().take(Layout::<C>::ANGLES) {
         let rows = angle_rows::<C>(set);
         let [angle0, angle1, bubble] = rows;
-        let crossed = axes * spin.chord_angles * ih;
+        let crossed = product(axes, &spin.chord_angles) * ih;
         for i in 0..3 {
             for j in 0..3 {
                 out.rows[x0 + i][rows[j]] -= crossed[(i, j)];
@@ -262,14 +262,14 @@ fn add_turns<const C: usize>(
     let rows = turn_rows::<C>();
     for (a, (d, &row)) in turns.iter().zip(&rows).enumerate() {
         // The Hessian times what the turn changes.
-        let mut chord = shape.chord_chord * d.chord + shape.chord_end * d.end;
-        let mut end = shape.chord_end.tr_mul(&d.chord) + shape.end_end * d.end;
+        let mut chord = times(&shape.chord_chord, &d.chord) + times(&shape.chord_end, &d.end);
+        let mut end = transposed_times(&shape.chord_end, &d.chord) + times(&shape.end_end, &d.end);
         let mut twist = 0.0;
         for (set, spin) in spins.iter().enumerate().take(Layout::<C>::ANGLES) {
             chord += spin.chord_angles.column(1) * d.twist;
             end += spin.end_angles.column(1) * d.twist;
-            let angles = spin.chord_angles.tr_mul(&d.chord)
-                + spin.end_angles.tr_mul(&d.end)
+            let angles = transposed_times(&spin.chord_angles, &d.chord)
+                + transposed_times(&spin.end_angles, &d.end)
                 + spin.angles_angles.column(1) * d.twist;
             twist += angles[1];
             for (i, angle) in angle_rows::<C>(set).into_iter().enumerate() {
@@ -277,11 +277,11 @@ fn add_turns<const C: usize>(
                 out.rows[first][last] += angles[i];
             }
         }
-        let product = axes * chord * ih;
+        let pull = times(axes, &chord) * ih;
         for i in 0..3 {
-            out.rows[x0 + i][row] -= product[i];
+            out.rows[x0 + i][row] -= pull[i];
             let (first, last) = if row < x1 { (row, x1 + i) } else { (x1 + i, row) };
-            out.rows[first][last] += product[i];
+            out.rows[first][last] += pull[i];
         }
         for b in a..4 {
             let q = &turns[b];

@@ -12,6 +12,7 @@
 //! plus −EI κ⁰·t′ + ½EI|κ⁰|² + ½GJ(τ − τ⁰)², κ⁰ = k₁d₁ + k₂d₂; this file holds the addition.
 
 use crate::Vec3;
+use crate::products::outer;
 use nalgebra::Matrix3;
 
 /// Stiffness and rest state at one Gauss point, in the element's units.
@@ -115,20 +116,20 @@ impl ReferenceTwist {
         let g = ia / (a + y.x);
         let e1 = Vec3::x();
         let eye = Matrix3::identity();
-        let yy = y * y.transpose();
+        let yy = outer(y, y);
 
         // G: 1/G = A + a y₁, its gradient is `slope`.
         let slope = y * (2.0 + y.x * ia) + e1 * a;
-        let ey = e1 * y.transpose();
+        let ey = outer(&e1, y);
         let bend_slope = eye * (2.0 + y.x * ia) + (ey + ey.transpose()) * ia - yy * (y.x * ia3);
         let dg = slope * (-g * g);
-        let hg = slope * slope.transpose() * (2.0 * g * g * g) - bend_slope * (g * g);
+        let hg = outer(&slope, &slope) * (2.0 * g * g * g) - bend_slope * (g * g);
 
         let d = y.y * z.z - y.z * z.y;
         let dy = Vec3::new(0.0, z.z, -z.y);
         let dz = Vec3::new(0.0, -y.z, y.y);
-        let dyg = dy * dg.transpose();
-        let mut yz = -(dg * dz.transpose());
+        let dyg = outer(&dy, &dg);
+        let mut yz = -outer(&dg, &dz);
         yz[(1, 2)] -= g;
         yz[(2, 1)] += g;
         Self {
@@ -170,9 +171,9 @@ impl ReferenceTwist {
         let (ty, tz) = (&self.along_y, &self.along_z);
         to.gy += ty * torque;
         to.gz += tz * torque;
-        to.hyy += ty * ty.transpose() * stiffness + self.yy * torque;
-        to.hyz += ty * tz.transpose() * stiffness + self.yz * torque;
-        to.hzz += tz * tz.transpose() * stiffness;
+        to.hyy += outer(ty, ty) * stiffness + self.yy * torque;
+        to.hyz += outer(ty, tz) * stiffness + self.yz * torque;
+        to.hzz += outer(tz, tz) * stiffness;
     }
 
     /// Adds the derivatives of an instrument's rest curvature, −P with P = (z·w)/a − (y·w) G q and q = z₁ + b/a, and returns −P with those in
@@ -188,7 +189,7 @@ impl ReferenceTwist {
         let ia3 = ia * ia * ia;
         let e1 = Vec3::x();
         let eye = Matrix3::identity();
-        let yy = y * y.transpose();
+        let yy = outer(y, y);
         let (sin, cos) = phi.sin_cos();
         let w = Vec3::new(0.0, moment[0] * cos - moment[1] * sin, moment[0] * sin + moment[1] * cos);
         let wp = Vec3::new(0.0, -w.z, w.y);
@@ -207,17 +208,16 @@ impl ReferenceTwist {
         let (_, _, value_p, py_p, pz_p) = first(&wp);
         to.gy -= py;
         to.gz -= pz;
-        let yz = y * z.transpose();
+        let yz = outer(y, z);
         let hq = (yz + yz.transpose() + eye * *b) * (-ia3) + yy * (3.0 * ia3 * ia * ia * b);
-        let wgq = w * gq.transpose();
-        let gd = dg * dq.transpose();
+        let wgq = outer(&w, &gq);
+        let gd = outer(dg, &dq);
         to.hyy += (eye * ia3 - yy * (3.0 * ia3 * ia * ia)) * m
             + wgq
             + wgq.transpose()
             + (hg * q + gd + gd.transpose() + hq * *g) * n;
         // Rows y, columns z.
-        to.hyz +=
-            y * w.transpose() * ia3 + (w * *g + dg * n) * lift.transpose() + (eye * *ia - yy * ia3) * (n * g);
+        to.hyz += outer(y, &w) * ia3 + outer(&(w * *g + dg * n), &lift) + (eye * *ia - yy * ia3) * (n * g);
         (-value, AngleDensity { first: -value_p, second: value, along_y: -py_p, along_z: -pz_p })
     }
 }

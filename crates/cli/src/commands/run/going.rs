@@ -13,6 +13,7 @@ use indicatif::ProgressBar;
 use super::told::live;
 use crate::failure::Failure;
 use crate::output::frames::FrameWriter;
+use crate::output::injections::{self, Injected};
 use crate::output::provenance::Provenance;
 use crate::output::recorder::{Recorder, Summary};
 use crate::output::saved::{Course, Saver};
@@ -41,7 +42,7 @@ pub(super) struct SoFar<'a> {
 
 impl SoFar<'_> {
     fn summary(&self, recorder: &Recorder) -> Summary {
-        let Course { converged, max_penetration_mm, step_time_s, .. } = self.course;
+        let &Course { converged, max_penetration_mm, step_time_s, .. } = &self.course;
         let steps = (recorder.steps(), self.script.len());
         let so_far = (converged, max_penetration_mm);
         let failure = self.failure.clone();
@@ -106,6 +107,8 @@ pub(super) struct Ended {
 impl Going<'_> {
     /// Writes what there is before the first step.
     pub(super) fn begin(&mut self) -> Result<(), Failure> {
+        self.inject(self.times_s.last().copied().unwrap_or_default());
+        injections::write(self.recorder.folder(), &self.so_far.course.injected)?;
         self.checkpoint()?;
         self.save()
     }
@@ -162,8 +165,23 @@ impl Going<'_> {
         self.recorder.record(moves, time_s, &self.so_far.simulation)?;
         self.so_far.course.steps += 1;
         self.so_far.draw((self.so_far.course.steps, time_s), last, &mut self.recorder)?;
+        if self.inject(time_s) {
+            injections::write(self.recorder.folder(), &self.so_far.course.injected)?;
+        }
         self.checkpoint()?;
         if self.saver.as_ref().is_some_and(Saver::is_due) { self.save() } else { Ok(()) }
+    }
+
+    /// Notes what begins to flow at the end of the last step; whether anything does.
+    fn inject(&mut self, now_s: f64) -> bool {
+        let SoFar { hand, simulation, frames, course, .. } = &mut self.so_far;
+        let begun = &hand.injections()[course.injected.len()..];
+        for one in begun {
+            let injected = Injected::new(one, one.time_s.unwrap_or(now_s), simulation);
+            frames.inject(&injected);
+            course.injected.push(injected);
+        }
+        !begun.is_empty()
     }
 
     fn checkpoint(&mut self) -> Result<(), Failure> {
@@ -174,7 +192,7 @@ impl Going<'_> {
     fn save(&mut self) -> Result<(), Failure> {
         let Some(saver) = &mut self.saver else { return Ok(()) };
         let SoFar { simulation, script, hand, course, .. } = &self.so_far;
-        saver.save(simulation, (script, hand.course()), *course, || self.recorder.sync())
+        saver.save(simulation, (script, hand.course()), course, || self.recorder.sync())
     }
 
     /// Writes what is not written yet.

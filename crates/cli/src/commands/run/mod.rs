@@ -14,6 +14,7 @@ use endowire_methods::Scene;
 use crate::args::RunArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
+use crate::output::injections::Injected;
 use crate::output::instruments::Lengths;
 use crate::output::progress;
 use crate::output::provenance::{Provenance, read_input};
@@ -39,6 +40,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let mut simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
     let saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
     let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation))?;
+    frames.check(&script).map_err(in_scene)?;
     let mut times_s = Vec::new();
     let mut hand = match &saved {
         Some(saved) => saved.restore(&scene, &mut simulation, &script, |step| {
@@ -57,7 +59,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let recorder = if args.resume.is_some() {
         let (mut recorder, earlier) = Recorder::go_on(&folder, args.force, course.steps, &simulation)?;
         let times = (times_s.as_slice(), next.is_none());
-        draw_again(&mut frames, earlier.as_ref(), (&folder, &simulation), times, &mut recorder)?;
+        let seen = (earlier.as_ref(), course.injected.as_slice());
+        draw_again(&mut frames, seen, (&folder, &simulation), times, &mut recorder)?;
         recorder
     } else {
         let recorder = Recorder::new(&folder, args.force, simulation.stack())?;
@@ -83,7 +86,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let mut going = Going { so_far, recorder, saver, times_s, ahead: false };
     let interrupted = interrupts();
     let bar = if args.quiet { progress::hidden() } else { progress::bar(script.len(), "step") };
-    bar.inc(course.steps as u64);
+    bar.inc(going.so_far.course.steps as u64);
     going.begin()?;
     going.carry_out(next, &interrupted, &bar);
     bar.finish_and_clear();
@@ -95,15 +98,17 @@ fn forget_state(path: &Path) -> Result<(), Failure> {
     whole::remove(path).map_err(|e| Failure::write(path, &e))
 }
 
-/// Draws the frames of a recording that goes on once more: the detector remembers those before. `times_s` are those of all steps so far.
+/// Draws the frames of a recording that goes on once more, with what was injected: the detector remembers those before. `times_s` are those of all steps so far.
 fn draw_again(
     frames: &mut FrameWriter,
-    earlier: Option<&Recording>,
+    (earlier, injected): (Option<&Recording>, &[Injected]),
     (folder, simulation): (&Path, &Simulation),
     (times_s, ended): (&[f64], bool),
     recorder: &mut Recorder,
 ) -> Result<(), Failure> {
+    let mut flowing = injected.iter().peekable();
     let Some(earlier) = earlier else {
+        flowing.for_each(|one| frames.inject(one));
         if let Some(&time_s) = times_s.last() {
             frames.stood((simulation.shape(), &simulation.report().lengths_mm()), time_s);
         }
@@ -116,8 +121,12 @@ fn draw_again(
         let shape = earlier.shape(row);
         let lengths_mm = lengths.after(step, &shape)?;
         let last = ended && step == times_s.len();
+        while let Some(one) = flowing.next_if(|one| one.after_step < step) {
+            frames.inject(one);
+        }
         frames.step((step, times_s[step - 1]), last, (&shape, &lengths_mm), recorder)?;
     }
+    flowing.for_each(|one| frames.inject(one));
     Ok(())
 }
 

@@ -9,8 +9,8 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::Wall;
 use endowire_methods::Scene;
 use endowire_viewer::{
-    Animation, ContactView, DeviceView, Frames, Labels, Mask, Moment, PathLengths, Pushed, Renderer, Seen,
-    View, ViewSpec,
+    Animation, ContactView, DeviceView, Frames, InjectionSpec, Labels, Mask, Moment, PathLengths, Pushed,
+    Renderer, Seen, View, ViewSpec,
 };
 use serde::Serialize;
 
@@ -128,6 +128,19 @@ impl<'a> Studio<'a> {
     /// What part of the way from the first frame to the last the next one is.
     fn part(&self) -> f64 {
         self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64
+    }
+
+    /// Lets medium flow beside that of the scene, before the first frame is drawn.
+    pub(super) fn inject(
+        &mut self,
+        injections: impl IntoIterator<Item = InjectionSpec>,
+    ) -> Result<(), Failure> {
+        let known = self.spec.injection.len();
+        self.spec.injection.extend(injections);
+        if self.spec.injection.len() > known && self.spec.wants(View::Fluoro) {
+            self.planes = Plane::all(&self.spec, &self.wall)?;
+        }
+        Ok(())
     }
 
     /// Draws a moment and writes what is wanted of it.

@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Until;
+use super::inject::{Bolus, Inject};
 use super::motion::{Motion, Part, Travel};
-use super::until::Condition;
+use super::until::{Condition, Until};
 use crate::device::Stack;
 use crate::vessel::CentrelineTree;
 use crate::{Error, Result};
@@ -12,6 +12,7 @@ use crate::{Error, Result};
 /// One line of a script: a motion and the increments it is cut into.
 ///
 /// `advance_mm`, `retract_mm` or `withdraw`, with or without `rotate_deg`; given together they happen together. `exchange` is two motions.
+/// `inject` may stand alone: nothing moves then, and no time goes by.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScriptLine {
@@ -38,6 +39,8 @@ pub struct ScriptLine {
     pub speed_deg_per_s: Option<f64>,
     /// What ends the line before it has gone all of its way, which is the most that it goes then.
     pub until: Option<Until>,
+    /// Contrast medium that is injected from the start of the line on.
+    pub inject: Option<Inject>,
     /// Lines of other instruments, which move at the same time; increments are as many as the one that needs most of them has.
     pub with: Vec<ScriptLine>,
 }
@@ -53,6 +56,16 @@ impl ScriptLine {
         stack: &Stack,
         centreline: Option<&CentrelineTree>,
     ) -> Result<Vec<Motion>> {
+        let bolus = |own| {
+            let inject = self.inject.as_ref();
+            inject.map(|inject| Bolus::new(format!("{name}.inject"), inject, own, stack)).transpose()
+        };
+        if self.only_injects() {
+            let named = self.inject.as_ref().is_some_and(|inject| inject.through.is_some());
+            let own = if named && self.instrument.is_none() { 0 } else { self.number(name, stack)? };
+            let inject = bolus(own)?;
+            return Ok(vec![Motion { name: name.to_owned(), parts: vec![], until: None, inject }]);
+        }
         let mut parts: Vec<Part> = Vec::new();
         for (name, line) in self.together(name)? {
             let part = line.part(name, stack)?;
@@ -64,10 +77,11 @@ impl ScriptLine {
             parts.push(part);
         }
         let lead = parts[0].instrument;
+        let inject = bolus(lead)?;
         let until = |until: &Until| Condition::new(&format!("{name}.until"), until, lead, centreline);
         let until = self.until.as_ref().map(until).transpose()?;
         let Some(other) = &self.exchange else {
-            return Ok(vec![Motion { name: name.to_owned(), parts, until }]);
+            return Ok(vec![Motion { name: name.to_owned(), parts, until, inject }]);
         };
         // The line's own part is that of the instrument which comes in: its keys are those of the way in.
         let key = format!("{name}.exchange");
@@ -85,9 +99,16 @@ impl ScriptLine {
         let inserted = Part { instrument, travel: into, ..parts.swap_remove(0) };
         let until = until.map(|condition| Condition { instrument, ..condition });
         Ok(vec![
-            Motion { name: name.to_owned(), parts: vec![withdrawn], until: None },
-            Motion { name: name.to_owned(), parts: vec![inserted], until },
+            Motion { name: name.to_owned(), parts: vec![withdrawn], until: None, inject },
+            Motion { name: name.to_owned(), parts: vec![inserted], until, inject: None },
         ])
+    }
+
+    /// Whether nothing moves in it.
+    fn only_injects(&self) -> bool {
+        let lengths = self.advance_mm.is_some() || self.retract_mm.is_some() || self.withdraw;
+        let moves = lengths || self.rotate_deg.is_some() || self.exchange.is_some();
+        self.inject.is_some() && !moves && self.until.is_none() && self.with.is_empty()
     }
 
     /// What the hand of this line's instrument does.
@@ -139,7 +160,7 @@ impl ScriptLine {
                 Err(Error::parameter(format!("{name}.retract_mm"), r, mend))
             }
             (None, None, false) if self.rotate_deg.is_none() && self.exchange.is_none() => {
-                let mend = "give advance_mm, retract_mm, withdraw, rotate_deg or exchange";
+                let mend = "give advance_mm, retract_mm, withdraw, rotate_deg, exchange or inject";
                 Err(Error::parameter(name, "{}", mend))
             }
             (_, _, true) => Ok(Travel::Out),
@@ -169,7 +190,8 @@ impl ScriptLine {
                 let mend = "is with another line already: list all of them there";
                 return Err(Error::parameter(format!("{name}.with"), line.with.len(), mend));
             }
-            for (key, given) in [("until", line.until.is_some()), ("exchange", line.exchange.is_some())] {
+            let keys = [line.until.is_some(), line.exchange.is_some(), line.inject.is_some()];
+            for (key, given) in ["until", "exchange", "inject"].into_iter().zip(keys) {
                 if given {
                     let mend = "belongs to the line itself, not to those with it";
                     return Err(Error::parameter(format!("{name}.{key}"), "given", mend));
@@ -182,7 +204,7 @@ impl ScriptLine {
 }
 
 /// Number of an instrument that a key names.
-fn find(stack: &Stack, instrument: &str, key: &str) -> Result<usize> {
+pub(super) fn find(stack: &Stack, instrument: &str, key: &str) -> Result<usize> {
     stack.find(instrument).map_err(|error| match error {
         Error::Parameter { value, mend, .. } => Error::Parameter { name: key.to_owned(), value, mend },
         other => other,

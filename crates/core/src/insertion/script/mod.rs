@@ -4,6 +4,7 @@
 //! what it has come to is told by the steps of each line begun ([`ScriptCourse`]), and from those and the script alone all moves so far, and
 //! lengths and times, are had again to the bit.
 
+mod inject;
 mod line;
 mod motion;
 mod run;
@@ -11,6 +12,7 @@ mod run;
 mod tests;
 mod until;
 
+pub use inject::{Inject, Injection};
 pub use line::ScriptLine;
 pub use run::{LineCourse, ScriptCourse, ScriptRun, Step};
 pub use until::{Met, Until};
@@ -103,8 +105,13 @@ impl Script {
         Ok(moves)
     }
 
+    /// Whether contrast medium is injected.
+    pub fn injects(&self) -> bool {
+        self.motions.iter().any(|motion| motion.inject.is_some())
+    }
+
     fn check_speeds(&self) -> Result<()> {
-        match self.motions.iter().find(|motion| !motion.is_timed()) {
+        match self.motions.iter().find(|motion| !motion.parts.is_empty() && !motion.is_timed()) {
             Some(motion) if self.is_timed() => {
                 let mend = "another line has a speed: give speed_mm_per_s or speed_deg_per_s in all of them, or in none";
                 Err(Error::parameter(&motion.name, "no speed", mend))
@@ -129,6 +136,9 @@ impl Bounds {
     /// Goes through a motion; the number of its steps at most.
     fn go(&mut self, motion: &Motion, stack: &Stack) -> Result<usize> {
         let steps = motion.steps(&self.high)?;
+        if let Some(bolus) = &motion.inject {
+            bolus.check_in(&self.high)?;
+        }
         let (low, high) = (self.low.clone(), self.high.clone());
         if low == high {
             self.high.before_mm.clone_from(&high.now_mm);

@@ -1,5 +1,6 @@
 //! A motion of one or several hands at the same time, and the steps it is cut into.
 
+use super::inject::Bolus;
 use super::until::Condition;
 use crate::insertion::{Command, Move};
 use crate::{Error, Result};
@@ -37,9 +38,11 @@ pub(super) struct Part {
 pub(super) struct Motion {
     /// What messages call its line.
     pub(super) name: String,
-    /// The line's own instrument first.
+    /// The line's own instrument first; none where hands rest, which takes no step.
     pub(super) parts: Vec<Part>,
     pub(super) until: Option<Condition>,
+    /// What is injected as it begins.
+    pub(super) inject: Option<Bolus>,
 }
 
 /// A motion cut into equal steps.
@@ -103,13 +106,13 @@ impl Motion {
     /// # Errors
     /// More steps than a script may have.
     pub(super) fn steps(&self, lengths: &Lengths) -> Result<Steps> {
-        let (mut count, mut duration_s) = (1, 0.0_f64);
+        let (mut count, mut duration_s) = (usize::from(!self.parts.is_empty()), 0.0_f64);
         for part in &self.parts {
             let mm = part.travel_mm(lengths);
             count = count.max(part.increments(mm)?);
             duration_s = duration_s.max(part.duration_s(mm));
         }
-        let share = 1.0 / count as f64;
+        let share = 1.0 / count.max(1) as f64;
         let command = |part: &Part| Command {
             advance_mm: part.travel_mm(lengths) * share,
             rotate_rad: part.turn_rad * share,

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::motion::{Lengths, Steps};
 use super::until::Condition;
-use super::{Met, Script};
+use super::{Injection, Met, Script};
 use crate::insertion::{Move, Simulation};
 use crate::{Error, Result};
 
@@ -42,13 +42,24 @@ pub struct ScriptRun<'a> {
     /// Of the motion that goes on.
     steps: Option<Steps>,
     time_s: f64,
+    /// Steps carried out.
+    done: usize,
+    injections: Vec<Injection>,
 }
 
 impl Script {
     /// The script at its start.
     pub fn begin(&self) -> ScriptRun<'_> {
         let lengths = Lengths { now_mm: self.start_mm.clone(), before_mm: self.start_mm.clone() };
-        ScriptRun { script: self, course: ScriptCourse::default(), lengths, steps: None, time_s: 0.0 }
+        ScriptRun {
+            script: self,
+            course: ScriptCourse::default(),
+            lengths,
+            steps: None,
+            time_s: 0.0,
+            done: 0,
+            injections: Vec::new(),
+        }
     }
 
     /// The script where it has come to; `seen` is given each step so far.
@@ -114,10 +125,16 @@ impl ScriptRun<'_> {
     pub fn carried_out(&mut self) {
         let (Some(steps), Some(line)) = (&self.steps, self.course.motions.last_mut()) else { return };
         line.steps += 1;
+        self.done += 1;
         self.time_s += steps.step_s;
         for one in &steps.moves {
             self.lengths.now_mm[one.instrument] += one.command.advance_mm;
         }
+    }
+
+    /// The injections that have begun, the next step's included where it is the first of its line.
+    pub fn injections(&self) -> &[Injection] {
+        &self.injections
     }
 
     /// What the script has come to.
@@ -136,6 +153,16 @@ impl ScriptRun<'_> {
     /// Begins the next motion; whether there is one.
     fn begin_motion(&mut self) -> Result<bool> {
         let Some(motion) = self.script.motions.get(self.course.motions.len()) else { return Ok(false) };
+        if let Some(bolus) = &motion.inject {
+            bolus.check_in(&self.lengths)?;
+            self.injections.push(Injection {
+                instrument: bolus.instrument,
+                ml: bolus.ml,
+                ml_per_s: bolus.ml_per_s,
+                after_step: self.done,
+                time_s: self.script.is_timed().then_some(self.time_s),
+            });
+        }
         self.steps = Some(motion.steps(&self.lengths)?);
         self.lengths.before_mm.clone_from(&self.lengths.now_mm);
         self.course.motions.push(LineCourse::default());

@@ -241,3 +241,76 @@ fn a_script_goes_on_from_its_course_in_the_middle_of_a_line_with_a_condition() {
         assert!(script.go_on(&wrong, |_| ()).is_err());
     }
 }
+
+fn inject(ml: f64, ml_per_s: f64, through: Option<&str>) -> Option<Inject> {
+    Some(Inject { ml, ml_per_s, through: through.map(str::to_owned) })
+}
+
+#[test]
+fn injections_begin_with_their_lines_and_are_had_again_from_the_course_of_the_script() {
+    let speed = |line: ScriptLine| ScriptLine { speed_mm_per_s: Some(2.0), step_mm: Some(5.0), ..line };
+    let go = |mm| speed(ScriptLine { advance_mm: Some(mm), ..line("wire") });
+    let lines = [
+        ScriptLine { inject: inject(2.0, 1.0, Some("catheter")), ..go(20.0) },
+        ScriptLine { inject: inject(8.0, 4.0, None), ..line("catheter") },
+        ScriptLine { inject: inject(5.0, 5.0, Some("catheter")), ..Default::default() },
+        go(10.0),
+        ScriptLine { inject: inject(1.0, 1.0, None), ..line("catheter") },
+    ];
+    let script = Script::new(&lines, &stack(), &[50.0, 0.0, 40.0], None).unwrap();
+    assert!(script.injects() && script.is_timed());
+    let mut run = script.begin();
+    let mut seen = Vec::new();
+    loop {
+        let goes_on = run.next_where(|_| None).unwrap().is_some();
+        seen.push((run.injections().to_vec(), run.course().clone()));
+        if !goes_on {
+            break;
+        }
+        run.carried_out();
+    }
+    let told = |one: &Injection| (one.instrument, one.ml, one.after_step, one.time_s.unwrap());
+    let all: Vec<_> = run.injections().iter().map(told).collect();
+    assert_eq!(all, [(2, 2.0, 0, 0.0), (2, 8.0, 4, 10.0), (2, 5.0, 4, 10.0), (2, 1.0, 6, 15.0)]);
+    assert_eq!(seen.iter().map(|(begun, _)| begun.len()).collect::<Vec<_>>(), [1, 1, 1, 1, 3, 3, 4]);
+    for (begun, course) in seen {
+        assert_eq!(script.go_on(&course, |_| ()).unwrap().injections(), begun);
+    }
+}
+
+#[test]
+fn an_injection_that_cannot_be_is_told_before_the_script_begins_or_where_its_line_does() {
+    let go = |inject| ScriptLine { inject, ..ScriptLine { advance_mm: Some(5.0), ..line("wire") } };
+    let with = ScriptLine {
+        with: vec![ScriptLine { inject: inject(1.0, 1.0, None), retract_mm: Some(1.0), ..line("catheter") }],
+        ..go(None)
+    };
+    let unmoved =
+        ScriptLine { until: Some(Until::default()), inject: inject(1.0, 1.0, None), ..line("catheter") };
+    for (line, told) in [
+        (go(inject(0.0, 1.0, Some("catheter"))), "script[0].inject.ml = 0: must be a number from 0.1 to 100"),
+        (go(inject(-1.0, 1.0, Some("catheter"))), "script[0].inject.ml = -1: must"),
+        (go(inject(1.0, f64::NAN, Some("catheter"))), "script[0].inject.ml_per_s = NaN: must"),
+        (
+            go(inject(1.0, 1.0, Some("cathter"))),
+            "script[0].inject.through = \"cathter\": did you mean \"catheter\"?",
+        ),
+        (go(inject(1.0, 1.0, None)), "script[0].inject.through = \"wire\": has no lumen"),
+        (with, "script[0].with[0].inject = given: belongs to the line itself"),
+        (unmoved, "script[0] = {}: give advance_mm"),
+    ] {
+        let error = Script::new(&[line], &stack(), &[9.0, 0.0, 9.0], None).unwrap_err().to_string();
+        assert!(error.starts_with(told), "{error}");
+    }
+    let lines = [go(inject(1.0, 1.0, Some("catheter")))];
+    let out = Script::new(&lines, &stack(), &[9.0, 0.0, 0.0], None).unwrap_err().to_string();
+    assert!(out.starts_with("script[0].inject = 1 ml: the instrument is not in"), "{out}");
+    // Whether it is in hangs on where the line before ends.
+    let force = Until { push_force_n: Some(0.5), ..Until::default() };
+    let first = ScriptLine { advance_mm: Some(4.0), until: Some(force), ..line("catheter") };
+    let lines = [first, lines[0].clone()];
+    let script = Script::new(&lines, &stack(), &[9.0, 0.0, 0.0], None).unwrap();
+    let outcome = script.begin().next_where(|_| Some(Met::PushForceN)).map(|_| ()).unwrap_err().to_string();
+    assert!(outcome.starts_with("script[1].inject = 1 ml: the instrument is not in"), "{outcome}");
+    assert!(script.begin().next_where(|_| None).is_ok(), "the twin: it is in then");
+}

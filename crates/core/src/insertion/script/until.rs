@@ -77,12 +77,7 @@ impl Condition {
     /// What of it is so, if anything is.
     pub(super) fn met(&self, simulation: &Simulation) -> Option<Met> {
         let report = simulation.report();
-        let inserted_mm = report.lengths_mm()[self.instrument];
-        let tip = || {
-            let own =
-                (inserted_mm > 0.0).then(|| simulation.shape().behind(report.inserted_mm - inserted_mm));
-            own.and_then(|shape| shape.tip_mm())
-        };
+        let tip = || simulation.tip_of_mm(self.instrument);
         if self.near.is_some_and(|(target, mm)| tip().is_some_and(|tip| (tip - target).norm() <= mm)) {
             return Some(Met::TipWithinMm);
         }

@@ -60,6 +60,44 @@ impl Nodes {
 
     /// Meshes the line, with the same nodes also where other lengths are inserted than they were made for.
     pub(super) fn mesh(&self, stack: &Stack, inserted_mm: &[f64], modulus_n_per_mm2: f64, mesh: &mut Mesh) {
+        self.place(inserted_mm, mesh);
+        mesh.elements.clear();
+        let ends = mesh.from_tip_mm.windows(2);
+        mesh.elements
+            .extend(ends.map(|ends| element(stack, inserted_mm, inserted_mm.len(), (ends[0], ends[1]))));
+        self.feel(stack, inserted_mm, modulus_n_per_mm2, mesh);
+    }
+
+    /// The same from the mesh of lengths that differ by less than `within_mm`; returns the elements that are others. These have an end that moves along
+    /// the line, or one of an instrument or section near by; in all others there is what was there.
+    pub(super) fn mesh_beside(
+        &self,
+        (stack, inserted_mm): (&Stack, &[f64]),
+        (known, within_mm): (&Mesh, f64),
+        modulus_n_per_mm2: f64,
+        mesh: &mut Mesh,
+    ) -> Vec<usize> {
+        self.place(inserted_mm, mesh);
+        mesh.elements.clone_from(&known.elements);
+        let line = known.from_tip_mm[0];
+        let instruments = stack.devices().zip(&known.inserted_mm);
+        let breaks: Vec<f64> =
+            instruments.flat_map(|(device, mm)| begins(device).map(move |begin| line - mm + begin)).collect();
+        let mut others = Vec::new();
+        for e in 0..mesh.elements.len() {
+            let [ends, were] = [&*mesh, known].map(|of| (of.from_tip_mm[e], of.from_tip_mm[e + 1]));
+            let beside = |at: &f64| were.1 - within_mm <= *at && *at <= were.0 + within_mm;
+            if ends != were || breaks.iter().any(beside) {
+                mesh.elements[e] = element(stack, inserted_mm, inserted_mm.len(), ends);
+                others.push(e);
+            }
+        }
+        self.feel(stack, inserted_mm, modulus_n_per_mm2, mesh);
+        others
+    }
+
+    /// Sets the places of the nodes.
+    fn place(&self, inserted_mm: &[f64], mesh: &mut Mesh) {
         let line = line_mm(inserted_mm.iter().copied());
         mesh.from_tip_mm.clear();
         mesh.from_tip_mm.extend(self.anchors.iter().map(|anchor| match *anchor {
@@ -69,11 +107,6 @@ impl Nodes {
         }));
         mesh.inserted_mm.clear();
         mesh.inserted_mm.extend_from_slice(inserted_mm);
-        mesh.elements.clear();
-        let ends = mesh.from_tip_mm.windows(2);
-        mesh.elements
-            .extend(ends.map(|ends| element(stack, inserted_mm, inserted_mm.len(), (ends[0], ends[1]))));
-        self.feel(stack, inserted_mm, modulus_n_per_mm2, mesh);
     }
 
     /// Sets the contact points, tip first.

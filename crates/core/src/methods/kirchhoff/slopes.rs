@@ -77,7 +77,7 @@ fn push_force<const C: usize>(
     let beside = |by: f64| {
         let mut inserted = inserted_mm.to_vec();
         inserted[index] += by;
-        Beside::new(environment, nodes, &inserted, at)
+        Beside::new(environment, nodes, (&inserted, MEET * step), at)
     };
     let (back, on) = (beside(-step), beside(step));
     let stored = 0.5 * (on.stored_more_than::<C>(&back, at) / step);
@@ -107,24 +107,34 @@ fn twist_per_mm(at: Start<'_>, i: usize, set: usize) -> f64 {
 /// Instruments with other lengths inserted, near by, and the unknowns as they are.
 struct Beside {
     mesh: Mesh,
+    /// Elements that are not those of the lengths as they are.
+    others: Vec<usize>,
     rod: RodState,
 }
 
 impl Beside {
-    fn new(environment: &Environment<'_>, nodes: &Nodes, inserted_mm: &[f64], at: Start<'_>) -> Self {
+    fn new(
+        environment: &Environment<'_>,
+        nodes: &Nodes,
+        (inserted_mm, within_mm): (&[f64], f64),
+        at: Start<'_>,
+    ) -> Self {
         let surroundings = &environment.surroundings;
         let mut mesh = Mesh::default();
-        nodes.mesh(surroundings.stack, inserted_mm, surroundings.properties.modulus_n_per_mm2, &mut mesh);
+        let modulus = surroundings.properties.modulus_n_per_mm2;
+        let known = (at.mesh, within_mm);
+        let others = nodes.mesh_beside((surroundings.stack, inserted_mm), known, modulus, &mut mesh);
         let mut rod = at.state.rod.clone();
         rod.place(&mesh.elements);
-        Self { mesh, rod }
+        Self { mesh, others, rod }
     }
 
     /// By how much more energy the rod stores than on the other side, mJ.
     fn stored_more_than<const C: usize>(&self, other: &Self, at: Start<'_>) -> f64 {
-        let pairs = self.mesh.elements.iter().zip(&other.mesh.elements).enumerate();
-        let changed = pairs.filter(|(_, (here, there))| here != there);
-        let more = changed.map(|(e, (here, there))| {
+        // An element is another one on both sides, or on neither.
+        let pairs = self.others.iter().map(|&e| (e, &self.mesh.elements[e], &other.mesh.elements[e]));
+        let changed = pairs.filter(|(_, here, there)| here != there);
+        let more = changed.map(|(e, here, there)| {
             let state = at.state.rod.element::<C>(e);
             element_energy::<C>(here, &state).total() - element_energy::<C>(there, &state).total()
         });

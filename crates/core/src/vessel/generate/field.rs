@@ -25,6 +25,9 @@ const HIDDEN: f64 = 0.3;
 /// Newton steps to the foot; from a sample a quarter radius away three are enough.
 const FOOT_STEPS: usize = 8;
 
+/// Last Newton step to the foot, in steps of the samples: what is left of the way is of the order of its square, which is rounding.
+const FOOT: f64 = 1e-7;
+
 /// Relative error of distances that decide what is left out.
 const ROUNDING: f64 = 1e-12;
 
@@ -59,6 +62,30 @@ pub(super) struct Local {
     sag: f64,
     /// What holds farther out.
     wider: Option<Arc<Local>>,
+}
+
+/// What each branch near a point is there.
+#[derive(Debug)]
+pub(super) struct Sounding {
+    at: Vec3,
+    /// Of each the nearest sample, …
+    feet: Vec<u32>,
+    /// … and its value.
+    here: Vec<Value>,
+}
+
+impl Sounding {
+    /// The field.
+    pub(super) fn f(&self) -> f64 {
+        blended(self.here.iter().copied()).f
+    }
+}
+
+/// The smooth minimum of values, in their order.
+fn blended(mut values: impl Iterator<Item = Value>) -> Value {
+    let none = Value { f: f64::INFINITY, gradient: Vec3::zeros(), radius: 1.0, exposure: 0.0 };
+    let first = values.next().unwrap_or(none);
+    values.fold(first, smooth_minimum)
 }
 
 impl Local {
@@ -113,16 +140,26 @@ impl Field {
 
     /// `wide` for a ball inside its own: the same branches, of which one by one is left out by the value at a point, with fewer
     /// samples. The field has the same bits.
-    pub(super) fn narrowed(&self, wide: &Arc<Local>, centre: &Vec3, reach: f64) -> Local {
-        let here: Vec<Value> = wide.parts.iter().map(|part| self.branch_value(part, centre)).collect();
-        let nearer = |(index, samples): &(usize, Vec<u32>)| {
+    pub(super) fn narrowed(&self, wide: &Arc<Local>, sounding: &Sounding, reach: f64) -> Local {
+        let Sounding { at, feet, here } = sounding;
+        let nearer = |((index, samples), &nearest): (&(usize, Vec<u32>), &u32)| {
             let branch = &self.branches[*index];
-            let distance = |k: u32| (branch.samples[k as usize].position - centre).norm();
-            let limit = distance(nearest_of(branch, samples, centre)) + 2.0 * reach;
+            let distance = |k: u32| (branch.samples[k as usize].position - at).norm();
+            let limit = distance(nearest) + 2.0 * reach;
             (*index, samples.iter().copied().filter(|&k| distance(k) <= limit).collect())
         };
-        let parts = wide.parts.iter().map(nearer).collect();
-        Local { wider: Some(Arc::clone(wide)), ..Local::new(parts, &here, *centre, reach) }
+        let parts = wide.parts.iter().zip(feet).map(nearer).collect();
+        Local { wider: Some(Arc::clone(wide)), ..Local::new(parts, here, *at, reach) }
+    }
+
+    /// All branches of `local` at a point, one by one.
+    pub(super) fn sound(&self, local: &Local, at: &Vec3) -> Sounding {
+        let foot = |(index, samples): &(usize, Vec<u32>)| {
+            let nearest = nearest_of(&self.branches[*index], samples, at);
+            (nearest, self.value_from(*index, nearest, at))
+        };
+        let (feet, here) = local.parts.iter().map(foot).unzip();
+        Sounding { at: *at, feet, here }
     }
 
     /// The field at `point`, which must be within the reach of `local` or of what is wider.
@@ -133,14 +170,7 @@ impl Field {
 
     /// The same from all branches of `local`.
     pub(super) fn value_of_all(&self, local: &Local, point: &Vec3) -> Value {
-        let mut values = local.parts.iter().map(|part| self.branch_value(part, point));
-        let first = values.next().unwrap_or(Value {
-            f: f64::INFINITY,
-            gradient: Vec3::zeros(),
-            radius: 1.0,
-            exposure: 0.0,
-        });
-        values.fold(first, smooth_minimum)
+        blended(local.parts.iter().map(|part| self.branch_value(part, point)))
     }
 
     /// The field from the few branches that reach `point`: where no other, and no blend of others, is near enough to blend with
@@ -179,8 +209,12 @@ impl Field {
     }
 
     fn branch_value(&self, (index, samples): &(usize, Vec<u32>), point: &Vec3) -> Value {
-        let branch = &self.branches[*index];
-        let nearest = nearest_of(branch, samples, point);
+        self.value_from(*index, nearest_of(&self.branches[*index], samples, point), point)
+    }
+
+    /// The value of a branch, of which this sample is the nearest.
+    fn value_from(&self, index: usize, nearest: u32, point: &Vec3) -> Value {
+        let branch = &self.branches[index];
         let (low, high) = (branch.root_row.is_some(), branch.leaf_row.is_some());
         let ends =
             (if low { f64::NEG_INFINITY } else { 0.0 }, if high { f64::INFINITY } else { branch.length() });
@@ -199,7 +233,7 @@ impl Field {
             let change = (next - s).abs();
             s = next;
             place = branch.at(s);
-            if change <= 1e-13 * (branch.step + s.abs()) {
+            if change <= FOOT * branch.step {
                 break;
             }
         }

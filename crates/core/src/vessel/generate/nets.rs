@@ -121,12 +121,13 @@ impl Sampler<'_> {
     fn cube(&mut self, from: [usize; 3], size: usize, wide: &Arc<Local>) {
         let centre = self.position(from.map(|k| k + size / 2));
         let half_diagonal = 0.75_f64.sqrt() * size as f64 * self.edge;
-        let value = self.field.value(wide, &centre).f;
+        let sounding = self.field.sound(wide, &centre);
+        let value = sounding.f();
         if value.abs() > self.field.steepness() * half_diagonal {
             self.clear.push((from, size, value));
             return;
         }
-        let local = self.field.narrowed(wide, &centre, half_diagonal + LEAF_MARGIN * self.edge);
+        let local = self.field.narrowed(wide, &sounding, half_diagonal + LEAF_MARGIN * self.edge);
         if size > LEAF {
             self.halve(from, size, &Arc::new(local));
             return;

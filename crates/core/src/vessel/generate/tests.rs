@@ -208,7 +208,7 @@ fn what_is_left_out_changes_no_bit_of_the_field() {
             let wide_at = sample.position + 1.5 * sample.radius * direction();
             let wide = std::sync::Arc::new(field.local(&wide_at, reach));
             let narrow_at = wide_at + 0.25 * reach * direction();
-            let narrow = field.narrowed(&wide, &narrow_at, 0.5 * reach);
+            let narrow = field.narrowed(&wide, &field.sound(&wide, &narrow_at), 0.5 * reach);
             // In the narrow ball, and beyond it in the wide one.
             for within in [0.25, 0.5] {
                 let point = narrow_at + within * 0.6 * reach * direction();

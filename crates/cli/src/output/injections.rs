@@ -1,0 +1,87 @@
+//! Contrast medium that a script has injected: injections.csv, beside steps.csv. Each row has the place of the tip as it began, from
+//! where the medium streams.
+
+use std::io;
+use std::path::Path;
+
+use endowire_core::insertion::{Injection, Simulation};
+use endowire_viewer::InjectionSpec;
+use serde::{Deserialize, Serialize};
+
+use super::whole;
+use crate::failure::Failure;
+
+/// The table; there is none where nothing was injected.
+pub(crate) const INJECTIONS: &str = "injections.csv";
+
+/// One line of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Injected {
+    /// Steps carried out before it.
+    pub(crate) after_step: usize,
+    time_s: f64,
+    instrument: String,
+    volume_ml: f64,
+    rate_ml_per_s: f64,
+    inserted_mm: f64,
+    tip_x_mm: f64,
+    tip_y_mm: f64,
+    tip_z_mm: f64,
+}
+
+impl Injected {
+    /// An injection that begins at `time_s`, where the simulation is now.
+    pub(crate) fn new(injection: &Injection, time_s: f64, simulation: &Simulation) -> Self {
+        let tip = simulation.tip_of_mm(injection.instrument).unwrap_or_default();
+        Self {
+            after_step: injection.after_step,
+            time_s,
+            instrument: simulation.stack().instruments()[injection.instrument].name.clone(),
+            volume_ml: injection.ml,
+            rate_ml_per_s: injection.ml_per_s,
+            inserted_mm: simulation.report().lengths_mm()[injection.instrument],
+            tip_x_mm: tip.x,
+            tip_y_mm: tip.y,
+            tip_z_mm: tip.z,
+        }
+    }
+
+    /// What flows of it.
+    pub(crate) fn spec(&self) -> InjectionSpec {
+        InjectionSpec {
+            start_s: self.time_s,
+            duration_s: self.volume_ml / self.rate_ml_per_s,
+            rate_ml_per_s: self.rate_ml_per_s,
+            at_mm: Some([self.tip_x_mm, self.tip_y_mm, self.tip_z_mm]),
+            at_tip: false,
+        }
+    }
+}
+
+/// Writes the table of a recording: whole each time, for there are few rows.
+pub(crate) fn write(folder: &Path, injected: &[Injected]) -> Result<(), Failure> {
+    let path = folder.join(INJECTIONS);
+    let written = if injected.is_empty() { whole::remove(&path) } else { write_rows(&path, injected) };
+    written.map_err(|e| Failure::write(&path, &e))
+}
+
+fn write_rows(path: &Path, injected: &[Injected]) -> io::Result<()> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    injected.iter().try_for_each(|row| table.serialize(row))?;
+    whole::write_bytes(path, &table.into_inner().map_err(csv::IntoInnerError::into_error)?)
+}
+
+/// What was injected in a recorded run.
+pub(crate) fn read(folder: &Path) -> Result<Vec<Injected>, Failure> {
+    let path = folder.join(INJECTIONS);
+    let refuse = |what: String| {
+        let mend = "run the scene again (endowire run)";
+        Failure::Input(format!("{}: {what}; {mend}", path.display()))
+    };
+    let text = match std::fs::read(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(vec![]),
+        read => read.map_err(|e| refuse(e.to_string()))?,
+    };
+    let rows = csv::Reader::from_reader(text.as_slice()).into_deserialize();
+    rows.collect::<Result<_, _>>().map_err(|e| refuse(e.to_string()))
+}

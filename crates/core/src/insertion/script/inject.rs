@@ -1,0 +1,84 @@
+//! Contrast medium that a line of a script injects: told, for those who draw; no force depends on it.
+
+use serde::{Deserialize, Serialize};
+
+use super::motion::Lengths;
+use crate::device::Stack;
+use crate::{Error, Result};
+
+/// Contrast medium through an instrument, from the moment at which the line begins on; the line's hand does not wait for its end.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Inject {
+    /// Volume, 0.1 to 100 ml.
+    pub ml: f64,
+    /// How fast, 0.01 to 100 ml/s.
+    pub ml_per_s: f64,
+    /// Name of the instrument; the line's own if absent.
+    pub through: Option<String>,
+}
+
+/// An injection that has begun.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Injection {
+    /// Number of the instrument that it goes through.
+    pub instrument: usize,
+    /// Volume, ml.
+    pub ml: f64,
+    /// How fast, ml/s.
+    pub ml_per_s: f64,
+    /// Steps carried out before it.
+    pub after_step: usize,
+    /// When, since the start of the script, s; none where the script has no speeds.
+    pub time_s: Option<f64>,
+}
+
+/// [`Inject`] with its instrument looked up.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Bolus {
+    /// What messages call it.
+    name: String,
+    pub(super) instrument: usize,
+    pub(super) ml: f64,
+    pub(super) ml_per_s: f64,
+}
+
+/// Least and most of a volume, ml, and of a rate, ml/s.
+const ML: [f64; 2] = [0.1, 100.0];
+const ML_PER_S: [f64; 2] = [0.01, 100.0];
+
+impl Bolus {
+    /// `own` is the number of the line's instrument.
+    ///
+    /// # Errors
+    /// Values out of range; an instrument without a lumen, of several.
+    pub(super) fn new(name: String, inject: &Inject, own: usize, stack: &Stack) -> Result<Self> {
+        for (key, value, [least, most]) in [("ml", inject.ml, ML), ("ml_per_s", inject.ml_per_s, ML_PER_S)] {
+            if !(least..=most).contains(&value) {
+                let mend = format!("must be a number from {least} to {most}");
+                return Err(Error::parameter(format!("{name}.{key}"), value, mend));
+            }
+        }
+        let through = format!("{name}.through");
+        let instrument = match &inject.through {
+            Some(other) => super::line::find(stack, other, &through)?,
+            None => own,
+        };
+        let one = &stack.instruments()[instrument];
+        // A device alone fits into nothing, and may leave its lumen to the pictures.
+        if stack.is_several() && one.device.sections().iter().any(|s| s.inner_radius_mm.is_none()) {
+            let mend = "has no lumen: inject through another, or give inner_radius_mm in all of its sections";
+            return Err(Error::parameter(through, format!("{:?}", one.name), mend));
+        }
+        Ok(Self { name, instrument, ml: inject.ml, ml_per_s: inject.ml_per_s })
+    }
+
+    /// Refuses it where its instrument is not in.
+    pub(super) fn check_in(&self, lengths: &Lengths) -> Result<()> {
+        if lengths.now_mm[self.instrument] > 0.0 {
+            return Ok(());
+        }
+        let mend = "the instrument is not in when the line begins: advance it before";
+        Err(Error::parameter(&self.name, format!("{} ml", self.ml), mend))
+    }
+}
