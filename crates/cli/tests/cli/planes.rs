@@ -53,6 +53,12 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
+/// Draws fluoroscopy of the last step of that run.
+fn last_step<'a>(run: &'a Path, out: &'a Path) -> [&'a str; 11] {
+    let [run, out] = [run, out].map(text);
+    ["render", run, "--from", "106", "--to", "106", "--view", "fluoro", "--out", out, "--json"]
+}
+
 #[test]
 fn a_run_in_two_planes_has_the_frames_and_the_matrix_of_each() {
     let folder = tempfile::tempdir().unwrap();
@@ -71,22 +77,7 @@ fn a_run_in_two_planes_has_the_frames_and_the_matrix_of_each() {
     assert_eq!(angles[1] - angles[0], 90.0);
     // Frames afterwards are in the planes of the scene too, with labels of both: the tip is where each matrix has it.
     let out = folder.path().join("out");
-    let drawn = [
-        "render",
-        text(&run),
-        "--from",
-        "106",
-        "--to",
-        "106",
-        "--view",
-        "fluoro",
-        "--labels",
-        "--raw",
-        "--out",
-        text(&out),
-        "--json",
-    ];
-    let files = written(&endowire(&drawn));
+    let files = written(&endowire(&[&last_step(&run, &out)[..], &["--labels", "--raw"]].concat()));
     let files: Vec<&str> = files["files"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
     for rest in ["fluoro.png", "mask.png", "mask_vessel.png", "labels.json", "line_integral.npy"] {
         let (name, ending) = rest.split_once('.').unwrap();
@@ -167,19 +158,7 @@ fn a_state_of_a_run_is_drawn_all_around_in_two_planes() {
     let folder = tempfile::tempdir().unwrap();
     let run = recorded(folder.path());
     let [out, dicom] = ["out", "turn.dcm"].map(|name| folder.path().join(name));
-    let step = [
-        "render",
-        text(&run),
-        "--from",
-        "106",
-        "--to",
-        "106",
-        "--view",
-        "fluoro",
-        "--out",
-        text(&out),
-        "--json",
-    ];
+    let step = last_step(&run, &out);
     let files = written(&endowire(
         &[&step[..], &["--turn", "180", "--count", "4", "--labels", "--dicom", text(&dicom)]].concat(),
     ));
