@@ -100,14 +100,14 @@ impl Guess {
         state.copy_from(&self.slid);
     }
 
-    /// What an equilibrium that was found teaches, of `hooks` too.
+    /// What an equilibrium that was found teaches, of `hooks` too, after what was learnt `before`.
     pub(super) fn teach(
         &self,
         elements: &[ElementData],
         found: &RodState,
         hooks: bool,
-        correction: &mut Correction,
+        (before, correction): (&Correction, &mut Correction),
     ) {
-        correction.learn(&self.motions, elements, (&self.slid, found), hooks);
+        correction.learn(&self.motions, elements, (&self.slid, found), hooks, before);
     }
 }

@@ -44,15 +44,21 @@ pub(super) struct Correction {
     departures: Vec<Departure>,
     /// Of every set of angles in each of these.
     turns: Vec<Turn>,
+    /// Whether the device let go of something in it, which it will not do again.
+    snapped: bool,
 }
 
 /// Motions are the same if their parts differ by less than this, …
 const SAME: f64 = 1e-6;
 /// … times a factor of at most this, or over it.
 const LONGER: f64 = 5.0;
-/// Nothing is learnt where a tangent turned by more than this, rad, beside what the curve turns by over the advance: the device let go of
-/// something. A hook that keeps its shape departs from the slid device by the latter.
+/// Where a tangent turned by more than this, rad, beside what the curve turns by over the advance, the device let go of something. A hook
+/// that keeps its shape departs from the slid device by the latter. …
 const LARGEST: f64 = 0.2;
+/// … Unless all tangents turned as in the step before, but for this, rad: a device that is stuck does not follow its own curve, but bends on.
+const AS_BEFORE: f64 = 0.1;
+/// Of turns as large as these a motion repeats at most so many times.
+const LONGER_BENT: f64 = 2.0;
 
 fn axes(f: &Frame) -> Matrix3<f64> {
     Matrix3::from_columns(&[f.t, f.u, f.v])
@@ -99,6 +105,7 @@ impl Correction {
         self.motions.clear();
         self.departures.clear();
         self.turns.clear();
+        self.snapped = false;
     }
 
     /// Elements that have learnt.
@@ -112,14 +119,16 @@ impl Correction {
         (n == 0 || n == elements) && self.turns.len() == n * sets
     }
 
-    /// Remembers the way from the slid device to the equilibrium that was found, also of `hooks`. Repeated, a hook's is right to second
-    /// order in its turn: near enough for a wall that yields, not for a rigid one, where contacts are lost by less.
+    /// Remembers the way from the slid device to the equilibrium that was found, also of `hooks`, where `before` was learnt in the step
+    /// before. Repeated, a hook's is right to second order in its turn: near enough for a wall that yields, not for a rigid one, where
+    /// contacts are lost by less.
     pub(super) fn learn(
         &mut self,
         motions: &[HandMotion],
         elements: &[ElementData],
         (slid, found): (&RodState, &RodState),
         hooks: bool,
+        before: &Self,
     ) {
         self.clear();
         self.motions.extend(motions.iter().map(HandMotion::parts));
@@ -131,9 +140,7 @@ impl Correction {
             changed(&found.frames[e + 1].t, &slid.frames[e + 1].t)
                 > LARGEST + if hooks { bent_per_mm * advance_mm } else { 0.0 }
         };
-        if elements.iter().enumerate().any(far) {
-            return;
-        }
+        let snapped = elements.iter().enumerate().any(far);
         let mut twist: f64 = found.reference_twists.iter().sum();
         for e in (0..n).rev() {
             let (f, i) = (&slid.frames[e], e + 1);
@@ -148,11 +155,30 @@ impl Correction {
             }));
             twist -= found.reference_twists[e];
         }
+        self.snapped = snapped && !self.goes_on(before);
     }
 
-    /// How many of the last motions of the hands these are; `None` if they are others.
+    /// Whether the device departed in the same way `before`.
+    fn goes_on(&self, before: &Self) -> bool {
+        let Some(factor) = before.times(self.motions.iter().copied()) else { return false };
+        let off = |(now, was): (&Departure, &Departure)| (now.tangent - was.tangent * factor).norm();
+        self.departures.iter().zip(&before.departures).all(|pair| off(pair) <= AS_BEFORE)
+    }
+
+    /// The largest turn of a tangent.
+    fn largest(&self) -> f64 {
+        self.departures.iter().fold(0.0, |most, by| most.max(by.tangent.norm()))
+    }
+
+    /// How many of the last motions of the hands these are; `None` if they are others, or what the device did then will not be done again.
     pub(super) fn repeats(&self, motions: &[HandMotion]) -> Option<f64> {
-        let (now, last) = (motions.iter().flat_map(HandMotion::parts), self.motions.iter().flatten());
+        self.times(motions.iter().map(HandMotion::parts))
+            .filter(|factor| !self.snapped && (*factor <= LONGER_BENT || self.largest() <= LARGEST))
+    }
+
+    /// How many of the last motions of the hands these are.
+    fn times(&self, motions: impl Iterator<Item = [f64; 2]> + Clone) -> Option<f64> {
+        let (now, last) = (motions.flatten(), self.motions.iter().flatten());
         let way = size(now.clone());
         let factor = way / size(last.clone().copied());
         let off = size(now.zip(last).map(|(now, last)| now - factor * last));

@@ -176,7 +176,8 @@ impl<const C: usize> Tools<C> {
         {
             return Err(STORED.into());
         }
-        self.guess.teach(&mesh.elements, &after.rod, softest >= YIELDING, &mut after.correction);
+        let corrections = (&start.state.correction, &mut after.correction);
+        self.guess.teach(&mesh.elements, &after.rod, softest >= YIELDING, corrections);
         self.friction.keep(&mut after.forces);
         rubbing::keep(&self.friction.between, &after.rod, mesh, &mut after.rubs);
         self.memory.keep(&mut after.known);
