@@ -24,8 +24,19 @@ const MISFIT: f64 = 0.4;
 /// A step that turns a node by more than this, rad, leads to another shape, not to a better guess.
 const LARGEST_TURN: f64 = 0.3;
 
+/// What became of a guess that was to be held.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Held {
+    /// It presses as the last equilibrium does.
+    Fits,
+    /// A step was taken.
+    Moved,
+    /// It presses otherwise, and there is no such step.
+    Lost,
+}
+
 impl Guess {
-    /// Moves `state` by a step that holds the contacts of the last equilibrium, if it needs one; returns whether it did.
+    /// Moves `state` by a step that holds the contacts of the last equilibrium, if it needs one.
     pub(super) fn hold<const C: usize>(
         &mut self,
         newton: &mut Newton<C>,
@@ -33,26 +44,26 @@ impl Guess {
         supports: &Supports,
         elements: &[ElementData],
         state: &mut RodState,
-    ) -> bool {
+    ) -> Held {
         if contact.misfit(elements, state) <= MISFIT {
-            return false;
+            return Held::Fits;
         }
         contact.holding = true;
         newton.assemble(elements, supports, contact, state);
         contact.holding = false;
-        let Some((inertia, step)) = newton.full_step(elements, supports) else { return false };
+        let Some((inertia, step)) = newton.full_step(elements, supports) else { return Held::Lost };
         let (turn, _) = RodState::largest_turn::<C>(elements, state, step);
         // Only towards a minimum: one negative pivot for each axial force.
         if inertia.negative != elements.len() || turn.is_nan() || turn > LARGEST_TURN {
-            return false;
+            return Held::Lost;
         }
         self.other.copy_from(state);
         self.other.advance::<C>(elements, state, step, 1.0);
         self.other.take_tensions::<C>(elements, state, step);
         if contact.is_outside(elements, &self.other) {
-            return false;
+            return Held::Lost;
         }
         std::mem::swap(state, &mut self.other);
-        true
+        Held::Moved
     }
 }

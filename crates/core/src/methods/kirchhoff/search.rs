@@ -19,6 +19,7 @@
 //! elsewhere there is one.
 
 use super::guess::Guess;
+use super::hold::Held;
 use super::settle::Settle;
 use crate::contact::{SETTLED, WallContact};
 use crate::rod::{ElementData, RodState, Supports};
@@ -34,8 +35,8 @@ const STUCK: usize = 60;
 const PATIENT: [usize; 3] = [60, 300, 300];
 /// Newton iterations of all of it.
 const LONGEST: usize = 2000;
-/// Newton iterations for friction and wall together.
-const TOGETHER: usize = 20;
+/// Newton iterations for friction and wall together. Those that find something mostly do in three to five.
+const TOGETHER: usize = 10;
 /// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
 const ROUNDS: usize = 5;
 /// Slides that have come so near to friction with its own normal forces are followed by a solution for both together, and again where
@@ -58,6 +59,8 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) state: &'a mut RodState,
     /// Part of the wall's modulus from which it is approached; 1 where it is no stiffer than the rod.
     pub(super) softest: f64,
+    /// That from which it is where there is a budget.
+    pub(super) soft: f64,
     /// Whether there is friction.
     pub(super) rubs: bool,
     /// Residual over force scale of an equilibrium.
@@ -126,7 +129,7 @@ impl<const C: usize> Search<'_, '_, C> {
     /// The wall by way of softer ones.
     fn by_softer_walls(&mut self) -> NewtonReport {
         let patient = self.budget.is_none();
-        self.contact.softness = self.softest;
+        self.contact.softness = if patient { self.softest } else { self.soft };
         loop {
             self.contact.hold_friction();
             let last = self.contact.softness >= 1.0;
@@ -141,7 +144,7 @@ impl<const C: usize> Search<'_, '_, C> {
             // What pressed on the softer wall presses as hard on this one.
             let Self { newton, guess, contact, supports, elements, state, .. } = self;
             let held = guess.hold(newton, contact, supports, elements, state);
-            self.take(usize::from(held));
+            self.take(usize::from(held == Held::Moved));
         }
     }
 

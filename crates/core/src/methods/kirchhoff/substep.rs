@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use super::configuration::{Configuration, Start};
 use super::guess::Quality;
 use super::hands::{Hand, motions};
+use super::hold::Held;
 use super::search::Search;
 use super::slide::{slide, slide_together};
 use super::workspace::Tools;
@@ -14,8 +15,11 @@ use crate::device::Stack;
 use crate::methods::StepReport;
 use crate::rod::Supports;
 
-/// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, …
+/// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, and in the last resort from one
+/// so soft, …
 const SOFTEST: f64 = 30.0;
+/// … but elsewhere from one so many times as stiff.
+const FIRMER: f64 = 100.0;
 /// A wall that yields: one that is approached from this part of its modulus, or more.
 const YIELDING: f64 = 0.1;
 /// Residual over force scale above which the last resort has found nothing.
@@ -118,8 +122,13 @@ impl<const C: usize> Tools<C> {
         let candidates = (start, &*mesh, &mut *rod);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, blocked);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
-        let near = quality != Quality::Beyond;
-        let held = near && self.guess.hold(&mut self.newton, &mut contact, &supports, &mesh.elements, rod);
+        let held = match quality {
+            Quality::Beyond => Held::Lost,
+            _ => self.guess.hold(&mut self.newton, &mut contact, &supports, &mesh.elements, rod),
+        };
+        let moved = held == Held::Moved;
+        // A guess that has learnt from the last step or kept its contacts is near, unless it has lost them.
+        let near = moved || (quality == Quality::Learnt && held == Held::Fits);
         // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
         let data = &mesh.elements[elements - 1];
         let element_stiffness = data.bending[2] / options.element_mm.powi(4);
@@ -135,15 +144,15 @@ impl<const C: usize> Tools<C> {
             elements: &mesh.elements,
             state: rod,
             softest,
+            soft: (FIRMER * softest).min(1.0),
             rubs: surroundings.properties.rubs(),
             tolerance: options.tolerance,
             max_iterations: options.max_iterations,
             budget: (!relax).then_some(budget),
-            iterations: usize::from(held),
+            iterations: usize::from(moved),
             slides: 0,
         };
-        // A guess that has learnt from the last step or kept its contacts is near.
-        let found = search.run(quality == Quality::Learnt || held);
+        let found = search.run(near);
         let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
         let (iterations, slides) = (search.iterations, search.slides);
         let unsettled = if surroundings.properties.rubs() { contact.unsettled() } else { 0.0 };
