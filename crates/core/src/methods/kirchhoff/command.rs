@@ -22,7 +22,7 @@ const SUBSTEP_LIMIT: usize = 4096;
 const LEAST_SHARE: f64 = 1e-4;
 /// Newton iterations that a command may take in all its sub-steps for every millimetre and every [`WORK_RAD`], those in vain
 /// included, before it comes to rest as it can: its cost is bounded.
-const WORK: f64 = 180.0;
+const WORK: f64 = 280.0;
 /// See [`WORK`], rad.
 const WORK_RAD: f64 = 0.1;
 /// … and never more than so many times what one solution may take.

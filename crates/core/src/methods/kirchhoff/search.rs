@@ -27,10 +27,16 @@ use crate::solve::{Newton, NewtonOptions, NewtonReport};
 
 /// Residual over force scale on softer walls.
 const LOOSE: f64 = 1e-3;
+/// Each is so many times as stiff as the one before, …
+const STIFFER: f64 = 10.0;
+/// … unless it comes so near to the wall itself.
+const LAST: f64 = 0.5;
 /// Newton iterations in which a guess that has learnt must come to its end, or the wall is approached from softer ones.
 const HURRIED: usize = 15;
 /// Newton iterations after which a solution has gone astray: from another guess, nearer by, it is found in fewer.
 const STUCK: usize = 60;
+/// Newton iterations of a slide.
+const SLID: usize = 120;
 /// Newton iterations of the last resort: on a softer wall, on the wall itself, and of a slide.
 const PATIENT: [usize; 3] = [60, 300, 300];
 /// Newton iterations of all of it.
@@ -57,10 +63,10 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) elements: &'a [ElementData],
     /// The guess, and then what was found.
     pub(super) state: &'a mut RodState,
-    /// Part of the wall's modulus from which it is approached; 1 where it is no stiffer than the rod.
+    /// Whether the wall is stiffer than the elements of the rod.
+    pub(super) stiff: bool,
+    /// Part of the wall's modulus from which it is approached.
     pub(super) softest: f64,
-    /// That from which it is where there is a budget.
-    pub(super) soft: f64,
     /// Whether there is friction.
     pub(super) rubs: bool,
     /// Residual over force scale of an equilibrium.
@@ -79,7 +85,7 @@ impl<const C: usize> Search<'_, '_, C> {
     /// Finds it; `near` says whether the guess has learnt or kept its contacts. What is returned is not converged where nothing was
     /// found, and with friction it has settled or not.
     pub(super) fn run(&mut self, near: bool) -> NewtonReport {
-        let stiff = self.softest < 1.0;
+        let stiff = self.stiff;
         self.contact.hand_over(stiff);
         if self.budget.is_some() && if stiff { near } else { self.rubs } {
             if let Some(found) = self.at_once() {
@@ -121,7 +127,7 @@ impl<const C: usize> Search<'_, '_, C> {
     /// The wall itself, from a guess that is near.
     fn at_once(&mut self) -> Option<NewtonReport> {
         self.contact.softness = 1.0;
-        let most = if self.softest < 1.0 { HURRIED } else { STUCK };
+        let most = if self.stiff { HURRIED } else { STUCK };
         let found = self.newton(most, self.tolerance);
         found.converged.then_some(found)
     }
@@ -129,7 +135,7 @@ impl<const C: usize> Search<'_, '_, C> {
     /// The wall by way of softer ones.
     fn by_softer_walls(&mut self) -> NewtonReport {
         let patient = self.budget.is_none();
-        self.contact.softness = if patient { self.softest } else { self.soft };
+        self.contact.softness = self.softest;
         loop {
             self.contact.hold_friction();
             let last = self.contact.softness >= 1.0;
@@ -140,7 +146,8 @@ impl<const C: usize> Search<'_, '_, C> {
                 self.contact.softness = 1.0;
                 return found;
             }
-            self.contact.softness = (10.0 * self.contact.softness).min(1.0);
+            let stiffer = STIFFER * self.contact.softness;
+            self.contact.softness = if stiffer < LAST { stiffer } else { 1.0 };
             // What pressed on the softer wall presses as hard on this one.
             let Self { newton, guess, contact, supports, elements, state, .. } = self;
             let held = guess.hold(newton, contact, supports, elements, state);
@@ -156,11 +163,7 @@ impl<const C: usize> Search<'_, '_, C> {
     /// From an equilibrium with the normal forces of others to one with its own.
     fn settled(&mut self, mut found: NewtonReport) -> NewtonReport {
         // On a wall that is no stiffer than the rod they settle by themselves, if they do.
-        while self.softest >= 1.0
-            && self.budget.is_some()
-            && !self.is_settled()
-            && !self.contact.handed_over()
-        {
+        while !self.stiff && self.budget.is_some() && !self.is_settled() && !self.contact.handed_over() {
             self.contact.unsettle_friction();
             found = self.newton(STUCK, self.tolerance);
             if !found.converged {
@@ -179,7 +182,7 @@ impl<const C: usize> Search<'_, '_, C> {
         self.state.copy_from(&self.guess.other);
         self.contact.rewind_friction();
         found = self.newton(STUCK, self.tolerance);
-        let (most, slides) = if self.budget.is_none() { (PATIENT[2], SLIDES[1]) } else { (STUCK, SLIDES[0]) };
+        let (most, slides) = if self.budget.is_none() { (PATIENT[2], SLIDES[1]) } else { (SLID, SLIDES[0]) };
         let mut near = NEARLY;
         for _ in 0..slides {
             if !found.converged || self.is_settled() {

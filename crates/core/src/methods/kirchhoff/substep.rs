@@ -15,13 +15,13 @@ use crate::device::Stack;
 use crate::methods::StepReport;
 use crate::rod::Supports;
 
-/// Where the wall is stiffer than this many elements of the rod, EI/h⁴, it is approached from softer walls, and in the last resort from one
-/// so soft, …
-const SOFTEST: f64 = 30.0;
-/// … but elsewhere from one so many times as stiff.
-const FIRMER: f64 = 100.0;
-/// A wall that yields: one that is approached from this part of its modulus, or more.
-const YIELDING: f64 = 0.1;
+/// A wall is stiff that is stiffer than this many elements of the rod, EI/h⁴, …
+const STIFF: f64 = 30.0;
+/// … and yields where it is not stiffer than this many. …
+const YIELDING: f64 = 300.0;
+/// … One that is stiffer than this many is approached from softer walls, of this stiffness on: near enough for contacts to stay where they
+/// are, and the device where it is.
+const SOFTEST: f64 = 3000.0;
 /// Residual over force scale above which the last resort has found nothing.
 pub(super) const AT_REST: f64 = 0.05;
 /// What is the matter where an equilibrium is on the other side of the wall.
@@ -129,12 +129,11 @@ impl<const C: usize> Tools<C> {
         let moved = held == Held::Moved;
         // A guess that has learnt from the last step or kept its contacts is near, unless it has lost them.
         let near = moved || (quality == Quality::Learnt && held == Held::Fits);
-        // A wall much stiffer than an element of the rod is approached by softer ones, ten times stiffer each.
         let data = &mesh.elements[elements - 1];
         let element_stiffness = data.bending[2] / options.element_mm.powi(4);
-        let stiffest = surroundings.properties.stiffest_n_per_mm2();
-        let softest = (SOFTEST * element_stiffness / stiffest).min(1.0);
-        contact.stiff = stiffest > element_stiffness;
+        // How many elements the wall is as stiff as.
+        let stiffness = surroundings.properties.stiffest_n_per_mm2() / element_stiffness;
+        contact.stiff = stiffness > 1.0;
         let mut search = Search {
             newton: &mut self.newton,
             settle: &mut self.settle,
@@ -143,8 +142,8 @@ impl<const C: usize> Tools<C> {
             supports: &mut supports,
             elements: &mesh.elements,
             state: rod,
-            softest,
-            soft: (FIRMER * softest).min(1.0),
+            stiff: stiffness > STIFF,
+            softest: (SOFTEST / stiffness).min(1.0),
             rubs: surroundings.properties.rubs(),
             tolerance: options.tolerance,
             max_iterations: options.max_iterations,
@@ -186,7 +185,7 @@ impl<const C: usize> Tools<C> {
             return Err(STORED.into());
         }
         let corrections = (&start.state.correction, &mut after.correction);
-        self.guess.teach(&mesh.elements, &after.rod, softest >= YIELDING, corrections);
+        self.guess.teach(&mesh.elements, &after.rod, stiffness <= YIELDING, corrections);
         self.friction.keep(&mut after.forces);
         rubbing::keep(&self.friction.between, &after.rod, mesh, &mut after.rubs);
         self.memory.keep(&mut after.known);
