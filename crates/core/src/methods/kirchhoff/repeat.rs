@@ -266,10 +266,11 @@ mod tests {
         let motions = [HandMotion { from_mm: 20.0, to_mm: 21.0, turn_rad: 0.0 }];
         // Slid along its own curve the hook begins 1 mm farther from the tip than it does in its shape.
         let (slid, found) = (hooked(&elements, 7.0), hooked(&elements, 6.0));
-        let mut correction = Correction::default();
-        correction.learn(&motions, &elements, (&slid, &found), false);
-        assert_eq!(correction.len(), 0);
-        correction.learn(&motions, &elements, (&slid, &found), true);
+        let nothing = Correction::default();
+        let mut correction = nothing.clone();
+        correction.learn(&motions, &elements, (&slid, &found), false, &nothing);
+        assert_eq!(correction.repeats(&motions), None);
+        correction.learn(&motions, &elements, (&slid, &found), true, &nothing);
         assert_eq!(correction.len(), NODES);
         assert_eq!(correction.repeats(&motions), Some(1.0));
         let mut guess = slid.clone();
@@ -277,11 +278,33 @@ mod tests {
         assert!(guess.farthest_mm(&found) < 0.05 * slid.farthest_mm(&found));
         // The same change in a step that is far too short for it.
         let short = [HandMotion { from_mm: 20.0, to_mm: 20.1, turn_rad: 0.0 }];
-        correction.learn(&short, &elements, (&slid, &found), true);
-        assert_eq!(correction.len(), 0);
+        correction.learn(&short, &elements, (&slid, &found), true, &nothing);
+        assert_eq!(correction.repeats(&short), None);
         // A hook that has sprung open.
-        correction.learn(&motions, &elements, (&slid, &hooked(&elements, 3.0)), true);
-        assert_eq!(correction.len(), 0);
+        correction.learn(&motions, &elements, (&slid, &hooked(&elements, 3.0)), true, &nothing);
+        assert_eq!(correction.repeats(&motions), None);
+    }
+
+    #[test]
+    fn a_device_that_bends_on_as_before_has_let_go_of_nothing() {
+        let elements = [ElementData::plain(ELEMENT_MM, 1.0); NODES];
+        let motions = [advance(1.0, 0.0)];
+        let step = |before: &Correction, from_mm: f64, to_mm: f64| {
+            let mut now = Correction::default();
+            let states = (&hooked(&elements, from_mm), &hooked(&elements, to_mm));
+            now.learn(&motions, &elements, states, false, before);
+            now
+        };
+        let first = step(&Correction::default(), 7.0, 6.0);
+        assert_eq!(first.repeats(&motions), None);
+        let second = step(&first, 7.0, 5.9);
+        assert_eq!(second.repeats(&motions), Some(1.0));
+        // So large a turn is foreseen for a little more than it was learnt from.
+        assert_eq!(second.repeats(&[advance(3.0, 0.0)]), None);
+        // Another one, and the first after it.
+        let snap = step(&second, 7.0, 3.0);
+        assert_eq!(snap.repeats(&motions), None);
+        assert_eq!(step(&snap, 7.0, 6.0).repeats(&motions), None);
     }
 
     fn learnt(
@@ -291,7 +314,7 @@ mod tests {
         found: &RodState,
     ) -> Correction {
         let mut correction = Correction::default();
-        correction.learn(motions, elements, (slid, found), true);
+        correction.learn(motions, elements, (slid, found), true, &Correction::default());
         correction
     }
 
