@@ -73,7 +73,7 @@ impl Coarsener<'_> {
             let mut v = mesh.vertices_mm[index];
             if info[index].rim.is_none() {
                 self.nets.with_local(self.field, &v.clone(), |local| {
-                    project(self.field, local, &mut v, self.nets.edge)
+                    project(self.field, local, &mut v, self.nets.edge);
                 });
             }
             v
