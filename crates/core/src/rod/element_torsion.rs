@@ -11,7 +11,7 @@ use super::element::{ElementData, ElementState, ElementSystem, Energy, Material,
 use super::frame::Frame;
 use super::layout::{Layout, MAX_ANGLES};
 use super::quadrature::GAUSS;
-use super::torsion::{AngleDensity, PointDerivatives, ReferenceTwist};
+use super::torsion::{PointDerivatives, ReferenceTwist};
 use crate::Vec3;
 use crate::products::{outer, product, times, transposed_times};
 use nalgebra::Matrix3;
@@ -159,8 +159,12 @@ fn add_point<const C: usize>(
     let twist = ReferenceTwist::new(&y, &z);
     let (weight, slope) = (Vec3::from(point.phi), Vec3::from(point.dphi));
     let ([yc, _, ye], [zc, _, ze]) = (point.y, point.z);
+    let in_chord = |p: &Vec3, q: &Vec3| p * yc + q * zc;
+    let in_end = |p: &Vec3, q: &Vec3| p * ye + q * ze;
+    // The gradient of the twist, of which all stiffness against it is a multiple of the square.
+    let (tc, te) = (in_chord(&twist.along_y, &twist.along_z), in_end(&twist.along_y, &twist.along_z));
     let (mut torques, mut stiffness) = (0.0, 0.0);
-    let (mut rest, mut f) = (PointDerivatives::default(), PointDerivatives::default());
+    let mut f = PointDerivatives::default();
     for set in 0..Layout::<C>::ANGLES {
         let material = &data.materials[set];
         if !material.is_present() {
@@ -172,31 +176,30 @@ fn add_point<const C: usize>(
         energy.twist += twist.energy(dphi, &input);
         torques += torque;
         stiffness += input.stiffness;
-        let mut own = AngleDensity::default();
-        if input.moment != [0.0; 2] {
-            let bend;
-            (bend, own) = twist.add_rest_curvature(phi, input.moment, &mut rest);
-            energy.bend += bend;
-        }
-        let both = |p: Vec3, q: Vec3| outer(&p, &weight) + outer(&q, &slope);
-        let hya = both(own.along_y, twist.along_y * input.stiffness);
-        let hza = both(own.along_z, twist.along_z * input.stiffness);
         let spin = &mut spins[set];
-        spin.chord_angles += hya * yc + hza * zc;
-        spin.end_angles += hya * ye + hza * ze;
-        spin.angles += weight * own.first + slope * torque;
-        spin.angles_angles += outer(&weight, &weight) * own.second + outer(&slope, &slope) * input.stiffness;
+        let stiff = slope * input.stiffness;
+        spin.chord_angles += outer(&tc, &stiff);
+        spin.end_angles += outer(&te, &stiff);
+        spin.angles += slope * torque;
+        spin.angles_angles += outer(&slope, &stiff);
+        if input.moment != [0.0; 2] {
+            let (bend, own) = twist.add_rest_curvature(phi, input.moment, &mut f);
+            energy.bend += bend;
+            spin.chord_angles += outer(&in_chord(&own.along_y, &own.along_z), &weight);
+            spin.end_angles += outer(&in_end(&own.along_y, &own.along_z), &weight);
+            spin.angles += weight * own.first;
+            spin.angles_angles += outer(&weight, &weight) * own.second;
+        }
     }
-    twist.add_twist(torques, stiffness, &mut f);
-    f.add(&rest);
-    shape.chord += f.gy * yc + f.gz * zc;
-    shape.end += f.gy * ye + f.gz * ze;
-    let hzy = f.hyz.transpose();
-    // Half products: derivative along y and z of the gradient in each vector.
-    let (cy, cz) = (f.hyy * yc + hzy * zc, f.hyz * yc + f.hzz * zc);
-    shape.chord_chord += cy * yc + cz * zc;
-    shape.chord_end += cy * ye + cz * ze;
-    shape.end_end += f.hyy * (ye * ye) + (f.hyz + hzy) * (ye * ze) + f.hzz * (ze * ze);
+    twist.add_twist(torques, &mut f);
+    shape.chord += in_chord(&f.gy, &f.gz);
+    shape.end += in_end(&f.gy, &f.gz);
+    let (hyz, hzy) = (f.hyz, f.hyz.transpose());
+    let both = hyz + hzy;
+    let (stiff_chord, stiff_end) = (tc * stiffness, te * stiffness);
+    shape.chord_chord += outer(&stiff_chord, &tc) + (f.hyy * (yc * yc) + both * (yc * zc));
+    shape.chord_end += outer(&stiff_chord, &te) + (f.hyy * (yc * ye) + hyz * (yc * ze) + hzy * (zc * ye));
+    shape.end_end += outer(&stiff_end, &te) + (f.hyy * (ye * ye) + both * (ye * ze));
 }
 
 /// Adds the Hessian in displacements and angles.

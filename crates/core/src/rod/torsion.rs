@@ -50,7 +50,8 @@ pub struct ReferenceTwist {
     yz: Matrix3<f64>,
 }
 
-/// Derivatives in y and z.
+/// Derivatives in y and z. There are none in z twice: both twist and curvature are linear in it, and the twist's square is added in
+/// chord and far tangent.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PointDerivatives {
     /// Gradient in y.
@@ -61,20 +62,6 @@ pub struct PointDerivatives {
     pub hyy: Matrix3<f64>,
     /// y (rows), z (columns).
     pub hyz: Matrix3<f64>,
-    /// z, z.
-    pub hzz: Matrix3<f64>,
-}
-
-impl PointDerivatives {
-    /// Adds others.
-    #[inline(always)]
-    pub fn add(&mut self, other: &Self) {
-        self.gy += other.gy;
-        self.gz += other.gz;
-        self.hyy += other.hyy;
-        self.hyz += other.hyz;
-        self.hzz += other.hzz;
-    }
 }
 
 /// Derivatives of an instrument's energy in φ, alone and mixed with y and z; those in hφ′ are the torque, GJ, and GJ times the gradients of
@@ -165,15 +152,13 @@ impl ReferenceTwist {
         dphi + self.value - p.rest_twist
     }
 
-    /// Adds the derivatives of all twist energies: they need the sums of torques and of stiffnesses alone.
+    /// Adds the torque times the derivatives of the twist.
     #[inline(always)]
-    pub fn add_twist(&self, torque: f64, stiffness: f64, to: &mut PointDerivatives) {
-        let (ty, tz) = (&self.along_y, &self.along_z);
-        to.gy += ty * torque;
-        to.gz += tz * torque;
-        to.hyy += outer(ty, ty) * stiffness + self.yy * torque;
-        to.hyz += outer(ty, tz) * stiffness + self.yz * torque;
-        to.hzz += outer(tz, tz) * stiffness;
+    pub fn add_twist(&self, torque: f64, to: &mut PointDerivatives) {
+        to.gy += self.along_y * torque;
+        to.gz += self.along_z * torque;
+        to.hyy += self.yy * torque;
+        to.hyz += self.yz * torque;
     }
 
     /// Adds the derivatives of an instrument's rest curvature, −P with P = (z·w)/a − (y·w) G q and q = z₁ + b/a, and returns −P with those in

@@ -5,11 +5,12 @@
 //! neighbours, and vertices evened out and projected back: Botsch and Kobbelt, "A remeshing approach to multiresolution modeling",
 //! SGP 2004, without the splits. Rims keep to their plane. All orders are fixed, so the result is deterministic.
 
-use std::collections::BTreeMap;
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, BinaryHeap};
 
 use super::nets::Nets;
 use super::trim::{End, onto_rim};
-use super::{Field, project};
+use super::{Field, approach, project};
 use crate::vessel::SurfaceMesh;
 use crate::vessel::mesh::retain_numbered;
 use crate::vessel::topology::{EdgeTable, NONE};
@@ -17,8 +18,6 @@ use crate::{Vec3, parallel};
 
 /// Rounds of collapsing, flipping and evening out. Later rounds find next to nothing to collapse.
 const ROUNDS: usize = 6;
-/// Passes of collapses within a round; each pass collapses edges that do not touch each other.
-const PASSES: usize = 12;
 /// Edges shorter than this fraction of the target go, and none longer than that fraction may arise (Botsch and Kobbelt: 4/5, 4/3).
 const SHORT: f64 = 0.8;
 /// Where the grid is as coarse as wanted, one round takes out only the stumps that cuts and grazing cells leave.
@@ -66,14 +65,19 @@ impl Coarsener<'_> {
             .collect();
         let (rounds, short) = if self.nets.edge < self.edge { (ROUNDS, SHORT) } else { (1, STUMP) };
         for _ in 0..rounds {
-            for _ in 0..PASSES {
-                if self.collapse(mesh, &mut info, short) == 0 {
-                    break;
-                }
-            }
+            self.collapse(mesh, &mut info, short);
             flip(mesh, &info);
             self.even_out(mesh, &mut info);
         }
+        mesh.vertices_mm = parallel::map(info.len(), |index| {
+            let mut v = mesh.vertices_mm[index];
+            if info[index].rim.is_none() {
+                self.nets.with_local(self.field, &v.clone(), |local| {
+                    project(self.field, local, &mut v, self.nets.edge);
+                });
+            }
+            v
+        });
     }
 
     /// Wanted edge length near a point of the surface.
@@ -87,49 +91,51 @@ impl Coarsener<'_> {
         (0..self.ends.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
 
-    /// The place on the surface, or on its rim, next to `point`, and the edge length wanted there.
+    /// The place next to the surface, or on its rim, next to `point`, and the edge length wanted there.
     fn settle(&self, mut point: Vec3, rim: Option<usize>) -> (Vec3, f64) {
         let edge = self.nets.edge;
-        let value = self.nets.with_local(self.field, &point.clone(), |local| match rim {
+        let radius = self.nets.with_local(self.field, &point.clone(), |local| match rim {
             Some(end) => {
                 point = onto_rim(self.field, local, &self.ends[end], point, edge);
-                None
+                self.ends[end].radius
             }
-            None => project(self.field, local, &mut point, edge),
+            None => approach(self.field, local, &mut point, edge).radius,
         });
-        let target = match value {
-            Some(value) => super::local_edge(self.edge, value.radius),
-            None => self.target(&point),
-        };
-        (point, target)
+        (point, super::local_edge(self.edge, radius))
     }
 
-    /// One pass of collapses, shortest edges (relative to their target) first; returns how many.
+    /// Collapses edges, the shortest (relative to their target) first; returns how many.
     fn collapse(&self, mesh: &mut SurfaceMesh, info: &mut [Vertex], shortest: f64) -> usize {
-        let around = triangles_around(mesh);
-        let mut short: Vec<(f64, u32, u32, bool)> = EdgeTable::new(&mesh.triangles)
-            .edges()
-            .map(|uses| (uses[0].low, uses[0].high, uses.len() == 1))
-            .filter_map(|(a, b, open)| {
-                let wanted = info[a as usize].target.min(info[b as usize].target);
-                let length = (mesh.vertices_mm[a as usize] - mesh.vertices_mm[b as usize]).norm();
-                (length < shortest * wanted).then_some((length / wanted, a, b, open))
-            })
-            .collect();
-        short.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
-        let mut touched = vec![false; mesh.vertices_mm.len()];
+        let mut around = triangles_around(mesh);
         let mut gone = vec![false; mesh.triangles.len()];
-        let mut count = 0;
-        for (_, a, b, open) in short {
+        // How often each vertex has moved: what was said of its edges before holds no more.
+        let mut moved = vec![0_u32; mesh.vertices_mm.len()];
+        let short = |mesh: &SurfaceMesh, info: &[Vertex], moved: &[u32], a: u32, b: u32| {
+            let wanted = info[a as usize].target.min(info[b as usize].target);
+            let part = (mesh.vertices_mm[a as usize] - mesh.vertices_mm[b as usize]).norm() / wanted;
+            // Positive numbers are in the order of their bits.
+            (part < shortest).then(|| Reverse((part.to_bits(), a, b, moved[a as usize], moved[b as usize])))
+        };
+        let table = EdgeTable::new(&mesh.triangles);
+        let mut queue: BinaryHeap<_> =
+            table.edges().filter_map(|uses| short(mesh, info, &moved, uses[0].low, uses[0].high)).collect();
+        let (mut ring, mut next, mut count) = (Vec::new(), Vec::new(), 0);
+        while let Some(Reverse((_, a, b, moved_a, moved_b))) = queue.pop() {
+            if (moved[a as usize], moved[b as usize]) != (moved_a, moved_b) {
+                continue;
+            }
+            let both = |t: &u32| mesh.triangles[*t as usize].contains(&b);
+            let open = around[a as usize].iter().filter(|t| both(t)).count() == 1;
             let (rim_a, rim_b) = (info[a as usize].rim, info[b as usize].rim);
             if rim_a.is_some() && rim_b.is_some() && !open {
                 continue;
             }
-            let ring: Vec<u32> = around[a as usize].iter().chain(&around[b as usize]).copied().collect();
-            let used = |t: &u32| mesh.triangles[*t as usize].iter().any(|v| touched[*v as usize]);
-            if ring.iter().any(used) || !link_is_simple(mesh, &around, a, b, open) {
-                continue;
-            }
+            ring.clear();
+            ring.extend(
+                around[a as usize]
+                    .iter()
+                    .chain(around[b as usize].iter().filter(|t| !mesh.triangles[**t as usize].contains(&a))),
+            );
             // A rim is not pulled inwards.
             let (pa, pb) = (mesh.vertices_mm[a as usize], mesh.vertices_mm[b as usize]);
             let start = match (rim_a, rim_b) {
@@ -137,21 +143,36 @@ impl Coarsener<'_> {
                 (None, Some(_)) => pb,
                 _ => (pa + pb) / 2.0,
             };
+            // To settle takes longest: what is not sound next to the surface is not so on it.
+            let wanted = info[a as usize].target.max(info[b as usize].target);
+            if !stays_sound(mesh, &ring, [a, b], &start, wanted) || !link_is_simple(mesh, &around, a, b, open)
+            {
+                continue;
+            }
             let (position, target) = self.settle(start, rim_a.or(rim_b));
             if !stays_sound(mesh, &ring, [a, b], &position, target) {
                 continue;
             }
-            for t in ring {
-                for v in mesh.triangles[t as usize] {
-                    touched[v as usize] = true;
+            for t in &ring {
+                let triangle = &mut mesh.triangles[*t as usize];
+                if triangle.contains(&a) && triangle.contains(&b) {
+                    gone[*t as usize] = true;
+                    triangle.iter().for_each(|v| around[*v as usize].retain(|other| other != t));
                 }
-                gone[t as usize] |=
-                    mesh.triangles[t as usize].contains(&a) && mesh.triangles[t as usize].contains(&b);
-                let triangle = &mut mesh.triangles[t as usize];
                 *triangle = triangle.map(|v| if v == b { a } else { v });
             }
+            ring.retain(|t| !gone[*t as usize]);
+            around[b as usize].clear();
+            around[a as usize].clone_from(&ring);
             mesh.vertices_mm[a as usize] = position;
             info[a as usize] = Vertex { rim: rim_a.or(rim_b), target };
+            moved[a as usize] += 1;
+            moved[b as usize] += 1;
+            next.clear();
+            next.extend(ring.iter().flat_map(|t| mesh.triangles[*t as usize]).filter(|v| *v != a));
+            next.sort_unstable();
+            next.dedup();
+            queue.extend(next.iter().filter_map(|&v| short(mesh, info, &moved, a.min(v), a.max(v))));
             count += 1;
         }
         retain_numbered(&mut mesh.triangles, |index, _| !gone[index]);
@@ -195,11 +216,14 @@ fn triangles_around(mesh: &SurfaceMesh) -> Vec<Vec<u32>> {
 /// Whether collapsing a–b keeps the surface a manifold: the two have only the neighbours in common that their triangles show.
 fn link_is_simple(mesh: &SurfaceMesh, around: &[Vec<u32>], a: u32, b: u32, open: bool) -> bool {
     let neighbours = |v: u32| {
-        let all =
-            around[v as usize].iter().flat_map(|t| mesh.triangles[*t as usize]).filter(move |w| *w != v);
-        all.collect::<std::collections::BTreeSet<u32>>()
+        let mut all: Vec<u32> = Vec::with_capacity(2 * around[v as usize].len());
+        all.extend(around[v as usize].iter().flat_map(|t| mesh.triangles[*t as usize]).filter(|w| *w != v));
+        all.sort_unstable();
+        all.dedup();
+        all
     };
-    neighbours(a).intersection(&neighbours(b)).count() == if open { 1 } else { 2 }
+    let of_b = neighbours(b);
+    neighbours(a).iter().filter(|v| of_b.binary_search(v).is_ok()).count() == if open { 1 } else { 2 }
 }
 
 /// Whether the triangles around a collapsed edge keep their direction, get no long edge and no sharp corner.
@@ -235,11 +259,11 @@ fn quality(t: &[Vec3; 3]) -> f64 {
 fn flip(mesh: &mut SurfaceMesh, info: &[Vertex]) {
     let table = EdgeTable::new(&mesh.triangles);
     let mut valence = vec![0_i64; mesh.vertices_mm.len()];
-    let mut exists: BTreeMap<(u32, u32), ()> = BTreeMap::new();
+    // Edges that are not those of the table any more, or not yet.
+    let (mut flipped, mut made) = (BTreeSet::new(), BTreeSet::new());
     for uses in table.edges() {
         valence[uses[0].low as usize] += 1;
         valence[uses[0].high as usize] += 1;
-        exists.insert((uses[0].low, uses[0].high), ());
     }
     let mut touched = vec![false; mesh.triangles.len()];
     for uses in table.edges() {
@@ -257,7 +281,10 @@ fn flip(mesh: &mut SurfaceMesh, info: &[Vertex]) {
         };
         let gain =
             [(a, -1), (b, -1), (c, 1), (d, 1)].iter().map(|&(v, k)| excess(v, 0) - excess(v, k)).sum::<i64>();
-        if gain <= 0 || exists.contains_key(&(c.min(d), c.max(d))) {
+        let across = (c.min(d), c.max(d));
+        let exists =
+            || made.contains(&across) || (!flipped.contains(&across) && !table.uses(c, d).is_empty());
+        if gain <= 0 || exists() {
             continue;
         }
         let at = |t: [u32; 3]| t.map(|v| mesh.vertices_mm[v as usize]);
@@ -268,8 +295,10 @@ fn flip(mesh: &mut SurfaceMesh, info: &[Vertex]) {
         }
         (mesh.triangles[s], mesh.triangles[t]) = (new[0], new[1]);
         (touched[s], touched[t]) = (true, true);
-        exists.remove(&(a.min(b), a.max(b)));
-        exists.insert((c.min(d), c.max(d)), ());
+        let before = (a.min(b), a.max(b));
+        made.remove(&before);
+        flipped.insert(before);
+        made.insert(across);
         for (v, change) in [(a, -1), (b, -1), (c, 1), (d, 1)] {
             valence[v as usize] += change;
         }

@@ -74,13 +74,6 @@ pub(super) struct Sounding {
     here: Vec<Value>,
 }
 
-impl Sounding {
-    /// The field.
-    pub(super) fn f(&self) -> f64 {
-        blended(self.here.iter().copied()).f
-    }
-}
-
 /// The smooth minimum of values, in their order.
 fn blended(mut values: impl Iterator<Item = Value>) -> Value {
     let none = Value { f: f64::INFINITY, gradient: Vec3::zeros(), radius: 1.0, exposure: 0.0 };

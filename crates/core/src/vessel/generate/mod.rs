@@ -3,6 +3,7 @@
 //! A tree without forks becomes a swept tube ([`sweep`]); one with forks an implicit surface ([`field`]) meshed by surface nets
 //! ([`nets`]), evened out, projected back and cut open at its ends ([`trim`]).
 
+mod cell;
 mod coarsen;
 mod curve;
 mod field;
@@ -28,11 +29,15 @@ const ON_SURFACE_MM: f64 = 1e-10;
 /// What is guaranteed in the end.
 const GUARANTEED_MM: f64 = 1e-6;
 
-/// Newton along an approximate gradient: quadratic on plain tubes, linear with a small factor in fillets.
+/// Newton along an approximate gradient: quadratic on plain tubes, in fillets nearly so with the steps' length learnt.
 const PROJECTION_STEPS: usize = 50;
+/// Part of the field's value that a step leaves, up to which the next learns from it, and how much longer or shorter it may be.
+const LEFT_AT_MOST: f64 = 0.75;
+const SHARE_AT_MOST: f64 = 4.0;
 
-/// Rounds of evening out. Surface nets leave short edges where the grid grazes the surface; more rounds change little.
-const SMOOTHING_ROUNDS: usize = 8;
+/// Rounds of evening out: where the nets stay as they are, and where they are coarsened. Surface nets leave short edges where the grid
+/// grazes the surface; more rounds change little.
+const SMOOTHING_ROUNDS: (usize, usize) = (8, 1);
 
 /// Surface nets on a random plane make 1.5 quadrilaterals per grid face area.
 const TRIANGLES_PER_FACE: f64 = 3.0;
@@ -211,7 +216,12 @@ fn implicit_mesh(
     let spacing = edge.min(GRID_PER_RADIUS * smallest_radius(&field.branches));
     let TrimmedNets { nets, mesh, .. } = match kept.take() {
         Some(known) if known.spacing == spacing => kept.insert(known),
-        _ => kept.insert(manifold_nets(field, ends, spacing)?),
+        _ => kept.insert(manifold_nets(
+            field,
+            ends,
+            spacing,
+            if spacing < edge { SMOOTHING_ROUNDS.1 } else { SMOOTHING_ROUNDS.0 },
+        )?),
     };
     let mut mesh = mesh.clone();
     coarsen::Coarsener { field, nets, ends, edge }.run(&mut mesh);
@@ -234,15 +244,24 @@ struct TrimmedNets {
     mesh: SurfaceMesh,
 }
 
-/// Surface nets, cut open, without edges of more than two triangles. Those arise where opposite corners of a grid cell are cut
-/// off in the same cell, by chance in the narrow angle of a fork; a slightly finer grid falls differently.
-fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<TrimmedNets> {
+/// Surface nets, cut open, without edges of more than two triangles. Those arise where one piece of surface in a cell passes a side of
+/// it twice, by chance in the narrow angle of a fork, as do ways through; a slightly finer grid falls differently.
+fn manifold_nets(field: &Field, ends: &[End], spacing: f64, rounds: usize) -> Result<TrimmedNets> {
     let mut attempt = spacing;
     let mut tried = spacing;
-    let mut fewest = usize::MAX;
+    let (mut fewest, mut has_way_through) = (usize::MAX, false);
     for _ in 0..GRID_ATTEMPTS {
         tried = attempt;
         let mut nets = nets::mesh(field, attempt)?;
+        // A way through between branches where the grid sees two sheets in one cell may be one that it made: then a finer one has
+        // none. Of a closed net of quadrilaterals V − E + F is V − F; a tree without loops has 2.
+        if nets.has_parted && nets.vertices.len() < nets.quads.len() + 2 {
+            if std::mem::replace(&mut has_way_through, true) {
+                break;
+            }
+            attempt *= GRID_SHRINK;
+            continue;
+        }
         // Chance makes a few, and another grid others; many that stay are in the tree. Evening out changes none of them.
         let crowded = crowded_edges(&nets.quads);
         let many = crowded.len();
@@ -266,7 +285,7 @@ fn manifold_nets(field: &Field, ends: &[End], spacing: f64) -> Result<TrimmedNet
             attempt *= GRID_SHRINK;
             continue;
         }
-        even_out(field, &mut nets);
+        even_out(field, &mut nets, rounds);
         let mut mesh = SurfaceMesh {
             vertices_mm: std::mem::take(&mut nets.vertices),
             triangles: Vec::with_capacity(2 * nets.quads.len()),
@@ -300,12 +319,13 @@ fn crowded_edges(quads: &[[u32; 4]]) -> Vec<(u32, u32)> {
     edges.chunk_by(|a, b| a == b).filter(|uses| uses.len() > 2).map(|uses| uses[0]).collect()
 }
 
-/// Moves vertices towards the mean of their neighbours along the surface, and back onto it.
-fn even_out(field: &Field, nets: &mut nets::Nets) {
+/// Moves vertices towards the mean of their neighbours along the surface, and back onto it: by one step of Newton's method in each of
+/// `rounds`, which leaves less than the next round moves them, and in the end for good.
+fn even_out(field: &Field, nets: &mut nets::Nets, rounds: usize) {
     let mut vertices = std::mem::take(&mut nets.vertices);
-    // Gradients where vertices lie, of those known from the round before.
-    let mut gradients: Vec<Option<Vec3>> = vec![None; vertices.len()];
-    for round in 0..=SMOOTHING_ROUNDS {
+    // Gradients next to where vertices lie, known from the round before.
+    let mut gradients = vec![Vec3::zeros(); vertices.len()];
+    for round in 0..=rounds {
         let mut sum = vec![(Vec3::zeros(), 0.0); vertices.len()];
         for quad in &nets.quads {
             for k in 0..4 {
@@ -318,12 +338,14 @@ fn even_out(field: &Field, nets: &mut nets::Nets) {
             let (mut v, (sum, count)) = (vertices[index], sum[index]);
             nets.with_local(field, &vertices[index], |local| {
                 if round > 0 && count > 0.0 {
-                    let gradient = gradients[index].unwrap_or_else(|| field.value(local, &v).gradient);
-                    let normal = gradient.try_normalize(1e-6).unwrap_or_default();
+                    let normal = gradients[index].try_normalize(1e-6).unwrap_or_default();
                     let pull = sum / count - v;
                     v += 0.5 * (pull - normal * normal.dot(&pull));
                 }
-                let gradient = project(field, local, &mut v, nets.edge).map(|value| value.gradient);
+                let gradient = approach(field, local, &mut v, nets.edge).gradient;
+                if round == rounds {
+                    project(field, local, &mut v, nets.edge);
+                }
                 (v, gradient)
             })
         });
@@ -332,18 +354,34 @@ fn even_out(field: &Field, nets: &mut nets::Nets) {
     nets.vertices = vertices;
 }
 
-/// Newton along the gradient. Returns the value at the end, if it is on the surface and within the reach of `local`.
-fn project(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) -> Option<field::Value> {
-    let start = *point;
+/// A step of Newton's method along the gradient; the value where it began.
+fn approach(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) -> field::Value {
+    let value = field.value(local, point);
+    *point += newton(&value, edge);
+    value
+}
+
+fn newton(value: &field::Value, edge: f64) -> Vec3 {
+    let step = value.gradient * (-value.f / value.gradient.norm_squared().max(1e-6));
+    step.cap_magnitude(0.5 * edge)
+}
+
+/// Such steps until the point is on the surface. In fillets, where the gradient is not quite that of the field, each is as much longer
+/// or shorter than Newton's as the one before it should have been.
+fn project(field: &Field, local: &field::Local, point: &mut Vec3, edge: f64) {
+    let (mut share, mut before) = (1.0_f64, f64::NAN);
     for _ in 0..PROJECTION_STEPS {
         let value = field.value(local, point);
         if value.f.abs() <= ON_SURFACE_MM {
-            return ((*point - start).norm() <= nets::MARGIN * edge).then_some(value);
+            break;
         }
-        let step = value.gradient * (-value.f / value.gradient.norm_squared().max(1e-6));
-        *point += step.cap_magnitude(0.5 * edge);
+        let left = value.f / before;
+        if left < LEFT_AT_MOST {
+            share = (share / (1.0 - left)).clamp(1.0 / SHARE_AT_MOST, SHARE_AT_MOST);
+        }
+        before = value.f;
+        *point += newton(&value, edge) * share;
     }
-    None
 }
 
 /// Adds a triangle or a quadrilateral, the latter cut along its shorter diagonal.

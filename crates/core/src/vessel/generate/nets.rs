@@ -1,26 +1,21 @@
-//! Surface nets: one vertex in every grid cell the surface passes, one quadrilateral around every grid edge it crosses.
+//! Surface nets: a vertex in every grid cell for every piece of surface in it, one quadrilateral around every grid edge that is crossed.
 //!
-//! Gibson, "Constrained elastic surface nets", MICCAI 1998. By hand, because the crate for it (fast-surface-nets 0.2) wants the
-//! whole box as a dense 32-bit array, of which a vessel tree fills a thousandth, and brings a second glam. Here only blocks of
-//! cells near the surface are sampled, in 64 bits.
+//! Gibson, "Constrained elastic surface nets", MICCAI 1998, with the pieces of [`super::cell`]. By hand, because the crate for it
+//! (fast-surface-nets 0.2) wants the whole box as a dense 32-bit array, of which a vessel tree fills a thousandth, and brings a second
+//! glam. Here the surface is followed from cell to cell, in 64 bits, and the field asked at the corners of cells that it passes alone.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::cell::{EDGES, Pieces};
 use super::field::{Field, Local};
-use crate::{Error, Result, Vec3, parallel};
+use crate::{Error, Result, Vec3};
 
 /// Cells along a block. Larger blocks waste samples away from the surface, smaller ones repeat more at their faces.
 const BLOCK: usize = 8;
 const CORNERS: usize = BLOCK + 1;
 
-/// Corners of a cell, by their distance from the first in the list of a block's.
-const CELL: [usize; 8] = {
-    let (y, z) = (CORNERS, CORNERS * CORNERS);
-    [0, 1, y, y + 1, z, z + 1, z + y, z + y + 1]
-};
-
-/// Cells along the smallest part of a block that is left out as a whole.
+/// Cells along the parts of a block that keep what matters in them alone.
 const LEAF: usize = 2;
 const LEAVES: usize = BLOCK / LEAF;
 
@@ -38,6 +33,8 @@ type Key = [i32; 3];
 pub(super) struct Nets {
     pub(super) vertices: Vec<Vec3>,
     pub(super) quads: Vec<[u32; 4]>,
+    /// Whether several pieces of surface are in one cell.
+    pub(super) has_parted: bool,
     /// Spacing of the grid, mm.
     pub(super) edge: f64,
     /// For blocks with surface what matters in them, and in their leaves.
@@ -62,10 +59,27 @@ impl Nets {
     }
 }
 
+/// What is known of the cells of a block.
 struct Block {
+    /// What of the field matters in it, and in its leaves.
+    local: Arc<Local>,
+    leaves: Leaves,
+    /// Values at corners; not a number where none was asked for.
     corners: Vec<f64>,
-    /// Vertex in each cell, or `u32::MAX`.
+    /// Whether each cell was looked at.
+    seen: Vec<bool>,
+    /// Vertex of the first piece in each cell, or `u32::MAX`.
     cells: Vec<u32>,
+    /// Pieces of the cells that have several: which each edge belongs to.
+    several: BTreeMap<usize, [u8; EDGES]>,
+}
+
+impl Block {
+    /// The vertex in a cell of the piece that crosses one of its edges.
+    fn vertex(&self, cell: usize, edge: usize) -> u32 {
+        let piece = self.several.get(&cell).map_or(0, |of_edge| u32::from(of_edge[edge]));
+        self.cells[cell].saturating_add(piece)
+    }
 }
 
 fn corner_index(at: [usize; 3]) -> usize {
@@ -80,124 +94,106 @@ fn leaf_index(at: [usize; 3]) -> usize {
     (at[2] * LEAVES + at[1]) * LEAVES + at[0]
 }
 
-/// Samples the corners of a block near the surface; others get a value of their sign.
-struct Sampler<'a> {
+/// Looks at cells of a grid where the surface leads.
+struct Follower<'a> {
     field: &'a Field,
     edge: f64,
-    /// First corner of the block, in cells.
-    first: [f64; 3],
-    corners: Vec<f64>,
-    leaves: Leaves,
-    /// First corner, cells along it and value of the parts without surface.
-    clear: Vec<([usize; 3], usize, f64)>,
+    blocks: BTreeMap<Key, Block>,
 }
 
-impl Sampler<'_> {
-    fn block(field: &Field, edge: f64, first: [f64; 3], local: &Arc<Local>) -> (Vec<f64>, Leaves) {
-        let corners = vec![f64::NAN; CORNERS * CORNERS * CORNERS];
-        let leaves = vec![None; LEAVES * LEAVES * LEAVES];
-        let mut sampler = Sampler { field, edge, first, corners, leaves, clear: Vec::new() };
-        sampler.halve([0; 3], BLOCK, local);
-        for (from, size, value) in sampler.clear {
-            for_each_corner(from, size, |at| {
-                let corner = &mut sampler.corners[corner_index(at)];
-                if corner.is_nan() {
-                    *corner = value;
-                }
-            });
-        }
-        (sampler.corners, sampler.leaves)
-    }
-
-    /// Looks at the eight halves of a cube of `size` cells.
-    fn halve(&mut self, from: [usize; 3], size: usize, local: &Arc<Local>) {
-        let half = size / 2;
-        for octant in 0..8 {
-            let from = [0, 1, 2].map(|axis| from[axis] + half * (octant >> axis & 1));
-            self.cube(from, half, local);
-        }
-    }
-
-    fn cube(&mut self, from: [usize; 3], size: usize, wide: &Arc<Local>) {
-        let centre = self.position(from.map(|k| k + size / 2));
-        let half_diagonal = 0.75_f64.sqrt() * size as f64 * self.edge;
-        let sounding = self.field.sound(wide, &centre);
-        let value = sounding.f();
-        if value.abs() > self.field.steepness() * half_diagonal {
-            self.clear.push((from, size, value));
-            return;
-        }
-        let local = self.field.narrowed(wide, &sounding, half_diagonal + LEAF_MARGIN * self.edge);
-        if size > LEAF {
-            self.halve(from, size, &Arc::new(local));
-            return;
-        }
-        for_each_corner(from, size, |at| {
-            if self.corners[corner_index(at)].is_nan() {
-                self.corners[corner_index(at)] = self.field.value(&local, &self.position(at)).f;
+impl Follower<'_> {
+    /// What the surface does in a cell, at a first look; `None` at later ones and where it does not pass.
+    fn look(&mut self, cell: Key) -> Option<Pieces> {
+        let key = cell.map(|k| k.div_euclid(BLOCK as i32));
+        let at = cell.map(|k| k.rem_euclid(BLOCK as i32) as usize);
+        let (field, edge) = (self.field, self.edge);
+        let position = |corner: [usize; 3]| {
+            grid_point([0, 1, 2].map(|axis| f64::from(key[axis]) * BLOCK as f64 + corner[axis] as f64), edge)
+        };
+        let block = self.blocks.entry(key).or_insert_with(|| {
+            let (centre, half) = (position([BLOCK / 2; 3]), half_diagonal(BLOCK, edge));
+            Block {
+                local: Arc::new(field.local(&centre, half + MARGIN * edge)),
+                leaves: vec![None; LEAVES * LEAVES * LEAVES],
+                corners: vec![f64::NAN; CORNERS * CORNERS * CORNERS],
+                seen: vec![false; BLOCK * BLOCK * BLOCK],
+                cells: vec![u32::MAX; BLOCK * BLOCK * BLOCK],
+                several: BTreeMap::new(),
             }
         });
-        self.leaves[leaf_index(from.map(|k| k / LEAF))] = Some(local);
+        if std::mem::replace(&mut block.seen[cell_index(at)], true) {
+            return None;
+        }
+        let leaf = at.map(|k| k / LEAF);
+        let local = block.leaves[leaf_index(leaf)].get_or_insert_with(|| {
+            let centre = position(leaf.map(|k| k * LEAF + LEAF / 2));
+            let sounding = field.sound(&block.local, &centre);
+            field.narrowed(&block.local, &sounding, half_diagonal(LEAF, edge) + LEAF_MARGIN * edge)
+        });
+        for corner in 0..8 {
+            let corner = [0, 1, 2].map(|axis| at[axis] + (corner >> axis & 1));
+            let known = &mut block.corners[corner_index(corner)];
+            if known.is_nan() {
+                *known = field.value(local, &position(corner)).f;
+            }
+        }
+        Pieces::of(|offset| block.corners[corner_index([0, 1, 2].map(|axis| at[axis] + offset[axis]))])
     }
 
-    fn position(&self, corner: [usize; 3]) -> Vec3 {
-        grid_point([0, 1, 2].map(|axis| self.first[axis] + corner[axis] as f64), self.edge)
+    /// Follows the surface from `cell` on.
+    fn follow(&mut self, cell: Key) {
+        let mut pending = vec![cell];
+        while let Some(cell) = pending.pop() {
+            let Some(pieces) = self.look(cell) else { continue };
+            for axis in 0..3 {
+                for (far, way) in [(false, -1), (true, 1)] {
+                    if pieces.passes(axis, far) {
+                        let mut next = cell;
+                        next[axis] += way;
+                        pending.push(next);
+                    }
+                }
+            }
+        }
     }
+}
+
+/// Half of the diagonal of so many cells.
+fn half_diagonal(cells: usize, edge: f64) -> f64 {
+    0.75_f64.sqrt() * cells as f64 * edge
 }
 
 fn grid_point(cell: [f64; 3], edge: f64) -> Vec3 {
     Vec3::from_fn(|axis, _| (cell[axis] + OFFSET[axis]) * edge)
 }
 
-fn for_each_corner(from: [usize; 3], size: usize, mut visit: impl FnMut([usize; 3])) {
-    for z in from[2]..=from[2] + size {
-        for y in from[1]..=from[1] + size {
-            for x in from[0]..=from[0] + size {
-                visit([x, y, z]);
-            }
-        }
-    }
-}
-
 /// Meshes the zero set of `field` on a grid of spacing `edge`.
 pub(super) fn mesh(field: &Field, edge: f64) -> Result<Nets> {
-    let width = BLOCK as f64 * edge;
-    let half_diagonal = width * 0.75_f64.sqrt();
-    let steepness = field.steepness();
-    let mut nets = Nets { vertices: Vec::new(), quads: Vec::new(), edge, locals: BTreeMap::new() };
-    let mut blocks: BTreeMap<Key, Block> = BTreeMap::new();
-    let keys: Vec<Key> = candidates(field, edge).into_iter().collect();
-    let first_corner = |key: &Key| key.map(|k| f64::from(k) * BLOCK as f64);
-    let sampled = parallel::map(keys.len(), |k| {
-        let first = first_corner(&keys[k]);
-        let centre = grid_point(first.map(|c| c + BLOCK as f64 / 2.0), edge);
-        let local = field.local(&centre, half_diagonal + MARGIN * edge);
-        if field.value(&local, &centre).f.abs() > steepness * half_diagonal {
-            return None;
-        }
-        let local = Arc::new(local);
-        let (corners, leaves) = Sampler::block(field, edge, first, &local);
-        Some((local, corners, leaves))
-    });
-    for (key, sampled) in keys.into_iter().zip(sampled) {
-        let Some((local, corners, leaves)) = sampled else { continue };
-        let first = first_corner(&key);
-        let mut cells = vec![u32::MAX; BLOCK * BLOCK * BLOCK];
-        let before = nets.vertices.len();
+    let mut follower = Follower { field, edge, blocks: BTreeMap::new() };
+    for cell in starts(field, edge) {
+        follower.follow(cell);
+    }
+    let mut blocks = follower.blocks;
+    let mut nets =
+        Nets { vertices: Vec::new(), quads: Vec::new(), has_parted: false, edge, locals: BTreeMap::new() };
+    for (key, block) in &mut blocks {
         for_each_cell(|at| {
-            if leaves[leaf_index(at.map(|k| k / LEAF))].is_none() {
+            if !block.seen[cell_index(at)] {
                 return;
             }
-            if let Some(inside) = crossing_mean(&corners, at) {
-                cells[cell_index(at)] = nets.vertices.len() as u32;
-                let cell = [0, 1, 2].map(|axis| first[axis] + at[axis] as f64 + inside[axis]);
+            let corner =
+                |offset: [usize; 3]| block.corners[corner_index([0, 1, 2].map(|k| at[k] + offset[k]))];
+            let Some(pieces) = Pieces::of(corner) else { return };
+            block.cells[cell_index(at)] = nets.vertices.len() as u32;
+            for mean in &pieces.means {
+                let cell = [0, 1, 2].map(|k| f64::from(key[k]) * BLOCK as f64 + at[k] as f64 + mean[k]);
                 nets.vertices.push(grid_point(cell, edge));
             }
+            if pieces.means.len() > 1 {
+                nets.has_parted = true;
+                block.several.insert(cell_index(at), pieces.of_edge);
+            }
         });
-        if nets.vertices.len() > before {
-            nets.locals.insert(key, (local, leaves));
-            blocks.insert(key, Block { corners, cells });
-        }
     }
     for (key, block) in &blocks {
         let mut missing = false;
@@ -212,7 +208,37 @@ pub(super) fn mesh(field: &Field, edge: f64) -> Result<Nets> {
             ));
         }
     }
+    nets.locals = blocks.into_iter().map(|(key, block)| (key, (block.local, block.leaves))).collect();
     Ok(nets)
+}
+
+/// Cells that the surface passes, in each branch some.
+fn starts(field: &Field, edge: f64) -> Vec<Key> {
+    let mut cells = Vec::new();
+    for branch in &field.branches {
+        let stride = ((BLOCK as f64 * edge / branch.step) as usize).max(1);
+        for sample in branch.samples.iter().step_by(stride) {
+            // Blends bulge by less than a radius.
+            let reach = 2.0 * sample.radius + 2.0 * edge;
+            let local = field.local(&sample.position, reach);
+            let axis = sample.tangent.iamin();
+            let mut cell = [0, 1, 2].map(|axis| (sample.position[axis] / edge - OFFSET[axis]).round() as i32);
+            let inside = |cell: &Key| field.value(&local, &grid_point(cell.map(f64::from), edge)).f < 0.0;
+            if !inside(&cell) {
+                continue;
+            }
+            for _ in 0..(reach / edge) as usize {
+                let mut next = cell;
+                next[axis] += 1;
+                if !inside(&next) {
+                    cells.push(cell);
+                    break;
+                }
+                cell = next;
+            }
+        }
+    }
+    cells
 }
 
 fn for_each_cell(mut visit: impl FnMut([usize; 3])) {
@@ -223,57 +249,6 @@ fn for_each_cell(mut visit: impl FnMut([usize; 3])) {
             }
         }
     }
-}
-
-/// Blocks that the lumen, widened by a block, can reach.
-fn candidates(field: &Field, edge: f64) -> BTreeSet<Key> {
-    let width = BLOCK as f64 * edge;
-    let mut keys = BTreeSet::new();
-    for branch in &field.branches {
-        for sample in &branch.samples {
-            // Blends bulge by less than a radius; the end may go on for the extension.
-            let reach = 1.3 * sample.radius + field.extension + branch.step;
-            let key = |axis: usize, sign: f64| {
-                ((sample.position[axis] + sign * reach) / width - OFFSET[axis] / BLOCK as f64).floor() as i32
-            };
-            for z in key(2, -1.0)..=key(2, 1.0) {
-                for y in key(1, -1.0)..=key(1, 1.0) {
-                    for x in key(0, -1.0)..=key(0, 1.0) {
-                        keys.insert([x, y, z]);
-                    }
-                }
-            }
-        }
-    }
-    keys
-}
-
-/// Mean of the points where the surface crosses the twelve edges of a cell, from its first corner, in cells.
-fn crossing_mean(corners: &[f64], cell: [usize; 3]) -> Option<[f64; 3]> {
-    let base = corner_index(cell);
-    let inside = CELL.iter().filter(|&&corner| corners[base + corner] < 0.0).count();
-    if inside == 0 || inside == CELL.len() {
-        return None;
-    }
-    let value = |offset: [usize; 3]| corners[corner_index([0, 1, 2].map(|a| cell[a] + offset[a]))];
-    let (mut sum, mut count) = (Vec3::zeros(), 0.0);
-    for axis in 0..3 {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        for (du, dv) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let mut from = [0; 3];
-            (from[u], from[v]) = (du, dv);
-            let mut to = from;
-            to[axis] = 1;
-            let (a, b) = (value(from), value(to));
-            if (a < 0.0) != (b < 0.0) {
-                let mut at = Vec3::from_fn(|k, _| from[k] as f64);
-                at[axis] = a / (a - b);
-                sum += at;
-                count += 1.0;
-            }
-        }
-    }
-    (count > 0.0).then(|| (sum / count).into())
 }
 
 /// Adds the quadrilateral around the grid edge from the first corner of `cell` along `axis`, if the surface crosses it.
@@ -289,7 +264,8 @@ fn push_quad(
     let mut ahead = cell;
     ahead[axis] += 1;
     let (a, b) = (block.corners[corner_index(cell)], block.corners[corner_index(ahead)]);
-    if (a < 0.0) == (b < 0.0) {
+    // Not numbers where the surface does not lead.
+    if a.is_nan() || b.is_nan() || (a < 0.0) == (b < 0.0) {
         return true;
     }
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -306,7 +282,8 @@ fn push_quad(
                 at[direction] -= 1;
             }
         }
-        quad[corner] = blocks.get(&key).map_or(u32::MAX, |b| b.cells[cell_index(at)]);
+        let edge = 4 * axis + usize::from(back_u) + 2 * usize::from(back_v);
+        quad[corner] = blocks.get(&key).map_or(u32::MAX, |b| b.vertex(cell_index(at), edge));
     }
     if a >= 0.0 {
         quad.reverse();

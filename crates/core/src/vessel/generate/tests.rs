@@ -153,13 +153,20 @@ fn an_end_inside_another_branch_and_a_tight_bend_are_refused_by_row() {
 }
 
 #[test]
-fn many_branches_from_one_point_end_soon_with_the_grid_that_was_tried() {
-    let mut rows = vec![([0.0, 0.0, 0.0], 1.0, -1), ([0.0, 0.0, 6.0], 1.0, 0)];
-    rows.extend((0..20).map(|k| {
-        let (sin, cos) = (18.0 * f64::from(k)).to_radians().sin_cos();
-        ([4.0 * cos, 4.0 * sin, 9.0], 0.2, 1)
-    }));
-    let message = GeneratedWall::new(&tree(&rows), Resolution::EdgeMm(0.5)).unwrap_err().to_string();
+fn many_branches_from_one_point_are_told_apart_or_end_soon_with_the_grid_that_was_tried() {
+    let star = |count: u32, out_mm: f64| {
+        let mut rows = vec![([0.0, 0.0, 0.0], 1.0, -1), ([0.0, 0.0, 6.0], 1.0, 0)];
+        rows.extend((0..count).map(|k| {
+            let (sin, cos) = (360.0 * f64::from(k) / f64::from(count)).to_radians().sin_cos();
+            ([out_mm * cos, out_mm * sin, 9.0], 0.2, 1)
+        }));
+        GeneratedWall::new(&tree(&rows), Resolution::EdgeMm(0.5))
+    };
+    // In their narrow angles cells hold two pieces of surface.
+    let report = check(star(20, 4.0).unwrap().wall.mesh()).unwrap();
+    assert!(report.is_sound() && report.self_intersections == 0, "{report:?}");
+    assert_eq!((report.components, report.openings.len()), (1, 21));
+    let message = star(40, 6.0).unwrap_err().to_string();
     assert!(message.contains("a grid of 0.1"), "{message}");
 }
 

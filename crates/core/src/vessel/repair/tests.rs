@@ -288,7 +288,7 @@ fn folds_and_spikes_are_cut_out_and_filled() {
     let clean = fork();
     for (place, push) in [
         // Pulled through its neighbours along the wall; and in through the other side of the vessel.
-        ([4., 15., 0.], Vec3::new(0.0, 3.0, 0.0)),
+        ([0., 15., 4.], Vec3::new(-0.1, 3.0, 0.0)),
         ([4., 15., 0.], Vec3::new(-9.0, 0.5, 0.3)),
         ([15., 52., 3.], Vec3::new(-3.0, -4.5, -0.1)),
     ] {

@@ -1,0 +1,152 @@
+//! The surface within one cell of a grid, by the values at its corners: its pieces, and where each crosses the cell's edges.
+//!
+//! On a face the crossings of its sides are joined to lines; what hangs together around the cell is a piece. On a face with four
+//! crossings it is the sign of the saddle of the bilinear interpolation that says which two belong together (Nielson and Hamann, "The
+//! asymptotic decider", Visualization 1991), and both cells at the face say the same. Where the narrow angle of a fork cuts off opposite
+//! corners of a cell, one vertex for both would make edges of four quadrilaterals; one for each piece makes none (Nielson, "Dual marching
+//! cubes", Visualization 2004).
+
+use crate::Vec3;
+
+/// Edges of a cell. Along `axis`, at `du` and `dv` of the two axes that follow it, runs edge 4 axis + du + 2 dv.
+pub(super) const EDGES: usize = 12;
+
+/// No piece: the surface does not cross the edge.
+const NO_PIECE: u8 = u8::MAX;
+
+/// Pieces of surface in a cell.
+pub(super) struct Pieces {
+    /// The piece that crosses each edge.
+    pub(super) of_edge: [u8; EDGES],
+    /// Mean of the points where each crosses edges, from the cell's first corner, in cells.
+    pub(super) means: Vec<[f64; 3]>,
+}
+
+/// Both ends of an edge.
+fn ends(edge: usize) -> [[usize; 3]; 2] {
+    let axis = edge / 4;
+    let mut from = [0; 3];
+    (from[(axis + 1) % 3], from[(axis + 2) % 3]) = (edge & 1, edge >> 1 & 1);
+    let mut to = from;
+    to[axis] = 1;
+    [from, to]
+}
+
+impl Pieces {
+    /// What the surface does in a cell of these values at its corners, if anything.
+    pub(super) fn of(value: impl Fn([usize; 3]) -> f64) -> Option<Self> {
+        let crossing = |edge: usize| {
+            let [from, to] = ends(edge);
+            let (a, b) = (value(from), value(to));
+            ((a < 0.0) != (b < 0.0)).then(|| {
+                let mut at = Vec3::from_fn(|k, _| from[k] as f64);
+                at[edge / 4] = a / (a - b);
+                at
+            })
+        };
+        let at: [Option<Vec3>; EDGES] = std::array::from_fn(crossing);
+        if at.iter().all(Option::is_none) {
+            return None;
+        }
+        // The first edge of each piece stands for it.
+        let mut first: [usize; EDGES] = std::array::from_fn(|edge| edge);
+        let mut join = |a: usize, b: usize| {
+            let (low, high) = (first[a].min(first[b]), first[a].max(first[b]));
+            first.iter_mut().filter(|f| **f == high).for_each(|f| *f = low);
+        };
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            for side in 0..2 {
+                let sides = [u * 4 + 2 * side, v * 4 + side + 2, u * 4 + 1 + 2 * side, v * 4 + side];
+                let mut crossed = sides.iter().copied().filter(|edge| at[*edge].is_some());
+                match (crossed.next(), crossed.next(), crossed.next()) {
+                    (Some(a), Some(b), None) => join(a, b),
+                    (Some(_), Some(_), Some(_)) => {
+                        let corner = |p: usize, q: usize| {
+                            let mut at = [side; 3];
+                            (at[u], at[v]) = (p, q);
+                            value(at)
+                        };
+                        let [low, right, high, left] = sides;
+                        // What is joined is around a corner that the saddle cuts off.
+                        if corner(0, 0) * corner(1, 1) > corner(1, 0) * corner(0, 1) {
+                            join(low, right);
+                            join(high, left);
+                        } else {
+                            join(low, left);
+                            join(high, right);
+                        }
+                    }
+                    _ => {}
+                }
+            }
+        }
+        let mut of_edge = [NO_PIECE; EDGES];
+        let mut sums: Vec<(Vec3, f64)> = Vec::with_capacity(1);
+        for edge in 0..EDGES {
+            let Some(at) = at[edge] else { continue };
+            if first[edge] == edge {
+                of_edge[edge] = sums.len() as u8;
+                sums.push((Vec3::zeros(), 0.0));
+            }
+            of_edge[edge] = of_edge[first[edge]];
+            let sum = &mut sums[of_edge[edge] as usize];
+            sum.0 += at;
+            sum.1 += 1.0;
+        }
+        let means = sums.into_iter().map(|(sum, count)| (sum / count).into()).collect();
+        Some(Self { of_edge, means })
+    }
+
+    /// Whether the surface passes through the side of the cell towards `axis`, the far one or the near one.
+    pub(super) fn passes(&self, axis: usize, far: bool) -> bool {
+        let (u, v, side) = ((axis + 1) % 3, (axis + 2) % 3, usize::from(far));
+        [u * 4 + 2 * side, u * 4 + 1 + 2 * side, v * 4 + side, v * 4 + side + 2]
+            .iter()
+            .any(|edge| self.of_edge[*edge] != NO_PIECE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pieces of a cell of which these corners are inside; a list of corners by x + 2y + 4z.
+    fn pieces(inside: &[usize], depth: f64) -> Option<Pieces> {
+        Pieces::of(|[x, y, z]| if inside.contains(&(x + 2 * y + 4 * z)) { -depth } else { 1.0 })
+    }
+
+    #[test]
+    fn a_cell_has_a_piece_for_each_corner_that_is_cut_off() {
+        assert!(pieces(&[], 1.0).is_none());
+        let one = pieces(&[0], 1.0).unwrap();
+        assert_eq!(one.means.len(), 1);
+        assert!((Vec3::from(one.means[0]) - Vec3::repeat(1.0 / 6.0)).norm() < 1e-15);
+        assert_eq!(one.of_edge.iter().filter(|piece| **piece == 0).count(), 3);
+        // Opposite corners of the cell, and of a face: two pieces, unless they are deep enough to be one.
+        assert_eq!(pieces(&[0, 7], 1.0).unwrap().means.len(), 2);
+        assert_eq!(pieces(&[0, 3], 0.5).unwrap().means.len(), 2);
+        assert_eq!(pieces(&[0, 3], 2.0).unwrap().means.len(), 1);
+        assert_eq!(pieces(&[0, 1, 2, 3], 1.0).unwrap().means, [[0.5; 3]]);
+    }
+
+    #[test]
+    fn two_pieces_share_no_edge_and_pass_through_their_own_sides() {
+        let two = pieces(&[0, 7], 1.0).unwrap();
+        for edge in 0..EDGES {
+            let [from, to] = ends(edge);
+            let of_first = from == [0; 3];
+            let of_last = to == [1; 3];
+            let expected = if of_first {
+                0
+            } else if of_last {
+                1
+            } else {
+                NO_PIECE
+            };
+            assert_eq!(two.of_edge[edge], expected, "{edge}");
+        }
+        let one = pieces(&[0], 1.0).unwrap();
+        assert!((0..3).all(|axis| one.passes(axis, false) && !one.passes(axis, true)));
+    }
+}
