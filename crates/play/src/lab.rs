@@ -137,13 +137,13 @@ impl Lab {
         Ok(())
     }
 
-    /// Injects `ml` at `at_mm` from `time_s` on.
+    /// Injects `ml` at `at_mm`, or at the inlet, from `time_s` on; what flows of it.
     pub(crate) fn inject(
         &mut self,
         (ml, ml_per_s): (f64, f64),
         at_mm: Option<Vec3>,
         time_s: f64,
-    ) -> Result<()> {
+    ) -> Result<InjectionSpec> {
         for (name, value) in [("ml", ml), ("ml_per_s", ml_per_s)] {
             if !(0.1..=100.0).contains(&value) {
                 return Err(Error::parameter(name, value, "must be a number from 0.1 to 100"));
@@ -160,10 +160,29 @@ impl Lab {
             at_mm: at_mm.map(Into::into),
             at_tip: false,
         };
+        self.flow_again([].into_iter(), vec![bolus.clone()])?;
+        Ok(bolus)
+    }
+
+    /// Has injections flow no more, and others from now on.
+    pub(crate) fn flow_again<'a>(
+        &mut self,
+        undone: impl Iterator<Item = &'a InjectionSpec>,
+        more: Vec<InjectionSpec>,
+    ) -> Result<()> {
+        let mut injection = self.fluoro.injection.clone();
+        undone.for_each(|one| injection.retain(|other| other != one));
+        if injection.len() == self.fluoro.injection.len() && more.is_empty() {
+            return Ok(());
+        }
+        injection.extend(more);
+        injection.drain(..injection.len().saturating_sub(MOST_INJECTIONS));
         self.change(|spec| {
-            let first = (spec.injection.len() + 1).saturating_sub(MOST_INJECTIONS);
-            spec.injection.drain(..first);
-            spec.injection.push(bolus);
+            if spec.xray.mode == Mode::Roadmap && injection.is_empty() {
+                // It would be one of no angiogram.
+                spec.xray.mode = Mode::Fluoro;
+            }
+            spec.injection = injection;
         })
     }
 

@@ -10,6 +10,7 @@ mod input;
 mod lab;
 mod pictures;
 mod readout;
+mod script;
 mod session;
 
 pub use hand::Motion;

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use endowire_core::insertion::Simulation;
+use endowire_core::insertion::{Injection, Simulation};
 use endowire_core::vessel::NoStore;
 use endowire_methods::Scene;
 use endowire_play::{EventKind, Input, Limits, Pictures, Session};
@@ -68,6 +68,7 @@ impl Dice {
             13 => Input::Collimate { width: share, height: share },
             14 => Input::TurnCamera { azimuth_deg: step, elevation_deg: turn },
             _ if self.below(8) == 0 => Input::Undo {},
+            _ if self.below(8) == 0 => Input::Redo {},
             _ if wild && self.below(8) == 0 => Input::GoTo { step: self.below(1000) as usize },
             _ => Input::Stop {},
         }
@@ -75,7 +76,12 @@ impl Dice {
 }
 
 /// The motions of a session, carried out by the scene as its script.
-fn replayed(mut scene: Scene, session: &Session) -> Simulation {
+fn replayed(scene: Scene, session: &Session) -> Simulation {
+    replayed_with_injections(scene, session).0
+}
+
+/// The same, with what was injected.
+fn replayed_with_injections(mut scene: Scene, session: &Session) -> (Simulation, Vec<Injection>) {
     let file =
         std::env::temp_dir().join(format!("endowire-played-{}-{}.toml", scene.name, std::process::id()));
     std::fs::write(&file, session.script()).unwrap();
@@ -89,7 +95,8 @@ fn replayed(mut scene: Scene, session: &Session) -> Simulation {
         simulation.step_together(&step).unwrap();
         run.carried_out();
     }
-    simulation
+    let injections = run.injections().to_vec();
+    (simulation, injections)
 }
 
 #[test]
@@ -115,8 +122,9 @@ fn ten_thousand_wild_inputs_do_no_harm() {
     let mut refused = 0;
     for _ in 0..10_000 {
         let before = session.steps();
-        refused += usize::from(session.apply(&dice.input(&["device", "nothing"], true)).is_err());
-        assert!(session.steps() <= before);
+        let input = dice.input(&["device", "nothing"], true);
+        refused += usize::from(session.apply(&input).is_err());
+        assert!(session.steps() <= before || input == Input::Redo {});
         if dice.below(4) == 0 {
             session.tick();
         }
@@ -151,6 +159,85 @@ fn any_earlier_moment_can_be_had_again() {
         session.apply(&Input::Undo {}).unwrap();
         assert_eq!(session.steps(), steps);
     }
+}
+
+fn go(session: &mut Session, instrument: &str, mm_per_s: f64, ticks: usize) {
+    session
+        .apply(&Input::Move { instrument: Some(instrument.to_owned()), mm_per_s, deg_per_s: 0.0 })
+        .unwrap();
+    (0..ticks).for_each(|_| session.tick());
+    session.apply(&Input::Stop {}).unwrap();
+    session.tick();
+}
+
+#[test]
+fn what_hands_inject_is_a_line_of_the_script_at_its_step_and_time() {
+    let (path, scene) = scene("arch_vertebral.toml");
+    let mut view = ViewSpec::of_scene(&scene, &path).unwrap();
+    view.flow.tree = Some(path.with_file_name("../vessels/aortic_arch.csv"));
+    let mut session = Session::new(scene.simulation(&NoStore).unwrap(), view, 64, Limits::default()).unwrap();
+    let inject = |ml: f64| Input::Inject { ml, ml_per_s: 4.0 };
+    // The catheter is out, and the wire has no lumen; then through the catheter twice, between alike steps.
+    go(&mut session, "catheter", -60.0, 60);
+    session.apply(&inject(2.0)).unwrap();
+    let out = session.steps();
+    go(&mut session, "catheter", 30.0, 30);
+    session.apply(&inject(3.0)).unwrap();
+    go(&mut session, "catheter", 30.0, 6);
+    session.apply(&inject(4.5)).unwrap();
+    assert!(session.script().contains("# 2.0 ml"), "{}", session.script());
+    let tip_mm = session.simulation().tip_of_mm(1).unwrap();
+    let last = session.snapshot().lab.fluoro().injection.last().cloned().unwrap();
+    assert_eq!(last.at_mm.map(endowire_core::Vec3::from), Some(tip_mm));
+
+    let (simulation, injections) = replayed_with_injections(scene, &session);
+    assert_eq!(simulation.shape(), session.simulation().shape());
+    let told: Vec<_> =
+        injections.iter().map(|one| (one.instrument, one.ml, one.ml_per_s, one.after_step)).collect();
+    assert_eq!(told, [(1, 3.0, 4.0, out + 30), (1, 4.5, 4.0, out + 36)]);
+    // A step is a tick; rests are none.
+    for one in injections {
+        assert!((one.time_s.unwrap() - one.after_step as f64 / 60.0).abs() < 1e-9, "{one:?}");
+    }
+}
+
+#[test]
+fn what_was_undone_is_done_again_with_the_same_bits_until_something_else_is_done() {
+    let (_, mut session) = session("arch_angiography.toml");
+    let flowing = |session: &Session| session.snapshot().lab.fluoro().injection.len();
+    let mut shapes = vec![session.simulation().shape().clone()];
+    for (mm_per_s, ticks) in [(60.0, 70), (-20.0, 10), (45.0, 80)] {
+        go(&mut session, "device", mm_per_s, ticks);
+        shapes.push(session.simulation().shape().clone());
+    }
+    session.apply(&Input::Inject { ml: 5.0, ml_per_s: 5.0 }).unwrap();
+    let (script, all) = (session.script(), flowing(&session));
+    for (input, steps, shape) in [
+        (Input::Undo {}, 80, 2),
+        (Input::Undo {}, 70, 1),
+        (Input::Redo {}, 80, 2),
+        (Input::Undo {}, 70, 1),
+        (Input::Undo {}, 0, 0),
+        (Input::Redo {}, 70, 1),
+        (Input::Redo {}, 80, 2),
+        (Input::Redo {}, 160, 3),
+        (Input::Redo {}, 160, 3),
+    ] {
+        session.apply(&input).unwrap();
+        assert_eq!((session.steps(), session.simulation().shape()), (steps, &shapes[shape]), "{input:?}");
+        // What was injected after the last motion comes and goes with it.
+        assert_eq!(flowing(&session) == all, steps == 160, "{input:?}");
+    }
+    assert_eq!(session.script(), script);
+    // A hand that moves, or an injection, takes what was undone away.
+    session.apply(&Input::Undo {}).unwrap();
+    go(&mut session, "device", 30.0, 3);
+    session.apply(&Input::Redo {}).unwrap();
+    assert_eq!(session.steps(), 83);
+    session.apply(&Input::Undo {}).unwrap();
+    session.apply(&Input::Inject { ml: 5.0, ml_per_s: 5.0 }).unwrap();
+    session.apply(&Input::Redo {}).unwrap();
+    assert_eq!((session.steps(), flowing(&session)), (80, all));
 }
 
 #[test]
