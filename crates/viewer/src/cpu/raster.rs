@@ -97,7 +97,8 @@ impl ScreenTriangle {
                 if inside {
                     entered = true;
                     let sum = e[0] + e[1] + e[2];
-                    let weights = if sum > 0.0 { [e[0] / sum, e[1] / sum, e[2] / sum] } else { [1.0 / 3.0; 3] };
+                    let weights =
+                        if sum > 0.0 { [e[0] / sum, e[1] / sum, e[2] / sum] } else { [1.0 / 3.0; 3] };
                     visit(x, y, weights);
                 } else if entered {
                     break;
