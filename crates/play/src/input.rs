@@ -74,6 +74,9 @@ pub enum Input {
         /// Downwards in the picture, mm at the isocentre.
         #[serde(default)]
         down_mm: f64,
+        /// Whether that is the picture of the second plane.
+        #[serde(default)]
+        second: bool,
     },
     /// Magnifies by a factor.
     Zoom {

@@ -2,7 +2,6 @@
 
 use endowire_core::insertion::{InstrumentReport, Simulation};
 use endowire_core::shape::Shape;
-use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, PhysicalEnd, Result};
 use endowire_viewer::{ContactView, Moment, ViewSpec};
 
@@ -62,6 +61,15 @@ pub struct Snapshot {
     pub moment: Moment,
     /// What is read.
     pub readout: Readout,
+}
+
+/// What a frame of fluoroscopy brings to the detectors of all planes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Delivered {
+    /// The room that it is of ([`Lab::revisions`]).
+    pub(crate) revision: u64,
+    /// Air kerma, nGy.
+    pub(crate) frame_ngy: f64,
 }
 
 impl std::fmt::Debug for Session {
@@ -124,7 +132,9 @@ impl Session {
             Input::Inject { ml, ml_per_s } => self.inject(*ml, *ml_per_s)?,
             Input::CArm { pose } => self.lab.pose(*pose)?,
             Input::TurnCArm { lao_deg, cra_deg } => self.lab.turn_c_arm([*lao_deg, *cra_deg])?,
-            Input::Table { right_mm, down_mm } => self.lab.table(*right_mm, *down_mm)?,
+            Input::Table { right_mm, down_mm, second } => {
+                self.lab.table([*right_mm, *down_mm], *second)?;
+            }
             Input::Zoom { factor } => self.lab.zoom(*factor)?,
             Input::Collimate { width, height } => self.lab.collimate([*width, *height])?,
             Input::TurnCamera { azimuth_deg, elevation_deg } => {
@@ -261,9 +271,9 @@ impl Session {
         self.history.script(self.simulation.stack())
     }
 
-    /// The vessel, closed, as pictures need it.
-    pub fn closed_wall(&self) -> SurfaceMesh {
-        self.simulation.wall().closed_mesh()
+    /// Hears what exposure control has brought to the detectors since the room is as it is; until then what is wanted counts.
+    pub fn exposed(&mut self, delivered: Delivered) {
+        self.lab.exposed(delivered);
     }
 
     /// What is drawn of this moment.
@@ -302,6 +312,7 @@ impl Session {
                 mode: spec.xray.mode,
                 lao_deg: spec.c_arm.primary_deg,
                 cra_deg: spec.c_arm.secondary_deg,
+                second_deg: self.lab.second_deg(),
                 magnification: self.lab.magnification(),
                 field_mm: self.lab.field_mm(),
                 open: self.lab.open(),

@@ -8,7 +8,7 @@ use endowire_core::insertion::{Injection, Simulation};
 use endowire_core::vessel::NoStore;
 use endowire_methods::Scene;
 use endowire_play::{EventKind, Input, Limits, Pictures, Session};
-use endowire_viewer::{Mode, ViewSpec};
+use endowire_viewer::{ExposureSpec, Mode, ViewSpec};
 
 fn scene(name: &str) -> (PathBuf, Scene) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/scenes").join(name);
@@ -63,7 +63,7 @@ impl Dice {
             }
             9 => Input::Inject { ml: 5.0 * share, ml_per_s: 10.0 * share },
             10 => Input::TurnCArm { lao_deg: step, cra_deg: turn },
-            11 => Input::Table { right_mm: 10.0 * step, down_mm: 5.0 * step },
+            11 => Input::Table { right_mm: 10.0 * step, down_mm: 5.0 * step, second: share > 0.4 },
             12 => Input::Zoom { factor: 1.0 + share },
             13 => Input::Collimate { width: share, height: share },
             14 => Input::TurnCamera { azimuth_deg: step, elevation_deg: turn },
@@ -270,13 +270,14 @@ fn hands_stop_at_the_ends_and_limits_warn() {
 #[test]
 fn pictures_follow_the_pedal() {
     let (scene, mut session) = session("arch_angiography.toml");
-    let mut pictures = Pictures::new(&scene, &session.snapshot(), session.closed_wall()).unwrap();
-    assert!(pictures.fluoro(&session.snapshot()).unwrap().is_none());
+    let mut pictures =
+        Pictures::new(&scene, &session.snapshot(), session.simulation().wall().clone()).unwrap();
+    assert!(pictures.fluoro(&session.snapshot()).unwrap().is_empty());
     let show = |session: &mut Session, pictures: &mut Pictures, input: Input| {
         session.apply(&input).unwrap();
         session.tick();
         session.tick();
-        pictures.fluoro(&session.snapshot()).unwrap().unwrap().clone()
+        pictures.fluoro(&session.snapshot()).unwrap()[0].clone()
     };
     let fluoro = Input::Pedal { down: true, mode: Some(Mode::Fluoro) };
     let first = show(&mut session, &mut pictures, fluoro.clone());
@@ -296,13 +297,94 @@ fn pictures_follow_the_pedal() {
     show(&mut session, &mut pictures, Input::Inject { ml: 15.0, ml_per_s: 15.0 });
     (0..60).for_each(|_| session.tick());
     let dark = |pictures: &mut Pictures, session: &Session| {
-        let image = pictures.fluoro(&session.snapshot()).unwrap().unwrap();
+        let image = &pictures.fluoro(&session.snapshot()).unwrap()[0];
         image.data().iter().filter(|pixel| **pixel < 100).count()
     };
     let filled = dark(&mut pictures, &session);
     (0..1200).for_each(|_| session.tick());
     let empty = dark(&mut pictures, &session);
     assert!(filled > 4 * empty + 40, "{filled} {empty}");
+}
+
+#[test]
+fn two_planes_are_live_together_and_a_room_that_changes_is_coarse_until_it_is_sharp() {
+    let (path, scene) = scene("curved_tube.toml");
+    let mut view = ViewSpec::of_scene(&scene, &path).unwrap();
+    view.biplane_deg = Some(90.0);
+    let mut session = Session::new(scene.simulation(&NoStore).unwrap(), view, 64, Limits::default()).unwrap();
+    let wall = session.simulation().wall().clone();
+    let mut pictures = Pictures::new(&scene, &session.snapshot(), wall.clone()).unwrap();
+    session.apply(&Input::Pedal { down: true, mode: Some(Mode::Fluoro) }).unwrap();
+    session.tick();
+    let before = session.readout().lab.lao_deg;
+    assert_eq!(session.readout().lab.second_deg.map(|[lao, _]| lao), Some(before + 90.0));
+    let [a, b] = <[_; 2]>::try_from(pictures.fluoro(&session.snapshot()).unwrap().to_vec()).unwrap();
+    assert_ne!(a, b);
+    session.apply(&Input::TurnCArm { lao_deg: -90.0, cra_deg: 0.0 }).unwrap();
+    let turned = pictures.fluoro(&session.snapshot()).unwrap().to_vec();
+    assert_eq!(turned[1].data(), a.data(), "the second stands where the first stood");
+    // Dose is that of both, a tick of 30 nGy frames at 30 a second.
+    assert!((session.readout().lab.dose_ugy - 2.0 * 0.03 / 2.0).abs() < 1e-12);
+    // The table goes along the picture that was dragged.
+    let isocentre = |session: &Session| session.snapshot().lab.fluoro().c_arm.isocentre_mm.unwrap();
+    let at = isocentre(&session);
+    session.apply(&Input::Table { right_mm: 2.0, down_mm: 0.0, second: false }).unwrap();
+    let first = isocentre(&session);
+    session.apply(&Input::Table { right_mm: 2.0, down_mm: 0.0, second: true }).unwrap();
+    let second = isocentre(&session);
+    let way = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| b[k] - a[k]);
+    let dot: f64 = way(at, first).into_iter().zip(way(first, second)).map(|(a, b)| a * b).sum();
+    assert!(dot.abs() < 1e-9 && at != first && first != second, "{dot}");
+
+    // On a clock the first frames of a new room are coarse, the last ones those of who waits.
+    let mut sharp = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
+    let widths = |images: &[endowire_viewer::Image]| images.iter().map(|i| i.width()).collect::<Vec<_>>();
+    let mut under_way = Vec::new();
+    let mut frames = 0;
+    while under_way.is_empty() {
+        assert_eq!(widths(pictures.soon(&session.snapshot()).unwrap()), [16, 16]);
+        under_way = pictures.sharpenings(&session.snapshot()).unwrap();
+        frames += 1;
+        session.tick();
+    }
+    assert_eq!((frames, under_way.len()), (4, 2), "three frames of rest");
+    assert!(pictures.sharpenings(&session.snapshot()).unwrap().is_empty(), "each is under way once");
+    for one in under_way {
+        pictures.sharpened(one.carry_out()).unwrap();
+    }
+    assert_eq!(pictures.soon(&session.snapshot()).unwrap(), sharp.fluoro(&session.snapshot()).unwrap());
+    session.apply(&Input::Collimate { width: 0.5, height: 0.5 }).unwrap();
+    assert_eq!(widths(pictures.soon(&session.snapshot()).unwrap()), [16, 16]);
+}
+
+#[test]
+fn dose_is_what_exposure_control_brings() {
+    let (path, scene) = scene("curved_tube.toml");
+    let dose = |most_ma: f64, known_after: usize| {
+        let mut view = ViewSpec::of_scene(&scene, &path).unwrap();
+        view.xray.pulse_ms = 8.0;
+        let control = ExposureSpec { current_ma: [0.01, most_ma], curve: vec![[100.0, 125.0]] };
+        view.exposure = Some(control);
+        let simulation = scene.simulation(&NoStore).unwrap();
+        let mut session = Session::new(simulation, view, 64, Limits::default()).unwrap();
+        let wall = session.simulation().wall().clone();
+        let mut pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
+        session.apply(&Input::Pedal { down: true, mode: Some(Mode::Fluoro) }).unwrap();
+        for tick in 0..60 {
+            session.tick();
+            if tick == known_after {
+                let delivered = pictures.expose(&session.snapshot()).unwrap().unwrap();
+                session.exposed(delivered);
+            }
+        }
+        session.readout().lab.dose_ugy
+    };
+    // A second of 30 frames of 30 nGy, if the tube can; the ticks before it was known count alike.
+    let wanted = 30.0 * 0.03;
+    assert!((dose(1000.0, 5) - wanted).abs() < 1e-9);
+    let weak = dose(0.02, 5);
+    assert!(weak < 0.5 * wanted && weak > 0.0, "{weak}");
+    assert_eq!(dose(0.02, 40), weak);
 }
 
 #[test]

@@ -48,6 +48,7 @@ pub(crate) struct Flow {
     /// Which of them is nearest to what in the lumen.
     pub(super) cells: Arc<Mutex<Cells>>,
     largest: OnceLock<Vec<f32>>,
+    carried: OnceLock<Arc<Mutex<Transport>>>,
     pub(super) injections: Vec<InjectionSpec>,
     pub(super) mean_inflow_mm3_per_s: f64,
     /// Mean time that medium stays in the tissue behind an end, s.
@@ -86,6 +87,7 @@ impl Flow {
             nodes: directed(tree, spec)?,
             cells: Arc::default(),
             largest: OnceLock::new(),
+            carried: OnceLock::new(),
             injections: injections.to_vec(),
             mean_inflow_mm3_per_s: spec.inflow_ml_per_s * 1000.0,
             tissue_s: spec.tissue_s,
@@ -102,8 +104,19 @@ impl Flow {
             nodes: self.nodes.clone(),
             cells: Arc::clone(&self.cells),
             largest: OnceLock::new(),
+            carried: OnceLock::new(),
             injections: injections.to_vec(),
             ..*self
+        }
+    }
+
+    /// The medium on its way, for all that show it: a moment is the same whoever asked for one before. What a tip injects depends on where it was
+    /// when it was asked for, and is everyone's own.
+    pub(super) fn carried(&self) -> Arc<Mutex<Transport>> {
+        let anew = || Arc::new(Mutex::new(Transport::new(self)));
+        match self.injections.iter().any(|one| one.at_tip) {
+            true => anew(),
+            false => Arc::clone(self.carried.get_or_init(anew)),
         }
     }
 

@@ -5,7 +5,7 @@
 //! the centre line, to that node's neighbour on its side: a bolus has no steps. A frame then needs one sparse product of these shares
 //! with the nodes' fractions.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
@@ -35,7 +35,7 @@ const TISSUE_REACH: f64 = 16.0;
 #[derive(Debug)]
 pub(crate) struct ContrastMap {
     flow: Arc<Flow>,
-    transport: Transport,
+    transport: Arc<Mutex<Transport>>,
     shares: Arc<Shares>,
 }
 
@@ -113,7 +113,7 @@ impl Shares {
 impl ContrastMap {
     /// Medium of `flow`, shared out to pixels.
     pub(crate) fn new(flow: &Arc<Flow>, shares: Arc<Shares>) -> Self {
-        Self { flow: Arc::clone(flow), transport: Transport::new(flow), shares }
+        Self { flow: Arc::clone(flow), transport: flow.carried(), shares }
     }
 
     /// How the lumen of each pixel is shared out, which another injection does not change.
@@ -123,9 +123,10 @@ impl ContrastMap {
 
     /// What the pixels see that see any, rising. What is injected through a tip has come from `tip_mm` since the time asked for before.
     pub(crate) fn at(&mut self, time_s: f64, tip_mm: Option<Vec3>) -> Vec<Medium> {
-        self.transport.advance(&self.flow, time_s, tip_mm);
-        let mut seen = self.shares.mixed(&self.transport.at(time_s));
-        let volumes = self.transport.tissue_mm3();
+        let mut transport = self.transport.lock().unwrap_or_else(PoisonError::into_inner);
+        transport.advance(&self.flow, time_s, tip_mm);
+        let mut seen = self.shares.mixed(&transport.at(time_s));
+        let volumes = transport.tissue_mm3();
         let filled = self.shares.tissue.iter().filter(|end| volumes[end.0] > 0.0);
         for (end, pixels) in filled {
             let volume = volumes[*end] as f32;
