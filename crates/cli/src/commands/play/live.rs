@@ -261,7 +261,13 @@ pub(crate) fn draw(pictures: Pictures, newest: &Newest, show: impl FnMut(&Shown<
     let (to, jobs) = mpsc::channel::<Sharpening>();
     let (done, back) = mpsc::channel();
     std::thread::scope(|scope| {
-        scope.spawn(move || jobs.into_iter().try_for_each(|job| done.send(job.carry_out())));
+        scope.spawn(move || {
+            for job in jobs {
+                if done.send(job.carry_out()).is_err() {
+                    break;
+                }
+            }
+        });
         // The other thread ends when nobody can give it more to do.
         draw_with(pictures, newest, (to, back), show)
     })
