@@ -35,6 +35,8 @@ fn a_page_is_whole_and_names_where_it_comes_from() {
     let none = endowire().arg("report").arg(folder.path()).output().unwrap();
     assert_eq!(none.status.code(), Some(2));
     assert!(said(&none).contains("recorded run"));
+    let none = endowire().arg("report").arg(folder.path().join("nowhere")).output().unwrap();
+    assert!(said(&none).contains("recorded run"), "{}", said(&none));
 }
 
 #[test]

@@ -46,7 +46,8 @@ pub(super) fn collect(folder: &Path) -> Result<Option<Tables>, Failure> {
     };
     let mut tables = files("csv").iter().map(|path| table(path)).collect::<Result<Vec<_>, _>>()?;
     let mut source = Vec::new();
-    if let Some(sweep) = endowire_sweep::table_of(folder)? {
+    let sweep = if folder.is_dir() { endowire_sweep::table_of(folder)? } else { None };
+    if let Some(sweep) = sweep {
         let (runs, told) = of_sweep(sweep);
         tables.insert(0, runs);
         source = told;
