@@ -45,7 +45,7 @@ pub enum Input {
         /// What is shown while it is; as before if absent.
         mode: Option<Mode>,
     },
-    /// Injects contrast medium at the tip of the outermost instrument.
+    /// Injects contrast medium at the tip of the outermost instrument that is in; of several, of those with a lumen.
     Inject {
         /// Volume, ml.
         ml: f64,
@@ -74,6 +74,9 @@ pub enum Input {
         /// Downwards in the picture, mm at the isocentre.
         #[serde(default)]
         down_mm: f64,
+        /// Whether that is the picture of the second plane.
+        #[serde(default)]
+        second: bool,
     },
     /// Magnifies by a factor.
     Zoom {
@@ -98,6 +101,8 @@ pub enum Input {
     },
     /// Takes the last motion back: all steps since a hand began to move.
     Undo {},
+    /// Does the next motion of those that were undone again, and what was injected in it. They are there until something else is done.
+    Redo {},
     /// Goes back to the moment after a step.
     GoTo {
         /// Number of the step; 0 is the start.

@@ -5,6 +5,7 @@ use endowire_core::{Error, Result, Vec3};
 use endowire_viewer::{CameraSpec, InjectionSpec, Mode, Pose, View, ViewSpec};
 
 use crate::TICKS_PER_S;
+use crate::session::Delivered;
 
 /// Part of the field that the vessel fills where the scene leaves the field open.
 const FILL: f64 = 0.92;
@@ -34,7 +35,11 @@ pub struct Lab {
     /// Changes with `fluoro` and with `three_d`.
     revisions: [u64; 2],
     beam_ticks: u64,
+    /// Of earlier rooms; of this one there are so many ticks.
     dose_ngy: f64,
+    room_ticks: u64,
+    /// What exposure control brings in this room, once it is known.
+    delivered_ngy: Option<f64>,
 }
 
 impl Lab {
@@ -67,8 +72,10 @@ impl Lab {
             revisions: [0; 2],
             beam_ticks: 0,
             dose_ngy: 0.0,
+            room_ticks: 0,
+            delivered_ngy: None,
         };
-        lab.fluoro.validate()?;
+        lab.fluoro.planes().iter().try_for_each(ViewSpec::validate)?;
         Ok(lab)
     }
 
@@ -97,9 +104,33 @@ impl Lab {
         self.beam_ticks as f64 / TICKS_PER_S
     }
 
-    /// Air kerma at the detector so far, µGy.
+    /// Air kerma at the detectors so far, µGy.
     pub fn dose_ugy(&self) -> f64 {
-        self.dose_ngy / 1000.0
+        (self.dose_ngy + self.room_ngy()) / 1000.0
+    }
+
+    /// Air kerma at the detectors while the room was as it is.
+    fn room_ngy(&self) -> f64 {
+        let spec = &self.fluoro;
+        let wanted_ngy = || {
+            let plane_ngy = spec.detector.dose_ngy.unwrap_or_else(|| spec.xray.mode.dose_ngy());
+            plane_ngy * spec.planes().len() as f64
+        };
+        let frame_ngy = self.delivered_ngy.unwrap_or_else(wanted_ngy);
+        frame_ngy * self.room_ticks as f64 * spec.frames_per_s / TICKS_PER_S
+    }
+
+    /// Hears what a frame brings, if that is of the room as it is.
+    pub(crate) fn exposed(&mut self, delivered: Delivered) {
+        if delivered.revision == self.revisions[0] {
+            self.delivered_ngy = Some(delivered.frame_ngy);
+        }
+    }
+
+    /// Angles of the second plane, LAO and cranial positive; none where there is one plane.
+    pub fn second_deg(&self) -> Option<[f64; 2]> {
+        let second = self.fluoro.biplane_deg.map(|turn_deg| self.fluoro.c_arm.turned(turn_deg));
+        second.map(|second| second.angles_deg())
     }
 
     /// Magnification.
@@ -116,9 +147,8 @@ impl Lab {
     /// A sixtieth of a second goes by.
     pub(crate) fn tick(&mut self) {
         if self.down {
-            let frame_ngy = self.fluoro.detector.dose_ngy.unwrap_or_else(|| self.fluoro.xray.mode.dose_ngy());
             self.beam_ticks += 1;
-            self.dose_ngy += frame_ngy * self.fluoro.frames_per_s / TICKS_PER_S;
+            self.room_ticks += 1;
         }
     }
 
@@ -137,13 +167,13 @@ impl Lab {
         Ok(())
     }
 
-    /// Injects `ml` at `at_mm` from `time_s` on.
+    /// Injects `ml` at `at_mm`, or at the inlet, from `time_s` on; what flows of it.
     pub(crate) fn inject(
         &mut self,
         (ml, ml_per_s): (f64, f64),
         at_mm: Option<Vec3>,
         time_s: f64,
-    ) -> Result<()> {
+    ) -> Result<InjectionSpec> {
         for (name, value) in [("ml", ml), ("ml_per_s", ml_per_s)] {
             if !(0.1..=100.0).contains(&value) {
                 return Err(Error::parameter(name, value, "must be a number from 0.1 to 100"));
@@ -160,10 +190,29 @@ impl Lab {
             at_mm: at_mm.map(Into::into),
             at_tip: false,
         };
+        self.flow_again([].into_iter(), vec![bolus.clone()])?;
+        Ok(bolus)
+    }
+
+    /// Has injections flow no more, and others from now on.
+    pub(crate) fn flow_again<'a>(
+        &mut self,
+        undone: impl Iterator<Item = &'a InjectionSpec>,
+        more: Vec<InjectionSpec>,
+    ) -> Result<()> {
+        let mut injection = self.fluoro.injection.clone();
+        undone.for_each(|one| injection.retain(|other| other != one));
+        if injection.len() == self.fluoro.injection.len() && more.is_empty() {
+            return Ok(());
+        }
+        injection.extend(more);
+        injection.drain(..injection.len().saturating_sub(MOST_INJECTIONS));
         self.change(|spec| {
-            let first = (spec.injection.len() + 1).saturating_sub(MOST_INJECTIONS);
-            spec.injection.drain(..first);
-            spec.injection.push(bolus);
+            if spec.xray.mode == Mode::Roadmap && injection.is_empty() {
+                // It would be one of no angiogram.
+                spec.xray.mode = Mode::Fluoro;
+            }
+            spec.injection = injection;
         })
     }
 
@@ -183,10 +232,12 @@ impl Lab {
         self.change(|spec| (spec.c_arm.primary_deg, spec.c_arm.secondary_deg) = (lao, cra))
     }
 
-    /// Moves the middle of the picture over the patient, as far as the vessel goes.
-    pub(crate) fn table(&mut self, right_mm: f64, down_mm: f64) -> Result<()> {
+    /// Moves the middle of the picture over the patient, as far as the vessel goes: along the picture of the first plane, or of the second.
+    pub(crate) fn table(&mut self, [right_mm, down_mm]: [f64; 2], second: bool) -> Result<()> {
         finite(["right_mm", "down_mm"], [right_mm, down_mm])?;
-        let [lao, cra] = self.fluoro.c_arm.angles_deg().map(f64::to_radians);
+        let plane = if second { self.second_deg() } else { None };
+        let angles_deg = plane.unwrap_or_else(|| self.fluoro.c_arm.angles_deg());
+        let [lao, cra] = angles_deg.map(f64::to_radians);
         let right = Vec3::new(lao.cos(), lao.sin(), 0.0);
         let detector = Vec3::new(lao.sin(), -lao.cos(), 0.0) * cra.cos() + Vec3::z() * cra.sin();
         let down = -detector.cross(&right);
@@ -239,7 +290,9 @@ impl Lab {
     fn change(&mut self, with: impl FnOnce(&mut ViewSpec)) -> Result<()> {
         let mut spec = self.fluoro.clone();
         with(&mut spec);
-        spec.validate()?;
+        spec.planes().iter().try_for_each(ViewSpec::validate)?;
+        self.dose_ngy += self.room_ngy();
+        (self.room_ticks, self.delivered_ngy) = (0, None);
         self.fluoro = spec;
         self.revisions[0] += 1;
         Ok(())

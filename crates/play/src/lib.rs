@@ -10,14 +10,15 @@ mod input;
 mod lab;
 mod pictures;
 mod readout;
+mod script;
 mod session;
 
 pub use hand::Motion;
 pub use input::Input;
 pub use lab::Lab;
-pub use pictures::Pictures;
+pub use pictures::{Pictures, Sharpened, Sharpening};
 pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Readout};
-pub use session::{Limits, Session, Snapshot};
+pub use session::{Delivered, Limits, Session, Snapshot};
 
 /// Ticks of a session in a second.
 pub const TICKS_PER_S: f64 = 60.0;

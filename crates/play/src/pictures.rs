@@ -1,50 +1,197 @@
-//! Draws what a cath lab shows: the live image, or the last one held, and the 3D view.
+//! Draws what a cath lab shows: the live image of each plane, or the last one held, and the 3D view.
+//!
+//! What stays from frame to frame takes a tenth of a second or more where the room has changed, a coarse picture of it a fifth of that. Whoever shows pictures on a
+//! clock draws them by [`Pictures::soon`] and has [`Sharpening`] carried out beside them, on another thread; all others wait
+//! ([`Pictures::fluoro`]).
 
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result};
 use endowire_methods::Scene;
-use endowire_viewer::{Image, Pushed, Renderer};
+use endowire_viewer::{DeviceView, Image, Moment, Pushed, Renderer, ViewSpec};
 
-use crate::session::Snapshot;
+use crate::session::{Delivered, Snapshot};
+
+/// Pixels of a picture for each of a coarse one, across: of 512 there are 128, which show where a wire is.
+const COARSER: u32 = 4;
+/// Frames for which a room has to stay as it is before it is drawn sharply.
+const REST: u32 = 3;
 
 /// Pictures of a session.
 #[derive(Debug)]
 pub struct Pictures {
     pushed: Pushed,
-    /// The vessel, closed.
-    wall: SurfaceMesh,
-    fluoro: Option<(u64, Renderer)>,
+    wall: Wall,
+    planes: Vec<Plane>,
     three_d: Option<(u64, Renderer)>,
-    /// The last live image.
-    held: Option<Image>,
+    /// The last live image of each plane.
+    held: Vec<Image>,
+    /// The room of the last frame, and for how many frames it has been as it is.
+    rested: (u64, u32),
+}
+
+/// What draws one plane, each with the room that it is for.
+#[derive(Debug, Default)]
+struct Plane {
+    sharp: Option<(u64, Renderer)>,
+    coarse: Option<(u64, Renderer)>,
+    /// Whether the sharp one is being made for another room.
+    away: bool,
+}
+
+/// What makes a sharp picture of a room that has changed.
+#[derive(Debug)]
+pub struct Sharpening {
+    plane: usize,
+    revision: u64,
+    spec: ViewSpec,
+    renderer: Renderer,
+}
+
+/// What has come of it.
+#[derive(Debug)]
+pub struct Sharpened {
+    plane: usize,
+    made: Result<(u64, Renderer)>,
+}
+
+impl Sharpening {
+    /// Computes what stays from frame to frame.
+    pub fn carry_out(self) -> Sharpened {
+        let Self { plane, revision, spec, mut renderer } = self;
+        let made = renderer.change(&spec).and_then(|()| renderer.prepare());
+        Sharpened { plane, made: made.map(|()| (revision, renderer)) }
+    }
 }
 
 impl Pictures {
-    /// Pictures of a scene's instruments in its closed wall ([`Session::closed_wall`](crate::Session::closed_wall)).
+    /// Pictures of a scene's instruments in its wall.
     ///
     /// # Errors
     /// As [`Pushed::new`].
-    pub fn new(scene: &Scene, first: &Snapshot, wall: SurfaceMesh) -> Result<Self> {
+    pub fn new(scene: &Scene, first: &Snapshot, wall: Wall) -> Result<Self> {
         let pushed = Pushed::new(scene, first.lab.fluoro())?;
-        Ok(Self { pushed, wall, fluoro: None, three_d: None, held: None })
+        Ok(Self { pushed, wall, planes: vec![], three_d: None, held: vec![], rested: (0, 0) })
     }
 
-    /// The fluoroscopic picture: live while the pedal is down, else the last one; none before the first.
+    /// The fluoroscopic picture of each plane: live while the pedal is down, else the last ones; none before the first.
     ///
     /// # Errors
-    /// As [`Renderer::new`] and [`Renderer::render_at`]; the picture before stays.
-    pub fn fluoro(&mut self, snapshot: &Snapshot) -> Result<Option<&Image>> {
+    /// As [`Renderer::new`] and [`Renderer::render_at`]; the pictures before stay.
+    pub fn fluoro(&mut self, snapshot: &Snapshot) -> Result<&[Image]> {
+        if snapshot.lab.is_live() {
+            self.sharpen(snapshot)?;
+            self.held = self.drawn(snapshot)?;
+        }
+        Ok(&self.held)
+    }
+
+    /// The same without delay: coarse ones where the room has changed, until what [`Self::sharpenings`] has told is carried out.
+    ///
+    /// # Errors
+    /// As [`Self::fluoro`].
+    pub fn soon(&mut self, snapshot: &Snapshot) -> Result<&[Image]> {
         if snapshot.lab.is_live() {
             let revision = snapshot.lab.revisions()[0];
-            if self.fluoro.as_ref().is_none_or(|(drawn, _)| *drawn != revision) {
-                self.fluoro = Some((revision, Renderer::new(snapshot.lab.fluoro(), &self.wall)?));
-            }
-            let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
-            if let Some((_, renderer)) = &mut self.fluoro {
-                self.held = renderer.render_at(&views, snapshot.moment)?.fluoro;
-            }
+            let rested = if self.rested.0 == revision { self.rested.1 + 1 } else { 0 };
+            self.rested = (revision, rested);
+            self.held = self.drawn(snapshot)?;
         }
-        Ok(self.held.as_ref())
+        Ok(&self.held)
+    }
+
+    /// What is to be carried out for sharp pictures, and then given to [`Self::sharpened`]; nothing while the room goes on changing.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn sharpenings(&mut self, snapshot: &Snapshot) -> Result<Vec<Sharpening>> {
+        let revision = snapshot.lab.revisions()[0];
+        if !snapshot.lab.is_live() || self.rested.0 != revision || self.rested.1 < REST {
+            return Ok(vec![]);
+        }
+        let mut all = Vec::new();
+        for (index, (plane, spec)) in self.planes.iter_mut().zip(snapshot.lab.fluoro().planes()).enumerate() {
+            if plane.away || plane.sharp.as_ref().is_some_and(|(drawn, _)| *drawn == revision) {
+                continue;
+            }
+            let renderer = match (plane.sharp.take(), &plane.coarse) {
+                (Some((_, renderer)), _) => renderer,
+                (None, Some((_, coarse))) => coarse.beside(&spec)?,
+                (None, None) => Renderer::of_wall(&spec, &self.wall)?,
+            };
+            plane.away = true;
+            all.push(Sharpening { plane: index, revision, spec, renderer });
+        }
+        Ok(all)
+    }
+
+    /// Takes what was carried out.
+    ///
+    /// # Errors
+    /// As [`Renderer::change`]; the plane stays coarse.
+    pub fn sharpened(&mut self, done: Sharpened) -> Result<()> {
+        if let Some(plane) = self.planes.get_mut(done.plane) {
+            plane.away = false;
+            plane.sharp = Some(done.made?);
+        }
+        Ok(())
+    }
+
+    /// What a frame brings to the detectors of all planes where exposure control chooses that; none without it, or before it is known.
+    pub fn delivered(&self, snapshot: &Snapshot) -> Option<Delivered> {
+        let revision = snapshot.lab.revisions()[0];
+        snapshot.lab.fluoro().exposure.as_ref()?;
+        let dose_ngy = |plane: &Plane| {
+            let now = [&plane.sharp, &plane.coarse].into_iter().flatten().find(|made| made.0 == revision)?;
+            Some(now.1.exposure()?.dose_ngy)
+        };
+        let each: Option<Vec<f64>> = self.planes.iter().map(dose_ngy).collect();
+        let frame_ngy = each.filter(|each| !each.is_empty())?.iter().sum();
+        Some(Delivered { revision, frame_ngy })
+    }
+
+    /// The same, computed where it is not known.
+    ///
+    /// # Errors
+    /// As [`Self::fluoro`].
+    pub fn expose(&mut self, snapshot: &Snapshot) -> Result<Option<Delivered>> {
+        if snapshot.lab.is_live() && snapshot.lab.fluoro().exposure.is_some() {
+            self.sharpen(snapshot)?;
+        }
+        Ok(self.delivered(snapshot))
+    }
+
+    /// Has each plane drawn sharply, now.
+    fn sharpen(&mut self, snapshot: &Snapshot) -> Result<()> {
+        let revision = snapshot.lab.revisions()[0];
+        let specs = snapshot.lab.fluoro().planes();
+        self.planes.resize_with(specs.len(), Plane::default);
+        for (plane, spec) in self.planes.iter_mut().zip(specs) {
+            made(&mut plane.sharp, None, (revision, &spec), &self.wall)?.prepare()?;
+        }
+        Ok(())
+    }
+
+    /// Draws each plane by what is there.
+    fn drawn(&mut self, snapshot: &Snapshot) -> Result<Vec<Image>> {
+        let revision = snapshot.lab.revisions()[0];
+        let specs = snapshot.lab.fluoro().planes();
+        self.planes.resize_with(specs.len(), Plane::default);
+        let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
+        let mut images = Vec::with_capacity(specs.len());
+        for (plane, spec) in self.planes.iter_mut().zip(specs) {
+            let sharp = plane.sharp.as_mut().filter(|(drawn, _)| *drawn == revision);
+            let renderer = match sharp {
+                Some((_, renderer)) => renderer,
+                None => {
+                    let size_px = spec.size_px.map(|n| n.div_ceil(COARSER));
+                    let coarse = ViewSpec { size_px, ..spec };
+                    let sharp = plane.sharp.as_ref().map(|(_, renderer)| renderer);
+                    made(&mut plane.coarse, sharp, (revision, &coarse), &self.wall)?
+                }
+            };
+            images.push(fluoro(renderer, &views, snapshot.moment)?);
+        }
+        Ok(images)
     }
 
     /// The 3D view.
@@ -52,20 +199,42 @@ impl Pictures {
     /// # Errors
     /// As [`Renderer::new`] and [`Renderer::render_at`].
     pub fn three_d(&mut self, snapshot: &Snapshot) -> Result<Image> {
-        let revision = snapshot.lab.revisions()[1];
-        if self.three_d.as_ref().is_none_or(|(drawn, _)| *drawn != revision) {
-            self.three_d = Some((revision, Renderer::new(snapshot.lab.three_d(), &self.wall)?));
-        }
+        let room = (snapshot.lab.revisions()[1], snapshot.lab.three_d());
         let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
-        let image = self.three_d.as_mut().and_then(|(_, renderer)| {
-            renderer.show_contacts(&snapshot.contacts);
-            renderer.render_at(&views, snapshot.moment).map(|frames| frames.three_d).transpose()
-        });
-        image.unwrap_or_else(|| Err(Error::parameter("view.views", "3d", "was not drawn")))
+        let renderer = made(&mut self.three_d, None, room, &self.wall)?;
+        renderer.show_contacts(&snapshot.contacts);
+        let image = renderer.render_at(&views, snapshot.moment)?.three_d;
+        image.ok_or_else(|| Error::parameter("view.views", "3d", "was not drawn"))
     }
 
     /// What draws the fluoroscopic picture, for people.
     pub fn backend(&self) -> Option<&str> {
-        self.fluoro.as_ref().map(|(_, renderer)| renderer.backend())
+        let plane = self.planes.first()?;
+        plane.sharp.as_ref().or(plane.coarse.as_ref()).map(|(_, renderer)| renderer.backend())
     }
+}
+
+/// The renderer of a room, with what it has in common with the one before, or `beside` it.
+fn made<'a>(
+    place: &'a mut Option<(u64, Renderer)>,
+    beside: Option<&Renderer>,
+    (revision, spec): (u64, &ViewSpec),
+    wall: &Wall,
+) -> Result<&'a mut Renderer> {
+    match (&mut *place, beside) {
+        (Some((drawn, renderer)), _) if *drawn != revision => {
+            renderer.change(spec)?;
+            *drawn = revision;
+        }
+        (Some(_), _) => {}
+        (none, Some(other)) => *none = Some((revision, other.beside(spec)?)),
+        (none, None) => *none = Some((revision, Renderer::of_wall(spec, wall)?)),
+    }
+    let none = || Error::parameter("view.views", "none", "nothing is drawn");
+    place.as_mut().map(|(_, renderer)| renderer).ok_or_else(none)
+}
+
+fn fluoro(renderer: &mut Renderer, views: &[DeviceView], moment: Moment) -> Result<Image> {
+    let image = renderer.render_at(views, moment)?.fluoro;
+    image.ok_or_else(|| Error::parameter("view.views", "fluoro", "was not drawn"))
 }

@@ -62,6 +62,8 @@ pub struct LabReadout {
     pub lao_deg: f64,
     /// Positioner secondary angle, cranial positive.
     pub cra_deg: f64,
+    /// Both angles of the second plane, where there is one.
+    pub second_deg: Option<[f64; 2]>,
     /// Magnification.
     pub magnification: f64,
     /// Width of what is seen at the isocentre, mm.
@@ -70,7 +72,7 @@ pub struct LabReadout {
     pub open: [f64; 2],
     /// How long the beam was on, s.
     pub beam_s: f64,
-    /// Air kerma at the detector so far, µGy.
+    /// Air kerma at the detectors so far, µGy: what exposure control has brought, where it acts.
     pub dose_ugy: f64,
 }
 

@@ -2,13 +2,12 @@
 
 use endowire_core::insertion::{InstrumentReport, Simulation};
 use endowire_core::shape::Shape;
-use endowire_core::vessel::SurfaceMesh;
-use endowire_core::{Error, PhysicalEnd, Result, Vec3};
+use endowire_core::{Error, PhysicalEnd, Result};
 use endowire_viewer::{ContactView, Moment, ViewSpec};
 
 use crate::TICKS_PER_S;
 use crate::hand::{Hand, Motion};
-use crate::history::{self, History};
+use crate::history::{self, History, Injected};
 use crate::input::Input;
 use crate::lab::Lab;
 use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Readout};
@@ -62,6 +61,15 @@ pub struct Snapshot {
     pub moment: Moment,
     /// What is read.
     pub readout: Readout,
+}
+
+/// What a frame of fluoroscopy brings to the detectors of all planes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Delivered {
+    /// The room that it is of ([`Lab::revisions`]).
+    pub(crate) revision: u64,
+    /// Air kerma, nGy.
+    pub(crate) frame_ngy: f64,
 }
 
 impl std::fmt::Debug for Session {
@@ -121,20 +129,26 @@ impl Session {
             }
             Input::Stop {} => self.stop(),
             Input::Pedal { down, mode } => self.lab.pedal(*down, *mode)?,
-            Input::Inject { ml, ml_per_s } => {
-                let at_mm = self.injection_mm();
-                self.lab.inject((*ml, *ml_per_s), at_mm, self.time_s())?;
-            }
+            Input::Inject { ml, ml_per_s } => self.inject(*ml, *ml_per_s)?,
             Input::CArm { pose } => self.lab.pose(*pose)?,
             Input::TurnCArm { lao_deg, cra_deg } => self.lab.turn_c_arm([*lao_deg, *cra_deg])?,
-            Input::Table { right_mm, down_mm } => self.lab.table(*right_mm, *down_mm)?,
+            Input::Table { right_mm, down_mm, second } => {
+                self.lab.table([*right_mm, *down_mm], *second)?;
+            }
             Input::Zoom { factor } => self.lab.zoom(*factor)?,
             Input::Collimate { width, height } => self.lab.collimate([*width, *height])?,
             Input::TurnCamera { azimuth_deg, elevation_deg } => {
                 self.lab.turn_camera([*azimuth_deg, *elevation_deg])?;
             }
-            Input::Undo {} => self.go_to(self.history.last_motion().unwrap_or(0))?,
-            Input::GoTo { step } => self.go_to(*step)?,
+            Input::Undo {} => self.go_to(self.history.last_motion())?,
+            Input::Redo {} => self.go_to(self.history.next_motion())?,
+            Input::GoTo { step } => {
+                let steps = self.history.steps();
+                if *step > steps {
+                    return Err(Error::parameter("step", step, format!("{steps} steps were carried out")));
+                }
+                self.go_to(*step)?;
+            }
         }
         Ok(())
     }
@@ -143,14 +157,23 @@ impl Session {
         self.hands.iter_mut().for_each(|hand| *hand = Hand::default());
     }
 
+    /// Goes to the moment after a step, forth or back. Medium of later moments is taken out of the vessel, and what is done again flows from now on.
     fn go_to(&mut self, step: usize) -> Result<()> {
-        if step > self.history.steps() {
-            let mend = format!("{} steps were carried out", self.history.steps());
-            return Err(Error::parameter("step", step, mend));
-        }
         self.stop();
         self.moving = false;
-        self.history.go_back(step, &mut self.simulation)
+        let before = self.history.steps();
+        self.history.go_to(step, &mut self.simulation)?;
+        let again = self.history.inject_again(before, self.time_s());
+        self.lab.flow_again(self.history.undone_injections().map(|one| &one.flow), again)
+    }
+
+    fn inject(&mut self, ml: f64, ml_per_s: f64) -> Result<()> {
+        let instrument = self.injects_through();
+        let at_mm = instrument.and_then(|one| self.simulation.tip_of_mm(one));
+        let flow = self.lab.inject((ml, ml_per_s), at_mm, self.time_s())?;
+        let after_step = self.history.steps();
+        self.history.inject(Injected { instrument, ml, ml_per_s, after_step, flow });
+        Ok(())
     }
 
     fn index(&self, instrument: Option<&str>) -> Result<usize> {
@@ -243,14 +266,14 @@ impl Session {
         &self.simulation
     }
 
-    /// All motions as `[[script]]` tables of a scene file, which carry them out to the bit.
+    /// All motions, and what was injected, as `[[script]]` tables of a scene file, which carry them out to the bit.
     pub fn script(&self) -> String {
         self.history.script(self.simulation.stack())
     }
 
-    /// The vessel, closed, as pictures need it.
-    pub fn closed_wall(&self) -> SurfaceMesh {
-        self.simulation.wall().closed_mesh()
+    /// Hears what exposure control has brought to the detectors since the room is as it is; until then what is wanted counts.
+    pub fn exposed(&mut self, delivered: Delivered) {
+        self.lab.exposed(delivered);
     }
 
     /// What is drawn of this moment.
@@ -289,6 +312,7 @@ impl Session {
                 mode: spec.xray.mode,
                 lao_deg: spec.c_arm.primary_deg,
                 cra_deg: spec.c_arm.secondary_deg,
+                second_deg: self.lab.second_deg(),
                 magnification: self.lab.magnification(),
                 field_mm: self.lab.field_mm(),
                 open: self.lab.open(),
@@ -323,8 +347,14 @@ impl Session {
         .collect()
     }
 
-    /// Where contrast medium comes out: at the tip of the outermost instrument that is in.
-    fn injection_mm(&self) -> Option<Vec3> {
-        (0..self.simulation.stack().instruments().len()).rev().find_map(|one| self.simulation.tip_of_mm(one))
+    /// What contrast medium goes through: the outermost instrument that is in. Of several that is one with a lumen.
+    fn injects_through(&self) -> Option<usize> {
+        let stack = self.simulation.stack();
+        let opens = |one: &usize| {
+            let sections = stack.instruments()[*one].device.sections();
+            !stack.is_several() || sections.iter().all(|section| section.inner_radius_mm.is_some())
+        };
+        let in_it = |one: &usize| self.simulation.tip_of_mm(*one).is_some();
+        (0..stack.instruments().len()).rev().filter(opens).find(in_it)
     }
 }

@@ -4,11 +4,11 @@
 
 use std::path::{Path, PathBuf};
 
-use endowire_core::insertion::Simulation;
+use endowire_core::insertion::{Injection, Simulation};
 use endowire_core::vessel::NoStore;
 use endowire_methods::Scene;
 use endowire_play::{EventKind, Input, Limits, Pictures, Session};
-use endowire_viewer::{Mode, ViewSpec};
+use endowire_viewer::{ExposureSpec, Mode, ViewSpec};
 
 fn scene(name: &str) -> (PathBuf, Scene) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/scenes").join(name);
@@ -63,11 +63,12 @@ impl Dice {
             }
             9 => Input::Inject { ml: 5.0 * share, ml_per_s: 10.0 * share },
             10 => Input::TurnCArm { lao_deg: step, cra_deg: turn },
-            11 => Input::Table { right_mm: 10.0 * step, down_mm: 5.0 * step },
+            11 => Input::Table { right_mm: 10.0 * step, down_mm: 5.0 * step, second: share > 0.4 },
             12 => Input::Zoom { factor: 1.0 + share },
             13 => Input::Collimate { width: share, height: share },
             14 => Input::TurnCamera { azimuth_deg: step, elevation_deg: turn },
             _ if self.below(8) == 0 => Input::Undo {},
+            _ if self.below(8) == 0 => Input::Redo {},
             _ if wild && self.below(8) == 0 => Input::GoTo { step: self.below(1000) as usize },
             _ => Input::Stop {},
         }
@@ -75,7 +76,12 @@ impl Dice {
 }
 
 /// The motions of a session, carried out by the scene as its script.
-fn replayed(mut scene: Scene, session: &Session) -> Simulation {
+fn replayed(scene: Scene, session: &Session) -> Simulation {
+    replayed_with_injections(scene, session).0
+}
+
+/// The same, with what was injected.
+fn replayed_with_injections(mut scene: Scene, session: &Session) -> (Simulation, Vec<Injection>) {
     let file =
         std::env::temp_dir().join(format!("endowire-played-{}-{}.toml", scene.name, std::process::id()));
     std::fs::write(&file, session.script()).unwrap();
@@ -89,7 +95,8 @@ fn replayed(mut scene: Scene, session: &Session) -> Simulation {
         simulation.step_together(&step).unwrap();
         run.carried_out();
     }
-    simulation
+    let injections = run.injections().to_vec();
+    (simulation, injections)
 }
 
 #[test]
@@ -115,8 +122,9 @@ fn ten_thousand_wild_inputs_do_no_harm() {
     let mut refused = 0;
     for _ in 0..10_000 {
         let before = session.steps();
-        refused += usize::from(session.apply(&dice.input(&["device", "nothing"], true)).is_err());
-        assert!(session.steps() <= before);
+        let input = dice.input(&["device", "nothing"], true);
+        refused += usize::from(session.apply(&input).is_err());
+        assert!(session.steps() <= before || input == Input::Redo {});
         if dice.below(4) == 0 {
             session.tick();
         }
@@ -153,6 +161,85 @@ fn any_earlier_moment_can_be_had_again() {
     }
 }
 
+fn go(session: &mut Session, instrument: &str, mm_per_s: f64, ticks: usize) {
+    session
+        .apply(&Input::Move { instrument: Some(instrument.to_owned()), mm_per_s, deg_per_s: 0.0 })
+        .unwrap();
+    (0..ticks).for_each(|_| session.tick());
+    session.apply(&Input::Stop {}).unwrap();
+    session.tick();
+}
+
+#[test]
+fn what_hands_inject_is_a_line_of_the_script_at_its_step_and_time() {
+    let (path, scene) = scene("arch_vertebral.toml");
+    let mut view = ViewSpec::of_scene(&scene, &path).unwrap();
+    view.flow.tree = Some(path.with_file_name("../vessels/aortic_arch.csv"));
+    let mut session = Session::new(scene.simulation(&NoStore).unwrap(), view, 64, Limits::default()).unwrap();
+    let inject = |ml: f64| Input::Inject { ml, ml_per_s: 4.0 };
+    // The catheter is out, and the wire has no lumen; then through the catheter twice, between alike steps.
+    go(&mut session, "catheter", -60.0, 60);
+    session.apply(&inject(2.0)).unwrap();
+    let out = session.steps();
+    go(&mut session, "catheter", 30.0, 30);
+    session.apply(&inject(3.0)).unwrap();
+    go(&mut session, "catheter", 30.0, 6);
+    session.apply(&inject(4.5)).unwrap();
+    assert!(session.script().contains("# 2.0 ml"), "{}", session.script());
+    let tip_mm = session.simulation().tip_of_mm(1).unwrap();
+    let last = session.snapshot().lab.fluoro().injection.last().cloned().unwrap();
+    assert_eq!(last.at_mm.map(endowire_core::Vec3::from), Some(tip_mm));
+
+    let (simulation, injections) = replayed_with_injections(scene, &session);
+    assert_eq!(simulation.shape(), session.simulation().shape());
+    let told: Vec<_> =
+        injections.iter().map(|one| (one.instrument, one.ml, one.ml_per_s, one.after_step)).collect();
+    assert_eq!(told, [(1, 3.0, 4.0, out + 30), (1, 4.5, 4.0, out + 36)]);
+    // A step is a tick; rests are none.
+    for one in injections {
+        assert!((one.time_s.unwrap() - one.after_step as f64 / 60.0).abs() < 1e-9, "{one:?}");
+    }
+}
+
+#[test]
+fn what_was_undone_is_done_again_with_the_same_bits_until_something_else_is_done() {
+    let (_, mut session) = session("arch_angiography.toml");
+    let flowing = |session: &Session| session.snapshot().lab.fluoro().injection.len();
+    let mut shapes = vec![session.simulation().shape().clone()];
+    for (mm_per_s, ticks) in [(60.0, 70), (-20.0, 10), (45.0, 80)] {
+        go(&mut session, "device", mm_per_s, ticks);
+        shapes.push(session.simulation().shape().clone());
+    }
+    session.apply(&Input::Inject { ml: 5.0, ml_per_s: 5.0 }).unwrap();
+    let (script, all) = (session.script(), flowing(&session));
+    for (input, steps, shape) in [
+        (Input::Undo {}, 80, 2),
+        (Input::Undo {}, 70, 1),
+        (Input::Redo {}, 80, 2),
+        (Input::Undo {}, 70, 1),
+        (Input::Undo {}, 0, 0),
+        (Input::Redo {}, 70, 1),
+        (Input::Redo {}, 80, 2),
+        (Input::Redo {}, 160, 3),
+        (Input::Redo {}, 160, 3),
+    ] {
+        session.apply(&input).unwrap();
+        assert_eq!((session.steps(), session.simulation().shape()), (steps, &shapes[shape]), "{input:?}");
+        // What was injected after the last motion comes and goes with it.
+        assert_eq!(flowing(&session) == all, steps == 160, "{input:?}");
+    }
+    assert_eq!(session.script(), script);
+    // A hand that moves, or an injection, takes what was undone away.
+    session.apply(&Input::Undo {}).unwrap();
+    go(&mut session, "device", 30.0, 3);
+    session.apply(&Input::Redo {}).unwrap();
+    assert_eq!(session.steps(), 83);
+    session.apply(&Input::Undo {}).unwrap();
+    session.apply(&Input::Inject { ml: 5.0, ml_per_s: 5.0 }).unwrap();
+    session.apply(&Input::Redo {}).unwrap();
+    assert_eq!((session.steps(), flowing(&session)), (80, all));
+}
+
 #[test]
 fn hands_stop_at_the_ends_and_limits_warn() {
     let (path, scene) = scene("curved_tube.toml");
@@ -183,13 +270,14 @@ fn hands_stop_at_the_ends_and_limits_warn() {
 #[test]
 fn pictures_follow_the_pedal() {
     let (scene, mut session) = session("arch_angiography.toml");
-    let mut pictures = Pictures::new(&scene, &session.snapshot(), session.closed_wall()).unwrap();
-    assert!(pictures.fluoro(&session.snapshot()).unwrap().is_none());
+    let mut pictures =
+        Pictures::new(&scene, &session.snapshot(), session.simulation().wall().clone()).unwrap();
+    assert!(pictures.fluoro(&session.snapshot()).unwrap().is_empty());
     let show = |session: &mut Session, pictures: &mut Pictures, input: Input| {
         session.apply(&input).unwrap();
         session.tick();
         session.tick();
-        pictures.fluoro(&session.snapshot()).unwrap().unwrap().clone()
+        pictures.fluoro(&session.snapshot()).unwrap()[0].clone()
     };
     let fluoro = Input::Pedal { down: true, mode: Some(Mode::Fluoro) };
     let first = show(&mut session, &mut pictures, fluoro.clone());
@@ -209,13 +297,94 @@ fn pictures_follow_the_pedal() {
     show(&mut session, &mut pictures, Input::Inject { ml: 15.0, ml_per_s: 15.0 });
     (0..60).for_each(|_| session.tick());
     let dark = |pictures: &mut Pictures, session: &Session| {
-        let image = pictures.fluoro(&session.snapshot()).unwrap().unwrap();
+        let image = &pictures.fluoro(&session.snapshot()).unwrap()[0];
         image.data().iter().filter(|pixel| **pixel < 100).count()
     };
     let filled = dark(&mut pictures, &session);
     (0..1200).for_each(|_| session.tick());
     let empty = dark(&mut pictures, &session);
     assert!(filled > 4 * empty + 40, "{filled} {empty}");
+}
+
+#[test]
+fn two_planes_are_live_together_and_a_room_that_changes_is_coarse_until_it_is_sharp() {
+    let (path, scene) = scene("curved_tube.toml");
+    let mut view = ViewSpec::of_scene(&scene, &path).unwrap();
+    view.biplane_deg = Some(90.0);
+    let mut session = Session::new(scene.simulation(&NoStore).unwrap(), view, 64, Limits::default()).unwrap();
+    let wall = session.simulation().wall().clone();
+    let mut pictures = Pictures::new(&scene, &session.snapshot(), wall.clone()).unwrap();
+    session.apply(&Input::Pedal { down: true, mode: Some(Mode::Fluoro) }).unwrap();
+    session.tick();
+    let before = session.readout().lab.lao_deg;
+    assert_eq!(session.readout().lab.second_deg.map(|[lao, _]| lao), Some(before + 90.0));
+    let [a, b] = <[_; 2]>::try_from(pictures.fluoro(&session.snapshot()).unwrap().to_vec()).unwrap();
+    assert_ne!(a, b);
+    session.apply(&Input::TurnCArm { lao_deg: -90.0, cra_deg: 0.0 }).unwrap();
+    let turned = pictures.fluoro(&session.snapshot()).unwrap().to_vec();
+    assert_eq!(turned[1].data(), a.data(), "the second stands where the first stood");
+    // Dose is that of both, a tick of 30 nGy frames at 30 a second.
+    assert!((session.readout().lab.dose_ugy - 2.0 * 0.03 / 2.0).abs() < 1e-12);
+    // The table goes along the picture that was dragged.
+    let isocentre = |session: &Session| session.snapshot().lab.fluoro().c_arm.isocentre_mm.unwrap();
+    let at = isocentre(&session);
+    session.apply(&Input::Table { right_mm: 2.0, down_mm: 0.0, second: false }).unwrap();
+    let first = isocentre(&session);
+    session.apply(&Input::Table { right_mm: 2.0, down_mm: 0.0, second: true }).unwrap();
+    let second = isocentre(&session);
+    let way = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|k| b[k] - a[k]);
+    let dot: f64 = way(at, first).into_iter().zip(way(first, second)).map(|(a, b)| a * b).sum();
+    assert!(dot.abs() < 1e-9 && at != first && first != second, "{dot}");
+
+    // On a clock the first frames of a new room are coarse, the last ones those of who waits.
+    let mut sharp = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
+    let widths = |images: &[endowire_viewer::Image]| images.iter().map(|i| i.width()).collect::<Vec<_>>();
+    let mut under_way = Vec::new();
+    let mut frames = 0;
+    while under_way.is_empty() {
+        assert_eq!(widths(pictures.soon(&session.snapshot()).unwrap()), [16, 16]);
+        under_way = pictures.sharpenings(&session.snapshot()).unwrap();
+        frames += 1;
+        session.tick();
+    }
+    assert_eq!((frames, under_way.len()), (4, 2), "three frames of rest");
+    assert!(pictures.sharpenings(&session.snapshot()).unwrap().is_empty(), "each is under way once");
+    for one in under_way {
+        pictures.sharpened(one.carry_out()).unwrap();
+    }
+    assert_eq!(pictures.soon(&session.snapshot()).unwrap(), sharp.fluoro(&session.snapshot()).unwrap());
+    session.apply(&Input::Collimate { width: 0.5, height: 0.5 }).unwrap();
+    assert_eq!(widths(pictures.soon(&session.snapshot()).unwrap()), [16, 16]);
+}
+
+#[test]
+fn dose_is_what_exposure_control_brings() {
+    let (path, scene) = scene("curved_tube.toml");
+    let dose = |most_ma: f64, known_after: usize| {
+        let mut view = ViewSpec::of_scene(&scene, &path).unwrap();
+        view.xray.pulse_ms = 8.0;
+        let control = ExposureSpec { current_ma: [0.01, most_ma], curve: vec![[100.0, 125.0]] };
+        view.exposure = Some(control);
+        let simulation = scene.simulation(&NoStore).unwrap();
+        let mut session = Session::new(simulation, view, 64, Limits::default()).unwrap();
+        let wall = session.simulation().wall().clone();
+        let mut pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
+        session.apply(&Input::Pedal { down: true, mode: Some(Mode::Fluoro) }).unwrap();
+        for tick in 0..60 {
+            session.tick();
+            if tick == known_after {
+                let delivered = pictures.expose(&session.snapshot()).unwrap().unwrap();
+                session.exposed(delivered);
+            }
+        }
+        session.readout().lab.dose_ugy
+    };
+    // A second of 30 frames of 30 nGy, if the tube can; the ticks before it was known count alike.
+    let wanted = 30.0 * 0.03;
+    assert!((dose(1000.0, 5) - wanted).abs() < 1e-9);
+    let weak = dose(0.02, 5);
+    assert!(weak < 0.5 * wanted && weak > 0.0, "{weak}");
+    assert_eq!(dose(0.02, 40), weak);
 }
 
 #[test]

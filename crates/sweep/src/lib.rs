@@ -39,7 +39,7 @@ mod work;
 pub use axis::{Axis, AxisSpec, Grid, Range};
 pub use file::{Recorded, Sweep};
 pub use key::Key;
-pub use merge::merge;
+pub use merge::{Table, merge, table_of};
 pub use outcome::{InstrumentOutcome, RunOutcome, StepFailure, UntilOutcome};
 pub use provenance::{Program, hash_inputs};
 pub use row::Row;

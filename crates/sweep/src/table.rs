@@ -23,6 +23,19 @@ enum Cells {
     Texts(Vec<Option<String>>),
 }
 
+impl Cells {
+    /// The value of a row; empty where there is none.
+    fn text(&self, row: usize) -> String {
+        match self {
+            Self::Booleans(cells) => cells[row].map(|v| v.to_string()),
+            Self::Integers(cells) => cells[row].map(|v| v.to_string()),
+            Self::Numbers(cells) => cells[row].map(|v| v.to_string()),
+            Self::Texts(cells) => cells[row].clone(),
+        }
+        .unwrap_or_default()
+    }
+}
+
 struct Column {
     name: String,
     cells: Cells,
@@ -46,6 +59,14 @@ pub(crate) fn write(path: &Path, columns: &Columns, rows: &[Row]) -> Result<()> 
         let _ = std::fs::remove_file(part);
     }
     written
+}
+
+/// Names of all columns, and rows of their values as texts.
+pub(crate) fn as_texts(columns: &Columns, rows: &[Row]) -> (Vec<String>, Vec<Vec<String>>) {
+    let columns = self::columns(columns, rows);
+    let row = |index: usize| columns.iter().map(|column| column.cells.text(index)).collect();
+    let rows = (0..rows.len()).map(row).collect();
+    (columns.into_iter().map(|column| column.name).collect(), rows)
 }
 
 /// All columns of a table.

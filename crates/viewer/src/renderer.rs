@@ -9,7 +9,7 @@ use crate::c_arm::CArm;
 use crate::cpu;
 use crate::device::{DeviceView, RefinedDevice};
 use crate::engine::{Engines, PathEngine};
-use crate::fluoro::{Afterglow, Anatomy, Fluoroscope, Moment, Sequence, labels};
+use crate::fluoro::{Afterglow, Anatomy, Fluoroscope, Kept, Moment, Sequence, labels};
 use crate::gpu;
 use crate::material::Material;
 use crate::output::{Image, Labels};
@@ -34,6 +34,8 @@ pub struct Renderer {
     engines: Engines,
     /// Made with the first frame.
     fluoro: Option<(Fluoroscope, Sequence)>,
+    /// What is left of the view before.
+    kept: Option<Kept>,
     /// Lengths of the central rays, with the first that are asked for.
     central: Option<Anatomy>,
     /// The last path lengths with what they transmit.
@@ -72,26 +74,12 @@ impl Renderer {
     }
 
     fn of_setup(setup: Setup) -> Result<Self> {
-        let spec = &setup.spec;
-        let nothing = setup.c_arm.is_none() && setup.camera.is_none();
-        let mut refused = None;
-        let on_gpu = match spec.backend {
-            Backend::Cpu => None,
-            _ if nothing => None,
-            Backend::Auto => gpu::engines(&setup, false).map_err(|reason| refused = Some(reason)).ok(),
-            Backend::Gpu => Some(gpu::engines(&setup, true).map_err(|reason| {
-                Error::parameter("view.backend", "gpu", format!("{reason}; use \"auto\" or \"cpu\""))
-            })?),
-        };
-        let is_cpu = on_gpu.is_none();
-        let mut engines = on_gpu.unwrap_or_else(|| cpu::engines(setup.c_arm.is_some()));
-        if let Some(reason) = refused {
-            engines.name = format!("{} ({reason})", engines.name);
-        }
+        let (engines, is_cpu) = engines(&setup)?;
         Ok(Self {
             setup,
             engines,
             fluoro: None,
+            kept: None,
             central: None,
             transmitted: None,
             contacts: vec![],
@@ -157,7 +145,7 @@ impl Renderer {
             pulse.push(devices.clone());
         }
         let contacts = std::mem::take(&mut self.contacts);
-        let frames = self.with_fallback(|setup, engines, fluoro| {
+        let frames = self.with_fallback(|setup, engines, fluoro, kept| {
             let c_arm = setup.c_arm.as_ref().filter(|_| setup.spec.camera.c_arm);
             let solids = Solids { devices: &devices, contacts: &contacts, c_arm };
             if engines.three_d.is_none() {
@@ -175,7 +163,7 @@ impl Renderer {
             }
             let fluoro = match &setup.c_arm {
                 Some(c_arm) => {
-                    let (scope, sequence, paths) = prepared(setup, engines, fluoro)?;
+                    let (scope, sequence, paths) = prepared(setup, engines, fluoro, kept)?;
                     let mut image = sequence.next(scope, paths, &pulse, moment)?;
                     if setup.spec.c_arm.markers {
                         draw_markers(&mut image, c_arm.right_and_up());
@@ -200,26 +188,65 @@ impl Renderer {
     pub fn turn_c_arm(&mut self, place: &CArmSpec) -> Result<()> {
         let spec = ViewSpec { c_arm: place.clone(), ..self.setup.spec.clone() };
         self.c_arm().ok_or_else(no_fluoro)?;
-        if spec.camera.c_arm && spec.wants(View::ThreeD) {
-            // The camera stands where it sees the beam.
-            let filled = Setup::filled(&spec, Arc::clone(&self.setup.wall), Arc::clone(&self.setup.filled))?;
-            let stored = self.fluoro.take().map(|(_, sequence)| sequence.into_afterglow());
-            let contacts = std::mem::take(&mut self.contacts);
-            *self = Self { contacts, next_frame: self.next_frame, ..Self::of_setup(filled)? };
-            return self.go_on_from(stored);
-        }
-        self.setup.c_arm = Some(self.setup.placed(&spec)?);
-        self.setup.spec = spec;
-        (self.central, self.transmitted) = (None, None);
-        let stored = self.fluoro.take().map(|(_, sequence)| sequence.into_afterglow());
+        let stored = self.show(&spec)?.map(Sequence::into_afterglow);
         self.go_on_from(stored)
+    }
+
+    /// A renderer of another view of the same vessel, with what both have in common.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn beside(&self, spec: &ViewSpec) -> Result<Self> {
+        Self::of_setup(self.setup.beside(spec)?)
+    }
+
+    /// Draws another view of the same vessel from now on, as a renderer that is new, and keeps what both have in common: where the C-arm stands in the same
+    /// place, the lengths of its rays.
+    ///
+    /// # Errors
+    /// As [`Self::new`]. The view then stays what it was.
+    pub fn change(&mut self, spec: &ViewSpec) -> Result<()> {
+        self.show(spec).map(drop)
+    }
+
+    /// The same; what the detector and the masks of the view before remember.
+    fn show(&mut self, spec: &ViewSpec) -> Result<Option<Sequence>> {
+        let setup = self.setup.beside(spec)?;
+        let before = &self.setup.spec;
+        let same =
+            before.views == spec.views && before.size_px == spec.size_px && before.backend == spec.backend;
+        // The camera stands where it sees the beam.
+        let camera = !spec.wants(View::ThreeD) || (before.camera == spec.camera && !spec.camera.c_arm);
+        let engines = if same && camera { None } else { Some(engines(&setup)?) };
+        let (scope, sequence) = self.fluoro.take().unzip();
+        let kept = scope.map(Fluoroscope::into_kept).or_else(|| self.kept.take());
+        self.kept = kept.and_then(|kept| kept.between(&self.setup, &setup));
+        self.setup = setup;
+        (self.central, self.transmitted) = (None, None);
+        if let Some(engines) = engines {
+            (self.engines, self.is_cpu) = engines;
+        }
+        Ok(sequence)
+    }
+
+    /// Computes what stays from frame to frame now, and not with the first one.
+    ///
+    /// # Errors
+    /// As [`Self::render_at`].
+    pub fn prepare(&mut self) -> Result<()> {
+        match self.c_arm() {
+            Some(_) => self.with_fallback(|setup, engines, fluoro, kept| {
+                prepared(setup, engines, fluoro, kept).map(drop)
+            }),
+            None => Ok(()),
+        }
     }
 
     /// Prepares the next frame of a detector that holds what another place has left, if there was one.
     fn go_on_from(&mut self, stored: Option<Afterglow>) -> Result<()> {
         let Some(stored) = stored else { return Ok(()) };
-        self.with_fallback(|setup, engines, fluoro| {
-            prepared(setup, engines, fluoro)?.1.go_on_from(stored.clone());
+        self.with_fallback(|setup, engines, fluoro, kept| {
+            prepared(setup, engines, fluoro, kept)?.1.go_on_from(stored.clone());
             Ok(())
         })
     }
@@ -236,8 +263,8 @@ impl Renderer {
     /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn take_mask(&mut self, devices: &[DeviceView]) -> Result<()> {
         let devices = [RefinedDevice::all(devices)?];
-        self.with_fallback(|setup, engines, fluoro| {
-            let (scope, sequence, paths) = prepared(setup, engines, fluoro)?;
+        self.with_fallback(|setup, engines, fluoro, kept| {
+            let (scope, sequence, paths) = prepared(setup, engines, fluoro, kept)?;
             sequence.take_mask(scope, paths, &devices)
         })
     }
@@ -258,8 +285,8 @@ impl Renderer {
     /// # Errors
     /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn labels(&mut self, devices: &[DeviceView], contacts_mm: &[Vec3]) -> Result<Labels> {
-        let of_scope = self.with_fallback(|setup, engines, fluoro| {
-            let (scope, _, _) = prepared(setup, engines, fluoro)?;
+        let of_scope = self.with_fallback(|setup, engines, fluoro, kept| {
+            let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
             Ok((setup.lumen.then(|| scope.vessel()), scope.exposure))
         })?;
         let c_arm = self.setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
@@ -289,12 +316,12 @@ impl Renderer {
         let default = self.setup.spec.xray.device_material;
         let devices = RefinedDevice::all(devices)?;
         if self.central.is_none() {
-            self.central = Some(self.with_fallback(|setup, engines, _| {
+            self.central = Some(self.with_fallback(|setup, engines, _, _| {
                 let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
                 Anatomy::new(setup, &c_arm, 1, engine.as_mut())
             })?);
         }
-        let (devices_mm, injected) = self.with_fallback(|setup, engines, fluoro| {
+        let (devices_mm, injected) = self.with_fallback(|setup, engines, fluoro, kept| {
             let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
             let mut maps: Vec<(Material, Vec<f32>)> = Vec::new();
             for device in &devices {
@@ -312,7 +339,9 @@ impl Renderer {
             let injected = match time_s.filter(|_| injecting) {
                 Some(time_s) => {
                     let tip = devices.first().and_then(|device| device.points.last());
-                    prepared(setup, engines, fluoro)?.0.injected(time_s, tip.map(|point| point.position_mm))
+                    prepared(setup, engines, fluoro, kept)?
+                        .0
+                        .injected(time_s, tip.map(|point| point.position_mm))
                 }
                 None => vec![],
             };
@@ -348,8 +377,8 @@ impl Renderer {
     /// [`Error::Parameter`] where the fluoroscopic view was not asked for.
     pub fn transmission(&mut self, paths: &PathLengths) -> Result<Vec<f32>> {
         let before = self.transmitted.take();
-        let left = self.with_fallback(|setup, engines, fluoro| {
-            prepared(setup, engines, fluoro)?.0.transmission(paths, before.as_ref())
+        let left = self.with_fallback(|setup, engines, fluoro, kept| {
+            prepared(setup, engines, fluoro, kept)?.0.transmission(paths, before.as_ref())
         })?;
         self.transmitted = Some((paths.clone(), left.clone()));
         Ok(left)
@@ -358,19 +387,39 @@ impl Renderer {
     /// Runs `job`; where an adapter fails in it, hands over to the CPU and runs it again.
     fn with_fallback<T>(
         &mut self,
-        job: impl Fn(&Setup, &mut Engines, &mut Option<(Fluoroscope, Sequence)>) -> Result<T>,
+        job: impl Fn(&Setup, &mut Engines, &mut Option<(Fluoroscope, Sequence)>, Option<&Kept>) -> Result<T>,
     ) -> Result<T> {
-        match job(&self.setup, &mut self.engines, &mut self.fluoro) {
+        match job(&self.setup, &mut self.engines, &mut self.fluoro, self.kept.as_ref()) {
             Err(Error::Computation(reason)) if !self.is_cpu => {
                 let mut engines = cpu::engines(self.setup.c_arm.is_some());
                 engines.name = format!("{} ({} failed: {reason})", engines.name, self.engines.name);
                 self.engines = engines;
                 self.is_cpu = true;
-                job(&self.setup, &mut self.engines, &mut self.fluoro)
+                job(&self.setup, &mut self.engines, &mut self.fluoro, self.kept.as_ref())
             }
             done => done,
         }
     }
+}
+
+/// What casts and draws for a set-up, and whether that is the CPU.
+fn engines(setup: &Setup) -> Result<(Engines, bool)> {
+    let nothing = setup.c_arm.is_none() && setup.camera.is_none();
+    let mut refused = None;
+    let on_gpu = match setup.spec.backend {
+        Backend::Cpu => None,
+        _ if nothing => None,
+        Backend::Auto => gpu::engines(setup, false).map_err(|reason| refused = Some(reason)).ok(),
+        Backend::Gpu => Some(gpu::engines(setup, true).map_err(|reason| {
+            Error::parameter("view.backend", "gpu", format!("{reason}; use \"auto\" or \"cpu\""))
+        })?),
+    };
+    let is_cpu = on_gpu.is_none();
+    let mut engines = on_gpu.unwrap_or_else(|| cpu::engines(setup.c_arm.is_some()));
+    if let Some(reason) = refused {
+        engines.name = format!("{} ({reason})", engines.name);
+    }
+    Ok((engines, is_cpu))
 }
 
 /// The fluoroscopic view, made where it is not yet, and what casts its rays.
@@ -378,13 +427,14 @@ fn prepared<'a>(
     setup: &Setup,
     engines: &'a mut Engines,
     fluoro: &'a mut Option<(Fluoroscope, Sequence)>,
+    kept: Option<&Kept>,
 ) -> Result<(&'a mut Fluoroscope, &'a mut Sequence, &'a mut dyn PathEngine)> {
     let paths = engines.paths.as_mut().ok_or_else(no_fluoro)?.as_mut();
     let (scope, sequence) = match fluoro {
         Some(made) => made,
         none => {
             let c_arm = setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
-            let scope = Fluoroscope::new(setup, c_arm, paths)?;
+            let scope = Fluoroscope::new(setup, c_arm, kept, paths)?;
             let sequence = Sequence::new(&setup.spec, &scope);
             none.insert((scope, sequence))
         }

@@ -19,7 +19,7 @@ pub(crate) struct Setup {
     pub(crate) wall: Arc<SurfaceMesh>,
     /// The surface of what blood fills, as the beam meets it.
     pub(crate) filled: Arc<SurfaceMesh>,
-    pub(crate) patient: Patient,
+    pub(crate) patient: Arc<Patient>,
     /// What carries contrast medium, where any is injected.
     pub(crate) flow: Option<Arc<Flow>>,
     /// Whether the wall is closed, so that lengths inside it are known; else blood counts as the tissue around it.
@@ -37,12 +37,25 @@ impl Setup {
 
     /// A set-up with a closed wall and what blood fills.
     pub(crate) fn filled(spec: &ViewSpec, wall: Arc<SurfaceMesh>, filled: Arc<SurfaceMesh>) -> Result<Self> {
+        Self::made(spec, (wall, filled), None)
+    }
+
+    /// That of another view of the same vessel, with what both have in common.
+    pub(crate) fn beside(&self, spec: &ViewSpec) -> Result<Self> {
+        Self::made(spec, (Arc::clone(&self.wall), Arc::clone(&self.filled)), Some(self))
+    }
+
+    fn made(
+        spec: &ViewSpec,
+        (wall, filled): (Arc<SurfaceMesh>, Arc<SurfaceMesh>),
+        other: Option<&Self>,
+    ) -> Result<Self> {
         spec.validate()?;
         let mut setup = Self {
             spec: spec.clone(),
             wall: Arc::default(),
             filled: Arc::default(),
-            patient: Patient::Slab { tissue_mm: spec.xray.tissue_mm },
+            patient: Arc::new(Patient::Slab { tissue_mm: spec.xray.tissue_mm }),
             flow: None,
             lumen: true,
             c_arm: None,
@@ -51,9 +64,14 @@ impl Setup {
         if spec.views.is_empty() {
             return Ok(setup);
         }
-        check_drawable(&wall)?;
+        let other = other.filter(|other| !other.spec.views.is_empty());
+        if other.is_none() {
+            check_drawable(&wall)?;
+        }
         if spec.wants(View::Fluoro) {
-            let closed = check_closed(&filled);
+            let other = other.filter(|other| other.c_arm.is_some());
+            let known = other.is_some_and(|other| other.lumen);
+            let closed = if known { Ok(()) } else { check_closed(&filled) };
             // Only contrast medium shows what is inside the wall: blood is nearly tissue, and a device is drawn without it.
             if !spec.injection.is_empty() || spec.xray.contrast_fraction > 0.0 {
                 closed?;
@@ -61,8 +79,15 @@ impl Setup {
                 setup.lumen = closed.is_ok();
             }
             setup.c_arm = Some(placed(spec, &wall)?);
-            setup.patient = Patient::new(spec, &wall)?;
-            setup.flow = Flow::of_view(spec)?.map(Arc::new);
+            let alike = |other: &&Self| {
+                let slabs = [&other.spec, spec].map(|spec| spec.xray.tissue_mm);
+                other.spec.patient == spec.patient && slabs[0] == slabs[1]
+            };
+            setup.patient = match other.filter(alike) {
+                Some(other) => Arc::clone(&other.patient),
+                None => Arc::new(Patient::new(spec, &wall)?),
+            };
+            setup.flow = flow(spec, other)?;
         }
         let beam: Vec<_> = match &setup.c_arm {
             Some(c_arm) if spec.camera.c_arm => {
@@ -76,11 +101,15 @@ impl Setup {
         (setup.wall, setup.filled) = (wall, filled);
         Ok(setup)
     }
+}
 
-    /// The C-arm where `spec` has it, which is to differ in nothing else.
-    pub(crate) fn placed(&self, spec: &ViewSpec) -> Result<CArm> {
-        spec.validate()?;
-        placed(spec, &self.wall)
+/// What carries the medium of a view, with what it has in common with that of another.
+fn flow(spec: &ViewSpec, other: Option<&Setup>) -> Result<Option<Arc<Flow>>> {
+    let known = other.filter(|other| other.spec.flow == spec.flow && !spec.injection.is_empty());
+    match known.and_then(|other| Some((other.flow.as_ref()?, &other.spec.injection))) {
+        Some((flow, injection)) if *injection == spec.injection => Ok(Some(Arc::clone(flow))),
+        Some((flow, _)) => Ok(Some(Arc::new(flow.injected(&spec.injection)))),
+        None => Ok(Flow::of_view(spec)?.map(Arc::new)),
     }
 }
 

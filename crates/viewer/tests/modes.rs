@@ -366,3 +366,48 @@ fn a_subtraction_that_turns_is_even_though_the_detector_remembers_the_angle_befo
     assert!(stopped > 10, "{stopped}");
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+#[test]
+fn a_view_that_changes_is_one_that_is_new() {
+    let folder = folder("change");
+    let (mut view, wall) = scene(&folder, Mode::Fluoro);
+    view.patient.torso = Some(TorsoSpec::default());
+    view.c_arm.pixel_mm = Some(1.6);
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    let mut beside = renderer.beside(&view).unwrap();
+    let frame = |renderer: &mut Renderer| renderer.render_at(&[wire()], at(3, 0.9)).unwrap().fluoro.unwrap();
+    let mut before = frame(&mut renderer);
+    let medium = view.injection.clone();
+    let changes: [&dyn Fn(&mut ViewSpec); 10] = [
+        &|view| view.c_arm.collimation_mm = Some([60.0, 80.0]),
+        &|view| view.xray.mode = Mode::Dsa,
+        &|view| view.injection.push(InjectionSpec { start_s: 0.5, ..medium[0].clone() }),
+        &|view| view.xray.mode = Mode::Roadmap,
+        &|view| {
+            view.c_arm.primary_deg += 20.0;
+            view.xray.mode = Mode::Cine;
+        },
+        &|view| view.injection.clear(),
+        &|view| view.flow.inflow_ml_per_s *= 2.0,
+        &|view| view.injection.clone_from(&medium),
+        &|view| view.patient.torso = None,
+        &|view| view.size_px = [96, 64],
+    ];
+    for (number, change) in changes.iter().enumerate() {
+        change(&mut view);
+        renderer.change(&view).unwrap();
+        beside = beside.beside(&view).unwrap();
+        let now = frame(&mut renderer);
+        let new = Renderer::new(&view, &wall).and_then(|mut new| new.prepare().map(|()| new));
+        assert!(now == frame(&mut new.unwrap()), "change {number}");
+        assert!(now == frame(&mut beside), "beside {number}");
+        // The twin: without the change it was another picture, but for a flow that carries nothing.
+        assert!(now != before || number == 6, "change {number} shows nothing");
+        before = now;
+    }
+    // What cannot be drawn changes nothing.
+    let bad = ViewSpec { frames_per_s: -1.0, ..view.clone() };
+    assert!(renderer.change(&bad).is_err());
+    assert!(renderer.spec() == &view && frame(&mut renderer).width() == 96);
+    std::fs::remove_dir_all(folder).unwrap();
+}

@@ -7,7 +7,7 @@ use endowire_core::shape::Shape;
 use endowire_methods::Scene;
 use endowire_viewer::{ContactView, Moment};
 
-use super::studio::{Still, Studio};
+use super::studio::{Plan, Still, Studio};
 use crate::args::{FluoroArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
@@ -31,6 +31,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     }
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let frames = args.count as usize;
+    let plan = Plan::new("fluoro", &args.frames, (&args.scene, &scene), ViewChoice::Fluoro, folder, frames)?;
     let cache = Cache::new(&args.frames.cache);
     // An empty vessel needs no wall that can be felt, which takes far longer to make than a picture.
     let mut simulation = match steps {
@@ -41,15 +42,15 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         Some(simulation) => simulation.wall().clone(),
         None => scene.wall(&cache).map_err(in_scene)?,
     };
-    let mut studio =
-        Studio::new("fluoro", &args.frames, (&args.scene, &scene, wall), ViewChoice::Fluoro, folder, frames)?;
     let now = match &mut simulation {
-        Some(simulation) => after(simulation, &script, steps, args, 1.0 / studio.frames_per_s())?,
+        Some(simulation) => after(simulation, &script, steps, args, plan.frames_per_s())?,
         None => Now::default(),
     };
-    studio.inject(now.injections.iter().map(Injected::spec))?;
-    for k in 0..studio.frames() {
-        let time_s = args.time + k as f64 / studio.frames_per_s();
+    let (frames, frames_per_s) = (plan.frames(), plan.frames_per_s());
+    let injections = now.injections.iter().map(Injected::spec);
+    let mut studio = Studio::new(plan, wall, injections).map_err(|e| e.at(args.scene.display()))?;
+    for k in 0..frames {
+        let time_s = args.time + k as f64 / frames_per_s;
         let moment = Moment { frame: k as u64, time_s };
         studio.draw(&Still {
             name: format!("frame_{k:06}"),
@@ -78,17 +79,14 @@ fn after(
     script: &Script,
     steps: usize,
     args: &FluoroArgs,
-    frame_s: f64,
+    frames_per_s: f64,
 ) -> Result<Now, Failure> {
     let bar = progress::bar(steps, "step");
     let mut run = script.begin();
     let mut injections = Vec::new();
     for index in 0..=steps {
         let moves = run.next(simulation)?.map(|step| step.moves.to_vec());
-        for one in &run.injections()[injections.len()..] {
-            let time_s = one.time_s.unwrap_or(one.after_step as f64 * frame_s);
-            injections.push(Injected::new(one, time_s, simulation));
-        }
+        injections.extend(Injected::begun(&run, injections.len(), frames_per_s, simulation));
         // A condition may have ended the script before.
         let Some(moves) = moves.filter(|_| index < steps) else { break };
         simulation.step_together(&moves).map_err(|e| {

@@ -3,7 +3,7 @@
 use endowire_methods::Scene;
 use endowire_viewer::{Moment, Seen};
 
-use super::studio::{Still, Studio};
+use super::studio::{Plan, Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
@@ -71,13 +71,15 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
     let wall =
         scene.wall(&Cache::new(&args.frames.cache)).map_err(|e| Failure::from(e).at(path.display()))?;
-    let seen = (path.as_path(), &scene, wall);
-    let mut studio = Studio::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
-    studio.inject(injections::read(&args.dir)?.iter().map(Injected::spec))?;
+    let seen = (path.as_path(), &scene);
+    let plan = Plan::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
+    let (frames, frame_s) = (plan.frames(), 1.0 / plan.frames_per_s());
+    let injections = injections::read(&args.dir)?;
+    let injections = injections.iter().map(Injected::spec);
+    let mut studio = Studio::new(plan, wall, injections).map_err(|e| e.at(path.display()))?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
-    let (times_s, frame_s) = (step_times(&args.dir)?, 1.0 / studio.frames_per_s());
-    let frames = studio.frames();
+    let times_s = step_times(&args.dir)?;
     let bar = progress::bar(frames, "frame");
     // Of one step all frames are, which may be several, or one of each step.
     let one = steps.len() == 1 && frames > 1;

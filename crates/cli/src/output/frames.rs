@@ -95,6 +95,11 @@ impl FrameWriter {
         self.injected = true;
     }
 
+    /// Frames a second; of a script without speeds also its steps.
+    pub(crate) fn frames_per_s(&self) -> f64 {
+        self.spec.frames_per_s
+    }
+
     /// Time at the end of a step whose script has no speeds, s: that of its frame.
     pub(crate) fn time_s(&self, step: usize) -> f64 {
         step as f64 / self.spec.frames_per_s

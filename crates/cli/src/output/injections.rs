@@ -4,7 +4,7 @@
 use std::io;
 use std::path::Path;
 
-use endowire_core::insertion::{Injection, Simulation};
+use endowire_core::insertion::{Injection, ScriptRun, Simulation};
 use endowire_viewer::InjectionSpec;
 use serde::{Deserialize, Serialize};
 
@@ -30,12 +30,22 @@ pub(crate) struct Injected {
 }
 
 impl Injected {
-    /// An injection that begins at `time_s`, where the simulation is now.
-    pub(crate) fn new(injection: &Injection, time_s: f64, simulation: &Simulation) -> Self {
+    /// Those of a script beyond the `known` first, which begin where the simulation is now; a script without speeds has `frames_per_s` steps a second.
+    pub(crate) fn begun(
+        run: &ScriptRun<'_>,
+        known: usize,
+        frames_per_s: f64,
+        simulation: &Simulation,
+    ) -> Vec<Self> {
+        let begun = run.injections()[known..].iter();
+        begun.map(|one| Self::new(one, frames_per_s, simulation)).collect()
+    }
+
+    fn new(injection: &Injection, frames_per_s: f64, simulation: &Simulation) -> Self {
         let tip = simulation.tip_of_mm(injection.instrument).unwrap_or_default();
         Self {
             after_step: injection.after_step,
-            time_s,
+            time_s: injection.time_s.unwrap_or(injection.after_step as f64 / frames_per_s),
             instrument: simulation.stack().instruments()[injection.instrument].name.clone(),
             volume_ml: injection.ml,
             rate_ml_per_s: injection.ml_per_s,

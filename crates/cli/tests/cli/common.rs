@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use serde_json::Value;
+
 /// `endowire`, with a cache of walls that is the tests' and not the user's.
 pub(crate) fn endowire() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_endowire"));
@@ -37,4 +39,25 @@ pub(crate) const SHORT: [(&str, &str); 2] =
 /// What the program says on stderr.
 pub(crate) fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A path as an argument.
+pub(crate) fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// What is in a file.
+pub(crate) fn bytes(path: impl AsRef<Path>) -> Vec<u8> {
+    std::fs::read(path.as_ref()).unwrap_or_else(|e| panic!("{}: {e}", path.as_ref().display()))
+}
+
+/// A file of JSON.
+pub(crate) fn document(path: impl AsRef<Path>) -> Value {
+    serde_json::from_slice(&bytes(path)).unwrap()
+}
+
+/// The JSON that a call has written on stdout, which must have gone well.
+pub(crate) fn told(output: &Output) -> Value {
+    assert!(output.status.success(), "{}", said(output));
+    serde_json::from_slice(&output.stdout).unwrap()
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::{endowire, said};
+use crate::common::{document, endowire, said, told};
 use serde_json::Value;
 
 fn compare(out: &Path, args: &[&str]) -> Output {
@@ -15,11 +15,6 @@ fn command(out: &Path, args: &[&str]) -> Command {
     let mut command = endowire();
     command.arg("compare").arg("--out").arg(out).args(args);
     command
-}
-
-fn document(output: &Output) -> Value {
-    assert_eq!(output.status.code(), Some(0), "{}", said(output));
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 fn rows(document: &Value) -> &[Value] {
@@ -40,7 +35,7 @@ const SMALL: [&str; 7] = [
 fn rows_pictures_and_the_front_are_written() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
-    let found = document(&compare(out, &SMALL));
+    let found = told(&compare(out, &SMALL));
     for key in ["version", "git_revision", "scene_hash", "seed"] {
         assert!(!found[key].is_null(), "{key}");
     }
@@ -70,9 +65,7 @@ fn rows_pictures_and_the_front_are_written() {
 
     let table = std::fs::read_to_string(out.join("compare.csv")).unwrap();
     assert!(table.starts_with("case,method,resolution,error,time_s,iterations"), "{table}");
-    let kept: Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("compare.json")).unwrap()).unwrap();
-    assert_eq!(kept["rows"], found["rows"]);
+    assert_eq!(document(out.join("compare.json"))["rows"], found["rows"]);
     let svg = std::fs::read_to_string(out.join("compare.svg")).unwrap();
     assert!(svg.contains("<svg") && svg.contains("cantilever"), "the panel has its title");
     let png = std::fs::read(out.join("compare.png")).unwrap();
@@ -91,14 +84,14 @@ fn rows_pictures_and_the_front_are_written() {
 fn what_is_there_is_not_run_again_and_what_is_not_is_added() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
-    let first = document(&compare(out, &SMALL));
-    let again = document(&compare(out, &SMALL));
+    let first = told(&compare(out, &SMALL));
+    let again = told(&compare(out, &SMALL));
     // Times are measured: rows that were run again would differ.
     assert_eq!(first["rows"], again["rows"]);
 
     let mut more = SMALL;
     more[3] = "kirchhoff,beam-fem-damped";
-    let more = document(&compare(out, &more));
+    let more = told(&compare(out, &more));
     assert_eq!(rows(&more).len(), rows(&first).len() + 2);
     for row in rows(&first) {
         assert!(rows(&more).contains(row), "{row}");
@@ -123,7 +116,7 @@ fn an_interrupted_run_goes_on() {
     let count = saved.lines().count() - 1;
     assert!(count > 0);
 
-    let found = document(&compare(out, &args));
+    let found = told(&compare(out, &args));
     assert_eq!(rows(&found).len(), 2 * 9 * 2);
     let table = std::fs::read_to_string(&table).unwrap();
     assert!(table.starts_with(&saved), "{count} rows must be kept as they were");
@@ -133,7 +126,7 @@ fn an_interrupted_run_goes_on() {
 fn a_method_that_cannot_says_so_in_its_row() {
     let folder = tempfile::tempdir().unwrap();
     let args = ["--case", "cantilever-10", "--method", "beam-fem,kirchhoff", "--elements", "16", "--json"];
-    let found = document(&compare(folder.path(), &args));
+    let found = told(&compare(folder.path(), &args));
     let row = rows(&found).iter().find(|row| row["method"] == "beam-fem").unwrap();
     assert!(row["error"].is_null() && row["time_s"].is_null());
     assert!(row["note"].as_str().unwrap().contains("beam-fem"), "{row}");
@@ -143,7 +136,7 @@ fn a_method_that_cannot_says_so_in_its_row() {
 fn an_insertion_is_compared_and_stops_at_the_limit() {
     let folder = tempfile::tempdir().unwrap();
     let args = ["--case", "soft-tube", "--method", "kirchhoff,rigid-links", "--elements", "10,20", "--json"];
-    let found = document(&compare(folder.path(), &[&args[..], &["--limit-s", "1e-6"]].concat()));
+    let found = told(&compare(folder.path(), &[&args[..], &["--limit-s", "1e-6"]].concat()));
     for row in rows(&found) {
         assert!(row["error"].is_null() && row["note"].as_str().unwrap().contains("limit of"), "{row}");
     }
@@ -151,7 +144,7 @@ fn an_insertion_is_compared_and_stops_at_the_limit() {
     assert!(notes[0].starts_with("stopped") && notes[1].starts_with("not begun: 10 elements"), "{notes:?}");
 
     let other = tempfile::tempdir().unwrap();
-    let found = document(&compare(other.path(), &args));
+    let found = told(&compare(other.path(), &args));
     let tip_error = rows(&found)[1]["error"].as_f64().unwrap();
     assert!(tip_error < 0.01, "case C5 on 20 elements: {tip_error} mm");
 }

@@ -4,15 +4,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Output;
 
-use crate::common::{SHORT, assets, said, scene_text};
+use crate::common::{SHORT, assets, bytes, document, said, scene_text, text, told};
 use serde_json::Value;
 
 fn endowire(args: &[&str], threads: &str) -> Output {
     crate::common::endowire().env("RAYON_NUM_THREADS", threads).args(args).output().unwrap()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
 }
 
 /// A specification of a short course in the curved tube with two devices.
@@ -43,11 +39,6 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         }
     }
     all
-}
-
-fn told(output: &Output) -> Value {
-    assert!(output.status.success(), "{}", said(output));
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 #[test]
@@ -82,8 +73,7 @@ fn annotations_are_those_of_coco_and_planes_know_each_other() {
     let spec = specification(folder.path(), "");
     let out = folder.path().join("out");
     told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
-    let document: Value =
-        serde_json::from_slice(&std::fs::read(out.join("annotations.json")).unwrap()).unwrap();
+    let document = document(out.join("annotations.json"));
     let images = document["images"].as_array().unwrap();
     assert_eq!(images.len(), 24);
     for (id, image) in images.iter().enumerate() {
@@ -148,4 +138,46 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
         let told = said(&output);
         assert!(output.status.code() == Some(2) && told.contains(named), "{to}: {told}");
     }
+}
+
+#[test]
+fn what_a_script_injects_is_in_pictures_of_its_steps_and_later() {
+    let folder = tempfile::tempdir().unwrap();
+    let tree = assets().join("vessels/curved_tube.csv");
+    let view = format!(
+        "[view]\nviews = [\"fluoro\"]\nsize_px = [64, 64]\nbackend = \"cpu\"\ndetector.noise = false\ndetector.lag = 0.0\n\
+         xray.window = [0.5, 6.0]\nflow.tree = {:?}\nc_arm = {{ primary_deg = 20.0, field_mm = 200.0 }}\n",
+        text(&tree)
+    );
+    let scene = |injects: &str| {
+        let head = scene_text("curved_tube.toml", &[]);
+        let head = &head[..head.find("[[script]]").unwrap()];
+        let line =
+            |mm: f64| format!("[[script]]\nadvance_mm = {mm:?}\nstep_mm = 4.0\nspeed_mm_per_s = 20.0\n");
+        format!("{head}{}{injects}{}{view}", line(20.0), line(12.0))
+    };
+    let injects = "[[script]]\ninject = { ml = 4.0, ml_per_s = 4.0 }\n";
+    // The picture of a step, of a dataset with these times of injections.
+    let picture = |name: &str, injects: &str, progress: f64, time_s: f64| {
+        std::fs::write(folder.path().join("scene.toml"), scene(injects)).unwrap();
+        let spec = folder.path().join("spec.toml");
+        let more = format!(
+            "scenes = [\"scene.toml\"]\nposes = 1\nmoments = 1\n[vary]\nprimary_deg = [20.0, 20.0]\nsecondary_deg = [0.0, 0.0]\n\
+             progress = [{progress:?}, {progress:?}]\ntime_s = [{time_s:?}, {time_s:?}]\n"
+        );
+        std::fs::write(&spec, more).unwrap();
+        let out = folder.path().join(name);
+        told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+        bytes(out.join("images/0000000.png"))
+    };
+    let medium = picture("medium", injects, 1.0, 0.0);
+    assert!(medium != picture("dry", "", 1.0, 0.0), "the twin: a script that injects nothing");
+    assert!(medium != picture("later", injects, 1.0, 3.0), "it flows on");
+    // Before it is injected there is none: steps 1 to 5 are those before the line.
+    assert!(picture("before", injects, 0.5, 0.0) == picture("before_dry", "", 0.5, 0.0));
+    // That of `fluoro` at the end of the last step, 32 mm at 20 mm/s.
+    std::fs::write(folder.path().join("scene.toml"), scene(injects)).unwrap();
+    let (path, out) = (folder.path().join("scene.toml"), folder.path().join("fluoro"));
+    told(&endowire(&["fluoro", text(&path), "--time", "1.6", "--out", text(&out), "--json"], "2"));
+    assert!(medium == bytes(out.join("frame_000000_fluoro.png")));
 }

@@ -3,16 +3,11 @@
 use std::path::Path;
 use std::process::Output;
 
-use crate::common::{endowire, said};
+use crate::common::{endowire, said, told};
 use serde_json::Value;
 
 fn experiment(args: &[&str]) -> Output {
     endowire().arg("experiment").args(args).output().unwrap()
-}
-
-fn document(output: &Output) -> Value {
-    assert_eq!(output.status.code(), Some(0), "{}", said(output));
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 fn rows(document: &Value) -> &[Value] {
@@ -33,7 +28,7 @@ fn timing_has_a_row_for_every_method_and_the_papers_column() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
     let args = ["timing", "--nodes", "20,50", "--repeats", "3", "--out", out, "--json"];
-    let found = document(&experiment(&args));
+    let found = told(&experiment(&args));
     assert_written(folder.path(), "timing", &found);
     let methods: Vec<&str> = rows(&found).iter().map(|row| row["method"].as_str().unwrap()).collect();
     let three = ["li2011-dense", "li2011-banded", "kirchhoff"];
@@ -58,7 +53,7 @@ fn timing_has_a_row_for_every_method_and_the_papers_column() {
 #[test]
 fn timing_says_who_is_too_slow_and_does_not_begin_larger_ones() {
     let args = ["timing", "--method", "mass-spring", "--nodes", "40,80", "--limit-s", "0.001", "--json"];
-    let found = document(&experiment(&args));
+    let found = told(&experiment(&args));
     let note = |k: usize| rows(&found)[k]["note"].as_str().unwrap();
     assert!(rows(&found).iter().all(|row| row["median_ms"].is_null()));
     assert!(note(0).starts_with("stopped at the limit of 0.001 s"), "{}", note(0));
@@ -69,7 +64,7 @@ fn timing_says_who_is_too_slow_and_does_not_begin_larger_ones() {
 fn a_target_is_reached_and_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
-    let found = document(&experiment(&["navigation", "--target", "aorta", "--out", out, "--json"]));
+    let found = told(&experiment(&["navigation", "--target", "aorta", "--out", out, "--json"]));
     assert_written(folder.path(), "navigation", &found);
     let [row] = rows(&found) else { panic!("one target was asked for") };
     assert_eq!((&row["target"], &row["success"]), (&"aorta".into(), &true.into()));
@@ -86,7 +81,7 @@ fn a_target_is_reached_and_drawn() {
 #[test]
 fn the_loop_grows_with_the_advance() {
     let folder = tempfile::tempdir().unwrap();
-    let found = document(&experiment(&["loop", "--out", folder.path().to_str().unwrap(), "--json"]));
+    let found = told(&experiment(&["loop", "--out", folder.path().to_str().unwrap(), "--json"]));
     assert_written(folder.path(), "loop", &found);
     // The paper's four pictures in two views, and the chart as SVG and PNG.
     let frames = found["frames"].as_array().unwrap();
@@ -112,7 +107,7 @@ fn measured_points_stand_in_for_the_computed_truth() {
     let out = folder.path().to_str().unwrap();
     let measured = ["--measured", points.to_str().unwrap()];
     let cell = ["deformation", "--l-mm", "3", "--l-over-h", "3", "--out", out, "--json"];
-    let found = document(&experiment(&[&cell[..], &measured[..]].concat()));
+    let found = told(&experiment(&[&cell[..], &measured[..]].concat()));
     assert_written(folder.path(), "deformation", &found);
     assert!(found["ground_truth"].as_str().unwrap().starts_with("measured points of"), "{found}");
     assert!(found["convergence"].as_array().unwrap().is_empty());

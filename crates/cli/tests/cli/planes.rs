@@ -5,27 +5,10 @@ use std::process::Output;
 
 use serde_json::Value;
 
-use crate::common::{SHORT, assets, said, scene_text};
+use crate::common::{SHORT, assets, bytes, document, said, scene_text, text, told};
 
 fn endowire(args: &[&str]) -> Output {
     crate::common::endowire().args(args).output().unwrap()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
-
-fn bytes(path: impl AsRef<Path>) -> Vec<u8> {
-    std::fs::read(path.as_ref()).unwrap_or_else(|e| panic!("{}: {e}", path.as_ref().display()))
-}
-
-fn document(path: impl AsRef<Path>) -> Value {
-    serde_json::from_slice(&bytes(path)).unwrap()
-}
-
-fn written(output: &Output) -> Value {
-    assert!(output.status.success(), "{}", said(output));
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 /// A short run in the curved tube, recorded with fluoroscopy in two planes.
@@ -77,7 +60,7 @@ fn a_run_in_two_planes_has_the_frames_and_the_matrix_of_each() {
     assert_eq!(angles[1] - angles[0], 90.0);
     // Frames afterwards are in the planes of the scene too, with labels of both: the tip is where each matrix has it.
     let out = folder.path().join("out");
-    let files = written(&endowire(&[&last_step(&run, &out)[..], &["--labels", "--raw"]].concat()));
+    let files = told(&endowire(&[&last_step(&run, &out)[..], &["--labels", "--raw"]].concat()));
     let files: Vec<&str> = files["files"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
     for rest in ["fluoro.png", "mask.png", "mask_vessel.png", "labels.json", "line_integral.npy"] {
         let (name, ending) = rest.split_once('.').unwrap();
@@ -105,7 +88,7 @@ fn two_planes_are_drawn_at_once_and_each_is_what_it_is_alone() {
         let mut all =
             vec!["render", text(&run), "--from", "106", "--to", "106", "--view", "fluoro", "--json"];
         all.extend(args);
-        written(&endowire(&all))
+        told(&endowire(&all))
     };
     let pair = draw(&["--pose", "RAO 20", "--biplane", "90", "--dicom", text(&dicom), "--out", text(&both)]);
     draw(&["--pose", "LAO 70", "--out", text(&alone)]);
@@ -129,7 +112,7 @@ fn arch(folder: &Path, mode: &str, more: &[&str]) -> Vec<Vec<u8>> {
     let still =
         ["--set", "detector.noise=false", "--set", "detector.lag=0", "--size", "64", "--view", "fluoro"];
     let scene = ["fluoro", text(&scene), "--steps", "0", "--mode", mode, "--out", text(&out), "--json"];
-    let files = written(&endowire(&[&scene[..], &still, more].concat()));
+    let files = told(&endowire(&[&scene[..], &still, more].concat()));
     let names = files["files"].as_array().unwrap().iter().filter_map(Value::as_str);
     names.filter(|name| name.ends_with(".png")).map(|name| bytes(out.join(name))).collect()
 }
@@ -159,7 +142,7 @@ fn a_state_of_a_run_is_drawn_all_around_in_two_planes() {
     let run = recorded(folder.path());
     let [out, dicom] = ["out", "turn.dcm"].map(|name| folder.path().join(name));
     let step = last_step(&run, &out);
-    let files = written(&endowire(
+    let files = told(&endowire(
         &[&step[..], &["--turn", "180", "--count", "4", "--labels", "--dicom", text(&dicom)]].concat(),
     ));
     let files: Vec<&str> = files["files"].as_array().unwrap().iter().filter_map(Value::as_str).collect();
@@ -210,7 +193,7 @@ fn a_pulse_shows_the_way_of_a_device_in_a_run_and_afterwards_alike() {
     let [long, short] = [run("long", "60.0"), run("short", "0.1")];
     let frame = |run: &Path| bytes(run.join("frames/step_000106_fluoro.png"));
     let render = ["render", text(&long), "--from", "105", "--view", "fluoro", "--json", "--labels"];
-    written(&endowire(&render));
+    told(&endowire(&render));
     assert!(frame(&long) == bytes(long.join("render/step_000106_fluoro.png")));
     assert!(frame(&long) != frame(&short), "the twin: a pulse that is over at once");
     let exposure = &document(long.join("summary.json"))["planes"][0]["exposure"];

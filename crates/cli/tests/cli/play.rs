@@ -185,40 +185,66 @@ impl Drop for Display {
     }
 }
 
-#[test]
+/// Runs a window on a display that nobody sees, gives it lines with pauses in ms, and has its pace; none where there is no Xvfb.
 #[cfg(all(target_os = "linux", feature = "window"))]
-fn a_window_shows_inputs_soon_and_physics_keeps_its_pace() {
+fn paced(scene: &str, record: &Path, lines: &[(Value, u64)]) -> Option<Value> {
     let Some(display) = Display::open() else {
         eprintln!("skipped: there is no Xvfb to open a window on");
-        return;
+        return None;
     };
-    let folder = tempfile::tempdir().unwrap();
-    let record = folder.path().join("played.toml");
-    let mut command = play("arch_vertebral.toml", &record, &["--listen", "127.0.0.1:0", "--json"]);
+    let mut command = play(scene, record, &["--listen", "127.0.0.1:0", "--json"]);
     let mut child = command.env("DISPLAY", &display.1).env_remove("WAYLAND_DISPLAY").spawn().unwrap();
     let mut said = BufReader::new(child.stderr.take().unwrap());
     let mut stream = TcpStream::connect(address(&mut said)).unwrap();
     let mut answers = BufReader::new(stream.try_clone().unwrap());
-    let mut say = |line: Value| {
+    for (line, pause_ms) in lines {
         writeln!(stream, "{line}").unwrap();
         let mut answer = String::new();
         answers.read_line(&mut answer).unwrap();
         assert_eq!(serde_json::from_str::<Value>(&answer).unwrap()["ok"], true, "{answer}");
-    };
-    let pause = |ms: u64| std::thread::sleep(std::time::Duration::from_millis(ms));
-    say(json!({"do": "pedal", "down": true, "mode": "fluoro"}));
-    pause(3000);
-    say(json!({"do": "move", "instrument": "catheter", "mm_per_s": 10, "deg_per_s": 20}));
-    for turn in 0..40 {
-        let mm = if turn % 3 == 0 { -0.5 } else { 0.75 };
-        say(json!({"do": "nudge", "instrument": "wire", "mm": mm, "deg": 4}));
-        pause(110);
+        std::thread::sleep(std::time::Duration::from_millis(*pause_ms));
     }
-    say(json!({"do": "quit"}));
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0));
-    let pace: Value = serde_json::from_slice(&output.stdout).unwrap();
+    Some(serde_json::from_slice(&output.stdout).unwrap())
+}
+
+#[test]
+#[cfg(all(target_os = "linux", feature = "window"))]
+fn a_window_shows_inputs_soon_and_physics_keeps_its_pace() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("played.toml");
+    let mut lines = vec![
+        (json!({"do": "pedal", "down": true, "mode": "fluoro"}), 3000),
+        (json!({"do": "move", "instrument": "catheter", "mm_per_s": 10, "deg_per_s": 20}), 0),
+    ];
+    for turn in 0..40 {
+        let mm = if turn % 3 == 0 { -0.5 } else { 0.75 };
+        lines.push((json!({"do": "nudge", "instrument": "wire", "mm": mm, "deg": 4}), 110));
+    }
+    lines.push((json!({"do": "quit"}), 0));
+    let Some(pace) = paced("arch_vertebral.toml", &record, &lines) else { return };
     assert!(pace["ticks_per_s"].as_f64().unwrap() > 55.0, "{pace}");
     assert!(pace["input_to_picture_ms"][0].as_f64().unwrap() <= 100.0, "{pace}");
     assert!(std::fs::read_to_string(&record).unwrap().contains("[[script]]"));
+}
+
+#[test]
+#[cfg(all(target_os = "linux", feature = "window"))]
+fn a_room_that_changes_is_seen_soon_over_a_whole_body_with_contrast_medium() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut lines = vec![(json!({"do": "pedal", "down": true, "mode": "fluoro"}), 4000)];
+    for turn in 0..27 {
+        lines.push(match turn % 3 {
+            0 => (json!({"do": "turn_c_arm", "lao_deg": 3}), 110),
+            1 => (json!({"do": "table", "right_mm": 2, "down_mm": 1}), 110),
+            _ => (json!({"do": "collimate", "width": 0.9 - 0.01 * f64::from(turn), "height": 0.8}), 700),
+        });
+    }
+    lines.push((json!({"do": "quit"}), 0));
+    let Some(pace) = paced("arch_angiography.toml", &folder.path().join("played.toml"), &lines) else {
+        return;
+    };
+    assert!(pace["ticks_per_s"].as_f64().unwrap() > 55.0, "{pace}");
+    assert!(pace["input_to_picture_ms"][0].as_f64().unwrap() <= 100.0, "{pace}");
 }

@@ -5,16 +5,11 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
-use crate::common::{SHORT, said, scene_text};
+use crate::common::{SHORT, document, said, scene_text, text, told};
 use npyz::NpyFile;
-use serde_json::Value;
 
 fn endowire(args: &[&str]) -> Output {
     crate::common::endowire().args(args).output().unwrap()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
 }
 
 /// A short run in the curved tube, recorded without frames.
@@ -25,11 +20,6 @@ fn recorded(folder: &Path) -> (PathBuf, PathBuf) {
     let run = folder.join("run");
     assert!(endowire(&["run", text(&path), "--out", text(&run)]).status.success());
     (path, run)
-}
-
-fn written(output: &Output) -> Value {
-    assert!(output.status.success(), "{}", said(output));
-    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 fn png_size(path: &Path) -> (u32, u32) {
@@ -67,9 +57,8 @@ fn a_recorded_run_is_drawn_from_any_angle_with_all_that_belongs_to_it() {
         text(&out),
         "--json",
     ]);
-    let document = written(&output);
-    let files: Vec<&str> =
-        document["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
+    let written = told(&output);
+    let files: Vec<&str> = written["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap()).collect();
     // Steps 40 and 80, and the last one.
     for step in ["step_000040", "step_000080", "step_000106"] {
         for rest in [
@@ -93,8 +82,7 @@ fn a_recorded_run_is_drawn_from_any_angle_with_all_that_belongs_to_it() {
     animated.next_frame(&mut data).unwrap();
 
     // The tip of the labels is the recorded one, seen by a pinhole at 1000 mm; the device attenuates there.
-    let labels: Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("step_000106_labels.json")).unwrap()).unwrap();
+    let labels = document(out.join("step_000106_labels.json"));
     let tip: Vec<f64> =
         labels["devices"][0]["tip_px"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
     assert!(labels["devices"][0]["tip_visible"].as_bool().unwrap(), "{tip:?}");
@@ -123,7 +111,7 @@ fn a_scene_is_drawn_without_a_recording() {
     let draw = |more: &[&str]| {
         let mut args = vec!["fluoro", text(&scene), "--out", text(&out), "--json", "--size", "48x32"];
         args.extend(more);
-        written(&endowire(&args))
+        told(&endowire(&args))
     };
     assert_eq!(draw(&["--steps", "0"])["files"].as_array().unwrap().len(), 1);
     let bare = std::fs::read(out.join("frame_000000_fluoro.png")).unwrap();

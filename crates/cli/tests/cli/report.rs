@@ -35,6 +35,8 @@ fn a_page_is_whole_and_names_where_it_comes_from() {
     let none = endowire().arg("report").arg(folder.path()).output().unwrap();
     assert_eq!(none.status.code(), Some(2));
     assert!(said(&none).contains("recorded run"));
+    let none = endowire().arg("report").arg(folder.path().join("nowhere")).output().unwrap();
+    assert!(said(&none).contains("recorded run"), "{}", said(&none));
 }
 
 #[test]
@@ -47,6 +49,67 @@ fn an_experiment_has_a_page_of_its_tables() {
     let text = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(text.contains("\"columns\":[\"method\"") && text.contains("\"git_revision\""), "{text}");
     assert!(!text.contains("http"));
+}
+
+/// A sweep of three runs in the curved tube, one of which must fail, and its page.
+fn sweep_page(folder: &Path) -> PathBuf {
+    let changes = [("advance_mm = 220.0", "advance_mm = 20.0"), ("[\"3d\", \"fluoro\"]", "[]")];
+    std::fs::write(folder.join("short.toml"), scene_text("curved_tube.toml", &changes)).unwrap();
+    let axis = "scene = \"short.toml\"\n[[axis]]\nkey = \"vessel.wall.friction\"\nlist = [0.0, 0.1, -1.0]\n";
+    std::fs::write(folder.join("sweep.toml"), axis).unwrap();
+    let out = folder.join("swept");
+    endowire().arg("sweep").arg(folder.join("sweep.toml")).arg("--out").arg(&out).output().unwrap();
+    let told = endowire().arg("report").arg(&out).output().unwrap();
+    assert_eq!(told.status.code(), Some(0), "{}", said(&told));
+    out.join("report.html")
+}
+
+#[test]
+fn a_sweep_has_a_page_of_its_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(sweep_page(folder.path())).unwrap();
+    let (_, data) = text.split_once("const data = ").unwrap();
+    let data: serde_json::Value = serde_json::from_str(data.split_once(";\n").unwrap().0).unwrap();
+    let table = &data["tables"][0];
+    assert_eq!((&table["name"], &table["count"]), (&"runs".into(), &3.into()));
+    let columns: Vec<&str> = table["columns"].as_array().unwrap().iter().filter_map(|c| c.as_str()).collect();
+    let value = |row: usize, column: &str| {
+        let place = columns.iter().position(|name| *name == column).unwrap_or_else(|| panic!("{columns:?}"));
+        table["rows"][row][place].as_str().unwrap().to_owned()
+    };
+    assert_eq!([0, 1, 2].map(|row| value(row, "vessel.wall.friction")), ["0", "0.1", "-1"]);
+    assert!(!value(0, "inserted_mm").is_empty() && value(2, "inserted_mm").is_empty());
+    assert_eq!(table["chart"], serde_json::json!(["vessel.wall.friction", "push_force_n"]));
+    assert!(value(2, "failure").contains("friction") && value(0, "failure").is_empty(), "the twin");
+    assert!(
+        !columns.contains(&"left_through")
+            && !columns.contains(&"git_revision")
+            && !columns.contains(&"seed"),
+        "{columns:?}"
+    );
+    assert!(data["source"].to_string().contains("git_revision"));
+    assert!(!text.contains("http") && !text.contains("src=\""));
+    // A sweep that goes on shows what there is.
+    let journal = folder.path().join("swept/runs.jsonl");
+    let rows = std::fs::read_to_string(&journal).unwrap();
+    let part: String = rows.lines().take(3).map(|line| format!("{line}\n")).collect();
+    std::fs::write(&journal, part).unwrap();
+    endowire().arg("report").arg(folder.path().join("swept")).output().unwrap();
+    let text = std::fs::read_to_string(folder.path().join("swept/report.html")).unwrap();
+    assert!(text.contains("runs so far of 3"));
+}
+
+#[test]
+fn a_browser_shows_the_table_of_a_sweep() {
+    let Some(browser) = browser() else {
+        eprintln!("skipped: there is no Chromium to open the page in");
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let url = format!("file://{}", sweep_page(folder.path()).display());
+    let document = shown(browser, folder.path(), &url, "--dump-dom");
+    assert!(document.contains("runs: 3 rows") && document.contains(">-1</td>"), "{document}");
+    assert!(document.contains("data-drawn-ms"));
 }
 
 /// A browser that can do without a window.

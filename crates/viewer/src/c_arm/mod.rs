@@ -70,7 +70,7 @@ impl CArm {
     /// Pixel coordinates of a point given by [`Self::in_beam`].
     pub(crate) fn pixel_of(&self, beam: &Vec3) -> [f64; 2] {
         let scale = self.focal_px() / (self.sod_mm + beam.z);
-        let [w, h] = self.size_px.map(f64::from);
+        let [w, h] = [f64::from(self.size_px[0]), f64::from(self.size_px[1])];
         [w / 2.0 + scale * beam.x, h / 2.0 + scale * beam.y]
     }
 

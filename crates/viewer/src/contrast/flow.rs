@@ -4,9 +4,13 @@
 //! the same mean velocity, as in large arteries, n = 3 is Murray's law for small ones (Proceedings of the National Academy of
 //! Sciences 12, 1926). It comes as the heart pumps it: a part of the flow, the pulsatility, in systole, the rest all the time.
 
+use std::sync::{Arc, Mutex, OnceLock};
+
 use endowire_core::vessel::{CentrelineNode, CentrelineTree};
 use endowire_core::{Error, Result, Vec3};
 
+use super::nearest::Cells;
+use super::transport::Transport;
 use crate::spec::{FlowSpec, InjectionSpec, ViewSpec};
 
 /// Points of the tree are set at most this far apart, mm.
@@ -38,9 +42,13 @@ pub(super) struct Node {
 }
 
 /// The tree directed from its inlet, with its injections.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct Flow {
     pub(super) nodes: Vec<Node>,
+    /// Which of them is nearest to what in the lumen.
+    pub(super) cells: Arc<Mutex<Cells>>,
+    largest: OnceLock<Vec<f32>>,
+    carried: OnceLock<Arc<Mutex<Transport>>>,
     pub(super) injections: Vec<InjectionSpec>,
     pub(super) mean_inflow_mm3_per_s: f64,
     /// Mean time that medium stays in the tissue behind an end, s.
@@ -77,6 +85,9 @@ impl Flow {
     pub(super) fn new(tree: &CentrelineTree, spec: &FlowSpec, injections: &[InjectionSpec]) -> Result<Self> {
         Ok(Self {
             nodes: directed(tree, spec)?,
+            cells: Arc::default(),
+            largest: OnceLock::new(),
+            carried: OnceLock::new(),
             injections: injections.to_vec(),
             mean_inflow_mm3_per_s: spec.inflow_ml_per_s * 1000.0,
             tissue_s: spec.tissue_s,
@@ -85,6 +96,33 @@ impl Flow {
             pulsatility: spec.pulsatility,
             dispersion: spec.dispersion,
         })
+    }
+
+    /// The same vessel and blood with other injections.
+    pub(crate) fn injected(&self, injections: &[InjectionSpec]) -> Self {
+        Self {
+            nodes: self.nodes.clone(),
+            cells: Arc::clone(&self.cells),
+            largest: OnceLock::new(),
+            carried: OnceLock::new(),
+            injections: injections.to_vec(),
+            ..*self
+        }
+    }
+
+    /// The medium on its way, for all that show it: a moment is the same whoever asked for one before. What a tip injects depends on where it was
+    /// when it was asked for, and is everyone's own.
+    pub(super) fn carried(&self) -> Arc<Mutex<Transport>> {
+        let anew = || Arc::new(Mutex::new(Transport::new(self)));
+        match self.injections.iter().any(|one| one.at_tip) {
+            true => anew(),
+            false => Arc::clone(self.carried.get_or_init(anew)),
+        }
+    }
+
+    /// The largest fraction that each cell ever has.
+    pub(super) fn largest(&self) -> &[f32] {
+        self.largest.get_or_init(|| Transport::largest(self))
     }
 
     /// Inflow at a time over its mean: a raised cosine in systole over a steady part.

@@ -5,19 +5,16 @@
 //! the centre line, to that node's neighbour on its side: a bolus has no steps. A frame then needs one sparse product of these shares
 //! with the nodes' fractions.
 
-use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 
-use super::flow::{Flow, Node};
+use super::flow::Flow;
+use super::nearest::{Nearest, STEP_MM};
 use super::transport::Transport;
 use crate::c_arm::CArm;
 use crate::cpu::wall_crossings;
-
-/// Length of a step and side of the cells that remember their nearest node, mm.
-const STEP_MM: f64 = 1.25;
 
 /// Contrast medium that a pixel sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,11 +31,17 @@ const TISSUE_BEHIND: f64 = 0.8;
 /// Squared deviations from that middle beyond which nothing is seen.
 const TISSUE_REACH: f64 = 16.0;
 
-/// The share of each node in the lumen of each pixel.
+/// The medium that is seen from one place of the C-arm.
 #[derive(Debug)]
 pub(crate) struct ContrastMap {
     flow: Arc<Flow>,
-    transport: Transport,
+    transport: Arc<Mutex<Transport>>,
+    shares: Arc<Shares>,
+}
+
+/// The share of each node in the lumen of each pixel.
+#[derive(Debug)]
+pub(crate) struct Shares {
     /// Pixels inside the wall, rising, and where their shares end.
     pixels: Vec<(u32, u32)>,
     shares: Vec<(u32, f32)>,
@@ -46,13 +49,12 @@ pub(crate) struct ContrastMap {
     tissue: Vec<(usize, Vec<(u32, f32)>)>,
 }
 
-impl ContrastMap {
+impl Shares {
     /// The shares of `flow` in the lumen that `wall` encloses.
-    pub(crate) fn new(flow: &Arc<Flow>, c_arm: &CArm, wall: &SurfaceMesh) -> Self {
-        let transport = Transport::new(flow);
+    pub(crate) fn new(flow: &Flow, c_arm: &CArm, wall: &SurfaceMesh) -> Self {
         let tissue = tissue(flow, c_arm);
-        let mut map = Self { flow: Arc::clone(flow), transport, pixels: vec![], shares: vec![], tissue };
-        let mut near = Nearest::new(&flow.nodes);
+        let mut map = Self { pixels: vec![], shares: vec![], tissue };
+        let mut near = Nearest::new(flow);
         let mut crossings = wall_crossings(c_arm, wall);
         crossings.sort_unstable_by(|a, b| {
             (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
@@ -96,12 +98,36 @@ impl ContrastMap {
         map
     }
 
+    fn mixed(&self, of_node: &[f32]) -> Vec<Medium> {
+        let mut start = 0;
+        let mix = |&(pixel, end): &(u32, u32)| {
+            let shares = &self.shares[start..end as usize];
+            start = end as usize;
+            let fraction = shares.iter().map(|&(node, share)| share * of_node[node as usize]).sum();
+            Medium { pixel, fraction, tissue_mm: 0.0 }
+        };
+        self.pixels.iter().map(mix).collect()
+    }
+}
+
+impl ContrastMap {
+    /// Medium of `flow`, shared out to pixels.
+    pub(crate) fn new(flow: &Arc<Flow>, shares: Arc<Shares>) -> Self {
+        Self { flow: Arc::clone(flow), transport: flow.carried(), shares }
+    }
+
+    /// How the lumen of each pixel is shared out, which another injection does not change.
+    pub(crate) fn into_shares(self) -> Arc<Shares> {
+        self.shares
+    }
+
     /// What the pixels see that see any, rising. What is injected through a tip has come from `tip_mm` since the time asked for before.
     pub(crate) fn at(&mut self, time_s: f64, tip_mm: Option<Vec3>) -> Vec<Medium> {
-        self.transport.advance(&self.flow, time_s, tip_mm);
-        let mut seen = self.mixed(&self.transport.at(time_s));
-        let volumes = self.transport.tissue_mm3();
-        let filled = self.tissue.iter().filter(|end| volumes[end.0] > 0.0);
+        let mut transport = self.transport.lock().unwrap_or_else(PoisonError::into_inner);
+        transport.advance(&self.flow, time_s, tip_mm);
+        let mut seen = self.shares.mixed(&transport.at(time_s));
+        let volumes = transport.tissue_mm3();
+        let filled = self.shares.tissue.iter().filter(|end| volumes[end.0] > 0.0);
         for (end, pixels) in filled {
             let volume = volumes[*end] as f32;
             seen.extend(pixels.iter().map(|&(pixel, length)| Medium {
@@ -124,18 +150,7 @@ impl ContrastMap {
 
     /// The largest fraction that a pixel's lumen ever has, each node at its own best moment.
     pub(crate) fn largest(&self) -> Vec<Medium> {
-        self.mixed(&Transport::largest(&self.flow))
-    }
-
-    fn mixed(&self, of_node: &[f32]) -> Vec<Medium> {
-        let mut start = 0;
-        let mix = |&(pixel, end): &(u32, u32)| {
-            let shares = &self.shares[start..end as usize];
-            start = end as usize;
-            let fraction = shares.iter().map(|&(node, share)| share * of_node[node as usize]).sum();
-            Medium { pixel, fraction, tissue_mm: 0.0 }
-        };
-        self.pixels.iter().map(mix).collect()
+        self.shares.mixed(self.flow.largest())
     }
 }
 
@@ -159,53 +174,4 @@ fn tissue(flow: &Flow, c_arm: &CArm) -> Vec<(usize, Vec<(u32, f32)>)> {
         (end, pixels.collect())
     })
     .collect()
-}
-
-/// Nearest nodes by cells, found where they are first asked for.
-struct Nearest<'a> {
-    nodes: &'a [Node],
-    /// The node after each, in its widest branch.
-    downstream: Vec<Option<usize>>,
-    cells: HashMap<[i32; 3], u32>,
-}
-
-impl<'a> Nearest<'a> {
-    fn new(nodes: &'a [Node]) -> Self {
-        let mut downstream: Vec<Option<usize>> = vec![None; nodes.len()];
-        for (i, node) in nodes.iter().enumerate() {
-            if let Some(before) = node.upstream {
-                let wider = |other: usize| nodes[other].radius_mm >= node.radius_mm;
-                if !downstream[before].is_some_and(wider) {
-                    downstream[before] = Some(i);
-                }
-            }
-        }
-        Self { nodes, downstream, cells: HashMap::new() }
-    }
-
-    /// The nearest node and the neighbour towards which a point lies along the centre line, with their shares of it.
-    fn shares(&mut self, point: &Vec3) -> [(u32, f32); 2] {
-        let node = self.node(point);
-        let at = self.nodes[node as usize].position_mm;
-        let neighbours = [self.nodes[node as usize].upstream, self.downstream[node as usize]];
-        let along = |neighbour: usize| {
-            let way = self.nodes[neighbour].position_mm - at;
-            let share = (point - at).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE);
-            (neighbour as u32, share.clamp(0.0, 1.0) as f32)
-        };
-        let most = neighbours.into_iter().flatten().map(along).max_by(|a, b| a.1.total_cmp(&b.1));
-        let (neighbour, share) = most.unwrap_or((node, 0.0));
-        [(node, 1.0 - share), (neighbour, share)]
-    }
-
-    fn node(&mut self, point: &Vec3) -> u32 {
-        let cell = [point.x, point.y, point.z].map(|x| (x / STEP_MM).floor() as i32);
-        *self.cells.entry(cell).or_insert_with(|| {
-            let centre = Vec3::from(cell.map(|i| (f64::from(i) + 0.5) * STEP_MM));
-            let power =
-                |node: &Node| (node.position_mm - centre).norm_squared() - node.radius_mm * node.radius_mm;
-            let best = (0..).zip(self.nodes).min_by(|a, b| power(a.1).total_cmp(&power(b.1)));
-            best.map_or(0, |(i, _)| i)
-        })
-    }
 }

@@ -2,7 +2,8 @@
 
 mod flow;
 mod map;
+mod nearest;
 mod transport;
 
 pub(crate) use flow::Flow;
-pub(crate) use map::{ContrastMap, Medium};
+pub(crate) use map::{ContrastMap, Medium, Shares};

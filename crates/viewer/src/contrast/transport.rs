@@ -18,6 +18,7 @@
 use endowire_core::Vec3;
 
 use super::flow::{Flow, nearest};
+use crate::spec::InjectionSpec;
 
 /// Part of the step at which a cell would be emptied.
 const COURANT: f64 = 0.8;
@@ -68,15 +69,24 @@ impl Transport {
             *self = Self::new(flow);
         }
         let places: Vec<usize> = flow.injections.iter().map(|i| place(flow, i, tip_mm)).collect();
-        let last = flow.injections.iter().map(|i| i.start_s + i.duration_s).fold(0.0, f64::max);
         while self.steps < wanted {
-            // What has all gone does not come back.
-            if self.steps as f64 * self.step_s > last && self.all_gone() {
-                self.steps = wanted;
-                break;
+            self.wait(flow, wanted);
+            if self.steps < wanted {
+                self.step(flow, &places);
             }
-            self.step(flow, &places);
         }
+    }
+
+    /// Where all has gone, goes on to the next injection or to a step: what has gone does not come back.
+    fn wait(&mut self, flow: &Flow, wanted: i64) {
+        let now_s = self.steps as f64 * self.step_s;
+        let flows = |i: &InjectionSpec| i.start_s <= now_s && now_s <= i.start_s + i.duration_s;
+        if flow.injections.iter().any(flows) || !self.all_gone() {
+            return;
+        }
+        let next_s = flow.injections.iter().map(|i| i.start_s).filter(|start| *start > now_s);
+        let next = (next_s.fold(f64::INFINITY, f64::min) / self.step_s).floor();
+        self.steps = self.steps.max((next as i64).min(wanted));
     }
 
     fn all_gone(&self) -> bool {
@@ -108,6 +118,7 @@ impl Transport {
             if over || now_s > last + WAITED_S {
                 return largest.into_iter().map(|f| f as f32).collect();
             }
+            transport.wait(flow, (last / transport.step_s).ceil() as i64);
             transport.step(flow, &places);
             largest.iter_mut().zip(&transport.fractions).for_each(|(most, f)| *most = most.max(*f));
         }
@@ -175,7 +186,7 @@ impl Transport {
 }
 
 /// The cell that an injection goes into.
-fn place(flow: &Flow, injection: &crate::spec::InjectionSpec, tip_mm: Option<Vec3>) -> usize {
+fn place(flow: &Flow, injection: &InjectionSpec, tip_mm: Option<Vec3>) -> usize {
     let at = if injection.at_tip { tip_mm } else { injection.at_mm.map(Vec3::from) };
     at.map_or(0, |point| nearest(&flow.nodes, &point))
 }
@@ -201,7 +212,7 @@ mod tests {
     use endowire_core::vessel::{CentrelineNode, CentrelineTree};
 
     use super::*;
-    use crate::spec::{FlowSpec, InjectionSpec};
+    use crate::spec::FlowSpec;
 
     /// A trunk of 100 mm and radius 5 that divides into radii 4 and 2, of 60 mm each.
     fn flow(spec: &FlowSpec, at_mm: Option<[f64; 3]>, rate_ml_per_s: f64) -> Flow {
@@ -299,5 +310,40 @@ mod tests {
         let most = pulse.iter().copied().fold(0.0, f64::max);
         assert!((most - flow.highest_pulse()).abs() < 1e-3 && most > 2.0, "{most}");
         assert!(pulse.iter().all(|p| *p > 0.09));
+    }
+
+    #[test]
+    fn between_injections_far_apart_nothing_is_computed_and_the_later_one_is_as_it_is_alone() {
+        let one = |start_s: f64| InjectionSpec {
+            start_s,
+            duration_s: 0.5,
+            rate_ml_per_s: 8.0,
+            at_mm: None,
+            at_tip: false,
+        };
+        let carried = |injections: &[InjectionSpec], time_s: f64| {
+            let spec = FlowSpec { tissue_s: 0.05, ..steady() };
+            let flow = flow(&spec, None, 8.0).injected(injections);
+            let mut transport = Transport::new(&flow);
+            transport.advance(&flow, time_s, None);
+            (flow, transport)
+        };
+        // When the first has gone, the next step is that of the second, eleven days later.
+        let (flow, mut waiting) = carried(&[one(0.5), one(1e6)], 300.0);
+        let now_s = |transport: &Transport| transport.steps as f64 * transport.step_s;
+        assert!(now_s(&waiting) < 301.0);
+        waiting.wait(&flow, i64::MAX);
+        assert!((0.0..=waiting.step_s).contains(&(1e6 - now_s(&waiting))), "{}", now_s(&waiting));
+        let (flow, mut early) = carried(&[one(0.5), one(1e6)], 1.2);
+        early.wait(&flow, i64::MAX);
+        assert!(now_s(&early) < 1.3, "the twin: the first is still there");
+        let [both, alone] = [&[one(0.5), one(1e6)][..], &[one(1e6)]].map(|injections| {
+            let (_, transport) = carried(injections, 1e6 + 0.4);
+            transport.at(1e6 + 0.4)
+        });
+        let most = both.iter().zip(&alone).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        // Two injections have shorter steps.
+        assert!(most < 0.02, "{most}");
+        assert!(alone.iter().any(|f| *f > 0.2), "the twin: there is medium");
     }
 }

@@ -22,10 +22,21 @@ pub(crate) struct ScreenTriangle {
     area2: f64,
 }
 
+/// A corner as triangles have it.
+#[inline]
+pub(crate) fn on_grid([x, y]: [f64; 2]) -> [f64; 2] {
+    [(x * GRID).round() / GRID, (y * GRID).round() / GRID]
+}
+
 impl ScreenTriangle {
     /// `None` for one without area, which covers no centre.
-    pub(crate) fn new(corners: [[f64; 2]; 3]) -> Option<Self> {
-        let corners = corners.map(|c| c.map(|x| (x * GRID).round() / GRID));
+    pub(crate) fn new([a, b, c]: [[f64; 2]; 3]) -> Option<Self> {
+        Self::on_grid([on_grid(a), on_grid(b), on_grid(c)])
+    }
+
+    /// The same of corners by [`on_grid`].
+    #[inline]
+    pub(crate) fn on_grid(corners: [[f64; 2]; 3]) -> Option<Self> {
         let [a, b, c] = corners;
         let area2 = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         (area2 != 0.0 && area2.is_finite()).then_some(Self { corners, area2 })
@@ -49,20 +60,28 @@ impl ScreenTriangle {
         rows: std::ops::Range<u32>,
         mut visit: impl FnMut(usize, usize, [f64; 3]),
     ) {
-        let xs = pixel_range(self.corners.map(|c| c[0]), width);
-        let ys = pixel_range(self.corners.map(|c| c[1]), rows.end);
+        // Loops are inlined where maps of arrays are not: most triangles of a body cover a centre or none.
+        let [a, b, c] = self.corners;
+        let xs = pixel_range([a[0], b[0], c[0]], width);
+        let ys = pixel_range([a[1], b[1], c[1]], rows.end);
         let ys = ys.start.max(rows.start as usize)..ys.end;
+        if xs.is_empty() || ys.is_empty() {
+            return;
+        }
         let turn = self.area2.signum();
-        let edges = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| {
-            let (a, b) = (self.corners[i], self.corners[j]);
+        let mut edges = [([0.0; 2], [0.0; 2], false); 3];
+        for (edge, (a, b)) in edges.iter_mut().zip([(b, c), (c, a), (a, b)]) {
             let ordered = (a[0], a[1]) <= (b[0], b[1]);
             let (a, b) = if ordered { (a, b) } else { (b, a) };
             // Zero is positive along the ordered direction only.
-            (a, [b[0] - a[0], b[1] - a[1]], if ordered { turn } else { -turn })
-        });
+            *edge = (a, [b[0] - a[0], b[1] - a[1]], (turn > 0.0) == ordered);
+        }
         for y in ys {
             let py = y as f64 + 0.5;
-            let rows = edges.map(|(a, d, sign)| (d[0] * (py - a[1]), d[1], a[0], sign > 0.0));
+            let mut rows = [(0.0, 0.0, 0.0, false); 3];
+            for (row, (a, d, positive)) in rows.iter_mut().zip(&edges) {
+                *row = (d[0] * (py - a[1]), d[1], a[0], *positive);
+            }
             let (low, high) = self.extent(py);
             let columns = span(low - 1.0, high + 1.0, width);
             let mut entered = false;
@@ -78,7 +97,9 @@ impl ScreenTriangle {
                 if inside {
                     entered = true;
                     let sum = e[0] + e[1] + e[2];
-                    visit(x, y, if sum > 0.0 { e.map(|v| v / sum) } else { [1.0 / 3.0; 3] });
+                    let weights =
+                        if sum > 0.0 { [e[0] / sum, e[1] / sum, e[2] / sum] } else { [1.0 / 3.0; 3] };
+                    visit(x, y, weights);
                 } else if entered {
                     break;
                 }
@@ -89,8 +110,8 @@ impl ScreenTriangle {
     /// Where the horizontal line at `y` enters and leaves, within rounding: a long slanting triangle fills little of its rectangle.
     fn extent(&self, y: f64) -> (f64, f64) {
         let (mut low, mut high) = (f64::MAX, f64::MIN);
-        for [i, j] in [[0, 1], [1, 2], [2, 0]] {
-            let (a, b) = (self.corners[i], self.corners[j]);
+        let [a, b, c] = self.corners;
+        for (a, b) in [(a, b), (b, c), (c, a)] {
             let crosses = a[1].min(b[1]) <= y && y <= a[1].max(b[1]);
             if crosses && a[1] == b[1] {
                 (low, high) = (low.min(a[0]).min(b[0]), high.max(a[0]).max(b[0]));
@@ -104,10 +125,9 @@ impl ScreenTriangle {
 }
 
 /// Pixels whose centres may lie within the extent of three coordinates.
-fn pixel_range(values: [f64; 3], size: u32) -> std::ops::Range<usize> {
-    let low = values.iter().copied().fold(f64::MAX, f64::min);
-    let high = values.iter().copied().fold(f64::MIN, f64::max);
-    span(low, high, size)
+#[inline]
+fn pixel_range([a, b, c]: [f64; 3], size: u32) -> std::ops::Range<usize> {
+    span(a.min(b).min(c), a.max(b).max(c), size)
 }
 
 /// Pixels whose centres lie in [low, high], clipped to a picture side.

@@ -14,16 +14,16 @@ use endowire_core::{Error, Result, Vec3};
 use rayon::prelude::*;
 
 use crate::c_arm::CArm;
-use crate::cpu::raster::ScreenTriangle;
+use crate::cpu::raster::{ScreenTriangle, on_grid};
 
 /// Rows of a band: what one thread sums up in double precision.
 const BAND_ROWS: u32 = 32;
 
-/// Pixel and inverse depth of each vertex.
+/// Pixel, as triangles have it, and inverse depth of each vertex.
 fn seen(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<([f64; 2], f64)> {
     let vertex = |v: &Vec3| {
         let beam = c_arm.in_beam(v);
-        (c_arm.pixel_of(&beam), 1.0 / (c_arm.sod_mm() + beam.z))
+        (on_grid(c_arm.pixel_of(&beam)), 1.0 / (c_arm.sod_mm() + beam.z))
     };
     wall.vertices_mm.par_iter().map(vertex).collect()
 }
@@ -37,13 +37,12 @@ fn meetings(
     seen: &[([f64; 2], f64)],
     mut visit: impl FnMut(usize, f64, f64),
 ) {
-    for corners in triangles {
-        let corners = corners.map(|v| seen[v as usize]);
-        let Some(triangle) = ScreenTriangle::new(corners.map(|c| c.0)) else { continue };
+    for [a, b, c] in triangles {
+        let ((a, i0), (b, i1), (c, i2)) = (seen[a as usize], seen[b as usize], seen[c as usize]);
+        let Some(triangle) = ScreenTriangle::on_grid([a, b, c]) else { continue };
         // Outward triangles turn clockwise on the screen (positive area, rows downwards) where they face the
         // source.
         let sign = -triangle.area2().signum();
-        let [i0, i1, i2] = corners.map(|c| c.1);
         triangle.scan_rows(width, rows.clone(), |x, y, [w0, w1, w2]| {
             visit(y * width as usize + x, sign, 1.0 / (w0 * i0 + w1 * i1 + w2 * i2));
         });
@@ -54,9 +53,9 @@ fn meetings(
 fn by_band(height: u32, wall: &SurfaceMesh, seen: &[([f64; 2], f64)]) -> Vec<Vec<u32>> {
     let mut bands = vec![vec![]; height.div_ceil(BAND_ROWS) as usize];
     for (index, corners) in (0..).zip(&wall.triangles) {
-        let rows = corners.map(|v| seen[v as usize].0[1]);
-        let low = rows.into_iter().fold(f64::MAX, f64::min);
-        let high = rows.into_iter().fold(f64::MIN, f64::max);
+        let [a, b, c] = *corners;
+        let [a, b, c] = [seen[a as usize].0[1], seen[b as usize].0[1], seen[c as usize].0[1]];
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         // Casts saturate; a row more on either side is for the rounding of corners.
         let first = (low - 1.0).max(0.0) as usize / BAND_ROWS as usize;
         let end = ((high + 1.0).max(0.0) as usize / BAND_ROWS as usize + 1).min(bands.len());

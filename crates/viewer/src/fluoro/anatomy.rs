@@ -34,7 +34,7 @@ impl Anatomy {
             view.obliquities().map(|_| 0.0).collect()
         };
         let mut maps = Self { lumen, ..Self::default() };
-        match &setup.patient {
+        match &*setup.patient {
             Patient::Slab { tissue_mm } => {
                 maps.body = view.obliquities().map(|obliquity| (tissue_mm * obliquity) as f32).collect();
             }

@@ -19,6 +19,8 @@ mod labels;
 mod scatter;
 mod sequence;
 
+use std::sync::Arc;
+
 use endowire_core::{Error, Result, Vec3};
 use rayon::prelude::*;
 
@@ -29,7 +31,7 @@ pub use sequence::Moment;
 pub(crate) use sequence::{Afterglow, Sequence};
 
 use crate::c_arm::CArm;
-use crate::contrast::{ContrastMap, Medium};
+use crate::contrast::{ContrastMap, Medium, Shares};
 use crate::cpu::layers_in_beam;
 use crate::device::RefinedDevice;
 use crate::engine::PathEngine;
@@ -76,7 +78,7 @@ pub(crate) struct Fluoroscope {
     rays: CArm,
     pub(crate) exposure: Exposure,
     pub(crate) beam: Beam,
-    anatomy: Anatomy,
+    anatomy: Arc<Anatomy>,
     /// Attenuation of tissue, bone, lung, blood and contrast medium less blood.
     lanes: [Lanes; 5],
     /// Their means over the signal of the reference, 1/mm.
@@ -98,11 +100,42 @@ pub(crate) struct Fluoroscope {
     listed: Vec<bool>,
 }
 
+/// What another view of the same vessel and body needs too where it has the same rays: blades, modes, doses and injections do not change it.
+#[derive(Debug, Clone)]
+pub(crate) struct Kept {
+    rays: u128,
+    anatomy: Arc<Anatomy>,
+    shares: Option<Arc<Shares>>,
+}
+
+impl Kept {
+    /// What of it serves a set-up `after` that before.
+    pub(crate) fn between(mut self, before: &Setup, after: &Setup) -> Option<Self> {
+        let rays = after.c_arm.as_ref().map(CArm::fingerprint);
+        let alike = Arc::ptr_eq(&before.patient, &after.patient)
+            && Arc::ptr_eq(&before.filled, &after.filled)
+            && before.lumen == after.lumen;
+        if before.spec.flow != after.spec.flow {
+            self.shares = None;
+        }
+        (alike && rays == Some(self.rays)).then_some(self)
+    }
+}
+
 impl Fluoroscope {
-    pub(crate) fn new(setup: &Setup, c_arm: &CArm, engine: &mut dyn PathEngine) -> Result<Self> {
+    /// Computes what stays, but for what is `kept` of a view with the same rays.
+    pub(crate) fn new(
+        setup: &Setup,
+        c_arm: &CArm,
+        kept: Option<&Kept>,
+        engine: &mut dyn PathEngine,
+    ) -> Result<Self> {
         let spec: &ViewSpec = &setup.spec;
         let rays = c_arm.refined(SUBRAYS);
-        let anatomy = Anatomy::new(setup, c_arm, SUBRAYS, engine)?;
+        let anatomy = match kept {
+            Some(kept) => Arc::clone(&kept.anatomy),
+            None => Arc::new(Anatomy::new(setup, c_arm, SUBRAYS, engine)?),
+        };
         let exposure = Exposure::new(spec, anatomy.reference_mm(&rays))?;
         let beam = Beam::new(&XRaySpec { kvp: exposure.kvp, ..spec.xray.clone() }, exposure.tissue_mm)?;
         let lanes = [
@@ -113,7 +146,10 @@ impl Fluoroscope {
             beam.excess(Material::Contrast370, Some(Material::Blood))?,
         ];
         let mu = lanes.each_ref().map(|lanes| beam.mean(lanes));
-        let contrast = setup.flow.as_ref().map(|flow| ContrastMap::new(flow, c_arm, &setup.filled));
+        let contrast = setup.flow.as_ref().map(|flow| {
+            let known = kept.and_then(|kept| kept.shares.clone());
+            ContrastMap::new(flow, known.unwrap_or_else(|| Arc::new(Shares::new(flow, c_arm, &setup.filled))))
+        });
         let pixels = c_arm.size_px().map(|n| n as usize).iter().product();
         let still = Signal { signal: vec![0.0; pixels], energy: vec![0.0; pixels] };
         let mut fluoroscope = Self {
@@ -153,6 +189,12 @@ impl Fluoroscope {
         (fluoroscope.scatter, fluoroscope.still) = behind(&|pixel| c_arm.openness(pixel) as f32);
         fluoroscope.unblocked = c_arm.opening_px().map(|_| behind(&|_| 1.0).1);
         Ok(fluoroscope)
+    }
+
+    /// What another view may need too.
+    pub(crate) fn into_kept(self) -> Kept {
+        let shares = self.contrast.map(ContrastMap::into_shares);
+        Kept { rays: self.c_arm.fingerprint(), anatomy: self.anatomy, shares }
     }
 
     /// Signal of the anatomy alone with the blades wide open: what the display adapts to, so that nothing open changes where they

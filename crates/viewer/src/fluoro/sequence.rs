@@ -253,7 +253,7 @@ mod tests {
         spec.c_arm.collimation_mm = collimation_mm;
         let setup = Setup::new(&spec, &wall).unwrap();
         let mut engine = cpu::CpuPaths;
-        let scope = Fluoroscope::new(&setup, setup.c_arm.as_ref().unwrap(), &mut engine).unwrap();
+        let scope = Fluoroscope::new(&setup, setup.c_arm.as_ref().unwrap(), None, &mut engine).unwrap();
         let sequence = Sequence::new(&spec, &scope);
         let mask = sequence.mask.unwrap();
         let values = logarithm(scope.still.signal.clone()).iter().zip(&mask).map(|(v, m)| v - m).collect();

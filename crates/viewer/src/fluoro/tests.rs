@@ -16,7 +16,7 @@ fn mean_lengths_of_rays_that_are_alike_tell_their_mean_signal() {
     spec.patient.torso = Some(TorsoSpec::default());
     spec.c_arm.field_mm = Some(100.0);
     let setup = Setup::new(&spec, &wall).unwrap();
-    let scope = Fluoroscope::new(&setup, setup.c_arm.as_ref().unwrap(), &mut cpu::CpuPaths).unwrap();
+    let scope = Fluoroscope::new(&setup, setup.c_arm.as_ref().unwrap(), None, &mut cpu::CpuPaths).unwrap();
     let (mut alike, mut worst, mut without) = (0, 0.0_f64, 0.0_f64);
     let room = &mut Lanes::new();
     for pixel in 0..128 * 128 {

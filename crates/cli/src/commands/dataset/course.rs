@@ -11,11 +11,14 @@ use serde_json::{Map, Value};
 use super::spec::Spec;
 use crate::cache::Cache;
 use crate::failure::Failure;
+use crate::output::injections::Injected;
 use crate::output::tell;
 
 /// What is in after a step.
 pub(super) struct Moment {
     pub(super) step: usize,
+    /// From when on times of injections are told, s: the end of the step where the script injects, else 0.
+    pub(super) time_s: f64,
     pub(super) shape: Shape,
     pub(super) inserted_mm: Vec<f64>,
     pub(super) contacts: Vec<ContactView>,
@@ -46,25 +49,29 @@ impl Course {
             None => Scene::read(file)?,
             Some(device) => with_device(file, device)?,
         };
-        let view = view(spec, &scene, file)?;
+        let mut view = view(spec, &scene, file)?;
         let pushed = Pushed::new(&scene, &view).map_err(|e| Failure::from(e).at(file.display()))?;
         let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(failed)?;
         let mut simulation = scene.simulation(cache).map_err(failed)?;
         let instruments = simulation.stack().instruments().iter().map(|i| i.name.clone()).collect();
         let mut moments = Vec::new();
         let mut run = script.begin();
+        let (mut injected, mut time_s) = (Vec::new(), 0.0);
         loop {
             let report = simulation.report();
             let contacts = report.contacts.iter();
             let contacts = contacts.map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() });
             moments.push(Moment {
                 step: moments.len(),
+                time_s,
                 shape: simulation.shape().clone(),
                 inserted_mm: report.lengths_mm(),
                 contacts: contacts.collect(),
             });
-            let Some(step) = run.next(&simulation)? else { break };
-            if let Err(error) = simulation.step_together(step.moves) {
+            let step = run.next(&simulation)?.map(|step| (step.moves.to_vec(), step.time_s));
+            injected.extend(Injected::begun(&run, injected.len(), view.frames_per_s, &simulation));
+            let Some((moves, ends_s)) = step else { break };
+            if let Err(error) = simulation.step_together(&moves) {
                 let step = moments.len();
                 tell(format_args!(
                     "endowire: {}: step {step}: {error}; pictures are of those before",
@@ -73,7 +80,12 @@ impl Course {
                 break;
             }
             run.carried_out();
+            if script.injects() {
+                time_s = ends_s.unwrap_or(moments.len() as f64 / view.frames_per_s);
+            }
         }
+        view.injection.extend(injected.iter().map(Injected::spec));
+        view.validate().map_err(failed)?;
         Ok(Self {
             scene: scene.name.clone(),
             device: device.and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned()),

@@ -40,7 +40,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
         let last = course.moments.len() - 1;
         let progress = of.within(What::Progress, spec.vary.progress);
         let moment = &course.moments[(progress * last as f64).round() as usize];
-        let time_s = of.within(What::Time, spec.vary.time_s);
+        let time_s = moment.time_s + of.within(What::Time, spec.vary.time_s);
         let devices = course.pushed.views(&moment.shape, &moment.inserted_mm);
         let in_line = course.instruments.iter().zip(&moment.inserted_mm).filter(|one| *one.1 > 0.0);
         let names: Vec<String> = in_line.map(|one| one.0.clone()).collect();

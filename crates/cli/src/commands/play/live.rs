@@ -3,12 +3,11 @@
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use endowire_core::Result;
-use endowire_play::{Input, Pictures, Session, Snapshot, TICKS_PER_S};
+use endowire_play::{Delivered, Input, Pictures, Session, Sharpened, Sharpening, Snapshot, TICKS_PER_S};
 use endowire_viewer::Image;
 use serde::Serialize;
 
@@ -51,6 +50,8 @@ pub(crate) struct Moment {
 #[derive(Default)]
 pub(crate) struct Newest {
     moment: Mutex<Option<Moment>>,
+    /// What exposure control has brought.
+    delivered: Mutex<Option<Delivered>>,
     there: Condvar,
     ended: AtomicBool,
 }
@@ -93,7 +94,8 @@ impl Newest {
 #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window reads or sends it"))]
 pub(crate) struct Shown<'a> {
     pub(crate) moment: &'a Moment,
-    pub(crate) fluoro: Option<&'a Image>,
+    /// Of each plane.
+    pub(crate) fluoro: &'a [Image],
     pub(crate) three_d: Option<&'a Image>,
     /// What kept a picture from being drawn.
     pub(crate) failure: Option<&'a str>,
@@ -202,6 +204,9 @@ pub(crate) fn physics(
                 break;
             }
         }
+        if let Some(delivered) = locked(&newest.delivered).take() {
+            session.exposed(delivered);
+        }
         let (before, clock) = (session.steps(), Instant::now());
         session.tick();
         let step_ms = ms(clock.elapsed());
@@ -251,18 +256,54 @@ impl Frames {
     }
 }
 
-/// Draws moments on this thread until the session ends, and has each shown.
-pub(crate) fn draw(mut pictures: Pictures, newest: &Newest, mut show: impl FnMut(&Shown<'_>)) -> Frames {
+/// Draws moments on this thread until the session ends, and has each shown; sharp pictures of a room that has changed are made on another.
+pub(crate) fn draw(pictures: Pictures, newest: &Newest, show: impl FnMut(&Shown<'_>)) -> Frames {
+    let (to, jobs) = mpsc::channel::<Sharpening>();
+    let (done, back) = mpsc::channel();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            for job in jobs {
+                if done.send(job.carry_out()).is_err() {
+                    break;
+                }
+            }
+        });
+        // The other thread ends when nobody can give it more to do.
+        draw_with(pictures, newest, (to, back), show)
+    })
+}
+
+fn draw_with(
+    mut pictures: Pictures,
+    newest: &Newest,
+    (to, back): (Sender<Sharpening>, Receiver<Sharpened>),
+    mut show: impl FnMut(&Shown<'_>),
+) -> Frames {
     let mut times = Frames::default();
     let (mut number, mut due, mut was_live) = (0_u64, Instant::now(), None::<Instant>);
     let (mut three_d, mut drawn_3d) = (None::<Image>, None);
+    let mut fluoro = Vec::new();
     while let Some(moment) = newest.take() {
         let clock = Instant::now();
         let snapshot = &moment.snapshot;
         let mut failure = None;
-        let drawn: Result<Option<Image>> = pictures.fluoro(snapshot).map(Option::<&Image>::cloned);
+        for sharpened in back.try_iter() {
+            failure = pictures.sharpened(sharpened).err().map(|error| error.to_string());
+        }
+        match pictures.soon(snapshot) {
+            Ok(images) => fluoro = images.to_vec(),
+            Err(error) => failure = Some(error.to_string()),
+        }
         let live = snapshot.lab.is_live();
         let frame_ms = ms(clock.elapsed());
+        match pictures.sharpenings(snapshot) {
+            // Whoever makes them has gone at the end alone.
+            Ok(all) => all.into_iter().for_each(|one| drop(to.send(one))),
+            Err(error) => failure = Some(error.to_string()),
+        }
+        if let Some(delivered) = pictures.delivered(snapshot) {
+            *locked(&newest.delivered) = Some(delivered);
+        }
         let seen = (snapshot.readout.step, snapshot.readout.tip_mm, snapshot.lab.revisions()[1]);
         if number.is_multiple_of(THREE_D_EVERY) && drawn_3d != Some(seen) {
             drawn_3d = Some(seen);
@@ -271,13 +312,9 @@ pub(crate) fn draw(mut pictures: Pictures, newest: &Newest, mut show: impl FnMut
                 Err(error) => failure = Some(error.to_string()),
             }
         }
-        let fluoro = drawn.unwrap_or_else(|error| {
-            failure = Some(error.to_string());
-            None
-        });
         let shown = Shown {
             moment: &moment,
-            fluoro: fluoro.as_ref(),
+            fluoro: &fluoro,
             three_d: three_d.as_ref(),
             failure: failure.as_deref(),
             frame_ms,

@@ -53,7 +53,11 @@ pub(crate) fn run(
 fn carry_out(order: Order, session: &mut Session, pictures: &mut Pictures) -> Result<(), String> {
     match order {
         Order::Read {} | Order::Quit {} => {}
-        Order::Wait { ticks } => (0..ticks).for_each(|_| session.tick()),
+        Order::Wait { ticks } => {
+            (0..ticks).for_each(|_| session.tick());
+            let delivered = pictures.expose(&session.snapshot()).map_err(|e| e.to_string())?;
+            delivered.into_iter().for_each(|delivered| session.exposed(delivered));
+        }
         Order::Picture { file } => picture(&file, session, pictures).map_err(|e| e.to_string())?,
     }
     Ok(())
@@ -62,8 +66,6 @@ fn carry_out(order: Order, session: &mut Session, pictures: &mut Pictures) -> Re
 fn picture(file: &Path, session: &Session, pictures: &mut Pictures) -> endowire_core::Result<()> {
     let snapshot = session.snapshot();
     let three_d = pictures.three_d(&snapshot)?;
-    match pictures.fluoro(&snapshot)? {
-        Some(fluoro) => fluoro.beside(&three_d).write_png(file),
-        None => three_d.write_png(file),
-    }
+    let planes = pictures.fluoro(&snapshot)?.iter().rev();
+    planes.fold(three_d, |right, left| left.beside(&right)).write_png(file)
 }

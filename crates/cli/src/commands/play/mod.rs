@@ -31,7 +31,8 @@ pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
     let simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
     let limits = Limits { push_n: args.warn_n, torque_nmm: args.warn_nmm };
     let session = Session::new(simulation, view, args.size, limits).map_err(in_scene)?;
-    let pictures = Pictures::new(&scene, &session.snapshot(), session.closed_wall()).map_err(in_scene)?;
+    let pictures =
+        Pictures::new(&scene, &session.snapshot(), session.simulation().wall().clone()).map_err(in_scene)?;
     let mut record = Record::new(args, &scene);
     let (sender, messages) = mpsc::channel();
     if let Some(address) = args.listen {

@@ -31,9 +31,11 @@ struct Table {
     rows: Vec<Vec<String>>,
     /// Rows of the file.
     count: usize,
+    /// Columns that are shown over each other at first: across and up; none where the page has no reason to choose.
+    chart: Option<[String; 2]>,
 }
 
-/// Gathers the tables (CSV), pictures (PNG) and sources (JSON) of a folder; none where it has no table.
+/// Gathers the tables (CSV, or the runs of a sweep), pictures (PNG) and sources (JSON) of a folder; none where it has no table.
 pub(super) fn collect(folder: &Path) -> Result<Option<Tables>, Failure> {
     let files = |extension: &str| -> Vec<PathBuf> {
         let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
@@ -42,7 +44,14 @@ pub(super) fn collect(folder: &Path) -> Result<Option<Tables>, Failure> {
         found.sort();
         found
     };
-    let tables = files("csv").iter().map(|path| table(path)).collect::<Result<Vec<_>, _>>()?;
+    let mut tables = files("csv").iter().map(|path| table(path)).collect::<Result<Vec<_>, _>>()?;
+    let mut source = Vec::new();
+    let sweep = if folder.is_dir() { endowire_sweep::table_of(folder)? } else { None };
+    if let Some(sweep) = sweep {
+        let (runs, told) = of_sweep(sweep);
+        tables.insert(0, runs);
+        source = told;
+    }
     if tables.is_empty() {
         return Ok(None);
     }
@@ -55,12 +64,42 @@ pub(super) fn collect(folder: &Path) -> Result<Option<Tables>, Failure> {
             pictures.push((stem(path), base64(&bytes)));
         }
     }
-    let documents = files("json").into_iter().filter_map(|path| std::fs::read(path).ok());
-    let told = documents.filter_map(|bytes| serde_json::from_slice::<Value>(&bytes).ok()).next();
-    let told = told.unwrap_or(Value::Null);
-    let source = SOURCE.iter().filter(|key| !told[**key].is_null());
-    let source = source.map(|key| ((*key).to_owned(), told[*key].clone())).collect();
+    if source.is_empty() {
+        let documents = files("json").into_iter().filter_map(|path| std::fs::read(path).ok());
+        let told = documents.filter_map(|bytes| serde_json::from_slice::<Value>(&bytes).ok()).next();
+        let told = told.unwrap_or(Value::Null);
+        let keys = SOURCE.iter().filter(|key| !told[**key].is_null());
+        source = keys.map(|key| ((*key).to_owned(), told[*key].clone())).collect();
+    }
     Ok(Some(Tables { name: stem(folder), tables, pictures, source }))
+}
+
+/// The runs of a sweep, and where all of them come from: what that says, and columns without a value, are not in the table.
+fn of_sweep(sweep: endowire_sweep::Table) -> (Table, Vec<(String, Value)>) {
+    let endowire_sweep::Table { columns, mut rows, runs } = sweep;
+    let mut source = Vec::new();
+    let mut shown = Vec::new();
+    for (index, column) in columns.iter().enumerate() {
+        let mut values = rows.iter().map(|row| &row[index]);
+        let first = values.next();
+        let same = first.filter(|first| values.all(|value| value == *first));
+        if let (true, Some(value)) = (SOURCE.contains(&column.as_str()), same) {
+            source.push((column.clone(), Value::from(value.as_str())));
+        } else if column == "scene_hash" {
+            // Each run's own, which the table of the sweep has.
+        } else if rows.iter().any(|row| !row[index].is_empty()) {
+            shown.push(index);
+        }
+    }
+    let count = rows.len();
+    rows.truncate(MOST_ROWS);
+    let rows = rows.into_iter().map(|row| shown.iter().map(|&index| row[index].clone()).collect()).collect();
+    let columns: Vec<String> = shown.iter().map(|&index| columns[index].clone()).collect();
+    // The first axis comes after the number of the run.
+    let up = ["push_force_n", "steps"].into_iter().find(|name| columns.iter().any(|column| column == name));
+    let chart = columns.get(1).cloned().zip(up).map(|(across, up)| [across, up.to_owned()]);
+    let name = if count < runs { format!("runs so far of {runs}") } else { "runs".to_owned() };
+    (Table { name, columns, rows, count, chart }, source)
 }
 
 fn stem(path: &Path) -> String {
@@ -77,5 +116,5 @@ fn table(path: &Path) -> Result<Table, Failure> {
     let mut rows = rows.map_err(|e| Failure::Input(format!("{}: {e}", path.display())))?;
     let count = rows.len();
     rows.truncate(MOST_ROWS);
-    Ok(Table { name: stem(path), columns, rows, count })
+    Ok(Table { name: stem(path), columns, rows, count, chart: None })
 }

@@ -107,7 +107,7 @@ pub(super) struct Ended {
 impl Going<'_> {
     /// Writes what there is before the first step.
     pub(super) fn begin(&mut self) -> Result<(), Failure> {
-        self.inject(self.times_s.last().copied().unwrap_or_default());
+        self.inject();
         injections::write(self.recorder.folder(), &self.so_far.course.injected)?;
         self.checkpoint()?;
         self.save()
@@ -165,7 +165,7 @@ impl Going<'_> {
         self.recorder.record(moves, time_s, &self.so_far.simulation)?;
         self.so_far.course.steps += 1;
         self.so_far.draw((self.so_far.course.steps, time_s), last, &mut self.recorder)?;
-        if self.inject(time_s) {
+        if self.inject() {
             injections::write(self.recorder.folder(), &self.so_far.course.injected)?;
         }
         self.checkpoint()?;
@@ -173,15 +173,13 @@ impl Going<'_> {
     }
 
     /// Notes what begins to flow at the end of the last step; whether anything does.
-    fn inject(&mut self, now_s: f64) -> bool {
+    fn inject(&mut self) -> bool {
         let SoFar { hand, simulation, frames, course, .. } = &mut self.so_far;
-        let begun = &hand.injections()[course.injected.len()..];
-        for one in begun {
-            let injected = Injected::new(one, one.time_s.unwrap_or(now_s), simulation);
-            frames.inject(&injected);
-            course.injected.push(injected);
-        }
-        !begun.is_empty()
+        let begun = Injected::begun(hand, course.injected.len(), frames.frames_per_s(), simulation);
+        begun.iter().for_each(|one| frames.inject(one));
+        let any = !begun.is_empty();
+        course.injected.extend(begun);
+        any
     }
 
     fn checkpoint(&mut self) -> Result<(), Failure> {

@@ -56,28 +56,22 @@ impl Written {
     }
 }
 
-/// Draws frames with the wishes of the command line.
-pub(super) struct Studio<'a> {
+/// Frames to be drawn as the command line wishes, checked before anything is carried out or drawn.
+pub(super) struct Plan<'a> {
     args: &'a FrameArgs,
     spec: ViewSpec,
-    wall: Wall,
     pushed: Pushed,
-    /// That of fluoroscopy and of the 3D view, and the second of two.
-    planes: Vec<Plane>,
     folder: PathBuf,
     frames: usize,
-    drawn: usize,
-    animation: Option<Animation>,
     manifest: Manifest,
-    files: Vec<PathBuf>,
 }
 
-impl<'a> Studio<'a> {
-    /// Prepares `frames` frames, or those of a turn whose speed is given, of a scene with its wall, in `folder`, where they replace those of an earlier call of the same command.
+impl<'a> Plan<'a> {
+    /// Plans `frames` frames, or those of a turn whose speed is given, of a scene in `folder`, where they replace those of an earlier call of the same command.
     pub(super) fn new(
         command: &str,
         args: &'a FrameArgs,
-        (path, scene, wall): (&Path, &Scene, Wall),
+        (path, scene): (&Path, &Scene),
         default: ViewChoice,
         folder: PathBuf,
         frames: usize,
@@ -85,10 +79,10 @@ impl<'a> Studio<'a> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
         args.animate.as_deref().map_or(Ok(()), Animation::check_name)?;
         let spec = wishes::wished(ViewSpec::of_scene(scene, path)?, args, default)?;
+        spec.validate().map_err(in_scene)?;
         let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
         let frames = wishes::frames_of_turn(args, spec.frames_per_s)?.unwrap_or(frames);
         wishes::check(args, &spec, frames)?;
-        let planes = Plane::all(&spec, &wall).map_err(in_scene)?;
         std::fs::create_dir_all(&folder).map_err(|e| {
             Failure::Input(format!("--out {}: {e}; name a folder that can be made", folder.display()))
         })?;
@@ -100,19 +94,7 @@ impl<'a> Studio<'a> {
                 folder.display()
             ));
         }
-        Ok(Self {
-            args,
-            spec,
-            wall,
-            pushed,
-            planes,
-            folder,
-            frames,
-            drawn: 0,
-            animation: None,
-            manifest,
-            files: vec![],
-        })
+        Ok(Self { args, spec, pushed, folder, frames, manifest })
     }
 
     /// Frames to draw.
@@ -124,45 +106,56 @@ impl<'a> Studio<'a> {
     pub(super) fn frames_per_s(&self) -> f64 {
         self.spec.frames_per_s
     }
+}
+
+/// Draws the frames of a plan.
+pub(super) struct Studio<'a> {
+    plan: Plan<'a>,
+    wall: Wall,
+    /// That of fluoroscopy and of the 3D view, and the second of two.
+    planes: Vec<Plane>,
+    drawn: usize,
+    animation: Option<Animation>,
+    files: Vec<PathBuf>,
+}
+
+impl<'a> Studio<'a> {
+    /// Prepares the frames of a vessel in which medium flows beside that of the scene.
+    pub(super) fn new(
+        mut plan: Plan<'a>,
+        wall: Wall,
+        injections: impl IntoIterator<Item = InjectionSpec>,
+    ) -> Result<Self, Failure> {
+        plan.spec.injection.extend(injections);
+        let planes = Plane::all(&plan.spec, &wall)?;
+        Ok(Self { plan, wall, planes, drawn: 0, animation: None, files: vec![] })
+    }
 
     /// What part of the way from the first frame to the last the next one is.
     fn part(&self) -> f64 {
-        self.drawn as f64 / self.frames.max(2).saturating_sub(1) as f64
-    }
-
-    /// Lets medium flow beside that of the scene, before the first frame is drawn.
-    pub(super) fn inject(
-        &mut self,
-        injections: impl IntoIterator<Item = InjectionSpec>,
-    ) -> Result<(), Failure> {
-        let known = self.spec.injection.len();
-        self.spec.injection.extend(injections);
-        if self.spec.injection.len() > known && self.spec.wants(View::Fluoro) {
-            self.planes = Plane::all(&self.spec, &self.wall)?;
-        }
-        Ok(())
+        self.drawn as f64 / self.plan.frames.max(2).saturating_sub(1) as f64
     }
 
     /// Draws a moment and writes what is wanted of it.
     pub(super) fn draw(&mut self, still: &Still) -> Result<(), Failure> {
-        let views = self.pushed.views(still.shape, still.inserted_mm);
-        let orbited = match self.args.orbit.filter(|_| self.spec.wants(View::ThreeD)) {
+        let views = self.plan.pushed.views(still.shape, still.inserted_mm);
+        let orbited = match self.plan.args.orbit.filter(|_| self.plan.spec.wants(View::ThreeD)) {
             Some(orbit_deg) => Some(self.orbited(orbit_deg, &views, still)?),
             None => None,
         };
-        let turn_deg = self.args.turn.map(|turn_deg| turn_deg * self.part());
+        let turn_deg = self.plan.args.turn.map(|turn_deg| turn_deg * self.part());
         let mut three_d = None;
         let mut fluoro = Vec::with_capacity(self.planes.len());
-        let wanted = orbited.is_none() || self.spec.wants(View::Fluoro);
+        let wanted = orbited.is_none() || self.plan.spec.wants(View::Fluoro);
         for plane in self.planes.iter_mut().filter(|_| wanted) {
             plane.renderer.show_contacts(still.contacts);
             plane.turn(&views, turn_deg)?;
             let now =
                 Seen { shape: still.shape, inserted_mm: still.inserted_mm, time_s: still.moment.time_s };
-            let pulse = self.pushed.pulse(still.before, now, &plane.renderer);
+            let pulse = self.plan.pushed.pulse(still.before, now, &plane.renderer);
             let frames = plane.renderer.render_pulse(&views, &pulse, still.moment)?;
             three_d = three_d.or(frames.three_d);
-            if let (Some(image), true) = (&frames.fluoro, self.args.dicom.is_some()) {
+            if let (Some(image), true) = (&frames.fluoro, self.plan.args.dicom.is_some()) {
                 plane.keep(image.clone());
             }
             fluoro.push((plane.ending, frames.fluoro));
@@ -190,7 +183,7 @@ impl<'a> Studio<'a> {
         views: &[DeviceView],
         still: &Still,
     ) -> Result<Option<endowire_viewer::Image>, Failure> {
-        let mut spec = ViewSpec { views: vec![View::ThreeD], ..self.spec.clone() };
+        let mut spec = ViewSpec { views: vec![View::ThreeD], ..self.plan.spec.clone() };
         (spec.camera.turn_deg, spec.camera.orbit_deg) = (orbit_deg * self.part(), Some(orbit_deg));
         let mut orbiting = Renderer::of_wall(&spec, &self.wall)?;
         orbiting.show_contacts(still.contacts);
@@ -214,11 +207,11 @@ impl<'a> Studio<'a> {
             both.write_png(&path)?;
         }
         if let (Some(path), Some(shown)) =
-            (&self.args.animate, both.as_ref().or(frames.three_d.as_ref()).or(frames.fluoro.as_ref()))
+            (&self.plan.args.animate, both.as_ref().or(frames.three_d.as_ref()).or(frames.fluoro.as_ref()))
         {
             let mut animation = match self.animation.take() {
                 Some(animation) => animation,
-                None => Animation::new(path, shown, self.frames as u32, self.spec.frames_per_s)?,
+                None => Animation::new(path, shown, self.plan.frames as u32, self.plan.spec.frames_per_s)?,
             };
             animation.push(shown)?;
             self.animation = Some(animation);
@@ -229,7 +222,7 @@ impl<'a> Studio<'a> {
     /// Labels and arrays of a plane.
     fn write_data(&mut self, still: &Still, plane: usize, views: &[DeviceView]) -> Result<(), Failure> {
         let ending = self.planes[plane].ending;
-        if self.args.labels {
+        if self.plan.args.labels {
             let contacts: Vec<_> = still.contacts.iter().map(|c| c.position_mm).collect();
             let labels = self.planes[plane].renderer.labels(views, &contacts)?;
             let path = self.file(&format!("{}_mask{ending}.png", still.name))?;
@@ -241,7 +234,7 @@ impl<'a> Studio<'a> {
             let path = self.file(&format!("{}_labels{ending}.json", still.name))?;
             std::fs::write(&path, to_json(&labels)? + "\n").map_err(|e| Failure::write(&path, &e))?;
         }
-        if self.args.raw {
+        if self.plan.args.raw {
             let renderer = &mut self.planes[plane].renderer;
             let paths = renderer.path_lengths_at(views, still.moment.time_s)?;
             let line: Vec<f32> = renderer.transmission(&paths)?.iter().map(|t| -t.ln()).collect();
@@ -255,30 +248,31 @@ impl<'a> Studio<'a> {
 
     /// A file of the folder, noted.
     fn file(&mut self, name: &str) -> Result<PathBuf, Failure> {
-        self.manifest.add(name).map_err(|e| Failure::write(&self.folder, &e))?;
+        self.plan.manifest.add(name).map_err(|e| Failure::write(&self.plan.folder, &e))?;
         self.files.push(name.into());
-        Ok(self.folder.join(name))
+        Ok(self.plan.folder.join(name))
     }
 
     /// Ends animation and series.
     pub(super) fn finish(mut self) -> Result<Written, Failure> {
-        if let (Some(animation), Some(path)) = (self.animation.take(), &self.args.animate) {
+        if let (Some(animation), Some(path)) = (self.animation.take(), &self.plan.args.animate) {
             animation.finish()?;
             self.files.push(path.clone());
         }
         for plane in 0..self.planes.len() {
-            let held = self.planes[plane].renderer.last_image_hold().filter(|_| self.args.hold);
+            let held = self.planes[plane].renderer.last_image_hold().filter(|_| self.plan.args.hold);
             if let Some(image) = held {
                 let path = self.file(&format!("hold{}.png", self.planes[plane].ending))?;
                 image.write_png(&path)?;
             }
         }
-        if let Some(path) = &self.args.dicom {
-            let step_deg = self.args.turn.unwrap_or(0.0) / self.frames.max(2).saturating_sub(1) as f64;
+        if let Some(path) = &self.plan.args.dicom {
+            let step_deg =
+                self.plan.args.turn.unwrap_or(0.0) / self.plan.frames.max(2).saturating_sub(1) as f64;
             self.files.extend(write_dicom(&self.planes, path, step_deg)?);
         }
         let renderer = self.planes.first().map(|plane| plane.renderer.backend().to_owned());
-        Ok(Written { renderer: renderer.unwrap_or_default(), folder: self.folder, files: self.files })
+        Ok(Written { renderer: renderer.unwrap_or_default(), folder: self.plan.folder, files: self.files })
     }
 }
 

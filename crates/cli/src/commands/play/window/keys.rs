@@ -21,7 +21,7 @@ pub(super) const HELP: &[(&str, &str)] = &[
     ("+ -, wheel", "magnify"),
     ("Q E", "blades in and out"),
     ("drag the 3D view", "turn it"),
-    ("Backspace", "undo the last motion"),
+    ("Backspace, Shift Backspace", "undo the last motion, do it again"),
     ("F1, Esc", "this help, end"),
 ];
 
@@ -111,6 +111,7 @@ impl Keys {
             KeyCode::Tab if press => {
                 self.choose(Some(self.chosen.map_or(0, |index| (index + 1) % self.instruments.len())))
             }
+            KeyCode::Backspace if press && self.modifiers.shift_key() => vec![Input::Redo {}],
             KeyCode::Backspace if press => vec![Input::Undo {}],
             KeyCode::KeyI if press => {
                 let ml = if self.modifiers.shift_key() { 20.0 } else { 5.0 };

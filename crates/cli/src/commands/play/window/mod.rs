@@ -28,8 +28,9 @@ use keys::{Asked, Keys};
 use screen::Layout;
 use text::{Canvas, Writer};
 
-/// Size of the window when it opens.
-const SIZE: [u32; 2] = [1280, 860];
+/// Width, with one plane and with two, and height of the window when it opens.
+const WIDTHS: [u32; 2] = [1280, 1720];
+const HEIGHT: u32 = 860;
 /// Turn of the 3D view by a drag, degrees a pixel.
 const DEG_PER_PX: f64 = 0.4;
 
@@ -65,6 +66,8 @@ struct Shell {
     to: Sender<Message>,
     keys: Keys,
     surface: Option<softbuffer::Surface<OwnedDisplayHandle, Arc<Window>>>,
+    /// Planes of fluoroscopy.
+    planes: usize,
     cursor: [f64; 2],
     dragging: bool,
     /// Width of the fluoroscopic field at the isocentre, mm.
@@ -99,6 +102,7 @@ pub(super) fn run(
         to: sender,
         keys: Keys::new(names),
         surface: None,
+        planes: screen::planes(&session.readout()),
         cursor: [0.0; 2],
         dragging: false,
         field_mm: 0.0,
@@ -164,7 +168,7 @@ impl Shell {
     fn open(&mut self, events: &ActiveEventLoop) -> Result<(), String> {
         let attributes = Window::default_attributes()
             .with_title(&self.title)
-            .with_inner_size(LogicalSize::new(SIZE[0], SIZE[1]));
+            .with_inner_size(LogicalSize::new(WIDTHS[self.planes.min(2) - 1], HEIGHT));
         let window = Arc::new(events.create_window(attributes).map_err(|e| e.to_string())?);
         let size = window.inner_size();
         self.resized(size.width, size.height);
@@ -212,18 +216,20 @@ impl Shell {
     fn dragged(&mut self, x: f64, y: f64) {
         let by = [x - self.cursor[0], y - self.cursor[1]];
         let size = [0, 1].map(|side| self.shared.size[side].load(Ordering::Relaxed));
-        let layout = Layout::of(size);
-        let on_fluoro = self.cursor[0] < layout.fluoro.1 as f64;
+        let layout = Layout::of(size, self.planes);
+        let plane = layout.plane_at(self.cursor[0], self.cursor[1]);
         self.cursor = [x, y];
         if !self.dragging || by == [0.0; 2] {
             return;
         }
-        self.send([if on_fluoro {
-            // The picture goes with the mouse.
-            let mm_per_px = self.field_mm / layout.fluoro.1.max(1) as f64;
-            Input::Table { right_mm: -by[0] * mm_per_px, down_mm: -by[1] * mm_per_px }
-        } else {
-            Input::TurnCamera { azimuth_deg: -by[0] * DEG_PER_PX, elevation_deg: by[1] * DEG_PER_PX }
+        self.send([match plane {
+            Some(plane) => {
+                // The picture goes with the mouse.
+                let mm_per_px = self.field_mm / layout.side.max(1) as f64;
+                let second = plane == 1;
+                Input::Table { right_mm: -by[0] * mm_per_px, down_mm: -by[1] * mm_per_px, second }
+            }
+            None => Input::TurnCamera { azimuth_deg: -by[0] * DEG_PER_PX, elevation_deg: by[1] * DEG_PER_PX },
         }]);
     }
 }

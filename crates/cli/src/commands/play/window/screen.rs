@@ -17,23 +17,35 @@ const CHOSEN: u32 = 0x5a_c8fa;
 /// Height of what is below the pictures, and of a line of text, at the usual size.
 const PANEL_PX: usize = 172;
 
-/// Where the pictures are: corner and side of the live one, corner and size of the 3D view.
+/// Where the pictures are: side of the live ones, which begin at the left, and corner and size of the 3D view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Layout {
-    pub(super) fluoro: ([usize; 2], usize),
+    planes: usize,
+    pub(super) side: usize,
     pub(super) three_d: ([usize; 2], [usize; 2]),
     panel: usize,
 }
 
 impl Layout {
-    pub(super) fn of([width, height]: [usize; 2]) -> Self {
+    pub(super) fn of([width, height]: [usize; 2], planes: usize) -> Self {
         let panel = PANEL_PX.min(height / 3);
-        let side = (height - panel).min(width * 3 / 5);
-        Self {
-            fluoro: ([0, 0], side),
-            three_d: ([side, 0], [width - side, height - panel]),
-            panel: height - panel,
-        }
+        // The 3D view has two parts of five in width, or one where there are two planes.
+        let most = if planes > 1 { width * 2 / 5 } else { width * 3 / 5 };
+        let side = (height - panel).min(most);
+        let left = planes * side;
+        Self { planes, side, three_d: ([left, 0], [width - left, height - panel]), panel: height - panel }
+    }
+
+    /// Corners of the live pictures.
+    fn corners(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let side = self.side;
+        (0..self.planes).map(move |plane| [plane * side, 0])
+    }
+
+    /// The plane whose picture is at a place in the window.
+    pub(super) fn plane_at(&self, x: f64, y: f64) -> Option<usize> {
+        let plane = (x / self.side.max(1) as f64) as usize;
+        (plane < self.planes && y < self.side as f64).then_some(plane)
     }
 }
 
@@ -41,15 +53,17 @@ impl Layout {
 pub(super) fn compose(writer: &mut Writer, shown: &Shown<'_>, size: [usize; 2], help: bool) -> Canvas {
     let mut canvas = Canvas::new(size);
     canvas.fill([0, 0], size, BACK);
-    let layout = Layout::of(size);
     let readout = &shown.moment.snapshot.readout;
-    let (corner, side) = layout.fluoro;
-    match shown.fluoro {
-        Some(image) => paint(&mut canvas, image, corner, [side; 2]),
-        None => {
-            canvas.fill(corner, [side; 2], 0);
-            let at = [corner[0] + side / 2 - 150.min(side / 2), corner[1] + side / 2];
-            writer.write(&mut canvas, at, 16, FAINT, "hold SPACE for fluoroscopy, F1 for help");
+    let layout = Layout::of(size, planes(readout));
+    let side = layout.side;
+    for (plane, corner) in layout.corners().enumerate() {
+        match shown.fluoro.get(plane) {
+            Some(image) => paint(&mut canvas, image, corner, [side; 2]),
+            None => {
+                canvas.fill(corner, [side; 2], 0);
+                let at = [corner[0] + side / 2 - 150.min(side / 2), corner[1] + side / 2];
+                writer.write(&mut canvas, at, 16, FAINT, "hold SPACE for fluoroscopy, F1 for help");
+            }
         }
     }
     if let Some(image) = shown.three_d {
@@ -68,9 +82,13 @@ pub(super) fn compose(writer: &mut Writer, shown: &Shown<'_>, size: [usize; 2], 
     canvas
 }
 
-/// What a cath lab writes into the picture.
+/// Planes of fluoroscopy.
+pub(super) fn planes(readout: &Readout) -> usize {
+    1 + usize::from(readout.lab.second_deg.is_some())
+}
+
+/// What a cath lab writes into the pictures.
 fn over_picture(writer: &mut Writer, canvas: &mut Canvas, readout: &Readout, layout: Layout) {
-    let ([left, top], side) = layout.fluoro;
     let lab = &readout.lab;
     let mode = match lab.mode {
         Mode::Fluoro => "FLUORO",
@@ -81,22 +99,20 @@ fn over_picture(writer: &mut Writer, canvas: &mut Canvas, readout: &Readout, lay
     let angle = |deg: f64, plus: &str, minus: &str| {
         format!("{} {:.0}°", if deg < 0.0 { minus } else { plus }, deg.abs())
     };
-    let pose = format!("{}  {}", angle(lab.lao_deg, "LAO", "RAO"), angle(lab.cra_deg, "CRA", "CAU"));
     let (state, colour) = if lab.live { (mode.to_owned(), LIVE) } else { (format!("{mode} held"), TEXT) };
-    shadowed(writer, canvas, [left + 12, top + 26], 18, colour, &state);
-    if lab.live {
-        canvas.fill([left + side.saturating_sub(28), top + 12], [16, 16], LIVE);
+    let angles = std::iter::once([lab.lao_deg, lab.cra_deg]).chain(lab.second_deg);
+    let side = layout.side;
+    for ([left, top], [lao_deg, cra_deg]) in layout.corners().zip(angles) {
+        let pose = format!("{}  {}", angle(lao_deg, "LAO", "RAO"), angle(cra_deg, "CRA", "CAU"));
+        shadowed(writer, canvas, [left + 12, top + 26], 18, colour, &state);
+        if lab.live {
+            canvas.fill([left + side.saturating_sub(28), top + 12], [16, 16], LIVE);
+        }
+        let bottom = top + side.saturating_sub(14);
+        shadowed(writer, canvas, [left + 12, bottom], 16, TEXT, &pose);
+        let zoom = format!("{:.0} mm", lab.field_mm);
+        shadowed(writer, canvas, [left + side.saturating_sub(90), bottom], 16, TEXT, &zoom);
     }
-    shadowed(writer, canvas, [left + 12, top + side.saturating_sub(14)], 16, TEXT, &pose);
-    let zoom = format!("{:.0} mm", lab.field_mm);
-    shadowed(
-        writer,
-        canvas,
-        [left + side.saturating_sub(90), top + side.saturating_sub(14)],
-        16,
-        TEXT,
-        &zoom,
-    );
 }
 
 fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, layout: Layout) {
@@ -220,9 +236,15 @@ mod tests {
     #[test]
     fn windows_of_any_size_have_a_place_for_all() {
         for size in [[1280, 800], [1, 1], [3, 900], [900, 3], [4000, 2000]] {
-            let layout = Layout::of(size);
-            assert!(layout.fluoro.1 <= size[0] && layout.fluoro.1 <= size[1], "{layout:?}");
-            assert!(layout.three_d.0[0] + layout.three_d.1[0] <= size[0], "{layout:?}");
+            for planes in [1, 2] {
+                let layout = Layout::of(size, planes);
+                assert!(planes * layout.side <= size[0] && layout.side <= size[1], "{layout:?}");
+                assert!(layout.three_d.0[0] + layout.three_d.1[0] <= size[0], "{layout:?}");
+                assert_eq!(layout.plane_at((planes * layout.side) as f64 + 0.5, 0.0), None);
+            }
+            let [one, two] = [1, 2].map(|planes| Layout::of([1280, 860], planes));
+            assert_eq!((one.plane_at(600.0, 5.0), two.plane_at(600.0, 5.0)), (Some(0), Some(1)));
+            assert_eq!(two.plane_at(600.0, 600.0), None, "below the pictures");
         }
     }
 
