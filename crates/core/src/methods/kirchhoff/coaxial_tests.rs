@@ -1,5 +1,7 @@
 //! Insertions of several instruments.
 
+use super::coaxial::Nodes;
+use super::mesh::Mesh;
 use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, LateralForce, Move, Sheath, Simulation, WallProperties};
 use crate::methods::kirchhoff::KirchhoffOptions;
@@ -166,6 +168,37 @@ fn a_hook_goes_out_and_in_freely_and_no_jump_is_told() {
             let what = format!("{element_mm} mm elements, {} mm in: {report:?}", report.inserted_mm);
             assert!(report.converged && !report.jumped && report.relaxations == 0, "{what}");
             assert!(report.substeps == 1, "{what}");
+        }
+    }
+}
+
+#[test]
+fn a_mesh_beside_another_is_the_one_made_anew() {
+    let (stack, modulus, by_mm) = (wire_in_catheter(), 1.0, 0.005);
+    // Lengths before and after, what was made from the mesh before and what anew, and the elements said to be others.
+    let both = |lengths: [f64; 2], moved: [f64; 2], within_mm: f64| {
+        let nodes = Nodes::new(&stack, &lengths, 2.0);
+        let [mut known, mut anew, mut beside] = [(); 3].map(|()| Mesh::default());
+        nodes.mesh(&stack, &lengths, modulus, &mut known);
+        nodes.mesh(&stack, &moved, modulus, &mut anew);
+        let others = nodes.mesh_beside((&stack, &moved), (&known, within_mm), modulus, &mut beside);
+        (known, anew, beside, others)
+    };
+    // Ends apart, at marks, of one length, and of the catheter beside that of the wire's tip on either side.
+    for lengths in [[90.3, 71.1], [80.0, 60.0], [95.0, 95.0], [95.0, 80.002], [95.0, 79.998]] {
+        for (index, by_mm) in [(WIRE, by_mm), (WIRE, -by_mm), (CATHETER, by_mm), (CATHETER, -by_mm)] {
+            let mut moved = lengths;
+            moved[index] += by_mm;
+            let (known, anew, beside, others) = both(lengths, moved, 0.01);
+            assert_eq!(beside.elements, anew.elements, "{moved:?}");
+            assert_eq!(beside.points, anew.points, "{moved:?}");
+            assert_eq!((beside.from_tip_mm, beside.inserted_mm), (anew.from_tip_mm, anew.inserted_mm));
+            for e in (0..known.elements.len()).filter(|e| !others.contains(e)) {
+                assert_eq!(beside.elements[e], known.elements[e], "{moved:?}, element {e}");
+            }
+            assert!(others.len() < known.elements.len() / 2 && !others.is_empty(), "{moved:?}: {others:?}");
+            // Without those it is another mesh.
+            assert!(others.iter().any(|e| anew.elements[*e] != known.elements[*e]), "{moved:?}");
         }
     }
 }

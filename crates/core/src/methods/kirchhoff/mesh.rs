@@ -5,13 +5,14 @@ use crate::device::Device;
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Material};
 
-/// Contact points lie no farther apart than this many radii of the device.
-const SPACING_RADII: f64 = 2.0;
+/// Contact points lie no farther apart than this many radii of the device: a sharp crest between two of them is felt when it is two thirds
+/// of a radius from the axis. At 2 radii it would reach it.
+const SPACING_RADII: f64 = 1.5;
 /// At the tip they begin this close, in radii, and double: a tip that touches the wall at an angle leaves it within a
 /// tenth of its radius.
 const TIP_SPACING_RADII: f64 = 1.0 / 256.0;
 /// Fewest and most intervals between contact points in an element.
-const INTERVALS: (f64, f64) = (2.0, 8.0);
+const INTERVALS: (f64, f64) = (2.0, 16.0);
 /// Ends of sections nearer to each other than this part of an element share a node: over an element that is shorter, differences of unit
 /// vectors have lost the digits that curvature is made of.
 pub(super) const NEAR: f64 = 1e-3;
@@ -197,6 +198,17 @@ mod tests {
     use crate::device::Section;
 
     #[test]
+    fn a_crest_between_two_contact_points_is_felt_before_it_reaches_the_axis() {
+        let mut mesh = Mesh::default();
+        for (radius_mm, element_mm) in [(0.178, 1.0), (0.178, 4.0), (0.445, 2.0), (0.445, 4.0), (0.9, 4.0)] {
+            mesh.build(&Device::uniform(100.0, radius_mm, 5.0).unwrap(), 50.0, element_mm, 1.0);
+            let gaps = mesh.points.windows(2).map(|pair| pair[1].from_tip_mm - pair[0].from_tip_mm);
+            let half = 0.5 * gaps.fold(0.0, f64::max) / radius_mm;
+            assert!((1.0 - half * half).sqrt() > 0.6, "{radius_mm} mm, {element_mm} mm: {half} radii");
+        }
+    }
+
+    #[test]
     fn ends_of_sections_are_nodes_and_elements_turn_little_in_their_rest_shape() {
         let wire = Section::straight(100.0, 0.4, 5.0);
         let hook = Section { length_mm: 7.0, rest_curvature_per_mm: [1.0 / 3.0, 0.0], ..wire };
@@ -233,7 +245,7 @@ mod tests {
             for element_mm in [1e4, 3000.0, 1.0] {
                 let mut mesh = Mesh::default();
                 mesh.build(&device, device.length_mm(), element_mm, 1.0);
-                let most = MOST_POINTS + 8 * mesh.elements.len();
+                let most = MOST_POINTS + INTERVALS.1 as usize * mesh.elements.len();
                 assert!(mesh.points.len() <= most, "{} points, {element_mm} mm", mesh.points.len());
                 let first = mesh.points.iter().filter(|p| p.element + 1 == mesh.elements.len()).count();
                 assert!(first <= MOST_POINTS, "{first} points in the first element, {element_mm} mm");
