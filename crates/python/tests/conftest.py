@@ -1,6 +1,11 @@
+import signal
+
 import pytest
 
 import endowire
+
+# A shell ignores Ctrl-C for what it starts in the background, and Python then does so too: tests that interrupt would wait for ever.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
