@@ -21,8 +21,9 @@ const STIFF: f64 = 30.0;
 const YIELDING: f64 = 300.0;
 /// … One that is stiff is approached from softer walls: from one that is as stiff as so many elements, …
 const SOFTEST: f64 = 3000.0;
-/// … or from this part of its modulus, if that is softer: near enough for contacts to stay where they are, and the device where it is.
-const NEARLY: f64 = 0.1;
+/// … or from this part of its modulus, if that is softer, but none that is not stiff itself: near enough for contacts to stay where they
+/// are, and the device where it is.
+const FIRM: f64 = 0.1;
 /// Residual over force scale above which the last resort has found nothing.
 pub(super) const AT_REST: f64 = 0.05;
 /// What is the matter where an equilibrium is on the other side of the wall.
@@ -144,7 +145,7 @@ impl<const C: usize> Tools<C> {
             elements: &mesh.elements,
             state: rod,
             stiff: stiffness > STIFF,
-            softest: (SOFTEST / stiffness).min(NEARLY).max(STIFF / stiffness).min(1.0),
+            softest: (SOFTEST / stiffness).min(FIRM).max(STIFF / stiffness).min(1.0),
             rubs: surroundings.properties.rubs(),
             tolerance: options.tolerance,
             max_iterations: options.max_iterations,
