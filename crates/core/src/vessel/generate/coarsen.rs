@@ -104,8 +104,8 @@ impl Coarsener<'_> {
         (point, super::local_edge(self.edge, radius))
     }
 
-    /// Collapses edges, the shortest (relative to their target) first; returns how many.
-    fn collapse(&self, mesh: &mut SurfaceMesh, info: &mut [Vertex], shortest: f64) -> usize {
+    /// Collapses edges, the shortest (relative to their target) first.
+    fn collapse(&self, mesh: &mut SurfaceMesh, info: &mut [Vertex], shortest: f64) {
         let mut around = triangles_around(mesh);
         let mut gone = vec![false; mesh.triangles.len()];
         // How often each vertex has moved: what was said of its edges before holds no more.
@@ -119,7 +119,7 @@ impl Coarsener<'_> {
         let table = EdgeTable::new(&mesh.triangles);
         let mut queue: BinaryHeap<_> =
             table.edges().filter_map(|uses| short(mesh, info, &moved, uses[0].low, uses[0].high)).collect();
-        let (mut ring, mut next, mut count) = (Vec::new(), Vec::new(), 0);
+        let (mut ring, mut next) = (Vec::new(), Vec::new());
         while let Some(Reverse((_, a, b, moved_a, moved_b))) = queue.pop() {
             if (moved[a as usize], moved[b as usize]) != (moved_a, moved_b) {
                 continue;
@@ -173,10 +173,8 @@ impl Coarsener<'_> {
             next.sort_unstable();
             next.dedup();
             queue.extend(next.iter().filter_map(|&v| short(mesh, info, &moved, a.min(v), a.max(v))));
-            count += 1;
         }
         retain_numbered(&mut mesh.triangles, |index, _| !gone[index]);
-        count
     }
 
     /// Moves each vertex halfway to the mean of its neighbours, rim vertices to the mean of those on the rim.

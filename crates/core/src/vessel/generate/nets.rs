@@ -75,6 +75,11 @@ struct Block {
 }
 
 impl Block {
+    /// What the surface does in a cell whose corners are known, if it passes.
+    fn pieces(&self, cell: [usize; 3]) -> Option<Pieces> {
+        Pieces::of(|offset| self.corners[corner_index([0, 1, 2].map(|axis| cell[axis] + offset[axis]))])
+    }
+
     /// The vertex in a cell of the piece that crosses one of its edges.
     fn vertex(&self, cell: usize, edge: usize) -> u32 {
         let piece = self.several.get(&cell).map_or(0, |of_edge| u32::from(of_edge[edge]));
@@ -137,7 +142,7 @@ impl Follower<'_> {
                 *known = field.value(local, &position(corner)).f;
             }
         }
-        Pieces::of(|offset| block.corners[corner_index([0, 1, 2].map(|axis| at[axis] + offset[axis]))])
+        block.pieces(at)
     }
 
     /// Follows the surface from `cell` on.
@@ -181,9 +186,8 @@ pub(super) fn mesh(field: &Field, edge: f64) -> Result<Nets> {
             if !block.seen[cell_index(at)] {
                 return;
             }
-            let corner =
-                |offset: [usize; 3]| block.corners[corner_index([0, 1, 2].map(|k| at[k] + offset[k]))];
-            let Some(pieces) = Pieces::of(corner) else { return };
+            // Asked for again: to remember them took longer.
+            let Some(pieces) = block.pieces(at) else { return };
             block.cells[cell_index(at)] = nets.vertices.len() as u32;
             for mean in &pieces.means {
                 let cell = [0, 1, 2].map(|k| f64::from(key[k]) * BLOCK as f64 + at[k] as f64 + mean[k]);
