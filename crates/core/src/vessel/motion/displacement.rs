@@ -1,0 +1,136 @@
+//! The field of a motion at one time: where points are, where they come from, and what derivatives become.
+
+use nalgebra::Matrix3;
+
+use super::fade::Fade;
+use crate::Vec3;
+
+/// A turn and a displacement, weighed: w(X) (A X + b).
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Affine {
+    pub(super) matrix: Matrix3<f64>,
+    pub(super) offset: Vec3,
+    pub(super) fade: Option<Fade>,
+}
+
+/// Where a vessel is at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Displacement {
+    modes: Vec<Affine>,
+    /// |∂u/∂X| is never more than this.
+    steepest: f64,
+}
+
+/// The field about a material point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Local {
+    /// F⁻¹, with F = I + ∂u/∂X.
+    pub inverse: Matrix3<f64>,
+    /// ∂²uₖ/∂X², 1/mm, for each component k.
+    pub second: [Matrix3<f64>; 3],
+}
+
+/// Iterations after which a point is taken as it is; they halve the distance at least, and near by double the digits.
+const MOST: usize = 60;
+/// What is left over is rounding where it is less than this part of a coordinate.
+const ROUNDING: f64 = f64::EPSILON;
+
+impl Displacement {
+    pub(super) fn new(modes: Vec<Affine>, steepest: f64) -> Self {
+        Self { modes, steepest }
+    }
+
+    /// u, mm.
+    pub fn displacement_mm(&self, material: &Vec3) -> Vec3 {
+        let each = self.modes.iter().map(|mode| {
+            let v = mode.matrix * material + mode.offset;
+            mode.fade.map_or(v, |fade| v * fade.at_mm((material - fade.centre()).norm()))
+        });
+        each.sum()
+    }
+
+    /// x = X + u(X): where a material point is, mm.
+    pub fn place(&self, material: &Vec3) -> Vec3 {
+        material + self.displacement_mm(material)
+    }
+
+    /// F = I + ∂u/∂X.
+    pub fn gradient(&self, material: &Vec3) -> Matrix3<f64> {
+        let mut gradient = Matrix3::identity();
+        for mode in &self.modes {
+            match mode.fade {
+                None => gradient += mode.matrix,
+                Some(fade) => {
+                    let (w, w1, _) = fade.derivatives(material);
+                    gradient += mode.matrix * w + (mode.matrix * material + mode.offset) * w1.transpose();
+                }
+            }
+        }
+        gradient
+    }
+
+    /// F⁻¹ and the second derivatives.
+    pub fn local(&self, material: &Vec3) -> Local {
+        let mut second = [Matrix3::zeros(); 3];
+        for mode in &self.modes {
+            let Some(fade) = mode.fade else { continue };
+            let (_, w1, w2) = fade.derivatives(material);
+            let v = mode.matrix * material + mode.offset;
+            for (k, of) in second.iter_mut().enumerate() {
+                let mixed = w1 * mode.matrix.row(k);
+                *of += w2 * v[k] + mixed + mixed.transpose();
+            }
+        }
+        Local { inverse: inverse(&self.gradient(material)), second }
+    }
+
+    /// X with X + u(X) = x: the material point that is there. Newton's method finds it, to a rigid motion in one step; where it does not come
+    /// nearer by half, X = x − u(X) does, since |∂u/∂X| is less than that.
+    pub fn material(&self, place: &Vec3) -> Vec3 {
+        let off = |x: &Vec3| place - self.place(x);
+        let mut x = place - self.displacement_mm(place);
+        let mut left = off(&x);
+        for _ in 0..MOST {
+            let size = left.norm();
+            // Also for what is not a number.
+            if !(size > ROUNDING * place.amax()) {
+                break;
+            }
+            let steps = [inverse(&self.gradient(&x)) * left, left];
+            let nearer = steps.map(|step| x + step).map(|next| (next, off(&next)));
+            let Some((next, rest)) = nearer.into_iter().find(|(_, rest)| rest.norm() < 0.5 * size) else {
+                break;
+            };
+            (x, left) = (next, rest);
+        }
+        x
+    }
+
+    /// What lengths between material points are to lengths in the moved vessel, or those to these, at most: 1/(1 − |∂u/∂X|).
+    pub fn stretch(&self) -> f64 {
+        1.0 / (1.0 - self.steepest)
+    }
+}
+
+/// The inverse of F, which is regular where |∂u/∂X| is less than 1.
+fn inverse(f: &Matrix3<f64>) -> Matrix3<f64> {
+    f.try_inverse().unwrap_or_else(Matrix3::identity)
+}
+
+impl Local {
+    /// Gradient and Hessian in space of what has these in the reference:
+    ///
+    /// ```text
+    /// g = F⁻ᵀ ∇φ,    F⁻ᵀ (∇∇φ − Σ gₖ ∂²uₖ/∂X²) F⁻¹
+    /// ```
+    pub fn in_space(&self, gradient: &Vec3, hessian: &Matrix3<f64>) -> (Vec3, Matrix3<f64>) {
+        let back = self.inverse.transpose();
+        let g = back * gradient;
+        (g, back * (hessian - self.bent(&g)) * self.inverse)
+    }
+
+    /// Σ gₖ ∂²uₖ/∂X².
+    pub fn bent(&self, g: &Vec3) -> Matrix3<f64> {
+        self.second[0] * g.x + self.second[1] * g.y + self.second[2] * g.z
+    }
+}

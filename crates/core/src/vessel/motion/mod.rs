@@ -1,0 +1,87 @@
+//! A vessel that moves: breathing, heartbeat, posture.
+//!
+//! A material point X of the vessel as its file has it, the *reference*, is at x = X + u(X, t). The field is a sum of modes
+//!
+//! ```text
+//! u(X, t) = Σ w(X) v(X, t),    v(X, t) = (R(a(t) θ) − I)(X − c) + a(t) d
+//! ```
+//!
+//! each a displacement d and a turn θ about an axis through c, with a waveform a(t) from 0 to 1 and a weight w(X) that fades over a shell
+//! about a point ([`fade`]). u and its first two derivatives in X are continuous:
+//!
+//! ```text
+//! ∂u/∂X   = Σ w (R − I) + v ∇wᵀ
+//! ∂²uₖ/∂X² = Σ vₖ ∇∇w + ∇w Aₖ + Aₖᵀ ∇wᵀ    with Aₖ the k-th row of R − I
+//! ```
+//!
+//! What is asked of the moved vessel at x is asked of the reference at X ([`Displacement::material`]), where nothing has to be made anew.
+//! That there is one such X, and none that comes from the other side of the wall, follows from |∂u/∂X| < 1/2 everywhere, which is checked
+//! beforehand from |R − I| = 2 sin(θ/2), |∇w| ≤ 15/8 per fade and the largest |v| in its shell.
+
+mod displacement;
+mod fade;
+mod mode;
+#[cfg(test)]
+mod tests;
+
+pub use displacement::{Displacement, Local};
+pub use fade::Around;
+pub use mode::{MotionMode, Turn, Waveform};
+
+use crate::error::number;
+use crate::{Error, Result, Vec3};
+use mode::Mode;
+
+/// What |∂u/∂X| stays below.
+const STEEPEST: f64 = 0.5;
+
+/// How a vessel moves, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VesselMotion {
+    modes: Vec<Mode>,
+    /// |∂u/∂X| is never more than this.
+    steepest: f64,
+}
+
+impl VesselMotion {
+    /// The motion of these modes; none where there are none.
+    ///
+    /// # Errors
+    /// Values out of range, keys that contradict each other, and a field that strains or turns the vessel by half or more.
+    pub fn new(modes: &[MotionMode]) -> Result<Option<Self>> {
+        if modes.is_empty() {
+            return Ok(None);
+        }
+        let each = modes.iter().enumerate();
+        let modes = each.map(|(index, mode)| mode.check(&format!("vessel.motion[{index}]")));
+        let modes = modes.collect::<Result<Vec<_>>>()?;
+        let steepest = modes.iter().map(Mode::steepest).sum::<f64>();
+        // Also for what is not a number.
+        if steepest.is_nan() || steepest >= STEEPEST {
+            let mend = format!(
+                "neighbouring points of the vessel would move apart by up to so much of their distance: it must stay below {STEEPEST}; \
+                 move less, or fade over a longer way (fade_mm)"
+            );
+            return Err(Error::parameter("vessel.motion", number(steepest), mend));
+        }
+        Ok(Some(Self { modes, steepest }))
+    }
+
+    /// The field at a time, s.
+    pub fn at(&self, time_s: f64) -> Displacement {
+        Displacement::new(
+            self.modes.iter().map(|mode| mode.at(mode.amplitude(time_s))).collect(),
+            self.steepest,
+        )
+    }
+
+    /// Whether the vessel is elsewhere at one time than at another.
+    pub fn changes(&self) -> bool {
+        self.modes.iter().any(Mode::changes)
+    }
+
+    /// No point so far from `place` as `within_mm` is ever farther from where it is in the reference than this, mm.
+    pub fn farthest_mm(&self, place: &Vec3, within_mm: f64) -> f64 {
+        self.modes.iter().map(|mode| mode.farthest_mm(place, within_mm)).sum()
+    }
+}

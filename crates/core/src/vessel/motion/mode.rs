@@ -1,0 +1,233 @@
+//! One mode of a motion: what moves, how far and when.
+//!
+//! Waveforms, with the phase φ of the period from 0 to 1:
+//!
+//! ```text
+//! breathing   a = sin⁴(πφ)              at rest where it begins, out of breath longer than in
+//! heartbeat   a = sin²(πφ/s)  for φ < s = 2/5, else 0     systole, then diastole
+//! steady      a = 1
+//! ```
+//!
+//! The first is that of A. E. Lujan, E. W. Larsen, J. M. Balter and R. K. Ten Haken, *A method for incorporating organ motion due to
+//! breathing into 3D dose calculations*, Med. Phys. 26 (1999) 715–720, with its exponent 2n = 4.
+
+use nalgebra::{Matrix3, Rotation3, Unit};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+use super::displacement::Affine;
+use super::fade::{Around, Fade};
+use crate::error::{in_range, vector};
+use crate::{Error, Result, Vec3};
+
+/// Part of a beat in which the heart contracts.
+const SYSTOLE: f64 = 0.4;
+/// Longest period, s.
+const LONGEST_S: f64 = 1e6;
+/// Farthest displacement, and largest radius, mm.
+const FARTHEST_MM: f64 = 1e4;
+
+/// How a mode goes with time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Waveform {
+    /// Out and back, staying out of breath longer than in.
+    Breathing,
+    /// A beat in two fifths of the period, and rest.
+    Heartbeat,
+    /// Displaced all the time.
+    Steady,
+}
+
+/// A turn about an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Turn {
+    /// A point of the axis, mm.
+    pub centre_mm: [f64; 3],
+    /// Its direction, any length.
+    pub axis: [f64; 3],
+    /// Angle, degrees, right-handed.
+    pub angle_deg: f64,
+}
+
+/// `[[vessel.motion]]`: a displacement, a turn, or both, with a waveform, in all of the vessel or in a part of it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MotionMode {
+    /// How it goes with time.
+    pub waveform: Waveform,
+    /// Its period, s; of all waveforms but `steady`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period_s: Option<f64>,
+    /// Part of the period that has gone by at the start, 0 to 1.
+    #[serde(default)]
+    pub phase: f64,
+    /// Displacement where it is largest, mm.
+    #[serde(default)]
+    pub displacement_mm: [f64; 3],
+    /// A turn beside it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turn: Option<Turn>,
+    /// Where nothing moves; all outside of it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub still: Option<Around>,
+    /// Where it moves; nothing outside of it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub within: Option<Around>,
+}
+
+/// A mode, checked.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Mode {
+    waveform: Waveform,
+    period_s: f64,
+    phase: f64,
+    displacement: Vec3,
+    /// Centre, axis and angle in radians.
+    turn: Option<(Vec3, Unit<Vec3>, f64)>,
+    fade: Option<Fade>,
+}
+
+impl MotionMode {
+    /// Checks it; `name` is what messages call it.
+    pub(super) fn check(&self, name: &str) -> Result<Mode> {
+        let key = |key: &str| format!("{name}.{key}");
+        let period_s = match (self.waveform, self.period_s) {
+            (Waveform::Steady, None) => 1.0,
+            (Waveform::Steady, Some(period_s)) => {
+                let mend = "what is steady has no period: leave it out, or choose another waveform";
+                return Err(Error::parameter(key("period_s"), period_s, mend));
+            }
+            (_, Some(period_s)) => {
+                in_range(&key("period_s"), period_s, LONGEST_S)?;
+                period_s
+            }
+            (_, None) => {
+                let mend = "give it, in seconds: about 4 of breathing, about 0.8 of a heartbeat";
+                return Err(Error::parameter(key("period_s"), "none", mend));
+            }
+        };
+        if !(0.0..=1.0).contains(&self.phase) {
+            let mend = "must be a part of the period, from 0 to 1";
+            return Err(Error::parameter(key("phase"), self.phase, mend));
+        }
+        let displacement = Vec3::from(self.displacement_mm);
+        if !(displacement.norm() <= FARTHEST_MM) {
+            let mend = format!("must be finite numbers, no farther than {FARTHEST_MM} mm");
+            return Err(Error::parameter(key("displacement_mm"), vector(&displacement), mend));
+        }
+        let turn = self.turn.map(|turn| turn.check(&key("turn"))).transpose()?;
+        if displacement == Vec3::zeros() && turn.is_none() {
+            let mend = "nothing moves in it: give displacement_mm, turn or both";
+            return Err(Error::parameter(name, "{}", mend));
+        }
+        let fade = match (self.still, self.within) {
+            (Some(_), Some(_)) => {
+                let mend = "still is given too: keep one of the two";
+                return Err(Error::parameter(key("within"), "given", mend));
+            }
+            (Some(around), None) => Some((around, true, "still")),
+            (None, Some(around)) => Some((around, false, "within")),
+            (None, None) => None,
+        };
+        let fade = fade.map(|(around, still, table)| {
+            around.check(&key(table))?;
+            Ok::<_, Error>(Fade { around, still })
+        });
+        let (waveform, phase) = (self.waveform, self.phase);
+        Ok(Mode { waveform, period_s, phase, displacement, turn, fade: fade.transpose()? })
+    }
+}
+
+impl Turn {
+    fn check(&self, name: &str) -> Result<(Vec3, Unit<Vec3>, f64)> {
+        let (centre, axis) = (Vec3::from(self.centre_mm), Vec3::from(self.axis));
+        if !(centre.norm() <= FARTHEST_MM) {
+            let mend = format!("must be finite numbers, no farther than {FARTHEST_MM} mm from the origin");
+            return Err(Error::parameter(format!("{name}.centre_mm"), vector(&centre), mend));
+        }
+        let Some(axis) = Unit::try_new(axis, f64::MIN_POSITIVE).filter(|a| a.iter().all(|c| c.is_finite()))
+        else {
+            let mend = "must be a direction: finite numbers, not all of them 0";
+            return Err(Error::parameter(format!("{name}.axis"), vector(&axis), mend));
+        };
+        if self.angle_deg == 0.0 || !(self.angle_deg.abs() <= 180.0) {
+            let mend = "must be an angle from -180 to 180 degrees other than 0";
+            return Err(Error::parameter(format!("{name}.angle_deg"), self.angle_deg, mend));
+        }
+        Ok((centre, axis, self.angle_deg.to_radians()))
+    }
+}
+
+impl Around {
+    fn check(&self, name: &str) -> Result<()> {
+        let centre = Vec3::from(self.centre_mm);
+        if !(centre.norm() <= FARTHEST_MM) {
+            let mend = format!("must be finite numbers, no farther than {FARTHEST_MM} mm from the origin");
+            return Err(Error::parameter(format!("{name}.centre_mm"), vector(&centre), mend));
+        }
+        if !(0.0..=FARTHEST_MM).contains(&self.radius_mm) {
+            let mend = format!("must be from 0 to {FARTHEST_MM}");
+            return Err(Error::parameter(format!("{name}.radius_mm"), self.radius_mm, mend));
+        }
+        in_range(&format!("{name}.fade_mm"), self.fade_mm, FARTHEST_MM)
+    }
+}
+
+impl Mode {
+    /// a(t).
+    pub(super) fn amplitude(&self, time_s: f64) -> f64 {
+        let phase = (time_s / self.period_s + self.phase).rem_euclid(1.0);
+        match self.waveform {
+            Waveform::Breathing => (PI * phase).sin().powi(4),
+            Waveform::Heartbeat if phase < SYSTOLE => (PI * phase / SYSTOLE).sin().powi(2),
+            Waveform::Heartbeat => 0.0,
+            Waveform::Steady => 1.0,
+        }
+    }
+
+    /// Whether it goes with time.
+    pub(super) fn changes(&self) -> bool {
+        self.waveform != Waveform::Steady
+    }
+
+    /// w v at an amplitude.
+    pub(super) fn at(&self, amplitude: f64) -> Affine {
+        let turned = self.turn.map(|(centre, axis, angle)| {
+            let matrix =
+                Rotation3::from_axis_angle(&axis, amplitude * angle).into_inner() - Matrix3::identity();
+            (matrix, -matrix * centre)
+        });
+        let (matrix, offset) = turned.unwrap_or_else(|| (Matrix3::zeros(), Vec3::zeros()));
+        Affine { matrix, offset: offset + self.displacement * amplitude, fade: self.fade }
+    }
+
+    /// Largest |R − I|: it grows with the angle up to half a turn.
+    fn turning(&self) -> f64 {
+        self.turn.map_or(0.0, |(.., angle)| 2.0 * (0.5 * angle.abs()).sin())
+    }
+
+    /// |v| is never more than this at so far from a place, mm.
+    fn fastest_mm(&self, place: &Vec3, within_mm: f64) -> f64 {
+        let turned =
+            self.turn.map_or(0.0, |(centre, ..)| self.turning() * ((place - centre).norm() + within_mm));
+        turned + self.displacement.norm()
+    }
+
+    /// |∂(wv)/∂X| is never more than this.
+    pub(super) fn steepest(&self) -> f64 {
+        let faded =
+            self.fade.map_or(0.0, |fade| fade.steepest() * self.fastest_mm(&fade.centre(), fade.outer_mm()));
+        self.turning() + faded
+    }
+
+    /// |wv| is never more than this at so far from a place, mm.
+    pub(super) fn farthest_mm(&self, place: &Vec3, within_mm: f64) -> f64 {
+        let weight = self.fade.map_or(1.0, |fade| {
+            let rho_mm = (place - fade.centre()).norm();
+            fade.at_mm(rho_mm + within_mm).max(fade.at_mm(rho_mm - within_mm))
+        });
+        weight * self.fastest_mm(place, within_mm)
+    }
+}
