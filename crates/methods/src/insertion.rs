@@ -94,6 +94,7 @@ impl Insertion {
     ) -> Result<Self> {
         model.check(surroundings.device)?;
         surroundings.properties.refuse_regions(model.name())?;
+        surroundings.refuse_motion(model.name())?;
         surroundings.sheath.refuse_friction(model.name())?;
         let friction = surroundings.properties.friction;
         if friction != 0.0 {

@@ -28,6 +28,7 @@
 
 mod between;
 mod coupling;
+mod moving;
 
 pub use between::{Between, Place, Rub};
 pub use coupling::Coupling;
@@ -39,6 +40,7 @@ use super::ContactPoint;
 use crate::Vec3;
 use crate::rod::quadrature::Point;
 use crate::rod::{ElementData, RodState};
+use crate::vessel::Displacement;
 
 /// Slip below which a point sticks, as a part of the motion of the hand, or of the radius of a device whose hand rests: what the
 /// regularisation gives away.
@@ -237,6 +239,20 @@ impl Friction {
             }
             slider.begun = (slider.normal, slider.force_n);
             self.sliders.push(slider);
+        }
+    }
+
+    /// The wall has moved since the step began, and its material points have taken along what slip is counted from: see [`moving`].
+    pub(crate) fn carry(&mut self, (before, after): (&Displacement, &Displacement), hands: &[HandMotion]) {
+        let mut farthest_mm = 0.0f64;
+        for slider in &mut self.sliders {
+            farthest_mm = farthest_mm.max(slider.carry(before, after));
+        }
+        // A hand that rests has no way of its own: that of the wall says how much is little then.
+        let moves = hands.iter().any(|hand| hand.parts() != [0.0; 2]);
+        let stick_mm = (STICK * farthest_mm).max(LEAST_STICK_MM);
+        if farthest_mm > 0.0 {
+            self.stick_mm = if moves { self.stick_mm.max(stick_mm) } else { stick_mm };
         }
     }
 

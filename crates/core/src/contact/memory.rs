@@ -9,10 +9,11 @@ use super::distance::{Distance, Nearness};
 use super::places::{Place, Places};
 use super::point::{FOLLOW, LOOK_AGAIN};
 use super::wall::Foreseen;
-use super::{ContactPoint, FeltWall};
+use super::{ContactPoint, FeltWall, MovedWall};
 use crate::Vec3;
 
-/// What a point knows of its surroundings.
+/// What a point knows of its surroundings. Places are material points of the vessel, and clearances lie between those; distances that were
+/// read are in space.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct KnownPoint {
     /// Where the wall was last looked for.
@@ -27,7 +28,7 @@ pub(super) struct KnownPoint {
     pub(super) free_mm: f64,
     /// Of a point that has sunk into the wall at its base, a triangle of the wall that it has sunk into.
     pub(super) side: Option<u32>,
-    /// Position at the state that Newton's method is leaving.
+    /// The material point where it is at the state that Newton's method is leaving.
     pub(super) base: Vec3,
     /// Where the wall was looked for when that state was assembled, and the triangle that was found: what points feel on the way from
     /// there hangs on where they are alone, not on other steps that were tried.
@@ -187,8 +188,9 @@ impl WallMemory {
     }
 
     /// How near `x` is to the wall, with derivatives below `limit_mm`; `None` where it is known to be farther.
-    pub(crate) fn nearness(&mut self, felt: &FeltWall, x: &Vec3, limit_mm: f64) -> Option<Nearness> {
-        let far_mm = limit_mm + felt.smooth.deepest_inset_mm();
+    pub(crate) fn nearness(&mut self, felt: MovedWall<'_>, x: &Vec3, limit_mm: f64) -> Option<Nearness> {
+        let x = &felt.material(x);
+        let far_mm = limit_mm * felt.stretch() + felt.smooth.deepest_inset_mm();
         if self.last.clearance(x) > far_mm {
             return None;
         }
@@ -240,6 +242,11 @@ impl WallMemory {
             None => TakenReading::NONE,
         };
         self.readings.extend(known.distances.iter().map(reading));
+    }
+
+    /// Forgets the distances that were read: those of material points change while the vessel moves.
+    pub(crate) fn forget_readings(&mut self) {
+        self.readings.fill(TakenReading::NONE);
     }
 
     /// Keeps what is known at the end of a step.

@@ -17,7 +17,7 @@ mod reading;
 use super::memory::WallMemory;
 use super::point::{Contact, ContactPoint, Counters, FOLLOW, Touch};
 use crate::Vec3;
-use crate::contact::{Between, FeltWall, Friction};
+use crate::contact::{Between, FeltWall, Friction, MovedWall};
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::External;
 
@@ -38,7 +38,7 @@ const DEEPER: f64 = 0.3;
 
 /// The wall's energy along a device.
 pub struct WallContact<'a> {
-    felt: &'a FeltWall,
+    felt: MovedWall<'a>,
     points: &'a [ContactPoint],
     /// Moment of the softest piece at a radius of 100 mm, N·mm.
     least_moment_nmm: f64,
@@ -59,7 +59,7 @@ impl<'a> WallContact<'a> {
     /// The wall's energy at `points` (tip first), with what is known from earlier steps. `softest_nmm2` is the device's
     /// least bending stiffness.
     pub fn new(
-        felt: &'a FeltWall,
+        felt: impl Into<MovedWall<'a>>,
         points: &'a [ContactPoint],
         memory: &'a mut WallMemory,
         friction: &'a mut Friction,
@@ -67,7 +67,7 @@ impl<'a> WallContact<'a> {
     ) -> Self {
         memory.resize(points.len());
         Self {
-            felt,
+            felt: felt.into(),
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
             softness: 1.0,
@@ -78,6 +78,11 @@ impl<'a> WallContact<'a> {
             rounding_n: 0.0,
             counters: Counters::default(),
         }
+    }
+
+    /// The material point of the vessel where point `index` is at a state. What is known of the wall is known of those.
+    fn material(&self, index: usize, elements: &[ElementData], state: &RodState) -> Vec3 {
+        self.felt.material(&self.points[index].position(elements, state))
     }
 
     /// Friction between instruments.
@@ -100,7 +105,7 @@ impl<'a> WallContact<'a> {
         sum: &mut PointSum,
         index: usize,
     ) {
-        let (point, x) = (&self.points[index], &self.memory.points[index].base);
+        let (point, x) = (&self.points[index], &self.felt.place(&self.memory.points[index].base));
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
         let Some(f) = self.friction.derivatives(index, x, angle, radius_mm) else { return };
         into.add_value(self.friction.value(index, x, angle, radius_mm));
@@ -155,10 +160,11 @@ impl<'a> WallContact<'a> {
     pub fn touch(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<Touch> {
         let point = self.points[index];
         let x = point.position(elements, state);
-        let Reading::Pressed(distance) = self.read(index, &x) else { return None };
+        let material = self.felt.material(&x);
+        let Reading::Pressed(distance) = self.read(index, &material) else { return None };
         let penetration_mm = point.potential.penetration_mm(distance.value_mm);
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
-        let stiffness = self.felt.stiffness(&x, self.memory.points[index].triangle, 1.0);
+        let stiffness = self.felt.stiffness(&material, self.memory.points[index].triangle, 1.0);
         let (mut normal, mut force_n) = point.pressed(&distance, stiffness.factor);
         if stiffness.slope.is_some() {
             let force = -stiffness.derivatives(&point.potential, &distance, point.weight_mm).0;
@@ -185,7 +191,7 @@ impl<'a> WallContact<'a> {
         let (mut misfit_n, mut sum_n) = (0.0, 0.0);
         for index in 0..self.points.len() {
             let point = self.points[index];
-            let x = point.position(elements, state);
+            let x = self.material(index, elements, state);
             let force_n = match self.read(index, &x) {
                 Reading::Pressed(d) => {
                     let triangle = self.memory.points[index].triangle;
@@ -207,7 +213,7 @@ impl<'a> WallContact<'a> {
         let mut last: Option<(Vec3, f64)> = None;
         let mut sunk = false;
         for index in (0..self.points.len()).rev() {
-            let x = self.points[index].position(elements, state);
+            let x = self.material(index, elements, state);
             let distance_mm = self.read(index, &x).distance_mm();
             let sunk_mm = SUNK * self.points[index].potential.radius_mm;
             if distance_mm < sunk_mm {
@@ -221,18 +227,18 @@ impl<'a> WallContact<'a> {
                     flat.distance_mm < -sunk_mm && felt.distance_from(flat.triangle, &x) < 0.0
                 })
             };
-            if std::mem::take(&mut sunk) && beyond(self.felt) {
+            if std::mem::take(&mut sunk) && beyond(&self.felt) {
                 return true;
             }
             if let Some((from, clearance_mm)) = last
-                && (x - from).norm() > SAFE * clearance_mm.max(distance_mm)
+                && (x - from).norm() > SAFE * clearance_mm.max(distance_mm) / self.felt.stretch()
             {
                 self.counters.queries += 1;
                 // A flat triangle may stand into the smooth lumen: what has gone through is behind the piece of wall that is next to it.
                 let beside = self.memory.points[index + 1].triangle;
                 let behind = |triangle| self.felt.distance_from(triangle, &x) < 0.0;
                 if self.felt.query.crossing(&from, &x, 1.0).is_some()
-                    && (beside.is_none_or(behind) || beyond(self.felt))
+                    && (beside.is_none_or(behind) || beyond(&self.felt))
                 {
                     return true;
                 }
@@ -249,7 +255,7 @@ impl<'a> WallContact<'a> {
             let known = &self.memory.points[index];
             let was_mm = if known.side.is_some() { known.base_clearance_mm } else { SUNK * radius_mm };
             let least_mm = was_mm.min(SUNK * radius_mm + DEEPER * radius_mm) - DEEPER * radius_mm;
-            let x = self.points[index].position(elements, state);
+            let x = self.material(index, elements, state);
             self.read(index, &x).distance_mm() <= least_mm
         });
         deep || self.safe_fraction(elements, state) < 1.0
@@ -260,7 +266,7 @@ impl External for WallContact<'_> {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         self.memory.before.clone_from(&self.memory.points);
         for index in 0..self.points.len() {
-            let x = self.points[index].position(elements, state);
+            let x = self.material(index, elements, state);
             let radius_mm = self.points[index].potential.radius_mm;
             let held = self.holding && self.memory.points[index].presses;
             let limit_mm = if held { (1.0 + FOLLOW) * radius_mm } else { radius_mm };
@@ -311,14 +317,15 @@ impl External for WallContact<'_> {
     fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         let mut sum = self.friction.between.taken_mj(state);
         for index in 0..self.points.len() {
-            let x = self.points[index].position(elements, state);
             let point = self.points[index];
+            let x = point.position(elements, state);
+            let material = self.felt.material(&x);
             let radius_mm = point.potential.radius_mm;
             let limit_mm = self.asked_mm(radius_mm);
-            let value_mm = self.read_within(index, &x, limit_mm).distance_mm();
+            let value_mm = self.read_within(index, &material, limit_mm).distance_mm();
             if value_mm < radius_mm {
                 let triangle = self.memory.points[index].triangle;
-                let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
+                let factor = self.felt.stiffness(&material, triangle, self.softness).factor;
                 sum += factor * point.weight_mm * point.potential.value(value_mm);
             }
             if self.friction.acts() {
@@ -399,9 +406,10 @@ impl External for WallContact<'_> {
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         let mut fraction: f64 = 1.0;
         for index in 0..self.points.len() {
-            let x = self.points[index].position(elements, to);
+            let x = self.material(index, elements, to);
             let known = &self.memory.points[index];
-            if known.side.is_some() || fraction * (x - known.base).norm() <= SAFE * known.base_clearance_mm {
+            let safe_mm = SAFE * known.base_clearance_mm / self.felt.stretch();
+            if known.side.is_some() || fraction * (x - known.base).norm() <= safe_mm {
                 continue;
             }
             self.counters.queries += 1;

@@ -9,7 +9,7 @@ use crate::error::vector;
 use crate::methods::MethodChoice;
 use crate::methods::kirchhoff::KirchhoffOptions;
 use crate::rod::MAX_ANGLES;
-use crate::vessel::{NoStore, Wall, WallQuery, WallStore};
+use crate::vessel::{NoStore, VesselMotion, Wall, WallQuery, WallStore};
 use crate::{Error, Result};
 
 /// A simulation to be built: wall, device and sheath, and what else is told.
@@ -18,6 +18,7 @@ pub struct SimulationBuilder<'a> {
     stack: Stack,
     sheath: Sheath,
     properties: WallProperties,
+    motion: Option<VesselMotion>,
     method: Option<&'a dyn MethodChoice>,
     store: &'a dyn WallStore,
 }
@@ -28,13 +29,21 @@ const MOUTH_MM: f64 = 1e-3;
 
 impl<'a> SimulationBuilder<'a> {
     pub(super) fn new(wall: Wall, stack: Stack, sheath: Sheath) -> Self {
-        Self { wall, stack, sheath, properties: WallProperties::default(), method: None, store: &NoStore }
+        let properties = WallProperties::default();
+        Self { wall, stack, sheath, properties, motion: None, method: None, store: &NoStore }
     }
 
     /// How the wall yields and rubs; [`WallProperties::default`] unless told.
     #[must_use]
     pub fn properties(mut self, properties: WallProperties) -> Self {
         self.properties = properties;
+        self
+    }
+
+    /// How the vessel moves; not at all unless told.
+    #[must_use]
+    pub fn motion(mut self, motion: Option<VesselMotion>) -> Self {
+        self.motion = motion;
         self
     }
 
@@ -58,24 +67,25 @@ impl<'a> SimulationBuilder<'a> {
     /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
     /// tell, wall properties or method options out of range, more than three instruments with friction, and what the method cannot do.
     pub fn build(self) -> Result<Simulation> {
-        let Self { wall, stack, sheath, properties, method, store } = self;
+        let Self { wall, stack, sheath, properties, motion, method, store } = self;
         properties.check(wall.mesh())?;
         check_inside(&wall, &sheath)?;
         let query = WallQuery::new(&wall)?;
         stack.devices().try_for_each(|device| check_mouth(&query, device, &sheath))?;
+        motion.iter().try_for_each(|motion| check_still(&query, motion, &stack, &sheath))?;
         // Of more than three those without a shape rub along the line alone.
         let rub = stack.rubs() && stack.instruments().len() <= MAX_ANGLES;
         let twists = stack.is_several() && (properties.rubs() || rub);
         let stack = if twists { stack.twisted()? } else { stack };
-        let scene = Environment { wall, properties, query, sheath, stack };
+        let scene = Environment { wall, properties, query, sheath, stack, motion };
         let own = KirchhoffOptions::default();
         let method = method.unwrap_or(&own);
         if scene.stack.is_several() && !method.takes_several() {
             let mend = "pushes one device and no more: leave one instrument, or choose kirchhoff";
             return Err(Error::parameter("method.name", method.name(), mend));
         }
-        let method = method.start(&scene.surroundings(), store)?;
-        Ok(Simulation { scene: Arc::new(scene), method })
+        let method = method.start(&scene.surroundings([0.0; 2]), store)?;
+        Ok(Simulation { scene: Arc::new(scene), method, time_s: 0.0 })
     }
 }
 
@@ -97,6 +107,23 @@ fn check_inside(wall: &Wall, sheath: &Sheath) -> Result<()> {
             if openings.is_empty() { "none".to_owned() } else { openings.join(", ") }
         ),
     ))
+}
+
+/// Refuses a motion that takes the wall through what lies in the sheath's mouth, which stays where it is.
+fn check_still(query: &WallQuery, motion: &VesselMotion, stack: &Stack, sheath: &Sheath) -> Result<()> {
+    let mouth = &sheath.position_mm;
+    let radius_mm = stack.radii_mm().1;
+    let room_mm = query.distance_mm(mouth) - radius_mm;
+    let moved_mm = motion.farthest_mm(mouth, room_mm + radius_mm);
+    if moved_mm <= room_mm {
+        return Ok(());
+    }
+    let mend = format!(
+        "mm is how far the vessel may move at the sheath's mouth at {}, which stays where it is with {room_mm:.3} mm to spare: let it be \
+         still there (still)",
+        vector(mouth)
+    );
+    Err(Error::parameter("vessel.motion", format!("{moved_mm:.3}"), mend))
 }
 
 /// A device so many times as thick as the vessel comes from another unit.

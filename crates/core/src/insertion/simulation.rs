@@ -7,7 +7,7 @@ use crate::device::{Device, LENGTH_SLACK_MM, Stack};
 use crate::insertion::SimulationBuilder;
 use crate::methods::{Command, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings};
 use crate::shape::Shape;
-use crate::vessel::{Wall, WallQuery};
+use crate::vessel::{Displacement, VesselMotion, Wall, WallQuery};
 use crate::{Error, Result, Vec3};
 
 /// An insertion under way.
@@ -17,6 +17,8 @@ use crate::{Error, Result, Vec3};
 pub struct Simulation {
     pub(super) scene: Arc<Environment>,
     pub(super) method: Box<dyn Method>,
+    /// Time since the start, s.
+    pub(super) time_s: f64,
 }
 
 /// What a simulation never changes.
@@ -26,18 +28,21 @@ pub(super) struct Environment {
     pub(super) query: WallQuery,
     pub(super) sheath: Sheath,
     pub(super) stack: Stack,
+    pub(super) motion: Option<VesselMotion>,
 }
 
 impl Environment {
-    pub(super) fn surroundings(&self) -> Surroundings<'_> {
-        let Self { wall, properties, query, sheath, stack } = self;
-        Surroundings { wall, properties, query, sheath, device: stack.first(), stack }
+    /// In a step from one time to another, s.
+    pub(super) fn surroundings(&self, time_s: [f64; 2]) -> Surroundings<'_> {
+        let Self { wall, properties, query, sheath, stack, motion } = self;
+        let (device, motion) = (stack.first(), motion.as_ref());
+        Surroundings { wall, properties, query, sheath, device, stack, motion, time_s }
     }
 }
 
 impl Clone for Simulation {
     fn clone(&self) -> Self {
-        Self { scene: Arc::clone(&self.scene), method: self.method.boxed_clone() }
+        Self { scene: Arc::clone(&self.scene), method: self.method.boxed_clone(), time_s: self.time_s }
     }
 }
 
@@ -57,7 +62,7 @@ impl Simulation {
             return self.step_together(&[Move { instrument: 0, command }]);
         }
         check_command(command, self.method.report().inserted_mm, self.scene.stack.length_mm())?;
-        self.method.step(&self.scene.surroundings(), command)?;
+        self.method.step(&self.scene.surroundings([self.time_s; 2]), command)?;
         Ok(self.method.report())
     }
 
@@ -67,14 +72,28 @@ impl Simulation {
     /// As [`Simulation::step`] for each; an instrument that is not there or moved twice, and instruments that cannot be in
     /// together so far ([`Stack::check_places`]; all [`Error::Parameter`]).
     pub fn step_together(&mut self, moves: &[Move]) -> Result<&StepReport> {
+        self.step_until(moves, None)
+    }
+
+    /// As [`Simulation::step_together`], while time goes on evenly until `time_s`, with the vessel if it moves; no time goes by where none is told.
+    ///
+    /// # Errors
+    /// As [`Simulation::step_together`], and a time before that of the last step or none at all.
+    pub fn step_until(&mut self, moves: &[Move], time_s: Option<f64>) -> Result<&StepReport> {
         self.check_moves(moves)?;
-        let surroundings = self.scene.surroundings();
+        let time_s = time_s.unwrap_or(self.time_s);
+        if !(self.time_s..=LATEST_S).contains(&time_s) {
+            let mend = format!("must be a time from that of the last step, {} s, to {LATEST_S}", self.time_s);
+            return Err(Error::parameter("time_s", time_s, mend));
+        }
+        let surroundings = self.scene.surroundings([self.time_s, time_s]);
         if self.scene.stack.is_several() {
             self.method.step_together(&surroundings, moves)?;
         } else {
             let command = moves.first().map_or_else(Command::default, |one| one.command);
             self.method.step(&surroundings, command)?;
         }
+        self.time_s = time_s;
         Ok(self.method.report())
     }
 
@@ -105,7 +124,7 @@ impl Simulation {
 
     /// All that the next step depends on, beside what surrounds the device.
     pub fn state(&self) -> State {
-        self.method.state()
+        self.method.state().at(self.time_s)
     }
 
     /// Goes on from a state of this scene as if nothing else had been: shape, report and all further steps are those of the simulation that
@@ -114,7 +133,13 @@ impl Simulation {
     /// # Errors
     /// A state of another method, vessel, device, sheath or element length, as far as its numbers show it ([`Error::Parameter`]).
     pub fn restore(&mut self, state: &State) -> Result<()> {
-        self.method.restore(&self.scene.surroundings(), state)
+        if !(0.0..=LATEST_S).contains(&state.time_s()) {
+            let mend = format!("must be a time from 0 to {LATEST_S} s: restore a state of this scene");
+            return Err(Error::parameter("state.time_s", state.time_s(), mend));
+        }
+        self.method.restore(&self.scene.surroundings([self.time_s; 2]), state)?;
+        self.time_s = state.time_s();
+        Ok(())
     }
 
     /// Drops the memory that steps work with, which the next one takes anew; no result changes. For simulations that wait.
@@ -130,7 +155,7 @@ impl Simulation {
     /// What holds an instrument, and all that lies in it, on the line of those outside it: at every node of [`shape`](Simulation::shape) the
     /// force across the line. None where nothing is outside the instrument or it has ended, at the sheath's mouth, and of a device alone.
     pub fn lateral_forces(&self, instrument: usize) -> Vec<LateralForce> {
-        self.method.lateral_forces(&self.scene.surroundings(), instrument)
+        self.method.lateral_forces(&self.scene.surroundings([self.time_s; 2]), instrument)
     }
 
     /// The inserted centre line, sheath to tip.
@@ -150,7 +175,22 @@ impl Simulation {
         self.method.report()
     }
 
-    /// The vessel.
+    /// Time since the start, s.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
+    }
+
+    /// How the vessel moves; none where it rests.
+    pub fn motion(&self) -> Option<&VesselMotion> {
+        self.scene.motion.as_ref()
+    }
+
+    /// Where the vessel is; none where it never moves.
+    pub fn displacement(&self) -> Option<Displacement> {
+        self.motion().map(|motion| motion.at(self.time_s))
+    }
+
+    /// The vessel, as it is at rest.
     pub fn wall(&self) -> &Wall {
         &self.scene.wall
     }
@@ -170,6 +210,9 @@ impl Simulation {
         &self.scene.sheath
     }
 }
+
+/// Latest time of a step, s: beyond it hardly any digits are left for a heartbeat.
+const LATEST_S: f64 = 1e9;
 
 /// Largest turn of one command, rad: a thousand turns. Beyond that a hand's input is a mistake, and far beyond it an angle has no digits
 /// left that tell where on the circle it is.

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::{Counters, WallProperties};
 use crate::device::{Device, Stack};
 use crate::shape::Shape;
-use crate::vessel::{Wall, WallQuery, WallStore};
+use crate::vessel::{Displacement, VesselMotion, Wall, WallQuery, WallStore};
 use crate::{Error, Result};
 use kirchhoff::KirchhoffOptions;
 
@@ -38,6 +38,37 @@ pub struct Surroundings<'a> {
     pub device: &'a Device,
     /// All instruments.
     pub stack: &'a Stack,
+    /// How the vessel moves; none where it rests.
+    pub motion: Option<&'a VesselMotion>,
+    /// Time before and after the step, s.
+    pub time_s: [f64; 2],
+}
+
+impl Surroundings<'_> {
+    /// Whether the vessel moves in the step.
+    pub fn moves(&self) -> bool {
+        let [before, after] = self.time_s;
+        before != after && self.motion.is_some_and(VesselMotion::changes)
+    }
+
+    /// Where the vessel is after this part of the step, 0 to 1; none where it never moves.
+    pub fn displacement(&self, part: f64) -> Option<Displacement> {
+        let [before, after] = self.time_s;
+        self.motion
+            .map(|motion| motion.at(if part == 1.0 { after } else { before + (after - before) * part }))
+    }
+
+    /// Refuses a vessel that moves on behalf of a method that knows it at rest.
+    ///
+    /// # Errors
+    /// Any motion.
+    pub fn refuse_motion(&self, method: &str) -> Result<()> {
+        if self.motion.is_none() {
+            return Ok(());
+        }
+        let mend = format!("{method} knows a vessel at rest: leave motion out or use the method kirchhoff");
+        Err(Error::parameter("vessel.motion", "given", mend))
+    }
 }
 
 /// A method keeps its own unknowns from step to step and moves them by commands.

@@ -19,6 +19,8 @@ use crate::{Error, Result, Vec3};
 pub struct State {
     /// Name of the method.
     method: String,
+    /// Time since the start, s.
+    time_s: f64,
     content: Content,
 }
 
@@ -96,7 +98,17 @@ pub struct NodesState {
 impl State {
     /// The state of a method of that name.
     pub fn new(method: &str, content: Content) -> Self {
-        Self { method: method.to_owned(), content }
+        Self { method: method.to_owned(), time_s: 0.0, content }
+    }
+
+    /// The same at a time since the start, s.
+    pub(crate) fn at(self, time_s: f64) -> Self {
+        Self { time_s, ..self }
+    }
+
+    /// Time since the start, s.
+    pub fn time_s(&self) -> f64 {
+        self.time_s
     }
 
     /// Name of the method.

@@ -10,7 +10,7 @@ use crate::device::{Device, DeviceFile, Instrument, Section, Stack, line_mm};
 use crate::input::{from_toml, parse_toml};
 use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
-use crate::vessel::{CentrelineTree, SurfaceMesh, Wall, WallRecipe, WallStore, unit_hint};
+use crate::vessel::{CentrelineTree, SurfaceMesh, VesselMotion, Wall, WallRecipe, WallStore, unit_hint};
 use crate::{Error, Result};
 
 /// A scene whose `[method]` is one of this crate's: the exact rod.
@@ -339,7 +339,17 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             true => self.centreline()?,
             false => None,
         };
-        Script::new(&self.script, stack, &self.inserted_mm(stack)?, centreline.as_ref())
+        let script = Script::new(&self.script, stack, &self.inserted_mm(stack)?, centreline.as_ref())?;
+        let moves = VesselMotion::new(&self.vessel.motion)?.is_some_and(|motion| motion.changes());
+        if moves && !script.is_empty() && !script.is_timed() {
+            let mend = "no time goes by in the script: give its lines speeds (speed_mm_per_s, speed_deg_per_s), or wait_s";
+            return Err(Error::parameter(
+                "vessel.motion",
+                format!("{} given", self.vessel.motion.len()),
+                mend,
+            ));
+        }
+        Ok(script)
     }
 
     /// The vessel's centre line: the tree it is built from, or the one given beside its surface; none where there is neither.
@@ -392,6 +402,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     fn built(&self, wall: Wall, stack: Stack, sheath: Sheath, store: &dyn WallStore) -> Result<Simulation> {
         Simulation::builder(wall, stack, sheath)
             .properties(self.vessel.wall.clone())
+            .motion(VesselMotion::new(&self.vessel.motion)?)
             .method(&self.method)
             .store(store)
             .build()

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use crate::device::Section;
 use crate::insertion::{Sheath, WallProperties};
-use crate::vessel::{CentrelineTree, Resolution, Wall};
+use crate::vessel::{CentrelineTree, MotionMode, Resolution, Wall};
 use crate::{Error, Result, Vec3};
 
 /// `[vessel]`: a surface file, or a centre-line tree to build the surface from.
@@ -28,6 +28,9 @@ pub struct VesselSpec {
     /// How the wall yields and rubs.
     #[serde(default)]
     pub wall: WallProperties,
+    /// How the vessel moves: modes that add up.
+    #[serde(default)]
+    pub motion: Vec<MotionMode>,
 }
 
 impl VesselSpec {

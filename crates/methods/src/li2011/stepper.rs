@@ -109,6 +109,7 @@ impl Li2011 {
             1e9,
         )?;
         surroundings.properties.refuse_regions("the paper's method")?;
+        surroundings.refuse_motion("the paper's method")?;
         surroundings.sheath.refuse_friction("the paper's method")?;
         if surroundings.properties.friction > 0.0 {
             return Err(Error::parameter(

@@ -101,6 +101,8 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
         sheath: &sheath,
         device: &device,
         stack: &stack,
+        motion: None,
+        time_s: [0.0; 2],
     };
 
     let methods = methods(&args.methods);

@@ -62,9 +62,9 @@ impl WallContact<'_> {
         for (index, point) in self.points.iter().enumerate() {
             let Some(d) = self.memory.pressed(index) else { continue };
             let known = &self.memory.points[index];
-            let x = &known.base;
+            let x = &self.felt.place(&known.base);
             let w = self.weight_mm(index);
-            let rough = self.felt.rough(x, known.triangle);
+            let rough = self.felt.rough(&known.base, known.triangle);
             let (size, n) = (d.gradient.norm(), d.gradient / d.gradient.norm());
             let second = point.potential.holding(d.value_mm).1;
             // The force is −w ψ′ |∇d|. Where moduli and coefficients of friction differ they are taken as even in a step.

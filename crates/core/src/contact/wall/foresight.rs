@@ -75,7 +75,7 @@ impl WallContact<'_> {
                 continue;
             }
             let point = self.points[index];
-            let (x, radius_mm) = (point.position(elements, trial), point.potential.radius_mm);
+            let (x, radius_mm) = (self.material(index, elements, trial), point.potential.radius_mm);
             let limit_mm = (1.0 + FOLLOW) * radius_mm;
             let Reading::Pressed(d) = self.read_within(index, &x, limit_mm) else { continue };
             let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, self.softness).factor;
@@ -139,7 +139,7 @@ impl WallContact<'_> {
                 continue;
             }
             let point = self.points[index];
-            let x = point.position(elements, trial);
+            let x = self.material(index, elements, trial);
             let limit_mm = self.asked_mm(point.potential.radius_mm);
             let gap_mm = self.read_within(index, &x, limit_mm).distance_mm() - point.potential.radius_mm;
             let force = gradient * (spring_n_per_mm * (gap_mm - foreseen_mm));

@@ -1,5 +1,8 @@
 //! How near a point of a device stands to the wall, from what is known of its surroundings.
 //!
+//! Places here are material points of the vessel, which is not where the device is while the vessel is displaced ([`crate::contact::MovedWall`]).
+//! So are lengths between them, and clearances that are remembered; what a reading tells is a distance in space.
+//!
 //! On the way from a base what a point reads hangs on where it is alone, not on other steps that were tried: within half its radius of
 //! where the wall was looked for at the base, it is read about the triangle that was found there.
 
@@ -39,7 +42,7 @@ impl Reading {
 const STEEPEST: f64 = 2.0;
 
 impl WallContact<'_> {
-    /// How near the wall point `index` would be at `x`.
+    /// How near the wall point `index` would be at the material point `x`.
     pub(super) fn read(&mut self, index: usize, x: &Vec3) -> Reading {
         self.read_within(index, x, self.points[index].potential.radius_mm)
     }
@@ -94,21 +97,22 @@ impl WallContact<'_> {
     /// What clearances and the last triangle say without a query.
     pub(super) fn read_known(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Option<Reading> {
         let radius = self.points[index].potential.radius_mm;
-        let near = radius * (1.0 + FOLLOW);
+        let stretch = self.felt.stretch();
+        let near = radius * (1.0 + FOLLOW) * stretch;
         let known = &mut self.memory.points[index];
         let moved = (x - known.base_looked_at).norm();
         if moved < known.base_free_mm {
             self.counters.avoided += 1;
             (known.looked_at, known.triangle) = (known.base_looked_at, None);
             (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, known.base_free_mm);
-            return Some(Reading::Free(known.clearance_mm - moved));
+            return Some(Reading::Free((known.clearance_mm - moved) / stretch));
         }
         let moved = (x - known.looked_at).norm();
         let free_mm = known.clearance_mm - near - self.felt.smooth.deepest_inset_mm();
         if moved < free_mm {
             self.counters.avoided += 1;
             known.free_mm = free_mm;
-            return Some(Reading::Free(known.clearance_mm - moved));
+            return Some(Reading::Free((known.clearance_mm - moved) / stretch));
         }
         if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius && known.base_triangle.is_some() {
             (known.looked_at, known.triangle) = (known.base_looked_at, known.base_triangle);
@@ -118,7 +122,7 @@ impl WallContact<'_> {
         // Most points that are near a wall do not touch it, and are moved little.
         let taken = &self.memory.readings[index];
         let clear_mm = limit_mm.max(radius);
-        let spare_mm = taken.nearness.value_mm() - clear_mm - STEEPEST * (x - taken.at_mm).norm();
+        let spare_mm = taken.nearness.value_mm() - clear_mm - STEEPEST * stretch * (x - taken.at_mm).norm();
         if spare_mm > 0.0 && taken.triangle == triangle {
             self.counters.avoided += 1;
             return Some(Reading::Free(clear_mm + spare_mm));
@@ -142,7 +146,8 @@ impl WallContact<'_> {
     /// From the triangle that is nearest through space.
     pub(super) fn read_anew(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
         let radius = self.points[index].potential.radius_mm;
-        let near = radius * (1.0 + FOLLOW);
+        let stretch = self.felt.stretch();
+        let near = radius * (1.0 + FOLLOW) * stretch;
         let known = &mut self.memory.points[index];
         let places = &mut self.memory.places;
         let asked = places.queries;
@@ -150,7 +155,7 @@ impl WallContact<'_> {
         self.counters.avoided += u64::from(places.queries == asked);
         (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
         (known.clearance_mm, known.triangle) = (place.clearance_mm, None);
-        let clearance = place.clearance(x);
+        let clearance = place.clearance(x) / stretch;
         let Some(triangle) = place.triangle else {
             // Past an opening there is no wall.
             known.free_mm = (x - place.middle).norm() + LOOK_AGAIN * radius;

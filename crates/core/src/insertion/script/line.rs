@@ -3,16 +3,22 @@
 use serde::{Deserialize, Serialize};
 
 use super::inject::{Bolus, Inject};
-use super::motion::{Motion, Part, Travel};
+use super::motion::{Motion, Part, Travel, Wait};
 use super::until::{Condition, Until};
 use crate::device::Stack;
+use crate::error::in_range;
 use crate::vessel::CentrelineTree;
 use crate::{Error, Result};
+
+/// Increment of time in which hands rest, s: ten pictures a second.
+const STEP_S: f64 = 0.1;
+/// Longest rest, s.
+const LONGEST_S: f64 = 1e6;
 
 /// One line of a script: a motion and the increments it is cut into.
 ///
 /// `advance_mm`, `retract_mm` or `withdraw`, with or without `rotate_deg`; given together they happen together. `exchange` is two motions.
-/// `inject` may stand alone: nothing moves then, and no time goes by.
+/// `inject` may stand alone: nothing moves then, and no time goes by. With `wait_s`, alone or beside it, hands rest and time goes by.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScriptLine {
@@ -39,6 +45,10 @@ pub struct ScriptLine {
     pub speed_deg_per_s: Option<f64>,
     /// What ends the line before it has gone all of its way, which is the most that it goes then.
     pub until: Option<Until>,
+    /// Time in which the hands rest, s; what else moves goes on.
+    pub wait_s: Option<f64>,
+    /// Largest increment of that time, s; 0.1 if absent.
+    pub step_s: Option<f64>,
     /// Contrast medium that is injected from the start of the line on.
     pub inject: Option<Inject>,
     /// Lines of other instruments, which move at the same time; increments are as many as the one that needs most of them has.
@@ -60,11 +70,15 @@ impl ScriptLine {
             let inject = self.inject.as_ref();
             inject.map(|inject| Bolus::new(format!("{name}.inject"), inject, own, stack)).transpose()
         };
-        if self.only_injects() {
+        let wait = self.wait(name)?;
+        if wait.is_some() || self.only_injects() {
             let named = self.inject.as_ref().is_some_and(|inject| inject.through.is_some());
-            let own = if named && self.instrument.is_none() { 0 } else { self.number(name, stack)? };
+            let own = match &self.inject {
+                Some(_) if !named || self.instrument.is_some() => self.number(name, stack)?,
+                _ => 0,
+            };
             let inject = bolus(own)?;
-            return Ok(vec![Motion { name: name.to_owned(), parts: vec![], until: None, inject }]);
+            return Ok(vec![Motion { name: name.to_owned(), parts: vec![], wait, until: None, inject }]);
         }
         let mut parts: Vec<Part> = Vec::new();
         for (name, line) in self.together(name)? {
@@ -81,7 +95,7 @@ impl ScriptLine {
         let until = |until: &Until| Condition::new(&format!("{name}.until"), until, lead, centreline);
         let until = self.until.as_ref().map(until).transpose()?;
         let Some(other) = &self.exchange else {
-            return Ok(vec![Motion { name: name.to_owned(), parts, until, inject }]);
+            return Ok(vec![Motion { name: name.to_owned(), parts, wait: None, until, inject }]);
         };
         // The line's own part is that of the instrument which comes in: its keys are those of the way in.
         let key = format!("{name}.exchange");
@@ -99,16 +113,43 @@ impl ScriptLine {
         let inserted = Part { instrument, travel: into, ..parts.swap_remove(0) };
         let until = until.map(|condition| Condition { instrument, ..condition });
         Ok(vec![
-            Motion { name: name.to_owned(), parts: vec![withdrawn], until: None, inject },
-            Motion { name: name.to_owned(), parts: vec![inserted], until, inject: None },
+            Motion { name: name.to_owned(), parts: vec![withdrawn], wait: None, until: None, inject },
+            Motion { name: name.to_owned(), parts: vec![inserted], wait: None, until, inject: None },
         ])
     }
 
     /// Whether nothing moves in it.
     fn only_injects(&self) -> bool {
+        self.inject.is_some() && self.rests()
+    }
+
+    /// Whether it says nothing of a motion.
+    fn rests(&self) -> bool {
         let lengths = self.advance_mm.is_some() || self.retract_mm.is_some() || self.withdraw;
         let moves = lengths || self.rotate_deg.is_some() || self.exchange.is_some();
-        self.inject.is_some() && !moves && self.until.is_none() && self.with.is_empty()
+        !moves && self.until.is_none() && self.with.is_empty()
+    }
+
+    /// How long hands rest in it, if they do.
+    fn wait(&self, name: &str) -> Result<Option<Wait>> {
+        let Some(wait_s) = self.wait_s else {
+            return match self.step_s {
+                Some(step_s) => {
+                    let mend =
+                        "cuts the time that hands rest: give wait_s, or step_mm and step_deg of a motion";
+                    Err(Error::parameter(format!("{name}.step_s"), step_s, mend))
+                }
+                None => Ok(None),
+            };
+        };
+        if !self.rests() {
+            let mend = "hands rest in it: leave all that moves to a line of its own";
+            return Err(Error::parameter(format!("{name}.wait_s"), wait_s, mend));
+        }
+        in_range(&format!("{name}.wait_s"), wait_s, LONGEST_S)?;
+        let step_s = self.step_s.unwrap_or(STEP_S);
+        in_range(&format!("{name}.step_s"), step_s, LONGEST_S)?;
+        Ok(Some(Wait { wait_s, step_s }))
     }
 
     /// What the hand of this line's instrument does.
@@ -160,7 +201,7 @@ impl ScriptLine {
                 Err(Error::parameter(format!("{name}.retract_mm"), r, mend))
             }
             (None, None, false) if self.rotate_deg.is_none() && self.exchange.is_none() => {
-                let mend = "give advance_mm, retract_mm, withdraw, rotate_deg, exchange or inject";
+                let mend = "give advance_mm, retract_mm, withdraw, rotate_deg, exchange, wait_s or inject";
                 Err(Error::parameter(name, "{}", mend))
             }
             (_, _, true) => Ok(Travel::Out),
@@ -190,8 +231,9 @@ impl ScriptLine {
                 let mend = "is with another line already: list all of them there";
                 return Err(Error::parameter(format!("{name}.with"), line.with.len(), mend));
             }
-            let keys = [line.until.is_some(), line.exchange.is_some(), line.inject.is_some()];
-            for (key, given) in ["until", "exchange", "inject"].into_iter().zip(keys) {
+            let waits = line.wait_s.is_some() || line.step_s.is_some();
+            let keys = [line.until.is_some(), line.exchange.is_some(), line.inject.is_some(), waits];
+            for (key, given) in ["until", "exchange", "inject", "wait_s"].into_iter().zip(keys) {
                 if given {
                     let mend = "belongs to the line itself, not to those with it";
                     return Err(Error::parameter(format!("{name}.{key}"), "given", mend));

@@ -113,7 +113,7 @@ impl Script {
     fn check_speeds(&self) -> Result<()> {
         match self.motions.iter().find(|motion| !motion.parts.is_empty() && !motion.is_timed()) {
             Some(motion) if self.is_timed() => {
-                let mend = "another line has a speed: give speed_mm_per_s or speed_deg_per_s in all of them, or in none";
+                let mend = "another line has a speed or wait_s: give speed_mm_per_s or speed_deg_per_s in all of them, or no times at all";
                 Err(Error::parameter(&motion.name, "no speed", mend))
             }
             _ => Ok(()),

@@ -33,13 +33,23 @@ pub(super) struct Part {
     pub(super) speed_deg_per_s: Option<f64>,
 }
 
+/// Time in which hands rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Wait {
+    pub(super) wait_s: f64,
+    /// Largest increment, s.
+    pub(super) step_s: f64,
+}
+
 /// What hands do at the same time.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Motion {
     /// What messages call its line.
     pub(super) name: String,
-    /// The line's own instrument first; none where hands rest, which takes no step.
+    /// The line's own instrument first; none where hands rest, which takes no step unless they wait.
     pub(super) parts: Vec<Part>,
+    /// How long hands rest; then there are no parts.
+    pub(super) wait: Option<Wait>,
     pub(super) until: Option<Condition>,
     /// What is injected as it begins.
     pub(super) inject: Option<Bolus>,
@@ -63,6 +73,18 @@ pub(super) struct Lengths {
     pub(super) before_mm: Vec<f64>,
 }
 
+/// Number of equal increments of a way of so many, of a line of this name.
+fn increments(name: &str, steps: f64) -> Result<usize> {
+    // The tolerance keeps 0.3 mm in steps of 0.1 mm at three increments, not four.
+    let count = (steps - 1e-9).ceil().max(1.0);
+    if count > STEP_LIMIT {
+        let steps = format!("{} steps", crate::error::number(count));
+        let mend = format!("at most {STEP_LIMIT} steps in a line: use larger increments");
+        return Err(Error::parameter(name, steps, mend));
+    }
+    Ok(count as usize)
+}
+
 impl Part {
     /// How far it goes from there, mm.
     pub(super) fn travel_mm(&self, lengths: &Lengths) -> f64 {
@@ -77,15 +99,9 @@ impl Part {
     fn increments(&self, mm: f64) -> Result<usize> {
         let mut count: f64 = 1.0;
         for (step, travel) in [(self.step_mm, mm.abs()), (self.step_deg, self.turn_rad.to_degrees().abs())] {
-            // The tolerance keeps 0.3 mm in steps of 0.1 mm at three increments, not four.
-            count = count.max((travel / step - 1e-9).ceil());
+            count = count.max(travel / step);
         }
-        if count > STEP_LIMIT {
-            let steps = format!("{} steps", crate::error::number(count));
-            let mend = format!("at most {STEP_LIMIT} steps in a line: use larger increments");
-            return Err(Error::parameter(&self.name, steps, mend));
-        }
-        Ok(count as usize)
+        increments(&self.name, count)
     }
 
     /// How long it takes, s.
@@ -96,9 +112,10 @@ impl Part {
 }
 
 impl Motion {
-    /// Whether it has a speed.
+    /// Whether it takes time that is known.
     pub(super) fn is_timed(&self) -> bool {
-        self.parts.iter().any(|part| part.speed_mm_per_s.is_some() || part.speed_deg_per_s.is_some())
+        let has_speed = |part: &Part| part.speed_mm_per_s.is_some() || part.speed_deg_per_s.is_some();
+        self.wait.is_some() || self.parts.iter().any(has_speed)
     }
 
     /// The steps of the whole motion from there.
@@ -111,6 +128,10 @@ impl Motion {
             let mm = part.travel_mm(lengths);
             count = count.max(part.increments(mm)?);
             duration_s = duration_s.max(part.duration_s(mm));
+        }
+        if let Some(Wait { wait_s, step_s }) = self.wait {
+            count = increments(&self.name, wait_s / step_s)?;
+            duration_s = wait_s;
         }
         let share = 1.0 / count.max(1) as f64;
         let command = |part: &Part| Command {

@@ -78,7 +78,11 @@ impl Condition {
     pub(super) fn met(&self, simulation: &Simulation) -> Option<Met> {
         let report = simulation.report();
         let tip = || simulation.tip_of_mm(self.instrument);
-        if self.near.is_some_and(|(target, mm)| tip().is_some_and(|tip| (tip - target).norm() <= mm)) {
+        // A target goes with the vessel.
+        let now = |target: Vec3| {
+            simulation.displacement().map_or(target, |displacement| displacement.place(&target))
+        };
+        if self.near.is_some_and(|(target, mm)| tip().is_some_and(|tip| (tip - now(target)).norm() <= mm)) {
             return Some(Met::TipWithinMm);
         }
         let push_n = match report.instruments.get(self.instrument) {

@@ -45,9 +45,9 @@ impl<const C: usize> Tools<C> {
         at: &Configuration,
     ) -> Option<PhysicalEnd> {
         let Configuration { mesh, state } = at;
-        let felt = environment.felt;
+        let wall = environment.wall();
         let mut contact = WallContact::new(
-            felt,
+            wall,
             &mesh.points,
             &mut self.memory,
             &mut self.friction,
@@ -57,7 +57,8 @@ impl<const C: usize> Tools<C> {
         for (index, point) in mesh.points.iter().enumerate() {
             let device_radius_mm = point.potential.radius_mm;
             let Some(touch) = contact.touch(&mesh.elements, &state.rod, index) else { continue };
-            let Some(lumen_radius_mm) = room_mm(felt, &touch.contact.position_mm, device_radius_mm) else {
+            let place = wall.material(&touch.contact.position_mm);
+            let Some(lumen_radius_mm) = room_mm(&wall, &place, device_radius_mm) else {
                 continue;
             };
             let part = lumen_radius_mm / device_radius_mm;
@@ -134,13 +135,15 @@ mod tests {
             sheath: &sheath,
             device: &device,
             stack: &stack,
+            motion: None,
+            time_s: [0.0; 2],
         };
         let options = KirchhoffOptions::default();
         let mut wire = Kirchhoff::<{ crate::rod::PLAIN }>::new(options, &surroundings, &NoStore).unwrap();
         for _ in 0..33 {
             wire.step(&surroundings, Command::advance(1.0)).unwrap();
         }
-        let environment = Environment { surroundings, felt: &wire.felt, options: &wire.options };
+        let environment = Environment::new(&surroundings, &wire.felt, &wire.options);
         let mut workspace = Workspace::<{ crate::rod::PLAIN }>::new(&environment, &wire.state);
         let moves = [Move { instrument: 0, command: Command::advance(1.0) }];
         workspace.carry_out(&environment, &wire.state, &moves).unwrap();

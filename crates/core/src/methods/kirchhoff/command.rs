@@ -4,6 +4,7 @@
 use std::borrow::Cow;
 
 use super::Environment;
+use super::carried::{WallWork, carried};
 use super::configuration::Start;
 use super::hands::{Hand, Way, lengths};
 use super::slide::Extension;
@@ -83,10 +84,14 @@ impl<const C: usize> Workspace<C> {
         now.own(*elements, *points);
         next.own(*elements, *points);
         let surroundings = &environment.surroundings;
+        let displacement = |part: f64| surroundings.displacement(part);
+        let start_displacement = displacement(0.0);
+        let mut displaced = start_displacement.clone();
         way.begin(surroundings.stack, &from.report, moves);
         let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
         if target > start {
-            check_inside(surroundings.wall, &from.tip_mm(), target - start)?;
+            let tip_mm = environment.displaced(displaced.as_ref()).wall().material(&from.tip_mm());
+            check_inside(surroundings.wall, &tip_mm, target - start)?;
         }
         let (mut sum, mut balanced) = (Sum::default(), true);
         tools.nodes_solved = 0;
@@ -105,7 +110,7 @@ impl<const C: usize> Workspace<C> {
         while done < 1.0 || (!balanced && again > 0) {
             // What has come to rest without an equilibrium at the end of its way goes on from there.
             again -= usize::from(done >= 1.0);
-            let here = if moved { now.start() } else { Start { mesh, state: from } };
+            let was = if moved { now.start() } else { Start { mesh, state: from } };
             let rest = 1.0 - done;
             // Where the way is lost, the device is let come to rest as far as the command goes; if it does not, in parts; and in the end
             // wherever it is.
@@ -114,29 +119,40 @@ impl<const C: usize> Workspace<C> {
                 share = rest;
             }
             let part = rest.min(share);
-            let blocked = tools.look_ahead(environment, here, &way.target, (target - start) * part);
             // A rest that is rounding is none.
             let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
             way.at(to, hands);
+            let then = displacement(to);
+            let passage = displaced.as_ref().zip(then.as_ref()).filter(|(before, after)| before != after);
+            let taken = passage.filter(|_| was.state.rod.elements() > 0).map(|passage| {
+                let mut taken = was.state.clone();
+                carried(was.mesh, &was.state.rod, passage, &mut taken.rod);
+                taken
+            });
+            let here = taken.as_ref().map_or(was, |state| Start { mesh: was.mesh, state });
+            let there = environment.displaced(then.as_ref());
+            let blocked = tools.look_ahead(&there, here, &way.target, (target - start) * part);
             sum.substeps += 1;
             if line_mm(lengths(hands)) == 0.0 {
                 now.withdraw(surroundings.stack, hands);
-                tools.write_report(environment, hands, now);
+                tools.write_report(&there, hands, now);
                 break;
             }
             let resort = relax.then_some(failures == RESORTS || done >= 1.0);
-            let attempt = Attempt { hands, blocked, resort };
-            match tools.try_step(environment, here, attempt, next, &mut budget) {
+            let left = passage.map(|passage| (was, passage));
+            let attempt = Attempt { hands, blocked, resort, left };
+            match tools.try_step(&there, here, attempt, next, &mut budget) {
                 Ok(found) => {
                     sum.add(&found, relax);
                     // At a crease of the wall forces are those of one side or the other and never in balance; where nothing moves
                     // any more the device is at rest all the same.
                     let rests = done >= 1.0
                         && found.residual <= AT_REST
-                        && here.state.rod.farthest_mm(&next.state.rod) <= REST_RADII * thinnest_mm;
+                        && was.state.rod.farthest_mm(&next.state.rod) <= REST_RADII * thinnest_mm;
                     balanced = found.balanced || rests;
-                    check_inside(surroundings.wall, &next.state.tip_mm(), 0.0)?;
+                    check_inside(surroundings.wall, &there.wall().material(&next.state.tip_mm()), 0.0)?;
                     std::mem::swap(now, next);
+                    displaced = then;
                     moved = true;
                     done = to;
                     share = (2.0 * part).min(1.0);
@@ -154,21 +170,23 @@ impl<const C: usize> Workspace<C> {
             }
             // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
             if done < 1.0 && (failures > RESORTS || sum.substeps > SUBSTEP_LIMIT) {
-                tools.refuse_narrower(environment, now, &way.commands)?;
+                tools.refuse_narrower(&environment.displaced(displaced.as_ref()), now, &way.commands)?;
                 return Err(Error::Computation(format!(
                     "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
                 )));
             }
         }
         if !balanced {
-            tools.refuse_narrower(environment, now, &way.commands)?;
+            tools.refuse_narrower(&environment.displaced(displaced.as_ref()), now, &way.commands)?;
         }
         let report = &mut now.parts().1.report;
         sum.write(report);
         report.converged = balanced;
         report.angles = from.report.angles;
         report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
-        report.jumped = jumped(surroundings.stack, &from.report, report, way);
+        let passage = start_displacement.as_ref().zip(displaced.as_ref());
+        let by_wall = WallWork::new(passage, (&from.report, report));
+        report.jumped = jumped(surroundings.stack, (&from.report, report), way, by_wall);
         Ok(())
     }
 }
@@ -188,18 +206,18 @@ impl<const C: usize> Tools<C> {
         }
         let tangent = here.state.rod.frames[here.state.rod.elements()].t;
         let radius_mm = environment.surroundings.stack.tip_radius_mm(lengths(target));
-        let felt = (environment.felt, &mut self.memory);
+        let felt = (environment.wall(), &mut self.memory);
         let way_mm = self.extension.trace(felt, here.state.tip_mm(), tangent, radius_mm, wanted_mm);
         way_mm < (1.0 - 1e-9) * wanted_mm
     }
 }
 
 /// Whether energy was set free that the hand had put in.
-fn jumped(stack: &Stack, before: &StepReport, after: &StepReport, way: &Way) -> bool {
+fn jumped(stack: &Stack, (before, after): (&StepReport, &StepReport), way: &Way, by_wall: WallWork) -> bool {
     // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between
     // what it is at the ends.
     let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
-    let mut work = 0.0;
+    let mut work = by_wall.least_mj;
     for (index, (start, target)) in way.start.iter().zip(&way.target).enumerate() {
         let (was, is) = (before.hand(index), after.hand(index));
         let push = |hand: &InstrumentReport| hand.push_force_n.unwrap_or(0.0);

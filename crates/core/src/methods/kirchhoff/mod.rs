@@ -14,6 +14,7 @@
 //! to the inserted length.
 
 mod blocked;
+mod carried;
 mod coaxial;
 #[cfg(test)]
 mod coaxial_friction_tests;
@@ -26,6 +27,8 @@ mod hands;
 mod hold;
 mod lateral;
 mod mesh;
+#[cfg(test)]
+mod motion_tests;
 mod readout;
 mod repeat;
 mod rubbing;
@@ -48,13 +51,13 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::{Counters, FeltWall};
+use crate::contact::{Counters, FeltWall, MovedWall};
 use crate::device::line_mm;
 use crate::methods::{Command, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
-use crate::vessel::WallStore;
+use crate::vessel::{Displacement, WallStore};
 use crate::{Error, Result};
 use coaxial::Nodes;
 use hands::{Hand, lengths};
@@ -135,10 +138,33 @@ pub struct Kirchhoff<const C: usize> {
 }
 
 /// What a step reads and does not change.
+#[derive(Clone, Copy)]
 struct Environment<'a> {
     surroundings: Surroundings<'a>,
     felt: &'a FeltWall,
     options: &'a KirchhoffOptions,
+    /// Where the vessel is; none where it never moves.
+    displacement: Option<&'a Displacement>,
+}
+
+impl<'a> Environment<'a> {
+    /// Of a vessel at rest.
+    fn new(surroundings: &Surroundings<'a>, felt: &'a FeltWall, options: &'a KirchhoffOptions) -> Self {
+        Self { surroundings: *surroundings, felt, options, displacement: None }
+    }
+
+    /// The same where the vessel is displaced.
+    fn displaced<'b>(&self, displacement: Option<&'b Displacement>) -> Environment<'b>
+    where
+        'a: 'b,
+    {
+        Environment { displacement, ..*self }
+    }
+
+    /// The wall where it is.
+    fn wall(&self) -> MovedWall<'a> {
+        MovedWall::new(self.felt, self.displacement)
+    }
 }
 
 impl<const C: usize> Kirchhoff<C> {
@@ -215,12 +241,11 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn step_together(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> Result<()> {
-        if moves.iter().all(|one| one.command == Command::default()) {
+        if moves.iter().all(|one| one.command == Command::default()) && !surroundings.moves() {
             Arc::make_mut(&mut self.state).report.rest();
             return Ok(());
         }
-        let environment =
-            Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
+        let environment = Environment::new(surroundings, &self.felt, &self.options);
         let mut workspace = match self.workspace.take() {
             Some(workspace) => workspace,
             None => {
@@ -253,8 +278,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn lateral_forces(&self, surroundings: &Surroundings<'_>, instrument: usize) -> Vec<LateralForce> {
-        let environment =
-            Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
+        let environment = Environment::new(surroundings, &self.felt, &self.options);
         let mut hands = Vec::new();
         hands::read(&self.state.report, &mut hands);
         let mut mesh = Mesh::default();
@@ -282,8 +306,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
             crate::methods::check_inserted(hand.inserted_mm, device)?;
         }
         surroundings.stack.check_places(hands.iter().map(|hand| hand.inserted_mm))?;
-        let environment =
-            Environment { surroundings: *surroundings, felt: &self.felt, options: &self.options };
+        let environment = Environment::new(surroundings, &self.felt, &self.options);
         let mut mesh = Mesh::default();
         meshed(&environment, &hands, &mut mesh);
         state.check(&Belongs {

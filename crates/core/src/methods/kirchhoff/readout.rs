@@ -29,6 +29,7 @@ impl<const C: usize> Tools<C> {
         report.rotation_rad = hands[0].turn_rad;
         report.tip_rotation_rad = report.rotation_rad;
         let tip = rod.positions[rod.elements()];
+        let tip = environment.wall().material(&tip);
         report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening);
         if mesh.elements.is_empty() {
             report.energy = Energy::default();
@@ -40,7 +41,7 @@ impl<const C: usize> Tools<C> {
             return 0.0;
         }
         let mut contact = WallContact::new(
-            environment.felt,
+            environment.wall(),
             &mesh.points,
             &mut self.memory,
             &mut self.friction,

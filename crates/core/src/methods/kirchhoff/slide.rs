@@ -4,7 +4,7 @@
 use nalgebra::Rotation3;
 
 use crate::Vec3;
-use crate::contact::{FeltWall, Nearness, WallMemory};
+use crate::contact::{MovedWall, Nearness, WallMemory};
 use crate::rod::quadrature::Point;
 use crate::rod::{Frame, RodState};
 
@@ -44,7 +44,7 @@ impl Extension {
     /// equilibrium would be that of a free tip.
     pub(super) fn trace(
         &mut self,
-        (wall, memory): (&FeltWall, &mut WallMemory),
+        (wall, memory): (MovedWall<'_>, &mut WallMemory),
         tip: Vec3,
         tangent: Vec3,
         radius_mm: f64,
@@ -125,17 +125,27 @@ fn on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64, element: &mut us
 /// Triads and chords on the mesh `to` of the rod that was in `state` on the mesh `from`, slid along its curve.
 fn slide_curve(from: &Mesh, state: &RodState, extension: &Extension, to: &Mesh, out: &mut RodState) {
     let inserted = to.from_tip_mm[0];
-    let first = state.frames[0];
-    let n = to.elements.len();
     let mut element = 0;
+    let direction = |from_tip_mm: f64| {
+        let t = on_curve(from, state, inserted - from_tip_mm, &mut element);
+        extension.bend(from_tip_mm, t)
+    };
+    lay((&state.frames[0], &state.positions[0]), to, direction, out);
+}
+
+/// Triads, chords and positions of a rod that begins with a triad at a place, and whose tangents are these by the distance from its tip.
+/// They are asked for from the sheath on; the triads are carried without twist.
+pub(super) fn lay(
+    (first, start): (&Frame, &Vec3),
+    to: &Mesh,
+    mut direction: impl FnMut(f64) -> Vec3,
+    out: &mut RodState,
+) {
+    let n = to.elements.len();
     out.frames.clear();
     out.chords.clear();
-    out.frames.push(first);
+    out.frames.push(*first);
     for e in 0..n {
-        let mut direction = |from_tip_mm: f64| {
-            let t = on_curve(from, state, inserted - from_tip_mm, &mut element);
-            extension.bend(from_tip_mm, t)
-        };
         let m = direction(0.5 * (to.from_tip_mm[e] + to.from_tip_mm[e + 1]));
         let t = direction(to.from_tip_mm[e + 1]);
         let frame: Frame = out.frames[e].transported_to(&t);
@@ -145,7 +155,7 @@ fn slide_curve(from: &Mesh, state: &RodState, extension: &Extension, to: &Mesh, 
     out.reference_twists.clear();
     out.reference_twists.resize(n, 0.0);
     out.positions.clear();
-    out.positions.resize(n + 1, state.positions[0]);
+    out.positions.resize(n + 1, *start);
     out.place(&to.elements);
 }
 

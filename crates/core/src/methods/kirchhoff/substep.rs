@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::carried::{Passage, WallWork};
 use super::configuration::{Configuration, Start};
 use super::guess::Quality;
 use super::hands::{Hand, motions};
@@ -13,7 +14,7 @@ use super::{Environment, meshed, rubbing};
 use crate::contact::{SETTLED, WallContact};
 use crate::device::Stack;
 use crate::methods::StepReport;
-use crate::rod::Supports;
+use crate::rod::{RodState, Supports};
 
 /// A wall is stiff that is stiffer than this many elements of the rod, EI/h⁴, …
 const STIFF: f64 = 30.0;
@@ -65,6 +66,8 @@ pub(super) struct Attempt<'a> {
     pub(super) blocked: bool,
     /// Whether the device is let come to rest as it can, and if so, whether that is taken whatever is left over.
     pub(super) resort: Option<bool>,
+    /// Where the vessel moves: what was before it did, and how it does. The sub-step then starts with the device taken along.
+    pub(super) left: Option<(Start<'a>, Passage<'a>)>,
 }
 
 impl<const C: usize> Tools<C> {
@@ -73,27 +76,40 @@ impl<const C: usize> Tools<C> {
         &mut self,
         environment: &Environment<'_>,
         start: Start<'_>,
-        hands: &[Hand],
+        Attempt { hands, left, .. }: Attempt<'_>,
         next: &mut Configuration,
     ) {
         let (mesh, after) = next.parts();
         meshed(environment, hands, mesh);
         let stack = environment.surroundings.stack;
-        let from = (start.mesh, &start.state.rod);
-        if stack.is_several() {
-            slide_together(from, &self.extension, mesh, stack.sets(), &mut after.rod);
-        } else {
-            slide(from, &self.extension, mesh, &mut after.rod);
-        }
+        let slide_from = |start: Start<'_>, rod: &mut RodState| {
+            let from = (start.mesh, &start.state.rod);
+            if stack.is_several() {
+                slide_together(from, &self.extension, mesh, stack.sets(), rod);
+            } else {
+                slide(from, &self.extension, mesh, rod);
+            }
+        };
         motions(&start.state.report, hands, &mut self.guess.motions);
         let before = (&start.mesh.points[..], &start.state.forces[..]);
-        self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
+        if let Some((was, passage)) = left {
+            slide_from(was, &mut after.rod);
+            self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
+            self.friction.carry(passage, &self.guess.motions);
+            slide_from(start, &mut after.rod);
+        } else {
+            slide_from(start, &mut after.rod);
+            self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
+        }
         let (places, moves) = (&mut self.friction.between, &self.guess.motions);
         rubbing::begin(stack, start, (mesh, &after.rod), moves, places);
         after.turn_tails(stack, hands);
         self.newton.resize(mesh.elements.len());
         let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
         self.memory.begin(&start.state.known, &start.mesh.points, &mesh.points, advance_mm);
+        if left.is_some() {
+            self.memory.forget_readings();
+        }
     }
 
     /// One sub-step from `start`: slides and solves on `next`, which is worth nothing if that fails. Newton iterations are taken from
@@ -107,15 +123,15 @@ impl<const C: usize> Tools<C> {
         budget: &mut usize,
     ) -> std::result::Result<Found, Cow<'static, str>> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
-        let Attempt { hands, blocked, resort } = attempt;
+        let Attempt { hands, blocked, resort, left } = attempt;
         let relax = resort.is_some();
-        self.slide_to(environment, start, hands, next);
+        self.slide_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
         let rod = &mut after.rod;
         let elements = mesh.elements.len();
         let softest_nmm2 = surroundings.stack.softest_nmm2();
         let mut contact = WallContact::new(
-            environment.felt,
+            environment.wall(),
             &mesh.points,
             &mut self.memory,
             &mut self.friction,
@@ -182,8 +198,9 @@ impl<const C: usize> Tools<C> {
         let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
         let (mesh, after) = next.parts();
         let taken = resort == Some(true) && balanced;
-        if !taken && rises(environment.surroundings.stack, &start.state.report, &after.report, dissipated_mj)
-        {
+        let reports = (&start.state.report, &after.report);
+        let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports);
+        if !taken && rises(environment.surroundings.stack, reports, dissipated_mj, by_wall) {
             return Err(STORED.into());
         }
         let corrections = (&start.state.correction, &mut after.correction);
@@ -207,9 +224,14 @@ pub(super) fn released_mj(stack: &Stack, before: &StepReport, after: &StepReport
 /// Whether more energy is stored, or taken by friction, than the hand can have put in. A device that was led to the far side of a
 /// crest, or into a corner of the wall that holds it from both sides, is in equilibrium there, at any energy, and nothing leads
 /// there from where it was; shorter steps stay on the branch on which it is.
-fn rises(stack: &Stack, before: &StepReport, after: &StepReport, dissipated_mj: f64) -> bool {
+fn rises(
+    stack: &Stack,
+    (before, after): (&StepReport, &StepReport),
+    dissipated_mj: f64,
+    by_wall: WallWork,
+) -> bool {
     let most = |before: f64, after: f64, way: f64| before.abs().max(after.abs()) * way.abs();
-    let mut work = 0.0;
+    let mut work = by_wall.most_mj;
     for index in 0..after.instruments.len().max(1) {
         let (was, is) = (before.hand(index), after.hand(index));
         let (Some(push), Some(pushes)) = (was.push_force_n, is.push_force_n) else {

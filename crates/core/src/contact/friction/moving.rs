@@ -1,0 +1,38 @@
+//! Friction on a wall that moves.
+//!
+//! A point slips from where the material point of the vessel has gone that it was on: a becomes χ(a), with χ from the vessel before the step to
+//! the one after. With G = ∂χ/∂x its direction becomes that of G t and the normal of the wall that of G⁻ᵀn; a wall that turns
+//! about the device by α takes the angle along from which the device's spin is counted,
+//!
+//! ```text
+//! α = atan2(½ (G − Gᵀ)^∨·t, ½ (tr G − t·G t))
+//! ```
+//!
+//! which is the angle of G where it is a turn about t; (A)^∨ is the vector with (A)^∨ × v = A v.
+
+use super::Slider;
+use crate::Vec3;
+use crate::vessel::Displacement;
+
+impl Slider {
+    /// Goes along with the wall; how far that is, mm.
+    pub(super) fn carry(&mut self, before: &Displacement, after: &Displacement) -> f64 {
+        let material = before.material(&self.from_mm);
+        let local = before.local(&material);
+        let turned = after.gradient(&material) * local.inverse;
+        let there = after.place(&material);
+        let way_mm = (there - self.from_mm).norm();
+        self.from_mm = there;
+        let axial =
+            Vec3::new(turned.m32 - turned.m23, turned.m13 - turned.m31, turned.m21 - turned.m12) * 0.5;
+        let t = self.along;
+        self.from_rad += axial.dot(&t).atan2(0.5 * (turned.trace() - t.dot(&(turned * t))));
+        self.along = (turned * t).normalize();
+        // G⁻ᵀ = (F F₀⁻¹)⁻ᵀ.
+        let across = turned.try_inverse().map_or(turned, |inverse| inverse.transpose());
+        for normal in [&mut self.normal, &mut self.begun.0, &mut self.seen.0] {
+            *normal = (across * *normal).try_normalize(0.0).unwrap_or_default();
+        }
+        way_mm
+    }
+}

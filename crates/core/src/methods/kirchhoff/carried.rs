@@ -1,0 +1,121 @@
+//! A device that a moving vessel takes along: where a sub-step starts in which the wall goes on.
+//!
+//! Every point of the device's curve goes with the material point of the vessel that it is at, c(s) = χ(r(s)) with χ from the vessel before to
+//! the vessel after. That curve is longer or shorter than the device: with G = ∂χ/∂x, |c′| = |G t|, and the device lies on it from the
+//! sheath on, tangents being
+//!
+//! ```text
+//! t(σ) = G t/|G t|  at the s with  σ = ∫ |G t| ds
+//! ```
+//!
+//! and at its tip goes on straight where the curve has become too short. The sheath stays where it is. From there the sub-step goes on as in a
+//! vessel that rests; friction counts slip from the material points themselves ([`Friction::carry`](crate::contact::Friction::carry)).
+
+use super::mesh::Mesh;
+use super::slide::lay;
+use crate::Vec3;
+use crate::contact::Contact;
+use crate::methods::StepReport;
+use crate::rod::RodState;
+use crate::rod::quadrature::{Point, hermite};
+use crate::vessel::Displacement;
+
+/// A vessel before and after a sub-step.
+pub(super) type Passage<'a> = (&'a Displacement, &'a Displacement);
+
+/// The curve of a device, taken along: arc lengths and unit tangents at nodes and in the middles between them.
+struct Curve {
+    ends_mm: Vec<f64>,
+    tangents: Vec<Vec3>,
+}
+
+impl Curve {
+    fn new(mesh: &Mesh, state: &RodState, (before, after): Passage<'_>) -> Self {
+        let carried = |x: &Vec3, t: &Vec3| {
+            let material = before.material(x);
+            let slope = after.gradient(&material) * before.local(&material).inverse * t;
+            (slope.norm(), slope / slope.norm())
+        };
+        let (mut at, first) = carried(&state.positions[0], &state.frames[0].t);
+        let mut curve = Self { ends_mm: vec![0.0], tangents: vec![first] };
+        let mut end_mm = 0.0;
+        for (e, data) in mesh.elements.iter().enumerate() {
+            let (t0, t1, h) = (state.frames[e].t, state.frames[e + 1].t, data.length);
+            let [w0, s0, w1, s1] = hermite(0.5);
+            let x = state.positions[e] * w0 + state.positions[e + 1] * w1 + (t0 * s0 + t1 * s1) * h;
+            let slope = Point::at(0.5, 0.0).derivatives(&state.chords[e], &t0, &t1).0;
+            let (middle, along) = carried(&x, &(slope / slope.norm()));
+            let (end, ahead) = carried(&state.positions[e + 1], &t1);
+            // Simpson's rule.
+            end_mm += h / 6.0 * (at + 4.0 * middle + end);
+            curve.ends_mm.push(end_mm);
+            curve.tangents.extend([along, ahead]);
+            at = end;
+        }
+        curve
+    }
+
+    /// Unit tangent at an arc length. `element` is where to start looking: calls go from the sheath to the tip.
+    fn tangent(&self, from_sheath_mm: f64, element: &mut usize) -> Vec3 {
+        let last = self.ends_mm.len() - 1;
+        while *element < last && self.ends_mm[*element + 1] <= from_sheath_mm {
+            *element += 1;
+        }
+        if *element == last {
+            return self.tangents[2 * last];
+        }
+        let (a, b) = (self.ends_mm[*element], self.ends_mm[*element + 1]);
+        let x = (from_sheath_mm - a) / (b - a);
+        let [first, middle, second] = [0, 1, 2].map(|k| self.tangents[2 * *element + k]);
+        let t = first * ((1.0 - x) * (1.0 - 2.0 * x))
+            + middle * (4.0 * x * (1.0 - x))
+            + second * (x * (2.0 * x - 1.0));
+        t / t.norm()
+    }
+}
+
+/// Sets `out` to the device that was in `state`, taken along.
+pub(super) fn carried(mesh: &Mesh, state: &RodState, passage: Passage<'_>, out: &mut RodState) {
+    let curve = Curve::new(mesh, state, passage);
+    let mut element = 0;
+    let inserted_mm = mesh.from_tip_mm[0];
+    let direction = |from_tip_mm: f64| curve.tangent(inserted_mm - from_tip_mm, &mut element);
+    lay((&state.frames[0], &state.positions[0]), mesh, direction, out);
+    out.tensions.clone_from(&state.tensions);
+    out.bubbles.clone_from(&state.bubbles);
+    // Angles are counted from triads carried along the rod without twist now.
+    out.angles.clone_from(&state.angles);
+    let sets = state.sets();
+    let mut twist = 0.0;
+    for (e, more) in state.reference_twists.iter().enumerate() {
+        twist += more;
+        out.angles[sets * (e + 1)..sets * (e + 2)].iter_mut().for_each(|angle| *angle += twist);
+    }
+}
+
+/// Work that the moving wall does on a device from one state to the next, mJ.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct WallWork {
+    /// The least of what the forces before and those after do.
+    pub(super) least_mj: f64,
+    /// The most that they may do.
+    pub(super) most_mj: f64,
+}
+
+impl WallWork {
+    /// None where the wall rests.
+    pub(super) fn new(passage: Option<Passage<'_>>, reports: (&StepReport, &StepReport)) -> Self {
+        let Some((before, after)) = passage else { return Self::default() };
+        let there = |x: &Vec3| after.place(&before.material(x)) - x;
+        let back = |x: &Vec3| x - before.place(&after.material(x));
+        let was = done(&reports.0.contacts, there);
+        let is = done(&reports.1.contacts, back);
+        Self { least_mj: was.0.min(is.0), most_mj: was.1.max(is.1) }
+    }
+}
+
+/// What forces at contacts do on the way of the wall there, mJ: with their signs, and without.
+fn done(contacts: &[Contact], way_mm: impl Fn(&Vec3) -> Vec3) -> (f64, f64) {
+    let each = contacts.iter().map(|contact| contact.total_n().dot(&way_mm(&contact.position_mm)));
+    each.fold((0.0, 0.0), |(sum, most), work| (sum + work, most + work.abs()))
+}
