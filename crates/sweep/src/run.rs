@@ -179,7 +179,7 @@ impl Run<'_> {
                 Ok(None) => break None,
                 Err(error) => break failed(error),
             };
-            match simulation.step_together(&moves) {
+            match simulation.step_until(&moves, time_s) {
                 Ok(report) => {
                     converged &= report.converged;
                     max_penetration_mm = max_penetration_mm.max(report.max_penetration_mm);

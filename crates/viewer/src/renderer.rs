@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use endowire_core::vessel::{SurfaceMesh, Wall};
+use endowire_core::vessel::{Displacement, SurfaceMesh, Wall};
 use endowire_core::{Error, Result, Vec3};
 
 use crate::c_arm::CArm;
@@ -149,7 +149,7 @@ impl Renderer {
             let c_arm = setup.c_arm.as_ref().filter(|_| setup.spec.camera.c_arm);
             let solids = Solids { devices: &devices, contacts: &contacts, c_arm };
             if engines.three_d.is_none() {
-                engines.three_d = setup.camera.as_ref().map(|camera| cpu::three_d(camera, &setup.wall));
+                engines.three_d = setup.camera.as_ref().map(|camera| cpu::three_d(camera, setup.wall_now()));
             }
             let mut three_d = engines.three_d.as_mut().map(|engine| engine.frame(&solids)).transpose()?;
             if let (Some(image), Some(camera)) = (&mut three_d, &setup.camera) {
@@ -227,6 +227,31 @@ impl Renderer {
             (self.engines, self.is_cpu) = engines;
         }
         Ok(sequence)
+    }
+
+    /// Moves the vessel from where it is at rest, or back there. The C-arm stands, the camera looks and the beam is as before, and masks that
+    /// were taken stay: a subtraction shows by how much the vessel is elsewhere.
+    ///
+    /// # Errors
+    /// As [`Self::render_at`].
+    pub fn move_vessel(&mut self, displacement: Option<&Displacement>) -> Result<()> {
+        if self.setup.displacement() == displacement {
+            return Ok(());
+        }
+        self.setup.move_vessel(displacement);
+        (self.kept, self.central, self.transmitted) = (None, None, None);
+        if self.is_cpu {
+            self.engines.three_d = None;
+        } else if self.setup.camera.is_some() {
+            (self.engines, self.is_cpu) = engines(&self.setup)?;
+        }
+        if self.fluoro.is_none() {
+            return Ok(());
+        }
+        self.with_fallback(|setup, engines, fluoro, kept| {
+            let (scope, _, paths) = prepared(setup, engines, fluoro, kept)?;
+            scope.move_vessel(setup, paths)
+        })
     }
 
     /// Computes what stays from frame to frame now, and not with the first one.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use endowire_core::Result;
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::{Displacement, SurfaceMesh};
 
 use crate::c_arm::CArm;
 use crate::contrast::Flow;
@@ -20,6 +20,8 @@ pub(crate) struct Setup {
     /// The surface of what blood fills, as the beam meets it.
     pub(crate) filled: Arc<SurfaceMesh>,
     pub(crate) patient: Arc<Patient>,
+    /// Where the vessel has moved to, if it has; the C-arm stands, and the camera looks, where it is at rest.
+    pub(crate) moved: Option<Arc<Moved>>,
     /// What carries contrast medium, where any is injected.
     pub(crate) flow: Option<Arc<Flow>>,
     /// Whether the wall is closed, so that lengths inside it are known; else blood counts as the tissue around it.
@@ -28,7 +30,42 @@ pub(crate) struct Setup {
     pub(crate) camera: Option<Camera>,
 }
 
+/// A vessel that has moved.
+#[derive(Debug)]
+pub(crate) struct Moved {
+    pub(crate) displacement: Displacement,
+    wall: SurfaceMesh,
+    filled: SurfaceMesh,
+}
+
 impl Setup {
+    /// Moves the vessel from where it is at rest, or back there.
+    pub(crate) fn move_vessel(&mut self, displacement: Option<&Displacement>) {
+        let moved = |mesh: &SurfaceMesh, displacement: &Displacement| SurfaceMesh {
+            vertices_mm: mesh.vertices_mm.iter().map(|v| displacement.place(v)).collect(),
+            triangles: mesh.triangles.clone(),
+        };
+        self.moved = displacement.map(|displacement| {
+            let (wall, filled) = (moved(&self.wall, displacement), moved(&self.filled, displacement));
+            Arc::new(Moved { displacement: displacement.clone(), wall, filled })
+        });
+    }
+
+    /// Where the vessel has moved to.
+    pub(crate) fn displacement(&self) -> Option<&Displacement> {
+        self.moved.as_ref().map(|moved| &moved.displacement)
+    }
+
+    /// The wall where it is.
+    pub(crate) fn wall_now(&self) -> &SurfaceMesh {
+        self.moved.as_ref().map_or(&self.wall, |moved| &moved.wall)
+    }
+
+    /// What blood fills where it is.
+    pub(crate) fn filled_now(&self) -> &SurfaceMesh {
+        self.moved.as_ref().map_or(&self.filled, |moved| &moved.filled)
+    }
+
     /// A set-up with a closed wall, which blood fills to its ends.
     pub(crate) fn new(spec: &ViewSpec, wall: &SurfaceMesh) -> Result<Self> {
         let wall = Arc::new(wall.clone());
@@ -56,6 +93,7 @@ impl Setup {
             wall: Arc::default(),
             filled: Arc::default(),
             patient: Arc::new(Patient::Slab { tissue_mm: spec.xray.tissue_mm }),
+            moved: other.and_then(|other| other.moved.clone()),
             flow: None,
             lumen: true,
             c_arm: None,

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use endowire_core::insertion::{Script, Simulation};
 use endowire_core::shape::Shape;
+use endowire_core::vessel::{Displacement, VesselMotion};
 use endowire_methods::Scene;
 use endowire_viewer::{ContactView, Moment};
 
@@ -44,7 +45,10 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     };
     let now = match &mut simulation {
         Some(simulation) => after(simulation, &script, steps, args, plan.frames_per_s())?,
-        None => Now::default(),
+        None => {
+            let motion = VesselMotion::new(&scene.vessel.motion).map_err(in_scene)?;
+            Now { displacement: motion.map(|motion| motion.at(0.0)), ..Now::default() }
+        }
     };
     let (frames, frames_per_s) = (plan.frames(), plan.frames_per_s());
     let injections = now.injections.iter().map(Injected::spec);
@@ -59,6 +63,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
             inserted_mm: &now.inserted_mm,
             contacts: &now.contacts,
             before: None,
+            displacement: now.displacement.as_ref(),
         })?;
     }
     studio.finish()?.tell(args.frames.json)
@@ -71,6 +76,8 @@ struct Now {
     inserted_mm: Vec<f64>,
     contacts: Vec<ContactView>,
     injections: Vec<Injected>,
+    /// Where the vessel is.
+    displacement: Option<Displacement>,
 }
 
 /// Carries out the first steps of the script.
@@ -85,11 +92,11 @@ fn after(
     let mut run = script.begin();
     let mut injections = Vec::new();
     for index in 0..=steps {
-        let moves = run.next(simulation)?.map(|step| step.moves.to_vec());
+        let step = run.next(simulation)?.map(|step| (step.moves.to_vec(), step.time_s));
         injections.extend(Injected::begun(&run, injections.len(), frames_per_s, simulation));
         // A condition may have ended the script before.
-        let Some(moves) = moves.filter(|_| index < steps) else { break };
-        simulation.step_together(&moves).map_err(|e| {
+        let Some((moves, time_s)) = step.filter(|_| index < steps) else { break };
+        simulation.step_until(&moves, time_s).map_err(|e| {
             Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), index + 1))
         })?;
         run.carried_out();
@@ -105,5 +112,6 @@ fn after(
             .map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() })
             .collect(),
         injections,
+        displacement: simulation.displacement(),
     })
 }

@@ -1,5 +1,6 @@
 //! `endowire render`: frames of a recorded run.
 
+use endowire_core::vessel::VesselMotion;
 use endowire_methods::Scene;
 use endowire_viewer::{Moment, Seen};
 
@@ -77,6 +78,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let injections = injections::read(&args.dir)?;
     let injections = injections.iter().map(Injected::spec);
     let mut studio = Studio::new(plan, wall, injections).map_err(|e| e.at(path.display()))?;
+    let motion = VesselMotion::new(&scene.vessel.motion).map_err(|e| Failure::from(e).at(path.display()))?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
     let times_s = step_times(&args.dir)?;
@@ -99,12 +101,15 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             None => None,
         };
         let before = before.as_ref();
+        // A step that is drawn several times rests, and the vessel with it.
+        let displacement = motion.as_ref().map(|motion| motion.at(ended_s(step)));
         studio.draw(&Still {
             name: format!("step_{step:06}{ending}"),
             moment: Moment { frame: (step + later) as u64, time_s: ended_s(step) + later as f64 * frame_s },
             shape: &shape,
             inserted_mm: &inserted_mm,
             contacts: &contacts,
+            displacement: displacement.as_ref(),
             before: before.map(|(inserted_mm, shape, time_s)| Seen { shape, inserted_mm, time_s: *time_s }),
         })?;
         bar.inc(1);

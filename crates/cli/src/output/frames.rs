@@ -6,7 +6,7 @@ use std::path::Path;
 use endowire_core::Error;
 use endowire_core::insertion::{Script, Simulation};
 use endowire_core::shape::Shape;
-use endowire_core::vessel::Wall;
+use endowire_core::vessel::{VesselMotion, Wall};
 use endowire_methods::Scene;
 use endowire_viewer::{Exposure, Moment, Pushed, Renderer, Seen, View, ViewSpec};
 use serde::Serialize;
@@ -32,6 +32,8 @@ pub(crate) struct FrameWriter {
     pushed: Pushed,
     /// Of the vessel, if any view is asked for: else nothing is built.
     wall: Option<Wall>,
+    /// How it moves.
+    motion: Option<VesselMotion>,
     /// That of the first plane, and of the second of two; none where no view is asked for: then nothing is built.
     planes: Vec<Renderer>,
     /// What was in after the step before, where pulses show its way from there.
@@ -60,9 +62,10 @@ impl FrameWriter {
         spec.validate().map_err(in_scene)?;
         let drawn = drawn.filter(|_| !spec.views.is_empty());
         let wall = drawn.map(|simulation| simulation.wall().clone());
+        let motion = drawn.and_then(|simulation| simulation.motion().cloned());
         let planes = wall.as_ref().map_or(Ok(Vec::new()), |wall| planes(&spec, wall)).map_err(in_scene)?;
         let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
-        Ok(Self { spec, pushed, wall, planes, before: None, injected: false })
+        Ok(Self { spec, pushed, wall, motion, planes, before: None, injected: false })
     }
 
     /// What draws, for the summary.
@@ -136,6 +139,10 @@ impl FrameWriter {
             // What they remember is of a vessel without: masks are taken anew, as for every injection in a room.
             self.planes = planes(&self.spec, wall)?;
             self.injected = false;
+        }
+        if let Some(motion) = &self.motion {
+            let displacement = motion.at(time_s);
+            self.planes.iter_mut().try_for_each(|plane| plane.move_vessel(Some(&displacement)))?;
         }
         let views = self.pushed.views(shape, inserted_mm);
         let moment = Moment { frame: step as u64, time_s };

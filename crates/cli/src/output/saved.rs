@@ -16,13 +16,14 @@ use super::{seal, whole};
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 4";
+const FORMAT: &str = "endowire state 5";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// What a state belongs to: hashes of all that its steps depended on.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Parts {
     vessel: String,
+    motion: String,
     wall: String,
     device: String,
     sheath: String,
@@ -41,6 +42,7 @@ impl Parts {
         let sheath = place.chain([&sheath.friction_n, &sheath.friction]).flat_map(|c| c.to_le_bytes());
         Self {
             vessel: hash(numbers.chain(indices).collect()),
+            motion: json(serde_json::to_vec(&scene.vessel.motion)),
             wall: json(serde_json::to_vec(&scene.vessel.wall)),
             device: json(pushed(scene, simulation)),
             sheath: hash(sheath.collect()),
@@ -52,6 +54,7 @@ impl Parts {
     fn differing(&self, other: &Self) -> Vec<&'static str> {
         let pairs = [
             ("the vessel", &self.vessel, &other.vessel),
+            ("how it moves (vessel.motion)", &self.motion, &other.motion),
             ("the properties of its wall (vessel.wall)", &self.wall, &other.wall),
             ("the device", &self.device, &other.device),
             ("the sheath", &self.sheath, &other.sheath),
@@ -82,6 +85,8 @@ fn replayed<'a>(
 ) -> endowire_core::Result<(ScriptRun<'a>, String)> {
     let mut numbers = Vec::new();
     let run = script.go_on(course, |step| {
+        // Where it has a time, the vessel is elsewhere after it.
+        numbers.extend(step.time_s.into_iter().flat_map(f64::to_le_bytes));
         for one in step.moves {
             if several {
                 numbers.extend((one.instrument as u64).to_le_bytes());

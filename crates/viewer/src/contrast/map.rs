@@ -8,7 +8,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use endowire_core::Vec3;
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::{Displacement, SurfaceMesh};
 
 use super::flow::Flow;
 use super::nearest::{Nearest, STEP_MM};
@@ -37,6 +37,7 @@ pub(crate) struct ContrastMap {
     flow: Arc<Flow>,
     transport: Arc<Mutex<Transport>>,
     shares: Arc<Shares>,
+    displacement: Option<Displacement>,
 }
 
 /// The share of each node in the lumen of each pixel.
@@ -50,9 +51,15 @@ pub(crate) struct Shares {
 }
 
 impl Shares {
-    /// The shares of `flow` in the lumen that `wall` encloses.
-    pub(crate) fn new(flow: &Flow, c_arm: &CArm, wall: &SurfaceMesh) -> Self {
-        let tissue = tissue(flow, c_arm);
+    /// The shares of `flow`, which is of the vessel at rest, in the lumen that `wall` encloses, displaced where the vessel has moved.
+    pub(crate) fn new(
+        flow: &Flow,
+        c_arm: &CArm,
+        wall: &SurfaceMesh,
+        displacement: Option<&Displacement>,
+    ) -> Self {
+        let material = |x: Vec3| displacement.map_or(x, |displacement| displacement.material(&x));
+        let tissue = tissue(flow, c_arm, displacement);
         let mut map = Self { pixels: vec![], shares: vec![], tissue };
         let mut near = Nearest::new(flow);
         let mut crossings = wall_crossings(c_arm, wall);
@@ -77,7 +84,7 @@ impl Shares {
                 let steps = (length / STEP_MM).ceil();
                 for k in 0..steps as usize {
                     let at = f64::from(pair[0].1) + (k as f64 + 0.5) * length / steps;
-                    let shares = near.shares(&(source + direction * at));
+                    let shares = near.shares(&material(source + direction * at));
                     for (node, share) in shares.into_iter().filter(|share| share.1 > 0.0) {
                         let length = share * (length / steps) as f32;
                         match own.iter_mut().find(|share| share.0 == node) {
@@ -111,9 +118,10 @@ impl Shares {
 }
 
 impl ContrastMap {
-    /// Medium of `flow`, shared out to pixels.
-    pub(crate) fn new(flow: &Arc<Flow>, shares: Arc<Shares>) -> Self {
-        Self { flow: Arc::clone(flow), transport: flow.carried(), shares }
+    /// Medium of `flow`, shared out to pixels, in a vessel that may be displaced.
+    pub(crate) fn new(flow: &Arc<Flow>, shares: Arc<Shares>, displacement: Option<&Displacement>) -> Self {
+        let displacement = displacement.cloned();
+        Self { flow: Arc::clone(flow), transport: flow.carried(), shares, displacement }
     }
 
     /// How the lumen of each pixel is shared out, which another injection does not change.
@@ -123,6 +131,8 @@ impl ContrastMap {
 
     /// What the pixels see that see any, rising. What is injected through a tip has come from `tip_mm` since the time asked for before.
     pub(crate) fn at(&mut self, time_s: f64, tip_mm: Option<Vec3>) -> Vec<Medium> {
+        let displacement = self.displacement.as_ref();
+        let tip_mm = tip_mm.map(|tip| displacement.map_or(tip, |displacement| displacement.material(&tip)));
         let mut transport = self.transport.lock().unwrap_or_else(PoisonError::into_inner);
         transport.advance(&self.flow, time_s, tip_mm);
         let mut seen = self.shares.mixed(&transport.at(time_s));
@@ -155,7 +165,11 @@ impl ContrastMap {
 }
 
 /// The pixels that see the tissue behind each end: a Gaussian about a place behind it, of which the radius is two deviations.
-fn tissue(flow: &Flow, c_arm: &CArm) -> Vec<(usize, Vec<(u32, f32)>)> {
+fn tissue(
+    flow: &Flow,
+    c_arm: &CArm,
+    displacement: Option<&Displacement>,
+) -> Vec<(usize, Vec<(u32, f32)>)> {
     let Some(radius_mm) = flow.tissue_mm else { return vec![] };
     let variance = (radius_mm / 2.0).powi(2);
     let [width, height] = c_arm.size_px();
@@ -164,6 +178,7 @@ fn tissue(flow: &Flow, c_arm: &CArm) -> Vec<(usize, Vec<(u32, f32)>)> {
         let before = node.upstream.map_or(node.position_mm, |up| flow.nodes[up].position_mm);
         let onwards = (node.position_mm - before).try_normalize(0.0).unwrap_or_default();
         let middle = node.position_mm + onwards * (TISSUE_BEHIND * radius_mm);
+        let middle = displacement.map_or(middle, |displacement| displacement.place(&middle));
         let pixels = (0..width * height).filter_map(|pixel| {
             let centre = [f64::from(pixel % width) + 0.5, f64::from(pixel / width) + 0.5];
             let (source, direction) = c_arm.ray(centre);

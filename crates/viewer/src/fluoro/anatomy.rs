@@ -29,7 +29,7 @@ impl Anatomy {
     pub(crate) fn new(setup: &Setup, c_arm: &CArm, rays: u32, engine: &mut dyn PathEngine) -> Result<Self> {
         let view = &c_arm.refined(rays);
         let lumen = if setup.lumen {
-            engine.mesh(view, &setup.filled)?
+            engine.mesh(view, setup.filled_now())?
         } else {
             view.obliquities().map(|_| 0.0).collect()
         };
@@ -60,6 +60,15 @@ impl Anatomy {
             }
         }
         Ok(maps)
+    }
+
+    /// The same with the vessel where it has moved to; the body around it stays.
+    pub(crate) fn moved(&self, setup: &Setup, view: &CArm, engine: &mut dyn PathEngine) -> Result<Self> {
+        let mut moved = self.clone();
+        if setup.lumen {
+            moved.lumen = engine.mesh(view, setup.filled_now())?;
+        }
+        Ok(moved)
     }
 
     /// Number of rays.

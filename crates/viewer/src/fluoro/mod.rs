@@ -113,7 +113,7 @@ impl Kept {
     pub(crate) fn between(mut self, before: &Setup, after: &Setup) -> Option<Self> {
         let rays = after.c_arm.as_ref().map(CArm::fingerprint);
         let alike = Arc::ptr_eq(&before.patient, &after.patient)
-            && Arc::ptr_eq(&before.filled, &after.filled)
+            && std::ptr::eq(before.filled_now(), after.filled_now())
             && before.lumen == after.lumen;
         if before.spec.flow != after.spec.flow {
             self.shares = None;
@@ -148,7 +148,8 @@ impl Fluoroscope {
         let mu = lanes.each_ref().map(|lanes| beam.mean(lanes));
         let contrast = setup.flow.as_ref().map(|flow| {
             let known = kept.and_then(|kept| kept.shares.clone());
-            ContrastMap::new(flow, known.unwrap_or_else(|| Arc::new(Shares::new(flow, c_arm, &setup.filled))))
+            let shares = || Arc::new(Shares::new(flow, c_arm, setup.filled_now(), setup.displacement()));
+            ContrastMap::new(flow, known.unwrap_or_else(shares), setup.displacement())
         });
         let pixels = c_arm.size_px().map(|n| n as usize).iter().product();
         let still = Signal { signal: vec![0.0; pixels], energy: vec![0.0; pixels] };
@@ -171,13 +172,19 @@ impl Fluoroscope {
             pixels: vec![],
             listed: vec![false; pixels],
         };
-        let whole = (0..pixels).into_par_iter().with_min_len(FEWEST_PIXELS);
-        let whole = whole.map_init(Lanes::new, |room, pixel| {
-            fluoroscope.primary(pixel, [fluoroscope.fraction, 0.0], room)
-        });
+        fluoroscope.look(spec);
+        Ok(fluoroscope)
+    }
+
+    /// Computes the signals of what stays from its lengths.
+    fn look(&mut self, spec: &ViewSpec) {
+        let c_arm = self.c_arm.clone();
+        let whole = (0..self.still.signal.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
+        let whole =
+            whole.map_init(Lanes::new, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room));
         let whole: Vec<[f32; 2]> = whole.collect();
         let scattered = |primary: Signal| {
-            let scatter = Scatter::new(&primary, c_arm, spec.detector.scatter_fraction);
+            let scatter = Scatter::new(&primary, &c_arm, spec.detector.scatter_fraction);
             let mut all = primary;
             scatter.add_still(&mut all);
             (scatter, all)
@@ -186,9 +193,19 @@ impl Fluoroscope {
             let of = |i: usize| whole.iter().enumerate().map(|(pixel, v)| v[i] * openness(pixel)).collect();
             scattered(Signal { signal: of(0), energy: of(1) })
         };
-        (fluoroscope.scatter, fluoroscope.still) = behind(&|pixel| c_arm.openness(pixel) as f32);
-        fluoroscope.unblocked = c_arm.opening_px().map(|_| behind(&|_| 1.0).1);
-        Ok(fluoroscope)
+        (self.scatter, self.still) = behind(&|pixel| c_arm.openness(pixel) as f32);
+        self.unblocked = c_arm.opening_px().map(|_| behind(&|_| 1.0).1);
+    }
+
+    /// Goes on with the vessel where it has moved to. Exposure, which a control would hold meanwhile, stays as it is.
+    pub(crate) fn move_vessel(&mut self, setup: &Setup, engine: &mut dyn PathEngine) -> Result<()> {
+        self.anatomy = Arc::new(self.anatomy.moved(setup, &self.rays, engine)?);
+        if let Some(flow) = &setup.flow {
+            let shares = Shares::new(flow, &self.c_arm, setup.filled_now(), setup.displacement());
+            self.contrast = Some(ContrastMap::new(flow, Arc::new(shares), setup.displacement()));
+        }
+        self.look(&setup.spec);
+        Ok(())
     }
 
     /// What another view may need too.

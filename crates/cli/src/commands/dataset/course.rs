@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use endowire_core::shape::Shape;
-use endowire_core::vessel::Wall;
+use endowire_core::vessel::{Displacement, Wall};
 use endowire_methods::Scene;
 use endowire_viewer::{ContactView, Pushed, View, ViewSpec};
 use serde_json::{Map, Value};
@@ -22,6 +22,8 @@ pub(super) struct Moment {
     pub(super) shape: Shape,
     pub(super) inserted_mm: Vec<f64>,
     pub(super) contacts: Vec<ContactView>,
+    /// Where the vessel is, if it moves.
+    pub(super) displacement: Option<Displacement>,
 }
 
 /// A scene with a device, carried out.
@@ -67,11 +69,12 @@ impl Course {
                 shape: simulation.shape().clone(),
                 inserted_mm: report.lengths_mm(),
                 contacts: contacts.collect(),
+                displacement: simulation.displacement(),
             });
             let step = run.next(&simulation)?.map(|step| (step.moves.to_vec(), step.time_s));
             injected.extend(Injected::begun(&run, injected.len(), view.frames_per_s, &simulation));
             let Some((moves, ends_s)) = step else { break };
-            if let Err(error) = simulation.step_together(&moves) {
+            if let Err(error) = simulation.step_until(&moves, ends_s) {
                 let step = moments.len();
                 tell(format_args!(
                     "endowire: {}: step {step}: {error}; pictures are of those before",

@@ -47,6 +47,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
         let contacts: Vec<Vec3> = moment.contacts.iter().map(|c| c.position_mm).collect();
         for (plane, (renderer, view)) in renderers.iter_mut().zip(&views).enumerate() {
             let id = (shot * spec.moments + m) * spec.views() + plane;
+            renderer.move_vessel(moment.displacement.as_ref())?;
             let frame = endowire_viewer::Moment { frame: m as u64, time_s };
             let Some(image) = renderer.render_at(&devices, frame)?.fluoro else { continue };
             let labels = renderer.labels(&devices, &contacts)?;

@@ -67,9 +67,9 @@ impl SoFar<'_> {
     }
 
     /// Moves the instruments.
-    fn simulate(&mut self, moves: &[Move]) -> endowire_core::Result<()> {
+    fn simulate(&mut self, moves: &[Move], time_s: Option<f64>) -> endowire_core::Result<()> {
         let clock = Instant::now();
-        let result = self.simulation.step_together(moves);
+        let result = self.simulation.step_until(moves, time_s);
         self.course.step_time_s += clock.elapsed().as_secs_f64();
         let report = result?;
         self.course.max_penetration_mm = self.course.max_penetration_mm.max(report.max_penetration_mm);
@@ -140,7 +140,7 @@ impl Going<'_> {
     /// Carries out a step and records it; the next one, if there is one and nothing failed.
     fn step(&mut self, (moves, time_s): OwnStep) -> Option<OwnStep> {
         let before = self.so_far.course.steps;
-        if let Err(error) = self.so_far.simulate(&moves) {
+        if let Err(error) = self.so_far.simulate(&moves, time_s) {
             self.so_far.fail(before, error.to_string());
             return None;
         }

@@ -6,7 +6,7 @@ mod wishes;
 use std::path::{Path, PathBuf};
 
 use endowire_core::shape::Shape;
-use endowire_core::vessel::Wall;
+use endowire_core::vessel::{Displacement, Wall};
 use endowire_methods::Scene;
 use endowire_viewer::{
     Animation, ContactView, DeviceView, Frames, InjectionSpec, Labels, Mask, Moment, PathLengths, Pushed,
@@ -30,6 +30,8 @@ pub(super) struct Still<'a> {
     /// Length in of the device, or of each instrument, mm.
     pub(super) inserted_mm: &'a [f64],
     pub(super) contacts: &'a [ContactView],
+    /// Where the vessel is, if it moves.
+    pub(super) displacement: Option<&'a Displacement>,
     /// What was recorded before, where pulses show the way from there.
     pub(super) before: Option<Seen<'a>>,
 }
@@ -148,6 +150,7 @@ impl<'a> Studio<'a> {
         let mut fluoro = Vec::with_capacity(self.planes.len());
         let wanted = orbited.is_none() || self.plan.spec.wants(View::Fluoro);
         for plane in self.planes.iter_mut().filter(|_| wanted) {
+            plane.renderer.move_vessel(still.displacement)?;
             plane.renderer.show_contacts(still.contacts);
             plane.turn(&views, turn_deg)?;
             let now =
@@ -186,6 +189,7 @@ impl<'a> Studio<'a> {
         let mut spec = ViewSpec { views: vec![View::ThreeD], ..self.plan.spec.clone() };
         (spec.camera.turn_deg, spec.camera.orbit_deg) = (orbit_deg * self.part(), Some(orbit_deg));
         let mut orbiting = Renderer::of_wall(&spec, &self.wall)?;
+        orbiting.move_vessel(still.displacement)?;
         orbiting.show_contacts(still.contacts);
         Ok(orbiting.render_at(views, still.moment)?.three_d)
     }
