@@ -82,10 +82,14 @@ impl Session {
     /// A session of a simulation as it is, in the room that `view` describes, with a square fluoroscopic picture of `side_px` pixels.
     ///
     /// # Errors
-    /// Limits that are not above 0; as [`ViewSpec::validate`].
+    /// Limits that are not above 0, and a vessel that moves; as [`ViewSpec::validate`].
     pub fn new(simulation: Simulation, view: ViewSpec, side_px: u32, limits: Limits) -> Result<Self> {
         for (name, limit) in [("warn_n", limits.push_n), ("warn_nmm", limits.torque_nmm)] {
             endowire_core::error::in_range(name, limit, 1e6)?;
+        }
+        if simulation.motion().is_some() {
+            let mend = "by hand a vessel is at rest: leave motion out";
+            return Err(Error::parameter("vessel.motion", "given", mend));
         }
         let lab = Lab::new(view, side_px, simulation.wall().mesh())?;
         let hands = vec![Hand::default(); simulation.stack().instruments().len()];

@@ -165,6 +165,11 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
         ("position_mm = [0.0, 0.0, 1.0]", "position_mm = [0.0, 0.0, 1.5]", "the sheath is not"),
         ("direction = [0.0, 0.0, 1.0]", "direction = [0.0, 0.0, 1.0]\nfriction_n = 0.2", "the sheath is not"),
         ("element_mm = 2.0", "element_mm = 3.0", "the method or its options is not"),
+        (
+            "[sheath]",
+            "[[vessel.motion]]\nwaveform = \"steady\"\ndisplacement_mm = [0.5, 0.0, 0.0]\n\n[sheath]",
+            "how it moves (vessel.motion) is not",
+        ),
         ("retract_mm", "advance_mm", "the script"),
         ("advance_mm = 120.0", "advance_mm = 100.0", "step 50, and the script has 45"),
         ("advance_mm = 120.0", "advance_mm = 119.0", "the part of the script that was carried out is not"),
@@ -284,6 +289,42 @@ fn a_run_that_is_killed_again_and_again_ends_with_the_files_of_one_that_was_not(
 fn two_hundred_kills_leave_no_trace() {
     kills_leave_no_trace(150, "[]");
     kills_leave_no_trace(50, "[\"3d\", \"fluoro\"]");
+}
+
+#[test]
+fn a_vessel_that_moves_goes_on_where_it_was_with_its_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let lines = ["advance_mm = 120.0\nstep_mm = 4.0\nspeed_mm_per_s = 40.0", "wait_s = 2.0\nstep_s = 0.1"];
+    let moving = |name: &str, lines: &[&str], views: &str| {
+        let path = scene_of(folder.path(), name, lines, views);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let motion = "[[vessel.motion]]\nwaveform = \"breathing\"\nperiod_s = 3.0\ndisplacement_mm = [0.0, 3.0, 8.0]\n\
+                      still = { centre_mm = [0.0, 0.0, 0.0], radius_mm = 20.0, fade_mm = 90.0 }\n\n[sheath]";
+        std::fs::write(&path, text.replacen("[sheath]", motion, 1)).unwrap();
+        path
+    };
+    let whole = moving("whole.toml", &lines, "[\"3d\", \"fluoro\"]");
+    done(&run(&whole, &at("whole"), &[]));
+    // One that ends in the middle of the breath, saved and gone on from.
+    let part = moving("part.toml", &[lines[0], "wait_s = 1.0\nstep_s = 0.1"], "[\"3d\", \"fluoro\"]");
+    let (out, state) = (at("out"), at("state"));
+    done(&run(&part, &out, &["--save-state".as_ref(), &state]));
+    done(&run(&whole, &out, &["--resume".as_ref(), &state]));
+    let rows = |out: &Path| std::fs::read_to_string(out.join("steps.csv")).unwrap();
+    assert_eq!(rows(&out), rows(&at("whole")));
+    assert_eq!(rows(&out).lines().count(), 1 + 30 + 20);
+    let picture = |out: &str, name: &str| std::fs::read(at(out).join("frames").join(name)).unwrap();
+    for name in ["step_000042_3d.png", "step_000049_3d.png"] {
+        assert_eq!(picture("out", name), picture("whole", name), "{name}");
+    }
+    // The hand rests between the two, and the vessel does not.
+    assert_ne!(picture("whole", "step_000042_3d.png"), picture("whole", "step_000035_3d.png"));
+    // A script without times is refused.
+    let timeless = moving("timeless.toml", &["advance_mm = 120.0"], "[]");
+    let refused = run(&timeless, &at("none"), &[]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(said(&refused).contains("vessel.motion = 1 given: no time goes by"), "{}", said(&refused));
 }
 
 #[test]

@@ -165,11 +165,7 @@ impl ContrastMap {
 }
 
 /// The pixels that see the tissue behind each end: a Gaussian about a place behind it, of which the radius is two deviations.
-fn tissue(
-    flow: &Flow,
-    c_arm: &CArm,
-    displacement: Option<&Displacement>,
-) -> Vec<(usize, Vec<(u32, f32)>)> {
+fn tissue(flow: &Flow, c_arm: &CArm, displacement: Option<&Displacement>) -> Vec<(usize, Vec<(u32, f32)>)> {
     let Some(radius_mm) = flow.tissue_mm else { return vec![] };
     let variance = (radius_mm / 2.0).powi(2);
     let [width, height] = c_arm.size_px();

@@ -180,8 +180,7 @@ impl Fluoroscope {
     fn look(&mut self, spec: &ViewSpec) {
         let c_arm = self.c_arm.clone();
         let whole = (0..self.still.signal.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
-        let whole =
-            whole.map_init(Lanes::new, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room));
+        let whole = whole.map_init(Lanes::new, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room));
         let whole: Vec<[f32; 2]> = whole.collect();
         let scattered = |primary: Signal| {
             let scatter = Scatter::new(&primary, &c_arm, spec.detector.scatter_fraction);

@@ -73,10 +73,8 @@ impl ScriptLine {
         let wait = self.wait(name)?;
         if wait.is_some() || self.only_injects() {
             let named = self.inject.as_ref().is_some_and(|inject| inject.through.is_some());
-            let own = match &self.inject {
-                Some(_) if !named || self.instrument.is_some() => self.number(name, stack)?,
-                _ => 0,
-            };
+            let asked = self.instrument.is_some() || (self.inject.is_some() && !named);
+            let own = if asked { self.number(name, stack)? } else { 0 };
             let inject = bolus(own)?;
             return Ok(vec![Motion { name: name.to_owned(), parts: vec![], wait, until: None, inject }]);
         }

@@ -184,6 +184,45 @@ fn a_script_with_speeds_has_times_and_all_of_its_lines_have_one() {
 }
 
 #[test]
+fn hands_that_rest_take_steps_of_time_and_move_nothing() {
+    let stack = Stack::from(Device::uniform(100.0, 0.4, 10.0).unwrap());
+    let go = ScriptLine { speed_mm_per_s: Some(5.0), ..advance(10.0, 5.0) };
+    let wait = |wait_s, step_s| ScriptLine { wait_s: Some(wait_s), step_s, ..Default::default() };
+    let script = |lines: &[ScriptLine]| Script::new(lines, &stack, &[0.0], None);
+    let resting = script(&[go.clone(), wait(1.0, Some(0.3)), go.clone()]).unwrap();
+    assert!(resting.is_timed());
+    assert_eq!(resting.len(), 2 + 4 + 2);
+    let (mut run, mut seen) = (resting.begin(), Vec::new());
+    while let Some(step) = run.next_where(|_| None).unwrap() {
+        seen.push((step.moves.len(), step.time_s.unwrap()));
+        run.carried_out();
+    }
+    assert_eq!(seen, [(1, 1.0), (1, 2.0), (0, 2.25), (0, 2.5), (0, 2.75), (0, 3.0), (1, 4.0), (1, 5.0)]);
+    let mut seen = Vec::new();
+    resting.go_on(run.course(), |step| seen.push(step.time_s)).unwrap();
+    assert_eq!(seen.len(), 8);
+    assert_eq!(script(&[wait(1.0, None)]).unwrap().len(), 10);
+    let told = |lines: &[ScriptLine]| script(lines).unwrap_err().to_string();
+    for (line, words) in [
+        (wait(0.0, None), "script[0].wait_s = 0: must be"),
+        (wait(f64::NAN, None), "script[0].wait_s = NaN: must be"),
+        (wait(1.0, Some(-1.0)), "script[0].step_s = -1: must be"),
+        (wait(1e6, Some(1e-9)), "script[0] = 1e15 steps"),
+        (ScriptLine { wait_s: Some(1.0), ..advance(1.0, 1.0) }, "script[0].wait_s = 1: hands rest"),
+        (ScriptLine { step_s: Some(1.0), ..advance(1.0, 1.0) }, "script[0].step_s = 1: cuts the time"),
+        (
+            ScriptLine { wait_s: Some(1.0), instrument: Some("wir".to_owned()), ..Default::default() },
+            "script[0].instrument",
+        ),
+    ] {
+        assert!(told(&[line]).starts_with(words), "{words}");
+    }
+    assert!(told(&[wait(1.0, None), advance(1.0, 1.0)]).starts_with("script[1] = no speed"));
+    let with = ScriptLine { with: vec![wait(1.0, None)], ..go };
+    assert!(told(&[with]).starts_with("script[0].with[0].wait_s = given"));
+}
+
+#[test]
 fn what_ends_a_line_is_checked_and_lengths_after_it_are_known_within_bounds() {
     let tree = crate::vessel::anatomy::tree("aortic_arch").unwrap();
     let until = |until: Until, mm| ScriptLine { until: Some(until), ..advance(mm, 1.0) };

@@ -1,0 +1,91 @@
+//! A vessel that moves in front of a C-arm that stands.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use common::*;
+use endowire_core::Vec3;
+use endowire_core::vessel::motion::{Around, MotionMode, VesselMotion, Waveform};
+use endowire_core::vessel::{Displacement, SurfaceMesh};
+use endowire_viewer::{Backend, DetectorSpec, Mode, Moment, Renderer, View, ViewSpec};
+
+/// 5 mm along x, of the upper half alone.
+fn displacement() -> Displacement {
+    let within = Some(Around { centre_mm: [0.0, 0.0, 60.0], radius_mm: 20.0, fade_mm: 30.0 });
+    let mode = MotionMode {
+        waveform: Waveform::Steady,
+        period_s: None,
+        phase: 0.0,
+        displacement_mm: [5.0, 0.0, 0.0],
+        turn: None,
+        still: None,
+        within,
+    };
+    VesselMotion::new(&[mode]).unwrap().unwrap().at(0.0)
+}
+
+fn vessel() -> SurfaceMesh {
+    let profile: Vec<(f64, f64)> = std::iter::once((0.0, -50.0))
+        .chain((0..=100).map(|k| (6.0, f64::from(k) - 50.0)))
+        .chain([(0.0, 50.0)])
+        .collect();
+    revolved(&profile, 64, Vec3::zeros())
+}
+
+fn view(mode: Mode) -> ViewSpec {
+    let mut view = spec(Backend::Cpu, 160, 0.8);
+    view.views = vec![View::ThreeD, View::Fluoro];
+    view.xray.energy_kev = None;
+    view.xray.mode = mode;
+    view.xray.contrast_fraction = 0.2;
+    // The place of the C-arm is that of the vessel at rest, whatever its bounds are.
+    view.c_arm.isocentre_mm = Some([0.0; 3]);
+    view.detector = DetectorSpec { noise: false, lag: 0.0, ..DetectorSpec::default() };
+    view
+}
+
+#[test]
+fn the_beam_meets_the_vessel_where_it_is_and_back_at_rest_all_is_as_before() {
+    let (moved, wall) = (displacement(), vessel());
+    let mut elsewhere = wall.clone();
+    elsewhere.vertices_mm.iter_mut().for_each(|v| *v = moved.place(v));
+    let view = view(Mode::Fluoro);
+    let mut renderer = Renderer::new(&view, &wall).unwrap();
+    let at = |frame: u64| Moment { frame, time_s: 0.0 };
+    let (rest, first) = (renderer.path_lengths(&[]).unwrap(), renderer.render_at(&[], at(0)).unwrap());
+    renderer.move_vessel(Some(&moved)).unwrap();
+    let now = renderer.path_lengths(&[]).unwrap();
+    let there = Renderer::new(&view, &elsewhere).unwrap().path_lengths(&[]).unwrap();
+    assert_eq!(now.lumen_mm, there.lumen_mm);
+    // The twin: at rest they are others.
+    let apart = now.lumen_mm.iter().zip(&rest.lumen_mm).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(apart > 5.0, "{apart}");
+    let frames = renderer.render_at(&[], at(1)).unwrap();
+    assert_ne!(frames.three_d, first.three_d);
+    assert_ne!(frames.fluoro, first.fluoro);
+    renderer.move_vessel(None).unwrap();
+    assert_eq!(renderer.path_lengths(&[]).unwrap().lumen_mm, rest.lumen_mm);
+    assert_eq!(renderer.render_at(&[], at(0)).unwrap(), first);
+}
+
+#[test]
+fn a_subtraction_shows_by_how_much_the_vessel_is_elsewhere_than_in_its_mask() {
+    let mut view = view(Mode::Dsa);
+    view.xray.window = Some([-1.0, 1.0]);
+    let mut renderer = Renderer::new(&view, &vessel()).unwrap();
+    let off = |renderer: &mut Renderer, rows: std::ops::Range<u32>, frame: u64| {
+        let image = renderer.render_at(&[], Moment { frame, time_s: 0.0 }).unwrap().fluoro.unwrap();
+        let grey = |x: u32, y: u32| f64::from(image.pixel(x, y).unwrap()[0]);
+        let background = grey(5, 5);
+        let pixels = rows.flat_map(|y| (0..160).map(move |x| (x, y)));
+        pixels.map(|(x, y)| (grey(x, y) - background).abs()).fold(0.0, f64::max)
+    };
+    assert!(off(&mut renderer, 20..140, 0) <= 2.0);
+    renderer.move_vessel(Some(&displacement())).unwrap();
+    // Half of it has stayed.
+    let [upper, lower] = [off(&mut renderer, 20..60, 1), off(&mut renderer, 100..140, 2)];
+    assert!(upper > 20.0 && lower <= 2.0, "{upper} {lower}");
+    renderer.take_mask(&[]).unwrap();
+    assert!(off(&mut renderer, 20..140, 3) <= 2.0);
+}
