@@ -64,6 +64,12 @@ impl Renderer {
         }
         Ok(views)
     }
+
+    /// Takes the vessel to where it is in a simulation.
+    fn move_vessel(&self, py: Python<'_>, simulation: &Simulation) -> PyResult<()> {
+        let displacement = simulation.with(py, |simulation| simulation.displacement());
+        self.with(py, |renderer| renderer.move_vessel(displacement.as_ref())).map_err(exception)
+    }
 }
 
 #[pymethods]
@@ -88,6 +94,7 @@ impl Renderer {
     #[pyo3(signature = (simulation, frame=None))]
     fn render(&self, py: Python<'_>, simulation: &Simulation, frame: Option<u64>) -> PyResult<Frames> {
         let views = self.views(py, simulation)?;
+        self.move_vessel(py, simulation)?;
         let frames = self
             .with(py, |renderer| match frame {
                 None => renderer.render(&views),
@@ -107,6 +114,7 @@ impl Renderer {
     /// coordinates times the depth from the source. Pixel coordinates are x and y from the top left.
     fn labels<'py>(&self, py: Python<'py>, simulation: &Simulation) -> PyResult<Bound<'py, PyDict>> {
         let views = self.views(py, simulation)?;
+        self.move_vessel(py, simulation)?;
         let contacts: Vec<Vec3> = simulation
             .with(py, |simulation| simulation.report().contacts.iter().map(|c| c.position_mm).collect());
         let labels = self.with(py, |renderer| renderer.labels(&views, &contacts)).map_err(exception)?;

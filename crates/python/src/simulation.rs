@@ -151,23 +151,25 @@ impl Simulation {
     }
 
     /// Carries out one command: the length pushed in (negative: pulled back), mm, and the turn of the tail, rad; one for each
-    /// instrument, and of an only instrument a number. Returns the StepReport.
+    /// instrument, and of an only instrument a number. Time, and a vessel that moves, goes on until `time_s` meanwhile, s; not at all if
+    /// absent. Returns the StepReport.
     ///
     /// Raises InputError for a command that cannot be followed, EndOfWay where the way ends, ComputationError where no equilibrium was found;
     /// then everything is as before.
-    #[pyo3(signature = (advance_mm=None, rotate_rad=None))]
+    #[pyo3(signature = (advance_mm=None, rotate_rad=None, time_s=None))]
     fn step(
         &self,
         py: Python<'_>,
         advance_mm: Option<&Bound<'_, PyAny>>,
         rotate_rad: Option<&Bound<'_, PyAny>>,
+        time_s: Option<f64>,
     ) -> PyResult<StepReport> {
         let hands = self.instruments.len();
         let lengths_mm = of_each("advance_mm", advance_mm, hands)?;
         let turns_rad = of_each("rotate_rad", rotate_rad, hands)?;
         let commands = lengths_mm.into_iter().zip(turns_rad);
         let moves = together(commands.map(|(advance_mm, rotate_rad)| Command { advance_mm, rotate_rad }));
-        let stepped = self.with(py, |simulation| simulation.step_together(&moves).cloned());
+        let stepped = self.with(py, |simulation| simulation.step_until(&moves, time_s).cloned());
         stepped.map(StepReport::new).map_err(exception)
     }
 
@@ -187,6 +189,12 @@ impl Simulation {
     #[getter]
     pub(crate) fn report(&self, py: Python<'_>) -> StepReport {
         StepReport::new(self.with(py, |simulation| simulation.report().clone()))
+    }
+
+    /// Time since the start, s.
+    #[getter]
+    fn time_s(&self, py: Python<'_>) -> f64 {
+        self.with(py, |simulation| simulation.time_s())
     }
 
     /// Number of instruments.

@@ -135,7 +135,7 @@ fn moved(f: &Distance, local: &Local) -> Distance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::WallProperties;
+    use crate::contact::{WallProperties, WallRegion};
     use crate::vessel::motion::{Around, MotionMode, Turn, Waveform};
     use crate::vessel::{GeneratedWall, NoStore, Resolution, VesselMotion, anatomy};
     use nalgebra::{Rotation3, Unit};
@@ -245,6 +245,44 @@ mod tests {
         // What the distance in the reference would be off by.
         assert!(plain > 0.03, "{plain}");
         assert!(off < 0.002, "{off}");
+    }
+
+    #[test]
+    fn regions_of_the_wall_go_with_it() {
+        let tree = anatomy::tree("straight_tube").unwrap();
+        let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(1.0)).unwrap().wall;
+        let region = WallRegion {
+            centre_mm: [4.0, 0.0, 50.0],
+            radius_mm: 6.0,
+            transition_mm: Some(8.0),
+            modulus_n_per_mm2: Some(10.0),
+            friction: None,
+        };
+        let properties =
+            WallProperties { deviation_mm: 0.0, region: vec![region], ..WallProperties::default() };
+        let felt = FeltWall::new(&wall, (0.5, 0.5), &properties, &NoStore).unwrap();
+        let still = Some(Around { centre_mm: [0.0, 0.0, 0.0], radius_mm: 10.0, fade_mm: 90.0 });
+        let field = VesselMotion::new(&[MotionMode { still, ..mode() }]).unwrap().unwrap().at(0.0);
+        let moved = MovedWall::new(&felt, Some(&field));
+        let mut steepest: f64 = 0.0;
+        for k in 0..12 {
+            let material = Vec3::new(3.4, 0.2 * f64::from(k) - 1.0, 42.0 + f64::from(k));
+            let triangle = felt.query.nearest(&material, 5.0).map(|near| near.triangle);
+            let at = |x: &Vec3| moved.stiffness(&moved.material(x), triangle, 1.0);
+            let x = field.place(&material);
+            assert_eq!(at(&x).factor, felt.stiffness(&moved.material(&x), triangle, 1.0).factor);
+            let (s1, s2) = at(&x).slope.unwrap();
+            let h = 1e-4;
+            for k in 0..3 {
+                let (plus, minus) = (at(&(x + Vec3::ith(k, h))), at(&(x - Vec3::ith(k, h))));
+                let slope = (plus.factor.ln() - minus.factor.ln()) / (2.0 * h);
+                assert!((slope - s1[k]).abs() < 1e-6, "{slope} {}", s1[k]);
+                let bend = (plus.slope.unwrap().0 - minus.slope.unwrap().0) / (2.0 * h);
+                assert!((bend - s2.column(k)).norm() < 1e-5, "{bend} {s2}");
+            }
+            steepest = steepest.max(s1.norm());
+        }
+        assert!(steepest > 0.1, "{steepest}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Insertions into vessels that move.
 
-use crate::device::{Device, Section};
+use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, Move, Sheath, Simulation, WallProperties};
 use crate::methods::kirchhoff::KirchhoffOptions;
 use crate::vessel::motion::{Around, Displacement, MotionMode, Turn, VesselMotion, Waveform};
@@ -200,6 +200,35 @@ fn a_breath_comes_back_to_itself() {
         let off_mm = apart_mm(&simulation, &begun);
         assert!(off_mm < 1e-6, "{off_mm}");
     }
+}
+
+#[test]
+fn several_instruments_breathe_and_come_back() {
+    let hollow = |length_mm: f64, bore: Option<f64>, radius_mm: f64, stiffness: f64| {
+        let section = Section::straight(length_mm, radius_mm, stiffness);
+        Device::new(vec![Section { inner_radius_mm: bore, ..section }]).unwrap()
+    };
+    let each = [("wire", hollow(500.0, None, 0.2, 10.0)), ("catheter", hollow(240.0, Some(0.3), 0.6, 30.0))];
+    let each = each.map(|(name, device)| Instrument { name: name.to_owned(), device, may_lead: true });
+    let mut simulation = Simulation::builder(
+        tube(),
+        Stack::new(each.into()).unwrap(),
+        Sheath::new(Vec3::z() * 6.0, Vec3::z()).unwrap(),
+    )
+    .motion(VesselMotion::new(&[breathing()]).unwrap())
+    .method(&KirchhoffOptions { tolerance: TOLERANCE, ..KirchhoffOptions::default() })
+    .build()
+    .unwrap();
+    let go = |instrument, mm| Move { instrument, command: Command::advance(mm) };
+    for _ in 0..80 {
+        simulation.step_together(&[go(0, 2.0), go(1, 1.5)]).unwrap();
+    }
+    let begun = simulation.clone();
+    wait(&mut simulation, 2.0).unwrap();
+    assert!(apart_mm(&simulation, &begun) > 5.0);
+    wait(&mut simulation, 4.0).unwrap();
+    let off_mm = apart_mm(&simulation, &begun);
+    assert!(off_mm < 1e-6, "{off_mm}");
 }
 
 #[test]

@@ -92,8 +92,7 @@ impl Displacement {
         let mut left = off(&x);
         for _ in 0..MOST {
             let size = left.norm();
-            // Also for what is not a number.
-            if !(size > ROUNDING * place.amax()) {
+            if size.is_nan() || size <= ROUNDING * place.amax() {
                 break;
             }
             let steps = [inverse(&self.gradient(&x)) * left, left];

@@ -113,7 +113,7 @@ impl MotionMode {
             return Err(Error::parameter(key("phase"), self.phase, mend));
         }
         let displacement = Vec3::from(self.displacement_mm);
-        if !(displacement.norm() <= FARTHEST_MM) {
+        if !(0.0..=FARTHEST_MM).contains(&displacement.norm()) {
             let mend = format!("must be finite numbers, no farther than {FARTHEST_MM} mm");
             return Err(Error::parameter(key("displacement_mm"), vector(&displacement), mend));
         }
@@ -143,7 +143,7 @@ impl MotionMode {
 impl Turn {
     fn check(&self, name: &str) -> Result<(Vec3, Unit<Vec3>, f64)> {
         let (centre, axis) = (Vec3::from(self.centre_mm), Vec3::from(self.axis));
-        if !(centre.norm() <= FARTHEST_MM) {
+        if !(0.0..=FARTHEST_MM).contains(&centre.norm()) {
             let mend = format!("must be finite numbers, no farther than {FARTHEST_MM} mm from the origin");
             return Err(Error::parameter(format!("{name}.centre_mm"), vector(&centre), mend));
         }
@@ -152,7 +152,7 @@ impl Turn {
             let mend = "must be a direction: finite numbers, not all of them 0";
             return Err(Error::parameter(format!("{name}.axis"), vector(&axis), mend));
         };
-        if self.angle_deg == 0.0 || !(self.angle_deg.abs() <= 180.0) {
+        if self.angle_deg == 0.0 || !(-180.0..=180.0).contains(&self.angle_deg) {
             let mend = "must be an angle from -180 to 180 degrees other than 0";
             return Err(Error::parameter(format!("{name}.angle_deg"), self.angle_deg, mend));
         }
@@ -163,7 +163,7 @@ impl Turn {
 impl Around {
     fn check(&self, name: &str) -> Result<()> {
         let centre = Vec3::from(self.centre_mm);
-        if !(centre.norm() <= FARTHEST_MM) {
+        if !(0.0..=FARTHEST_MM).contains(&centre.norm()) {
             let mend = format!("must be finite numbers, no farther than {FARTHEST_MM} mm from the origin");
             return Err(Error::parameter(format!("{name}.centre_mm"), vector(&centre), mend));
         }

@@ -140,7 +140,8 @@ fn what_makes_no_sense_is_refused_with_its_key() {
         change(&mut one);
         VesselMotion::new(&[mode(Waveform::Steady), one]).unwrap_err().to_string()
     };
-    let cases: [(&dyn Fn(&mut MotionMode), &str); 11] = [
+    type Change<'a> = &'a dyn Fn(&mut MotionMode);
+    let cases: [(Change<'_>, &str); 11] = [
         (&|m| m.period_s = None, "vessel.motion[1].period_s = none"),
         (&|m| m.period_s = Some(-1.0), "vessel.motion[1].period_s"),
         (&|m| m.waveform = Waveform::Steady, "what is steady has no period"),
