@@ -203,6 +203,31 @@ fn a_breath_comes_back_to_itself() {
 }
 
 #[test]
+fn what_a_breath_stores_is_the_work_of_the_wall() {
+    let mut simulation = wire(SOFT, &[breathing()]);
+    push(&mut simulation, 180.0).unwrap();
+    let begun_mj = simulation.report().energy.total();
+    let (mut work_mj, mut moved_mm): (f64, f64) = (0.0, 0.0);
+    for k in 1..=100 {
+        let before = (simulation.report().contacts.clone(), simulation.displacement().unwrap());
+        simulation.step_until(&[], Some(0.02 * f64::from(k))).unwrap();
+        let after = (simulation.report().contacts.clone(), simulation.displacement().unwrap());
+        // Half of it by the forces before, half by those after: the hand rests, and the sheath does not move.
+        for (contacts, here) in [&before, &after] {
+            for contact in contacts {
+                let material = here.material(&contact.position_mm);
+                let way = after.1.place(&material) - before.1.place(&material);
+                work_mj += 0.5 * contact.total_n().dot(&way);
+                moved_mm = moved_mm.max(way.norm());
+            }
+        }
+    }
+    let stored_mj = simulation.report().energy.total() - begun_mj;
+    assert!((stored_mj - work_mj).abs() < 1e-3 * work_mj.abs(), "{stored_mj} {work_mj}");
+    assert!(stored_mj.abs() > 1e-3 && moved_mm > 0.1, "{stored_mj} {moved_mm}");
+}
+
+#[test]
 fn several_instruments_breathe_and_come_back() {
     let hollow = |length_mm: f64, bore: Option<f64>, radius_mm: f64, stiffness: f64| {
         let section = Section::straight(length_mm, radius_mm, stiffness);

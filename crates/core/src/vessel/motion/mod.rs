@@ -7,7 +7,7 @@
 //! ```
 //!
 //! each a displacement d and a turn θ about an axis through c, with a waveform a(t) from 0 to 1 and a weight w(X) that fades over a shell
-//! about a point ([`fade`]). u and its first two derivatives in X are continuous:
+//! about a point ([`Around`]). u and its first two derivatives in X are continuous:
 //!
 //! ```text
 //! ∂u/∂X   = Σ w (R − I) + v ∇wᵀ
