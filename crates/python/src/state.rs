@@ -11,7 +11,7 @@ use crate::error::{InputError, exception};
 use crate::report::StepReport;
 
 /// The first bytes of a saved state.
-const FORMAT: &[u8] = b"endowire.State 1\n";
+const FORMAT: &[u8] = b"endowire.State 2\n";
 
 /// All that the next step of a simulation depends on, beside what surrounds the instruments.
 ///

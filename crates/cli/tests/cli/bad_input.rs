@@ -411,3 +411,36 @@ fn a_region_of_the_wall_that_cannot_be_is_refused_by_its_key() {
             .is_refused(&["vessel.wall.region = 2 given", "kirchhoff"]);
     }
 }
+
+#[test]
+fn a_motion_of_the_vessel_that_cannot_be_is_refused_by_its_key() {
+    let good = "waveform = \"breathing\"\nperiod_s = 4.0\ndisplacement_mm = [0, 5, 0]\n\
+                still = { centre_mm = [0, 0, 0], radius_mm = 10.0, fade_mm = 60.0 }\n";
+    let scene = |motion: &str| {
+        let scene = Scene::good().with("[sheath]", &format!("[[vessel.motion]]\n{motion}\n[sheath]"));
+        scene.with("step_mm = 2.0", "step_mm = 2.0\nspeed_mm_per_s = 10.0")
+    };
+    let output = scene(good).run();
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    for (from, to, words) in [
+        ("breathing", "breath", &["line 12", "breath", "breathing"][..]),
+        ("period_s = 4.0\n", "", &["vessel.motion[0].period_s = none"]),
+        ("[0, 5, 0]", "[0, nan, 0]", &["vessel.motion[0].displacement_mm = [0, NaN, 0]"]),
+        ("fade_mm = 60.0", "fade_mm = 12.0", &["vessel.motion = 0.78", "below 0.5", "fade_mm"]),
+        ("radius_mm = 10.0", "radius_mm = -1.0", &["vessel.motion[0].still.radius_mm = -1"]),
+        ("[0, 0, 0]", "[60, 0, 0]", &["vessel.motion = 1", "sheath's mouth", "still"]),
+        ("still", "stil", &["stil", "still"]),
+    ] {
+        assert!(good.contains(from), "{from}");
+        scene(&good.replace(from, to)).is_refused(words);
+    }
+    let timeless = scene(good).with("\nspeed_mm_per_s = 10.0", "");
+    timeless.is_refused(&["vessel.motion = 1 given", "no time goes by", "wait_s"]);
+    let other = scene(good).with("[[script]]", "[method]\nname = \"li2011-banded\"\n\n[[script]]");
+    other.is_refused(&["vessel.motion = given", "the paper's method", "kirchhoff"]);
+    let played = scene(good);
+    std::fs::write(played.path("scene.toml"), &played.text).unwrap();
+    let output = endowire(&["play".as_ref(), played.path("scene.toml").as_ref(), "--headless".as_ref()]);
+    assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+    assert!(said(&output).contains("by hand a vessel is at rest"), "{}", said(&output));
+}

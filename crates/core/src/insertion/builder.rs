@@ -119,11 +119,11 @@ fn check_still(query: &WallQuery, motion: &VesselMotion, stack: &Stack, sheath: 
         return Ok(());
     }
     let mend = format!(
-        "mm is how far the vessel may move at the sheath's mouth at {}, which stays where it is with {room_mm:.3} mm to spare: let it be \
+        "so far may the vessel move at the sheath's mouth at {}, which stays where it is with {room_mm:.3} mm to spare: keep the vessel \
          still there (still)",
         vector(mouth)
     );
-    Err(Error::parameter("vessel.motion", format!("{moved_mm:.3}"), mend))
+    Err(Error::parameter("vessel.motion", format!("{moved_mm:.3} mm"), mend))
 }
 
 /// A device so many times as thick as the vessel comes from another unit.
