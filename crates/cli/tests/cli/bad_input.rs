@@ -428,7 +428,7 @@ fn a_motion_of_the_vessel_that_cannot_be_is_refused_by_its_key() {
         ("[0, 5, 0]", "[0, nan, 0]", &["vessel.motion[0].displacement_mm = [0, NaN, 0]"]),
         ("fade_mm = 60.0", "fade_mm = 12.0", &["vessel.motion = 0.78", "below 0.5", "fade_mm"]),
         ("radius_mm = 10.0", "radius_mm = -1.0", &["vessel.motion[0].still.radius_mm = -1"]),
-        ("[0, 0, 0]", "[60, 0, 0]", &["vessel.motion = 1", "sheath's mouth", "still"]),
+        ("[0, 0, 0]", "[60, 0, 0]", &["vessel.motion = 4.932 mm", "sheath's mouth", "still"]),
         ("still", "stil", &["stil", "still"]),
     ] {
         assert!(good.contains(from), "{from}");
