@@ -24,6 +24,8 @@ const MOST_CELLS_ALONG: f64 = 32.0;
 
 /// Half of the distance between the places at which a device feels the wall, in radii, is at most this.
 const APART_RADII: f64 = 1.5;
+/// Beyond an opening's plane and within so many of its radii of its axis there is no wall to be behind.
+const BESIDE_RADII: f64 = 2.0;
 /// A device farther behind the triangles is told to be as far as this, mm.
 const FARTHEST_MM: f64 = 20.0;
 
@@ -90,13 +92,16 @@ impl CrossingTest {
         let (shape, stack) = (simulation.shape(), simulation.stack());
         let inserted_mm = simulation.report().lengths_mm();
         let contacts = &simulation.report().contacts;
-        let mut points = curve(shape);
-        // Beyond an opening there is no wall to be behind.
-        if let Some(opening) = simulation.report().left_through.and_then(|number| wall.openings().get(number))
-        {
-            let is_within = |x: &Vec3| (x - opening.centre_mm).dot(&opening.direction) <= 0.0;
-            points.truncate(points.iter().rposition(is_within).map_or(0, |last| last + 1));
-        }
+        let points = curve(shape);
+        // A tip goes out through an opening, and so does a bow whose tip is still within.
+        let is_out = |x: &Vec3| {
+            wall.openings().iter().any(|opening| {
+                let offset = x - opening.centre_mm;
+                let beyond_mm = offset.dot(&opening.direction);
+                beyond_mm > 0.0
+                    && (offset - opening.direction * beyond_mm).norm() < BESIDE_RADII * opening.radius_mm
+            })
+        };
         let missing = |x: &Vec3, behind_mm: f64, (piece, part): (usize, f64)| {
             // An instrument may end at the element's first node: the radius is that of the place itself.
             let (e, within) = (piece / CHORDS, ((piece % CHORDS) as f64 + part) / CHORDS as f64);
@@ -113,6 +118,10 @@ impl CrossingTest {
         let mut note = |mm: f64| most = Some(most.map_or(mm.max(0.0), |most| most.max(mm)));
         let mut behind = false;
         for (piece, ends) in points.windows(2).enumerate() {
+            if is_out(&ends[1]) {
+                behind = false;
+                continue;
+            }
             if let Some(part) = self.first_met(ends[0], ends[1]) {
                 note(missing(&ends[0].lerp(&ends[1], part), 0.0, (piece, part)));
                 behind = true;
@@ -153,11 +162,6 @@ impl CrossingTest {
             }
             tried *= 2.0;
         }
-    }
-
-    /// Whether the curve of a device passes through a triangle.
-    pub(crate) fn crosses_curve(&self, shape: &Shape) -> bool {
-        self.crosses(&curve(shape))
     }
 }
 
@@ -245,8 +249,8 @@ mod tests {
             tangents: vec![t, back],
             from_tip_mm: vec![25.0, 0.0],
         };
-        assert!(test.crosses_curve(&shape(t, back)));
-        assert!(!test.crosses_curve(&shape(Vec3::z(), Vec3::z())));
+        assert!(test.crosses(&curve(&shape(t, back))));
+        assert!(!test.crosses(&curve(&shape(Vec3::z(), Vec3::z()))));
     }
 
     #[test]

@@ -255,6 +255,9 @@ fn row_text(row: &CellRow, line: &mut impl FnMut(std::fmt::Arguments<'_>)) {
     let crossed = match row.crossings {
         0 => "–".to_owned(),
         count => format!("{count}×{:.2}", row.missing_mm),
+    } + &match row.untold {
+        0 => String::new(),
+        untold => format!(" ({untold} untold)"),
     };
     line(format_args!(
         "  {:<8} {:<52} {:>7.1} {:>5} {:>7} {:>6} {:>7.0} {:>8.2} {:>9.1} {:>7.2} {:>7.3} {:>5} {:>6} {:>9}{}",

@@ -32,10 +32,14 @@ pub struct Summary {
     pub slow_steps: usize,
     /// Insertions that crossed given triangles.
     pub cells_crossing: usize,
-    /// Commands after which the device was in a given triangle.
+    /// Commands after which the device's axis was in a given triangle.
     pub crossings: usize,
     /// How much less deep than it was a device said to have sunk in there, mm.
     pub missing_mm: f64,
+    /// The same behind the triangles that are felt, mm.
+    pub missing_felt_mm: f64,
+    /// Commands after which that was more than the wall that is felt is stated to be off.
+    pub untold: usize,
     /// Parts of commands in which the last resort was needed.
     pub relaxations: u64,
     /// Jumps.
@@ -64,6 +68,8 @@ impl Summary {
             sum.cells_crossing += usize::from(row.crossings > 0);
             sum.crossings += row.crossings;
             sum.missing_mm = sum.missing_mm.max(row.missing_mm);
+            sum.missing_felt_mm = sum.missing_felt_mm.max(row.missing_felt_mm);
+            sum.untold += row.untold;
             sum.relaxations += row.relaxations;
             sum.jumps += row.jumps;
             if row.slowest_ms > sum.slowest_ms {
@@ -83,14 +89,17 @@ impl std::fmt::Display for Summary {
             f,
             "{cells} cells: {arrived} arrived, {left} left, {blocked} blocked, {failed} failed, {refused} refused; \
              {good_percent:.1} % good ends; {} commands, {} over {ITERATIONS_PER_MM} iterations/mm, {} last resorts, {} \
-             jumps; {} crossings in {} cells, {:.3} mm not told",
+             jumps; in given triangles after {} commands in {} cells, {:.3} mm more than told, behind felt ones {:.3} mm; {} \
+             crossings beyond what is stated",
             self.steps,
             self.slow_steps,
             self.relaxations,
             self.jumps,
             self.crossings,
             self.cells_crossing,
-            self.missing_mm
+            self.missing_mm,
+            self.missing_felt_mm,
+            self.untold
         )?;
         if self.slowest.is_empty() {
             return Ok(());

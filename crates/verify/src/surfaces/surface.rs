@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::crossing::CrossingTest;
 use endowire_core::insertion::Sheath;
-use endowire_core::vessel::{SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore};
+use endowire_core::vessel::{Conditioning, SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore, condition};
 use endowire_core::{Error, Result};
 
 use super::start::{Found, at_opening, inside};
@@ -39,6 +39,10 @@ pub struct Surface {
     pub wall: Wall,
     /// The triangles as they were given, before any repair.
     pub given: CrossingTest,
+    /// The triangles that devices feel, as `endowire vessel check --felt` writes them.
+    pub felt: CrossingTest,
+    /// How far these are from the given ones at most, as stated there, mm; no less than what is aimed at.
+    pub stated_mm: f64,
     /// Longest side of the surface's bounding box, mm.
     pub size_mm: f64,
     /// Length to insert, mm.
@@ -59,6 +63,8 @@ impl Surface {
         let wall = store
             .wall(&WallRecipe::Repaired { surface: &mesh })
             .map_err(|e| Error::content(&file.path, e.to_string()))?;
+        let aimed = Conditioning::default();
+        let felt = condition(wall.mesh(), &aimed)?;
         let (low, high) = wall.mesh().bounds_mm().unwrap_or_default();
         let size_mm = (high - low).amax();
         let mut surface = Self {
@@ -66,6 +72,8 @@ impl Surface {
             path: file.path.clone(),
             unit_mm: file.unit_mm,
             given: CrossingTest::new(&mesh),
+            felt: CrossingTest::new(&felt.mesh),
+            stated_mm: felt.deviation_mm.max(aimed.deviation_mm),
             size_mm,
             length_mm: file.sidecar.length_mm.unwrap_or_else(|| LENGTH_MM.min(LENGTH_IN_SIZES * size_mm)),
             places: Vec::new(),
