@@ -4,12 +4,12 @@
 //! Shapira et al., *The Visual Computer* 24, 2008, with one ray), medianed over neighbours. Edges are to be
 //!
 //! ```text
-//! h = min(R / 2.2,  1 / κ,  √(2.4 R d),  2 mm)       not shorter than max(0.6 t, R / 3.5)
+//! h = min(R / 2.2,  0.5 / κ,  √(2.4 R d),  2 mm)       not shorter than min(max(0.6 t, R / 3.5), 0.4 mm)
 //! ```
 //!
 //! with the curvature κ of the conditioned surface so far, the limit t = min(deviation, R/20) and, at a septum of thickness d, a sag
 //! h²/8R below 0.3 d. A kink of angle θ can be rounded within t by an arc of radius 8t/θ² and length 8t/θ; with κ = θ²/8t the
-//! formula gives edges of 8 t/θ² there; in wide vessels R/3.5 ends this sooner. κ is measured on the surface as it comes out, not on
+//! formula gives edges of 4 t/θ² there; R/3.5 and 0.4 mm end this sooner. κ is measured on the surface as it comes out, not on
 //! the triangles given, so that kinks of a coarse mesh that vanish within the limit cost nothing.
 //! Neighbouring lengths differ by at most 0.35 of their distance.
 
@@ -25,12 +25,16 @@ const EDGE_PER_RADIUS: f64 = 1.0 / 2.2;
 /// Longest edge, mm: some radii of a device. In wide vessels that are given coarsely every edge is a kink, and a device must find it
 /// rounded on its own scale: with edges up to six of its radii nearly all insertions arrived, with ten and more few.
 const LONGEST_MM: f64 = 2.0;
-/// Largest angle between the normals at the ends of an edge, radians, that is aimed at.
-const TURN: f64 = 1.0;
+/// Largest angle between the normals at the ends of an edge, radians, that is aimed at. With 1.0 the quadrics at the crests of flow dividers
+/// stood 0.2 to 0.5 mm into the lumen, with kinks in which no equilibrium exists; with 0.4 edges are so short that facets of coarse meshes
+/// are no longer faired.
+const TURN: f64 = 0.5;
 /// Shortest edge over the limit: the sharpest kink needs no shorter ones; …
 const FLOOR: f64 = 0.6;
-/// … and over the local radius: the smooth wall rounds a kink over an edge or two by itself, and kinks of a coarse mesh are long.
+/// … and over the local radius: the smooth wall rounds a kink over an edge or two by itself, and kinks of a coarse mesh are long; …
 const FLOOR_PER_RADIUS: f64 = 1.0 / 3.5;
+/// … but in wide vessels this, mm: crests there are as sharp as in narrow ones, and about as long as a wire is thick has to be right.
+const FLOOR_MM: f64 = 0.4;
 /// Where the surfaces are farther apart than the limit, edges are made so much shorter, …
 const SHORTER: f64 = 0.65;
 /// … down to this part of the local radius.
@@ -76,7 +80,7 @@ pub(super) fn set(corners: &mut Corners, reference: &Reference, curvature: &[f64
         let length = round
             .min(TURN / bend.max(f64::MIN_POSITIVE))
             .min((2.4 * radius * thick).sqrt().max(TOUCHING.1 * round))
-            .max((FLOOR * limit).max(FLOOR_PER_RADIUS * radius).min(LONGEST_MM));
+            .max((FLOOR * limit).max(FLOOR_PER_RADIUS * radius).min(FLOOR_MM));
         vertex.target_mm = length;
     }
     grade(corners);
