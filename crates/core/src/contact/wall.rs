@@ -258,7 +258,10 @@ impl<'a> WallContact<'a> {
 
 impl External for WallContact<'_> {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
-        self.memory.before.clone_from(&self.memory.points);
+        // Only where trials are assembled may one be refused.
+        if self.is_fixed() {
+            self.memory.before.clone_from(&self.memory.points);
+        }
         for index in 0..self.points.len() {
             let x = self.points[index].position(elements, state);
             let radius_mm = self.points[index].potential.radius_mm;
