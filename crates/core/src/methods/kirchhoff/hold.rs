@@ -45,7 +45,7 @@ impl Guess {
         elements: &[ElementData],
         state: &mut RodState,
     ) -> Held {
-        if contact.misfit(elements, state) <= MISFIT {
+        if !contact.stiff || contact.misfit(elements, state) <= MISFIT {
             return Held::Fits;
         }
         contact.holding = true;
