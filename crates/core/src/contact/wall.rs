@@ -396,6 +396,10 @@ impl External for WallContact<'_> {
         !self.friction.acts()
     }
 
+    fn is_lagged(&self) -> bool {
+        self.friction.acts() && !self.stiff
+    }
+
     /// A point may move by nearly its clearance, whatever the direction: the ball about it holds no wall. Farther it may go where its
     /// straight way meets no wall, and nearly up to the wall where it does. A point that has sunk in knows its side, and the energy
     /// holds it there.
