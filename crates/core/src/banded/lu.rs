@@ -3,8 +3,9 @@
 //! A wall that rubs in proportion to what presses on it has no potential, and the Newton matrix of both together is not
 //! symmetric (`methods/kirchhoff/settle.rs`). The unknowns of a rod couple neighbouring nodes alone, so the matrix is a band
 //! of C − 1 entries on either side of the diagonal, and elimination with partial pivoting fills C − 1 more on the right
-//! (Golub and Van Loan, *Matrix Computations*, 4th ed., section 4.3.3; LAPACK's `dgbtrf`). It is needed where friction does
-//! not settle otherwise, which is seldom: plain loops will do, and faer has no band solver that keeps its memory.
+//! (Golub and Van Loan, *Matrix Computations*, 4th ed., section 4.3.3; LAPACK's `dgbtrf`). Most of that stays empty: rows end with the
+//! block after their own, and what elimination fills with that of the farthest pivot so far (`dgbtf2` keeps the same account of columns). Plain
+//! loops will do, and faer has no band solver that keeps its memory.
 
 use super::ldlt::FactorError;
 use super::matrix::{BandMatrix, Shift};
@@ -21,6 +22,8 @@ pub struct BandLu<const C: usize> {
 impl<const C: usize> BandLu<C> {
     /// Entries on either side of the diagonal.
     const SIDE: usize = C - 1;
+    /// Rows of a block.
+    const BLOCK: usize = C / 2;
     /// Entries a row has room for.
     const STRIDE: usize = 3 * (C - 1) + 1;
 
@@ -41,6 +44,12 @@ impl<const C: usize> BandLu<C> {
         i * Self::STRIDE + (j + Self::SIDE - i)
     }
 
+    /// The last unknown that unknown `i` is coupled with.
+    #[inline]
+    fn last(&self, i: usize) -> usize {
+        ((i / Self::BLOCK + 2) * Self::BLOCK).min(self.dimension()) - 1
+    }
+
     /// Sets this to a symmetric matrix plus `factor` times a shift.
     pub fn copy_from(&mut self, matrix: &BandMatrix<C>, shift: &Shift, factor: f64) {
         let n = matrix.dimension();
@@ -49,8 +58,7 @@ impl<const C: usize> BandLu<C> {
         self.pivots.clear();
         self.pivots.extend(0..n);
         for i in 0..n {
-            let end = ((i / (C / 2) + 2) * (C / 2)).min(n);
-            for j in i..end {
+            for j in i..=self.last(i) {
                 let value = matrix.get(i, j);
                 self.rows[Self::at(i, j)] = value;
                 self.rows[Self::at(j, i)] = value;
@@ -64,14 +72,13 @@ impl<const C: usize> BandLu<C> {
         }
     }
 
-    /// Adds to entry `(i, j)` alone. Entries outside the band are ignored; only a caller that numbered its unknowns wrongly asks
+    /// Adds to entry `(i, j)` alone. Entries outside the blocks are ignored; only a caller that numbered its unknowns wrongly asks
     /// for them, which debug builds report.
     #[inline]
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
-        debug_assert!(i.abs_diff(j) <= Self::SIDE, "entry ({i}, {j}) lies outside the band");
-        if i.abs_diff(j) <= Self::SIDE
-            && let Some(entry) = self.rows.get_mut(Self::at(i, j))
-        {
+        let is_inside = (i / Self::BLOCK).abs_diff(j / Self::BLOCK) <= 1;
+        debug_assert!(is_inside, "entry ({i}, {j}) lies outside the blocks");
+        if is_inside && let Some(entry) = self.rows.get_mut(Self::at(i, j)) {
             *entry += value;
         }
     }
@@ -87,10 +94,10 @@ impl<const C: usize> BandLu<C> {
     /// # Errors
     /// A column without a pivot that is a number other than zero.
     pub fn factor(&mut self) -> Result<(), FactorError> {
-        let n = self.dimension();
-        for k in 0..n {
-            let below = (k + Self::SIDE).min(n - 1);
-            let right = (k + 2 * Self::SIDE).min(n - 1);
+        // Rows worked on so far end here: as far as the farthest of those that have become pivots.
+        let mut right = 0;
+        for k in 0..self.dimension() {
+            let below = self.last(k);
             let mut p = k;
             let mut largest = self.rows[Self::at(k, k)].abs();
             for i in k + 1..=below {
@@ -106,6 +113,7 @@ impl<const C: usize> BandLu<C> {
                 return Err(FactorError::ZeroPivot { row: k });
             }
             self.pivots[k] = p;
+            right = right.max(self.last(p));
             if p != k {
                 for j in k..=right {
                     self.rows.swap(Self::at(k, j), Self::at(p, j));

@@ -264,7 +264,10 @@ impl<'a> WallContact<'a> {
 
 impl External for WallContact<'_> {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
-        self.memory.before.clone_from(&self.memory.points);
+        // Only where trials are assembled may one be refused.
+        if self.is_fixed() {
+            self.memory.before.clone_from(&self.memory.points);
+        }
         for index in 0..self.points.len() {
             let x = self.material(index, elements, state);
             let radius_mm = self.points[index].potential.radius_mm;
@@ -398,6 +401,10 @@ impl External for WallContact<'_> {
     /// Friction renews the normal forces it works with.
     fn is_fixed(&self) -> bool {
         !self.friction.acts()
+    }
+
+    fn is_lagged(&self) -> bool {
+        self.friction.acts() && !self.stiff
     }
 
     /// A point may move by nearly its clearance, whatever the direction: the ball about it holds no wall. Farther it may go where its

@@ -15,7 +15,7 @@ use super::element_torsion::add_torsion;
 use super::invariants::{Derivatives, Factors};
 use super::layout::Layout;
 use super::quadrature::GAUSS;
-use super::torsion::torsion_value;
+use super::torsion::TwistValue;
 use crate::Vec3;
 
 /// The element's energy alone, where two neighbouring nodes have `C` unknowns.
@@ -27,17 +27,22 @@ pub fn element_energy<const C: usize>(data: &ElementData, s: &ElementState) -> E
         energy.bend += point.weight * data.bending[k] * bending_value(&y, &z);
     }
     energy.bend *= arc_factor(&t0, &t1).0 * mean_speed(mid_slope(&t0, &s.chord, &t1).norm()) / data.length;
-    let instruments = data.materials.iter().zip(&s.angles).take(Layout::<C>::ANGLES);
-    for (material, of) in instruments.filter(|(material, _)| material.is_present()) {
+    if Layout::<C>::ANGLES > 0 {
         let (chord, end) = (s.first.local(&s.chord), s.first.local(&t1));
-        for (k, point) in GAUSS.iter().enumerate() {
+        let shared = GAUSS.map(|point| {
             let (y, z) = point.derivatives(&chord, &Vec3::x(), &end);
-            let (phi, dphi) = angles(of, point);
-            let (bend, twist) = torsion_value(&y, &z, phi, dphi, &material.torsion_input(k, data.length));
-            energy.bend += bend;
-            energy.twist += twist;
+            TwistValue::new(&y, &z)
+        });
+        let instruments = data.materials.iter().zip(&s.angles).take(Layout::<C>::ANGLES);
+        for (material, of) in instruments.filter(|(material, _)| material.is_present()) {
+            for (k, point) in GAUSS.iter().enumerate() {
+                let (phi, dphi) = angles(of, point);
+                let (bend, twist) = shared[k].energies(phi, dphi, &material.torsion_input(k, data.length));
+                energy.bend += bend;
+                energy.twist += twist;
+            }
+            energy.bend += material.rest_energy(data.length);
         }
-        energy.bend += material.rest_energy(data.length);
     }
     if data.flexibility > 0.0 {
         let c = elongation(data.length, &mid_slope(&t0, &s.chord, &t1));

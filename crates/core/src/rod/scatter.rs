@@ -11,6 +11,7 @@ use super::state::RodState;
 use super::stencils::{Stencils, Triple};
 use crate::Vec3;
 use crate::banded::BandLu;
+use crate::products::times;
 
 impl<const C: usize> Stencils for Assembly<C> {
     fn wants_hessian(&self) -> bool {
@@ -164,7 +165,7 @@ pub(crate) fn add_unsymmetric<const C: usize>(
 ) {
     let columns = point_columns::<C>(state, element, e, xi);
     for (column, way) in &columns {
-        let force = force * way;
+        let force = times(force, way);
         for (row, to) in &columns {
             matrix.add(*row, *column, to.dot(&force));
         }

@@ -78,18 +78,43 @@ pub struct AngleDensity {
     pub along_z: Vec3,
 }
 
-/// The two energies alone: (bend, twist).
-#[inline]
-pub(crate) fn torsion_value(y: &Vec3, z: &Vec3, phi: f64, dphi: f64, p: &TorsionInput) -> (f64, f64) {
-    let a = y.norm();
-    let g = 1.0 / (a * (a + y.x));
-    let (sin, cos) = phi.sin_cos();
-    let w2 = p.moment[0] * cos - p.moment[1] * sin;
-    let w3 = p.moment[0] * sin + p.moment[1] * cos;
-    let m = z.y * w2 + z.z * w3;
-    let n = y.y * w2 + y.z * w3;
-    let tau = dphi - (y.y * z.z - y.z * z.y) * g - p.rest_twist;
-    (n * g * (z.x + y.dot(z) / a) - m / a, 0.5 * p.stiffness * tau * tau)
+/// What all instruments have in common at a Gauss point where energies alone are asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TwistValue {
+    y: Vec3,
+    z: Vec3,
+    /// a and G.
+    a: f64,
+    g: f64,
+    /// DG.
+    twist: f64,
+}
+
+impl TwistValue {
+    /// That of y and z.
+    #[inline]
+    pub(crate) fn new(y: &Vec3, z: &Vec3) -> Self {
+        let a = y.norm();
+        let g = 1.0 / (a * (a + y.x));
+        Self { y: *y, z: *z, a, g, twist: (y.y * z.z - y.z * z.y) * g }
+    }
+
+    /// The two energies of an instrument: (bend, twist).
+    #[inline]
+    pub(crate) fn energies(&self, phi: f64, dphi: f64, p: &TorsionInput) -> (f64, f64) {
+        let Self { y, z, a, g, twist } = self;
+        let tau = dphi - twist - p.rest_twist;
+        let twisted = 0.5 * p.stiffness * tau * tau;
+        if p.moment == [0.0; 2] {
+            return (0.0, twisted);
+        }
+        let (sin, cos) = phi.sin_cos();
+        let w2 = p.moment[0] * cos - p.moment[1] * sin;
+        let w3 = p.moment[0] * sin + p.moment[1] * cos;
+        let m = z.y * w2 + z.z * w3;
+        let n = y.y * w2 + y.z * w3;
+        (n * g * (z.x + y.dot(z) / a) - m / a, twisted)
+    }
 }
 
 impl ReferenceTwist {

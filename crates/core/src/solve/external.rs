@@ -87,6 +87,12 @@ pub trait External {
         false
     }
 
+    /// Whether something in it is lagged, and all else changes little within a step: then it is what is renewed that is left in a residual,
+    /// and factors of an earlier state serve as well.
+    fn is_lagged(&self) -> bool {
+        false
+    }
+
     /// Whether it rises so steeply within a step that a trial may have to be looked for between one that was taken and one that was
     /// refused, as a wall does.
     fn is_steep(&self) -> bool {

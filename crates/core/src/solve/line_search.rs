@@ -7,7 +7,7 @@
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::{StepRecord, StopReason};
 use super::shift::WHISPER;
-use super::stop::{SHORT, residual_alone};
+use super::stop::{SHORT, Turn, residual_alone};
 use crate::rod::{ElementData, Layout, RodState};
 
 /// Most trials.
@@ -68,8 +68,8 @@ struct Stride {
     part: f64,
     /// How far it turns nodes, rad, …
     turn: f64,
-    /// … and where it says how near the minimum is; infinite elsewhere.
-    whole_turn: f64,
+    /// … and where it says how near the minimum is.
+    whole_turn: Turn,
 }
 
 impl Merit {
@@ -93,7 +93,7 @@ impl Merit {
 
 impl<const C: usize> Newton<C> {
     /// Moves `state` along the step from the assembled state, whose relative residual and shift are given. Returns how far nodes were
-    /// turned by it, in radians, if it was a whole step of Newton's; infinity otherwise.
+    /// turned by it.
     pub(super) fn line_search(
         &mut self,
         problem: &mut Problem<'_>,
@@ -101,7 +101,7 @@ impl<const C: usize> Newton<C> {
         search: &mut LineSearch,
         residual: f64,
         shift: f64,
-    ) -> Result<f64, StopReason> {
+    ) -> Result<Turn, StopReason> {
         let Stride { mut merit, mut part, mut whole_turn, turn } =
             self.stride(problem, state, search, shift)?;
         let free = problem.supports.conditions() == 0;
@@ -111,7 +111,7 @@ impl<const C: usize> Newton<C> {
             && turn <= SHORT
             && merit.slope <= 0.0
             && -merit.slope <= merit.rounding();
-        let turn_of = |part: f64, whole_turn: f64| if part == 1.0 { whole_turn } else { f64::INFINITY };
+        let turn_of = |part: f64, whole_turn: Turn| if part == 1.0 { whole_turn } else { Turn::NONE };
         // Where the last step's first trial was taken this one's nearly always is: the energy is asked for together with what
         // the next iteration begins with.
         let mut bold =
@@ -140,7 +140,8 @@ impl<const C: usize> Newton<C> {
                 let assembles = bold && !meets;
                 energy_change = if assembles {
                     search.assembled = true;
-                    let near = residual_alone(turn_of(part, whole_turn), problem.options.tolerance);
+                    let near =
+                        residual_alone(turn_of(part, whole_turn).with_forces, problem.options.tolerance);
                     self.assemble_trial(problem, !near);
                     self.assembly.energy.total() + self.assembly.external_energy - merit.energy
                 } else {
@@ -213,13 +214,13 @@ impl<const C: usize> Newton<C> {
         shift: f64,
     ) -> Result<Stride, StopReason> {
         let merit = self.merit_along(problem, state, search);
-        let (turn, _) = RodState::largest_turn::<C>(problem.elements, state, &self.step);
+        let (turn, twist) = RodState::largest_turn::<C>(problem.elements, state, &self.step);
         if !turn.is_finite() {
             return Err(StopReason::NotFinite);
         }
         let most = problem.options.max_turn;
         let part = if turn > most { most / turn } else { 1.0 };
-        Ok(Stride { merit, part, turn, whole_turn: self.whole_turn(problem, turn, shift) })
+        Ok(Stride { merit, part, turn, whole_turn: self.whole_turn(problem, (turn, twist), shift) })
     }
 
     /// Assembles the base with its matrix again, as it was for the step.
@@ -260,16 +261,17 @@ impl<const C: usize> Newton<C> {
         Merit { energy: stored + outside, gaps: weighed, slope, scale }
     }
 
-    /// How far a whole step turns nodes, where it is Newton's own and the matrix says that it leads to a minimum; infinity elsewhere.
+    /// How far a whole step turns nodes, where it is Newton's own and the matrix says that it leads to a minimum.
     /// Axial forces stiffen the rod against bending over its length.
-    fn whole_turn(&self, problem: &Problem<'_>, turn: f64, shift: f64) -> f64 {
+    fn whole_turn(&self, problem: &Problem<'_>, (turn, twist): (f64, f64), shift: f64) -> Turn {
         if !(problem.minimum && shift == 0.0 && problem.supports.conditions() == 0) {
-            return f64::INFINITY;
+            return Turn::NONE;
         }
         let l = Layout::<C>;
         let elements = problem.elements;
         let pulled = (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
-        turn.max(STIFFENING * pulled * WHISPER / Self::whisper(elements))
+        let with_forces = turn.max(STIFFENING * pulled * WHISPER / Self::whisper(elements));
+        Turn { with_forces, of_nodes: turn.max(twist) }
     }
 
     /// Sets the trial to a part of the step, at most `part`, that crosses nothing; returns the part.

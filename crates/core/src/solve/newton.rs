@@ -179,8 +179,9 @@ impl<const C: usize> Newton<C> {
             report.iterations += 1;
             self.unsymmetric();
             Self::restore_tensions(elements, &mut self.step);
+            let factored = self.assembly.hessian;
             match self.line_search(&mut problem, state, &mut search, size.relative, shift) {
-                Ok(turn) => progress.last_turn = turn,
+                Ok(turn) => progress.has_turned(turn, factored),
                 Err(StopReason::NoDescent) => {
                     return self.without_descent(&mut problem, state, &progress, natural, report);
                 }
@@ -199,12 +200,13 @@ impl<const C: usize> Newton<C> {
         assembled: bool,
     ) -> ResidualSize {
         let Problem { elements, supports, external, options, .. } = problem;
+        let lagged = external.is_lagged();
         if !assembled {
-            self.assembly.hessian = progress.wants_hessian(options.tolerance);
+            self.assembly.hessian = progress.wants_hessian(options.tolerance, lagged);
             self.assemble_parts(elements, supports, *external, state);
         }
         let size = self.residual(elements, *external, supports, options.tolerance);
-        if self.assembly.hessian || size.small || progress.shrinks_enough(&size, options.tolerance) {
+        if self.assembly.hessian || size.small || progress.shrinks_enough(&size, options.tolerance, lagged) {
             return size;
         }
         self.assemble(elements, supports, *external, state);

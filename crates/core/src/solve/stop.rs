@@ -17,8 +17,25 @@ const NEAR: f64 = 1e-3;
 const QUADRATIC: f64 = 10.0;
 /// … and another step with the same factors leaves a residual smaller by the last turn times no more than this.
 const CHORD: f64 = 10.0;
+/// Where something is lagged, factors serve while nodes have turned by no more than `SHORT` since they were taken, whatever axial forces
+/// have done, and each step leaves no more than this part of the residual: what renewing it leaves there is not lessened by a newer matrix.
+const SHRINKS: f64 = 0.1;
 /// A residual that is as small as this, relative, and shrinks no more, is rounding.
 const ROUNDED: f64 = 1e-6;
+
+/// How far a whole step of Newton's method has turned nodes, rad; infinite of any other step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Turn {
+    /// With the change of axial forces as the turn that they are worth.
+    pub(super) with_forces: f64,
+    /// Tangents and angles alone.
+    pub(super) of_nodes: f64,
+}
+
+impl Turn {
+    /// That of a step that says nothing.
+    pub(super) const NONE: Self = Self { with_forces: f64::INFINITY, of_nodes: f64::INFINITY };
+}
 
 /// How far the iteration has come since it began, or since it left a saddle.
 #[derive(Debug, Clone, Copy)]
@@ -27,27 +44,37 @@ pub(super) struct Progress {
     best: f64,
     /// States in a row that did not halve it.
     stalled: usize,
-    /// Turn of the last step, rad, if it was a whole one of Newton's; infinite otherwise.
-    pub(super) last_turn: f64,
+    /// Turn of the last step, rad, if it was a whole one of Newton's; infinite otherwise. Axial forces count as turns.
+    last_turn: f64,
+    /// Turns of nodes alone, of all steps with the factors at hand.
+    since: f64,
 }
 
 impl Default for Progress {
     fn default() -> Self {
-        Self { best: f64::INFINITY, stalled: 0, last_turn: f64::INFINITY }
+        Self { best: f64::INFINITY, stalled: 0, last_turn: f64::INFINITY, since: f64::INFINITY }
     }
 }
 
 impl Progress {
-    /// Whether the next state is assembled with its matrix.
-    pub(super) fn wants_hessian(&self, tolerance: f64) -> bool {
-        !residual_alone(self.last_turn, tolerance)
+    /// Takes note of a step, with factors of the state that it began at or of one before.
+    pub(super) fn has_turned(&mut self, turn: Turn, factored: bool) {
+        self.last_turn = turn.with_forces;
+        self.since = if factored { turn.of_nodes } else { self.since + turn.of_nodes };
+    }
+
+    /// Whether the next state is assembled with its matrix; `lagged` says that something is renewed there.
+    pub(super) fn wants_hessian(&self, tolerance: f64, lagged: bool) -> bool {
+        !(residual_alone(self.last_turn, tolerance) || (lagged && self.since <= SHORT))
     }
 
     /// Whether another step with the factors of an earlier state leads to the tolerance. Where steps no longer shrink a residual, it
     /// takes the matrix of the state itself to say so: with factors from before a contact opened or closed, steps may lead to and fro
     /// for ever.
-    pub(super) fn shrinks_enough(&self, size: &ResidualSize, tolerance: f64) -> bool {
-        size.relative < 0.5 * self.best && CHORD * self.last_turn * size.relative <= tolerance
+    pub(super) fn shrinks_enough(&self, size: &ResidualSize, tolerance: f64, lagged: bool) -> bool {
+        let arrives = CHORD * self.last_turn * size.relative <= tolerance;
+        let shrinks = lagged && self.since <= SHORT && size.relative <= SHRINKS * self.best;
+        size.relative < 0.5 * self.best && (arrives || shrinks)
     }
 
     /// Takes note of the residual of a state; returns whether it is an equilibrium.
@@ -78,4 +105,45 @@ impl ResidualSize {
 /// residual alone is looked at.
 pub(super) fn residual_alone(last_turn: f64, tolerance: f64) -> bool {
     last_turn <= SHORT || (last_turn <= NEAR && QUADRATIC * last_turn * last_turn <= tolerance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TOLERANCE: f64 = 1e-9;
+
+    /// After a whole step with new factors that turned nodes by `of_nodes` and left `relative` of a residual of 1e-3.
+    fn after(of_nodes: f64, relative: f64) -> (Progress, ResidualSize) {
+        let mut progress = Progress { best: 1e-3, ..Progress::default() };
+        progress.has_turned(Turn { with_forces: 1e-3, of_nodes }, true);
+        (progress, ResidualSize { relative, small: false, rounding: false })
+    }
+
+    #[test]
+    fn factors_serve_what_is_renewed_while_nodes_have_hardly_turned() {
+        let (progress, size) = after(0.4 * SHORT, 1e-5);
+        assert!(!progress.wants_hessian(TOLERANCE, true) && progress.shrinks_enough(&size, TOLERANCE, true));
+        // Where nothing is renewed, axial forces count as turns.
+        assert!(
+            progress.wants_hessian(TOLERANCE, false) && !progress.shrinks_enough(&size, TOLERANCE, false)
+        );
+        // Each step must leave a tenth.
+        let (progress, size) = after(0.4 * SHORT, 2e-4);
+        assert!(!progress.shrinks_enough(&size, TOLERANCE, true));
+        let (progress, _) = after(2.0 * SHORT, 1e-5);
+        assert!(progress.wants_hessian(TOLERANCE, true));
+    }
+
+    #[test]
+    fn turns_add_up_until_there_are_new_factors() {
+        let turn = Turn { with_forces: 1e-3, of_nodes: 0.4 * SHORT };
+        let (mut progress, _) = after(0.4 * SHORT, 1e-5);
+        progress.has_turned(turn, false);
+        assert!(!progress.wants_hessian(TOLERANCE, true));
+        progress.has_turned(turn, false);
+        assert!(progress.wants_hessian(TOLERANCE, true));
+        progress.has_turned(turn, true);
+        assert!(!progress.wants_hessian(TOLERANCE, true));
+    }
 }

@@ -11,7 +11,8 @@
 //!
 //! with the force F of the last equilibrium in place of w k (r − d), as sequential quadratic programming has the multipliers of the
 //! last iterate in its Hessian (Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 18.1): the forces of the guess itself
-//! are too large by powers of ten, and of either sign. What is left is of second order in the step.
+//! are too large by powers of ten, and of either sign. What is left is of second order in the step. On a wall softer than an element
+//! nothing is lost, and Newton's method goes on from any guess.
 
 use super::guess::Guess;
 use crate::contact::WallContact;
@@ -45,7 +46,7 @@ impl Guess {
         elements: &[ElementData],
         state: &mut RodState,
     ) -> Held {
-        if contact.misfit(elements, state) <= MISFIT {
+        if !contact.stiff || contact.misfit(elements, state) <= MISFIT {
             return Held::Fits;
         }
         contact.holding = true;

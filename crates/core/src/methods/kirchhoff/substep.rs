@@ -137,6 +137,11 @@ impl<const C: usize> Tools<C> {
             &mut self.friction,
             softest_nmm2,
         );
+        let data = &mesh.elements[elements - 1];
+        let element_stiffness = data.bending[2] / options.element_mm.powi(4);
+        // How many elements the wall is as stiff as.
+        let stiffness = surroundings.properties.stiffest_n_per_mm2() / element_stiffness;
+        contact.stiff = stiffness > 1.0;
         let candidates = (start, &*mesh, &mut *rod);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, blocked);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
@@ -147,11 +152,6 @@ impl<const C: usize> Tools<C> {
         let moved = held == Held::Moved;
         // A guess that has learnt from the last step or kept its contacts is near, unless it has lost them.
         let near = moved || (quality == Quality::Learnt && held == Held::Fits);
-        let data = &mesh.elements[elements - 1];
-        let element_stiffness = data.bending[2] / options.element_mm.powi(4);
-        // How many elements the wall is as stiff as.
-        let stiffness = surroundings.properties.stiffest_n_per_mm2() / element_stiffness;
-        contact.stiff = stiffness > 1.0;
         let mut search = Search {
             newton: &mut self.newton,
             settle: &mut self.settle,
