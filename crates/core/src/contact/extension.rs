@@ -2,7 +2,8 @@
 //!
 //! A surface ends where the scan ended, and a wall that stops holding a tip from one point to the next has no
 //! equilibrium there. Every opening that a device can pass is extended straight along its direction, as flow extensions
-//! are in vessel models; smaller ones are holes of the mesh and closed. The triangles of the vessel keep their numbers.
+//! are in vessel models, and closed where that ends, so that nothing is ever where no wall is; smaller ones are holes of the mesh and
+//! closed. Extensions that would meet each other or the vessel are shorter. The triangles of the vessel keep their numbers.
 //!
 //! A rim has the corners of a surface that was cut there, and drawn out straight they would be furrows in which a tip is caught. So
 //! the rim passes into the ellipse next to it, r(s) = c + a cos s + b sin s with the part s of its length, over its own width.
@@ -14,12 +15,10 @@ use nalgebra::Matrix3;
 use crate::Vec3;
 use crate::vessel::{Opening, SurfaceMesh, Wall};
 
-/// How far beyond an opening a tip may go, mm.
-pub const LEAVE_MM: f64 = 30.0;
+/// How much is left of an extension, mm, where a tip that goes there has left.
+const LEFT_MM: f64 = 2.0;
 /// Length over which a rim passes into an ellipse, in radii of the opening.
 const ROUNDING: f64 = 2.0;
-/// Length of the extensions, mm; they are closed there, so that nothing is ever where no wall is.
-const EXTENSION_MM: f64 = LEAVE_MM + 2.0;
 
 /// The surface of `wall` with its openings wider than `radius_mm` extended and the others closed.
 pub fn extended(wall: &Wall, radius_mm: f64) -> SurfaceMesh {
@@ -39,12 +38,12 @@ fn extend(mesh: &mut SurfaceMesh, opening: &Opening) {
     let count = opening.boundary.len();
     let at = |k: usize| mesh.vertices_mm[opening.boundary[k % count] as usize];
     let around: f64 = (0..count).map(|k| (at(k + 1) - at(k)).norm()).sum();
-    let rings = (EXTENSION_MM / (around / count as f64)).ceil().clamp(1.0, 1000.0) as usize;
+    let rings = (opening.beyond_mm / (around / count as f64)).ceil().clamp(1.0, 1000.0) as usize;
     let rim: Vec<Vec3> = (0..count).map(at).collect();
     let round = ellipse(&rim);
     let mut last = opening.boundary.clone();
     for ring in 1..=rings {
-        let way_mm = EXTENSION_MM * ring as f64 / rings as f64;
+        let way_mm = opening.beyond_mm * ring as f64 / rings as f64;
         let t = (way_mm / (ROUNDING * opening.radius_mm)).min(1.0);
         let (share, way) = (t * t * (3.0 - 2.0 * t), opening.direction * way_mm);
         let first = mesh.vertices_mm.len() as u32;
@@ -59,7 +58,7 @@ fn extend(mesh: &mut SurfaceMesh, opening: &Opening) {
         last = next;
     }
     let centre = mesh.vertices_mm.len() as u32;
-    mesh.vertices_mm.push(opening.centre_mm + opening.direction * EXTENSION_MM);
+    mesh.vertices_mm.push(opening.centre_mm + opening.direction * opening.beyond_mm);
     mesh.triangles.extend((0..count).map(|k| [last[k], last[(k + 1) % count], centre]));
 }
 
@@ -88,13 +87,18 @@ fn ellipse(line: &[Vec3]) -> Vec<Vec3> {
     }
 }
 
+/// How far beyond an opening a tip may go, mm.
+pub fn leave_mm(opening: &Opening) -> f64 {
+    opening.beyond_mm - LEFT_MM
+}
+
 /// The opening beyond whose plane `x` lies, within its extension.
 pub fn left_through(wall: &Wall, x: &Vec3) -> Option<(usize, f64)> {
     wall.openings().iter().find_map(|o| {
         let offset = x - o.centre_mm;
         let beyond = offset.dot(&o.direction);
         let aside = (offset - o.direction * beyond).norm();
-        (beyond > 0.0 && beyond <= EXTENSION_MM && aside < 1.5 * o.radius_mm).then_some((o.index, beyond))
+        (beyond > 0.0 && beyond <= o.beyond_mm && aside < 1.5 * o.radius_mm).then_some((o.index, beyond))
     })
 }
 

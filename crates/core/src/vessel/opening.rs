@@ -6,6 +6,13 @@ use super::SurfaceMesh;
 use super::topology::{EdgeTable, EdgeUse, NONE};
 use crate::Vec3;
 
+/// Openings lead on straight for so much, mm, where nothing is in the way.
+const MOST_BEYOND_MM: f64 = 32.0;
+/// … and for so much, mm, whatever is.
+const LEAST_BEYOND_MM: f64 = 3.0;
+/// What is drawn out of an opening keeps so many of its radii free about its middle.
+const FREE_RADII: f64 = 1.1;
+
 /// An open end of a wall: one closed loop of edges that belong to a single triangle each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opening {
@@ -19,6 +26,9 @@ pub struct Opening {
     pub direction: Vec3,
     /// The loop's vertices, in the direction in which the triangles of a cap would run along it.
     pub boundary: Vec<u32>,
+    /// How far the vessel may be drawn out straight beyond it, mm, before that meets the vessel again or what is drawn out of
+    /// another opening.
+    pub beyond_mm: f64,
 }
 
 impl Opening {
@@ -33,7 +43,7 @@ impl Opening {
         let area: Vec3 = (0..count).map(|k| (at(k) - centre_mm).cross(&(at(k + 1) - centre_mm)) / 2.0).sum();
         // A slit encloses no area; any direction is as good as another, but it must be a unit vector.
         let direction = area.try_normalize(1e-12 * radius_mm * radius_mm).unwrap_or_else(Vec3::x);
-        Self { index: 0, centre_mm, radius_mm, direction, boundary }
+        Self { index: 0, centre_mm, radius_mm, direction, boundary, beyond_mm: MOST_BEYOND_MM }
     }
 
     /// The triangles that close the opening: a fan around its centre, facing out.
@@ -49,6 +59,55 @@ impl Opening {
         let next = self.boundary.iter().cycle().skip(1);
         mesh.triangles.extend(self.boundary.iter().zip(next).map(|(&a, &b)| [a, b, centre]));
     }
+}
+
+/// Shortens what may be drawn out beyond the openings of `mesh` to where it meets nothing.
+pub(super) fn keep_apart(mesh: &SurfaceMesh, openings: &mut [Opening]) {
+    let mut beyond = vec![MOST_BEYOND_MM; openings.len()];
+    for (i, a) in openings.iter().enumerate() {
+        for (j, b) in openings.iter().enumerate().skip(i + 1) {
+            let free = FREE_RADII * (a.radius_mm + b.radius_mm);
+            // Neighbours may be as near as they begin.
+            let least = free.min((a.centre_mm - b.centre_mm).norm() * (1.0 - 1e-9));
+            if apart(a, b, MOST_BEYOND_MM) >= least {
+                continue;
+            }
+            let (mut low, mut high) = (0.0, MOST_BEYOND_MM);
+            for _ in 0..20 {
+                let middle = 0.5 * (low + high);
+                if apart(a, b, middle) < least { high = middle } else { low = middle }
+            }
+            beyond[i] = low.min(beyond[i]);
+            beyond[j] = low.min(beyond[j]);
+        }
+    }
+    let centres = (0..mesh.triangles.len()).map(|t| mesh.corners(t).iter().sum::<Vec3>() / 3.0);
+    for x in mesh.vertices_mm.iter().copied().chain(centres) {
+        for (opening, beyond) in openings.iter().zip(&mut beyond) {
+            let (offset, free) = (x - opening.centre_mm, FREE_RADII * opening.radius_mm);
+            let along = offset.dot(&opening.direction);
+            // Rims may be oblique.
+            if along > free && along < *beyond + free && (offset - opening.direction * along).norm() < free {
+                *beyond = along - free;
+            }
+        }
+    }
+    for (opening, beyond) in openings.iter_mut().zip(beyond) {
+        opening.beyond_mm = beyond.max(LEAST_BEYOND_MM);
+    }
+}
+
+/// Least distance of the straight ways of this length out of two openings, mm: Ericson, *Real-Time Collision Detection*, 2005,
+/// section 5.1.9, for unit directions.
+fn apart(a: &Opening, b: &Opening, length_mm: f64) -> f64 {
+    let (d, e, r) = (a.direction, b.direction, a.centre_mm - b.centre_mm);
+    let (cos, c, f) = (d.dot(&e), d.dot(&r), e.dot(&r));
+    let within = |t: f64| t.clamp(0.0, length_mm);
+    let sine_squared = 1.0 - cos * cos;
+    let s = if sine_squared > 1e-12 { within((cos * f - c) / sine_squared) } else { 0.0 };
+    let t = within(cos * s + f);
+    let s = within(cos * t - c);
+    (r + d * s - e * t).norm()
 }
 
 /// Boundary loops of a consistently oriented mesh.
@@ -197,5 +256,37 @@ mod tests {
         assert!((found.openings[0].radius_mm - 0.5_f64.sqrt()).abs() < 1e-15);
         // The sheet faces +z, so its cap faces −z.
         assert!((found.openings[0].direction + Vec3::z()).norm() < 1e-15);
+    }
+
+    #[test]
+    fn what_is_drawn_out_of_two_openings_stays_apart() {
+        let opening = |x: f64, direction: Vec3| Opening {
+            index: 0,
+            centre_mm: Vec3::x() * x,
+            radius_mm: 1.0,
+            direction: direction.normalize(),
+            boundary: Vec::new(),
+            beyond_mm: MOST_BEYOND_MM,
+        };
+        let beyond = |mesh: &SurfaceMesh, turned: f64| {
+            let mut pair =
+                [opening(-5.0, Vec3::new(turned, 0.0, 1.0)), opening(5.0, Vec3::new(-turned, 0.0, 1.0))];
+            keep_apart(mesh, &mut pair);
+            pair.map(|o| o.beyond_mm)
+        };
+        let nothing = SurfaceMesh::default();
+        assert_eq!(beyond(&nothing, 0.0), [MOST_BEYOND_MM; 2]);
+        assert_eq!(beyond(&nothing, -0.2), [MOST_BEYOND_MM; 2]);
+        // They come within 2.2 mm of each other where each has gone 7.8 mm / √2.
+        let met = 7.8 / 2.0_f64.sqrt();
+        assert!(
+            beyond(&nothing, 1.0).iter().all(|mm| (mm - met).abs() < 1e-3),
+            "{:?}",
+            beyond(&nothing, 1.0)
+        );
+        // A vertex of the vessel 10 mm above the first.
+        let vessel = SurfaceMesh { vertices_mm: vec![Vec3::new(-5.0, 0.5, 10.0)], triangles: Vec::new() };
+        let [first, second] = beyond(&vessel, 0.0);
+        assert!((first - 8.9).abs() < 1e-12 && second == MOST_BEYOND_MM, "{first} {second}");
     }
 }

@@ -208,9 +208,10 @@ impl Wall {
         }
         report.components = count;
         report.smallest_component = sizes.into_iter().min().unwrap_or(0);
-        let boundary = opening::boundary(&mesh, table);
+        let mut boundary = opening::boundary(&mesh, table);
         report.openings = boundary.openings.len();
         report.stray_edges = boundary.stray_edges;
+        opening::keep_apart(&mesh, &mut boundary.openings);
         let caps = boundary.openings.iter().flat_map(|o| o.cap(&mesh).collect::<Vec<_>>()).collect();
         Self { mesh, openings: boundary.openings, caps, report }
     }

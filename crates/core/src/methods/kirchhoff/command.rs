@@ -11,7 +11,7 @@ use super::slide::Extension;
 use super::state::KirchhoffState;
 use super::substep::{AT_REST, Attempt, Found, released_mj};
 use super::workspace::{Tools, Workspace};
-use crate::contact::extension::{LEAVE_MM, left_through};
+use crate::contact::extension::{leave_mm, left_through};
 use crate::device::{Stack, line_mm};
 use crate::methods::{InstrumentReport, Move, StepReport};
 use crate::vessel::Wall;
@@ -232,10 +232,10 @@ fn jumped(stack: &Stack, (before, after): (&StepReport, &StepReport), way: &Way,
 
 /// Refuses a tip that, `ahead_mm` farther, would be beyond an opening where nothing is known any more.
 fn check_inside(wall: &Wall, tip_mm: &Vec3, ahead_mm: f64) -> Result<()> {
-    match left_through(wall, tip_mm) {
-        Some((opening, beyond_mm)) if beyond_mm + ahead_mm > LEAVE_MM => {
-            Err(Error::End(PhysicalEnd::Left { opening, beyond_mm, limit_mm: LEAVE_MM }))
-        }
-        _ => Ok(()),
+    let Some((opening, beyond_mm)) = left_through(wall, tip_mm) else { return Ok(()) };
+    let limit_mm = wall.openings().get(opening).map_or(f64::MAX, leave_mm);
+    if beyond_mm + ahead_mm > limit_mm {
+        return Err(Error::End(PhysicalEnd::Left { opening, beyond_mm, limit_mm }));
     }
+    Ok(())
 }
