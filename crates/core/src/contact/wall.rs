@@ -31,6 +31,8 @@ const SAFE: f64 = 0.9;
 /// A point whose axis is nearer to the wall than this part of its radius has sunk into it: on which side of the wall it is says the
 /// side that it came from, and the nearest piece of wall is looked for along the wall, not through space.
 const SUNK: f64 = 0.3;
+/// No smooth wall is off its triangles by so many radii; one that seems to be is another one.
+const FAR_SIDE: f64 = 1.5;
 /// Roundings of a coordinate by which a distance is off.
 const ROUNDING: f64 = 4.0;
 /// A guess is none if it sinks deeper than the last equilibrium by this part of the radius.
@@ -221,10 +223,14 @@ impl<'a> WallContact<'a> {
                 continue;
             }
             // What the smooth wall takes for the lumen may be that of another wall, seen through one that is thin. Where facets are
-            // coarse the smooth wall stands beyond them, and what is outside of those is still in front of their own piece of it.
+            // coarse the smooth wall stands beyond them, and what is outside of those is still in front of their own piece of it. In a lumen
+            // much narrower than the device the far side is in the same piece: what it is in front of is behind the near one.
+            let radius_mm = self.points[index].potential.radius_mm;
             let beyond = |felt: &FeltWall| {
                 felt.query.nearest(&x, felt.reach_mm).is_some_and(|flat| {
-                    flat.distance_mm < -sunk_mm && felt.distance_from(flat.triangle, &x) < 0.0
+                    flat.distance_mm < -sunk_mm
+                        && (felt.distance_from(flat.triangle, &x) < 0.0
+                            || distance_mm - flat.distance_mm > FAR_SIDE * radius_mm)
                 })
             };
             if std::mem::take(&mut sunk) && beyond(&self.felt) {
