@@ -31,8 +31,10 @@ const SAFE: f64 = 0.9;
 /// A point whose axis is nearer to the wall than this part of its radius has sunk into it: on which side of the wall it is says the
 /// side that it came from, and the nearest piece of wall is looked for along the wall, not through space.
 const SUNK: f64 = 0.3;
-/// No smooth wall is off its triangles by so many radii; one that seems to be is another one.
+/// A smooth wall that seems to be off its triangles by so many radii, …
 const FAR_SIDE: f64 = 1.5;
+/// … and by so much, mm, is that of another side: coarse meshes have walls that are off by half of it.
+const FAR_SIDE_MM: f64 = 0.5;
 /// Roundings of a coordinate by which a distance is off.
 const ROUNDING: f64 = 4.0;
 /// A guess is none if it sinks deeper than the last equilibrium by this part of the radius.
@@ -230,7 +232,7 @@ impl<'a> WallContact<'a> {
                 felt.query.nearest(&x, felt.reach_mm).is_some_and(|flat| {
                     flat.distance_mm < -sunk_mm
                         && (felt.distance_from(flat.triangle, &x) < 0.0
-                            || distance_mm - flat.distance_mm > FAR_SIDE * radius_mm)
+                            || distance_mm - flat.distance_mm > (FAR_SIDE * radius_mm).max(FAR_SIDE_MM))
                 })
             };
             if std::mem::take(&mut sunk) && beyond(&self.felt) {
