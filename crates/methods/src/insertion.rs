@@ -166,7 +166,7 @@ impl Insertion {
         let report = &mut self.report;
         report.inserted_mm = from_tip_mm[0];
         let tip = posture.positions_mm[posture.positions_mm.len() - 1];
-        report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening);
+        report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening.index);
         let mut load = WallLoad::new(&self.wall, surroundings, from_tip_mm);
         let wall = load.contacts(&posture.positions_mm, &mut report.contacts);
         let bend = chain.bending_energy_mj(posture);

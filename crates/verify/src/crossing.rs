@@ -96,10 +96,8 @@ impl CrossingTest {
         // A tip goes out through an opening, and so does a bow whose tip is still within.
         let is_out = |x: &Vec3| {
             wall.openings().iter().any(|opening| {
-                let offset = x - opening.centre_mm;
-                let beyond_mm = offset.dot(&opening.direction);
-                beyond_mm > 0.0
-                    && (offset - opening.direction * beyond_mm).norm() < BESIDE_RADII * opening.radius_mm
+                let (beyond_mm, aside_mm) = opening.beyond_and_aside_mm(x);
+                beyond_mm > 0.0 && aside_mm < BESIDE_RADII * opening.radius_mm
             })
         };
         let missing = |x: &Vec3, behind_mm: f64, (piece, part): (usize, f64)| {

@@ -92,13 +92,11 @@ pub fn leave_mm(opening: &Opening) -> f64 {
     opening.beyond_mm - LEFT_MM
 }
 
-/// The opening beyond whose plane `x` lies, within its extension.
-pub fn left_through(wall: &Wall, x: &Vec3) -> Option<(usize, f64)> {
+/// The opening beyond whose plane `x` lies, within its extension, and how far, mm.
+pub fn left_through<'a>(wall: &'a Wall, x: &Vec3) -> Option<(&'a Opening, f64)> {
     wall.openings().iter().find_map(|o| {
-        let offset = x - o.centre_mm;
-        let beyond = offset.dot(&o.direction);
-        let aside = (offset - o.direction * beyond).norm();
-        (beyond > 0.0 && beyond <= o.beyond_mm && aside < 1.5 * o.radius_mm).then_some((o.index, beyond))
+        let (beyond, aside) = o.beyond_and_aside_mm(x);
+        (beyond > 0.0 && beyond <= o.beyond_mm && aside < 1.5 * o.radius_mm).then_some((o, beyond))
     })
 }
 
@@ -145,7 +143,7 @@ mod tests {
             .wall;
         let top = wall.openings().iter().find(|o| o.direction.z > 0.5).unwrap();
         let found = left_through(&wall, &Vec3::new(1.0, 0.0, 105.0)).unwrap();
-        assert!(found.0 == top.index && (found.1 - 5.0).abs() < 1e-6);
+        assert!(found.0.index == top.index && (found.1 - 5.0).abs() < 1e-6);
         assert!(left_through(&wall, &Vec3::new(1.0, 0.0, 95.0)).is_none());
     }
 }

@@ -46,6 +46,13 @@ impl Opening {
         Self { index: 0, centre_mm, radius_mm, direction, boundary, beyond_mm: MOST_BEYOND_MM }
     }
 
+    /// How far `x` is beyond the opening's plane, and aside from its axis, mm.
+    pub fn beyond_and_aside_mm(&self, x: &Vec3) -> (f64, f64) {
+        let offset = x - self.centre_mm;
+        let beyond_mm = offset.dot(&self.direction);
+        (beyond_mm, (offset - self.direction * beyond_mm).norm())
+    }
+
     /// The triangles that close the opening: a fan around its centre, facing out.
     pub fn cap(&self, mesh: &SurfaceMesh) -> impl Iterator<Item = [Vec3; 3]> {
         let at = |k: usize| mesh.vertices_mm[self.boundary[k % self.boundary.len()] as usize];
@@ -84,10 +91,10 @@ pub(super) fn keep_apart(mesh: &SurfaceMesh, openings: &mut [Opening]) {
     let centres = (0..mesh.triangles.len()).map(|t| mesh.corners(t).iter().sum::<Vec3>() / 3.0);
     for x in mesh.vertices_mm.iter().copied().chain(centres) {
         for (opening, beyond) in openings.iter().zip(&mut beyond) {
-            let (offset, free) = (x - opening.centre_mm, FREE_RADII * opening.radius_mm);
-            let along = offset.dot(&opening.direction);
+            let free = FREE_RADII * opening.radius_mm;
+            let (along, aside) = opening.beyond_and_aside_mm(&x);
             // Rims may be oblique.
-            if along > free && along < *beyond + free && (offset - opening.direction * along).norm() < free {
+            if along > free && along < *beyond + free && aside < free {
                 *beyond = along - free;
             }
         }

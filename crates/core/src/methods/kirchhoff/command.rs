@@ -233,9 +233,9 @@ fn jumped(stack: &Stack, (before, after): (&StepReport, &StepReport), way: &Way,
 /// Refuses a tip that, `ahead_mm` farther, would be beyond an opening where nothing is known any more.
 fn check_inside(wall: &Wall, tip_mm: &Vec3, ahead_mm: f64) -> Result<()> {
     let Some((opening, beyond_mm)) = left_through(wall, tip_mm) else { return Ok(()) };
-    let limit_mm = wall.openings().get(opening).map_or(f64::MAX, leave_mm);
+    let limit_mm = leave_mm(opening);
     if beyond_mm + ahead_mm > limit_mm {
-        return Err(Error::End(PhysicalEnd::Left { opening, beyond_mm, limit_mm }));
+        return Err(Error::End(PhysicalEnd::Left { opening: opening.index, beyond_mm, limit_mm }));
     }
     Ok(())
 }
