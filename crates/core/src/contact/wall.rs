@@ -375,6 +375,14 @@ impl External for WallContact<'_> {
         self.press_or_let_go_contacts(elements, base, moved, into)
     }
 
+    fn part_towards(&mut self, moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> f64 {
+        self.part_towards_contacts(moved)
+    }
+
+    fn hold_on(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> usize {
+        self.hold_on_contacts(elements, base, into)
+    }
+
     fn forget(&mut self) {
         self.memory.foreseen.clear();
     }

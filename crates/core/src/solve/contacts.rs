@@ -1,28 +1,40 @@
 //! Contacts within a step: which of them press at its end, and how a trial is brought back to them.
 //!
 //! Newton's step knows of the contacts that press where it begins. Where a trial runs into others it is refused, and is found anew with
-//! them: each by the plane in which the trial has met the wall, and those that would pull let go, until the model
+//! them: each by the plane in which the trial has met the wall, and those that would pull let go, until it is the minimum of the model
 //!
 //! ```text
-//! min  r·δ + ½ δᵀ K δ + Σ ½ wᵢ k (gᵢ + ∇dᵢ·δ)₋²
+//! m(δ) = r·δ + ½ δᵀ K δ + Σ ½ wᵢ k (gᵢ + ∇dᵢ·δ)₋²
 //! ```
 //!
-//! of energy and contacts has its own active set: the semi-smooth Newton method of contact (M. Hintermüller, K. Ito, K. Kunisch, *The
-//! primal-dual active set strategy as a semismooth Newton method*, SIAM J. Optim. 13 (2002)) within the step, at the cost of
-//! a factorisation a round and no question to the wall.
+//! of energy and contacts, K being the matrix without their springs. That is the semi-smooth Newton method of contact (M. Hintermüller, K. Ito,
+//! K. Kunisch, *The primal-dual active set strategy as a semismooth Newton method*, SIAM J. Optim. 13 (2002)) within the step, at the
+//! cost of a factorisation a round and no question to the wall. Whole steps of it go round in circles where dozens of contacts change at
+//! once; each goes as far as m falls along it, which is a search over the kinks of a parabola, and ends at the minimum where m
+//! is convex. Where a contact that is let go leaves a matrix that is not that of a minimum, those of the base are kept, and may pull.
+//!
+//! Nothing but the contacts is asked for that search. Of a step δ that is a mean of solutions, with the same weights, r + Kδ = −Σ Fᵢ ∇dᵢ,
+//! where Fᵢ is that mean of the forces wᵢ k (gᵢ + ∇dᵢ·δ) of the springs in each; so along p = δ′ − δ, to the solution δ′ with the forces
+//! Fᵢ′,
+//!
+//! ```text
+//! dm/ds = Σ [wᵢ k (gᵢ + ∇dᵢ·(δ + s p))₋ − Fᵢ − s (Fᵢ′ − Fᵢ)] ∇dᵢ·p
+//! ```
 
+use super::external::External;
 use super::newton::{Newton, Problem};
 use super::trial::LARGEST_CORRECTION;
 use crate::Vec3;
+use crate::banded::{FactorError, Inertia};
 use crate::rod::scatter::point_step;
-use crate::rod::{ElementData, RodState};
+use crate::rod::{Assembly, ElementData, RodState};
 
 /// Most corrections of the contacts at a trial.
 const CORRECTIONS: usize = 3;
 /// Forces of contacts may be off what was foreseen by this part.
 const STRAYED: f64 = 0.1;
 /// Most rounds in which the contacts that a step leads to are looked for.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 30;
 
 /// How far a step moves the point at ξ of an element along a direction.
 fn moved<'a, const C: usize>(
@@ -49,7 +61,7 @@ impl<const C: usize> Newton<C> {
         part: f64,
         shift: f64,
     ) -> bool {
-        let Problem { elements, supports, external, .. } = problem;
+        let Problem { elements, ref mut external, .. } = *problem;
         let arrived = external.meet(elements, &self.trial, part, &moved::<C>(elements, state, &self.step));
         if !arrived {
             return false;
@@ -57,30 +69,55 @@ impl<const C: usize> Newton<C> {
         self.spare.copy_from_slice(&self.step);
         let whisper = Self::whisper(elements);
         let sigma = if shift > whisper { whisper + shift } else { whisper };
+        let minimum = |found: Result<Inertia, FactorError>| {
+            found.is_ok_and(|inertia| inertia.negative == elements.len())
+        };
+        let mut whole = true;
         for round in 0..=ROUNDS {
-            // The slope of the energy is that at the base; what contacts change is for the right-hand side alone.
-            std::mem::swap(&mut self.assembly.residual, &mut self.assembly.correction);
-            let changed = {
-                let way = moved::<C>(elements, state, &self.step);
-                external.press_or_let_go(elements, state, &way, &mut self.assembly)
-            };
-            std::mem::swap(&mut self.assembly.residual, &mut self.assembly.correction);
-            supports.hold(&mut self.assembly);
+            let changed = self.change_contacts(problem, |external, step, into| {
+                external.press_or_let_go(elements, state, &moved::<C>(elements, state, step), into)
+            });
             // The step at hand is the one that these contacts give.
             if changed == 0 && round == 0 {
                 return false;
             }
-            if changed == 0 || round == ROUNDS {
+            if (changed == 0 && whole) || round == ROUNDS {
                 break;
             }
-            if !self.factor_step(sigma).is_ok_and(|inertia| inertia.negative == elements.len()) {
-                self.step.copy_from_slice(&self.spare);
-                external.forget();
-                return false;
+            self.before.copy_from_slice(&self.step);
+            if !minimum(self.factor_step(sigma)) {
+                let kept = self
+                    .change_contacts(problem, |external, _, into| external.hold_on(elements, state, into));
+                if kept == 0 || !minimum(self.factor_step(sigma)) {
+                    self.step.copy_from_slice(&self.spare);
+                    problem.external.forget();
+                    return false;
+                }
+            }
+            let part = problem.external.part_towards(&moved::<C>(elements, state, &self.step));
+            whole = part >= 1.0;
+            if !whole {
+                for (step, before) in self.step.iter_mut().zip(&self.before) {
+                    *step = before + part * (*step - before);
+                }
             }
         }
         Self::restore_tensions(elements, &mut self.step);
         true
+    }
+
+    /// Changes contacts in the assembled system. The slope of the energy stays that at the base: what they change is for the right-hand
+    /// side alone.
+    fn change_contacts(
+        &mut self,
+        problem: &mut Problem<'_>,
+        change: impl FnOnce(&mut dyn External, &[f64], &mut Assembly<C>) -> usize,
+    ) -> usize {
+        std::mem::swap(&mut self.assembly.residual, &mut self.assembly.correction);
+        let changed = change(&mut *problem.external, &self.step, &mut self.assembly);
+        std::mem::swap(&mut self.assembly.residual, &mut self.assembly.correction);
+        problem.supports.hold(&mut self.assembly);
+        changed
     }
 
     /// Second-order corrections of the contacts at the trial, `part` of the step from the assembled state, with the factorisation at hand.

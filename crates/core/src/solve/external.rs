@@ -61,6 +61,17 @@ pub trait External {
         0
     }
 
+    /// Part of the way from the step foreseen last to another, which solves the system as it is, at which the model has its minimum: of the
+    /// energy with springs where contacts press and none where they would pull.
+    fn part_towards(&mut self, _moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> f64 {
+        1.0
+    }
+
+    /// Adds the springs again of contacts that press at the base and were let go, for good. Returns how many.
+    fn hold_on(&mut self, _elements: &[ElementData], _base: &RodState, _into: &mut dyn Stencils) -> usize {
+        0
+    }
+
     /// Nothing is foreseen any more: the step that was is not taken.
     fn forget(&mut self) {}
 

@@ -36,6 +36,8 @@ pub struct Newton<const C: usize> {
     pub(super) factor: Factor<C>,
     pub(super) step: Vec<f64>,
     pub(super) spare: Vec<f64>,
+    /// The step before, while contacts within one are looked for.
+    pub(super) before: Vec<f64>,
     pub(super) columns: Vec<Vec<f64>>,
     pub(super) trial: RodState,
     pub(super) other: RodState,
@@ -54,6 +56,7 @@ impl<const C: usize> Newton<C> {
             factor: Factor::new(n),
             step: vec![0.0; n],
             spare: vec![0.0; n],
+            before: vec![0.0; n],
             columns: Vec::new(),
             trial: RodState::default(),
             other: RodState::default(),
@@ -78,7 +81,7 @@ impl<const C: usize> Newton<C> {
         }
         self.assembly.resize(elements);
         self.factor.resize(n);
-        for list in [&mut self.step, &mut self.spare].into_iter().chain(&mut self.columns) {
+        for list in [&mut self.step, &mut self.spare, &mut self.before].into_iter().chain(&mut self.columns) {
             list.resize(n, 0.0);
         }
     }

@@ -15,7 +15,7 @@ use nalgebra::Matrix3;
 
 use super::{Reading, WallContact};
 use crate::Vec3;
-use crate::contact::point::FOLLOW;
+use crate::contact::point::{ContactPoint, FOLLOW};
 use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
@@ -33,8 +33,51 @@ pub(in crate::contact) struct Foreseen {
     gradient: Vec3,
     /// w k, N/mm.
     spring_n_per_mm: f64,
+    /// The force that the rod's own stiffness is in balance with, as a spring's of that deflection, N.
+    carried_n: f64,
+    /// Whether it presses at the base.
+    at_base: bool,
     /// Whether the matrix knows of it.
     presses: bool,
+    /// Whether it is not let go in this step: without it there is no minimum.
+    kept: bool,
+}
+
+impl Foreseen {
+    /// Adds its spring to a system, or takes it away.
+    fn switch(
+        &self,
+        point: &ContactPoint,
+        elements: &[ElementData],
+        base: &RodState,
+        into: &mut dyn Stencils,
+    ) {
+        let sign = if self.presses { 1.0 } else { -1.0 };
+        let along = self.gradient * (sign * self.spring_n_per_mm);
+        let force = along * self.gap_mm[0];
+        let hessian = along * self.gradient.transpose();
+        let e = point.element;
+        if self.gap_mm[0] >= 0.0 {
+            // The force by which a plane that is not reached yet would pull is none that tangents turn under.
+            let [_, near, _, far] = hermite(point.xi);
+            for (node, share) in [(e, near), (e + 1, far)] {
+                let back = share * elements[e].length * force.dot(&base.frames[node].t);
+                into.add_turn(node, &Vec3::zeros(), &Matrix3::from_diagonal(&Vec3::new(back, back, 0.0)));
+            }
+        }
+        let mut sum = PointSum::default();
+        sum.add(point.xi, &force, Some(&hessian));
+        into.add_points(base, &elements[e], e, &sum);
+    }
+}
+
+/// Those principal curvatures of a wall that are wanted, times a force, N.
+fn crest(force_n: f64, hessian: &Matrix3<f64>, wanted: impl Fn(f64) -> bool) -> Matrix3<f64> {
+    let principal = hessian.symmetric_eigen();
+    let ways = principal.eigenvalues.iter().zip(principal.eigenvectors.column_iter());
+    ways.filter(|(value, _)| wanted(**value))
+        .map(|(value, way)| way * way.transpose() * (force_n * value))
+        .sum()
 }
 
 impl WallContact<'_> {
@@ -44,15 +87,18 @@ impl WallContact<'_> {
         foreseen.clear();
         for (index, point) in self.points.iter().enumerate() {
             let Some(d) = self.memory.pressed(index) else { continue };
+            let (gap_mm, change_mm) =
+                (d.value_mm - point.potential.radius_mm, moved((point.element, point.xi), &d.gradient));
+            let spring_n_per_mm = self.weight_mm(index) * point.potential.modulus_n_per_mm2;
             foreseen.push(Foreseen {
                 index,
-                gap_mm: [
-                    d.value_mm - point.potential.radius_mm,
-                    moved((point.element, point.xi), &d.gradient),
-                ],
+                gap_mm: [gap_mm, change_mm],
                 gradient: d.gradient,
-                spring_n_per_mm: self.weight_mm(index) * point.potential.modulus_n_per_mm2,
+                spring_n_per_mm,
+                carried_n: spring_n_per_mm * (gap_mm + change_mm),
+                at_base: true,
                 presses: true,
+                kept: false,
             });
         }
         self.memory.foreseen = foreseen;
@@ -68,15 +114,18 @@ impl WallContact<'_> {
         moved: &dyn Fn((usize, f64), &Vec3) -> f64,
     ) -> bool {
         let known = self.memory.foreseen.len();
-        let mut next = 0;
+        let (mut next, mut met) = (0, 0);
         for index in 0..self.points.len() {
-            if next < known && self.memory.foreseen[next].index == index {
-                next += 1;
+            let old =
+                self.memory.foreseen[..known].get(next).filter(|contact| contact.index == index).copied();
+            next += usize::from(old.is_some());
+            // Those that press are brought back to what was foreseen of them.
+            if old.is_some_and(|contact| contact.presses) {
                 continue;
             }
             let point = self.points[index];
             let (x, radius_mm) = (self.material(index, elements, trial), point.potential.radius_mm);
-            let limit_mm = (1.0 + FOLLOW) * radius_mm;
+            let limit_mm = if old.is_some() { radius_mm } else { (1.0 + FOLLOW) * radius_mm };
             let Reading::Pressed(d) = self.read_within(index, &x, limit_mm) else { continue };
             let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, self.softness).factor;
             let change_mm = moved((point.element, point.xi), &d.gradient);
@@ -84,16 +133,24 @@ impl WallContact<'_> {
             let plane_mm = d.value_mm - radius_mm - part * change_mm;
             let base_mm = self.memory.points[index].base_clearance_mm - radius_mm;
             let gap_mm = if plane_mm < 0.0 { base_mm.max(0.0) } else { plane_mm };
-            self.memory.foreseen.push(Foreseen {
+            let contact = Foreseen {
                 index,
                 gap_mm: [gap_mm, change_mm],
                 gradient: d.gradient,
                 spring_n_per_mm: factor * point.weight_mm * point.potential.modulus_n_per_mm2,
+                carried_n: 0.0,
+                at_base: old.is_some_and(|contact| contact.at_base),
                 presses: false,
-            });
+                kept: false,
+            };
+            met += 1;
+            match old {
+                Some(_) => self.memory.foreseen[next - 1] = contact,
+                None => self.memory.foreseen.push(contact),
+            }
         }
         self.memory.foreseen.sort_unstable_by_key(|contact| contact.index);
-        self.memory.foreseen.len() > known
+        met > 0
     }
 
     /// See [`External::press_or_let_go`](crate::solve::External::press_or_let_go).
@@ -109,17 +166,78 @@ impl WallContact<'_> {
             let point = &self.points[contact.index];
             contact.gap_mm[1] = moved((point.element, point.xi), &contact.gradient);
             let presses = contact.gap_mm[0] + contact.gap_mm[1] < 0.0;
-            if presses == contact.presses {
+            if presses == contact.presses || contact.kept {
                 continue;
             }
             (contact.presses, changed) = (presses, changed + 1);
-            let spring = if presses { contact.spring_n_per_mm } else { -contact.spring_n_per_mm };
-            let along = contact.gradient * spring;
-            let mut sum = PointSum::default();
-            sum.add(point.xi, &(along * contact.gap_mm[0]), Some(&(along * contact.gradient.transpose())));
-            into.add_points(base, &elements[point.element], point.element, &sum);
+            contact.switch(point, elements, base, into);
         }
         changed
+    }
+
+    /// See [`External::part_towards`](crate::solve::External::part_towards).
+    pub(super) fn part_towards_contacts(&mut self, moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> f64 {
+        let points = self.points;
+        let foreseen = &mut self.memory.foreseen;
+        let way_mm = |contact: &Foreseen| {
+            let point = &points[contact.index];
+            moved((point.element, point.xi), &contact.gradient) - contact.gap_mm[1]
+        };
+        // (gap, its change along the way, the force carried, and that at the end, all as springs')
+        let lines: Vec<_> = foreseen
+            .iter()
+            .map(|contact| {
+                let (gap, way) = (contact.gap_mm[0] + contact.gap_mm[1], way_mm(contact));
+                let end = if contact.presses { contact.spring_n_per_mm * (gap + way) } else { 0.0 };
+                (contact, gap, way, end)
+            })
+            .collect();
+        let slope = |part: f64| -> f64 {
+            let each = lines.iter().map(|&(contact, gap, way, end)| {
+                let there = gap + part * way;
+                let felt = if contact.kept { there } else { there.min(0.0) };
+                let carried = contact.carried_n + part * (end - contact.carried_n);
+                (contact.spring_n_per_mm * felt - carried) * way
+            });
+            each.sum()
+        };
+        let mut kinks: Vec<f64> = lines
+            .iter()
+            .map(|(_, gap, way, _)| -gap / way)
+            .filter(|part| *part > 0.0 && *part < 1.0)
+            .collect();
+        kinks.sort_unstable_by(f64::total_cmp);
+        kinks.push(1.0);
+        let mut last = (0.0, slope(0.0));
+        let mut part = 1.0;
+        for kink in kinks {
+            let here = slope(kink);
+            if here > 0.0 {
+                part = last.0 + (kink - last.0) * last.1 / (last.1 - here);
+                break;
+            }
+            last = (kink, here);
+        }
+        let ends: Vec<f64> = lines.iter().map(|line| line.3).collect();
+        for (contact, end) in foreseen.iter_mut().zip(ends) {
+            contact.carried_n += part * (end - contact.carried_n);
+        }
+        part
+    }
+
+    /// See [`External::hold_on`](crate::solve::External::hold_on).
+    pub(super) fn hold_on_contacts(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        into: &mut dyn Stencils,
+    ) -> usize {
+        let mut kept = 0;
+        for contact in self.memory.foreseen.iter_mut().filter(|contact| contact.at_base && !contact.presses) {
+            (contact.presses, contact.kept, kept) = (true, true, kept + 1);
+            contact.switch(&self.points[contact.index], elements, base, into);
+        }
+        kept
     }
 
     /// See [`External::stray`](crate::solve::External::stray).
@@ -133,7 +251,7 @@ impl WallContact<'_> {
         let (mut stray_n, mut foreseen_n) = (0.0, self.least_force_n());
         for k in 0..self.memory.foreseen.len() {
             let contact = self.memory.foreseen[k];
-            let Foreseen { index, gap_mm: [gap, change], gradient, spring_n_per_mm, presses } = contact;
+            let Foreseen { index, gap_mm: [gap, change], gradient, spring_n_per_mm, presses, .. } = contact;
             let foreseen_mm = gap + part * change;
             if !presses || foreseen_mm >= 0.0 {
                 continue;
@@ -163,15 +281,9 @@ impl WallContact<'_> {
         for (index, point) in self.points.iter().enumerate() {
             let Some(d) = self.memory.pressed(index) else { continue };
             let press = -self.weight_mm(index) * point.potential.derivatives(d.value_mm).0;
-            let curvature = d.hessian.symmetric_eigen();
-            let mut crest = Matrix3::zeros();
-            for (value, way) in curvature.eigenvalues.iter().zip(curvature.eigenvectors.column_iter()) {
-                if *value > 0.0 {
-                    crest += way * way.transpose() * (press * value);
-                }
-            }
             let (e, h) = (point.element, elements[point.element].length);
-            if curvature.eigenvalues.max() > CREST_PER_MM {
+            let crest = crest(press, &d.hessian, |value| value > 0.0);
+            if crest.trace() > CREST_PER_MM * press {
                 any = true;
                 let mut sum = PointSum::default();
                 sum.add(point.xi, &Vec3::zeros(), Some(&crest));
