@@ -270,6 +270,11 @@ impl Friction {
         (way - s.normal * s.normal.dot(&way) + spin * (angle - s.from_rad), spin)
     }
 
+    /// The largest force of friction on a point, N.
+    pub(crate) fn largest_n(&self, index: usize) -> f64 {
+        self.sliders.get(index).map_or(0.0, |slider| self.coefficient * slider.force_n)
+    }
+
     /// Friction energy of a point.
     pub fn value(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> f64 {
         let force = self.sliders.get(index).map_or(0.0, |s| self.coefficient * s.force_n);

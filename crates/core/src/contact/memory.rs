@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::distance::{Distance, Nearness};
 use super::places::{Place, Places};
 use super::point::{FOLLOW, LOOK_AGAIN};
-use super::wall::Foreseen;
+use super::wall::{Foreseen, Slipping};
 use super::{ContactPoint, FeltWall, MovedWall};
 use crate::Vec3;
 
@@ -108,6 +108,8 @@ pub struct WallMemory {
     pub(super) aims: Vec<f64>,
     /// What a step does to the contacts, to first order.
     pub(super) foreseen: Vec<Foreseen>,
+    /// What it does to the friction, where it was found anew.
+    pub(super) slipping: Vec<Slipping>,
 }
 
 /// What the points of a device know of the wall at an equilibrium.
@@ -157,6 +159,7 @@ impl WallMemory {
             last: Place::UNKNOWN,
             aims: Vec::new(),
             foreseen: Vec::new(),
+            slipping: Vec::new(),
         }
     }
 

@@ -13,16 +13,18 @@
 mod coupling;
 mod foresight;
 mod reading;
+mod slipping;
 
 use super::memory::WallMemory;
 use super::point::{Contact, ContactPoint, Counters, FOLLOW, Touch};
 use crate::Vec3;
 use crate::contact::{Between, FeltWall, Friction, MovedWall};
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
-use crate::solve::External;
+use crate::solve::{External, Moved};
 
 pub(super) use foresight::Foreseen;
 use reading::Reading;
+pub(super) use slipping::Slipping;
 
 /// Radius of the gentlest bend worth a number, mm.
 const LEAST_BEND_MM: f64 = 100.0;
@@ -350,41 +352,46 @@ impl External for WallContact<'_> {
         std::mem::swap(&mut self.memory.points, &mut self.memory.before);
     }
 
-    fn foresee(&mut self, moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> bool {
+    fn foresee(&mut self, moved: &Moved<'_>) -> bool {
         self.foresee_contacts(moved)
     }
 
     fn meet(
         &mut self,
         elements: &[ElementData],
-        trial: &RodState,
+        (base, trial): (&RodState, &RodState),
         part: f64,
-        moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        moved: &Moved<'_>,
     ) -> bool {
         // Where the modulus changes by powers of ten from place to place, a plane and a spring are no model of what a trial has met.
-        self.stiff && self.felt.grading.is_none() && self.meet_contacts(elements, trial, part, moved)
+        if !self.stiff || self.felt.grading.is_some() {
+            return false;
+        }
+        let slips = self.begin_slipping(base, moved);
+        self.meet_contacts(elements, trial, part, moved) || slips
     }
 
     fn press_or_let_go(
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        moved: &Moved<'_>,
         into: &mut dyn Stencils,
     ) -> usize {
-        self.press_or_let_go_contacts(elements, base, moved, into)
+        self.press_or_let_go_contacts(elements, base, moved, into) + self.slip_on(elements, base, moved, into)
     }
 
-    fn part_towards(&mut self, moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> f64 {
+    fn part_towards(&mut self, moved: &Moved<'_>) -> f64 {
         self.part_towards_contacts(moved)
     }
 
     fn hold_on(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> usize {
-        self.hold_on_contacts(elements, base, into)
+        self.hold_on_contacts(elements, base, into) + self.stop_slipping(elements, base, into)
     }
 
     fn forget(&mut self) {
         self.memory.foreseen.clear();
+        self.memory.slipping.clear();
     }
 
     fn stray(

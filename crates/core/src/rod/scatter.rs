@@ -141,16 +141,23 @@ fn point_columns<const C: usize>(
     ]
 }
 
-/// How much the point at ξ of element `e` moves along `way` with the step `d`.
+/// How the point at ξ of element `e` moves with the step `d`.
 pub(crate) fn point_step<const C: usize>(
     state: &RodState,
     element: &ElementData,
     (e, xi): (usize, f64),
-    way: &Vec3,
     d: &[f64],
-) -> f64 {
+) -> Vec3 {
     let columns = point_columns::<C>(state, element, e, xi);
-    columns.iter().map(|(row, column)| way.dot(column) * d[*row]).sum()
+    columns.iter().map(|(row, column)| column * d[*row]).sum()
+}
+
+/// Change of the material angle of the instrument in a `set` of angles at ξ of element `e` in a step `d`, rad.
+pub(crate) fn point_turn<const C: usize>((e, xi, set): (usize, f64, usize), d: &[f64]) -> f64 {
+    if Layout::<C>::ANGLES == 0 {
+        return 0.0;
+    }
+    angle_weights::<C>(e, xi, set).iter().map(|(row, share)| share * d[*row]).sum()
 }
 
 /// Adds the derivatives of a force on the point at ξ of element `e`, and of a moment about the tangent there on the instrument in a `set`

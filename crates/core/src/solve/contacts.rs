@@ -26,7 +26,7 @@ use super::newton::{Newton, Problem};
 use super::trial::LARGEST_CORRECTION;
 use crate::Vec3;
 use crate::banded::{FactorError, Inertia};
-use crate::rod::scatter::point_step;
+use crate::rod::scatter::{point_step, point_turn};
 use crate::rod::{Assembly, ElementData, RodState};
 
 /// Most corrections of the contacts at a trial.
@@ -36,13 +36,16 @@ const STRAYED: f64 = 0.1;
 /// Most rounds in which the contacts that a step leads to are looked for.
 const ROUNDS: usize = 30;
 
-/// How far a step moves the point at ξ of an element along a direction.
+/// What a step does to points of the rod.
 fn moved<'a, const C: usize>(
     elements: &'a [ElementData],
     state: &'a RodState,
     step: &'a [f64],
-) -> impl Fn((usize, f64), &Vec3) -> f64 + 'a {
-    move |(e, xi), way| point_step::<C>(state, &elements[e], (e, xi), way, step)
+) -> impl Fn((usize, f64, usize)) -> (Vec3, f64) + 'a {
+    move |(e, xi, set)| {
+        let way = point_step::<C>(state, &elements[e], (e, xi), step);
+        (way, point_turn::<C>((e, xi, set), step))
+    }
 }
 
 impl<const C: usize> Newton<C> {
@@ -62,7 +65,8 @@ impl<const C: usize> Newton<C> {
         shift: f64,
     ) -> bool {
         let Problem { elements, ref mut external, .. } = *problem;
-        let arrived = external.meet(elements, &self.trial, part, &moved::<C>(elements, state, &self.step));
+        let arrived =
+            external.meet(elements, (state, &self.trial), part, &moved::<C>(elements, state, &self.step));
         if !arrived {
             return false;
         }

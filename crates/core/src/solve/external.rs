@@ -3,6 +3,9 @@
 use crate::Vec3;
 use crate::rod::{ElementData, RodState, Stencils};
 
+/// What a step does to the point at ξ of an element, on the instrument in a set of angles: how far it moves it, mm, and turns it, rad.
+pub type Moved<'a> = dyn Fn((usize, f64, usize)) -> (Vec3, f64) + 'a;
+
 /// An energy outside the rod: loads, walls, or several of them together. It says where it acts in terms of the rod
 /// ([`Stencils`]) and knows nothing of unknowns.
 ///
@@ -31,20 +34,19 @@ pub trait External {
     /// The state linearised last was a trial that is refused: the base before it is the base again, and is linearised next.
     fn return_to_base(&mut self) {}
 
-    /// Notes what a step from the base does to contacts, to first order: `moved` tells how far the step moves the point at ξ of an element
-    /// along a direction. Returns whether there are any: a trial may then [`stray`](External::stray).
-    fn foresee(&mut self, _moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> bool {
+    /// Notes what a step from the base does to contacts, to first order. Returns whether there are any: a trial may then [`stray`](External::stray).
+    fn foresee(&mut self, _moved: &Moved<'_>) -> bool {
         false
     }
 
-    /// Notes the contacts into which a trial, `part` of the step from the base, has run, by the plane in which each has met the wall.
+    /// Notes the contacts into which a trial, the second of two states and `part` of the step from the first, the base, has run, by the plane in which each has met the wall.
     /// Returns whether there are any that were not foreseen.
     fn meet(
         &mut self,
         _elements: &[ElementData],
-        _trial: &RodState,
+        _states: (&RodState, &RodState),
         _part: f64,
-        _moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        _moved: &Moved<'_>,
     ) -> bool {
         false
     }
@@ -55,7 +57,7 @@ pub trait External {
         &mut self,
         _elements: &[ElementData],
         _base: &RodState,
-        _moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        _moved: &Moved<'_>,
         _into: &mut dyn Stencils,
     ) -> usize {
         0
@@ -63,7 +65,7 @@ pub trait External {
 
     /// Part of the way from the step foreseen last to another, which solves the system as it is, at which the model has its minimum: of the
     /// energy with springs where contacts press and none where they would pull.
-    fn part_towards(&mut self, _moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> f64 {
+    fn part_towards(&mut self, _moved: &Moved<'_>) -> f64 {
         1.0
     }
 

@@ -16,7 +16,7 @@ mod stop;
 mod trial;
 mod unsymmetric;
 
-pub use external::External;
+pub use external::{External, Moved};
 pub use newton::Newton;
 pub use report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 pub use residual::ResidualSize;

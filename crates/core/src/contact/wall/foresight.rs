@@ -18,9 +18,14 @@ use crate::Vec3;
 use crate::contact::point::{ContactPoint, FOLLOW};
 use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
+use crate::solve::Moved;
 
 /// A wall that bends away from the lumen by less than this, 1/mm, has no crest.
 const CREST_PER_MM: f64 = 1e-3;
+/// A search ends where this part of the slope is left, …
+const SEARCHED: f64 = 1e-3;
+/// … and after so many trials.
+const SEARCHES: usize = 60;
 
 /// A contact in a step, and what that does to it.
 #[derive(Debug, Clone, Copy)]
@@ -44,6 +49,11 @@ pub(in crate::contact) struct Foreseen {
 }
 
 impl Foreseen {
+    /// Force of its spring in the system after a step that changes its gap so much, N.
+    fn linear_n(&self, change_mm: f64) -> f64 {
+        if self.presses { self.spring_n_per_mm * (self.gap_mm[0] + change_mm) } else { 0.0 }
+    }
+
     /// Adds its spring to a system, or takes it away.
     fn switch(
         &self,
@@ -58,16 +68,51 @@ impl Foreseen {
         let hessian = along * self.gradient.transpose();
         let e = point.element;
         if self.gap_mm[0] >= 0.0 {
-            // The force by which a plane that is not reached yet would pull is none that tangents turn under.
-            let [_, near, _, far] = hermite(point.xi);
-            for (node, share) in [(e, near), (e + 1, far)] {
-                let back = share * elements[e].length * force.dot(&base.frames[node].t);
-                into.add_turn(node, &Vec3::zeros(), &Matrix3::from_diagonal(&Vec3::new(back, back, 0.0)));
-            }
+            straighten(point, &elements[e], base, &force, into);
         }
         let mut sum = PointSum::default();
         sum.add(point.xi, &force, Some(&hessian));
         into.add_points(base, &elements[e], e, &sum);
+    }
+}
+
+/// Part of a way, at most all of it, up to which a convex function falls whose slope is given (the Illinois method).
+fn falls_until(slope: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = ((0.0, slope(0.0)), (1.0, slope(1.0)));
+    if high.1 <= 0.0 || low.1 >= 0.0 {
+        return 1.0;
+    }
+    let least = SEARCHED * -low.1;
+    let mut last = 0.0;
+    for _ in 0..SEARCHES {
+        let part = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+        let here = slope(part);
+        if here.abs() <= least {
+            return part;
+        }
+        let (end, other) = if here < 0.0 { (&mut low, &mut high) } else { (&mut high, &mut low) };
+        *end = (part, here);
+        if last * here > 0.0 {
+            other.1 *= 0.5;
+        }
+        last = here;
+    }
+    low.0
+}
+
+/// Takes away what a force on a point that is added to a system, as a gradient, does to the tangents as they turn: those by which a plane
+/// that is not reached yet would pull, or friction is linear, are none under which they do.
+pub(super) fn straighten(
+    point: &ContactPoint,
+    element: &ElementData,
+    base: &RodState,
+    force: &Vec3,
+    into: &mut dyn Stencils,
+) {
+    let [_, near, _, far] = hermite(point.xi);
+    for (node, share) in [(point.element, near), (point.element + 1, far)] {
+        let back = share * element.length * force.dot(&base.frames[node].t);
+        into.add_turn(node, &Vec3::zeros(), &Matrix3::from_diagonal(&Vec3::new(back, back, 0.0)));
     }
 }
 
@@ -82,13 +127,16 @@ fn crest(force_n: f64, hessian: &Matrix3<f64>, wanted: impl Fn(f64) -> bool) -> 
 
 impl WallContact<'_> {
     /// See [`External::foresee`](crate::solve::External::foresee).
-    pub(super) fn foresee_contacts(&mut self, moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> bool {
+    pub(super) fn foresee_contacts(&mut self, moved: &Moved<'_>) -> bool {
         let mut foreseen = std::mem::take(&mut self.memory.foreseen);
         foreseen.clear();
+        self.memory.slipping.clear();
         for (index, point) in self.points.iter().enumerate() {
             let Some(d) = self.memory.pressed(index) else { continue };
-            let (gap_mm, change_mm) =
-                (d.value_mm - point.potential.radius_mm, moved((point.element, point.xi), &d.gradient));
+            let (gap_mm, change_mm) = (
+                d.value_mm - point.potential.radius_mm,
+                moved((point.element, point.xi, point.set)).0.dot(&d.gradient),
+            );
             let spring_n_per_mm = self.weight_mm(index) * point.potential.modulus_n_per_mm2;
             foreseen.push(Foreseen {
                 index,
@@ -111,7 +159,7 @@ impl WallContact<'_> {
         elements: &[ElementData],
         trial: &RodState,
         part: f64,
-        moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        moved: &Moved<'_>,
     ) -> bool {
         let known = self.memory.foreseen.len();
         let (mut next, mut met) = (0, 0);
@@ -128,7 +176,7 @@ impl WallContact<'_> {
             let limit_mm = if old.is_some() { radius_mm } else { (1.0 + FOLLOW) * radius_mm };
             let Reading::Pressed(d) = self.read_within(index, &x, limit_mm) else { continue };
             let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, self.softness).factor;
-            let change_mm = moved((point.element, point.xi), &d.gradient);
+            let change_mm = moved((point.element, point.xi, point.set)).0.dot(&d.gradient);
             // At the base it does not press, whatever the plane says of there.
             let plane_mm = d.value_mm - radius_mm - part * change_mm;
             let base_mm = self.memory.points[index].base_clearance_mm - radius_mm;
@@ -158,13 +206,13 @@ impl WallContact<'_> {
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        moved: &Moved<'_>,
         into: &mut dyn Stencils,
     ) -> usize {
         let mut changed = 0;
         for contact in &mut self.memory.foreseen {
             let point = &self.points[contact.index];
-            contact.gap_mm[1] = moved((point.element, point.xi), &contact.gradient);
+            contact.gap_mm[1] = moved((point.element, point.xi, point.set)).0.dot(&contact.gradient);
             let presses = contact.gap_mm[0] + contact.gap_mm[1] < 0.0;
             if presses == contact.presses || contact.kept {
                 continue;
@@ -176,52 +224,32 @@ impl WallContact<'_> {
     }
 
     /// See [`External::part_towards`](crate::solve::External::part_towards).
-    pub(super) fn part_towards_contacts(&mut self, moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> f64 {
-        let points = self.points;
-        let foreseen = &mut self.memory.foreseen;
-        let way_mm = |contact: &Foreseen| {
-            let point = &points[contact.index];
-            moved((point.element, point.xi), &contact.gradient) - contact.gap_mm[1]
-        };
-        // (gap, its change along the way, the force carried, and that at the end, all as springs')
-        let lines: Vec<_> = foreseen
+    pub(super) fn part_towards_contacts(&mut self, moved: &Moved<'_>) -> f64 {
+        let ends: Vec<f64> = self
+            .memory
+            .foreseen
             .iter()
             .map(|contact| {
-                let (gap, way) = (contact.gap_mm[0] + contact.gap_mm[1], way_mm(contact));
-                let end = if contact.presses { contact.spring_n_per_mm * (gap + way) } else { 0.0 };
-                (contact, gap, way, end)
+                let point = &self.points[contact.index];
+                moved((point.element, point.xi, point.set)).0.dot(&contact.gradient)
             })
             .collect();
+        let slipped = self.slipping_ends(moved);
         let slope = |part: f64| -> f64 {
-            let each = lines.iter().map(|&(contact, gap, way, end)| {
-                let there = gap + part * way;
+            let each = self.memory.foreseen.iter().zip(&ends).map(|(contact, end)| {
+                let way = end - contact.gap_mm[1];
+                let there = contact.gap_mm[0] + contact.gap_mm[1] + part * way;
                 let felt = if contact.kept { there } else { there.min(0.0) };
-                let carried = contact.carried_n + part * (end - contact.carried_n);
+                let carried = contact.carried_n + part * (contact.linear_n(*end) - contact.carried_n);
                 (contact.spring_n_per_mm * felt - carried) * way
             });
-            each.sum()
+            each.sum::<f64>() + self.slipping_slope(&slipped, part)
         };
-        let mut kinks: Vec<f64> = lines
-            .iter()
-            .map(|(_, gap, way, _)| -gap / way)
-            .filter(|part| *part > 0.0 && *part < 1.0)
-            .collect();
-        kinks.sort_unstable_by(f64::total_cmp);
-        kinks.push(1.0);
-        let mut last = (0.0, slope(0.0));
-        let mut part = 1.0;
-        for kink in kinks {
-            let here = slope(kink);
-            if here > 0.0 {
-                part = last.0 + (kink - last.0) * last.1 / (last.1 - here);
-                break;
-            }
-            last = (kink, here);
+        let part = falls_until(slope);
+        for (contact, end) in self.memory.foreseen.iter_mut().zip(&ends) {
+            contact.carried_n += part * (contact.linear_n(*end) - contact.carried_n);
         }
-        let ends: Vec<f64> = lines.iter().map(|line| line.3).collect();
-        for (contact, end) in foreseen.iter_mut().zip(ends) {
-            contact.carried_n += part * (end - contact.carried_n);
-        }
+        self.carry_slipping(&slipped, part);
         part
     }
 

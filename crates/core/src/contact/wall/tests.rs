@@ -282,26 +282,32 @@ impl External for Pushed<'_> {
     fn return_to_base(&mut self) {
         self.wall.return_to_base();
     }
-    fn foresee(&mut self, moved: &dyn Fn((usize, f64), &Vec3) -> f64) -> bool {
+    fn foresee(&mut self, moved: &Moved<'_>) -> bool {
         self.foreseeing && self.wall.foresee(moved)
     }
     fn meet(
         &mut self,
         elements: &[ElementData],
-        trial: &RodState,
+        states: (&RodState, &RodState),
         part: f64,
-        moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        moved: &Moved<'_>,
     ) -> bool {
-        self.foreseeing && self.wall.meet(elements, trial, part, moved)
+        self.foreseeing && self.wall.meet(elements, states, part, moved)
     }
     fn press_or_let_go(
         &mut self,
         elements: &[ElementData],
         base: &RodState,
-        moved: &dyn Fn((usize, f64), &Vec3) -> f64,
+        moved: &Moved<'_>,
         into: &mut dyn Stencils,
     ) -> usize {
         self.wall.press_or_let_go(elements, base, moved, into)
+    }
+    fn part_towards(&mut self, moved: &Moved<'_>) -> f64 {
+        self.wall.part_towards(moved)
+    }
+    fn hold_on(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> usize {
+        self.wall.hold_on(elements, base, into)
     }
     fn stray(
         &mut self,

@@ -124,7 +124,7 @@ impl<const C: usize> Settle<C> {
             fraction *= contact.safe_fraction(elements, &self.trial);
             contact.aim(|point, way| {
                 let e = point.element;
-                point_step::<C>(state, &elements[e], (e, point.xi), way, &self.step)
+                point_step::<C>(state, &elements[e], (e, point.xi), &self.step).dot(way)
             });
             for _ in 0..TRIALS {
                 self.trial.advance::<C>(elements, state, &self.step, fraction);

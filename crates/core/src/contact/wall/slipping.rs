@@ -1,0 +1,214 @@
+//! Friction within a step of Newton's method.
+//!
+//! A step knows of the friction where it begins: a point that sticks there holds like a spring, however far the step takes it, and one
+//! that slips drives the step on, also where it is led back and would be held. What friction takes, μ N φ(|u|), is convex in the slip,
+//! and the slip u is linear in the step. So where a step is found anew with the contacts that it leads to ([`super::foresight`]), it is found
+//! with this too: in every round with the force and the stiffness at the slip that the last one led to,
+//!
+//! ```text
+//! f(u) + H(u) (u′ − u),    f = μ N φ′ û,    H = ∂f/∂u
+//! ```
+//!
+//! and as far along the round as the model falls.
+
+use nalgebra::Matrix3;
+
+use super::WallContact;
+use crate::Vec3;
+use crate::contact::friction::FrictionDerivatives;
+use crate::contact::point::ContactPoint;
+use crate::rod::{ElementData, PointSum, RodState, Stencils};
+use crate::solve::Moved;
+
+/// A point's friction has changed in a step where its force is off by more than this part of the largest that it can be.
+const CHANGED: f64 = 0.05;
+
+/// How far a step moves a point, mm, and turns it, rad.
+pub(super) type Motion = (Vec3, f64);
+
+/// A force on a point, N, and a moment, N·mm.
+type Wrench = (Vec3, f64);
+
+/// A point with friction in a step.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::contact) struct Slipping {
+    /// Number of the point.
+    index: usize,
+    /// Its place, mm, and material angle, rad, at the base.
+    base: (Vec3, f64),
+    /// What the step does to it.
+    way: Motion,
+    /// Force and moment of friction at the end of the step where they are linear: in the system, without a motion.
+    at_rest: Wrench,
+    /// Their derivatives in the system.
+    stiffness: (Matrix3<f64>, Vec3, f64),
+    /// What the rod's own stiffness is in balance with.
+    carried: Wrench,
+    /// Whether the stiffness stays that of the base: without it there is no minimum.
+    kept: bool,
+}
+
+fn times((hessian, mixed, turn2): &(Matrix3<f64>, Vec3, f64), (way, turn): &Motion) -> Wrench {
+    (hessian * way + mixed * *turn, mixed.dot(way) + turn2 * turn)
+}
+
+fn plus(a: &Wrench, part: f64, b: &Wrench) -> Wrench {
+    (a.0 + b.0 * part, a.1 + b.1 * part)
+}
+
+fn work(force: &Wrench, (way, turn): &Motion) -> f64 {
+    force.0.dot(way) + force.1 * turn
+}
+
+impl Slipping {
+    /// Force and moment in the system at the end of a step.
+    fn linear(&self, way: &Motion) -> Wrench {
+        plus(&self.at_rest, 1.0, &times(&self.stiffness, way))
+    }
+
+    /// Changes the system to another force without motion and another stiffness.
+    fn switch(
+        &mut self,
+        to: (Wrench, (Matrix3<f64>, Vec3, f64)),
+        (point, element): (&ContactPoint, &ElementData),
+        base: &RodState,
+        into: &mut dyn Stencils,
+    ) {
+        let force = plus(&to.0, -1.0, &self.at_rest);
+        let (hessian, mixed, turn2) = to.1;
+        let (old_hessian, old_mixed, old_turn2) = self.stiffness;
+        super::foresight::straighten(point, element, base, &force.0, into);
+        let mut sum = PointSum::default();
+        sum.add(point.xi, &force.0, Some(&(hessian - old_hessian)));
+        into.add_points(base, element, point.element, &sum);
+        let place = (point.element, point.xi, point.set);
+        into.add_spin(base, element, place, &(mixed - old_mixed), (force.1, turn2 - old_turn2));
+        (self.at_rest, self.stiffness) = to;
+    }
+}
+
+/// Stiffness of friction in a point's place and angle.
+fn stiffness(f: &FrictionDerivatives) -> (Matrix3<f64>, Vec3, f64) {
+    (f.hessian, f.mixed, f.turn2)
+}
+
+impl WallContact<'_> {
+    /// Friction of a point after a motion from where it is at the base.
+    fn friction_after(&self, slipping: &Slipping, way: &Motion) -> Option<FrictionDerivatives> {
+        let radius_mm = self.points[slipping.index].potential.radius_mm;
+        let (x, angle) = &slipping.base;
+        self.friction.derivatives(slipping.index, &(x + way.0), angle + way.1, radius_mm)
+    }
+
+    /// Begins to look at the friction of a step from the base; returns whether there is any.
+    pub(super) fn begin_slipping(&mut self, base: &RodState, moved: &Moved<'_>) -> bool {
+        let mut slipping = std::mem::take(&mut self.memory.slipping);
+        if slipping.is_empty() && self.friction.acts() && !self.friction.is_coupled() {
+            for (index, point) in self.points.iter().enumerate() {
+                let x = self.felt.place(&self.memory.points[index].base);
+                let (angle, radius_mm) = (point.angle(base), point.potential.radius_mm);
+                let Some(f) = self.friction.derivatives(index, &x, angle, radius_mm) else { continue };
+                let way = moved((point.element, point.xi, point.set));
+                let mut new = Slipping {
+                    index,
+                    base: (x, angle),
+                    way,
+                    at_rest: (f.gradient, f.turn),
+                    stiffness: stiffness(&f),
+                    carried: (Vec3::zeros(), 0.0),
+                    kept: false,
+                };
+                new.carried = new.linear(&way);
+                slipping.push(new);
+            }
+        }
+        self.memory.slipping = slipping;
+        !self.memory.slipping.is_empty()
+    }
+
+    /// Has friction be that at the end of the step; returns at how many points that changes it.
+    pub(super) fn slip_on(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        moved: &Moved<'_>,
+        into: &mut dyn Stencils,
+    ) -> usize {
+        let mut changed = 0;
+        for k in 0..self.memory.slipping.len() {
+            let mut slipping = self.memory.slipping[k];
+            let point = &self.points[slipping.index];
+            let way = moved((point.element, point.xi, point.set));
+            let Some(f) = self.friction_after(&slipping, &way) else { continue };
+            slipping.way = way;
+            let off = plus(&(f.gradient, f.turn), -1.0, &slipping.linear(&way));
+            if off.0.norm() > CHANGED * self.friction.largest_n(slipping.index) {
+                changed += 1;
+                let stiffness = if slipping.kept { slipping.stiffness } else { stiffness(&f) };
+                let at_rest = plus(&(f.gradient, f.turn), -1.0, &times(&stiffness, &way));
+                let of = (point, &elements[point.element]);
+                slipping.switch((at_rest, stiffness), of, base, into);
+            }
+            self.memory.slipping[k] = slipping;
+        }
+        changed
+    }
+
+    /// Gives every point the stiffness of the base again, with the force at the end of the step; returns how many had another.
+    pub(super) fn stop_slipping(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        into: &mut dyn Stencils,
+    ) -> usize {
+        let mut kept = 0;
+        for k in 0..self.memory.slipping.len() {
+            let mut slipping = self.memory.slipping[k];
+            let point = &self.points[slipping.index];
+            let none = (Vec3::zeros(), 0.0);
+            let (Some(f), Some(now)) =
+                (self.friction_after(&slipping, &none), self.friction_after(&slipping, &slipping.way))
+            else {
+                continue;
+            };
+            if slipping.kept || stiffness(&f) == slipping.stiffness {
+                continue;
+            }
+            (slipping.kept, kept) = (true, kept + 1);
+            let at_rest = plus(&(now.gradient, now.turn), -1.0, &times(&stiffness(&f), &slipping.way));
+            let of = (point, &elements[point.element]);
+            slipping.switch((at_rest, stiffness(&f)), of, base, into);
+            self.memory.slipping[k] = slipping;
+        }
+        kept
+    }
+
+    /// Slope of what friction takes at a `part` of the way to another step, less what is carried there.
+    pub(super) fn slipping_slope(&self, ends: &[Motion], part: f64) -> f64 {
+        let each = self.memory.slipping.iter().zip(ends).map(|(slipping, end)| {
+            let way = plus(end, -1.0, &slipping.way);
+            let Some(f) = self.friction_after(slipping, &plus(&slipping.way, part, &way)) else { return 0.0 };
+            let to = plus(&slipping.linear(end), -1.0, &slipping.carried);
+            let carried = plus(&slipping.carried, part, &to);
+            work(&plus(&(f.gradient, f.turn), -1.0, &carried), &way)
+        });
+        each.sum()
+    }
+
+    /// What the rod's stiffness is in balance with after that part of the way.
+    pub(super) fn carry_slipping(&mut self, ends: &[Motion], part: f64) {
+        for (slipping, end) in self.memory.slipping.iter_mut().zip(ends) {
+            let to = plus(&slipping.linear(end), -1.0, &slipping.carried);
+            slipping.carried = plus(&slipping.carried, part, &to);
+        }
+    }
+
+    /// What a step does to the points with friction.
+    pub(super) fn slipping_ends(&self, moved: &Moved<'_>) -> Vec<Motion> {
+        let of = |slipping: &Slipping| {
+            let point = &self.points[slipping.index];
+            moved((point.element, point.xi, point.set))
+        };
+        self.memory.slipping.iter().map(of).collect()
+    }
+}
