@@ -323,12 +323,35 @@ impl Friction {
         angle: f64,
         radius_mm: f64,
     ) -> Option<FrictionDerivatives> {
+        self.spring(index, (x, angle), radius_mm, false)
+    }
+
+    /// As [`derivatives`](Self::derivatives), with the stiffness of the spring that holds with the same force after the same slip: more than
+    /// the second derivatives, and convex.
+    pub(crate) fn secant(
+        &self,
+        index: usize,
+        x: &Vec3,
+        angle: f64,
+        radius_mm: f64,
+    ) -> Option<FrictionDerivatives> {
+        self.spring(index, (x, angle), radius_mm, true)
+    }
+
+    fn spring(
+        &self,
+        index: usize,
+        (x, angle): (&Vec3, f64),
+        radius_mm: f64,
+        secant: bool,
+    ) -> Option<FrictionDerivatives> {
         let slider = self.sliders.get(index).filter(|s| self.coupled || s.force_n > 0.0)?;
         let force = self.coefficient * slider.force_n;
         let stiff = if self.coupled { self.coefficient * slider.matrix_n } else { force };
         let (slip, spin) = self.slip(index, x, angle, radius_mm);
         let y = slip.norm();
         let (over, second) = rates(y, self.stick_mm);
+        let second = if secant { over } else { second };
         let gradient = slip * (force * over);
         let unit = if y > 0.0 { slip / y } else { Vec3::zeros() };
         let plane = Matrix3::identity() - slider.normal * slider.normal.transpose();

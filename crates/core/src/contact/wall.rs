@@ -381,12 +381,12 @@ impl External for WallContact<'_> {
         self.press_or_let_go_contacts(elements, base, moved, into) + self.slip_on(elements, base, moved, into)
     }
 
-    fn part_towards(&mut self, moved: &Moved<'_>) -> f64 {
-        self.part_towards_contacts(moved)
+    fn part_towards(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
+        self.part_towards_contacts(moved, most)
     }
 
     fn hold_on(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> usize {
-        self.hold_on_contacts(elements, base, into) + self.stop_slipping(elements, base, into)
+        self.hold_on_contacts(elements, base, into) + self.stiffen(elements, base, into)
     }
 
     fn forget(&mut self) {

@@ -34,7 +34,11 @@ const CORRECTIONS: usize = 3;
 /// Forces of contacts may be off what was foreseen by this part.
 const STRAYED: f64 = 0.1;
 /// Most rounds in which the contacts that a step leads to are looked for.
-const ROUNDS: usize = 30;
+const ROUNDS: usize = 15;
+/// A round that goes no farther than this part of its way is the last.
+const LEAST_PART: f64 = 1e-3;
+/// Turn of a step, rad, at which a round ends: planes and lines are no model of what is farther away.
+const LARGEST_TURN: f64 = 1.0;
 
 /// What a step does to points of the rod.
 fn moved<'a, const C: usize>(
@@ -89,21 +93,26 @@ impl<const C: usize> Newton<C> {
                 break;
             }
             self.before.copy_from_slice(&self.step);
-            if !minimum(self.factor_step(sigma)) {
-                let kept = self
+            while !minimum(self.factor_step(sigma)) {
+                let held = self
                     .change_contacts(problem, |external, _, into| external.hold_on(elements, state, into));
-                if kept == 0 || !minimum(self.factor_step(sigma)) {
+                if held == 0 {
                     self.step.copy_from_slice(&self.spare);
                     problem.external.forget();
                     return false;
                 }
             }
-            let part = problem.external.part_towards(&moved::<C>(elements, state, &self.step));
+            let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
+            let most = if turn > LARGEST_TURN { LARGEST_TURN / turn } else { 1.0 };
+            let part = problem.external.part_towards(&moved::<C>(elements, state, &self.step), most);
             whole = part >= 1.0;
             if !whole {
                 for (step, before) in self.step.iter_mut().zip(&self.before) {
                     *step = before + part * (*step - before);
                 }
+            }
+            if part < LEAST_PART {
+                break;
             }
         }
         Self::restore_tensions(elements, &mut self.step);

@@ -64,12 +64,13 @@ pub trait External {
     }
 
     /// Part of the way from the step foreseen last to another, which solves the system as it is, at which the model has its minimum: of the
-    /// energy with springs where contacts press and none where they would pull.
-    fn part_towards(&mut self, _moved: &Moved<'_>) -> f64 {
-        1.0
+    /// energy with springs where contacts press and none where they would pull, and friction. It is `most` at the most.
+    fn part_towards(&mut self, _moved: &Moved<'_>, most: f64) -> f64 {
+        most
     }
 
-    /// Adds the springs again of contacts that press at the base and were let go, for good. Returns how many.
+    /// Adds the springs again of contacts that press at the base and were let go, for good, and has friction be stiffer. Returns at how many
+    /// points.
     fn hold_on(&mut self, _elements: &[ElementData], _base: &RodState, _into: &mut dyn Stencils) -> usize {
         0
     }

@@ -224,7 +224,7 @@ impl WallContact<'_> {
     }
 
     /// See [`External::part_towards`](crate::solve::External::part_towards).
-    pub(super) fn part_towards_contacts(&mut self, moved: &Moved<'_>) -> f64 {
+    pub(super) fn part_towards_contacts(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
         let ends: Vec<f64> = self
             .memory
             .foreseen
@@ -245,7 +245,7 @@ impl WallContact<'_> {
             });
             each.sum::<f64>() + self.slipping_slope(&slipped, part)
         };
-        let part = falls_until(slope);
+        let part = falls_until(slope).min(most);
         for (contact, end) in self.memory.foreseen.iter_mut().zip(&ends) {
             contact.carried_n += part * (contact.linear_n(*end) - contact.carried_n);
         }

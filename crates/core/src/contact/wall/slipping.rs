@@ -44,8 +44,19 @@ pub(in crate::contact) struct Slipping {
     stiffness: (Matrix3<f64>, Vec3, f64),
     /// What the rod's own stiffness is in balance with.
     carried: Wrench,
-    /// Whether the stiffness stays that of the base: without it there is no minimum.
-    kept: bool,
+    /// How stiff it is.
+    as_stiff: Stiffness,
+}
+
+/// How stiff friction is in a step: no more than it must be for the step to have a minimum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Stiffness {
+    /// As the second derivatives at its end.
+    Tangent,
+    /// As a spring that holds as it does at its end.
+    Secant,
+    /// As at the base.
+    Base,
 }
 
 fn times((hessian, mixed, turn2): &(Matrix3<f64>, Vec3, f64), (way, turn): &Motion) -> Wrench {
@@ -116,7 +127,7 @@ impl WallContact<'_> {
                     at_rest: (f.gradient, f.turn),
                     stiffness: stiffness(&f),
                     carried: (Vec3::zeros(), 0.0),
-                    kept: false,
+                    as_stiff: Stiffness::Tangent,
                 };
                 new.carried = new.linear(&way);
                 slipping.push(new);
@@ -144,43 +155,55 @@ impl WallContact<'_> {
             let off = plus(&(f.gradient, f.turn), -1.0, &slipping.linear(&way));
             if off.0.norm() > CHANGED * self.friction.largest_n(slipping.index) {
                 changed += 1;
-                let stiffness = if slipping.kept { slipping.stiffness } else { stiffness(&f) };
-                let at_rest = plus(&(f.gradient, f.turn), -1.0, &times(&stiffness, &way));
-                let of = (point, &elements[point.element]);
-                slipping.switch((at_rest, stiffness), of, base, into);
+                self.switch(&mut slipping, f, (elements, base), into);
             }
             self.memory.slipping[k] = slipping;
         }
         changed
     }
 
-    /// Gives every point the stiffness of the base again, with the force at the end of the step; returns how many had another.
-    pub(super) fn stop_slipping(
+    /// Has friction with the force `f` at the end of the step be in the system, as stiff as it is to be.
+    fn switch(
+        &self,
+        slipping: &mut Slipping,
+        f: FrictionDerivatives,
+        (elements, base): (&[ElementData], &RodState),
+        into: &mut dyn Stencils,
+    ) {
+        let point = &self.points[slipping.index];
+        let (x, angle) = (slipping.base.0 + slipping.way.0, slipping.base.1 + slipping.way.1);
+        let spring = match slipping.as_stiff {
+            Stiffness::Tangent => Some(f),
+            Stiffness::Secant => self.friction.secant(slipping.index, &x, angle, point.potential.radius_mm),
+            Stiffness::Base => self.friction_after(slipping, &(Vec3::zeros(), 0.0)),
+        };
+        let stiffness = spring.as_ref().map_or(slipping.stiffness, stiffness);
+        let at_rest = plus(&(f.gradient, f.turn), -1.0, &times(&stiffness, &slipping.way));
+        slipping.switch((at_rest, stiffness), (point, &elements[point.element]), base, into);
+    }
+
+    /// Has friction be stiffer; returns at how many points it could be.
+    pub(super) fn stiffen(
         &mut self,
         elements: &[ElementData],
         base: &RodState,
         into: &mut dyn Stencils,
     ) -> usize {
-        let mut kept = 0;
+        let Some(least) = self.memory.slipping.iter().map(|slipping| slipping.as_stiff).min() else {
+            return 0;
+        };
+        let stiffer = if least == Stiffness::Tangent { Stiffness::Secant } else { Stiffness::Base };
+        let mut stiffened = 0;
         for k in 0..self.memory.slipping.len() {
             let mut slipping = self.memory.slipping[k];
-            let point = &self.points[slipping.index];
-            let none = (Vec3::zeros(), 0.0);
-            let (Some(f), Some(now)) =
-                (self.friction_after(&slipping, &none), self.friction_after(&slipping, &slipping.way))
-            else {
-                continue;
-            };
-            if slipping.kept || stiffness(&f) == slipping.stiffness {
-                continue;
+            let Some(f) = self.friction_after(&slipping, &slipping.way) else { continue };
+            if slipping.as_stiff < stiffer {
+                (slipping.as_stiff, stiffened) = (stiffer, stiffened + 1);
+                self.switch(&mut slipping, f, (elements, base), into);
+                self.memory.slipping[k] = slipping;
             }
-            (slipping.kept, kept) = (true, kept + 1);
-            let at_rest = plus(&(now.gradient, now.turn), -1.0, &times(&stiffness(&f), &slipping.way));
-            let of = (point, &elements[point.element]);
-            slipping.switch((at_rest, stiffness(&f)), of, base, into);
-            self.memory.slipping[k] = slipping;
         }
-        kept
+        stiffened
     }
 
     /// Slope of what friction takes at a `part` of the way to another step, less what is carried there.

@@ -303,8 +303,8 @@ impl External for Pushed<'_> {
     ) -> usize {
         self.wall.press_or_let_go(elements, base, moved, into)
     }
-    fn part_towards(&mut self, moved: &Moved<'_>) -> f64 {
-        self.wall.part_towards(moved)
+    fn part_towards(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
+        self.wall.part_towards(moved, most)
     }
     fn hold_on(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> usize {
         self.wall.hold_on(elements, base, into)
