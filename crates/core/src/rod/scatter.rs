@@ -148,8 +148,13 @@ pub(crate) fn point_step<const C: usize>(
     (e, xi): (usize, f64),
     d: &[f64],
 ) -> Vec3 {
-    let columns = point_columns::<C>(state, element, e, xi);
-    columns.iter().map(|(row, column)| column * d[*row]).sum()
+    let l = Layout::<C>;
+    let [w0, s0, w1, s1] = hermite(xi);
+    let node = |i: usize, w: f64, s: f64| {
+        let (x, t, f) = (l.position(i), l.tangent(i), &state.frames[i]);
+        Vec3::new(d[x], d[x + 1], d[x + 2]) * w + (f.u * d[t] + f.v * d[t + 1]) * (s * element.length)
+    };
+    node(e, w0, s0) + node(e + 1, w1, s1)
 }
 
 /// Change of the material angle of the instrument in a `set` of angles at ξ of element `e` in a step `d`, rad.

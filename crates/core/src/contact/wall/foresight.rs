@@ -234,7 +234,7 @@ impl WallContact<'_> {
                 moved((point.element, point.xi, point.set)).0.dot(&contact.gradient)
             })
             .collect();
-        let slipped = self.slipping_ends(moved);
+        let slipped = self.slips_to(moved);
         let slope = |part: f64| -> f64 {
             let each = self.memory.foreseen.iter().zip(&ends).map(|(contact, end)| {
                 let way = end - contact.gap_mm[1];

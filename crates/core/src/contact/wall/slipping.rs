@@ -59,6 +59,19 @@ enum Stiffness {
     Base,
 }
 
+/// What a round does to a point with friction.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slip {
+    /// Its slip where the round begins, mm.
+    begin_mm: Vec3,
+    /// Change of its slip, mm.
+    change_mm: Vec3,
+    /// What the step at its end does to the point.
+    end: Motion,
+    /// Work, on the way, of what is carried where it begins, and of its change, mJ.
+    carried: [f64; 2],
+}
+
 fn times((hessian, mixed, turn2): &(Matrix3<f64>, Vec3, f64), (way, turn): &Motion) -> Wrench {
     (hessian * way + mixed * *turn, mixed.dot(way) + turn2 * turn)
 }
@@ -206,32 +219,44 @@ impl WallContact<'_> {
         stiffened
     }
 
-    /// Slope of what friction takes at a `part` of the way to another step, less what is carried there.
-    pub(super) fn slipping_slope(&self, ends: &[Motion], part: f64) -> f64 {
-        let each = self.memory.slipping.iter().zip(ends).map(|(slipping, end)| {
-            let way = plus(end, -1.0, &slipping.way);
-            let Some(f) = self.friction_after(slipping, &plus(&slipping.way, part, &way)) else { return 0.0 };
-            let to = plus(&slipping.linear(end), -1.0, &slipping.carried);
-            let carried = plus(&slipping.carried, part, &to);
-            work(&plus(&(f.gradient, f.turn), -1.0, &carried), &way)
+    /// What a round does to the points with friction.
+    pub(super) fn slips_to(&self, moved: &Moved<'_>) -> Vec<Slip> {
+        let slip = |slipping: &Slipping, way: &Motion| {
+            let (x, angle) = plus(&slipping.base, 1.0, way);
+            let radius_mm = self.points[slipping.index].potential.radius_mm;
+            self.friction.slip_mm(slipping.index, &x, angle, radius_mm)
+        };
+        let of = |slipping: &Slipping| {
+            let point = &self.points[slipping.index];
+            let end = moved((point.element, point.xi, point.set));
+            let (begin_mm, end_mm) = (slip(slipping, &slipping.way), slip(slipping, &end));
+            let way = plus(&end, -1.0, &slipping.way);
+            let carried = plus(&slipping.linear(&end), -1.0, &slipping.carried);
+            Slip {
+                begin_mm,
+                change_mm: end_mm - begin_mm,
+                end,
+                carried: [work(&slipping.carried, &way), work(&carried, &way)],
+            }
+        };
+        self.memory.slipping.iter().map(of).collect()
+    }
+
+    /// Slope of what friction takes at a `part` of a round, less what is carried there.
+    pub(super) fn slipping_slope(&self, slips: &[Slip], part: f64) -> f64 {
+        let each = self.memory.slipping.iter().zip(slips).map(|(slipping, slip)| {
+            let there = slip.begin_mm + slip.change_mm * part;
+            let against = self.friction.resistance(slipping.index, &there) * there.dot(&slip.change_mm);
+            against - (slip.carried[0] + part * slip.carried[1])
         });
         each.sum()
     }
 
-    /// What the rod's stiffness is in balance with after that part of the way.
-    pub(super) fn carry_slipping(&mut self, ends: &[Motion], part: f64) {
-        for (slipping, end) in self.memory.slipping.iter_mut().zip(ends) {
-            let to = plus(&slipping.linear(end), -1.0, &slipping.carried);
+    /// What the rod's stiffness is in balance with after that part of the round.
+    pub(super) fn carry_slipping(&mut self, slips: &[Slip], part: f64) {
+        for (slipping, slip) in self.memory.slipping.iter_mut().zip(slips) {
+            let to = plus(&slipping.linear(&slip.end), -1.0, &slipping.carried);
             slipping.carried = plus(&slipping.carried, part, &to);
         }
-    }
-
-    /// What a step does to the points with friction.
-    pub(super) fn slipping_ends(&self, moved: &Moved<'_>) -> Vec<Motion> {
-        let of = |slipping: &Slipping| {
-            let point = &self.points[slipping.index];
-            moved((point.element, point.xi, point.set))
-        };
-        self.memory.slipping.iter().map(of).collect()
     }
 }
