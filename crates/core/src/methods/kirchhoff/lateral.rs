@@ -24,7 +24,7 @@ use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
 use crate::rod::element::ElementSystem;
 use crate::rod::quadrature::{Point, hermite};
-use crate::rod::{Layout, RodState, element_system};
+use crate::rod::{ElementData, Layout, Material, RodState, element_system};
 
 /// Rounds in which the axial force behind a node and the friction there are found: each is nearer by μ times half the angle of an element.
 const ROUNDS: usize = 12;
@@ -147,8 +147,7 @@ fn parts<const C: usize>(
     rod: &RodState,
     (e, instrument): (usize, usize),
 ) -> [NodeForce; 4] {
-    let ends = (mesh.from_tip_mm[e], mesh.from_tip_mm[e + 1]);
-    let data = element(stack, &mesh.inserted_mm, instrument + 1, ends);
+    let data = inside(stack, mesh, (e, instrument));
     let mut system = ElementSystem::<C>::zeros();
     let mut at = rod.element::<C>(e);
     at.tension = 0.0;
@@ -157,6 +156,25 @@ fn parts<const C: usize>(
     let both = |of: &[f64; C]| [0, 1].map(|i| NodeForce::of(of, l.position(i), l.tangent(i)));
     let ([near, far], [near_pull, far_pull]) = (both(&system.gradient), both(&system.stretch));
     [near, far, near_pull, far_pull]
+}
+
+/// Element `e` of an instrument and those in it. Where all of them have angles, the mesh knows each by itself.
+fn inside(stack: &Stack, mesh: &Mesh, (e, instrument): (usize, usize)) -> ElementData {
+    let sets = &stack.sets()[..=instrument];
+    if sets.contains(&None) {
+        let ends = (mesh.from_tip_mm[e], mesh.from_tip_mm[e + 1]);
+        return element(stack, &mesh.inserted_mm, instrument + 1, ends);
+    }
+    let whole = &mesh.elements[e];
+    let mut data = ElementData::of(whole.length, Material::NONE);
+    for set in sets.iter().flatten() {
+        let own = &whole.materials[*set];
+        for (sum, bending) in data.bending.iter_mut().zip(own.bending) {
+            *sum += bending;
+        }
+        data.materials[*set] = *own;
+    }
+    data
 }
 
 /// Curvature of the line at a node along u and v of its triad: the mean of the elements beside it.
