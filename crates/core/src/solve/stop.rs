@@ -57,6 +57,16 @@ impl Default for Progress {
 }
 
 impl Progress {
+    /// At its beginning, with factors of a state from which nodes have turned by so much since, rad.
+    pub(super) fn going_on(since: f64) -> Self {
+        Self { since, ..Self::default() }
+    }
+
+    /// Turns of nodes of all steps with the factors at hand, rad.
+    pub(super) fn since(&self) -> f64 {
+        self.since
+    }
+
     /// Takes note of a step, with factors of the state that it began at or of one before.
     pub(super) fn has_turned(&mut self, turn: Turn, factored: bool) {
         self.last_turn = turn.with_forces;

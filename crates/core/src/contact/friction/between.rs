@@ -147,6 +147,11 @@ impl Between {
         &self.places
     }
 
+    /// Whether couples hang on what presses: not where instruments slide in one another without being turned, and all of friction is along the line.
+    pub(crate) fn turns(&self) -> bool {
+        self.places.iter().any(|p| p.sets.is_some() && (p.advance_mm == 0.0 || p.turn_rad != 0.0))
+    }
+
     /// Forces across the line of each node and the length that it stands for, N and mm; returns by what part of the largest couples those that act change with them.
     pub(crate) fn renew(&mut self, state: &RodState, forces: impl Fn(&Place) -> (f64, f64)) -> f64 {
         let (mut change, mut sum) = (0.0, 0.0);
