@@ -146,6 +146,18 @@ mod tests {
     }
 
     #[test]
+    fn factors_of_the_last_solution_serve_where_its_state_is_near() {
+        let near = Progress::going_on(0.4 * SHORT);
+        assert!(!near.wants_hessian(TOLERANCE, true));
+        let size = ResidualSize { relative: 1e-5, small: false, rounding: false };
+        assert!(near.shrinks_enough(&size, TOLERANCE, true));
+        // Not where nothing was renewed, from afar, or where there are none.
+        assert!(near.wants_hessian(TOLERANCE, false));
+        assert!(Progress::going_on(2.0 * SHORT).wants_hessian(TOLERANCE, true));
+        assert!(Progress::default().wants_hessian(TOLERANCE, true));
+    }
+
+    #[test]
     fn turns_add_up_until_there_are_new_factors() {
         let turn = Turn { with_forces: 1e-3, of_nodes: 0.4 * SHORT };
         let (mut progress, _) = after(0.4 * SHORT, 1e-5);

@@ -224,6 +224,17 @@ mod tests {
     }
 
     #[test]
+    fn couples_hang_on_what_presses_where_nothing_slides_or_a_hand_turns() {
+        let turns = |advance_mm: f64, turn_rad: f64, sets: Option<(usize, usize)>| {
+            let place = Place { advance_mm, turn_rad, sets, ..Place::new((1, 0, 1), 0.25, 0.4) };
+            Between { places: vec![place] }.turns()
+        };
+        assert!(turns(0.0, 0.0, Some((0, 1))) && turns(0.2, 0.1, Some((0, 1))));
+        assert!(!turns(0.2, 0.0, Some((0, 1))) && !turns(0.0, 0.1, None));
+        assert!(!Between::default().turns());
+    }
+
+    #[test]
     fn what_slips_uses_all_of_its_cone_and_what_sticks_less() {
         let (place, state) = turned(0.3, [0.7, 0.1]);
         let [along, around] = place.parts(&state);
