@@ -186,14 +186,36 @@ impl SmoothWall {
             part.map(inset).collect::<Vec<_>>()
         };
         let own = parallel::parts(mesh.triangles.len(), insets).concat();
-        let mut around = vec![0.0f32; mesh.vertices_mm.len()];
-        for (triangle, inset) in mesh.triangles.iter().zip(&own) {
+        self.spread_insets(&own);
+    }
+
+    /// Gives each triangle the largest inset of those that share a corner with it.
+    fn spread_insets(&mut self, own_mm: &[f32]) {
+        let triangles = &self.lists.triangles;
+        let mut around = vec![0.0f32; self.quadrics.len()];
+        for (triangle, inset) in triangles.iter().zip(own_mm) {
             triangle.iter().for_each(|v| around[*v as usize] = around[*v as usize].max(*inset));
         }
         let most =
             |triangle: &[u32; 3]| triangle.iter().fold(0.0f32, |most, v| most.max(around[*v as usize]));
-        self.insets_mm = mesh.triangles.iter().map(most).collect();
+        self.insets_mm = triangles.iter().map(most).collect();
         self.deepest_inset_mm = self.insets_mm.iter().copied().fold(0.0, f32::max).into();
+    }
+
+    /// Triangles that the smooth wall lies inside of by more than this, mm.
+    pub(super) fn inside_of(&self, least_mm: f64) -> Vec<u32> {
+        let inside = |triangle: &u32| self.inset_mm(*triangle) > least_mm;
+        (0..self.insets_mm.len() as u32).filter(inside).collect()
+    }
+
+    /// Takes over what the smooth wall lies inside of triangles elsewhere than on them, where that is more.
+    pub(super) fn deepen(&mut self, seen: impl Iterator<Item = (u32, f64)>) {
+        let mut own = self.insets_mm.clone();
+        for (triangle, inset_mm) in seen {
+            let most = &mut own[triangle as usize];
+            *most = most.max(inset_mm as f32);
+        }
+        self.spread_insets(&own);
     }
 
     /// How far the smooth wall lies inside a triangle, mm: 0 where it lies beyond it.

@@ -11,7 +11,7 @@ use super::point::{FOLLOW, LOOK_AGAIN};
 use super::properties::WallProperties;
 use super::{Distance, SmoothWall};
 use crate::vessel::{Conditioning, Wall, WallQuery, WallRecipe, WallStore};
-use crate::{Result, Vec3};
+use crate::{Result, Vec3, parallel};
 
 /// A wall prepared for the contact of devices.
 #[derive(Debug, Clone)]
@@ -31,6 +31,11 @@ pub struct FeltWall {
 /// How much farther than it must a point looks for the wall, mm: while it moves less it need not ask again. A point on the axis of a
 /// tube has all of its triangles at one distance, and a question that reaches them looks at all: asking a little farther is enough.
 const LOOK_MM: f64 = 0.5;
+
+/// What lies inside by more than this part of the thickest radius is looked at above the triangles, …
+const CREST: f64 = 0.3;
+/// … at so many heights, so many radii apart.
+const OVER: (u32, f64) = (6, 0.5);
 
 /// Coverage below which the flat triangles take part.
 const COVERED: f64 = 0.15;
@@ -60,8 +65,37 @@ impl FeltWall {
         let felt = Wall::welded(&felt)?;
         let smooth = SmoothWall::new(&felt, thickest_mm);
         let grading = if properties.region.is_empty() { None } else { Grading::new(&smooth, properties) };
-        let reach_mm = (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + smooth.deepest_inset_mm() + LOOK_MM;
-        Ok(Self { smooth, query: WallQuery::new(&felt)?, grading, thinnest_mm, reach_mm })
+        let reach_mm = |smooth: &SmoothWall| {
+            (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + smooth.deepest_inset_mm() + LOOK_MM
+        };
+        let query = WallQuery::new(&felt)?;
+        let mut felt = Self { reach_mm: reach_mm(&smooth), smooth, query, grading, thinnest_mm };
+        let crests = felt.over_crests(thickest_mm);
+        felt.smooth.deepen(crests.into_iter().flatten());
+        felt.reach_mm = reach_mm(&felt.smooth);
+        Ok(felt)
+    }
+
+    /// How far the smooth wall lies inside the flat one over triangles where that is much, mm: beside a crest it ends farther above them than it
+    /// does on them, and a point that is taken for free there would press from one place to the next.
+    fn over_crests(&self, thickest_mm: f64) -> Vec<Vec<(u32, f64)>> {
+        let crests = self.smooth.inside_of(CREST * thickest_mm);
+        let step_mm = OVER.1 * thickest_mm;
+        parallel::map(crests.len(), |index| {
+            let triangle = crests[index];
+            let [a, b, c] = self.query.corners(triangle);
+            let (middle, normal) = ((a + b + c) / 3.0, self.query.inward_normal(triangle));
+            let places = [middle, (a + middle) * 0.5, (b + middle) * 0.5, (c + middle) * 0.5];
+            let over = places
+                .into_iter()
+                .flat_map(|x| (1..=OVER.0).map(move |k| x + normal * (f64::from(k) * step_mm)));
+            over.filter_map(|x| {
+                let flat = self.query.nearest(&x, self.reach_mm).filter(|flat| flat.distance_mm > 0.0)?;
+                let felt_mm = self.nearness(&x, flat.triangle, f64::NEG_INFINITY).value_mm();
+                Some((flat.triangle, flat.distance_mm - felt_mm))
+            })
+            .collect()
+        })
     }
 
     /// How near `x` is, whose nearest triangle is `triangle` or close to it; with derivatives below `limit_mm`.
@@ -111,5 +145,42 @@ impl FeltWall {
     /// Coefficient of friction there, over the largest of all.
     pub(super) fn rough(&self, x: &Vec3, triangle: Option<u32>) -> f64 {
         self.grading.as_ref().zip(triangle).map_or(1.0, |(g, triangle)| g.rough(&self.smooth, x, triangle))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{splitmix64, unit};
+    use crate::vessel::{GeneratedWall, NoStore, Resolution, anatomy};
+
+    #[test]
+    fn what_is_free_of_the_triangles_is_free_of_the_smooth_wall() {
+        const RADIUS_MM: f64 = 0.445;
+        // Coarse, so that the crotches of its forks are crests far inside the triangles.
+        let tree = anatomy::tree("aortic_arch").unwrap();
+        let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(6.0)).unwrap().wall;
+        let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
+        let felt = FeltWall::new(&wall, (RADIUS_MM, RADIUS_MM), &properties, &NoStore).unwrap();
+        // With insets as they are on the triangles alone.
+        let on_them = SmoothWall::new(&Wall::welded(&extended(&wall, RADIUS_MM)).unwrap(), RADIUS_MM);
+        let mut pressing = [0, 0];
+        for triangle in felt.smooth.inside_of(0.1) {
+            let ([a, b, c], normal) = (felt.query.corners(triangle), felt.query.inward_normal(triangle));
+            for k in 0..60 {
+                let [u, v, up] = [0, 1, 2].map(|n| unit(splitmix64(u64::from(triangle), 3 * k + n)));
+                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                let x = a + (b - a) * u + (c - a) * v + normal * (6.0 * RADIUS_MM * up);
+                let Some(flat) = felt.query.nearest(&x, felt.reach_mm) else { continue };
+                let felt_mm = felt.nearness(&x, flat.triangle, f64::NEG_INFINITY).value_mm();
+                for (smooth, count) in [&felt.smooth, &on_them].into_iter().zip(&mut pressing) {
+                    let free_mm =
+                        flat.distance_mm - (1.0 + FOLLOW) * RADIUS_MM - smooth.inset_mm(flat.triangle);
+                    *count += u32::from(free_mm >= 0.0 && felt_mm < RADIUS_MM);
+                }
+            }
+        }
+        assert_eq!(pressing[0], 0);
+        assert!(pressing[1] > 10, "{pressing:?}");
     }
 }

@@ -427,7 +427,7 @@ impl External for WallContact<'_> {
     }
 
     fn is_lagged(&self) -> bool {
-        self.friction.acts() && !self.stiff
+        (self.friction.acts() || !self.friction.between.places().is_empty()) && !self.stiff
     }
 
     /// A point may move by nearly its clearance, whatever the direction: the ball about it holds no wall. Farther it may go where its

@@ -34,6 +34,8 @@ pub struct Newton<const C: usize> {
     pub start_residual: [f64; C],
     pub(super) unit_shift: Shift,
     pub(super) factor: Factor<C>,
+    /// How far nodes have turned since the factors at hand were taken, rad; infinite where they are those of no matrix near the state.
+    pub(super) since: f64,
     pub(super) step: Vec<f64>,
     pub(super) spare: Vec<f64>,
     /// The step before, while contacts within one are looked for.
@@ -54,6 +56,7 @@ impl<const C: usize> Newton<C> {
             start_residual: [0.0; C],
             unit_shift: Shift::default(),
             factor: Factor::new(n),
+            since: f64::INFINITY,
             step: vec![0.0; n],
             spare: vec![0.0; n],
             before: vec![0.0; n],
@@ -144,7 +147,8 @@ impl<const C: usize> Newton<C> {
         // Loads without potential make the stiffness unsymmetric: its symmetric part says nothing about minima.
         let minimum = options.minimum && external.is_conservative();
         let mut problem = Problem { elements, supports, external, options, minimum };
-        let mut progress = Progress::default();
+        let since = std::mem::replace(&mut self.since, f64::INFINITY);
+        let mut progress = if options.goes_on { Progress::going_on(since) } else { Progress::default() };
         let mut search = LineSearch::new(elements);
         let mut shift = 0.0;
         loop {
@@ -162,6 +166,8 @@ impl<const C: usize> Newton<C> {
             if arrived {
                 self.judge(&problem, natural, &mut report);
                 if report.stable || !minimum {
+                    let own = self.assembly.hessian && shift == 0.0;
+                    self.since = if own { 0.0 } else { progress.since() };
                     return report.converged(size.reason());
                 }
             }

@@ -14,11 +14,13 @@ pub struct NewtonOptions {
     pub max_turn: f64,
     /// Whether to look for a minimum (or take any equilibrium, as continuation does).
     pub minimum: bool,
+    /// Whether the state is the one that the last solution ended at, and next to nothing has changed: its factors serve first.
+    pub goes_on: bool,
 }
 
 impl Default for NewtonOptions {
     fn default() -> Self {
-        Self { max_iterations: 500, tolerance: 1e-10, max_turn: 1.4, minimum: true }
+        Self { max_iterations: 500, tolerance: 1e-10, max_turn: 1.4, minimum: true, goes_on: false }
     }
 }
 
@@ -100,6 +102,11 @@ impl NewtonReport {
             converged: false,
             reason: StopReason::MaxIterations,
         }
+    }
+
+    /// Whether it ended at this residual or less, or at what rounding leaves of one.
+    pub(crate) fn is_within(&self, tolerance: f64) -> bool {
+        self.residual <= tolerance || self.reason == StopReason::RoundingFloor
     }
 
     /// An equilibrium.

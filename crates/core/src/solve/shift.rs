@@ -21,6 +21,7 @@ impl<const C: usize> Newton<C> {
     /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
     pub fn inertia(&mut self, elements: &[ElementData], supports: &Supports, sigma: f64) -> Option<Inertia> {
         Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
+        self.since = f64::INFINITY;
         self.factor.factor_shifted(&self.assembly.matrix, &self.unit_shift, sigma).ok()
     }
 

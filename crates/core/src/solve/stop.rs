@@ -57,6 +57,16 @@ impl Default for Progress {
 }
 
 impl Progress {
+    /// At its beginning, with factors of a state from which nodes have turned by so much since, rad.
+    pub(super) fn going_on(since: f64) -> Self {
+        Self { since, ..Self::default() }
+    }
+
+    /// Turns of nodes of all steps with the factors at hand, rad.
+    pub(super) fn since(&self) -> f64 {
+        self.since
+    }
+
     /// Takes note of a step, with factors of the state that it began at or of one before.
     pub(super) fn has_turned(&mut self, turn: Turn, factored: bool) {
         self.last_turn = turn.with_forces;
@@ -133,6 +143,18 @@ mod tests {
         assert!(!progress.shrinks_enough(&size, TOLERANCE, true));
         let (progress, _) = after(2.0 * SHORT, 1e-5);
         assert!(progress.wants_hessian(TOLERANCE, true));
+    }
+
+    #[test]
+    fn factors_of_the_last_solution_serve_where_its_state_is_near() {
+        let near = Progress::going_on(0.4 * SHORT);
+        assert!(!near.wants_hessian(TOLERANCE, true));
+        let size = ResidualSize { relative: 1e-5, small: false, rounding: false };
+        assert!(near.shrinks_enough(&size, TOLERANCE, true));
+        // Not where nothing was renewed, from afar, or where there are none.
+        assert!(near.wants_hessian(TOLERANCE, false));
+        assert!(Progress::going_on(2.0 * SHORT).wants_hessian(TOLERANCE, true));
+        assert!(Progress::default().wants_hessian(TOLERANCE, true));
     }
 
     #[test]

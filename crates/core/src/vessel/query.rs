@@ -105,6 +105,11 @@ impl WallQuery {
         (c - a).cross(&(b - a)).try_normalize(0.0).unwrap_or_else(Vec3::x)
     }
 
+    /// Corners of a triangle.
+    pub(crate) fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.mesh.corners(triangle as usize)
+    }
+
     /// How far a point is from the wall, mm, on whichever side. For one question: it looks at all triangles, which takes less time than
     /// to make ready for more.
     pub(crate) fn distance_mm(&self, point_mm: &Vec3) -> f64 {

@@ -24,7 +24,7 @@ use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
 use crate::rod::element::ElementSystem;
 use crate::rod::quadrature::{Point, hermite};
-use crate::rod::{Layout, RodState, element_system};
+use crate::rod::{ElementData, Layout, Material, RodState, element_system};
 
 /// Rounds in which the axial force behind a node and the friction there are found: each is nearer by μ times half the angle of an element.
 const ROUNDS: usize = 12;
@@ -108,13 +108,14 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
     let last = mesh.nearest_node(line_mm - reach_mm);
     // Beyond the others it is alone, with the axial force of the line.
     let mut beyond = NodeForce::default();
+    let mut system = ElementSystem::<C>::zeros();
     if comes_out(mesh, instrument).is_some() && first < mesh.elements.len() {
-        let [near, _, pull, _] = parts::<C>(stack, mesh, rod, (first, instrument));
+        let [near, _, pull, _] = parts(stack, mesh, rod, (first, instrument), &mut system);
         let wall = wall_force(line, (first, instrument));
         beyond = near.plus(&pull, rod.tensions[first]).plus(&wall, -1.0);
     }
     for i in (1..=first).rev() {
-        let [near, far, near_pull, far_pull] = parts::<C>(stack, mesh, rod, (i - 1, instrument));
+        let [near, far, near_pull, far_pull] = parts(stack, mesh, rod, (i - 1, instrument), &mut system);
         let (t, curvature) = (rod.frames[i].t, curvature(mesh, rod, i));
         let known = beyond.plus(&far, 1.0);
         let (along, rate) = (known.along(&t, &curvature), far_pull.along(&t, &curvature));
@@ -146,17 +147,35 @@ fn parts<const C: usize>(
     mesh: &Mesh,
     rod: &RodState,
     (e, instrument): (usize, usize),
+    system: &mut ElementSystem<C>,
 ) -> [NodeForce; 4] {
-    let ends = (mesh.from_tip_mm[e], mesh.from_tip_mm[e + 1]);
-    let data = element(stack, &mesh.inserted_mm, instrument + 1, ends);
-    let mut system = ElementSystem::<C>::zeros();
+    let data = inside(stack, mesh, (e, instrument));
     let mut at = rod.element::<C>(e);
     at.tension = 0.0;
-    element_system::<C, false>(&data, &at, 0.0, &mut system);
+    element_system::<C, false>(&data, &at, 0.0, system);
     let l = Layout::<C>;
     let both = |of: &[f64; C]| [0, 1].map(|i| NodeForce::of(of, l.position(i), l.tangent(i)));
     let ([near, far], [near_pull, far_pull]) = (both(&system.gradient), both(&system.stretch));
     [near, far, near_pull, far_pull]
+}
+
+/// Element `e` of an instrument and those in it. Where all of them have angles, the mesh knows each by itself.
+fn inside(stack: &Stack, mesh: &Mesh, (e, instrument): (usize, usize)) -> ElementData {
+    let sets = &stack.sets()[..=instrument];
+    if sets.contains(&None) {
+        let ends = (mesh.from_tip_mm[e], mesh.from_tip_mm[e + 1]);
+        return element(stack, &mesh.inserted_mm, instrument + 1, ends);
+    }
+    let whole = &mesh.elements[e];
+    let mut data = ElementData::of(whole.length, Material::NONE);
+    for set in sets.iter().flatten() {
+        let own = &whole.materials[*set];
+        for (sum, bending) in data.bending.iter_mut().zip(own.bending) {
+            *sum += bending;
+        }
+        data.materials[*set] = *own;
+    }
+    data
 }
 
 /// Curvature of the line at a node along u and v of its triad: the mean of the elements beside it.

@@ -110,10 +110,11 @@ impl<const C: usize> Search<'_, '_, C> {
         let mut rubs = Vec::new();
         for round in 0..=RENEWALS {
             change = self.press(stack, mesh, &mut rubs);
-            if !found.converged || change < SETTLED || round == RENEWALS {
+            let there = change < SETTLED && found.is_within(self.tolerance);
+            if !found.converged || there || round == RENEWALS {
                 break;
             }
-            found = self.on();
+            found = self.on(change < SETTLED);
         }
         (found, change)
     }

@@ -25,6 +25,8 @@ use crate::contact::{SETTLED, WallContact};
 use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
 
+/// Residual over force scale at which what presses between instruments is renewed first: renewing it leaves as much.
+const RENEWED: f64 = 1e-4;
 /// Residual over force scale on softer walls.
 const LOOSE: f64 = 1e-3;
 /// Each is so many times as stiff as the one before, …
@@ -89,7 +91,7 @@ impl<const C: usize> Search<'_, '_, C> {
         self.contact.hand_over(stiff);
         if self.budget.is_some() && if stiff { near } else { self.rubs } {
             if let Some(found) = self.at_once() {
-                return self.settled(found);
+                return if found.is_within(self.tolerance) { self.settled(found) } else { found };
             }
             self.guess.plain(self.state);
             self.contact.rewind_friction();
@@ -98,19 +100,25 @@ impl<const C: usize> Search<'_, '_, C> {
         if found.converged { self.settled(found) } else { found }
     }
 
-    /// From an equilibrium to the next one nearby, where something has changed that is lagged.
-    pub(super) fn on(&mut self) -> NewtonReport {
-        let found = self.newton(STUCK, self.tolerance);
+    /// From an equilibrium to the next one nearby, where something has changed that is lagged; `hardly`, so that the factors at hand serve.
+    pub(super) fn on(&mut self, hardly: bool) -> NewtonReport {
+        let found = self.solve(STUCK, self.tolerance, hardly);
         if found.converged { self.settled(found) } else { found }
     }
 
     /// Newton's method from the state on.
     fn newton(&mut self, most: usize, tolerance: f64) -> NewtonReport {
+        self.solve(most, tolerance, false)
+    }
+
+    /// The same; `goes_on` says that the factors at hand serve first.
+    fn solve(&mut self, most: usize, tolerance: f64, goes_on: bool) -> NewtonReport {
         let left = match &self.budget {
             Some(budget) => (**budget).min(self.max_iterations),
             None => LONGEST.saturating_sub(self.iterations),
         };
-        let options = NewtonOptions { max_iterations: most.min(left), tolerance, ..NewtonOptions::default() };
+        let most = most.min(left);
+        let options = NewtonOptions { max_iterations: most, tolerance, goes_on, ..NewtonOptions::default() };
         let found = self.newton.solve(self.elements, self.supports, self.contact, self.state, &options);
         self.take(found.iterations);
         found
@@ -128,7 +136,9 @@ impl<const C: usize> Search<'_, '_, C> {
     fn at_once(&mut self) -> Option<NewtonReport> {
         self.contact.softness = 1.0;
         let most = if self.stiff { HURRIED } else { STUCK };
-        let found = self.newton(most, self.tolerance);
+        // What presses between instruments is renewed before it is asked for more.
+        let renewed = !self.stiff && self.contact.between().turns();
+        let found = self.newton(most, if renewed { self.tolerance.max(RENEWED) } else { self.tolerance });
         found.converged.then_some(found)
     }
 
