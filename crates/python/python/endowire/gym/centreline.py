@@ -50,6 +50,19 @@ class Centreline:
             ways[row] = min(ways[row], ways[self.parents[row]] + self.lengths_mm[row - 1])
         return ways
 
+    def path(self, point_mm: NDArray[np.float64]) -> Path:
+        """The way along the tree from its root to the place nearest to a point."""
+        segment, part, _ = self.nearest(point_mm)
+        rows = [int(self.parents[segment + 1])]
+        while self.parents[rows[-1]] >= 0:
+            rows.append(int(self.parents[rows[-1]]))
+        table = np.column_stack([self.positions_mm, self.radii_mm])[[*rows[::-1], segment + 1]]
+        if part > 0.0 or len(table) == 2:
+            # The last piece ends at the place, a hundredth of it on at least: no path is a point.
+            table[-1] = table[-2] + max(part, 0.01) * (table[-1] - table[-2])
+            return Path(table)
+        return Path(table[:-1])
+
     def way_mm(self, ways_mm: NDArray[np.float64], point_mm: NDArray[np.float64]) -> float:
         """Length of the way from the place nearest to a point to the end that ``ways_mm`` lead to, mm.
 
@@ -63,3 +76,28 @@ class Centreline:
                 ways_mm[self.parents[segment + 1]] + part * length,
             )
         )
+
+
+class Path:
+    """A way from the sheath's side to a target: ``table_mm`` has the shape (n, 4), positions and radii of the vessel in mm."""
+
+    def __init__(self, table_mm: NDArray[np.float64]) -> None:
+        self.table_mm = table_mm
+        pieces = np.diff(table_mm[:, :3], axis=0)
+        self._arcs_mm = np.append(0.0, np.cumsum(np.linalg.norm(pieces, axis=1)))
+        self._line = Centreline(np.column_stack([table_mm, np.arange(-1, len(table_mm) - 1)]))
+
+    @property
+    def length_mm(self) -> float:
+        """Its length."""
+        return float(self._arcs_mm[-1])
+
+    def nearest(self, point_mm: NDArray[np.float64]) -> tuple[float, float, float]:
+        """The place nearest to a point: arc length from the beginning, distance, and the vessel's radius there, mm."""
+        segment, part, distance_mm = self._line.nearest(point_mm)
+        at_mm = self._arcs_mm[segment] + part * self._line.lengths_mm[segment]
+        return float(at_mm), distance_mm, float(np.interp(at_mm, self._arcs_mm, self.table_mm[:, 3]))
+
+    def at_mm(self, arcs_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points at arc lengths, shape (m,) to (m, 3); beyond the end the end."""
+        return np.stack([np.interp(arcs_mm, self._arcs_mm, self.table_mm[:, k]) for k in range(3)], axis=-1)

@@ -9,6 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from .. import Batch, EndOfWay, EndowireError
+from .centreline import Path
 from .task import Task
 from .vessels import Site
 
@@ -36,6 +37,8 @@ class Episodes:
         self.tip_mm = np.zeros((n, 3))
         #: Way along the centre line to the target, mm, shape (n,), now and before the last step.
         self.way_mm, self.way_before_mm = np.zeros(n), np.zeros(n)
+        #: The way from the root of the centre line to the target, of each.
+        self.paths: list[Path | None] = [None] * n
         #: Whether the tip is at the target, shape (n,).
         self.reached = np.zeros(n, dtype=bool)
         #: Steps made, shape (n,).
@@ -64,6 +67,7 @@ class Episodes:
             self.batch.replace(k, simulation)
             self.sites[k] = site
             self.target_mm[k] = self.task.target.sample(rng, site, starts[k])
+            self.paths[k] = site.centreline.path(self.target_mm[k])
             self._ways_mm[k] = site.centreline.ways_mm(self.target_mm[k])
             self.frame[k] = int(rng.integers(1 << 30)) * _FRAMES
             self.steps[k], self.safe_steps[k], self.action[k] = 0, 0, 0.0
