@@ -10,6 +10,7 @@ from endowire.gym import (
     Episodes,
     InsertionEnv,
     Task,
+    arches,
     centreline,
     ends,
     evaluation,
@@ -49,6 +50,29 @@ def test_a_path_leads_from_the_root_to_a_place():
     # At a point, before the root, and at a fork: the way ends in it and is no point.
     assert line.path(np.array([0.0, 0.0, 10.0])).length_mm == 10.0
     assert 0.0 < line.path(np.array([0.0, 0.0, -1.0])).length_mm < 0.2
+
+
+def test_ways_of_many_are_those_of_each():
+    rng, ways, alone = np.random.default_rng(1), centreline.Ways(3), centreline.Ways(1)
+    tables = [arches.arch(np.random.default_rng(seed))[0] for seed in (4, 6, 7)]
+    lines = [centreline.Centreline(table) for table in (tables[0][:20], *tables[1:])]
+    # A longer tree after a shorter one, and a shorter one in the place of a longer.
+    for k, line in [(0, lines[0]), (2, lines[1]), (1, lines[1]), (2, lines[2]), (1, lines[0])]:
+        target = line.positions_mm[-3]
+        ways.put(k, line, target)
+    for _ in range(20):
+        points = rng.uniform(*arches.ArchVariety.bounds_mm, (3, 3))
+        told = ways.left_mm(points)
+        for k, line in enumerate((lines[0], lines[0], lines[2])):
+            segment, part, _ = line.nearest(points[k])
+            rows = line.ways_mm(line.positions_mm[-3])
+            child, parent = rows[segment + 1], rows[line.parents[segment + 1]]
+            length = line.lengths_mm[segment]
+            assert told[k] == pytest.approx(
+                min(child + (1 - part) * length, parent + part * length), abs=1e-9
+            )
+            alone.put(0, line, line.positions_mm[-3])
+            assert alone.left_mm(points[k : k + 1])[0] == told[k]
 
 
 @pytest.mark.parametrize("kind", ["follow_path", "search_ahead"])
