@@ -163,6 +163,16 @@ def test_evaluation_is_of_the_episodes_of_its_seeds(task):
     assert drawn[0] == drawn[1] != drawn[2]
 
 
+def test_an_episode_ends_where_steps_take_too_much(task):
+    for most, over in ((0, True), (1_000_000, False)):
+        env = InsertionEnv(Task(task.instruments, task.vessels, ends=[ends.Laborious(most)], wall=task.wall))
+        env.reset(seed=1)
+        *_, terminated, truncated, _ = env.step(np.array([[30.0, 1.0]]))
+        batch = env._episodes.batch
+        assert batch.iterations[0] == batch.simulation(0).report.iterations > 0
+        assert truncated == over and not terminated
+
+
 def test_intervals_are_those_of_wilson():
     # Newcombe (1998), table I: 81 of 263, 15 of 148, 0 of 20.
     for counts, expected in (
