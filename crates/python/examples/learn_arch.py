@@ -11,7 +11,6 @@ kept, with rewards of its own; evaluation is the task's own in all but what is o
 
 import argparse
 import csv
-import json
 import time
 from collections import deque
 from pathlib import Path
@@ -30,6 +29,19 @@ LEARNING_SEED = 1
 CHECKED, EVALUATED = range(800_000, 800_020), range(900_000, 901_000)
 ENVIRONMENTS, STEPS = 16, 128
 SEEN = {"roadmap": observations.Roadmap(), "last_action": observations.LastAction()}
+EVALUATION = (
+    "policy",
+    "seed",
+    "reached",
+    "steps",
+    "way_mm",
+    "safety",
+    "failure",
+    "out_of_time",
+    "processor_s",
+)
+#: What the observations of a model are normalised with.
+NORMALIZED = {"cloned": "cloned", "model": "normalize"}
 CURVE = ("steps", "processor_s", "reached", "reached_unseen", "return")
 
 
@@ -176,57 +188,61 @@ def train(out, minutes, check_every):
 
 
 class Patient:
-    """A policy whose instruments stay when an episode has taken so many seconds of processor time."""
+    """A policy whose instruments stay when its episode has taken so many seconds of processor time."""
 
     def __init__(self, policy, most_s):
-        self.policy, self.most_s, self.began_s, self.given_up = policy, most_s, 0.0, set()
+        self.policy, self.most_s, self.began_s, self.given_up = policy, most_s, time.process_time(), False
 
     def act(self, episodes):
-        if episodes.steps[0] == 0:
-            self.began_s = time.process_time()
-        if time.process_time() - self.began_s < self.most_s:
-            return self.policy.act(episodes)
-        self.given_up.add(int(episodes.frame[0] - episodes.steps[0]))
-        return np.zeros_like(episodes.action)
+        self.given_up |= time.process_time() - self.began_s > self.most_s
+        return np.zeros_like(episodes.action) if self.given_up else self.policy.act(episodes)
+
+
+def known_policy(out, name, seed):
+    if name in ("cloned", "learnt"):
+        file = {"cloned": "cloned", "learnt": "model"}[name]
+        normalize = VecNormalize.load(out / f"{NORMALIZED[file]}.pkl", SB3VecEnv(unseen_task(), 1))
+        return Learned(PPO.load(out / f"{file}.zip", device="cpu"), normalize)
+    hands = {"follow": "follow_path", "look-ahead": "search_ahead"}
+    return (
+        policies.Steered(hands[name])
+        if name in hands
+        else {"random": lambda: policies.Uniform(seed), "straight": policies.Straight}[name]()
+    )
 
 
 def evaluate(out, episodes, names, most_s):
-    def learned(name):
-        environments = SB3VecEnv(unseen_task(), 1)
-        normalize = VecNormalize.load(out / f"{name}.pkl", environments)
-        model = PPO.load(out / ("model.zip" if name == "normalize" else f"{name}.zip"), device="cpu")
-        return Learned(model, normalize)
+    """A row for each episode; those that are there already are not run again."""
+    file = out / "evaluation.csv"
+    rows = list(csv.DictReader(file.open())) if file.exists() else []
+    with file.open("a", newline="") as appended:
+        writer = csv.DictWriter(appended, EVALUATION)
+        if not rows:
+            writer.writeheader()
+        for name in names:
+            there = {int(row["seed"]) for row in rows if row["policy"] == name}
+            for seed in [seed for seed in EVALUATED[:episodes] if seed not in there]:
+                policy = Patient(known_policy(out, name, seed), most_s)
+                began = time.process_time()
+                (outcome,) = evaluation.evaluate(unseen_task(), policy, [seed])
+                told = {"policy": name, **vars(outcome), "out_of_time": policy.given_up}
+                rows.append({**told, "processor_s": round(time.process_time() - began, 2)})
+                writer.writerow(rows[-1])
+                appended.flush()
+            tell(name, [row for row in rows if row["policy"] == name])
 
-    known = {
-        "random": policies.Uniform,
-        "straight": policies.Straight,
-        "follow": lambda: policies.Steered("follow_path"),
-        "look-ahead": lambda: policies.Steered("search_ahead"),
-        "cloned": lambda: learned("cloned"),
-        "learnt": lambda: learned("normalize"),
-    }
-    for name in names:
-        began, policy = time.process_time(), Patient(known[name](), most_s)
-        outcomes = []
-        for seed in EVALUATED[:episodes]:
-            outcomes += evaluation.evaluate(unseen_task(), policy, [seed])
-        reached = [outcome for outcome in outcomes if outcome.reached]
-        low, high = evaluation.interval(len(reached), len(outcomes))
-        told = {
-            "policy": name,
-            "episodes": len(outcomes),
-            "reached": len(reached),
-            "interval_95": [round(low, 3), round(high, 3)],
-            "median_steps_of_those": float(np.median([o.steps for o in reached])) if reached else None,
-            "safety": round(float(np.mean([o.safety for o in outcomes])), 3),
-            "out_of_time": len(policy.given_up),
-            "failures": sum(bool(o.failure) for o in outcomes),
-            "processor_s": round(time.process_time() - began, 1),
-            "reached_seeds": [o.seed for o in reached],
-        }
-        print(json.dumps(told), flush=True)
-        with (out / "evaluation.jsonl").open("a") as file:
-            file.write(json.dumps(told) + "\n")
+
+def tell(name, rows):
+    reached = [row for row in rows if str(row["reached"]) == "True"]
+    low, high = evaluation.interval(len(reached), len(rows))
+    steps = np.median([int(row["steps"]) for row in reached]) if reached else np.nan
+    lost = sum(str(row["out_of_time"]) == "True" for row in rows)
+    spent = np.median([float(row["processor_s"]) for row in rows])
+    print(
+        f"{name:11}{len(reached):4} of {len(rows)}, {len(reached) / len(rows):5.1%}, 95 % {low:.1%} to {high:.1%}; "
+        f"median of those that arrived {steps:.0f} steps; out of time {lost}; {spent:.1f} s an episode",
+        flush=True,
+    )
 
 
 def plot(out, picture):
@@ -264,7 +280,7 @@ def main():
     parser.add_argument(
         "--policies", nargs="*", default=["random", "straight", "follow", "look-ahead", "cloned", "learnt"]
     )
-    parser.add_argument("--most-s", type=float, default=90.0, help="processor time of an episode")
+    parser.add_argument("--most-s", type=float, default=30.0, help="processor time of an episode")
     parser.add_argument("--picture", type=Path)
     told = parser.parse_args()
     torch.set_num_threads(1)
