@@ -40,8 +40,6 @@ EVALUATION = (
     "out_of_time",
     "processor_s",
 )
-#: What the observations of a model are normalised with.
-NORMALIZED = {"cloned": "cloned", "model": "normalize"}
 CURVE = ("steps", "processor_s", "reached", "reached_unseen", "return")
 
 
@@ -199,16 +197,15 @@ class Patient:
 
 
 def known_policy(out, name, seed):
-    if name in ("cloned", "learnt"):
-        file = {"cloned": "cloned", "learnt": "model"}[name]
-        normalize = VecNormalize.load(out / f"{NORMALIZED[file]}.pkl", SB3VecEnv(unseen_task(), 1))
-        return Learned(PPO.load(out / f"{file}.zip", device="cpu"), normalize)
-    hands = {"follow": "follow_path", "look-ahead": "search_ahead"}
-    return (
-        policies.Steered(hands[name])
-        if name in hands
-        else {"random": lambda: policies.Uniform(seed), "straight": policies.Straight}[name]()
-    )
+    if name == "random":
+        return policies.Uniform(seed)
+    if name == "straight":
+        return policies.Straight()
+    if name in ("follow", "look-ahead"):
+        return policies.Steered({"follow": "follow_path", "look-ahead": "search_ahead"}[name])
+    model, normalized = {"cloned": ("cloned", "cloned"), "learnt": ("model", "normalize")}[name]
+    normalize = VecNormalize.load(out / f"{normalized}.pkl", SB3VecEnv(unseen_task(), 1))
+    return Learned(PPO.load(out / f"{model}.zip", device="cpu"), normalize)
 
 
 def evaluate(out, episodes, names, most_s):
