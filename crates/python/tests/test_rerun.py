@@ -1,8 +1,10 @@
 """Episodes as recordings of Rerun."""
 
+import gymnasium
 import numpy as np
 import pytest
 
+import endowire
 from endowire.gym import InsertionEnv, Task, ends, vessels
 
 pytest.importorskip("rerun")
@@ -46,5 +48,7 @@ def test_an_episode_is_a_recording(vessel, wire, tmp_path):
     assert told["/tip", "step"] == [0, 1, 2, 3, 4]
     assert np.reshape(told["/tip", "Points3D:positions"], (-1, 3)) == pytest.approx(np.array(tips), abs=1e-4)
     assert np.reshape(told["/vessel", "Mesh3D:vertex_positions"], (-1, 3)).shape == vessel.vertices_mm.shape
+    with pytest.raises(endowire.InputError, match="not a vector"):
+        RerunLog(gymnasium.make("CartPole-v1"), tmp_path)
     last = np.reshape(told["/instrument_0", "LineStrips3D:strips"][-1], (-1, 3))
     assert last[-1] == pytest.approx(tips[-1], abs=1e-4) and len(last) > 2

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsFloat
 
 import gymnasium
 import numpy as np
 import rerun
 from numpy.typing import NDArray
 
+from .. import InputError
 from .environment import InsertionEnv
 
 
@@ -23,11 +24,16 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
     Lengths are in mm. Beside steps there is the time of the task, s.
     """
 
-    def __init__(self, env: InsertionEnv, folder: str | PathLike[str]) -> None:
+    def __init__(self, env: gymnasium.Env[Any, Any], folder: str | PathLike[str]) -> None:
         super().__init__(env)
+        inner = env.unwrapped
+        if not isinstance(inner, InsertionEnv):
+            raise InputError(f"env = {inner}: give an environment of endowire, not a vector")
+        self._inner = inner
         self.folder = Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._number, self._recording = -1, None
+        self._number = -1
+        self._recording: rerun.RecordingStream | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -38,7 +44,7 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         recording = rerun.RecordingStream("endowire", recording_id=f"episode {self._number}")
         recording.save(self.folder / f"episode_{self._number:06}.rrd")
         self._recording = recording
-        episodes = self.env.unwrapped._episodes
+        episodes = self._inner._episodes
         vessel = episodes.sites[0].vessel
         wall = rerun.Mesh3D(
             vertex_positions=vessel.vertices_mm,
@@ -46,16 +52,16 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
             albedo_factor=[200, 110, 110, 70],
         )
         recording.log("vessel", wall, static=True)
-        target = rerun.Points3D(episodes.target_mm, radii=self.env.unwrapped.task.threshold_mm)
+        target = rerun.Points3D(episodes.target_mm, radii=self._inner.task.threshold_mm)
         recording.log("target", target, static=True)
         self._log({"way_mm": told[1]["way_mm"]})
         return told
 
-    def step(self, action: NDArray[Any]) -> tuple[dict[str, NDArray[Any]], float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[Any]) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
         told = self.env.step(action)
         _, reward, _, _, info = told
-        episodes = self.env.unwrapped._episodes
-        numbers = {"reward": reward, "way_mm": info["way_mm"]}
+        episodes = self._inner._episodes
+        numbers = {"reward": float(reward), "way_mm": info["way_mm"]}
         numbers["largest_contact_force_n"] = episodes.batch.largest_contact_force_n[0]
         for k, (push, turn) in enumerate(episodes.action[0]):
             numbers[f"instrument_{k}/push_mm_s"], numbers[f"instrument_{k}/turn_rad_s"] = push, turn
@@ -75,8 +81,9 @@ class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
             self._recording = None
 
     def _log(self, numbers: dict[str, float]) -> None:
-        recording, episodes = self._recording, self.env.unwrapped._episodes
-        task, step = self.env.unwrapped.task, int(episodes.steps[0])
+        recording, episodes = self._recording, self._inner._episodes
+        assert recording is not None, "reset comes before step"
+        task, step = self._inner.task, int(episodes.steps[0])
         recording.set_time("step", sequence=step)
         recording.set_time("time", duration=step * task.control_period_s)
         simulation = episodes.batch.simulation(0)

@@ -102,7 +102,7 @@ class Learned:
         self.model, self.normalize = model, normalize
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:
-        observed = episodes.observe()
+        observed: Any = episodes.observe()
         if self.normalize is not None:
             observed = self.normalize.normalize_obs(observed)
         actions, _ = self.model.predict(observed, deterministic=True)
