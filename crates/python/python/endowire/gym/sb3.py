@@ -29,11 +29,12 @@ class SB3VecEnv(VecEnv):
 
     def __init__(self, task: Task, num_envs: int, seed: int | None = None) -> None:
         self.task = task
-        self._episodes = Episodes(task, num_envs)
-        self._limits = self._episodes.action_space.high
+        #: What parts of a task and policies look at.
+        self.episodes = Episodes(task, num_envs)
+        self._limits = self.episodes.action_space.high
         self.render_mode = None
         actions = spaces.Box(-1.0, 1.0, self._limits.shape, dtype=np.float32)
-        super().__init__(num_envs, self._episodes.observation_space, actions)
+        super().__init__(num_envs, self.episodes.observation_space, actions)
         self._generators = [seeding.np_random(None if seed is None else seed + k)[0] for k in range(num_envs)]
         self._velocities = np.zeros((num_envs, *self._limits.shape))
 
@@ -44,9 +45,9 @@ class SB3VecEnv(VecEnv):
                 self._generators[k] = seeding.np_random(int(own))[0]
         self._reset_seeds()
         self._reset_options()
-        self._episodes.begin(dict(enumerate(self._generators)))
+        self.episodes.begin(dict(enumerate(self._generators)))
         self.reset_infos = self._infos()
-        return self._episodes.observe()
+        return self.episodes.observe()
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Takes the actions of the next `step_wait`."""
@@ -56,19 +57,19 @@ class SB3VecEnv(VecEnv):
         self,
     ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Moves all."""
-        self._episodes.step(self._velocities, np.ones(self.num_envs, dtype=bool))
-        rewards = self._episodes.rewards().astype(np.float32)
-        terminated, truncated = self._episodes.ended()
+        self.episodes.step(self._velocities, np.ones(self.num_envs, dtype=bool))
+        rewards = self.episodes.rewards().astype(np.float32)
+        terminated, truncated = self.episodes.ended()
         over = terminated | truncated
-        observed, infos = self._episodes.observe(), self._infos()
+        observed, infos = self.episodes.observe(), self._infos()
         if over.any():
             ended = [int(k) for k in np.flatnonzero(over)]
             for k in ended:
                 infos[k]["terminal_observation"] = {name: values[k] for name, values in observed.items()}
                 infos[k]["TimeLimit.truncated"] = bool(truncated[k] and not terminated[k])
-                infos[k]["steps"] = int(self._episodes.steps[k])
-            self._episodes.begin({k: self._generators[k] for k in ended})
-            observed = self._episodes.observe()
+                infos[k]["steps"] = int(self.episodes.steps[k])
+            self.episodes.begin({k: self._generators[k] for k in ended})
+            observed = self.episodes.observe()
         return observed, rewards, over, infos
 
     def close(self) -> None:
@@ -91,7 +92,7 @@ class SB3VecEnv(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
     def _infos(self) -> list[dict[str, Any]]:
-        told = self._episodes.info()
+        told = self.episodes.info()
         return [{name: values[k] for name, values in told.items()} for k in range(self.num_envs)]
 
 
