@@ -2,9 +2,9 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use endowire_core::{Error, Vec3};
 use endowire_core::control::{self, Action, FollowPath, Follower, SearchAhead, Team};
 use endowire_core::vessel::CentrelinePath;
+use endowire_core::{Error, Vec3};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
