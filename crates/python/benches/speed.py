@@ -95,7 +95,7 @@ def calls(n, steps):
     for name, work in (
         ("Batch.step that moves nothing", lambda: batch.step(still)),
         ("tips, forces, lengths", lambda: (batch.tip_mm, batch.push_force_n, batch.inserted_mm)),
-        ("a step of the environment beside that", lambda: made.step(still)),
+        ("a step of the environment, that included", lambda: made.step(still)),
     ):
         work()
         print(f"{name:42}{1e6 * processor_s(work, 500) / n:8.2f} µs a simulation of {n}")
