@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Draws the pictures of README.md and of chapters 5 and 15 of the guide anew, in assets/pictures.
+# Draws the pictures of README.md and of chapters 5 and 15 of the guide anew, in assets/pictures. That of chapter 16 is a curve of learning:
+# `python crates/python/examples/learn_arch.py plot out/learn --picture assets/pictures/learning.png`.
 #
 #     assets/pictures.sh [ENDOWIRE]      (the program; built if absent)
 set -euo pipefail

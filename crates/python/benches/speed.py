@@ -1,6 +1,14 @@
-"""What the package costs beside the simulation: `python crates/python/benches/speed.py [number of simulations]`."""
+"""What environments and the package cost, in processor time.
 
+RAYON_NUM_THREADS=1 python crates/python/benches/speed.py                 # all but `random`
+RAYON_NUM_THREADS=1 python crates/python/benches/speed.py calls resets    # some of it
+RAYON_NUM_THREADS=1 python crates/python/benches/speed.py random --steps 1000000
+"""
+
+import argparse
+import collections
 import resource
+import subprocess
 import sys
 import time
 
@@ -9,14 +17,15 @@ import numpy as np
 
 import endowire
 import endowire.gym
+from endowire.gym import arches, observations
 
 
-def seconds(work, times):
-    work()
-    began = time.perf_counter()
+def processor_s(work, times=1):
+    """Processor time of one of so many."""
+    began = time.process_time()
     for _ in range(times):
         work()
-    return (time.perf_counter() - began) / times
+    return (time.process_time() - began) / times
 
 
 def resident_kib():
@@ -24,30 +33,122 @@ def resident_kib():
         return int(statm.read().split()[1]) * resource.getpagesize() // 1024
 
 
-def main(n):
-    environments = gymnasium.make_vec("endowire/AorticArch-v0", num_envs=n)
-    environments.reset(seed=0)
-    rng = np.random.default_rng(0)
-    limits = environments.single_action_space.high
-    actions = [rng.uniform([-10.0, -3.14], limits, (n, 1, 2)) for _ in range(100)]
-    began = time.perf_counter()
-    for action in actions:
-        environments.step(action)
-    print(f"environment steps on all cores  {len(actions) * n / (time.perf_counter() - began):8.0f} /s")
+def random_steps(environments, steps, seed=0):
+    """Steps with random velocities, as a policy that has learnt nothing makes them; reasons for which episodes ended."""
+    rng, high = np.random.default_rng(seed), environments.action_space.high
+    low = np.where(high == high[..., :1], -10.0, -high)
+    ended = collections.Counter()
+    for _ in range(-(-steps // environments.num_envs)):
+        *_, terminated, truncated, info = environments.step(rng.uniform(low, high))
+        for k in np.flatnonzero(terminated | truncated):
+            left = environments.unwrapped._episodes.batch.left_through[k] >= 0
+            reason = info["failure"][k].split(":")[0] or ("left the vessel" if left else "step limit")
+            ended["reached" if info["reached"][k] else reason] += 1
+    return ended
 
-    simulation = environments.unwrapped._episodes.batch.simulation(0)
-    batch, still = endowire.Batch([simulation] * n), np.zeros((n, 1, 2))
-    call = seconds(lambda: batch.step(still), 1000)
-    print(f"Batch.step that moves nothing   {1e6 * call / n:8.2f} µs a simulation of {n}")
-    read = seconds(lambda: (batch.tip_mm, batch.push_force_n, batch.inserted_mm), 1000)
-    print(f"tips, forces, lengths           {1e6 * read / n:8.2f} µs a simulation of {n}")
-    print(f"Simulation.step, nothing moved  {1e6 * seconds(simulation.step, 10000):8.2f} µs")
 
+def environments(n, steps):
+    """Environment steps a second, episodes' beginnings included."""
+    picture = {"fluoroscopy": observations.Fluoroscopy(size_px=(128, 128))}
+    for name, task, parts in (
+        (
+            "ArchVariety, a new arch in each episode",
+            "ArchVariety",
+            {"vessels": arches.ArchVariety(count=None)},
+        ),
+        ("ArchVariety, four arches kept", "ArchVariety", {"vessels": arches.ArchVariety(count=4)}),
+        (
+            "    with a picture of 128 × 128",
+            "ArchVariety",
+            {"vessels": arches.ArchVariety(count=4), "observations": picture},
+        ),
+        ("DualDeviceNav in the built-in arch", "DualDeviceNav", {}),
+    ):
+        made = gymnasium.make_vec(f"endowire/{task}-v0", num_envs=n, **parts)
+        made.reset(seed=0)
+        ended = {}
+        spent = processor_s(lambda: ended.update(random_steps(made, steps)))
+        print(f"{name:42}{steps / spent:8.0f} steps/s   ({sum(ended.values())} episodes ended: {ended})")
+
+
+def resets(n, steps):
+    """What a new arch and its simulation take."""
+    variety, rng = arches.ArchVariety(count=None), np.random.default_rng(0)
+    task = gymnasium.make("endowire/ArchVariety-v0").unwrapped.task
+    sites = []
+    made = processor_s(lambda: sites.append(variety.sample(rng)), 20)
+    begun = processor_s(lambda: task.start(sites.pop()), 20)
+    print(f"{'a new arch':42}{1e3 * made:8.1f} ms")
+    print(f"{'its simulation':42}{1e3 * begun:8.1f} ms")
+    kept = gymnasium.make("endowire/ArchVariety-v0", vessels=arches.ArchVariety(count=1))
+    kept.reset(seed=0)
+    print(f"{'an episode in an arch that is kept':42}{1e3 * processor_s(kept.reset, 100):8.2f} ms")
+
+
+def calls(n, steps):
+    """What Python adds to a step."""
+    made = gymnasium.make_vec("endowire/ArchVariety-v0", num_envs=n, vessels=arches.ArchVariety(count=4))
+    made.reset(seed=0)
+    for _ in range(15):
+        made.step(np.tile([[30.0, 0.5]], (n, 1, 1)))
+    still, batch = np.zeros((n, 1, 2)), made.unwrapped._episodes.batch
+    for name, work in (
+        ("Batch.step that moves nothing", lambda: batch.step(still)),
+        ("tips, forces, lengths", lambda: (batch.tip_mm, batch.push_force_n, batch.inserted_mm)),
+        ("a step of the environment, that included", lambda: made.step(still)),
+    ):
+        work()
+        print(f"{name:42}{1e6 * processor_s(work, 500) / n:8.2f} µs a simulation of {n}")
+    simulation = batch.simulation(0)
+    print(f"{'Simulation.step that moves nothing':42}{1e6 * processor_s(simulation.step, 10000):8.2f} µs")
     before, copies = resident_kib(), [simulation.copy() for _ in range(100)]
     for copy in copies:
         copy.step(1.0)
-    print(f"memory of a copy that steps     {(resident_kib() - before) / len(copies):8.0f} KiB")
+    print(f"{'memory of a copy that steps':42}{(resident_kib() - before) / len(copies):8.0f} KiB")
 
+
+def threads(n, steps):
+    """Wall time of the same steps on one thread and on two; of use on an idle machine alone."""
+    code = (
+        "import sys, time; sys.path.insert(0, sys.argv[1]); import gymnasium, speed; from endowire.gym import arches\n"
+        f"made = gymnasium.make_vec('endowire/ArchVariety-v0', num_envs={n}, vessels=arches.ArchVariety(count=4))\n"
+        f"made.reset(seed=0); t = time.perf_counter(); speed.random_steps(made, {steps}); print(time.perf_counter() - t)"
+    )
+    one, two = (
+        float(
+            subprocess.check_output(
+                ["env", f"RAYON_NUM_THREADS={count}", sys.executable, "-c", code, sys.path[0]]
+            )
+        )
+        for count in (1, 2)
+    )
+    print(f"{'two threads, times as fast as one':42}{one / two:8.2f}")
+
+
+def random(n, steps):
+    """Many steps with random actions: why episodes end, and whether memory grows."""
+    made = gymnasium.make_vec("endowire/ArchVariety-v0", num_envs=n, vessels=arches.ArchVariety(count=4))
+    made.reset(seed=0)
+    ended = collections.Counter()
+    for part in range(10):
+        began = time.process_time()
+        ended += random_steps(made, steps // 10, seed=part)
+        rate = steps / 10 / (time.process_time() - began)
+        print(
+            f"{(part + 1) * steps // 10:10} steps  {resident_kib():8} KiB  {rate:6.0f} steps/s  {dict(ended)}",
+            flush=True,
+        )
+
+
+PARTS = {"environments": environments, "resets": resets, "calls": calls, "threads": threads, "random": random}
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 64)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("parts", nargs="*", default=["environments", "resets", "calls", "threads"])
+    parser.add_argument("--simulations", type=int, default=64)
+    parser.add_argument("--steps", type=int, default=20_000)
+    told = parser.parse_args()
+    for one in told.parts:
+        PARTS[one](told.simulations, told.steps)

@@ -234,6 +234,12 @@ impl Batch {
         self.of_each(py, |report| report.left_through.map_or(-1, |opening| opening as i64))
     }
 
+    /// Iterations of the method in the last steps, shape (n,).
+    #[getter]
+    fn iterations<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
+        self.of_each(py, |report| report.iterations)
+    }
+
     /// Whether the last steps met the method's own convergence test, shape (n,).
     #[getter]
     fn converged<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {

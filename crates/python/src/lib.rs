@@ -7,6 +7,7 @@
 
 mod arrays;
 mod batch;
+mod control;
 mod document;
 mod error;
 mod frames;
@@ -28,6 +29,8 @@ use pyo3::prelude::*;
 mod _endowire {
     #[pymodule_export]
     use super::batch::Batch;
+    #[pymodule_export]
+    use super::control::Controller;
     #[pymodule_export]
     use super::frames::{Frames, Renderer};
     #[pymodule_export]

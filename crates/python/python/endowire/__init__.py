@@ -5,6 +5,7 @@ Units everywhere: millimetre, newton, second, radian; names carry them. ``endowi
 
 from ._endowire import (
     Batch,
+    Controller,
     Frames,
     Instrument,
     Renderer,
@@ -23,6 +24,7 @@ from .errors import ComputationError, EndOfWay, EndowireError, InputError
 __all__ = [
     "Batch",
     "ComputationError",
+    "Controller",
     "EndOfWay",
     "EndowireError",
     "Frames",

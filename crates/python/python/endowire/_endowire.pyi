@@ -178,7 +178,33 @@ class Batch:
     @property
     def left_through(self) -> NDArray[np.int64]: ...
     @property
+    def iterations(self) -> NDArray[np.uint32]: ...
+    @property
     def converged(self) -> NDArray[np.bool_]: ...
+
+class Controller:
+    @staticmethod
+    def follow_path(
+        path_mm: ArrayLike,
+        *,
+        arrived_mm: float = 5.0,
+        lead: int = 0,
+        followers: Sequence[tuple[int, float]] = (),
+    ) -> Controller: ...
+    @staticmethod
+    def search_ahead(
+        path_mm: ArrayLike,
+        *,
+        arrived_mm: float = 5.0,
+        lead: int = 0,
+        followers: Sequence[tuple[int, float]] = (),
+        turned: Sequence[int] | None = None,
+    ) -> Controller: ...
+    def next(self, simulation: Simulation) -> NDArray[np.float64] | None: ...
+    @property
+    def ended(self) -> str | None: ...
+    @property
+    def retries(self) -> int: ...
 
 class Frames:
     @property

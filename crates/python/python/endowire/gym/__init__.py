@@ -6,8 +6,8 @@
 
 from gymnasium import register as _register
 
-from . import arches, ends, observations, originals, rewards, targets, vessels
-from .centreline import Centreline
+from . import arches, ends, evaluation, observations, originals, policies, rewards, targets, vessels
+from .centreline import Centreline, Path
 from .environment import InsertionEnv
 from .episodes import Episodes
 from .task import Task
@@ -19,11 +19,14 @@ __all__ = [
     "Episodes",
     "InsertionEnv",
     "InsertionVectorEnv",
+    "Path",
     "Task",
     "arches",
     "ends",
+    "evaluation",
     "observations",
     "originals",
+    "policies",
     "rewards",
     "targets",
     "vessels",

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import InputError, Vessel
+from .. import ComputationError, InputError, Vessel
 from .centreline import Centreline
 from .vessels import Site
 
@@ -226,7 +226,7 @@ class ArchVariety:
             table, aorta = arch(rng)
             try:
                 vessel = Vessel.generate(table, edge_mm=self.edge_mm)
-            except InputError as refused:
+            except (InputError, ComputationError) as refused:
                 last = refused
                 continue
             line = Centreline(table)

@@ -62,3 +62,18 @@ class ForceLimit:
 
     def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
         return episodes.batch.largest_contact_force_n > self.limit_n
+
+
+class Laborious:
+    """The last step took more iterations of the method than so many: one of the few states whose steps take seconds, in place of a thousandth.
+
+    For learning alone: the others of a vector wait for such an environment.
+    """
+
+    terminates = False
+
+    def __init__(self, iterations: int = 200) -> None:
+        self.iterations = iterations
+
+    def ended(self, episodes: Episodes) -> NDArray[np.bool_]:
+        return episodes.batch.iterations > self.iterations

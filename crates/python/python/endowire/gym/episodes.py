@@ -9,6 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from .. import Batch, EndOfWay, EndowireError
+from .centreline import Path, Ways
 from .task import Task
 from .vessels import Site
 
@@ -36,6 +37,8 @@ class Episodes:
         self.tip_mm = np.zeros((n, 3))
         #: Way along the centre line to the target, mm, shape (n,), now and before the last step.
         self.way_mm, self.way_before_mm = np.zeros(n), np.zeros(n)
+        #: The way from the root of the centre line to the target, of each.
+        self.paths: list[Path | None] = [None] * n
         #: Whether the tip is at the target, shape (n,).
         self.reached = np.zeros(n, dtype=bool)
         #: Steps made, shape (n,).
@@ -48,7 +51,7 @@ class Episodes:
         self.action = np.zeros((n, instruments, 2))
         #: What went wrong in the last step: exceptions by environment.
         self.failures: dict[int, EndowireError] = {}
-        self._ways_mm: list[NDArray[np.float64]] = [np.zeros(0)] * n
+        self._ways = Ways(n)
 
     def begin(self, generators: dict[int, np.random.Generator]) -> None:
         """Begins episodes of these environments; everything random comes from their generators."""
@@ -64,7 +67,8 @@ class Episodes:
             self.batch.replace(k, simulation)
             self.sites[k] = site
             self.target_mm[k] = self.task.target.sample(rng, site, starts[k])
-            self._ways_mm[k] = site.centreline.ways_mm(self.target_mm[k])
+            self.paths[k] = site.centreline.path(self.target_mm[k])
+            self._ways.put(k, site.centreline, self.target_mm[k])
             self.frame[k] = int(rng.integers(1 << 30)) * _FRAMES
             self.steps[k], self.safe_steps[k], self.action[k] = 0, 0, 0.0
             self.failures.pop(k, None)
@@ -126,9 +130,4 @@ class Episodes:
     def _look(self) -> None:
         self.tip_mm = self.batch.tip_mm
         self.reached = np.linalg.norm(self.tip_mm - self.target_mm, axis=1) < self.task.threshold_mm
-        self.way_mm = np.array(
-            [
-                site.centreline.way_mm(ways, tip)
-                for site, ways, tip in zip(self.sites, self._ways_mm, self.tip_mm, strict=True)
-            ]
-        )
+        self.way_mm = self._ways.left_mm(self.tip_mm)

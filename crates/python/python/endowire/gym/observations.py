@@ -9,6 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from .centreline import Path
     from .episodes import Episodes
     from .task import Task
 
@@ -62,6 +63,55 @@ class Shape:
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         return episodes.batch.points_mm(self.from_tip_mm)
+
+
+class Roadmap:
+    """What a roadmap shows of the way ahead, seen from the tip of the device, shape (3 len(ahead_mm) + 6,), numbers of about 1.
+
+    For each length ahead of the place of the way nearest to the tip, the point there, from the tip and in parts of that length: towards the side to which
+    the tip is bent, across that, and along the device behind its bend. Then the tip itself, seen so from where its bend ends ``bend_mm`` behind it
+    (bent to the side, along); the way that is left in 100 mm; the distance from the way in the vessel's radii; the vessel's radius in 10 mm; and how much
+    more is inserted than has become way, in 50 mm. It is of the innermost instrument.
+
+    A policy that has it knows the centre line to the target, as an operator does with a roadmap; parts without it do not.
+    """
+
+    def __init__(self, ahead_mm: tuple[float, ...] = (5.0, 10.0, 20.0, 40.0), bend_mm: float = 16.0) -> None:
+        self.ahead_mm, self.bend_mm = np.asarray(ahead_mm, dtype=float), bend_mm
+
+    def space(self, task: Task) -> spaces.Box:
+        return spaces.Box(-5.0, 5.0, (3 * len(self.ahead_mm) + 6,), dtype=np.float32)
+
+    def observe(self, episodes: Episodes) -> NDArray[np.float64]:
+        points_mm = episodes.batch.points_mm([0.0, self.bend_mm, self.bend_mm + 4.0])
+        inserted_mm = episodes.batch.inserted_mm[:, 0]
+        return np.stack(
+            [self._of(*each) for each in zip(points_mm, inserted_mm, episodes.paths, strict=True)]
+        )
+
+    def _of(
+        self, points_mm: NDArray[np.float64], inserted_mm: float, path: Path | None
+    ) -> NDArray[np.float64]:
+        assert path is not None
+        tip, root, behind = points_mm
+        at_mm, off_mm, radius_mm = path.nearest(tip)
+        ahead = path.at_mm(at_mm + self.ahead_mm)
+        along = root - behind
+        if not along.any():
+            # What is in is still within its bend: the way tells where the device goes.
+            along = ahead[0] - path.at_mm(np.array([at_mm - 5.0]))[0]
+        along = along / np.linalg.norm(along)
+        bent = tip - root - (tip - root) @ along * along
+        if np.linalg.norm(bent) < 1e-6:
+            bent = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+        bent = bent / np.linalg.norm(bent)
+        frame = np.stack([bent, np.cross(along, bent), along], axis=1)
+        shown = (ahead - tip) @ frame / self.ahead_mm[:, None]
+        own = (tip - root) @ frame / self.bend_mm
+        left_mm = path.length_mm - at_mm
+        more_mm = inserted_mm - at_mm
+        numbers = [left_mm / 100.0, off_mm / radius_mm, radius_mm / 10.0, more_mm / 50.0]
+        return np.concatenate([shown.ravel(), own[[0, 2]], numbers])
 
 
 class Hands:

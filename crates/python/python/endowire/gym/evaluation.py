@@ -1,0 +1,68 @@
+"""How well a policy does: episodes of stated seeds, and how sure the share of those that arrived is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from gymnasium.utils import seeding
+
+from .episodes import Episodes
+from .policies import Policy
+from .task import Task
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How an episode ended."""
+
+    seed: int
+    reached: bool
+    steps: int
+    #: Way to the target that was left, mm.
+    way_mm: float
+    #: Part of the steps after which no contact pressed harder than the task's limit.
+    safety: float
+    #: What went wrong, or nothing.
+    failure: str
+
+
+def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8) -> list[Outcome]:
+    """One episode of each seed, the same as that of an environment reset with it, in the order of the seeds."""
+    episodes = Episodes(task, min(num_envs, len(seeds)))
+    waiting = list(enumerate(seeds))[::-1]
+    current = {k: waiting.pop() for k in range(len(episodes.target_mm))}
+    episodes.begin({k: seeding.np_random(seed)[0] for k, (_, seed) in current.items()})
+    outcomes: dict[int, Outcome] = {}
+    while current:
+        moving = np.isin(np.arange(len(episodes.sites)), list(current))
+        episodes.step(policy.act(episodes), moving)
+        over = np.logical_or(*episodes.ended()) & moving
+        info = episodes.info()
+        begun = {}
+        for k in np.flatnonzero(over).tolist():
+            place, seed = current.pop(k)
+            outcomes[place] = Outcome(
+                seed,
+                bool(info["reached"][k]),
+                int(episodes.steps[k]),
+                float(info["way_mm"][k]),
+                float(info["safety"][k]),
+                str(info["failure"][k]),
+            )
+            if waiting:
+                current[k] = waiting.pop()
+                begun[k] = seeding.np_random(current[k][1])[0]
+        if begun:
+            episodes.begin(begun)
+    return [outcomes[place] for place in range(len(seeds))]
+
+
+def interval(successes: int, episodes: int, z: float = 1.959964) -> tuple[float, float]:
+    """The interval of Wilson (1927) for a share, of 95 % unless told: it holds near 0 and 1, too."""
+    share, square = successes / episodes, z * z / episodes
+    middle = (share + square / 2) / (1 + square)
+    half = z * sqrt(share * (1 - share) / episodes + square / (4 * episodes)) / (1 + square)
+    return max(0.0, middle - half), min(1.0, middle + half)

@@ -1,0 +1,66 @@
+"""What acts in an environment without learning: what a policy that learns is compared with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import Controller
+
+if TYPE_CHECKING:
+    from .episodes import Episodes
+
+
+class Policy(Protocol):
+    """Says what to do next."""
+
+    def act(self, episodes: Episodes) -> NDArray[np.float64]:
+        """Velocities for all environments, shape (n, n_instruments, 2): mm/s and rad/s. An episode begins where ``episodes.steps`` is 0."""
+        ...
+
+
+class Straight:
+    """Pushes on at the fastest and never turns."""
+
+    def act(self, episodes: Episodes) -> NDArray[np.float64]:
+        action = np.zeros_like(episodes.action)
+        action[..., 0] = episodes.task.speed_limits[0]
+        return action
+
+
+class Uniform:
+    """Random velocities, uniform from ``slowest_mm_s`` to the limit of a push and within the limits of a turn."""
+
+    def __init__(self, seed: int = 0, slowest_mm_s: float = -10.0) -> None:
+        self.rng, self.slowest_mm_s = np.random.default_rng(seed), slowest_mm_s
+
+    def act(self, episodes: Episodes) -> NDArray[np.float64]:
+        push, turn = episodes.task.speed_limits
+        return self.rng.uniform((self.slowest_mm_s, -turn), (push, turn), episodes.action.shape)
+
+
+class Steered:
+    """The library's hands, which know the centre line to the target: ``follow_path`` or ``search_ahead`` of `Controller`, on copies of the
+    simulations. Where a hand gives up its instruments stay.
+
+    Their commands of 2 mm and 0.35 rad at most are within a step's limits at 7.5 Hz and 35 mm/s.
+    """
+
+    def __init__(self, kind: str = "search_ahead") -> None:
+        self.make = getattr(Controller, kind)
+        self._hands: dict[int, Controller] = {}
+
+    def act(self, episodes: Episodes) -> NDArray[np.float64]:
+        action = np.zeros_like(episodes.action)
+        for k in range(len(episodes.sites)):
+            if episodes.steps[k] == 0:
+                path = episodes.paths[k]
+                assert path is not None
+                # The end of an episode is the task's to tell: the hand goes on to the end of its way.
+                self._hands[k] = self.make(path.table_mm, arrived_mm=0.0)
+            move = self._hands[k].next(episodes.batch.simulation(k))
+            if move is not None:
+                action[k] = move / episodes.task.control_period_s
+        return action

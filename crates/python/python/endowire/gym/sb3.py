@@ -1,0 +1,110 @@
+"""A vector of environments as `stable-baselines3 <https://stable-baselines3.readthedocs.io>`_ has them, and its models as policies.
+
+Import it where stable-baselines3 is installed: ``pip install "endowire[learn]"``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import seeding
+from numpy.typing import NDArray
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
+
+from .episodes import Episodes
+from .task import Task
+
+
+class SB3VecEnv(VecEnv):
+    """``num_envs`` environments of a task, stepped in one call.
+
+    Actions are parts of the limits of the task's own, from -1 to 1, shape (num_envs, n_instruments, 2). As stable-baselines3 wants it, an environment
+    whose episode ends begins the next at once: what it shows is the first observation of that, the last of the one that has ended is
+    ``infos[k]["terminal_observation"]``. Environment k has the seed ``seed + k``, and an episode with it is that of `InsertionEnv`.
+    """
+
+    def __init__(self, task: Task, num_envs: int, seed: int | None = None) -> None:
+        self.task = task
+        #: What parts of a task and policies look at.
+        self.episodes = Episodes(task, num_envs)
+        self._limits = self.episodes.action_space.high
+        self.render_mode = None
+        actions = spaces.Box(-1.0, 1.0, self._limits.shape, dtype=np.float32)
+        super().__init__(num_envs, self.episodes.observation_space, actions)
+        self._generators = [seeding.np_random(None if seed is None else seed + k)[0] for k in range(num_envs)]
+        self._velocities = np.zeros((num_envs, *self._limits.shape))
+
+    def reset(self) -> dict[str, NDArray[Any]]:
+        """Begins all episodes."""
+        for k, own in enumerate(self._seeds):
+            if own is not None:
+                self._generators[k] = seeding.np_random(int(own))[0]
+        self._reset_seeds()
+        self._reset_options()
+        self.episodes.begin(dict(enumerate(self._generators)))
+        self.reset_infos = self._infos()
+        return self.episodes.observe()
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Takes the actions of the next `step_wait`."""
+        self._velocities = np.asarray(actions, dtype=float) * self._limits
+
+    def step_wait(
+        self,
+    ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Moves all."""
+        self.episodes.step(self._velocities, np.ones(self.num_envs, dtype=bool))
+        rewards = self.episodes.rewards().astype(np.float32)
+        terminated, truncated = self.episodes.ended()
+        over = terminated | truncated
+        observed, infos = self.episodes.observe(), self._infos()
+        if over.any():
+            ended = [int(k) for k in np.flatnonzero(over)]
+            for k in ended:
+                infos[k]["terminal_observation"] = {name: values[k] for name, values in observed.items()}
+                infos[k]["TimeLimit.truncated"] = bool(truncated[k] and not terminated[k])
+                infos[k]["steps"] = int(self.episodes.steps[k])
+            self.episodes.begin({k: self._generators[k] for k in ended})
+            observed = self.episodes.observe()
+        return observed, rewards, over, infos
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """The same of all: environments have nothing of their own."""
+        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        raise NotImplementedError(f"{attr_name}: replace the task's part instead")
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        raise NotImplementedError(f"{method_name}: environments have no methods of their own")
+
+    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
+        """None is."""
+        return [False for _ in self._get_indices(indices)]
+
+    def _infos(self) -> list[dict[str, Any]]:
+        told = self.episodes.info()
+        return [{name: values[k] for name, values in told.items()} for k in range(self.num_envs)]
+
+
+class Learned:
+    """A model of stable-baselines3 as a `Policy`, without its noise; ``normalize`` is what its observations were normalised with."""
+
+    def __init__(self, model: BaseAlgorithm, normalize: VecNormalize | None = None) -> None:
+        self.model, self.normalize = model, normalize
+
+    def act(self, episodes: Episodes) -> NDArray[np.float64]:
+        observed: Any = episodes.observe()
+        if self.normalize is not None:
+            observed = self.normalize.normalize_obs(observed)
+        actions, _ = self.model.predict(observed, deterministic=True)
+        return np.asarray(actions, dtype=float) * episodes.action_space.high

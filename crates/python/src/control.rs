@@ -1,0 +1,135 @@
+//! Hands that steer, as the library has them.
+
+use std::sync::{Mutex, PoisonError};
+
+use endowire_core::control::{self, Action, FollowPath, Follower, SearchAhead, Team};
+use endowire_core::vessel::CentrelinePath;
+use endowire_core::{Error, Vec3};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::arrays::{Table, array, rows};
+use crate::error::{exception, refuse};
+use crate::simulation::Simulation;
+
+/// A hand that steers one instrument along a way: it looks at a simulation and says what to do next, without learning.
+///
+/// `path_mm` is the way, shape (n, 4): x, y, z and the vessel's radius, mm. `lead` is the instrument that is steered; `followers` go
+/// behind its tip, pairs of an instrument and how far, mm. It has arrived where the tip is no more than `arrived_mm` before the end of the way.
+#[pyclass(frozen, module = "endowire", name = "Controller")]
+pub(crate) struct Controller {
+    inner: Mutex<Hand>,
+}
+
+struct Hand {
+    controller: Box<dyn control::Controller + Send>,
+    /// Instruments that it turns, beside those of its team.
+    turned: Vec<usize>,
+    ended: Option<&'static str>,
+}
+
+impl Controller {
+    fn of(controller: impl control::Controller + Send + 'static, turned: Vec<usize>) -> Self {
+        Self { inner: Mutex::new(Hand { controller: Box::new(controller), turned, ended: None }) }
+    }
+
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut Hand) -> T + Send) -> T {
+        py.detach(|| work(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner)))
+    }
+}
+
+#[pymethods]
+impl Controller {
+    /// Turns the bent tip to where the way goes and pushes on; where it goes astray or makes no way it pulls back and tries another turn.
+    ///
+    /// Raises InputError for a path that is none.
+    #[staticmethod]
+    #[pyo3(signature = (path_mm, *, arrived_mm = 5.0, lead = 0, followers = Vec::new()))]
+    fn follow_path(
+        path_mm: Table<'_, f64>,
+        arrived_mm: f64,
+        lead: usize,
+        followers: Vec<(usize, f64)>,
+    ) -> PyResult<Self> {
+        Ok(Self::of(FollowPath::new(path(&path_mm)?, team(lead, followers), arrived_mm), Vec::new()))
+    }
+
+    /// Tries turns of the instruments `turned` (that which leads, unless told) on copies of the simulation, pushes and pulls for 20 mm
+    /// after each, and does what brought the tip farthest along the way.
+    ///
+    /// Raises InputError for a path that is none.
+    #[staticmethod]
+    #[pyo3(signature = (path_mm, *, arrived_mm = 5.0, lead = 0, followers = Vec::new(), turned = None))]
+    fn search_ahead(
+        path_mm: Table<'_, f64>,
+        arrived_mm: f64,
+        lead: usize,
+        followers: Vec<(usize, f64)>,
+        turned: Option<Vec<usize>>,
+    ) -> PyResult<Self> {
+        let turned = turned.unwrap_or_else(|| vec![lead]);
+        let hand = SearchAhead::new(path(&path_mm)?, team(lead, followers), turned.clone(), arrived_mm);
+        Ok(Self::of(hand, turned))
+    }
+
+    /// What to do with a simulation as it is now: advance_mm and rotate_rad of each instrument, shape (n_instruments, 2); None where it
+    /// ends, as `ended` tells. Ask once before every step, and carry it out.
+    ///
+    /// Raises InputError for instruments that the simulation does not have.
+    fn next<'py>(
+        &self,
+        py: Python<'py>,
+        simulation: &Simulation,
+    ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let hands = simulation.instruments.len();
+        // A copy, so that others may look at the simulation meanwhile.
+        let copy = simulation.with(py, |simulation| simulation.clone());
+        let told = self.with(py, move |hand| {
+            if let Some(absent) = hand.turned.iter().find(|instrument| **instrument >= hands) {
+                let mend = format!("there are {hands}, the innermost is 0");
+                return Err(Error::parameter("turned", absent, mend));
+            }
+            let action = hand.controller.next(&copy)?;
+            hand.ended = match action {
+                Action::Arrived => Some("arrived"),
+                Action::GivenUp => Some("given up"),
+                Action::Move(_) => None,
+            };
+            Ok(action)
+        });
+        let Action::Move(moves) = told.map_err(exception)? else { return Ok(None) };
+        let mut numbers = vec![0.0; 2 * hands];
+        for one in moves {
+            numbers[2 * one.instrument] += one.command.advance_mm;
+            numbers[2 * one.instrument + 1] += one.command.rotate_rad;
+        }
+        array(py, numbers, [hands, 2]).map(Some)
+    }
+
+    /// "arrived" or "given up" where the last answer of `next` was None.
+    #[getter]
+    fn ended(&self, py: Python<'_>) -> Option<&'static str> {
+        self.with(py, |hand| hand.ended)
+    }
+
+    /// How often it has pulled back to try something else.
+    #[getter]
+    fn retries(&self, py: Python<'_>) -> usize {
+        self.with(py, |hand| hand.controller.retries())
+    }
+}
+
+fn path(table: &Table<'_, f64>) -> PyResult<CentrelinePath> {
+    let rows = rows::<f64, 4>("path_mm", table)?;
+    let count = rows.len();
+    let finite = rows.as_flattened().iter().all(|number| number.is_finite());
+    let points = rows.into_iter().map(|[x, y, z, radius_mm]| (Vec3::new(x, y, z), radius_mm)).collect();
+    let made = if finite { CentrelinePath::new(points) } else { None };
+    let mend = "must have two rows or more of finite numbers, and no two that follow in one place";
+    made.ok_or_else(|| refuse("path_mm", format!("{count} rows"), mend))
+}
+
+fn team(lead: usize, followers: Vec<(usize, f64)>) -> Team {
+    let followers = followers.into_iter().map(|(instrument, behind_mm)| Follower { instrument, behind_mm });
+    Team { lead, followers: followers.collect() }
+}
