@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::distance::{Distance, Nearness};
 use super::places::{Place, Places};
 use super::point::{FOLLOW, LOOK_AGAIN};
-use super::wall::{Foreseen, Slipping};
+use super::wall::{Foreseen, Slip, Slipping};
 use super::{ContactPoint, FeltWall, MovedWall};
 use crate::Vec3;
 
@@ -110,6 +110,8 @@ pub struct WallMemory {
     pub(super) foreseen: Vec<Foreseen>,
     /// What it does to the friction, where it was found anew.
     pub(super) slipping: Vec<Slipping>,
+    /// Changes of gaps by a round of that, mm, and what it does to points with friction.
+    pub(super) ends: (Vec<f64>, Vec<Slip>),
 }
 
 /// What the points of a device know of the wall at an equilibrium.
@@ -160,6 +162,7 @@ impl WallMemory {
             aims: Vec::new(),
             foreseen: Vec::new(),
             slipping: Vec::new(),
+            ends: (Vec::new(), Vec::new()),
         }
     }
 
@@ -174,6 +177,9 @@ impl WallMemory {
         self.before.reserve(points.saturating_sub(self.before.len()));
         self.aims.reserve(points.saturating_sub(self.aims.len()));
         self.foreseen.reserve(points.saturating_sub(self.foreseen.len()));
+        self.slipping.reserve(points.saturating_sub(self.slipping.len()));
+        self.ends.0.reserve(points.saturating_sub(self.ends.0.len()));
+        self.ends.1.reserve(points.saturating_sub(self.ends.1.len()));
         self.readings.reserve(points.saturating_sub(self.readings.len()));
     }
 

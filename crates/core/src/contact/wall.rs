@@ -12,19 +12,20 @@
 
 mod coupling;
 mod foresight;
+mod passing;
 mod reading;
 mod slipping;
 
 use super::memory::WallMemory;
 use super::point::{Contact, ContactPoint, Counters, FOLLOW, Touch};
 use crate::Vec3;
-use crate::contact::{Between, FeltWall, Friction, MovedWall};
+use crate::contact::{Between, Friction, MovedWall};
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::{External, Moved};
 
 pub(super) use foresight::Foreseen;
 use reading::Reading;
-pub(super) use slipping::Slipping;
+pub(super) use slipping::{Slip, Slipping};
 
 /// Radius of the gentlest bend worth a number, mm.
 const LEAST_BEND_MM: f64 = 100.0;
@@ -33,14 +34,8 @@ const SAFE: f64 = 0.9;
 /// A point whose axis is nearer to the wall than this part of its radius has sunk into it: on which side of the wall it is says the
 /// side that it came from, and the nearest piece of wall is looked for along the wall, not through space.
 const SUNK: f64 = 0.3;
-/// A smooth wall that seems to be off its triangles by so many radii, …
-const FAR_SIDE: f64 = 1.5;
-/// … and by so much, mm, is that of another side: coarse meshes have walls that are off by half of it.
-const FAR_SIDE_MM: f64 = 0.5;
 /// Roundings of a coordinate by which a distance is off.
 const ROUNDING: f64 = 4.0;
-/// A guess is none if it sinks deeper than the last equilibrium by this part of the radius.
-const DEEPER: f64 = 0.3;
 
 /// The wall's energy along a device.
 pub struct WallContact<'a> {
@@ -211,64 +206,6 @@ impl<'a> WallContact<'a> {
             sum_n += was_n;
         }
         if sum_n > 0.0 { misfit_n / sum_n } else { 0.0 }
-    }
-
-    /// Whether the device has passed through the wall to where it is: followed from the sheath, a piece of it between two points in
-    /// the lumen meets the wall, or comes out of the wall on its other side. Of a point that has sunk in the side is known.
-    pub fn passes_through(&mut self, elements: &[ElementData], state: &RodState) -> bool {
-        let mut last: Option<(Vec3, f64)> = None;
-        let mut sunk = false;
-        for index in (0..self.points.len()).rev() {
-            let x = self.material(index, elements, state);
-            let distance_mm = self.read(index, &x).distance_mm();
-            let sunk_mm = SUNK * self.points[index].potential.radius_mm;
-            if distance_mm < sunk_mm {
-                (last, sunk) = (None, true);
-                continue;
-            }
-            // What the smooth wall takes for the lumen may be that of another wall, seen through one that is thin. Where facets are
-            // coarse the smooth wall stands beyond them, and what is outside of those is still in front of their own piece of it. In a lumen
-            // much narrower than the device the far side is in the same piece: what it is in front of is behind the near one.
-            let radius_mm = self.points[index].potential.radius_mm;
-            let beyond = |felt: &FeltWall| {
-                felt.query.nearest(&x, felt.reach_mm).is_some_and(|flat| {
-                    flat.distance_mm < -sunk_mm
-                        && (felt.distance_from(flat.triangle, &x) < 0.0
-                            || distance_mm - flat.distance_mm > (FAR_SIDE * radius_mm).max(FAR_SIDE_MM))
-                })
-            };
-            if std::mem::take(&mut sunk) && beyond(&self.felt) {
-                return true;
-            }
-            if let Some((from, clearance_mm)) = last
-                && (x - from).norm() > SAFE * clearance_mm.max(distance_mm) / self.felt.stretch()
-            {
-                self.counters.queries += 1;
-                // A flat triangle may stand into the smooth lumen: what has gone through is behind the piece of wall that is next to it.
-                let beside = self.memory.points[index + 1].triangle;
-                let behind = |triangle| self.felt.distance_from(triangle, &x) < 0.0;
-                if self.felt.query.crossing(&from, &x, 1.0).is_some()
-                    && (beside.is_none_or(behind) || beyond(&self.felt))
-                {
-                    return true;
-                }
-            }
-            last = Some((x, distance_mm));
-        }
-        false
-    }
-
-    /// Whether a guess is none: a point sinks much deeper than where it comes from, or passes through the wall on its way from there.
-    pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
-        let deep = (0..self.points.len()).any(|index| {
-            let radius_mm = self.points[index].potential.radius_mm;
-            let known = &self.memory.points[index];
-            let was_mm = if known.side.is_some() { known.base_clearance_mm } else { SUNK * radius_mm };
-            let least_mm = was_mm.min(SUNK * radius_mm + DEEPER * radius_mm) - DEEPER * radius_mm;
-            let x = self.material(index, elements, state);
-            self.read(index, &x).distance_mm() <= least_mm
-        });
-        deep || self.safe_fraction(elements, state) < 1.0
     }
 }
 

@@ -77,7 +77,7 @@ impl Foreseen {
 }
 
 /// Part of a way, at most all of it, up to which a convex function falls whose slope is given (the Illinois method).
-fn falls_until(slope: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn falls_until(slope: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = ((0.0, slope(0.0)), (1.0, slope(1.0)));
     if high.1 <= 0.0 || low.1 >= 0.0 {
         return 1.0;
@@ -116,13 +116,11 @@ pub(super) fn straighten(
     }
 }
 
-/// Those principal curvatures of a wall that are wanted, times a force, N.
-fn crest(force_n: f64, hessian: &Matrix3<f64>, wanted: impl Fn(f64) -> bool) -> Matrix3<f64> {
+/// What a wall that bends away from the lumen does to a force on it, N, as a crest does.
+fn crest(force_n: f64, hessian: &Matrix3<f64>) -> Matrix3<f64> {
     let principal = hessian.symmetric_eigen();
     let ways = principal.eigenvalues.iter().zip(principal.eigenvectors.column_iter());
-    ways.filter(|(value, _)| wanted(**value))
-        .map(|(value, way)| way * way.transpose() * (force_n * value))
-        .sum()
+    ways.map(|(value, way)| way * way.transpose() * (force_n * value.max(0.0))).sum()
 }
 
 impl WallContact<'_> {
@@ -225,16 +223,13 @@ impl WallContact<'_> {
 
     /// See [`External::part_towards`](crate::solve::External::part_towards).
     pub(super) fn part_towards_contacts(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
-        let ends: Vec<f64> = self
-            .memory
-            .foreseen
-            .iter()
-            .map(|contact| {
-                let point = &self.points[contact.index];
-                moved((point.element, point.xi, point.set)).0.dot(&contact.gradient)
-            })
-            .collect();
-        let slipped = self.slips_to(moved);
+        let (mut ends, mut slips) = std::mem::take(&mut self.memory.ends);
+        ends.clear();
+        ends.extend(self.memory.foreseen.iter().map(|contact| {
+            let point = &self.points[contact.index];
+            moved((point.element, point.xi, point.set)).0.dot(&contact.gradient)
+        }));
+        self.slips_to(moved, &mut slips);
         let slope = |part: f64| -> f64 {
             let each = self.memory.foreseen.iter().zip(&ends).map(|(contact, end)| {
                 let way = end - contact.gap_mm[1];
@@ -243,13 +238,14 @@ impl WallContact<'_> {
                 let carried = contact.carried_n + part * (contact.linear_n(*end) - contact.carried_n);
                 (contact.spring_n_per_mm * felt - carried) * way
             });
-            each.sum::<f64>() + self.slipping_slope(&slipped, part)
+            each.sum::<f64>() + self.slipping_slope(&slips, part)
         };
         let part = falls_until(slope).min(most);
         for (contact, end) in self.memory.foreseen.iter_mut().zip(&ends) {
             contact.carried_n += part * (contact.linear_n(*end) - contact.carried_n);
         }
-        self.carry_slipping(&slipped, part);
+        self.carry_slipping(&slips, part);
+        self.memory.ends = (ends, slips);
         part
     }
 
@@ -310,7 +306,7 @@ impl WallContact<'_> {
             let Some(d) = self.memory.pressed(index) else { continue };
             let press = -self.weight_mm(index) * point.potential.derivatives(d.value_mm).0;
             let (e, h) = (point.element, elements[point.element].length);
-            let crest = crest(press, &d.hessian, |value| value > 0.0);
+            let crest = crest(press, &d.hessian);
             if crest.trace() > CREST_PER_MM * press {
                 any = true;
                 let mut sum = PointSum::default();

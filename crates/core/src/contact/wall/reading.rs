@@ -6,7 +6,7 @@
 //! On the way from a base what a point reads hangs on where it is alone, not on other steps that were tried: within half its radius of
 //! where the wall was looked for at the base, it is read about the triangle that was found there.
 
-use super::WallContact;
+use super::{SUNK, WallContact};
 use crate::Vec3;
 use crate::contact::distance::{Distance, Nearness};
 use crate::contact::memory::TakenReading;
@@ -50,7 +50,12 @@ impl WallContact<'_> {
     /// The same, with derivatives nearer than `limit_mm`.
     pub(super) fn read_within(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
         if let Some(side) = self.memory.points[index].side {
-            return self.read_from_side(index, x, side, limit_mm);
+            let reading = self.read_from_side(index, x, side, limit_mm);
+            // What has come back out has no side any more: what it is near to may be the other one.
+            if reading.distance_mm() < SUNK * self.points[index].potential.radius_mm {
+                return reading;
+            }
+            return self.read_anew(index, x, limit_mm);
         }
         self.read_known(index, x, limit_mm).unwrap_or_else(|| self.read_anew(index, x, limit_mm))
     }

@@ -61,7 +61,7 @@ enum Stiffness {
 
 /// What a round does to a point with friction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Slip {
+pub(in crate::contact) struct Slip {
     /// Its slip where the round begins, mm.
     begin_mm: Vec3,
     /// Change of its slip, mm.
@@ -220,7 +220,7 @@ impl WallContact<'_> {
     }
 
     /// What a round does to the points with friction.
-    pub(super) fn slips_to(&self, moved: &Moved<'_>) -> Vec<Slip> {
+    pub(super) fn slips_to(&self, moved: &Moved<'_>, slips: &mut Vec<Slip>) {
         let slip = |slipping: &Slipping, way: &Motion| {
             let (x, angle) = plus(&slipping.base, 1.0, way);
             let radius_mm = self.points[slipping.index].potential.radius_mm;
@@ -239,7 +239,8 @@ impl WallContact<'_> {
                 carried: [work(&slipping.carried, &way), work(&carried, &way)],
             }
         };
-        self.memory.slipping.iter().map(of).collect()
+        slips.clear();
+        slips.extend(self.memory.slipping.iter().map(of));
     }
 
     /// Slope of what friction takes at a `part` of a round, less what is carried there.

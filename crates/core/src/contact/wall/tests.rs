@@ -3,8 +3,9 @@
 use crate::contact::memory::TakenReading;
 use nalgebra::SMatrix;
 
+use super::foresight::falls_until;
 use super::*;
-use crate::contact::{KnownPoints, WallPotential, WallProperties};
+use crate::contact::{FeltWall, HandMotion, KnownPoints, WallPotential, WallProperties};
 use crate::rod::{Assembly, Frame, Layout, PLAIN, Supports};
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
 use crate::vessel::{NoStore, SurfaceMesh, Wall};
@@ -324,7 +325,7 @@ impl External for Pushed<'_> {
         self.foreseeing && self.wall.convexify(elements, base, into)
     }
     fn is_fixed(&self) -> bool {
-        true
+        self.wall.is_fixed()
     }
     fn is_steep(&self) -> bool {
         true
@@ -364,4 +365,54 @@ fn a_rod_slides_around_a_hard_wall_in_few_steps() {
     assert!(few <= 15 && many > 2 * few, "{few} iterations, {many} without contacts foreseen");
     // A trial that is off by a hundred times what was foreseen to press is brought back within two corrections.
     assert!(none.is_empty() && strays.windows(3).any(|s| s[0] > 100.0 && s[2] < 0.1), "{strays:?}");
+}
+
+/// Pushes the tip of a rod along the wall of a tube on which it rubs, and lets the push go; tells the iterations of both, and how far the tip
+/// went and came back, mm.
+fn rubbed(felt: &FeltWall, foreseeing: bool) -> ([usize; 2], [f64; 2]) {
+    let mut rod = rod(felt, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);
+    rod.friction = Friction::new(0.3);
+    let (mut state, elements) = (rod.at(Vec3::z() * 10.0), rod.elements.clone());
+    let hand = HandMotion { from_mm: 20.0, to_mm: 20.0, turn_rad: 0.0 };
+    rod.friction.begin(&elements, &state, &rod.points, (&[], &[]), &[hand]);
+    let mut supports = Supports { start_tangent: true, ..Supports::default() };
+    let mut newton = Newton::<PLAIN>::new(20);
+    let options = NewtonOptions::default();
+    let down = Vec3::x() * 0.2;
+    let mut pushed = Pushed { wall: rod.contact(), force_n: down, foreseeing, strays: Vec::new() };
+    let mut solve = |force_n: Vec3| {
+        pushed.force_n = force_n;
+        let report = newton.solve(&elements, &mut supports, &mut pushed, &mut state, &options);
+        assert!(report.converged && report.stable, "{}", report.reason);
+        (report.iterations, state.positions[20].y)
+    };
+    solve(down);
+    let (there, went_mm) = solve(down + Vec3::y() * 0.3);
+    let (back, left_mm) = solve(down);
+    ([there, back], [went_mm, left_mm])
+}
+
+#[test]
+fn a_rod_that_rubs_slips_and_sticks_in_few_steps() {
+    let felt = straight();
+    let ((few, with), (many, without)) = (rubbed(&felt, true), rubbed(&felt, false));
+    println!("{few:?} {many:?} {with:?} {without:?}");
+    assert!(
+        (with[0] - without[0]).abs() < 1e-6 && (with[1] - without[1]).abs() < 1e-6,
+        "{with:?} {without:?}"
+    );
+    // It does not come back all the way.
+    assert!(with[0] > 0.8 && with[1] > 0.05 && with[1] < with[0], "{with:?}");
+    assert!(few[0] + few[1] <= 30 && many[0] + many[1] > 2 * (few[0] + few[1]), "{few:?} {many:?}");
+}
+
+#[test]
+fn a_search_ends_where_a_convex_function_falls_no_more() {
+    // (x − 3)² / 2 and springs that press from 0.2 and 0.5 on.
+    let slope = |x: f64| x - 3.0 + 4.0 * (x - 0.2f64).max(0.0) + 40.0 * (x - 0.5f64).max(0.0);
+    let part = falls_until(slope);
+    assert!(slope(part).abs() < 1e-2 && (part - 23.8 / 45.0).abs() < 1e-3, "{part}");
+    // Without them it falls all the way, and where it rises from the beginning there is nothing to search.
+    assert_eq!(falls_until(|x| x - 3.0), 1.0);
+    assert_eq!(falls_until(|x| x + 3.0), 1.0);
 }
