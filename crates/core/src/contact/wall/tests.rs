@@ -207,7 +207,7 @@ fn a_base_that_is_returned_to_is_what_it_was() {
         let [first, again] = refused(&felt, seed, false);
         untold += u32::from(first != again);
     }
-    assert!(pressed > 250 && untold > 20, "{pressed} press, {untold} differ where the wall is not told");
+    assert!(pressed > 250 && untold > 10, "{pressed} press, {untold} differ where the wall is not told");
 }
 
 #[test]
@@ -217,27 +217,47 @@ fn a_place_has_a_reading_for_each_triangle() {
     let about = |y: f64| felt.query.nearest(&Vec3::new(0.4, y, 20.1), 1.0).unwrap().triangle;
     let (near, far) = (about(0.38), about(-0.38));
     let mut rod = rod(&felt, 1, &[1.0], 1e3);
-    // Of a point in the lumen and of one that has sunk in.
-    for sunk in [false, true] {
-        let mut contact = rod.contact();
-        let ask = |contact: &mut WallContact<'_>, triangle: u32| {
-            let known = &mut contact.memory.points[0];
-            (known.base_looked_at, known.base_triangle) = (x, Some(triangle));
-            (known.looked_at, known.triangle) = (x, Some(triangle));
-            known.side = Some(triangle).filter(|_| sunk);
-            contact.read_within(0, &x, 1.0).distance_mm()
-        };
-        let direct = |triangle: u32| felt.nearness(&x, triangle, 1.0).value_mm();
-        assert!((direct(near) - 0.3).abs() < 0.02 && (direct(far) - 0.5).abs() < 0.02);
-        for triangle in [near, far, near, near, far] {
-            assert_eq!(ask(&mut contact, triangle), direct(triangle));
-        }
-        let counted = contact.count();
-        assert_eq!((counted.near, counted.avoided), (4, 1));
-        // What was read about one and is taken for the other is wrong.
-        contact.memory.readings[0].triangle = near;
-        assert_eq!(ask(&mut contact, near), direct(far));
-        contact.memory.readings[0] = TakenReading { triangle: u32::MAX, ..contact.memory.readings[0] };
+    let mut contact = rod.contact();
+    let ask = |contact: &mut WallContact<'_>, triangle: u32| {
+        let known = &mut contact.memory.points[0];
+        (known.base_looked_at, known.base_triangle) = (x, Some(triangle));
+        (known.looked_at, known.triangle) = (x, Some(triangle));
+        contact.read_within(0, &x, 1.0).distance_mm()
+    };
+    let direct = |triangle: u32| felt.nearness(&x, triangle, 1.0).value_mm();
+    assert!((direct(near) - 0.3).abs() < 0.02 && (direct(far) - 0.5).abs() < 0.02);
+    for triangle in [near, far, near, near, far] {
+        assert_eq!(ask(&mut contact, triangle), direct(triangle));
+    }
+    let counted = contact.count();
+    assert_eq!((counted.near, counted.avoided), (4, 1));
+    // What was read about one and is taken for the other is wrong.
+    contact.memory.readings[0].triangle = near;
+    assert_eq!(ask(&mut contact, near), direct(far));
+}
+
+#[test]
+fn what_has_come_back_out_of_the_wall_reads_what_is_nearest() {
+    let felt = slit();
+    let place = |y: f64| Vec3::new(0.4, y, 20.1);
+    let about = |y: f64| felt.query.nearest(&place(y), 1.0).unwrap().triangle;
+    let (near, far) = (about(0.38), about(-0.38));
+    let mut rod = rod(&felt, 1, &[1.0], 1e3);
+    let mut contact = rod.contact();
+    let mut ask = |y: f64, side: u32| {
+        let known = &mut contact.memory.points[0];
+        (known.base_looked_at, known.base_triangle) = (place(y), Some(side));
+        known.side = Some(side);
+        contact.read_within(0, &place(y), 1.0).distance_mm()
+    };
+    // Sunk in at one side it stays with that, also behind it; across the lumen it presses on the other.
+    for (y, side) in [(0.3, near), (0.42, near), (-0.3, far), (-0.42, far)] {
+        assert_eq!(ask(y, side), felt.nearness(&place(y), side, 1.0).value_mm(), "{y}");
+    }
+    for (y, side, other) in [(0.3, far, near), (0.42, far, near), (-0.42, near, far)] {
+        let across = felt.nearness(&place(y), side, 1.0).value_mm();
+        assert!(ask(y, side) < 0.15 && across > 0.6, "{y}: {across}");
+        assert!((ask(y, side) - felt.nearness(&place(y), other, 1.0).value_mm()).abs() < 1e-9, "{y}");
     }
 }
 
@@ -396,13 +416,12 @@ fn rubbed(felt: &FeltWall, foreseeing: bool) -> ([usize; 2], [f64; 2]) {
 fn a_rod_that_rubs_slips_and_sticks_in_few_steps() {
     let felt = straight();
     let ((few, with), (many, without)) = (rubbed(&felt, true), rubbed(&felt, false));
-    println!("{few:?} {many:?} {with:?} {without:?}");
     assert!(
         (with[0] - without[0]).abs() < 1e-6 && (with[1] - without[1]).abs() < 1e-6,
         "{with:?} {without:?}"
     );
-    // It does not come back all the way.
-    assert!(with[0] > 0.8 && with[1] > 0.05 && with[1] < with[0], "{with:?}");
+    // It comes back to within what it sticks by, as it is held by less than it is bent.
+    assert!(with[0] > 0.8 && with[1].abs() < 0.01, "{with:?}");
     assert!(few[0] + few[1] <= 30 && many[0] + many[1] > 2 * (few[0] + few[1]), "{few:?} {many:?}");
 }
 
