@@ -1,5 +1,7 @@
 //! From a scene to frames: chooses an engine, prepares what the wanted views need, draws.
 
+mod path_lengths;
+
 use std::sync::Arc;
 
 use endowire_core::vessel::{Displacement, SurfaceMesh, Wall};
@@ -11,10 +13,9 @@ use crate::device::{DeviceView, RefinedDevice};
 use crate::engine::{Engines, PathEngine};
 use crate::fluoro::{Afterglow, Anatomy, Fluoroscope, Kept, Moment, Sequence, labels};
 use crate::gpu;
-use crate::material::Material;
 use crate::output::{Image, Labels};
 use crate::scene::Setup;
-use crate::spec::{Backend, CArmSpec, Mode, View, ViewSpec};
+use crate::spec::{Backend, CArmSpec, View, ViewSpec};
 use crate::tails::with_tails;
 use crate::three_d::{ContactView, Solids, draw_legend, draw_markers, draw_scale_bar};
 use crate::xray::{Exposure, PathLengths};
@@ -316,97 +317,6 @@ impl Renderer {
         })?;
         let c_arm = self.setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
         labels(c_arm, devices, contacts_mm, self.setup.spec.xray.device_material, of_scope)
-    }
-
-    /// Path lengths of the rays through the pixel centres, before any injection.
-    ///
-    /// # Errors
-    /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
-    pub fn path_lengths(&mut self, devices: &[DeviceView]) -> Result<PathLengths> {
-        self.lengths(devices, None)
-    }
-
-    /// The same with the contrast medium of a moment, in s.
-    ///
-    /// # Errors
-    /// As [`Self::path_lengths`].
-    pub fn path_lengths_at(&mut self, devices: &[DeviceView], time_s: f64) -> Result<PathLengths> {
-        self.lengths(devices, Some(time_s))
-    }
-
-    fn lengths(&mut self, devices: &[DeviceView], time_s: Option<f64>) -> Result<PathLengths> {
-        let c_arm = self.setup.c_arm.clone().ok_or_else(no_fluoro)?;
-        let [width, height] = c_arm.size_px();
-        let pixels = width as usize * height as usize;
-        let default = self.setup.spec.xray.device_material;
-        let devices = RefinedDevice::all(devices)?;
-        if self.central.is_none() {
-            self.central = Some(self.with_fallback(|setup, engines, _, _| {
-                let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
-                Anatomy::new(setup, &c_arm, 1, engine.as_mut())
-            })?);
-        }
-        let (devices_mm, injected) = self.with_fallback(|setup, engines, fluoro, kept| {
-            let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
-            let mut maps: Vec<(Material, Vec<f32>)> = Vec::new();
-            for device in &devices {
-                for (layer, pieces) in cpu::layers_in_beam(&c_arm, device) {
-                    let material = layer.material.unwrap_or(default);
-                    let place = maps.iter().position(|map| map.0 == material).unwrap_or_else(|| {
-                        maps.push((material, vec![0.0; pixels]));
-                        maps.len() - 1
-                    });
-                    engine.pieces(&c_arm, &pieces, &mut maps[place].1, &mut Vec::new())?;
-                }
-            }
-            // A roadmap's injections are those of its angiogram.
-            let injecting = setup.flow.is_some() && setup.spec.xray.mode != Mode::Roadmap;
-            let injected = match time_s.filter(|_| injecting) {
-                Some(time_s) => {
-                    let tip = devices.first().and_then(|device| device.points.last());
-                    prepared(setup, engines, fluoro, kept)?
-                        .0
-                        .injected(time_s, tip.map(|point| point.position_mm))
-                }
-                None => vec![],
-            };
-            Ok((maps, injected))
-        })?;
-        let Anatomy { body, bone, lung, lumen } = self.central.clone().unwrap_or_default();
-        let fraction = self.setup.spec.xray.contrast_fraction as f32;
-        let mut contrast_mm = vec![];
-        if fraction > 0.0 || !injected.is_empty() {
-            let filling = |i: usize| lumen[i] - devices_mm.iter().map(|map| map.1[i]).sum::<f32>();
-            contrast_mm = (0..pixels).map(|i| fraction * filling(i)).collect();
-            for medium in injected {
-                let i = medium.pixel as usize;
-                contrast_mm[i] = (fraction + medium.fraction).min(1.0) * filling(i) + medium.tissue_mm;
-            }
-        }
-        Ok(PathLengths {
-            width,
-            height,
-            body_mm: body,
-            bone_mm: bone,
-            lung_mm: lung,
-            lumen_mm: lumen,
-            contrast_mm,
-            devices_mm,
-        })
-    }
-
-    /// Transmitted share of the absorbed energy behind the given path lengths, with this scene's spectrum and detector: the signal
-    /// over that of the open beam. −ln of it is the line integral.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] where the fluoroscopic view was not asked for.
-    pub fn transmission(&mut self, paths: &PathLengths) -> Result<Vec<f32>> {
-        let before = self.transmitted.take();
-        let left = self.with_fallback(|setup, engines, fluoro, kept| {
-            prepared(setup, engines, fluoro, kept)?.0.transmission(paths, before.as_ref())
-        })?;
-        self.transmitted = Some((paths.clone(), left.clone()));
-        Ok(left)
     }
 
     /// Runs `job`; where an adapter fails in it, hands over to the CPU and runs it again.

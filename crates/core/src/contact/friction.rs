@@ -336,8 +336,7 @@ impl Friction {
         self.spring(index, (x, angle), radius_mm, false)
     }
 
-    /// As [`derivatives`](Self::derivatives), with the stiffness of the spring that holds with the same force after the same slip: more than
-    /// the second derivatives, and convex.
+    /// The same with the stiffness of a spring of that force after that slip: more than the second derivatives.
     pub(crate) fn secant(
         &self,
         index: usize,
