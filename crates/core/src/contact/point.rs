@@ -52,6 +52,11 @@ impl ContactPoint {
         (d.gradient / size, -factor * self.weight_mm * self.potential.derivatives(d.value_mm).0 * size)
     }
 
+    /// Its element, ξ and set of angles.
+    pub(crate) fn place(&self) -> (usize, f64, usize) {
+        (self.element, self.xi, self.set)
+    }
+
     /// Material angle, rad.
     pub fn angle(&self, state: &RodState) -> f64 {
         let [w0, w1, wb] = Point::at(self.xi, 0.0).phi;

@@ -131,10 +131,8 @@ impl WallContact<'_> {
         self.memory.slipping.clear();
         for (index, point) in self.points.iter().enumerate() {
             let Some(d) = self.memory.pressed(index) else { continue };
-            let (gap_mm, change_mm) = (
-                d.value_mm - point.potential.radius_mm,
-                moved((point.element, point.xi, point.set)).0.dot(&d.gradient),
-            );
+            let (gap_mm, change_mm) =
+                (d.value_mm - point.potential.radius_mm, moved(point.place()).0.dot(&d.gradient));
             let spring_n_per_mm = self.weight_mm(index) * point.potential.modulus_n_per_mm2;
             foreseen.push(Foreseen {
                 index,
@@ -174,7 +172,7 @@ impl WallContact<'_> {
             let limit_mm = if old.is_some() { radius_mm } else { (1.0 + FOLLOW) * radius_mm };
             let Reading::Pressed(d) = self.read_within(index, &x, limit_mm) else { continue };
             let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, self.softness).factor;
-            let change_mm = moved((point.element, point.xi, point.set)).0.dot(&d.gradient);
+            let change_mm = moved(point.place()).0.dot(&d.gradient);
             // At the base it does not press, whatever the plane says of there.
             let plane_mm = d.value_mm - radius_mm - part * change_mm;
             let base_mm = self.memory.points[index].base_clearance_mm - radius_mm;
@@ -210,7 +208,7 @@ impl WallContact<'_> {
         let mut changed = 0;
         for contact in &mut self.memory.foreseen {
             let point = &self.points[contact.index];
-            contact.gap_mm[1] = moved((point.element, point.xi, point.set)).0.dot(&contact.gradient);
+            contact.gap_mm[1] = moved(point.place()).0.dot(&contact.gradient);
             let presses = contact.gap_mm[0] + contact.gap_mm[1] < 0.0;
             if presses == contact.presses || contact.kept {
                 continue;
@@ -227,7 +225,7 @@ impl WallContact<'_> {
         ends.clear();
         ends.extend(self.memory.foreseen.iter().map(|contact| {
             let point = &self.points[contact.index];
-            moved((point.element, point.xi, point.set)).0.dot(&contact.gradient)
+            moved(point.place()).0.dot(&contact.gradient)
         }));
         self.slips_to(moved, &mut slips);
         let slope = |part: f64| -> f64 {

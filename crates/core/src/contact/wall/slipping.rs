@@ -105,8 +105,7 @@ impl Slipping {
         let mut sum = PointSum::default();
         sum.add(point.xi, &force.0, Some(&(hessian - old_hessian)));
         into.add_points(base, element, point.element, &sum);
-        let place = (point.element, point.xi, point.set);
-        into.add_spin(base, element, place, &(mixed - old_mixed), (force.1, turn2 - old_turn2));
+        into.add_spin(base, element, point.place(), &(mixed - old_mixed), (force.1, turn2 - old_turn2));
         (self.at_rest, self.stiffness) = to;
     }
 }
@@ -132,7 +131,7 @@ impl WallContact<'_> {
                 let x = self.felt.place(&self.memory.points[index].base);
                 let (angle, radius_mm) = (point.angle(base), point.potential.radius_mm);
                 let Some(f) = self.friction.derivatives(index, &x, angle, radius_mm) else { continue };
-                let way = moved((point.element, point.xi, point.set));
+                let way = moved(point.place());
                 let mut new = Slipping {
                     index,
                     base: (x, angle),
@@ -162,7 +161,7 @@ impl WallContact<'_> {
         for k in 0..self.memory.slipping.len() {
             let mut slipping = self.memory.slipping[k];
             let point = &self.points[slipping.index];
-            let way = moved((point.element, point.xi, point.set));
+            let way = moved(point.place());
             let Some(f) = self.friction_after(&slipping, &way) else { continue };
             slipping.way = way;
             let off = plus(&(f.gradient, f.turn), -1.0, &slipping.linear(&way));
@@ -228,7 +227,7 @@ impl WallContact<'_> {
         };
         let of = |slipping: &Slipping| {
             let point = &self.points[slipping.index];
-            let end = moved((point.element, point.xi, point.set));
+            let end = moved(point.place());
             let (begin_mm, end_mm) = (slip(slipping, &slipping.way), slip(slipping, &end));
             let way = plus(&end, -1.0, &slipping.way);
             let carried = plus(&slipping.linear(&end), -1.0, &slipping.carried);
