@@ -14,7 +14,7 @@ impl Renderer {
     /// Path lengths of the rays through the pixel centres, before any injection.
     ///
     /// # Errors
-    /// As [`Self::render_at`], and [`Error::Parameter`] where the fluoroscopic view was not asked for.
+    /// As [`Self::render_at`], and [`Error::Parameter`](endowire_core::Error::Parameter) where the fluoroscopic view was not asked for.
     pub fn path_lengths(&mut self, devices: &[DeviceView]) -> Result<PathLengths> {
         self.lengths(devices, None)
     }
@@ -92,7 +92,7 @@ impl Renderer {
     /// over that of the open beam. −ln of it is the line integral.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where the fluoroscopic view was not asked for.
+    /// [`Error::Parameter`](endowire_core::Error::Parameter) where the fluoroscopic view was not asked for.
     pub fn transmission(&mut self, paths: &PathLengths) -> Result<Vec<f32>> {
         let before = self.transmitted.take();
         let left = self.with_fallback(|setup, engines, fluoro, kept| {
