@@ -262,18 +262,13 @@ impl Friction {
         forces.extend(self.sliders.iter().map(|s| NormalForce { normal: s.normal, force_n: s.force_n }));
     }
 
-    /// Slip of a point, mm.
-    pub(crate) fn slip_mm(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> Vec3 {
-        self.slip(index, x, angle, radius_mm).0
-    }
-
     /// Force of friction on a point over its `slip`, N/mm.
     pub(crate) fn resistance(&self, index: usize, slip: &Vec3) -> f64 {
         self.largest_n(index) * rates(slip.norm(), self.stick_mm).0
     }
 
     /// Slip vector of a point and the direction its surface takes when it spins.
-    fn slip(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> (Vec3, Vec3) {
+    pub(crate) fn slip(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> (Vec3, Vec3) {
         let s = &self.sliders[index];
         let spin = s.normal.cross(&s.along) * radius_mm;
         let way = x - s.from_mm;
@@ -336,18 +331,8 @@ impl Friction {
         self.spring(index, (x, angle), radius_mm, false)
     }
 
-    /// The same with the stiffness of a spring of that force after that slip: more than the second derivatives.
-    pub(crate) fn secant(
-        &self,
-        index: usize,
-        x: &Vec3,
-        angle: f64,
-        radius_mm: f64,
-    ) -> Option<FrictionDerivatives> {
-        self.spring(index, (x, angle), radius_mm, true)
-    }
-
-    fn spring(
+    /// The same, or with the stiffness of a spring of that force after that slip, the `secant`: more than the second derivatives.
+    pub(crate) fn spring(
         &self,
         index: usize,
         (x, angle): (&Vec3, f64),

@@ -66,10 +66,10 @@ pub(in crate::contact) struct Slip {
     begin_mm: Vec3,
     /// Change of its slip, mm.
     change_mm: Vec3,
-    /// What the step at its end does to the point.
-    end: Motion,
-    /// Work, on the way, of what is carried where it begins, and of its change, mJ.
-    carried: [f64; 2],
+    /// Change of what is carried, by a whole round.
+    carried: Wrench,
+    /// Work, on the way, of what is carried where it begins, and of that change, mJ.
+    work_mj: [f64; 2],
 }
 
 fn times((hessian, mixed, turn2): &(Matrix3<f64>, Vec3, f64), (way, turn): &Motion) -> Wrench {
@@ -116,11 +116,11 @@ fn stiffness(f: &FrictionDerivatives) -> (Matrix3<f64>, Vec3, f64) {
 }
 
 impl WallContact<'_> {
-    /// Friction of a point after a motion from where it is at the base.
-    fn friction_after(&self, slipping: &Slipping, way: &Motion) -> Option<FrictionDerivatives> {
+    /// Friction of a point after a motion from where it is at the base, as stiff as its derivatives or as its `secant`.
+    fn friction_after(&self, slipping: &Slipping, way: &Motion, secant: bool) -> Option<FrictionDerivatives> {
         let radius_mm = self.points[slipping.index].potential.radius_mm;
-        let (x, angle) = &slipping.base;
-        self.friction.derivatives(slipping.index, &(x + way.0), angle + way.1, radius_mm)
+        let (x, angle) = plus(&slipping.base, 1.0, way);
+        self.friction.spring(slipping.index, (&x, angle), radius_mm, secant)
     }
 
     /// Begins to look at the friction of a step from the base; returns whether there is any.
@@ -162,7 +162,7 @@ impl WallContact<'_> {
             let mut slipping = self.memory.slipping[k];
             let point = &self.points[slipping.index];
             let way = moved(point.place());
-            let Some(f) = self.friction_after(&slipping, &way) else { continue };
+            let Some(f) = self.friction_after(&slipping, &way, false) else { continue };
             slipping.way = way;
             let off = plus(&(f.gradient, f.turn), -1.0, &slipping.linear(&way));
             if off.0.norm() > CHANGED * self.friction.largest_n(slipping.index) {
@@ -183,11 +183,10 @@ impl WallContact<'_> {
         into: &mut dyn Stencils,
     ) {
         let point = &self.points[slipping.index];
-        let (x, angle) = (slipping.base.0 + slipping.way.0, slipping.base.1 + slipping.way.1);
         let spring = match slipping.as_stiff {
             Stiffness::Tangent => Some(f),
-            Stiffness::Secant => self.friction.secant(slipping.index, &x, angle, point.potential.radius_mm),
-            Stiffness::Base => self.friction_after(slipping, &(Vec3::zeros(), 0.0)),
+            Stiffness::Secant => self.friction_after(slipping, &slipping.way, true),
+            Stiffness::Base => self.friction_after(slipping, &(Vec3::zeros(), 0.0), false),
         };
         let stiffness = spring.as_ref().map_or(slipping.stiffness, stiffness);
         let at_rest = plus(&(f.gradient, f.turn), -1.0, &times(&stiffness, &slipping.way));
@@ -208,7 +207,7 @@ impl WallContact<'_> {
         let mut stiffened = 0;
         for k in 0..self.memory.slipping.len() {
             let mut slipping = self.memory.slipping[k];
-            let Some(f) = self.friction_after(&slipping, &slipping.way) else { continue };
+            let Some(f) = self.friction_after(&slipping, &slipping.way, false) else { continue };
             if slipping.as_stiff < stiffer {
                 (slipping.as_stiff, stiffened) = (stiffer, stiffened + 1);
                 self.switch(&mut slipping, f, (elements, base), into);
@@ -223,7 +222,7 @@ impl WallContact<'_> {
         let slip = |slipping: &Slipping, way: &Motion| {
             let (x, angle) = plus(&slipping.base, 1.0, way);
             let radius_mm = self.points[slipping.index].potential.radius_mm;
-            self.friction.slip_mm(slipping.index, &x, angle, radius_mm)
+            self.friction.slip(slipping.index, &x, angle, radius_mm).0
         };
         let of = |slipping: &Slipping| {
             let point = &self.points[slipping.index];
@@ -234,8 +233,8 @@ impl WallContact<'_> {
             Slip {
                 begin_mm,
                 change_mm: end_mm - begin_mm,
-                end,
-                carried: [work(&slipping.carried, &way), work(&carried, &way)],
+                carried,
+                work_mj: [work(&slipping.carried, &way), work(&carried, &way)],
             }
         };
         slips.clear();
@@ -247,7 +246,7 @@ impl WallContact<'_> {
         let each = self.memory.slipping.iter().zip(slips).map(|(slipping, slip)| {
             let there = slip.begin_mm + slip.change_mm * part;
             let against = self.friction.resistance(slipping.index, &there) * there.dot(&slip.change_mm);
-            against - (slip.carried[0] + part * slip.carried[1])
+            against - (slip.work_mj[0] + part * slip.work_mj[1])
         });
         each.sum()
     }
@@ -255,8 +254,7 @@ impl WallContact<'_> {
     /// What the rod's stiffness is in balance with after that part of the round.
     pub(super) fn carry_slipping(&mut self, slips: &[Slip], part: f64) {
         for (slipping, slip) in self.memory.slipping.iter_mut().zip(slips) {
-            let to = plus(&slipping.linear(&slip.end), -1.0, &slipping.carried);
-            slipping.carried = plus(&slipping.carried, part, &to);
+            slipping.carried = plus(&slipping.carried, part, &slip.carried);
         }
     }
 }
