@@ -6,10 +6,6 @@ use crate::contact::FeltWall;
 use crate::rod::{ElementData, RodState};
 use crate::solve::External;
 
-/// A smooth wall that seems to be off its triangles by so many radii, …
-const FAR_SIDE: f64 = 1.5;
-/// … and by so much, mm, is that of another side: coarse meshes have walls that are off by half of it.
-const FAR_SIDE_MM: f64 = 0.5;
 /// A guess is none if it sinks deeper than the last equilibrium by this part of the radius.
 const DEEPER: f64 = 0.3;
 
@@ -27,15 +23,13 @@ impl WallContact<'_> {
                 (last, sunk) = (None, true);
                 continue;
             }
-            // What the smooth wall takes for the lumen may be that of another wall, seen through one that is thin. Where facets are
-            // coarse the smooth wall stands beyond them, and what is outside of those is still in front of their own piece of it. In a lumen
-            // much narrower than the device the far side is in the same piece: what it is in front of is behind the near one.
-            let radius_mm = self.points[index].potential.radius_mm;
+            // What the smooth wall takes for the lumen may be that of another wall, seen through one that is thin, or the far side of a
+            // lumen much narrower than the device. Where facets are coarse the smooth wall stands beyond them, and what is outside of
+            // those is still in front of their own piece of it: ever less, the farther behind the facet. From another it goes away.
             let beyond = |felt: &FeltWall| {
                 felt.query.nearest(&x, felt.reach_mm).is_some_and(|flat| {
-                    flat.distance_mm < -sunk_mm
-                        && (felt.distance_from(flat.triangle, &x) < 0.0
-                            || distance_mm - flat.distance_mm > (FAR_SIDE * radius_mm).max(FAR_SIDE_MM))
+                    let from = |x: &Vec3| felt.distance_from(flat.triangle, x);
+                    flat.distance_mm < -sunk_mm && (from(&x) < 0.0 || from(&x) >= from(&flat.point_mm))
                 })
             };
             if std::mem::take(&mut sunk) && beyond(&self.felt) {

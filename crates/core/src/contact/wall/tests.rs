@@ -1,10 +1,12 @@
 //! The wall's energy as Newton's method asks for it, in small pieces of vessel.
 
-use crate::contact::memory::TakenReading;
+use std::f64::consts::PI;
+
 use nalgebra::SMatrix;
 
 use super::foresight::falls_until;
 use super::*;
+use crate::contact::memory::TakenReading;
 use crate::contact::{FeltWall, HandMotion, KnownPoints, WallPotential, WallProperties};
 use crate::rod::{Assembly, Frame, Layout, PLAIN, Supports};
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
@@ -13,6 +15,10 @@ use crate::vessel::{NoStore, SurfaceMesh, Wall};
 /// A closed outline that is swept along: `place` gives the k-th of `rings` its middle, the direction of the outline's first axis and its
 /// size; the second axis is y.
 fn swept(outline: &[(f64, f64)], rings: u32, place: impl Fn(u32) -> (Vec3, Vec3, f64)) -> FeltWall {
+    felt(&sweep(outline, rings, place))
+}
+
+fn sweep(outline: &[(f64, f64)], rings: u32, place: impl Fn(u32) -> (Vec3, Vec3, f64)) -> SurfaceMesh {
     let count = outline.len() as u32;
     let mut mesh = SurfaceMesh::default();
     for k in 0..rings {
@@ -26,8 +32,13 @@ fn swept(outline: &[(f64, f64)], rings: u32, place: impl Fn(u32) -> (Vec3, Vec3,
             mesh.triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
+    mesh
+}
+
+/// The wall as it is meshed.
+fn felt(mesh: &SurfaceMesh) -> FeltWall {
     let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
-    FeltWall::new(&Wall::welded(&mesh).unwrap(), (RADIUS_MM, RADIUS_MM), &properties, &NoStore).unwrap()
+    FeltWall::new(&Wall::welded(mesh).unwrap(), (RADIUS_MM, RADIUS_MM), &properties, &NoStore).unwrap()
 }
 
 /// An ellipse with these half axes, mm.
@@ -259,6 +270,37 @@ fn what_has_come_back_out_of_the_wall_reads_what_is_nearest() {
         assert!(ask(y, side) < 0.15 && across > 0.6, "{y}: {across}");
         assert!((ask(y, side) - felt.nearness(&place(y), other, 1.0).value_mm()).abs() < 1e-9, "{y}");
     }
+}
+
+/// Whether a straight rod from `start` towards `end`, 5 mm long, has passed through the wall.
+fn has_passed(felt: &FeltWall, start: Vec3, end: Vec3) -> bool {
+    let mut rod = rod(felt, 5, &[0.5], 1e4);
+    let state =
+        RodState::straight(&rod.elements, start, Frame::new((end - start).normalize(), Some(Vec3::x())));
+    let elements = rod.elements.clone();
+    rod.contact().passes_through(&elements, &state)
+}
+
+#[test]
+fn behind_a_coarse_facet_is_not_yet_through_the_wall() {
+    // Middles of the sides are 0.76 mm nearer to the axis than corners, and the smooth wall is not.
+    let coarse = swept(&ellipse(4.0, 4.0, 5), 21, |k| (Vec3::z() * (2.0 * f64::from(k)), Vec3::x(), 1.0));
+    let side = Vec3::new((0.2 * PI).cos(), (0.2 * PI).sin(), 0.0);
+    let along =
+        |from_mm: f64, to_mm: f64| (side * from_mm + Vec3::z() * 16.0, side * to_mm + Vec3::z() * 20.9);
+    let flat = |x: &Vec3| coarse.query.nearest(x, 10.0).unwrap().distance_mm;
+    let (start, end) = along(3.0, 3.6);
+    assert!(flat(&start) > 0.2 && flat(&end) < -SUNK * RADIUS_MM, "{} {}", flat(&start), flat(&end));
+    assert!(!has_passed(&coarse, start, end));
+    // Through the wall into another vessel beside it.
+    let tube = |x: f64| sweep(&ellipse(2.0, 2.0, 24), 81, |k| (along_z(k).0 + Vec3::x() * x, Vec3::x(), 1.0));
+    let (mut both, other) = (tube(0.0), tube(4.4));
+    let first = both.vertices_mm.len() as u32;
+    both.triangles.extend(other.triangles.iter().map(|corners| corners.map(|corner| first + corner)));
+    both.vertices_mm.extend(other.vertices_mm);
+    let (both, from) = (felt(&both), Vec3::new(0.3, 0.0, 20.0));
+    assert!(has_passed(&both, from, from + Vec3::x()));
+    assert!(!has_passed(&both, from, from + Vec3::z()));
 }
 
 #[test]
