@@ -55,21 +55,22 @@ impl<const C: usize> BandMatrix<C> {
         self.rows[last..].fill([0.0; C]);
     }
 
-    /// Adds the upper triangle of the rows of two blocks, the first of which begins at row `at`: what couples one node with the
+    /// Adds the upper triangle of two blocks, the first of which begins at row `at`: what couples one node with the
     /// next, node by node. What was in the second block before is overwritten.
-    #[inline]
-    pub(crate) fn lay_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
+    #[inline(always)]
+    pub(crate) fn lay_blocks(&mut self, at: usize, entry: impl Fn(usize, usize) -> f64) {
         let targets = &mut self.rows[at..at + C];
         for i in 0..Self::BLOCK {
-            for k in 0..C {
-                targets[i][k] += rows[i][k];
+            for j in i..C {
+                targets[i][j] += entry(i, j);
             }
         }
         for i in Self::BLOCK..C {
-            for k in 0..Self::BLOCK {
-                targets[i][k] = rows[i][Self::BLOCK + k];
-                targets[i][Self::BLOCK + k] = 0.0;
+            let mut row = [0.0; C];
+            for j in i..C {
+                row[j - Self::BLOCK] = entry(i, j);
             }
+            targets[i] = row;
         }
     }
 

@@ -21,13 +21,15 @@
 //! Units are the caller's, any consistent set: nothing here knows a millimetre.
 
 pub mod assembly;
-pub mod bending;
+mod batch;
+mod bending;
 pub mod clamp;
 pub mod element;
 mod element_torsion;
 pub mod frame;
 mod invariants;
 pub mod lagrangian;
+mod lanes;
 pub mod layout;
 pub mod points;
 pub mod quadrature;
@@ -36,12 +38,13 @@ mod share;
 pub mod state;
 pub mod stencils;
 pub mod supports;
-pub mod torsion;
+mod torsion;
 
 pub use assembly::Assembly;
 pub use clamp::Clamp;
 pub use element::{ElementData, Energy, Material};
 pub use frame::Frame;
+pub(crate) use lagrangian::stored_energy;
 pub use lagrangian::{element_energy, element_system};
 pub use layout::{Layout, MAX_ANGLES, PLAIN, TWISTED};
 pub use points::PointSum;
@@ -52,3 +55,5 @@ pub use supports::{EndAngle, Supports};
 
 #[cfg(test)]
 mod derivative_tests;
+#[cfg(test)]
+mod lane_tests;

@@ -245,7 +245,7 @@ fn mid_rate<const C: usize>(elements: &[ElementData], base: &RodState, d: &[f64]
     let (t0, t1) = (l.tangent(e), l.tangent(e + 1));
     let chord = (position_step(d, l.position(e + 1)) - position_step(d, l.position(e))) / elements[e].length;
     let ends = f0.u * d[t0] + f0.v * d[t0 + 1] + f1.u * d[t1] + f1.v * d[t1 + 1];
-    (mid_slope(&f0.t, &base.chords[e], &f1.t), chord * 1.5 - ends * 0.25)
+    (mid_slope(f0.t, base.chords[e], f1.t), chord * 1.5 - ends * 0.25)
 }
 
 /// Three entries of a step.
