@@ -12,6 +12,26 @@ use pulp::Simd;
 /// Most lanes of any processor.
 pub(super) const MOST: usize = 8;
 
+/// An element on its way into a lane.
+#[derive(Clone, Copy)]
+pub(super) struct Lane<'a> {
+    pub(super) data: &'a ElementData,
+    pub(super) first: &'a Frame,
+    pub(super) second: &'a Frame,
+    pub(super) chord: &'a Vec3,
+    pub(super) tension: f64,
+    pub(super) angles: [[f64; 3]; MAX_ANGLES],
+}
+
+impl<'a> Lane<'a> {
+    /// An element that stands alone.
+    #[inline(always)]
+    pub(super) fn of(data: &'a ElementData, s: &'a ElementState) -> Self {
+        let ElementState { first, second, chord, tension, angles } = s;
+        Self { data, first, second, chord, tension: *tension, angles: *angles }
+    }
+}
+
 /// Each lane's own vector.
 #[inline(always)]
 fn vector<'a, S: Simd>(simd: S, of: impl Fn(usize) -> &'a Vec3) -> Vector<S> {
@@ -104,9 +124,9 @@ pub(super) struct Batch<S: Simd> {
 impl<S: Simd> Batch<S> {
     /// Of as many elements as there are lanes, where two neighbouring nodes have `C` unknowns.
     #[inline(always)]
-    pub(super) fn new<const C: usize>(simd: S, data: &[&ElementData], states: &[ElementState]) -> Self {
+    pub(super) fn new<const C: usize>(simd: S, lanes: &[Lane<'_>]) -> Self {
         const { assert!(S::F64_LANES <= MOST) }
-        let (data, states) = (&data[..S::F64_LANES], &states[..S::F64_LANES]);
+        let lanes = &lanes[..S::F64_LANES];
         let zero = Lanes::splat(simd, 0.0);
         let none = Instrument {
             present: false,
@@ -119,28 +139,28 @@ impl<S: Simd> Batch<S> {
         };
         let mut batch = Self {
             simd,
-            length: Lanes::gather(simd, |lane| data[lane].length),
+            length: Lanes::gather(simd, |lane| lanes[lane].data.length),
             bending: [zero; 3],
-            flexibility: Lanes::gather(simd, |lane| data[lane].flexibility),
-            stretches: data.iter().any(|data| data.flexibility > 0.0),
+            flexibility: Lanes::gather(simd, |lane| lanes[lane].data.flexibility),
+            stretches: lanes.iter().any(|lane| lane.data.flexibility > 0.0),
             instruments: [none; MAX_ANGLES],
-            first: Axes::gather(simd, |lane| &states[lane].first),
-            second: Axes::gather(simd, |lane| &states[lane].second),
-            chord: vector(simd, |lane| &states[lane].chord),
-            tension: Lanes::gather(simd, |lane| states[lane].tension),
+            first: Axes::gather(simd, |lane| lanes[lane].first),
+            second: Axes::gather(simd, |lane| lanes[lane].second),
+            chord: vector(simd, |lane| lanes[lane].chord),
+            tension: Lanes::gather(simd, |lane| lanes[lane].tension),
         };
         for k in 0..3 {
-            batch.bending[k] = Lanes::gather(simd, |lane| data[lane].bending[k]);
+            batch.bending[k] = Lanes::gather(simd, |lane| lanes[lane].data.bending[k]);
         }
         for set in 0..Layout::<C>::ANGLES {
             let of = &mut batch.instruments[set];
-            of.present = data.iter().any(|data| data.materials[set].is_present());
-            of.curved = data.iter().any(|data| data.materials[set].rest_curvature != [[0.0; 2]; 3]);
+            of.present = lanes.iter().any(|lane| lane.data.materials[set].is_present());
+            of.curved = lanes.iter().any(|lane| lane.data.materials[set].rest_curvature != [[0.0; 2]; 3]);
             for k in 0..3 {
-                let of_lane = |lane: usize| &data[lane].materials[set];
+                let of_lane = |lane: usize| &lanes[lane].data.materials[set];
                 of.torsion[k] = Lanes::gather(simd, |lane| of_lane(lane).torsion[k]);
                 of.rest_twist[k] = Lanes::gather(simd, |lane| of_lane(lane).rest_twist[k]);
-                of.angles[k] = Lanes::gather(simd, |lane| states[lane].angles[set][k]);
+                of.angles[k] = Lanes::gather(simd, |lane| lanes[lane].angles[set][k]);
                 if of.curved {
                     of.bending[k] = Lanes::gather(simd, |lane| of_lane(lane).bending[k]);
                     for a in 0..2 {

@@ -7,7 +7,7 @@
 //! and of the reference twist. Energy and gradient come from the vectors y and z of each Gauss point, the Hessian from the
 //! element's invariants (`invariants`).
 
-use super::batch::{Batch, MOST};
+use super::batch::{Batch, Lane, MOST};
 use super::bending::{bending, bending_value};
 use super::element::{
     ElementData, ElementState, ElementSystem, Energy, angles, arc_factor, elongation, mean_speed, mid_slope,
@@ -23,7 +23,7 @@ use pulp::{Arch, Scalar, Simd, WithSimd, bytemuck};
 
 /// The element's energy alone, where two neighbouring nodes have `C` unknowns.
 pub fn element_energy<const C: usize>(data: &ElementData, s: &ElementState) -> Energy {
-    energy::<_, C>(&Batch::new::<C>(Scalar, &[data], std::slice::from_ref(s)))
+    energy::<_, C>(&Batch::new::<C>(Scalar, &[Lane::of(data, s)]))
 }
 
 /// The element's Lagrangian with derivatives; the Hessian only where `HESSIAN` is set, and with the augmentation `gamma` (γ
@@ -34,7 +34,7 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
     gamma: f64,
     out: &mut ElementSystem<C>,
 ) {
-    let batch = Batch::new::<C>(Scalar, &[data], std::slice::from_ref(s));
+    let batch = Batch::new::<C>(Scalar, &[Lane::of(data, s)]);
     system::<_, C, HESSIAN>(&batch, Lanes::splat(Scalar, gamma), out);
 }
 
@@ -77,14 +77,12 @@ pub(super) fn beside<S: Simd, const C: usize>(
     first: usize,
 ) -> (Batch<S>, usize) {
     let last = elements.len() - 1;
-    let mut data = [&elements[first]; MOST];
-    let mut states = [state.element::<C>(first); MOST];
+    let mut lanes = [state.lane::<C>(&elements[first], first); MOST];
     for lane in 1..S::F64_LANES {
         let e = (first + lane).min(last);
-        data[lane] = &elements[e];
-        states[lane] = state.element::<C>(e);
+        lanes[lane] = state.lane::<C>(&elements[e], e);
     }
-    (Batch::new::<C>(simd, &data, &states), S::F64_LANES.min(elements.len() - first))
+    (Batch::new::<C>(simd, &lanes), S::F64_LANES.min(elements.len() - first))
 }
 
 #[inline(always)]
@@ -253,7 +251,12 @@ fn add_hessian<S: Simd, const C: usize>(
     let wr = combined(&by_x, [vv[0][3], vv[1][3], vv[2][3]]);
     if Layout::<C>::ANGLES > 0 {
         // What is set below is the same every time; torsion adds to more.
-        out.rows = [[Lanes::splat(s.simd, 0.0).stored(); C]; C];
+        let zero = Lanes::splat(s.simd, 0.0).stored();
+        for i in 0..C {
+            for j in i..C {
+                out.rows[i][j] = zero;
+            }
+        }
     }
     let stiffness = (by_x[0].outer(ws) + by_x[1].outer(wp) + by_x[2].outer(wq))
         .with_diagonal(vs * 2.0 * ih * ih)

@@ -5,9 +5,9 @@
 //! independent unknown (Hellinger–Reissner) and, with angles, an angle bubble b that makes the angle quadratic in
 //! the element. The Lagrangian is
 //!
-//!   ½∫EI |r′×r″|²/|r′|⁴ ds                                     bending ([`bending`])
-//!   + Σᵢ − ∫EIᵢ κᵢ⁰·t′ ds + ½∫EIᵢ |κᵢ⁰|² ds                     rest curvature ([`torsion`])
-//!   + Σᵢ ½∫GJᵢ (τᵢ − τᵢ⁰)² ds                                  twist ([`torsion`])
+//!   ½∫EI |r′×r″|²/|r′|⁴ ds                                     bending (`bending`)
+//!   + Σᵢ − ∫EIᵢ κᵢ⁰·t′ ds + ½∫EIᵢ |κᵢ⁰|² ds                     rest curvature (`torsion`)
+//!   + Σᵢ ½∫GJᵢ (τᵢ − τᵢ⁰)² ds                                  twist (`torsion`)
 //!   + Σ N c − ½ D N²                                          axial ([`lagrangian`])
 //!
 //! where instruments i that lie in one another share the centre line, EI is the sum of theirs, and κᵢ⁰ = R(θᵢ)(kᵢ₁, kᵢ₂) turns with the
@@ -17,6 +17,8 @@
 //! Sources: C. Meier, A. Popp, W. A. Wall, *An objective 3D large deformation finite element formulation for
 //! geometrically exact curved Kirchhoff rods*, CMAME 278 (2014); *A locking-free finite element formulation and reduced models
 //! for geometrically exact Kirchhoff rods*, CMAME 290 (2015); M. Bergou et al., *Discrete viscous threads*, SIGGRAPH 2010.
+//!
+//! Assemblies and stored energies are computed for several elements at once, a lane each (`lanes`, `batch`).
 //!
 //! Units are the caller's, any consistent set: nothing here knows a millimetre.
 
