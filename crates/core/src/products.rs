@@ -30,12 +30,6 @@ pub(crate) fn times(m: &Matrix3<f64>, v: &Vec3) -> Vec3 {
     Vec3::new(row(m.m11, m.m12, m.m13), row(m.m21, m.m22, m.m23), row(m.m31, m.m32, m.m33))
 }
 
-/// Mᵀ v.
-#[inline(always)]
-pub(crate) fn transposed_times(m: &Matrix3<f64>, v: &Vec3) -> Vec3 {
-    times(&m.transpose(), v)
-}
-
 /// A B.
 #[inline(always)]
 pub(crate) fn product(a: &Matrix3<f64>, b: &Matrix3<f64>) -> Matrix3<f64> {
@@ -58,7 +52,6 @@ mod tests {
             let (u, v) = (a.column(0).into_owned(), b.column(1).into_owned());
             assert_eq!(outer(&u, &v), u * v.transpose());
             assert_eq!(times(&a, &v), a * v);
-            assert_eq!(transposed_times(&a, &v), a.tr_mul(&v));
             assert_eq!(product(&a, &b), a * b);
         }
     }

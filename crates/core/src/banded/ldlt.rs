@@ -41,18 +41,6 @@ pub enum FactorError {
     },
 }
 
-/// Runs a block for every index below `$end` ≤ 12, each on its own: loops whose bounds hang on another index would not be unrolled,
-/// and their rows not kept in registers.
-macro_rules! unrolled {
-    ($i:ident in 0..$end:expr, $body:block) => { unrolled!(@ $i, $end, $body, 0 1 2 3 4 5 6 7 8 9 10 11) };
-    (@ $i:ident, $end:expr, $body:block, $($k:literal)*) => {
-        $({
-            let $i: usize = $k;
-            if $i < $end $body
-        })*
-    };
-}
-
 /// An LDLᵀ factorisation; its memory is reused from one factorisation to the next.
 #[derive(Debug, Clone)]
 pub struct Factor<const C: usize> {

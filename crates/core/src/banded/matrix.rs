@@ -48,29 +48,28 @@ impl<const C: usize> BandMatrix<C> {
         self.rows.get(i).and_then(|row| row.get(column)).copied().unwrap_or(0.0)
     }
 
-    /// Begins a matrix that is put together with [`Self::lay_blocks`]: clears the first block and the last.
+    /// Begins a matrix that is put together with [`Self::lay_blocks`]: clears the first block and the last two.
     pub(crate) fn begin_blocks(&mut self) {
-        let last = self.rows.len() - Self::BLOCK;
+        let last = self.rows.len() - 2 * Self::BLOCK;
         self.rows[..Self::BLOCK].fill([0.0; C]);
         self.rows[last..].fill([0.0; C]);
     }
 
-    /// Adds the upper triangle of the rows of two blocks, the first of which begins at row `at`: what couples one node with the
-    /// next, node by node. What was in the second block before is overwritten.
-    #[inline]
-    pub(crate) fn lay_blocks(&mut self, at: usize, rows: &[[f64; C]; C]) {
+    /// Adds the upper triangle of two blocks, the first of which begins at row `at`: what couples one node with the
+    /// next, node by node. Of the second block and of what couples the two, what was there before is overwritten.
+    #[inline(always)]
+    pub(crate) fn lay_blocks(&mut self, at: usize, entry: impl Fn(usize, usize) -> f64) {
         let targets = &mut self.rows[at..at + C];
-        for i in 0..Self::BLOCK {
-            for k in 0..C {
-                targets[i][k] += rows[i][k];
+        let (first, second) = targets.split_at_mut(Self::BLOCK);
+        unrolled!(i in 0..Self::BLOCK, {
+            for j in i..Self::BLOCK {
+                first[i][j] += entry(i, j);
+                second[i][j] = entry(Self::BLOCK + i, Self::BLOCK + j);
             }
-        }
-        for i in Self::BLOCK..C {
-            for k in 0..Self::BLOCK {
-                targets[i][k] = rows[i][Self::BLOCK + k];
-                targets[i][Self::BLOCK + k] = 0.0;
+            for j in Self::BLOCK..C {
+                first[i][j] = entry(i, j);
             }
-        }
+        });
     }
 
     /// Adds the upper triangle of the rows of two blocks, the first of which begins at row `at`.

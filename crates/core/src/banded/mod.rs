@@ -3,6 +3,18 @@
 //! [`matrix`] holds the symmetric block tridiagonal ones, [`ldlt`] factors them without pivoting and tells their inertia; [`lu`] is
 //! the band with row interchanges for those that are not symmetric.
 
+/// Runs a block for every index below `$end` ≤ 12, each on its own: loops whose bounds hang on another index would not be unrolled,
+/// and their rows not kept in registers.
+macro_rules! unrolled {
+    ($i:ident in 0..$end:expr, $body:block) => { unrolled!(@ $i, $end, $body, 0 1 2 3 4 5 6 7 8 9 10 11) };
+    (@ $i:ident, $end:expr, $body:block, $($k:literal)*) => {
+        $({
+            let $i: usize = $k;
+            if $i < $end $body
+        })*
+    };
+}
+
 pub mod ldlt;
 pub mod lu;
 pub mod matrix;

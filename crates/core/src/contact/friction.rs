@@ -205,7 +205,7 @@ impl Friction {
         for (index, point) in points.iter().enumerate() {
             let e = point.element;
             let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
-            let slope = Point::at(point.xi, 0.0).derivatives(&state.chords[e], &t0, &t1).0;
+            let slope = Point::at(point.xi, 0.0).derivatives(state.chords[e], t0, t1).0;
             let along = slope / slope.norm();
             let mut slider = Slider {
                 from_mm: point.position(elements, state) - along * hands[point.instrument].advance_mm(),

@@ -13,11 +13,14 @@
 //! with the same dq: an augmentation of the linear algebra, not of the mechanics. Its inertia tells minima from saddle
 //! points just as that of the first form does.
 
+use super::batch::MOST;
 use super::element::{ElementData, ElementSystem, Energy};
-use super::lagrangian::element_system;
+use super::lagrangian::{beside, system};
+use super::lanes::Lanes;
 use super::layout::Layout;
 use super::state::RodState;
 use crate::banded::{BandMatrix, Shift};
+use pulp::{Arch, Simd, WithSimd, bytemuck};
 
 /// A rank-one addition p qᵀ to the matrix that is not symmetric: loads that follow the rod.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,9 +92,9 @@ impl<const C: usize> Assembly<C> {
         self.rank_ones.clear();
         self.scale = [0.0; 2];
         if !self.hessian {
-            return self.add_elements::<false>(elements, state);
+            return Arch::new().dispatch(AddElements::<C, false> { to: self, elements, state });
         }
-        self.add_elements::<true>(elements, state);
+        Arch::new().dispatch(AddElements::<C, true> { to: self, elements, state });
         let l = Layout::<C>;
         // Rows without meaning.
         self.matrix.add(Layout::<C>::BLOCK - 1, Layout::<C>::BLOCK - 1, 1.0);
@@ -116,30 +119,6 @@ impl<const C: usize> Assembly<C> {
                 for row in [l.bubble(e, set), l.angle(e + 1, set)] {
                     self.matrix.add(row, row, 1.0);
                 }
-            }
-        }
-    }
-
-    fn add_elements<const HESSIAN: bool>(&mut self, elements: &[ElementData], state: &RodState) {
-        let l = Layout::<C>;
-        let mut system = ElementSystem::<C>::zeros();
-        for (e, data) in elements.iter().enumerate() {
-            let gamma = data.augmentation();
-            element_system::<C, HESSIAN>(data, &state.element::<C>(e), gamma, &mut system);
-            self.energy.add(&system.energy);
-            let g = &system.gradient;
-            let (x, t) = (l.position(0), l.tangent(0));
-            let force = g[x].abs().max(g[x + 1].abs()).max(g[x + 2].abs());
-            let moment = g[t].abs().max(g[t + 1].abs());
-            self.scale = [self.scale[0].max(force), self.scale[1].max(moment)];
-            let at = Layout::<C>::BLOCK * e;
-            let gap = gamma * g[C - 1];
-            let residual = self.residual[at..at + C].iter_mut().zip(&system.gradient);
-            residual.for_each(|(r, g)| *r += g);
-            let correction = self.correction[at..at + C].iter_mut().zip(&system.stretch);
-            correction.for_each(|(r, s)| *r += gap * s);
-            if HESSIAN {
-                self.matrix.lay_blocks(at, &system.rows);
             }
         }
     }
@@ -173,6 +152,69 @@ impl<const C: usize> Assembly<C> {
         for row in held.iter().flatten() {
             shift.diagonal[*row] = 0.0;
             shift.next[*row] = 0.0;
+        }
+    }
+}
+
+/// The elements of a rod that are added to its assembly, several side by side.
+pub(super) struct AddElements<'a, const C: usize, const HESSIAN: bool> {
+    pub(super) to: &'a mut Assembly<C>,
+    pub(super) elements: &'a [ElementData],
+    pub(super) state: &'a RodState,
+}
+
+impl<const C: usize, const HESSIAN: bool> WithSimd for AddElements<'_, C, HESSIAN> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { to, elements, state } = self;
+        let mut all = ElementSystem::<C, S::f64s>::filled(simd.splat_f64s(0.0));
+        for first in (0..elements.len()).step_by(S::F64_LANES) {
+            let (batch, count) = beside::<S, C>(simd, elements, state, first);
+            let mut gammas = [0.0; MOST];
+            for lane in 0..count {
+                gammas[lane] = elements[first + lane].augmentation();
+            }
+            system::<S, C, HESSIAN>(&batch, Lanes::gather(simd, |lane| gammas[lane]), &mut all);
+            for lane in 0..count {
+                to.add_lane::<S, HESSIAN>(first + lane, lane, gammas[lane], &all);
+            }
+        }
+    }
+}
+
+impl<const C: usize> Assembly<C> {
+    /// Adds element `e`, which is in this lane of all.
+    #[inline(always)]
+    fn add_lane<S: Simd, const HESSIAN: bool>(
+        &mut self,
+        e: usize,
+        lane: usize,
+        gamma: f64,
+        all: &ElementSystem<C, S::f64s>,
+    ) {
+        let l = Layout::<C>;
+        let lanes = S::F64_LANES;
+        let of = |list: &[S::f64s; C], i: usize| bytemuck::cast_slice::<_, f64>(list)[i * lanes + lane];
+        let Energy { bend, twist, axial } = all.energy;
+        let [bend, twist, axial] =
+            [bend, twist, axial].map(|kind| bytemuck::cast_slice::<_, f64>(&[kind])[lane]);
+        self.energy.add(&Energy { bend, twist, axial });
+        let g = |i: usize| of(&all.gradient, i);
+        let (x, t) = (l.position(0), l.tangent(0));
+        let force = g(x).abs().max(g(x + 1).abs()).max(g(x + 2).abs());
+        let moment = g(t).abs().max(g(t + 1).abs());
+        self.scale = [self.scale[0].max(force), self.scale[1].max(moment)];
+        let at = Layout::<C>::BLOCK * e;
+        let gap = gamma * g(C - 1);
+        let (residual, correction) = (&mut self.residual[at..at + C], &mut self.correction[at..at + C]);
+        for i in 0..C {
+            residual[i] += g(i);
+            correction[i] += gap * of(&all.stretch, i);
+        }
+        if HESSIAN {
+            self.matrix.lay_blocks(at, |i, j| of(&all.rows[i], j));
         }
     }
 }

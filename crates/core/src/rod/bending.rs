@@ -7,47 +7,47 @@
 //! element where curvature varies. With |r′|⁵ it is gone at this order. The element multiplies by its mean |r′|, so that
 //! stretch as a whole changes nothing and the axial unknown is the axial force (see [`super::element`]).
 
-use crate::Vec3;
+use super::lanes::{Lanes, Vector};
+use pulp::Simd;
 
 /// ½(AC − B²)/A^(5/2) with its gradient in (y, z) and its derivatives in (A, B, C).
-#[derive(Debug, Clone, Copy)]
-pub struct BendingDensity {
+#[derive(Clone, Copy)]
+pub(super) struct BendingDensity<S: Simd> {
     /// Value.
-    pub value: f64,
+    pub(super) value: Lanes<S>,
     /// Gradient in y.
-    pub gy: Vec3,
+    pub(super) gy: Vector<S>,
     /// Gradient in z.
-    pub gz: Vec3,
+    pub(super) gz: Vector<S>,
     /// Derivatives in (A, B, C).
-    pub partials: Partials,
+    pub(super) partials: Partials<S>,
 }
 
 /// First and second derivatives of the density in A = y·y, B = y·z, C = z·z; those in (B, C) and (C, C) are zero.
-#[derive(Debug, Clone, Copy)]
-#[allow(missing_docs, reason = "named by what they are derivatives in")]
-pub struct Partials {
-    pub a: f64,
-    pub b: f64,
-    pub c: f64,
-    pub aa: f64,
-    pub ab: f64,
-    pub ac: f64,
-    pub bb: f64,
+#[derive(Clone, Copy)]
+pub(super) struct Partials<S: Simd> {
+    pub(super) a: Lanes<S>,
+    pub(super) b: Lanes<S>,
+    pub(super) c: Lanes<S>,
+    pub(super) aa: Lanes<S>,
+    pub(super) ab: Lanes<S>,
+    pub(super) ac: Lanes<S>,
+    pub(super) bb: Lanes<S>,
 }
 
 /// The density alone.
-#[inline]
-pub(crate) fn bending_value(y: &Vec3, z: &Vec3) -> f64 {
-    let a = 1.0 / y.dot(y);
+#[inline(always)]
+pub(super) fn bending_value<S: Simd>(y: Vector<S>, z: Vector<S>) -> Lanes<S> {
+    let a = y.dot(y).inverse();
     // The cross product keeps digits where z is nearly along y; AC − B² would lose them.
-    0.5 * y.cross(z).norm_squared() * a * a * a.sqrt()
+    let cross = y.cross(z);
+    cross.dot(cross) * 0.5 * a * a * a.sqrt()
 }
 
-/// The density with its derivatives.
-// Always inlined: where no Hessian is wanted the compiler leaves its half out.
+/// The density with its derivatives. Where no Hessian is wanted the compiler leaves its half out.
 #[inline(always)]
-pub fn bending(y: &Vec3, z: &Vec3) -> BendingDensity {
-    let a = 1.0 / y.dot(y);
+pub(super) fn bending<S: Simd>(y: Vector<S>, z: Vector<S>) -> BendingDensity<S> {
+    let a = y.dot(y).inverse();
     let b = y.dot(z);
     let c = z.dot(z);
     // a3 = A^(−3/2) and so on.
@@ -57,15 +57,15 @@ pub fn bending(y: &Vec3, z: &Vec3) -> BendingDensity {
     let a7 = a5 * a;
     let bb = b * b * a;
     let partials = Partials {
-        a: a5 * (1.25 * bb - 0.75 * c),
+        a: a5 * (bb * 1.25 - c * 0.75),
         b: -b * a5,
-        c: 0.5 * a3,
-        aa: a7 * (1.875 * c - 4.375 * bb),
-        ab: 2.5 * b * a7,
-        ac: -0.75 * a5,
+        c: a3 * 0.5,
+        aa: a7 * (c * 1.875 - bb * 4.375),
+        ab: b * 2.5 * a7,
+        ac: a5 * -0.75,
         bb: -a5,
     };
-    let gy = y * (2.0 * partials.a) + z * partials.b;
+    let gy = y * (partials.a * 2.0) + z * partials.b;
     let gz = y * partials.b + z * a3;
-    BendingDensity { value: 0.5 * y.cross(z).norm_squared() * a * a * root, gy, gz, partials }
+    BendingDensity { value: bending_value(y, z), gy, gz, partials }
 }

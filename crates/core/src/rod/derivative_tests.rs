@@ -6,7 +6,7 @@ use super::lagrangian::{element_energy, element_system};
 use super::layout::{Layout, MAX_ANGLES, PLAIN, TWISTED};
 use crate::Vec3;
 
-fn noise(seed: &mut u64) -> f64 {
+pub(super) fn noise(seed: &mut u64) -> f64 {
     *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     ((*seed >> 11) as f64) / (1u64 << 53) as f64 * 2.0 - 1.0
 }
@@ -45,7 +45,7 @@ fn material(s: &mut u64) -> Material {
 }
 
 /// An element of three instruments with shapes of their own, and one without.
-fn data(seed: &mut u64) -> ElementData {
+pub(super) fn data(seed: &mut u64) -> ElementData {
     let materials = [material(seed), material(seed), material(seed)];
     let bending =
         [0, 1, 2].map(|k| materials.iter().map(|m| m.bending[k]).sum::<f64>() + 0.5 * positive(seed));
@@ -71,7 +71,7 @@ fn lagrangian<const C: usize>(data: &ElementData, s: &ElementState, d: &[f64; C]
     moved.tension += d[l.tension(0)];
     let rigid = ElementData { flexibility: 0.0, ..*data };
     let e = element_energy::<C>(&rigid, &moved);
-    let c = elongation(data.length, &mid_slope(&moved.first.t, &moved.chord, &moved.second.t));
+    let c = elongation(data.length, mid_slope(moved.first.t, moved.chord, moved.second.t).norm());
     e.total() + moved.tension * c - 0.5 * data.flexibility * moved.tension * moved.tension
 }
 

@@ -1,10 +1,12 @@
 //! What an element is made of, where it is, and what it yields: the types that the parts of its Lagrangian share, and its kinematics.
 
 use super::frame::Frame;
+use super::lanes::{Lanes, Vector};
 use super::layout::MAX_ANGLES;
-use super::quadrature::{GAUSS, Point};
-use super::torsion::TorsionInput;
+use super::quadrature::Point;
 use crate::Vec3;
+use pulp::Simd;
+use std::ops::{Add, Mul, Sub};
 
 /// One instrument in an element, sampled at its Gauss points: what its material angle is needed for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,28 +30,6 @@ impl Material {
     #[inline]
     pub(crate) fn is_present(&self) -> bool {
         self.torsion != [0.0; 3]
-    }
-
-    /// Stiffness and rest state of Gauss point `k` of an element of this length, in the units of [`super::torsion`].
-    #[inline]
-    pub(super) fn torsion_input(&self, k: usize, length: f64) -> TorsionInput {
-        let moment = GAUSS[k].weight * self.bending[k];
-        TorsionInput {
-            moment: [moment * self.rest_curvature[k][0], moment * self.rest_curvature[k][1]],
-            stiffness: GAUSS[k].weight * self.torsion[k] / length,
-            rest_twist: length * self.rest_twist[k],
-        }
-    }
-
-    /// ½∫EI|κ⁰|² ds over an element of this length, the constant that makes the bending energy zero in the rest state.
-    #[inline]
-    pub(super) fn rest_energy(&self, length: f64) -> f64 {
-        let mut sum = 0.0;
-        for k in 0..3 {
-            let [a, b] = self.rest_curvature[k];
-            sum += GAUSS[k].weight * self.bending[k] * (a * a + b * b);
-        }
-        0.5 * length * sum
     }
 }
 
@@ -133,13 +113,13 @@ pub struct ElementState {
 
 /// Stored energy by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Energy {
+pub struct Energy<T = f64> {
     /// Bending, ½∫EI|κ − κ⁰|² ds.
-    pub bend: f64,
+    pub bend: T,
     /// Twist, ½∫GJ(τ − τ⁰)² ds.
-    pub twist: f64,
+    pub twist: T,
     /// Stretch, ½∫EA ε² ds.
-    pub axial: f64,
+    pub axial: T,
 }
 
 impl Energy {
@@ -157,15 +137,21 @@ impl Energy {
 }
 
 /// r′ at the middle of the element.
-#[inline]
-pub fn mid_slope(first: &Vec3, chord: &Vec3, second: &Vec3) -> Vec3 {
+#[inline(always)]
+pub fn mid_slope<V>(first: V, chord: V, second: V) -> V
+where
+    V: Add<Output = V> + Sub<Output = V> + Mul<f64, Output = V>,
+{
     chord * 1.5 - (first + second) * 0.25
 }
 
-/// The element's elongation, Simpson's rule for ∫(|r′| − 1) ds with unit slopes at the nodes: ⅔h(|r′(½)| − 1).
-#[inline]
-pub fn elongation(length: f64, mid: &Vec3) -> f64 {
-    2.0 / 3.0 * length * (mid.norm() - 1.0)
+/// The element's elongation from |r′(½)|, Simpson's rule for ∫(|r′| − 1) ds with unit slopes at the nodes: ⅔h(|r′(½)| − 1).
+#[inline(always)]
+pub(super) fn elongation<T>(length: T, speed: T) -> T
+where
+    T: Mul<Output = T> + Mul<f64, Output = T> + Sub<f64, Output = T>,
+{
+    length * (2.0 / 3.0) * (speed - 1.0)
 }
 
 /// What the bending energy is multiplied by beside its mean speed, with its first and second derivative in c = t₀·t₁.
@@ -176,46 +162,54 @@ pub fn elongation(length: f64, mid: &Vec3) -> f64 {
 /// q = 2(1 − c) = φ² + O(φ⁴) the factor 1 − 7q²/2880 takes the excess out: constant curvature is met to order 6, and where
 /// curvature varies the error at order 4 is a third of what it is without. It is 1 for an element whose ends
 /// are parallel and never less than 0.96.
-#[inline]
-pub(super) fn arc_factor(t0: &Vec3, t1: &Vec3) -> (f64, f64, f64) {
-    let q = 2.0 * (1.0 - t0.dot(t1));
+#[inline(always)]
+pub(super) fn arc_factor<S: Simd>(t0: Vector<S>, t1: Vector<S>) -> (Lanes<S>, Lanes<S>, f64) {
+    let one = t0.x.like(1.0);
+    let q = (one - t0.dot(t1)) * 2.0;
     const EXCESS: f64 = 7.0 / 2880.0;
-    (1.0 - EXCESS * q * q, 4.0 * EXCESS * q, -8.0 * EXCESS)
+    (one - q * EXCESS * q, q * (4.0 * EXCESS), -8.0 * EXCESS)
 }
 
 /// Mean of |r′| over the element from that in its middle, Simpson's rule with unit slopes at the nodes.
-#[inline]
-pub(super) fn mean_speed(mid: f64) -> f64 {
-    (1.0 + 2.0 * mid) / 3.0
+#[inline(always)]
+pub(super) fn mean_speed<S: Simd>(mid: Lanes<S>) -> Lanes<S> {
+    (mid * 2.0 + 1.0) / 3.0
 }
 
 /// φ and h φ′ at a point from (θ₀, θ₁, b).
-#[inline]
-pub(super) fn angles(a: &[f64; 3], p: &Point) -> (f64, f64) {
+#[inline(always)]
+pub(super) fn angles<S: Simd>(a: &[Lanes<S>; 3], p: &Point) -> (Lanes<S>, Lanes<S>) {
     (
-        p.phi[0] * a[0] + p.phi[1] * a[1] + p.phi[2] * a[2],
-        p.dphi[0] * a[0] + p.dphi[1] * a[1] + p.dphi[2] * a[2],
+        a[0] * p.phi[0] + a[1] * p.phi[1] + a[2] * p.phi[2],
+        a[0] * p.dphi[0] + a[1] * p.dphi[1] + a[2] * p.dphi[2],
     )
 }
 
 /// Gradient and upper triangle of the Hessian in the unknowns of the element's nodes, in the order of [`super::layout`]. Those
-/// that belong to the element before, its N and b at the first node, are empty.
+/// that belong to the element before, its N and b at the first node, are empty. A number is one or, of elements side by side, one of each.
 #[derive(Debug, Clone)]
-pub struct ElementSystem<const C: usize> {
+pub struct ElementSystem<const C: usize, T = f64> {
     /// Gradient of the Lagrangian; the last entry is the constraint c − D N.
-    pub gradient: [f64; C],
+    pub gradient: [T; C],
     /// Hessian, upper triangle; the last column is that of N.
-    pub rows: [[f64; C]; C],
+    pub rows: [[T; C]; C],
     /// Derivative of the elongation c in the unknowns.
-    pub stretch: [f64; C],
+    pub stretch: [T; C],
     /// Energies.
-    pub energy: Energy,
+    pub energy: Energy<T>,
 }
 
 impl<const C: usize> ElementSystem<C> {
     /// All zero.
     pub const fn zeros() -> Self {
-        let energy = Energy { bend: 0.0, twist: 0.0, axial: 0.0 };
-        Self { gradient: [0.0; C], rows: [[0.0; C]; C], stretch: [0.0; C], energy }
+        Self::filled(0.0)
+    }
+}
+
+impl<const C: usize, T: Copy> ElementSystem<C, T> {
+    /// Everything is `value`.
+    pub(super) const fn filled(value: T) -> Self {
+        let energy = Energy { bend: value, twist: value, axial: value };
+        Self { gradient: [value; C], rows: [[value; C]; C], stretch: [value; C], energy }
     }
 }

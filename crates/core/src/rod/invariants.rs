@@ -13,7 +13,9 @@
 //! explains, c the elongation with its axial force, and the augmentation of [`super::assembly`], of which only γ∇c∇cᵀ counts.
 
 use super::bending::Partials;
+use super::lanes::Lanes;
 use super::quadrature::{GAUSS, Point};
+use pulp::Simd;
 
 /// Weights of g in y·y, y·z and z·z at one point. (Tangents have length 1: their squares are constant.)
 #[derive(Debug, Clone, Copy)]
@@ -43,37 +45,44 @@ const GRAMS: [Gram; 3] = [Gram::at(&GAUSS[0]), Gram::at(&GAUSS[1]), Gram::at(&GA
 const MIDDLE: [f64; 4] = [2.25, -0.75, -0.75, 0.125];
 
 /// First derivatives of a function of g, and the upper triangle of its second ones.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Derivatives {
+#[derive(Clone, Copy)]
+pub(super) struct Derivatives<S: Simd> {
     /// By gᵢ.
-    pub(super) first: [f64; 4],
+    pub(super) first: [Lanes<S>; 4],
     /// By gᵢ and gⱼ, i ≤ j; the rest means nothing.
-    pub(super) second: [[f64; 4]; 4],
+    pub(super) second: [[Lanes<S>; 4]; 4],
 }
 
 /// What the bending energy at unit speed is multiplied by, and what is added to it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Factors {
+#[derive(Clone, Copy)]
+pub(super) struct Factors<S: Simd> {
     /// Bending energy at unit speed.
-    pub(super) stored: f64,
+    pub(super) stored: Lanes<S>,
     /// Arc factor with its first and second derivative in t₀·t₁.
-    pub(super) arc: (f64, f64, f64),
+    pub(super) arc: (Lanes<S>, Lanes<S>, f64),
     /// Mean of |r′|.
-    pub(super) mean: f64,
+    pub(super) mean: Lanes<S>,
     /// 1/|r′(½)|.
-    pub(super) slow: f64,
+    pub(super) slow: Lanes<S>,
     /// Length h.
-    pub(super) length: f64,
+    pub(super) length: Lanes<S>,
     /// Axial force.
-    pub(super) tension: f64,
+    pub(super) tension: Lanes<S>,
     /// γ of the augmentation.
-    pub(super) gamma: f64,
+    pub(super) gamma: Lanes<S>,
 }
 
-impl Derivatives {
+impl<S: Simd> Derivatives<S> {
+    /// All zero.
+    #[inline(always)]
+    pub(super) fn zeros(simd: S) -> Self {
+        let zero = Lanes::splat(simd, 0.0);
+        Self { first: [zero; 4], second: [[zero; 4]; 4] }
+    }
+
     /// Adds the bending density of Gauss point `k` times `scale`.
     #[inline(always)]
-    pub(super) fn add_point(&mut self, k: usize, scale: f64, f: &Partials) {
+    pub(super) fn add_point(&mut self, k: usize, scale: Lanes<S>, f: &Partials<S>) {
         let w = &GRAMS[k];
         let (a, b, c) = (f.a * scale, f.b * scale, f.c * scale);
         let (aa, ab, ac, bb) = (f.aa * scale, f.ab * scale, f.ac * scale, f.bb * scale);
@@ -90,17 +99,21 @@ impl Derivatives {
 
     /// From those of the bending energy at unit speed to those of the whole Lagrangian.
     #[inline(always)]
-    pub(super) fn complete(&self, f: &Factors) -> Self {
+    pub(super) fn complete(&self, f: &Factors<S>) -> Self {
         let (arc, slope, curve) = f.arc;
         // d|r′(½)| / d|r′(½)|² times ⅔, which mean speed (⅓ + ⅔|r′(½)|) and elongation (⅔h(|r′(½)| − 1)) share.
         let rate = f.slow * (1.0 / 3.0);
         let force = arc * f.stored + f.length * f.tension;
-        let bend = -0.5 * rate * (f.slow * f.slow) * force + f.gamma * (f.length * rate) * (f.length * rate);
+        let bend = rate * -0.5 * (f.slow * f.slow) * force + f.gamma * (f.length * rate) * (f.length * rate);
         let along = slope * rate * f.stored;
         let factor = arc * f.mean;
-        let mut by = MIDDLE.map(|w| arc * rate * w);
+        let stretched = arc * rate;
+        let mut by = [stretched; 4];
+        for i in 0..4 {
+            by[i] = stretched * MIDDLE[i];
+        }
         by[3] += slope * f.mean;
-        let mut out = Self::default();
+        let mut out = *self;
         for i in 0..4 {
             out.first[i] = self.first[i] * factor + force * rate * MIDDLE[i];
             for j in i..4 {
@@ -112,7 +125,7 @@ impl Derivatives {
             out.second[i][3] += along * MIDDLE[i];
         }
         out.first[3] += slope * f.mean * f.stored;
-        out.second[3][3] += along * MIDDLE[3] + curve * f.mean * f.stored;
+        out.second[3][3] += along * MIDDLE[3] + f.mean * curve * f.stored;
         out
     }
 }

@@ -5,9 +5,9 @@
 //! independent unknown (Hellinger–Reissner) and, with angles, an angle bubble b that makes the angle quadratic in
 //! the element. The Lagrangian is
 //!
-//!   ½∫EI |r′×r″|²/|r′|⁴ ds                                     bending ([`bending`])
-//!   + Σᵢ − ∫EIᵢ κᵢ⁰·t′ ds + ½∫EIᵢ |κᵢ⁰|² ds                     rest curvature ([`torsion`])
-//!   + Σᵢ ½∫GJᵢ (τᵢ − τᵢ⁰)² ds                                  twist ([`torsion`])
+//!   ½∫EI |r′×r″|²/|r′|⁴ ds                                     bending (`bending`)
+//!   + Σᵢ − ∫EIᵢ κᵢ⁰·t′ ds + ½∫EIᵢ |κᵢ⁰|² ds                     rest curvature (`torsion`)
+//!   + Σᵢ ½∫GJᵢ (τᵢ − τᵢ⁰)² ds                                  twist (`torsion`)
 //!   + Σ N c − ½ D N²                                          axial ([`lagrangian`])
 //!
 //! where instruments i that lie in one another share the centre line, EI is the sum of theirs, and κᵢ⁰ = R(θᵢ)(kᵢ₁, kᵢ₂) turns with the
@@ -18,16 +18,20 @@
 //! geometrically exact curved Kirchhoff rods*, CMAME 278 (2014); *A locking-free finite element formulation and reduced models
 //! for geometrically exact Kirchhoff rods*, CMAME 290 (2015); M. Bergou et al., *Discrete viscous threads*, SIGGRAPH 2010.
 //!
+//! Assemblies and stored energies are computed for several elements at once, a lane each (`lanes`, `batch`).
+//!
 //! Units are the caller's, any consistent set: nothing here knows a millimetre.
 
 pub mod assembly;
-pub mod bending;
+mod batch;
+mod bending;
 pub mod clamp;
 pub mod element;
 mod element_torsion;
 pub mod frame;
 mod invariants;
 pub mod lagrangian;
+mod lanes;
 pub mod layout;
 pub mod points;
 pub mod quadrature;
@@ -36,12 +40,13 @@ mod share;
 pub mod state;
 pub mod stencils;
 pub mod supports;
-pub mod torsion;
+mod torsion;
 
 pub use assembly::Assembly;
 pub use clamp::Clamp;
 pub use element::{ElementData, Energy, Material};
 pub use frame::Frame;
+pub(crate) use lagrangian::stored_energy;
 pub use lagrangian::{element_energy, element_system};
 pub use layout::{Layout, MAX_ANGLES, PLAIN, TWISTED};
 pub use points::PointSum;
@@ -52,3 +57,5 @@ pub use supports::{EndAngle, Supports};
 
 #[cfg(test)]
 mod derivative_tests;
+#[cfg(test)]
+mod lane_tests;

@@ -7,7 +7,7 @@
 //!
 //! both free of the unit of length: energies of an element depend on h only through EI/h and GJ/h.
 
-use crate::Vec3;
+use std::ops::{Add, Mul};
 
 /// Weights of (e, t₀, t₁) in y and z, and of (θ₀, θ₁, b) in the angle, at one point of an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,8 +40,11 @@ impl Point {
     }
 
     /// y and z for the given chord and tangents.
-    #[inline]
-    pub fn derivatives(&self, e: &Vec3, t0: &Vec3, t1: &Vec3) -> (Vec3, Vec3) {
+    #[inline(always)]
+    pub fn derivatives<V>(&self, e: V, t0: V, t1: V) -> (V, V)
+    where
+        V: Copy + Add<Output = V> + Mul<f64, Output = V>,
+    {
         (e * self.y[0] + t0 * self.y[1] + t1 * self.y[2], e * self.z[0] + t0 * self.z[1] + t1 * self.z[2])
     }
 }

@@ -1,5 +1,6 @@
 //! Where the rod is, and how a Newton step moves it.
 
+use super::batch::Lane;
 use super::element::{ElementData, ElementState, mid_slope};
 use super::frame::{Frame, normalised, reference_twist, turn_parts};
 use super::layout::{Layout, MAX_ANGLES};
@@ -80,19 +81,38 @@ impl RodState {
     /// State of element `e`, where two neighbouring nodes have `C` unknowns.
     #[inline]
     pub fn element<const C: usize>(&self, e: usize) -> ElementState {
+        ElementState {
+            first: self.frames[e],
+            second: self.frames[e + 1],
+            chord: self.chords[e],
+            tension: self.tensions[e],
+            angles: self.element_angles::<C>(e),
+        }
+    }
+
+    /// Element `e` beside others.
+    #[inline(always)]
+    pub(super) fn lane<'a, const C: usize>(&'a self, data: &'a ElementData, e: usize) -> Lane<'a> {
+        Lane {
+            data,
+            first: &self.frames[e],
+            second: &self.frames[e + 1],
+            chord: &self.chords[e],
+            tension: self.tensions[e],
+            angles: self.element_angles::<C>(e),
+        }
+    }
+
+    /// θ₀, θ₁ + reference twist, and b of each set of angles of element `e`.
+    #[inline(always)]
+    fn element_angles<const C: usize>(&self, e: usize) -> [[f64; 3]; MAX_ANGLES] {
         let k = Layout::<C>::ANGLES;
         let mut angles = [[0.0; 3]; MAX_ANGLES];
         for (set, angles) in angles.iter_mut().enumerate().take(k) {
             let (first, second) = (self.angles[k * e + set], self.angles[k * (e + 1) + set]);
             *angles = [first, second + self.reference_twists[e], self.bubbles[k * e + set]];
         }
-        ElementState {
-            first: self.frames[e],
-            second: self.frames[e + 1],
-            chord: self.chords[e],
-            tension: self.tensions[e],
-            angles,
-        }
+        angles
     }
 
     /// Sets of angles there is room for.
@@ -245,7 +265,7 @@ fn mid_rate<const C: usize>(elements: &[ElementData], base: &RodState, d: &[f64]
     let (t0, t1) = (l.tangent(e), l.tangent(e + 1));
     let chord = (position_step(d, l.position(e + 1)) - position_step(d, l.position(e))) / elements[e].length;
     let ends = f0.u * d[t0] + f0.v * d[t0 + 1] + f1.u * d[t1] + f1.v * d[t1 + 1];
-    (mid_slope(&f0.t, &base.chords[e], &f1.t), chord * 1.5 - ends * 0.25)
+    (mid_slope(f0.t, base.chords[e], f1.t), chord * 1.5 - ends * 0.25)
 }
 
 /// Three entries of a step.

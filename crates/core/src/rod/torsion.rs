@@ -11,142 +11,150 @@
 //! The energy of the isotropic cross-section, ½EI|t′ − κ⁰|² + ½GJ(τ − τ⁰)², is the bending energy of the straight rod
 //! plus −EI κ⁰·t′ + ½EI|κ⁰|² + ½GJ(τ − τ⁰)², κ⁰ = k₁d₁ + k₂d₂; this file holds the addition.
 
-use crate::Vec3;
-use crate::products::outer;
-use nalgebra::Matrix3;
+use super::lanes::{Lanes, Matrix, Vector};
+use pulp::Simd;
 
-/// Stiffness and rest state at one Gauss point, in the element's units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TorsionInput {
+/// Stiffness and rest state of an instrument at one Gauss point, in the element's units.
+#[derive(Clone, Copy)]
+pub(super) struct TorsionInput<S: Simd> {
     /// Quadrature weight × EI, times the rest curvature components along d₁ and d₂.
-    pub moment: [f64; 2],
+    pub(super) moment: [Lanes<S>; 2],
     /// Quadrature weight × GJ/h.
-    pub stiffness: f64,
+    pub(super) stiffness: Lanes<S>,
     /// h τ⁰.
-    pub rest_twist: f64,
+    pub(super) rest_twist: Lanes<S>,
 }
 
 /// What all instruments have in common at a Gauss point: the twist −DG of the reference triad with its derivatives in y and z.
-#[derive(Debug, Clone, Copy)]
-pub struct ReferenceTwist {
-    y: Vec3,
-    z: Vec3,
+#[derive(Clone, Copy)]
+pub(super) struct ReferenceTwist<S: Simd> {
+    y: Vector<S>,
+    z: Vector<S>,
     /// 1/a and y·z.
-    ia: f64,
-    b: f64,
+    ia: Lanes<S>,
+    b: Lanes<S>,
     /// G with its derivatives in y.
-    g: f64,
-    dg: Vec3,
-    hg: Matrix3<f64>,
+    g: Lanes<S>,
+    dg: Vector<S>,
+    hg: Matrix<S>,
     /// −DG.
-    value: f64,
+    value: Lanes<S>,
     /// Gradients of −DG in y …
-    pub along_y: Vec3,
+    pub(super) along_y: Vector<S>,
     /// … and z.
-    pub along_z: Vec3,
+    pub(super) along_z: Vector<S>,
     /// Its second derivatives: y, y, …
-    yy: Matrix3<f64>,
+    yy: Matrix<S>,
     /// … y (rows), z (columns).
-    yz: Matrix3<f64>,
+    yz: Matrix<S>,
 }
 
 /// Derivatives in y and z. There are none in z twice: both twist and curvature are linear in it, and the twist's square is added in
 /// chord and far tangent.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct PointDerivatives {
+#[derive(Clone, Copy)]
+pub(super) struct PointDerivatives<S: Simd> {
     /// Gradient in y.
-    pub gy: Vec3,
+    pub(super) gy: Vector<S>,
     /// Gradient in z.
-    pub gz: Vec3,
+    pub(super) gz: Vector<S>,
     /// y, y.
-    pub hyy: Matrix3<f64>,
+    pub(super) hyy: Matrix<S>,
     /// y (rows), z (columns).
-    pub hyz: Matrix3<f64>,
+    pub(super) hyz: Matrix<S>,
 }
 
 /// Derivatives of an instrument's energy in φ, alone and mixed with y and z; those in hφ′ are the torque, GJ, and GJ times the gradients of
 /// the [`ReferenceTwist`].
-#[derive(Debug, Clone, Copy, Default)]
-pub struct AngleDensity {
+#[derive(Clone, Copy)]
+pub(super) struct AngleDensity<S: Simd> {
     /// In φ.
-    pub first: f64,
+    pub(super) first: Lanes<S>,
     /// In φ twice.
-    pub second: f64,
+    pub(super) second: Lanes<S>,
     /// In y and φ.
-    pub along_y: Vec3,
+    pub(super) along_y: Vector<S>,
     /// In z and φ.
-    pub along_z: Vec3,
+    pub(super) along_z: Vector<S>,
 }
 
 /// What all instruments have in common at a Gauss point where energies alone are asked for.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct TwistValue {
-    y: Vec3,
-    z: Vec3,
+#[derive(Clone, Copy)]
+pub(super) struct TwistValue<S: Simd> {
+    y: Vector<S>,
+    z: Vector<S>,
     /// a and G.
-    a: f64,
-    g: f64,
+    a: Lanes<S>,
+    g: Lanes<S>,
     /// DG.
-    twist: f64,
+    twist: Lanes<S>,
 }
 
-impl TwistValue {
+impl<S: Simd> TwistValue<S> {
     /// That of y and z.
-    #[inline]
-    pub(crate) fn new(y: &Vec3, z: &Vec3) -> Self {
+    #[inline(always)]
+    pub(super) fn new(y: Vector<S>, z: Vector<S>) -> Self {
         let a = y.norm();
-        let g = 1.0 / (a * (a + y.x));
-        Self { y: *y, z: *z, a, g, twist: (y.y * z.z - y.z * z.y) * g }
+        let g = (a * (a + y.x)).inverse();
+        Self { y, z, a, g, twist: (y.y * z.z - y.z * z.y) * g }
     }
 
-    /// The two energies of an instrument: (bend, twist).
-    #[inline]
-    pub(crate) fn energies(&self, phi: f64, dphi: f64, p: &TorsionInput) -> (f64, f64) {
-        let Self { y, z, a, g, twist } = self;
-        let tau = dphi - twist - p.rest_twist;
-        let twisted = 0.5 * p.stiffness * tau * tau;
-        if p.moment == [0.0; 2] {
-            return (0.0, twisted);
-        }
+    /// The twist energy of an instrument.
+    #[inline(always)]
+    pub(super) fn twist_energy(&self, dphi: Lanes<S>, p: &TorsionInput<S>) -> Lanes<S> {
+        let tau = dphi - self.twist - p.rest_twist;
+        p.stiffness * 0.5 * tau * tau
+    }
+
+    /// The energy of its rest curvature.
+    #[inline(always)]
+    pub(super) fn rest_curvature_energy(&self, phi: Lanes<S>, p: &TorsionInput<S>) -> Lanes<S> {
+        let Self { y, z, a, g, .. } = *self;
         let (sin, cos) = phi.sin_cos();
         let w2 = p.moment[0] * cos - p.moment[1] * sin;
         let w3 = p.moment[0] * sin + p.moment[1] * cos;
         let m = z.y * w2 + z.z * w3;
         let n = y.y * w2 + y.z * w3;
-        (n * g * (z.x + y.dot(z) / a) - m / a, twisted)
+        n * g * (z.x + y.dot(z) / a) - m / a
     }
 }
 
-impl ReferenceTwist {
-    /// That of y and z.
-    // Always inlined: where no Hessian is wanted the compiler leaves its half out.
+impl<S: Simd> PointDerivatives<S> {
+    /// All zero.
     #[inline(always)]
-    pub fn new(y: &Vec3, z: &Vec3) -> Self {
+    pub(super) fn zeros(simd: S) -> Self {
+        let (vector, matrix) = (Vector::splat(simd, [0.0; 3]), Matrix::zeros(simd));
+        Self { gy: vector, gz: vector, hyy: matrix, hyz: matrix }
+    }
+}
+
+impl<S: Simd> ReferenceTwist<S> {
+    /// That of y and z. Where no Hessian is wanted the compiler leaves its half out.
+    #[inline(always)]
+    pub(super) fn new(y: Vector<S>, z: Vector<S>) -> Self {
         let a = y.norm();
-        let ia = 1.0 / a;
+        let zero = a.like(0.0);
+        let ia = a.inverse();
         let ia3 = ia * ia * ia;
         let g = ia / (a + y.x);
-        let e1 = Vec3::x();
-        let eye = Matrix3::identity();
-        let yy = outer(y, y);
+        let e1 = Vector::new(a.like(1.0), zero, zero);
 
         // G: 1/G = A + a y₁, its gradient is `slope`.
-        let slope = y * (2.0 + y.x * ia) + e1 * a;
-        let ey = outer(&e1, y);
-        let bend_slope = eye * (2.0 + y.x * ia) + (ey + ey.transpose()) * ia - yy * (y.x * ia3);
+        let mut slope = y * (y.x * ia + 2.0);
+        slope.x += a;
+        let bend_slope =
+            (e1.outer(y).with_transpose() * ia).with_diagonal(y.x * ia + 2.0) - y.outer(y) * (y.x * ia3);
         let dg = slope * (-g * g);
-        let hg = outer(&slope, &slope) * (2.0 * g * g * g) - bend_slope * (g * g);
+        let hg = slope.outer(slope) * (g * 2.0 * g * g) - bend_slope * (g * g);
 
         let d = y.y * z.z - y.z * z.y;
-        let dy = Vec3::new(0.0, z.z, -z.y);
-        let dz = Vec3::new(0.0, -y.z, y.y);
-        let dyg = outer(&dy, &dg);
-        let mut yz = -outer(&dg, &dz);
-        yz[(1, 2)] -= g;
-        yz[(2, 1)] += g;
+        let dy = Vector::new(zero, z.z, -z.y);
+        let dz = Vector::new(zero, -y.z, y.y);
+        let mut yz = -dg.outer(dz);
+        yz.y.z -= g;
+        yz.z.y += g;
         Self {
-            y: *y,
-            z: *z,
+            y,
+            z,
             ia,
             b: y.dot(z),
             g,
@@ -155,79 +163,90 @@ impl ReferenceTwist {
             value: -(d * g),
             along_y: -(dy * g + dg * d),
             along_z: -dz * g,
-            yy: -(dyg + dyg.transpose() + hg * d),
+            yy: -(dy.outer(dg).with_transpose() + hg * d),
             yz,
         }
     }
 
     /// The torque of an instrument.
     #[inline(always)]
-    pub fn torque(&self, dphi: f64, p: &TorsionInput) -> f64 {
+    pub(super) fn torque(&self, dphi: Lanes<S>, p: &TorsionInput<S>) -> Lanes<S> {
         p.stiffness * self.tau(dphi, p)
     }
 
     /// Its twist energy.
     #[inline(always)]
-    pub fn energy(&self, dphi: f64, p: &TorsionInput) -> f64 {
-        0.5 * self.torque(dphi, p) * self.tau(dphi, p)
+    pub(super) fn energy(&self, dphi: Lanes<S>, p: &TorsionInput<S>) -> Lanes<S> {
+        self.torque(dphi, p) * 0.5 * self.tau(dphi, p)
     }
 
     #[inline(always)]
-    fn tau(&self, dphi: f64, p: &TorsionInput) -> f64 {
+    fn tau(&self, dphi: Lanes<S>, p: &TorsionInput<S>) -> Lanes<S> {
         dphi + self.value - p.rest_twist
     }
 
     /// Adds the torque times the derivatives of the twist.
     #[inline(always)]
-    pub fn add_twist(&self, torque: f64, to: &mut PointDerivatives) {
+    pub(super) fn add_twist(&self, torque: Lanes<S>, to: &mut PointDerivatives<S>) {
         to.gy += self.along_y * torque;
         to.gz += self.along_z * torque;
         to.hyy += self.yy * torque;
         to.hyz += self.yz * torque;
     }
 
-    /// Adds the derivatives of an instrument's rest curvature, −P with P = (z·w)/a − (y·w) G q and q = z₁ + b/a, and returns −P with those in
-    /// φ.
+    /// P = (z·w)/a − (y·w) G q with q = z₁ + b/a: (z·w, y·w, P) and its gradients in y and z.
     #[inline(always)]
-    pub fn add_rest_curvature(
-        &self,
-        phi: f64,
-        moment: [f64; 2],
-        to: &mut PointDerivatives,
-    ) -> (f64, AngleDensity) {
-        let Self { y, z, ia, b, g, dg, hg, .. } = self;
+    fn curvature(&self, w: Vector<S>, q: Lanes<S>, gq: Vector<S>, lift: Vector<S>) -> Curvature<S> {
+        let Self { y, z, ia, g, .. } = *self;
         let ia3 = ia * ia * ia;
-        let e1 = Vec3::x();
-        let eye = Matrix3::identity();
-        let yy = outer(y, y);
-        let (sin, cos) = phi.sin_cos();
-        let w = Vec3::new(0.0, moment[0] * cos - moment[1] * sin, moment[0] * sin + moment[1] * cos);
-        let wp = Vec3::new(0.0, -w.z, w.y);
-        let q = z.x + b * ia;
-        let dq = z * *ia - y * (ia3 * b);
-        let lift = e1 + y * *ia;
-        let gq = dg * q + dq * *g;
-        let first = |w: &Vec3| {
-            let (m, n) = (z.dot(w), y.dot(w));
-            let value = m * ia - n * g * q;
-            let pz = w * *ia - lift * (n * g);
-            let py = -y * (ia3 * m) - w * (g * q) - gq * n;
-            (m, n, value, py, pz)
-        };
-        let (m, n, value, py, pz) = first(&w);
-        let (_, _, value_p, py_p, pz_p) = first(&wp);
-        to.gy -= py;
-        to.gz -= pz;
-        let yz = outer(y, z);
-        let hq = (yz + yz.transpose() + eye * *b) * (-ia3) + yy * (3.0 * ia3 * ia * ia * b);
-        let wgq = outer(&w, &gq);
-        let gd = outer(dg, &dq);
-        to.hyy += (eye * ia3 - yy * (3.0 * ia3 * ia * ia)) * m
-            + wgq
-            + wgq.transpose()
-            + (hg * q + gd + gd.transpose() + hq * *g) * n;
-        // Rows y, columns z.
-        to.hyz += outer(y, &w) * ia3 + outer(&(w * *g + dg * n), &lift) + (eye * *ia - yy * ia3) * (n * g);
-        (-value, AngleDensity { first: -value_p, second: value, along_y: -py_p, along_z: -pz_p })
+        let (m, n) = (z.dot(w), y.dot(w));
+        let value = m * ia - n * g * q;
+        let along_z = w * ia - lift * (n * g);
+        let along_y = -y * (ia3 * m) - w * (g * q) - gq * n;
+        Curvature { m, n, value, along_y, along_z }
     }
+
+    /// Adds the derivatives of an instrument's rest curvature, −P, and returns −P with those in φ.
+    #[inline(always)]
+    pub(super) fn add_rest_curvature(
+        &self,
+        phi: Lanes<S>,
+        moment: [Lanes<S>; 2],
+        to: &mut PointDerivatives<S>,
+    ) -> (Lanes<S>, AngleDensity<S>) {
+        let Self { y, z, ia, b, g, dg, hg, .. } = *self;
+        let ia3 = ia * ia * ia;
+        let zero = ia.like(0.0);
+        let yy = y.outer(y);
+        let (sin, cos) = phi.sin_cos();
+        let w = Vector::new(zero, moment[0] * cos - moment[1] * sin, moment[0] * sin + moment[1] * cos);
+        let wp = Vector::new(zero, -w.z, w.y);
+        let q = z.x + b * ia;
+        let dq = z * ia - y * (ia3 * b);
+        let mut lift = y * ia;
+        lift.x += ia.like(1.0);
+        let gq = dg * q + dq * g;
+        let Curvature { m, n, value, along_y, along_z } = self.curvature(w, q, gq, lift);
+        let turned = self.curvature(wp, q, gq, lift);
+        to.gy -= along_y;
+        to.gz -= along_z;
+        let hq = y.outer(z).with_transpose().with_diagonal(b) * (-ia3) + yy * (ia3 * 3.0 * ia * ia * b);
+        to.hyy += (yy * (ia3 * -3.0 * ia * ia)).with_diagonal(ia3) * m
+            + w.outer(gq).with_transpose()
+            + (hg * q + dg.outer(dq).with_transpose() + hq * g) * n;
+        // Rows y, columns z.
+        to.hyz += y.outer(w) * ia3 + (w * g + dg * n).outer(lift) + (yy * (-ia3)).with_diagonal(ia) * (n * g);
+        let (along_y, along_z) = (-turned.along_y, -turned.along_z);
+        (-value, AngleDensity { first: -turned.value, second: value, along_y, along_z })
+    }
+}
+
+/// P along a w, with z·w and y·w, and its gradients.
+#[derive(Clone, Copy)]
+struct Curvature<S: Simd> {
+    m: Lanes<S>,
+    n: Lanes<S>,
+    value: Lanes<S>,
+    along_y: Vector<S>,
+    along_z: Vector<S>,
 }

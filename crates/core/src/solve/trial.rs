@@ -2,7 +2,7 @@
 
 use super::external::External;
 use super::newton::Newton;
-use crate::rod::{ElementData, Layout, RodState, Supports, element_energy};
+use crate::rod::{ElementData, Layout, RodState, Supports, stored_energy};
 
 /// Halvings towards the minimum along a step that a wall cut short.
 const REFINEMENTS: usize = 6;
@@ -37,11 +37,7 @@ impl<const C: usize> Newton<C> {
         external: &mut dyn External,
         state: &RodState,
     ) -> f64 {
-        let mut stored = 0.0;
-        for (e, data) in elements.iter().enumerate() {
-            stored += element_energy::<C>(data, &state.element::<C>(e)).total();
-        }
-        stored + external.value(elements, state)
+        stored_energy::<C>(elements, state) + external.value(elements, state)
     }
 
     /// Second-order corrections of the end conditions with the factorisation at hand.

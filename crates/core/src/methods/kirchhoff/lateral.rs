@@ -184,7 +184,7 @@ fn curvature(mesh: &Mesh, rod: &RodState, i: usize) -> [f64; 2] {
     for (e, xi) in [(i.wrapping_sub(1), 1.0), (i, 0.0)] {
         let Some(data) = mesh.elements.get(e) else { continue };
         let (t0, t1) = (rod.frames[e].t, rod.frames[e + 1].t);
-        sum += Point::at(xi, 0.0).derivatives(&rod.chords[e], &t0, &t1).1 / data.length;
+        sum += Point::at(xi, 0.0).derivatives(rod.chords[e], t0, t1).1 / data.length;
         count += 1.0;
     }
     [rod.frames[i].u, rod.frames[i].v].map(|axis| axis.dot(&sum) / count)

@@ -65,7 +65,7 @@ fn axes(f: &Frame) -> Matrix3<f64> {
 }
 
 fn middle(state: &RodState, e: usize) -> Vec3 {
-    mid_slope(&state.frames[e].t, &state.chords[e], &state.frames[e + 1].t).normalize()
+    mid_slope(state.frames[e].t, state.chords[e], state.frames[e + 1].t).normalize()
 }
 
 fn size(motions: impl Iterator<Item = f64>) -> f64 {

@@ -118,7 +118,7 @@ fn on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64, element: &mut us
     let h = mesh.elements[e].length;
     let xi = ((mesh.from_tip_mm[e] - s) / h).clamp(0.0, 1.0);
     let (t0, t1) = (state.frames[e].t, state.frames[e + 1].t);
-    let slope = Point::at(xi, 0.0).derivatives(&state.chords[e], &t0, &t1).0;
+    let slope = Point::at(xi, 0.0).derivatives(state.chords[e], t0, t1).0;
     slope / slope.norm()
 }
 

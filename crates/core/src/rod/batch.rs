@@ -1,0 +1,175 @@
+//! Elements side by side, a lane each: what they are made of and where they are, as [`super::lanes`] computes with it.
+
+use super::element::{ElementData, ElementState};
+use super::frame::Frame;
+use super::lanes::{Lanes, Vector};
+use super::layout::{Layout, MAX_ANGLES};
+use super::quadrature::GAUSS;
+use super::torsion::TorsionInput;
+use crate::Vec3;
+use pulp::Simd;
+
+/// Most lanes of any processor.
+pub(super) const MOST: usize = 8;
+
+/// An element on its way into a lane.
+#[derive(Clone, Copy)]
+pub(super) struct Lane<'a> {
+    pub(super) data: &'a ElementData,
+    pub(super) first: &'a Frame,
+    pub(super) second: &'a Frame,
+    pub(super) chord: &'a Vec3,
+    pub(super) tension: f64,
+    pub(super) angles: [[f64; 3]; MAX_ANGLES],
+}
+
+impl<'a> Lane<'a> {
+    /// An element that stands alone.
+    #[inline(always)]
+    pub(super) fn of(data: &'a ElementData, s: &'a ElementState) -> Self {
+        let ElementState { first, second, chord, tension, angles } = s;
+        Self { data, first, second, chord, tension: *tension, angles: *angles }
+    }
+}
+
+/// Each lane's own vector.
+#[inline(always)]
+fn vector<'a, S: Simd>(simd: S, of: impl Fn(usize) -> &'a Vec3) -> Vector<S> {
+    let x = Lanes::gather(simd, |lane| of(lane).x);
+    let y = Lanes::gather(simd, |lane| of(lane).y);
+    let z = Lanes::gather(simd, |lane| of(lane).z);
+    Vector::new(x, y, z)
+}
+
+/// Triads.
+#[derive(Clone, Copy)]
+pub(super) struct Axes<S: Simd> {
+    pub(super) t: Vector<S>,
+    pub(super) u: Vector<S>,
+    pub(super) v: Vector<S>,
+}
+
+impl<S: Simd> Axes<S> {
+    #[inline(always)]
+    fn gather<'a>(simd: S, of: impl Fn(usize) -> &'a Frame) -> Self {
+        let t = vector(simd, |lane| &of(lane).t);
+        let u = vector(simd, |lane| &of(lane).u);
+        let v = vector(simd, |lane| &of(lane).v);
+        Self { t, u, v }
+    }
+
+    /// Components of `w` along (t, u, v).
+    #[inline(always)]
+    pub(super) fn local(&self, w: Vector<S>) -> Vector<S> {
+        Vector::new(self.t.dot(w), self.u.dot(w), self.v.dot(w))
+    }
+}
+
+/// An instrument in the elements.
+#[derive(Clone, Copy)]
+pub(super) struct Instrument<S: Simd> {
+    /// Whether it is in any of them, …
+    pub(super) present: bool,
+    /// … and has rest curvature there.
+    pub(super) curved: bool,
+    bending: [Lanes<S>; 3],
+    torsion: [Lanes<S>; 3],
+    rest_curvature: [[Lanes<S>; 2]; 3],
+    rest_twist: [Lanes<S>; 3],
+    /// θ₀, θ₁ + reference twist, and b.
+    pub(super) angles: [Lanes<S>; 3],
+}
+
+impl<S: Simd> Instrument<S> {
+    /// Stiffness and rest state of Gauss point `k` of elements of these lengths, in the units of [`super::torsion`].
+    #[inline(always)]
+    pub(super) fn torsion_input(&self, k: usize, length: Lanes<S>) -> TorsionInput<S> {
+        let moment = self.bending[k] * GAUSS[k].weight;
+        TorsionInput {
+            moment: [moment * self.rest_curvature[k][0], moment * self.rest_curvature[k][1]],
+            stiffness: self.torsion[k] * GAUSS[k].weight / length,
+            rest_twist: length * self.rest_twist[k],
+        }
+    }
+
+    /// ½∫EI|κ⁰|² ds over elements of these lengths, the constant that makes the bending energy zero in the rest state.
+    #[inline(always)]
+    pub(super) fn rest_energy(&self, length: Lanes<S>) -> Lanes<S> {
+        let mut sum = length.like(0.0);
+        for k in 0..3 {
+            let [a, b] = self.rest_curvature[k];
+            sum += self.bending[k] * GAUSS[k].weight * (a * a + b * b);
+        }
+        length * 0.5 * sum
+    }
+}
+
+/// Elements side by side.
+#[derive(Clone, Copy)]
+pub(super) struct Batch<S: Simd> {
+    pub(super) simd: S,
+    pub(super) length: Lanes<S>,
+    /// EI of all instruments together.
+    pub(super) bending: [Lanes<S>; 3],
+    /// Axial flexibility, and whether any is above zero.
+    pub(super) flexibility: Lanes<S>,
+    pub(super) stretches: bool,
+    pub(super) instruments: [Instrument<S>; MAX_ANGLES],
+    pub(super) first: Axes<S>,
+    pub(super) second: Axes<S>,
+    pub(super) chord: Vector<S>,
+    pub(super) tension: Lanes<S>,
+}
+
+impl<S: Simd> Batch<S> {
+    /// Of as many elements as there are lanes, where two neighbouring nodes have `C` unknowns.
+    #[inline(always)]
+    pub(super) fn new<const C: usize>(simd: S, lanes: &[Lane<'_>]) -> Self {
+        const { assert!(S::F64_LANES <= MOST) }
+        let lanes = &lanes[..S::F64_LANES];
+        let zero = Lanes::splat(simd, 0.0);
+        let none = Instrument {
+            present: false,
+            curved: false,
+            bending: [zero; 3],
+            torsion: [zero; 3],
+            rest_curvature: [[zero; 2]; 3],
+            rest_twist: [zero; 3],
+            angles: [zero; 3],
+        };
+        let mut batch = Self {
+            simd,
+            length: Lanes::gather(simd, |lane| lanes[lane].data.length),
+            bending: [zero; 3],
+            flexibility: Lanes::gather(simd, |lane| lanes[lane].data.flexibility),
+            stretches: lanes.iter().any(|lane| lane.data.flexibility > 0.0),
+            instruments: [none; MAX_ANGLES],
+            first: Axes::gather(simd, |lane| lanes[lane].first),
+            second: Axes::gather(simd, |lane| lanes[lane].second),
+            chord: vector(simd, |lane| lanes[lane].chord),
+            tension: Lanes::gather(simd, |lane| lanes[lane].tension),
+        };
+        for k in 0..3 {
+            batch.bending[k] = Lanes::gather(simd, |lane| lanes[lane].data.bending[k]);
+        }
+        for set in 0..Layout::<C>::ANGLES {
+            let of = &mut batch.instruments[set];
+            of.present = lanes.iter().any(|lane| lane.data.materials[set].is_present());
+            of.curved = lanes.iter().any(|lane| lane.data.materials[set].rest_curvature != [[0.0; 2]; 3]);
+            for k in 0..3 {
+                let of_lane = |lane: usize| &lanes[lane].data.materials[set];
+                of.torsion[k] = Lanes::gather(simd, |lane| of_lane(lane).torsion[k]);
+                of.rest_twist[k] = Lanes::gather(simd, |lane| of_lane(lane).rest_twist[k]);
+                of.angles[k] = Lanes::gather(simd, |lane| lanes[lane].angles[set][k]);
+                if of.curved {
+                    of.bending[k] = Lanes::gather(simd, |lane| of_lane(lane).bending[k]);
+                    for a in 0..2 {
+                        of.rest_curvature[k][a] =
+                            Lanes::gather(simd, |lane| of_lane(lane).rest_curvature[k][a]);
+                    }
+                }
+            }
+        }
+        batch
+    }
+}
