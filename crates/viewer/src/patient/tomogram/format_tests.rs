@@ -178,7 +178,8 @@ fn headers_of_the_second_format_that_cannot_be_are_refused() {
         (&|b| b[176..184].copy_from_slice(&1e-3_f64.to_le_bytes()), "all is air"),
         (
             &|b| {
-                (b[176..184].copy_from_slice(&1e-3_f64.to_le_bytes()), b[184..192].copy_from_slice(&[0; 8])).1
+                b[176..184].copy_from_slice(&1e-3_f64.to_le_bytes());
+                b[184..192].copy_from_slice(&[0; 8]);
             },
             "scaled to one",
         ),
