@@ -109,7 +109,7 @@ pub fn simulation() -> Result<Simulation> {
     Simulation::builder(made.wall, Device::uniform(100.0, 0.4, 10.0)?, sheath).build()
 }
 
-/// A tomogram (NIfTI), and rays through it.
+/// A tomogram (NIfTI of either format), and rays through it.
 ///
 /// # Errors
 /// As [`Renderer::new`], and a file that cannot be written for it.
@@ -117,13 +117,34 @@ pub fn tomogram(bytes: &[u8]) -> Result<()> {
     let name = format!("endowire-{}-{:?}.nii", std::process::id(), std::thread::current().id());
     let path = std::env::temp_dir().join(name);
     std::fs::write(&path, bytes).map_err(|e| Error::content(&path, e.to_string()))?;
-    let mut spec = ViewSpec { views: vec![View::Fluoro], size_px: [16, 12], ..ViewSpec::default() };
-    spec.patient.ct = Some(CtSpec { file: path.clone(), offset_mm: [0.0; 3] });
-    let wall = SurfaceMesh::cuboid(Vec3::zeros(), Vec3::repeat(10.0), 10.0);
-    let read = Renderer::new(&spec, &wall).and_then(|mut renderer| renderer.path_lengths(&[]).map(drop));
+    let read = rays_through(&path);
     // What is left in the folder of temporary files is nobody's loss.
     let _ = std::fs::remove_file(&path);
     read
+}
+
+/// A tomogram of two slices (DICOM), one in each half of the bytes, and rays through it.
+///
+/// # Errors
+/// As [`Renderer::new`], and files that cannot be written for it.
+pub fn slices(bytes: &[u8]) -> Result<()> {
+    let name = format!("endowire-{}-{:?}", std::process::id(), std::thread::current().id());
+    let folder = std::env::temp_dir().join(name);
+    let written = std::fs::create_dir_all(&folder).and_then(|()| {
+        let (a, b) = bytes.split_at(bytes.len() / 2);
+        std::fs::write(folder.join("a.dcm"), a).and_then(|()| std::fs::write(folder.join("b.dcm"), b))
+    });
+    written.map_err(|e| Error::content(&folder, e.to_string()))?;
+    let read = rays_through(&folder);
+    let _ = std::fs::remove_dir_all(&folder);
+    read
+}
+
+fn rays_through(file: &Path) -> Result<()> {
+    let mut spec = ViewSpec { views: vec![View::Fluoro], size_px: [16, 12], ..ViewSpec::default() };
+    spec.patient.ct = Some(CtSpec { file: file.into(), offset_mm: [0.0; 3] });
+    let wall = SurfaceMesh::cuboid(Vec3::zeros(), Vec3::repeat(10.0), 10.0);
+    Renderer::new(&spec, &wall).and_then(|mut renderer| renderer.path_lengths(&[]).map(drop))
 }
 
 fn text(bytes: &[u8]) -> Result<&str> {

@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use endowire_core::Vec3;
 use endowire_core::vessel::Wall;
+use endowire_core::{Error, Vec3};
 use endowire_viewer::{self as viewer, DevicePart, Image, Moment, PixelFormat, ViewSpec};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -33,17 +33,28 @@ pub(crate) struct Frames {
 }
 
 impl Renderer {
-    /// A renderer for `spec`, but for what `view` says otherwise.
+    /// A renderer for a plane of `spec`, but for what `view` says otherwise.
     pub(crate) fn prepare(
         py: Python<'_>,
         spec: &ViewSpec,
         view: Option<&Bound<'_, PyAny>>,
+        plane: usize,
         wall: Arc<Wall>,
     ) -> PyResult<Self> {
         let spec = match view {
             Some(table) => document::read_over("view", spec, table)?,
             None => spec.clone(),
         };
+        spec.validate().map_err(exception)?;
+        let mut planes = spec.planes();
+        if plane >= planes.len() {
+            let mend = match planes.len() {
+                1 => "the view has one plane, 0; a second is that of view.biplane_deg",
+                _ => "the view has two planes, 0 and 1",
+            };
+            return Err(exception(Error::parameter("plane", plane, mend)));
+        }
+        let spec = planes.swap_remove(plane);
         let made = interruptible(py, move || viewer::Renderer::of_wall(&spec, &wall))?;
         Ok(Self { inner: Mutex::new(made.map_err(exception)?) })
     }
@@ -75,12 +86,13 @@ impl Renderer {
 #[pymethods]
 impl Renderer {
     /// Prepares views of a vessel. `view` has the keys of `[view]` of a scene file: views (["3d", "fluoro"]), size_px, c_arm, xray, detector,
-    /// patient, camera, …
+    /// patient, camera, … With `biplane_deg` in it, `plane` 1 is the fluoroscopy of the second plane.
     ///
     /// Raises InputError for values out of range, and for a vessel that cannot be drawn.
     #[new]
-    fn new(py: Python<'_>, vessel: &Vessel, view: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Self::prepare(py, &ViewSpec::default(), Some(view), Arc::clone(&vessel.wall))
+    #[pyo3(signature = (vessel, view, plane=0))]
+    fn new(py: Python<'_>, vessel: &Vessel, view: &Bound<'_, PyAny>, plane: usize) -> PyResult<Self> {
+        Self::prepare(py, &ViewSpec::default(), Some(view), plane, Arc::clone(&vessel.wall))
     }
 
     /// What draws: "CPU reference", or the graphics interface and adapter.

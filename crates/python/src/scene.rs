@@ -116,20 +116,22 @@ impl Scene {
         Ok(simulation.report(py))
     }
 
-    /// What draws the views of its `[view]` table, in which `view` says otherwise, in `vessel` if it is at hand.
-    #[pyo3(signature = (view=None, vessel=None))]
+    /// What draws the views of its `[view]` table, in which `view` says otherwise, in `vessel` if it is at hand. With
+    /// `biplane_deg` in it, `plane` 1 is the fluoroscopy of the second plane.
+    #[pyo3(signature = (view=None, vessel=None, plane=0))]
     fn renderer(
         &self,
         py: Python<'_>,
         view: Option<&Bound<'_, PyAny>>,
         vessel: Option<&Vessel>,
+        plane: usize,
     ) -> PyResult<Renderer> {
         let spec = ViewSpec::of_scene(&self.scene, &self.path).map_err(exception)?;
         let wall = match vessel {
             Some(vessel) => Arc::clone(&vessel.wall),
             None => self.vessel(py)?.wall,
         };
-        Renderer::prepare(py, &spec, view, wall)
+        Renderer::prepare(py, &spec, view, plane, wall)
     }
 
     fn __repr__(&self) -> String {

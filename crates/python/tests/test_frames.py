@@ -32,6 +32,23 @@ def test_sixteen_bits_and_one_view(vessel, simulation):
     assert frames.three_d is None and frames.fluoro.dtype == np.uint16 and frames.fluoro.max() > 255
 
 
+def test_the_second_plane_is_the_first_turned(vessel, simulation):
+    simulation.run([[[5.0, 0.0]]] * 16)
+    view = {**VIEW, "c_arm": {"primary_deg": 30.0}, "biplane_deg": -90.0}
+    matrices = [endowire.Renderer(vessel, view, plane).labels(simulation)["camera_matrix"] for plane in (0, 1)]
+    single = {**view, "biplane_deg": None}
+    assert np.array_equal(matrices[0], endowire.Renderer(vessel, single).labels(simulation)["camera_matrix"])
+    turned = {**single, "c_arm": {"primary_deg": -60.0}}
+    assert np.array_equal(matrices[1], endowire.Renderer(vessel, turned).labels(simulation)["camera_matrix"])
+    assert not np.array_equal(*matrices)
+    frames = endowire.Renderer(vessel, view, plane=1).render(simulation)
+    assert frames.three_d is None and frames.fluoro.shape == (32, 48)
+    with pytest.raises(endowire.InputError, match="plane = 1.*biplane_deg"):
+        endowire.Renderer(vessel, single, 1)
+    with pytest.raises(endowire.InputError, match="plane = 2"):
+        endowire.Renderer(vessel, view, 2)
+
+
 def test_a_wrong_view_is_named(vessel):
     with pytest.raises(endowire.InputError, match="unknown field `sizepx`"):
         endowire.Renderer(vessel, {"sizepx": [1, 1]})

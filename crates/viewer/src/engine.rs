@@ -9,7 +9,7 @@ use crate::output::Image;
 use crate::three_d::Solids;
 
 /// Computes lengths of rays inside things: the one task that processors differ in.
-pub(crate) trait PathEngine: Send {
+pub(crate) trait PathEngine: Send + Sync {
     /// Length inside a closed mesh of the central ray of each pixel of `view`, row by row.
     fn mesh(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Vec<f32>>;
 
@@ -25,7 +25,7 @@ pub(crate) trait PathEngine: Send {
 }
 
 /// Draws 3D frames of one set-up.
-pub(crate) trait ThreeDEngine: Send {
+pub(crate) trait ThreeDEngine: Send + Sync {
     fn frame(&mut self, solids: &Solids) -> Result<Image>;
 }
 

@@ -14,8 +14,8 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_viewer::{
-    Backend, ContactView, DevicePart, DeviceView, Image, InjectionSpec, Material, Mode, Moment, Renderer,
-    TorsoSpec, View, ViewSpec,
+    Backend, ContactView, DevicePart, DeviceView, ExposureSpec, Image, InjectionSpec, Material, Mode, Moment,
+    Renderer, TorsoSpec, View, ViewSpec,
 };
 
 /// Grey levels that mathematical libraries may differ by, and the share of pixels that may differ by more.
@@ -107,6 +107,11 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden")
 }
 
+/// A guidewire so much aside.
+fn wire(aside_mm: f64) -> DeviceView {
+    device(20, 0.45, |w| Vec3::new(1.0 + aside_mm, 2.0, 5.0 + 170.0 * w))
+}
+
 fn moved(aside_mm: f64) -> DeviceView {
     let mut moved = catheter();
     moved.points.iter_mut().for_each(|p| p.position_mm.x += aside_mm);
@@ -133,6 +138,68 @@ fn frames_are_the_stored_ones_and_a_wire_a_millimetre_aside_is_not() {
     // The twin.
     let [image, _] = draw(Renderer::new(&view(Mode::Fluoro), &arch()).unwrap(), moved(1.0));
     assert!(differing(image.data(), pictures[0].1.data()) > SHARE, "the comparison must be able to fail");
+}
+
+/// What each picture of a sequence shows, and what its twin leaves out: the run before the hold, the motion within the pulse, exposure
+/// control, the turn.
+fn of_sequences(twin: bool) -> Vec<(String, Image)> {
+    let mut pictures = Vec::new();
+    let mut add = |name: &str, image: Image| pictures.push((format!("{name}.png"), image));
+    let frame = |renderer: &mut Renderer, aside_mm: f64, frame: u64| {
+        let moment = Moment { frame, time_s: 1.6 };
+        renderer.render_at(&[wire(aside_mm)], moment).unwrap().fluoro.unwrap()
+    };
+
+    // Near, and without contrast medium: what moves is seen.
+    let near = || {
+        let mut near = view(Mode::Fluoro);
+        near.injection.clear();
+        (near.c_arm.field_mm, near.c_arm.isocentre_mm) = (Some(110.0), Some([1.0, 2.0, 150.0]));
+        Renderer::new(&near, &arch()).unwrap()
+    };
+    // A wire that goes 6 mm aside from frame to frame: where it was fades.
+    let mut held = near();
+    for k in 0..6 {
+        let aside_mm = if twin { 0.0 } else { 6.0 * (k as f64 - 5.0) };
+        frame(&mut held, aside_mm, k);
+    }
+    add("hold", held.last_image_hold().unwrap());
+
+    // 2 mm aside while the beam is on: wide and faint.
+    let last = if twin { 1 } else { 8 };
+    let pulse: Vec<_> = (0..last).map(|k| vec![wire(2.0 * f64::from(k) / 8.0)]).collect();
+    let moment = Moment { frame: 3, time_s: 1.6 };
+    add("pulse", near().render_pulse(&[wire(0.0)], &pulse, moment).unwrap().fluoro.unwrap());
+
+    // A thick patient: more voltage, less contrast.
+    let mut thick = view(Mode::Fluoro);
+    thick.patient.torso = Some(TorsoSpec { width_mm: 460.0, depth_mm: 330.0, ..TorsoSpec::default() });
+    (thick.xray.pulse_ms, thick.exposure) = (8.0, (!twin).then(ExposureSpec::default));
+    add("exposure", frame(&mut Renderer::new(&thick, &arch()).unwrap(), 0.0, 3));
+
+    // The fourth frame of a turn of 10° each, with what the detector holds of the third.
+    let mut turning = Renderer::new(&view(Mode::Fluoro), &arch()).unwrap();
+    let start = turning.spec().c_arm.clone();
+    let mut shown = None;
+    for k in 0..4 {
+        turning.turn_c_arm(&start.turned(if twin { 0.0 } else { -10.0 * k as f64 })).unwrap();
+        shown = Some(frame(&mut turning, 0.0, k));
+    }
+    add("turn", shown.unwrap());
+    pictures
+}
+
+#[test]
+fn pictures_of_sequences_are_the_stored_ones_and_without_what_makes_them_are_not() {
+    let pictures = of_sequences(false);
+    bless(&pictures);
+    for ((name, image), (_, twin)) in pictures.iter().zip(of_sequences(true)) {
+        let reference = stored(&folder().join(name));
+        let share = differing(image.data(), &reference);
+        assert!(share <= SHARE, "{name}: {share} of the bytes differ");
+        let share = differing(twin.data(), &reference);
+        assert!(share > SHARE, "{name}: its twin must differ, and {share} of the bytes do");
+    }
 }
 
 /// What pictures of different drivers may differ by: grey levels in the mean, and levels that all but a share of the bytes stay
@@ -167,13 +234,18 @@ fn frames_of_the_adapter_are_the_stored_pictures_and_a_wire_a_millimetre_aside_i
     assert!(!renderer.backend().contains("CPU reference"), "{}", renderer.backend());
     let name = renderer.backend().to_owned();
     let [fluoro, three_d] = draw(renderer, catheter());
-    let Some(renderer) = on_gpu(&view(Mode::Dsa), &arch()) else { return };
-    let [dsa, _] = draw(renderer, catheter());
-    let pictures = [("fluoro", fluoro), ("three_d", three_d), ("dsa", dsa)];
+    let of_mode = |mode, device| {
+        let [image, _] = draw(on_gpu(&view(mode), &arch()).unwrap(), device);
+        image
+    };
+    const OTHERS: [Mode; 3] = [Mode::Dsa, Mode::Cine, Mode::Roadmap];
+    let [dsa, cine, roadmap] = OTHERS.map(|mode| of_mode(mode, catheter()));
+    let pictures =
+        [("fluoro", fluoro), ("three_d", three_d), ("dsa", dsa), ("cine", cine), ("roadmap", roadmap)];
     let pictures = pictures.map(|(name, image)| (format!("wgpu_{name}.png"), image));
     bless(&pictures);
-    let references = [0, 1, 2].map(|i| stored(&folder().join(&pictures[i].0)));
-    let tolerances = [FLUORO, THREE_D, FLUORO];
+    let references = [0, 1, 2, 3, 4].map(|i| stored(&folder().join(&pictures[i].0)));
+    let tolerances = [FLUORO, THREE_D, FLUORO, FLUORO, FLUORO];
     for (((file, image), reference), tolerance) in pictures.iter().zip(&references).zip(&tolerances) {
         let (said, differ) = tolerance.compare(image.data(), reference);
         eprintln!("{name}: {file}: {said}");
@@ -186,8 +258,12 @@ fn frames_of_the_adapter_are_the_stored_pictures_and_a_wire_a_millimetre_aside_i
     }
     // Another: a wire a millimetre aside, half a pixel.
     let Some(renderer) = on_gpu(&view(Mode::Fluoro), &arch()) else { return };
-    let aside = draw(renderer, moved(1.0));
-    for ((image, reference), tolerance) in aside.iter().zip(&references).zip(&tolerances) {
+    let [fluoro, three_d] = draw(renderer, moved(1.0));
+    // A subtraction has the wire in its mask too, and shows nothing of it.
+    let others = OTHERS.map(|mode| (mode != Mode::Dsa).then(|| of_mode(mode, moved(1.0))));
+    let aside = [Some(fluoro), Some(three_d)].into_iter().chain(others);
+    for ((image, reference), tolerance) in aside.zip(&references).zip(&tolerances) {
+        let Some(image) = image else { continue };
         let (said, differ) = tolerance.compare(image.data(), reference);
         eprintln!("aside: {said}");
         assert!(differ, "{said}");

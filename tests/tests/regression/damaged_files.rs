@@ -177,6 +177,82 @@ fn damaged_tomograms() {
     let units = (0..12_i16).map(|k| 60 * k - 200);
     let short: Vec<u8> = units.clone().flat_map(i16::to_le_bytes).collect();
     let float: Vec<u8> = units.flat_map(|hu| f32::from(hu).to_le_bytes()).collect();
-    let places = ["is no NIfTI volume", "voxel", "bitpix", "dimensions", "its axes", "its affine"];
-    reads_or_refuses(&[nifti(1, 4, &short), nifti(0, 16, &float)], &places, readers::tomogram);
+    let places = [
+        "is no NIfTI volume",
+        "voxel",
+        "bitpix",
+        "dimensions",
+        "its axes",
+        "its affine",
+        "dim[",
+        "pair",
+        "its values",
+        "nothing of the vessel",
+    ];
+    let files = [nifti(1, 4, &short), nifti(0, 16, &float), second_nifti(&short)];
+    reads_or_refuses(&files, &places, readers::tomogram);
+}
+
+/// The tomogram of [`nifti`] in the second format.
+fn second_nifti(voxels: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0; 544];
+    let mut put = |at: usize, data: &[u8]| bytes[at..at + data.len()].copy_from_slice(data);
+    put(0, &540_i32.to_le_bytes());
+    put(4, b"n+2\0\r\n\x1a\n");
+    put(12, &4_i16.to_le_bytes());
+    put(14, &16_i16.to_le_bytes());
+    (0..).zip([3_i64, 3, 2, 2, 1, 1, 1, 1]).for_each(|(k, n)| put(16 + 8 * k, &n.to_le_bytes()));
+    (0..4).for_each(|k| put(104 + 8 * k, &10_f64.to_le_bytes()));
+    put(168, &544_i64.to_le_bytes());
+    put(176, &1_f64.to_le_bytes());
+    put(348, &1_i32.to_le_bytes());
+    (0..3).for_each(|k| put(400 + 40 * k, &10_f64.to_le_bytes()));
+    put(500, &2_i32.to_le_bytes());
+    bytes.extend(voxels);
+    bytes
+}
+
+/// A slice of 2 × 2 pixels of 10 mm at a height, explicit VR little endian.
+fn slice(z_mm: u8) -> Vec<u8> {
+    let element = |group: u16, number: u16, kind: &str, value: &[u8]| {
+        let mut bytes = [group.to_le_bytes(), number.to_le_bytes()].concat();
+        bytes.extend(kind.bytes());
+        match kind {
+            "OW" | "OB" => bytes.extend([&[0, 0], &(value.len() as u32).to_le_bytes()[..]].concat()),
+            _ => bytes.extend((value.len() as u16).to_le_bytes()),
+        }
+        bytes.extend(value);
+        bytes
+    };
+    let meta = [
+        element(2, 0x02, "UI", b"1.2.840.10008.5.1.4.1.1.2\0"),
+        element(2, 0x03, "UI", format!("2.25.{}", 10 + z_mm / 10).as_bytes()),
+        element(2, 0x10, "UI", b"1.2.840.10008.1.2.1\0"),
+        element(2, 0x12, "UI", b"2.25"),
+    ]
+    .concat();
+    let word = |number, value: u16| element(0x28, number, "US", &value.to_le_bytes());
+    let position = format!("-5\\-5\\{z_mm:03} ");
+    let pixels: Vec<u8> = [-800_i16, -30, 40, 300].into_iter().flat_map(i16::to_le_bytes).collect();
+    let elements = [
+        element(0x08, 0x16, "UI", b"1.2.840.10008.5.1.4.1.1.2\0"),
+        element(0x08, 0x60, "CS", b"CT"),
+        element(0x20, 0x0e, "UI", b"2.25.7"),
+        element(0x20, 0x32, "DS", position.as_bytes()),
+        element(0x20, 0x37, "DS", b"1\\0\\0\\0\\1\\0 "),
+        [word(0x02, 1), word(0x10, 2), word(0x11, 2)].concat(),
+        element(0x28, 0x30, "DS", b"10\\10 "),
+        [word(0x100, 16), word(0x101, 16), word(0x102, 15), word(0x103, 1)].concat(),
+        element(0x28, 0x1052, "DS", b"0 "),
+        element(0x28, 0x1053, "DS", b"1 "),
+        element(0x7fe0, 0x10, "OW", &pixels),
+    ];
+    let length = element(2, 0, "UL", &(meta.len() as u32).to_le_bytes());
+    [&[0; 128], &b"DICM"[..], &length, &meta, &elements.concat()].concat()
+}
+
+#[test]
+fn damaged_slices() {
+    let places = ["a.dcm", "b.dcm", "slices", "voxel", "its axes", "its values", "nothing of the vessel"];
+    reads_or_refuses(&[[slice(0), slice(10)].concat()], &places, readers::slices);
 }

@@ -61,12 +61,13 @@ impl Shares {
         let material = |x: Vec3| displacement.map_or(x, |displacement| displacement.material(&x));
         let tissue = tissue(flow, c_arm, displacement);
         let mut map = Self { pixels: vec![], shares: vec![], tissue };
-        let mut near = Nearest::new(flow);
         let mut crossings = wall_crossings(c_arm, wall);
         crossings.sort_unstable_by(|a, b| {
             (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
         });
         let source = c_arm.source_mm();
+        // Others wait for it from here on: no work may be shared out to threads, of which one may be another that waits.
+        let mut near = Nearest::new(flow);
         let mut own: Vec<(u32, f32)> = Vec::new();
         for of_pixel in crossings.chunk_by(|a, b| a.0 == b.0) {
             let pixel = of_pixel[0].0;

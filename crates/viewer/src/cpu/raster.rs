@@ -48,7 +48,7 @@ impl ScreenTriangle {
     }
 
     /// Calls `visit(x, y, weights)` for every pixel of a `size` picture whose centre is covered. The weights
-    /// belong to the corners, are not negative and sum to one.
+    /// belong to the corners and are not negative; their sum, which is not zero, is left to those who need it.
     pub(crate) fn scan(&self, size: [u32; 2], visit: impl FnMut(usize, usize, [f64; 3])) {
         self.scan_rows(size[0], 0..size[1], visit);
     }
@@ -96,10 +96,7 @@ impl ScreenTriangle {
                 }
                 if inside {
                     entered = true;
-                    let sum = e[0] + e[1] + e[2];
-                    let weights =
-                        if sum > 0.0 { [e[0] / sum, e[1] / sum, e[2] / sum] } else { [1.0 / 3.0; 3] };
-                    visit(x, y, weights);
+                    visit(x, y, if e == [0.0; 3] { [1.0; 3] } else { e });
                 } else if entered {
                     break;
                 }
@@ -206,7 +203,7 @@ mod tests {
         triangle.scan([16; 2], |x, y, w| {
             covered += 1;
             for k in 0..2 {
-                let value: f64 = (0..3).map(|i| w[i] * corners[i][k]).sum();
+                let value = (0..3).map(|i| w[i] * corners[i][k]).sum::<f64>() / w.iter().sum::<f64>();
                 assert!((value - ([x, y][k] as f64 + 0.5)).abs() < 1e-5);
             }
         });

@@ -44,7 +44,7 @@ fn meetings(
         // source.
         let sign = -triangle.area2().signum();
         triangle.scan_rows(width, rows.clone(), |x, y, [w0, w1, w2]| {
-            visit(y * width as usize + x, sign, 1.0 / (w0 * i0 + w1 * i1 + w2 * i2));
+            visit(y * width as usize + x, sign, (w0 + w1 + w2) / (w0 * i0 + w1 * i1 + w2 * i2));
         });
     }
 }

@@ -38,7 +38,7 @@ impl Patient {
             return Ok(Self::Torso(Body::new(torso, bounds)));
         }
         if let Some(ct) = &spec.patient.ct {
-            return Ok(Self::Tomogram(Box::new(Volume::read(ct)?)));
+            return Ok(Self::Tomogram(Box::new(Volume::read(ct, wall)?)));
         }
         Ok(Self::Slab { tissue_mm: spec.xray.tissue_mm })
     }

@@ -57,7 +57,8 @@ impl Default for TorsoSpec {
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct CtSpec {
-    /// NIfTI volume (.nii or .nii.gz) of Hounsfield units, of at most 268 million voxels (512 × 512 × 1024).
+    /// Hounsfield units, at most 268 million voxels (512 × 512 × 1024): a NIfTI-1 or NIfTI-2 volume (.nii or .nii.gz), or a folder with the
+    /// slices of one CT series as DICOM files, uncompressed. Values that no body has are refused, and a volume that holds nothing of the vessel.
     pub file: PathBuf,
     /// Where the volume's origin lies in the scene's axes, each coordinate -100,000 to 100,000.
     #[serde(default)]

@@ -44,6 +44,8 @@ pub(crate) struct Beam {
     kev_per_mm2_ngy: f64,
     /// Weights and weights times energies by lanes, the rest of the last lane zero.
     weights: Vec<[[f32; LANES]; 2]>,
+    /// Widest instructions there are. Sums are of the same numbers in the same order with any.
+    arch: pulp::Arch,
 }
 
 /// Attenuation of one material, by lanes of nodes, 1/mm.
@@ -89,6 +91,7 @@ impl Beam {
             nodes,
             reference_mm,
             weights: vec![],
+            arch: pulp::Arch::new(),
         };
         let weights = beam.lanes(|k| beam.nodes[k].1);
         let energies = beam.lanes(|k| beam.nodes[k].1 * beam.nodes[k].0);
@@ -142,22 +145,7 @@ impl Beam {
         line_integrals: &mut Lanes,
         sum: &mut [[f32; LANES]; 2],
     ) {
-        line_integrals.clear();
-        line_integrals.resize(self.weights.len(), [0.0; LANES]);
-        for (mu, length) in layers {
-            for (p, mu) in line_integrals.iter_mut().zip(mu) {
-                for i in 0..LANES {
-                    p[i] -= mu[i] * length;
-                }
-            }
-        }
-        for ([weight, energy], p) in self.weights.iter().zip(line_integrals) {
-            let left = exp_lanes(*p);
-            for i in 0..LANES {
-                sum[0][i] += weight[i] * left[i];
-                sum[1][i] += energy[i] * left[i];
-            }
-        }
+        self.arch.dispatch(Left { weights: &self.weights, layers, line_integrals, sum });
     }
 
     /// Natural logarithm of the transmission at the reference.
@@ -174,6 +162,46 @@ impl Beam {
     /// Absorbed energy in keV of a pixel at the reference.
     pub(crate) fn kev(&self, pixel_mm: f64, dose_ngy: f64) -> f64 {
         self.kev_per_mm2_ngy * pixel_mm * pixel_mm * dose_ngy
+    }
+}
+
+/// What is left behind layers, to be added to a sum. A struct: what it does is inlined where a closure is not.
+struct Left<'a, Layers> {
+    weights: &'a [[[f32; LANES]; 2]],
+    layers: Layers,
+    line_integrals: &'a mut Lanes,
+    sum: &'a mut [[f32; LANES]; 2],
+}
+
+impl<'a, Layers: Iterator<Item = (&'a Lanes, f32)>> pulp::WithSimd for Left<'_, Layers> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { weights, layers, line_integrals, sum } = self;
+        line_integrals.clear();
+        line_integrals.resize(weights.len(), [0.0; LANES]);
+        for (mu, length) in layers {
+            for (p, mu) in line_integrals.iter_mut().zip(mu) {
+                let mut left = *p;
+                for i in 0..LANES {
+                    left[i] -= mu[i] * length;
+                }
+                *p = left;
+            }
+        }
+        // On their own, sums stay in registers.
+        let [mut signal, mut energy] = *sum;
+        for ([weights, energies], p) in weights.iter().zip(line_integrals) {
+            let left = exp_lanes(*p);
+            for i in 0..LANES {
+                signal[i] += weights[i] * left[i];
+            }
+            for i in 0..LANES {
+                energy[i] += energies[i] * left[i];
+            }
+        }
+        *sum = [signal, energy];
     }
 }
 

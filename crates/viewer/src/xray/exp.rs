@@ -6,7 +6,7 @@ pub(crate) const LANES: usize = 8;
 /// e^x within 2e-7 of its value for |x| ≤ 87, saturating beyond.
 ///
 /// e^x = 2ⁿ e^r with n = ⌊x log₂e + ½⌋ and |r| ≤ ln 2/2, and the Taylor series to r⁷/7!, whose next term is below 6e-9.
-#[inline]
+#[inline(always)]
 pub(crate) fn exp_lanes(x: [f32; LANES]) -> [f32; LANES] {
     // Added to a small number this leaves its nearest integer in the low bits.
     const ROUND: f32 = 12_582_912.0;

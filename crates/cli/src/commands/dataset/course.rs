@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use endowire_core::shape::Shape;
-use endowire_core::vessel::{Displacement, Wall};
+use endowire_core::vessel::Displacement;
 use endowire_methods::Scene;
-use endowire_viewer::{ContactView, Pushed, View, ViewSpec};
+use endowire_viewer::{ContactView, Pushed, Renderer, View, ViewSpec};
 use serde_json::{Map, Value};
 
+use super::shot;
 use super::spec::Spec;
 use crate::cache::Cache;
 use crate::failure::Failure;
@@ -32,16 +33,18 @@ pub(super) struct Course {
     pub(super) device: Option<String>,
     pub(super) instruments: Vec<String>,
     pub(super) view: ViewSpec,
-    pub(super) wall: Wall,
+    /// What all poses have in common; it draws nothing itself.
+    pub(super) renderer: Renderer,
     pub(super) pushed: Pushed,
     /// By step; the first is before the script.
     pub(super) moments: Vec<Moment>,
 }
 
 impl Course {
-    /// Carries a scene out. A step that fails ends it; what came before is kept.
+    /// Carries a scene out, of which `first` is the first shot. A step that fails ends it; what came before is kept.
     pub(super) fn run(
         spec: &Spec,
+        first: usize,
         file: &Path,
         device: Option<&Path>,
         cache: &Cache,
@@ -89,12 +92,13 @@ impl Course {
         }
         view.injection.extend(injected.iter().map(Injected::spec));
         view.validate().map_err(failed)?;
+        let views = shot::planes(spec, &view, first);
         Ok(Self {
             scene: scene.name.clone(),
             device: device.and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned()),
             instruments,
+            renderer: Renderer::of_wall(&views[0], simulation.wall())?,
             view,
-            wall: simulation.wall().clone(),
             pushed,
             moments,
         })

@@ -85,7 +85,9 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     let bar = progress::bar(pairs.len(), "scene");
     let run = |(k, (scene, device)): (usize, &(&PathBuf, Option<&Path>))| {
         let wanted = open.iter().any(|shot| shot / spec.poses == k);
-        let course = wanted.then(|| Course::run(&spec, scene, *device, &Cache::new(&args.cache))).transpose();
+        let course = wanted
+            .then(|| Course::run(&spec, k * spec.poses, scene, *device, &Cache::new(&args.cache)))
+            .transpose();
         bar.inc(1);
         course
     };

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
-use endowire_viewer::{Labels, Renderer, ViewSpec};
+use endowire_viewer::{Labels, ViewSpec};
 use serde::{Deserialize, Serialize};
 
 use super::coco::{Annotation, ImageRow, annotations};
@@ -28,11 +28,11 @@ pub(super) fn list(folder: &Path, shot: usize) -> PathBuf {
 
 /// Draws the pictures of shot number `shot`, pose number `pose` of a course.
 pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> Result<Part, Failure> {
-    let draw = Draw::new(spec.seed).of(shot);
-    let views = planes(spec, course, draw);
+    let draw = drawn(spec, shot);
+    let views = planes(spec, &course.view, shot);
     let mut renderers = Vec::with_capacity(views.len());
     for view in &views {
-        renderers.push(Renderer::of_wall(view, &course.wall)?);
+        renderers.push(course.renderer.beside(view)?);
     }
     let mut part = Part { images: vec![], annotations: vec![] };
     for m in 0..spec.moments {
@@ -85,10 +85,15 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
     Ok(part)
 }
 
-/// The views of a shot's planes.
-fn planes(spec: &Spec, course: &Course, draw: Draw) -> Vec<ViewSpec> {
-    let vary = &spec.vary;
-    let mut view = course.view.clone();
+/// What a shot is drawn from.
+fn drawn(spec: &Spec, shot: usize) -> Draw {
+    Draw::new(spec.seed).of(shot)
+}
+
+/// The views of a shot's planes, those of its course but for what is drawn.
+pub(super) fn planes(spec: &Spec, of_course: &ViewSpec, shot: usize) -> Vec<ViewSpec> {
+    let (vary, draw) = (&spec.vary, drawn(spec, shot));
+    let mut view = of_course.clone();
     view.c_arm.primary_deg = draw.within(What::Primary, vary.primary_deg);
     view.c_arm.secondary_deg = draw.within(What::Secondary, vary.secondary_deg);
     view.detector.seed = draw.word(What::Noise);

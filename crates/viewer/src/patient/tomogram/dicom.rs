@@ -1,0 +1,324 @@
+//! A series of CT slices: a folder of DICOM files, one slice each.
+//!
+//! CT Image IOD (DICOM PS3.3, A.3), native pixels of 16 bits in any uncompressed transfer syntax. With rows along **r**, columns along **c**
+//! (`ImageOrientationPatient`), the middle of the first pixel at **p** (`ImagePositionPatient`) and the distances Δc between columns and Δr
+//! between rows (`PixelSpacing`, which tells that of rows first), pixel (i, j) of a slice is at **p** + i Δc **r** + j Δr **c** (C.7.6.2.1.1),
+//! in the scene's axes: left, posterior, superior. Slices are put in order along **r** × **c** and must be evenly spaced; those of a tilted gantry go
+//! aside from each other by as much each time, which an affine can say.
+
+use std::io::{Cursor, Read};
+use std::path::{Path, PathBuf};
+
+use dicom_core::value::{PrimitiveValue, Value};
+use dicom_core::{Tag, header::HasLength};
+use dicom_dictionary_std::{tags, uids};
+use dicom_object::{DefaultDicomObject, FileMetaTable, OpenFileOptions};
+use dicom_parser::dataset::LazyDataToken;
+use dicom_parser::dataset::lazy_read::LazyDataSetReader;
+use dicom_transfer_syntax_registry::{TransferSyntax, TransferSyntaxIndex, TransferSyntaxRegistry};
+use endowire_core::nalgebra::Matrix3;
+use endowire_core::{Error, Result, Vec3};
+
+use super::{MOST_VOXELS, Scan};
+
+/// Transfer syntaxes with native pixels.
+const NATIVE: [&str; 3] =
+    [uids::IMPLICIT_VR_LITTLE_ENDIAN, uids::EXPLICIT_VR_LITTLE_ENDIAN, "1.2.840.10008.1.2.2"];
+/// Directions of a series differ by no more, and are unit vectors at right angles within it.
+const DIRECTION: f64 = 1e-3;
+/// Part of the distance between slices by which one may be off its place.
+const UNEVEN: f64 = 0.02;
+/// What is taken in place of padding: air.
+const PADDED_HU: f32 = -1000.0;
+
+/// What is read of a slice.
+struct Slice {
+    path: PathBuf,
+    series: String,
+    size: [usize; 2],
+    /// Along rows and along columns.
+    directions: [Vec3; 2],
+    /// Between columns and between rows.
+    spacing_mm: [f64; 2],
+    position_mm: Vec3,
+    hu: Vec<f32>,
+}
+
+/// Reads the series in a folder; files that are no DICOM, and folders in it, are passed over.
+///
+/// # Errors
+/// [`Error::Content`] for a slice that is none of a tomogram, and slices that are not one evenly spaced series; [`Error::File`] for what
+/// cannot be read.
+pub(super) fn read(folder: &Path) -> Result<Scan> {
+    let mut slices = Vec::new();
+    let mut voxels = 0;
+    for path in files(folder)? {
+        let Some(slice) = slice(&path).map_err(|why| Error::content(&path, why))? else { continue };
+        voxels += slice.hu.len() as u64;
+        if voxels > MOST_VOXELS {
+            let why = format!("has more than {MOST_VOXELS} voxels: take out slices or make it coarser");
+            return Err(Error::content(folder, why));
+        }
+        slices.push(slice);
+    }
+    joined(slices).map_err(|why| Error::content(folder, why))
+}
+
+/// Files of a folder that begin as DICOM files do, in the order of their names.
+fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let failed = |path: &Path| {
+        let path = path.to_path_buf();
+        move |error| Error::file(&path, error)
+    };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed(folder))? {
+        let path = entry.map_err(failed(folder))?.path();
+        if !path.is_file() {
+            continue;
+        }
+        let mut begin = Vec::with_capacity(132);
+        let file = std::fs::File::open(&path).map_err(failed(&path))?;
+        file.take(132).read_to_end(&mut begin).map_err(failed(&path))?;
+        if begin.ends_with(b"DICM") && begin.len() == 132 {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+type Told<T> = std::result::Result<T, String>;
+
+/// A slice; `None` of the directory of a medium.
+fn slice(path: &Path) -> Told<Option<Slice>> {
+    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
+    let Some(object) = object(&bytes)? else { return Ok(None) };
+    let class = text(&object, tags::SOP_CLASS_UID, "SOPClassUID").unwrap_or_default();
+    let modality = text(&object, tags::MODALITY, "Modality")?;
+    if modality != "CT" {
+        return Err(format!(
+            "is of modality {modality:?}, whose numbers are no Hounsfield units; take it out of the folder"
+        ));
+    }
+    if class == uids::ENHANCED_CT_IMAGE_STORAGE
+        || number(&object, tags::NUMBER_OF_FRAMES).is_ok_and(|n| n > 1.0)
+    {
+        return Err(
+            "holds many frames, and one slice a file is read; export it as single slices, or as NIfTI".into(),
+        );
+    }
+    let whole = |tag, name: &str, [least, most]: [u16; 2]| -> Told<u16> {
+        let value = number(&object, tag).map_err(|why| format!("{name} {why}"))?;
+        let fits = value.fract() == 0.0 && (f64::from(least)..=f64::from(most)).contains(&value);
+        if fits { Ok(value as u16) } else { Err(format!("{name} = {value}: must be {least} to {most}")) }
+    };
+    let [rows, columns] =
+        [whole(tags::ROWS, "Rows", [2, u16::MAX])?, whole(tags::COLUMNS, "Columns", [2, u16::MAX])?];
+    whole(tags::SAMPLES_PER_PIXEL, "SamplesPerPixel", [1, 1])?;
+    whole(tags::BITS_ALLOCATED, "BitsAllocated", [16, 16])?;
+    let bits = whole(tags::BITS_STORED, "BitsStored", [1, 16])?;
+    whole(tags::HIGH_BIT, "HighBit", [bits - 1, bits - 1])?;
+    let signed = whole(tags::PIXEL_REPRESENTATION, "PixelRepresentation", [0, 1])? == 1;
+    let [slope, intercept] =
+        [(tags::RESCALE_SLOPE, "RescaleSlope"), (tags::RESCALE_INTERCEPT, "RescaleIntercept")].map(
+            |(tag, name)| {
+                number(&object, tag)
+                    .map_err(|why| format!("{name} {why}: its numbers are no Hounsfield units without it"))
+            },
+        );
+    let [slope, intercept] = [slope?, intercept?];
+    if let Ok(kind) = text(&object, tags::RESCALE_TYPE, "RescaleType")
+        && !matches!(kind.as_str(), "HU" | "")
+    {
+        return Err(format!("RescaleType = {kind:?}: its numbers are no Hounsfield units"));
+    }
+    let [rx, ry, rz, cx, cy, cz] =
+        numbers(&object, tags::IMAGE_ORIENTATION_PATIENT, "ImageOrientationPatient")?;
+    let directions = [Vec3::new(rx, ry, rz), Vec3::new(cx, cy, cz)];
+    let off = directions
+        .map(|d| (d.norm() - 1.0).abs())
+        .into_iter()
+        .chain([directions[0].dot(&directions[1]).abs()]);
+    if off.fold(0.0, f64::max) > DIRECTION {
+        return Err("ImageOrientationPatient is not two directions at right angles".into());
+    }
+    let [between_rows, between_columns] = numbers(&object, tags::PIXEL_SPACING, "PixelSpacing")?;
+    let position: [f64; 3] = numbers(&object, tags::IMAGE_POSITION_PATIENT, "ImagePositionPatient")?;
+    let padding = number(&object, tags::PIXEL_PADDING_VALUE).ok();
+    let stored = pixels(&object, usize::from(rows) * usize::from(columns))?;
+    let spare = 16 - u32::from(bits);
+    let value = |raw: u16| {
+        // What is above the stored bits is not the pixel's.
+        let up = raw << spare;
+        f64::from(if signed { i32::from(up as i16 >> spare) } else { i32::from(up >> spare) })
+    };
+    let hu = stored.into_iter().map(|raw| match value(raw) {
+        value if padding == Some(value) => PADDED_HU,
+        value => (value * slope + intercept) as f32,
+    });
+    Ok(Some(Slice {
+        path: path.to_path_buf(),
+        series: text(&object, tags::SERIES_INSTANCE_UID, "SeriesInstanceUID")?,
+        size: [usize::from(columns), usize::from(rows)],
+        directions,
+        spacing_mm: [between_columns, between_rows],
+        position_mm: position.into(),
+        hu: hu.collect(),
+    }))
+}
+
+/// What a file tells; `None` of the directory of a medium.
+fn object(bytes: &[u8]) -> Told<Option<DefaultDicomObject>> {
+    let explicit = TransferSyntaxRegistry.get(uids::EXPLICIT_VR_LITTLE_ENDIAN).ok_or("cannot be read")?;
+    let mut rest = bytes.get(128..).unwrap_or_default();
+    check_lengths(rest.get(4..).unwrap_or_default(), explicit, |tag| tag.0 == 2)?;
+    let meta = FileMetaTable::from_reader(&mut rest).map_err(|e| unreadable(&e))?;
+    if meta.media_storage_sop_class_uid() == uids::MEDIA_STORAGE_DIRECTORY_STORAGE {
+        return Ok(None);
+    }
+    let name = meta.transfer_syntax();
+    let syntax = TransferSyntaxRegistry.get(name).filter(|_| NATIVE.contains(&name)).ok_or_else(|| {
+        let name: String = name.chars().filter(|c| !c.is_control()).take(64).collect();
+        format!("is compressed (transfer syntax {name}); decompress it first, as with `gdcmconv --raw` or `dcmdjpeg`")
+    })?;
+    check_lengths(rest, syntax, |_| true)?;
+    OpenFileOptions::new().from_reader(bytes).map(Some).map_err(|e| unreadable(&e))
+}
+
+/// Refuses a file with an element that says it is longer than the file, in the elements up to the first that is not `wanted`: a reader
+/// makes room for it before it reads.
+fn check_lengths(bytes: &[u8], syntax: &TransferSyntax, wanted: impl Fn(Tag) -> bool) -> Told<()> {
+    let mut tokens =
+        LazyDataSetReader::new_with_ts(Cursor::new(bytes), syntax).map_err(|e| unreadable(&e))?;
+    while let Some(token) = tokens.advance() {
+        let token = token.map_err(|e| unreadable(&e))?;
+        let length = match &token {
+            LazyDataToken::ElementHeader(header) if !wanted(header.tag) => return Ok(()),
+            LazyDataToken::LazyValue { header, .. } => header.len.get().unwrap_or(0),
+            LazyDataToken::LazyItemValue { len, .. } => *len,
+            _ => 0,
+        };
+        if length as usize > bytes.len() {
+            return Err(format!(
+                "has an element of {length} bytes, more than are in it: it is damaged or cut off"
+            ));
+        }
+        token.skip().map_err(|e| unreadable(&e))?;
+    }
+    Ok(())
+}
+
+fn unreadable(error: &dyn std::error::Error) -> String {
+    format!("is no DICOM file that can be read: {}", chain(error))
+}
+
+/// The words of a slice's pixels.
+fn pixels(object: &DefaultDicomObject, count: usize) -> Told<Vec<u16>> {
+    let element = object.element_opt(tags::PIXEL_DATA).ok().flatten().ok_or("has no PixelData")?;
+    let words = match element.value() {
+        Value::Primitive(PrimitiveValue::U16(words)) => words.to_vec(),
+        Value::Primitive(PrimitiveValue::U8(bytes)) => {
+            bytes.chunks_exact(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect()
+        }
+        _ => return Err("PixelData is compressed; decompress it first, as with `gdcmconv --raw`".into()),
+    };
+    if words.len() != count {
+        return Err(format!(
+            "PixelData holds {} pixels ({:?} bytes), not the {count} of its rows and columns",
+            words.len(),
+            element.length().get()
+        ));
+    }
+    Ok(words)
+}
+
+fn text(object: &DefaultDicomObject, tag: Tag, name: &str) -> Told<String> {
+    let element = object.element_opt(tag).ok().flatten().ok_or_else(|| format!("has no {name}"))?;
+    let text = element.to_str().map_err(|error| format!("{name}: {}", chain(&error)))?;
+    Ok(text.trim_matches(|c: char| c.is_whitespace() || c == '\0').chars().take(100).collect())
+}
+
+fn number(object: &DefaultDicomObject, tag: Tag) -> Told<f64> {
+    let element = object.element_opt(tag).ok().flatten().ok_or("is absent")?;
+    let number = element.to_float64().map_err(|error| format!("is no number: {}", chain(&error)))?;
+    if number.is_finite() { Ok(number) } else { Err(format!("is {number}")) }
+}
+
+fn numbers<const N: usize>(object: &DefaultDicomObject, tag: Tag, name: &str) -> Told<[f64; N]> {
+    let element = object.element_opt(tag).ok().flatten().ok_or_else(|| format!("has no {name}"))?;
+    let all = element.to_multi_float64().map_err(|error| format!("{name}: {}", chain(&error)))?;
+    let all: [f64; N] =
+        all.try_into().map_err(|all: Vec<f64>| format!("{name} has {} numbers, not {N}", all.len()))?;
+    if all.iter().all(|x| x.is_finite()) { Ok(all) } else { Err(format!("{name} is not finite")) }
+}
+
+/// An error with what brought it about, on one line.
+fn chain(error: &dyn std::error::Error) -> String {
+    let mut told = error.to_string();
+    let mut source = error.source();
+    while let Some(error) = source {
+        told = format!("{told}: {error}");
+        source = error.source();
+    }
+    told.chars().map(|c| if c.is_control() { ' ' } else { c }).take(300).collect()
+}
+
+/// One volume of slices.
+fn joined(mut slices: Vec<Slice>) -> Told<Scan> {
+    let name = |slice: &Slice| {
+        slice.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+    };
+    if slices.len() < 2 {
+        return Err(format!(
+            "holds {} slices of a CT series (files that begin as DICOM files do); at least 2 are needed",
+            slices.len()
+        ));
+    }
+    for other in &slices[1..] {
+        let first = &slices[0];
+        let turned = (0..2).any(|k| (other.directions[k] - first.directions[k]).norm() > DIRECTION);
+        let differs = match () {
+            () if other.series != first.series => "are of two series (SeriesInstanceUID)",
+            () if other.size != first.size => "have other rows or columns",
+            () if other.spacing_mm != first.spacing_mm => "have another PixelSpacing",
+            () if turned => "have another ImageOrientationPatient, as a scout has",
+            () => continue,
+        };
+        return Err(format!(
+            "{} and {} {differs}: leave the slices of one volume in the folder",
+            name(first),
+            name(other)
+        ));
+    }
+    let [along_rows, along_columns] = slices[0].directions;
+    let normal = along_rows.cross(&along_columns);
+    slices.sort_by(|a, b| a.position_mm.dot(&normal).total_cmp(&b.position_mm.dot(&normal)));
+    let count = slices.len();
+    let origin_mm = slices[0].position_mm;
+    let step = (slices[count - 1].position_mm - origin_mm) / (count - 1) as f64;
+    let apart = |pair: &[Slice]| (pair[1].position_mm - pair[0].position_mm).dot(&normal);
+    for pair in slices.windows(2) {
+        if apart(pair) < UNEVEN * step.norm() || apart(pair) == 0.0 {
+            return Err(format!(
+                "{} and {} are of one place: leave one of them in the folder",
+                name(&pair[0]),
+                name(&pair[1])
+            ));
+        }
+    }
+    for (k, slice) in slices.iter().enumerate() {
+        let off = (slice.position_mm - origin_mm - step * k as f64).norm();
+        if off > UNEVEN * step.norm() {
+            let distances = slices.windows(2).map(apart);
+            let (least, most) = distances.fold((f64::MAX, 0.0_f64), |(l, m), d| (l.min(d), m.max(d)));
+            return Err(format!(
+                "{} is {off:.3} mm off its place in an even row of {count} slices, which are {least:.3} to {most:.3} mm apart: one may be missing; resample the series, as to NIfTI",
+                name(slice)
+            ));
+        }
+    }
+    let [dx, dy] = slices[0].spacing_mm;
+    let axes = Matrix3::from_columns(&[along_rows * dx, along_columns * dy, step]);
+    let size = [slices[0].size[0], slices[0].size[1], count];
+    Ok(Scan { size, axes, origin_mm, hu: slices.into_iter().flat_map(|slice| slice.hu).collect() })
+}

@@ -1,0 +1,237 @@
+//! A computed tomogram as background: NIfTI or a series of DICOM slices in, lengths of tissue and bone out.
+//!
+//! Hounsfield units tell attenuation relative to water. Up to [`SOFT_HU`] a voxel is taken as soft tissue of less or more mass,
+//! above as a mixture with cortical bone, so that one volume gives lengths in two materials whatever the spectrum. A ray is
+//! marched in steps of half a voxel through the trilinear interpolation of its voxels.
+
+mod dicom;
+mod nifti;
+
+use endowire_core::nalgebra::Matrix3;
+use endowire_core::vessel::SurfaceMesh;
+use endowire_core::{Error, Result, Vec3};
+
+use crate::c_arm::CArm;
+use crate::spec::CtSpec;
+
+/// Sides of a voxel that can be meant, mm: a unit mistake is easily a factor of a thousand, and rays march by half a side.
+const VOXEL_MM: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
+/// Most voxels of a volume: 512 × 512 × 1024, two gigabytes of materials.
+const MOST_VOXELS: u64 = 1 << 28;
+/// Air: no tissue at all below this.
+const AIR_HU: f32 = -950.0;
+/// Bone begins.
+const SOFT_HU: f32 = 120.0;
+/// Solid cortical bone at 60 keV: (0.574/0.206 − 1) · 1000.
+const CORTICAL_HU: f32 = 1790.0;
+/// Values that Hounsfield units can have: what pads a picture may be lower than air, what metal does may need 16 bits.
+const POSSIBLE_HU: std::ops::RangeInclusive<f32> = -32_768.0..=65_535.0;
+/// Values within as much of each other are those of a picture scaled to [0, 1] or [-1, 1].
+const SCALED: f32 = 2.0;
+/// Part of the smallest voxel side that a ray advances at once.
+const STEP: f64 = 0.5;
+
+/// Equivalent lengths per length in a voxel: soft tissue, cortical bone.
+fn materials(hu: f32) -> [f32; 2] {
+    if hu <= AIR_HU {
+        return [0.0, 0.0];
+    }
+    if hu <= SOFT_HU {
+        return [1.0 + hu / 1000.0, 0.0];
+    }
+    let bone = ((hu - SOFT_HU) / (CORTICAL_HU - SOFT_HU)).min(2.0);
+    [(1.0 + SOFT_HU / 1000.0) * (1.0 - bone).max(0.0), bone]
+}
+
+/// Values as a scanner gave them, with voxel (i, j, k) at `origin_mm` + `axes` · (i, j, k) in the scene's axes; the first index is the fastest.
+#[derive(Debug, PartialEq)]
+struct Scan {
+    size: [usize; 3],
+    axes: Matrix3<f64>,
+    origin_mm: Vec3,
+    hu: Vec<f32>,
+}
+
+impl Scan {
+    /// Refuses values that cannot be Hounsfield units: air is -1000, fat about -100, water 0 and bone above 300, of which a body has the first
+    /// two or is in the first.
+    fn check_values(&self) -> std::result::Result<(), String> {
+        let place =
+            |i: usize| [i % self.size[0], i / self.size[0] % self.size[1], i / self.size[0] / self.size[1]];
+        if let Some(i) = self.hu.iter().position(|hu| !POSSIBLE_HU.contains(hu)) {
+            return Err(format!(
+                "voxel {:?} is {}, and Hounsfield units are {} to {}; mend it, or the slope and intercept",
+                place(i),
+                self.hu[i],
+                POSSIBLE_HU.start(),
+                POSSIBLE_HU.end()
+            ));
+        }
+        let [least, most] = self.hu.iter().fold([f32::MAX, f32::MIN], |[l, m], hu| [l.min(*hu), m.max(*hu)]);
+        let why = match () {
+            () if most <= AIR_HU => "all is air",
+            () if most - least <= SCALED => "they seem scaled to one",
+            () if least >= 0.0 => {
+                "none is below 0, where air and fat are: an intercept of -1024 may be missing"
+            }
+            () => return Ok(()),
+        };
+        Err(format!("its values, {least} to {most}, are no Hounsfield units of a body: {why}"))
+    }
+}
+
+/// A volume of materials in the scene's axes.
+#[derive(Debug)]
+pub(crate) struct Volume {
+    size: [usize; 3],
+    /// Voxel index = `into` · (point − `origin_mm`).
+    into: Matrix3<f64>,
+    origin_mm: Vec3,
+    step_mm: f64,
+    /// Soft tissue and bone of each voxel, the first index fastest.
+    voxels: Vec<[f32; 2]>,
+}
+
+impl Volume {
+    /// Reads Hounsfield units: a NIfTI file, or a folder of DICOM slices. `wall` is what the volume is to be around.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the key for a file that is not there, [`Error::Content`] for one that is no usable volume, and
+    /// for one that holds nothing of the vessel.
+    pub(crate) fn read(spec: &CtSpec, wall: &SurfaceMesh) -> Result<Self> {
+        let path = &spec.file;
+        let told = std::fs::metadata(path)
+            .map_err(|source| Error::parameter("view.patient.ct.file", path.display(), source.to_string()))?;
+        let bad = |reason: String| Error::content(path, reason);
+        let scan = if told.is_dir() { dicom::read(path)? } else { nifti::read(path)? };
+        if scan.size.iter().any(|&n| n < 2) {
+            let [nx, ny, nz] = scan.size;
+            return Err(bad(format!("{nx} × {ny} × {nz} voxels are no volume")));
+        }
+        scan.check_values().map_err(bad)?;
+        let voxels = scan.hu.into_iter().map(materials).collect();
+        let volume = Self::new(scan.size, scan.axes, scan.origin_mm + Vec3::from(spec.offset_mm), voxels);
+        let volume = volume.ok_or_else(|| {
+            bad("its axes do not span space, or its voxels are no 0.001 to 1000 mm wide; mend its sform or pixdim, or PixelSpacing and ImagePositionPatient".into())
+        })?;
+        volume.check_holds(wall).map_err(bad)?;
+        Ok(volume)
+    }
+
+    /// Refuses a vessel of which no vertex is in the volume.
+    fn check_holds(&self, wall: &SurfaceMesh) -> std::result::Result<(), String> {
+        let within = |v: &Vec3| {
+            let at = self.into * (v - self.origin_mm);
+            (0..3).all(|k| (-0.5..=self.size[k] as f64 - 0.5).contains(&at[k]))
+        };
+        if wall.vertices_mm.is_empty() || wall.vertices_mm.iter().any(within) {
+            return Ok(());
+        }
+        let axes = self.into.try_inverse().unwrap_or_default();
+        let corners = (0..8).map(|k| {
+            let at = |axis: usize| if k >> axis & 1 == 1 { self.size[axis] as f64 - 0.5 } else { -0.5 };
+            self.origin_mm + axes * Vec3::from_fn(|axis, _| at(axis))
+        });
+        let spans = |points: &mut dyn Iterator<Item = Vec3>| {
+            let [least, most] = points
+                .fold([Vec3::repeat(f64::MAX), Vec3::repeat(f64::MIN)], |[l, m], p| [l.inf(&p), m.sup(&p)]);
+            let told = |v: Vec3| format!("[{:.0}, {:.0}, {:.0}]", v.x, v.y, v.z);
+            format!("{} to {}", told(least), told(most))
+        };
+        Err(format!(
+            "holds nothing of the vessel: in the scene's axes (left, posterior, superior, mm) it is from {}, the vessel from {}; move it with view.patient.ct.offset_mm",
+            spans(&mut corners.into_iter()),
+            spans(&mut wall.vertices_mm.iter().copied())
+        ))
+    }
+
+    /// A volume with voxel (i, j, k) at `origin_mm` + `axes` · (i, j, k).
+    fn new(size: [usize; 3], axes: Matrix3<f64>, origin_mm: Vec3, voxels: Vec<[f32; 2]>) -> Option<Self> {
+        let smallest = axes.column_iter().map(|c| c.norm()).fold(f64::MAX, f64::min);
+        let sides = axes.column_iter().map(|c| c.norm());
+        if !sides.clone().all(|side| VOXEL_MM.contains(&side)) {
+            return None;
+        }
+        let into = axes.try_inverse().filter(|m| m.iter().all(|x| x.is_finite()))?;
+        Some(Self { size, into, origin_mm, step_mm: STEP * smallest, voxels })
+    }
+
+    /// Lengths in soft tissue and bone of the central ray of each pixel.
+    pub(crate) fn project(&self, view: &CArm) -> [Vec<f32>; 2] {
+        // Voxels are wider than rays: every fourth ray is marched, those between are interpolated.
+        const EVERY: usize = 2;
+        let [width, height] = view.size_px().map(|n| n as usize);
+        let nodes = [width, height].map(|n| n.div_ceil(EVERY) + 1);
+        let mut coarse = Vec::with_capacity(nodes[0] * nodes[1]);
+        for j in 0..nodes[1] {
+            for i in 0..nodes[0] {
+                coarse.push(self.march(view, [(i * EVERY) as f64, (j * EVERY) as f64]));
+            }
+        }
+        let at = |pixel: usize, k: usize| {
+            let place = |n: usize| ((n as f32 + 0.5) / EVERY as f32, n / EVERY);
+            let ((x, i), (y, j)) = (place(pixel % width), place(pixel / width));
+            let (u, v) = (x - i as f32, y - j as f32);
+            let row =
+                |j: usize| coarse[j * nodes[0] + i][k] * (1.0 - u) + coarse[j * nodes[0] + i + 1][k] * u;
+            row(j) * (1.0 - v) + row(j + 1) * v
+        };
+        [0, 1].map(|k| (0..width * height).map(|pixel| at(pixel, k)).collect())
+    }
+
+    /// Lengths along one ray.
+    fn march(&self, view: &CArm, pixel: [f64; 2]) -> [f32; 2] {
+        let (source, direction) = view.ray(pixel);
+        let (start, slope) = (self.into * (source - self.origin_mm), self.into * direction);
+        // Where the ray is between the middles of the outermost voxels, in millimetres.
+        let (mut near, mut far) = (0.0_f64, f64::MAX);
+        for k in 0..3 {
+            let last = (self.size[k] - 1) as f64;
+            if slope[k] == 0.0 {
+                if !(0.0..=last).contains(&start[k]) {
+                    return [0.0; 2];
+                }
+                continue;
+            }
+            let [a, b] = [-start[k] / slope[k], (last - start[k]) / slope[k]];
+            (near, far) = (near.max(a.min(b)), far.min(a.max(b)));
+        }
+        if far <= near {
+            return [0.0; 2];
+        }
+        let steps = ((far - near) / self.step_mm).ceil();
+        let step = (far - near) / steps;
+        let mut sum = [0.0; 2];
+        for n in 0..steps as usize {
+            let at = start + slope * (near + (n as f64 + 0.5) * step);
+            let value = self.value([at.x as f32, at.y as f32, at.z as f32]);
+            sum = [sum[0] + value[0], sum[1] + value[1]];
+        }
+        sum.map(|s| s * step as f32)
+    }
+
+    /// Trilinear interpolation at voxel coordinates.
+    fn value(&self, at: [f32; 3]) -> [f32; 2] {
+        let place = |k: usize| {
+            let x = at[k].clamp(0.0, (self.size[k] - 1) as f32);
+            let i = (x as usize).min(self.size[k] - 2);
+            (i, x - i as f32)
+        };
+        let [(i, u), (j, v), (k, w)] = [place(0), place(1), place(2)];
+        let row = self.size[0];
+        let slice = row * self.size[1];
+        let first = k * slice + j * row + i;
+        let mix = |a: [f32; 2], b: [f32; 2], t: f32| [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t];
+        let along = |at: usize| mix(self.voxels[at], self.voxels[at + 1], u);
+        mix(
+            mix(along(first), along(first + row), v),
+            mix(along(first + slice), along(first + slice + row), v),
+            w,
+        )
+    }
+}
+
+#[cfg(test)]
+mod format_tests;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,261 @@
+//! NIfTI-1 and NIfTI-2 files, bare or compressed.
+//!
+//! The two formats tell the same with headers of 348 and 540 bytes; the library in use reads the first. Of the second
+//! (<https://nifti.nimh.nih.gov/pub/dist/doc/nifti2.h>) the header is read here, and its voxels as if they had one of the first. Axes are
+//! right, anterior, superior in both.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::Path;
+
+use endowire_core::nalgebra::Matrix3;
+use endowire_core::{Error, Result, Vec3};
+use flate2::bufread::GzDecoder;
+use nifti::{
+    Endianness, InMemNiftiObject, InMemNiftiVolume, NiftiError, NiftiHeader, NiftiObject, NiftiVolume,
+    RandomAccessNiftiVolume, ReaderOptions,
+};
+
+use super::{MOST_VOXELS, Scan};
+
+/// Bytes of a header of the second format.
+const SECOND_BYTES: usize = 540;
+/// What its magic string begins with in a file of header and voxels, and in one of a pair.
+const SECOND: &[u8] = b"n+2\0";
+const SECOND_OF_PAIR: &[u8] = b"ni2\0";
+
+/// Reads a file of either format.
+///
+/// # Errors
+/// [`Error::Content`] for one that is no usable volume.
+pub(super) fn read(path: &Path) -> Result<Scan> {
+    let bad = |reason: String| Error::content(path, reason);
+    let unreadable = |error: NiftiError| bad(format!("is no NIfTI volume: {error}"));
+    let header = second(path).map_err(bad)?;
+    let (header, placed, volume) = match header {
+        Some((header, placed, offset)) => {
+            check_size(&header).map_err(bad)?;
+            let skip = offset - SECOND_BYTES as u64;
+            let mut voxels = plain(path).map_err(|e| unreadable(e.into()))?;
+            io::copy(&mut (&mut voxels).take(SECOND_BYTES as u64 + skip), &mut io::sink())
+                .map_err(|e| unreadable(e.into()))?;
+            let volume = InMemNiftiVolume::from_reader(voxels, &header).map_err(unreadable)?;
+            (header, placed, volume)
+        }
+        None => {
+            // The header first: it says how much memory the volume asks for.
+            check_size(&NiftiHeader::from_file(path).map_err(unreadable)?).map_err(bad)?;
+            let object: InMemNiftiObject = ReaderOptions::new().read_file(path).map_err(unreadable)?;
+            let header = object.header().clone();
+            let placed = Placed::first(&header);
+            (header, placed, object.into_volume())
+        }
+    };
+    let dim = volume.dim().to_vec();
+    let [nx, ny, nz] = match dim.as_slice() {
+        [x, y, z] | [x, y, z, 1] => [*x, *y, *z],
+        other => return Err(bad(format!("a volume has three dimensions, not {other:?}"))),
+    };
+    let mut hu = Vec::with_capacity(usize::from(nx) * usize::from(ny) * usize::from(nz));
+    let extra: &[u16] = if dim.len() == 4 { &[0] } else { &[] };
+    for z in 0..nz {
+        for y in 0..ny {
+            for x in 0..nx {
+                let place: Vec<u16> = [x, y, z].iter().chain(extra).copied().collect();
+                let value = volume.get_f32(&place);
+                hu.push(value.map_err(|e| bad(format!("voxel [{x}, {y}, {z}] cannot be read: {e}")))?);
+            }
+        }
+    }
+    let (axes, origin_mm) = placed.in_lps(header.xyzt_units).map_err(bad)?;
+    Ok(Scan { size: [nx, ny, nz].map(usize::from), axes, origin_mm, hu })
+}
+
+/// A file's bytes, unpacked if they are compressed.
+fn plain(path: &Path) -> io::Result<Box<dyn Read>> {
+    let mut file = BufReader::new(File::open(path)?);
+    let compressed = file.fill_buf()?.starts_with(&[0x1f, 0x8b]);
+    Ok(if compressed { Box::new(GzDecoder::new(file)) } else { Box::new(file) })
+}
+
+/// Refuses a volume that memory may not hold, and one whose header contradicts itself about the size of a voxel.
+fn check_size(header: &NiftiHeader) -> std::result::Result<(), String> {
+    let bits = header.data_type().map_or(header.bitpix, |kind| 8 * kind.size_of() as i16);
+    if header.bitpix != bits {
+        return Err(format!(
+            "says bitpix = {} of voxels that have {bits} bits; mend its header",
+            header.bitpix
+        ));
+    }
+    let dims = usize::from(header.dim[0]).clamp(1, 7);
+    let voxels = header.dim[1..=dims].iter().fold(1_u64, |product, n| product.saturating_mul(u64::from(*n)));
+    if voxels <= MOST_VOXELS {
+        return Ok(());
+    }
+    Err(format!(
+        "has {voxels} voxels (dim = {:?}), at most {MOST_VOXELS} are read: crop it or make it coarser",
+        &header.dim[1..=dims]
+    ))
+}
+
+/// The header of a file of the second format as one of the first, where its voxels are placed, and where they begin; `None` of any
+/// other file.
+fn second(path: &Path) -> std::result::Result<Option<(NiftiHeader, Placed, u64)>, String> {
+    let mut bytes = Vec::with_capacity(SECOND_BYTES);
+    // What cannot be read is told by the reader of the first format.
+    let read = plain(path).and_then(|file| file.take(SECOND_BYTES as u64).read_to_end(&mut bytes));
+    if read.is_err() || bytes.len() < SECOND_BYTES {
+        return Ok(None);
+    }
+    if &bytes[4..8] == SECOND_OF_PAIR {
+        return Err("is the header of a NIfTI-2 pair; join header and voxels in one .nii file".into());
+    }
+    let header = [Endianness::Little, Endianness::Big].map(|order| Fields { bytes: &bytes, order });
+    let Some(of) = header.into_iter().find(|of| of.i32(0) == SECOND_BYTES as i32) else { return Ok(None) };
+    if &bytes[4..8] != SECOND {
+        return Ok(None);
+    }
+    let mut dim = [0; 8];
+    for (k, n) in dim.iter_mut().enumerate() {
+        let side = of.i64(16 + 8 * k);
+        // Sides beyond the last dimension say nothing.
+        *n = match u16::try_from(side) {
+            Ok(side) => side,
+            Err(_) if (k as i64) > of.i64(16) => 1,
+            Err(_) => return Err(format!("dim[{k}] = {side}: at most {} a side are read", u16::MAX)),
+        };
+    }
+    let offset = of.i64(168);
+    let begins = u64::try_from(offset).ok().filter(|begins| *begins >= SECOND_BYTES as u64);
+    let begins = begins.ok_or_else(|| format!("its voxels begin at vox_offset = {offset}, in its header"))?;
+    let header = NiftiHeader {
+        dim,
+        datatype: of.i16(12),
+        bitpix: of.i16(14),
+        scl_slope: of.f64(176) as f32,
+        scl_inter: of.f64(184) as f32,
+        xyzt_units: of.i32(500) as u8,
+        endianness: of.order,
+        ..NiftiHeader::default()
+    };
+    let placed = Placed {
+        sform: (of.i32(348) > 0)
+            .then(|| [400, 432, 464].map(|row| std::array::from_fn(|k| of.f64(row + 8 * k)))),
+        qform: (of.i32(344) > 0)
+            .then(|| [[352, 360, 368], [376, 384, 392]].map(|at| at.map(|at| of.f64(at)))),
+        spacing: [112, 120, 128].map(|at| of.f64(at)),
+        flipped: of.f64(104) < 0.0,
+    };
+    Ok(Some((header, placed, begins)))
+}
+
+/// Numbers of a header at their places.
+struct Fields<'a> {
+    bytes: &'a [u8],
+    order: Endianness,
+}
+
+impl Fields<'_> {
+    fn at<const N: usize>(&self, at: usize) -> [u8; N] {
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(&self.bytes[at..at + N]);
+        if self.order == Endianness::Big {
+            bytes.reverse();
+        }
+        bytes
+    }
+
+    fn i16(&self, at: usize) -> i16 {
+        i16::from_le_bytes(self.at(at))
+    }
+
+    fn i32(&self, at: usize) -> i32 {
+        i32::from_le_bytes(self.at(at))
+    }
+
+    fn i64(&self, at: usize) -> i64 {
+        i64::from_le_bytes(self.at(at))
+    }
+
+    fn f64(&self, at: usize) -> f64 {
+        f64::from_le_bytes(self.at(at))
+    }
+}
+
+/// Where voxels are, as headers of both formats tell it.
+struct Placed {
+    /// Rows of an affine.
+    sform: Option<[[f64; 4]; 3]>,
+    /// Three parts of a quaternion, and the origin.
+    qform: Option<[[f64; 3]; 2]>,
+    spacing: [f64; 3],
+    flipped: bool,
+}
+
+impl Placed {
+    fn first(header: &NiftiHeader) -> Self {
+        let rows = [header.srow_x, header.srow_y, header.srow_z].map(|row| row.map(f64::from));
+        let quaternion = [header.quatern_b, header.quatern_c, header.quatern_d].map(f64::from);
+        let origin = [header.quatern_x, header.quatern_y, header.quatern_z].map(f64::from);
+        Self {
+            sform: (header.sform_code > 0).then_some(rows),
+            qform: (header.qform_code > 0).then_some([quaternion, origin]),
+            spacing: [1, 2, 3].map(|k| f64::from(header.pixdim[k])),
+            flipped: header.pixdim[0] < 0.0,
+        }
+    }
+
+    /// Axes and origin of voxel indices in LPS millimetres: left and posterior change sign.
+    fn in_lps(&self, units: u8) -> std::result::Result<(Matrix3<f64>, Vec3), String> {
+        let rows = self.sform.unwrap_or_else(|| {
+            // Method 2 of the standard: a quaternion, or with no code the spacing alone.
+            let [[b, c, d], origin] = self.qform.unwrap_or_default();
+            let a = (1.0 - b * b - c * c - d * d).max(0.0).sqrt();
+            let rotation = [
+                [a * a + b * b - c * c - d * d, 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)],
+                [2.0 * (b * c + a * d), a * a + c * c - b * b - d * d, 2.0 * (c * d - a * b)],
+                [2.0 * (b * d - a * c), 2.0 * (c * d + a * b), a * a + d * d - b * b - c * c],
+            ];
+            let flip = if self.flipped { -1.0 } else { 1.0 };
+            let [dx, dy, dz] = self.spacing;
+            [0, 1, 2].map(|r| {
+                let [x, y, z] = rotation[r];
+                [x * dx, y * dy, z * dz * flip, origin[r]]
+            })
+        });
+        if rows.iter().flatten().any(|x| !x.is_finite()) {
+            return Err("its affine is not finite; mend its sform or qform".into());
+        }
+        // Spatial units in the lower three bits: metre, millimetre, micrometre; unknown is taken as millimetre.
+        let unit = match units & 7 {
+            1 => 1000.0,
+            3 => 1e-3,
+            _ => 1.0,
+        };
+        let sign = [-unit, -unit, unit];
+        let axes = Matrix3::from_fn(|r, c| sign[r] * rows[r][c]);
+        Ok((axes, Vec3::from_fn(|r, _| sign[r] * rows[r][3])))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_affine_is_read_in_patient_axes() {
+        let header = NiftiHeader {
+            sform_code: 1,
+            srow_x: [-0.5, 0.0, 0.0, 100.0],
+            srow_y: [0.0, 0.6, 0.0, -50.0],
+            srow_z: [0.0, 0.0, 2.0, 7.0],
+            xyzt_units: 2,
+            ..NiftiHeader::default()
+        };
+        let (axes, origin) = Placed::first(&header).in_lps(header.xyzt_units).unwrap();
+        assert_eq!(origin, Vec3::new(-100.0, 50.0, 7.0));
+        assert!(
+            (axes[(0, 0)] - 0.5).abs() < 1e-6 && (axes[(1, 1)] + 0.6).abs() < 1e-6 && axes[(2, 2)] == 2.0
+        );
+    }
+}
