@@ -23,14 +23,12 @@ pub(crate) struct Controller {
 
 struct Hand {
     controller: Box<dyn control::Controller + Send>,
-    /// Instruments that it turns, beside those of its team.
-    turned: Vec<usize>,
     ended: Option<&'static str>,
 }
 
 impl Controller {
-    fn of(controller: impl control::Controller + Send + 'static, turned: Vec<usize>) -> Self {
-        Self { inner: Mutex::new(Hand { controller: Box::new(controller), turned, ended: None }) }
+    fn of(controller: impl control::Controller + Send + 'static) -> Self {
+        Self { inner: Mutex::new(Hand { controller: Box::new(controller), ended: None }) }
     }
 
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut Hand) -> T + Send) -> T {
@@ -51,7 +49,7 @@ impl Controller {
         lead: usize,
         followers: Vec<(usize, f64)>,
     ) -> PyResult<Self> {
-        Ok(Self::of(FollowPath::new(path(&path_mm)?, team(lead, followers), arrived_mm), Vec::new()))
+        Ok(Self::of(FollowPath::new(path(&path_mm)?, team(lead, followers), arrived_mm)))
     }
 
     /// Tries turns of the instruments `turned` (that which leads, unless told) on copies of the simulation, pushes and pulls for 20 mm
@@ -68,8 +66,7 @@ impl Controller {
         turned: Option<Vec<usize>>,
     ) -> PyResult<Self> {
         let turned = turned.unwrap_or_else(|| vec![lead]);
-        let hand = SearchAhead::new(path(&path_mm)?, team(lead, followers), turned.clone(), arrived_mm);
-        Ok(Self::of(hand, turned))
+        Ok(Self::of(SearchAhead::new(path(&path_mm)?, team(lead, followers), turned, arrived_mm)))
     }
 
     /// What to do with a simulation as it is now: advance_mm and rotate_rad of each instrument, shape (n_instruments, 2); None where it
@@ -85,17 +82,13 @@ impl Controller {
         // A copy, so that others may look at the simulation meanwhile.
         let copy = simulation.with(py, |simulation| simulation.clone());
         let told = self.with(py, move |hand| {
-            if let Some(absent) = hand.turned.iter().find(|instrument| **instrument >= hands) {
-                let mend = format!("there are {hands}, the innermost is 0");
-                return Err(Error::parameter("turned", absent, mend));
-            }
             let action = hand.controller.next(&copy)?;
             hand.ended = match action {
                 Action::Arrived => Some("arrived"),
                 Action::GivenUp => Some("given up"),
                 Action::Move(_) => None,
             };
-            Ok(action)
+            Ok::<_, Error>(action)
         });
         let Action::Move(moves) = told.map_err(exception)? else { return Ok(None) };
         let mut numbers = vec![0.0; 2 * hands];

@@ -9,9 +9,9 @@ use std::f64::consts::TAU;
 
 use super::follow::{GOLDEN_RAD, STEP_MM, TURN_RAD};
 use super::{Action, Controller, Team};
-use crate::Result;
 use crate::insertion::{Command, Move, Simulation};
 use crate::vessel::CentrelinePath;
+use crate::{Error, Result};
 
 /// How far it looks ahead, mm.
 const AHEAD_MM: f64 = 20.0;
@@ -136,6 +136,11 @@ impl SearchAhead {
 impl Controller for SearchAhead {
     fn next(&mut self, simulation: &Simulation) -> Result<Action> {
         self.team.check(simulation)?;
+        let count = simulation.stack().instruments().len();
+        if let Some(absent) = self.turned.iter().find(|instrument| **instrument >= count) {
+            let mend = format!("there are {count}, the innermost is 0");
+            return Err(Error::parameter("turned", absent, mend));
+        }
         if self.team.has_arrived(simulation, &self.path, self.arrived_mm) {
             return Ok(Action::Arrived);
         }

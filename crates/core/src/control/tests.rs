@@ -97,3 +97,16 @@ fn a_team_of_instruments_that_are_not_there_is_refused() {
         assert!(told.contains("there are 2, the innermost is 0"), "{told}");
     }
 }
+
+#[test]
+fn instruments_that_are_absent_are_refused_and_not_given_up_on() {
+    let (simulation, path) = scene("curved_tube", 45);
+    let next = |lead: usize, turned: Vec<usize>| {
+        SearchAhead::new(path.clone(), Team { lead, followers: Vec::new() }, turned, 6.0).next(&simulation)
+    };
+    assert!(matches!(next(0, vec![1]), Ok(Action::Move(_))));
+    for refused in [next(0, vec![1, 2]), next(2, vec![0])] {
+        let text = refused.unwrap_err().to_string();
+        assert!(text.contains('2') && text.contains("there are 2"), "{text}");
+    }
+}
