@@ -173,17 +173,19 @@ impl WallContact<'_> {
             let Reading::Pressed(d) = self.read_within(index, &x, limit_mm) else { continue };
             let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, self.softness).factor;
             let change_mm = moved(point.place()).0.dot(&d.gradient);
-            // At the base it does not press, whatever the plane says of there.
+            // At the base it presses as it does there, or not at all, whatever the plane says of there.
+            let at_base = old.is_some_and(|contact| contact.at_base);
             let plane_mm = d.value_mm - radius_mm - part * change_mm;
             let base_mm = self.memory.points[index].base_clearance_mm - radius_mm;
-            let gap_mm = if plane_mm < 0.0 { base_mm.max(0.0) } else { plane_mm };
+            let least_mm = if at_base { base_mm } else { base_mm.max(0.0) };
+            let gap_mm = if plane_mm < 0.0 { least_mm } else { plane_mm };
             let contact = Foreseen {
                 index,
                 gap_mm: [gap_mm, change_mm],
                 gradient: d.gradient,
                 spring_n_per_mm: factor * point.weight_mm * point.potential.modulus_n_per_mm2,
                 carried_n: 0.0,
-                at_base: old.is_some_and(|contact| contact.at_base),
+                at_base,
                 presses: false,
                 kept: false,
             };
