@@ -477,3 +477,28 @@ fn a_search_ends_where_a_convex_function_falls_no_more() {
     assert_eq!(falls_until(|x| x - 3.0), 1.0);
     assert_eq!(falls_until(|x| x + 3.0), 1.0);
 }
+
+#[test]
+fn a_contact_that_is_met_again_is_at_the_base_as_it_was() {
+    let felt = straight();
+    let mut rod = rod(&felt, 1, &[1.0], 1e4);
+    // A tip that presses where the step begins; the tube has a radius of 2 mm.
+    let sunk_mm = 1e-3;
+    let (base, elements) = (rod.at(Vec3::new(2.0 - RADIUS_MM + sunk_mm, 0.0, 20.0)), rod.elements.clone());
+    let trial = rod.at(Vec3::new(2.0 - RADIUS_MM + 4.0 * sunk_mm, 0.0, 20.0));
+    let mut contact = rod.contact();
+    let mut assembly = Assembly::<PLAIN>::new(1);
+    contact.linearise(&elements, &base, &mut assembly);
+    // What the step seems to do at first, and what a trial of it has done, mm.
+    let (off, on) = (Vec3::x() * -5.0 * sunk_mm, Vec3::x() * sunk_mm);
+    assert!(contact.foresee(&|_| (off, 0.0)));
+    assert_eq!(contact.press_or_let_go(&elements, &base, &|_| (off, 0.0), &mut assembly), 1);
+    assert!(contact.meet(&elements, (&base, &trial), 1.0, &|_| (on, 0.0)));
+    assert_eq!(contact.press_or_let_go(&elements, &base, &|_| (on, 0.0), &mut assembly), 1);
+    // Of a step that is hardly begun there is nothing to correct.
+    let mut stray = |part: f64, state: &RodState| {
+        contact.stray(&elements, (&base, state), part, &mut Assembly::<PLAIN>::new(1))
+    };
+    assert!(stray(1e-9, &base) < 1e-6, "{}", stray(1e-9, &base));
+    assert!(stray(1.0, &trial) > 0.1);
+}
