@@ -394,4 +394,6 @@ impl External for WallContact<'_> {
 }
 
 #[cfg(test)]
+mod step_tests;
+#[cfg(test)]
 mod tests;
