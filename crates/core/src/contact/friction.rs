@@ -45,8 +45,10 @@ use crate::vessel::Displacement;
 /// Slip below which a point sticks, as a part of the motion of the hand, or of the radius of a device whose hand rests: what the
 /// regularisation gives away.
 const STICK: f64 = 1e-3;
-/// In every slide while the hand holds still it shrinks to this part.
+/// In every slide while the hand holds still it shrinks to this part, …
 const STICK_AT_REST: f64 = 0.3;
+/// … but to no less than this part of what it was in the step: a spring that holds a point within less is stiffer than any wall.
+const LEAST_AT_REST: f64 = 0.01;
 /// Least slip length, mm: below it steps are lost in the rounding of positions.
 const LEAST_STICK_MM: f64 = 1e-8;
 /// Points nearer to the tip than this many radii (beside the advance) bring their normal force along; the others find the
@@ -114,6 +116,8 @@ pub struct Friction {
     coefficient: f64,
     /// ε, mm.
     stick_mm: f64,
+    /// What it does not shrink below while the hand holds still, mm.
+    least_stick_mm: f64,
     /// Whether normal forces are no longer renewed in this step.
     settled: bool,
     /// How often normal forces were renewed in this step.
@@ -197,7 +201,7 @@ impl Friction {
         // An instrument that rests sticks within as much as the others move.
         let ways = hands.iter().map(|hand| hand.advance_mm().abs() + radius * hand.turn_rad.abs());
         let way = ways.fold(0.0, f64::max);
-        self.stick_mm = (STICK * if way > 0.0 { way } else { radius }).max(LEAST_STICK_MM);
+        self.stick_within(STICK * if way > 0.0 { way } else { radius });
         let (old_points, old) = before;
         let count = old_points.len().min(old.len());
         let near_tip = TIP_RADII * radius + advance.abs();
@@ -250,10 +254,16 @@ impl Friction {
         }
         // A hand that rests has no way of its own: that of the wall says how much is little then.
         let moves = hands.iter().any(|hand| hand.parts() != [0.0; 2]);
-        let stick_mm = (STICK * farthest_mm).max(LEAST_STICK_MM);
+        let stick_mm = STICK * farthest_mm;
         if farthest_mm > 0.0 {
-            self.stick_mm = if moves { self.stick_mm.max(stick_mm) } else { stick_mm };
+            self.stick_within(if moves { self.stick_mm.max(stick_mm) } else { stick_mm });
         }
+    }
+
+    /// Sets the ε of a step.
+    fn stick_within(&mut self, stick_mm: f64) {
+        self.stick_mm = stick_mm.max(LEAST_STICK_MM);
+        self.least_stick_mm = (LEAST_AT_REST * stick_mm).max(LEAST_STICK_MM);
     }
 
     /// Keeps the normal forces that a step has ended with.
@@ -303,7 +313,7 @@ impl Friction {
     /// to rest. What a point has slipped within ε it has slipped within the new, smaller one, in proportion: friction holds it as it did.
     pub fn anchor(&mut self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) {
         let taken_mj = self.dissipated_mj(elements, state, points);
-        let stick_mm = (self.stick_mm * STICK_AT_REST).max(LEAST_STICK_MM);
+        let stick_mm = (self.stick_mm * STICK_AT_REST).max(self.least_stick_mm);
         for (index, point) in points.iter().enumerate().take(self.sliders.len()) {
             let (x, angle) = (point.position(elements, state), point.angle(state));
             let slip = self.slip(index, &x, angle, point.potential.radius_mm).0;

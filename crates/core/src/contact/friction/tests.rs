@@ -124,6 +124,21 @@ const SLIPS: [Vec3; 3] =
     [Vec3::new(0.3, 0.2, -0.1), Vec3::new(0.0, 0.02, 0.004), Vec3::new(0.003, -0.002, 0.001)];
 
 #[test]
+fn what_comes_to_rest_sticks_within_a_hundredth_and_no_less() {
+    let mut point = slipped(SLIPS[0], 0.01);
+    point.friction.stick_within(0.01);
+    let mut within_mm = || {
+        point.anchor();
+        point.friction.stick_mm
+    };
+    assert!((within_mm() - 0.003).abs() < 1e-15 && (within_mm() - 0.0009).abs() < 1e-15);
+    for _ in 0..10 {
+        within_mm();
+    }
+    assert!((within_mm() - 1e-4).abs() < 1e-15);
+}
+
+#[test]
 fn what_is_anchored_anew_is_held_as_before_and_has_taken_as_much() {
     for (slip, slips) in SLIPS.into_iter().zip([true, true, false]) {
         let mut point = slipped(slip, 0.01);

@@ -13,8 +13,8 @@
 //! E(xₖ₊₁) + Dₖ(xₖ₊₁) ≤ E(xₖ) + Dₖ(xₖ),    Dₖ(x) = Σ μ Nᵢ(xₖ) φ(|uᵢ(x; xₖ)|),    Dₖ(xₖ) ≤ Σ μ Nᵢ εₖ
 //! ```
 //!
-//! with the slip that is kept within εₖ, which shrinks to three tenths from slide to slide; and as E is bounded below what friction takes comes
-//! to an end, and with it the slip. The limit is in equilibrium with forces within
+//! with the slip that is kept within εₖ, which shrinks to three tenths from slide to slide, down to a hundredth of that of the step; and as E
+//! is bounded below what friction takes comes to an end, and with it all slip beyond that. The limit is in equilibrium with forces within
 //! the cones of Coulomb's law of its own normal forces: where a slow motion with friction comes to rest, in a few steps of it where
 //! elsewhere there is one.
 
