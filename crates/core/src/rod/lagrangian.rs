@@ -38,7 +38,7 @@ pub fn element_system<const C: usize, const HESSIAN: bool>(
     system::<_, C, HESSIAN>(&batch, Lanes::splat(Scalar, gamma), out);
 }
 
-/// Energy of all elements of a rod, mJ.
+/// Energy of all elements of a rod.
 pub(crate) fn stored_energy<const C: usize>(elements: &[ElementData], state: &RodState) -> f64 {
     Arch::new().dispatch(Stored::<C> { elements, state })
 }

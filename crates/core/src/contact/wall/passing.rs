@@ -28,8 +28,11 @@ impl WallContact<'_> {
             // those is still in front of their own piece of it: ever less, the farther behind the facet. From another it goes away.
             let beyond = |felt: &FeltWall| {
                 felt.query.nearest(&x, felt.reach_mm).is_some_and(|flat| {
-                    let from = |x: &Vec3| felt.distance_from(flat.triangle, x);
-                    flat.distance_mm < -sunk_mm && (from(&x) < 0.0 || from(&x) >= from(&flat.point_mm))
+                    if flat.distance_mm >= -sunk_mm {
+                        return false;
+                    }
+                    let here_mm = felt.distance_from(flat.triangle, &x);
+                    here_mm < 0.0 || here_mm >= felt.distance_from(flat.triangle, &flat.point_mm)
                 })
             };
             if std::mem::take(&mut sunk) && beyond(&self.felt) {

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use dicom_core::value::{PrimitiveValue, Value};
 use dicom_core::{Tag, header::HasLength};
 use dicom_dictionary_std::{tags, uids};
+use dicom_object::mem::InMemElement;
 use dicom_object::{DefaultDicomObject, FileMetaTable, OpenFileOptions};
 use dicom_parser::dataset::LazyDataToken;
 use dicom_parser::dataset::lazy_read::LazyDataSetReader;
@@ -214,7 +215,7 @@ fn unreadable(error: &dyn std::error::Error) -> String {
 
 /// The words of a slice's pixels.
 fn pixels(object: &DefaultDicomObject, count: usize) -> Told<Vec<u16>> {
-    let element = object.element_opt(tags::PIXEL_DATA).ok().flatten().ok_or("has no PixelData")?;
+    let element = element(object, tags::PIXEL_DATA).ok_or("has no PixelData")?;
     let words = match element.value() {
         Value::Primitive(PrimitiveValue::U16(words)) => words.to_vec(),
         Value::Primitive(PrimitiveValue::U8(bytes)) => {
@@ -232,20 +233,24 @@ fn pixels(object: &DefaultDicomObject, count: usize) -> Told<Vec<u16>> {
     Ok(words)
 }
 
+fn element(object: &DefaultDicomObject, tag: Tag) -> Option<&InMemElement> {
+    object.element_opt(tag).ok().flatten()
+}
+
 fn text(object: &DefaultDicomObject, tag: Tag, name: &str) -> Told<String> {
-    let element = object.element_opt(tag).ok().flatten().ok_or_else(|| format!("has no {name}"))?;
+    let element = element(object, tag).ok_or_else(|| format!("has no {name}"))?;
     let text = element.to_str().map_err(|error| format!("{name}: {}", chain(&error)))?;
     Ok(text.trim_matches(|c: char| c.is_whitespace() || c == '\0').chars().take(100).collect())
 }
 
 fn number(object: &DefaultDicomObject, tag: Tag) -> Told<f64> {
-    let element = object.element_opt(tag).ok().flatten().ok_or("is absent")?;
+    let element = element(object, tag).ok_or("is absent")?;
     let number = element.to_float64().map_err(|error| format!("is no number: {}", chain(&error)))?;
     if number.is_finite() { Ok(number) } else { Err(format!("is {number}")) }
 }
 
 fn numbers<const N: usize>(object: &DefaultDicomObject, tag: Tag, name: &str) -> Told<[f64; N]> {
-    let element = object.element_opt(tag).ok().flatten().ok_or_else(|| format!("has no {name}"))?;
+    let element = element(object, tag).ok_or_else(|| format!("has no {name}"))?;
     let all = element.to_multi_float64().map_err(|error| format!("{name}: {}", chain(&error)))?;
     let all: [f64; N] =
         all.try_into().map_err(|all: Vec<f64>| format!("{name} has {} numbers, not {N}", all.len()))?;

@@ -35,10 +35,8 @@ pub(super) fn read(path: &Path) -> Result<Scan> {
     let (header, placed, volume) = match header {
         Some((header, placed, offset)) => {
             check_size(&header).map_err(bad)?;
-            let skip = offset - SECOND_BYTES as u64;
             let mut voxels = plain(path).map_err(|e| unreadable(e.into()))?;
-            io::copy(&mut (&mut voxels).take(SECOND_BYTES as u64 + skip), &mut io::sink())
-                .map_err(|e| unreadable(e.into()))?;
+            io::copy(&mut (&mut voxels).take(offset), &mut io::sink()).map_err(|e| unreadable(e.into()))?;
             let volume = InMemNiftiVolume::from_reader(voxels, &header).map_err(unreadable)?;
             (header, placed, volume)
         }
