@@ -27,11 +27,13 @@ pub(super) fn cut(corners: &mut Corners) {
     let mut moved = vec![true; corners.vertices.len()];
     for _ in 0..PASSES {
         // What was not moved has not got sharp.
-        moved = sharp(corners, &moved);
+        let (sharp, mut bent) = sharp(corners, &moved);
+        moved = sharp;
         if !moved.contains(&true) {
             break;
         }
         grow(corners, &mut moved);
+        grow(corners, &mut bent);
         let means: Vec<(u32, Vec3)> = corners
             .live_vertices()
             .filter(|&v| moved[v as usize] && corners.kind(v) == Kind::Free)
@@ -43,8 +45,11 @@ pub(super) fn cut(corners: &mut Corners) {
             })
             .collect();
         for (v, mean) in means {
-            let at = &mut corners.vertices[v as usize].at;
-            *at += (mean - *at) * STEP;
+            let vertex = &mut corners.vertices[v as usize];
+            let way = mean - vertex.at;
+            // A needle asks for nothing but other places on the surface.
+            let along = if bent[v as usize] { way } else { way - vertex.normal * vertex.normal.dot(&way) };
+            vertex.at += along * STEP;
         }
         pull_together(corners, &moved);
         flip_some(corners, by_angles, Some(&moved));
@@ -52,9 +57,10 @@ pub(super) fn cut(corners: &mut Corners) {
     corners.set_normals();
 }
 
-/// Vertices of edges and triangles that no mesh should have, where at least one end is `among` these.
-fn sharp(corners: &Corners, among: &[bool]) -> Vec<bool> {
+/// Vertices of edges and triangles that no mesh should have, where at least one end is `among` these; and those of the edges among them.
+fn sharp(corners: &Corners, among: &[bool]) -> (Vec<bool>, Vec<bool>) {
     let mut found = vec![false; corners.vertices.len()];
+    let mut folded = found.clone();
     let (needle_cos, sharp_cos, fold_cos) = (NEEDLE.cos(), SHARP.cos(), FOLD.cos());
     let moved = |e: &u32| among[corners.from(*e) as usize];
     for e in (0..corners.half_edges()).filter(|&e| corners.lives(e)).filter(moved) {
@@ -71,14 +77,17 @@ fn sharp(corners: &Corners, among: &[bool]) -> Vec<bool> {
             let least = if d.dot(&normal) < 0.0 { sharp_cos } else { fold_cos };
             normal.dot(&other) < least * (normal.norm_squared() * other.norm_squared()).sqrt()
         };
-        if needle || bent {
+        if needle {
             [a, b, c].iter().for_each(|&v| found[v as usize] = true);
-            if bent {
-                found[corners.apex(back) as usize] = true;
-            }
+        }
+        if bent {
+            [a, b, c, corners.apex(back)].iter().for_each(|&v| {
+                found[v as usize] = true;
+                folded[v as usize] = true;
+            });
         }
     }
-    found
+    (found, folded)
 }
 
 /// Adds the neighbours.
