@@ -57,8 +57,7 @@ impl Bumps {
             let mut around = Around::default();
             part.map(|v| row(corners, v as u32, &mut around).unwrap_or_default()).collect::<Vec<_>>()
         });
-        let mut bumps =
-            Self { starts: vec![0], columns: Vec::new(), at_rest_mm: Vec::with_capacity(count) };
+        let mut bumps = Self { starts: vec![0], columns: Vec::new(), at_rest_mm: Vec::with_capacity(count) };
         for row in rows.into_iter().flatten() {
             bumps.columns.extend(row.columns);
             bumps.starts.push(bumps.columns.len() as u32);

@@ -235,3 +235,33 @@ fn duplicated_triangles_do_no_harm() {
     assert!(found.mesh.vertices_mm.iter().all(|v| v.iter().all(|c| c.is_finite())));
     assert!(off_tube(&found.mesh) < 0.2, "{}", off_tube(&found.mesh));
 }
+
+/// Mean bump of a mesh over its edges.
+fn roughness(mesh: &SurfaceMesh) -> f64 {
+    let mut corners = Corners::new(mesh, 0.1);
+    corners.set_normals();
+    fairing::roughness(&corners)
+}
+
+#[test]
+fn a_smooth_tube_has_no_bumps_however_it_is_meshed_and_a_noisy_one_has() {
+    let mut numbers = Numbers(3);
+    // Eight vertices around, and 24 that are a fifth of an edge off their places along the tube.
+    let coarse: Vec<f64> = (0..8).map(|k| TAU * f64::from(k) / 8.0).collect();
+    let coarse = tube(&even(20.0, 13), &coarse);
+    let fine: Vec<f64> = (0..24).map(|k| TAU * (f64::from(k) + 0.4 * numbers.next()) / 24.0).collect();
+    let mut fine = tube(&even(20.0, 38), &fine);
+    for v in fine.vertices_mm.iter_mut().filter(|v| v.z > 1.0 && v.z < 19.0) {
+        v.z += 0.2 * (numbers.next() - 0.5);
+    }
+    for mesh in [&coarse, &fine] {
+        assert!(roughness(mesh) < 0.4 * ROUGH, "{}", roughness(mesh));
+    }
+    // Noise of a fortieth of an edge of 0.52 mm.
+    let mut noisy = fine;
+    for v in &mut noisy.vertices_mm {
+        let off = 1.0 + 0.5 * (0.0258 * (numbers.next() - 0.5));
+        (v.x, v.y) = (v.x * off, v.y * off);
+    }
+    assert!(roughness(&noisy) > ROUGH, "{}", roughness(&noisy));
+}
