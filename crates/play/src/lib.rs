@@ -4,6 +4,7 @@
 //! [`Readout`], and a [`Snapshot`] of which [`Pictures`] draws what a cath lab shows. All motions are kept, so that a session can go back to any
 //! moment and becomes a script that carries the same motions out to the bit ([`Session::script`]).
 
+mod demonstration;
 mod hand;
 mod history;
 mod input;

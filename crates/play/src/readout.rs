@@ -30,6 +30,8 @@ pub enum EventKind {
     Left,
     /// A force or torque of a hand is beyond its limit.
     Limit,
+    /// The script that is shown is at its end, or a hand has taken over.
+    Script,
 }
 
 /// One instrument.
@@ -83,6 +85,8 @@ pub struct Readout {
     pub step: usize,
     /// Time of the session, s.
     pub time_s: f64,
+    /// Whether the scene's script is shown.
+    pub demonstrates: bool,
     /// Name of the instrument that is in the hand.
     pub selected: String,
     /// Each instrument, the innermost first.
