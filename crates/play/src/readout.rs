@@ -3,6 +3,22 @@
 use endowire_viewer::Mode;
 use serde::Serialize;
 
+/// Beyond these a hand is warned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Push force, N, of either sign.
+    pub push_n: f64,
+    /// Torque, N·mm, of either sign.
+    pub torque_nmm: f64,
+}
+
+impl Default for Limits {
+    /// 1 N and 5 N·mm.
+    fn default() -> Self {
+        Self { push_n: 1.0, torque_nmm: 5.0 }
+    }
+}
+
 /// What has happened that an operator must know.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Event {

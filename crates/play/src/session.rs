@@ -11,26 +11,10 @@ use crate::hand::{Hand, Motion};
 use crate::history::{self, Done, History, Injected};
 use crate::input::Input;
 use crate::lab::Lab;
-use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Readout};
+use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout};
 
 /// Events that are kept.
 const MOST_EVENTS: usize = 1000;
-
-/// Beyond these a hand is warned.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// Push force, N, of either sign.
-    pub push_n: f64,
-    /// Torque, N·mm, of either sign.
-    pub torque_nmm: f64,
-}
-
-impl Default for Limits {
-    /// 1 N and 5 N·mm.
-    fn default() -> Self {
-        Self { push_n: 1.0, torque_nmm: 5.0 }
-    }
-}
 
 /// A session of instruments moved by hand.
 pub struct Session {
