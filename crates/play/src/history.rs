@@ -25,10 +25,18 @@ pub(crate) struct Injected {
     pub(crate) flow: InjectionSpec,
 }
 
+/// A step that was carried out.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Done {
+    pub(crate) motions: Vec<Motion>,
+    /// How many such steps a second has.
+    pub(crate) per_s: f64,
+}
+
 /// What was done, step by step. What was undone stays behind it until something else is done.
 #[derive(Debug)]
 pub(crate) struct History {
-    steps: Vec<Vec<Motion>>,
+    steps: Vec<Done>,
     /// How many of the steps are done; those after them are undone.
     done: usize,
     /// State after step `EVERY · index`.
@@ -67,12 +75,12 @@ impl History {
     }
 
     /// Adds a step that `after` has just carried out.
-    pub(crate) fn push(&mut self, motions: Vec<Motion>, after: &Simulation) {
+    pub(crate) fn push(&mut self, step: Done, after: &Simulation) {
         self.forget_undone();
         if std::mem::take(&mut self.begins) {
             self.begun.push(self.done);
         }
-        self.steps.push(motions);
+        self.steps.push(step);
         self.done += 1;
         if self.done.is_multiple_of(EVERY) {
             self.states.push(after.state());
@@ -100,8 +108,8 @@ impl History {
     pub(crate) fn go_to(&mut self, step: usize, simulation: &mut Simulation) -> Result<()> {
         let kept = step / EVERY;
         simulation.restore(&self.states[kept])?;
-        for motions in &self.steps[kept * EVERY..step] {
-            simulation.step_together(&moves(motions))?;
+        for done in &self.steps[kept * EVERY..step] {
+            simulation.step_together(&moves(&done.motions))?;
         }
         self.done = step;
         self.begins = false;

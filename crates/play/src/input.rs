@@ -99,6 +99,8 @@ pub enum Input {
         #[serde(default)]
         elevation_deg: f64,
     },
+    /// Shows the scene's script from its start, or goes on where it rests. An instrument that is moved ends it; `stop` has it rest.
+    Script {},
     /// Takes the last motion back: all steps since a hand began to move.
     Undo {},
     /// Does the next motion of those that were undone again, and what was injected in it. They are there until something else is done.

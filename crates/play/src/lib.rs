@@ -4,6 +4,7 @@
 //! [`Readout`], and a [`Snapshot`] of which [`Pictures`] draws what a cath lab shows. All motions are kept, so that a session can go back to any
 //! moment and becomes a script that carries the same motions out to the bit ([`Session::script`]).
 
+mod demonstration;
 mod hand;
 mod history;
 mod input;
@@ -17,8 +18,8 @@ pub use hand::Motion;
 pub use input::Input;
 pub use lab::Lab;
 pub use pictures::{Pictures, Sharpened, Sharpening};
-pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Readout};
-pub use session::{Delivered, Limits, Session, Snapshot};
+pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout};
+pub use session::{Delivered, Session, Snapshot};
 
 /// Ticks of a session in a second.
 pub const TICKS_PER_S: f64 = 60.0;

@@ -3,6 +3,22 @@
 use endowire_viewer::Mode;
 use serde::Serialize;
 
+/// Beyond these a hand is warned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Push force, N, of either sign.
+    pub push_n: f64,
+    /// Torque, N·mm, of either sign.
+    pub torque_nmm: f64,
+}
+
+impl Default for Limits {
+    /// 1 N and 5 N·mm.
+    fn default() -> Self {
+        Self { push_n: 1.0, torque_nmm: 5.0 }
+    }
+}
+
 /// What has happened that an operator must know.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Event {
@@ -30,6 +46,8 @@ pub enum EventKind {
     Left,
     /// A force or torque of a hand is beyond its limit.
     Limit,
+    /// The script that is shown is at its end, or a hand has taken over.
+    Script,
 }
 
 /// One instrument.
@@ -83,6 +101,8 @@ pub struct Readout {
     pub step: usize,
     /// Time of the session, s.
     pub time_s: f64,
+    /// Whether the scene's script is shown.
+    pub demonstrates: bool,
     /// Name of the instrument that is in the hand.
     pub selected: String,
     /// Each instrument, the innermost first.

@@ -4,16 +4,15 @@ use std::fmt::Write as _;
 
 use endowire_core::device::Stack;
 
-use crate::TICKS_PER_S;
 use crate::hand::Motion;
-use crate::history::Injected;
+use crate::history::{Done, Injected};
 
 /// Least increment of a line, mm and degrees: less than that a line does in one step.
 const LEAST: f64 = 1e-9;
 
 /// Steps with what was injected between them, by steps rising. Alike steps in a row are one line where that has the same bits.
 pub(crate) fn script<'a>(
-    steps: &[Vec<Motion>],
+    steps: &[Done],
     injected: impl Iterator<Item = &'a Injected>,
     stack: &Stack,
 ) -> String {
@@ -28,11 +27,11 @@ pub(crate) fn script<'a>(
     text
 }
 
-fn lines(text: &mut String, steps: &[Vec<Motion>], stack: &Stack) {
+fn lines(text: &mut String, steps: &[Done], stack: &Stack) {
     for run in steps.chunk_by(|a, b| a == b) {
         let mut left = run.len();
         while left > 0 {
-            let count = (1..=left).rev().find(|count| cuts_evenly(&run[0], *count)).unwrap_or(1);
+            let count = (1..=left).rev().find(|count| cuts_evenly(&run[0].motions, *count)).unwrap_or(1);
             line(text, stack, &run[0], count);
             left -= count;
         }
@@ -53,8 +52,8 @@ fn cuts_evenly(motions: &[Motion], count: usize) -> bool {
     })
 }
 
-/// Writes a line of a script. A step was a tick.
-fn line(text: &mut String, stack: &Stack, motions: &[Motion], count: usize) {
+/// Writes a line of a script.
+fn line(text: &mut String, stack: &Stack, Done { motions, per_s }: &Done, count: usize) {
     let keys = |one: &Motion| {
         let mut keys = Vec::new();
         if stack.is_several() {
@@ -64,12 +63,12 @@ fn line(text: &mut String, stack: &Stack, motions: &[Motion], count: usize) {
         if one.advance_mm != 0.0 {
             keys.push(format!("{key} = {:?}", one.advance_mm.abs() * count as f64));
             keys.push(format!("step_mm = {:?}", one.advance_mm.abs().max(LEAST)));
-            keys.push(format!("speed_mm_per_s = {:?}", one.advance_mm.abs() * TICKS_PER_S));
+            keys.push(format!("speed_mm_per_s = {:?}", one.advance_mm.abs() * per_s));
         }
         if one.rotate_deg != 0.0 {
             keys.push(format!("rotate_deg = {:?}", one.rotate_deg * count as f64));
             keys.push(format!("step_deg = {:?}", one.rotate_deg.abs().max(LEAST)));
-            keys.push(format!("speed_deg_per_s = {:?}", one.rotate_deg.abs() * TICKS_PER_S));
+            keys.push(format!("speed_deg_per_s = {:?}", one.rotate_deg.abs() * per_s));
         }
         keys
     };

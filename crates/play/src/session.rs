@@ -1,35 +1,20 @@
 //! The state machine: inputs and ticks in, readouts and snapshots out.
 
-use endowire_core::insertion::{InstrumentReport, Simulation};
+use endowire_core::insertion::{InstrumentReport, Script, Simulation};
 use endowire_core::shape::Shape;
 use endowire_core::{Error, PhysicalEnd, Result};
 use endowire_viewer::{ContactView, Moment, ViewSpec};
 
 use crate::TICKS_PER_S;
+use crate::demonstration::{Demonstration, Next};
 use crate::hand::{Hand, Motion};
-use crate::history::{self, History, Injected};
+use crate::history::{self, Done, History, Injected};
 use crate::input::Input;
 use crate::lab::Lab;
-use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Readout};
+use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout};
 
 /// Events that are kept.
 const MOST_EVENTS: usize = 1000;
-
-/// Beyond these a hand is warned.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// Push force, N, of either sign.
-    pub push_n: f64,
-    /// Torque, N·mm, of either sign.
-    pub torque_nmm: f64,
-}
-
-impl Default for Limits {
-    /// 1 N and 5 N·mm.
-    fn default() -> Self {
-        Self { push_n: 1.0, torque_nmm: 5.0 }
-    }
-}
 
 /// A session of instruments moved by hand.
 pub struct Session {
@@ -39,6 +24,9 @@ pub struct Session {
     history: History,
     lab: Lab,
     limits: Limits,
+    /// What can be shown, and what is.
+    script: Option<Script>,
+    demonstration: Option<Demonstration>,
     ticks: u64,
     /// Whether a hand moved in the last tick.
     moving: bool,
@@ -101,11 +89,20 @@ impl Session {
             history,
             lab,
             limits,
+            script: None,
+            demonstration: None,
             ticks: 0,
             moving: false,
             events: Vec::new(),
             events_in_all: 0,
         })
+    }
+
+    /// The same with a script of the simulation as it is, which [`Input::Script`] shows.
+    #[must_use]
+    pub fn with_script(mut self, script: Script) -> Self {
+        self.script = Some(script);
+        self
     }
 
     /// Takes an input. What is refused is an event too, and changes nothing else.
@@ -126,14 +123,22 @@ impl Session {
             Input::Move { instrument, mm_per_s, deg_per_s } => {
                 let index = self.index(instrument.as_deref())?;
                 self.hands[index].hold(*mm_per_s, *deg_per_s)?;
+                if *mm_per_s != 0.0 || *deg_per_s != 0.0 {
+                    self.take_over();
+                }
             }
             Input::Nudge { instrument, mm, deg } => {
                 let index = self.index(instrument.as_deref())?;
                 self.hands[index].nudge(*mm, *deg)?;
+                self.take_over();
             }
-            Input::Stop {} => self.stop(),
+            Input::Stop {} => {
+                self.stop();
+                self.demonstration.iter_mut().for_each(|shown| shown.paused = true);
+            }
+            Input::Script {} => self.demonstrate()?,
             Input::Pedal { down, mode } => self.lab.pedal(*down, *mode)?,
-            Input::Inject { ml, ml_per_s } => self.inject(*ml, *ml_per_s)?,
+            Input::Inject { ml, ml_per_s } => self.inject(self.injects_through(), *ml, *ml_per_s)?,
             Input::CArm { pose } => self.lab.pose(*pose)?,
             Input::TurnCArm { lao_deg, cra_deg } => self.lab.turn_c_arm([*lao_deg, *cra_deg])?,
             Input::Table { right_mm, down_mm, second } => {
@@ -161,9 +166,37 @@ impl Session {
         self.hands.iter_mut().for_each(|hand| *hand = Hand::default());
     }
 
+    /// Shows the script, or goes on with it.
+    fn demonstrate(&mut self) -> Result<()> {
+        if let Some(shown) = &mut self.demonstration {
+            shown.paused = false;
+            return Ok(());
+        }
+        let steps = self.history.steps();
+        let Some(script) = self.script.clone().filter(|script| !script.is_empty()) else {
+            let mend = "there is none to show: give [[script]] in the scene";
+            return Err(Error::parameter("script", "none", mend));
+        };
+        if steps > 0 {
+            let mend = "it begins where the scene does: go back to step 0 first";
+            return Err(Error::parameter("script", format!("step {steps}"), mend));
+        }
+        self.stop();
+        self.demonstration = Some(Demonstration::new(script));
+        Ok(())
+    }
+
+    /// A hand moves: what was shown is at its end.
+    fn take_over(&mut self) {
+        if self.demonstration.take().is_some() {
+            self.happened(EventKind::Script, "the script ends here: a hand has taken over".to_owned());
+        }
+    }
+
     /// Goes to the moment after a step, forth or back. Medium of later moments is taken out of the vessel, and what is done again flows from now on.
     fn go_to(&mut self, step: usize) -> Result<()> {
         self.stop();
+        self.demonstration = None;
         self.moving = false;
         let before = self.history.steps();
         self.history.go_to(step, &mut self.simulation)?;
@@ -171,8 +204,7 @@ impl Session {
         self.lab.flow_again(self.history.undone_injections().map(|one| &one.flow), again)
     }
 
-    fn inject(&mut self, ml: f64, ml_per_s: f64) -> Result<()> {
-        let instrument = self.injects_through();
+    fn inject(&mut self, instrument: Option<usize>, ml: f64, ml_per_s: f64) -> Result<()> {
         let at_mm = instrument.and_then(|one| self.simulation.tip_of_mm(one));
         let flow = self.lab.inject((ml, ml_per_s), at_mm, self.time_s())?;
         let after_step = self.history.steps();
@@ -184,10 +216,15 @@ impl Session {
         instrument.map_or(Ok(self.selected), |name| self.simulation.stack().find(name))
     }
 
-    /// A sixtieth of a second goes by: hands that move carry out one step.
+    /// A sixtieth of a second goes by: hands that move carry out one step, and a script that is shown those that end in it.
     pub fn tick(&mut self) {
         self.ticks += 1;
         self.lab.tick();
+        if let Some(shown) = self.demonstration.take_if(|shown| !shown.paused) {
+            self.demonstration = self.show(shown);
+            self.moving = false;
+            return;
+        }
         let lengths_mm = self.simulation.report().lengths_mm();
         let instruments = self.simulation.stack().instruments();
         let mut motions = Vec::new();
@@ -203,18 +240,51 @@ impl Session {
             if !self.moving {
                 self.history.begin_motion();
             }
-            self.step(motions);
+            self.step(motions, TICKS_PER_S);
         }
         self.moving = moving;
     }
 
-    fn step(&mut self, motions: Vec<Motion>) {
+    /// Carries out what a script does in this tick; it, where it goes on.
+    fn show(&mut self, mut shown: Demonstration) -> Option<Demonstration> {
+        shown.tick();
+        loop {
+            let next = shown.next(&self.simulation);
+            for one in shown.injections() {
+                if let Err(error) = self.inject(Some(one.instrument), one.ml, one.ml_per_s) {
+                    self.happened(EventKind::Refused, error.to_string());
+                }
+            }
+            match next {
+                Ok(Next::Later) => return Some(shown),
+                Ok(Next::End) => {
+                    self.happened(EventKind::Script, "the script is at its end".to_owned());
+                    return None;
+                }
+                Ok(Next::Step { motions, per_s, begins }) => {
+                    if begins {
+                        self.history.begin_motion();
+                    }
+                    if !motions.is_empty() && !self.step(motions, per_s) {
+                        return None;
+                    }
+                }
+                Err(error) => {
+                    self.happened(EventKind::Refused, error.to_string());
+                    return None;
+                }
+            }
+        }
+    }
+
+    /// Carries out a step, so many of which a second has; whether it was possible.
+    fn step(&mut self, motions: Vec<Motion>, per_s: f64) -> bool {
         let before = self.simulation.report();
         let (was_out, warned) = (before.left_through, self.warns());
         match self.simulation.step_together(&history::moves(&motions)) {
             Ok(report) => {
                 let (jumped, out) = (report.jumped, report.left_through);
-                self.history.push(motions, &self.simulation);
+                self.history.push(Done { motions, per_s }, &self.simulation);
                 if jumped {
                     self.happened(EventKind::Jumped, "jumped: it let go of energy".to_owned());
                 }
@@ -224,6 +294,7 @@ impl Session {
                 if self.warns() && !warned {
                     self.happened(EventKind::Limit, "force or torque is beyond its limit".to_owned());
                 }
+                true
             }
             Err(error) => {
                 let kind = match &error {
@@ -232,6 +303,7 @@ impl Session {
                     _ => EventKind::Blocked,
                 };
                 self.happened(kind, error.to_string());
+                false
             }
         }
     }
@@ -253,6 +325,11 @@ impl Session {
     /// Time of the session, s.
     pub fn time_s(&self) -> f64 {
         self.ticks as f64 / TICKS_PER_S
+    }
+
+    /// Whether the script is shown now, and does not rest.
+    pub fn demonstrates(&self) -> bool {
+        self.demonstration.as_ref().is_some_and(|shown| !shown.paused)
     }
 
     /// Steps carried out, less those taken back.
@@ -306,6 +383,7 @@ impl Session {
         Readout {
             step: self.history.steps(),
             time_s: self.time_s(),
+            demonstrates: self.demonstrates(),
             selected: self.simulation.stack().instruments()[self.selected].name.clone(),
             instruments: self.instruments(),
             tip_mm: self.simulation.shape().tip_mm().map(Into::into),

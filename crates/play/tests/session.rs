@@ -398,6 +398,7 @@ fn inputs_are_read_as_they_are_documented() {
         read(r#"{"do": "pedal", "down": true, "mode": "cine"}"#).unwrap(),
         Input::Pedal { down: true, mode: Some(Mode::Cine) }
     );
+    assert_eq!(read(r#"{"do": "script"}"#).unwrap(), Input::Script {});
     assert!(matches!(read(r#"{"do": "c_arm", "pose": "LAO 40"}"#), Ok(Input::CArm { .. })));
     assert_eq!(
         read(r#"{"do": "turn_c_arm", "lao_deg": 5}"#).unwrap(),

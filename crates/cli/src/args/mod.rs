@@ -140,8 +140,17 @@ pub(crate) struct NewArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct PlayArgs {
-    /// Scene file (TOML); its script is not carried out
+    /// Scene file (TOML)
     pub(crate) scene: PathBuf,
+    /// Show the scene's script in the time that it takes, until an instrument is moved by hand
+    #[arg(long)]
+    pub(crate) watch: bool,
+    /// Begin where the scene's script ends, with what it has injected in the vessel
+    #[arg(long, conflicts_with = "watch")]
+    pub(crate) after_script: bool,
+    /// Take the script of this file, tables `script` alone, in place of the scene's own: what an earlier session has recorded
+    #[arg(long, value_name = "FILE")]
+    pub(crate) script: Option<PathBuf>,
     /// File for what hands have done: a script that `endowire run SCENE --script FILE` carries out to the bit; out/NAME OF THE
     /// SCENE/played.toml if absent
     #[arg(long, value_name = "FILE")]

@@ -91,6 +91,39 @@ fn what_is_played_is_run_with_the_same_bits() {
 }
 
 #[test]
+fn a_session_begins_where_a_script_ends_or_watches_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (record, script) = (folder.path().join("played.toml"), folder.path().join("script.toml"));
+    std::fs::write(&script, "[[script]]\nadvance_mm = 12.0\nstep_mm = 2.0\nspeed_mm_per_s = 20.0\n").unwrap();
+    let read = |how: &str, ticks: u32| {
+        let more = ["--headless", "--size", "64", how, "--script", script.to_str().unwrap()];
+        let child = play("curved_tube.toml", &record, &more).spawn().unwrap();
+        let lines = [
+            json!({"do": "wait", "ticks": ticks}),
+            json!({"do": "nudge", "mm": 1}),
+            json!({"do": "wait", "ticks": 2}),
+        ];
+        let (told, code, said) = answers(child, &lines);
+        assert_eq!(code, Some(0), "{said}");
+        let seen =
+            |k: usize| (told[k]["readout"]["step"].clone(), told[k]["readout"]["demonstrates"].clone());
+        (seen(0), seen(2))
+    };
+    assert_eq!(read("--after-script", 0), ((json!(6), json!(false)), (json!(7), json!(false))));
+    // Three steps of a tenth of a second, then the hand.
+    assert_eq!(read("--watch", 18), ((json!(3), json!(true)), (json!(4), json!(false))));
+    let recorded = std::fs::read_to_string(&record).unwrap();
+    assert!(
+        recorded.contains("speed_mm_per_s = 20.0") && recorded.contains("speed_mm_per_s = 60.0"),
+        "{recorded}"
+    );
+
+    let more = ["--headless", "--watch", "--after-script"];
+    let output = play("curved_tube.toml", &record, &more).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
 fn a_script_file_has_scripts_alone() {
     let folder = tempfile::tempdir().unwrap();
     let script = folder.path().join("script.toml");

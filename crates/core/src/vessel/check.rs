@@ -4,7 +4,8 @@ use super::crossings::crossings;
 use super::hints::unit_hint;
 use super::survey::{Survey, survey};
 use super::topology::EdgeTable;
-use super::wall::{duplicate_pairs, flat_volume_mm3, weld_tolerance_mm};
+use super::wall::{duplicate_pairs, flat_volume_mm3};
+use super::weld::Welding;
 use super::{RepairReport, SurfaceMesh, Wall, sliver};
 use crate::{Error, Result};
 
@@ -127,16 +128,12 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
     if !(septum_mm.is_finite() && septum_mm >= 0.0) {
         return Err(Error::parameter("septum_mm", septum_mm, "must be a thickness in mm, 0 or more"));
     }
-    let wall = Wall::from_surface(surface)?;
+    let welding = Welding::of(surface)?;
+    let wall = Wall::mended(welding.clone(), true)?;
     // What needed no more than welding and turning over is what was given: it is neither welded nor searched again.
     let as_given = wall.report().is_as_given();
-    let given = if as_given { wall.clone() } else { Wall::welded(surface)? };
-    let tolerance_mm = weld_tolerance_mm(surface);
-    let target = super::weld::merge_targets(&surface.vertices_mm, tolerance_mm);
-    let welded = SurfaceMesh {
-        vertices_mm: surface.vertices_mm.clone(),
-        triangles: surface.triangles.iter().map(|t| t.map(|v| target[v as usize])).collect(),
-    };
+    let given = if as_given { None } else { Some(Wall::mended(welding.clone(), false)?) };
+    let Welding { mesh: welded, bounds_mm: (low, high), tolerance_mm, merged } = welding;
     let degenerate = |i: &usize| sliver::is_degenerate(&welded.corners(*i), tolerance_mm);
     let table = EdgeTable::new(&welded.triangles);
     let open_edges = table.edges().filter(|uses| uses.len() == 1).count();
@@ -150,19 +147,23 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
             (welded.vertices_mm[uses[0].low as usize] - welded.vertices_mm[uses[0].high as usize]).norm()
         })
         .collect();
-    edges.sort_by(f64::total_cmp);
-    let edge = |k: usize| edges.get(k).copied().unwrap_or(0.0);
-    let (low, high) = surface.used_bounds_mm().unwrap_or_default();
-    let (report, repair) = (given.report(), wall.report().clone());
+    let (middle, last) = (edges.len() / 2, edges.len().saturating_sub(1));
+    let [edge_min_mm, edge_median_mm, edge_max_mm] = [0, middle, last].map(|k| match edges.is_empty() {
+        true => 0.0,
+        false => *edges.select_nth_unstable_by(k, f64::total_cmp).1,
+    });
+    let (report, repair) = (given.as_ref().unwrap_or(&wall).report(), wall.report().clone());
     let survey = survey(&wall, septum_mm)?;
+    let volume_mm3 = wall.volume_mm3();
+    let rounding_mm3 = flat_volume_mm3(wall.mesh());
     let contrast = repair.stray_edges + repair.non_manifold_edges + repair.one_sided_edges == 0
-        && wall.volume_mm3() > flat_volume_mm3(wall.mesh());
+        && volume_mm3 > rounding_mm3;
     let hints = hints(&wall, &survey, (high - low).norm(), unit_mm);
     let non_manifold_edges = table.non_manifold();
     Ok(CheckReport {
         triangles: surface.triangles.len(),
-        vertices: surface.vertices_mm.len() - report.vertices_welded,
-        duplicate_vertices: report.vertices_welded,
+        vertices: surface.vertices_mm.len() - merged,
+        duplicate_vertices: merged,
         components: report.components,
         watertight: open_edges == 0 && non_manifold_edges == 0,
         open_edges,
@@ -186,14 +187,14 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
         self_intersections: intersections.count,
         self_intersections_capped: intersections.capped,
         intersecting_pairs: intersections.first,
-        flat: wall.volume_mm3() <= flat_volume_mm3(wall.mesh()),
-        volume_mm3: wall.volume_mm3(),
+        flat: volume_mm3 <= rounding_mm3,
+        volume_mm3,
         area_mm2: area_mm2(&welded),
         low_mm: low.into(),
         high_mm: high.into(),
-        edge_min_mm: edge(0),
-        edge_median_mm: edge(edges.len() / 2),
-        edge_max_mm: edge(edges.len().saturating_sub(1)),
+        edge_min_mm,
+        edge_median_mm,
+        edge_max_mm,
         repair,
         survey,
         contrast,

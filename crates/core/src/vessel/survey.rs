@@ -1,5 +1,6 @@
 //! What a wall holds for a device: how wide it is, where two vessels all but touch, and where one could begin.
 
+use std::cell::LazyCell;
 use std::f64::consts::PI;
 
 use super::{Wall, WallQuery};
@@ -82,7 +83,8 @@ pub fn survey(wall: &Wall, septum_mm: f64) -> Result<Survey> {
     let query = WallQuery::new(wall)?;
     let size_mm = mesh.used_bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
     let off_mm = OFF * size_mm;
-    let neighbours = wall.neighbours();
+    // Few walls have septa.
+    let neighbours = LazyCell::new(|| wall.neighbours());
     let every = mesh.triangles.len().div_ceil(SAMPLES).max(1);
     let mut chords: Vec<(f64, Vec3)> = Vec::new();
     let mut septa =
@@ -144,16 +146,18 @@ fn start(wall: &Wall, query: &WallQuery, chords: &[(f64, Vec3)], size_mm: f64) -
     // Few of the longest, many of the rest: the longest chords may run along the vessel.
     let count = chords.len();
     let step = |k: usize| count - 1 - (count - 1) * k * k / (PLACES * PLACES);
-    let mut best: Option<(f64, Vec3)> = None;
+    let mut places: Vec<(f64, Vec3)> = Vec::new();
     for k in 0..PLACES.min(count) {
         let (_, place) = chords[step(k)];
         let Some(near) = query.nearest(&place, f64::INFINITY) else { continue };
-        if !near.rim && near.distance_mm > best.map_or(0.0, |b| b.0) && wall.contains(&place).is_ok_and(|c| c)
-        {
-            best = Some((near.distance_mm, place));
+        if !near.rim && near.distance_mm > 0.0 {
+            places.push((near.distance_mm, place));
         }
     }
-    let (clearance_mm, place) = best?;
+    // Whether a place is inside takes all triangles to tell: the deepest are asked first.
+    places.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (clearance_mm, place) =
+        places.into_iter().find(|(_, place)| wall.contains(place).is_ok_and(|inside| inside))?;
     let golden = PI * (3.0 - 5.0_f64.sqrt());
     let mut longest = (0.0, Vec3::x());
     for k in 0..DIRECTIONS {

@@ -6,12 +6,9 @@ use super::mesh::retain_numbered;
 use super::opening::{self, Opening};
 pub use super::topology::NONE as NO_NEIGHBOUR;
 use super::topology::{EdgeTable, EdgeUse, Edges};
-use super::{SurfaceMesh, orient, repair, sliver, weld};
+use super::weld::Welding;
+use super::{SurfaceMesh, orient, repair, sliver};
 use crate::{Error, Result, Vec3};
-
-/// Vertices closer than this fraction of the diagonal of the triangles' bounding box are one vertex: ten times the resolution of the
-/// 32-bit floats of an STL file, and far below any detail of an anatomy.
-const WELD_TOLERANCE: f64 = 1e-6;
 
 /// Volume of a sheet over the cube of the surface's size below which it has no inside.
 const FLAT: f64 = 1e-14;
@@ -148,7 +145,7 @@ impl Wall {
     /// # Errors
     /// [`Error::Mesh`] if there is no triangle with area, an index is out of range or a coordinate that is used is not finite.
     pub fn from_surface(surface: &SurfaceMesh) -> Result<Self> {
-        Self::mended(surface, true)
+        Self::mended(Welding::of(surface)?, true)
     }
 
     /// A wall of `surface` with vertices welded, triangles without area removed and the winding made consistent, and no more:
@@ -157,22 +154,17 @@ impl Wall {
     /// # Errors
     /// As [`Wall::from_surface`].
     pub fn welded(surface: &SurfaceMesh) -> Result<Self> {
-        Self::mended(surface, false)
+        Self::mended(Welding::of(surface)?, false)
     }
 
-    fn mended(surface: &SurfaceMesh, whole: bool) -> Result<Self> {
-        validate(surface)?;
+    /// [`Wall::from_surface`], or no more than [`Wall::welded`], of a surface whose vertices are merged.
+    pub(super) fn mended(welding: Welding, whole: bool) -> Result<Self> {
+        let Welding { mut mesh, tolerance_mm, merged, .. } = welding;
         let mut report = RepairReport {
-            triangles_given: surface.triangles.len(),
-            vertices_given: surface.vertices_mm.len(),
+            triangles_given: mesh.triangles.len(),
+            vertices_given: mesh.vertices_mm.len(),
+            vertices_welded: merged,
             ..Default::default()
-        };
-        let tolerance_mm = weld_tolerance_mm(surface);
-        let target = weld::merge_targets(&surface.vertices_mm, tolerance_mm);
-        report.vertices_welded = target.iter().enumerate().filter(|(v, t)| *v != **t as usize).count();
-        let mut mesh = SurfaceMesh {
-            vertices_mm: surface.vertices_mm.clone(),
-            triangles: surface.triangles.iter().map(|t| t.map(|v| target[v as usize])).collect(),
         };
         report.degenerate_removed = sliver::remove_degenerate(&mut mesh, tolerance_mm);
         if mesh.triangles.is_empty() {
@@ -268,11 +260,6 @@ impl<'de> Deserialize<'de> for Wall {
         validate(&mesh).map_err(de::Error::custom)?;
         Ok(Self::finished(mesh, Edges::default(), report))
     }
-}
-
-/// Welding tolerance for `surface` in mm.
-pub(crate) fn weld_tolerance_mm(surface: &SurfaceMesh) -> f64 {
-    surface.used_bounds_mm().map_or(0.0, |(low, high)| WELD_TOLERANCE * (high - low).norm())
 }
 
 /// Volume in mm³ up to which a surface is a flat sheet: it encloses nothing but rounding.

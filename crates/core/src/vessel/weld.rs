@@ -5,17 +5,55 @@
 
 use std::collections::VecDeque;
 
+use super::SurfaceMesh;
 use super::topology::DisjointSets;
-use crate::Vec3;
+use super::wall::validate;
+use crate::{Result, Vec3};
+
+/// Vertices closer than this fraction of the diagonal of the triangles' bounding box are one vertex: ten times the resolution of the
+/// 32-bit floats of an STL file, and far below any detail of an anatomy.
+const WELD_TOLERANCE: f64 = 1e-6;
 
 /// Vertices are sorted along this vector of hardly less than unit length: across all planes that surfaces tend to have.
 const ALONG: Vec3 = Vec3::new(0.537_7, 0.371_9, 0.747_9);
 /// Largest difference along it of what is near, over the tolerance: with room for rounding.
 const SLACK: f64 = 1.001;
 
+/// A surface with its vertices merged.
+#[derive(Debug, Clone)]
+pub(super) struct Welding {
+    /// All vertices as given, and triangles between those that stay.
+    pub(super) mesh: SurfaceMesh,
+    /// Smallest and largest coordinates of the vertices that triangles use.
+    pub(super) bounds_mm: (Vec3, Vec3),
+    /// Up to this distance vertices were merged.
+    pub(super) tolerance_mm: f64,
+    /// How many were merged into another one.
+    pub(super) merged: usize,
+}
+
+impl Welding {
+    /// Merges the vertices of a surface that can be a wall.
+    ///
+    /// # Errors
+    /// As [`validate`].
+    pub(super) fn of(surface: &SurfaceMesh) -> Result<Self> {
+        validate(surface)?;
+        let bounds_mm = surface.used_bounds_mm().unwrap_or_default();
+        let tolerance_mm = WELD_TOLERANCE * (bounds_mm.1 - bounds_mm.0).norm();
+        let target = merge_targets(&surface.vertices_mm, tolerance_mm);
+        let merged = target.iter().enumerate().filter(|(v, t)| *v != **t as usize).count();
+        let mesh = SurfaceMesh {
+            vertices_mm: surface.vertices_mm.clone(),
+            triangles: surface.triangles.iter().map(|t| t.map(|v| target[v as usize])).collect(),
+        };
+        Ok(Self { mesh, bounds_mm, tolerance_mm, merged })
+    }
+}
+
 /// For each vertex the index of the vertex it is merged into (its own index if it stays): the smallest index of
 /// all vertices linked to it by steps of at most `tolerance_mm`. Vertices that are not finite are joined to none.
-pub(crate) fn merge_targets(vertices_mm: &[Vec3], tolerance_mm: f64) -> Vec<u32> {
+fn merge_targets(vertices_mm: &[Vec3], tolerance_mm: f64) -> Vec<u32> {
     let usable = |v: &Vec3| v.iter().all(|c| c.is_finite());
     let mut order: Vec<(f64, u32)> =
         (0..).zip(vertices_mm).filter(|(_, v)| usable(v)).map(|(index, v)| (ALONG.dot(v), index)).collect();

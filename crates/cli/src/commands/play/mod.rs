@@ -13,7 +13,7 @@ use std::path::Path;
 use std::sync::mpsc;
 
 use endowire_methods::Scene;
-use endowire_play::{Limits, Pictures, Session};
+use endowire_play::{Input, Limits, Pictures, Session};
 use endowire_viewer::ViewSpec;
 
 use crate::args::PlayArgs;
@@ -25,12 +25,15 @@ use record::Record;
 
 /// Opens a session in the way that was asked for, and records what was done.
 pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
-    let scene = Scene::read(&args.scene)?;
+    let mut scene = Scene::read(&args.scene)?;
+    args.script.as_deref().map_or(Ok(()), |path| scene.take_script(path))?;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
     let view = ViewSpec::of_scene(&scene, &args.scene)?;
     let simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
     let limits = Limits { push_n: args.warn_n, torque_nmm: args.warn_nmm };
+    let script = scene.steps(simulation.stack()).map_err(in_scene)?;
     let session = Session::new(simulation, view, args.size, limits).map_err(in_scene)?;
+    let session = begun(session.with_script(script), args).map_err(in_scene)?;
     let pictures =
         Pictures::new(&scene, &session.snapshot(), session.simulation().wall().clone()).map_err(in_scene)?;
     let mut record = Record::new(args, &scene);
@@ -56,6 +59,17 @@ pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
     }
     tell(pace);
     Ok(())
+}
+
+/// The session with its script on its way, or carried out, if that was asked for.
+fn begun(mut session: Session, args: &PlayArgs) -> endowire_core::Result<Session> {
+    if args.watch || args.after_script {
+        session.apply(&Input::Script {})?;
+    }
+    while args.after_script && session.demonstrates() {
+        session.tick();
+    }
+    Ok(session)
 }
 
 /// Has lines read on a thread of their own: from a file, or from stdin.

@@ -1,5 +1,7 @@
 //! A script that is carried out.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use super::motion::{Lengths, Steps};
@@ -31,12 +33,14 @@ pub struct Step<'a> {
     pub moves: &'a [Move],
     /// Time at its end since the start of the script, s; none where the script has no speeds.
     pub time_s: Option<f64>,
+    /// How long it takes, s; 0 where the script has no speeds.
+    pub duration_s: f64,
 }
 
 /// A script that is carried out step by step.
 #[derive(Debug, Clone)]
 pub struct ScriptRun<'a> {
-    script: &'a Script,
+    script: Cow<'a, Script>,
     course: ScriptCourse,
     lengths: Lengths,
     /// Of the motion that goes on.
@@ -50,16 +54,12 @@ pub struct ScriptRun<'a> {
 impl Script {
     /// The script at its start.
     pub fn begin(&self) -> ScriptRun<'_> {
-        let lengths = Lengths { now_mm: self.start_mm.clone(), before_mm: self.start_mm.clone() };
-        ScriptRun {
-            script: self,
-            course: ScriptCourse::default(),
-            lengths,
-            steps: None,
-            time_s: 0.0,
-            done: 0,
-            injections: Vec::new(),
-        }
+        ScriptRun::of(Cow::Borrowed(self))
+    }
+
+    /// The script at its start, which the run takes along.
+    pub fn into_run(self) -> ScriptRun<'static> {
+        ScriptRun::of(Cow::Owned(self))
     }
 
     /// The script where it has come to; `seen` is given each step so far.
@@ -93,7 +93,20 @@ impl Script {
     }
 }
 
-impl ScriptRun<'_> {
+impl<'a> ScriptRun<'a> {
+    fn of(script: Cow<'a, Script>) -> Self {
+        let lengths = Lengths { now_mm: script.start_mm.clone(), before_mm: script.start_mm.clone() };
+        Self {
+            script,
+            course: ScriptCourse::default(),
+            lengths,
+            steps: None,
+            time_s: 0.0,
+            done: 0,
+            injections: Vec::new(),
+        }
+    }
+
     /// The next step; none at the end of the script. Conditions are looked at in `simulation`.
     ///
     /// # Errors
@@ -116,9 +129,9 @@ impl ScriptRun<'_> {
             }
             self.end_motion(met);
         }
-        let time_s =
-            self.script.is_timed().then(|| self.time_s + self.steps.as_ref().map_or(0.0, |s| s.step_s));
-        Ok(self.steps.as_ref().map(|steps| Step { moves: &steps.moves, time_s }))
+        let duration_s = self.steps.as_ref().map_or(0.0, |steps| steps.step_s);
+        let time_s = self.script.is_timed().then_some(self.time_s + duration_s);
+        Ok(self.steps.as_ref().map(|steps| Step { moves: &steps.moves, time_s, duration_s }))
     }
 
     /// Says that the step that was told last has been carried out.

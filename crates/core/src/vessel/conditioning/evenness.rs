@@ -1,9 +1,6 @@
 //! Whether a mesh is fine as it is, and how even it is.
 
-use super::Conditioning;
 use super::corners::{Corners, Kind};
-use super::reference::Reference;
-use super::sizes;
 use crate::vessel::topology::NONE;
 
 /// Longest over shortest edge around a vertex: a regular grid three times as long as wide has √10.
@@ -16,6 +13,8 @@ const LARGEST_TURN: f64 = 1.5;
 const USUAL_TURN: f64 = 0.75;
 /// Longest edge over the local radius.
 const LONGEST: f64 = 1.6;
+/// Sine of a difference of angles that is rounding.
+const DOUBT: f64 = 1e-9;
 
 /// Angles and edges of a mesh.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +34,8 @@ impl Evenness {
     pub(super) fn of(corners: &Corners, at: impl Fn(u32) -> crate::Vec3) -> Self {
         let mut edges = Vec::new();
         let mut extremes = vec![(f64::MAX, 0.0f64); corners.vertices.len()];
-        let mut least_angle = f64::MAX;
+        // The least angle, and its sine and cosine times any length.
+        let (mut least_angle, mut least) = (f64::MAX, (0.0, -1.0));
         let mut cosines = Vec::new();
         let normal = |t: u32| {
             let [a, b, c] = corners.triangles[t as usize].map(&at);
@@ -44,16 +44,23 @@ impl Evenness {
         for e in (0..corners.half_edges()).filter(|&e| corners.lives(e)) {
             let (a, b, c) = (corners.from(e), corners.to(e), corners.apex(e));
             let (x, y) = (at(b) - at(a), at(c) - at(a));
-            let angle = x.cross(&y).norm().atan2(x.dot(&y));
-            least_angle = least_angle.min(angle);
+            let (sine, cosine) = (x.cross(&y).norm(), x.dot(&y));
+            // The sine of what it is larger by tells nearly all apart, and takes no arc tangent.
+            let beyond = sine * least.1 - cosine * least.0;
+            if beyond.is_nan() || beyond <= DOUBT * (sine + cosine.abs()) * (least.0 + least.1.abs()) {
+                let angle = sine.atan2(cosine);
+                if angle < least_angle {
+                    (least_angle, least) = (angle, (sine, cosine));
+                }
+            }
             if !corners.leads(e) {
                 continue;
             }
             let length = x.norm();
             edges.push(length);
             for v in [a, b] {
-                let (least, largest) = &mut extremes[v as usize];
-                (*least, *largest) = (least.min(length), largest.max(length));
+                let (shortest, longest) = &mut extremes[v as usize];
+                (*shortest, *longest) = (shortest.min(length), longest.max(length));
             }
             let back = corners.twin(e);
             if back != NONE {
@@ -92,13 +99,48 @@ impl Evenness {
     }
 }
 
-/// Whether all edges are short against the vessel. Sets sizes.
-pub(super) fn is_fine_enough(corners: &mut Corners, reference: &Reference, options: &Conditioning) -> bool {
-    corners.set_normals();
-    sizes::set(corners, reference, &[], options.wanted());
+/// Whether all edges are short against the vessel, whose sizes are set.
+pub(super) fn is_fine_enough(corners: &Corners) -> bool {
     (0..corners.half_edges()).filter(|&e| corners.leads(e)).all(|e| {
         let radius = |v: u32| corners.vertices[v as usize].radius_mm;
         corners.kind(corners.from(e)) == Kind::Locked
             || corners.length_mm(e) <= LONGEST * radius(corners.from(e)).max(radius(corners.to(e)))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Vec3;
+    use crate::random::{splitmix64, unit};
+    use crate::vessel::SurfaceMesh;
+
+    #[test]
+    fn the_least_angle_is_that_of_all_angles_to_the_bit() {
+        for seed in 0..50 {
+            // Triangles that share nothing, some of them nearly alike and some without an area.
+            let mut mesh = SurfaceMesh::default();
+            for k in 0..20_u32 {
+                let like = if k % 3 == 0 { 0 } else { k };
+                let at = |n: u32| unit(splitmix64(seed, u64::from(9 * like + n)));
+                let corner = |n: u32| Vec3::new(at(n), at(n + 1), at(n + 2)) * (1.0 + f64::from(k));
+                mesh.vertices_mm.extend([0, 3, 6].map(corner));
+                mesh.triangles.push([3 * k, 3 * k + 1, 3 * k + 2]);
+            }
+            if seed == 7 {
+                mesh.vertices_mm[31] = mesh.vertices_mm[30];
+            }
+            let corners = Corners::new(&mesh, 0.1);
+            let angle = |[a, b, c]: [Vec3; 3]| {
+                let (x, y) = (b - a, c - a);
+                x.cross(&y).norm().atan2(x.dot(&y))
+            };
+            let least = (0..mesh.triangles.len())
+                .map(|t| mesh.corners(t))
+                .flat_map(|[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]])
+                .map(angle)
+                .fold(f64::MAX, f64::min);
+            assert_eq!(Evenness::of(&corners, |v| corners.at(v)).least_angle, least, "{seed}");
+        }
+    }
 }

@@ -148,19 +148,19 @@ pub fn condition<'a>(surface: &'a SurfaceMesh, options: &Conditioning) -> Result
     let reference = Reference::new(surface);
     let mut corners = Corners::new(surface, options.deviation_mm);
     let even = Evenness::of(&corners, |v| corners.at(v));
-    let fine = evenness::is_fine_enough(&mut corners, &reference, options);
-    if even.is_even() && fine && fairing::roughness(&corners) <= ROUGH {
+    corners.set_normals();
+    let mut too_many = sizes::set(&mut corners, &reference, &[], options.wanted());
+    if even.is_even() && evenness::is_fine_enough(&corners) && fairing::roughness(&corners) <= ROUGH {
         return Ok(Conditioned::new(Cow::Borrowed(surface), &Deviation::default(), &even, false));
     }
     let remesher = Remesher { reference: &reference, most_triangles: options.most_triangles };
-    let mut curvature = Vec::new();
-    let mut too_many = false;
-    let mut at = Vec::new();
-    for round in 0..ROUNDS {
+    remesher.run(&mut corners, REMESHINGS.0);
+    let mut at = faired(&mut corners, &reference, false);
+    for round in 1..ROUNDS {
+        let curvature = fairing::curvature(&corners, &at);
         too_many = sizes::set(&mut corners, &reference, &curvature, options.wanted());
-        remesher.run(&mut corners, if round == 0 { REMESHINGS.0 } else { REMESHINGS.1 });
+        remesher.run(&mut corners, REMESHINGS.1);
         at = faired(&mut corners, &reference, round + 1 == ROUNDS);
-        curvature = fairing::curvature(&corners, &at);
     }
     for _ in 0..CORRECTIONS {
         let far = deviation::measure(&corners, &at, &reference).far;

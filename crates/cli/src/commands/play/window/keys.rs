@@ -21,6 +21,7 @@ pub(super) const HELP: &[(&str, &str)] = &[
     ("+ -, wheel", "magnify"),
     ("Q E", "blades in and out"),
     ("drag the 3D view", "turn it"),
+    ("P, Shift P", "show the script, have it rest; moving takes over"),
     ("Backspace, Shift Backspace", "undo the last motion, do it again"),
     ("F1, Esc", "this help, end"),
 ];
@@ -111,6 +112,8 @@ impl Keys {
             KeyCode::Tab if press => {
                 self.choose(Some(self.chosen.map_or(0, |index| (index + 1) % self.instruments.len())))
             }
+            KeyCode::KeyP if press && self.modifiers.shift_key() => vec![Input::Stop {}],
+            KeyCode::KeyP if press => vec![Input::Script {}],
             KeyCode::Backspace if press && self.modifiers.shift_key() => vec![Input::Redo {}],
             KeyCode::Backspace if press => vec![Input::Undo {}],
             KeyCode::KeyI if press => {

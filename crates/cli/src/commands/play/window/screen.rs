@@ -146,6 +146,8 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, layout: La
         let recent = |event: &&endowire_play::Event| readout.time_s - event.time_s < 6.0;
         readout.event.as_ref().filter(recent).map(|event| event.text.clone())
     });
+    let told =
+        told.or_else(|| readout.demonstrates.then(|| "the script is shown: move to take over".to_owned()));
     if let Some(text) = told {
         writer.write(canvas, [12, y + 48], 15, WARN, &text);
     }
