@@ -341,6 +341,16 @@ impl External for WallContact<'_> {
         self.stray_contacts(elements, states, part, into)
     }
 
+    fn follow(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        moved: &Moved<'_>,
+        into: &mut dyn Stencils,
+    ) -> bool {
+        self.follow_contacts(elements, base, moved, into)
+    }
+
     fn convexify(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> bool {
         self.convexify_contacts(elements, base, into)
     }

@@ -187,6 +187,9 @@ impl<const C: usize> Newton<C> {
             }
             report.iterations += 1;
             self.unsymmetric();
+            if shift == 0.0 && minimum && problem.external.is_lagged() {
+                self.follow_step(&mut problem, state);
+            }
             Self::restore_tensions(elements, &mut self.step);
             let factored = self.assembly.hessian;
             match self.line_search(&mut problem, state, &mut search, size.relative, shift) {
