@@ -289,8 +289,9 @@ impl External for WallContact<'_> {
         std::mem::swap(&mut self.memory.points, &mut self.memory.before);
     }
 
+    /// Where the wall yields more than an element, a trial does not lose its contacts.
     fn foresee(&mut self, moved: &Moved<'_>) -> bool {
-        self.foresee_contacts(moved)
+        self.stiff && self.foresee_contacts(moved)
     }
 
     fn meet(
