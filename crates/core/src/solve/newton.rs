@@ -235,8 +235,11 @@ impl<const C: usize> Newton<C> {
         arrived: bool,
     ) -> Result<Option<Inertia>, StopReason> {
         if !self.assembly.hessian {
-            self.right_hand_side();
-            self.factor.solve(&mut self.step);
+            // An equilibrium asks for the inertia alone.
+            if !arrived {
+                self.right_hand_side();
+                self.factor.solve(&mut self.step);
+            }
             *shift = 0.0;
             return Ok(Some(self.factor.inertia()));
         }
