@@ -88,7 +88,9 @@ impl<const C: usize> Factor<C> {
     /// Factors `matrix` and replaces `b` by the solution of `A x = b`; the forward solve is fused with the
     /// factorisation. On an error `b` is spoilt.
     pub fn factor_solve(&mut self, matrix: &BandMatrix<C>, b: &mut [f64]) -> Result<Inertia, FactorError> {
-        self.eliminate::<true>(matrix, None, b)
+        let inertia = self.eliminate::<true>(matrix, None, b)?;
+        Arch::new().dispatch(Solve::<C, false> { factor: self, b });
+        Ok(inertia)
     }
 
     /// As [`Self::factor_solve`] with `factor` times `shift` added to the matrix.
@@ -99,22 +101,24 @@ impl<const C: usize> Factor<C> {
         factor: f64,
         b: &mut [f64],
     ) -> Result<Inertia, FactorError> {
-        self.eliminate::<true>(matrix, Some((shift, factor)), b)
+        let inertia = self.eliminate::<true>(matrix, Some((shift, factor)), b)?;
+        Arch::new().dispatch(Solve::<C, false> { factor: self, b });
+        Ok(inertia)
     }
 
     /// Replaces `b` by the solution of `A x = b` with the matrix factored last.
     pub fn solve(&self, b: &mut [f64]) {
-        Arch::new().dispatch(Solve { factor: self, b });
+        Arch::new().dispatch(Solve::<C, true> { factor: self, b });
     }
 
+    /// `y = L⁻¹ b`.
     #[inline(always)]
-    fn solve_blocks(&self, b: &mut [f64]) {
+    fn forward(&self, b: &mut [f64]) {
         let block = C / 2;
         let mut known = begun(b);
         for (k, rows) in self.rows[..self.dimension].chunks_exact(block).enumerate() {
             forward(rows, &mut b[k * block..], &mut known);
         }
-        self.backward(b);
     }
 
     /// `x = L⁻ᵀ D⁻¹ y`.
@@ -146,7 +150,7 @@ impl<const C: usize> Factor<C> {
         }
     }
 
-    /// Sets the rows to those of the factor of a matrix with a multiple of a shift, and solves with it.
+    /// Sets the rows to those of the factor of a matrix with a multiple of a shift, and `b` to what its forward solve gives.
     fn eliminate<const SOLVE: bool>(
         &mut self,
         matrix: &BandMatrix<C>,
@@ -224,9 +228,6 @@ impl<const C: usize> Factor<C> {
             }
         }
         self.inertia = Inertia { positive: n - negative, negative };
-        if SOLVE {
-            self.backward(b);
-        }
         Ok(self.inertia)
     }
 }
@@ -255,18 +256,23 @@ impl<const C: usize, const SOLVE: bool> WithSimd for Eliminate<'_, C, SOLVE> {
     }
 }
 
-/// A solution with factors at hand, likewise.
-struct Solve<'a, const C: usize> {
+/// A solution with factors at hand, likewise; without its forward half where that rode along. Within the elimination the other half would
+/// cost that registers.
+struct Solve<'a, const C: usize, const FORWARD: bool> {
     factor: &'a Factor<C>,
     b: &'a mut [f64],
 }
 
-impl<const C: usize> WithSimd for Solve<'_, C> {
+impl<const C: usize, const FORWARD: bool> WithSimd for Solve<'_, C, FORWARD> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        self.factor.solve_blocks(self.b);
+        let Self { factor, b } = self;
+        if FORWARD {
+            factor.forward(b);
+        }
+        factor.backward(b);
     }
 }
 

@@ -97,11 +97,11 @@ where
     fn with_simd<S: Simd>(mut self, simd: S) {
         let zero = Lanes::splat(simd, 0.0);
         let mut all = ElementSystem::<C, S::f64s>::filled(zero.stored());
+        let mut made = [ElementData::EMPTY; MOST];
         for first in (0..self.count).step_by(S::F64_LANES) {
-            let made: [ElementData; MOST] = std::array::from_fn(|lane| match lane < S::F64_LANES {
-                true => (self.data)((first + lane).min(self.count - 1)),
-                false => ElementData::EMPTY,
-            });
+            for (lane, data) in made.iter_mut().enumerate().take(S::F64_LANES) {
+                *data = (self.data)((first + lane).min(self.count - 1));
+            }
             let mut lanes = [self.state.lane::<C>(&made[0], first); MOST];
             for lane in 0..S::F64_LANES {
                 lanes[lane] = self.state.lane::<C>(&made[lane], (first + lane).min(self.count - 1));
