@@ -6,7 +6,8 @@
 //!
 //! The factorisation is the right-looking outer product form (Golub and Van Loan, *Matrix Computations*, 4th ed., section
 //! 4.1.2, block by block as in 4.5.1): the rows of a block are eliminated one after the other, then they are taken from the
-//! next block all at once. The forward solve rides along. By Sylvester's law the signs of D are the inertia of the matrix.
+//! next block all at once. The forward solve rides along. All of it is compiled for AVX2 too, which [`pulp`] looks for at run time; nothing is
+//! fused, so that bits do not hang on it. By Sylvester's law the signs of D are the inertia of the matrix.
 //!
 //! No pivoting: an LDLᵀ of an indefinite matrix exists for the order of unknowns used here (a constraint comes
 //! after the unknowns it constrains, see [`crate::rod::layout`]), and where it does not, the caller shifts and
@@ -14,6 +15,7 @@
 //! unseen.
 
 use super::matrix::{BandMatrix, Shift};
+use pulp::{Arch, Simd, WithSimd};
 
 /// Numbers of positive, negative and zero eigenvalues (zero: the factorisation met a zero pivot and stopped).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -87,7 +89,7 @@ impl<const C: usize> Factor<C> {
     /// factorisation. On an error `b` is spoilt.
     pub fn factor_solve(&mut self, matrix: &BandMatrix<C>, b: &mut [f64]) -> Result<Inertia, FactorError> {
         let inertia = self.eliminate::<true>(matrix, None, b)?;
-        self.backward(b);
+        Arch::new().dispatch(Solve::<C, false> { factor: self, b });
         Ok(inertia)
     }
 
@@ -100,20 +102,27 @@ impl<const C: usize> Factor<C> {
         b: &mut [f64],
     ) -> Result<Inertia, FactorError> {
         let inertia = self.eliminate::<true>(matrix, Some((shift, factor)), b)?;
-        self.backward(b);
+        Arch::new().dispatch(Solve::<C, false> { factor: self, b });
         Ok(inertia)
     }
 
     /// Replaces `b` by the solution of `A x = b` with the matrix factored last.
     pub fn solve(&self, b: &mut [f64]) {
+        Arch::new().dispatch(Solve::<C, true> { factor: self, b });
+    }
+
+    /// `y = L⁻¹ b`.
+    #[inline(always)]
+    fn forward(&self, b: &mut [f64]) {
         let block = C / 2;
+        let mut known = begun(b);
         for (k, rows) in self.rows[..self.dimension].chunks_exact(block).enumerate() {
-            forward(rows, &mut b[k * block..]);
+            forward(rows, &mut b[k * block..], &mut known);
         }
-        self.backward(b);
     }
 
     /// `x = L⁻ᵀ D⁻¹ y`.
+    #[inline(always)]
     fn backward(&self, b: &mut [f64]) {
         let block = C / 2;
         let mut known = [0.0; C];
@@ -141,32 +150,31 @@ impl<const C: usize> Factor<C> {
         }
     }
 
-    /// Sets the rows to those of the factor of a matrix with a multiple of a shift.
+    /// Sets the rows to those of the factor of a matrix with a multiple of a shift, and `b` to what its forward solve gives.
     fn eliminate<const SOLVE: bool>(
         &mut self,
         matrix: &BandMatrix<C>,
         shift: Option<(&Shift, f64)>,
         b: &mut [f64],
     ) -> Result<Inertia, FactorError> {
-        const { assert!(C >= 12 && C <= 24 && C.is_multiple_of(4), "a node has 6, 8, 10 or 12 unknowns") }
-        match C {
-            12 => self.eliminate_blocks::<6, SOLVE>(matrix, shift, b),
-            16 => self.eliminate_blocks::<8, SOLVE>(matrix, shift, b),
-            20 => self.eliminate_blocks::<10, SOLVE>(matrix, shift, b),
-            _ => self.eliminate_blocks::<12, SOLVE>(matrix, shift, b),
-        }
+        Arch::new().dispatch(Eliminate::<C, SOLVE> { factor: self, matrix, shift, b })
     }
 
+    #[inline(always)]
     fn eliminate_blocks<const B: usize, const SOLVE: bool>(
         &mut self,
         matrix: &BandMatrix<C>,
         shift: Option<(&Shift, f64)>,
         b: &mut [f64],
     ) -> Result<Inertia, FactorError> {
+        // Rows are worked off in whole vectors: what stands left of where a row begins is of no account. Short ones in halves, which all fit
+        // into registers.
+        let whole: usize = const { if C >= 20 { 4 } else { 2 } };
         let n = self.dimension;
         let mut negative = 0;
         // What the block before takes from the block at hand.
         let mut taken = [[0.0; B]; B];
+        let mut known = begun(b);
         let (blocks, _) = self.rows[..n].as_chunks_mut::<B>();
         let (sources, _) = matrix.rows.as_chunks::<B>();
         for (k, (block, source)) in blocks.iter_mut().zip(sources).enumerate() {
@@ -193,12 +201,12 @@ impl<const C: usize> Factor<C> {
                 negative += usize::from(pivot < 0.0);
                 let inverse = 1.0 / pivot;
                 let mut l = [0.0; C];
-                for j in r + 1..C {
+                for j in (r + 1) / whole * whole..C {
                     l[j] = rows[r][j] * inverse;
                 }
                 unrolled!(i in 0..B, {
                     if i > r {
-                        for j in i..C {
+                        for j in i / whole * whole..C {
                             rows[i][j] -= l[i] * rows[r][j];
                         }
                     }
@@ -209,14 +217,14 @@ impl<const C: usize> Factor<C> {
             unrolled!(i in 0..B, {
                 let mut sum = [0.0; B];
                 for r in 0..B {
-                    for j in i..B {
+                    for j in i / 2 * 2..B {
                         sum[j] += block[r][B + i] * rows[r][B + j];
                     }
                 }
                 taken[i] = sum;
             });
             if SOLVE {
-                forward(block, &mut b[begin..]);
+                forward(block, &mut b[begin..], &mut known);
             }
         }
         self.inertia = Inertia { positive: n - negative, negative };
@@ -224,22 +232,75 @@ impl<const C: usize> Factor<C> {
     }
 }
 
-/// The forward solve of one block: `b` begins with its rows.
+/// A factorisation, for the processor at hand.
+struct Eliminate<'a, const C: usize, const SOLVE: bool> {
+    factor: &'a mut Factor<C>,
+    matrix: &'a BandMatrix<C>,
+    shift: Option<(&'a Shift, f64)>,
+    b: &'a mut [f64],
+}
+
+impl<const C: usize, const SOLVE: bool> WithSimd for Eliminate<'_, C, SOLVE> {
+    type Output = Result<Inertia, FactorError>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Self::Output {
+        const { assert!(C >= 12 && C <= 24 && C.is_multiple_of(4), "a node has 6, 8, 10 or 12 unknowns") }
+        let Self { factor, matrix, shift, b } = self;
+        match C {
+            12 => factor.eliminate_blocks::<6, SOLVE>(matrix, shift, b),
+            16 => factor.eliminate_blocks::<8, SOLVE>(matrix, shift, b),
+            20 => factor.eliminate_blocks::<10, SOLVE>(matrix, shift, b),
+            _ => factor.eliminate_blocks::<12, SOLVE>(matrix, shift, b),
+        }
+    }
+}
+
+/// A solution with factors at hand, likewise; without its forward half where that rode along. Within the elimination the other half would
+/// cost that registers.
+struct Solve<'a, const C: usize, const FORWARD: bool> {
+    factor: &'a Factor<C>,
+    b: &'a mut [f64],
+}
+
+impl<const C: usize, const FORWARD: bool> WithSimd for Solve<'_, C, FORWARD> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { factor, b } = self;
+        if FORWARD {
+            factor.forward(b);
+        }
+        factor.backward(b);
+    }
+}
+
+/// What a forward solve of `b` begins with: see [`forward`].
 #[inline(always)]
-fn forward<const C: usize>(rows: &[[f64; C]], b: &mut [f64]) {
+fn begun<const C: usize>(b: &[f64]) -> [f64; C] {
+    let mut known = [0.0; C];
+    if let Some(first) = b.get(..C / 2) {
+        known[C / 2..].copy_from_slice(first);
+    }
+    known
+}
+
+/// The forward solve of one block: `b` begins with its rows. The second half of `known` is what they are after all blocks before, and those of
+/// the next block after this one: handed on in registers, not through memory.
+#[inline(always)]
+fn forward<const C: usize>(rows: &[[f64; C]], b: &mut [f64], known: &mut [f64; C]) {
     let block = C / 2;
+    known.copy_within(block.., 0);
     let (now, next) = b.split_at_mut(block);
-    for r in 0..block {
-        let y = now[r];
-        for i in r + 1..block {
-            now[i] -= rows[r][i] * y;
-        }
+    if let Some(next) = next.get(..block) {
+        known[block..].copy_from_slice(next);
     }
-    if let Some(next) = next.get_mut(..block) {
-        for r in 0..block {
-            for j in 0..block {
-                next[j] -= rows[r][block + j] * now[r];
-            }
+    unrolled!(r in 0..C / 2, {
+        let y = known[r];
+        for j in r + 1..C {
+            known[j] -= rows[r][j] * y;
         }
-    }
+    });
+    now.copy_from_slice(&known[..block]);
 }

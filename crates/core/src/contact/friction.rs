@@ -120,6 +120,8 @@ pub struct Friction {
     least_stick_mm: f64,
     /// Whether normal forces are no longer renewed in this step.
     settled: bool,
+    /// Whether they are those of the state looked at last, and are renewed again at the next.
+    renewed: bool,
     /// How often normal forces were renewed in this step.
     renewals: usize,
     /// Whether they are left alone once they should have settled, for another method to go on from there.
@@ -188,6 +190,7 @@ impl Friction {
     ) {
         self.sliders.clear();
         self.settled = false;
+        self.renewed = false;
         self.renewals = 0;
         self.hands_over = false;
         self.coupled = false;
@@ -373,6 +376,7 @@ impl Friction {
     /// Looks at what presses at the state that Newton's method has come to, a normal and a force for every point, and
     /// renews the lagged ones unless they are still on their way or have settled. `least_n` is a force not worth settling.
     pub fn follow(&mut self, pressed: impl Iterator<Item = (Vec3, f64)>, least_n: f64) {
+        self.renewed = false;
         let (mut moved, mut sum) = (0.0, least_n);
         for (slider, now) in self.sliders.iter_mut().zip(pressed) {
             moved += (slider.seen.0 * slider.seen.1 - now.0 * now.1).norm();
@@ -385,6 +389,7 @@ impl Friction {
         self.settled = self.unsettled(least_n) < SETTLED;
         self.renewals += 1;
         let relaxed = !self.settled && self.renewals > WHOLE_RENEWALS;
+        self.renewed = !self.settled && !relaxed;
         for slider in &mut self.sliders {
             let (normal, force) = slider.seen;
             if relaxed {
@@ -396,6 +401,16 @@ impl Friction {
                 (slider.normal, slider.force_n) = slider.seen;
             }
         }
+    }
+
+    /// Whether normal forces are those of the state looked at last, and are renewed again at the next.
+    pub(crate) fn is_renewed(&self) -> bool {
+        self.renewed
+    }
+
+    /// What was seen last is what the step begins with: normal forces are renewed at the first state that presses nearly so.
+    pub(crate) fn begin_seen(&mut self) {
+        self.sliders.iter_mut().for_each(|s| s.seen = s.begun);
     }
 
     /// How much of the normal force has changed since it was last renewed.

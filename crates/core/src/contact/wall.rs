@@ -289,8 +289,9 @@ impl External for WallContact<'_> {
         std::mem::swap(&mut self.memory.points, &mut self.memory.before);
     }
 
+    /// Where the wall yields more than an element, a trial does not lose its contacts.
     fn foresee(&mut self, moved: &Moved<'_>) -> bool {
-        self.foresee_contacts(moved)
+        self.stiff && self.foresee_contacts(moved)
     }
 
     fn meet(
@@ -339,6 +340,16 @@ impl External for WallContact<'_> {
         into: &mut dyn Stencils,
     ) -> f64 {
         self.stray_contacts(elements, states, part, into)
+    }
+
+    fn follow(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        moved: &Moved<'_>,
+        into: &mut dyn Stencils,
+    ) -> bool {
+        self.follow_contacts(elements, base, moved, into)
     }
 
     fn convexify(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> bool {

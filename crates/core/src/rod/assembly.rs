@@ -108,6 +108,32 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
+    /// Gathers a residual of its own in `residual`: what `add` adds. That at hand stays as it is, and so does the matrix.
+    pub(crate) fn beside<T>(&mut self, residual: &mut Vec<f64>, add: impl FnOnce(&mut Self) -> T) -> T {
+        std::mem::swap(&mut self.residual, residual);
+        self.residual.fill(0.0);
+        let hessian = std::mem::replace(&mut self.hessian, false);
+        let told = add(self);
+        self.hessian = hessian;
+        std::mem::swap(&mut self.residual, residual);
+        told
+    }
+
+    /// Slope of the energy, constraints included, along a step.
+    pub(crate) fn slope(&self, step: &[f64]) -> f64 {
+        let l = Layout::<C>;
+        let elements = self.residual.len() / Layout::<C>::BLOCK - 2;
+        let mut slope = 0.0;
+        for i in 0..l.support(elements) {
+            slope += self.residual[i] * step[i];
+        }
+        for e in 0..elements {
+            let row = l.tension(e);
+            slope -= self.residual[row] * step[row];
+        }
+        slope
+    }
+
     /// Angles of instruments that have ended mean nothing.
     fn add_absent(&mut self, elements: &[ElementData]) {
         let l = Layout::<C>;

@@ -68,6 +68,58 @@ impl<const C: usize> WithSimd for Stored<'_, C> {
     }
 }
 
+/// Tells of each of `count` elements, made by `data`, the gradient and the derivative of its elongation where `state` is, without axial force.
+pub(crate) fn element_gradients<const C: usize>(
+    count: usize,
+    data: impl Fn(usize) -> ElementData,
+    state: &RodState,
+    tell: impl FnMut(usize, &[f64; C], &[f64; C]),
+) {
+    Arch::new().dispatch(Gradients { count, data, state, tell });
+}
+
+/// The gradients of elements that are made one after the other.
+pub(super) struct Gradients<'a, const C: usize, D, T> {
+    pub(super) count: usize,
+    pub(super) data: D,
+    pub(super) state: &'a RodState,
+    pub(super) tell: T,
+}
+
+impl<const C: usize, D, T> WithSimd for Gradients<'_, C, D, T>
+where
+    D: Fn(usize) -> ElementData,
+    T: FnMut(usize, &[f64; C], &[f64; C]),
+{
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let zero = Lanes::splat(simd, 0.0);
+        let mut all = ElementSystem::<C, S::f64s>::filled(zero.stored());
+        let mut made = [ElementData::EMPTY; MOST];
+        for first in (0..self.count).step_by(S::F64_LANES) {
+            for (lane, data) in made.iter_mut().enumerate().take(S::F64_LANES) {
+                *data = (self.data)((first + lane).min(self.count - 1));
+            }
+            let mut lanes = [self.state.lane::<C>(&made[0], first); MOST];
+            for lane in 0..S::F64_LANES {
+                lanes[lane] = self.state.lane::<C>(&made[lane], (first + lane).min(self.count - 1));
+                lanes[lane].tension = 0.0;
+            }
+            system::<S, C, false>(&Batch::new::<C>(simd, &lanes), zero, &mut all);
+            for lane in 0..S::F64_LANES.min(self.count - first) {
+                let of = |list: &[S::f64s; C], i: usize| {
+                    bytemuck::cast_slice::<_, f64>(list)[i * S::F64_LANES + lane]
+                };
+                let gradient = std::array::from_fn(|i| of(&all.gradient, i));
+                let stretch = std::array::from_fn(|i| of(&all.stretch, i));
+                (self.tell)(first + lane, &gradient, &stretch);
+            }
+        }
+    }
+}
+
 /// As many elements from `first` on as there are lanes, and how many of them there are: the last one fills what is left over.
 #[inline(always)]
 pub(super) fn beside<S: Simd, const C: usize>(

@@ -2,9 +2,9 @@
 
 use super::assembly::{AddElements, Assembly};
 use super::derivative_tests::{data, noise};
-use super::element::{ElementData, Material};
+use super::element::{ElementData, ElementState, ElementSystem, Material};
 use super::frame::Frame;
-use super::lagrangian::Stored;
+use super::lagrangian::{Stored, element_gradients, element_system};
 use super::layout::{Layout, MAX_ANGLES, PLAIN, TWISTED};
 use super::state::RodState;
 use crate::Vec3;
@@ -84,6 +84,29 @@ fn elements_side_by_side_have_the_bits_of_each_alone() {
     have_the_bits_of_each_alone::<TWISTED>();
     have_the_bits_of_each_alone::<20>();
     have_the_bits_of_each_alone::<24>();
+}
+
+#[test]
+fn gradients_side_by_side_are_those_of_each_without_axial_force() {
+    let (elements, rod) = rod(5, 2, 7);
+    let mut seen = 0;
+    element_gradients::<20>(
+        elements.len(),
+        |e| elements[e],
+        &rod,
+        |e, gradient, stretch| {
+            let of = |tension: f64| {
+                let mut alone = ElementSystem::<20>::zeros();
+                let at = ElementState { tension, ..rod.element::<20>(e) };
+                element_system::<20, false>(&elements[e], &at, 0.0, &mut alone);
+                (alone.gradient, alone.stretch)
+            };
+            assert_eq!((e, *gradient, *stretch), (seen, of(0.0).0, of(0.0).1));
+            assert_ne!(*gradient, of(rod.tensions[e]).0);
+            seen += 1;
+        },
+    );
+    assert_eq!(seen, elements.len());
 }
 
 #[test]

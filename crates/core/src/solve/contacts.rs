@@ -41,7 +41,7 @@ const LEAST_PART: f64 = 1e-3;
 const LARGEST_TURN: f64 = 1.0;
 
 /// What a step does to points of the rod.
-fn moved<'a, const C: usize>(
+pub(super) fn moved<'a, const C: usize>(
     elements: &'a [ElementData],
     state: &'a RodState,
     step: &'a [f64],
@@ -138,13 +138,10 @@ impl<const C: usize> Newton<C> {
         let Problem { elements, supports, external, .. } = problem;
         let mut last = f64::INFINITY;
         for round in 0..=CORRECTIONS {
-            // The assembly scatters; its own residual is that of the base.
-            std::mem::swap(&mut self.assembly.residual, &mut self.spare);
-            self.assembly.residual.fill(0.0);
-            let hessian = std::mem::replace(&mut self.assembly.hessian, false);
-            let stray = external.stray(elements, (state, &self.trial), part, &mut self.assembly);
-            self.assembly.hessian = hessian;
-            std::mem::swap(&mut self.assembly.residual, &mut self.spare);
+            let trial = &self.trial;
+            let stray = self
+                .assembly
+                .beside(&mut self.spare, |into| external.stray(elements, (state, trial), part, into));
             if round > 0 && (stray.is_nan() || stray >= last) {
                 std::mem::swap(&mut self.trial, &mut self.other);
                 break;

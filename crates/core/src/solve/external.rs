@@ -107,6 +107,18 @@ pub trait External {
         false
     }
 
+    /// Adds, as a gradient at the base, by how much its forces there change where what is lagged follows a step, to first order: what its
+    /// Hessian leaves out. Returns whether anything follows.
+    fn follow(
+        &mut self,
+        _elements: &[ElementData],
+        _base: &RodState,
+        _moved: &Moved<'_>,
+        _into: &mut dyn Stencils,
+    ) -> bool {
+        false
+    }
+
     /// Whether it rises so steeply within a step that a trial may have to be looked for between one that was taken and one that was
     /// refused, as a wall does.
     fn is_steep(&self) -> bool {

@@ -243,14 +243,7 @@ impl<const C: usize> Newton<C> {
             let penalty = &mut search.penalty[usize::from(j >= 3)];
             *penalty = penalty.max(2.0 * value.abs());
         }
-        let mut slope = 0.0;
-        for i in 0..first {
-            slope += self.assembly.residual[i] * self.step[i];
-        }
-        for e in 0..elements.len() {
-            let row = l.tension(e);
-            slope -= self.assembly.residual[row] * self.step[row];
-        }
+        let mut slope = self.assembly.slope(&self.step);
         for j in 0..6 {
             slope += supports.multipliers[j] * gaps[j];
         }

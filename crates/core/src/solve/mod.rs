@@ -6,6 +6,7 @@
 
 mod contacts;
 pub mod external;
+mod lagged;
 mod line_search;
 pub mod newton;
 pub mod report;

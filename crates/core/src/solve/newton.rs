@@ -187,6 +187,9 @@ impl<const C: usize> Newton<C> {
             }
             report.iterations += 1;
             self.unsymmetric();
+            if shift == 0.0 && minimum && problem.external.is_lagged() {
+                self.follow_step(&mut problem, state);
+            }
             Self::restore_tensions(elements, &mut self.step);
             let factored = self.assembly.hessian;
             match self.line_search(&mut problem, state, &mut search, size.relative, shift) {
@@ -232,8 +235,11 @@ impl<const C: usize> Newton<C> {
         arrived: bool,
     ) -> Result<Option<Inertia>, StopReason> {
         if !self.assembly.hessian {
-            self.right_hand_side();
-            self.factor.solve(&mut self.step);
+            // An equilibrium asks for the inertia alone.
+            if !arrived {
+                self.right_hand_side();
+                self.factor.solve(&mut self.step);
+            }
             *shift = 0.0;
             return Ok(Some(self.factor.inertia()));
         }

@@ -1,7 +1,7 @@
-//! Friction whose normal forces follow the state at once: what its derivatives are then.
+//! Friction whose normal forces follow the state at once, or a step: what its derivatives are then.
 //!
 //! With lagged normal forces friction has a potential; with those of the state itself it has none, and its Newton matrix is not
-//! symmetric (`methods/kirchhoff/settle.rs`). With the normal force f of the state, and a(y) = φ′/y,
+//! symmetric (`methods/kirchhoff/settle.rs`, `solve/lagged.rs`). With the normal force f of the state, and a(y) = φ′/y,
 //!
 //! ```text
 //! g  = μ N a u,    N = f                                    friction on the wall, minus that on the device
@@ -87,7 +87,8 @@ impl Friction {
         let y = slip.norm();
         let (over, second) = rates(y, self.stick_mm);
         let unit = if y > 0.0 { slip / y } else { Vec3::zeros() };
-        let (n, force) = (slider.normal, self.coefficient * slider.matrix_n);
+        let size_n = if self.coupled { slider.matrix_n } else { slider.force_n };
+        let (n, force) = (slider.normal, self.coefficient * size_n);
         // v ↦ r v × t.
         let cross = slider.along.cross_matrix() * -radius_mm;
         let way = x - slider.from_mm;

@@ -56,7 +56,7 @@ pub(super) fn straight() -> FeltWall {
 }
 
 /// One that is bent to a radius of 12 mm about a line through (−12, 0, 0); inside of the bend its wall is a crest.
-fn bent() -> FeltWall {
+pub(super) fn bent() -> FeltWall {
     swept(&ellipse(2.0, 2.0, 24), 31, |k| {
         let angle = 0.035 * (f64::from(k) - 15.0);
         let n = Vec3::new(angle.cos(), 0.0, angle.sin());

@@ -22,9 +22,8 @@ use crate::Vec3;
 use crate::contact::{Contact, ContactPoint, Rub};
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
-use crate::rod::element::ElementSystem;
 use crate::rod::quadrature::{Point, hermite};
-use crate::rod::{ElementData, Layout, Material, RodState, element_system};
+use crate::rod::{ElementData, Layout, Material, RodState, element_gradients};
 
 /// Rounds in which the axial force behind a node and the friction there are found: each is nearer by μ times half the angle of an element.
 const ROUNDS: usize = 12;
@@ -108,14 +107,14 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
     let last = mesh.nearest_node(line_mm - reach_mm);
     // Beyond the others it is alone, with the axial force of the line.
     let mut beyond = NodeForce::default();
-    let mut system = ElementSystem::<C>::zeros();
+    let parts = parts::<C>(stack, mesh, rod, (mesh.elements.len().min(first + 1), instrument));
     if comes_out(mesh, instrument).is_some() && first < mesh.elements.len() {
-        let [near, _, pull, _] = parts(stack, mesh, rod, (first, instrument), &mut system);
+        let [near, _, pull, _] = parts[first];
         let wall = wall_force(line, (first, instrument));
         beyond = near.plus(&pull, rod.tensions[first]).plus(&wall, -1.0);
     }
     for i in (1..=first).rev() {
-        let [near, far, near_pull, far_pull] = parts(stack, mesh, rod, (i - 1, instrument), &mut system);
+        let [near, far, near_pull, far_pull] = parts[i - 1];
         let (t, curvature) = (rod.frames[i].t, curvature(mesh, rod, i));
         let known = beyond.plus(&far, 1.0);
         let (along, rate) = (known.along(&t, &curvature), far_pull.along(&t, &curvature));
@@ -127,7 +126,11 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
         };
         // What presses depends on the axial force behind the node, by the angle that the line turns there.
         for _ in 0..if drag == 0.0 { 0 } else { ROUNDS } {
-            tension = (drag * across(tension).norm() - along) / rate;
+            let next = (drag * across(tension).norm() - along) / rate;
+            if next == tension {
+                break;
+            }
+            tension = next;
         }
         if i <= last {
             let force_n = across(tension);
@@ -141,22 +144,23 @@ pub(super) fn lateral_forces<const C: usize>(line: &Line<'_>, instrument: usize)
     told
 }
 
-/// What element `e` of an instrument and those in it exerts at its near and its far node without axial force, and there with a unit of it.
+/// What each of the first elements of an instrument and those in it exerts at its near and its far node without axial force, and there with
+/// a unit of it.
 fn parts<const C: usize>(
     stack: &Stack,
     mesh: &Mesh,
     rod: &RodState,
-    (e, instrument): (usize, usize),
-    system: &mut ElementSystem<C>,
-) -> [NodeForce; 4] {
-    let data = inside(stack, mesh, (e, instrument));
-    let mut at = rod.element::<C>(e);
-    at.tension = 0.0;
-    element_system::<C, false>(&data, &at, 0.0, system);
+    (count, instrument): (usize, usize),
+) -> Vec<[NodeForce; 4]> {
     let l = Layout::<C>;
     let both = |of: &[f64; C]| [0, 1].map(|i| NodeForce::of(of, l.position(i), l.tangent(i)));
-    let ([near, far], [near_pull, far_pull]) = (both(&system.gradient), both(&system.stretch));
-    [near, far, near_pull, far_pull]
+    let mut all = Vec::with_capacity(count);
+    let data = |e: usize| inside(stack, mesh, (e, instrument));
+    element_gradients::<C>(count, data, rod, |_, gradient, stretch| {
+        let ([near, far], [near_pull, far_pull]) = (both(gradient), both(stretch));
+        all.push([near, far, near_pull, far_pull]);
+    });
+    all
 }
 
 /// Element `e` of an instrument and those in it. Where all of them have angles, the mesh knows each by itself.

@@ -37,6 +37,8 @@ pub(super) fn write_instruments<const C: usize>(
     let inserted: Vec<f64> = lengths(hands).collect();
     let line = line_mm(lengths(hands));
     let nodes = Nodes::new(environment.surroundings.stack, &inserted, environment.options.element_mm);
+    let turning = turning(touching.1, at.start());
+    let touching = (touching.0, &turning[..]);
     let mut told = Vec::with_capacity(hands.len());
     for (index, hand) in hands.iter().enumerate() {
         let set = sets[index].filter(|_| hand.inserted_mm > 0.0);
@@ -64,7 +66,7 @@ fn push_force<const C: usize>(
     environment: &Environment<'_>,
     nodes: &Nodes,
     (index, inserted_mm): (usize, &[f64]),
-    (pressed, between): (&[Pressed], &[Place]),
+    (pressed, between): (&[Pressed], &[Turning]),
     at: Start<'_>,
 ) -> Option<f64> {
     let stack = environment.surroundings.stack;
@@ -102,6 +104,29 @@ fn twist_per_mm(at: Start<'_>, i: usize, set: usize) -> f64 {
         count += 1.0;
     }
     if count > 0.0 { sum / count } else { 0.0 }
+}
+
+/// A node at which friction between two instruments, the inner one first, holds what is twisted.
+struct Turning {
+    node: usize,
+    instruments: [usize; 2],
+    couple_nmm: f64,
+    twists_per_mm: [f64; 2],
+}
+
+/// Those of the places where instruments rub.
+fn turning(between: &[Place], at: Start<'_>) -> Vec<Turning> {
+    let each = between.iter().filter_map(|place| {
+        let sets = place.sets?;
+        let twist = |set: usize| twist_per_mm(at, place.node, set);
+        Some(Turning {
+            node: place.node,
+            instruments: [place.inner, place.outer],
+            couple_nmm: place.couple(&at.state.rod).0,
+            twists_per_mm: [twist(sets.0), twist(sets.1)],
+        })
+    });
+    each.collect()
 }
 
 /// Instruments with other lengths inserted, near by, and the unknowns as they are.
@@ -142,17 +167,15 @@ impl Beside {
     }
 
     /// Work against the couples of friction between instruments on the way here, on which what lies at a node turns with its twist, mJ.
-    fn turning_against(&self, between: &[Place], at: Start<'_>) -> f64 {
-        let each = between.iter().filter_map(|place| {
-            let sets = place.sets?;
-            let couple = place.couple(&at.state.rod).0;
+    fn turning_against(&self, between: &[Turning], at: Start<'_>) -> f64 {
+        let each = between.iter().map(|place| {
             // By how much farther from its tip is what lies there now.
             let label = |mesh: &Mesh, k: usize| {
                 mesh.from_tip_mm[place.node] - (mesh.from_tip_mm[0] - mesh.inserted_mm[k])
             };
             let moved = |k: usize| label(&self.mesh, k) - label(at.mesh, k);
-            let twist = |set: usize| twist_per_mm(at, place.node, set);
-            Some(couple * (moved(place.inner) * twist(sets.0) - moved(place.outer) * twist(sets.1)))
+            let work = |k: usize| moved(place.instruments[k]) * place.twists_per_mm[k];
+            place.couple_nmm * (work(0) - work(1))
         });
         each.sum()
     }

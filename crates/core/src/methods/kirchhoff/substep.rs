@@ -142,6 +142,9 @@ impl<const C: usize> Tools<C> {
         // How many elements the wall is as stiff as.
         let stiffness = surroundings.properties.stiffest_n_per_mm2() / element_stiffness;
         contact.stiff = stiffness > 1.0;
+        if !contact.stiff {
+            contact.trust_guess();
+        }
         let candidates = (start, &*mesh, &mut *rod);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, blocked);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
