@@ -247,7 +247,7 @@ fn failures_change_nothing(mut simulation: Simulation, seed: u64, count: usize) 
 
 #[test]
 fn a_command_that_fails_leaves_the_state_to_the_byte() {
-    let blocked = failures_change_nothing(tube(true, 500), 5, 48);
+    let blocked = failures_change_nothing(tube(true, 500), 5, 56);
     let left = failures_change_nothing(tube(false, 500), 6, 300);
     let hurried = failures_change_nothing(tube(false, 1), 7, 80);
     println!("{blocked:?} {left:?} {hurried:?}");
