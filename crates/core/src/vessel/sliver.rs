@@ -17,17 +17,20 @@ pub(crate) fn is_degenerate(corners: &[Vec3; 3], tolerance_mm: f64) -> bool {
 
 /// Removes triangles with a repeated vertex, and needles: corners distinct but in line. Removing a needle alone would
 /// leave a slit between its long edge and its two short ones, so the long edge is flipped together with the triangle
-/// across it. Returns the number of degenerate triangles that went.
+/// across it. Returns the number of degenerate triangles that were found; none is left.
 pub(crate) fn remove_degenerate(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> usize {
     let before = mesh.triangles.len();
     let repeated = |t: &[u32; 3]| t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
     mesh.triangles.retain(|t| !repeated(t));
-    let mut removed = before - mesh.triangles.len();
-    for _ in 0..PASSES {
+    let mut found = before - mesh.triangles.len();
+    for pass in 0..PASSES {
         let slivers: Vec<usize> =
             (0..mesh.triangles.len()).filter(|&i| is_degenerate(&mesh.corners(i), tolerance_mm)).collect();
         if slivers.is_empty() {
-            return removed;
+            return found;
+        }
+        if pass == 0 {
+            found += slivers.len();
         }
         let across = EdgeTable::new(&mesh.triangles).neighbours(mesh.triangles.len());
         let mut touched = vec![false; mesh.triangles.len()];
@@ -47,13 +50,12 @@ pub(crate) fn remove_degenerate(mesh: &mut SurfaceMesh, tolerance_mm: f64) -> us
             touched[index] = true;
         }
         retain_numbered(&mut mesh.triangles, |index, t| !gone[index] && !repeated(t));
-        removed = before - mesh.triangles.len();
     }
     // What is left sits in knots of slivers that flips only pass around.
     let survivors: Vec<bool> =
         (0..mesh.triangles.len()).map(|i| !is_degenerate(&mesh.corners(i), tolerance_mm)).collect();
     retain_numbered(&mut mesh.triangles, |index, _| survivors[index]);
-    before - mesh.triangles.len()
+    found
 }
 
 /// Replaces needle (a, b, c), long edge a–b, and its neighbour across a–b by the two halves of the neighbour cut at c.
@@ -85,7 +87,9 @@ mod tests {
             (0..m.triangles.len()).map(|i| crate::vessel::mesh::area(&m.corners(i))).sum::<f64>()
         };
         assert_eq!(opening::boundary(&mesh, &EdgeTable::new(&mesh.triangles)).openings.len(), 1);
-        remove_degenerate(&mut mesh, 1e-6);
+        // What is flipped is found too: such a mesh is not as it was given.
+        assert_eq!(remove_degenerate(&mut mesh, 1e-6), 1);
+        assert_eq!((mesh.triangles.len(), remove_degenerate(&mut mesh, 1e-6)), (4, 0));
         assert!((0..mesh.triangles.len()).all(|i| !is_degenerate(&mesh.corners(i), 1e-6)));
         assert_eq!(opening::boundary(&mesh, &EdgeTable::new(&mesh.triangles)).openings[0].boundary.len(), 4);
         assert!((area(&mesh) - 1.0).abs() < 1e-15);
