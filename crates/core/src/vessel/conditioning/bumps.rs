@@ -81,13 +81,14 @@ impl Bumps {
         // ‖B‖₂² ≤ ‖B‖₁ ‖B‖_∞.
         let mut down = vec![0.0f64; self.at_rest_mm.len()];
         let mut across: f64 = 0.0;
-        for (v, down_v) in (0..down.len()).map(|v| (v, f64::from(u8::from(!self.row(v).is_empty())))) {
-            down[v] += down_v;
-            let sum = self.row(v).iter().map(|(w, weight)| {
+        for v in (0..self.at_rest_mm.len()).filter(|v| !self.row(*v).is_empty()) {
+            let mut sum = 1.0;
+            down[v] += 1.0;
+            for (w, weight) in self.row(v) {
                 down[*w as usize] += weight.abs();
-                weight.abs()
-            });
-            across = across.max(down_v + sum.sum::<f64>());
+                sum += weight.abs();
+            }
+            across = across.max(sum);
         }
         across * down.into_iter().fold(0.0, f64::max)
     }
