@@ -20,7 +20,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::corners::{Corners, Kind};
+use super::corners::{Corners, Kind, Vertex};
 use crate::{Vec3, parallel};
 
 /// Coefficients of that surface.
@@ -35,7 +35,9 @@ const LEAST_HEIGHT: f64 = 1e-3;
 const LARGEST_SUM: f64 = 4.0;
 
 /// The bumps of a surface as a linear function of heights hⱼ of its vertices along their normals: rᵥ + hᵥ − Σ aⱼ (nᵥ·nⱼ) hⱼ.
+#[derive(Default)]
 pub(super) struct Bumps {
+    /// Where the row of each vertex begins, and where the last one ends.
     starts: Vec<u32>,
     /// Vertices around each, and −aⱼ nᵥ·nⱼ.
     columns: Vec<(u32, f64)>,
@@ -43,27 +45,57 @@ pub(super) struct Bumps {
     at_rest_mm: Vec<f64>,
 }
 
-/// Row of one vertex.
-#[derive(Default)]
-struct Row {
-    columns: Vec<(u32, f64)>,
-    at_rest_mm: f64,
-}
-
 impl Bumps {
     pub(super) fn new(corners: &Corners) -> Self {
-        let count = corners.vertices.len();
-        let rows = parallel::parts(count, |part| {
-            let mut around = Around::default();
-            part.map(|v| row(corners, v as u32, &mut around).unwrap_or_default()).collect::<Vec<_>>()
+        let parts = parallel::parts(corners.vertices.len(), |part| {
+            let (mut bumps, mut around) = (Self::default(), Around::default());
+            for v in part {
+                bumps.starts.push(bumps.columns.len() as u32);
+                let at_rest_mm = bumps.add(corners, v as u32, &mut around).unwrap_or(0.0);
+                bumps.at_rest_mm.push(at_rest_mm);
+            }
+            bumps
         });
-        let mut bumps = Self { starts: vec![0], columns: Vec::new(), at_rest_mm: Vec::with_capacity(count) };
-        for row in rows.into_iter().flatten() {
-            bumps.columns.extend(row.columns);
-            bumps.starts.push(bumps.columns.len() as u32);
-            bumps.at_rest_mm.push(row.at_rest_mm);
+        let mut all = Self::default();
+        for part in parts {
+            let before = all.columns.len() as u32;
+            all.starts.extend(part.starts.into_iter().map(|start| start + before));
+            all.columns.extend(part.columns);
+            all.at_rest_mm.extend(part.at_rest_mm);
         }
-        bumps
+        all.starts.push(all.columns.len() as u32);
+        all
+    }
+
+    /// Adds the columns of vertex `v` and returns its bump at rest, mm, if its surroundings tell of one.
+    fn add(&mut self, corners: &Corners, v: u32, around: &mut Around) -> Option<f64> {
+        let vertex = &corners.vertices[v as usize];
+        let normal = vertex.normal;
+        if vertex.kind != Kind::Free || normal == Vec3::zeros() {
+            return None;
+        }
+        around.gather(corners, v);
+        if around.all.len() < LEAST_NEIGHBOURS {
+            return None;
+        }
+        let equations = around.fit(corners, vertex).cholesky()?;
+        // The first row of the inverse times what neighbours add is what the height at v itself comes to.
+        let mut height = Terms::zeros();
+        height[0] = 1.0;
+        equations.solve_mut(&mut height);
+        let begin = self.columns.len();
+        let (mut sum, mut at_rest_mm) = (0.0, 0.0);
+        for (&w, (terms, weight)) in around.all.iter().zip(&around.terms) {
+            let share = weight * height.dot(terms);
+            sum += share.abs();
+            at_rest_mm -= share * normal.dot(&(corners.at(w) - vertex.at));
+            self.columns.push((w, -share * normal.dot(&corners.vertices[w as usize].normal)));
+        }
+        if sum > LARGEST_SUM {
+            self.columns.truncate(begin);
+            return None;
+        }
+        Some(at_rest_mm)
     }
 
     fn row(&self, v: usize) -> &[(u32, f64)] {
@@ -120,19 +152,25 @@ impl Bumps {
     }
 }
 
+/// 1, u, v, u², uv, v², z² of a vertex.
+type Terms = SVector<f64, COEFFICIENTS>;
+
 /// What lies around a vertex.
 #[derive(Default)]
 struct Around {
     spokes: Vec<u32>,
     ring: Vec<u32>,
     next: Vec<u32>,
+    /// Neighbours, and theirs.
     all: Vec<u32>,
+    /// Terms and weights of `all`.
+    terms: Vec<(Terms, f64)>,
 }
 
 impl Around {
     /// Sets `all` to the neighbours of `v`, those first, and theirs.
     fn gather(&mut self, corners: &Corners, v: u32) {
-        let Self { spokes, ring, next, all } = self;
+        let Self { spokes, ring, next, all, .. } = self;
         corners.spokes(v, spokes);
         corners.neighbours(spokes, ring);
         all.clear();
@@ -147,52 +185,28 @@ impl Around {
             }
         }
     }
-}
 
-/// The row of vertex `v`, if its surroundings tell of a bump.
-fn row(corners: &Corners, v: u32, around: &mut Around) -> Option<Row> {
-    let vertex = &corners.vertices[v as usize];
-    let normal = vertex.normal;
-    if vertex.kind != Kind::Free || normal == Vec3::zeros() {
-        return None;
+    /// Sets the terms of all, in edges so that the equations have one scale; returns those.
+    fn fit(&mut self, corners: &Corners, vertex: &Vertex) -> SMatrix<f64, COEFFICIENTS, COEFFICIENTS> {
+        let normal = vertex.normal;
+        let offset = |w: u32| corners.at(w) - vertex.at;
+        let ring = self.ring.len().max(1);
+        let edge_mm = self.ring.iter().map(|w| offset(*w).norm()).sum::<f64>() / ring as f64;
+        let first = if normal.x.abs() < 0.6 { Vec3::x() } else { Vec3::y() };
+        let first = (first - normal * normal.dot(&first)).normalize();
+        let second = normal.cross(&first);
+        let mut equations = SMatrix::<f64, COEFFICIENTS, COEFFICIENTS>::zeros();
+        equations[(6, 6)] = LEAST_HEIGHT;
+        self.terms.clear();
+        for &w in &self.all {
+            let y = offset(w) / edge_mm;
+            let (u, v, z) = (first.dot(&y), second.dot(&y), normal.dot(&y));
+            let facing = corners.vertices[w as usize].normal.dot(&normal).max(0.0);
+            let weight = facing * (-y.norm_squared() / (WIDTH * WIDTH)).exp();
+            let terms = Terms::from([1.0, u, v, u * u, u * v, v * v, z * z]);
+            equations.ger(weight, &terms, &terms, 1.0);
+            self.terms.push((terms, weight));
+        }
+        equations
     }
-    around.gather(corners, v);
-    let neighbours = &around.all;
-    if neighbours.len() < LEAST_NEIGHBOURS {
-        return None;
-    }
-    let offset = |w: u32| corners.at(w) - vertex.at;
-    let ring = around.ring.len().max(1);
-    let edge_mm = around.ring.iter().map(|w| offset(*w).norm()).sum::<f64>() / ring as f64;
-    let first = if normal.x.abs() < 0.6 { Vec3::x() } else { Vec3::y() };
-    let first = (first - normal * normal.dot(&first)).normalize();
-    let second = normal.cross(&first);
-    // In edges, so that the equations have one scale.
-    let basis = |w: u32| {
-        let y = offset(w) / edge_mm;
-        let (u, v, z) = (first.dot(&y), second.dot(&y), normal.dot(&y));
-        let facing = corners.vertices[w as usize].normal.dot(&normal).max(0.0);
-        let weight = facing * (-y.norm_squared() / (WIDTH * WIDTH)).exp();
-        (SVector::<f64, COEFFICIENTS>::from([1.0, u, v, u * u, u * v, v * v, z * z]), weight)
-    };
-    let mut equations = SMatrix::<f64, COEFFICIENTS, COEFFICIENTS>::zeros();
-    equations[(6, 6)] = LEAST_HEIGHT;
-    for &w in neighbours {
-        let (basis, weight) = basis(w);
-        equations.ger(weight, &basis, &basis, 1.0);
-    }
-    // The first row of the inverse times what neighbours add is what the height at v itself comes to.
-    let mut height = SVector::<f64, COEFFICIENTS>::zeros();
-    height[0] = 1.0;
-    equations.cholesky()?.solve_mut(&mut height);
-    let mut row = Row::default();
-    let mut sum = 0.0;
-    for &w in neighbours {
-        let (basis, weight) = basis(w);
-        let share = weight * height.dot(&basis);
-        sum += share.abs();
-        row.at_rest_mm -= share * normal.dot(&offset(w));
-        row.columns.push((w, -share * normal.dot(&corners.vertices[w as usize].normal)));
-    }
-    (sum <= LARGEST_SUM).then_some(row)
 }
