@@ -3,12 +3,9 @@
 use endowire_core::Result;
 use endowire_core::insertion::{Injection, Move, Script, ScriptRun, Simulation};
 
-use crate::TICKS_PER_S;
 use crate::hand::Motion;
+use crate::{TICKS_PER_S, USUAL_DEG_PER_S, USUAL_MM_PER_S};
 
-/// How fast steps are shown that have no times, mm/s and degrees/s: as fast as keys move an instrument.
-const MM_PER_S: f64 = 10.0;
-const DEG_PER_S: f64 = 90.0;
 /// Least time of a step, s: a tick carries out no more than so many.
 const LEAST_S: f64 = 1.0 / (16.0 * TICKS_PER_S);
 /// Part of a tick by which a step may come too soon: sums of times are rounded.
@@ -88,7 +85,7 @@ impl Demonstration {
 fn usual_s(moves: &[Move]) -> f64 {
     let each = moves.iter().map(|one| {
         let (mm, rad) = (one.command.advance_mm.abs(), one.command.rotate_rad.abs());
-        (mm / MM_PER_S).max(rad.to_degrees() / DEG_PER_S)
+        (mm / USUAL_MM_PER_S).max(rad.to_degrees() / USUAL_DEG_PER_S)
     });
     each.fold(0.0, f64::max)
 }

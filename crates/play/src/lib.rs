@@ -23,3 +23,9 @@ pub use session::{Delivered, Session, Snapshot};
 
 /// Ticks of a session in a second.
 pub const TICKS_PER_S: f64 = 60.0;
+
+/// How fast a key moves an instrument, mm/s; steps of a script without times are shown as fast.
+pub const USUAL_MM_PER_S: f64 = 10.0;
+
+/// How fast a key turns one, degrees/s, likewise.
+pub const USUAL_DEG_PER_S: f64 = 90.0;

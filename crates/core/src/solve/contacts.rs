@@ -41,7 +41,7 @@ const LEAST_PART: f64 = 1e-3;
 const LARGEST_TURN: f64 = 1.0;
 
 /// What a step does to points of the rod.
-pub(super) fn moved<'a, const C: usize>(
+pub(crate) fn moved<'a, const C: usize>(
     elements: &'a [ElementData],
     state: &'a RodState,
     step: &'a [f64],

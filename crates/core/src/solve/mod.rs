@@ -4,7 +4,7 @@
 //! a file each; beside them are the size of a residual, the trial state, contacts within a step, the way out of saddle points, and stiffness that is not
 //! symmetric.
 
-mod contacts;
+pub(crate) mod contacts;
 pub mod external;
 mod lagged;
 mod line_search;

@@ -4,8 +4,8 @@ use super::foresight::falls_until;
 use super::tests::{RADIUS_MM, bent, rod, straight};
 use super::*;
 use crate::contact::{FeltWall, HandMotion};
-use crate::rod::scatter::{point_step, point_turn};
 use crate::rod::{Assembly, Layout, PLAIN, Supports, TWISTED};
+use crate::solve::contacts::moved;
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
 
 /// A wall and a force on the tip; where it is not `foreseeing`, Newton's method is told nothing of contacts within a step.
@@ -172,10 +172,7 @@ fn what_follows_a_step_is_the_change_of_friction_that_is_renewed() {
         step[x..x + 3].copy_from_slice(&[0.8, -0.3, 0.5]);
         step[Layout::<TWISTED>.angle(i, 0)] = 0.2 * i as f64;
     }
-    let moved = |(e, xi, set): (usize, f64, usize)| {
-        let way = point_step::<TWISTED>(&state, &elements[e], (e, xi), &step);
-        (way, point_turn::<TWISTED>((e, xi, set), &step))
-    };
+    let moved = moved::<TWISTED>(&elements, &state, &step);
     let mut gradient = |contact: &mut WallContact<'_>, part: f64| {
         let mut there = state.clone();
         there.advance::<TWISTED>(&elements, &state, &step, part);

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use endowire_play::Input;
+use endowire_play::{Input, USUAL_DEG_PER_S, USUAL_MM_PER_S};
 use endowire_viewer::Mode;
 use winit::keyboard::{KeyCode, ModifiersState};
 
@@ -25,10 +25,6 @@ pub(super) const HELP: &[(&str, &str)] = &[
     ("Backspace, Shift Backspace", "undo the last motion, do it again"),
     ("F1, Esc", "this help, end"),
 ];
-
-/// Speeds of a hand, mm/s and degrees/s.
-const MM_PER_S: f64 = 10.0;
-const DEG_PER_S: f64 = 90.0;
 
 /// What a key asks of the window itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -161,8 +157,8 @@ impl Keys {
             (false, true) => 0.2,
             _ => 1.0,
         };
-        let mm_per_s = scale * MM_PER_S * axis(KeyCode::ArrowUp, KeyCode::ArrowDown);
-        let deg_per_s = scale * DEG_PER_S * axis(KeyCode::ArrowRight, KeyCode::ArrowLeft);
+        let mm_per_s = scale * USUAL_MM_PER_S * axis(KeyCode::ArrowUp, KeyCode::ArrowDown);
+        let deg_per_s = scale * USUAL_DEG_PER_S * axis(KeyCode::ArrowRight, KeyCode::ArrowLeft);
         let hands =
             self.instruments.iter().enumerate().filter(|(index, _)| self.chosen.is_none_or(|c| c == *index));
         hands.map(|(_, name)| Input::Move { instrument: Some(name.clone()), mm_per_s, deg_per_s }).collect()
