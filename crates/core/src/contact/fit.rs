@@ -15,7 +15,7 @@ const THINNEST: f64 = 0.01;
 /// next to it must not bend it. With n = 1, the outer ring counting most, the smooth wall was off by 0.1 mm at 3 of 100 places of
 /// coarse wide vessels, with 6 at 1 of 1,000, and from a vessel that is known it was twice as far; with 16 it is worse again.
 const NEAR: i32 = 6;
-/// Weight that holds the fit of a vertex with few neighbours: 1e-6 of what a neighbour one edge away contributes.
+/// Weight that holds the fit of a vertex with few neighbours, |g|² and tr S²: 1e-6 of what a neighbour one edge away contributes.
 const REGULAR: f64 = 1e-6;
 
 /// For every vertex those that share an edge with it, ascending.
@@ -98,8 +98,8 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &Ne
         (y.dot(&a), y.dot(&b), y.dot(&normal))
     };
     let plane = ellipse(near.iter().map(|&w| flat(w)).map(|(p, q, _)| (p, q))) / (SUPPORT * SUPPORT);
-    let axes = plane.symmetric_eigenvalues();
-    let half_axes_mm = (axes.max().sqrt().recip(), axes.min().sqrt().recip());
+    let shape = plane.symmetric_eigen();
+    let half_axes_mm = (shape.eigenvalues.max().sqrt().recip(), shape.eigenvalues.min().sqrt().recip());
     let mut ring = near.to_vec();
     for &w in near {
         ring.extend(neighbours.of(w));
@@ -108,6 +108,8 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &Ne
     ring.dedup();
     let long = half_axes_mm.1;
     let mut matrix = SMatrix::<f64, 5, 5>::identity() * REGULAR;
+    // tr S² = S₁₁² + 2 S₁₂² + S₂₂² is the same in all axes.
+    matrix[(3, 3)] *= 2.0;
     let mut right = SVector::<f64, 5>::zeros();
     for &w in &ring {
         // Beyond a crease or far away there is another surface.
@@ -129,14 +131,9 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &Ne
     } else {
         (Vector2::zeros(), Matrix2::zeros())
     };
-    // Sag over the support against its half axes, direction by direction.
-    let size = (0..2)
-        .map(|i| {
-            (0..2)
-                .map(|j| (bend[(i, j)] / plane[(i, i)].sqrt().sqrt() / plane[(j, j)].sqrt().sqrt()).abs())
-                .sum::<f64>()
-        })
-        .fold(0.0, f64::max);
+    // Sag over the support against its half axes, in the direction in which it is largest.
+    let shrink = shape.eigenvectors * Matrix2::from_diagonal(&shape.eigenvalues.map(|l| l.sqrt().sqrt().recip()));
+    let size = (shrink.transpose() * bend * shrink).symmetric_eigenvalues().amax();
     let bend = bend * (LARGEST_BEND / size.max(1e-300)).min(1.0);
     // The plane of the fit, and curvature and support seen from it.
     let normal = (normal - a * tilt.x - b * tilt.y).normalize();
