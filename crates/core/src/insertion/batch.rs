@@ -1,8 +1,8 @@
 //! Many insertions stepped side by side, each as if it were alone.
 
-use rayon::iter::{
-    IndexedParallelIterator, IntoParallelRefIterator, IntoParallelRefMutIterator, ParallelIterator,
-};
+use std::cmp::Reverse;
+
+use rayon::iter::{ParallelBridge, ParallelIterator};
 
 use crate::insertion::{Command, Move, Simulation};
 use crate::{Error, Result};
@@ -66,10 +66,20 @@ impl Batch {
         if let ([simulation], [one]) = (&mut self.simulations[..], given) {
             return Ok(vec![work(simulation, one)]);
         }
-        // Steps differ in length by orders of magnitude: each is a piece of work of its own.
-        let each = self.simulations.par_iter_mut().zip(given.par_iter()).with_max_len(1);
-        Ok(each.map(|(simulation, one)| work(simulation, one)).collect())
+        // Steps differ in length by orders of magnitude: each is a piece of work of its own, and those that may be long come first, so
+        // that no thread begins one when the others have done. A step is mostly like the one before it.
+        let mut all: Vec<_> = self.simulations.iter_mut().zip(given).enumerate().collect();
+        all.sort_by_cached_key(|(_, (simulation, _))| Reverse(labour(simulation)));
+        let step = |(index, (simulation, one))| (index, work(simulation, one));
+        let mut told: Vec<_> = all.into_iter().par_bridge().map(step).collect();
+        told.sort_by_key(|(index, _)| *index);
+        Ok(told.into_iter().map(|(_, told)| told).collect())
     }
+}
+
+/// What the last step took: iterations, times what each of them goes through.
+fn labour(simulation: &Simulation) -> usize {
+    simulation.report().iterations as usize * simulation.shape().positions_mm.len()
 }
 
 #[cfg(test)]

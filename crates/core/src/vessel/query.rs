@@ -7,6 +7,7 @@
 use std::sync::OnceLock;
 
 use parry3d_f64::glamx::DVec3;
+use parry3d_f64::partitioning::BvhNode;
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
 use parry3d_f64::shape::{CompositeShapeRef, TriMesh, Triangle, TrianglePointLocation};
 
@@ -16,6 +17,9 @@ use crate::{Error, Result, Vec3};
 
 /// Closer to the wall than this, in mm, the direction to the closest point is rounding: the triangle's normal is used.
 const ON_WALL_MM: f64 = 1e-7;
+
+/// Boxes of triangles are taken for larger by this, in mm, when a way through them is looked for: more than rounding.
+const BOX_MARGIN_MM: f64 = 1e-9;
 
 /// The closest point of a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -129,7 +133,17 @@ impl WallQuery {
             return None;
         }
         let ray = Ray::new(to_parry(from_mm), to_parry(&(to_mm - from_mm)));
-        self.ready()?.shape.cast_local_ray(&ray, farthest, true)
+        let shape = &self.ready()?.shape;
+        // As the shape's own question, but for divisions at every box.
+        let per_way = ray.dir.recip();
+        let enters = |node: &BvhNode, nearest: f64| {
+            let low = (node.mins() - BOX_MARGIN_MM - ray.origin) * per_way;
+            let high = (node.maxs() + BOX_MARGIN_MM - ray.origin) * per_way;
+            let begin = low.min(high).max_element().max(0.0);
+            if begin <= low.max(high).min_element().min(nearest) { begin } else { f64::MAX }
+        };
+        let meets = |triangle, nearest| shape.triangle(triangle).cast_local_ray(&ray, nearest, true);
+        shape.bvh().find_best(farthest, enters, meets).map(|(_, part)| part)
     }
 
     /// What a ray first meets within `reach_mm`: how far it is, and the triangle. `direction` is of unit length.
@@ -172,5 +186,43 @@ impl WallQuery {
         let side = if offset.dot(&inward) >= 0.0 { 1.0 } else { -1.0 };
         let normal = if length > ON_WALL_MM { offset * (side / length) } else { own };
         Some(Nearest { point_mm: closest, distance_mm: side * length, normal, triangle, rim })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{splitmix64, unit};
+    use crate::vessel::{GeneratedWall, Resolution, anatomy};
+
+    #[test]
+    fn ways_meet_the_wall_where_the_shape_itself_says() {
+        let tree = anatomy::tree("aortic_arch").unwrap();
+        let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(4.0)).unwrap().wall;
+        let query = WallQuery::new(&wall).unwrap();
+        let shape = &query.ready().unwrap().shape;
+        let (mut met, mut missed) = (0, 0);
+        for k in 0..3000_u64 {
+            let number = |n| unit(splitmix64(7, 12 * k + n)) - 0.5;
+            // From places around vertices, ways of 0.01 to 100 mm; some along an axis, and some that begin on a box's side.
+            let vertex = wall.mesh().vertices_mm[k as usize % wall.mesh().vertices_mm.len()];
+            let away = Vec3::new(number(0), number(1), number(2)) * 20.0;
+            let from = if k % 7 == 0 { vertex } else { vertex + away };
+            let mut way = Vec3::new(number(3), number(4), number(5)) * 10f64.powf(4.0 * number(6) + 1.0);
+            if k % 5 == 0 {
+                way[k as usize % 3] = 0.0;
+            }
+            if k % 15 == 0 {
+                way[(k as usize + 1) % 3] = 0.0;
+            }
+            let farthest = 1.0 + 4.0 * (number(7) + 0.5);
+            let ray = Ray::new(to_parry(&from), to_parry(&((from + way) - from)));
+            let expected = shape.cast_local_ray(&ray, farthest, true);
+            assert_eq!(query.crossing(&from, &(from + way), farthest), expected, "{from} {way}");
+            *(if expected.is_some() { &mut met } else { &mut missed }) += 1;
+        }
+        assert!(met > 500 && missed > 500, "{met} met it, {missed} did not");
+        assert_eq!(query.crossing(&Vec3::zeros(), &Vec3::zeros(), 2.0), None);
+        assert_eq!(query.crossing(&Vec3::zeros(), &Vec3::repeat(f64::NAN), 2.0), None);
     }
 }

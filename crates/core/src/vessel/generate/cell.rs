@@ -33,8 +33,13 @@ fn ends(edge: usize) -> [[usize; 3]; 2] {
 }
 
 impl Pieces {
-    /// What the surface does in a cell of these values at its corners, if anything.
-    pub(super) fn of(value: impl Fn([usize; 3]) -> f64) -> Option<Self> {
+    /// What the surface does in a cell of these values at its corners (x + 2 y + 4 z), if anything.
+    pub(super) fn of(values: &[f64; 8]) -> Option<Self> {
+        let inside = values.iter().filter(|value| **value < 0.0).count();
+        if inside == 0 || inside == values.len() {
+            return None;
+        }
+        let value = |[x, y, z]: [usize; 3]| values[x + 2 * y + 4 * z];
         let crossing = |edge: usize| {
             let [from, to] = ends(edge);
             let (a, b) = (value(from), value(to));
@@ -45,9 +50,6 @@ impl Pieces {
             })
         };
         let at: [Option<Vec3>; EDGES] = std::array::from_fn(crossing);
-        if at.iter().all(Option::is_none) {
-            return None;
-        }
         // The first edge of each piece stands for it.
         let mut first: [usize; EDGES] = std::array::from_fn(|edge| edge);
         let mut join = |a: usize, b: usize| {
@@ -113,7 +115,7 @@ mod tests {
 
     /// Pieces of a cell of which these corners are inside; a list of corners by x + 2y + 4z.
     fn pieces(inside: &[usize], depth: f64) -> Option<Pieces> {
-        Pieces::of(|[x, y, z]| if inside.contains(&(x + 2 * y + 4 * z)) { -depth } else { 1.0 })
+        Pieces::of(&std::array::from_fn(|corner| if inside.contains(&corner) { -depth } else { 1.0 }))
     }
 
     #[test]

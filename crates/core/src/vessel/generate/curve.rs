@@ -54,6 +54,16 @@ pub(super) struct Branch {
     pub(super) root_row: Option<usize>,
     /// Row of the leaf, if the branch ends in one: an open end.
     pub(super) leaf_row: Option<usize>,
+    /// The course at each sample: where every search for a foot begins.
+    pub(super) at_samples: Vec<Course>,
+}
+
+/// Position and derivatives of a centre line at an arc length.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Course {
+    pub(super) position: Vec3,
+    pub(super) first: Vec3,
+    pub(super) second: Vec3,
 }
 
 /// Position and derivatives at an arc length.
@@ -74,37 +84,63 @@ impl Branch {
 
     /// The curve at arc length `s`; beyond the ends it goes on straight, with the same taper.
     pub(super) fn at(&self, s: f64) -> Place {
-        let last = self.samples.len() - 1;
-        let end = if s < 0.0 { Some((&self.samples[0], s)) } else { None };
-        let end = if s > self.length() { Some((&self.samples[last], s - self.length())) } else { end };
-        if let Some((sample, beyond)) = end {
-            return Place {
+        let (Course { position, first, second }, (radius, slope)) = (self.course(s), self.width(s));
+        Place { position, first, second, radius, slope }
+    }
+
+    /// [`Branch::at`] without the radius.
+    pub(super) fn course(&self, s: f64) -> Course {
+        if let Some((sample, beyond)) = self.beyond(s) {
+            return Course {
                 position: sample.position + beyond * sample.tangent,
                 first: sample.tangent,
                 second: Vec3::zeros(),
-                radius: (sample.radius + beyond * sample.slope)
-                    .clamp(0.5 * sample.radius, 2.0 * sample.radius),
-                slope: sample.slope,
             };
         }
-        let index = ((s / self.step) as usize).min(last - 1);
-        let (a, b, h) = (&self.samples[index], &self.samples[index + 1], self.step);
-        let t = s / h - index as f64;
+        let (a, b, t) = self.between(s);
+        let h = self.step;
         let (t2, t3) = (t * t, t * t * t);
-        let value = [2.0 * t3 - 3.0 * t2 + 1.0, t3 - 2.0 * t2 + t, 3.0 * t2 - 2.0 * t3, t3 - t2];
-        let first = [6.0 * t2 - 6.0 * t, 3.0 * t2 - 4.0 * t + 1.0, 6.0 * t - 6.0 * t2, 3.0 * t2 - 2.0 * t];
-        let second = [12.0 * t - 6.0, 6.0 * t - 4.0, 6.0 - 12.0 * t, 6.0 * t - 2.0];
+        let value = [t3 - 2.0 * t2 + t, 3.0 * t2 - 2.0 * t3, t3 - t2];
+        let first = [3.0 * t2 - 4.0 * t + 1.0, 6.0 * t - 6.0 * t2, 3.0 * t2 - 2.0 * t];
+        let second = [6.0 * t - 4.0, 6.0 - 12.0 * t, 6.0 * t - 2.0];
         // Positions relative to the first sample, so that far-away anatomies lose no digits.
         let chord = b.position - a.position;
-        let curve = |w: [f64; 4]| w[2] * chord + h * (w[1] * a.tangent + w[3] * b.tangent);
-        let radius = |w: [f64; 4]| w[0] * a.radius + w[2] * b.radius + h * (w[1] * a.slope + w[3] * b.slope);
-        Place {
+        let curve = |w: [f64; 3]| w[1] * chord + h * (w[0] * a.tangent + w[2] * b.tangent);
+        Course {
             position: a.position + curve(value),
             first: curve(first) / h,
             second: curve(second) / (h * h),
-            radius: radius(value),
-            slope: radius(first) / h,
         }
+    }
+
+    /// Radius and its slope at arc length `s`, as [`Branch::at`] has them.
+    pub(super) fn width(&self, s: f64) -> (f64, f64) {
+        if let Some((sample, beyond)) = self.beyond(s) {
+            let radius = sample.radius + beyond * sample.slope;
+            return (radius.clamp(0.5 * sample.radius, 2.0 * sample.radius), sample.slope);
+        }
+        let (a, b, t) = self.between(s);
+        let h = self.step;
+        let (t2, t3) = (t * t, t * t * t);
+        let value = [2.0 * t3 - 3.0 * t2 + 1.0, t3 - 2.0 * t2 + t, 3.0 * t2 - 2.0 * t3, t3 - t2];
+        let first = [6.0 * t2 - 6.0 * t, 3.0 * t2 - 4.0 * t + 1.0, 6.0 * t - 6.0 * t2, 3.0 * t2 - 2.0 * t];
+        let radius = |w: [f64; 4]| w[0] * a.radius + w[2] * b.radius + h * (w[1] * a.slope + w[3] * b.slope);
+        (radius(value), radius(first) / h)
+    }
+
+    /// The end beyond which arc length `s` is, if any, and by how much.
+    fn beyond(&self, s: f64) -> Option<(&Sample, f64)> {
+        if s < 0.0 {
+            return Some((&self.samples[0], s));
+        }
+        (s > self.length()).then(|| (&self.samples[self.samples.len() - 1], s - self.length()))
+    }
+
+    /// The samples that arc length `s` is between, and the part of the way from one to the other.
+    fn between(&self, s: f64) -> (&Sample, &Sample, f64) {
+        let along = s / self.step;
+        let index = (along as usize).min(self.samples.len() - 2);
+        (&self.samples[index], &self.samples[index + 1], along - index as f64)
     }
 }
 
@@ -214,12 +250,15 @@ fn fit(tree: &CentrelineTree, rows: &[usize], leaves_parent: bool, ends_in_leaf:
             slope: place.slope / speed,
         });
     }
-    Ok(Branch {
+    let mut branch = Branch {
         samples,
         step,
         root_row: (!leaves_parent).then_some(rows[0]),
         leaf_row: ends_in_leaf.then_some(rows[rows.len() - 1]),
-    })
+        at_samples: Vec::new(),
+    };
+    branch.at_samples = (0..branch.samples.len()).map(|k| branch.course(step * k as f64)).collect();
+    Ok(branch)
 }
 
 /// A natural cubic spline over chord length, with a monotone cubic for the radius.

@@ -213,39 +213,40 @@ impl Field {
             (if low { f64::NEG_INFINITY } else { 0.0 }, if high { f64::INFINITY } else { branch.length() });
         let centre = branch.step * f64::from(nearest);
         let mut s = centre;
-        let mut place = branch.at(s);
+        let mut course = branch.at_samples[nearest as usize];
         let mut stretch = 1.0;
         for _ in 0..FOOT_STEPS {
-            let offset = point - place.position;
+            let offset = point - course.position;
             // The derivative of the squared distance; positive near the foot because bends are wider than the vessel.
-            stretch = (place.first.norm_squared() - offset.dot(&place.second)).max(0.05);
+            stretch = (course.first.norm_squared() - offset.dot(&course.second)).max(0.05);
             let inner = s > 0.0 && s < branch.length();
-            let move_by = offset.dot(&place.first) / stretch;
+            let move_by = offset.dot(&course.first) / stretch;
             let limit = if inner { branch.step } else { f64::INFINITY };
             let next = (s + move_by.clamp(-limit, limit)).clamp(ends.0, ends.1);
             let change = (next - s).abs();
             s = next;
-            place = branch.at(s);
+            course = branch.course(s);
             if change <= FOOT * branch.step {
                 break;
             }
         }
-        let offset = point - place.position;
+        let (radius, slope) = branch.width(s);
+        let offset = point - course.position;
         let distance = offset.norm();
-        let radial = distance - place.radius;
+        let radial = distance - radius;
         // Past an open end the tube goes on for `extension` and stops flat.
         let beyond = (-s).max(s - branch.length()) - self.extension;
         if beyond > radial {
-            let outward = if s < 0.0 { -place.first } else { place.first };
-            return Value { f: beyond, gradient: outward, radius: place.radius, exposure: 1.0 };
+            let outward = if s < 0.0 { -course.first } else { course.first };
+            return Value { f: beyond, gradient: outward, radius, exposure: 1.0 };
         }
         let clamped = (!low && s <= 0.0) || (!high && s >= branch.length());
-        let along = if clamped { Vec3::zeros() } else { place.first / stretch };
-        let gradient = offset / distance.max(f64::MIN_POSITIVE) - place.slope * along;
+        let along = if clamped { Vec3::zeros() } else { course.first / stretch };
+        let gradient = offset / distance.max(f64::MIN_POSITIVE) - slope * along;
         let from_start = if low { f64::INFINITY } else { s };
         let from_end = if high { f64::INFINITY } else { branch.length() - s };
-        let exposure = smooth_step(from_start.min(from_end) / (HIDDEN * place.radius));
-        Value { f: radial, gradient, radius: place.radius, exposure }
+        let exposure = smooth_step(from_start.min(from_end) / (HIDDEN * radius));
+        Value { f: radial, gradient, radius, exposure }
     }
 }
 

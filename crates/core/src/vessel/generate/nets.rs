@@ -77,7 +77,11 @@ struct Block {
 impl Block {
     /// What the surface does in a cell whose corners are known, if it passes.
     fn pieces(&self, cell: [usize; 3]) -> Option<Pieces> {
-        Pieces::of(|offset| self.corners[corner_index([0, 1, 2].map(|axis| cell[axis] + offset[axis]))])
+        let [near, far] = [0, CORNERS * CORNERS].map(|up| corner_index(cell) + up);
+        let row = |at: usize| [self.corners[at], self.corners[at + 1]];
+        let ([a, b], [c, d]) = (row(near), row(near + CORNERS));
+        let ([e, f], [g, h]) = (row(far), row(far + CORNERS));
+        Pieces::of(&[a, b, c, d, e, f, g, h])
     }
 
     /// The vertex in a cell of the piece that crosses one of its edges.
@@ -259,7 +263,7 @@ fn for_each_cell(mut visit: impl FnMut([usize; 3])) {
 /// False if a cell around it has no vertex.
 fn push_quad(
     blocks: &BTreeMap<Key, Block>,
-    key: &Key,
+    own: &Key,
     block: &Block,
     cell: [usize; 3],
     axis: usize,
@@ -277,7 +281,7 @@ fn push_quad(
     for (corner, (back_u, back_v)) in
         [(true, true), (false, true), (false, false), (true, false)].into_iter().enumerate()
     {
-        let (mut at, mut key) = (cell, *key);
+        let (mut at, mut key) = (cell, *own);
         for (direction, back) in [(u, back_u), (v, back_v)] {
             if back && at[direction] == 0 {
                 at[direction] = BLOCK - 1;
@@ -287,7 +291,9 @@ fn push_quad(
             }
         }
         let edge = 4 * axis + usize::from(back_u) + 2 * usize::from(back_v);
-        quad[corner] = blocks.get(&key).map_or(u32::MAX, |b| b.vertex(cell_index(at), edge));
+        // Most of its cells are in one block, whose place need not be looked for.
+        let owner = if key == *own { Some(block) } else { blocks.get(&key) };
+        quad[corner] = owner.map_or(u32::MAX, |b| b.vertex(cell_index(at), edge));
     }
     if a >= 0.0 {
         quad.reverse();
