@@ -1,9 +1,9 @@
 //! To which point of the tree a place in the lumen belongs: found once for a vessel, whatever is injected and wherever the C-arm stands.
 
-use std::collections::HashMap;
 use std::sync::{MutexGuard, PoisonError};
 
 use endowire_core::Vec3;
+use rustc_hash::FxHashMap;
 
 use super::flow::{Flow, Node};
 
@@ -11,7 +11,7 @@ use super::flow::{Flow, Node};
 pub(super) const STEP_MM: f64 = 1.25;
 
 /// The nearest node of each cell that was asked for.
-pub(super) type Cells = HashMap<[i32; 3], u32>;
+pub(super) type Cells = FxHashMap<[i32; 3], u32>;
 
 /// Nearest nodes of a flow by cells, found where they are first asked for.
 pub(super) struct Nearest<'a> {

@@ -24,6 +24,8 @@ use crate::spec::InjectionSpec;
 const COURANT: f64 = 0.8;
 /// Longest step, s: a hundredth of a heartbeat.
 const LONGEST_S: f64 = 0.008;
+/// Most moments that are kept to go back to. Where there would be more, each second one is let go.
+const MOST_MARKS: usize = 64;
 /// Part of the injected medium that may be left where all has passed, and how long that is waited for, s.
 const LEFT: f64 = 0.01;
 const WAITED_S: f64 = 20.0;
@@ -43,6 +45,9 @@ pub(super) struct Transport {
     left_mm3: f64,
     /// Flows through the faces upstream of cells, mm³/s.
     faces: Vec<f64>,
+    /// Moments on the way, rising, and the least steps between them.
+    marks: Vec<Self>,
+    apart: i64,
 }
 
 impl Transport {
@@ -59,22 +64,55 @@ impl Transport {
             tissue_mm3: vec![0.0; cells],
             left_mm3: 0.0,
             faces: vec![0.0; cells],
+            marks: vec![],
+            apart: 1,
         }
     }
 
-    /// Goes on to a time; one that has passed begins anew. Where a tip injects it does so at `tip_mm` all the way.
+    /// Goes on to a time; to one that has passed, from a moment before it or from the first. Where a tip injects it does so at `tip_mm` all the
+    /// way, from the first moment on.
     pub(super) fn advance(&mut self, flow: &Flow, time_s: f64, tip_mm: Option<Vec3>) {
         let wanted = (time_s / self.step_s).ceil() as i64;
         if wanted < self.steps {
-            *self = Self::new(flow);
+            self.go_back(flow, wanted);
         }
+        let stays = !flow.injections.iter().any(|i| i.at_tip);
         let places: Vec<usize> = flow.injections.iter().map(|i| place(flow, i, tip_mm)).collect();
         while self.steps < wanted {
             self.wait(flow, wanted);
             if self.steps < wanted {
                 self.step(flow, &places);
+                if stays {
+                    self.mark();
+                }
             }
         }
+    }
+
+    /// To the last moment that is known not after a step.
+    fn go_back(&mut self, flow: &Flow, step: i64) {
+        let (marks, apart) = (std::mem::take(&mut self.marks), self.apart);
+        let before = marks.partition_point(|mark| mark.steps <= step).checked_sub(1);
+        *self = before.map_or_else(|| Self::new(flow), |place| marks[place].clone());
+        (self.marks, self.apart) = (marks, apart);
+    }
+
+    /// Keeps this moment where none that is near is kept.
+    fn mark(&mut self) {
+        if self.marks.last().is_some_and(|mark| self.steps < mark.steps + self.apart) {
+            return;
+        }
+        let mut marks = std::mem::take(&mut self.marks);
+        if marks.len() >= MOST_MARKS {
+            let mut first = false;
+            marks.retain(|_| {
+                first = !first;
+                first
+            });
+            self.apart *= 2;
+        }
+        marks.push(self.clone());
+        self.marks = marks;
     }
 
     /// Where all has gone, goes on to the next injection or to a step: what has gone does not come back.
@@ -299,6 +337,20 @@ mod tests {
         once.advance(&flow, 1.777, None);
         assert_eq!(often.at(1.777), once.at(1.777));
         assert!(once.at(1.777).iter().any(|f| *f > 0.1));
+        // Back from a moment that is kept: few are, and a later one is none to go on from.
+        assert!(often.marks.len() <= MOST_MARKS && often.apart > 1, "{}", often.apart);
+        for time in [1.21, 2.4, 1.003, 1.777] {
+            often.advance(&flow, time, None);
+            let mut alone = Transport::new(&flow);
+            alone.advance(&flow, time, None);
+            assert_eq!((often.at(time), often.steps), (alone.at(time), alone.steps), "{time}");
+            assert_eq!(often.tissue_mm3, alone.tissue_mm3);
+        }
+        let near = often.marks.partition_point(|mark| mark.steps <= often.steps);
+        assert!(
+            near > 0 && often.steps - often.marks[near - 1].steps < often.apart,
+            "the twin: from the first moment"
+        );
     }
 
     #[test]

@@ -90,6 +90,8 @@ pub(crate) struct Fluoroscope {
     pub(crate) still: Signal,
     /// The same with the blades wide open, where there are any.
     unblocked: Option<Signal>,
+    /// Pixels that show the vessel, once they were asked for.
+    vessel: Option<Mask>,
     /// Lengths inside devices by material, all zero between frames.
     devices: Vec<(Material, Lanes, Vec<f32>)>,
     /// Rays and pixels that devices touch in this frame.
@@ -165,6 +167,7 @@ impl Fluoroscope {
             scatter: Scatter::new(&still, c_arm, spec.detector.scatter_fraction),
             still,
             unblocked: None,
+            vessel: None,
             devices: vec![],
             touched: vec![],
             pixels: vec![],
@@ -197,6 +200,7 @@ impl Fluoroscope {
     /// Goes on with the vessel where it has moved to. Exposure, which a control would hold meanwhile, stays as it is.
     pub(crate) fn move_vessel(&mut self, setup: &Setup, engine: &mut dyn PathEngine) -> Result<()> {
         self.anatomy = Arc::new(self.anatomy.moved(setup, &self.rays, engine)?);
+        self.vessel = None;
         if let Some(flow) = &setup.flow {
             let shares = Shares::new(flow, &self.c_arm, setup.filled_now(), setup.displacement());
             self.contrast = Some(ContrastMap::new(flow, Arc::new(shares), setup.displacement()));
@@ -218,7 +222,10 @@ impl Fluoroscope {
     }
 
     /// Pixels at least half of whose rays meet the lumen, under no blade.
-    pub(crate) fn vessel(&self) -> Mask {
+    pub(crate) fn vessel(&mut self) -> Mask {
+        if let Some(known) = &self.vessel {
+            return known.clone();
+        }
         let inside = |pixel: u32| {
             let (first, stride) = self.first_ray(pixel as usize);
             let rays = (0..SUBRAYS as usize)
@@ -227,7 +234,8 @@ impl Fluoroscope {
             2 * met >= (SUBRAYS * SUBRAYS) as usize && self.c_arm.openness(pixel as usize) >= 0.5
         };
         let size_px = self.c_arm.size_px();
-        Mask::new(size_px, (0..size_px[0] * size_px[1]).filter(|&pixel| inside(pixel)).collect())
+        let mask = Mask::new(size_px, (0..size_px[0] * size_px[1]).filter(|&pixel| inside(pixel)).collect());
+        self.vessel.insert(mask).clone()
     }
 
     /// Signal with devices, the mean over the instants of a pulse, and the contrast medium of a time; without a time, before any injection.

@@ -19,13 +19,13 @@ const CELLS: f64 = 4.0;
 /// The Gaussian ends at this many deviations.
 const REACH: f64 = 3.0;
 
-/// Scattered signal and signal times energy, by cells.
+/// Scattered signal and signal times energy.
 #[derive(Debug, Clone)]
 pub(super) struct Scatter {
     cells: Cells,
     /// Scattered for each unit of primary.
     gain: f32,
-    /// That of the anatomy.
+    /// That of the anatomy, by pixels; empty where nothing is scattered.
     still: Vec<[f32; 2]>,
 }
 
@@ -34,15 +34,15 @@ impl Scatter {
     pub(super) fn new(primary: &Signal, c_arm: &CArm, share: f64) -> Self {
         let gain = (share / (1.0 - share)) as f32;
         let mut scatter = Self { cells: Cells::new(c_arm, SCATTER_MM), gain, still: vec![] };
-        let values = primary.signal.iter().zip(&primary.energy).map(|(s, e)| [*s, *e]);
-        scatter.still = scatter.spread(values.enumerate());
+        if scatter.gain > 0.0 {
+            let values = primary.signal.iter().zip(&primary.energy).map(|(s, e)| [*s, *e]);
+            scatter.still = scatter.cells.spread_out(&scatter.spread(values.enumerate()));
+        }
         scatter
     }
 
+    /// What pixels scatter, by cells.
     fn spread(&self, primary: impl Iterator<Item = (usize, [f32; 2])>) -> Vec<[f32; 2]> {
-        if self.gain == 0.0 {
-            return vec![[0.0; 2]; self.cells.count.iter().product()];
-        }
         let mut cells = self.cells.blurred(&self.cells.gathered(primary));
         cells.iter_mut().for_each(|cell| *cell = cell.map(|v| v * self.gain));
         cells
@@ -50,29 +50,26 @@ impl Scatter {
 
     /// What the anatomy scatters to a pixel.
     pub(super) fn still(&self, pixel: usize) -> [f32; 2] {
-        self.cells.at(&self.still, pixel)
+        self.still.get(pixel).copied().unwrap_or_default()
     }
 
     /// Adds what the anatomy scatters.
     pub(super) fn add_still(&self, to: &mut Signal) {
-        self.add(&self.still, to);
+        add(&self.still, to);
     }
 
     /// Adds what is scattered more, or less, where the primary of the given pixels differs from the anatomy's.
     pub(super) fn add_change(&self, primary: impl Iterator<Item = (usize, [f32; 2])>, to: &mut Signal) {
-        self.add(&self.spread(primary), to);
-    }
-
-    fn add(&self, cells: &[[f32; 2]], to: &mut Signal) {
-        if self.gain == 0.0 {
-            return;
+        if self.gain > 0.0 {
+            add(&self.cells.spread_out(&self.spread(primary)), to);
         }
-        let pixels = to.signal.par_iter_mut().zip(&mut to.energy).with_min_len(FEWEST_PIXELS).enumerate();
-        pixels.for_each(|(pixel, (signal, energy))| {
-            let [more, more_energy] = self.cells.at(cells, pixel);
-            *signal += more;
-            *energy += more_energy;
-        });
+    }
+}
+
+fn add(scattered: &[[f32; 2]], to: &mut Signal) {
+    for ((signal, energy), [more, more_energy]) in to.signal.iter_mut().zip(&mut to.energy).zip(scattered) {
+        *signal += more;
+        *energy += more_energy;
     }
 }
 
@@ -80,8 +77,7 @@ impl Scatter {
 pub(super) fn shading(values: &[f32], c_arm: &CArm) -> Vec<f32> {
     let cells = Cells::new(c_arm, SHADING_MM);
     let coarse = cells.blurred(&cells.gathered(values.iter().map(|v| [*v]).enumerate()));
-    let pixels = (0..values.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
-    pixels.map(|pixel| cells.at(&coarse, pixel)[0]).collect()
+    cells.spread_out(&coarse).into_iter().map(|[v]| v).collect()
 }
 
 /// A picture in cells, a quarter of a deviation wide each.
@@ -117,19 +113,31 @@ impl Cells {
         sums
     }
 
-    /// The value at a pixel, bilinear between the middles of cells.
-    #[inline]
-    fn at<const N: usize>(&self, cells: &[[f32; N]], pixel: usize) -> [f32; N] {
-        let place = |pixel: usize, n: usize| {
-            let v = ((pixel as f32 + 0.5) / self.side_px as f32 - 0.5).clamp(0.0, (n - 1) as f32);
-            let i = (v as usize).min(n.saturating_sub(2));
-            (i, (i + 1).min(n - 1), v - i as f32)
-        };
-        let (x0, x1, u) = place(pixel % self.size_px[0], self.count[0]);
-        let (y0, y1, v) = place(pixel / self.size_px[0], self.count[1]);
-        let [a, b, c, d] =
-            [(x0, y0), (x1, y0), (x0, y1), (x1, y1)].map(|(x, y)| cells[y * self.count[0] + x]);
-        std::array::from_fn(|i| (a[i] * (1.0 - u) + b[i] * u) * (1.0 - v) + (c[i] * (1.0 - u) + d[i] * u) * v)
+    /// The cells before and after a column or row of pixels, and the weight of the second.
+    fn place(&self, pixel: usize, axis: usize) -> (usize, usize, f32) {
+        let n = self.count[axis];
+        let v = ((pixel as f32 + 0.5) / self.side_px as f32 - 0.5).clamp(0.0, (n - 1) as f32);
+        let i = (v as usize).min(n.saturating_sub(2));
+        (i, (i + 1).min(n - 1), v - i as f32)
+    }
+
+    /// The value at each pixel, bilinear between the middles of cells.
+    fn spread_out<const N: usize>(&self, cells: &[[f32; N]]) -> Vec<[f32; N]> {
+        let [width, height] = self.size_px;
+        let columns: Vec<_> = (0..width).map(|x| self.place(x, 0)).collect();
+        let mut out = vec![[0.0; N]; width * height];
+        let rows = out.par_chunks_exact_mut(width).with_min_len(FEWEST_PIXELS.div_ceil(width)).enumerate();
+        rows.for_each(|(y, row)| {
+            let (y0, y1, v) = self.place(y, 1);
+            let [above, below] = [y0, y1].map(|y| &cells[y * self.count[0]..][..self.count[0]]);
+            for (out, &(x0, x1, u)) in row.iter_mut().zip(&columns) {
+                let [a, b, c, d] = [above[x0], above[x1], below[x0], below[x1]];
+                for i in 0..N {
+                    out[i] = (a[i] * (1.0 - u) + b[i] * u) * (1.0 - v) + (c[i] * (1.0 - u) + d[i] * u) * v;
+                }
+            }
+        });
+        out
     }
 
     /// Blurs along rows, then along columns; borders repeat: the body goes on.

@@ -11,6 +11,7 @@
 use rayon::prelude::*;
 
 use super::blur::Blur;
+use super::exp::LANES;
 use super::noise::{normal, normal_table, philox, poisson};
 use crate::c_arm::CArm;
 use crate::spec::{DetectorSpec, XRaySpec};
@@ -19,8 +20,10 @@ use crate::spec::{DetectorSpec, XRaySpec};
 const QUANTA: u32 = 0;
 const ELECTRONS: u32 = 1;
 
-/// Fewest groups of four pixels worth handing to another thread.
-const FEWEST_GROUPS: usize = 2048;
+/// Pixels whose random words are made side by side.
+const BLOCK: usize = 4 * LANES;
+/// Pixels that one thread takes at a time: whole blocks.
+const RUN: usize = 256 * BLOCK;
 
 /// Turns signals into noisy, blurred and lagging ones.
 #[derive(Debug)]
@@ -35,6 +38,8 @@ pub(crate) struct Detector {
     lag: f32,
     /// The last signal read; empty before the first.
     stored: Vec<f32>,
+    /// Widest instructions there are: the same operations with any.
+    arch: pulp::Arch,
 }
 
 impl Detector {
@@ -52,6 +57,7 @@ impl Detector {
             electronic_kev: if spec.noise { electronic_kev as f32 } else { 0.0 },
             lag: spec.lag as f32,
             stored: vec![],
+            arch: pulp::Arch::new(),
         }
     }
 
@@ -95,36 +101,109 @@ impl Detector {
         image
     }
 
-    /// Random words of four pixels.
-    fn words(&self, group: u32, stream: u32, frame: u64) -> [u32; 4] {
-        philox([group, stream, frame as u32, (frame >> 32) as u32], self.key)
-    }
-
     /// Counts quanta: signals become those of numbers of quanta.
     fn count(&self, image: &mut [f32], energy: &[f32], kev: f64, frame: u64) {
-        let (kev, each) = (kev as f32, 1.0 / kev as f32);
-        let normal = normal_table();
-        let groups =
-            image.par_chunks_mut(4).zip(energy.par_chunks(4)).with_min_len(FEWEST_GROUPS).enumerate();
-        groups.for_each(|(group, (signal, energy))| {
-            let words = self.words(group as u32, QUANTA, frame);
-            for ((s, &e), word) in signal.iter_mut().zip(energy).zip(words) {
-                // An energy of e/s each: s·kev/(e/s) quanta.
-                let quantum = e / s.max(f32::MIN_POSITIVE);
-                let mean = *s * kev / quantum.max(1.0);
-                *s = (poisson(mean, word, normal) * quantum * each).max(0.0);
-            }
+        let runs = image.par_chunks_mut(RUN).zip(energy.par_chunks(RUN)).enumerate();
+        runs.for_each(|(run, (signal, energy))| {
+            let words = Words { key: self.key, first: run * RUN, stream: QUANTA, frame };
+            self.arch.dispatch(Counted { words, signal, energy, kev: kev as f32, each: 1.0 / kev as f32 });
         });
     }
 
     /// Adds the noise of electronics.
     fn add_electronic(&self, image: &mut [f32], kev: f64, frame: u64) {
         let deviation = self.electronic_kev / kev as f32;
-        let table = normal_table();
-        image.par_chunks_mut(4).with_min_len(FEWEST_GROUPS).enumerate().for_each(|(group, signal)| {
-            let words = self.words(group as u32, ELECTRONS, frame);
-            signal.iter_mut().zip(words).for_each(|(s, word)| *s += deviation * normal(word, table));
+        image.par_chunks_mut(RUN).enumerate().for_each(|(run, signal)| {
+            let words = Words { key: self.key, first: run * RUN, stream: ELECTRONS, frame };
+            self.arch.dispatch(Disturbed { words, signal, deviation });
         });
+    }
+}
+
+/// Where the random words of a run of pixels come from: four pixels have the words of one counter.
+#[derive(Clone, Copy)]
+struct Words {
+    key: [u32; 2],
+    /// Number of the first pixel.
+    first: usize,
+    stream: u32,
+    frame: u64,
+}
+
+impl Words {
+    /// Those of a block of the run.
+    #[inline(always)]
+    fn of(&self, block: usize) -> [u32; BLOCK] {
+        let mut groups = [(self.first / 4 + block * LANES) as u32; LANES];
+        for (lane, group) in groups.iter_mut().enumerate() {
+            *group = group.wrapping_add(lane as u32);
+        }
+        let frame = [self.frame as u32, (self.frame >> 32) as u32];
+        let words = philox([groups, [self.stream; LANES], [frame[0]; LANES], [frame[1]; LANES]], self.key);
+        let mut of_pixels = [0; BLOCK];
+        for lane in 0..LANES {
+            for (k, word) in words.iter().enumerate() {
+                of_pixels[4 * lane + k] = word[lane];
+            }
+        }
+        of_pixels
+    }
+}
+
+/// Signals that are to become those of numbers of quanta. Structs, and loops in place of maps: what they do is inlined where closures
+/// are not, and has the widest instructions there are.
+struct Counted<'a> {
+    words: Words,
+    signal: &'a mut [f32],
+    energy: &'a [f32],
+    kev: f32,
+    each: f32,
+}
+
+impl pulp::WithSimd for Counted<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { words, signal, energy, kev, each } = self;
+        let table = normal_table();
+        for (block, (signal, energy)) in signal.chunks_mut(BLOCK).zip(energy.chunks(BLOCK)).enumerate() {
+            // The last block of a picture may be a part of one.
+            let (mut s, mut quanta, mut means) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+            s[..signal.len()].copy_from_slice(signal);
+            quanta[..energy.len()].copy_from_slice(energy);
+            for i in 0..BLOCK {
+                // An energy of e/s each: s·kev/(e/s) quanta.
+                quanta[i] /= s[i].max(f32::MIN_POSITIVE);
+                means[i] = s[i] * kev / quanta[i].max(1.0);
+            }
+            let counts = poisson(means, words.of(block), table);
+            for i in 0..BLOCK {
+                s[i] = (counts[i] * quanta[i] * each).max(0.0);
+            }
+            signal.copy_from_slice(&s[..signal.len()]);
+        }
+    }
+}
+
+/// Signals that get the noise of electronics.
+struct Disturbed<'a> {
+    words: Words,
+    signal: &'a mut [f32],
+    deviation: f32,
+}
+
+impl pulp::WithSimd for Disturbed<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { words, signal, deviation } = self;
+        let table = normal_table();
+        for (block, signal) in signal.chunks_mut(BLOCK).enumerate() {
+            let words = words.of(block);
+            signal.iter_mut().zip(words).for_each(|(s, word)| *s += deviation * normal(word, table));
+        }
     }
 }
 

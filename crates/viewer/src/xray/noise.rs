@@ -15,15 +15,20 @@ const FEW: f32 = 12.0;
 /// Entries of the table of normal quantiles.
 const QUANTILES: usize = 1 << 12;
 
-/// Philox4x32-10.
-#[inline]
-pub(super) fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
-    let [mut c0, mut c1, mut c2, mut c3] = counter;
+/// Philox4x32-10 of as many counters side by side: word by word, a counter in each lane.
+#[inline(always)]
+pub(super) fn philox<const N: usize>(counters: [[u32; N]; 4], key: [u32; 2]) -> [[u32; N]; 4] {
+    let [mut c0, mut c1, mut c2, mut c3] = counters;
     let [mut k0, mut k1] = key;
     for _ in 0..10 {
-        let a = u64::from(c0) * 0xD251_1F53;
-        let b = u64::from(c2) * 0xCD9E_8D57;
-        [c0, c1, c2, c3] = [(b >> 32) as u32 ^ c1 ^ k0, b as u32, (a >> 32) as u32 ^ c3 ^ k1, a as u32];
+        for i in 0..N {
+            let a = u64::from(c0[i]) * 0xD251_1F53;
+            let b = u64::from(c2[i]) * 0xCD9E_8D57;
+            c0[i] = (b >> 32) as u32 ^ c1[i] ^ k0;
+            c1[i] = b as u32;
+            c2[i] = (a >> 32) as u32 ^ c3[i] ^ k1;
+            c3[i] = a as u32;
+        }
         k0 = k0.wrapping_add(0x9E37_79B9);
         k1 = k1.wrapping_add(0xBB67_AE85);
     }
@@ -66,19 +71,37 @@ pub(super) fn normal_table() -> &'static [f32; QUANTILES] {
 
 /// A standard normal number from a random word: the sum of two independent quantiles reaches further into the tails than one of so
 /// few.
-#[inline]
+#[inline(always)]
 pub(super) fn normal(word: u32, table: &[f32; QUANTILES]) -> f32 {
     (table[(word >> 20) as usize] + table[(word & 0xFFF) as usize]) * std::f32::consts::FRAC_1_SQRT_2
 }
 
-/// A Poisson number of mean `mean` from a random word; not whole for large means.
-#[inline]
-pub(super) fn poisson(mean: f32, word: u32, normal: &[f32; QUANTILES]) -> f32 {
-    if mean < FEW {
-        return few(mean, word);
+/// Poisson numbers of some means, each from a random word; not whole for large means.
+#[inline(always)]
+pub(super) fn poisson<const N: usize>(
+    means: [f32; N],
+    words: [u32; N],
+    table: &[f32; QUANTILES],
+) -> [f32; N] {
+    let mut counts = [0.0; N];
+    // Look-ups on their own: what follows is vector instructions.
+    for i in 0..N {
+        counts[i] = normal(words[i], table);
     }
-    let z = self::normal(word, normal);
-    mean + mean.sqrt() * z + (z * z - 1.0) * (1.0 / 6.0)
+    let mut some_are_few = false;
+    for i in 0..N {
+        let (mean, z) = (means[i], counts[i]);
+        counts[i] = mean + mean.sqrt() * z + (z * z - 1.0) * (1.0 / 6.0);
+        some_are_few |= mean < FEW;
+    }
+    if some_are_few {
+        for i in 0..N {
+            if means[i] < FEW {
+                counts[i] = few(means[i], words[i]);
+            }
+        }
+    }
+    counts
 }
 
 /// The quantile by adding up probabilities.
@@ -105,6 +128,7 @@ mod tests {
     #[test]
     fn philox_gives_the_published_words() {
         // Known answers of the authors' library.
+        let philox = |counter: [u32; 4], key| philox(counter.map(|word| [word]), key).map(|[word]| word);
         assert_eq!(philox([0; 4], [0; 2]), [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]);
         assert_eq!(
             philox([u32::MAX; 4], [u32::MAX; 2]),
@@ -114,6 +138,24 @@ mod tests {
             philox([0x243f_6a88, 0x85a3_08d3, 0x1319_8a2e, 0x0370_7344], [0xa409_3822, 0x299f_31d0]),
             [0xd16c_fe09, 0x94fd_cceb, 0x5001_e420, 0x2412_6ea1]
         );
+    }
+
+    #[test]
+    fn lanes_do_not_know_of_each_other() {
+        let counters: [[u32; 8]; 4] = std::array::from_fn(|k| {
+            std::array::from_fn(|i| 0x9E37_79B9_u32.wrapping_mul((8 * k + i) as u32))
+        });
+        let words = philox(counters, [3, 4]);
+        // Few quanta in some lanes, many in others.
+        let means: [f32; 8] = std::array::from_fn(|i| if i % 3 == 0 { 2.5 } else { 40.0 * i as f32 });
+        let table = normal_table();
+        let counts = poisson(means, words[0], table);
+        for i in 0..8 {
+            let alone = philox(counters.map(|word| [word[i]]), [3, 4]);
+            assert_eq!(words.map(|word| word[i]), alone.map(|[word]| word));
+            assert_eq!(counts[i], poisson([means[i]], alone[0], table)[0]);
+        }
+        assert_ne!(words[0][1], words[0][2], "the twin: lanes are not all one");
     }
 
     #[test]
@@ -133,8 +175,9 @@ mod tests {
             let (mut sum, mut squares, mut cubes) = (0.0, 0.0, 0.0);
             let count = 400_000;
             for i in 0..count / 4 {
-                for word in philox([i, 7, 0, 0], [1, 2]) {
-                    let n = f64::from(poisson(mean, word, normal)) - f64::from(mean);
+                for word in philox([[i], [7], [0], [0]], [1, 2]) {
+                    let [count] = poisson([mean], word, normal);
+                    let n = f64::from(count) - f64::from(mean);
                     sum += n;
                     squares += n * n;
                     cubes += n * n * n;
