@@ -1,26 +1,37 @@
 #!/usr/bin/env bash
-# Draws the pictures of README.md and of chapters 5 and 15 of the guide anew, in assets/pictures. That of chapter 16 is a curve of learning:
+# Draws the pictures of README.md and of chapters 0, 5 and 15 of the guide anew, in assets/pictures; a test runs it and compares
+# (crates/cli/tests/cli/pictures.rs). That of chapter 16 is a curve of learning:
 # `python crates/python/examples/learn_arch.py plot out/learn --picture assets/pictures/learning.png`.
 #
-#     assets/pictures.sh [ENDOWIRE]      (the program; built if absent)
+#     assets/pictures.sh                      with a program that is built
+#     assets/pictures.sh ENDOWIRE FOLDER      with that program, into that folder: all but the poses, which an example draws
 set -euo pipefail
 cd "$(dirname "$0")/.."
 endowire=${1:-}
+to=${2:-assets/pictures}
 if [ -z "$endowire" ]; then
   cargo build --release -p endowire-cli
   endowire=${CARGO_TARGET_DIR:-target}/release/endowire
 fi
-to=assets/pictures
+endowire=$(realpath "$endowire")
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 
 # Eight poses of each part of the body.
-cargo run --release -p endowire-viewer --example poses -- $to 192
+if [ $# -eq 0 ]; then
+  cargo run --release -p endowire-viewer --example poses -- "$to" 192
+fi
+
+# README.md and chapter 0: the window after what that chapter has hands do.
+sed -n '/^```json file=hand.jsonl$/,/^```$/p' docs/guide/0-first-five-minutes.md | sed '/^```/d' >"$out/hand.jsonl"
+scene=$PWD/assets/scenes/arch_carotid.toml
+(cd "$out" && "$endowire" play "$scene" --headless --inputs hand.jsonl --record played.toml >/dev/null)
+cp "$out/play.png" "$to"
 
 # README.md: the last frames of a run.
 "$endowire" run assets/scenes/aortic_arch.toml --out "$out/arch" --quiet
 for view in 3d fluoro; do
-  cp "$(ls "$out"/arch/frames/step_*_$view.png | tail -n 1)" $to/aortic_arch_$view.png
+  cp "$(ls "$out"/arch/frames/step_*_$view.png | tail -n 1)" "$to"/aortic_arch_$view.png
 done
 
 # Modes, two planes, a C-arm that turns: the arch after the script of its scene.
@@ -28,18 +39,18 @@ draw() { # NAME OF THE FOLDER, OPTIONS
   "$endowire" fluoro assets/scenes/arch_angiography.toml --out "$out/$1" "${@:2}"
 }
 draw live --size 320 --mode fluoro --time -1 --count 8 --hold
-cp "$out/live/frame_000007_fluoro.png" $to/arch_fluoro.png
-cp "$out/live/hold.png" $to/arch_hold.png
+cp "$out/live/frame_000007_fluoro.png" "$to"/arch_fluoro.png
+cp "$out/live/hold.png" "$to"/arch_hold.png
 draw cine --size 320 --mode cine --time 1.6
-cp "$out/cine/frame_000000_fluoro.png" $to/arch_cine.png
+cp "$out/cine/frame_000000_fluoro.png" "$to"/arch_cine.png
 draw dsa --size 320 --mode dsa --time 1.6
-cp "$out/dsa/frame_000000_fluoro.png" $to/arch_dsa.png
+cp "$out/dsa/frame_000000_fluoro.png" "$to"/arch_dsa.png
 draw roadmap --size 320 --mode roadmap
-cp "$out/roadmap/frame_000000_fluoro.png" $to/arch_roadmap.png
+cp "$out/roadmap/frame_000000_fluoro.png" "$to"/arch_roadmap.png
 draw pair --size 320 --mode cine --time 1.6 --pose "RAO 30" --biplane 90
-cp "$out/pair/frame_000000_fluoro.png" $to/arch_pair_a.png
-cp "$out/pair/frame_000000_fluoro_b.png" $to/arch_pair_b.png
+cp "$out/pair/frame_000000_fluoro.png" "$to"/arch_pair_a.png
+cp "$out/pair/frame_000000_fluoro_b.png" "$to"/arch_pair_b.png
 draw turn --size 200 --mode dsa --time 1.4 --pose "RAO 60" --turn 120 --count 4
 for k in 0 1 2 3; do
-  cp "$out/turn/frame_00000${k}_fluoro.png" $to/arch_turn_$k.png
+  cp "$out/turn/frame_00000${k}_fluoro.png" "$to"/arch_turn_$k.png
 done

@@ -92,7 +92,8 @@ fn draw<B: DrawingBackend>(backend: B, path: &Path, chart: &impl Chart) -> Resul
         .map_err(|e| Failure::Computation(format!("the chart {} cannot be drawn: {e}", path.display())))
 }
 
-fn write_png(path: &Path, size: (u32, u32), rgb: &[u8]) -> std::io::Result<()> {
+/// Writes a picture of three bytes a pixel.
+pub(crate) fn write_png(path: &Path, size: (u32, u32), rgb: &[u8]) -> std::io::Result<()> {
     let file = std::io::BufWriter::new(std::fs::File::create(path)?);
     let mut encoder = png::Encoder::new(file, size.0, size.1);
     encoder.set_color(png::ColorType::Rgb);

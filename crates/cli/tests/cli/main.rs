@@ -15,6 +15,8 @@ mod instruments;
 mod killed;
 mod methods;
 mod packages;
+#[cfg(all(unix, feature = "window"))]
+mod pictures;
 mod planes;
 mod play;
 mod recording;

@@ -23,8 +23,12 @@ pub(crate) enum Order {
     Read {},
     /// Lets so many sixtieths of a second go by.
     Wait { ticks: u32 },
-    /// Writes both views side by side.
-    Picture { file: PathBuf },
+    /// Writes both views side by side, or the whole window.
+    Picture {
+        file: PathBuf,
+        #[serde(default)]
+        window: bool,
+    },
     /// Ends the session.
     Quit {},
 }

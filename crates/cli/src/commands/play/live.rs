@@ -99,7 +99,8 @@ pub(crate) struct Shown<'a> {
     pub(crate) three_d: Option<&'a Image>,
     /// What kept a picture from being drawn.
     pub(crate) failure: Option<&'a str>,
-    pub(crate) frame_ms: f64,
+    /// None where there is no clock.
+    pub(crate) frame_ms: Option<f64>,
 }
 
 /// How fast it went.
@@ -317,7 +318,7 @@ fn draw_with(
             fluoro: &fluoro,
             three_d: three_d.as_ref(),
             failure: failure.as_deref(),
-            frame_ms,
+            frame_ms: Some(frame_ms),
         };
         show(&shown);
         times.inputs_ms.extend(moment.input_at.map(|at| ms(at.elapsed())));

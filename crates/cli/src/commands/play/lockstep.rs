@@ -5,7 +5,8 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
-use endowire_play::{Pictures, Session};
+use endowire_play::{Pictures, Session, Snapshot};
+use endowire_viewer::Image;
 
 use super::lines::{self, Line, Order};
 use super::live::Message;
@@ -58,14 +59,32 @@ fn carry_out(order: Order, session: &mut Session, pictures: &mut Pictures) -> Re
             let delivered = pictures.expose(&session.snapshot()).map_err(|e| e.to_string())?;
             delivered.into_iter().for_each(|delivered| session.exposed(delivered));
         }
-        Order::Picture { file } => picture(&file, session, pictures).map_err(|e| e.to_string())?,
+        Order::Picture { file, window } => picture(&file, window, session, pictures)?,
     }
     Ok(())
 }
 
-fn picture(file: &Path, session: &Session, pictures: &mut Pictures) -> endowire_core::Result<()> {
+fn picture(file: &Path, window: bool, session: &Session, pictures: &mut Pictures) -> Result<(), String> {
     let snapshot = session.snapshot();
-    let three_d = pictures.three_d(&snapshot)?;
-    let planes = pictures.fluoro(&snapshot)?.iter().rev();
-    planes.fold(three_d, |right, left| left.beside(&right)).write_png(file)
+    let three_d = pictures.three_d(&snapshot).map_err(|e| e.to_string())?;
+    let planes = pictures.fluoro(&snapshot).map_err(|e| e.to_string())?;
+    if window {
+        return whole_window(file, snapshot, planes, &three_d);
+    }
+    planes
+        .iter()
+        .rev()
+        .fold(three_d, |right, left| left.beside(&right))
+        .write_png(file)
+        .map_err(|e| e.to_string())
+}
+
+#[cfg(feature = "window")]
+fn whole_window(file: &Path, snapshot: Snapshot, planes: &[Image], three_d: &Image) -> Result<(), String> {
+    super::window::write(file, snapshot, planes, three_d)
+}
+
+#[cfg(not(feature = "window"))]
+fn whole_window(_: &Path, _: Snapshot, _: &[Image], _: &Image) -> Result<(), String> {
+    Err("window: this program was built without a window: leave it out, or build it with the feature \"window\"".to_owned())
 }

@@ -6,6 +6,9 @@ use endowire_play::{Input, USUAL_DEG_PER_S, USUAL_MM_PER_S};
 use endowire_viewer::Mode;
 use winit::keyboard::{KeyCode, ModifiersState};
 
+#[cfg(any(test, feature = "gamepad"))]
+use super::pad::Pad;
+
 /// Keys and what they do.
 pub(super) const HELP: &[(&str, &str)] = &[
     ("up, down", "push, pull (hold)"),
@@ -39,7 +42,10 @@ pub(super) struct Keys {
     /// The chosen one; none for all.
     chosen: Option<usize>,
     down: HashSet<KeyCode>,
-    modifiers: ModifiersState,
+    /// Shift and their like of the keyboard, and what does the same on a gamepad.
+    modifiers: [ModifiersState; 2],
+    /// Shares of the usual speeds that the sticks of a gamepad ask for.
+    leans: [f64; 2],
     /// Whether the beam stays on.
     locked: bool,
     open: f64,
@@ -51,7 +57,8 @@ impl Keys {
             instruments,
             chosen: Some(0),
             down: HashSet::new(),
-            modifiers: ModifiersState::empty(),
+            modifiers: [ModifiersState::empty(); 2],
+            leans: [0.0; 2],
             locked: false,
             open: 1.0,
         }
@@ -59,8 +66,26 @@ impl Keys {
 
     /// Hears that Shift and their like have changed: hands go faster or slower.
     pub(super) fn modify(&mut self, modifiers: ModifiersState) -> Vec<Input> {
-        self.modifiers = modifiers;
+        self.modifiers[0] = modifiers;
         self.moving()
+    }
+
+    /// What a gamepad does that is held otherwise than before.
+    #[cfg(any(test, feature = "gamepad"))]
+    pub(super) fn pad(&mut self, before: &Pad, now: &Pad) -> Vec<Input> {
+        let asked = (self.modifiers[1], self.leans);
+        (self.modifiers[1], self.leans) = (now.modifiers(), now.leans());
+        let keys = now.keys_since(before);
+        let mut inputs: Vec<Input> =
+            keys.into_iter().flat_map(|(key, down)| self.key(key, down, false).0).collect();
+        if asked != (self.modifiers[1], self.leans) {
+            inputs.extend(self.moving());
+        }
+        inputs
+    }
+
+    fn holds(&self, modifier: ModifiersState) -> bool {
+        self.modifiers.iter().any(|held| held.contains(modifier))
     }
 
     /// Lets go of everything: the window has lost the keyboard.
@@ -108,12 +133,12 @@ impl Keys {
             KeyCode::Tab if press => {
                 self.choose(Some(self.chosen.map_or(0, |index| (index + 1) % self.instruments.len())))
             }
-            KeyCode::KeyP if press && self.modifiers.shift_key() => vec![Input::Stop {}],
+            KeyCode::KeyP if press && self.holds(ModifiersState::SHIFT) => vec![Input::Stop {}],
             KeyCode::KeyP if press => vec![Input::Script {}],
-            KeyCode::Backspace if press && self.modifiers.shift_key() => vec![Input::Redo {}],
+            KeyCode::Backspace if press && self.holds(ModifiersState::SHIFT) => vec![Input::Redo {}],
             KeyCode::Backspace if press => vec![Input::Undo {}],
             KeyCode::KeyI if press => {
-                let ml = if self.modifiers.shift_key() { 20.0 } else { 5.0 };
+                let ml = if self.holds(ModifiersState::SHIFT) { 20.0 } else { 5.0 };
                 vec![Input::Inject { ml, ml_per_s: ml }]
             }
             KeyCode::KeyJ if down => vec![Input::TurnCArm { lao_deg: -5.0, cra_deg: 0.0 }],
@@ -149,16 +174,20 @@ impl Keys {
         std::iter::once(Input::Stop {}).chain(select).chain(self.moving()).collect()
     }
 
-    /// What the arrows have hands do now.
+    /// What arrows and sticks have hands do now.
     fn moving(&self) -> Vec<Input> {
-        let axis = |plus, minus| f64::from(self.down.contains(&plus)) - f64::from(self.down.contains(&minus));
-        let scale = match (self.modifiers.shift_key(), self.modifiers.control_key()) {
+        let axis = |plus, minus, lean: f64| {
+            let keys = f64::from(self.down.contains(&plus)) - f64::from(self.down.contains(&minus));
+            (keys + lean).clamp(-1.0, 1.0)
+        };
+        let scale = match (self.holds(ModifiersState::SHIFT), self.holds(ModifiersState::CONTROL)) {
             (true, false) => 4.0,
             (false, true) => 0.2,
             _ => 1.0,
         };
-        let mm_per_s = scale * USUAL_MM_PER_S * axis(KeyCode::ArrowUp, KeyCode::ArrowDown);
-        let deg_per_s = scale * USUAL_DEG_PER_S * axis(KeyCode::ArrowRight, KeyCode::ArrowLeft);
+        let mm_per_s = scale * USUAL_MM_PER_S * axis(KeyCode::ArrowUp, KeyCode::ArrowDown, self.leans[0]);
+        let deg_per_s =
+            scale * USUAL_DEG_PER_S * axis(KeyCode::ArrowRight, KeyCode::ArrowLeft, self.leans[1]);
         let hands =
             self.instruments.iter().enumerate().filter(|(index, _)| self.chosen.is_none_or(|c| c == *index));
         hands.map(|(_, name)| Input::Move { instrument: Some(name.clone()), mm_per_s, deg_per_s }).collect()

@@ -1,16 +1,22 @@
 //! The window: a thin shell that turns keys and mouse into inputs and shows what was drawn.
 
+#[cfg(feature = "gamepad")]
+mod gamepad;
 mod keys;
+#[cfg(any(test, feature = "gamepad"))]
+mod pad;
 mod screen;
 mod text;
 
 use std::num::NonZeroU32;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use endowire_play::{Input, Pictures, Session};
+use endowire_play::{Input, Pictures, Session, Snapshot};
+use endowire_viewer::Image;
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
@@ -23,6 +29,7 @@ use super::live::{self, Message, Newest, Pace};
 use super::record::Record;
 use crate::args::PlayArgs;
 use crate::failure::Failure;
+use crate::output::chart::write_png;
 use crate::output::tell;
 use keys::{Asked, Keys};
 use screen::Layout;
@@ -39,6 +46,9 @@ const DEG_PER_PX: f64 = 0.4;
 enum Told {
     /// A picture is there.
     Picture,
+    /// How a gamepad is held that is connected, with its name; none when it has gone.
+    #[cfg(feature = "gamepad")]
+    Gamepad(Option<(String, pad::Pad)>),
     /// The session has ended.
     Ended,
 }
@@ -48,6 +58,8 @@ enum Told {
 struct Shared {
     size: [AtomicUsize; 2],
     help: AtomicBool,
+    /// Name of the gamepad that is connected.
+    gamepad: Mutex<Option<String>>,
     picture: Mutex<Option<Picture>>,
 }
 
@@ -65,6 +77,9 @@ struct Shell {
     shared: Arc<Shared>,
     to: Sender<Message>,
     keys: Keys,
+    /// How the gamepad is held.
+    #[cfg(feature = "gamepad")]
+    pad: pad::Pad,
     surface: Option<softbuffer::Surface<OwnedDisplayHandle, Arc<Window>>>,
     /// Planes of fluoroscopy.
     planes: usize,
@@ -101,6 +116,8 @@ pub(super) fn run(
         shared: Arc::clone(&shared),
         to: sender,
         keys: Keys::new(names),
+        #[cfg(feature = "gamepad")]
+        pad: pad::Pad::default(),
         surface: None,
         planes: screen::planes(&session.readout()),
         cursor: [0.0; 2],
@@ -109,6 +126,8 @@ pub(super) fn run(
         inputs_ms: Vec::new(),
         failure: None,
     };
+    #[cfg(feature = "gamepad")]
+    gamepad::listen(events.create_proxy());
     let newest = Newest::default();
     let (drawn_for, proxy) = (events.create_proxy(), events.create_proxy());
     std::thread::scope(|scope| {
@@ -148,13 +167,43 @@ fn draw(
         if size.contains(&0) {
             return;
         }
-        let canvas = screen::compose(&mut writer, shown, size, shared.help.load(Ordering::Relaxed));
+        let gamepad = shared.gamepad.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let help = shared.help.load(Ordering::Relaxed).then(|| help(gamepad.is_some()));
+        let canvas = screen::compose(&mut writer, shown, size, help.as_deref(), gamepad.as_deref());
         let mut picture = shared.picture.lock().unwrap_or_else(PoisonError::into_inner);
         let unseen = picture.take().and_then(|before| before.input_at);
         let field_mm = shown.moment.snapshot.readout.lab.field_mm;
         *picture = Some(Picture { canvas, input_at: unseen.or(shown.moment.input_at), field_mm });
         let _ = proxy.send_event(Told::Picture);
     })
+}
+
+/// Writes the window of a moment as a PNG file, at the size with which it opens. It is drawn in memory: no display is needed.
+pub(super) fn write(
+    file: &Path,
+    snapshot: Snapshot,
+    fluoro: &[Image],
+    three_d: &Image,
+) -> Result<(), String> {
+    let failed = |reason: String| format!("{}: {reason}", file.display());
+    let mut writer = Writer::new().ok_or_else(|| failed("the font cannot be read".to_owned()))?;
+    let width = WIDTHS[screen::planes(&snapshot.readout).min(2) - 1];
+    let moment = live::Moment { snapshot, input_at: None, step_ms: 0.0 };
+    let shown =
+        live::Shown { moment: &moment, fluoro, three_d: Some(three_d), failure: None, frame_ms: None };
+    let canvas = screen::compose(&mut writer, &shown, [width, HEIGHT].map(|side| side as usize), None, None);
+    let rgb: Vec<u8> =
+        canvas.pixels.iter().flat_map(|pixel| pixel.to_be_bytes().into_iter().skip(1)).collect();
+    write_png(file, (width, HEIGHT), &rgb).map_err(|e| failed(e.to_string()))
+}
+
+/// What F1 shows: keys, and those of a gamepad where one is connected.
+fn help(gamepad: bool) -> Vec<screen::Help> {
+    #[cfg(feature = "gamepad")]
+    let of_pad = pad::HELP;
+    #[cfg(not(feature = "gamepad"))]
+    let of_pad: &[screen::Help] = &[];
+    keys::HELP.iter().chain(of_pad.iter().filter(|_| gamepad)).copied().collect()
 }
 
 impl Shell {
@@ -212,6 +261,17 @@ impl Shell {
         }
     }
 
+    /// A gamepad is held otherwise; one that has gone is held by nobody.
+    #[cfg(feature = "gamepad")]
+    fn held(&mut self, now: Option<(String, pad::Pad)>) {
+        let (name, now) = now.unzip();
+        *self.shared.gamepad.lock().unwrap_or_else(PoisonError::into_inner) = name;
+        let now = now.unwrap_or_default();
+        let before = std::mem::replace(&mut self.pad, now);
+        let inputs = self.keys.pad(&before, &self.pad);
+        self.send(inputs);
+    }
+
     /// A drag moves what it began on: the table under the live picture, or the camera of the 3D view.
     fn dragged(&mut self, x: f64, y: f64) {
         let by = [x - self.cursor[0], y - self.cursor[1]];
@@ -249,6 +309,8 @@ impl ApplicationHandler<Told> for Shell {
             (Told::Ended, _) => events.exit(),
             (Told::Picture, Some(surface)) => surface.window().request_redraw(),
             (Told::Picture, None) => {}
+            #[cfg(feature = "gamepad")]
+            (Told::Gamepad(now), _) => self.held(now),
         }
     }
 

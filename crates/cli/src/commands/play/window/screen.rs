@@ -4,7 +4,6 @@ use endowire_play::{InstrumentReadout, Readout};
 use endowire_viewer::{Image, Mode, PixelFormat};
 
 use super::super::live::Shown;
-use super::keys::HELP;
 use super::text::{Canvas, Writer};
 
 const BACK: u32 = 0x10_1418;
@@ -16,6 +15,9 @@ const LIVE: u32 = 0xff_c020;
 const CHOSEN: u32 = 0x5a_c8fa;
 /// Height of what is below the pictures, and of a line of text, at the usual size.
 const PANEL_PX: usize = 172;
+
+/// Keys, and what they do.
+pub(super) type Help = (&'static str, &'static str);
 
 /// Where the pictures are: side of the live ones, which begin at the left, and corner and size of the 3D view.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,8 +51,14 @@ impl Layout {
     }
 }
 
-/// Draws all of a window.
-pub(super) fn compose(writer: &mut Writer, shown: &Shown<'_>, size: [usize; 2], help: bool) -> Canvas {
+/// Draws all of a window, with help where it is wanted and the name of a gamepad where one is connected.
+pub(super) fn compose(
+    writer: &mut Writer,
+    shown: &Shown<'_>,
+    size: [usize; 2],
+    help: Option<&[Help]>,
+    gamepad: Option<&str>,
+) -> Canvas {
     let mut canvas = Canvas::new(size);
     canvas.fill([0, 0], size, BACK);
     let readout = &shown.moment.snapshot.readout;
@@ -75,9 +83,9 @@ pub(super) fn compose(writer: &mut Writer, shown: &Shown<'_>, size: [usize; 2], 
     }
     over_picture(writer, &mut canvas, readout, layout);
     canvas.fill([0, layout.panel], [size[0], size[1] - layout.panel], PANEL);
-    panel(writer, &mut canvas, shown, layout);
-    if help {
-        show_help(writer, &mut canvas);
+    panel(writer, &mut canvas, shown, gamepad, layout);
+    if let Some(help) = help {
+        show_help(writer, &mut canvas, help);
     }
     canvas
 }
@@ -115,7 +123,7 @@ fn over_picture(writer: &mut Writer, canvas: &mut Canvas, readout: &Readout, lay
     }
 }
 
-fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, layout: Layout) {
+fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, gamepad: Option<&str>, layout: Layout) {
     let readout = &shown.moment.snapshot.readout;
     let (width, top) = (canvas.size[0], layout.panel);
     for (line, one) in readout.instruments.iter().rev().enumerate() {
@@ -137,10 +145,14 @@ fn panel(writer: &mut Writer, canvas: &mut Canvas, shown: &Shown<'_>, layout: La
     );
     let y = top + 28 + 26 * readout.instruments.len() + 8;
     writer.write(canvas, [12, y], 15, TEXT, &beam);
-    let times = format!(
-        "step {}   {:.1} ms a step   {:.1} ms a frame   F1 help",
-        readout.step, shown.moment.step_ms, shown.frame_ms
-    );
+    let frame = |ms: f64| format!("   {:.1} ms a step   {ms:.1} ms a frame", shown.moment.step_ms);
+    let times = [
+        format!("step {}", readout.step),
+        shown.frame_ms.map_or_else(String::new, frame),
+        "   F1 help".to_owned(),
+        gamepad.map_or_else(String::new, |name| format!("   gamepad: {name}")),
+    ]
+    .concat();
     writer.write(canvas, [12, y + 24], 15, FAINT, &times);
     let told = shown.failure.map(str::to_owned).or_else(|| {
         let recent = |event: &&endowire_play::Event| readout.time_s - event.time_s < 6.0;
@@ -168,10 +180,10 @@ fn instrument(writer: &mut Writer, canvas: &mut Canvas, one: &InstrumentReadout,
     }
 }
 
-fn show_help(writer: &mut Writer, canvas: &mut Canvas) {
-    let size = [620, 22 * HELP.len() + 24];
+fn show_help(writer: &mut Writer, canvas: &mut Canvas, help: &[Help]) {
+    let size = [620, 22 * help.len() + 24];
     canvas.fill([24, 24], size, 0x08_0c10);
-    for (line, (keys, what)) in HELP.iter().enumerate() {
+    for (line, (keys, what)) in help.iter().enumerate() {
         let y = 52 + 22 * line;
         writer.write(canvas, [40, y], 15, CHOSEN, keys);
         writer.write(canvas, [270, y], 15, TEXT, what);

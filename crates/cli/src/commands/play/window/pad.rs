@@ -1,0 +1,220 @@
+//! What a gamepad does: sticks move and turn what is chosen, buttons do what keys do.
+
+use std::collections::BTreeSet;
+
+use winit::keyboard::{KeyCode, ModifiersState};
+
+/// Buttons and sticks, and what they do.
+pub(super) const HELP: &[(&str, &str)] = &[
+    ("left stick, up down", "push, pull, as fast as it leans"),
+    ("right stick, left right", "turn, as fast as it leans"),
+    ("right / left bumper with these", "coarse (four times) / fine (a fifth)"),
+    ("right, left trigger (hold)", "fluoroscopy, cine"),
+    ("upper, left button (hold)", "DSA, roadmap"),
+    ("lower button", "inject 5 ml; 20 ml with the right bumper"),
+    ("right button", "undo; do it again with the right bumper"),
+    ("cross", "C-arm RAO LAO, cranial caudal, by 5°"),
+    ("select, start", "next instrument, fluoroscopy on or off"),
+];
+
+/// A stick that leans by less is at rest: worn ones do not come back to the middle.
+const DEAD_ZONE: f64 = 0.15;
+
+/// A button, by where it is: makers write different letters on them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Button {
+    Lower,
+    Right,
+    Left,
+    Upper,
+    LeftBumper,
+    RightBumper,
+    LeftTrigger,
+    RightTrigger,
+    Select,
+    Start,
+    CrossLeft,
+    CrossRight,
+    CrossUp,
+    CrossDown,
+}
+
+impl Button {
+    /// All of them.
+    pub(super) const ALL: [Self; 14] = [
+        Self::Lower,
+        Self::Right,
+        Self::Left,
+        Self::Upper,
+        Self::LeftBumper,
+        Self::RightBumper,
+        Self::LeftTrigger,
+        Self::RightTrigger,
+        Self::Select,
+        Self::Start,
+        Self::CrossLeft,
+        Self::CrossRight,
+        Self::CrossUp,
+        Self::CrossDown,
+    ];
+
+    /// The key that does the same; none of bumpers, which are Shift and Ctrl.
+    fn key(self) -> Option<KeyCode> {
+        Some(match self {
+            Self::Lower => KeyCode::KeyI,
+            Self::Right => KeyCode::Backspace,
+            Self::Left => KeyCode::KeyB,
+            Self::Upper => KeyCode::KeyV,
+            Self::LeftBumper | Self::RightBumper => return None,
+            Self::LeftTrigger => KeyCode::KeyC,
+            Self::RightTrigger => KeyCode::Space,
+            Self::Select => KeyCode::Tab,
+            Self::Start => KeyCode::Enter,
+            Self::CrossLeft => KeyCode::KeyJ,
+            Self::CrossRight => KeyCode::KeyL,
+            Self::CrossUp => KeyCode::KeyO,
+            Self::CrossDown => KeyCode::KeyK,
+        })
+    }
+}
+
+/// How a gamepad is held at a moment; nothing is pressed on one that is not there.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Pad {
+    /// How far the left stick leans up, from -1 to 1.
+    pub(super) up: f64,
+    /// How far the right stick leans to the right.
+    pub(super) right: f64,
+    pub(super) down: BTreeSet<Button>,
+}
+
+impl Pad {
+    /// Shares of the usual speeds of pushing and turning.
+    pub(super) fn leans(&self) -> [f64; 2] {
+        [self.up, self.right].map(share)
+    }
+
+    /// Keys that are held with the sticks.
+    pub(super) fn modifiers(&self) -> ModifiersState {
+        let held =
+            [(Button::RightBumper, ModifiersState::SHIFT), (Button::LeftBumper, ModifiersState::CONTROL)];
+        held.into_iter().filter(|(button, _)| self.down.contains(button)).map(|(_, key)| key).collect()
+    }
+
+    /// Keys that go up and down from a moment to this one.
+    pub(super) fn keys_since(&self, before: &Self) -> Vec<(KeyCode, bool)> {
+        let up = before.down.difference(&self.down).map(|button| (button, false));
+        let down = self.down.difference(&before.down).map(|button| (button, true));
+        up.chain(down).filter_map(|(button, is_down)| Some((button.key()?, is_down))).collect()
+    }
+}
+
+/// Nothing within the dead zone, all at the end, straight between in hundredths: what a stick trembles by is no other speed.
+fn share(lean: f64) -> f64 {
+    let beyond = (lean.abs().clamp(0.0, 1.0) - DEAD_ZONE).max(0.0) / (1.0 - DEAD_ZONE);
+    // What is no number is beyond nothing.
+    let whole = (100.0 * beyond).round();
+    if whole > 0.0 { whole.copysign(lean) / 100.0 } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use endowire_play::Input;
+    use endowire_viewer::Mode;
+
+    use super::super::keys::Keys;
+    use super::*;
+
+    fn held(up: f64, right: f64, down: &[Button]) -> Pad {
+        Pad { up, right, down: down.iter().copied().collect() }
+    }
+
+    fn moved(name: &str, mm_per_s: f64, deg_per_s: f64) -> Input {
+        Input::Move { instrument: Some(name.to_owned()), mm_per_s, deg_per_s }
+    }
+
+    #[test]
+    fn speeds_follow_the_sticks_beyond_a_dead_zone() {
+        for (lean, speed) in [(0.0, 0.0), (0.149, 0.0), (-0.1, 0.0), (0.575, 0.5), (1.0, 1.0), (-1.0, -1.0)] {
+            assert_eq!(share(lean), speed, "{lean}");
+        }
+        for broken in [f64::NAN, -f64::NAN] {
+            assert_eq!(share(broken), 0.0);
+        }
+        assert_eq!([share(f64::INFINITY), share(-7.0)], [1.0, -1.0]);
+        // The twin: without rounding a tremble would be another speed.
+        assert_eq!(share(0.5749), share(0.5751));
+        let steps: Vec<f64> = (0..=1000).map(|k| share(f64::from(k) / 1000.0)).collect();
+        assert!(steps.windows(2).all(|pair| pair[0] <= pair[1]), "what leans more is not slower");
+    }
+
+    #[test]
+    fn sticks_move_what_is_chosen_finely_and_coarsely() {
+        let mut keys = Keys::new(vec!["wire".to_owned(), "catheter".to_owned()]);
+        let rest = Pad::default();
+        let half = held(0.575, 0.0, &[]);
+        assert_eq!(keys.pad(&rest, &half), [moved("wire", 5.0, 0.0)]);
+        assert_eq!(keys.pad(&half, &held(0.5749, 0.1, &[])), [], "a tremble is nothing");
+        let coarse = held(0.575, -1.0, &[Button::RightBumper]);
+        assert_eq!(keys.pad(&half, &coarse), [moved("wire", 20.0, -360.0)]);
+        let fine = held(0.575, -1.0, &[Button::LeftBumper]);
+        assert_eq!(keys.pad(&coarse, &fine), [moved("wire", 1.0, -18.0)]);
+        // The other instrument goes on as the sticks lean, and that before rests.
+        let next = held(0.575, -1.0, &[Button::LeftBumper, Button::Select]);
+        let select = Input::Select { instrument: "catheter".to_owned() };
+        assert_eq!(keys.pad(&fine, &next), [Input::Stop {}, select, moved("catheter", 1.0, -18.0)]);
+        // One that is unplugged lets go of all.
+        assert_eq!(keys.pad(&next, &rest), [moved("catheter", 0.0, 0.0)]);
+        // Arrows and a stick together are no faster than either.
+        keys.key(KeyCode::ArrowUp, true, false);
+        assert_eq!(keys.pad(&rest, &held(1.0, 0.0, &[])), [moved("catheter", 10.0, 0.0)]);
+    }
+
+    #[test]
+    fn buttons_are_pedals_and_keys() {
+        let mut keys = Keys::new(vec!["device".to_owned()]);
+        let rest = Pad::default();
+        let mut press = |button: Button, bumper: bool| {
+            let bumper = bumper.then_some(Button::RightBumper);
+            let with: Vec<Button> = bumper.into_iter().chain([button]).collect();
+            let before = held(0.0, 0.0, &with[..with.len() - 1]);
+            keys.pad(&rest, &before);
+            let inputs = keys.pad(&before, &held(0.0, 0.0, &with));
+            let after = keys.pad(&held(0.0, 0.0, &with), &before);
+            keys.pad(&before, &rest);
+            (inputs, after)
+        };
+        let pedal = |down, mode| vec![Input::Pedal { down, mode: Some(mode) }];
+        for (button, mode) in [
+            (Button::RightTrigger, Mode::Fluoro),
+            (Button::LeftTrigger, Mode::Cine),
+            (Button::Upper, Mode::Dsa),
+            (Button::Left, Mode::Roadmap),
+        ] {
+            assert_eq!(press(button, false), (pedal(true, mode), pedal(false, mode)), "{button:?}");
+        }
+        let turn = |lao_deg, cra_deg| vec![Input::TurnCArm { lao_deg, cra_deg }];
+        for (button, bumper, inputs) in [
+            (Button::Lower, false, vec![Input::Inject { ml: 5.0, ml_per_s: 5.0 }]),
+            (Button::Lower, true, vec![Input::Inject { ml: 20.0, ml_per_s: 20.0 }]),
+            (Button::Right, false, vec![Input::Undo {}]),
+            (Button::Right, true, vec![Input::Redo {}]),
+            (Button::Start, false, pedal(true, Mode::Fluoro)),
+            (Button::Start, false, pedal(false, Mode::Fluoro)),
+            (Button::CrossLeft, false, turn(-5.0, 0.0)),
+            (Button::CrossRight, false, turn(5.0, 0.0)),
+            (Button::CrossUp, false, turn(0.0, 5.0)),
+            (Button::CrossDown, false, turn(0.0, -5.0)),
+        ] {
+            assert_eq!(press(button, bumper), (inputs, vec![]), "{button:?}");
+        }
+    }
+
+    #[test]
+    fn every_button_does_something_that_the_help_tells() {
+        let keys: BTreeSet<_> =
+            Button::ALL.into_iter().filter_map(Button::key).map(|k| format!("{k:?}")).collect();
+        assert_eq!(keys.len(), Button::ALL.len() - 2, "bumpers have none, no two have one");
+        assert!(HELP.iter().any(|(name, _)| name.contains("bumper")));
+    }
+}
