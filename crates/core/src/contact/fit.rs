@@ -131,10 +131,10 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &Ne
     } else {
         (Vector2::zeros(), Matrix2::zeros())
     };
-    // Sag over the support against its half axes, in the direction in which it is largest.
+    // Sag over the support against its half axes, in all directions together.
     let shrink =
         shape.eigenvectors * Matrix2::from_diagonal(&shape.eigenvalues.map(|l| l.sqrt().sqrt().recip()));
-    let size = (shrink.transpose() * bend * shrink).symmetric_eigenvalues().amax();
+    let size = (shrink.transpose() * bend * shrink).norm();
     let bend = bend * (LARGEST_BEND / size.max(1e-300)).min(1.0);
     // The plane of the fit, and curvature and support seen from it.
     let normal = (normal - a * tilt.x - b * tilt.y).normalize();
