@@ -293,6 +293,11 @@ impl Friction {
         self.sliders.get(index).map_or(0.0, |slider| self.coefficient * slider.force_n)
     }
 
+    /// Whether nothing rubs at a point, and nothing did where the step began.
+    pub(super) fn is_free(&self, index: usize) -> bool {
+        self.sliders.get(index).is_none_or(|slider| slider.force_n == 0.0 && slider.begun.1 == 0.0)
+    }
+
     /// Friction energy of a point.
     pub fn value(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> f64 {
         let force = self.sliders.get(index).map_or(0.0, |s| self.coefficient * s.force_n);

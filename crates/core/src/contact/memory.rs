@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::distance::{Distance, Nearness};
 use super::places::{Place, Places};
 use super::point::{FOLLOW, LOOK_AGAIN};
-use super::wall::{Foreseen, Slip, Slipping};
+use super::wall::{Foreseen, Slip, Slipping, Span};
 use super::{ContactPoint, FeltWall, MovedWall};
 use crate::Vec3;
 
@@ -96,8 +96,12 @@ struct KnownDistance {
 #[derive(Debug, Clone)]
 pub struct WallMemory {
     pub(super) points: Vec<KnownPoint>,
-    /// What they knew before the state assembled last became the base.
+    /// What those that were looked at knew before the state assembled last became the base.
     pub(super) before: Vec<KnownPoint>,
+    /// The points element by element.
+    pub(super) spans: Vec<Span>,
+    /// Numbers of the points that press at the base.
+    pub(super) pressing: Vec<usize>,
     /// Where each point last read the distance of a near wall, and what it read. Apart from `points`: most points are free, and
     /// all of them are looked at many times a step.
     pub(super) readings: Vec<TakenReading>,
@@ -156,6 +160,8 @@ impl WallMemory {
         Self {
             points: Vec::new(),
             before: Vec::new(),
+            spans: Vec::new(),
+            pressing: Vec::new(),
             readings: Vec::new(),
             places,
             last: Place::UNKNOWN,
@@ -175,6 +181,8 @@ impl WallMemory {
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points.saturating_sub(self.points.len()));
         self.before.reserve(points.saturating_sub(self.before.len()));
+        self.spans.reserve(points.saturating_sub(self.spans.len()));
+        self.pressing.reserve(points.saturating_sub(self.pressing.len()));
         self.aims.reserve(points.saturating_sub(self.aims.len()));
         self.foreseen.reserve(points.saturating_sub(self.foreseen.len()));
         self.slipping.reserve(points.saturating_sub(self.slipping.len()));
@@ -183,9 +191,14 @@ impl WallMemory {
         self.readings.reserve(points.saturating_sub(self.readings.len()));
     }
 
-    pub(super) fn resize(&mut self, points: usize) {
-        self.points.resize(points, NOTHING);
-        self.readings.resize(points, TakenReading::NONE);
+    /// Is of these points, of none of which is known that it is clear of the wall.
+    pub(super) fn look_at(&mut self, points: &[ContactPoint]) {
+        self.points.resize(points.len(), NOTHING);
+        self.before.resize(points.len(), NOTHING);
+        self.readings.resize(points.len(), TakenReading::NONE);
+        self.spans.clear();
+        self.spans.extend(Span::all(points));
+        self.pressing.clear();
     }
 
     /// The distance that point `index` read at its base, if it presses on the wall there.

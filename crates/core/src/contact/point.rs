@@ -34,15 +34,17 @@ pub struct ContactPoint {
 impl ContactPoint {
     /// Position on the device's axis, mm.
     pub fn position(&self, elements: &[ElementData], state: &RodState) -> Vec3 {
-        let (e, xi) = (self.element, self.xi);
-        if xi == 1.0 {
-            return state.positions[e + 1];
+        let (e, x, frames) = (self.element, &state.positions, &state.frames);
+        self.between(&[x[e], x[e + 1], frames[e].t, frames[e + 1].t], elements[e].length)
+    }
+
+    /// Position between places and tangents of two nodes, on an element of that length, mm.
+    pub(super) fn between(&self, [x0, x1, t0, t1]: &[Vec3; 4], length_mm: f64) -> Vec3 {
+        if self.xi == 1.0 {
+            return *x1;
         }
-        let [w0, s0, w1, s1] = hermite(xi);
-        let h = elements[e].length;
-        state.positions[e] * w0
-            + state.positions[e + 1] * w1
-            + (state.frames[e].t * s0 + state.frames[e + 1].t * s1) * h
+        let [w0, s0, w1, s1] = hermite(self.xi);
+        x0 * w0 + x1 * w1 + (t0 * s0 + t1 * s1) * length_mm
     }
 
     /// Normal of the wall and force on it at a distance, N; `factor` as in [`Stiffness`](super::grading::Stiffness).

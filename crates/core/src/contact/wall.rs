@@ -10,6 +10,7 @@
 //! A point asks the bounding volume hierarchy only when it may have come near something new: while it has moved less than
 //! its last clearance, nothing can touch it.
 
+mod clear;
 mod coupling;
 mod foresight;
 mod passing;
@@ -17,12 +18,13 @@ mod reading;
 mod slipping;
 
 use super::memory::WallMemory;
-use super::point::{Contact, ContactPoint, Counters, FOLLOW, Touch};
+use super::point::{Contact, ContactPoint, Counters, Touch};
 use crate::Vec3;
 use crate::contact::{Between, Friction, MovedWall};
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::{External, Moved};
 
+pub(super) use clear::Span;
 pub(super) use foresight::Foreseen;
 use reading::Reading;
 pub(super) use slipping::{Slip, Slipping};
@@ -66,7 +68,7 @@ impl<'a> WallContact<'a> {
         friction: &'a mut Friction,
         softest_nmm2: f64,
     ) -> Self {
-        memory.resize(points.len());
+        memory.look_at(points);
         Self {
             felt: felt.into(),
             points,
@@ -145,11 +147,55 @@ impl<'a> WallContact<'a> {
         sum.add(point.xi, &gradient, into.wants_hessian().then_some(&hessian));
     }
 
+    /// Adds the energy of point `index` at a state to a sum.
+    fn value_of(&mut self, elements: &[ElementData], state: &RodState, index: usize, mut sum: f64) -> f64 {
+        let point = self.points[index];
+        let x = point.position(elements, state);
+        let material = self.felt.material(&x);
+        let radius_mm = point.potential.radius_mm;
+        let limit_mm = self.asked_mm(radius_mm);
+        let value_mm = self.read_within(index, &material, limit_mm).distance_mm();
+        if value_mm < radius_mm {
+            let triangle = self.memory.points[index].triangle;
+            let factor = self.felt.stiffness(&material, triangle, self.softness).factor;
+            sum += factor * point.weight_mm * point.potential.value(value_mm);
+        }
+        if self.friction.acts() {
+            sum += self.friction.value(index, &x, point.angle(state), radius_mm);
+        }
+        sum
+    }
+
     /// Length that point `index` stands for at its base, times the part of the modulus that acts there, mm.
     fn weight_mm(&self, index: usize) -> f64 {
         let known = &self.memory.points[index];
         let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
         factor * self.points[index].weight_mm
+    }
+
+    /// Part of its way from the base to `to`, at most `fraction`, that point `index` may go.
+    fn safe_fraction_of(
+        &mut self,
+        elements: &[ElementData],
+        to: &RodState,
+        index: usize,
+        fraction: f64,
+    ) -> f64 {
+        let x = self.material(index, elements, to);
+        let known = &self.memory.points[index];
+        let safe_mm = SAFE * known.base_clearance_mm / self.felt.stretch();
+        if known.side.is_some() || fraction * (x - known.base).norm() <= safe_mm {
+            return fraction;
+        }
+        self.counters.queries += 1;
+        let Some(met) = self.felt.query.crossing(&known.base, &x, fraction / SAFE) else { return fraction };
+        // Near the wall flat triangles may stand into the smooth lumen, and what it says counts.
+        let from_mm = known.base_clearance_mm;
+        match known.triangle.map(|triangle| self.felt.distance_from(triangle, &x)) {
+            Some(to_mm) if to_mm > 0.0 => fraction,
+            Some(to_mm) => fraction.min(SAFE * from_mm / (from_mm - to_mm)),
+            None => SAFE * met,
+        }
     }
 
     /// A device bent to a radius of 100 mm carries this.
@@ -187,23 +233,35 @@ impl<'a> WallContact<'a> {
         })
     }
 
+    /// What happens at all points that press on the wall at a state.
+    pub fn touches(&mut self, elements: &[ElementData], state: &RodState, to: &mut Vec<(usize, Touch)>) {
+        to.clear();
+        for span in 0..self.memory.spans.len() {
+            for index in self.near(span, elements, state).into_iter().flatten() {
+                to.extend(self.touch(elements, state, index).map(|touch| (index, touch)));
+            }
+        }
+    }
+
     /// How much the forces on the wall differ at a state from those of the last equilibrium, over the latter; 0 where there were none.
     pub fn misfit(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         let (mut misfit_n, mut sum_n) = (0.0, 0.0);
-        for index in 0..self.points.len() {
-            let point = self.points[index];
-            let x = self.material(index, elements, state);
-            let force_n = match self.read(index, &x) {
-                Reading::Pressed(d) => {
-                    let triangle = self.memory.points[index].triangle;
-                    let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
-                    point.pressed(&d, factor).1
-                }
-                Reading::Free(_) => 0.0,
-            };
-            let was_n = self.memory.points[index].force_n;
-            misfit_n += (force_n - was_n).abs();
-            sum_n += was_n;
+        for span in 0..self.memory.spans.len() {
+            for index in self.near(span, elements, state).into_iter().flatten() {
+                let point = self.points[index];
+                let x = self.material(index, elements, state);
+                let force_n = match self.read(index, &x) {
+                    Reading::Pressed(d) => {
+                        let triangle = self.memory.points[index].triangle;
+                        let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
+                        point.pressed(&d, factor).1
+                    }
+                    Reading::Free(_) => 0.0,
+                };
+                let was_n = self.memory.points[index].force_n;
+                misfit_n += (force_n - was_n).abs();
+                sum_n += was_n;
+            }
         }
         if sum_n > 0.0 { misfit_n / sum_n } else { 0.0 }
     }
@@ -211,27 +269,7 @@ impl<'a> WallContact<'a> {
 
 impl External for WallContact<'_> {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
-        // Only where trials are assembled may one be refused.
-        if self.is_fixed() {
-            self.memory.before.clone_from(&self.memory.points);
-        }
-        for index in 0..self.points.len() {
-            let x = self.material(index, elements, state);
-            let radius_mm = self.points[index].potential.radius_mm;
-            let held = self.holding && self.memory.points[index].presses;
-            let limit_mm = if held { (1.0 + FOLLOW) * radius_mm } else { radius_mm };
-            let reading = self.read_within(index, &x, limit_mm);
-            let known = &mut self.memory.points[index];
-            known.base = x;
-            known.base_clearance_mm = reading.distance_mm();
-            known.presses = matches!(reading, Reading::Pressed(_));
-            (known.base_looked_at, known.base_triangle) = (known.looked_at, known.triangle);
-            (known.base_looked_clearance_mm, known.base_free_mm) = (known.clearance_mm, known.free_mm);
-            known.side = known.triangle.filter(|_| known.base_clearance_mm < SUNK * radius_mm);
-            if !known.presses {
-                known.force_n = 0.0;
-            }
-        }
+        self.look_at_base(elements, state);
         // Forces that hold are none that friction follows, unless it is solved for with them.
         if self.friction.is_coupled() {
             self.press_friction();
@@ -249,44 +287,34 @@ impl External for WallContact<'_> {
         }
         self.friction.between.add(state, into);
         self.rounding_n = 0.0;
-        let mut begin = 0;
         let mut sum = PointSum::default();
-        for group in self.points.chunk_by(|a, b| a.element == b.element) {
-            let end = begin + group.len();
-            for index in begin..end {
+        for span in 0..self.memory.spans.len() {
+            let Span { ref points, element, at_base, .. } = self.memory.spans[span];
+            // What is not known there is clear of the wall.
+            if !at_base {
+                continue;
+            }
+            for index in points.clone() {
                 self.gather(elements, state, into, &mut sum, index);
             }
             if !sum.is_empty() {
-                let e = group[0].element;
-                into.add_points(state, &elements[e], e, &std::mem::take(&mut sum));
+                into.add_points(state, &elements[element], element, &std::mem::take(&mut sum));
             }
-            begin = end;
         }
     }
 
     fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         let mut sum = self.friction.between.taken_mj(state);
-        for index in 0..self.points.len() {
-            let point = self.points[index];
-            let x = point.position(elements, state);
-            let material = self.felt.material(&x);
-            let radius_mm = point.potential.radius_mm;
-            let limit_mm = self.asked_mm(radius_mm);
-            let value_mm = self.read_within(index, &material, limit_mm).distance_mm();
-            if value_mm < radius_mm {
-                let triangle = self.memory.points[index].triangle;
-                let factor = self.felt.stiffness(&material, triangle, self.softness).factor;
-                sum += factor * point.weight_mm * point.potential.value(value_mm);
-            }
-            if self.friction.acts() {
-                sum += self.friction.value(index, &x, point.angle(state), point.potential.radius_mm);
+        for span in 0..self.memory.spans.len() {
+            for index in self.near(span, elements, state).into_iter().flatten() {
+                sum = self.value_of(elements, state, index, sum);
             }
         }
         sum
     }
 
     fn return_to_base(&mut self) {
-        std::mem::swap(&mut self.memory.points, &mut self.memory.before);
+        self.look_back();
     }
 
     /// Where the wall yields more than an element, a trial does not lose its contacts.
@@ -383,21 +411,9 @@ impl External for WallContact<'_> {
     /// holds it there.
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         let mut fraction: f64 = 1.0;
-        for index in 0..self.points.len() {
-            let x = self.material(index, elements, to);
-            let known = &self.memory.points[index];
-            let safe_mm = SAFE * known.base_clearance_mm / self.felt.stretch();
-            if known.side.is_some() || fraction * (x - known.base).norm() <= safe_mm {
-                continue;
-            }
-            self.counters.queries += 1;
-            let Some(met) = self.felt.query.crossing(&known.base, &x, fraction / SAFE) else { continue };
-            // Near the wall flat triangles may stand into the smooth lumen, and what it says counts.
-            let from_mm = known.base_clearance_mm;
-            match known.triangle.map(|triangle| self.felt.distance_from(triangle, &x)) {
-                Some(to_mm) if to_mm > 0.0 => {}
-                Some(to_mm) => fraction = fraction.min(SAFE * from_mm / (from_mm - to_mm)),
-                None => fraction = SAFE * met,
+        for span in 0..self.memory.spans.len() {
+            for index in self.near_way(span, elements, to, fraction).into_iter().flatten() {
+                fraction = self.safe_fraction_of(elements, to, index, fraction);
             }
         }
         fraction

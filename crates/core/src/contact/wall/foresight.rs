@@ -129,8 +129,9 @@ impl WallContact<'_> {
         let mut foreseen = std::mem::take(&mut self.memory.foreseen);
         foreseen.clear();
         self.memory.slipping.clear();
-        for (index, point) in self.points.iter().enumerate() {
+        for index in self.memory.pressing.iter().copied() {
             let Some(d) = self.memory.pressed(index) else { continue };
+            let point = &self.points[index];
             let (gap_mm, change_mm) =
                 (d.value_mm - point.potential.radius_mm, moved(point.place()).0.dot(&d.gradient));
             let spring_n_per_mm = self.weight_mm(index) * point.potential.modulus_n_per_mm2;
@@ -159,44 +160,60 @@ impl WallContact<'_> {
     ) -> bool {
         let known = self.memory.foreseen.len();
         let (mut next, mut met) = (0, 0);
-        for index in 0..self.points.len() {
-            let old =
-                self.memory.foreseen[..known].get(next).filter(|contact| contact.index == index).copied();
-            next += usize::from(old.is_some());
-            // Those that press are brought back to what was foreseen of them.
-            if old.is_some_and(|contact| contact.presses) {
-                continue;
-            }
-            let point = self.points[index];
-            let (x, radius_mm) = (self.material(index, elements, trial), point.potential.radius_mm);
-            let limit_mm = if old.is_some() { radius_mm } else { (1.0 + FOLLOW) * radius_mm };
-            let Reading::Pressed(d) = self.read_within(index, &x, limit_mm) else { continue };
-            let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, self.softness).factor;
-            let change_mm = moved(point.place()).0.dot(&d.gradient);
-            // At the base it presses as it does there, or not at all, whatever the plane says of there.
-            let at_base = old.is_some_and(|contact| contact.at_base);
-            let plane_mm = d.value_mm - radius_mm - part * change_mm;
-            let base_mm = self.memory.points[index].base_clearance_mm - radius_mm;
-            let least_mm = if at_base { base_mm } else { base_mm.max(0.0) };
-            let gap_mm = if plane_mm < 0.0 { least_mm } else { plane_mm };
-            let contact = Foreseen {
-                index,
-                gap_mm: [gap_mm, change_mm],
-                gradient: d.gradient,
-                spring_n_per_mm: factor * point.weight_mm * point.potential.modulus_n_per_mm2,
-                carried_n: 0.0,
-                at_base,
-                presses: false,
-                kept: false,
-            };
-            met += 1;
-            match old {
-                Some(_) => self.memory.foreseen[next - 1] = contact,
-                None => self.memory.foreseen.push(contact),
+        for span in 0..self.memory.spans.len() {
+            for index in self.near(span, elements, trial).into_iter().flatten() {
+                next += self.memory.foreseen[next..known].partition_point(|contact| contact.index < index);
+                let old = self.memory.foreseen[next..known].first().filter(|contact| contact.index == index);
+                // Those that press are brought back to what was foreseen of them.
+                if old.is_some_and(|contact| contact.presses) {
+                    continue;
+                }
+                let old = old.copied();
+                let Some(contact) = self.met(elements, trial, part, moved, (index, old.as_ref())) else {
+                    continue;
+                };
+                met += 1;
+                match old {
+                    Some(_) => self.memory.foreseen[next] = contact,
+                    None => self.memory.foreseen.push(contact),
+                }
             }
         }
         self.memory.foreseen.sort_unstable_by_key(|contact| contact.index);
         met > 0
+    }
+
+    /// What point `index` meets at a trial, if it does; `old` is what was foreseen of it.
+    fn met(
+        &mut self,
+        elements: &[ElementData],
+        trial: &RodState,
+        part: f64,
+        moved: &Moved<'_>,
+        (index, old): (usize, Option<&Foreseen>),
+    ) -> Option<Foreseen> {
+        let point = self.points[index];
+        let (x, radius_mm) = (self.material(index, elements, trial), point.potential.radius_mm);
+        let limit_mm = if old.is_some() { radius_mm } else { (1.0 + FOLLOW) * radius_mm };
+        let Reading::Pressed(d) = self.read_within(index, &x, limit_mm) else { return None };
+        let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, self.softness).factor;
+        let change_mm = moved(point.place()).0.dot(&d.gradient);
+        // At the base it presses as it does there, or not at all, whatever the plane says of there.
+        let at_base = old.is_some_and(|contact| contact.at_base);
+        let plane_mm = d.value_mm - radius_mm - part * change_mm;
+        let base_mm = self.memory.points[index].base_clearance_mm - radius_mm;
+        let least_mm = if at_base { base_mm } else { base_mm.max(0.0) };
+        let gap_mm = if plane_mm < 0.0 { least_mm } else { plane_mm };
+        Some(Foreseen {
+            index,
+            gap_mm: [gap_mm, change_mm],
+            gradient: d.gradient,
+            spring_n_per_mm: factor * point.weight_mm * point.potential.modulus_n_per_mm2,
+            carried_n: 0.0,
+            at_base,
+            presses: false,
+            kept: false,
+        })
     }
 
     /// See [`External::press_or_let_go`](crate::solve::External::press_or_let_go).
@@ -302,8 +319,9 @@ impl WallContact<'_> {
         into: &mut dyn Stencils,
     ) -> bool {
         let mut any = false;
-        for (index, point) in self.points.iter().enumerate() {
+        for index in self.memory.pressing.iter().copied() {
             let Some(d) = self.memory.pressed(index) else { continue };
+            let point = &self.points[index];
             let press = -self.weight_mm(index) * point.potential.derivatives(d.value_mm).0;
             let (e, h) = (point.element, elements[point.element].length);
             let crest = crest(press, &d.hessian);

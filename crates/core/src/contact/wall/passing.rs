@@ -1,5 +1,6 @@
 //! Whether a device has gone through the wall.
 
+use super::clear::Room;
 use super::{SAFE, SUNK, WallContact};
 use crate::Vec3;
 use crate::contact::FeltWall;
@@ -58,13 +59,23 @@ impl WallContact<'_> {
 
     /// Whether a guess is none: a point sinks much deeper than where it comes from, or passes through the wall on its way from there.
     pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
-        let deep = (0..self.points.len()).any(|index| {
-            let radius_mm = self.points[index].potential.radius_mm;
-            let known = &self.memory.points[index];
-            let was_mm = if known.side.is_some() { known.base_clearance_mm } else { SUNK * radius_mm };
-            let least_mm = was_mm.min(SUNK * radius_mm + DEEPER * radius_mm) - DEEPER * radius_mm;
-            let x = self.material(index, elements, state);
-            self.read(index, &x).distance_mm() <= least_mm
+        let deep = (0..self.memory.spans.len()).any(|span| {
+            let Some(points) = self.near(span, elements, state) else { return false };
+            let mut room = Room::ALL;
+            for index in points {
+                let radius_mm = self.points[index].potential.radius_mm;
+                let known = &self.memory.points[index];
+                let was_mm = if known.side.is_some() { known.base_clearance_mm } else { SUNK * radius_mm };
+                let least_mm = was_mm.min(SUNK * radius_mm + DEEPER * radius_mm) - DEEPER * radius_mm;
+                let x = self.material(index, elements, state);
+                let reading = self.read(index, &x);
+                if reading.distance_mm() <= least_mm {
+                    return true;
+                }
+                room.take(self.room(index, &x, &reading));
+            }
+            self.note(span, state, room);
+            false
         });
         deep || self.safe_fraction(elements, state) < 1.0
     }

@@ -6,7 +6,6 @@ use super::hands::Hand;
 use super::rubbing::LEAST_SLIP_MM;
 use super::slopes::write_instruments;
 use super::workspace::Tools;
-use crate::contact::WallContact;
 use crate::contact::extension::left_through;
 use crate::device::Stack;
 use crate::methods::{Energy, Surroundings};
@@ -40,32 +39,17 @@ impl<const C: usize> Tools<C> {
             }
             return 0.0;
         }
-        let mut contact = WallContact::new(
-            environment.wall(),
-            &mesh.points,
-            &mut self.memory,
-            &mut self.friction,
-            surroundings.stack.softest_nmm2(),
-        );
         let stored = self.newton.assembly.energy;
         report.energy = Energy { bend: stored.bend, twist: stored.twist, wall: 0.0 };
-        let mut pressed = Vec::new();
-        for index in 0..mesh.points.len() {
-            let Some(touch) = contact.touch(&mesh.elements, rod, index) else {
-                continue;
-            };
+        for (_, touch) in &self.touches {
             report.energy.wall += touch.energy_mj;
             report.max_penetration_mm = report.max_penetration_mm.max(touch.contact.penetration_mm);
             report.contacts.push(touch.contact);
-            if surroundings.stack.is_several() {
-                pressed.push((index, touch));
-            }
         }
-
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
         if surroundings.stack.is_several() {
             let between = self.friction.between.places();
-            write_instruments::<C>(environment, hands, Some(&clamp), (&pressed, between), at);
+            write_instruments::<C>(environment, hands, Some(&clamp), (&self.touches, between), at);
             self.rub(at);
             let taken_mj = self.rub_in_valves(surroundings.stack, at);
             return taken_mj + self.rub_in_sheath(surroundings, &clamp, at);

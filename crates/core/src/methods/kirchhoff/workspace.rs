@@ -8,7 +8,7 @@ use super::settle::Settle;
 use super::slide::Extension;
 use super::state::KirchhoffState;
 use super::{Environment, meshed};
-use crate::contact::{Counters, Friction, WallMemory};
+use crate::contact::{Counters, Friction, Touch, WallMemory};
 use crate::solve::Newton;
 
 /// The workspace of a simulation.
@@ -36,6 +36,8 @@ pub(super) struct Tools<const C: usize> {
     pub(super) friction: Friction,
     pub(super) memory: WallMemory,
     pub(super) extension: Extension,
+    /// Points that press in the equilibrium found last, and what happens there.
+    pub(super) touches: Vec<(usize, Touch)>,
     /// Nodes of the sub-steps of the command in which the device moved.
     pub(super) nodes_solved: u64,
     /// Questions about the wall.
@@ -59,6 +61,7 @@ impl<const C: usize> Workspace<C> {
             friction: Friction::new(surroundings.properties.largest_friction()),
             memory: WallMemory::new(environment.felt),
             extension: Extension::default(),
+            touches: Vec::new(),
             nodes_solved: 0,
             counters: Counters::default(),
         };
@@ -67,6 +70,7 @@ impl<const C: usize> Workspace<C> {
         tools.settle.reserve(elements);
         tools.friction.reserve(points);
         tools.memory.reserve(points);
+        tools.touches.reserve(points);
         let mut mesh = Mesh::default();
         let mut hands = Vec::new();
         super::hands::read(state.report(), &mut hands);

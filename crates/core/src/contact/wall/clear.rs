@@ -1,0 +1,249 @@
+//! Elements of the rod that are clear of the wall.
+//!
+//! All of a device is looked at several times in every iteration, and most of it is nowhere near a wall. Where none of the points of an
+//! element can touch, whatever the direction, as long as it moves by less than s, its points are not looked at again until it has. A point
+//! at ξ of an element of length h is a mean of its nodes and a part of their tangents ([`hermite`](crate::rod::quadrature::hermite)), so
+//! that none moves by more than
+//!
+//! ```text
+//! max |Δxₖ| + 4/27 h (|Δt₀| + |Δt₁|),    ξ (1 − ξ)² ≤ 4/27
+//! ```
+//!
+//! What its points would read is what they have read: they are free by a distance that is known. So nothing that is felt hangs on what is left
+//! out. Only where they are at the base is not noted, and they are looked at there before they are at any trial.
+
+use std::ops::Range;
+
+use super::{Reading, SAFE, SUNK, WallContact};
+use crate::Vec3;
+use crate::contact::memory::WallMemory;
+use crate::contact::point::{ContactPoint, FOLLOW};
+use crate::rod::{ElementData, RodState};
+use crate::solve::External;
+
+/// The largest of ξ (1 − ξ)².
+const BULGE: f64 = 4.0 / 27.0;
+
+/// Places and tangents of the two nodes of an element.
+type Nodes = [Vec3; 4];
+
+/// How far points are from touching anything.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Room {
+    /// None touches the wall while they move by less than this, mm; 0 where they may.
+    free_mm: f64,
+    /// No wall is nearer than this to any of them, mm.
+    clearance_mm: f64,
+}
+
+impl Room {
+    /// That of no points.
+    pub(super) const ALL: Self = Self { free_mm: f64::INFINITY, clearance_mm: f64::INFINITY };
+    /// That of points of which nothing is known.
+    const NONE: Self = Self { free_mm: 0.0, clearance_mm: 0.0 };
+
+    /// The room that these and others have.
+    pub(super) fn take(&mut self, other: Self) {
+        self.free_mm = self.free_mm.min(other.free_mm);
+        self.clearance_mm = self.clearance_mm.min(other.clearance_mm);
+    }
+}
+
+/// The contact points of one element.
+#[derive(Debug, Clone)]
+pub(in crate::contact) struct Span {
+    /// Its points.
+    pub(super) points: Range<usize>,
+    /// Number of the element.
+    pub(super) element: usize,
+    /// Its nodes where all of its points were looked at last, and at the base.
+    looked_at: Nodes,
+    base: Nodes,
+    room: Room,
+    /// Whether its points are known where they are at the base.
+    pub(super) at_base: bool,
+}
+
+impl Span {
+    /// Those of `points`, of which nothing is known.
+    pub(in crate::contact) fn all(points: &[ContactPoint]) -> impl Iterator<Item = Self> {
+        let mut begin = 0;
+        points.chunk_by(|a, b| a.element == b.element).map(move |group| {
+            let span = begin..begin + group.len();
+            begin = span.end;
+            Self {
+                points: span,
+                element: group[0].element,
+                looked_at: UNKNOWN,
+                base: UNKNOWN,
+                room: Room::NONE,
+                at_base: true,
+            }
+        })
+    }
+
+    /// Notes how far its points are from touching anything at a state.
+    fn look(&mut self, state: &RodState, room: Room) {
+        (self.looked_at, self.room) = (nodes(self.element, state), room);
+    }
+}
+
+/// Where nodes are that nobody has looked at.
+const UNKNOWN: Nodes = [Vec3::new(f64::NAN, f64::NAN, f64::NAN); 4];
+
+fn nodes(element: usize, state: &RodState) -> Nodes {
+    let (x, frames) = (&state.positions, &state.frames);
+    [x[element], x[element + 1], frames[element].t, frames[element + 1].t]
+}
+
+impl WallContact<'_> {
+    /// Whether no point of a span can touch the wall at a state.
+    fn is_free(&self, span: &Span, elements: &[ElementData], state: &RodState) -> bool {
+        // Friction that follows the state at once is asked for everywhere.
+        span.room.free_mm > 0.0 && !self.friction.is_coupled() && {
+            let to = nodes(span.element, state);
+            self.motion_mm(&span.looked_at, &to, elements[span.element].length) < span.room.free_mm
+        }
+    }
+
+    /// How far a material point of the vessel at which a point of an element is moves at most, mm.
+    fn motion_mm(&self, from: &Nodes, to: &Nodes, length_mm: f64) -> f64 {
+        let [x0, x1, t0, t1] = [0, 1, 2, 3].map(|k| (to[k] - from[k]).norm());
+        (x0.max(x1) + BULGE * length_mm * (t0 + t1)) * self.felt.stretch()
+    }
+
+    /// The points of a span, unless none can touch the wall at a state; those that are told are known where they are at the base.
+    pub(super) fn near(
+        &mut self,
+        span: usize,
+        elements: &[ElementData],
+        state: &RodState,
+    ) -> Option<Range<usize>> {
+        let known = &self.memory.spans[span];
+        if self.is_free(known, elements, state) {
+            return None;
+        }
+        let points = known.points.clone();
+        self.know_base(span, elements);
+        Some(points)
+    }
+
+    /// The points of a span, unless all can go `part` of the straight way from the base to a state without coming near a wall; those that
+    /// are told are known where they are at the base.
+    pub(super) fn near_way(
+        &mut self,
+        span: usize,
+        elements: &[ElementData],
+        state: &RodState,
+        part: f64,
+    ) -> Option<Range<usize>> {
+        let known = &self.memory.spans[span];
+        if known.room.free_mm > 0.0 {
+            let (to, length_mm) = (nodes(known.element, state), elements[known.element].length);
+            let clearance_mm =
+                known.room.clearance_mm - self.motion_mm(&known.looked_at, &known.base, length_mm);
+            if part * self.motion_mm(&known.base, &to, length_mm) <= SAFE * clearance_mm {
+                return None;
+            }
+        }
+        let points = known.points.clone();
+        self.know_base(span, elements);
+        Some(points)
+    }
+
+    /// The points of a span are known where they are at the base.
+    fn know_base(&mut self, span: usize, elements: &[ElementData]) {
+        let known = &mut self.memory.spans[span];
+        if std::mem::replace(&mut known.at_base, true) {
+            return;
+        }
+        let (points, base, length_mm) = (known.points.clone(), known.base, elements[known.element].length);
+        for index in points {
+            let x = self.points[index].between(&base, length_mm);
+            self.read_base(index, &self.felt.material(&x));
+        }
+    }
+
+    /// All points are known where they are at the base.
+    pub fn know_whole_base(&mut self, elements: &[ElementData]) {
+        for span in 0..self.memory.spans.len() {
+            self.know_base(span, elements);
+        }
+    }
+
+    /// Has a state be the base, and looks at the points that may touch there.
+    pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
+        self.memory.pressing.clear();
+        // Only where trials are assembled may one be refused.
+        let may_return = self.is_fixed();
+        for span in 0..self.memory.spans.len() {
+            let free = self.is_free(&self.memory.spans[span], elements, state);
+            let known = &mut self.memory.spans[span];
+            known.base = nodes(known.element, state);
+            known.at_base = !free;
+            if free {
+                continue;
+            }
+            let points = known.points.clone();
+            if may_return {
+                let WallMemory { points: all, before, .. } = &mut *self.memory;
+                before[points.clone()].copy_from_slice(&all[points.clone()]);
+            }
+            let mut room = Room::ALL;
+            for index in points {
+                let x = self.material(index, elements, state);
+                let reading = self.read_base(index, &x);
+                if self.memory.points[index].presses {
+                    self.memory.pressing.push(index);
+                }
+                room.take(self.room(index, &x, &reading));
+            }
+            self.memory.spans[span].look(state, room);
+        }
+    }
+
+    /// How far point `index`, which is at `x` and has this reading, is from touching anything.
+    pub(super) fn room(&self, index: usize, x: &Vec3, reading: &Reading) -> Room {
+        let known = &self.memory.points[index];
+        let moved_mm = (x - known.looked_at).norm();
+        // What has pressed in the last equilibrium may be held to the wall.
+        let free = matches!(reading, Reading::Free(_))
+            && known.side.is_none()
+            && known.force_n == 0.0
+            && self.friction.is_free(index);
+        let free_mm = if free { known.free_mm - moved_mm } else { 0.0 };
+        Room { free_mm, clearance_mm: known.clearance_mm - moved_mm }
+    }
+
+    /// Notes how far the points of a span, which have been looked at at a state, are from touching anything.
+    pub(super) fn note(&mut self, span: usize, state: &RodState, room: Room) {
+        self.memory.spans[span].look(state, room);
+    }
+
+    /// The base before the one looked at last is the base again.
+    pub(super) fn look_back(&mut self) {
+        let WallMemory { points, before, spans, .. } = &mut *self.memory;
+        for span in spans.iter().filter(|span| span.at_base) {
+            points[span.points.clone()].copy_from_slice(&before[span.points.clone()]);
+        }
+    }
+
+    /// Notes of a point that it is at `x` at the base, and what it reads there.
+    fn read_base(&mut self, index: usize, x: &Vec3) -> Reading {
+        let radius_mm = self.points[index].potential.radius_mm;
+        let held = self.holding && self.memory.points[index].presses;
+        let limit_mm = if held { (1.0 + FOLLOW) * radius_mm } else { radius_mm };
+        let reading = self.read_within(index, x, limit_mm);
+        let known = &mut self.memory.points[index];
+        known.base = *x;
+        known.base_clearance_mm = reading.distance_mm();
+        known.presses = matches!(reading, Reading::Pressed(_));
+        (known.base_looked_at, known.base_triangle) = (known.looked_at, known.triangle);
+        (known.base_looked_clearance_mm, known.base_free_mm) = (known.clearance_mm, known.free_mm);
+        known.side = known.triangle.filter(|_| known.base_clearance_mm < SUNK * radius_mm);
+        if !known.presses {
+            known.force_n = 0.0;
+        }
+        reading
+    }
+}
