@@ -247,3 +247,6 @@ impl WallContact<'_> {
         reading
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -12,7 +12,11 @@ use crate::vessel::{NoStore, SurfaceMesh, Wall};
 
 /// A closed outline that is swept along: `place` gives the k-th of `rings` its middle, the direction of the outline's first axis and its
 /// size; the second axis is y.
-fn swept(outline: &[(f64, f64)], rings: u32, place: impl Fn(u32) -> (Vec3, Vec3, f64)) -> FeltWall {
+pub(super) fn swept(
+    outline: &[(f64, f64)],
+    rings: u32,
+    place: impl Fn(u32) -> (Vec3, Vec3, f64),
+) -> FeltWall {
     felt(&sweep(outline, rings, place))
 }
 
@@ -40,7 +44,7 @@ fn felt(mesh: &SurfaceMesh) -> FeltWall {
 }
 
 /// An ellipse with these half axes, mm.
-fn ellipse(a_mm: f64, b_mm: f64, count: u32) -> Vec<(f64, f64)> {
+pub(super) fn ellipse(a_mm: f64, b_mm: f64, count: u32) -> Vec<(f64, f64)> {
     let angle = |i: u32| std::f64::consts::TAU * f64::from(i) / f64::from(count);
     (0..count).map(|i| (a_mm * angle(i).cos(), b_mm * angle(i).sin())).collect()
 }
@@ -313,7 +317,7 @@ fn what_is_kept_of_a_reading_knows_its_triangle() {
     let x = Vec3::new(0.4, 0.1, 20.1);
     let triangle = rod.contact().felt.query.nearest(&x, 1.0).unwrap().triangle;
     let nearness = felt.nearness(&x, triangle, 1.0);
-    rod.memory.resize(1);
+    rod.memory.look_at(&rod.points);
     rod.memory.readings[0] = TakenReading { at_mm: x, triangle, nearness };
     let mut known = KnownPoints::default();
     rod.memory.keep(&mut known);
