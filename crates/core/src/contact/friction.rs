@@ -293,6 +293,11 @@ impl Friction {
         self.sliders.get(index).map_or(0.0, |slider| self.coefficient * slider.force_n)
     }
 
+    /// Whether a point may be held by friction.
+    pub(super) fn holds(&self, index: usize) -> bool {
+        self.sliders.get(index).is_some_and(|slider| self.coupled || slider.force_n > 0.0)
+    }
+
     /// Whether nothing rubs at a point, and nothing did where the step began.
     pub(super) fn is_free(&self, index: usize) -> bool {
         self.sliders.get(index).is_none_or(|slider| slider.force_n == 0.0 && slider.begun.1 == 0.0)
@@ -310,7 +315,7 @@ impl Friction {
     /// Energy that friction has taken in the step, mJ.
     pub fn dissipated_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> f64 {
         let each = points.iter().enumerate().take(self.sliders.len());
-        let taken = each.map(|(index, point)| {
+        let taken = each.filter(|(index, _)| self.largest_n(*index) > 0.0).map(|(index, point)| {
             let x = point.position(elements, state);
             self.value(index, &x, point.angle(state), point.potential.radius_mm)
         });
@@ -357,7 +362,7 @@ impl Friction {
         radius_mm: f64,
         secant: bool,
     ) -> Option<FrictionDerivatives> {
-        let slider = self.sliders.get(index).filter(|s| self.coupled || s.force_n > 0.0)?;
+        let slider = self.sliders.get(index).filter(|_| self.holds(index))?;
         let force = self.coefficient * slider.force_n;
         let stiff = if self.coupled { self.coefficient * slider.matrix_n } else { force };
         let (slip, spin) = self.slip(index, x, angle, radius_mm);
@@ -378,14 +383,20 @@ impl Friction {
         })
     }
 
-    /// Looks at what presses at the state that Newton's method has come to, a normal and a force for every point, and
-    /// renews the lagged ones unless they are still on their way or have settled. `least_n` is a force not worth settling.
-    pub fn follow(&mut self, pressed: impl Iterator<Item = (Vec3, f64)>, least_n: f64) {
+    /// Looks at what presses at the state that Newton's method has come to, the numbers of the points that do, ascending, each with a normal
+    /// and a force, and renews the lagged ones unless they are still on their way or have settled. `least_n` is a force not worth settling.
+    pub fn follow(&mut self, pressed: impl Iterator<Item = (usize, (Vec3, f64))>, least_n: f64) {
         self.renewed = false;
         let (mut moved, mut sum) = (0.0, least_n);
-        for (slider, now) in self.sliders.iter_mut().zip(pressed) {
-            moved += (slider.seen.0 * slider.seen.1 - now.0 * now.1).norm();
-            sum += now.1;
+        let mut pressed = pressed.peekable();
+        for (index, slider) in self.sliders.iter_mut().enumerate() {
+            let now =
+                pressed.next_if(|(point, _)| *point == index).map_or((Vec3::zeros(), 0.0), |(_, now)| now);
+            // Most points press neither now nor before.
+            if now.1 > 0.0 || slider.seen.1 > 0.0 {
+                moved += (slider.seen.0 * slider.seen.1 - now.0 * now.1).norm();
+                sum += now.1;
+            }
             slider.seen = now;
         }
         if self.settled || moved > STEADY * sum || self.handed_over() {
@@ -421,7 +432,7 @@ impl Friction {
     /// How much of the normal force has changed since it was last renewed.
     pub fn unsettled(&self, least_n: f64) -> f64 {
         let (mut change, mut sum) = (0.0, least_n);
-        for slider in &self.sliders {
+        for slider in self.sliders.iter().filter(|slider| slider.force_n != 0.0 || slider.seen.1 > 0.0) {
             change += (slider.normal * slider.force_n - slider.seen.0 * slider.seen.1).norm();
             sum += slider.seen.1;
         }

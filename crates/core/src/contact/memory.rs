@@ -3,6 +3,8 @@
 //! What is known at an equilibrium ([`KnownPoints`]) belongs to the state of an insertion. A step takes it over, slides it with the device and
 //! goes on from there in its own memory ([`WallMemory`]), so that a step that fails has changed nothing.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, Nearness};
@@ -96,7 +98,7 @@ struct KnownDistance {
 #[derive(Debug, Clone)]
 pub struct WallMemory {
     pub(super) points: Vec<KnownPoint>,
-    /// What those that were looked at knew before the state assembled last became the base.
+    /// What those that are known at the base knew before it was.
     pub(super) before: Vec<KnownPoint>,
     /// The points element by element.
     pub(super) spans: Vec<Span>,
@@ -199,6 +201,11 @@ impl WallMemory {
         self.spans.clear();
         self.spans.extend(Span::all(points));
         self.pressing.clear();
+    }
+
+    /// What these points know can be gone back to.
+    pub(super) fn remember(&mut self, points: Range<usize>) {
+        self.before[points.clone()].copy_from_slice(&self.points[points]);
     }
 
     /// The distance that point `index` read at its base, if it presses on the wall there.

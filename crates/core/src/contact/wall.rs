@@ -108,6 +108,9 @@ impl<'a> WallContact<'a> {
         sum: &mut PointSum,
         index: usize,
     ) {
+        if !self.friction.holds(index) {
+            return;
+        }
         let (point, x) = (&self.points[index], &self.felt.place(&self.memory.points[index].base));
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
         let Some(f) = self.friction.derivatives(index, x, angle, radius_mm) else { return };
@@ -160,7 +163,7 @@ impl<'a> WallContact<'a> {
             let factor = self.felt.stiffness(&material, triangle, self.softness).factor;
             sum += factor * point.weight_mm * point.potential.value(value_mm);
         }
-        if self.friction.acts() {
+        if self.friction.holds(index) {
             sum += self.friction.value(index, &x, point.angle(state), radius_mm);
         }
         sum
@@ -276,12 +279,11 @@ impl External for WallContact<'_> {
         } else if self.friction.acts() && !self.holding {
             let least_n = self.least_force_n();
             let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
-            let pressed = self.points.iter().enumerate().map(|(index, point)| {
-                let Some(d) = memory.pressed(index) else { return (Vec3::zeros(), 0.0) };
+            let pressed = memory.pressing.iter().filter_map(|&index| {
                 let known = &memory.points[index];
                 let factor = felt.stiffness(&known.base, known.triangle, softness).factor;
-                let (normal, force) = point.pressed(d, factor);
-                (normal, force * felt.rough(&known.base, known.triangle))
+                let (normal, force) = self.points[index].pressed(memory.pressed(index)?, factor);
+                Some((index, (normal, force * felt.rough(&known.base, known.triangle))))
             });
             self.friction.follow(pressed, least_n);
         }

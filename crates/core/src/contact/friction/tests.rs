@@ -64,8 +64,8 @@ fn forces_that_overshoot_settle_too() {
     for _ in 0..100 {
         let answer = (4.0 - 1.5 * friction.sliders[0].force_n).max(0.0);
         // Newton's method looks twice: the second look finds nothing moved.
-        friction.follow(std::iter::once((normal, answer)), 1e-9);
-        friction.follow(std::iter::once((normal, answer)), 1e-9);
+        friction.follow(std::iter::once((0, (normal, answer))), 1e-9);
+        friction.follow(std::iter::once((0, (normal, answer))), 1e-9);
     }
     assert!(friction.settled && (friction.sliders[0].force_n - 1.6).abs() < 1e-3);
 }

@@ -19,7 +19,6 @@ use crate::Vec3;
 use crate::contact::memory::WallMemory;
 use crate::contact::point::{ContactPoint, FOLLOW};
 use crate::rod::{ElementData, RodState};
-use crate::solve::External;
 
 /// The largest of ξ (1 − ξ)².
 const BULGE: f64 = 4.0 / 27.0;
@@ -158,6 +157,7 @@ impl WallContact<'_> {
             return;
         }
         let (points, base, length_mm) = (known.points.clone(), known.base, elements[known.element].length);
+        self.memory.remember(points.clone());
         for index in points {
             let x = self.points[index].between(&base, length_mm);
             self.read_base(index, &self.felt.material(&x));
@@ -174,8 +174,6 @@ impl WallContact<'_> {
     /// Has a state be the base, and looks at the points that may touch there.
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
         self.memory.pressing.clear();
-        // Only where trials are assembled may one be refused.
-        let may_return = self.is_fixed();
         for span in 0..self.memory.spans.len() {
             let free = self.is_free(&self.memory.spans[span], elements, state);
             let known = &mut self.memory.spans[span];
@@ -185,10 +183,7 @@ impl WallContact<'_> {
                 continue;
             }
             let points = known.points.clone();
-            if may_return {
-                let WallMemory { points: all, before, .. } = &mut *self.memory;
-                before[points.clone()].copy_from_slice(&all[points.clone()]);
-            }
+            self.memory.remember(points.clone());
             let mut room = Room::ALL;
             for index in points {
                 let x = self.material(index, elements, state);

@@ -127,7 +127,8 @@ impl WallContact<'_> {
     pub(super) fn begin_slipping(&mut self, base: &RodState, moved: &Moved<'_>) -> bool {
         let mut slipping = std::mem::take(&mut self.memory.slipping);
         if slipping.is_empty() && self.friction.acts() && !self.friction.is_coupled() {
-            for (index, point) in self.points.iter().enumerate() {
+            let rubbing = self.points.iter().enumerate().filter(|(index, _)| self.friction.holds(*index));
+            for (index, point) in rubbing {
                 let x = self.felt.place(&self.memory.points[index].base);
                 let (angle, radius_mm) = (point.angle(base), point.potential.radius_mm);
                 let Some(f) = self.friction.derivatives(index, &x, angle, radius_mm) else { continue };

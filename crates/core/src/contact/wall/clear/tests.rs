@@ -5,6 +5,7 @@ use super::*;
 use crate::contact::FeltWall;
 use crate::random::{splitmix64, unit};
 use crate::rod::{Assembly, Frame, PLAIN};
+use crate::solve::External;
 
 const ELEMENTS: usize = 12;
 
