@@ -316,7 +316,7 @@ impl External for WallContact<'_> {
     }
 
     fn return_to_base(&mut self) {
-        self.look_back();
+        self.restore_base();
     }
 
     /// Where the wall yields more than an element, a trial does not lose its contacts.

@@ -278,9 +278,9 @@ mod tests {
 
     #[test]
     fn the_same_seed_frame_and_pose_give_the_same_noise_and_others_do_not() {
-        let size = [256, 256];
-        let flat = vec![1.0_f32; 65_536];
-        let energy = vec![60.0_f32; 65_536];
+        let size = [512, 512];
+        let flat = vec![1.0_f32; 512 * 512];
+        let energy = vec![60.0_f32; 512 * 512];
         let read = |seed, frame, primary_deg| {
             let spec = DetectorSpec { seed, blur_mm: 0.0, ..DetectorSpec::default() };
             let mut detector = Detector::new(&spec, &XRaySpec::default(), &arm(primary_deg, size), 0.0);
@@ -294,9 +294,9 @@ mod tests {
         };
         let one = read(1, 4, 0.0);
         assert_eq!(one, read(1, 4, 0.0));
-        // Of 65,536 pixels, independent noise correlates by 0.004.
+        // Of 512 × 512 pixels, independent noise correlates by 0.002.
         for other in [read(2, 4, 0.0), read(1, 5, 0.0), read(1, 4, 1e-6), read(1, 4, -30.0)] {
-            assert!(correlation(&one, &other).abs() < 0.02, "{}", correlation(&one, &other));
+            assert!(correlation(&one, &other).abs() < 0.01, "{}", correlation(&one, &other));
         }
         assert!(correlation(&one, &one) > 0.999, "the twin: one field correlates with itself");
     }

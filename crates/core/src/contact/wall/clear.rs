@@ -9,8 +9,9 @@
 //! max |Δxₖ| + 4/27 h (|Δt₀| + |Δt₁|),    ξ (1 − ξ)² ≤ 4/27
 //! ```
 //!
-//! What its points would read is what they have read: they are free by a distance that is known. So nothing that is felt hangs on what is left
-//! out. Only where they are at the base is not noted, and they are looked at there before they are at any trial.
+//! What its points would read is what they have read: they are free by s, their [`Room`], whatever the direction. So nothing that is felt hangs
+//! on what is left out. Only where they are at the base is not noted, and they are looked at there before they are at any trial. Of two places
+//! where a point has looked for the wall, both near, it may then know the other: distances that it is told hang on that by rounding.
 
 use std::ops::Range;
 
@@ -29,7 +30,7 @@ type Nodes = [Vec3; 4];
 /// How far points are from touching anything.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Room {
-    /// None touches the wall while they move by less than this, mm; 0 where they may.
+    /// s: none touches the wall while they move by less than this, mm; 0 where they may.
     free_mm: f64,
     /// No wall is nearer than this to any of them, mm.
     clearance_mm: f64,
@@ -37,7 +38,7 @@ pub(super) struct Room {
 
 impl Room {
     /// That of no points.
-    pub(super) const ALL: Self = Self { free_mm: f64::INFINITY, clearance_mm: f64::INFINITY };
+    pub(super) const UNLIMITED: Self = Self { free_mm: f64::INFINITY, clearance_mm: f64::INFINITY };
     /// That of points of which nothing is known.
     const NONE: Self = Self { free_mm: 0.0, clearance_mm: 0.0 };
 
@@ -59,7 +60,7 @@ pub(in crate::contact) struct Span {
     looked_at: Nodes,
     base: Nodes,
     room: Room,
-    /// Whether its points are known where they are at the base.
+    /// Whether its points are known where they are at the base. Those that a step begins with are: at the last equilibrium.
     pub(super) at_base: bool,
 }
 
@@ -81,8 +82,8 @@ impl Span {
         })
     }
 
-    /// Notes how far its points are from touching anything at a state.
-    fn look(&mut self, state: &RodState, room: Room) {
+    /// Notes how far its points, which have been looked at at a state, are from touching anything.
+    pub(super) fn look(&mut self, state: &RodState, room: Room) {
         (self.looked_at, self.room) = (nodes(self.element, state), room);
     }
 }
@@ -164,7 +165,7 @@ impl WallContact<'_> {
         }
     }
 
-    /// All points are known where they are at the base.
+    /// All points are known where they are at the base: what is kept of them must be, and what is looked at elsewhere.
     pub fn know_whole_base(&mut self, elements: &[ElementData]) {
         for span in 0..self.memory.spans.len() {
             self.know_base(span, elements);
@@ -184,7 +185,7 @@ impl WallContact<'_> {
             }
             let points = known.points.clone();
             self.memory.remember(points.clone());
-            let mut room = Room::ALL;
+            let mut room = Room::UNLIMITED;
             for index in points {
                 let x = self.material(index, elements, state);
                 let reading = self.read_base(index, &x);
@@ -201,22 +202,20 @@ impl WallContact<'_> {
     pub(super) fn room(&self, index: usize, x: &Vec3, reading: &Reading) -> Room {
         let known = &self.memory.points[index];
         let moved_mm = (x - known.looked_at).norm();
-        // What has pressed in the last equilibrium may be held to the wall.
+        // A look from within the room must change nothing that is known, so no triangle is; what has pressed in the last equilibrium may
+        // be held to the wall; and what is no number has no room.
         let free = matches!(reading, Reading::Free(_))
+            && known.triangle.is_none()
             && known.side.is_none()
-            && known.force_n == 0.0
-            && self.friction.is_free(index);
+            && !known.presses
+            && self.friction.is_free(index)
+            && known.free_mm > moved_mm;
         let free_mm = if free { known.free_mm - moved_mm } else { 0.0 };
         Room { free_mm, clearance_mm: known.clearance_mm - moved_mm }
     }
 
-    /// Notes how far the points of a span, which have been looked at at a state, are from touching anything.
-    pub(super) fn note(&mut self, span: usize, state: &RodState, room: Room) {
-        self.memory.spans[span].look(state, room);
-    }
-
     /// The base before the one looked at last is the base again.
-    pub(super) fn look_back(&mut self) {
+    pub(super) fn restore_base(&mut self) {
         let WallMemory { points, before, spans, .. } = &mut *self.memory;
         for span in spans.iter().filter(|span| span.at_base) {
             points[span.points.clone()].copy_from_slice(&before[span.points.clone()]);

@@ -61,7 +61,7 @@ impl WallContact<'_> {
     pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
         let deep = (0..self.memory.spans.len()).any(|span| {
             let Some(points) = self.near(span, elements, state) else { return false };
-            let mut room = Room::ALL;
+            let mut room = Room::UNLIMITED;
             for index in points {
                 let radius_mm = self.points[index].potential.radius_mm;
                 let known = &self.memory.points[index];
@@ -74,7 +74,7 @@ impl WallContact<'_> {
                 }
                 room.take(self.room(index, &x, &reading));
             }
-            self.note(span, state, room);
+            self.memory.spans[span].look(state, room);
             false
         });
         deep || self.safe_fraction(elements, state) < 1.0

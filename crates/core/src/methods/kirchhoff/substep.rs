@@ -183,7 +183,9 @@ impl<const C: usize> Tools<C> {
         let at_rest = balanced || (relax && found.residual <= least);
         contact.know_whole_base(&mesh.elements);
         let passed = at_rest && contact.passes_through(&mesh.elements, rod);
-        contact.touches(&mesh.elements, rod, &mut self.touches);
+        if at_rest && !passed {
+            contact.touches(&mesh.elements, rod, &mut self.touches);
+        }
         let counted = contact.count();
         self.counters.add(&counted);
         if iterations > 0 {

@@ -112,3 +112,21 @@ fn no_point_of_an_element_moves_farther_than_is_said() {
     // It is no more than it must be: a node that moves farther than the other says so exactly, but for turns.
     assert!(nearest < 0.1 * RADIUS_MM, "{nearest}");
 }
+
+#[test]
+fn where_there_are_no_numbers_there_is_no_room() {
+    let felt = tube();
+    let mut rod = rod(&felt, ELEMENTS, &[1.0, 0.5], 10.0);
+    let elements = rod.elements.clone();
+    let (good, mut bad) = (rod.at(Vec3::new(0.0, 0.0, 8.0)), rod.at(Vec3::new(0.0, 0.0, 8.0)));
+    bad.positions[ELEMENTS / 2] = Vec3::repeat(f64::NAN);
+    let mut assembly = Assembly::<PLAIN>::new(ELEMENTS);
+    // Elements that are looked at at a good state after a base of numbers and after one with a node that has none.
+    for (base, elements_near) in [(&good, 0), (&bad, 2)] {
+        let mut contact = rod.contact();
+        assembly.assemble(&elements, base);
+        contact.linearise(&elements, base, &mut assembly);
+        let near = (0..ELEMENTS).filter(|span| contact.near(*span, &elements, &good).is_some()).count();
+        assert_eq!(near, elements_near);
+    }
+}
