@@ -218,9 +218,10 @@ impl Drop for Display {
     }
 }
 
-/// Runs a window on a display that nobody sees, gives it lines with pauses in ms, and has its pace; none where there is no Xvfb.
+/// Runs a window on a display that nobody sees, gives it lines with pauses in ms, and has its pace; none where there is no Xvfb. After each
+/// line `also` is told the display and the line's number.
 #[cfg(all(target_os = "linux", feature = "window"))]
-fn paced(scene: &str, record: &Path, lines: &[(Value, u64)]) -> Option<Value> {
+fn paced(scene: &str, record: &Path, lines: &[(Value, u64)], also: impl Fn(&str, usize)) -> Option<Value> {
     let Some(display) = Display::open() else {
         eprintln!("skipped: there is no Xvfb to open a window on");
         return None;
@@ -230,11 +231,12 @@ fn paced(scene: &str, record: &Path, lines: &[(Value, u64)]) -> Option<Value> {
     let mut said = BufReader::new(child.stderr.take().unwrap());
     let mut stream = TcpStream::connect(address(&mut said)).unwrap();
     let mut answers = BufReader::new(stream.try_clone().unwrap());
-    for (line, pause_ms) in lines {
+    for (number, (line, pause_ms)) in lines.iter().enumerate() {
         writeln!(stream, "{line}").unwrap();
         let mut answer = String::new();
         answers.read_line(&mut answer).unwrap();
         assert_eq!(serde_json::from_str::<Value>(&answer).unwrap()["ok"], true, "{answer}");
+        also(&display.1, number);
         std::thread::sleep(std::time::Duration::from_millis(*pause_ms));
     }
     let output = child.wait_with_output().unwrap();
@@ -256,7 +258,7 @@ fn a_window_shows_inputs_soon_and_physics_keeps_its_pace() {
         lines.push((json!({"do": "nudge", "instrument": "wire", "mm": mm, "deg": 4}), 110));
     }
     lines.push((json!({"do": "quit"}), 0));
-    let Some(pace) = paced("arch_vertebral.toml", &record, &lines) else { return };
+    let Some(pace) = paced("arch_vertebral.toml", &record, &lines, |_, _| {}) else { return };
     assert!(pace["ticks_per_s"].as_f64().unwrap() > 55.0, "{pace}");
     assert!(pace["input_to_picture_ms"][0].as_f64().unwrap() <= 100.0, "{pace}");
     assert!(std::fs::read_to_string(&record).unwrap().contains("[[script]]"));
@@ -275,9 +277,49 @@ fn a_room_that_changes_is_seen_soon_over_a_whole_body_with_contrast_medium() {
         });
     }
     lines.push((json!({"do": "quit"}), 0));
-    let Some(pace) = paced("arch_angiography.toml", &folder.path().join("played.toml"), &lines) else {
-        return;
-    };
+    let record = folder.path().join("played.toml");
+    let Some(pace) = paced("arch_angiography.toml", &record, &lines, |_, _| {}) else { return };
     assert!(pace["ticks_per_s"].as_f64().unwrap() > 55.0, "{pace}");
     assert!(pace["input_to_picture_ms"][0].as_f64().unwrap() <= 100.0, "{pace}");
+}
+
+/// Windows of a display are taken off it, put back, and given one of many sizes.
+#[cfg(all(target_os = "linux", feature = "window"))]
+fn disturb(display: &str, number: usize) {
+    use x11rb::connection::Connection;
+    use x11rb::protocol::xproto::{ConfigureWindowAux, ConnectionExt};
+    const SIZES: [[u32; 2]; 7] =
+        [[1, 1], [1400, 20], [37, 900], [640, 480], [3, 3], [3000, 2000], [1280, 860]];
+    let (connection, screen) = x11rb::connect(Some(display)).unwrap();
+    let root = connection.setup().roots[screen].root;
+    let [width, height] = SIZES[number % SIZES.len()];
+    for window in connection.query_tree(root).unwrap().reply().unwrap().children {
+        let size = ConfigureWindowAux::new().width(width).height(height);
+        match number % 4 {
+            1 => connection.unmap_window(window),
+            2 => connection.map_window(window),
+            _ => connection.configure_window(window, &size),
+        }
+        .unwrap()
+        .ignore_error();
+    }
+    // All of it has been done when there is an answer.
+    connection.get_input_focus().unwrap().reply().unwrap();
+}
+
+#[test]
+#[cfg(all(target_os = "linux", feature = "window"))]
+fn a_window_that_is_resized_and_hidden_loses_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("played.toml");
+    let mut lines = vec![(json!({"do": "pedal", "down": true, "mode": "fluoro"}), 1500)];
+    lines.extend((0..42).map(|_| (json!({"do": "nudge", "instrument": "wire", "mm": 0.5}), 70)));
+    lines.push((json!({"do": "quit"}), 0));
+    let Some(pace) = paced("arch_vertebral.toml", &record, &lines, disturb) else { return };
+    assert!(pace["ticks_per_s"].as_f64().unwrap() > 55.0, "{pace}");
+    // Every nudge is in the script.
+    let script: toml::Table = std::fs::read_to_string(&record).unwrap().parse().unwrap();
+    let advance = |line: &toml::Value| line.get("advance_mm").and_then(toml::Value::as_float).unwrap_or(0.0);
+    let advanced: f64 = script["script"].as_array().unwrap().iter().map(advance).sum();
+    assert!((advanced - 21.0).abs() < 1e-9, "{advanced} mm");
 }

@@ -51,6 +51,11 @@ pub(super) struct Keys {
     open: f64,
 }
 
+/// Keys that move instruments while they are down, …
+const ARROWS: [KeyCode; 4] = [KeyCode::ArrowUp, KeyCode::ArrowDown, KeyCode::ArrowLeft, KeyCode::ArrowRight];
+/// … and pedals.
+const PEDALS: [KeyCode; 4] = [KeyCode::Space, KeyCode::KeyC, KeyCode::KeyV, KeyCode::KeyB];
+
 impl Keys {
     pub(super) fn new(instruments: Vec<String>) -> Self {
         Self {
@@ -88,11 +93,17 @@ impl Keys {
         self.modifiers.iter().any(|held| held.contains(modifier))
     }
 
-    /// Lets go of everything: the window has lost the keyboard.
+    /// Lets go of what keys hold: the window has lost the keyboard. What other hands do goes on.
     pub(super) fn let_go(&mut self) -> Vec<Input> {
+        let held = |keys: [KeyCode; 4]| keys.iter().any(|key| self.down.contains(key));
+        let (moves, shines) = (held(ARROWS), self.locked || held(PEDALS));
         self.down.clear();
         self.locked = false;
-        vec![Input::Stop {}, Input::Pedal { down: false, mode: None }]
+        let mut inputs = if moves { self.moving() } else { vec![] };
+        if shines {
+            inputs.push(Input::Pedal { down: false, mode: None });
+        }
+        inputs
     }
 
     /// What a key does that goes down, once more while it is held, or up.
@@ -233,7 +244,9 @@ mod tests {
         keys.key(KeyCode::ArrowLeft, false, false);
         let all = keys.key(KeyCode::Digit0, true, false).0;
         assert_eq!(all, [Input::Stop {}, moved("wire", 10.0, 0.0), moved("catheter", 10.0, 0.0)]);
-        assert_eq!(keys.let_go()[0], Input::Stop {});
+        assert_eq!(keys.let_go(), [moved("wire", 0.0, 0.0), moved("catheter", 0.0, 0.0)]);
+        // What no key holds is another hand's.
+        assert!(keys.let_go().is_empty());
         assert_eq!(
             keys.modify(ModifiersState::SHIFT),
             [moved("wire", 0.0, 0.0), moved("catheter", 0.0, 0.0)]
@@ -249,6 +262,12 @@ mod tests {
         assert_eq!(keys.key(KeyCode::Enter, true, false).0, pedal(true, Mode::Fluoro));
         assert_eq!(keys.key(KeyCode::Enter, true, false).0, pedal(false, Mode::Fluoro));
         assert_eq!(keys.key(KeyCode::Digit7, true, false).0, []);
+        let up = [Input::Pedal { down: false, mode: None }];
+        for key in [KeyCode::Enter, KeyCode::KeyV] {
+            keys.key(key, true, false);
+            assert_eq!(keys.let_go(), up);
+            assert!(keys.let_go().is_empty());
+        }
         assert_eq!(keys.key(KeyCode::F1, true, false).1, Some(Asked::Help));
     }
 }
