@@ -305,7 +305,7 @@ impl Friction {
 
     /// Friction energy of a point.
     pub fn value(&self, index: usize, x: &Vec3, angle: f64, radius_mm: f64) -> f64 {
-        let force = self.sliders.get(index).map_or(0.0, |s| self.coefficient * s.force_n);
+        let force = self.largest_n(index);
         if force == 0.0 {
             return 0.0;
         }

@@ -216,6 +216,11 @@ impl WallMemory {
         }
     }
 
+    /// The points that press at the base, ascending, and the distance that each read there.
+    pub(super) fn all_pressed(&self) -> impl Iterator<Item = (usize, &Distance)> {
+        self.pressing.iter().filter_map(|&index| Some((index, self.pressed(index)?)))
+    }
+
     /// How near `x` is to the wall, with derivatives below `limit_mm`; `None` where it is known to be farther.
     pub(crate) fn nearness(&mut self, felt: MovedWall<'_>, x: &Vec3, limit_mm: f64) -> Option<Nearness> {
         let x = &felt.material(x);

@@ -130,9 +130,7 @@ impl<'a> WallContact<'a> {
         sum: &mut PointSum,
         index: usize,
     ) {
-        if self.friction.acts() {
-            self.add_friction(elements, state, into, sum, index);
-        }
+        self.add_friction(elements, state, into, sum, index);
         let Some(d) = self.memory.pressed(index) else { return };
         let (point, known) = (&self.points[index], &self.memory.points[index]);
         let stiffness = self.felt.stiffness(&known.base, known.triangle, self.softness);
@@ -279,11 +277,11 @@ impl External for WallContact<'_> {
         } else if self.friction.acts() && !self.holding {
             let least_n = self.least_force_n();
             let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
-            let pressed = memory.pressing.iter().filter_map(|&index| {
+            let pressed = memory.all_pressed().map(|(index, d)| {
                 let known = &memory.points[index];
                 let factor = felt.stiffness(&known.base, known.triangle, softness).factor;
-                let (normal, force) = self.points[index].pressed(memory.pressed(index)?, factor);
-                Some((index, (normal, force * felt.rough(&known.base, known.triangle))))
+                let (normal, force) = self.points[index].pressed(d, factor);
+                (index, (normal, force * felt.rough(&known.base, known.triangle)))
             });
             self.friction.follow(pressed, least_n);
         }

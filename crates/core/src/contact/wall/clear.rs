@@ -123,9 +123,7 @@ impl WallContact<'_> {
         if self.is_free(known, elements, state) {
             return None;
         }
-        let points = known.points.clone();
-        self.know_base(span, elements);
-        Some(points)
+        Some(self.know_base(span, elements))
     }
 
     /// The points of a span, unless all can go `part` of the straight way from the base to a state without coming near a wall; those that
@@ -146,23 +144,21 @@ impl WallContact<'_> {
                 return None;
             }
         }
-        let points = known.points.clone();
-        self.know_base(span, elements);
-        Some(points)
+        Some(self.know_base(span, elements))
     }
 
-    /// The points of a span are known where they are at the base.
-    fn know_base(&mut self, span: usize, elements: &[ElementData]) {
+    /// The points of a span, which are known where they are at the base from here on.
+    fn know_base(&mut self, span: usize, elements: &[ElementData]) -> Range<usize> {
         let known = &mut self.memory.spans[span];
-        if std::mem::replace(&mut known.at_base, true) {
-            return;
-        }
         let (points, base, length_mm) = (known.points.clone(), known.base, elements[known.element].length);
-        self.memory.remember(points.clone());
-        for index in points {
-            let x = self.points[index].between(&base, length_mm);
-            self.read_base(index, &self.felt.material(&x));
+        if !std::mem::replace(&mut known.at_base, true) {
+            self.memory.remember(points.clone());
+            for index in points.clone() {
+                let x = self.points[index].between(&base, length_mm);
+                self.read_base(index, &self.felt.material(&x));
+            }
         }
+        points
     }
 
     /// All points are known where they are at the base: what is kept of them must be, and what is looked at elsewhere.

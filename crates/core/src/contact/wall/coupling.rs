@@ -61,8 +61,7 @@ impl WallContact<'_> {
 
     /// Tells the derivatives of friction at the base, `state`, that lagged normal forces leave out, point by point.
     pub fn couplings(&self, state: &RodState, mut to: impl FnMut(&ContactPoint, &Coupling)) {
-        for index in self.memory.pressing.iter().copied() {
-            let Some(d) = self.memory.pressed(index) else { continue };
+        for (index, d) in self.memory.all_pressed() {
             let (point, known) = (&self.points[index], &self.memory.points[index]);
             let x = &self.felt.place(&known.base);
             let w = self.weight_mm(index);
@@ -158,8 +157,7 @@ impl WallContact<'_> {
     /// What held points pull with, over what the others press with.
     pub fn pull(&self) -> f64 {
         let (mut pull, mut press) = (0.0, 0.0);
-        for index in self.memory.pressing.iter().copied() {
-            let Some(d) = self.memory.pressed(index) else { continue };
+        for (index, d) in self.memory.all_pressed() {
             let (point, w) = (&self.points[index], self.weight_mm(index));
             let force = -w * point.potential.holding(d.value_mm).0;
             if force < 0.0 {

@@ -129,8 +129,7 @@ impl WallContact<'_> {
         let mut foreseen = std::mem::take(&mut self.memory.foreseen);
         foreseen.clear();
         self.memory.slipping.clear();
-        for index in self.memory.pressing.iter().copied() {
-            let Some(d) = self.memory.pressed(index) else { continue };
+        for (index, d) in self.memory.all_pressed() {
             let point = &self.points[index];
             let (gap_mm, change_mm) =
                 (d.value_mm - point.potential.radius_mm, moved(point.place()).0.dot(&d.gradient));
@@ -319,8 +318,7 @@ impl WallContact<'_> {
         into: &mut dyn Stencils,
     ) -> bool {
         let mut any = false;
-        for index in self.memory.pressing.iter().copied() {
-            let Some(d) = self.memory.pressed(index) else { continue };
+        for (index, d) in self.memory.all_pressed() {
             let point = &self.points[index];
             let press = -self.weight_mm(index) * point.potential.derivatives(d.value_mm).0;
             let (e, h) = (point.element, elements[point.element].length);

@@ -54,9 +54,9 @@ impl<const C: usize> Tools<C> {
             environment.surroundings.stack.softest_nmm2(),
         );
         let mut least: Option<(f64, PhysicalEnd)> = None;
-        for (index, point) in mesh.points.iter().enumerate() {
-            let device_radius_mm = point.potential.radius_mm;
-            let Some(touch) = contact.touch(&mesh.elements, &state.rod, index) else { continue };
+        contact.touches(&mesh.elements, &state.rod, &mut self.touches);
+        for (index, touch) in &self.touches {
+            let device_radius_mm = mesh.points[*index].potential.radius_mm;
             let place = wall.material(&touch.contact.position_mm);
             let Some(lumen_radius_mm) = room_mm(&wall, &place, device_radius_mm) else {
                 continue;

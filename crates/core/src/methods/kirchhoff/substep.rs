@@ -181,9 +181,10 @@ impl<const C: usize> Tools<C> {
         let balanced = (found.converged || (relax && found.residual < SETTLED)) && unsettled < SETTLED;
         let least = if resort == Some(true) { f64::MAX } else { AT_REST };
         let at_rest = balanced || (relax && found.residual <= least);
-        contact.know_whole_base(&mesh.elements);
-        let passed = at_rest && contact.passes_through(&mesh.elements, rod);
-        if at_rest && !passed {
+        let mut passed = false;
+        if at_rest {
+            contact.know_whole_base(&mesh.elements);
+            passed = contact.passes_through(&mesh.elements, rod);
             contact.touches(&mesh.elements, rod, &mut self.touches);
         }
         let counted = contact.count();
