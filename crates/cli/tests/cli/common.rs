@@ -1,7 +1,8 @@
 //! The program under test, and scenes of the assets for it.
 
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{ChildStderr, Command, Output, Stdio};
 
 use serde_json::Value;
 
@@ -60,4 +61,26 @@ pub(crate) fn document(path: impl AsRef<Path>) -> Value {
 pub(crate) fn told(output: &Output) -> Value {
     assert!(output.status.success(), "{}", said(output));
     serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// A scene of the assets.
+pub(crate) fn scene(name: &str) -> PathBuf {
+    assets().join("scenes").join(name)
+}
+
+/// `endowire play` in a scene of the assets.
+pub(crate) fn play(name: &str, record: &Path, more: &[&str]) -> Command {
+    let mut command = endowire();
+    command
+        .args(["play".as_ref(), scene(name).as_os_str(), "--record".as_ref(), record.as_os_str()])
+        .args(more);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// Where a program of `play` listens.
+pub(crate) fn address(said: &mut BufReader<ChildStderr>) -> String {
+    let mut line = String::new();
+    said.read_line(&mut line).unwrap();
+    line.trim().strip_prefix("endowire: listens at ").unwrap_or_else(|| panic!("{line}")).to_owned()
 }

@@ -2,24 +2,10 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
-use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStderr, Command, Stdio};
+use std::process::Child;
 
-use crate::common::{assets, endowire};
+use crate::common::{address, endowire, play, scene};
 use serde_json::{Value, json};
-
-fn scene(name: &str) -> PathBuf {
-    assets().join("scenes").join(name)
-}
-
-fn play(name: &str, record: &Path, more: &[&str]) -> Command {
-    let mut command = endowire();
-    command
-        .args(["play".as_ref(), scene(name).as_os_str(), "--record".as_ref(), record.as_os_str()])
-        .args(more);
-    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    command
-}
 
 /// Sends lines, and has the answers.
 fn answers(mut child: Child, lines: &[Value]) -> (Vec<Value>, Option<i32>, String) {
@@ -135,13 +121,6 @@ fn a_script_file_has_scripts_alone() {
     assert!(said.contains("script.toml") && said.contains("vessel"), "{said}");
 }
 
-/// Where the program listens.
-fn address(said: &mut BufReader<ChildStderr>) -> String {
-    let mut line = String::new();
-    said.read_line(&mut line).unwrap();
-    line.trim().strip_prefix("endowire: listens at ").unwrap_or_else(|| panic!("{line}")).to_owned()
-}
-
 #[test]
 fn a_program_that_leaves_takes_nothing_with_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -192,134 +171,4 @@ fn without_a_display_it_says_so_and_names_run() {
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
     assert!(said.contains("no display") && said.contains("endowire run"), "{said}");
-}
-
-/// A display that nobody sees; none where there is no such program.
-#[cfg(all(target_os = "linux", feature = "window"))]
-struct Display(Child, String);
-
-#[cfg(all(target_os = "linux", feature = "window"))]
-impl Display {
-    fn open() -> Option<Self> {
-        let mut command = Command::new("Xvfb");
-        command.args(["-displayfd", "1", "-screen", "0", "1400x1000x24"]);
-        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().ok()?;
-        let mut number = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut number).ok()?;
-        Some(Self(child, format!(":{}", number.trim())))
-    }
-}
-
-#[cfg(all(target_os = "linux", feature = "window"))]
-impl Drop for Display {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// Runs a window on a display that nobody sees, gives it lines with pauses in ms, and has its pace; none where there is no Xvfb. After each
-/// line `also` is told the display and the line's number.
-#[cfg(all(target_os = "linux", feature = "window"))]
-fn paced(scene: &str, record: &Path, lines: &[(Value, u64)], also: impl Fn(&str, usize)) -> Option<Value> {
-    let Some(display) = Display::open() else {
-        eprintln!("skipped: there is no Xvfb to open a window on");
-        return None;
-    };
-    let mut command = play(scene, record, &["--listen", "127.0.0.1:0", "--json"]);
-    let mut child = command.env("DISPLAY", &display.1).env_remove("WAYLAND_DISPLAY").spawn().unwrap();
-    let mut said = BufReader::new(child.stderr.take().unwrap());
-    let mut stream = TcpStream::connect(address(&mut said)).unwrap();
-    let mut answers = BufReader::new(stream.try_clone().unwrap());
-    for (number, (line, pause_ms)) in lines.iter().enumerate() {
-        writeln!(stream, "{line}").unwrap();
-        let mut answer = String::new();
-        answers.read_line(&mut answer).unwrap();
-        assert_eq!(serde_json::from_str::<Value>(&answer).unwrap()["ok"], true, "{answer}");
-        also(&display.1, number);
-        std::thread::sleep(std::time::Duration::from_millis(*pause_ms));
-    }
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(0));
-    Some(serde_json::from_slice(&output.stdout).unwrap())
-}
-
-#[test]
-#[cfg(all(target_os = "linux", feature = "window"))]
-fn a_window_shows_inputs_soon_and_physics_keeps_its_pace() {
-    let folder = tempfile::tempdir().unwrap();
-    let record = folder.path().join("played.toml");
-    let mut lines = vec![
-        (json!({"do": "pedal", "down": true, "mode": "fluoro"}), 3000),
-        (json!({"do": "move", "instrument": "catheter", "mm_per_s": 10, "deg_per_s": 20}), 0),
-    ];
-    for turn in 0..40 {
-        let mm = if turn % 3 == 0 { -0.5 } else { 0.75 };
-        lines.push((json!({"do": "nudge", "instrument": "wire", "mm": mm, "deg": 4}), 110));
-    }
-    lines.push((json!({"do": "quit"}), 0));
-    let Some(pace) = paced("arch_vertebral.toml", &record, &lines, |_, _| {}) else { return };
-    assert!(pace["ticks_per_s"].as_f64().unwrap() > 55.0, "{pace}");
-    assert!(pace["input_to_picture_ms"][0].as_f64().unwrap() <= 100.0, "{pace}");
-    assert!(std::fs::read_to_string(&record).unwrap().contains("[[script]]"));
-}
-
-#[test]
-#[cfg(all(target_os = "linux", feature = "window"))]
-fn a_room_that_changes_is_seen_soon_over_a_whole_body_with_contrast_medium() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut lines = vec![(json!({"do": "pedal", "down": true, "mode": "fluoro"}), 4000)];
-    for turn in 0..27 {
-        lines.push(match turn % 3 {
-            0 => (json!({"do": "turn_c_arm", "lao_deg": 3}), 110),
-            1 => (json!({"do": "table", "right_mm": 2, "down_mm": 1}), 110),
-            _ => (json!({"do": "collimate", "width": 0.9 - 0.01 * f64::from(turn), "height": 0.8}), 700),
-        });
-    }
-    lines.push((json!({"do": "quit"}), 0));
-    let record = folder.path().join("played.toml");
-    let Some(pace) = paced("arch_angiography.toml", &record, &lines, |_, _| {}) else { return };
-    assert!(pace["ticks_per_s"].as_f64().unwrap() > 55.0, "{pace}");
-    assert!(pace["input_to_picture_ms"][0].as_f64().unwrap() <= 100.0, "{pace}");
-}
-
-/// Windows of a display are taken off it, put back, and given one of many sizes.
-#[cfg(all(target_os = "linux", feature = "window"))]
-fn disturb(display: &str, number: usize) {
-    use x11rb::connection::Connection;
-    use x11rb::protocol::xproto::{ConfigureWindowAux, ConnectionExt};
-    const SIZES: [[u32; 2]; 7] =
-        [[1, 1], [1400, 20], [37, 900], [640, 480], [3, 3], [3000, 2000], [1280, 860]];
-    let (connection, screen) = x11rb::connect(Some(display)).unwrap();
-    let root = connection.setup().roots[screen].root;
-    let [width, height] = SIZES[number % SIZES.len()];
-    for window in connection.query_tree(root).unwrap().reply().unwrap().children {
-        let size = ConfigureWindowAux::new().width(width).height(height);
-        match number % 4 {
-            1 => connection.unmap_window(window),
-            2 => connection.map_window(window),
-            _ => connection.configure_window(window, &size),
-        }
-        .unwrap()
-        .ignore_error();
-    }
-    // All of it has been done when there is an answer.
-    connection.get_input_focus().unwrap().reply().unwrap();
-}
-
-#[test]
-#[cfg(all(target_os = "linux", feature = "window"))]
-fn a_window_that_is_resized_and_hidden_loses_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let record = folder.path().join("played.toml");
-    let mut lines = vec![(json!({"do": "pedal", "down": true, "mode": "fluoro"}), 1500)];
-    lines.extend((0..42).map(|_| (json!({"do": "nudge", "instrument": "wire", "mm": 0.5}), 70)));
-    lines.push((json!({"do": "quit"}), 0));
-    let Some(pace) = paced("arch_vertebral.toml", &record, &lines, disturb) else { return };
-    assert!(pace["ticks_per_s"].as_f64().unwrap() > 55.0, "{pace}");
-    // Every nudge is in the script.
-    let script: toml::Table = std::fs::read_to_string(&record).unwrap().parse().unwrap();
-    let advance = |line: &toml::Value| line.get("advance_mm").and_then(toml::Value::as_float).unwrap_or(0.0);
-    let advanced: f64 = script["script"].as_array().unwrap().iter().map(advance).sum();
-    assert!((advanced - 21.0).abs() < 1e-9, "{advanced} mm");
 }
