@@ -87,7 +87,8 @@ impl CrossingTest {
     }
 
     /// How much less deep than it is, mm, the device says to have sunk in where it passes through a triangle and beyond; `None` where
-    /// it passes through none. No more than the distance between the wall that is felt and the triangles if it was pressed in. `wall` tells inside from outside.
+    /// it passes through none. No more than the distance between the wall that is felt and the triangles if it was pressed in. `wall`, made of these triangles, tells inside
+    /// from outside.
     pub fn missing_mm(&self, wall: &Wall, simulation: &Simulation) -> Option<f64> {
         let (shape, stack) = (simulation.shape(), simulation.stack());
         let inserted_mm = simulation.report().lengths_mm();

@@ -1,5 +1,7 @@
 //! The vessel as a device feels it: evenly meshed, extended beyond its openings, smooth, and ready for queries.
 
+mod deviation;
+
 use std::borrow::Cow;
 
 use nalgebra::Matrix3;
@@ -12,6 +14,7 @@ use super::properties::WallProperties;
 use super::{Distance, SmoothWall};
 use crate::vessel::{Conditioning, Wall, WallQuery, WallRecipe, WallStore};
 use crate::{Result, Vec3, parallel};
+pub use deviation::Deviation;
 
 /// A wall prepared for the contact of devices.
 #[derive(Debug, Clone)]
@@ -45,8 +48,7 @@ fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) 
     if properties.deviation_mm == 0.0 {
         return Ok(Cow::Borrowed(wall));
     }
-    let options =
-        Conditioning { deviation_mm: properties.deviation_mm, measured: false, ..Conditioning::default() };
+    let options = Conditioning { deviation_mm: properties.deviation_mm, ..Conditioning::default() };
     store.wall(&WallRecipe::Even { wall, options }).map(Cow::Owned)
 }
 

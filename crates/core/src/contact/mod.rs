@@ -18,7 +18,7 @@ mod ridge_tests;
 pub mod wall;
 
 pub use distance::{Distance, Nearness, SmoothWall};
-pub use felt::FeltWall;
+pub use felt::{Deviation, FeltWall};
 pub use friction::{Between, Friction, HandMotion, NormalForce, Place, Rub, SETTLED};
 pub use grading::Grading;
 pub use memory::{KnownPoints, WallMemory};

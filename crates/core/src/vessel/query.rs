@@ -155,6 +155,11 @@ impl WallQuery {
         Some((way_mm, triangle))
     }
 
+    /// What is asked.
+    pub(crate) fn mesh(&self) -> &SurfaceMesh {
+        &self.mesh
+    }
+
     /// Number of triangles.
     pub fn triangles(&self) -> usize {
         self.mesh.triangles.len()

@@ -108,9 +108,8 @@ pub struct CellRow {
     pub total_s: f64,
 }
 
-/// How far the smooth wall may be behind the triangles that it is made from, mm: vessels with edges of a seventh of their radius are met
-/// within a hundredth of a millimetre, kinks within less than the limit that fairing has.
-const SMOOTH_MM: f64 = 0.1;
+/// What sample points, between which the largest deviation is, may miss of it, mm.
+const MISSED_MM: f64 = 0.005;
 
 impl Cell {
     /// What the hand does in `surface`.
@@ -211,7 +210,7 @@ impl CellRow {
     /// Whether the device passes through given triangles or those that it feels, and whether it has sunk in there as it says.
     fn check(&mut self, surface: &Surface, simulation: &Simulation) {
         let given = surface.given.missing_mm(&surface.wall, simulation);
-        let felt = surface.felt.missing_mm(&surface.wall, simulation);
+        let felt = surface.felt.missing_mm(&surface.even, simulation);
         if given.is_some() {
             self.crossings += 1;
             self.first_crossing_mm = self.first_crossing_mm.or(Some(self.inserted_mm));
@@ -219,7 +218,9 @@ impl CellRow {
         let (given_mm, felt_mm) = (given.unwrap_or(0.0), felt.unwrap_or(0.0));
         self.missing_mm = self.missing_mm.max(given_mm);
         self.missing_felt_mm = self.missing_felt_mm.max(felt_mm);
-        self.untold += usize::from(given_mm > surface.stated_mm || felt_mm > SMOOTH_MM);
+        let place = &surface.places[self.cell.wire];
+        self.untold +=
+            usize::from(given_mm > place.stated_mm + MISSED_MM || felt_mm > place.smooth_mm + MISSED_MM);
     }
 }
 

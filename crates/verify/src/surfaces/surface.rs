@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use crate::crossing::CrossingTest;
+use endowire_core::contact::{FeltWall, WallProperties};
 use endowire_core::insertion::Sheath;
-use endowire_core::vessel::{Conditioning, SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore, condition};
+use endowire_core::vessel::{Conditioning, NoStore, SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore};
 use endowire_core::{Error, Result};
 
 use super::start::{Found, at_opening, inside};
@@ -24,6 +25,10 @@ pub struct Place {
     pub sheath: Sheath,
     /// How that was found.
     pub found: Found,
+    /// How far the wall that the wire feels is stated to be from the repaired surface, mm; no less than what is aimed at.
+    pub stated_mm: f64,
+    /// The same from the triangles that it is made of.
+    pub smooth_mm: f64,
 }
 
 /// A surface, repaired into a wall, with what its insertions share.
@@ -39,10 +44,10 @@ pub struct Surface {
     pub wall: Wall,
     /// The triangles as they were given, before any repair.
     pub given: CrossingTest,
-    /// The triangles that devices feel, as `endowire vessel check --felt` writes them.
+    /// The triangles that devices feel, as `endowire vessel check --felt` writes them, …
     pub felt: CrossingTest,
-    /// How far these are from the given ones at most, as stated there, mm; no less than what is aimed at.
-    pub stated_mm: f64,
+    /// … as a wall.
+    pub even: Wall,
     /// Longest side of the surface's bounding box, mm.
     pub size_mm: f64,
     /// Length to insert, mm.
@@ -64,7 +69,9 @@ impl Surface {
             .wall(&WallRecipe::Repaired { surface: &mesh })
             .map_err(|e| Error::content(&file.path, e.to_string()))?;
         let aimed = Conditioning::default();
-        let felt = condition(wall.mesh(), &aimed)?;
+        let even = store.wall(&WallRecipe::Even { wall: &wall, options: aimed })?;
+        // As it is meshed now.
+        let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
         let (low, high) = wall.mesh().bounds_mm().unwrap_or_default();
         let size_mm = (high - low).amax();
         let mut surface = Self {
@@ -72,12 +79,12 @@ impl Surface {
             path: file.path.clone(),
             unit_mm: file.unit_mm,
             given: CrossingTest::new(&mesh),
-            felt: CrossingTest::new(&felt.mesh),
-            stated_mm: felt.deviation_mm.max(aimed.deviation_mm),
+            felt: CrossingTest::new(even.mesh()),
             size_mm,
             length_mm: file.sidecar.length_mm.unwrap_or_else(|| LENGTH_MM.min(LENGTH_IN_SIZES * size_mm)),
             places: Vec::new(),
             skipped: Vec::new(),
+            even,
             wall,
         };
         let query = WallQuery::new(&surface.wall)?;
@@ -102,7 +109,12 @@ impl Surface {
                 None => (None, inside(&surface.wall, &query, radius_mm)),
             };
             match start {
-                Some((sheath, found)) => surface.places.push(Place { wire, sheath, found }),
+                Some((sheath, found)) => {
+                    let felt = FeltWall::new(&surface.even, (radius_mm, radius_mm), &properties, &NoStore)?;
+                    let stated_mm = felt.deviation(&surface.wall)?.most_mm.max(aimed.deviation_mm);
+                    let smooth_mm = felt.deviation(&surface.even)?.most_mm;
+                    surface.places.push(Place { wire, sheath, found, stated_mm, smooth_mm });
+                }
                 None => {
                     let room =
                         room_mm.map_or_else(String::new, |room| format!(", the wall is {room:.3} mm away"));

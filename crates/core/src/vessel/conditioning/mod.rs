@@ -8,9 +8,9 @@
 //! 2. The lumen's radius and the curvature say how long edges should be (`sizes`).
 //! 3. The mesh is split, collapsed, flipped and evened out on the given surface (`remesh`, `corners`,
 //!    `reference`).
-//! 4. Kinks and noise are faired within the limit (`fairing`, `bumps`); where that leaves curvature, steps 2 to 4 follow with shorter edges.
+//! 4. Kinks and noise are faired within the limit (`fairing`, `bumps`); where that leaves curvature, steps 2 to 4 follow with shorter edges,
+//!    and so they do where the two surfaces are too far apart (`deviation`).
 //! 5. Blades, spikes and folds that no even mesh can hold are cut off (`spikes`), beyond the limit if need be.
-//! 6. The distance of the two surfaces is measured both ways (`deviation`), if that is wanted.
 //!
 //! Openings stay open, nothing is welded, and what is not a manifold stays where it is.
 
@@ -32,7 +32,6 @@ use super::SurfaceMesh;
 use super::wall::validate;
 use crate::{Error, Result, Vec3};
 use corners::Corners;
-use deviation::Deviation;
 use evenness::Evenness;
 use reference::Reference;
 use remesh::Remesher;
@@ -58,13 +57,11 @@ pub struct Conditioning {
     pub deviation_mm: f64,
     /// Most triangles that are aimed at; edges get longer instead.
     pub most_triangles: usize,
-    /// Whether to measure how far the result is from the given surface.
-    pub measured: bool,
 }
 
 impl Default for Conditioning {
     fn default() -> Self {
-        Self { deviation_mm: 0.1, most_triangles: 400_000, measured: true }
+        Self { deviation_mm: 0.1, most_triangles: 400_000 }
     }
 }
 
@@ -85,21 +82,13 @@ impl Conditioning {
     }
 }
 
-/// A conditioned surface, and how it compares with the given one.
+/// A conditioned surface. How far the wall that is made of it is from the given one says [`FeltWall::deviation`](crate::contact::FeltWall::deviation).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conditioned<'a> {
     /// The mesh, counter-clockwise from outside as the given one; that one itself if it is even already.
     pub mesh: Cow<'a, SurfaceMesh>,
     /// Whether it is another than the given one.
     pub changed: bool,
-    /// Largest distance found between the two surfaces, both ways, mm; 0 if it was not measured.
-    pub deviation_mm: f64,
-    /// 99 of 100 of these distances are less, mm.
-    pub usual_deviation_mm: f64,
-    /// Mean of these distances, mm.
-    pub mean_deviation_mm: f64,
-    /// Where the surfaces are farthest apart, mm.
-    pub worst_mm: Option<Vec3>,
     /// Shortest edge, mm.
     pub edge_min_mm: f64,
     /// Median edge, mm.
@@ -115,17 +104,10 @@ pub struct Conditioned<'a> {
 }
 
 impl<'a> Conditioned<'a> {
-    fn new(mesh: Cow<'a, SurfaceMesh>, deviation: &Deviation, even: &Evenness, too_many: bool) -> Self {
-        let mut distances = deviation.distances_mm.concat();
-        distances.sort_by(f64::total_cmp);
-        let at = |part: f64| distances.get((distances.len() as f64 * part) as usize).copied().unwrap_or(0.0);
+    fn new(mesh: Cow<'a, SurfaceMesh>, even: &Evenness, too_many: bool) -> Self {
         Self {
             changed: matches!(mesh, Cow::Owned(_)),
             mesh,
-            deviation_mm: distances.last().copied().unwrap_or(0.0),
-            usual_deviation_mm: at(0.99),
-            mean_deviation_mm: distances.iter().sum::<f64>() / distances.len().max(1) as f64,
-            worst_mm: deviation.worst.map(|worst| worst.0),
             edge_min_mm: even.edge_min_mm,
             edge_median_mm: even.edge_median_mm,
             edge_max_mm: even.edge_max_mm,
@@ -151,7 +133,7 @@ pub fn condition<'a>(surface: &'a SurfaceMesh, options: &Conditioning) -> Result
     corners.set_normals();
     let mut too_many = sizes::set(&mut corners, &reference, &[], options.wanted());
     if even.is_even() && evenness::is_fine_enough(&corners) && fairing::roughness(&corners) <= ROUGH {
-        return Ok(Conditioned::new(Cow::Borrowed(surface), &Deviation::default(), &even, false));
+        return Ok(Conditioned::new(Cow::Borrowed(surface), &even, false));
     }
     let remesher = Remesher { reference: &reference, most_triangles: options.most_triangles };
     remesher.run(&mut corners, REMESHINGS.0);
@@ -163,7 +145,7 @@ pub fn condition<'a>(surface: &'a SurfaceMesh, options: &Conditioning) -> Result
         at = faired(&mut corners, &reference, round + 1 == ROUNDS);
     }
     for _ in 0..CORRECTIONS {
-        let far = deviation::measure(&corners, &at, &reference).far;
+        let far = deviation::far(&corners, &at, &reference);
         if far.is_empty() || too_many {
             break;
         }
@@ -174,11 +156,9 @@ pub fn condition<'a>(surface: &'a SurfaceMesh, options: &Conditioning) -> Result
     corners.vertices.iter_mut().zip(&at).for_each(|(vertex, at)| vertex.at = *at);
     spikes::cut(&mut corners);
     let at: Vec<Vec3> = corners.vertices.iter().map(|v| v.at).collect();
-    let deviation =
-        if options.measured { deviation::measure(&corners, &at, &reference) } else { Deviation::default() };
     let even = Evenness::of(&corners, |v| at[v as usize]);
     let mesh = corners.surface(|v| at[v as usize]);
-    Ok(Conditioned::new(Cow::Owned(mesh), &deviation, &even, too_many))
+    Ok(Conditioned::new(Cow::Owned(mesh), &even, too_many))
 }
 
 fn faired(corners: &mut Corners, reference: &Reference, last: bool) -> Vec<Vec3> {

@@ -1,0 +1,159 @@
+//! How far the wall that is felt is from the surface it is made from.
+//!
+//! A device feels the smooth wall and not the triangles that this is made from: where these are cut across a crest the smooth wall stands a
+//! little farther out, and in tubes by the sag edge²/8R. So what is measured is the smooth wall, both ways, at sample points: how far
+//! points of the given surface are from it, and feet on it from the given surface. At a point x next to the smooth wall it is |f|/|∇f| away,
+//! to first order, and its foot is x − f ∇f/|∇f|².
+
+use std::ops::Range;
+
+use super::FeltWall;
+use crate::vessel::{SurfaceMesh, Wall, WallQuery};
+use crate::{Result, Vec3, parallel};
+
+/// Sample points from each side, about, beside two in every triangle.
+const SAMPLES: f64 = 120_000.0;
+/// Triangles with a distance of this part of the largest are looked at with …
+const NEARLY: f64 = 0.85;
+/// … so many times the points.
+const CLOSER: usize = 30;
+
+/// Beyond an opening's plane and within so many of its radii of its axis there is its extension.
+const BESIDE_RADII: f64 = 2.0;
+
+/// Distances of two surfaces.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Deviation {
+    /// In the mean of the places that were looked at, mm.
+    pub mean_mm: f64,
+    /// What 99 of 100 of them are below, mm.
+    pub usual_mm: f64,
+    /// The largest, mm, …
+    pub most_mm: f64,
+    /// … and the place of the given surface, or of the felt one, where that is.
+    pub worst_at_mm: Vec3,
+}
+
+impl FeltWall {
+    /// How far this wall and `given` are from each other, its extensions beyond openings left out.
+    ///
+    /// # Errors
+    /// A given wall that has no triangles.
+    pub fn deviation(&self, given: &Wall) -> Result<Deviation> {
+        let query = WallQuery::new(given)?;
+        let from_given = |x: &Vec3| {
+            let Some(near) = self.query.nearest(x, f64::MAX) else { return Some(f64::MAX) };
+            let felt = self.smooth.distance(x, near.triangle);
+            Some(felt.map_or(near.distance_mm, |felt| felt.value_mm / felt.gradient.norm()).abs())
+        };
+        let extended = |x: &Vec3| {
+            given.openings().iter().any(|opening| {
+                let (beyond_mm, aside_mm) = opening.beyond_and_aside_mm(x);
+                beyond_mm > 0.0 && aside_mm < BESIDE_RADII * opening.radius_mm
+            })
+        };
+        let from_felt = |x: &Vec3| {
+            if extended(x) {
+                return None;
+            }
+            let triangle = self.query.nearest(x, f64::MAX)?.triangle;
+            let felt = self.smooth.distance(x, triangle)?;
+            let foot = x - felt.gradient * (felt.value_mm / felt.gradient.norm_squared());
+            let near = query.nearest(&foot, f64::MAX)?;
+            // Beyond a rim of the given surface there is what closes a hole.
+            (!near.rim).then_some(near.distance_mm.abs())
+        };
+        let sides = [measured(given.mesh(), from_given), measured(self.query.mesh(), from_felt)];
+        let (most_mm, worst_at_mm) =
+            sides.iter().map(|side| side.most).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default();
+        let mut all: Vec<f64> = sides.into_iter().flat_map(|side| side.distances_mm).collect();
+        all.sort_by(f64::total_cmp);
+        Ok(Deviation {
+            mean_mm: all.iter().sum::<f64>() / all.len().max(1) as f64,
+            usual_mm: all.get(all.len() * 99 / 100).copied().unwrap_or(0.0),
+            most_mm,
+            worst_at_mm,
+        })
+    }
+}
+
+/// What was found on one side.
+struct Measured {
+    distances_mm: Vec<f64>,
+    most: (f64, Vec3),
+}
+
+/// What `distance` says at points spread evenly over the triangles of a mesh; the largest is looked for more closely.
+fn measured(mesh: &SurfaceMesh, distance: impl Fn(&Vec3) -> Option<f64> + Sync) -> Measured {
+    let area = |index: usize| {
+        let [a, b, c] = mesh.corners(index);
+        0.5 * (b - a).cross(&(c - a)).norm()
+    };
+    let count = mesh.triangles.len();
+    let each_mm2 = ((0..count).map(area).sum::<f64>() / SAMPLES).max(f64::MIN_POSITIVE);
+    let on = |index: usize, times: usize| {
+        let points = 1 + times * (area(index) / each_mm2).ceil() as usize;
+        let (corners, distance) = (mesh.corners(index), &distance);
+        (0..points).filter_map(move |k| {
+            let x = point(corners, k);
+            Some((distance(&x)?, x))
+        })
+    };
+    let each = |part: Range<usize>| {
+        let all = part.flat_map(|index| on(index, 1).map(move |(mm, x)| (mm, x, index)));
+        all.collect::<Vec<_>>()
+    };
+    let all = parallel::parts(count, each).concat();
+    let largest = |a: (f64, Vec3), b: (f64, Vec3)| if b.0 > a.0 { b } else { a };
+    let most = all.iter().map(|&(mm, x, _)| (mm, x)).fold((0.0, Vec3::zeros()), largest);
+    let mut far: Vec<usize> = all.iter().filter(|(mm, ..)| *mm > NEARLY * most.0).map(|far| far.2).collect();
+    far.dedup();
+    let most = far.into_iter().flat_map(|index| on(index, CLOSER)).fold(most, largest);
+    Measured { distances_mm: all.into_iter().map(|(mm, ..)| mm).collect(), most }
+}
+
+/// A point of a triangle: a corner, the middle, and then where the sequence of Roberts, *The unreasonable effectiveness of quasirandom
+/// sequences*, 2018, says.
+fn point([a, b, c]: [Vec3; 3], number: usize) -> Vec3 {
+    match number {
+        0 => a,
+        1 => (a + b + c) / 3.0,
+        _ => {
+            let [u, v] = [0.754_877_666_246_693, 0.569_840_290_998_053].map(|w| (w * number as f64).fract());
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            a + (b - a) * u + (c - a) * v
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::WallProperties;
+    use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution};
+
+    fn tube(radius_mm: f64) -> Wall {
+        let node = |z: f64, parent| CentrelineNode { position_mm: Vec3::z() * z, radius_mm, parent };
+        let nodes = (0..=20).map(|k: usize| node(3.0 * k as f64, k.checked_sub(1))).collect();
+        let tree = CentrelineTree::new(nodes).unwrap();
+        GeneratedWall::new(&tree, Resolution::EdgeMm(1.0)).unwrap().wall
+    }
+
+    #[test]
+    fn it_is_the_sag_of_triangles_and_the_distance_of_another_tube() {
+        let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
+        let given = tube(4.0);
+        let felt = FeltWall::new(&given, (0.2, 0.2), &properties, &NoStore).unwrap();
+        let own = felt.deviation(&given).unwrap();
+        // The middle of a chord of 1 mm, and a little more in the middle of a triangle.
+        let sag_mm = 1.0 / 32.0;
+        assert!((0.8..1.6).contains(&(own.most_mm / sag_mm)), "{own:?}");
+        assert!(own.mean_mm < own.usual_mm && own.usual_mm <= own.most_mm, "{own:?}");
+        // Caps and extensions are no part of it: nothing is 4 mm away.
+        for by_mm in [-0.3, 0.3] {
+            let other = felt.deviation(&tube(4.0 + by_mm)).unwrap();
+            assert!((other.mean_mm - 0.3_f64).abs() < sag_mm, "{other:?}");
+            assert!((other.most_mm - 0.3_f64).abs() < 2.0 * sag_mm, "{other:?}");
+        }
+    }
+}
