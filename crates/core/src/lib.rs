@@ -14,6 +14,7 @@ pub mod control;
 pub mod device;
 pub mod error;
 pub mod file;
+pub mod flow;
 pub mod input;
 pub mod insertion;
 pub mod methods;

@@ -103,6 +103,12 @@ impl StepReport {
         self.report.dissipated_mj
     }
 
+    /// Force of the blood that flows on all instruments, N, shape (3,); 0 where no flow is given.
+    #[getter]
+    fn drag_n<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, self.report.drag_n.as_slice())
+    }
+
     /// Where the wall holds the instruments: points on the axis, mm, shape (n, 3).
     #[getter]
     fn contact_positions_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {

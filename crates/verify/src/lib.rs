@@ -14,6 +14,7 @@ mod contact;
 pub mod crossing;
 mod cylinder;
 mod ends;
+mod flow_drag;
 mod insertion;
 pub mod insertion_stress;
 pub mod instrument_stress;
@@ -205,6 +206,7 @@ pub const FAMILIES: &[Family] = &[
         run: regions::regions,
     },
     Family { id: "C8", title: "Deep in a soft wall", run: insertion::yielding_tube },
+    Family { id: "C9", title: "Blood that drags at a wire (Poiseuille)", run: flow_drag::drag },
     Family {
         id: "D1",
         title: "Instruments on one line: stiffness adds, in any order",

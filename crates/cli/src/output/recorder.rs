@@ -79,6 +79,7 @@ struct Row {
     angles: bool,
     converged: bool,
     time_s: f64,
+    drag_n: f64,
 }
 
 /// How often a run that goes on writes its summary, and has the disk keep what a power failure would take.
@@ -215,6 +216,7 @@ impl Recorder {
             angles: report.angles,
             converged: report.converged,
             time_s,
+            drag_n: report.drag_n.norm(),
         };
         // The row comes last: every step of the table is in the arrays.
         let write_row = || {

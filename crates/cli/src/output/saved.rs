@@ -16,7 +16,7 @@ use super::{seal, whole};
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 5";
+const FORMAT: &str = "endowire state 6";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// What a state belongs to: hashes of all that its steps depended on.
@@ -24,6 +24,7 @@ const ANY_FORMAT: &str = "endowire state ";
 pub(crate) struct Parts {
     vessel: String,
     motion: String,
+    flow: String,
     wall: String,
     device: String,
     sheath: String,
@@ -37,12 +38,15 @@ impl Parts {
         let mesh = simulation.wall().mesh();
         let numbers = mesh.vertices_mm.iter().flat_map(|v| v.iter().flat_map(|c| c.to_le_bytes()));
         let indices = mesh.triangles.iter().flatten().flat_map(|index| index.to_le_bytes());
+        // Where nothing flows a centre line decides nothing.
+        let tree = scene.vessel.flow.as_ref().and_then(|_| scene.centreline().ok().flatten());
         let sheath = simulation.sheath();
         let place = sheath.position_mm.iter().chain(&sheath.direction);
         let sheath = place.chain([&sheath.friction_n, &sheath.friction]).flat_map(|c| c.to_le_bytes());
         Self {
             vessel: hash(numbers.chain(indices).collect()),
             motion: json(serde_json::to_vec(&scene.vessel.motion)),
+            flow: json(serde_json::to_vec(&(&scene.vessel.flow, tree))),
             wall: json(serde_json::to_vec(&scene.vessel.wall)),
             device: json(pushed(scene, simulation)),
             sheath: hash(sheath.collect()),
@@ -55,6 +59,7 @@ impl Parts {
         let pairs = [
             ("the vessel", &self.vessel, &other.vessel),
             ("how it moves (vessel.motion)", &self.motion, &other.motion),
+            ("what flows in it (vessel.flow)", &self.flow, &other.flow),
             ("the properties of its wall (vessel.wall)", &self.wall, &other.wall),
             ("the device", &self.device, &other.device),
             ("the sheath", &self.sheath, &other.sheath),

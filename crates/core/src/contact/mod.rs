@@ -1,6 +1,7 @@
 //! What the wall does to a device: distance, energy, friction.
 
 pub mod distance;
+mod drag;
 pub mod extension;
 pub mod felt;
 mod fit;
@@ -18,6 +19,7 @@ mod ridge_tests;
 pub mod wall;
 
 pub use distance::{Distance, Nearness, SmoothWall};
+pub use drag::Drag;
 pub use felt::{Deviation, FeltWall};
 pub use friction::{Between, Friction, HandMotion, NormalForce, Place, Rub, SETTLED};
 pub use grading::Grading;

@@ -20,7 +20,8 @@ mod slipping;
 use super::memory::WallMemory;
 use super::point::{Contact, ContactPoint, Counters, Touch};
 use crate::Vec3;
-use crate::contact::{Between, Friction, MovedWall};
+use crate::contact::{Between, Drag, Friction, MovedWall};
+use crate::flow::BloodFlow;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::{External, Moved};
 
@@ -51,6 +52,8 @@ pub struct WallContact<'a> {
     pub stiff: bool,
     /// Whether points that pressed in the last equilibrium are held to the wall, should they have come off it.
     pub holding: bool,
+    /// What the blood that flows does.
+    pub drag: Option<&'a mut Drag>,
     memory: &'a mut WallMemory,
     friction: &'a mut Friction,
     /// What rounding of positions leaves of the forces at the last state, N.
@@ -76,6 +79,7 @@ impl<'a> WallContact<'a> {
             softness: 1.0,
             stiff: true,
             holding: false,
+            drag: None,
             memory,
             friction,
             rounding_n: 0.0,
@@ -86,6 +90,12 @@ impl<'a> WallContact<'a> {
     /// The material point of the vessel where point `index` is at a state. What is known of the wall is known of those.
     fn material(&self, index: usize, elements: &[ElementData], state: &RodState) -> Vec3 {
         self.felt.material(&self.points[index].position(elements, state))
+    }
+
+    /// Takes the drag of a flow at a state. Returns the part by which it has changed.
+    pub(crate) fn renew_drag(&mut self, flow: &BloodFlow, elements: &[ElementData], state: &RodState) -> f64 {
+        let Some(drag) = &mut self.drag else { return 0.0 };
+        drag.renew(flow, self.felt, self.points, elements, state)
     }
 
     /// Friction between instruments.
@@ -286,6 +296,9 @@ impl External for WallContact<'_> {
             self.friction.follow(pressed, least_n);
         }
         self.friction.between.add(state, into);
+        if let Some(drag) = &self.drag {
+            drag.add(elements, state, into);
+        }
         self.rounding_n = 0.0;
         let mut sum = PointSum::default();
         for span in 0..self.memory.spans.len() {
@@ -305,6 +318,7 @@ impl External for WallContact<'_> {
 
     fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         let mut sum = self.friction.between.taken_mj(state);
+        sum += self.drag.as_ref().map_or(0.0, |drag| drag.value_mj(elements, state));
         for span in 0..self.memory.spans.len() {
             for index in self.near(span, elements, state).into_iter().flatten() {
                 sum = self.value_of(elements, state, index, sum);

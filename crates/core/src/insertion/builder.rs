@@ -6,6 +6,7 @@ use super::simulation::{Environment, Simulation};
 use super::{Sheath, WallProperties};
 use crate::device::{Device, Stack};
 use crate::error::vector;
+use crate::flow::BloodFlow;
 use crate::methods::MethodChoice;
 use crate::methods::kirchhoff::KirchhoffOptions;
 use crate::rod::MAX_ANGLES;
@@ -19,6 +20,7 @@ pub struct SimulationBuilder<'a> {
     sheath: Sheath,
     properties: WallProperties,
     motion: Option<VesselMotion>,
+    flow: Option<BloodFlow>,
     method: Option<&'a dyn MethodChoice>,
     store: &'a dyn WallStore,
 }
@@ -30,7 +32,7 @@ const MOUTH_MM: f64 = 1e-3;
 impl<'a> SimulationBuilder<'a> {
     pub(super) fn new(wall: Wall, stack: Stack, sheath: Sheath) -> Self {
         let properties = WallProperties::default();
-        Self { wall, stack, sheath, properties, motion: None, method: None, store: &NoStore }
+        Self { wall, stack, sheath, properties, motion: None, flow: None, method: None, store: &NoStore }
     }
 
     /// How the wall yields and rubs; [`WallProperties::default`] unless told.
@@ -44,6 +46,13 @@ impl<'a> SimulationBuilder<'a> {
     #[must_use]
     pub fn motion(mut self, motion: Option<VesselMotion>) -> Self {
         self.motion = motion;
+        self
+    }
+
+    /// What flows through the vessel and drags at the device; nothing unless told.
+    #[must_use]
+    pub fn flow(mut self, flow: Option<BloodFlow>) -> Self {
+        self.flow = flow;
         self
     }
 
@@ -67,7 +76,7 @@ impl<'a> SimulationBuilder<'a> {
     /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
     /// tell, wall properties or method options out of range, more than three instruments with friction, and what the method cannot do.
     pub fn build(self) -> Result<Simulation> {
-        let Self { wall, stack, sheath, properties, motion, method, store } = self;
+        let Self { wall, stack, sheath, properties, motion, flow, method, store } = self;
         properties.check(wall.mesh())?;
         check_inside(&wall, &sheath)?;
         let query = WallQuery::new(&wall)?;
@@ -77,7 +86,7 @@ impl<'a> SimulationBuilder<'a> {
         let rub = stack.rubs() && stack.instruments().len() <= MAX_ANGLES;
         let twists = stack.is_several() && (properties.rubs() || rub);
         let stack = if twists { stack.twisted()? } else { stack };
-        let scene = Environment { wall, properties, query, sheath, stack, motion };
+        let scene = Environment { wall, properties, query, sheath, stack, motion, flow };
         let own = KirchhoffOptions::default();
         let method = method.unwrap_or(&own);
         if scene.stack.is_several() && !method.takes_several() {

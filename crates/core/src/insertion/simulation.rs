@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::contact::{Counters, WallProperties};
 use crate::device::{Device, LENGTH_SLACK_MM, Stack};
+use crate::flow::BloodFlow;
 use crate::insertion::SimulationBuilder;
 use crate::methods::{Command, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings};
 use crate::shape::Shape;
@@ -29,14 +30,15 @@ pub(super) struct Environment {
     pub(super) sheath: Sheath,
     pub(super) stack: Stack,
     pub(super) motion: Option<VesselMotion>,
+    pub(super) flow: Option<BloodFlow>,
 }
 
 impl Environment {
     /// In a step from one time to another, s.
     pub(super) fn surroundings(&self, time_s: [f64; 2]) -> Surroundings<'_> {
-        let Self { wall, properties, query, sheath, stack, motion } = self;
-        let (device, motion) = (stack.first(), motion.as_ref());
-        Surroundings { wall, properties, query, sheath, device, stack, motion, time_s }
+        let Self { wall, properties, query, sheath, stack, motion, flow } = self;
+        let (device, motion, flow) = (stack.first(), motion.as_ref(), flow.as_ref());
+        Surroundings { wall, properties, query, sheath, device, stack, motion, flow, time_s }
     }
 }
 

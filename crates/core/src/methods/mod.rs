@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::{Counters, WallProperties};
 use crate::device::{Device, Stack};
+use crate::flow::BloodFlow;
 use crate::shape::Shape;
 use crate::vessel::{Displacement, VesselMotion, Wall, WallQuery, WallStore};
 use crate::{Error, Result};
@@ -40,6 +41,8 @@ pub struct Surroundings<'a> {
     pub stack: &'a Stack,
     /// How the vessel moves; none where it rests.
     pub motion: Option<&'a VesselMotion>,
+    /// What flows through the vessel and drags at the device; nothing where it is left out.
+    pub flow: Option<&'a BloodFlow>,
     /// Time before and after the step, s.
     pub time_s: [f64; 2],
 }
@@ -58,16 +61,15 @@ impl Surroundings<'_> {
             .map(|motion| motion.at(if part == 1.0 { after } else { before + (after - before) * part }))
     }
 
-    /// Refuses a vessel that moves on behalf of a method that knows it at rest.
+    /// Refuses a vessel that moves, and blood that does, on behalf of a method that knows both at rest.
     ///
     /// # Errors
-    /// Any motion.
+    /// Any motion and any flow.
     pub fn refuse_motion(&self, method: &str) -> Result<()> {
-        if self.motion.is_none() {
-            return Ok(());
-        }
-        let mend = format!("{method} knows a vessel at rest: leave motion out or use the method kirchhoff");
-        Err(Error::parameter("vessel.motion", "given", mend))
+        let given = [("motion", self.motion.is_some()), ("flow", self.flow.is_some())];
+        let Some((key, _)) = given.into_iter().find(|(_, given)| *given) else { return Ok(()) };
+        let mend = format!("{method} knows a vessel at rest: leave {key} out or use the method kirchhoff");
+        Err(Error::parameter(format!("vessel.{key}"), "given", mend))
     }
 }
 

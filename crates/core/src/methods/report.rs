@@ -117,6 +117,8 @@ pub struct StepReport {
     pub dissipated_mj: f64,
     /// Where the wall holds the device.
     pub contacts: Vec<Contact>,
+    /// Force of the blood that flows on the device, N; zero where no flow is given.
+    pub drag_n: Vec3,
     /// The opening through which the tip has left the vessel, while it is beyond it.
     pub left_through: Option<usize>,
     /// Iterations (linear solves) of this step.

@@ -29,6 +29,15 @@ impl PointSum {
         !self.felt
     }
 
+    /// Energy of gradients that do not change, from where all is at the device's first node: Σ gᵢ·(xᵢ − x₀).
+    pub fn along(&self, state: &RodState, element: &ElementData, e: usize) -> f64 {
+        let start = state.positions[0];
+        let [x0, x1] = [e, e + 1].map(|node| state.positions[node] - start);
+        let [t0, t1] = [e, e + 1].map(|node| state.frames[node].t * element.length);
+        let [f0, g0, f1, g1] = &self.forces;
+        f0.dot(&x0) + g0.dot(&t0) + f1.dot(&x1) + g1.dot(&t1)
+    }
+
     /// Adds an energy of the point at ξ, whose gradient and, if wanted, Hessian in that point's position are given.
     pub fn add(&mut self, xi: f64, gradient: &Vec3, hessian: Option<&Matrix3<f64>>) {
         self.felt = true;

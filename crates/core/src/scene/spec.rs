@@ -7,6 +7,7 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 
 use super::tables::{DEPTH_MM, DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};
 use crate::device::{Device, DeviceFile, Instrument, Section, Stack, line_mm};
+use crate::flow::BloodFlow;
 use crate::input::{from_toml, parse_toml};
 use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
@@ -369,6 +370,19 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         CentrelineTree::read(&self.resolve(path)).map(Some).map_err(|error| missing(key, error))
     }
 
+    /// What flows through the vessel; none where it is left out.
+    ///
+    /// # Errors
+    /// As [`SceneOf::centreline`] and [`BloodFlow::new`]; flow without a centre line.
+    pub fn flow(&self) -> Result<Option<BloodFlow>> {
+        let Some(flow) = &self.vessel.flow else { return Ok(None) };
+        let Some(tree) = self.centreline()? else {
+            let mend = "blood flows along a centre line: give vessel.centreline beside the surface, or build the vessel from a tree";
+            return Err(Error::parameter("vessel.flow", "given", mend));
+        };
+        BloodFlow::new(&tree, flow).map(Some)
+    }
+
     /// The simulation at the start, with walls from `store`: nothing inserted but what instruments say.
     ///
     /// # Errors
@@ -403,6 +417,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         Simulation::builder(wall, stack, sheath)
             .properties(self.vessel.wall.clone())
             .motion(VesselMotion::new(&self.vessel.motion)?)
+            .flow(self.flow()?)
             .method(&self.method)
             .store(store)
             .build()

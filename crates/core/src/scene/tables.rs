@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::Deserialize;
 
 use crate::device::Section;
+use crate::flow::VesselFlow;
 use crate::insertion::{Sheath, WallProperties};
 use crate::vessel::{CentrelineTree, MotionMode, Resolution, Wall};
 use crate::{Error, Result, Vec3};
@@ -31,6 +32,8 @@ pub struct VesselSpec {
     /// How the vessel moves: modes that add up.
     #[serde(default)]
     pub motion: Vec<MotionMode>,
+    /// What flows through its centre line and drags at devices; nothing if absent.
+    pub flow: Option<VesselFlow>,
 }
 
 impl VesselSpec {

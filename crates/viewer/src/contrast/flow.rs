@@ -1,24 +1,18 @@
 //! The vessel tree that contrast medium is carried through, directed from its inlet.
 //!
-//! Blood enters the centre-line tree at its inlet and divides at bifurcations in proportion to radiusⁿ: n = 2 gives all branches
-//! the same mean velocity, as in large arteries, n = 3 is Murray's law for small ones (Proceedings of the National Academy of
-//! Sciences 12, 1926). It comes as the heart pumps it: a part of the flow, the pulsatility, in systole, the rest all the time.
+//! Blood enters the centre-line tree at its inlet and divides at bifurcations ([`flow_nodes`]). It comes as the heart pumps it: a part of the
+//! flow, the pulsatility, in systole, the rest all the time.
 
 use std::sync::{Arc, Mutex, OnceLock};
 
-use endowire_core::vessel::{CentrelineNode, CentrelineTree};
+use endowire_core::flow::{FlowNode, flow_nodes};
+use endowire_core::vessel::CentrelineTree;
 use endowire_core::{Error, Result, Vec3};
 
 use super::nearest::Cells;
 use super::transport::Transport;
 use crate::spec::{FlowSpec, InjectionSpec, ViewSpec};
 
-/// Points of the tree are set at most this far apart, mm.
-const SPACING_MM: f64 = 2.0;
-/// Most points: every cell of the lumen asks all of them which is nearest.
-const MOST_NODES: f64 = 50_000.0;
-/// Ends of at least this part of the widest's radius are about as wide.
-const ABOUT_AS_WIDE: f64 = 0.95;
 /// Part of its volume that counts of a stretch of a side branch inside the trunk: the trunk has the rest.
 const LEAST_PART: f64 = 0.25;
 /// Part of a heartbeat that systole takes.
@@ -159,100 +153,11 @@ pub(super) fn nearest(nodes: &[Node], point: &Vec3) -> usize {
     (0..nodes.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
 }
 
-/// The end where an artery is supplied: the widest, and of those about as wide the one nearest to the head.
-fn supplying(points: &[CentrelineNode], ends: impl Iterator<Item = usize> + Clone) -> Option<usize> {
-    let widest = ends.clone().map(|i| points[i].radius_mm).fold(0.0, f64::max);
-    let wide = ends.filter(|&i| points[i].radius_mm >= ABOUT_AS_WIDE * widest);
-    wide.max_by(|&a, &b| points[a].position_mm.z.total_cmp(&points[b].position_mm.z))
-}
-
-/// The tree's points and some between them, from the inlet downstream, with the shares of the flow.
+/// The tree's points and some between them, with the lumen before each.
 fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
-    let points = tree.nodes();
-    let pieces = |a: &Vec3, b: &Vec3| ((b - a).norm() / SPACING_MM).ceil().max(1.0);
-    let parent = |i: usize| points[i].parent.map(|parent| points[parent].position_mm);
-    let count: f64 = (0..points.len())
-        .filter_map(|i| parent(i).map(|before| pieces(&before, &points[i].position_mm)))
-        .sum();
-    if count > MOST_NODES {
-        let mend = format!(
-            "with a point each {SPACING_MM} mm it has {count:.0} points, at most {MOST_NODES} are followed: mend the unit (mm), or \
-             leave out branches or points"
-        );
-        return Err(Error::parameter("view.flow.tree", format!("{} rows", points.len()), mend));
-    }
-    let mut neighbours: Vec<Vec<usize>> = vec![vec![]; points.len()];
-    for (i, point) in points.iter().enumerate() {
-        if let Some(parent) = point.parent {
-            neighbours[i].push(parent);
-            neighbours[parent].push(i);
-        }
-    }
-    let ends = (0..points.len()).filter(|&i| neighbours[i].len() == 1);
-    let inlet = match spec.inlet_mm {
-        None => supplying(points, ends),
-        Some(near) => {
-            let near = Vec3::from(near);
-            let distance = |i: &usize| (points[*i].position_mm - near).norm();
-            ends.min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        }
-    };
-    let inlet = inlet.ok_or_else(|| {
-        Error::parameter(
-            "view.flow.tree",
-            format!("{} rows", points.len()),
-            "has no end where blood comes in",
-        )
-    })?;
-    let place = |i: usize| (points[i].position_mm, points[i].radius_mm);
-    let (position_mm, radius_mm) = place(inlet);
-    let mut nodes = vec![Node {
-        position_mm,
-        radius_mm,
-        upstream: None,
-        share: 1.0,
-        volume_mm3: 0.0,
-        length_mm: 0.0,
-        is_end: false,
-    }];
-    // Points whose downstream neighbours are still to come, with the point before and the node they became.
-    let mut open = vec![(inlet, usize::MAX, 0_usize)];
-    while let Some((at, before, becomes)) = open.pop() {
-        let onwards: Vec<usize> = neighbours[at].iter().copied().filter(|&n| n != before).collect();
-        let weight = |i: usize| points[i].radius_mm.powf(spec.split_exponent);
-        let total: f64 = onwards.iter().map(|&i| weight(i)).sum();
-        let widest = onwards.iter().map(|&i| points[i].radius_mm).fold(0.0, f64::max);
-        for &next in &onwards {
-            let share = nodes[becomes].share * weight(next) / total;
-            let ((x0, r0), (x1, r1)) = (place(at), place(next));
-            // A side branch begins where it leaves the trunk, and has its own radius from there on.
-            let is_side = r1 < widest;
-            let steps = pieces(&x0, &x1) as usize;
-            let step = (x1 - x0).norm() / steps as f64;
-            let mut last = becomes;
-            for k in 1..=steps {
-                let w = k as f64 / steps as f64;
-                let radius_mm = if is_side { r1 } else { r0 + (r1 - r0) * w };
-                let within = is_side && w * (x1 - x0).norm() < r0;
-                let [ra, rb] = [if is_side { r1 } else { nodes[last].radius_mm }, radius_mm];
-                let cone = std::f64::consts::PI * step * (ra * ra + ra * rb + rb * rb) / 3.0;
-                nodes.push(Node {
-                    position_mm: x0 + (x1 - x0) * w,
-                    radius_mm,
-                    upstream: Some(last),
-                    share,
-                    volume_mm3: if within { LEAST_PART * cone } else { cone },
-                    length_mm: step,
-                    is_end: false,
-                });
-                last = nodes.len() - 1;
-            }
-            open.push((next, at, last));
-        }
-    }
-    let mut is_end = vec![true; nodes.len()];
-    nodes.iter().filter_map(|node| node.upstream).for_each(|up| is_end[up] = false);
-    nodes.iter_mut().zip(is_end).for_each(|(node, end)| node.is_end = end);
+    let found = flow_nodes(tree, spec.inlet_mm.map(Vec3::from), spec.split_exponent, "view.flow.tree")?;
+    let mut nodes: Vec<Node> = found.iter().map(Node::from).collect();
+    found.iter().filter_map(|node| node.upstream).for_each(|up| nodes[up].is_end = false);
     // The inlet itself has the volume of the first stretch.
     if let Some(first) = nodes.get(1).map(|node| node.volume_mm3) {
         nodes[0].volume_mm3 = first;
@@ -260,10 +165,22 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
     Ok(nodes)
 }
 
+impl From<&FlowNode> for Node {
+    fn from(node: &FlowNode) -> Self {
+        let &FlowNode { position_mm, radius_mm, upstream, share, length_mm, from_radius_mm, within_trunk } =
+            node;
+        let [ra, rb] = [from_radius_mm, radius_mm];
+        let cone = std::f64::consts::PI * length_mm * (ra * ra + ra * rb + rb * rb) / 3.0;
+        let volume_mm3 = if within_trunk { LEAST_PART * cone } else { cone };
+        Self { position_mm, radius_mm, upstream, share, volume_mm3, length_mm, is_end: true }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::contrast::transport::Transport;
+    use endowire_core::vessel::CentrelineNode;
 
     /// A trunk of 100 mm and radius 5 that divides into radii 4 and 2.
     fn tree() -> CentrelineTree {

@@ -102,6 +102,7 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
         device: &device,
         stack: &stack,
         motion: None,
+        flow: None,
         time_s: [0.0; 2],
     };
 

@@ -136,6 +136,7 @@ mod tests {
             device: &device,
             stack: &stack,
             motion: None,
+            flow: None,
             time_s: [0.0; 2],
         };
         let options = KirchhoffOptions::default();

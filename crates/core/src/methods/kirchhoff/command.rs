@@ -224,6 +224,9 @@ fn jumped(stack: &Stack, (before, after): (&StepReport, &StepReport), way: &Way,
         work += least(push(&was), push(&is), target.inserted_mm - start.inserted_mm)
             + least(was.torque_nmm, is.torque_nmm, way.commands[index].rotate_rad);
     }
+    // The flow may have done as much against it.
+    let drag_n = before.drag_n.norm().max(after.drag_n.norm());
+    work -= drag_n * (after.inserted_mm - before.inserted_mm).abs();
     let (energy, now) = (before.energy.total(), after.energy.total());
     let released = released_mj(stack, before, after);
     let lost = work - after.dissipated_mj - (now - energy - released);

@@ -22,6 +22,8 @@ mod coaxial_friction_tests;
 mod coaxial_tests;
 mod command;
 mod configuration;
+#[cfg(test)]
+mod drag_tests;
 mod guess;
 mod hands;
 mod hold;

@@ -6,6 +6,8 @@ use super::hands::Hand;
 use super::rubbing::LEAST_SLIP_MM;
 use super::slopes::write_instruments;
 use super::workspace::Tools;
+use crate::Vec3;
+use crate::contact::Drag;
 use crate::contact::extension::left_through;
 use crate::device::Stack;
 use crate::methods::{Energy, Surroundings};
@@ -24,6 +26,7 @@ impl<const C: usize> Tools<C> {
         let (rod, report) = (&state.rod, &mut state.report);
         report.contacts.clear();
         report.max_penetration_mm = 0.0;
+        report.drag_n = Vec3::zeros();
         report.inserted_mm = mesh.from_tip_mm[0];
         report.rotation_rad = hands[0].turn_rad;
         report.tip_rotation_rad = report.rotation_rad;
@@ -34,8 +37,8 @@ impl<const C: usize> Tools<C> {
             report.energy = Energy::default();
             (report.push_force_n, report.torque_nmm) = (0.0, 0.0);
             if surroundings.stack.is_several() {
-                let (pressed, between) = (&[], &[]);
-                write_instruments::<C>(environment, hands, None, (pressed, between), at);
+                let touching = (&[][..], &[][..], None);
+                write_instruments::<C>(environment, hands, None, touching, at);
             }
             return 0.0;
         }
@@ -46,10 +49,12 @@ impl<const C: usize> Tools<C> {
             report.max_penetration_mm = report.max_penetration_mm.max(touch.contact.penetration_mm);
             report.contacts.push(touch.contact);
         }
+        let drag = surroundings.flow.map(|_| &self.drag);
+        report.drag_n = drag.map_or_else(Vec3::zeros, Drag::total_n);
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);
         if surroundings.stack.is_several() {
             let between = self.friction.between.places();
-            write_instruments::<C>(environment, hands, Some(&clamp), (&self.touches, between), at);
+            write_instruments::<C>(environment, hands, Some(&clamp), (&self.touches, between, drag), at);
             self.rub(at);
             let taken_mj = self.rub_in_valves(surroundings.stack, at);
             return taken_mj + self.rub_in_sheath(surroundings, &clamp, at);

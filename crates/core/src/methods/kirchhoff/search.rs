@@ -22,6 +22,7 @@ use super::guess::Guess;
 use super::hold::Held;
 use super::settle::Settle;
 use crate::contact::{SETTLED, WallContact};
+use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
 
@@ -54,6 +55,11 @@ const NEARLY: f64 = 0.05;
 const FARTHER: f64 = 0.1;
 /// Most slides with the hand held still, and in the last resort. Two or three are the rule.
 const SLIDES: [usize; 2] = [40, 400];
+
+/// Drag that changes by less than this part on the way to an equilibrium is taken as it is; …
+const DRAG_CHANGED: f64 = 1e-4;
+/// … it is renewed at most so often.
+const DRAG_RENEWALS: usize = 5;
 
 /// A search for an equilibrium.
 pub(super) struct Search<'a, 'b, const C: usize> {
@@ -98,6 +104,18 @@ impl<const C: usize> Search<'_, '_, C> {
         }
         let found = self.by_softer_walls();
         if found.converged { self.settled(found) } else { found }
+    }
+
+    /// From an equilibrium under the drag of where it was looked for to one under its own, where blood flows.
+    pub(super) fn dragged(&mut self, mut found: NewtonReport, flow: Option<&BloodFlow>) -> NewtonReport {
+        let Some(flow) = flow else { return found };
+        for _ in 0..DRAG_RENEWALS {
+            if !found.converged || self.contact.renew_drag(flow, self.elements, self.state) < DRAG_CHANGED {
+                break;
+            }
+            found = self.on(false);
+        }
+        found
     }
 
     /// From an equilibrium to the next one nearby, where something has changed that is lagged; `hardly`, so that the factors at hand serve.

@@ -12,7 +12,7 @@ use super::configuration::{Configuration, Start};
 use super::hands::{Hand, lengths};
 use super::mesh::Mesh;
 use crate::Vec3;
-use crate::contact::{ContactPoint, Place, Touch};
+use crate::contact::{ContactPoint, Drag, Place, Touch};
 use crate::device::line_mm;
 use crate::methods::InstrumentReport;
 use crate::rod::{Clamp, RodState, element_energy};
@@ -30,15 +30,15 @@ pub(super) fn write_instruments<const C: usize>(
     environment: &Environment<'_>,
     hands: &[Hand],
     clamp: Option<&Clamp>,
-    touching: (&[Pressed], &[Place]),
+    (pressed, between, drag): (&[Pressed], &[Place], Option<&Drag>),
     at: &mut Configuration,
 ) {
     let sets = environment.surroundings.stack.sets();
     let inserted: Vec<f64> = lengths(hands).collect();
     let line = line_mm(lengths(hands));
     let nodes = Nodes::new(environment.surroundings.stack, &inserted, environment.options.element_mm);
-    let turning = turning(touching.1, at.start());
-    let touching = (touching.0, &turning[..]);
+    let turning = turning(between, at.start());
+    let touching = (pressed, &turning[..], drag);
     let mut told = Vec::with_capacity(hands.len());
     for (index, hand) in hands.iter().enumerate() {
         let set = sets[index].filter(|_| hand.inserted_mm > 0.0);
@@ -66,7 +66,7 @@ fn push_force<const C: usize>(
     environment: &Environment<'_>,
     nodes: &Nodes,
     (index, inserted_mm): (usize, &[f64]),
-    (pressed, between): (&[Pressed], &[Turning]),
+    (pressed, between, drag): (&[Pressed], &[Turning], Option<&Drag>),
     at: Start<'_>,
 ) -> Option<f64> {
     let stack = environment.surroundings.stack;
@@ -89,8 +89,19 @@ fn push_force<const C: usize>(
         (one, other) => one.or(other)?,
     };
     let turned = (on.turning_against(between, at) - back.turning_against(between, at)) / (2.0 * step);
+    let dragged = drag.map_or(0.0, |drag| {
+        // Where a point comes or goes on one side, the other tells.
+        let each = at.mesh.points.iter().enumerate().filter_map(|(index, point)| {
+            let way = match (on.moved_mm(point, at, step), back.moved_mm(point, at, step)) {
+                (Some(on), Some(back)) => (on - back) / (2.0 * step),
+                (on, back) => on.map(|on| on / step).or(back.map(|back| -back / step))?,
+            };
+            Some(drag.force_n(index).dot(&way))
+        });
+        each.sum()
+    });
     let mouth = stack.instruments()[index].device.section_at(own);
-    Some(stored + wall + turned - mouth.straightening_n())
+    Some(stored + wall + turned - dragged - mouth.straightening_n())
 }
 
 /// Twist of the instrument in a `set` of angles at node `i`, towards the tip: the mean of the elements beside it that it is in.
@@ -187,6 +198,19 @@ impl Beside {
         let mut near =
             self.mesh.points[first..].iter().take_while(|p| p.from_tip_mm <= was.from_tip_mm + within);
         near.find(|p| p.instrument == was.instrument && (p.weight_mm - was.weight_mm).abs() <= within)
+    }
+
+    /// How far what lies at a contact point comes on the way here, if the point is still there. Points next to the mouth lag behind: what
+    /// comes in is met by elements that grow.
+    fn moved_mm(&self, was: &ContactPoint, at: Start<'_>, step_mm: f64) -> Option<Vec3> {
+        let is = self.same_point(was, step_mm.abs())?;
+        let from_tip_mm = |p: &ContactPoint, mesh: &Mesh| {
+            p.from_tip_mm - (mesh.from_tip_mm[0] - mesh.inserted_mm[p.instrument])
+        };
+        let lag_mm = from_tip_mm(is, &self.mesh) - from_tip_mm(was, at.mesh);
+        let moved =
+            is.position(&self.mesh.elements, &self.rod) - was.position(&at.mesh.elements, &at.state.rod);
+        Some(moved + self.rod.frames[is.element].t * lag_mm)
     }
 
     /// Slope of the wall's energy towards here, N: points that press move against their forces, and stand for more or less length. `None`

@@ -142,6 +142,10 @@ impl<const C: usize> Tools<C> {
         // How many elements the wall is as stiff as.
         let stiffness = surroundings.properties.stiffest_n_per_mm2() / element_stiffness;
         contact.stiff = stiffness > 1.0;
+        if let Some(flow) = surroundings.flow {
+            contact.drag = Some(&mut self.drag);
+            contact.renew_drag(flow, &mesh.elements, rod);
+        }
         if !contact.stiff {
             contact.trust_guess();
         }
@@ -173,6 +177,7 @@ impl<const C: usize> Tools<C> {
             slides: 0,
         };
         let found = search.run(near);
+        let found = search.dragged(found, surroundings.flow);
         let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
         let (iterations, slides) = (search.iterations, search.slides);
         let unsettled = if surroundings.properties.rubs() { contact.unsettled() } else { 0.0 };
@@ -249,6 +254,7 @@ fn rises(
         work += most(push, pushes, is.inserted_mm - was.inserted_mm)
             + most(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
     }
+    work += most(before.drag_n.norm(), after.drag_n.norm(), after.inserted_mm - before.inserted_mm);
     let gained = after.energy.total() - before.energy.total() - released_mj(stack, before, after);
     let stored = gained + dissipated_mj;
     stored > LARGEST_RISE * work + RISE_SHARE * before.energy.total() + RISE_FLOOR_MJ

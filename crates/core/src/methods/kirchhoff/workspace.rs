@@ -8,7 +8,7 @@ use super::settle::Settle;
 use super::slide::Extension;
 use super::state::KirchhoffState;
 use super::{Environment, meshed};
-use crate::contact::{Counters, Friction, Touch, WallMemory};
+use crate::contact::{Counters, Drag, Friction, Touch, WallMemory};
 use crate::solve::Newton;
 
 /// The workspace of a simulation.
@@ -35,6 +35,8 @@ pub(super) struct Tools<const C: usize> {
     pub(super) settle: Settle<C>,
     pub(super) friction: Friction,
     pub(super) memory: WallMemory,
+    /// What the flow does along the device.
+    pub(super) drag: Drag,
     pub(super) extension: Extension,
     /// Points that press in the equilibrium found last, and what happens there.
     pub(super) touches: Vec<(usize, Touch)>,
@@ -60,6 +62,7 @@ impl<const C: usize> Workspace<C> {
             settle: Settle::default(),
             friction: Friction::new(surroundings.properties.largest_friction()),
             memory: WallMemory::new(environment.felt),
+            drag: Drag::default(),
             extension: Extension::default(),
             touches: Vec::new(),
             nodes_solved: 0,
