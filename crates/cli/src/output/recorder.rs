@@ -78,8 +78,8 @@ struct Row {
     nodes_solved: u64,
     angles: bool,
     converged: bool,
-    time_s: f64,
     drag_n: f64,
+    time_s: f64,
 }
 
 /// How often a run that goes on writes its summary, and has the disk keep what a power failure would take.
@@ -215,8 +215,8 @@ impl Recorder {
             nodes_solved: report.nodes_solved,
             angles: report.angles,
             converged: report.converged,
-            time_s,
             drag_n: report.drag_n.norm(),
+            time_s,
         };
         // The row comes last: every step of the table is in the arrays.
         let write_row = || {

@@ -413,6 +413,43 @@ fn a_region_of_the_wall_that_cannot_be_is_refused_by_its_key() {
 }
 
 #[test]
+fn a_flow_that_cannot_be_is_refused_by_its_key() {
+    let good = "inflow_ml_per_s = 20.0\ninlet_mm = [0, 0, 0]\n";
+    let scene = |flow: &str| Scene::good().with("[sheath]", &format!("[vessel.flow]\n{flow}\n[sheath]"));
+    let output = scene(good).run();
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    for (from, to, words) in [
+        ("20.0", "-20.0", &["vessel.flow.inflow_ml_per_s = -20", "above 0"][..]),
+        ("20.0", "1e4", &["vessel.flow.inflow_ml_per_s = 10000", "1000"]),
+        ("inflow_ml_per_s = 20.0", "", &["inflow_ml_per_s"]),
+        ("[0, 0, 0]", "[0, nan, 0]", &["vessel.flow.inlet_mm = [0, NaN, 0]"]),
+        ("inlet_mm", "split_exponent = 0.0\ninlet_mm", &["vessel.flow.split_exponent = 0"]),
+        ("inlet_mm", "viscosity_mpa_s = inf\ninlet_mm", &["vessel.flow.viscosity_mpa_s = inf"]),
+        ("inlet_mm", "inlet", &["inlet"]),
+    ] {
+        scene(&good.replace(from, to)).is_refused(words);
+    }
+    let other = scene(good).with("[[script]]", "[method]\nname = \"li2011-banded\"\n\n[[script]]");
+    other.is_refused(&["vessel.flow = given", "the paper's method", "kirchhoff"]);
+    // A surface alone has no centre line.
+    let surface = scene(good).with("tree = \"tube.csv\"\nedge_mm = 2.0", "file = \"tube.stl\"");
+    let tree = surface.path("tube.csv");
+    std::fs::copy(&tree, surface.path("tree.csv")).unwrap();
+    let made = endowire(&[
+        "vessel".as_ref(),
+        "generate".as_ref(),
+        tree.as_ref(),
+        "--out".as_ref(),
+        surface.path("tube.stl").as_ref(),
+    ]);
+    assert_eq!(made.status.code(), Some(0), "{}", said(&made));
+    surface.is_refused(&["vessel.flow = given", "vessel.centreline"]);
+    let beside = surface.with("file = \"tube.stl\"", "file = \"tube.stl\"\ncentreline = \"tree.csv\"");
+    let output = beside.run();
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+}
+
+#[test]
 fn a_motion_of_the_vessel_that_cannot_be_is_refused_by_its_key() {
     let good = "waveform = \"breathing\"\nperiod_s = 4.0\ndisplacement_mm = [0, 5, 0]\n\
                 still = { centre_mm = [0, 0, 0], radius_mm = 10.0, fade_mm = 60.0 }\n";
