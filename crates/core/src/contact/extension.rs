@@ -5,9 +5,14 @@
 //! are in vessel models, and closed where that ends, so that nothing is ever where no wall is; smaller ones are holes of the mesh and
 //! closed. Extensions that would meet each other or the vessel are shorter. The triangles of the vessel keep their numbers.
 //!
+//! An extension begins as the wall arrives, which may lean from the opening's direction, as the lip of a dome that was cut off does: else their kink would
+//! be a crest all around, into the lumen at a lip, on which a device that leaves finds no equilibrium. The lean is gone on with, less and less, over a radius of
+//! the opening, x(w) = w (1 − w/R)².
+//!
 //! A rim has the corners of a surface that was cut there, and drawn out straight they would be furrows in which a tip is caught. So
 //! the rim passes into the ellipse next to it, r(s) = c + a cos s + b sin s with the part s of its length, over its own width.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use nalgebra::Matrix3;
@@ -19,13 +24,20 @@ use crate::vessel::{Opening, SurfaceMesh, Wall};
 const LEFT_MM: f64 = 2.0;
 /// Length over which a rim passes into an ellipse, in radii of the opening.
 const ROUNDING: f64 = 2.0;
+/// Length over which the wall's own lean at the rim ends, in radii of the opening.
+const STRAIGHTENING: f64 = 1.0;
+/// Steepest lean that is gone on with.
+const STEEPEST: f64 = 1.0;
+/// Half of the part of a rim that a lean is the mean of, in radii of the opening.
+const NEIGHBOURHOOD: f64 = 0.3;
 
 /// The surface of `wall` with its openings wider than `radius_mm` extended and the others closed.
 pub fn extended(wall: &Wall, radius_mm: f64) -> SurfaceMesh {
     let mut mesh = wall.mesh().clone();
+    let beside = beside_rims(wall);
     for opening in wall.openings() {
         if opening.radius_mm > radius_mm {
-            extend(&mut mesh, opening);
+            extend(&mut mesh, opening, &beside);
         } else {
             opening.close(&mut mesh);
         }
@@ -33,21 +45,33 @@ pub fn extended(wall: &Wall, radius_mm: f64) -> SurfaceMesh {
     mesh
 }
 
+/// Triangles with two corners on rims.
+fn beside_rims(wall: &Wall) -> Vec<[u32; 3]> {
+    let mut on_rim = vec![false; wall.mesh().vertices_mm.len()];
+    wall.openings().iter().flat_map(|o| &o.boundary).for_each(|v| on_rim[*v as usize] = true);
+    let is_beside = |t: &&[u32; 3]| t.iter().filter(|v| on_rim[**v as usize]).count() > 1;
+    wall.mesh().triangles.iter().filter(is_beside).copied().collect()
+}
+
 /// Rings along the opening's direction, as far apart as the rim's vertices.
-fn extend(mesh: &mut SurfaceMesh, opening: &Opening) {
+fn extend(mesh: &mut SurfaceMesh, opening: &Opening, beside: &[[u32; 3]]) {
     let count = opening.boundary.len();
     let at = |k: usize| mesh.vertices_mm[opening.boundary[k % count] as usize];
-    let around: f64 = (0..count).map(|k| (at(k + 1) - at(k)).norm()).sum();
+    let around = opening.boundary_length_mm(mesh);
     let rings = (opening.beyond_mm / (around / count as f64)).ceil().clamp(1.0, 1000.0) as usize;
     let rim: Vec<Vec3> = (0..count).map(at).collect();
     let round = ellipse(&rim);
+    let leans = leans(mesh, opening, beside);
     let mut last = opening.boundary.clone();
     for ring in 1..=rings {
         let way_mm = opening.beyond_mm * ring as f64 / rings as f64;
         let t = (way_mm / (ROUNDING * opening.radius_mm)).min(1.0);
         let (share, way) = (t * t * (3.0 - 2.0 * t), opening.direction * way_mm);
+        let u = (way_mm / (STRAIGHTENING * opening.radius_mm)).min(1.0);
+        let lean_mm = way_mm * (1.0 - u) * (1.0 - u);
         let first = mesh.vertices_mm.len() as u32;
-        mesh.vertices_mm.extend(rim.iter().zip(&round).map(|(v, w)| v + (w - v) * share + way));
+        let places = rim.iter().zip(&round).zip(&leans);
+        mesh.vertices_mm.extend(places.map(|((v, w), lean)| v + (w - v) * share + way + lean * lean_mm));
         let next: Vec<u32> = (first..first + count as u32).collect();
         for k in 0..count {
             let l = (k + 1) % count;
@@ -60,6 +84,40 @@ fn extend(mesh: &mut SurfaceMesh, opening: &Opening) {
     let centre = mesh.vertices_mm.len() as u32;
     mesh.vertices_mm.push(opening.centre_mm + opening.direction * opening.beyond_mm);
     mesh.triangles.extend((0..count).map(|k| [last[k], last[(k + 1) % count], centre]));
+}
+
+/// By how much the wall leans from the opening's direction at each corner of its rim: the way across that direction over that along it, in
+/// the mean over the rim's neighbourhood, for a rim may be jagged. Triangles `beside` it go on in their own planes.
+fn leans(mesh: &SurfaceMesh, opening: &Opening, beside: &[[u32; 3]]) -> Vec<Vec3> {
+    let boundary = &opening.boundary;
+    let count = boundary.len();
+    let number: BTreeMap<u32, usize> = boundary.iter().enumerate().map(|(k, v)| (*v, k)).collect();
+    let mut outward = vec![Vec3::zeros(); count];
+    for triangle in beside {
+        for k in 0..3 {
+            let ends = [0, 1, 2].map(|j| triangle[(k + j) % 3]);
+            let (Some(&i), Some(&j)) = (number.get(&ends[0]), number.get(&ends[1])) else { continue };
+            if (i + 1) % count != j && (j + 1) % count != i {
+                continue;
+            }
+            let [a, b, c] = ends.map(|v| mesh.vertices_mm[v as usize]);
+            let (edge, from) = (b - a, a - c);
+            let away = from - edge * (edge.dot(&from) / edge.norm_squared().max(f64::MIN_POSITIVE));
+            let way = away.try_normalize(0.0).unwrap_or_default() * edge.norm();
+            outward[i] += way;
+            outward[j] += way;
+        }
+    }
+    let around = opening.boundary_length_mm(mesh).max(f64::MIN_POSITIVE);
+    let reach = ((NEIGHBOURHOOD * opening.radius_mm * count as f64 / around).round() as usize).min(count / 2);
+    let lean = |k: usize| {
+        let sum: Vec3 = (0..=2 * reach).map(|n| outward[(k + count + n - reach) % count]).sum();
+        let along = sum.dot(&opening.direction);
+        let across = sum - opening.direction * along;
+        let size = across.norm();
+        if along > 0.0 && size > 0.0 { across * ((size / along).min(STEEPEST) / size) } else { Vec3::zeros() }
+    };
+    (0..count).map(lean).collect()
 }
 
 /// The points of the ellipse next to a closed line, one for each of its corners: least squares over its length.
@@ -134,6 +192,45 @@ mod tests {
         let sizes: Vec<f64> = ellipse(&rough).iter().map(|v| v.xy().norm()).collect();
         let (least, most) = sizes.iter().fold((f64::MAX, 0.0f64), |(a, b), r| (a.min(*r), b.max(*r)));
         assert!(most - least < 0.02 && (least - 3.15).abs() < 0.03, "{least} {most}");
+    }
+
+    #[test]
+    fn an_extension_begins_as_the_wall_arrives() {
+        // A tube of radius 4 that narrows to its end, by 0.5 mm a mm.
+        let ring = |z: f64, r: f64| {
+            (0..24).map(move |k| {
+                let (sin, cos) = (TAU * f64::from(k) / 24.0).sin_cos();
+                Vec3::new(r * cos, r * sin, z)
+            })
+        };
+        let rings = [(0.0, 4.0), (5.0, 4.0), (8.0, 4.0), (9.0, 3.5), (10.0, 3.0)];
+        let vertices_mm = rings.into_iter().flat_map(|(z, r)| ring(z, r)).collect();
+        let strip = |n: u32| {
+            (0..24).flat_map(move |k| {
+                let [a, b] = [24 * n + k, 24 * n + (k + 1) % 24];
+                [[a, b, a + 24], [b, b + 24, a + 24]]
+            })
+        };
+        let wall =
+            Wall::from_surface(&SurfaceMesh { vertices_mm, triangles: (0..4).flat_map(strip).collect() })
+                .unwrap();
+        let top = wall.openings().iter().find(|o| o.direction.z > 0.5).unwrap();
+        for lean in leans(wall.mesh(), top, &beside_rims(&wall)).iter().zip(&top.boundary) {
+            let out = wall.mesh().vertices_mm[*lean.1 as usize].xy().normalize();
+            assert!((lean.0.xy() + out * 0.5).norm() < 0.02 && lean.0.z.abs() < 1e-12, "{lean:?}");
+        }
+        // Where the tube is straight nothing leans.
+        let bottom = wall.openings().iter().find(|o| o.direction.z < -0.5).unwrap();
+        assert!(leans(wall.mesh(), bottom, &beside_rims(&wall)).iter().all(|lean| lean.norm() < 1e-9));
+        let mesh = extended(&wall, 0.5);
+        let radii = mesh.vertices_mm.iter().filter(|v| v.z > 10.5).map(|v| v.xy().norm());
+        let (least, most) =
+            radii.filter(|r| *r > 0.1).fold((f64::MAX, 0.0f64), |(a, b), r| (a.min(r), b.max(r)));
+        // 0.5 · 4/27 of the radius, and wide again.
+        assert!(
+            (least - (3.0 - 3.0 * 0.5 * 4.0 / 27.0)).abs() < 0.03 && (most - 3.0).abs() < 0.03,
+            "{least} {most}"
+        );
     }
 
     #[test]

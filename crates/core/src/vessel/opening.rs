@@ -46,6 +46,13 @@ impl Opening {
         Self { index: 0, centre_mm, radius_mm, direction, boundary, beyond_mm: MOST_BEYOND_MM }
     }
 
+    /// Length of the boundary, mm.
+    pub(crate) fn boundary_length_mm(&self, mesh: &SurfaceMesh) -> f64 {
+        let count = self.boundary.len();
+        let at = |k: usize| mesh.vertices_mm[self.boundary[k % count] as usize];
+        (0..count).map(|k| (at(k + 1) - at(k)).norm()).sum()
+    }
+
     /// How far `x` is beyond the opening's plane, and aside from its axis, mm.
     pub fn beyond_and_aside_mm(&self, x: &Vec3) -> (f64, f64) {
         let offset = x - self.centre_mm;

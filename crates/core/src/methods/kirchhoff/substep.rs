@@ -190,7 +190,9 @@ impl<const C: usize> Tools<C> {
         if at_rest {
             contact.know_whole_base(&mesh.elements);
             passed = contact.passes_through(&mesh.elements, rod);
-            contact.touches(&mesh.elements, rod, &mut self.touches);
+            if !passed {
+                contact.touches(&mesh.elements, rod, &mut self.touches);
+            }
         }
         let counted = contact.count();
         self.counters.add(&counted);
