@@ -6,7 +6,7 @@
 
 use super::{ContactPoint, MovedWall};
 use crate::Vec3;
-use crate::flow::BloodFlow;
+use crate::flow::{BloodFlow, FlowAt};
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 
 /// Drag at the contact points of a device.
@@ -38,7 +38,7 @@ impl Drag {
         begins.reverse();
         let place = |p: &ContactPoint| begins[p.element] + (1.0 - p.xi) * elements[p.element].length;
         let (mut changed_n, mut last_mm) = (0.0, 0.0);
-        self.size_n = 0.0;
+        let was_n = std::mem::take(&mut self.size_n);
         self.sums.clear();
         for (index, point) in points.iter().enumerate() {
             let next_mm = points.get(index + 1).map_or(line_mm, |next| 0.5 * (place(point) + place(next)));
@@ -47,7 +47,9 @@ impl Drag {
             let (e, x) = (point.element, point.position(elements, state));
             let [from, to] = [e, e + 1].map(|node| state.frames[node].t);
             let tangent = from.lerp(&to, point.xi).normalize();
-            let drag = flow.at(&wall.material(&x)).map_or_else(Vec3::zeros, |flow| {
+            let material = wall.material(&x);
+            let drag = flow.at(&material).map_or_else(Vec3::zeros, |flow| {
+                let flow = FlowAt { direction: wall.carried(&material, &flow.direction), ..flow };
                 flow.drag_n_per_mm(point.potential.radius_mm, &tangent) * length_mm
             });
             changed_n += (drag - self.forces_n[index]).norm();
@@ -60,14 +62,8 @@ impl Drag {
                 sum.add(point.xi, &-drag, None);
             }
         }
-        if self.size_n > 0.0 { changed_n / self.size_n } else { 0.0 }
-    }
-
-    /// Nothing flows.
-    pub fn clear(&mut self) {
-        self.forces_n.clear();
-        self.sums.clear();
-        self.size_n = 0.0;
+        let most_n = self.size_n.max(was_n);
+        if most_n > 0.0 { changed_n / most_n } else { 0.0 }
     }
 
     /// Adds V and its derivatives.

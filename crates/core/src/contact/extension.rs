@@ -26,8 +26,8 @@ const LEFT_MM: f64 = 2.0;
 const ROUNDING: f64 = 2.0;
 /// Length over which the wall's own lean at the rim ends, in radii of the opening.
 const STRAIGHTENING: f64 = 1.0;
-/// Steepest lean that is gone on with.
-const STEEPEST: f64 = 1.0;
+/// Steepest lean that is gone on with: 4/27 of it in radii is how much wider an extension becomes, and a tenth is kept free around it.
+const STEEPEST: f64 = 0.67;
 /// Half of the part of a rim that a lean is the mean of, in radii of the opening.
 const NEIGHBOURHOOD: f64 = 0.3;
 

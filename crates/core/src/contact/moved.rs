@@ -74,6 +74,12 @@ impl<'a> MovedWall<'a> {
         self.displacement.map_or(*material, |displacement| displacement.place(material))
     }
 
+    /// A unit direction in the reference, at a material point, as it is in space.
+    pub(super) fn carried(&self, material: &Vec3, direction: &Vec3) -> Vec3 {
+        let Some(displacement) = self.displacement else { return *direction };
+        (direction + displacement.gradient(material) * direction).normalize()
+    }
+
     /// Lengths in space are no more than this times those in the reference, and the other way round.
     pub(super) fn stretch(&self) -> f64 {
         self.displacement.map_or(1.0, Displacement::stretch)

@@ -53,7 +53,7 @@ pub struct WallContact<'a> {
     /// Whether points that pressed in the last equilibrium are held to the wall, should they have come off it.
     pub holding: bool,
     /// What the blood that flows does.
-    pub drag: Option<&'a mut Drag>,
+    drag: Option<&'a mut Drag>,
     memory: &'a mut WallMemory,
     friction: &'a mut Friction,
     /// What rounding of positions leaves of the forces at the last state, N.
@@ -92,10 +92,29 @@ impl<'a> WallContact<'a> {
         self.felt.material(&self.points[index].position(elements, state))
     }
 
+    /// Has a flow drag at the device, as it does at a state; nothing where there is none. Returns its potential there, mJ.
+    pub(crate) fn begin_drag(
+        &mut self,
+        flow: Option<&BloodFlow>,
+        drag: &'a mut Drag,
+        elements: &[ElementData],
+        state: &RodState,
+    ) -> f64 {
+        let Some(flow) = flow else { return 0.0 };
+        self.drag = Some(drag);
+        self.renew_drag(flow, elements, state);
+        self.drag_mj(elements, state)
+    }
+
     /// Takes the drag of a flow at a state. Returns the part by which it has changed.
     pub(crate) fn renew_drag(&mut self, flow: &BloodFlow, elements: &[ElementData], state: &RodState) -> f64 {
         let Some(drag) = &mut self.drag else { return 0.0 };
         drag.renew(flow, self.felt, self.points, elements, state)
+    }
+
+    /// Potential of the drag as it is held, mJ; 0 where nothing flows.
+    pub(crate) fn drag_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
+        self.drag.as_ref().map_or(0.0, |drag| drag.value_mj(elements, state))
     }
 
     /// Friction between instruments.
@@ -318,7 +337,7 @@ impl External for WallContact<'_> {
 
     fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         let mut sum = self.friction.between.taken_mj(state);
-        sum += self.drag.as_ref().map_or(0.0, |drag| drag.value_mj(elements, state));
+        sum += self.drag_mj(elements, state);
         for span in 0..self.memory.spans.len() {
             for index in self.near(span, elements, state).into_iter().flatten() {
                 sum = self.value_of(elements, state, index, sum);

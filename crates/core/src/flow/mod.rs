@@ -22,7 +22,8 @@
 //! Phenomena*, section 2.4); next to the wall, πGa(R − a). Across the flow a thread is dragged twice as much as along it (Cox, *Journal of
 //! Fluid Mechanics* 44, 1970), so that one whose tangent t is not along the flow's direction d feels f (2d − (d·t) t).
 //!
-//! Pressure on the ends of a device, πa² times that in the vessel, is left out: it is the same at every step.
+//! Pressure is left out: on the ends of a device πa² times that at the tip, which falls by πa²G a length downstream. That is a part a/(R − a) of
+//! the drag of a thread on the wall, and less on the axis.
 
 mod drag;
 mod tree;
@@ -133,7 +134,7 @@ impl BloodFlow {
         })
     }
 
-    /// The flow at a place; none outside of the vessel.
+    /// The flow at a place, of the stretch of the centre line that is nearest; none outside of the vessel.
     pub fn at(&self, x: &Vec3) -> Option<FlowAt> {
         if !x.iter().all(|c| c.is_finite()) {
             return None;
@@ -143,10 +144,13 @@ impl BloodFlow {
         let from = &self.nodes[node.upstream?];
         let [_, part] = place.barycentric_coordinates();
         let radius_mm = node.from_radius_mm + (node.radius_mm - node.from_radius_mm) * part;
-        let offset_mm = (vector(x) - near.point).length();
+        let direction = (node.position_mm - from.position_mm).normalize();
+        // Beyond an end of the centre line the tube goes on along it.
+        let away = x - Vec3::new(near.point.x, near.point.y, near.point.z);
+        let offset_mm = (away - direction * away.dot(&direction)).norm();
         let flow = node.share * self.inflow_mm3_per_s;
-        (offset_mm < OUTSIDE_RADII * radius_mm).then(|| FlowAt {
-            direction: (node.position_mm - from.position_mm).normalize(),
+        (away.norm() < OUTSIDE_RADII * radius_mm).then(|| FlowAt {
+            direction,
             radius_mm,
             offset_mm,
             gradient_n_per_mm3: 8.0 * self.viscosity_ns_per_mm2 * flow

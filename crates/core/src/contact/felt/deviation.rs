@@ -15,9 +15,13 @@ use crate::{Result, Vec3, parallel};
 const SAMPLES: f64 = 120_000.0;
 /// Triangles with a distance of this part of the largest are looked at with …
 const NEARLY: f64 = 0.85;
-/// … so many times the points.
+/// … so many times the points, …
 const CLOSER: usize = 30;
+/// … those with the largest, of so many places.
+const LOOKED_AT: usize = 500;
 
+/// A gradient, which is nearly 1, is not taken for less: there the foot is nowhere near.
+const FLAT: f64 = 0.1;
 /// Beyond an opening's plane and within so many of its radii of its axis there is its extension.
 const BESIDE_RADII: f64 = 2.0;
 
@@ -44,7 +48,7 @@ impl FeltWall {
         let from_given = |x: &Vec3| {
             let Some(near) = self.query.nearest(x, f64::MAX) else { return Some(f64::MAX) };
             let felt = self.smooth.distance(x, near.triangle);
-            Some(felt.map_or(near.distance_mm, |felt| felt.value_mm / felt.gradient.norm()).abs())
+            Some(felt.map_or(near.distance_mm, |felt| felt.value_mm / felt.gradient.norm().max(FLAT)).abs())
         };
         let extended = |x: &Vec3| {
             given.openings().iter().any(|opening| {
@@ -58,7 +62,7 @@ impl FeltWall {
             }
             let triangle = self.query.nearest(x, f64::MAX)?.triangle;
             let felt = self.smooth.distance(x, triangle)?;
-            let foot = x - felt.gradient * (felt.value_mm / felt.gradient.norm_squared());
+            let foot = x - felt.gradient * (felt.value_mm / felt.gradient.norm_squared().max(FLAT * FLAT));
             let near = query.nearest(&foot, f64::MAX)?;
             // Beyond a rim of the given surface there is what closes a hole.
             (!near.rim).then_some(near.distance_mm.abs())
@@ -106,9 +110,11 @@ fn measured(mesh: &SurfaceMesh, distance: impl Fn(&Vec3) -> Option<f64> + Sync) 
     let all = parallel::parts(count, each).concat();
     let largest = |a: (f64, Vec3), b: (f64, Vec3)| if b.0 > a.0 { b } else { a };
     let most = all.iter().map(|&(mm, x, _)| (mm, x)).fold((0.0, Vec3::zeros()), largest);
-    let mut far: Vec<usize> = all.iter().filter(|(mm, ..)| *mm > NEARLY * most.0).map(|far| far.2).collect();
-    far.dedup();
-    let most = far.into_iter().flat_map(|index| on(index, CLOSER)).fold(most, largest);
+    let mut far: Vec<(f64, usize)> =
+        all.iter().filter(|(mm, ..)| *mm > NEARLY * most.0).map(|(mm, _, index)| (*mm, *index)).collect();
+    far.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    far.truncate(LOOKED_AT);
+    let most = far.into_iter().flat_map(|(_, index)| on(index, CLOSER)).fold(most, largest);
     Measured { distances_mm: all.into_iter().map(|(mm, ..)| mm).collect(), most }
 }
 

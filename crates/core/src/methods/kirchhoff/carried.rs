@@ -93,7 +93,7 @@ pub(super) fn carried(mesh: &Mesh, state: &RodState, passage: Passage<'_>, out: 
     }
 }
 
-/// Work that the moving wall does on a device from one state to the next, mJ.
+/// Work that what moves about a device, wall and blood, does on it from one state to the next, mJ.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct WallWork {
     /// The least of what the forces before and those after do.
@@ -111,6 +111,11 @@ impl WallWork {
         let was = done(&reports.0.contacts, there);
         let is = done(&reports.1.contacts, back);
         Self { least_mj: was.0.min(is.0), most_mj: was.1.max(is.1) }
+    }
+
+    /// The same, and blood that does so much at the most, or has it done against it.
+    pub(super) fn with_flow(self, most_mj: f64) -> Self {
+        Self { least_mj: self.least_mj - most_mj, most_mj: self.most_mj + most_mj }
     }
 }
 

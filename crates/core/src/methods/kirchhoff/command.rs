@@ -48,6 +48,7 @@ struct Sum {
     slides: u32,
     imbalance: f64,
     dissipated_mj: f64,
+    flow_mj: f64,
 }
 
 impl Sum {
@@ -56,6 +57,7 @@ impl Sum {
         self.iterations += found.iterations;
         self.slides += found.slides;
         self.dissipated_mj += found.dissipated_mj;
+        self.flow_mj += found.flow_mj;
         if relaxed {
             self.relaxations += 1;
             self.imbalance = self.imbalance.max(found.residual.max(found.unsettled));
@@ -185,7 +187,7 @@ impl<const C: usize> Workspace<C> {
         report.angles = from.report.angles;
         report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
         let passage = start_displacement.as_ref().zip(displaced.as_ref());
-        let by_wall = WallWork::new(passage, (&from.report, report));
+        let by_wall = WallWork::new(passage, (&from.report, report)).with_flow(sum.flow_mj);
         report.jumped = jumped(surroundings.stack, (&from.report, report), way, by_wall);
         Ok(())
     }
@@ -224,9 +226,6 @@ fn jumped(stack: &Stack, (before, after): (&StepReport, &StepReport), way: &Way,
         work += least(push(&was), push(&is), target.inserted_mm - start.inserted_mm)
             + least(was.torque_nmm, is.torque_nmm, way.commands[index].rotate_rad);
     }
-    // The flow may have done as much against it.
-    let drag_n = before.drag_n.norm().max(after.drag_n.norm());
-    work -= drag_n * (after.inserted_mm - before.inserted_mm).abs();
     let (energy, now) = (before.energy.total(), after.energy.total());
     let released = released_mj(stack, before, after);
     let lost = work - after.dissipated_mj - (now - energy - released);

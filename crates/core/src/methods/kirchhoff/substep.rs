@@ -7,14 +7,17 @@ use super::configuration::{Configuration, Start};
 use super::guess::Quality;
 use super::hands::{Hand, motions};
 use super::hold::Held;
+use super::mesh::Mesh;
 use super::search::Search;
 use super::slide::{slide, slide_together};
+use super::state::KirchhoffState;
 use super::workspace::Tools;
 use super::{Environment, meshed, rubbing};
 use crate::contact::{SETTLED, WallContact};
 use crate::device::Stack;
 use crate::methods::StepReport;
 use crate::rod::{RodState, Supports};
+use crate::solve::NewtonReport;
 
 /// A wall is stiff that is stiffer than this many elements of the rod, EI/h⁴, …
 const STIFF: f64 = 30.0;
@@ -49,6 +52,8 @@ pub(super) struct Found {
     pub(super) slides: u32,
     /// Energy that friction took, mJ.
     pub(super) dissipated_mj: f64,
+    /// Work that blood may have done, or had done against it, mJ.
+    pub(super) flow_mj: f64,
     /// Residual over force scale.
     pub(super) residual: f64,
     /// Part by which the normal forces that friction follows differ from those of the wall.
@@ -112,6 +117,13 @@ impl<const C: usize> Tools<C> {
         }
     }
 
+    /// Gives the state what the next sub-step starts with.
+    fn keep(&self, mesh: &Mesh, after: &mut KirchhoffState) {
+        self.friction.keep(&mut after.forces);
+        rubbing::keep(&self.friction.between, &after.rod, mesh, &mut after.rubs);
+        self.memory.keep(&mut after.known);
+    }
+
     /// One sub-step from `start`: slides and solves on `next`, which is worth nothing if that fails. Newton iterations are taken from
     /// `budget`.
     pub(super) fn try_step(
@@ -142,10 +154,7 @@ impl<const C: usize> Tools<C> {
         // How many elements the wall is as stiff as.
         let stiffness = surroundings.properties.stiffest_n_per_mm2() / element_stiffness;
         contact.stiff = stiffness > 1.0;
-        if let Some(flow) = surroundings.flow {
-            contact.drag = Some(&mut self.drag);
-            contact.renew_drag(flow, &mesh.elements, rod);
-        }
+        let slid_mj = contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
         if !contact.stiff {
             contact.trust_guess();
         }
@@ -194,37 +203,54 @@ impl<const C: usize> Tools<C> {
                 contact.touches(&mesh.elements, rod, &mut self.touches);
             }
         }
-        let counted = contact.count();
-        self.counters.add(&counted);
+        let aside_mj = (contact.drag_mj(&mesh.elements, rod) - slid_mj).abs();
+        self.counters.add(&contact.count());
         if iterations > 0 {
             self.nodes_solved += elements as u64 + 1;
         }
-        if !at_rest {
-            if found.converged {
-                return Err(UNSETTLED.into());
-            }
-            return Err(format!("{} (residual {:.1e})", found.reason, found.residual).into());
+        if !at_rest || passed {
+            return Err(what_is_wrong(&found, at_rest));
         }
-        if passed {
-            return Err(PASSED.into());
-        }
-        let dissipated_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
-        let dissipated_mj = dissipated_mj + self.friction.between.taken_mj(rod);
+        let along_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
+        let dissipated_mj = along_mj + self.friction.between.taken_mj(rod);
         let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
         let (mesh, after) = next.parts();
-        let taken = resort == Some(true) && balanced;
         let reports = (&start.state.report, &after.report);
-        let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports);
-        if !taken && rises(environment.surroundings.stack, reports, dissipated_mj, by_wall) {
+        let flow_mj = aside_mj + self.drag.size_n() * farthest_mm(reports);
+        let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
+        if !(resort == Some(true) && balanced)
+            && rises(environment.surroundings.stack, reports, dissipated_mj, by_wall)
+        {
             return Err(STORED.into());
         }
         let corrections = (&start.state.correction, &mut after.correction);
         self.guess.teach(&mesh.elements, &after.rod, stiffness <= YIELDING, corrections);
-        self.friction.keep(&mut after.forces);
-        rubbing::keep(&self.friction.between, &after.rod, mesh, &mut after.rubs);
-        self.memory.keep(&mut after.known);
-        Ok(Found { iterations, slides, dissipated_mj, residual: found.residual, unsettled, balanced })
+        self.keep(mesh, after);
+        Ok(Found {
+            iterations,
+            slides,
+            dissipated_mj,
+            flow_mj,
+            residual: found.residual,
+            unsettled,
+            balanced,
+        })
     }
+}
+
+/// What is the matter with what was found, which is not at rest or has passed through the wall.
+fn what_is_wrong(found: &NewtonReport, at_rest: bool) -> Cow<'static, str> {
+    match (at_rest, found.converged) {
+        (true, _) => PASSED.into(),
+        (false, true) => UNSETTLED.into(),
+        (false, false) => format!("{} (residual {:.1e})", found.reason, found.residual).into(),
+    }
+}
+
+/// The farthest way of a hand, mm.
+fn farthest_mm((before, after): (&StepReport, &StepReport)) -> f64 {
+    let hands = before.hands().into_iter().zip(after.hands());
+    hands.map(|(was, is)| (is.inserted_mm - was.inserted_mm).abs()).fold(0.0, f64::max)
 }
 
 /// Energy that the sheath no longer stores, mJ: of the shape of what has come out of it, which is straight in it.
@@ -256,7 +282,6 @@ fn rises(
         work += most(push, pushes, is.inserted_mm - was.inserted_mm)
             + most(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
     }
-    work += most(before.drag_n.norm(), after.drag_n.norm(), after.inserted_mm - before.inserted_mm);
     let gained = after.energy.total() - before.energy.total() - released_mj(stack, before, after);
     let stored = gained + dissipated_mj;
     stored > LARGEST_RISE * work + RISE_SHARE * before.energy.total() + RISE_FLOOR_MJ
