@@ -249,8 +249,8 @@ fn what_is_wrong(found: &NewtonReport, at_rest: bool) -> Cow<'static, str> {
 
 /// The farthest way of a hand, mm.
 fn farthest_mm((before, after): (&StepReport, &StepReport)) -> f64 {
-    let hands = before.hands().into_iter().zip(after.hands());
-    hands.map(|(was, is)| (is.inserted_mm - was.inserted_mm).abs()).fold(0.0, f64::max)
+    let way = |index: usize| (after.hand(index).inserted_mm - before.hand(index).inserted_mm).abs();
+    (0..after.instruments.len().max(1)).map(way).fold(0.0, f64::max)
 }
 
 /// Energy that the sheath no longer stores, mJ: of the shape of what has come out of it, which is straight in it.
