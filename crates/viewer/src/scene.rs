@@ -36,10 +36,12 @@ pub(crate) struct Moved {
     pub(crate) displacement: Displacement,
     wall: SurfaceMesh,
     filled: SurfaceMesh,
+    /// The air of a generated body: diaphragm, borders of the heart and bowel go with what moves the vessel.
+    air: Option<SurfaceMesh>,
 }
 
 impl Setup {
-    /// Moves the vessel from where it is at rest, or back there.
+    /// Moves the vessel, and the air of a generated body, from where they are at rest, or back there.
     pub(crate) fn move_vessel(&mut self, displacement: Option<&Displacement>) {
         let moved = |mesh: &SurfaceMesh, displacement: &Displacement| SurfaceMesh {
             vertices_mm: mesh.vertices_mm.iter().map(|v| displacement.place(v)).collect(),
@@ -47,7 +49,8 @@ impl Setup {
         };
         self.moved = displacement.map(|displacement| {
             let (wall, filled) = (moved(&self.wall, displacement), moved(&self.filled, displacement));
-            Arc::new(Moved { displacement: displacement.clone(), wall, filled })
+            let air = self.patient.air().map(|air| moved(air, displacement));
+            Arc::new(Moved { displacement: displacement.clone(), wall, filled, air })
         });
     }
 
@@ -64,6 +67,14 @@ impl Setup {
     /// What blood fills where it is.
     pub(crate) fn filled_now(&self) -> &SurfaceMesh {
         self.moved.as_ref().map_or(&self.filled, |moved| &moved.filled)
+    }
+
+    /// The air of a generated body where it is.
+    pub(crate) fn air_now(&self) -> Option<&SurfaceMesh> {
+        match &self.moved {
+            Some(moved) => moved.air.as_ref(),
+            None => self.patient.air(),
+        }
     }
 
     /// A set-up with a closed wall, which blood fills to its ends.

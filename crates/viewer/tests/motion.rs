@@ -8,7 +8,7 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::motion::{Around, MotionMode, VesselMotion, Waveform};
 use endowire_core::vessel::{Displacement, SurfaceMesh};
-use endowire_viewer::{Backend, DetectorSpec, Mode, Moment, Renderer, View, ViewSpec};
+use endowire_viewer::{Backend, DetectorSpec, Mode, Moment, Renderer, TorsoSpec, View, ViewSpec};
 
 /// 5 mm along x, of the upper half alone.
 fn displacement() -> Displacement {
@@ -88,4 +88,46 @@ fn a_subtraction_shows_by_how_much_the_vessel_is_elsewhere_than_in_its_mask() {
     assert!(upper > 20.0 && lower <= 2.0, "{upper} {lower}");
     renderer.take_mask(&[]).unwrap();
     assert!(off(&mut renderer, 20..140, 3) <= 2.0);
+}
+
+#[test]
+fn the_air_of_a_body_goes_with_its_vessel_and_bones_and_skin_stay() {
+    let mut view = view(Mode::Fluoro);
+    // The domes of the diaphragm lie in the middle of what moves.
+    view.patient.torso = Some(TorsoSpec { diaphragm_mm: Some(60.0), ..TorsoSpec::default() });
+    view.c_arm.isocentre_mm = Some([0.0, 0.0, 60.0]);
+    let breath = MotionMode {
+        waveform: Waveform::Steady,
+        period_s: None,
+        phase: 0.0,
+        displacement_mm: [0.0, 0.0, -10.0],
+        turn: None,
+        still: None,
+        within: None,
+    };
+    let breath = VesselMotion::new(&[breath]).unwrap().unwrap().at(0.0);
+    let mut renderer = Renderer::new(&view, &vessel()).unwrap();
+    let rest = renderer.path_lengths(&[]).unwrap();
+    let still = renderer.render_at(&[], Moment { frame: 0, time_s: 0.0 }).unwrap().fluoro.unwrap();
+    renderer.move_vessel(Some(&breath)).unwrap();
+    let now = renderer.path_lengths(&[]).unwrap();
+    assert_eq!(now.bone_mm, rest.bone_mm);
+    assert_eq!(now.body_mm, rest.body_mm);
+    // Lungs come down: there is more air in the picture, and a diaphragm where none was.
+    let air = |of: &[f32]| of.iter().map(|&mm| f64::from(mm)).sum::<f64>();
+    assert!(air(&now.lung_mm) > 1.02 * air(&rest.lung_mm), "{} {}", air(&now.lung_mm), air(&rest.lung_mm));
+    // By as much as 10 mm at the isocentre, but for the beam's spread over the depth of a dome.
+    let lowest = |of: &[f32]| (0..160).rposition(|y| of[y * 160 + 30] > 5.0).unwrap() as f64;
+    let c_arm = renderer.c_arm().unwrap();
+    let [from, to] = [60.0, 50.0].map(|z| c_arm.project(&Vec3::new(0.0, 0.0, z))[1]);
+    let shift = lowest(&now.lung_mm) - lowest(&rest.lung_mm);
+    assert!((shift - (to - from)).abs() < 2.0, "{shift} {}", to - from);
+    let moved = renderer.render_at(&[], Moment { frame: 0, time_s: 0.0 }).unwrap().fluoro.unwrap();
+    assert_ne!(still, moved);
+    // Its picture is that of the moved surfaces, whether they moved before or after the first frame.
+    let mut fresh = Renderer::new(&view, &vessel()).unwrap();
+    fresh.move_vessel(Some(&breath)).unwrap();
+    assert_eq!(fresh.path_lengths(&[]).unwrap().lung_mm, now.lung_mm);
+    renderer.move_vessel(None).unwrap();
+    assert_eq!(renderer.path_lengths(&[]).unwrap().lung_mm, rest.lung_mm);
 }

@@ -39,19 +39,13 @@ impl Anatomy {
                 maps.body = view.obliquities().map(|obliquity| (tissue_mm * obliquity) as f32).collect();
             }
             Patient::Torso(body) => {
-                let mut cast = |mesh: &SurfaceMesh| match mesh.triangles.is_empty() {
-                    true => Ok(vec![]),
-                    false => engine.mesh(c_arm, mesh),
-                };
+                let mut cast = |mesh: &SurfaceMesh| cast(mesh, c_arm, engine);
                 let finer = |map: Vec<f32>| finer(map, c_arm.size_px(), rays);
                 maps.body = finer(cast(&body.skin)?);
                 let (mut bone, marrow) = (cast(&body.bones)?, cast(&body.marrow)?);
                 bone.iter_mut().zip(marrow).for_each(|(b, m)| *b = (*b - Body::NOT_BONE as f32 * m).max(0.0));
                 maps.bone = finer(bone);
-                let mut lung = cast(&body.lungs)?;
-                // Vessels of a lung overlap where they divide.
-                lung.iter_mut().for_each(|length| *length = length.max(0.0));
-                maps.lung = finer(lung);
+                maps.lung = air(setup, c_arm, rays, engine)?;
             }
             Patient::Tomogram(volume) => {
                 let [tissue, bone] = volume.project(view);
@@ -62,12 +56,19 @@ impl Anatomy {
         Ok(maps)
     }
 
-    /// The same with the vessel where it has moved to; the body around it stays.
-    pub(crate) fn moved(&self, setup: &Setup, view: &CArm, engine: &mut dyn PathEngine) -> Result<Self> {
+    /// The same with the vessel, and the air of a generated body, where they have moved to; bones, skin and tomograms stay.
+    pub(crate) fn moved(
+        &self,
+        setup: &Setup,
+        c_arm: &CArm,
+        rays: u32,
+        engine: &mut dyn PathEngine,
+    ) -> Result<Self> {
         let mut moved = self.clone();
         if setup.lumen {
-            moved.lumen = engine.mesh(view, setup.filled_now())?;
+            moved.lumen = engine.mesh(&c_arm.refined(rays), setup.filled_now())?;
         }
+        moved.lung = air(setup, c_arm, rays, engine)?;
         Ok(moved)
     }
 
@@ -107,6 +108,23 @@ impl Anatomy {
         let (_, median, _) = depths.select_nth_unstable_by(middle, f32::total_cmp);
         f64::from(*median)
     }
+}
+
+/// Lengths in a mesh with one ray a pixel; none at all in one without triangles.
+fn cast(mesh: &SurfaceMesh, c_arm: &CArm, engine: &mut dyn PathEngine) -> Result<Vec<f32>> {
+    match mesh.triangles.is_empty() {
+        true => Ok(vec![]),
+        false => engine.mesh(c_arm, mesh),
+    }
+}
+
+/// Lengths in the air of a generated body, where it is.
+fn air(setup: &Setup, c_arm: &CArm, rays: u32, engine: &mut dyn PathEngine) -> Result<Vec<f32>> {
+    let Some(mesh) = setup.air_now() else { return Ok(vec![]) };
+    let mut air = cast(mesh, c_arm, engine)?;
+    // Vessels of a lung overlap where they divide.
+    air.iter_mut().for_each(|length| *length = length.max(0.0));
+    Ok(finer(air, c_arm.size_px(), rays))
 }
 
 /// A map with `rays` × `rays` values for each one, bilinear between the middles of pixels.

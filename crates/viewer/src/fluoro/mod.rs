@@ -199,7 +199,7 @@ impl Fluoroscope {
 
     /// Goes on with the vessel where it has moved to. Exposure, which a control would hold meanwhile, stays as it is.
     pub(crate) fn move_vessel(&mut self, setup: &Setup, engine: &mut dyn PathEngine) -> Result<()> {
-        self.anatomy = Arc::new(self.anatomy.moved(setup, &self.rays, engine)?);
+        self.anatomy = Arc::new(self.anatomy.moved(setup, &self.c_arm, SUBRAYS, engine)?);
         self.vessel = None;
         if let Some(flow) = &setup.flow {
             let shares = Shares::new(flow, &self.c_arm, setup.filled_now(), setup.displacement());

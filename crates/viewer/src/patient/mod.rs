@@ -42,4 +42,12 @@ impl Patient {
         }
         Ok(Self::Slab { tissue_mm: spec.xray.tissue_mm })
     }
+
+    /// The air of a generated body.
+    pub(crate) fn air(&self) -> Option<&SurfaceMesh> {
+        match self {
+            Self::Torso(body) => Some(&body.lungs),
+            Self::Slab { .. } | Self::Tomogram(_) => None,
+        }
+    }
 }
