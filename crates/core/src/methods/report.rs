@@ -121,7 +121,7 @@ pub struct StepReport {
     pub drag_n: Vec3,
     /// The opening through which the tip has left the vessel, while it is beyond it.
     pub left_through: Option<usize>,
-    /// Iterations (linear solves) of this step.
+    /// Iterations (linear solves) of this step, those of attempts in vain included.
     pub iterations: u32,
     /// Parts that the command was cut into.
     pub substeps: u32,

@@ -10,7 +10,7 @@ use super::hands::{Hand, Way, lengths};
 use super::slide::Extension;
 use super::state::KirchhoffState;
 use super::substep::{AT_REST, Attempt, Found, released_mj};
-use super::workspace::{Tools, Workspace};
+use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::{leave_mm, left_through};
 use crate::device::{Stack, line_mm};
 use crate::methods::{InstrumentReport, Move, StepReport};
@@ -42,7 +42,6 @@ const JUMP_FLOOR_MJ: f64 = 1e-6;
 /// What the sub-steps of a command come to.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sum {
-    iterations: usize,
     substeps: usize,
     relaxations: u32,
     slides: u32,
@@ -54,7 +53,6 @@ struct Sum {
 impl Sum {
     /// Adds a sub-step, in which the device may have come to rest as it can.
     fn add(&mut self, found: &Found, relaxed: bool) {
-        self.iterations += found.iterations;
         self.slides += found.slides;
         self.dissipated_mj += found.dissipated_mj;
         self.flow_mj += found.flow_mj;
@@ -65,7 +63,7 @@ impl Sum {
     }
 
     fn write(&self, report: &mut StepReport) {
-        (report.iterations, report.substeps) = (self.iterations as u32, self.substeps as u32);
+        report.substeps = self.substeps as u32;
         (report.relaxations, report.slides) = (self.relaxations, self.slides);
         (report.imbalance, report.dissipated_mj) = (self.imbalance, self.dissipated_mj);
     }
@@ -96,7 +94,7 @@ impl<const C: usize> Workspace<C> {
             check_inside(surroundings.wall, &tip_mm, target - start)?;
         }
         let (mut sum, mut balanced) = (Sum::default(), true);
-        tools.nodes_solved = 0;
+        tools.work = Work::default();
         let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD).max(1.0);
         let mut budget = ((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most));
@@ -185,7 +183,8 @@ impl<const C: usize> Workspace<C> {
         sum.write(report);
         report.converged = balanced;
         report.angles = from.report.angles;
-        report.nodes_solved = from.report.nodes_solved + tools.nodes_solved;
+        report.iterations = tools.work.iterations as u32;
+        report.nodes_solved = from.report.nodes_solved + tools.work.nodes_solved;
         let passage = start_displacement.as_ref().zip(displaced.as_ref());
         let by_wall = WallWork::new(passage, (&from.report, report)).with_flow(sum.flow_mj);
         report.jumped = jumped(surroundings.stack, (&from.report, report), way, by_wall);

@@ -46,8 +46,6 @@ const UNSETTLED: &str = "friction and wall forces do not settle";
 
 /// How an equilibrium was found.
 pub(super) struct Found {
-    /// Newton iterations.
-    pub(super) iterations: usize,
     /// How often the device slid on while the hand held still.
     pub(super) slides: u32,
     /// Energy that friction took, mJ.
@@ -205,9 +203,7 @@ impl<const C: usize> Tools<C> {
         }
         let aside_mj = (contact.drag_mj(&mesh.elements, rod) - slid_mj).abs();
         self.counters.add(&contact.count());
-        if iterations > 0 {
-            self.nodes_solved += elements as u64 + 1;
-        }
+        self.work.add(iterations, elements);
         if !at_rest || passed {
             return Err(what_is_wrong(&found, at_rest));
         }
@@ -227,7 +223,6 @@ impl<const C: usize> Tools<C> {
         self.guess.teach(&mesh.elements, &after.rod, stiffness <= YIELDING, corrections);
         self.keep(mesh, after);
         Ok(Found {
-            iterations,
             slides,
             dissipated_mj,
             flow_mj,

@@ -40,10 +40,27 @@ pub(super) struct Tools<const C: usize> {
     pub(super) extension: Extension,
     /// Points that press in the equilibrium found last, and what happens there.
     pub(super) touches: Vec<(usize, Touch)>,
-    /// Nodes of the sub-steps of the command in which the device moved.
-    pub(super) nodes_solved: u64,
+    /// What the sub-steps of the command took.
+    pub(super) work: Work,
     /// Questions about the wall.
     pub(super) counters: Counters,
+}
+
+/// What sub-steps take, those in vain included.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Work {
+    /// Newton iterations.
+    pub(super) iterations: usize,
+    /// Nodes of the sub-steps in which the device moved.
+    pub(super) nodes_solved: u64,
+}
+
+impl Work {
+    /// Adds a sub-step of so many elements.
+    pub(super) fn add(&mut self, iterations: usize, elements: usize) {
+        self.iterations += iterations;
+        self.nodes_solved += if iterations > 0 { elements as u64 + 1 } else { 0 };
+    }
 }
 
 impl<const C: usize> Workspace<C> {
@@ -65,7 +82,7 @@ impl<const C: usize> Workspace<C> {
             drag: Drag::default(),
             extension: Extension::default(),
             touches: Vec::new(),
-            nodes_solved: 0,
+            work: Work::default(),
             counters: Counters::default(),
         };
         tools.newton.reserve(elements);
