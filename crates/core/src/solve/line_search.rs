@@ -264,7 +264,7 @@ impl<const C: usize> Newton<C> {
         let elements = problem.elements;
         let pulled = (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
         let with_forces = turn.max(STIFFENING * pulled * WHISPER / Self::whisper(elements));
-        Turn { with_forces, of_nodes: turn.max(twist) }
+        Turn { with_forces, of_nodes: turn.max(twist), pull_n: pulled }
     }
 
     /// Sets the trial to a part of the step, at most `part`, that crosses nothing; returns the part.

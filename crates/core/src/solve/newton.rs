@@ -16,7 +16,7 @@ use super::external::External;
 use super::line_search::LineSearch;
 use super::report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 use super::residual::ResidualSize;
-use super::stop::Progress;
+use super::stop::{Progress, Since};
 use crate::banded::{Factor, Inertia, Shift};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
 
@@ -34,8 +34,8 @@ pub struct Newton<const C: usize> {
     pub start_residual: [f64; C],
     pub(super) unit_shift: Shift,
     pub(super) factor: Factor<C>,
-    /// How far nodes have turned since the factors at hand were taken, rad; infinite where they are those of no matrix near the state.
-    pub(super) since: f64,
+    /// What has changed since the factors at hand were taken.
+    pub(super) since: Since,
     pub(super) step: Vec<f64>,
     pub(super) spare: Vec<f64>,
     /// The step before, while contacts within one are looked for.
@@ -56,7 +56,7 @@ impl<const C: usize> Newton<C> {
             start_residual: [0.0; C],
             unit_shift: Shift::default(),
             factor: Factor::new(n),
-            since: f64::INFINITY,
+            since: Since::NEVER,
             step: vec![0.0; n],
             spare: vec![0.0; n],
             before: vec![0.0; n],
@@ -147,7 +147,7 @@ impl<const C: usize> Newton<C> {
         // Loads without potential make the stiffness unsymmetric: its symmetric part says nothing about minima.
         let minimum = options.minimum && external.is_conservative();
         let mut problem = Problem { elements, supports, external, options, minimum };
-        let since = std::mem::replace(&mut self.since, f64::INFINITY);
+        let since = std::mem::replace(&mut self.since, Since::NEVER);
         let mut progress = if options.goes_on { Progress::going_on(since) } else { Progress::default() };
         let mut search = LineSearch::new(elements);
         let mut shift = 0.0;
@@ -159,6 +159,9 @@ impl<const C: usize> Newton<C> {
                 return report.stopped(StopReason::NotFinite);
             }
             let arrived = progress.has_arrived(&size, &self.steps);
+            if arrived && minimum && !self.assembly.hessian && !progress.tells_inertia(&state.tensions) {
+                self.assemble(elements, problem.supports, problem.external, state);
+            }
             let natural = match self.descent_step(&mut problem, state, &mut shift, arrived) {
                 Ok(inertia) => inertia,
                 Err(reason) => return report.stopped(reason),
@@ -167,7 +170,7 @@ impl<const C: usize> Newton<C> {
                 self.judge(&problem, natural, &mut report);
                 if report.stable || !minimum {
                     let own = self.assembly.hessian && shift == 0.0;
-                    self.since = if own { 0.0 } else { progress.since() };
+                    self.since = if own { Since::NOW } else { progress.since() };
                     return report.converged(size.reason());
                 }
             }

@@ -7,6 +7,7 @@
 
 use super::newton::{Newton, Problem};
 use super::report::StopReason;
+use super::stop::Since;
 use crate::banded::{FactorError, Inertia};
 use crate::rod::{Assembly, ElementData, RodState, Supports};
 
@@ -21,7 +22,7 @@ impl<const C: usize> Newton<C> {
     /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
     pub fn inertia(&mut self, elements: &[ElementData], supports: &Supports, sigma: f64) -> Option<Inertia> {
         Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
-        self.since = f64::INFINITY;
+        self.since = Since::NEVER;
         self.factor.factor_shifted(&self.assembly.matrix, &self.unit_shift, sigma).ok()
     }
 

@@ -20,6 +20,9 @@ const CHORD: f64 = 10.0;
 /// Where something is lagged, factors serve while nodes have turned by no more than `SHORT` since they were taken, whatever axial forces
 /// have done, and each step leaves no more than this part of the residual: what renewing it leaves there is not lessened by a newer matrix.
 const SHRINKS: f64 = 0.1;
+/// Where axial forces have changed by more than this part of the largest since factors were taken, their inertia says nothing of the
+/// state: a column is pressed beyond what buckles it without a turn.
+const PRESSED: f64 = 0.1;
 /// A residual that is as small as this, relative, and shrinks no more, is rounding.
 const ROUNDED: f64 = 1e-6;
 
@@ -30,11 +33,29 @@ pub(super) struct Turn {
     pub(super) with_forces: f64,
     /// Tangents and angles alone.
     pub(super) of_nodes: f64,
+    /// Largest change of an axial force, N.
+    pub(super) pull_n: f64,
 }
 
 impl Turn {
     /// That of a step that says nothing.
-    pub(super) const NONE: Self = Self { with_forces: f64::INFINITY, of_nodes: f64::INFINITY };
+    pub(super) const NONE: Self = Self { with_forces: f64::INFINITY, of_nodes: f64::INFINITY, pull_n: f64::INFINITY };
+}
+
+/// What has changed since the factors at hand were taken.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Since {
+    /// Turns of nodes alone, of all steps, rad.
+    pub(super) turn: f64,
+    /// Changes of axial forces, N.
+    pub(super) pull_n: f64,
+}
+
+impl Since {
+    /// They are of this state.
+    pub(super) const NOW: Self = Self { turn: 0.0, pull_n: 0.0 };
+    /// They are of no matrix near the state.
+    pub(super) const NEVER: Self = Self { turn: f64::INFINITY, pull_n: f64::INFINITY };
 }
 
 /// How far the iteration has come since it began, or since it left a saddle.
@@ -46,36 +67,42 @@ pub(super) struct Progress {
     stalled: usize,
     /// Turn of the last step, rad, if it was a whole one of Newton's; infinite otherwise. Axial forces count as turns.
     last_turn: f64,
-    /// Turns of nodes alone, of all steps with the factors at hand.
-    since: f64,
+    since: Since,
 }
 
 impl Default for Progress {
     fn default() -> Self {
-        Self { best: f64::INFINITY, stalled: 0, last_turn: f64::INFINITY, since: f64::INFINITY }
+        Self { best: f64::INFINITY, stalled: 0, last_turn: f64::INFINITY, since: Since::NEVER }
     }
 }
 
 impl Progress {
-    /// At its beginning, with factors of a state from which nodes have turned by so much since, rad.
-    pub(super) fn going_on(since: f64) -> Self {
+    /// At its beginning, with factors from which so much has changed.
+    pub(super) fn going_on(since: Since) -> Self {
         Self { since, ..Self::default() }
     }
 
-    /// Turns of nodes of all steps with the factors at hand, rad.
-    pub(super) fn since(&self) -> f64 {
+    /// What has changed since the factors at hand were taken.
+    pub(super) fn since(&self) -> Since {
         self.since
+    }
+
+    /// Whether the inertia of the factors at hand says something of a state with these axial forces, N.
+    pub(super) fn tells_inertia(&self, tensions_n: &[f64]) -> bool {
+        let largest_n = tensions_n.iter().fold(0.0f64, |most, tension| most.max(tension.abs()));
+        self.since.pull_n <= PRESSED * largest_n
     }
 
     /// Takes note of a step, with factors of the state that it began at or of one before.
     pub(super) fn has_turned(&mut self, turn: Turn, factored: bool) {
         self.last_turn = turn.with_forces;
-        self.since = if factored { turn.of_nodes } else { self.since + turn.of_nodes };
+        let before = if factored { Since::NOW } else { self.since };
+        self.since = Since { turn: before.turn + turn.of_nodes, pull_n: before.pull_n + turn.pull_n };
     }
 
     /// Whether the next state is assembled with its matrix; `lagged` says that something is renewed there.
     pub(super) fn wants_hessian(&self, tolerance: f64, lagged: bool) -> bool {
-        !(residual_alone(self.last_turn, tolerance) || (lagged && self.since <= SHORT))
+        !(residual_alone(self.last_turn, tolerance) || (lagged && self.since.turn <= SHORT))
     }
 
     /// Whether another step with the factors of an earlier state leads to the tolerance. Where steps no longer shrink a residual, it
@@ -83,7 +110,7 @@ impl Progress {
     /// for ever.
     pub(super) fn shrinks_enough(&self, size: &ResidualSize, tolerance: f64, lagged: bool) -> bool {
         let arrives = CHORD * self.last_turn * size.relative <= tolerance;
-        let shrinks = lagged && self.since <= SHORT && size.relative <= SHRINKS * self.best;
+        let shrinks = lagged && self.since.turn <= SHORT && size.relative <= SHRINKS * self.best;
         size.relative < 0.5 * self.best && (arrives || shrinks)
     }
 
@@ -126,7 +153,7 @@ mod tests {
     /// After a whole step with new factors that turned nodes by `of_nodes` and left `relative` of a residual of 1e-3.
     fn after(of_nodes: f64, relative: f64) -> (Progress, ResidualSize) {
         let mut progress = Progress { best: 1e-3, ..Progress::default() };
-        progress.has_turned(Turn { with_forces: 1e-3, of_nodes }, true);
+        progress.has_turned(Turn { with_forces: 1e-3, of_nodes, pull_n: 0.0 }, true);
         (progress, ResidualSize { relative, small: false, rounding: false })
     }
 
@@ -147,19 +174,19 @@ mod tests {
 
     #[test]
     fn factors_of_the_last_solution_serve_where_its_state_is_near() {
-        let near = Progress::going_on(0.4 * SHORT);
+        let near = Progress::going_on(Since { turn: 0.4 * SHORT, ..Since::NOW });
         assert!(!near.wants_hessian(TOLERANCE, true));
         let size = ResidualSize { relative: 1e-5, small: false, rounding: false };
         assert!(near.shrinks_enough(&size, TOLERANCE, true));
         // Not where nothing was renewed, from afar, or where there are none.
         assert!(near.wants_hessian(TOLERANCE, false));
-        assert!(Progress::going_on(2.0 * SHORT).wants_hessian(TOLERANCE, true));
+        assert!(Progress::going_on(Since { turn: 2.0 * SHORT, ..Since::NOW }).wants_hessian(TOLERANCE, true));
         assert!(Progress::default().wants_hessian(TOLERANCE, true));
     }
 
     #[test]
     fn turns_add_up_until_there_are_new_factors() {
-        let turn = Turn { with_forces: 1e-3, of_nodes: 0.4 * SHORT };
+        let turn = Turn { with_forces: 1e-3, of_nodes: 0.4 * SHORT, pull_n: 0.04 };
         let (mut progress, _) = after(0.4 * SHORT, 1e-5);
         progress.has_turned(turn, false);
         assert!(!progress.wants_hessian(TOLERANCE, true));
@@ -167,5 +194,17 @@ mod tests {
         assert!(progress.wants_hessian(TOLERANCE, true));
         progress.has_turned(turn, true);
         assert!(!progress.wants_hessian(TOLERANCE, true));
+    }
+
+    #[test]
+    fn factors_tell_no_inertia_of_a_column_that_was_pressed_since() {
+        let turn = Turn { with_forces: 1e-3, of_nodes: 0.0, pull_n: 0.06 };
+        let (mut progress, _) = after(0.0, 1e-5);
+        progress.has_turned(turn, true);
+        assert!(progress.tells_inertia(&[0.0, -1.0]));
+        progress.has_turned(turn, false);
+        assert!(!progress.tells_inertia(&[0.0, -1.0]));
+        progress.has_turned(turn, true);
+        assert!(progress.tells_inertia(&[0.0, -1.0]));
     }
 }
