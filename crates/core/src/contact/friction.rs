@@ -444,6 +444,11 @@ impl Friction {
         self.settled = true;
     }
 
+    /// Whether nothing pressed where the step began.
+    pub fn began_free(&self) -> bool {
+        self.sliders.iter().all(|s| s.begun.1 == 0.0)
+    }
+
     /// The normal forces are those that it can be rewound to.
     pub fn mark(&mut self) {
         self.sliders.iter_mut().for_each(|s| s.begun = (s.normal, s.force_n));

@@ -39,7 +39,8 @@ pub(super) struct Turn {
 
 impl Turn {
     /// That of a step that says nothing.
-    pub(super) const NONE: Self = Self { with_forces: f64::INFINITY, of_nodes: f64::INFINITY, pull_n: f64::INFINITY };
+    pub(super) const NONE: Self =
+        Self { with_forces: f64::INFINITY, of_nodes: f64::INFINITY, pull_n: f64::INFINITY };
 }
 
 /// What has changed since the factors at hand were taken.

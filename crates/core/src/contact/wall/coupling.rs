@@ -44,6 +44,16 @@ impl WallContact<'_> {
         self.friction.rewind();
     }
 
+    /// Whether nothing pressed where the step began, as far as friction knows.
+    pub fn began_free(&self) -> bool {
+        self.friction.began_free()
+    }
+
+    /// Whether something presses at the state looked at last.
+    pub fn presses(&self) -> bool {
+        !self.memory.pressing.is_empty()
+    }
+
     /// The normal forces of friction are those that it can be rewound to.
     pub fn mark_friction(&mut self) {
         self.friction.mark();

@@ -360,3 +360,32 @@ fn the_force_between_two_on_an_arc_is_that_of_the_rods() {
         assert!(none(&told[0]) && none(&told[shape.len() - 1]) || lengths[0] < lengths[1]);
     }
 }
+
+#[test]
+fn instruments_with_flush_tips_push_together_as_one_does() {
+    let straight = |name: &str, radius_mm, inner_radius_mm, stiffness| {
+        let section = Section { inner_radius_mm, ..Section::straight(300.0, radius_mm, stiffness) };
+        Instrument { name: name.to_owned(), device: Device::new(vec![section]).unwrap(), may_lead: true }
+    };
+    let both =
+        Stack::new(vec![straight("wire", 0.2, None, 20.0), straight("catheter", 0.5, Some(0.3), 20.0)]);
+    let mut pair = along(bend(), 4.0, both.unwrap());
+    let mut one = along(bend(), 4.0, Device::uniform(300.0, 0.5, 40.0).unwrap());
+    for _ in 0..40 {
+        push(&mut pair, &[(WIRE, 2.0), (CATHETER, 2.0)]).unwrap();
+        one.step(Command::advance(2.0)).unwrap();
+    }
+    let told = pair.report().clone();
+    assert!(told.instruments.iter().all(|each| each.push_force_n.is_none()));
+    let alone_n = one.report().push_force_n;
+    assert!(alone_n > 0.01, "{alone_n}");
+    assert!((told.push_force_n - alone_n).abs() < 1e-3 * alone_n, "{} {alone_n}", told.push_force_n);
+    // The twin: with tips apart each hand feels its part.
+    push(&mut pair, &[(WIRE, 0.3)]).unwrap();
+    let apart = pair.report();
+    let sum: f64 = apart.instruments.iter().map(|each| each.push_force_n.unwrap()).sum();
+    assert!(
+        (apart.push_force_n - sum).abs() < 1e-12 && (sum - alone_n).abs() < 0.2 * alone_n,
+        "{sum} {alone_n}"
+    );
+}

@@ -44,6 +44,8 @@ mod slide_tests;
 mod slopes;
 mod state;
 mod substep;
+#[cfg(test)]
+mod touch_tests;
 mod workspace;
 
 pub use mesh::Mesh;

@@ -94,6 +94,7 @@ impl<const C: usize> Search<'_, '_, C> {
     /// found, and with friction it has settled or not.
     pub(super) fn run(&mut self, near: bool) -> NewtonReport {
         let stiff = self.stiff;
+        self.touch_first();
         self.contact.hand_over(stiff);
         if self.budget.is_some() && if stiff { near } else { self.rubs } {
             if let Some(found) = self.at_once() {
@@ -104,6 +105,26 @@ impl<const C: usize> Search<'_, '_, C> {
         }
         let found = self.by_softer_walls();
         if found.converged { self.settled(found) } else { found }
+    }
+
+    /// The first normal forces of a device that presses where nothing did. Lagged ones are none, and without friction it would slide from
+    /// where it touches to anywhere, and stay there: so they are those of the guess, solved for together with friction from there.
+    fn touch_first(&mut self) {
+        if self.budget.is_none() || !self.rubs || !self.contact.began_free() {
+            return;
+        }
+        self.contact.softness = 1.0;
+        self.newton.assemble_residual(self.elements, self.supports, self.contact, self.state);
+        if !self.contact.presses() {
+            return;
+        }
+        self.guess.other.copy_from(self.state);
+        if self.coupled() {
+            self.contact.mark_friction();
+        } else {
+            self.contact.rewind_friction();
+        }
+        self.state.copy_from(&self.guess.other);
     }
 
     /// From an equilibrium under the drag of where it was looked for to one under its own, where blood flows.
@@ -242,12 +263,7 @@ impl<const C: usize> Search<'_, '_, C> {
     /// Friction and wall solved for together. What is found may be no minimum, and is left then.
     fn together(&mut self) -> Option<NewtonReport> {
         for _ in 0..ROUNDS {
-            let left = self.budget.as_ref().map_or(usize::MAX, |budget| **budget);
-            let limits = (self.tolerance, left.min(TOGETHER));
-            let system = (&mut *self.newton, &mut *self.contact, &mut *self.supports);
-            let (there, iterations) = self.settle.solve(system, self.elements, self.state, limits);
-            self.take(iterations);
-            if !there {
+            if !self.coupled() {
                 return None;
             }
             let found = self.newton(STUCK, self.tolerance);
@@ -259,5 +275,15 @@ impl<const C: usize> Search<'_, '_, C> {
             }
         }
         None
+    }
+
+    /// Moves the state to an equilibrium, or a saddle, with its own normal forces, if one is found.
+    fn coupled(&mut self) -> bool {
+        let left = self.budget.as_ref().map_or(usize::MAX, |budget| **budget);
+        let limits = (self.tolerance, left.min(TOGETHER));
+        let system = (&mut *self.newton, &mut *self.contact, &mut *self.supports);
+        let (there, iterations) = self.settle.solve(system, self.elements, self.state, limits);
+        self.take(iterations);
+        there
     }
 }

@@ -50,35 +50,44 @@ pub(super) fn write_instruments<const C: usize>(
             inserted_mm: hand.inserted_mm,
             rotation_rad: hand.turn_rad,
             tip_rotation_rad: hand.turn_rad + twist,
-            push_force_n: push_force::<C>(environment, &nodes, (index, &inserted), touching, at.start()),
+            push_force_n: push_force::<C>(environment, &nodes, (&[index], &inserted), touching, at.start()),
             torque_nmm: set.zip(clamp).map_or(0.0, |(set, clamp)| clamp.torques[set]),
         });
     }
+    // Where ends are flush a hand alone feels a jump; what all of them feel together has a slope.
+    let flush: Vec<usize> = (0..told.len())
+        .filter(|index| told[*index].push_force_n.is_none() && inserted[*index] > 0.0)
+        .collect();
+    let together =
+        flush.chunk_by(|a, b| (inserted[*a] - inserted[*b]).abs() <= MEET * difference_mm(at.start()));
+    let flush_n = together
+        .filter(|flush| flush.len() > 1)
+        .filter_map(|flush| push_force::<C>(environment, &nodes, (flush, &inserted), touching, at.start()))
+        .sum::<f64>();
     let report = &mut at.parts().1.report;
     (report.rotation_rad, report.tip_rotation_rad) = (told[0].rotation_rad, told[0].tip_rotation_rad);
-    report.push_force_n = told.iter().filter_map(|i| i.push_force_n).sum();
+    report.push_force_n = told.iter().filter_map(|i| i.push_force_n).sum::<f64>() + flush_n;
     report.torque_nmm = told.iter().map(|i| i.torque_nmm).sum();
     report.instruments = told;
 }
 
-/// Force with which one hand pushes; none where it jumps.
+/// Force with which the hands of those that move `together` push, with ends at one place if they are several; none where it jumps.
 fn push_force<const C: usize>(
     environment: &Environment<'_>,
     nodes: &Nodes,
-    (index, inserted_mm): (usize, &[f64]),
+    (together, inserted_mm): (&[usize], &[f64]),
     (pressed, between, drag): (&[Pressed], &[Turning], Option<&Drag>),
     at: Start<'_>,
 ) -> Option<f64> {
     let stack = environment.surroundings.stack;
-    let shortest = at.mesh.elements.iter().map(|e| e.length).fold(f64::INFINITY, f64::min);
-    let (own, step) = (inserted_mm[index], STEP * shortest);
-    let meets = |(other, end): (usize, &f64)| other != index && (end - own).abs() <= MEET * step;
+    let (own, step) = (inserted_mm[together[0]], difference_mm(at));
+    let meets = |(other, end): (usize, &f64)| !together.contains(&other) && (end - own).abs() <= MEET * step;
     if own <= MEET * step || inserted_mm.iter().enumerate().any(meets) {
         return None;
     }
     let beside = |by: f64| {
         let mut inserted = inserted_mm.to_vec();
-        inserted[index] += by;
+        together.iter().for_each(|index| inserted[*index] += by);
         Beside::new(environment, nodes, (&inserted, MEET * step), at)
     };
     let (back, on) = (beside(-step), beside(step));
@@ -100,8 +109,14 @@ fn push_force<const C: usize>(
         });
         each.sum()
     });
-    let mouth = stack.instruments()[index].device.section_at(own);
-    Some(stored + wall + turned - dragged - mouth.straightening_n())
+    let straightened_n =
+        together.iter().map(|index| stack.instruments()[*index].device.section_at(own).straightening_n());
+    Some(stored + wall + turned - dragged - straightened_n.sum::<f64>())
+}
+
+/// Step of the differences, mm.
+fn difference_mm(at: Start<'_>) -> f64 {
+    STEP * at.mesh.elements.iter().map(|e| e.length).fold(f64::INFINITY, f64::min)
 }
 
 /// Twist of the instrument in a `set` of angles at node `i`, towards the tip: the mean of the elements beside it that it is in.

@@ -9,7 +9,7 @@ use super::hands::{Hand, motions};
 use super::hold::Held;
 use super::mesh::Mesh;
 use super::search::Search;
-use super::slide::{slide, slide_together};
+use super::slide::{Extension, slide, slide_together};
 use super::state::KirchhoffState;
 use super::workspace::Tools;
 use super::{Environment, meshed, rubbing};
@@ -85,25 +85,25 @@ impl<const C: usize> Tools<C> {
         let (mesh, after) = next.parts();
         meshed(environment, hands, mesh);
         let stack = environment.surroundings.stack;
-        let slide_from = |start: Start<'_>, rod: &mut RodState| {
+        let slide_from = |start: Start<'_>, extension: &Extension, rod: &mut RodState| {
             let from = (start.mesh, &start.state.rod);
             if stack.is_several() {
-                slide_together(from, &self.extension, mesh, stack.sets(), rod);
+                slide_together(from, extension, mesh, stack.sets(), rod);
             } else {
-                slide(from, &self.extension, mesh, rod);
+                slide(from, extension, mesh, rod);
             }
         };
         motions(&start.state.report, hands, &mut self.guess.motions);
-        let before = (&start.mesh.points[..], &start.state.forces[..]);
-        if let Some((was, passage)) = left {
-            slide_from(was, &mut after.rod);
+        if self.friction.acts() {
+            // What slips is counted from the device's own curve: a tip that is bent to the wall has not slid by that.
+            slide_from(left.map_or(start, |(was, _)| was), &Extension::default(), &mut after.rod);
+            let before = (&start.mesh.points[..], &start.state.forces[..]);
             self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
-            self.friction.carry(passage, &self.guess.motions);
-            slide_from(start, &mut after.rod);
-        } else {
-            slide_from(start, &mut after.rod);
-            self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
+            if let Some((_, passage)) = left {
+                self.friction.carry(passage, &self.guess.motions);
+            }
         }
+        slide_from(start, &self.extension, &mut after.rod);
         let (places, moves) = (&mut self.friction.between, &self.guess.motions);
         rubbing::begin(stack, start, (mesh, &after.rod), moves, places);
         after.turn_tails(stack, hands);
@@ -222,14 +222,7 @@ impl<const C: usize> Tools<C> {
         let corrections = (&start.state.correction, &mut after.correction);
         self.guess.teach(&mesh.elements, &after.rod, stiffness <= YIELDING, corrections);
         self.keep(mesh, after);
-        Ok(Found {
-            slides,
-            dissipated_mj,
-            flow_mj,
-            residual: found.residual,
-            unsettled,
-            balanced,
-        })
+        Ok(Found { slides, dissipated_mj, flow_mj, residual: found.residual, unsettled, balanced })
     }
 }
 

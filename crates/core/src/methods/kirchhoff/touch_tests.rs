@@ -1,0 +1,99 @@
+//! Tips that touch a wall with friction: they stick, buckle and slide, whatever the step.
+
+use crate::Vec3;
+use crate::device::{Device, Section};
+use crate::insertion::{Command, Sheath, Simulation, WallProperties};
+use crate::methods::StepReport;
+use crate::methods::kirchhoff::KirchhoffOptions;
+use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution};
+
+/// A device in a straight tube along z, with a sheath at this place and direction.
+fn in_tube(
+    (radius_mm, edge_mm): (f64, f64),
+    device: Device,
+    (position_mm, direction): (Vec3, Vec3),
+    (friction, modulus_n_per_mm2, element_mm): (f64, f64, f64),
+) -> Simulation {
+    let node = |i: usize| CentrelineNode {
+        position_mm: Vec3::z() * (50.0 * i as f64),
+        radius_mm,
+        parent: i.checked_sub(1),
+    };
+    let tree = CentrelineTree::new((0..4).map(node).collect()).unwrap();
+    let made = GeneratedWall::new(&tree, Resolution::EdgeMm(edge_mm)).unwrap();
+    let sheath = Sheath { position_mm, direction, friction: 0.0, friction_n: 0.0 };
+    let properties = WallProperties { friction, modulus_n_per_mm2, ..WallProperties::default() };
+    let method = KirchhoffOptions { element_mm, ..KirchhoffOptions::default() };
+    Simulation::builder(made.wall, device, sheath).properties(properties).method(&method).build().unwrap()
+}
+
+/// A soft wire across a wide tube, on whose wall it will stand upright.
+fn upright(friction: f64) -> Simulation {
+    let wire = Device::uniform(100.0, 0.4, 0.2).unwrap();
+    let sheath = (Vec3::new(-18.0, 0.0, 75.0), Vec3::x());
+    let mut simulation = in_tube((20.0, 2.0), wire, sheath, (friction, 10.0, 2.0));
+    go_on(&mut simulation, 37.0, 1.0);
+    simulation
+}
+
+/// Pushes it in as far as that; returns the last report.
+fn go_on(simulation: &mut Simulation, to_mm: f64, step_mm: f64) -> StepReport {
+    while simulation.report().inserted_mm < to_mm - 1e-9 {
+        let report = simulation.step(Command::advance(step_mm)).unwrap();
+        assert!(report.converged);
+    }
+    simulation.report().clone()
+}
+
+fn aside_mm(simulation: &Simulation) -> f64 {
+    let tip = simulation.shape().tip_mm().unwrap();
+    (tip - Vec3::new(tip.x, 0.0, 75.0)).norm()
+}
+
+#[test]
+fn a_tip_that_first_touches_in_a_long_step_sticks_as_in_short_ones() {
+    let [mut long, mut short] = [upright(0.3), upright(0.3)];
+    let forces = [go_on(&mut long, 40.0, 1.0), go_on(&mut short, 40.0, 0.1)].map(|r| r.push_force_n);
+    assert!((forces[0] / forces[1] - 1.0).abs() < 0.02, "{forces:?}");
+    // A column clamped at one end and pinned at the other, of 37.6 mm: 20.19 EI/L², and less the more it is bent.
+    let euler_n = 20.19 * 0.2 / (37.6 * 37.6);
+    assert!(forces[0] < euler_n && forces[0] > 0.7 * euler_n, "{forces:?} {euler_n}");
+    assert!(aside_mm(&long) < 0.01 && aside_mm(&short) < 0.01);
+    // The twin: without friction it slides away.
+    let mut free = upright(0.0);
+    let slid = go_on(&mut free, 40.0, 1.0);
+    assert!(aside_mm(&free) > 5.0 && slid.push_force_n < 0.7 * forces[0]);
+}
+
+#[test]
+fn a_column_buckles_in_a_step_that_presses_it_without_a_turn() {
+    let wire = Device::uniform(100.0, 0.4, 5.0).unwrap();
+    let sheath = (Vec3::new(0.0, 0.0, 75.0), Vec3::x());
+    let mut simulation = in_tube((20.0, 2.0), wire, sheath, (0.3, 1.0, 1.0));
+    // Pressed in by 1.4 mm it would carry 1.56 N, six times what buckles it.
+    let report = go_on(&mut simulation, 21.0, 1.0);
+    assert!(report.push_force_n < 20.19 * 5.0 / (20.0 * 20.0), "{}", report.push_force_n);
+}
+
+#[test]
+fn a_hook_that_slides_takes_what_the_hand_gives() {
+    let hook = Section { rest_curvature_per_mm: [0.0, 0.06], ..Section::straight(15.0, 0.3, 2.0) };
+    let wire = Device::new(vec![hook, Section::straight(300.0, 0.3, 12.0)]).unwrap();
+    let sheath = (Vec3::new(0.0, 0.0, 1.0), Vec3::z());
+    let mut simulation = in_tube((4.0, 1.5), wire, sheath, (0.3, 1.0, 2.0));
+    let mut before = go_on(&mut simulation, 16.0, 1.0);
+    let (mut given, mut left, mut taken) = (0.0, 0.0, 0.0);
+    while simulation.report().inserted_mm < 50.0 - 1e-9 {
+        let report = simulation.step(Command::advance(0.5)).unwrap().clone();
+        assert!(!report.jumped, "{}", report.inserted_mm);
+        given += 0.25 * (before.push_force_n + report.push_force_n);
+        left += report.energy.total() - before.energy.total();
+        taken += report.dissipated_mj;
+        // Coulomb's law: all of it slides along.
+        let rub: f64 = report.contacts.iter().map(|c| c.friction_n.norm()).sum();
+        let off = report.dissipated_mj / (0.5 * rub) - 1.0;
+        assert!(off.abs() < 0.02, "{}: {off}", report.inserted_mm);
+        before = report;
+    }
+    assert!((given - left - taken).abs() < 0.02 * taken, "{given} {left} {taken}");
+}
