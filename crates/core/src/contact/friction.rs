@@ -317,7 +317,9 @@ impl Friction {
         let each = points.iter().enumerate().take(self.sliders.len());
         let taken = each.filter(|(index, _)| self.largest_n(*index) > 0.0).map(|(index, point)| {
             let x = point.position(elements, state);
-            self.value(index, &x, point.angle(state), point.potential.radius_mm)
+            let value = self.value(index, &x, point.angle(state), point.potential.radius_mm);
+            // What sticks takes nothing.
+            value - self.largest_n(index) * phi(0.0, self.stick_mm)
         });
         self.taken_mj + taken.sum::<f64>()
     }
@@ -447,6 +449,12 @@ impl Friction {
     /// Whether nothing pressed where the step began.
     pub fn began_free(&self) -> bool {
         self.sliders.iter().all(|s| s.begun.1 == 0.0)
+    }
+
+    /// The normal forces are those seen last, and those that it can be rewound to.
+    pub fn take_seen(&mut self) {
+        self.sliders.iter_mut().for_each(|s| (s.normal, s.force_n) = s.seen);
+        self.mark();
     }
 
     /// The normal forces are those that it can be rewound to.

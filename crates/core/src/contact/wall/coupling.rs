@@ -49,9 +49,9 @@ impl WallContact<'_> {
         self.friction.began_free()
     }
 
-    /// Whether something presses at the state looked at last.
-    pub fn presses(&self) -> bool {
-        !self.memory.pressing.is_empty()
+    /// The normal forces of friction are those of the state looked at last.
+    pub fn take_seen_friction(&mut self) {
+        self.friction.take_seen();
     }
 
     /// The normal forces of friction are those that it can be rewound to.

@@ -363,12 +363,12 @@ fn the_force_between_two_on_an_arc_is_that_of_the_rods() {
 
 #[test]
 fn instruments_with_flush_tips_push_together_as_one_does() {
-    let straight = |name: &str, radius_mm, inner_radius_mm, stiffness| {
-        let section = Section { inner_radius_mm, ..Section::straight(300.0, radius_mm, stiffness) };
+    let straight = |name: &str, length_mm, radius_mm, inner_radius_mm| {
+        let section = Section { inner_radius_mm, ..Section::straight(length_mm, radius_mm, 20.0) };
         Instrument { name: name.to_owned(), device: Device::new(vec![section]).unwrap(), may_lead: true }
     };
     let both =
-        Stack::new(vec![straight("wire", 0.2, None, 20.0), straight("catheter", 0.5, Some(0.3), 20.0)]);
+        Stack::new(vec![straight("wire", 320.0, 0.2, None), straight("catheter", 300.0, 0.5, Some(0.3))]);
     let mut pair = along(bend(), 4.0, both.unwrap());
     let mut one = along(bend(), 4.0, Device::uniform(300.0, 0.5, 40.0).unwrap());
     for _ in 0..40 {

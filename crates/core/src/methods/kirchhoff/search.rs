@@ -107,24 +107,15 @@ impl<const C: usize> Search<'_, '_, C> {
         if found.converged { self.settled(found) } else { found }
     }
 
-    /// The first normal forces of a device that presses where nothing did. Lagged ones are none, and without friction it would slide from
-    /// where it touches to anywhere, and stay there: so they are those of the guess, solved for together with friction from there.
+    /// The first normal forces of a device that presses where nothing did are those of the guess, which has gone on as far as the hand: too
+    /// large, so that it sticks where it touches. With none it would slide from there to anywhere, and stay there.
     fn touch_first(&mut self) {
-        if self.budget.is_none() || !self.rubs || !self.contact.began_free() {
+        if !self.rubs || !self.contact.began_free() {
             return;
         }
         self.contact.softness = 1.0;
         self.newton.assemble_residual(self.elements, self.supports, self.contact, self.state);
-        if !self.contact.presses() {
-            return;
-        }
-        self.guess.other.copy_from(self.state);
-        if self.coupled() {
-            self.contact.mark_friction();
-        } else {
-            self.contact.rewind_friction();
-        }
-        self.state.copy_from(&self.guess.other);
+        self.contact.take_seen_friction();
     }
 
     /// From an equilibrium under the drag of where it was looked for to one under its own, where blood flows.
@@ -263,7 +254,12 @@ impl<const C: usize> Search<'_, '_, C> {
     /// Friction and wall solved for together. What is found may be no minimum, and is left then.
     fn together(&mut self) -> Option<NewtonReport> {
         for _ in 0..ROUNDS {
-            if !self.coupled() {
+            let left = self.budget.as_ref().map_or(usize::MAX, |budget| **budget);
+            let limits = (self.tolerance, left.min(TOGETHER));
+            let system = (&mut *self.newton, &mut *self.contact, &mut *self.supports);
+            let (there, iterations) = self.settle.solve(system, self.elements, self.state, limits);
+            self.take(iterations);
+            if !there {
                 return None;
             }
             let found = self.newton(STUCK, self.tolerance);
@@ -275,15 +271,5 @@ impl<const C: usize> Search<'_, '_, C> {
             }
         }
         None
-    }
-
-    /// Moves the state to an equilibrium, or a saddle, with its own normal forces, if one is found.
-    fn coupled(&mut self) -> bool {
-        let left = self.budget.as_ref().map_or(usize::MAX, |budget| **budget);
-        let limits = (self.tolerance, left.min(TOGETHER));
-        let system = (&mut *self.newton, &mut *self.contact, &mut *self.supports);
-        let (there, iterations) = self.settle.solve(system, self.elements, self.state, limits);
-        self.take(iterations);
-        there
     }
 }
