@@ -103,6 +103,16 @@ def test_wrong_actions_of_one_are_exceptions(task):
     assert env.step(np.array([[10.0, 0.0]]))[4]["failure"] == ""
 
 
+def test_reset_comes_first(task):
+    single = endowire.gym.InsertionEnv(task, render_mode="rgb_array")
+    vector = InsertionVectorEnv(task, 2, render_mode="rgb_array")
+    for env in (single, vector):
+        with pytest.raises(gymnasium.error.ResetNeeded, match="reset comes before step"):
+            env.step(env.action_space.sample())
+        with pytest.raises(gymnasium.error.ResetNeeded, match="reset comes before render"):
+            env.render()
+
+
 def test_pictures_of_two_planes_are_observed(vessel, wire):
     planes = observations.Fluoroscopy(
         planes=((0.0, 0.0), (90.0, 0.0)), size_px=(24, 16), view={"backend": "cpu"}

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from .. import Batch, EndOfWay, EndowireError
@@ -79,7 +80,10 @@ class Episodes:
     def step(self, actions: NDArray[np.float64], moving: NDArray[np.bool_]) -> None:
         """Moves those environments by velocities, shape (n, n_instruments, 2); the others wait. Where one is NaN the simulation refuses it, and
         that is its failure.
+
+        Raises ResetNeeded of Gymnasium before the first `begin`.
         """
+        self.check_begun("step")
         limits = self.action_space.high
         velocities = np.clip(actions, -limits, limits)
         done = moving & ~np.isnan(velocities).any(axis=(1, 2))
@@ -97,6 +101,11 @@ class Episodes:
         self.frame += moving
         self.way_before_mm = self.way_mm.copy()
         self._look()
+
+    def check_begun(self, what: str) -> None:
+        """Raises ResetNeeded of Gymnasium where no episode has begun: there is nothing to step or to draw."""
+        if not self.sites:
+            raise ResetNeeded(f"reset comes before {what}: call reset once first")
 
     def observe(self) -> dict[str, NDArray[Any]]:
         """All parts of the observations, within their spaces."""
