@@ -136,7 +136,8 @@ def test_surfaces_of_vtk_are_read(vessel, tmp_path, kind):
 
 def test_pieces_of_a_surface_are_joined_and_what_is_no_triangle_is_refused(tmp_path):
     def array(name, type_, numbers):
-        return f'<DataArray type="{type_}" Name="{name}" format="ascii">{" ".join(map(str, numbers))}</DataArray>'
+        text = " ".join(map(str, numbers))
+        return f'<DataArray type="{type_}" Name="{name}" format="ascii">{text}</DataArray>'
 
     def piece(points, corners, counts=""):
         connectivity = array("connectivity", "Int32", np.ravel(corners))
