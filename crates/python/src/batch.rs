@@ -11,7 +11,6 @@ use pyo3::types::PyDict;
 use crate::arrays::{Numbers, array, numbers, points};
 use crate::error::{exception, refuse};
 use crate::instrument::Instrument;
-use crate::moves::Moves;
 use crate::report::push_force_n;
 use crate::simulation::{Simulation, points_at, tip_mm, tips_mm};
 use crate::state::State;
@@ -123,7 +122,7 @@ impl Batch {
     ///
     /// Returns the failures: a dictionary from the index of a simulation to the exception that `Simulation.step` would have raised; empty
     /// where all went well. Those that failed are as before, and do not concern the others.
-    fn step<'py>(&self, py: Python<'py>, moves: Moves<'_>) -> PyResult<Bound<'py, PyDict>> {
+    fn step<'py>(&self, py: Python<'py>, moves: Numbers<'_>) -> PyResult<Bound<'py, PyDict>> {
         let (count, hands) = self.with(py, |members| (members.instruments.len(), members.hands()));
         let moves = crate::moves::moves(&moves, Some(count), hands)?;
         let told = self.with(py, |members| members.batch.step_together(&moves)).map_err(exception)?;
@@ -184,12 +183,14 @@ impl Batch {
     }
 
     /// Points of the centre lines at these arc lengths from the tip, mm: shape (m,) to (n, m, 3).
+    ///
+    /// Raises InputError for lengths that are not finite.
     fn points_mm<'py>(
         &self,
         py: Python<'py>,
         from_tip_mm: Numbers<'_>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let lengths = numbers(&from_tip_mm);
+        let lengths = numbers("from_tip_mm", &from_tip_mm)?;
         let (count, list) = self.with(py, |members| {
             let all = members.batch.simulations();
             let list = all.iter().flat_map(|s| points_at(s, &lengths)).flat_map(|p| [p.x, p.y, p.z]);

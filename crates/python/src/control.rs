@@ -8,7 +8,7 @@ use endowire_core::{Error, Vec3};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::arrays::{Table, array, rows};
+use crate::arrays::{Numbers, array, natural, rows};
 use crate::error::{exception, refuse};
 use crate::simulation::Simulation;
 
@@ -42,14 +42,14 @@ impl Controller {
     ///
     /// Raises InputError for a path that is none.
     #[staticmethod]
-    #[pyo3(signature = (path_mm, *, arrived_mm = 5.0, lead = 0, followers = Vec::new()))]
+    #[pyo3(signature = (path_mm, *, arrived_mm = 5.0, lead = 0, followers = None))]
     fn follow_path(
-        path_mm: Table<'_, f64>,
+        path_mm: Numbers<'_>,
         arrived_mm: f64,
-        lead: usize,
-        followers: Vec<(usize, f64)>,
+        lead: i64,
+        followers: Option<Vec<(i64, f64)>>,
     ) -> PyResult<Self> {
-        Ok(Self::of(FollowPath::new(path(&path_mm)?, team(lead, followers), arrived_mm)))
+        Ok(Self::of(FollowPath::new(path(&path_mm)?, team(lead, followers)?, arrived_mm)))
     }
 
     /// Tries turns of the instruments `turned` (that which leads, unless told) on copies of the simulation, pushes and pulls for 20 mm
@@ -57,16 +57,20 @@ impl Controller {
     ///
     /// Raises InputError for a path that is none.
     #[staticmethod]
-    #[pyo3(signature = (path_mm, *, arrived_mm = 5.0, lead = 0, followers = Vec::new(), turned = None))]
+    #[pyo3(signature = (path_mm, *, arrived_mm = 5.0, lead = 0, followers = None, turned = None))]
     fn search_ahead(
-        path_mm: Table<'_, f64>,
+        path_mm: Numbers<'_>,
         arrived_mm: f64,
-        lead: usize,
-        followers: Vec<(usize, f64)>,
-        turned: Option<Vec<usize>>,
+        lead: i64,
+        followers: Option<Vec<(i64, f64)>>,
+        turned: Option<Vec<i64>>,
     ) -> PyResult<Self> {
-        let turned = turned.unwrap_or_else(|| vec![lead]);
-        Ok(Self::of(SearchAhead::new(path(&path_mm)?, team(lead, followers), turned, arrived_mm)))
+        let team = team(lead, followers)?;
+        let turned = match turned {
+            Some(turned) => turned.into_iter().map(|one| natural("turned", one)).collect::<PyResult<_>>()?,
+            None => vec![team.lead],
+        };
+        Ok(Self::of(SearchAhead::new(path(&path_mm)?, team, turned, arrived_mm)))
     }
 
     /// What to do with a simulation as it is now: advance_mm and rotate_rad of each instrument, shape (n_instruments, 2); None where it
@@ -112,8 +116,8 @@ impl Controller {
     }
 }
 
-fn path(table: &Table<'_, f64>) -> PyResult<CentrelinePath> {
-    let rows = rows::<f64, 4>("path_mm", table)?;
+fn path(table: &Numbers<'_>) -> PyResult<CentrelinePath> {
+    let rows = rows::<4>("path_mm", table)?;
     let count = rows.len();
     let finite = rows.as_flattened().iter().all(|number| number.is_finite());
     let points = rows.into_iter().map(|[x, y, z, radius_mm]| (Vec3::new(x, y, z), radius_mm)).collect();
@@ -122,7 +126,9 @@ fn path(table: &Table<'_, f64>) -> PyResult<CentrelinePath> {
     made.ok_or_else(|| refuse("path_mm", format!("{count} rows"), mend))
 }
 
-fn team(lead: usize, followers: Vec<(usize, f64)>) -> Team {
-    let followers = followers.into_iter().map(|(instrument, behind_mm)| Follower { instrument, behind_mm });
-    Team { lead, followers: followers.collect() }
+fn team(lead: i64, followers: Option<Vec<(i64, f64)>>) -> PyResult<Team> {
+    let follower =
+        |(instrument, behind_mm)| Ok(Follower { instrument: natural("followers", instrument)?, behind_mm });
+    let followers = followers.unwrap_or_default().into_iter().map(follower).collect::<PyResult<_>>()?;
+    Ok(Team { lead: natural("lead", lead)?, followers })
 }

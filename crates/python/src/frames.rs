@@ -2,16 +2,16 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
+use endowire_core::Vec3;
 use endowire_core::vessel::Wall;
-use endowire_core::{Error, Vec3};
 use endowire_viewer::{self as viewer, DevicePart, Image, Moment, PixelFormat, ViewSpec};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::arrays::array;
+use crate::arrays::{array, natural};
 use crate::document;
-use crate::error::exception;
+use crate::error::{exception, refuse};
 use crate::interrupt::interruptible;
 use crate::simulation::Simulation;
 use crate::vessel::Vessel;
@@ -38,7 +38,7 @@ impl Renderer {
         py: Python<'_>,
         spec: &ViewSpec,
         view: Option<&Bound<'_, PyAny>>,
-        plane: usize,
+        plane: i64,
         wall: Arc<Wall>,
     ) -> PyResult<Self> {
         let spec = match view {
@@ -47,14 +47,14 @@ impl Renderer {
         };
         spec.validate().map_err(exception)?;
         let mut planes = spec.planes();
-        if plane >= planes.len() {
+        let Some(place) = usize::try_from(plane).ok().filter(|place| *place < planes.len()) else {
             let mend = match planes.len() {
                 1 => "the view has one plane, 0; a second is that of view.biplane_deg",
                 _ => "the view has two planes, 0 and 1",
             };
-            return Err(exception(Error::parameter("plane", plane, mend)));
-        }
-        let spec = planes.swap_remove(plane);
+            return Err(refuse("plane", plane, mend));
+        };
+        let spec = planes.swap_remove(place);
         let made = interruptible(py, move || viewer::Renderer::of_wall(&spec, &wall))?;
         Ok(Self { inner: Mutex::new(made.map_err(exception)?) })
     }
@@ -91,7 +91,7 @@ impl Renderer {
     /// Raises InputError for values out of range, and for a vessel that cannot be drawn.
     #[new]
     #[pyo3(signature = (vessel, view, plane=0))]
-    fn new(py: Python<'_>, vessel: &Vessel, view: &Bound<'_, PyAny>, plane: usize) -> PyResult<Self> {
+    fn new(py: Python<'_>, vessel: &Vessel, view: &Bound<'_, PyAny>, plane: i64) -> PyResult<Self> {
         Self::prepare(py, &ViewSpec::default(), Some(view), plane, Arc::clone(&vessel.wall))
     }
 
@@ -103,8 +103,11 @@ impl Renderer {
 
     /// Draws the views of a simulation as it is. `frame` is the number of the frame, which seeds its noise and tells its time; the next one
     /// unless told.
+    ///
+    /// Raises InputError for a negative frame, and for a simulation that cannot be drawn.
     #[pyo3(signature = (simulation, frame=None))]
-    fn render(&self, py: Python<'_>, simulation: &Simulation, frame: Option<u64>) -> PyResult<Frames> {
+    fn render(&self, py: Python<'_>, simulation: &Simulation, frame: Option<i64>) -> PyResult<Frames> {
+        let frame: Option<u64> = frame.map(|frame| natural("frame", frame)).transpose()?;
         let views = self.views(py, simulation)?;
         self.move_vessel(py, simulation)?;
         let frames = self

@@ -1,17 +1,18 @@
 //! What hands do, as arrays: for each instrument the length pushed in, mm, and the turn, rad.
 
 use endowire_core::insertion::{Command, Move};
-use numpy::{AllowTypeChange, PyArrayLikeDyn};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
+use crate::arrays::{Numbers, misshapen};
 use crate::error::refuse;
 
-/// Moves of anything like an array, of shape (…, n_instruments, 2).
-pub(crate) type Moves<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
-
 /// What all of `instruments` do, for each of `count`, or of any count: an array of shape (count, instruments, 2).
-pub(crate) fn moves(moves: &Moves<'_>, count: Option<usize>, instruments: usize) -> PyResult<Vec<Vec<Move>>> {
+pub(crate) fn moves(
+    moves: &Numbers<'_>,
+    count: Option<usize>,
+    instruments: usize,
+) -> PyResult<Vec<Vec<Move>>> {
     let view = moves.as_array();
     let fits = match view.shape() {
         [given, hands, 2] => *hands == instruments && count.is_none_or(|count| count == *given),
@@ -19,13 +20,10 @@ pub(crate) fn moves(moves: &Moves<'_>, count: Option<usize>, instruments: usize)
     };
     if !fits {
         let first = count.map_or("n".to_owned(), |count| count.to_string());
-        return Err(refuse(
-            "moves",
-            format!("an array of shape {:?}", view.shape()),
-            &format!(
-                "must have the shape ({first}, {instruments}, 2): advance_mm and rotate_rad of each instrument"
-            ),
-        ));
+        let mend = format!(
+            "must have the shape ({first}, {instruments}, 2): advance_mm and rotate_rad of each instrument"
+        );
+        return Err(misshapen("moves", view.shape(), &mend));
     }
     let numbers: Vec<f64> = view.iter().copied().collect();
     let hands = |row: &[f64]| {

@@ -124,7 +124,7 @@ impl Scene {
         py: Python<'_>,
         view: Option<&Bound<'_, PyAny>>,
         vessel: Option<&Vessel>,
-        plane: usize,
+        plane: i64,
     ) -> PyResult<Renderer> {
         let spec = ViewSpec::of_scene(&self.scene, &self.path).map_err(exception)?;
         let wall = match vessel {

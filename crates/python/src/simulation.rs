@@ -13,12 +13,12 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Numbers, numbers, points};
+use crate::arrays::{Numbers, natural, numbers, points};
 use crate::document;
 use crate::error::{exception, refuse};
 use crate::instrument::Instrument;
 use crate::interrupt::interruptible;
-use crate::moves::{Moves, of_each, together};
+use crate::moves::{of_each, together};
 use crate::report::StepReport;
 use crate::state::State;
 use crate::vessel::Vessel;
@@ -107,7 +107,7 @@ impl Simulation {
         py: Python<'_>,
         vessel: &Vessel,
         instruments: Instruments,
-        opening: Option<usize>,
+        opening: Option<i64>,
         depth_mm: Option<f64>,
         position_mm: Option<[f64; 3]>,
         direction: Option<[f64; 3]>,
@@ -128,6 +128,7 @@ impl Simulation {
             wall.map(|table| document::read("wall", table)).transpose()?.unwrap_or_default();
         let method: AnyMethod =
             method.map(|table| document::read("method", table)).transpose()?.unwrap_or_default();
+        let opening = opening.map(|opening| natural("opening", opening)).transpose()?;
         let nowhere = opening.is_none() && position_mm.is_none() && direction.is_none();
         let opening = opening.or_else(|| nowhere.then(|| vessel.inlet().unwrap_or(0)));
         let sheath = SheathSpec {
@@ -177,7 +178,7 @@ impl Simulation {
     /// StepReport. Ctrl-C ends it between two steps.
     ///
     /// Raises what `step` raises, after the steps before.
-    fn run(&self, py: Python<'_>, moves: Moves<'_>) -> PyResult<StepReport> {
+    fn run(&self, py: Python<'_>, moves: Numbers<'_>) -> PyResult<StepReport> {
         for moves in crate::moves::moves(&moves, None, self.instruments.len())? {
             self.with(py, |simulation| simulation.step_together(&moves).map(drop)).map_err(exception)?;
             py.check_signals()?;
@@ -247,12 +248,13 @@ impl Simulation {
     /// points of `positions_mm`; `length_mm` is the length that each of them stands for.
     ///
     /// Raises InputError for an instrument that is not there.
-    fn lateral_forces<'py>(&self, py: Python<'py>, instrument: usize) -> PyResult<Bound<'py, PyDict>> {
-        if instrument >= self.instruments.len() {
-            let mend = format!("there are {}, the innermost is 0", self.instruments.len());
+    fn lateral_forces<'py>(&self, py: Python<'py>, instrument: i64) -> PyResult<Bound<'py, PyDict>> {
+        let count = self.instruments.len();
+        let Some(place) = usize::try_from(instrument).ok().filter(|place| *place < count) else {
+            let mend = format!("there are {count}, the innermost is 0");
             return Err(refuse("instrument", instrument, &mend));
-        }
-        let forces = self.with(py, |simulation| simulation.lateral_forces(instrument));
+        };
+        let forces = self.with(py, |simulation| simulation.lateral_forces(place));
         let told = PyDict::new(py);
         let list = |of: fn(&LateralForce) -> f64| PyArray1::from_vec(py, forces.iter().map(of).collect());
         told.set_item("force_n", points(py, forces.iter().map(|at| at.force_n))?)?;
@@ -277,12 +279,14 @@ impl Simulation {
 
     /// Points of the centre line at these arc lengths from the tip, mm: shape (n,) to (n, 3). Lengths that are not inserted are in the
     /// sheath's mouth.
+    ///
+    /// Raises InputError for lengths that are not finite.
     fn points_mm<'py>(
         &self,
         py: Python<'py>,
         from_tip_mm: Numbers<'_>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let lengths = numbers(&from_tip_mm);
+        let lengths = numbers("from_tip_mm", &from_tip_mm)?;
         points(py, self.with(py, |simulation| points_at(simulation, &lengths)))
     }
 

@@ -9,6 +9,7 @@ use endowire_sweep::{Order, Program, Shard, Sweep, merge};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::arrays::natural;
 use crate::error::{exception, refuse};
 use crate::interrupt::{interruptible, stoppable};
 
@@ -26,9 +27,10 @@ pub(crate) fn sweep<'py>(
     py: Python<'py>,
     path: PathBuf,
     out: PathBuf,
-    jobs: Option<usize>,
+    jobs: Option<i64>,
     shard: &str,
 ) -> PyResult<Bound<'py, PyDict>> {
+    let jobs = jobs.map(|jobs| natural("jobs", jobs)).transpose()?;
     let shard: Shard = shard.parse().map_err(|mend: String| refuse("shard", format!("{shard:?}"), &mend))?;
     let sweep = Sweep::read(&path).map_err(exception)?;
     if sweep.recorded().is_some() {

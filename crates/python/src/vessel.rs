@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::Serialize;
 
-use crate::arrays::{Table, array, points, rows};
+use crate::arrays::{Numbers, array, natural, points, rows};
 use crate::document;
 use crate::error::{InputError, exception, refuse};
 use crate::interrupt::interruptible;
@@ -34,7 +34,7 @@ type Pickled<'py> =
 #[derive(FromPyObject)]
 pub(crate) enum Tree<'py> {
     Path(PathBuf),
-    Table(Table<'py, f64>),
+    Table(Numbers<'py>),
 }
 
 #[derive(Serialize)]
@@ -59,16 +59,20 @@ impl Vessel {
 
     /// The wall of a triangle surface: vertices in mm, shape (n, 3), and triangles of vertex indices, shape (m, 3), counter-clockwise seen
     /// from outside. What can be mended is mended.
+    ///
+    /// Raises InputError for arrays of another shape, for what is no number of a vertex, and for a surface that serves as no wall.
     #[staticmethod]
-    fn from_arrays(py: Python<'_>, vertices_mm: Table<'_, f64>, triangles: Table<'_, i64>) -> PyResult<Self> {
+    fn from_arrays(py: Python<'_>, vertices_mm: Numbers<'_>, triangles: Numbers<'_>) -> PyResult<Self> {
         let vertices_mm: Vec<Vec3> = rows("vertices_mm", &vertices_mm)?.into_iter().map(Vec3::from).collect();
-        let index = |corner: i64| {
-            u32::try_from(corner)
-                .ok()
-                .filter(|corner| (*corner as usize) < vertices_mm.len())
-                .ok_or_else(|| refuse("triangles", corner, "must be the number of a vertex, from 0"))
+        // Numbers as they are given: as whole ones they would lose their fractions.
+        let index = |corner: f64| {
+            let last = vertices_mm.len().min(u32::MAX as usize) as f64 - 1.0;
+            match (0.0..=last).contains(&corner) && corner.fract() == 0.0 {
+                true => Ok(corner as u32),
+                false => Err(refuse("triangles", corner, "must be the number of a vertex, from 0")),
+            }
         };
-        let triangles = rows::<i64, 3>("triangles", &triangles)?
+        let triangles = rows("triangles", &triangles)?
             .into_iter()
             .map(|[a, b, c]| Ok([index(a)?, index(b)?, index(c)?]))
             .collect::<PyResult<_>>()?;
@@ -87,12 +91,12 @@ impl Vessel {
         py: Python<'_>,
         tree: Tree<'_>,
         edge_mm: Option<f64>,
-        triangles: Option<usize>,
+        triangles: Option<i64>,
     ) -> PyResult<Self> {
         let tree = tree.tree()?;
         let resolution = match (edge_mm, triangles) {
             (Some(edge_mm), None) => Resolution::EdgeMm(edge_mm),
-            (None, Some(count)) => Resolution::Triangles(count),
+            (None, Some(count)) => Resolution::Triangles(natural("triangles", count)?),
             (None, None) => Resolution::fitting(&tree),
             (Some(edge_mm), Some(_)) => {
                 return Err(refuse("edge_mm", edge_mm, "triangles is given too: keep one of the two"));
@@ -157,11 +161,7 @@ impl Vessel {
     }
 
     /// Whether points (mm, shape (n, 3)) are inside: booleans of shape (n,).
-    fn contains<'py>(
-        &self,
-        py: Python<'py>,
-        points_mm: Table<'_, f64>,
-    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    fn contains<'py>(&self, py: Python<'py>, points_mm: Numbers<'_>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let points = rows("points_mm", &points_mm)?;
         let wall = &self.wall;
         let inside: endowire_core::Result<Vec<bool>> =
@@ -196,7 +196,7 @@ impl Vessel {
     #[staticmethod]
     fn _unpickled(
         wall: &[u8],
-        centreline: Option<Table<'_, f64>>,
+        centreline: Option<Numbers<'_>>,
         inlet: Option<usize>,
         targets: Vec<(String, usize)>,
     ) -> PyResult<Self> {
@@ -231,7 +231,7 @@ impl Tree<'_> {
                 None => CentrelineTree::read(path).map_err(exception),
             },
             Self::Table(table) => {
-                let nodes = rows::<f64, 5>("tree", table)?
+                let nodes = rows::<5>("tree", table)?
                     .into_iter()
                     .enumerate()
                     .map(|(row, [x, y, z, radius_mm, parent])| {

@@ -81,6 +81,18 @@ def test_one_that_fails_is_told_and_the_others_go_on(task):
         vector.step(np.zeros((3, 2)))
 
 
+def test_an_action_that_is_no_number_is_not_the_last_action(vessel, wire):
+    seen = {"last_action": observations.LastAction()}
+    vector = InsertionVectorEnv(Task([wire], vessels.FixedVessel(vessel), observations=seen), 2)
+    vector.reset(seed=1)
+    actions = np.array([[[10.0, 1.0]], [[20.0, 2.0]]])
+    before = vector.step(actions)[0]
+    actions[1, 0] = [30.0, np.nan]
+    observed, *_, info = vector.step(actions)
+    assert "NaN" in info["failure"][1] and vector.observation_space.contains(observed)
+    assert np.array_equal(observed["last_action"], before["last_action"])
+
+
 def test_wrong_actions_of_one_are_exceptions(task):
     env = endowire.gym.InsertionEnv(task)
     env.reset(seed=1)
@@ -89,6 +101,16 @@ def test_wrong_actions_of_one_are_exceptions(task):
     with pytest.raises(endowire.InputError, match="shape"):
         env.step(np.zeros(2))
     assert env.step(np.array([[10.0, 0.0]]))[4]["failure"] == ""
+
+
+def test_reset_comes_first(task):
+    single = endowire.gym.InsertionEnv(task, render_mode="rgb_array")
+    vector = InsertionVectorEnv(task, 2, render_mode="rgb_array")
+    for env in (single, vector):
+        with pytest.raises(gymnasium.error.ResetNeeded, match="reset comes before step"):
+            env.step(env.action_space.sample())
+        with pytest.raises(gymnasium.error.ResetNeeded, match="reset comes before render"):
+            env.render()
 
 
 def test_pictures_of_two_planes_are_observed(vessel, wire):

@@ -163,6 +163,19 @@ def test_evaluation_is_of_the_episodes_of_its_seeds(task):
     assert drawn[0] == drawn[1] != drawn[2]
 
 
+def test_what_cannot_be_evaluated_is_refused(task):
+    assert evaluation.evaluate(task, policies.Straight(), []) == []
+    assert evaluation.evaluate(task, policies.Straight(), np.array([], dtype=int)) == []
+    for wrong, words in (
+        (lambda: evaluation.evaluate(task, policies.Straight(), [1], num_envs=0), "num_envs = 0: must be 1"),
+        (lambda: evaluation.interval(0, 0), "episodes = 0: must be 1 or more"),
+        (lambda: evaluation.interval(4, 3), "successes = 4: must be 0 to 3"),
+        (lambda: policies.Steered("next"), "kind = 'next': give follow_path or search_ahead"),
+    ):
+        with pytest.raises(endowire.InputError, match=words):
+            wrong()
+
+
 def test_an_episode_ends_where_steps_take_too_much(task):
     for most, over in ((0, True), (1_000_000, False)):
         env = InsertionEnv(Task(task.instruments, task.vessels, ends=[ends.Laborious(most)], wall=task.wall))

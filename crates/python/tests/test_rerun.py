@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import endowire
-from endowire.gym import InsertionEnv, Task, ends, vessels
+from endowire.gym import InsertionEnv, InsertionVectorEnv, Task, ends, vessels
 
 pytest.importorskip("rerun")
 
@@ -48,7 +48,21 @@ def test_an_episode_is_a_recording(vessel, wire, tmp_path):
     assert told["/tip", "step"] == [0, 1, 2, 3, 4]
     assert np.reshape(told["/tip", "Points3D:positions"], (-1, 3)) == pytest.approx(np.array(tips), abs=1e-4)
     assert np.reshape(told["/vessel", "Mesh3D:vertex_positions"], (-1, 3)).shape == vessel.vertices_mm.shape
-    with pytest.raises(endowire.InputError, match="not a vector"):
-        RerunLog(gymnasium.make("CartPole-v1"), tmp_path)
     last = np.reshape(told["/instrument_0", "LineStrips3D:strips"][-1], (-1, 3))
     assert last[-1] == pytest.approx(tips[-1], abs=1e-4) and len(last) > 2
+
+
+def test_what_cannot_be_recorded_is_refused(vessel, wire, tmp_path):
+    from endowire.gym.rerun_log import RerunLog
+
+    task = Task([wire], vessels.FixedVessel(vessel))
+    for other in (gymnasium.make("CartPole-v1"), InsertionVectorEnv(task, 2)):
+        with pytest.raises(endowire.InputError, match="env = .*: give an environment .*, not a vector"):
+            RerunLog(other, tmp_path / "out")
+    earlier = RerunLog(InsertionEnv(task), tmp_path / "out")
+    earlier.reset(seed=1)
+    earlier.close()
+    kept = (tmp_path / "out" / "episode_000000.rrd").read_bytes()
+    with pytest.raises(endowire.InputError, match="folder = .*out: is not empty: give a new one"):
+        RerunLog(InsertionEnv(task), tmp_path / "out")
+    assert (tmp_path / "out" / "episode_000000.rrd").read_bytes() == kept

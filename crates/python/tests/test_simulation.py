@@ -94,6 +94,43 @@ def test_wrong_parts_are_named(vessel, wire):
         endowire.Vessel.from_arrays(np.zeros((3, 3)), [[0, 1, 9]])
 
 
+def test_arrays_that_are_none_are_named(vessel, wire, simulation):
+    points, triangles = vessel.vertices_mm, vessel.triangles
+    for wrong, words in (
+        (lambda: simulation.points_mm([0.0, np.nan]), r"from_tip_mm\[1\] = NaN: must be a finite number"),
+        (lambda: endowire.Batch([simulation]).points_mm([np.nan]), r"from_tip_mm\[0\] = NaN"),
+        (lambda: simulation.points_mm(1.0), r"from_tip_mm = an array of shape \[\]: .* shape \(n,\)"),
+        (lambda: vessel.contains([0, 0, 10.0]), r"points_mm = an array of shape \[3\]: .* \(n, 3\)"),
+        (lambda: endowire.Vessel.from_arrays(points, triangles + 0.9), r"triangles = \d+.9: must be the"),
+        (lambda: endowire.Vessel.from_arrays(points, np.full((1, 3), np.nan)), "triangles = NaN: must be"),
+        (lambda: endowire.Vessel.from_arrays(points, [[0, 1, -1]]), "triangles = -1: must be the number"),
+        (lambda: endowire.Vessel.from_arrays(points, triangles[0]), r"triangles = an array of shape \[3\]"),
+        (lambda: endowire.Vessel.generate([0.0, 1.0]), r"tree = an array of shape \[2\]"),
+    ):
+        with pytest.raises(endowire.InputError, match=words):
+            wrong()
+    again = endowire.Vessel.from_arrays(points, triangles.astype(float))
+    assert np.array_equal(again.triangles, triangles)
+
+
+def test_negative_numbers_are_named(vessel, wire, simulation, tmp_path):
+    line = vessel.centreline[:, :4]
+    view = {"views": ["fluoro"], "size_px": [16, 16], "backend": "cpu"}
+    for wrong, words in (
+        (lambda: endowire.Simulation(vessel, wire, opening=-1), "opening = -1: must be 0 or more"),
+        (lambda: endowire.Vessel.generate("curved_tube", triangles=-1), "triangles = -1: must be 0 or more"),
+        (lambda: simulation.lateral_forces(-1), "instrument = -1: there are 1"),
+        (lambda: endowire.Renderer(vessel, view).render(simulation, frame=-1), "frame = -1: must be 0"),
+        (lambda: endowire.Renderer(vessel, view, -1), "plane = -1: the view has one plane, 0"),
+        (lambda: endowire.Controller.follow_path(line, lead=-1), "lead = -1: must be 0 or more"),
+        (lambda: endowire.Controller.follow_path(line, followers=[(-1, 5.0)]), "followers = -1: must be 0"),
+        (lambda: endowire.Controller.search_ahead(line, turned=[-1]), "turned = -1: must be 0 or more"),
+        (lambda: endowire.sweep(tmp_path / "sweep.toml", tmp_path, jobs=-1), "jobs = -1: must be 0 or more"),
+    ):
+        with pytest.raises(endowire.InputError, match=words):
+            wrong()
+
+
 def test_the_way_ends_where_the_vessel_ends(vessel, wire):
     simulation = endowire.Simulation(vessel, wire)
     with pytest.raises(endowire.EndOfWay, match="left the vessel"):

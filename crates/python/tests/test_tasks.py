@@ -134,6 +134,40 @@ def test_surfaces_of_vtk_are_read(vessel, tmp_path, kind):
             vtp.read_vtp(tmp_path / "a.vtp")
 
 
+def test_pieces_of_a_surface_are_joined_and_what_is_no_triangle_is_refused(tmp_path):
+    def array(name, type_, numbers):
+        text = " ".join(map(str, numbers))
+        return f'<DataArray type="{type_}" Name="{name}" format="ascii">{text}</DataArray>'
+
+    def piece(points, corners, counts=""):
+        connectivity = array("connectivity", "Int32", np.ravel(corners))
+        offsets = array("offsets", "Int32", 3 * np.arange(1, len(corners) + 1))
+        return (
+            f"<Piece {counts}><Points>{array('Points', 'Float32', np.ravel(points))}</Points>"
+            f"<Polys>{connectivity}{offsets}</Polys></Piece>"
+        )
+
+    def read(*pieces):
+        text = f'<VTKFile type="PolyData"><PolyData>{"".join(pieces)}</PolyData></VTKFile>'
+        (tmp_path / "a.vtp").write_text(text)
+        return vtp.read_vtp(tmp_path / "a.vtp")
+
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    first = piece(square, [[0, 1, 2], [0, 2, 3]])
+    points, triangles = read(first, piece(np.zeros((0, 3)), []), piece(square[:3] + 5, [[2, 1, 0]]))
+    assert points.tolist() == [*square.tolist(), *(square[:3] + 5).tolist()]
+    assert triangles.tolist() == [[0, 1, 2], [0, 2, 3], [6, 5, 4]]
+    # Without the check this corner would be one of the piece behind it.
+    for refused, words in (
+        ((piece(square[:3], [[0, 1, 3]]), first), "a corner that is none of the 3 points of its piece"),
+        ((first, piece(square, [[0, 1, 2]], 'NumberOfStrips="2"')), "2 Strips: write it as triangles"),
+        ((piece(square, [[0, 1, 2]], 'NumberOfVerts="0" NumberOfLines="1"'),), "1 Lines"),
+        ((), "it has no piece"),
+    ):
+        with pytest.raises(endowire.InputError, match=f"a.vtp: no surface of triangles .*{words}"):
+            read(*refused)
+
+
 def test_the_vessel_of_basic_wire_nav_is_read_from_its_files(tmp_path):
     made = endowire.Vessel.generate(
         np.array([[0, 0, 0, 1.2, -1], [0, 0, 6, 1.2, 0], [0, 0, 12, 1.2, 1], [4, 0, 16, 0.6, 2]]), edge_mm=0.4

@@ -38,7 +38,8 @@ class InsertionEnv(gymnasium.Env[dict[str, NDArray[Any]], NDArray[np.float32]]):
     ) -> tuple[dict[str, NDArray[Any]], float, bool, bool, dict[str, Any]]:
         """Moves by velocities, shape (n_instruments, 2): mm/s and rad/s, clipped to the limits.
 
-        Raises InputError for an action of another shape, and for one that is not finite; then nothing has moved.
+        Raises InputError for an action of another shape, and for one that is not finite, and ResetNeeded of Gymnasium before the first `reset`;
+        then nothing has moved.
         """
         velocities = np.asarray(action, dtype=float)
         if velocities.shape != self.action_space.shape:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from .. import Batch, EndOfWay, EndowireError
@@ -47,7 +48,7 @@ class Episodes:
         self.safe_steps = np.zeros(n, dtype=int)
         #: Number of the frame that shows it, shape (n,): seeds the noise of pictures.
         self.frame = np.zeros(n, dtype=np.int64)
-        #: Last actions within the limits, shape (n, n_instruments, 2).
+        #: Last actions within the limits, shape (n, n_instruments, 2); one that was no number leaves that before it.
         self.action = np.zeros((n, instruments, 2))
         #: What went wrong in the last step: exceptions by environment.
         self.failures: dict[int, EndowireError] = {}
@@ -77,10 +78,17 @@ class Episodes:
             self.way_before_mm[k] = self.way_mm[k]
 
     def step(self, actions: NDArray[np.float64], moving: NDArray[np.bool_]) -> None:
-        """Moves those environments by velocities, shape (n, n_instruments, 2); the others wait."""
+        """Moves those environments by velocities, shape (n, n_instruments, 2); the others wait. Where one is NaN the simulation refuses it, and
+        that is its failure.
+
+        Raises ResetNeeded of Gymnasium before the first `begin`.
+        """
+        self.check_begun("step")
         limits = self.action_space.high
-        self.action = np.where(moving[:, None, None], np.clip(actions, -limits, limits), self.action)
-        moves = self.action * self.task.control_period_s
+        velocities = np.clip(actions, -limits, limits)
+        done = moving & ~np.isnan(velocities).any(axis=(1, 2))
+        self.action = np.where(done[:, None, None], velocities, self.action)
+        moves = velocities * self.task.control_period_s
         # Nothing is pushed in beyond its end or pulled out of the sheath.
         inserted_mm = self.batch.inserted_mm
         moves[..., 0] = np.clip(moves[..., 0], -inserted_mm, self._lengths_mm - inserted_mm)
@@ -93,6 +101,11 @@ class Episodes:
         self.frame += moving
         self.way_before_mm = self.way_mm.copy()
         self._look()
+
+    def check_begun(self, what: str) -> None:
+        """Raises ResetNeeded of Gymnasium where no episode has begun: there is nothing to step or to draw."""
+        if not self.sites:
+            raise ResetNeeded(f"reset comes before {what}: call reset once first")
 
     def observe(self) -> dict[str, NDArray[Any]]:
         """All parts of the observations, within their spaces."""

@@ -9,6 +9,7 @@ from math import sqrt
 import numpy as np
 from gymnasium.utils import seeding
 
+from .. import InputError
 from .episodes import Episodes
 from .policies import Policy
 from .task import Task
@@ -30,7 +31,14 @@ class Outcome:
 
 
 def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8) -> list[Outcome]:
-    """One episode of each seed, the same as that of an environment reset with it, in the order of the seeds."""
+    """One episode of each seed, the same as that of an environment reset with it, in the order of the seeds; none of none.
+
+    Raises InputError for ``num_envs`` below 1.
+    """
+    if num_envs < 1:
+        raise InputError(f"num_envs = {num_envs}: must be 1 or more")
+    if not len(seeds):
+        return []
     episodes = Episodes(task, min(num_envs, len(seeds)))
     waiting = list(enumerate(seeds))[::-1]
     current = {k: waiting.pop() for k in range(len(episodes.target_mm))}
@@ -61,7 +69,14 @@ def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8
 
 
 def interval(successes: int, episodes: int, z: float = 1.959964) -> tuple[float, float]:
-    """The interval of Wilson (1927) for a share, of 95 % unless told: it holds near 0 and 1, too."""
+    """The interval of Wilson (1927) for a share, of 95 % unless told: it holds near 0 and 1, too.
+
+    Raises InputError where there is no episode, and for successes that are not among them.
+    """
+    if episodes < 1:
+        raise InputError(f"episodes = {episodes}: must be 1 or more, a share of none is not known")
+    if not 0 <= successes <= episodes:
+        raise InputError(f"successes = {successes}: must be 0 to {episodes}, the number of episodes")
     share, square = successes / episodes, z * z / episodes
     middle = (share + square / 2) / (1 + square)
     half = z * sqrt(share * (1 - share) / episodes + square / (4 * episodes)) / (1 + square)

@@ -21,8 +21,8 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from .. import InputError
-from .environment import InsertionEnv
 from .lerobot_numbers import LEVELS, Numbers, of_levels, of_rows, together
+from .logs import new_folder, watched
 
 #: Files in a folder, at most.
 _CHUNK = 1000
@@ -56,14 +56,9 @@ class LeRobotLog(gymnasium.Wrapper[Any, Any, Any, Any]):
         folder: str | PathLike[str],
         task: str = "steer the tip to the target",
     ) -> None:
+        inner = watched(env)
+        self._inner, self._task, self.folder = inner, task, new_folder(folder)
         super().__init__(env)
-        inner = env.unwrapped
-        if not isinstance(inner, InsertionEnv):
-            raise InputError(f"env = {inner}: give an environment of endowire, not a vector")
-        self.folder = Path(folder)
-        if self.folder.exists() and any(self.folder.iterdir()):
-            raise InputError(f"folder = {self.folder}: is not empty: give a new one")
-        self._inner, self._task = inner, task
         self._fps = Fraction(1.0 / inner.task.control_period_s).limit_denominator(_FINEST_RATE)
         spaces: dict[str, Any] = inner.task.observation_spaces()
         wrong = [name for name in spaces if "/" in name]

@@ -9,7 +9,11 @@ from .episodes import Episodes
 
 
 def picture(episodes: Episodes, k: int) -> NDArray[np.uint8]:
-    """Environment ``k`` in its task's view, shape (height, width, 3): in 3D where that is asked for, else in fluoroscopy."""
+    """Environment ``k`` in its task's view, shape (height, width, 3): in 3D where that is asked for, else in fluoroscopy.
+
+    Raises ResetNeeded of Gymnasium before the first reset.
+    """
+    episodes.check_begun("render")
     renderer = episodes.sites[k].renderer({**episodes.task.view, "bits": 8})
     frames = renderer.render(episodes.batch.simulation(k), int(episodes.frame[k]))
     if frames.three_d is not None:

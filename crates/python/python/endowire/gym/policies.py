@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import Controller
+from .. import Controller, InputError
 
 if TYPE_CHECKING:
     from .episodes import Episodes
@@ -45,11 +45,14 @@ class Steered:
     """The library's hands, which know the centre line to the target: ``follow_path`` or ``search_ahead`` of `Controller`, on copies of the
     simulations. Where a hand gives up its instruments stay.
 
-    Their commands of 2 mm and 0.35 rad at most are within a step's limits at 7.5 Hz and 35 mm/s.
+    Their commands of 2 mm and 0.35 rad at most are within a step's limits at 7.5 Hz and 35 mm/s. Raises InputError for another ``kind``.
     """
 
     def __init__(self, kind: str = "search_ahead") -> None:
-        self.make = getattr(Controller, kind)
+        hands = {"follow_path": Controller.follow_path, "search_ahead": Controller.search_ahead}
+        if kind not in hands:
+            raise InputError(f"kind = {kind!r}: give {' or '.join(hands)}")
+        self.make = hands[kind]
         self._hands: dict[int, Controller] = {}
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:

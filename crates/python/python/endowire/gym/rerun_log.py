@@ -6,7 +6,6 @@ Import it where rerun-sdk is installed: ``pip install "endowire[rerun]"``.
 from __future__ import annotations
 
 from os import PathLike
-from pathlib import Path
 from typing import Any, SupportsFloat
 
 import gymnasium
@@ -14,23 +13,20 @@ import numpy as np
 import rerun
 from numpy.typing import NDArray
 
-from .. import InputError
-from .environment import InsertionEnv
+from .logs import new_folder, watched
 
 
 class RerunLog(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """Writes each episode of an environment as ``episode_000000.rrd`` and so on in a folder; a file is whole with the next `reset` or `close`.
+    """Writes each episode of an environment as ``episode_000000.rrd`` and so on in ``folder``, which must be new or empty; a file is whole with the
+    next `reset` or `close`.
 
-    Lengths are in mm. Beside steps there is the time of the task, s.
+    Lengths are in mm. Beside steps there is the time of the task, s. Raises InputError for a folder that holds something, and for what is no
+    single environment of endowire.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], folder: str | PathLike[str]) -> None:
+        self._inner, self.folder = watched(env), new_folder(folder)
         super().__init__(env)
-        inner = env.unwrapped
-        if not isinstance(inner, InsertionEnv):
-            raise InputError(f"env = {inner}: give an environment of endowire, not a vector")
-        self._inner = inner
-        self.folder = Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self._number = -1
         self._recording: rerun.RecordingStream | None = None

@@ -65,7 +65,7 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
     ]:
         """Moves all by velocities, shape (num_envs, n_instruments, 2): mm/s and rad/s, clipped to the limits.
 
-        Raises InputError for actions of another shape; then nothing has moved.
+        Raises InputError for actions of another shape, and ResetNeeded of Gymnasium before the first `reset`; then nothing has moved.
         """
         velocities = np.asarray(actions, dtype=float)
         if velocities.shape != self.action_space.shape:

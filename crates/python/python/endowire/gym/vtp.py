@@ -21,9 +21,10 @@ _TYPES = {
 
 
 def read_vtp(path: str | PathLike[str]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Points, shape (n, 3), and triangles, shape (m, 3), of a file of polygons.
+    """Points, shape (n, 3), and triangles, shape (m, 3), of a file of polygons, all its pieces together.
 
-    Raises InputError for a file that is none, whose polygons are no triangles, or that is compressed otherwise than by zlib.
+    Raises InputError for a file that is none, that has anything but triangles (strips, lines, lone points, other polygons), or that is
+    compressed otherwise than by zlib.
     """
     try:
         return _read(Path(path).read_bytes())
@@ -41,13 +42,29 @@ def _read(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     if b"base64" in attributes:
         appended = appended.partition(b"</AppendedData")[0]
     reader = _Reader(root.attrib, appended.partition(b"_")[2], b"base64" in attributes)
-    piece = root.find("PolyData/Piece")
+    pieces = [_piece(piece, reader) for piece in root.findall("PolyData/Piece")]
+    if not pieces:
+        raise ValueError("it has no piece")
+    # Each piece numbers its own points from 0.
+    firsts = np.cumsum([0, *(len(points) for points, _ in pieces)])
+    triangles = [corners + first for (_, corners), first in zip(pieces, firsts, strict=False)]
+    return np.concatenate([points for points, _ in pieces]), np.concatenate(triangles)
+
+
+def _piece(piece: ElementTree.Element, reader: _Reader) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Points and triangles of a piece."""
+    for kind in ("Verts", "Lines", "Strips"):
+        count = int(piece.get(f"NumberOf{kind}", 0))
+        if count:
+            raise ValueError(f"{count} {kind}: write it as triangles, vtkTriangleFilter makes them")
     points = reader.numbers(piece.find("Points/DataArray")).reshape(-1, 3).astype(float)
     polygons = {array.get("Name"): array for array in piece.findall("Polys/DataArray")}
     corners = reader.numbers(polygons["connectivity"]).astype(np.int64)
     offsets = reader.numbers(polygons["offsets"]).astype(np.int64)
     if not np.array_equal(offsets, 3 * np.arange(1, len(offsets) + 1)):
         raise ValueError("not all polygons are triangles")
+    if corners.size and not 0 <= corners.min() <= corners.max() < len(points):
+        raise ValueError(f"a triangle has a corner that is none of the {len(points)} points of its piece")
     return points, corners.reshape(-1, 3)
 
 
