@@ -22,6 +22,7 @@ mod sequence;
 
 use std::sync::Arc;
 
+use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result, Vec3};
 use rayon::prelude::*;
 
@@ -33,7 +34,7 @@ pub(crate) use sequence::{Afterglow, Sequence};
 
 use crate::c_arm::CArm;
 use crate::contrast::{ContrastMap, Medium, Shares};
-use crate::cpu::layers_in_beam;
+use crate::cpu::{covered_by_half, layers_in_beam};
 use crate::device::RefinedDevice;
 use crate::engine::PathEngine;
 use crate::material::Material;
@@ -221,21 +222,27 @@ impl Fluoroscope {
         self.unblocked.as_ref().unwrap_or(&self.still)
     }
 
-    /// Pixels at least half of whose rays meet the lumen, under no blade.
-    pub(crate) fn vessel(&mut self) -> Mask {
+    /// Pixels of which half or more is of the `filled` vessel, under no blade.
+    pub(crate) fn vessel(&mut self, filled: &SurfaceMesh) -> Mask {
         if let Some(known) = &self.vessel {
             return known.clone();
         }
-        let inside = |pixel: u32| {
+        let size_px = self.c_arm.size_px();
+        let (mut inside, mut edge) = (vec![], vec![]);
+        for pixel in 0..size_px[0] * size_px[1] {
             let (first, stride) = self.first_ray(pixel as usize);
             let rays = (0..SUBRAYS as usize)
                 .flat_map(|row| first + row * stride..first + row * stride + SUBRAYS as usize);
-            let met = rays.filter(|&ray| self.anatomy.lumen[ray] > LEAST_LUMEN_MM).count();
-            2 * met >= (SUBRAYS * SUBRAYS) as usize && self.c_arm.openness(pixel as usize) >= 0.5
-        };
-        let size_px = self.c_arm.size_px();
-        let mask = Mask::new(size_px, (0..size_px[0] * size_px[1]).filter(|&pixel| inside(pixel)).collect());
-        self.vessel.insert(mask).clone()
+            match rays.filter(|&ray| self.anatomy.lumen[ray] > LEAST_LUMEN_MM).count() {
+                0 => {}
+                RAYS => inside.push(pixel),
+                _ => edge.push(pixel),
+            }
+        }
+        inside.extend(covered_by_half(&self.c_arm, filled, &edge));
+        inside.retain(|&pixel| self.c_arm.openness(pixel as usize) >= 0.5);
+        inside.sort_unstable();
+        self.vessel.insert(Mask::new(size_px, inside)).clone()
     }
 
     /// Signal with devices, the mean over the instants of a pulse, and the contrast medium of a time; without a time, before any injection.
