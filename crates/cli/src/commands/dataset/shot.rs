@@ -67,6 +67,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
                 device: course.device.clone(),
                 instruments: names.clone(),
                 step: moment.step,
+                step_time_s: moment.step_time_s,
                 time_s,
                 plane,
                 pair: (spec.views() == 2).then_some(id - plane + (1 - plane)),
