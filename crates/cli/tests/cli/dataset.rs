@@ -57,6 +57,12 @@ fn a_dataset_is_the_same_with_any_threads_and_goes_on_where_it_was() {
     let again = told(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
     assert_eq!(again["drawn"].as_u64(), Some(6));
     assert!(whole == files(&two));
+    // A picture of a dataset that is whole, and the arrays of another, go missing.
+    std::fs::remove_file(two.join("images/0000001.png")).unwrap();
+    std::fs::remove_file(two.join("arrays/0000023.npz")).unwrap();
+    let again = told(&endowire(&["dataset", text(&spec), "--out", text(&two), "--json"], "2"));
+    assert_eq!(again["drawn"].as_u64(), Some(12));
+    assert!(whole == files(&two));
     // The twin: another seed is another dataset, and is not mixed with this one.
     let spec = specification(folder.path(), "seed = 2");
     let refused = endowire(&["dataset", text(&spec), "--out", text(&two)], "2");
@@ -148,10 +154,15 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
         ("dose_ngy = [20.0, 90.0]", "dose_ngy = [90.0, 20.0]", "vary.dose_ngy"),
         ("moments = 3", "moments = 0", "moments"),
         ("size_px = [256, 192]", "size_px = [0, 192]", "size_px"),
-        ("kvp = [70.0, 80.0]", "kvp = [71.0]", "kvp"),
+        ("kvp = [70.0, 80.0]", "kvp = [71.0]", "spec.toml: vary.kvp = [71]: must be 50 to 125"),
+        ("kvp = [70.0, 80.0]", "kvp = []", "vary.kvp = []"),
+        ("\"scene.toml\"", "\"nix.toml\"", "spec.toml: scenes = [\"nix.toml\"]"),
+        ("devices = [", "devices = [\"nix.toml\", ", "spec.toml: devices = [\"nix.toml\"]"),
+        ("[view]\n", "[view]\nviews = [\"3d\"]\n", "view.views = [\"3d\"]"),
+        ("[view]\n", "[view]\nc_arm.pose = \"LAO 30\"\n", "view.c_arm.pose = \"LAO 30\""),
     ] {
         std::fs::write(&spec, whole.replace(from, to)).unwrap();
-        let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join(to))], "1");
+        let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join("out"))], "1");
         let told = said(&output);
         assert!(output.status.code() == Some(2) && told.contains(named), "{to}: {told}");
     }

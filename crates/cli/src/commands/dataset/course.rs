@@ -136,7 +136,7 @@ fn view(spec: &Spec, scene: &Scene, file: &Path) -> Result<ViewSpec, Failure> {
     // Moments are drawn at random: what was before one is not before it.
     view.detector.lag = 0.0;
     view.c_arm.pose = None;
-    if view.exposure.is_some() && !spec.vary.kvp.is_empty() {
+    if view.exposure.is_some() && spec.vary.kvp.is_some() {
         let text = "vary.kvp and [view.exposure] both say the voltage: leave out one of them";
         return Err(Failure::Input(text.to_owned()).at(file.display()));
     }
