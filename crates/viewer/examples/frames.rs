@@ -9,7 +9,7 @@ use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Result, Vec3};
 use endowire_viewer::{
     Angiogram, Animation, Backend, CArmSpec, DevicePart, DevicePoint, DeviceView, InjectionSpec, Material,
-    Mode, Moment, Renderer, TorsoSpec, View, ViewSpec,
+    Mode, Moment, Pace, Renderer, TorsoSpec, View, ViewSpec,
 };
 
 /// A catheter up the descending aorta, its tip in the arch, and a wire that sticks out of it.
@@ -117,14 +117,15 @@ fn main() -> Result<()> {
     if let (Some(first), Some(c_arm), Some(exposure)) =
         (series.first(), renderer.c_arm(), renderer.exposure())
     {
-        let mut animation = Animation::new(folder.join("angiogram.png"), first, series.len() as u32, 15.0)?;
+        let mut animation =
+            Animation::new(folder.join("angiogram.png"), first, series.len() as u32, Pace::even(15.0))?;
         series.iter().try_for_each(|frame| animation.push(frame))?;
         animation.finish()?;
         let angiogram = Angiogram {
             c_arm,
             turn_deg: 0.0,
             exposure,
-            frames_per_s: 15.0,
+            pace: Pace::even(15.0),
             mode: Mode::Dsa,
             contrast: true,
             description: "aortic arch",

@@ -57,7 +57,7 @@ pub use device_file::{device_parts, section_parts};
 pub use fluoro::Moment;
 pub use material::Material;
 pub use output::{
-    Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, PartLabel, PixelFormat,
+    Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, Pace, PartLabel, PixelFormat,
 };
 pub use pulse::Seen;
 pub use pushed::Pushed;

@@ -313,7 +313,7 @@ impl Renderer {
     pub fn labels(&mut self, devices: &[DeviceView], contacts_mm: &[Vec3]) -> Result<Labels> {
         let of_scope = self.with_fallback(|setup, engines, fluoro, kept| {
             let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
-            Ok((setup.lumen.then(|| scope.vessel()), scope.exposure))
+            Ok((setup.lumen.then(|| scope.vessel(setup.filled_now())), scope.exposure))
         })?;
         let c_arm = self.setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
         labels(c_arm, devices, contacts_mm, self.setup.spec.xray.device_material, of_scope)

@@ -411,3 +411,39 @@ fn a_view_that_changes_is_one_that_is_new() {
     assert!(renderer.spec() == &view && frame(&mut renderer).width() == 96);
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+#[test]
+fn blades_leave_the_greys_of_what_is_open_and_what_they_close_is_black_in_every_mode() {
+    let folder = folder("blades");
+    let opening = [48.0, 64.0];
+    for mode in [Mode::Fluoro, Mode::Cine, Mode::Dsa, Mode::Roadmap] {
+        let (mut view, wall) = scene(&folder, mode);
+        view.patient.torso = Some(TorsoSpec::default());
+        view.detector = DetectorSpec::ideal();
+        let frame = |view: &ViewSpec| {
+            let mut renderer = Renderer::new(view, &wall).unwrap();
+            let image = renderer.render_at(&[wire()], at(0, 1.9)).unwrap().fluoro.unwrap();
+            (image, renderer.last_image_hold().unwrap())
+        };
+        let (whole, _) = frame(&view);
+        view.c_arm.collimation_mm = Some(opening);
+        let (closed, hold) = frame(&view);
+        // Half widths in pixels, with the blades' own pixel left out.
+        let [across, down] = opening.map(|mm| (mm / 0.8 / 2.0) as i32);
+        for (x, y) in (0..160).flat_map(|x| (0..160).map(move |y| (x, y))) {
+            let [from_x, from_y] = [x, y].map(|i: u32| (2 * i as i32 + 1 - 160).abs() / 2);
+            let of = |image: &Image| image.pixel(x, y).unwrap()[0];
+            if from_x < across - 1 && from_y < down - 1 {
+                assert!(of(&whole).abs_diff(of(&closed)) <= 1, "{mode:?} {x} {y}");
+            } else if from_x > across + 1 || from_y > down + 1 {
+                assert_eq!([of(&closed), of(&hold)], [0; 2], "{mode:?} {x} {y}");
+            }
+        }
+        // The noise of a detector behind blades is not shown either.
+        view.detector = DetectorSpec { lag: 0.0, ..DetectorSpec::default() };
+        let (noisy, _) = frame(&view);
+        let corner = (0..20).flat_map(|x| (0..20).map(move |y| (x, y)));
+        assert!(corner.into_iter().all(|(x, y)| noisy.pixel(x, y).unwrap()[0] == 0), "{mode:?}");
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}

@@ -45,20 +45,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             args.dir.display()
         )));
     }
-    let last = args.to.unwrap_or(recording.steps()).min(recording.steps());
-    if args.every == 0 || args.from == 0 || args.from > last {
-        return Err(Failure::Input(format!(
-            "--from {} --to {last} --every {}: {} has steps 1 to {}",
-            args.from,
-            args.every,
-            args.dir.display(),
-            recording.steps()
-        )));
-    }
-    let mut steps: Vec<usize> = (args.from..=last).step_by(args.every).collect();
-    if steps.last() != Some(&last) {
-        steps.push(last);
-    }
+    let steps = wanted(args, recording.steps())?;
     let frames = match (steps.len(), args.count.map(|count| count as usize)) {
         (1, count) => count.unwrap_or(1),
         (several, None) if args.frames.deg_per_s.is_none() => several,
@@ -75,21 +62,26 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let seen = (path.as_path(), &scene);
     let plan = Plan::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
     let (frames, frame_s) = (plan.frames(), 1.0 / plan.frames_per_s());
+    let times_s = step_times(&args.dir)?;
+    let ended_s = |step: usize| time_s(&times_s, step, frame_s);
+    // Of one step all frames are, which may be several, or one of each step.
+    let one = steps.len() == 1 && frames > 1;
+    let moment = |k: usize| {
+        let (step, later) = if one { (steps[0], k) } else { (steps[k], 0) };
+        Moment { frame: (step + later) as u64, time_s: ended_s(step) + later as f64 * frame_s }
+    };
+    let plan = plan.at(&(0..frames).map(|k| moment(k).time_s).collect::<Vec<_>>());
     let injections = injections::read(&args.dir)?;
     let injections = injections.iter().map(Injected::spec);
     let mut studio = Studio::new(plan, wall, injections).map_err(|e| e.at(path.display()))?;
     let motion = VesselMotion::new(&scene.vessel.motion).map_err(|e| Failure::from(e).at(path.display()))?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
-    let times_s = step_times(&args.dir)?;
     let bar = progress::bar(frames, "frame");
-    // Of one step all frames are, which may be several, or one of each step.
-    let one = steps.len() == 1 && frames > 1;
     for k in 0..frames {
         let step = if one { steps[0] } else { steps[k] };
-        let (ending, later) = if one { (format!("_frame_{k:06}"), k) } else { (String::new(), 0) };
+        let ending = if one { format!("_frame_{k:06}") } else { String::new() };
         let contacts = recording.contacts(step);
-        let ended_s = |step: usize| time_s(&times_s, step, frame_s);
         let shape = recording.shape(step);
         let inserted_mm = lengths.after(step, &shape)?;
         // A step that is drawn several times rests.
@@ -105,7 +97,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         let displacement = motion.as_ref().map(|motion| motion.at(ended_s(step)));
         studio.draw(&Still {
             name: format!("step_{step:06}{ending}"),
-            moment: Moment { frame: (step + later) as u64, time_s: ended_s(step) + later as f64 * frame_s },
+            moment: moment(k),
             shape: &shape,
             inserted_mm: &inserted_mm,
             contacts: &contacts,
@@ -116,6 +108,25 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     }
     bar.finish_and_clear();
     studio.finish()?.tell(args.frames.json)
+}
+
+/// Steps to draw of those that are recorded; the last of them always.
+fn wanted(args: &RenderArgs, recorded: usize) -> Result<Vec<usize>, Failure> {
+    let last = args.to.unwrap_or(recorded).min(recorded);
+    if args.every == 0 || args.from == 0 || args.from > last {
+        return Err(Failure::Input(format!(
+            "--from {} --to {last} --every {}: {} has steps 1 to {}",
+            args.from,
+            args.every,
+            args.dir.display(),
+            recorded
+        )));
+    }
+    let mut steps: Vec<usize> = (args.from..=last).step_by(args.every).collect();
+    if steps.last() != Some(&last) {
+        steps.push(last);
+    }
+    Ok(steps)
 }
 
 /// When a step ended, s, in the time of its script. A run that was killed may have its last step in no row yet: it is taken to be as long as that before.

@@ -79,7 +79,11 @@ fn a_recorded_run_is_drawn_from_any_angle_with_all_that_belongs_to_it() {
         png::Decoder::new(BufReader::new(File::open(&animation).unwrap())).read_info().unwrap();
     assert_eq!(animated.info().animation_control.unwrap().num_frames, 3);
     let mut data = vec![0; animated.output_buffer_size().unwrap()];
-    animated.next_frame(&mut data).unwrap();
+    // A frame a step, 15 a second: 40 steps to the second, and 26 to the last.
+    for delay in [2667, 1733, 2200] {
+        animated.next_frame(&mut data).unwrap();
+        assert_eq!(animated.info().frame_control.unwrap().delay_num, delay);
+    }
 
     // The tip of the labels is the recorded one, seen by a pinhole at 1000 mm; the device attenuates there.
     let labels = document(out.join("step_000106_labels.json"));
@@ -101,6 +105,8 @@ fn a_recorded_run_is_drawn_from_any_angle_with_all_that_belongs_to_it() {
     assert!(line.iter().all(|p| p.is_finite() && *p > 0.5));
     let bytes = std::fs::read(&dicom).unwrap();
     assert_eq!(&bytes[128..132], b"DICM");
+    let increments = b"0\\2666.667\\1733.333";
+    assert!(bytes.windows(increments.len()).any(|window| window == increments));
 }
 
 #[test]

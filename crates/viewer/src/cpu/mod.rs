@@ -3,6 +3,7 @@
 mod coverage;
 mod devices;
 mod fluoro;
+mod lumen;
 mod piece;
 mod raster;
 mod view3d;
@@ -13,6 +14,7 @@ pub(crate) use devices::layers_in_beam;
 #[cfg(feature = "gpu")]
 pub(crate) use devices::pixels_of;
 pub(crate) use fluoro::CpuPaths;
+pub(crate) use lumen::covered_by_half;
 pub(crate) use wall::{check_closed, check_drawable, wall_crossings};
 
 use endowire_core::vessel::SurfaceMesh;

@@ -105,7 +105,7 @@ impl ScreenTriangle {
     }
 
     /// Where the horizontal line at `y` enters and leaves, within rounding: a long slanting triangle fills little of its rectangle.
-    fn extent(&self, y: f64) -> (f64, f64) {
+    pub(super) fn extent(&self, y: f64) -> (f64, f64) {
         let (mut low, mut high) = (f64::MAX, f64::MIN);
         let [a, b, c] = self.corners;
         for (a, b) in [(a, b), (b, c), (c, a)] {

@@ -34,15 +34,14 @@ pub(super) fn logarithm(mut signal: Vec<f32>) -> Vec<f32> {
     signal
 }
 
-/// The window that shows the middle of an anatomy: `values` where `seen`.
-pub(super) fn fitted(values: &[f32], size: [u32; 2], seen: impl Fn(usize) -> bool) -> Window {
+/// The window that shows the middle of an anatomy.
+pub(super) fn fitted(values: &[f32], size: [u32; 2]) -> Window {
     let width = size[0] as usize;
     let middle = |i: usize| {
         let off = |at: usize, n: u32| ((at as f64 + 0.5) / f64::from(n) - 0.5).abs();
         off(i % width, size[0]) <= FITTED / 2.0 && off(i / width, size[1]) <= FITTED / 2.0
     };
-    let mut sorted: Vec<f32> =
-        (0..values.len()).filter(|&i| middle(i) && seen(i)).map(|i| values[i]).collect();
+    let mut sorted: Vec<f32> = (0..values.len()).filter(|&i| middle(i)).map(|i| values[i]).collect();
     if sorted.is_empty() {
         return [0.0, 1.0];
     }

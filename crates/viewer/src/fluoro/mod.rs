@@ -22,6 +22,7 @@ mod sequence;
 
 use std::sync::Arc;
 
+use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Error, Result, Vec3};
 use rayon::prelude::*;
 
@@ -33,7 +34,7 @@ pub(crate) use sequence::{Afterglow, Sequence};
 
 use crate::c_arm::CArm;
 use crate::contrast::{ContrastMap, Medium, Shares};
-use crate::cpu::layers_in_beam;
+use crate::cpu::{covered_by_half, layers_in_beam};
 use crate::device::RefinedDevice;
 use crate::engine::PathEngine;
 use crate::material::Material;
@@ -68,6 +69,15 @@ pub(crate) struct Signal {
     pub(crate) energy: Vec<f32>,
 }
 
+/// What comes through the anatomy alone, without devices and injections.
+#[derive(Debug, Clone)]
+pub(crate) struct Still {
+    pub(crate) signal: Signal,
+    scatter: Scatter,
+    /// Whether it is what the blades leave; else they are wide open.
+    between_blades: bool,
+}
+
 /// Everything about a fluoroscopic view that stays from frame to frame, and the buffers of the next.
 #[derive(Debug)]
 pub(crate) struct Fluoroscope {
@@ -85,11 +95,9 @@ pub(crate) struct Fluoroscope {
     contrast: Option<ContrastMap>,
     /// Material of devices that name none.
     default_material: Material,
-    scatter: Scatter,
-    /// Signal of the anatomy without devices and injections.
-    pub(crate) still: Signal,
+    pub(crate) still: Still,
     /// The same with the blades wide open, where there are any.
-    unblocked: Option<Signal>,
+    unblocked: Option<Still>,
     /// Pixels that show the vessel, once they were asked for.
     vessel: Option<Mask>,
     /// Lengths inside devices by material, all zero between frames.
@@ -152,7 +160,8 @@ impl Fluoroscope {
             ContrastMap::new(flow, known.unwrap_or_else(shares), setup.displacement())
         });
         let pixels = c_arm.size_px().map(|n| n as usize).iter().product();
-        let still = Signal { signal: vec![0.0; pixels], energy: vec![0.0; pixels] };
+        let dark = Signal { signal: vec![0.0; pixels], energy: vec![0.0; pixels] };
+        let scatter = Scatter::new(&dark, c_arm, spec.detector.scatter_fraction);
         let mut fluoroscope = Self {
             c_arm: c_arm.clone(),
             rays,
@@ -164,8 +173,7 @@ impl Fluoroscope {
             fraction: spec.xray.contrast_fraction as f32,
             contrast,
             default_material: spec.xray.device_material,
-            scatter: Scatter::new(&still, c_arm, spec.detector.scatter_fraction),
-            still,
+            still: Still { signal: dark, scatter, between_blades: true },
             unblocked: None,
             vessel: None,
             devices: vec![],
@@ -179,22 +187,24 @@ impl Fluoroscope {
 
     /// Computes the signals of what stays from its lengths.
     fn look(&mut self, spec: &ViewSpec) {
-        let c_arm = self.c_arm.clone();
-        let whole = (0..self.still.signal.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
+        let whole = (0..self.listed.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
         let whole = whole.map_init(Lanes::new, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room));
         let whole: Vec<[f32; 2]> = whole.collect();
-        let scattered = |primary: Signal| {
-            let scatter = Scatter::new(&primary, &c_arm, spec.detector.scatter_fraction);
-            let mut all = primary;
-            scatter.add_still(&mut all);
-            (scatter, all)
+        let behind = |between_blades: bool| {
+            let open = |pixel: usize| self.openness(pixel, between_blades);
+            let of = |i: usize| whole.iter().enumerate().map(|(pixel, v)| v[i] * open(pixel)).collect();
+            let mut signal = Signal { signal: of(0), energy: of(1) };
+            let scatter = Scatter::new(&signal, &self.c_arm, spec.detector.scatter_fraction);
+            scatter.add_still(&mut signal);
+            Still { signal, scatter, between_blades }
         };
-        let behind = |openness: &dyn Fn(usize) -> f32| {
-            let of = |i: usize| whole.iter().enumerate().map(|(pixel, v)| v[i] * openness(pixel)).collect();
-            scattered(Signal { signal: of(0), energy: of(1) })
-        };
-        (self.scatter, self.still) = behind(&|pixel| c_arm.openness(pixel) as f32);
-        self.unblocked = c_arm.opening_px().map(|_| behind(&|_| 1.0).1);
+        let unblocked = self.c_arm.opening_px().map(|_| behind(false));
+        (self.still, self.unblocked) = (behind(true), unblocked);
+    }
+
+    /// Share of a pixel that is open, to the blades' edges or where they are wide open.
+    fn openness(&self, pixel: usize, between_blades: bool) -> f32 {
+        if between_blades { self.c_arm.openness(pixel) as f32 } else { 1.0 }
     }
 
     /// Goes on with the vessel where it has moved to. Exposure, which a control would hold meanwhile, stays as it is.
@@ -215,27 +225,33 @@ impl Fluoroscope {
         Kept { rays: self.c_arm.fingerprint(), anatomy: self.anatomy, shares }
     }
 
-    /// Signal of the anatomy alone with the blades wide open: what the display adapts to, so that nothing open changes where they
+    /// What comes through the anatomy with the blades wide open: what the display adapts to, so that nothing open changes where they
     /// close.
-    pub(crate) fn unblocked(&self) -> &Signal {
+    pub(crate) fn unblocked(&self) -> &Still {
         self.unblocked.as_ref().unwrap_or(&self.still)
     }
 
-    /// Pixels at least half of whose rays meet the lumen, under no blade.
-    pub(crate) fn vessel(&mut self) -> Mask {
+    /// Pixels of which half or more is of the `filled` vessel, under no blade.
+    pub(crate) fn vessel(&mut self, filled: &SurfaceMesh) -> Mask {
         if let Some(known) = &self.vessel {
             return known.clone();
         }
-        let inside = |pixel: u32| {
+        let size_px = self.c_arm.size_px();
+        let (mut inside, mut edge) = (vec![], vec![]);
+        for pixel in 0..size_px[0] * size_px[1] {
             let (first, stride) = self.first_ray(pixel as usize);
             let rays = (0..SUBRAYS as usize)
                 .flat_map(|row| first + row * stride..first + row * stride + SUBRAYS as usize);
-            let met = rays.filter(|&ray| self.anatomy.lumen[ray] > LEAST_LUMEN_MM).count();
-            2 * met >= (SUBRAYS * SUBRAYS) as usize && self.c_arm.openness(pixel as usize) >= 0.5
-        };
-        let size_px = self.c_arm.size_px();
-        let mask = Mask::new(size_px, (0..size_px[0] * size_px[1]).filter(|&pixel| inside(pixel)).collect());
-        self.vessel.insert(mask).clone()
+            match rays.filter(|&ray| self.anatomy.lumen[ray] > LEAST_LUMEN_MM).count() {
+                0 => {}
+                RAYS => inside.push(pixel),
+                _ => edge.push(pixel),
+            }
+        }
+        inside.extend(covered_by_half(&self.c_arm, filled, &edge));
+        inside.retain(|&pixel| self.c_arm.openness(pixel as usize) >= 0.5);
+        inside.sort_unstable();
+        self.vessel.insert(Mask::new(size_px, inside)).clone()
     }
 
     /// Signal with devices, the mean over the instants of a pulse, and the contrast medium of a time; without a time, before any injection.
@@ -273,18 +289,15 @@ impl Fluoroscope {
         medium: &[Medium],
     ) -> Result<Signal> {
         let cast = self.cast(engine, devices);
-        let mut now = self.still.clone();
-        if cast.is_ok() {
-            self.pixels.sort_unstable();
-            self.draw(&self.pixels, medium, &mut now);
-        }
+        self.pixels.sort_unstable();
+        let now = cast.map(|()| self.draw(&self.still, &self.pixels, medium));
         for (_, _, lengths) in &mut self.devices {
             self.touched.iter().for_each(|&ray| lengths[ray as usize] = 0.0);
         }
         self.pixels.iter().for_each(|&pixel| self.listed[pixel as usize] = false);
         self.touched.clear();
         self.pixels.clear();
-        cast.map(|()| now)
+        now
     }
 
     /// Adds up the lengths inside devices, and lists the pixels that they touch.
@@ -353,25 +366,24 @@ impl Fluoroscope {
         Ok(behind.collect())
     }
 
-    /// Largest fraction of contrast medium at any time and place shown together: what a roadmap is made of.
-    pub(crate) fn opacified(&self) -> Result<Signal> {
+    /// Largest fraction of contrast medium at any time and place shown together, over what is `still`: what a roadmap is made of.
+    pub(crate) fn opacified(&self, still: &Still) -> Result<Signal> {
         let contrast = self.contrast.as_ref().ok_or_else(|| {
             let mend = "a roadmap shows an angiogram; give a [[view.injection]]";
             Error::parameter("view.xray.mode", "roadmap", mend)
         })?;
-        let mut full = self.still.clone();
-        self.draw(&[], &contrast.largest(), &mut full);
-        Ok(full)
+        Ok(self.draw(still, &[], &contrast.largest()))
     }
 
-    /// Draws pixels that devices touch and those with contrast medium, both rising, over the still picture.
-    fn draw(&self, pixels: &[u32], medium: &[Medium], now: &mut Signal) {
+    /// Draws pixels that devices touch and those with contrast medium, both rising, over what is still.
+    fn draw(&self, still: &Still, pixels: &[u32], medium: &[Medium]) -> Signal {
+        let mut now = still.signal.clone();
         let mut lost = Vec::with_capacity(medium.len());
         let anew = merged(pixels, medium);
         let drawn =
             anew.par_iter().with_min_len(FEWEST_PIXELS).map_init(Lanes::new, |room, (pixel, more)| {
                 let pixel = *pixel as usize;
-                match self.c_arm.openness(pixel) as f32 {
+                match self.openness(pixel, still.between_blades) {
                     0.0 => [0.0; 2],
                     open => {
                         let [more, tissue_mm] = more.map_or([0.0; 2], |m| [m.fraction, m.tissue_mm]);
@@ -383,17 +395,18 @@ impl Fluoroscope {
         let drawn: Vec<[f32; 2]> = drawn.collect();
         for ((pixel, more), primary) in anew.into_iter().zip(drawn) {
             let pixel = pixel as usize;
-            let scattered = self.scatter.still(pixel);
+            let scattered = still.scatter.still(pixel);
             if more.is_some() {
-                let still = [self.still.signal[pixel], self.still.energy[pixel]];
-                lost.push((pixel, std::array::from_fn(|i| primary[i] + scattered[i] - still[i])));
+                let before = [still.signal.signal[pixel], still.signal.energy[pixel]];
+                lost.push((pixel, std::array::from_fn(|i| primary[i] + scattered[i] - before[i])));
             }
             now.signal[pixel] = primary[0] + scattered[0];
             now.energy[pixel] = primary[1] + scattered[1];
         }
         if !lost.is_empty() {
-            self.scatter.add_change(lost.into_iter(), now);
+            still.scatter.add_change(lost.into_iter(), &mut now);
         }
+        now
     }
 }
 

@@ -46,6 +46,8 @@ pub(crate) struct Sequence {
     /// Absorbed energy of a pixel at a signal of one, keV.
     kev: f64,
     window: Window,
+    /// Pixels that are black whatever is read: those behind blades in differences, which are of noise alone there.
+    shutter: Vec<u32>,
     bits: u32,
     noisy: bool,
     /// What is subtracted from −ln of each frame: the stored mask or angiogram, or shading.
@@ -73,18 +75,18 @@ impl Sequence {
         let share = spec.xray.harmonised as f32;
         let mask: Option<Vec<f32>> = (matches!(mode, Mode::Fluoro | Mode::Cine) && share > 0.0).then(|| {
             // Relative to the reference, whose logarithm is zero: the middle keeps its grey.
-            let values = logarithm(fluoroscope.unblocked().signal.clone());
+            let values = logarithm(fluoroscope.unblocked().signal.signal.clone());
             shading(&values, c_arm).iter().map(|v| share * v).collect()
         });
         let window = match (mode, spec.xray.window) {
             // Line integrals against the open beam, where signals are told against the reference.
             (Mode::Fluoro | Mode::Cine, Some(window)) => window.map(|p| (p + offset) as f32),
             (Mode::Fluoro | Mode::Cine, None) => {
-                let mut values = logarithm(fluoroscope.still.signal.clone());
+                let mut values = logarithm(fluoroscope.unblocked().signal.signal.clone());
                 if let Some(mask) = &mask {
                     values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
                 }
-                let [white, black] = fitted(&values, c_arm.size_px(), |pixel| c_arm.openness(pixel) == 1.0);
+                let [white, black] = fitted(&values, c_arm.size_px());
                 [white, black.max(densest(fluoroscope, mask.as_deref()))]
             }
             (_, Some(window)) => window.map(|p| p as f32),
@@ -93,6 +95,13 @@ impl Sequence {
                 DSA_SHARES.map(|share| share * strongest)
             }
             (Mode::Roadmap, None) => ROADMAP_WINDOW,
+        };
+        let closed = |pixel: &u32| c_arm.openness(*pixel as usize) < 0.5;
+        let shutter = match mode {
+            Mode::Dsa | Mode::Roadmap if c_arm.opening_px().is_some() => {
+                (0..c_arm.size_px().iter().product()).filter(closed).collect()
+            }
+            _ => vec![],
         };
         let kev = fluoroscope.beam.kev(c_arm.pixel_mm(), dose);
         // n quanta of the energy ε vary by √n ε.
@@ -103,6 +112,7 @@ impl Sequence {
             mode,
             kev,
             window,
+            shutter,
             bits: spec.bits,
             noisy: spec.detector.noise,
             mask,
@@ -151,16 +161,17 @@ impl Sequence {
         } else {
             self.held.clone_from(&values);
         }
-        Ok(self.shown(&values, fluoroscope))
+        Ok(self.shown(values, fluoroscope))
     }
 
     /// The mean of the last frames, the newest weighing most; `None` before the first.
     pub(crate) fn hold(&self, fluoroscope: &Fluoroscope) -> Option<Image> {
-        (!self.held.is_empty()).then(|| self.shown(&self.held, fluoroscope))
+        (!self.held.is_empty()).then(|| self.shown(self.held.clone(), fluoroscope))
     }
 
-    fn shown(&self, values: &[f32], fluoroscope: &Fluoroscope) -> Image {
-        picture(values, self.window, fluoroscope.c_arm.size_px(), self.bits, !self.noisy)
+    fn shown(&self, mut values: Vec<f32>, fluoroscope: &Fluoroscope) -> Image {
+        self.shutter.iter().for_each(|&pixel| values[pixel as usize] = f32::INFINITY);
+        picture(&values, self.window, fluoroscope.c_arm.size_px(), self.bits, !self.noisy)
     }
 
     /// Stores what is there now, without injections, as the mask.
@@ -177,11 +188,11 @@ impl Sequence {
 
     /// Stores the anatomy, with the vessels of the angiogram as bright as they are to be shown.
     fn store_roadmap(&mut self, fluoroscope: &Fluoroscope) -> Result<()> {
-        let full = fluoroscope.opacified()?;
+        let full = fluoroscope.opacified(&fluoroscope.still)?;
         let kev = self.kev * Mode::Dsa.dose_ngy() / self.mode.dose_ngy();
         let scale = ROADMAP_VESSEL / strongest(fluoroscope);
         let full = self.stored(&full, kev);
-        let mut map = self.stored(&fluoroscope.still, kev);
+        let mut map = self.stored(&fluoroscope.still.signal, kev);
         // A frame less this is −scale in the vessel.
         map.iter_mut().zip(full).for_each(|(map, full)| *map -= scale * (full - *map));
         self.mask = Some(map);
@@ -207,9 +218,7 @@ impl Sequence {
 
 /// Densest shown value where contrast medium ever comes, but for the darkest few pixels; a vessel full of it keeps its shades.
 fn densest(fluoroscope: &Fluoroscope, mask: Option<&[f32]>) -> f32 {
-    let Ok(full) = fluoroscope.opacified() else { return f32::MIN };
-    let still = logarithm(fluoroscope.still.signal.clone());
-    let full = logarithm(full.signal);
+    let Some([still, full]) = opacified(fluoroscope) else { return f32::MIN };
     let filled = (0..full.len()).filter(|&i| full[i] - still[i] > LEAST_OPACITY);
     let values = filled.map(|i| full[i] - mask.map_or(0.0, |mask| mask[i])).collect();
     but_for_outliers(values).unwrap_or(f32::MIN)
@@ -217,10 +226,16 @@ fn densest(fluoroscope: &Fluoroscope, mask: Option<&[f32]>) -> f32 {
 
 /// Strongest subtracted value that contrast medium ever brings, but for the darkest few pixels.
 fn strongest(fluoroscope: &Fluoroscope) -> f32 {
-    let Ok(full) = fluoroscope.opacified() else { return FAINTEST };
-    let still = logarithm(fluoroscope.still.signal.clone());
-    let opacities = logarithm(full.signal).into_iter().zip(still).map(|(v, still)| v - still);
+    let Some([still, full]) = opacified(fluoroscope) else { return FAINTEST };
+    let opacities = full.into_iter().zip(still).map(|(v, still)| v - still);
     but_for_outliers(opacities.filter(|v| *v > LEAST_OPACITY).collect()).map_or(FAINTEST, |v| v.max(FAINTEST))
+}
+
+/// Values without contrast medium and with all that ever comes, blades wide open; none where nothing is injected.
+fn opacified(fluoroscope: &Fluoroscope) -> Option<[Vec<f32>; 2]> {
+    let still = fluoroscope.unblocked();
+    let full = fluoroscope.opacified(still).ok()?;
+    Some([logarithm(still.signal.signal.clone()), logarithm(full.signal)])
 }
 
 /// The largest value but for the outliers.
@@ -256,7 +271,8 @@ mod tests {
         let scope = Fluoroscope::new(&setup, setup.c_arm.as_ref().unwrap(), None, &mut engine).unwrap();
         let sequence = Sequence::new(&spec, &scope);
         let mask = sequence.mask.unwrap();
-        let values = logarithm(scope.still.signal.clone()).iter().zip(&mask).map(|(v, m)| v - m).collect();
+        let values =
+            logarithm(scope.still.signal.signal.clone()).iter().zip(&mask).map(|(v, m)| v - m).collect();
         (values, mask, (0..128 * 128).map(|i| scope.c_arm.openness(i) == 1.0).collect())
     }
 

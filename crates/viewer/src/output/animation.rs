@@ -8,7 +8,7 @@ use endowire_core::{Error, Result};
 
 #[cfg(feature = "mp4")]
 use super::film::Film;
-use super::{Image, PixelFormat};
+use super::{Image, Pace, PixelFormat};
 
 /// Effort of choosing 256 colours, 1 to 30: the crate's own middle.
 const GIF_SPEED: i32 = 10;
@@ -18,12 +18,14 @@ pub struct Animation {
     path: PathBuf,
     writer: Writer,
     like: Image,
+    pace: Pace,
+    pushed: usize,
 }
 
-/// What a picture is written with; a GIF with the hundredths of a second that each frame stays.
+/// What a picture is written with.
 enum Writer {
     Png(png::Writer<BufWriter<File>>),
-    Gif(gif::Encoder<BufWriter<File>>, u16),
+    Gif(gif::Encoder<BufWriter<File>>),
     #[cfg(feature = "mp4")]
     Film(Box<Film>),
 }
@@ -52,11 +54,11 @@ impl Animation {
         kind(path).map(drop)
     }
 
-    /// Begins an endless loop of `frames` frames of the size and format of `like`.
+    /// Begins an endless loop of `frames` frames at a pace, of the size and format of `like`.
     ///
     /// # Errors
     /// [`Error::File`] naming `path`; [`Error::Parameter`] without frames, or as [`Animation::check_name`].
-    pub fn new(path: impl AsRef<Path>, like: &Image, frames: u32, frames_per_s: f64) -> Result<Self> {
+    pub fn new(path: impl AsRef<Path>, like: &Image, frames: u32, pace: Pace) -> Result<Self> {
         let path = path.as_ref();
         if frames == 0 {
             return Err(Error::parameter("frames", frames, "an animation needs at least one frame"));
@@ -66,9 +68,6 @@ impl Animation {
                 let failed = |error: png::EncodingError| Error::file(path, std::io::Error::other(error));
                 let mut encoder = like.png_encoder(path)?;
                 encoder.set_animated(frames, 0).map_err(failed)?;
-                // In thousandths of a second.
-                let delay = (1000.0 / frames_per_s).round().clamp(1.0, 65_535.0) as u16;
-                encoder.set_frame_delay(delay, 1000).map_err(failed)?;
                 Writer::Png(encoder.write_header().map_err(failed)?)
             }
             Kind::Gif => {
@@ -78,15 +77,14 @@ impl Animation {
                 let mut encoder =
                     gif::Encoder::new(BufWriter::new(file), width, height, &[]).map_err(failed)?;
                 encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
-                // In hundredths of a second; most programs show less than 2 as 10.
-                Writer::Gif(encoder, (100.0 / frames_per_s).round().clamp(2.0, 65_535.0) as u16)
+                Writer::Gif(encoder)
             }
             #[cfg(feature = "mp4")]
             Kind::Film => Writer::Film(Box::new(
-                Film::new(path, like, frames_per_s).map_err(|source| Error::file(path, source))?,
+                Film::new(path, like, 1.0 / pace.mean_s()).map_err(|source| Error::file(path, source))?,
             )),
         };
-        Ok(Self { path: path.to_path_buf(), writer, like: like.clone() })
+        Ok(Self { path: path.to_path_buf(), writer, like: like.clone(), pace, pushed: 0 })
     }
 
     /// Adds a frame.
@@ -99,13 +97,22 @@ impl Animation {
             let mend = format!("all frames of an animation are alike: {:?}", shape(&self.like));
             return Err(Error::parameter("frame", format!("{:?}", shape(image)), mend));
         }
+        let stays_s = self.pace.stays_s(self.pushed);
+        self.pushed += 1;
         let written = match &mut self.writer {
-            Writer::Png(writer) => writer.write_image_data(image.data()).map_err(std::io::Error::other),
-            Writer::Gif(encoder, delay) => {
-                encoder.write_frame(&gif_frame(image, *delay)).map_err(std::io::Error::other)
+            Writer::Png(writer) => {
+                // In thousandths of a second.
+                let delay = (1000.0 * stays_s).round().clamp(1.0, 65_535.0) as u16;
+                let delayed = writer.set_frame_delay(delay, 1000);
+                delayed.and_then(|()| writer.write_image_data(image.data())).map_err(std::io::Error::other)
+            }
+            Writer::Gif(encoder) => {
+                // In hundredths of a second; most programs show less than 2 as 10.
+                let delay = (100.0 * stays_s).round().clamp(2.0, 65_535.0) as u16;
+                encoder.write_frame(&gif_frame(image, delay)).map_err(std::io::Error::other)
             }
             #[cfg(feature = "mp4")]
-            Writer::Film(film) => film.push(image),
+            Writer::Film(film) => film.push(image, stays_s),
         };
         written.map_err(|error| Error::file(&self.path, error))
     }
@@ -118,7 +125,7 @@ impl Animation {
         let Self { path, writer, .. } = self;
         let finished = match writer {
             Writer::Png(writer) => writer.finish().map_err(std::io::Error::other),
-            Writer::Gif(encoder, _) => match encoder.into_inner() {
+            Writer::Gif(encoder) => match encoder.into_inner() {
                 Ok(file) => file.into_inner().map(drop).map_err(std::io::IntoInnerError::into_error),
                 Err(error) => Err(std::io::Error::other(error)),
             },
@@ -173,7 +180,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.gif");
         let frame = |k: u8| Image::new(2, 2, PixelFormat::Gray8, vec![k, 100, 200, 255]);
-        let mut animation = Animation::new(&path, &frame(0), 3, 15.0).unwrap();
+        let mut animation = Animation::new(&path, &frame(0), 3, Pace::of(&[0.0, 0.07, 1.07], 15.0)).unwrap();
         (0..3).for_each(|k| animation.push(&frame(k)).unwrap());
         animation.finish().unwrap();
         let mut options = gif::DecodeOptions::new();
@@ -181,7 +188,7 @@ mod tests {
         let mut reader = options.read_info(File::open(&path).unwrap()).unwrap();
         for k in 0..3 {
             let read = reader.read_next_frame().unwrap().unwrap();
-            assert_eq!(read.delay, 7);
+            assert_eq!(read.delay, [7, 100, 54][usize::from(k)]);
             let greys: Vec<u8> = read.buffer.iter().copied().step_by(4).collect();
             assert_eq!(greys, frame(k).data());
         }
@@ -201,7 +208,7 @@ mod tests {
     fn an_animation_reads_back_frame_by_frame() {
         let path = std::env::temp_dir().join(format!("endowire-animation-{}.png", std::process::id()));
         let frame = |k: u8| Image::new(2, 2, PixelFormat::Gray8, vec![k, 1, 2, 3]);
-        let mut animation = Animation::new(&path, &frame(0), 3, 15.0).unwrap();
+        let mut animation = Animation::new(&path, &frame(0), 3, Pace::of(&[0.0, 1.2, 1.5], 15.0)).unwrap();
         assert!(animation.push(&Image::new(1, 1, PixelFormat::Gray8, vec![0])).is_err());
         (0..3).for_each(|k| animation.push(&frame(k)).unwrap());
         animation.finish().unwrap();
@@ -213,7 +220,7 @@ mod tests {
             let mut data = vec![0; 4];
             reader.next_frame(&mut data).unwrap();
             assert_eq!(data, frame(k).data());
-            assert_eq!(reader.info().frame_control.unwrap().delay_num, 67);
+            assert_eq!(reader.info().frame_control.unwrap().delay_num, [1200, 300, 750][usize::from(k)]);
         }
         std::fs::remove_file(&path).unwrap();
     }

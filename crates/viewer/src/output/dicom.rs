@@ -12,7 +12,7 @@ use dicom_dictionary_std::{tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
 use endowire_core::{Error, Result};
 
-use super::{Image, PixelFormat};
+use super::{Image, Pace, PixelFormat};
 use crate::c_arm::CArm;
 use crate::fingerprint::fingerprint;
 use crate::spec::Mode;
@@ -27,8 +27,8 @@ pub struct Angiogram<'a> {
     pub turn_deg: f64,
     /// How frames are exposed, the first where the C-arm turns.
     pub exposure: Exposure,
-    /// Frames a second.
-    pub frames_per_s: f64,
+    /// How frames follow each other.
+    pub pace: Pace,
     /// What is shown.
     pub mode: Mode,
     /// Whether contrast medium is injected.
@@ -90,7 +90,8 @@ impl Angiogram<'_> {
         let opening = self.c_arm.opening_px().into_iter().flatten();
         let [current_ma, pulse_ms] = self.exposure.pulse.map_or([0.0; 2], |p| [p.current_ma, p.pulse_ms]);
         let numbers = opening
-            .chain([self.exposure.kvp, current_ma, pulse_ms, self.frames_per_s, self.turn_deg])
+            .chain([self.exposure.kvp, current_ma, pulse_ms, self.pace.mean_s(), self.turn_deg])
+            .chain(self.pace.intervals_s().iter().copied())
             .flat_map(f64::to_le_bytes);
         let size = frames.first().map_or([0; 2], |f| [f.width(), f.height()]);
         let told = numbers
@@ -233,12 +234,25 @@ impl Angiogram<'_> {
 
     /// Cine and multi-frame.
     fn time(&self, object: &mut InMemDicomObject, frames: usize) {
-        let rate = self.frames_per_s.round().max(1.0).to_string();
-        put(object, tags::FRAME_TIME, VR::DS, &decimal(1000.0 / self.frames_per_s));
         put(object, tags::NUMBER_OF_FRAMES, VR::IS, &frames.to_string());
-        put(object, tags::CINE_RATE, VR::IS, &rate);
-        put(object, tags::RECOMMENDED_DISPLAY_FRAME_RATE, VR::IS, &rate);
-        let pointer = PrimitiveValue::Tags(SmallVec::from_slice(&[tags::FRAME_TIME]));
+        // Whole numbers: less than one a second cannot be told.
+        let rate = 1.0 / self.pace.mean_s();
+        if rate >= 1.0 {
+            let rate = rate.round().to_string();
+            put(object, tags::CINE_RATE, VR::IS, &rate);
+            put(object, tags::RECOMMENDED_DISPLAY_FRAME_RATE, VR::IS, &rate);
+        }
+        let time = match increments(self.pace.intervals_s()) {
+            Some(increments) => {
+                put(object, tags::FRAME_TIME_VECTOR, VR::DS, &increments);
+                tags::FRAME_TIME_VECTOR
+            }
+            None => {
+                put(object, tags::FRAME_TIME, VR::DS, &decimal(1000.0 * self.pace.mean_s()));
+                tags::FRAME_TIME
+            }
+        };
+        let pointer = PrimitiveValue::Tags(SmallVec::from_slice(&[time]));
         object.put(DataElement::new(tags::FRAME_INCREMENT_POINTER, VR::AT, pointer));
     }
 }
@@ -310,6 +324,14 @@ fn sequence(object: &mut InMemDicomObject, tag: Tag, item: InMemDicomObject) {
 
 fn uid(number: u128) -> String {
     format!("2.25.{number}")
+}
+
+/// Times of frames after those before, ms: the first is after none. None of frames that are even, or so many that the element has no room.
+fn increments(intervals_s: &[f64]) -> Option<String> {
+    // To the microsecond.
+    let each = intervals_s.iter().map(|interval| decimal((1e6 * interval).round() / 1e3));
+    let all = std::iter::once("0".to_owned()).chain(each).collect::<Vec<_>>().join("\\");
+    (!intervals_s.is_empty() && all.len() < usize::from(u16::MAX)).then_some(all)
 }
 
 /// A decimal string of at most 16 characters.

@@ -44,7 +44,7 @@ fn angiogram(c_arm: &CArm, mode: Mode) -> Angiogram<'_> {
         c_arm,
         turn_deg: 0.0,
         exposure: Exposure { kvp: 80.0, dose_ngy: 30.0, tissue_mm: 200.0, pulse: None },
-        frames_per_s: 12.5,
+        pace: Pace::even(12.5),
         mode,
         contrast: mode == Mode::Dsa,
         description: "test",
@@ -109,8 +109,20 @@ fn a_validator_finds_no_error_in_any_mode_and_in_both_planes() {
         (1.5, "DYNAMIC")
     );
     let float = |tag| read.element(tag).unwrap().to_float64().unwrap();
+    assert!(read.element(tags::FRAME_TIME_VECTOR).is_err() && float(tags::FRAME_TIME) == 80.0);
     assert_eq!((float(tags::X_RAY_TUBE_CURRENT), float(tags::EXPOSURE_INU_AS)), (123.0, 926.0));
     paths.push(turning);
+    // Frames that are not even, and less than one a second.
+    let uneven = folder.path().join("uneven.dcm");
+    let pace = Pace::of(&[1.0, 2.2, 5.2], 15.0);
+    Angiogram { pace, ..angiogram(&arm_a, Mode::Fluoro) }.write(&uneven, &pixels).unwrap();
+    let read = dicom_object::open_file(&uneven).unwrap();
+    let told = read.element(tags::FRAME_TIME_VECTOR).unwrap().to_multi_float64().unwrap();
+    assert_eq!(told, [0.0, 1200.0, 3000.0]);
+    let pointer = read.element(tags::FRAME_INCREMENT_POINTER).unwrap();
+    assert_eq!(pointer.value().to_tag().unwrap(), tags::FRAME_TIME_VECTOR);
+    assert!([tags::FRAME_TIME, tags::CINE_RATE].iter().all(|tag| read.element(*tag).is_err()));
+    paths.push(uneven);
     for path in &paths {
         match errors(path) {
             Some(errors) => assert!(errors.is_empty(), "{}: {errors:#?}", path.display()),

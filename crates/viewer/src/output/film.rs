@@ -1,4 +1,4 @@
-//! Films: H.264 in an MP4 file (ISO/IEC 14496-12 and -15), one video track, all frames alike in length.
+//! Films: H.264 in an MP4 file (ISO/IEC 14496-12 and -15), one video track.
 
 use std::fs::File;
 use std::io::{BufWriter, Error, Result, Seek, SeekFrom, Write};
@@ -23,13 +23,19 @@ pub(super) struct Film {
     file: BufWriter<File>,
     encoder: Encoder,
     size: [usize; 2],
-    frame_ticks: u32,
     /// Where the data begins, after what tells its length.
     begin: u64,
     sps: Vec<u8>,
     pps: Vec<u8>,
-    /// Bytes of each frame, and whether it stands alone.
-    samples: Vec<(u32, bool)>,
+    samples: Vec<Sample>,
+}
+
+/// A frame.
+struct Sample {
+    bytes: u32,
+    /// Whether it needs none before it.
+    alone: bool,
+    ticks: u32,
 }
 
 impl Film {
@@ -49,11 +55,11 @@ impl Film {
         file.write_all(&[0, 0, 0, 0])?;
         file.write_all(b"mdat")?;
         let begin = file.stream_position()?;
-        let frame_ticks = (f64::from(TIMESCALE) / frames_per_s).round().clamp(1.0, 1e9) as u32;
-        Ok(Self { file, encoder, size, frame_ticks, begin, sps: vec![], pps: vec![], samples: vec![] })
+        Ok(Self { file, encoder, size, begin, sps: vec![], pps: vec![], samples: vec![] })
     }
 
-    pub(super) fn push(&mut self, image: &Image) -> Result<()> {
+    /// Adds a frame that stays for a time.
+    pub(super) fn push(&mut self, image: &Image, stays_s: f64) -> Result<()> {
         let rgb = even_rgb(image, self.size);
         let source = YUVBuffer::from_rgb8_source(RgbSliceU8::new(&rgb, (self.size[0], self.size[1])));
         let stream = self.encoder.encode(&source).map_err(Error::other)?;
@@ -74,7 +80,8 @@ impl Film {
                 }
             }
         }
-        self.samples.push((bytes, alone));
+        let ticks = (f64::from(TIMESCALE) * stays_s).round().clamp(1.0, 1e9) as u32;
+        self.samples.push(Sample { bytes, alone, ticks });
         Ok(())
     }
 
@@ -91,7 +98,7 @@ impl Film {
 
     /// What the file tells of its data.
     fn movie(&self) -> Vec<u8> {
-        let ticks = self.frame_ticks.saturating_mul(self.samples.len() as u32);
+        let ticks = self.samples.iter().fold(0_u32, |sum, sample| sum.saturating_add(sample.ticks));
         let [width, height] = self.size.map(|side| side as u32);
         let matrix = [ONE, 0, 0, 0, ONE, 0, 0, 0, 0x4000_0000];
         let mvhd = words(&[&[0, 0, 0, TIMESCALE, ticks, ONE, 0x0100_0000, 0, 0], &matrix, &[0; 6], &[2]]);
@@ -139,11 +146,17 @@ impl Film {
         let stsd = [&words(&[&[0, 1]])[..], &boxed(b"avc1", &[&avc1])].concat();
         let count = self.samples.len() as u32;
         let alone: Vec<u32> =
-            (1..).zip(&self.samples).filter(|(_, sample)| sample.1).map(|(number, _)| number).collect();
-        let sizes: Vec<u32> = self.samples.iter().map(|sample| sample.0).collect();
+            (1..).zip(&self.samples).filter(|(_, sample)| sample.alone).map(|(number, _)| number).collect();
+        let sizes: Vec<u32> = self.samples.iter().map(|sample| sample.bytes).collect();
+        // Frames that stay as long one after the other, and how long.
+        let runs: Vec<[u32; 2]> = self
+            .samples
+            .chunk_by(|a, b| a.ticks == b.ticks)
+            .map(|run| [run.len() as u32, run[0].ticks])
+            .collect();
         [
             boxed(b"stsd", &[&stsd]),
-            boxed(b"stts", &[&words(&[&[0, 1, count, self.frame_ticks]])]),
+            boxed(b"stts", &[&words(&[&[0, runs.len() as u32], runs.as_flattened()])]),
             boxed(b"stss", &[&words(&[&[0, alone.len() as u32], &alone])]),
             boxed(b"stsc", &[&words(&[&[0, 1, 1, count, 1]])]),
             boxed(b"stsz", &[&words(&[&[0, 0, count], &sizes])]),
@@ -189,11 +202,13 @@ mod tests {
         let path = folder.path().join("a.mp4");
         let frame = |k: u8| Image::new(33, 17, PixelFormat::Gray8, vec![40 * k; 33 * 17]);
         let mut film = Film::new(&path, &frame(0), 15.0).unwrap();
-        (0..5).for_each(|k| film.push(&frame(k)).unwrap());
+        (0..5).for_each(|k| film.push(&frame(k), if k < 3 { 0.1 } else { 0.4 }).unwrap());
         assert_eq!(film.samples.len(), 5);
-        assert!(film.samples[0].1 && film.samples.iter().all(|sample| sample.0 > 4));
+        assert!(film.samples[0].alone && film.samples.iter().all(|sample| sample.bytes > 4));
         film.finish().unwrap();
         let bytes = std::fs::read(&path).unwrap();
+        let times = [&b"stts"[..], &words(&[&[0, 2, 3, 9_000, 2, 36_000]])].concat();
+        assert!(bytes.windows(times.len()).any(|window| window == times));
         let mut names = Vec::new();
         let mut at = 0;
         while at < bytes.len() {

@@ -7,9 +7,11 @@ mod film;
 mod image;
 mod labels;
 mod mask;
+mod pace;
 
 pub use animation::Animation;
 pub use dicom::Angiogram;
 pub use image::{Image, PixelFormat};
 pub use labels::{ContactLabel, DeviceLabel, Labels, PartLabel};
 pub use mask::Mask;
+pub use pace::Pace;

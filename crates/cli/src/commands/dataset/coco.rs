@@ -9,6 +9,15 @@ pub(super) struct Category {
     id: u32,
     name: &'static str,
     supercategory: &'static str,
+    /// Names of the points that annotations of it have, and which of them are joined.
+    #[serde(flatten)]
+    points: Option<Points>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Points {
+    keypoints: [&'static str; 1],
+    skeleton: [[u32; 2]; 0],
 }
 
 const VESSEL: u32 = 1;
@@ -17,8 +26,13 @@ const PART: u32 = 3;
 
 /// All categories.
 pub(super) fn categories() -> [Category; 3] {
-    [(VESSEL, "vessel", "anatomy"), (INSTRUMENT, "instrument", "device"), (PART, "part", "device")]
-        .map(|(id, name, supercategory)| Category { id, name, supercategory })
+    let tip = Points { keypoints: ["tip"], skeleton: [] };
+    [
+        (VESSEL, "vessel", "anatomy", None),
+        (INSTRUMENT, "instrument", "device", Some(tip)),
+        (PART, "part", "device", None),
+    ]
+    .map(|(id, name, supercategory, points)| Category { id, name, supercategory, points })
 }
 
 /// A picture.
@@ -33,6 +47,9 @@ pub(super) struct ImageRow {
     pub(super) device: Option<String>,
     pub(super) instruments: Vec<String>,
     pub(super) step: usize,
+    /// When the step ended, in the time of the script and of a vessel that moves.
+    pub(super) step_time_s: f64,
+    /// Time of injections.
     pub(super) time_s: f64,
     /// 0, or 1 of the second plane of a pair.
     pub(super) plane: usize,
@@ -59,9 +76,12 @@ pub(super) struct Annotation {
     instrument: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none", default)]
     material: Option<String>,
-    /// Column, row, and whether it is seen (2) or not (1), of the tip.
+    /// Column, row, and whether it is seen (2) or behind a blade (1), of the tip; zeros where it is not in the picture.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     keypoints: Option<[f64; 3]>,
+    /// Points that are in the picture.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    num_keypoints: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none", default)]
     tip_mm: Option<[f64; 3]>,
 }
@@ -73,7 +93,8 @@ struct RunLengths {
     counts: Vec<u32>,
 }
 
-/// Most annotations of a picture: numbers of annotations are those of their picture times it, and more.
+/// Most annotations of a picture: numbers of annotations are those of their picture times it, and more. They begin at 1: the evaluation of
+/// pycocotools takes 0 for no match.
 const MOST: usize = 1000;
 
 /// What is seen in a picture; things that no pixel shows are left out.
@@ -84,7 +105,7 @@ pub(super) fn annotations(image: usize, labels: &Labels, instruments: &[String])
         let [width, height] = mask.size_px();
         let segmentation = RunLengths { size: [height, width], counts: mask.run_lengths() };
         let mut row = Annotation {
-            id: image * MOST + rows.len(),
+            id: image * MOST + rows.len() + 1,
             image_id: image,
             category_id,
             iscrowd: 0,
@@ -94,6 +115,7 @@ pub(super) fn annotations(image: usize, labels: &Labels, instruments: &[String])
             instrument: None,
             material: None,
             keypoints: None,
+            num_keypoints: None,
             tip_mm: None,
         };
         finish(&mut row);
@@ -105,7 +127,8 @@ pub(super) fn annotations(image: usize, labels: &Labels, instruments: &[String])
     for (device, name) in labels.devices.iter().zip(instruments) {
         add(INSTRUMENT, &device.mask, &|row| {
             row.instrument = Some(name.clone());
-            row.keypoints = keypoints(device);
+            let tip = keypoint(device, labels.size_px);
+            (row.keypoints, row.num_keypoints) = (Some(tip), Some(u32::from(tip[2] > 0.0)));
             row.tip_mm = device.tip_mm;
         });
         for part in &device.parts {
@@ -118,6 +141,11 @@ pub(super) fn annotations(image: usize, labels: &Labels, instruments: &[String])
     rows
 }
 
-fn keypoints(device: &DeviceLabel) -> Option<[f64; 3]> {
-    device.tip_px.map(|[x, y]| [x, y, if device.tip_visible { 2.0 } else { 1.0 }])
+/// The tip where it is in the picture.
+fn keypoint(device: &DeviceLabel, size_px: [u32; 2]) -> [f64; 3] {
+    let inside = |pixel: &[f64; 2]| (0..2).all(|k| (0.0..=f64::from(size_px[k])).contains(&pixel[k]));
+    match device.tip_px.filter(inside) {
+        Some([x, y]) => [x, y, if device.tip_visible { 2.0 } else { 1.0 }],
+        None => [0.0; 3],
+    }
 }

@@ -18,6 +18,8 @@ use crate::output::tell;
 /// What is in after a step.
 pub(super) struct Moment {
     pub(super) step: usize,
+    /// When it ended.
+    pub(super) step_time_s: f64,
     /// From when on times of injections are told, s: the end of the step where the script injects, else 0.
     pub(super) time_s: f64,
     pub(super) shape: Shape,
@@ -61,14 +63,15 @@ impl Course {
         let instruments = simulation.stack().instruments().iter().map(|i| i.name.clone()).collect();
         let mut moments = Vec::new();
         let mut run = script.begin();
-        let (mut injected, mut time_s) = (Vec::new(), 0.0);
+        let (mut injected, mut step_time_s) = (Vec::new(), 0.0);
         loop {
             let report = simulation.report();
             let contacts = report.contacts.iter();
             let contacts = contacts.map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() });
             moments.push(Moment {
                 step: moments.len(),
-                time_s,
+                step_time_s,
+                time_s: if script.injects() { step_time_s } else { 0.0 },
                 shape: simulation.shape().clone(),
                 inserted_mm: report.lengths_mm(),
                 contacts: contacts.collect(),
@@ -86,9 +89,7 @@ impl Course {
                 break;
             }
             run.carried_out();
-            if script.injects() {
-                time_s = ends_s.unwrap_or(moments.len() as f64 / view.frames_per_s);
-            }
+            step_time_s = ends_s.unwrap_or(moments.len() as f64 / view.frames_per_s);
         }
         view.injection.extend(injected.iter().map(Injected::spec));
         view.validate().map_err(failed)?;
@@ -135,7 +136,7 @@ fn view(spec: &Spec, scene: &Scene, file: &Path) -> Result<ViewSpec, Failure> {
     // Moments are drawn at random: what was before one is not before it.
     view.detector.lag = 0.0;
     view.c_arm.pose = None;
-    if view.exposure.is_some() && !spec.vary.kvp.is_empty() {
+    if view.exposure.is_some() && spec.vary.kvp.is_some() {
         let text = "vary.kvp and [view.exposure] both say the voltage: leave out one of them";
         return Err(Failure::Input(text.to_owned()).at(file.display()));
     }

@@ -78,7 +78,7 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
         })
         .collect();
     let shots = pairs.len() * spec.poses;
-    let missing = |shot: &usize| read_part(&shot::list(folder, *shot)).is_none();
+    let missing = |shot: &usize| !shot::is_whole(folder, *shot);
     let open: Vec<usize> = (0..shots).filter(missing).collect();
 
     let start = Instant::now();
@@ -165,17 +165,12 @@ fn claim(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
     }
 }
 
-/// What a shot has written, if it is whole.
-fn read_part(path: &Path) -> Option<Part> {
-    serde_json::from_slice(&std::fs::read(path).ok()?).ok()
-}
-
 /// Writes the annotations of all shots.
 fn join(folder: &Path, shots: usize, provenance: &Provenance) -> Result<(), Failure> {
     let info = Info { description: "endowire: simulated fluoroscopy", provenance: provenance.clone() };
     let mut document = Document { info, images: vec![], categories: categories(), annotations: vec![] };
     for path in (0..shots).map(|shot| shot::list(folder, shot)) {
-        let part = read_part(&path).ok_or_else(|| {
+        let part = Part::read(&path).ok_or_else(|| {
             Failure::Computation(format!("{}: is not there any more; run the command again", path.display()))
         })?;
         document.images.extend(part.images);

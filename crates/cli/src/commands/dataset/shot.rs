@@ -21,9 +21,24 @@ pub(super) struct Part {
     pub(super) annotations: Vec<Annotation>,
 }
 
+impl Part {
+    /// That of a list, if it is there and whole.
+    pub(super) fn read(path: &Path) -> Option<Self> {
+        serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+    }
+}
+
 /// Where the list of a shot is.
 pub(super) fn list(folder: &Path, shot: usize) -> PathBuf {
     folder.join("parts").join(format!("{shot:06}.json"))
+}
+
+/// Whether a shot is there: its list, and the files that it names.
+pub(super) fn is_whole(folder: &Path, shot: usize) -> bool {
+    let there = |image: &ImageRow| {
+        [&image.file_name, &image.arrays].into_iter().all(|file| folder.join(file).is_file())
+    };
+    Part::read(&list(folder, shot)).is_some_and(|part| part.images.iter().all(there))
 }
 
 /// Draws the pictures of shot number `shot`, pose number `pose` of a course.
@@ -67,6 +82,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
                 device: course.device.clone(),
                 instruments: names.clone(),
                 step: moment.step,
+                step_time_s: moment.step_time_s,
                 time_s,
                 plane,
                 pair: (spec.views() == 2).then_some(id - plane + (1 - plane)),
@@ -97,7 +113,8 @@ pub(super) fn planes(spec: &Spec, of_course: &ViewSpec, shot: usize) -> Vec<View
     view.c_arm.primary_deg = draw.within(What::Primary, vary.primary_deg);
     view.c_arm.secondary_deg = draw.within(What::Secondary, vary.secondary_deg);
     view.detector.seed = draw.word(What::Noise);
-    if let Some(&kvp) = vary.kvp.get((draw.unit(What::Voltage) * vary.kvp.len() as f64) as usize) {
+    let voltages = vary.kvp.as_deref().unwrap_or_default();
+    if let Some(&kvp) = voltages.get((draw.unit(What::Voltage) * voltages.len() as f64) as usize) {
         view.xray.kvp = kvp;
     }
     if let Some(range) = vary.dose_ngy {

@@ -47,7 +47,7 @@ pub(super) struct Vary {
     pub(super) primary_deg: [f64; 2],
     pub(super) secondary_deg: [f64; 2],
     /// Of a pose, one of these; absent: the scene's.
-    pub(super) kvp: Vec<f64>,
+    pub(super) kvp: Option<Vec<f64>>,
     /// Of a pose, even on a logarithmic scale; absent: usual for the mode.
     pub(super) dose_ngy: Option<[f64; 2]>,
     /// Of a picture: time of injections.
@@ -61,7 +61,7 @@ impl Default for Vary {
         Self {
             primary_deg: [-45.0, 45.0],
             secondary_deg: [-25.0, 25.0],
-            kvp: vec![],
+            kvp: None,
             dose_ngy: None,
             time_s: [0.0, 0.0],
             progress: [0.2, 1.0],
@@ -87,7 +87,20 @@ impl Spec {
         let (mut spec, _): (Self, String) = from_toml(path)?;
         spec.check().map_err(|failure| failure.at(path.display()))?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        spec.scenes.iter_mut().chain(&mut spec.devices).for_each(|file| *file = folder.join(&*file));
+        for (key, files) in [("scenes", &mut spec.scenes), ("devices", &mut spec.devices)] {
+            for file in files {
+                let found = folder.join(&*file);
+                if !found.is_file() {
+                    let text = format!(
+                        "{key} = [\"{}\"]: there is no file {}; paths start from the folder of the specification",
+                        file.display(),
+                        found.display()
+                    );
+                    return Err(Failure::Input(text).at(path.display()));
+                }
+                *file = found;
+            }
+        }
         Ok(spec)
     }
 
@@ -125,14 +138,39 @@ impl Spec {
                 ));
             }
         }
-        if let Some(turn) = self.view.get("biplane_deg") {
-            return refuse(format!("view.biplane_deg = {turn}: a dataset has biplane_deg beside its seed"));
+        let kvp = vary.kvp.as_deref();
+        if let Some([]) = kvp {
+            return refuse("vary.kvp = []: name at least one voltage, or leave the key out".to_owned());
         }
+        let untabulated = |kvp: &&f64| !(50.0..=125.0).contains(*kvp) || **kvp % 5.0 != 0.0;
+        if let Some(kvp) = kvp.unwrap_or_default().iter().find(untabulated) {
+            return refuse(format!("vary.kvp = [{kvp}]: must be 50 to 125 kV in steps of 5"));
+        }
+        self.check_view()?;
         match self.biplane_deg {
             Some(turn) if !(-180.0..=180.0).contains(&turn) => {
                 refuse(format!("biplane_deg = {turn}: must be a number from -180 to 180"))
             }
             _ => Ok(()),
         }
+    }
+
+    /// Refuses keys of `[view]` that the pictures of a dataset would not show.
+    fn check_view(&self) -> Result<(), Failure> {
+        for (keys, mend) in [
+            (&["biplane_deg"][..], "a dataset has biplane_deg beside its seed"),
+            (&["views"], "a dataset draws fluoroscopy alone: leave the key out"),
+            (&["c_arm", "pose"], "poses are drawn: give vary.primary_deg and vary.secondary_deg"),
+            (&["c_arm", "primary_deg"], "poses are drawn: give vary.primary_deg"),
+            (&["c_arm", "secondary_deg"], "poses are drawn: give vary.secondary_deg"),
+            (&["detector", "seed"], "noise is drawn: give seed"),
+        ] {
+            let (first, others) = keys.split_first().map_or(("", keys), |(first, others)| (*first, others));
+            let value = others.iter().fold(self.view.get(first), |value, key| value?.get(key));
+            if let Some(value) = value {
+                return Err(Failure::Input(format!("view.{} = {value}: {mend}", keys.join("."))));
+            }
+        }
+        Ok(())
     }
 }

@@ -9,8 +9,8 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, Wall};
 use endowire_methods::Scene;
 use endowire_viewer::{
-    Animation, ContactView, DeviceView, Frames, InjectionSpec, Labels, Mask, Moment, PathLengths, Pushed,
-    Renderer, Seen, View, ViewSpec,
+    Animation, ContactView, DeviceView, Frames, InjectionSpec, Labels, Mask, Moment, Pace, PathLengths,
+    Pushed, Renderer, Seen, View, ViewSpec,
 };
 use serde::Serialize;
 
@@ -65,6 +65,7 @@ pub(super) struct Plan<'a> {
     pushed: Pushed,
     folder: PathBuf,
     frames: usize,
+    pace: Pace,
     manifest: Manifest,
 }
 
@@ -96,7 +97,13 @@ impl<'a> Plan<'a> {
                 folder.display()
             ));
         }
-        Ok(Self { args, spec, pushed, folder, frames, manifest })
+        let pace = Pace::even(spec.frames_per_s);
+        Ok(Self { args, spec, pushed, folder, frames, pace, manifest })
+    }
+
+    /// The same with frames at these moments in place of so many a second.
+    pub(super) fn at(self, times_s: &[f64]) -> Self {
+        Self { pace: Pace::of(times_s, self.spec.frames_per_s), ..self }
     }
 
     /// Frames to draw.
@@ -215,7 +222,7 @@ impl<'a> Studio<'a> {
         {
             let mut animation = match self.animation.take() {
                 Some(animation) => animation,
-                None => Animation::new(path, shown, self.plan.frames as u32, self.plan.spec.frames_per_s)?,
+                None => Animation::new(path, shown, self.plan.frames as u32, self.plan.pace.clone())?,
             };
             animation.push(shown)?;
             self.animation = Some(animation);
@@ -273,7 +280,7 @@ impl<'a> Studio<'a> {
         if let Some(path) = &self.plan.args.dicom {
             let step_deg =
                 self.plan.args.turn.unwrap_or(0.0) / self.plan.frames.max(2).saturating_sub(1) as f64;
-            self.files.extend(write_dicom(&self.planes, path, step_deg)?);
+            self.files.extend(write_dicom(&self.planes, path, step_deg, &self.plan.pace)?);
         }
         let renderer = self.planes.first().map(|plane| plane.renderer.backend().to_owned());
         Ok(Written { renderer: renderer.unwrap_or_default(), folder: self.plan.folder, files: self.files })

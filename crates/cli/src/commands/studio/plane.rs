@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result};
-use endowire_viewer::{Angiogram, CArm, CArmSpec, DeviceView, Exposure, Image, Mode, Renderer, ViewSpec};
+use endowire_viewer::{
+    Angiogram, CArm, CArmSpec, DeviceView, Exposure, Image, Mode, Pace, Renderer, ViewSpec,
+};
 
 /// A plane.
 pub(super) struct Plane {
@@ -53,14 +55,14 @@ impl Plane {
     }
 
     /// What a DICOM file says of the frames, which turned by `turn_deg` from one to the next.
-    fn angiogram(&self, turn_deg: f64) -> Result<Angiogram<'_>> {
+    fn angiogram(&self, turn_deg: f64, pace: &Pace) -> Result<Angiogram<'_>> {
         let spec = self.renderer.spec();
         let none = || Error::parameter("view.views", "without fluoro", "add \"fluoro\"");
         Ok(Angiogram {
             c_arm: self.arm.as_ref().ok_or_else(none)?,
             turn_deg,
             exposure: self.exposure.ok_or_else(none)?,
-            frames_per_s: spec.frames_per_s,
+            pace: pace.clone(),
             mode: spec.xray.mode,
             contrast: !spec.injection.is_empty() || spec.xray.contrast_fraction > 0.0,
             description: "endowire",
@@ -69,16 +71,16 @@ impl Plane {
 }
 
 /// Writes the frames of one plane, or of two that refer to each other, and tells the files.
-pub(super) fn write_dicom(planes: &[Plane], path: &Path, turn_deg: f64) -> Result<Vec<PathBuf>> {
+pub(super) fn write_dicom(planes: &[Plane], path: &Path, turn_deg: f64, pace: &Pace) -> Result<Vec<PathBuf>> {
     match planes {
         [first, second] => {
             let other = beside(path);
-            let told = [first.angiogram(turn_deg)?, second.angiogram(turn_deg)?];
+            let told = [first.angiogram(turn_deg, pace)?, second.angiogram(turn_deg, pace)?];
             Angiogram::write_biplane([&told[0], &told[1]], [path, &other], [&first.series, &second.series])?;
             Ok(vec![path.to_owned(), other])
         }
         [one, ..] => {
-            one.angiogram(turn_deg)?.write(path, &one.series)?;
+            one.angiogram(turn_deg, pace)?.write(path, &one.series)?;
             Ok(vec![path.to_owned()])
         }
         [] => Ok(vec![]),
