@@ -1,8 +1,11 @@
 //! Input files: TOML into types, with errors that name file, line and key, and the nearest right key.
 
+mod whole;
+
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
+use whole::Whole;
 
 use crate::{Error, Result};
 
@@ -15,7 +18,8 @@ const SIMILAR: f64 = 0.75;
 /// Reads a TOML file into `T`, and returns its text too.
 ///
 /// # Errors
-/// A file that cannot be read, is no TOML, or does not fit `T`; unknown keys come with the nearest known one.
+/// A file that cannot be read, is no TOML, or does not fit `T`, lists longer than they may be included; unknown keys come with the nearest
+/// known one.
 pub fn from_toml<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
     let text = String::from_utf8(crate::file::read(path, SIZE_LIMIT)?)
         .map_err(|e| Error::content(path, format!("is no text: {}", e.utf8_error())))?;
@@ -27,10 +31,14 @@ pub fn from_toml<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
 /// # Errors
 /// As [`from_toml`], less those of the file.
 pub fn parse_toml<T: DeserializeOwned>(text: &str, name: &Path) -> Result<T> {
-    toml::from_str(text).map_err(|e| {
-        let fits = |text: &str| toml::from_str::<T>(text).is_ok();
+    read(text).map_err(|e| {
+        let fits = |text: &str| read::<T>(text).is_ok();
         Error::content(name, explain(&e, text, fits))
     })
+}
+
+fn read<T: DeserializeOwned>(text: &str) -> std::result::Result<T, toml::de::Error> {
+    T::deserialize(Whole(toml::Deserializer::parse(text)?))
 }
 
 /// Most lines of a table that are tried one by one.
@@ -118,6 +126,54 @@ mod tests {
             let text = good.replace(from, to);
             let message = parse_toml::<File>(&text, Path::new("f.toml")).unwrap_err().to_string();
             assert!(message.starts_with(start), "{message}");
+        }
+    }
+
+    #[derive(Debug, PartialEq, serde::Deserialize)]
+    struct Lists {
+        place_mm: Option<[f64; 3]>,
+        #[serde(default)]
+        pairs: Vec<(u32, [u8; 2])>,
+        #[serde(default)]
+        choice: Choice,
+        any: Option<toml::Value>,
+    }
+
+    #[derive(Debug, Default, PartialEq, serde::Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Choice {
+        #[default]
+        None,
+        Within([f64; 2]),
+        Around {
+            centre_mm: [f64; 2],
+        },
+    }
+
+    #[test]
+    fn a_list_that_is_longer_than_it_may_be_is_named_by_line_and_key() {
+        let read = |text: &str| parse_toml::<Lists>(text, Path::new("f.toml")).map_err(|e| e.to_string());
+        let good = "place_mm = [1, 2.0, 3]\npairs = [[1, [2, 3]], [4, [5, 6]]]\nany = [[1], 1979-05-27]\n";
+        let lists = read(good).unwrap();
+        assert_eq!(lists.place_mm, Some([1.0, 2.0, 3.0]));
+        assert_eq!(lists.pairs, [(1, [2, 3]), (4, [5, 6])]);
+        assert!(lists.any.is_some_and(|any| any[1].is_datetime() && any[0][0].as_integer() == Some(1)));
+        for (text, told) in [
+            ("place_mm = [1, 2, 3, 4]", "f.toml: line 1: place_mm: invalid length 4, expected a list of 3"),
+            (
+                "place_mm = [1, 2]",
+                "f.toml: line 1: place_mm: invalid length 2, expected an array of length 3",
+            ),
+            (
+                "\npairs = [[1, [2, 3, 4, 5]]]",
+                "f.toml: line 2: pairs: invalid length 4, expected a list of 2",
+            ),
+            ("pairs = [[1, [2, 3], 4]]", "f.toml: line 1: pairs: invalid length 3, expected a list of 2"),
+            ("choice = { within = [1, 2, 3] }", "invalid length 3, expected a list of 2"),
+            ("[choice.around]\ncentre_mm = [1, 2, 3]", "f.toml: line 2: centre_mm: invalid length 3"),
+        ] {
+            let message = read(text).unwrap_err();
+            assert!(message.contains(told), "{message}");
         }
     }
 }

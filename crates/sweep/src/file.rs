@@ -179,15 +179,23 @@ fn samples(spec: &SweepSpec) -> Result<usize> {
 fn check_axes(axes: &[Axis], spec: &SweepSpec) -> Result<()> {
     for (index, axis) in axes.iter().enumerate() {
         let name = format!("axis[{index}].key");
-        if axes[..index].iter().any(|other| other.key == axis.key) {
-            return Err(Error::parameter(
-                name,
-                &axis.key,
-                "is the key of another axis too: keep one of them",
-            ));
+        let same = |other: &Key| other.holds(&axis.key) && axis.key.holds(other);
+        let overlaps = |other: &&Axis| other.key.holds(&axis.key) || axis.key.holds(&other.key);
+        if let Some(other) = axes[..index].iter().find(overlaps) {
+            let mend = match same(&other.key) {
+                true => "is the key of another axis too: keep one of them".to_owned(),
+                false => format!("overlaps with that of another axis, {}: keep one of them", other.key),
+            };
+            return Err(Error::parameter(name, &axis.key, mend));
         }
-        if spec.set.contains_key(&axis.key.to_string()) {
-            return Err(Error::parameter(name, &axis.key, "is given in [set] too: keep one of the two"));
+        for given in spec.set.keys() {
+            let key = Key::parse(given)?;
+            // An axis within a table of [set] replaces nothing but its own key, as in a table of the scene.
+            if axis.key.holds(&key) {
+                let what = if same(&key) { String::new() } else { format!("with {given} in it ") };
+                let mend = format!("{what}is given in [set] too: keep one of the two");
+                return Err(Error::parameter(name, &axis.key, mend));
+            }
         }
         if axis.key.begins() == "view" && spec.record != Some(Recorded::Frames) {
             let mend = "a view changes no row: give record = \"frames\", or leave the axis out";

@@ -44,6 +44,11 @@ impl Key {
         }
     }
 
+    /// Whether what it names is the other, or holds it: giving it a value takes that of the other away.
+    pub(crate) fn holds(&self, other: &Self) -> bool {
+        other.parts.starts_with(&self.parts)
+    }
+
     /// Gives the key of `scene` a value; tables on the way that are not there are made.
     ///
     /// # Errors
@@ -118,6 +123,22 @@ mod tests {
         assert_eq!(scene["script"][0]["advance_mm"].as_float(), Some(1.0));
         assert_eq!(scene["script"][1]["rotate_deg"].as_integer(), Some(8));
         assert_eq!(scene["vessel"]["wall"]["friction"].as_integer(), Some(9));
+    }
+
+    #[test]
+    fn a_key_holds_itself_and_what_lies_in_it() {
+        let key = |text: &str| Key::parse(text).unwrap();
+        for (outer, inner, holds) in [
+            ("vessel.wall", "vessel.wall", true),
+            ("vessel.wall", "vessel.wall.friction", true),
+            ("script", "script[1].advance_mm", true),
+            ("script[01]", "script[1].advance_mm", true),
+            ("vessel.wall.friction", "vessel.wall", false),
+            ("vessel.wall", "vessel.wall_mm", false),
+            ("script[1]", "script[2]", false),
+        ] {
+            assert_eq!(key(outer).holds(&key(inner)), holds, "{outer} {inner}");
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ use super::{seal, whole};
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 6";
+const FORMAT: &str = "endowire state 7";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// What a state belongs to: hashes of all that its steps depended on.
@@ -69,7 +69,7 @@ impl Parts {
     }
 }
 
-/// The device, or instruments with their names, friction in each other, and what of them is in at the start.
+/// The device, or instruments with their names, friction in each other and in their valves, and what of them is in at the start.
 fn pushed(scene: &Scene, simulation: &Simulation) -> serde_json::Result<Vec<u8>> {
     let stack = simulation.stack();
     if !stack.is_several() {
@@ -77,7 +77,8 @@ fn pushed(scene: &Scene, simulation: &Simulation) -> serde_json::Result<Vec<u8>>
     }
     let start_mm = scene.instrument.iter().map(|spec| spec.inserted_mm);
     let each = stack.instruments().iter().zip(start_mm).enumerate();
-    let each = each.map(|(i, (one, mm))| (&one.name, one.device.sections(), stack.friction(i), mm));
+    let each = each
+        .map(|(i, (one, mm))| (&one.name, one.device.sections(), stack.friction(i), stack.valve_n(i), mm));
     serde_json::to_vec(&each.collect::<Vec<_>>())
 }
 
@@ -105,6 +106,9 @@ fn replayed<'a>(
         numbers.extend([one.instrument, one.after_step].into_iter().flat_map(|n| (n as u64).to_le_bytes()));
         numbers.extend([one.ml, one.ml_per_s].into_iter().flat_map(f64::to_le_bytes));
     }
+    // With another condition a line may have ended earlier.
+    let decided = serde_json::to_vec(&run.decided().collect::<Vec<_>>());
+    numbers.extend(decided.map_err(|e| endowire_core::Error::Computation(e.to_string()))?);
     Ok((run, hash(numbers)))
 }
 

@@ -96,6 +96,11 @@ fn a_missing_scene_is_named() {
 #[test]
 fn a_missing_vessel_or_device_file_is_named() {
     Scene::good().with("tube.csv", "gone.csv").is_refused(&["vessel.tree", "gone.csv"]);
+    Scene::good().with("tube.csv", "aortic_arch").is_refused(&[
+        "vessel.tree",
+        "a scene names a table",
+        "endowire new DIR --vessel aortic_arch",
+    ]);
     Scene::good()
         .with("[[device.section]]", "[device]\nfile = \"gone.toml\"\n[[device.section]]")
         .is_refused(&["device"]);
@@ -119,6 +124,40 @@ fn a_wrong_key_comes_with_the_nearest_right_one() {
     Scene::good()
         .with("[sheath]", "[method]\nname = \"li2011-bandet\"\n[sheath]")
         .is_refused(&["li2011-bandet", "did you mean `li2011-banded`?"]);
+}
+
+#[test]
+fn lists_that_are_too_long_are_named_by_line_and_key() {
+    for (from, to, words) in [
+        (
+            "position_mm = [1.0, 0.0, 0.0]",
+            "position_mm = [1, 0, 0, 77]",
+            ["line 12: position_mm: invalid length 4", "a list of 3"],
+        ),
+        (
+            "radius_mm = 0.5",
+            "radius_mm = 0.5\nrest_curvature_per_mm = [0.02, 0.0, 0.5]",
+            ["line 9: rest_curvature_per_mm: invalid length 3", "a list of 2"],
+        ),
+        ("[sheath]", "[view]\nsize_px = [8, 8, 8]\n[sheath]", ["size_px: invalid length 3", "a list of 2"]),
+        (
+            "[sheath]",
+            "[[vessel.wall.region]]\ncentre_mm = [1, 2, 3, 4]\nradius_mm = 1\nfriction = 0.1\n[sheath]",
+            ["centre_mm: invalid length 4", "a list of 3"],
+        ),
+    ] {
+        Scene::good().with(from, to).is_refused(&words);
+    }
+}
+
+#[test]
+fn a_table_of_the_method_without_a_name_is_that_of_the_default() {
+    let with = |table: &str| Scene::good().with("[sheath]", &format!("[method]\n{table}\n[sheath]"));
+    let output = with("element_mm = 4.0").run();
+    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert!(said(&output).contains("kirchhoff"), "{}", said(&output));
+    with("wall_stiffness_n_per_mm = 1.0").is_refused(&["unknown field `wall_stiffness_n_per_mm`"]);
+    with("element_mm = true").is_refused(&["element_mm: invalid type: boolean"]);
 }
 
 #[test]
@@ -235,6 +274,13 @@ fn contradicting_keys_are_refused() {
         .with("position_mm = [1.0, 0.0, 0.0]", "opening = 0")
         .is_refused(&["sheath = {opening, direction}"]);
     Scene::good().with("tree = \"tube.csv\"\nedge_mm = 2.0", "").is_refused(&["vessel"]);
+}
+
+#[test]
+fn a_centre_line_beside_a_tree_is_refused_whatever_it_is_for() {
+    Scene::good()
+        .with("edge_mm", "centreline = \"tube.csv\"\nedge_mm")
+        .is_refused(&["vessel.centreline = tube.csv: vessel.tree is given too"]);
 }
 
 #[test]
@@ -426,6 +472,7 @@ fn a_flow_that_cannot_be_is_refused_by_its_key() {
         ("inlet_mm", "split_exponent = 0.0\ninlet_mm", &["vessel.flow.split_exponent = 0"]),
         ("inlet_mm", "viscosity_mpa_s = inf\ninlet_mm", &["vessel.flow.viscosity_mpa_s = inf"]),
         ("inlet_mm", "inlet", &["inlet"]),
+        ("[0, 0, 0]", "[5000, 0, 50]", &["vessel.flow.inlet_mm = [5000, 0, 50]", "[80, 0, 0]"]),
     ] {
         scene(&good.replace(from, to)).is_refused(words);
     }

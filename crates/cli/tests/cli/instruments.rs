@@ -117,6 +117,11 @@ fn what_instruments_cannot_do_is_told_before_anything_moves() {
             "inserted_mm = 2601.0",
             "instrument[0].inserted_mm = 2601: must be 0 to its length",
         ),
+        (
+            "inserted_mm = 60.0",
+            "inserted_mm = 60.0\nmay_lead = true",
+            "instrument[0].may_lead = true: nothing lies in the first instrument",
+        ),
         ("inserted_mm = 60.0", "inserted = 60.0", "did you mean `inserted_mm`?"),
         (
             "wire_035_hydrophilic_angled.toml",

@@ -118,6 +118,39 @@ fn a_run_goes_on_in_the_middle_of_a_line_with_a_condition() {
 }
 
 #[test]
+fn a_condition_that_has_been_looked_at_stays_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let line = |until: &str| format!("advance_mm = 32.0\nstep_mm = 4.0\n{until}");
+    let next = "advance_mm = 8.0\nstep_mm = 4.0";
+    let said_of = |name: &str, lines: &[&str]| {
+        let path = scene_of(folder.path(), &format!("{name}.toml"), lines, "[]");
+        let output = run(&path, &at(name), &["--resume".as_ref(), &at("state")]);
+        (output.status.code(), said(&output))
+    };
+    let first = line("until = { push_force_n = 5.0 }");
+    let path = scene_of(folder.path(), "first.toml", &[&first], "[]");
+    done(&run(&path, &at("first"), &["--save-state".as_ref(), &at("state")]));
+    for (name, other) in [
+        ("lower", "until = { push_force_n = 0.001 }"),
+        ("higher", "until = { push_force_n = 6.0 }"),
+        ("none", ""),
+    ] {
+        let (code, said) = said_of(name, &[&line(other), next]);
+        assert!(
+            code == Some(2) && said.contains("the part of the script that was carried out is not"),
+            "{said}"
+        );
+    }
+    let later = format!("{next}\nuntil = {{ push_force_n = 5.0 }}");
+    assert_eq!(said_of("same", &[&first, &later]).0, Some(0));
+    // One where there was none.
+    let path = scene_of(folder.path(), "plain.toml", &[&line("")], "[]");
+    done(&run(&path, &at("plain"), &["--save-state".as_ref(), &at("state")]));
+    assert_eq!(said_of("given", &[&first, next]).0, Some(2));
+}
+
+#[test]
 fn a_run_goes_on_from_the_end_of_another_as_if_it_had_been_one() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -192,13 +225,13 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
     let bytes = std::fs::read(&state).unwrap();
     let damaged = at("damaged");
     let mut newer = bytes.clone();
-    newer["endowire state ".len()] = b'7';
+    newer["endowire state ".len()] = b'8';
     let mut changed = bytes.clone();
     let middle = changed.len() / 2;
     changed[middle] ^= 1;
     let told = [
         (text.clone().into_bytes(), "is no saved state"),
-        (newer, "its format is \"endowire state 7\""),
+        (newer, "its format is \"endowire state 8\""),
         (changed, "is not whole or was changed"),
         (bytes[..bytes.len() - 1].to_vec(), "is not whole"),
         (bytes[..20].to_vec(), "is not whole"),

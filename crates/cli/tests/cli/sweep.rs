@@ -268,6 +268,16 @@ fn what_is_wrong_with_a_sweep_is_told_on_one_line() {
         ),
         ("latin = {", "lattin = {", "did you mean `latin`?"),
         ("vessel.wall.friction", "seed", "axis[3].key = seed: is the key of another axis too"),
+        (
+            "[[axis]]",
+            "[[axis]]\nkey = \"vessel.wall\"\nlist = [{ modulus_n_per_mm2 = 1.0 }]\n[[axis]]",
+            "axis[2].key = vessel.wall.friction: overlaps with that of another axis, vessel.wall: keep one",
+        ),
+        (
+            "[[axis]]",
+            "[set]\n\"device.section[0].length_mm\" = 200.0\n[[axis]]\nkey = \"device.section\"\nlist = [[]]\n[[axis]]",
+            "axis[0].key = device.section: with device.section[0].length_mm in it is given in [set] too",
+        ),
         ("vessel.wall.friction", "view.every", "a view changes no row: give record = \"frames\""),
         ("[[axis]]", "[set]\nseed = 1\n[[axis]]", "axis[3].key = seed: is given in [set] too"),
         ("scene = \"scene.toml\"", "scene = \"scne.toml\"", "scne.toml: No such file"),

@@ -36,9 +36,9 @@ use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::Polyline;
 use serde::{Deserialize, Serialize};
 
-use crate::error::in_range;
-use crate::vessel::CentrelineTree;
-use crate::{Result, Vec3};
+use crate::error::{self, in_range};
+use crate::vessel::{CentrelineTree, Wall};
+use crate::{Error, Result, Vec3};
 
 /// Most of what flows in, ml/s: ten times the heart's.
 const MOST_INFLOW_ML_PER_S: f64 = 1000.0;
@@ -46,6 +46,10 @@ const MOST_INFLOW_ML_PER_S: f64 = 1000.0;
 const MOST_VISCOSITY_MPA_S: f64 = 1000.0;
 /// Largest exponent by which flow divides.
 const MOST_EXPONENT: f64 = 10.0;
+/// An inlet is at most so many radii from the end that it tells.
+const INLET_RADII: f64 = 5.0;
+/// Most points of the centre line that are looked for in a vessel.
+const POINTS_ASKED: usize = 200;
 /// Beyond so many radii of the axis there is no flow.
 const OUTSIDE_RADII: f64 = 2.0;
 
@@ -105,7 +109,7 @@ impl BloodFlow {
     /// The flow through `tree`.
     ///
     /// # Errors
-    /// Values out of range, and a centre line that cannot be followed.
+    /// Values out of range, an inlet that is next to no end, and a centre line that cannot be followed.
     pub fn new(tree: &CentrelineTree, flow: &VesselFlow) -> Result<Self> {
         in_range("vessel.flow.inflow_ml_per_s", flow.inflow_ml_per_s, MOST_INFLOW_ML_PER_S)?;
         in_range("vessel.flow.viscosity_mpa_s", flow.viscosity_mpa_s, MOST_VISCOSITY_MPA_S)?;
@@ -113,9 +117,12 @@ impl BloodFlow {
         let inlet_mm = flow.inlet_mm.map(Vec3::from);
         if let Some(inlet) = inlet_mm.filter(|inlet| !inlet.iter().all(|c| c.is_finite())) {
             let mend = "must be finite, in mm";
-            return Err(crate::Error::parameter("vessel.flow.inlet_mm", crate::error::vector(&inlet), mend));
+            return Err(Error::parameter("vessel.flow.inlet_mm", error::vector(&inlet), mend));
         }
         let nodes = flow_nodes(tree, inlet_mm, flow.split_exponent, "vessel.flow")?;
+        if let (Some(inlet), Some(end)) = (inlet_mm, nodes.first()) {
+            check_inlet(&inlet, end)?;
+        }
         let mut stretches = Vec::new();
         let mut downstream = Vec::new();
         for (index, node) in nodes.iter().enumerate() {
@@ -132,6 +139,30 @@ impl BloodFlow {
             inflow_mm3_per_s: 1e3 * flow.inflow_ml_per_s,
             viscosity_ns_per_mm2: 1e-9 * flow.viscosity_mpa_s,
         })
+    }
+
+    /// Refuses a centre line of which nothing lies within `wall`; its ends may stick out.
+    pub(crate) fn check_within(&self, wall: &Wall) -> Result<()> {
+        let extent = |points: &mut dyn Iterator<Item = Vec3>| {
+            let start = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+            points.fold(start, |(low, high), x| (low.inf(&x), high.sup(&x)))
+        };
+        let (low, high) = extent(&mut wall.mesh().vertices_mm.iter().copied());
+        let points = self.nodes.iter().map(|node| node.position_mm);
+        let near: Vec<Vec3> =
+            points.clone().filter(|x| (*x - x.sup(&low).inf(&high)).norm() == 0.0).collect();
+        let asked = near.iter().step_by(near.len().div_ceil(POINTS_ASKED).max(1));
+        if asked.into_iter().any(|x| wall.winding_number(x) > 0.5) {
+            return Ok(());
+        }
+        let (from, to) = extent(&mut points.into_iter());
+        let mend = format!(
+            "no point of it is in the vessel, which lies in {} to {}: give the centre line of this surface, in its coordinates and in mm",
+            error::vector(&low),
+            error::vector(&high)
+        );
+        let value = format!("{} to {}", error::vector(&from), error::vector(&to));
+        Err(Error::parameter("vessel.centreline", value, mend))
     }
 
     /// The flow at a place, of the stretch of the centre line that is nearest; none outside of the vessel.
@@ -159,6 +190,69 @@ impl BloodFlow {
     }
 }
 
+/// Refuses an inlet that is not next to the end of the centre line nearest to it.
+fn check_inlet(inlet_mm: &Vec3, end: &FlowNode) -> Result<()> {
+    let distance_mm = (end.position_mm - inlet_mm).norm();
+    if distance_mm <= INLET_RADII * end.radius_mm {
+        return Ok(());
+    }
+    let mend = format!(
+        "the nearest end of the centre line, at {}, is {distance_mm:.3} mm away, and at most {INLET_RADII} of its radii may be: give a \
+         place next to the end where blood comes in",
+        error::vector(&end.position_mm)
+    );
+    Err(Error::parameter("vessel.flow.inlet_mm", error::vector(inlet_mm), mend))
+}
+
 fn vector(x: &Vec3) -> Vector {
     Vector::new(x.x, x.y, x.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vessel::{CentrelineNode, SurfaceMesh};
+
+    /// A straight centre line along z.
+    fn line(x_mm: f64, z_mm: [f64; 2]) -> CentrelineTree {
+        let node =
+            |z: f64, parent| CentrelineNode { position_mm: Vec3::new(x_mm, 0.0, z), radius_mm: 4.0, parent };
+        CentrelineTree::new(vec![node(z_mm[0], None), node(z_mm[1], Some(0))]).unwrap()
+    }
+
+    fn flow(tree: &CentrelineTree, inlet_mm: Option<[f64; 3]>) -> Result<BloodFlow> {
+        let spec = VesselFlow { inflow_ml_per_s: 20.0, inlet_mm, split_exponent: 3.0, viscosity_mpa_s: 3.5 };
+        BloodFlow::new(tree, &spec)
+    }
+
+    #[test]
+    fn an_inlet_is_next_to_an_end() {
+        let tree = line(0.0, [0.0, 100.0]);
+        for inlet in [[0.0; 3], [0.0, 0.0, 118.0], [3.0, 4.0, 85.0]] {
+            assert!(flow(&tree, Some(inlet)).is_ok(), "{inlet:?}");
+        }
+        for inlet in [[5000.0, 0.0, 50.0], [0.0, 0.0, 50.0]] {
+            let error = flow(&tree, Some(inlet)).unwrap_err().to_string();
+            assert!(
+                error.starts_with("vessel.flow.inlet_mm = [") && error.contains("nearest end"),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_centre_line_that_is_nowhere_in_the_vessel_is_refused() {
+        let cuboid = SurfaceMesh::cuboid(Vec3::new(-4.0, -4.0, 0.0), Vec3::new(4.0, 4.0, 50.0), 2.0);
+        let wall = Wall::from_surface(&cuboid).unwrap();
+        let within = |x_mm, z_mm| flow(&line(x_mm, z_mm), None).unwrap().check_within(&wall);
+        // It may stick out at its ends, or be that of a longer vessel.
+        for z_mm in [[0.0, 50.0], [-3.0, 55.0], [-200.0, 300.0], [45.0, 300.0]] {
+            assert!(within(0.0, z_mm).is_ok(), "{z_mm:?}");
+        }
+        for (x_mm, z_mm) in [(500.0, [0.0, 50.0]), (0.0, [60.0, 110.0]), (4.5, [0.0, 50.0])] {
+            let error = within(x_mm, z_mm).unwrap_err().to_string();
+            let told = format!("vessel.centreline = [{x_mm}, 0, {}] to", z_mm[0]);
+            assert!(error.starts_with(&told) && error.contains("[4, 4, 50]"), "{error}");
+        }
+    }
 }

@@ -74,11 +74,12 @@ impl<'a> SimulationBuilder<'a> {
     ///
     /// # Errors
     /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
-    /// tell, wall properties or method options out of range, more than three instruments with friction, and what the method cannot do.
+    /// tell, blood that flows nowhere in the vessel, wall properties or method options out of range, more than three instruments with friction, and what the method cannot do.
     pub fn build(self) -> Result<Simulation> {
         let Self { wall, stack, sheath, properties, motion, flow, method, store } = self;
         properties.check(wall.mesh())?;
         check_inside(&wall, &sheath)?;
+        flow.iter().try_for_each(|flow| flow.check_within(&wall))?;
         let query = WallQuery::new(&wall)?;
         stack.devices().try_for_each(|device| check_mouth(&query, device, &sheath))?;
         motion.iter().try_for_each(|motion| check_still(&query, motion, &stack, &sheath))?;

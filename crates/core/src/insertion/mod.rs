@@ -14,7 +14,7 @@ pub use batch::Batch;
 pub use builder::SimulationBuilder;
 pub use nodes::nodes_from_tip;
 pub use script::{
-    Inject, Injection, LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until,
+    Condition, Inject, Injection, LineCourse, Met, Script, ScriptCourse, ScriptLine, ScriptRun, Step, Until,
     script_commands,
 };
 pub use simulation::Simulation;

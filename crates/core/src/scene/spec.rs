@@ -5,13 +5,16 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
+use super::method_table;
 use super::tables::{DEPTH_MM, DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};
 use crate::device::{Device, DeviceFile, Instrument, Section, Stack, line_mm};
 use crate::flow::BloodFlow;
 use crate::input::{from_toml, parse_toml};
 use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
-use crate::vessel::{CentrelineTree, SurfaceMesh, VesselMotion, Wall, WallRecipe, WallStore, unit_hint};
+use crate::vessel::{
+    CentrelineTree, SurfaceMesh, VesselMotion, Wall, WallRecipe, WallStore, anatomy, unit_hint,
+};
 use crate::{Error, Result};
 
 /// A scene whose `[method]` is one of this crate's: the exact rod.
@@ -19,7 +22,7 @@ pub type Scene = SceneOf<OwnMethod>;
 
 /// A scene as its file says it, with the folder that its paths start from. `M` is what its `[method]` may be.
 #[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, bound(deserialize = "M: MethodChoice + Deserialize<'de> + Default"))]
 pub struct SceneOf<M> {
     /// Name of the scene; the file's stem if absent.
     #[serde(default)]
@@ -37,7 +40,7 @@ pub struct SceneOf<M> {
     /// Where it enters.
     pub sheath: SheathSpec,
     /// How its equilibrium is found.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "method_table::read")]
     pub method: M,
     /// What the hand does.
     #[serde(default)]
@@ -70,6 +73,20 @@ fn missing(key: &str, error: Error) -> Error {
     match error {
         Error::File { path, source } => Error::parameter(key, path.display(), source.to_string()),
         other => other,
+    }
+}
+
+/// A tree that cannot be read, with a hint where a built-in vessel is meant.
+fn missing_tree(path: &Path, error: Error) -> Error {
+    let name = path.file_name().and_then(|name| name.to_str()).filter(|name| anatomy::NAMES.contains(name));
+    match (missing("vessel.tree", error), name) {
+        (Error::Parameter { name: key, value, mend }, Some(name)) => {
+            let mend = format!(
+                "{mend}; a scene names a table: `endowire new DIR --vessel {name}` writes that of the built-in vessel"
+            );
+            Error::Parameter { name: key, value, mend }
+        }
+        (error, _) => error,
     }
 }
 
@@ -175,7 +192,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                     "only with vessel.file: a tree is in millimetres",
                 ));
             }
-            let tree = CentrelineTree::read(&path).map_err(|e| missing("vessel.tree", e))?;
+            self.centreline_path()?;
+            let tree = CentrelineTree::read(&path).map_err(|e| missing_tree(&path, e))?;
             let resolution = spec.resolution(&tree)?;
             let recipe = WallRecipe::Generated { tree: &tree, resolution };
             return store.wall(&recipe).map_err(|error| match error {
@@ -221,16 +239,24 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// What is pushed: the device alone, or all instruments.
     ///
     /// # Errors
-    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, and as [`Stack::new`], [`Stack::rubbing`] and
+    /// Missing or unusable files, values out of range, `[device]` and `[[instrument]]` together or neither, `may_lead` of the first, and as [`Stack::new`], [`Stack::rubbing`] and
     /// [`Stack::sealed`].
     pub fn stack(&self) -> Result<Stack> {
         match (&self.device, self.instrument.is_empty()) {
             (Some(spec), true) => self.read_device("device", &spec.file, &spec.section).map(Stack::from),
             (None, false) => {
+                if let Some(may_lead) = self.instrument.first().and_then(|first| first.may_lead) {
+                    let mend = "nothing lies in the first instrument, which it could lead: leave it out";
+                    return Err(Error::parameter("instrument[0].may_lead", may_lead, mend));
+                }
                 let each = self.instrument.iter().enumerate().map(|(index, spec)| {
                     let device =
                         self.read_device(&format!("instrument[{index}]"), &spec.file, &spec.section)?;
-                    Ok(Instrument { name: spec.name.clone(), device, may_lead: spec.may_lead })
+                    Ok(Instrument {
+                        name: spec.name.clone(),
+                        device,
+                        may_lead: spec.may_lead.unwrap_or(true),
+                    })
                 });
                 let frictions = self.instrument.iter().map(|spec| spec.friction).collect();
                 let valves_n = self.instrument.iter().map(|spec| spec.valve_n).collect();
@@ -358,16 +384,24 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// # Errors
     /// A missing or unusable file; one given beside a tree.
     pub fn centreline(&self) -> Result<Option<CentrelineTree>> {
-        let (key, path) = match (&self.vessel.tree, &self.vessel.centreline) {
-            (None, None) => return Ok(None),
-            (Some(path), None) => ("vessel.tree", path),
-            (None, Some(path)) => ("vessel.centreline", path),
+        let Some((key, path)) = self.centreline_path()? else { return Ok(None) };
+        CentrelineTree::read(&path).map(Some).map_err(|error| match key {
+            "vessel.tree" => missing_tree(&path, error),
+            _ => missing(key, error),
+        })
+    }
+
+    /// The file of the centre line and the key that names it.
+    fn centreline_path(&self) -> Result<Option<(&'static str, PathBuf)>> {
+        match (&self.vessel.tree, &self.vessel.centreline) {
+            (None, None) => Ok(None),
+            (Some(path), None) => Ok(Some(("vessel.tree", self.resolve(path)))),
+            (None, Some(path)) => Ok(Some(("vessel.centreline", self.resolve(path)))),
             (Some(_), Some(path)) => {
                 let mend = "vessel.tree is given too, and is the centre line: keep one of the two";
-                return Err(Error::parameter("vessel.centreline", path.display(), mend));
+                Err(Error::parameter("vessel.centreline", path.display(), mend))
             }
-        };
-        CentrelineTree::read(&self.resolve(path)).map(Some).map_err(|error| missing(key, error))
+        }
     }
 
     /// What flows through the vessel; none where it is left out.

@@ -77,19 +77,14 @@ pub struct InstrumentSpec {
     /// Length that is in at the start, mm.
     #[serde(default)]
     pub inserted_mm: f64,
-    /// Whether its tip may be farther in than that of the instrument in it; it may if absent.
-    #[serde(default = "yes")]
-    pub may_lead: bool,
+    /// Whether its tip may be farther in than that of the instrument in it, of all but the first; it may if absent.
+    pub may_lead: Option<bool>,
     /// Coulomb coefficient of friction between it and the instruments outside it, along the line and around it; 0 is none and costs nothing.
     #[serde(default)]
     pub friction: f64,
     /// Friction of the valve on its hub, which seals what lies in it, N; 0 is none and costs nothing.
     #[serde(default)]
     pub valve_n: f64,
-}
-
-fn yes() -> bool {
-    true
 }
 
 /// `[sheath]`: an opening of the vessel, or a point and a direction.

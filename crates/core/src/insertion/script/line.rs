@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::inject::{Bolus, Inject};
-use super::motion::{Motion, Part, Travel, Wait};
+use super::motion::{Incoming, Motion, Part, Travel, Wait};
 use super::until::{Condition, Until};
 use crate::device::Stack;
 use crate::error::in_range;
@@ -76,7 +76,8 @@ impl ScriptLine {
             let asked = self.instrument.is_some() || (self.inject.is_some() && !named);
             let own = if asked { self.number(name, stack)? } else { 0 };
             let inject = bolus(own)?;
-            return Ok(vec![Motion { name: name.to_owned(), parts: vec![], wait, until: None, inject }]);
+            let name = name.to_owned();
+            return Ok(vec![Motion { name, parts: vec![], wait, until: None, inject, exchange: None }]);
         }
         let mut parts: Vec<Part> = Vec::new();
         for (name, line) in self.together(name)? {
@@ -93,7 +94,8 @@ impl ScriptLine {
         let until = |until: &Until| Condition::new(&format!("{name}.until"), until, lead, centreline);
         let until = self.until.as_ref().map(until).transpose()?;
         let Some(other) = &self.exchange else {
-            return Ok(vec![Motion { name: name.to_owned(), parts, wait: None, until, inject }]);
+            let name = name.to_owned();
+            return Ok(vec![Motion { name, parts, wait: None, until, inject, exchange: None }]);
         };
         // The line's own part is that of the instrument which comes in: its keys are those of the way in.
         let key = format!("{name}.exchange");
@@ -110,9 +112,18 @@ impl ScriptLine {
         (withdrawn.travel, withdrawn.turn_rad) = (Travel::Out, 0.0);
         let inserted = Part { instrument, travel: into, ..parts.swap_remove(0) };
         let until = until.map(|condition| Condition { instrument, ..condition });
+        let incoming = Incoming { key, instrument, name: other.clone() };
+        let motion = |part| Motion {
+            name: name.to_owned(),
+            parts: vec![part],
+            wait: None,
+            until: None,
+            inject: None,
+            exchange: None,
+        };
         Ok(vec![
-            Motion { name: name.to_owned(), parts: vec![withdrawn], wait: None, until: None, inject },
-            Motion { name: name.to_owned(), parts: vec![inserted], wait: None, until, inject: None },
+            Motion { inject, exchange: Some(incoming), ..motion(withdrawn) },
+            Motion { until, ..motion(inserted) },
         ])
     }
 

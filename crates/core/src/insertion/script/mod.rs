@@ -15,7 +15,7 @@ mod until;
 pub use inject::{Inject, Injection};
 pub use line::ScriptLine;
 pub use run::{LineCourse, ScriptCourse, ScriptRun, Step};
-pub use until::{Met, Until};
+pub use until::{Condition, Met, Until};
 
 use super::simulation::check_command;
 use super::{Command, Move};
@@ -139,6 +139,9 @@ impl Bounds {
         if let Some(bolus) = &motion.inject {
             bolus.check_in(&self.high)?;
         }
+        if let Some(incoming) = &motion.exchange {
+            incoming.check_out(&self.low)?;
+        }
         let (low, high) = (self.low.clone(), self.high.clone());
         if low == high {
             self.high.before_mm.clone_from(&high.now_mm);
@@ -205,9 +208,13 @@ fn go(stack: &Stack, inserted_mm: &mut [f64], motion: &Motion, steps: &Steps, st
         let inserted = &mut inserted_mm[one.instrument];
         check_command(one.command, *inserted, device.length_mm()).map_err(|error| match error {
             Error::Parameter { name: key, mend, .. } => {
-                let value = match part.travel {
-                    Travel::By(mm) => mm.abs(),
-                    _ => (one.command.advance_mm * steps.count as f64).abs(),
+                let (key, value) = match part.travel {
+                    // Without the last digits of a change of units.
+                    _ if key == "rotate_rad" => {
+                        ("rotate_deg", (part.turn_rad.to_degrees() * 1e6).round() / 1e6)
+                    }
+                    Travel::By(mm) => (key.as_str(), mm.abs()),
+                    _ => (key.as_str(), (one.command.advance_mm * steps.count as f64).abs()),
                 };
                 Error::parameter(format!("{}.{key}", part.name), value, format!("in its step {step}, {mend}"))
             }

@@ -2,6 +2,7 @@
 
 use super::inject::Bolus;
 use super::until::Condition;
+use crate::device::LENGTH_SLACK_MM;
 use crate::insertion::{Command, Move};
 use crate::{Error, Result};
 
@@ -53,6 +54,30 @@ pub(super) struct Motion {
     pub(super) until: Option<Condition>,
     /// What is injected as it begins.
     pub(super) inject: Option<Bolus>,
+    /// The instrument that comes in by the next motion, where one leaves for it.
+    pub(super) exchange: Option<Incoming>,
+}
+
+/// An instrument that takes the place of another.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Incoming {
+    /// The key that names it.
+    pub(super) key: String,
+    pub(super) instrument: usize,
+    pub(super) name: String,
+}
+
+impl Incoming {
+    /// Refuses it where it is in.
+    pub(super) fn check_out(&self, lengths: &Lengths) -> Result<()> {
+        let now_mm = lengths.now_mm[self.instrument];
+        if now_mm <= LENGTH_SLACK_MM {
+            return Ok(());
+        }
+        let mend =
+            format!("{now_mm:.3} mm of it are in already: withdraw it before, or name one that is out");
+        Err(Error::parameter(&self.key, format!("{:?}", self.name), mend))
+    }
 }
 
 /// A motion cut into equal steps.

@@ -155,6 +155,14 @@ impl<'a> ScriptRun<'a> {
         &self.course
     }
 
+    /// The conditions that have been looked at and have decided what was done: those of motions that have steps or have been ended, by the
+    /// numbers of these.
+    pub fn decided(&self) -> impl Iterator<Item = (usize, &Condition)> {
+        let begun = self.script.motions.iter().zip(&self.course.motions).enumerate();
+        let decided = begun.filter(|(_, (_, line))| line.steps > 0 || line.met.is_some());
+        decided.filter_map(|(index, (motion, _))| Some((index, motion.until.as_ref()?)))
+    }
+
     /// Lines with a condition that have ended: how messages call each, and what it has come to.
     pub fn conditions(&self) -> impl Iterator<Item = (&str, LineCourse)> {
         let begun = self.script.motions.iter().zip(&self.course.motions);
@@ -166,6 +174,9 @@ impl<'a> ScriptRun<'a> {
     /// Begins the next motion; whether there is one.
     fn begin_motion(&mut self) -> Result<bool> {
         let Some(motion) = self.script.motions.get(self.course.motions.len()) else { return Ok(false) };
+        if let Some(incoming) = &motion.exchange {
+            incoming.check_out(&self.lengths)?;
+        }
         if let Some(bolus) = &motion.inject {
             bolus.check_in(&self.lengths)?;
             self.injections.push(Injection {

@@ -115,6 +115,10 @@ fn a_script_says_which_instrument_moves_and_what_does_not_go_is_told_before_it_b
             vec![ScriptLine { withdraw: true, ..advance("wire", 1.0) }],
             "script[0].withdraw = true: pulls back all",
         ),
+        (
+            vec![ScriptLine { rotate_deg: Some(-720_000.0), step_deg: Some(720_000.0), ..line("wire") }],
+            "script[0].rotate_deg = -720000: in its step 1, is more than 1000 turns in one command",
+        ),
         (vec![advance("wire", 201.0)], "script[0].advance_mm = 201: in its step 201, the device is 200 mm"),
         (
             vec![advance("wire", 5.0), advance("stiff wire", 5.0)],
@@ -162,6 +166,45 @@ fn a_wire_is_exchanged_in_one_line_as_far_as_the_one_before() {
     ] {
         let error = Script::new(&[line], &stack(), &[0.0; 3], None).unwrap_err().to_string();
         assert!(error.starts_with(told), "{error}");
+    }
+}
+
+#[test]
+fn a_wire_is_exchanged_for_one_that_is_out() {
+    let exchange = ScriptLine { exchange: Some("catheter".to_owned()), ..line("wire") };
+    let told = "script[0].exchange = \"catheter\": 10.000 mm of it are in already: withdraw it before";
+    let error = Script::new(&[exchange.clone()], &stack(), &[30.0, 0.0, 10.0], None).unwrap_err();
+    assert!(error.to_string().starts_with(told), "{error}");
+    // Pulled back to where rounding is left of it.
+    let back = ScriptLine { retract_mm: Some(0.3), step_mm: Some(0.1), ..line("catheter") };
+    let lines = [back.clone(), back.clone(), back, exchange.clone()];
+    assert!(Script::new(&lines, &stack(), &[30.0, 0.0, 0.9], None).is_ok());
+    // Where a condition decides it is told where the line begins.
+    let until = Some(Until { push_force_n: Some(0.5), ..Until::default() });
+    let first = ScriptLine { advance_mm: Some(10.0), until, ..line("catheter") };
+    let script = Script::new(&[first, exchange], &stack(), &[30.0, 0.0, 0.0], None).unwrap();
+    let mut run = script.begin();
+    for _ in 0..10 {
+        run.next_where(|_| None).unwrap();
+        run.carried_out();
+    }
+    let error = run.next_where(|_| None).unwrap_err().to_string();
+    assert!(error.starts_with(&told.replace("[0]", "[1]")), "{error}");
+    assert!(script.begin().next_where(|_| Some(Met::PushForceN)).is_ok());
+}
+
+#[test]
+fn conditions_that_have_decided_are_told() {
+    let until = |force| Some(Until { push_force_n: Some(force), ..Until::default() });
+    let lines = [1.0, 2.0].map(|force| ScriptLine { until: until(force), ..advance(2.0, 1.0) });
+    let script = Script::new(&lines, &Stack::from(Device::uniform(9.0, 0.4, 1.0).unwrap()), &[0.0], None);
+    let script = script.unwrap();
+    let mut run = script.begin();
+    for decided in [vec![], vec![1.0], vec![1.0], vec![1.0, 2.0]] {
+        run.next_where(|_| None).unwrap();
+        let told: Vec<f64> = run.decided().filter_map(|(_, condition)| condition.push_force_n).collect();
+        assert_eq!(told, decided);
+        run.carried_out();
     }
 }
 

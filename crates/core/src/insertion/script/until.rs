@@ -30,13 +30,14 @@ pub enum Met {
 }
 
 /// [`Until`] with its target looked up.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Condition {
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Condition {
     /// The instrument that is looked at.
-    pub(super) instrument: usize,
+    pub instrument: usize,
     /// Target and distance, mm.
-    pub(super) near: Option<(Vec3, f64)>,
-    pub(super) push_force_n: Option<f64>,
+    pub near: Option<(Vec3, f64)>,
+    /// The least push, N.
+    pub push_force_n: Option<f64>,
 }
 
 /// Largest distance, mm, and force, N, that can be meant.
