@@ -173,7 +173,7 @@ fn a_wire_is_exchanged_in_one_line_as_far_as_the_one_before() {
 fn a_wire_is_exchanged_for_one_that_is_out() {
     let exchange = ScriptLine { exchange: Some("catheter".to_owned()), ..line("wire") };
     let told = "script[0].exchange = \"catheter\": 10.000 mm of it are in already: withdraw it before";
-    let error = Script::new(&[exchange.clone()], &stack(), &[30.0, 0.0, 10.0], None).unwrap_err();
+    let error = Script::new(std::slice::from_ref(&exchange), &stack(), &[30.0, 0.0, 10.0], None).unwrap_err();
     assert!(error.to_string().starts_with(told), "{error}");
     // Pulled back to where rounding is left of it.
     let back = ScriptLine { retract_mm: Some(0.3), step_mm: Some(0.1), ..line("catheter") };
