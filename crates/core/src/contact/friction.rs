@@ -448,13 +448,7 @@ impl Friction {
 
     /// Whether nothing pressed where the step began.
     pub fn began_free(&self) -> bool {
-        self.sliders.iter().all(|s| s.begun.1 == 0.0)
-    }
-
-    /// The normal forces are those seen last, and those that it can be rewound to.
-    pub fn take_seen(&mut self) {
-        self.sliders.iter_mut().for_each(|s| (s.normal, s.force_n) = s.seen);
-        self.mark();
+        self.acts() && self.sliders.iter().all(|s| s.begun.1 == 0.0)
     }
 
     /// The normal forces are those that it can be rewound to.

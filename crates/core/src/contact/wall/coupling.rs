@@ -49,11 +49,6 @@ impl WallContact<'_> {
         self.friction.began_free()
     }
 
-    /// The normal forces of friction are those of the state looked at last.
-    pub fn take_seen_friction(&mut self) {
-        self.friction.take_seen();
-    }
-
     /// The normal forces of friction are those that it can be rewound to.
     pub fn mark_friction(&mut self) {
         self.friction.mark();

@@ -94,7 +94,6 @@ impl<const C: usize> Search<'_, '_, C> {
     /// found, and with friction it has settled or not.
     pub(super) fn run(&mut self, near: bool) -> NewtonReport {
         let stiff = self.stiff;
-        self.touch_first();
         self.contact.hand_over(stiff);
         if self.budget.is_some() && if stiff { near } else { self.rubs } {
             if let Some(found) = self.at_once() {
@@ -105,17 +104,6 @@ impl<const C: usize> Search<'_, '_, C> {
         }
         let found = self.by_softer_walls();
         if found.converged { self.settled(found) } else { found }
-    }
-
-    /// The first normal forces of a device that presses where nothing did are those of the guess, which has gone on as far as the hand: too
-    /// large, so that it sticks where it touches. With none it would slide from there to anywhere, and stay there.
-    fn touch_first(&mut self) {
-        if !self.rubs || !self.contact.began_free() {
-            return;
-        }
-        self.contact.softness = 1.0;
-        self.newton.assemble_residual(self.elements, self.supports, self.contact, self.state);
-        self.contact.take_seen_friction();
     }
 
     /// From an equilibrium under the drag of where it was looked for to one under its own, where blood flows.

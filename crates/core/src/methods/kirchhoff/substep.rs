@@ -41,6 +41,10 @@ const RISE_SHARE: f64 = 0.02;
 const RISE_FLOOR_MJ: f64 = 1e-3;
 /// What is the matter where it is.
 const STORED: &str = "more energy would be stored than the hand gives";
+/// A device with friction on which nothing pressed may first touch the wall in a step of this part of its radius; …
+const FIRST_TOUCH: f64 = 0.05;
+/// … what is the matter with a longer one.
+const TOUCHED: &str = "the wall is first touched on the way";
 /// What is the matter where they do not.
 const UNSETTLED: &str = "friction and wall forces do not settle";
 
@@ -156,6 +160,7 @@ impl<const C: usize> Tools<C> {
         if !contact.stiff {
             contact.trust_guess();
         }
+        let began_free = contact.began_free();
         let candidates = (start, &*mesh, &mut *rod);
         let quality = self.guess.choose(&self.newton, &mut contact, candidates, blocked);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
@@ -212,7 +217,12 @@ impl<const C: usize> Tools<C> {
         let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
         let (mesh, after) = next.parts();
         let reports = (&start.state.report, &after.report);
-        let flow_mj = aside_mj + self.drag.size_n() * farthest_mm(reports);
+        let way_mm = farthest_mm(reports);
+        // Without a normal force to begin with it has slid from where it touches to anywhere, and stays there.
+        if began_free && slides > 0 && !relax && way_mm > FIRST_TOUCH * surroundings.device.min_radius_mm() {
+            return Err(TOUCHED.into());
+        }
+        let flow_mj = aside_mj + self.drag.size_n() * way_mm;
         let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
         if !(resort == Some(true) && balanced)
             && rises(environment.surroundings.stack, reports, dissipated_mj, by_wall)
