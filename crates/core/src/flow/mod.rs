@@ -143,11 +143,7 @@ impl BloodFlow {
 
     /// Refuses a centre line of which nothing lies within `wall`; its ends may stick out.
     pub(crate) fn check_within(&self, wall: &Wall) -> Result<()> {
-        let extent = |points: &mut dyn Iterator<Item = Vec3>| {
-            let start = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
-            points.fold(start, |(low, high), x| (low.inf(&x), high.sup(&x)))
-        };
-        let (low, high) = extent(&mut wall.mesh().vertices_mm.iter().copied());
+        let Some((low, high)) = wall.mesh().bounds_mm() else { return Ok(()) };
         let points = self.nodes.iter().map(|node| node.position_mm);
         let near: Vec<Vec3> =
             points.clone().filter(|x| (*x - x.sup(&low).inf(&high)).norm() == 0.0).collect();
@@ -155,7 +151,8 @@ impl BloodFlow {
         if asked.into_iter().any(|x| wall.winding_number(x) > 0.5) {
             return Ok(());
         }
-        let (from, to) = extent(&mut points.into_iter());
+        let nowhere = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
+        let (from, to) = points.fold(nowhere, |(low, high), x| (low.inf(&x), high.sup(&x)));
         let mend = format!(
             "no point of it is in the vessel, which lies in {} to {}: give the centre line of this surface, in its coordinates and in mm",
             error::vector(&low),

@@ -90,10 +90,15 @@ impl Extension {
         way
     }
 
+    /// Whether the device is bent to the wall.
+    pub(super) fn bends(&self) -> bool {
+        self.curvature != Vec3::zeros()
+    }
+
     /// A direction at `from_tip_mm` of the device that has moved on, bent to the wall.
     fn bend(&self, from_tip_mm: f64, t: Vec3) -> Vec3 {
         let length = self.bent_mm - from_tip_mm;
-        if length <= 0.0 || self.curvature == Vec3::zeros() {
+        if length <= 0.0 || !self.bends() {
             return t;
         }
         Rotation3::new(self.curvature * length) * t

@@ -41,12 +41,12 @@ const RISE_SHARE: f64 = 0.02;
 const RISE_FLOOR_MJ: f64 = 1e-3;
 /// What is the matter where it is.
 const STORED: &str = "more energy would be stored than the hand gives";
+/// What is the matter where they do not.
+const UNSETTLED: &str = "friction and wall forces do not settle";
 /// A device with friction on which nothing pressed may first touch the wall in a step of this part of its radius; …
 const FIRST_TOUCH: f64 = 0.05;
 /// … what is the matter with a longer one.
 const TOUCHED: &str = "the wall is first touched on the way";
-/// What is the matter where they do not.
-const UNSETTLED: &str = "friction and wall forces do not settle";
 
 /// How an equilibrium was found.
 pub(super) struct Found {
@@ -107,7 +107,10 @@ impl<const C: usize> Tools<C> {
                 self.friction.carry(passage, &self.guess.motions);
             }
         }
-        slide_from(start, &self.extension, &mut after.rod);
+        // Where nothing bends or moves it lies there already.
+        if !self.friction.acts() || left.is_some() || self.extension.bends() {
+            slide_from(start, &self.extension, &mut after.rod);
+        }
         let (places, moves) = (&mut self.friction.between, &self.guess.motions);
         rubbing::begin(stack, start, (mesh, &after.rod), moves, places);
         after.turn_tails(stack, hands);
