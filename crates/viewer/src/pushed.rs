@@ -4,7 +4,7 @@ use endowire_core::device::{Device, Stack, line_mm};
 use endowire_core::methods::MethodChoice;
 use endowire_core::scene::SceneOf;
 use endowire_core::shape::Shape;
-use endowire_core::{Error, Result};
+use endowire_core::{Error, Result, Vec3};
 use serde::de::DeserializeOwned;
 
 use crate::device::{DevicePart, DeviceView};
@@ -42,6 +42,12 @@ impl Pushed {
             parts[0] = own.to_vec();
         }
         Ok(Self { stack, parts })
+    }
+
+    /// The tip of the innermost instrument that is in on this line, where these lengths are, mm.
+    pub fn tip_mm(&self, shape: &Shape, inserted_mm: &[f64]) -> Option<Vec3> {
+        let first_mm = inserted_mm.iter().find(|mm| **mm > 0.0)?;
+        shape.position_at(line_mm(inserted_mm.iter().copied()) - first_mm)
     }
 
     /// Views of all that is in on this line, where these lengths are.

@@ -198,7 +198,25 @@ impl Renderer {
     /// # Errors
     /// As [`Self::new`].
     pub fn beside(&self, spec: &ViewSpec) -> Result<Self> {
-        Self::of_setup(self.setup.beside(spec)?)
+        Self::of_setup(self.setup.beside(spec)?.of_own_run())
+    }
+
+    /// Tells where the tip of the innermost instrument is at a moment that is not drawn, in the vessel at rest: medium that is injected
+    /// `at_tip` goes where the tip is meanwhile. Frames tell it themselves; between moments its way is straight. Where the tip was said to
+    /// be elsewhere at that moment, what was said of it and of later ones is forgotten.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for values that are not finite.
+    pub fn follow_tip(&mut self, time_s: f64, place_mm: Vec3) -> Result<()> {
+        for (name, value) in [("time_s", time_s), ("place_mm", place_mm.sum())] {
+            if !value.is_finite() {
+                return Err(Error::parameter(name, value, "must be finite"));
+            }
+        }
+        if let Some(flow) = &self.setup.flow {
+            flow.follow_tip(time_s, place_mm);
+        }
+        Ok(())
     }
 
     /// Draws another view of the same vessel from now on, as a renderer that is new, and keeps what both have in common: where the C-arm stands in the same

@@ -93,6 +93,12 @@ impl Setup {
         Self::made(spec, (Arc::clone(&self.wall), Arc::clone(&self.filled)), Some(self))
     }
 
+    /// The same for a run of its own: what comes out of a tip is not that of another.
+    pub(crate) fn of_own_run(mut self) -> Self {
+        self.flow = self.flow.map(|flow| if flow.follows_tip() { Arc::new(flow.anew()) } else { flow });
+        self
+    }
+
     fn made(
         spec: &ViewSpec,
         (wall, filled): (Arc<SurfaceMesh>, Arc<SurfaceMesh>),

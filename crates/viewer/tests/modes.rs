@@ -106,6 +106,46 @@ fn contrast_medium_fills_the_vessel_from_the_inlet_and_washes_out() {
 }
 
 #[test]
+fn medium_from_a_tip_goes_where_the_tip_was_whichever_frames_were_drawn() {
+    let folder = folder("tip");
+    let (mut view, wall) = scene(&folder, Mode::Fluoro);
+    view.injection[0].at_tip = true;
+    // A tip that is pushed on while it injects.
+    let tip_mm = |time_s: f64| Vec3::new(1.0, 0.0, -45.0 + 40.0 * (time_s - 1.0).clamp(0.0, 1.0));
+    let wire = |time_s: f64| device(9, 0.45, |w| tip_mm(time_s) - Vec3::z() * (10.0 * (1.0 - w)));
+    let steps = (0..=40).map(|k| 0.8 + 0.025 * f64::from(k));
+    let end_s = 1.8;
+    let filled =
+        |renderer: &mut Renderer| renderer.path_lengths_at(&[wire(end_s)], end_s).unwrap().contrast_mm;
+    let mut often = Renderer::new(&view, &wall).unwrap();
+    for (k, time_s) in (0..).zip(steps.clone()) {
+        often.render_at(&[wire(time_s)], at(k, time_s)).unwrap();
+    }
+    let drawn = filled(&mut often);
+    let mut told = Renderer::new(&view, &wall).unwrap();
+    for time_s in steps.clone() {
+        told.follow_tip(time_s, tip_mm(time_s)).unwrap();
+    }
+    assert_eq!(filled(&mut told), drawn);
+    // Seen from another place and back.
+    let place = endowire_viewer::CArmSpec { primary_deg: 20.0, ..view.c_arm.clone() };
+    often.turn_c_arm(&place).unwrap();
+    often.turn_c_arm(&view.c_arm).unwrap();
+    assert_eq!(filled(&mut often), drawn);
+    // Another run in the same room: its tip was there all the time.
+    often.follow_tip(-1e3, tip_mm(end_s)).unwrap();
+    let mut rests = Renderer::new(&view, &wall).unwrap();
+    let rested = filled(&mut rests);
+    assert_eq!(filled(&mut often), rested);
+    // The twin: that is another picture.
+    let apart = rested.iter().zip(&drawn).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(apart > 0.5, "{apart} mm");
+    assert!(often.follow_tip(f64::NAN, Vec3::zeros()).is_err());
+    assert!(often.follow_tip(0.0, Vec3::repeat(f64::INFINITY)).is_err());
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn bones_vanish_from_a_subtraction_of_one_energy_and_scatter_brings_them_back() {
     let folder = folder("bones");
     let (mut view, wall) = scene(&folder, Mode::Dsa);

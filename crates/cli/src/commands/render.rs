@@ -78,8 +78,17 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;
     let bar = progress::bar(frames, "frame");
+    // Steps whose tips are told.
+    let mut told = 0;
     for k in 0..frames {
         let step = if one { steps[0] } else { steps[k] };
+        while studio.follows_tip() && told < step {
+            told += 1;
+            let (shape, time_s) = (recording.shape(told), ended_s(told));
+            let inserted_mm = &lengths.after(told, &shape)?;
+            let displacement = motion.as_ref().map(|motion| motion.at(time_s));
+            studio.follow_tip(Seen { shape: &shape, inserted_mm, time_s }, displacement.as_ref())?;
+        }
         let ending = if one { format!("_frame_{k:06}") } else { String::new() };
         let contacts = recording.contacts(step);
         let shape = recording.shape(step);

@@ -3,10 +3,10 @@
 use std::io;
 use std::path::Path;
 
-use endowire_core::Error;
 use endowire_core::insertion::{Script, Simulation};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{VesselMotion, Wall};
+use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
 use endowire_viewer::{Exposure, Moment, Pushed, Renderer, Seen, View, ViewSpec};
 use serde::Serialize;
@@ -40,6 +40,8 @@ pub(crate) struct FrameWriter {
     before: Option<Before>,
     /// Whether medium flows that the renderers do not know.
     injected: bool,
+    /// Where the tip was after each step, in the vessel at rest, and when, s; kept where the scene injects through it.
+    tips: Vec<(f64, Vec3)>,
 }
 
 /// What was in after a step, and when.
@@ -65,7 +67,7 @@ impl FrameWriter {
         let motion = drawn.and_then(|simulation| simulation.motion().cloned());
         let planes = wall.as_ref().map_or(Ok(Vec::new()), |wall| planes(&spec, wall)).map_err(in_scene)?;
         let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;
-        Ok(Self { spec, pushed, wall, motion, planes, before: None, injected: false })
+        Ok(Self { spec, pushed, wall, motion, planes, before: None, injected: false, tips: vec![] })
     }
 
     /// What draws, for the summary.
@@ -118,15 +120,27 @@ impl FrameWriter {
     ) -> Result<(), Failure> {
         let due = last || step.is_multiple_of(self.spec.every as usize);
         let drawn = if due { self.draw((step, time_s), seen, recorder) } else { Ok(()) };
-        self.stood(seen, time_s);
-        drawn
+        self.stood(seen, time_s).and(drawn)
     }
 
-    /// Notes what is in at a moment: a pulse of the next step begins on the way from there.
-    pub(crate) fn stood(&mut self, (shape, inserted_mm): (&Shape, &[f64]), time_s: f64) {
+    /// Notes what is in at a moment: a pulse of the next step begins on the way from there, and what a tip injects goes where it was.
+    pub(crate) fn stood(
+        &mut self,
+        (shape, inserted_mm): (&Shape, &[f64]),
+        time_s: f64,
+    ) -> Result<(), Failure> {
+        if self.spec.injection.iter().any(|one| one.at_tip)
+            && let Some(tip_mm) = self.pushed.tip_mm(shape, inserted_mm)
+        {
+            let displacement = self.motion.as_ref().map(|motion| motion.at(time_s));
+            let at_rest_mm = displacement.map_or(tip_mm, |displacement| displacement.material(&tip_mm));
+            self.tips.push((time_s, at_rest_mm));
+            self.planes.iter_mut().try_for_each(|plane| plane.follow_tip(time_s, at_rest_mm))?;
+        }
         if self.spec.xray.pulse_ms > 0.0 && !self.planes.is_empty() {
             self.before = Some(Before { shape: shape.clone(), inserted_mm: inserted_mm.to_vec(), time_s });
         }
+        Ok(())
     }
 
     fn draw(
@@ -138,6 +152,9 @@ impl FrameWriter {
         if let (true, Some(wall)) = (self.injected, &self.wall) {
             // What they remember is of a vessel without: masks are taken anew, as for every injection in a room.
             self.planes = planes(&self.spec, wall)?;
+            for plane in &mut self.planes {
+                self.tips.iter().try_for_each(|(then_s, place_mm)| plane.follow_tip(*then_s, *place_mm))?;
+            }
             self.injected = false;
         }
         if let Some(motion) = &self.motion {

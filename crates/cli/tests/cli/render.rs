@@ -230,3 +230,31 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
         }
     }
 }
+
+#[test]
+fn medium_from_a_tip_is_where_the_tip_was_whichever_frames_are_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = [
+        ("size_px = [640, 640]", "size_px = [96, 96]\nbackend = \"cpu\"\ndetector = { lag = 0.0 }"),
+        ("mode = \"dsa\"", "mode = \"fluoro\""),
+        ("advance_mm = 160.0", "advance_mm = 80.0"),
+        ("rate_ml_per_s = 20.0", "rate_ml_per_s = 20.0\nat_tip = true"),
+    ];
+    // The last frame of 20 steps.
+    let last = |name: &str, every: &str, at_tip: bool| {
+        let scene = scene_text("arch_angiography.toml", &small).replace("every = 40", every);
+        let scene = if at_tip { scene } else { scene.replace("at_tip = true", "at_tip = false") };
+        let (path, out) = (folder.path().join(format!("{name}.toml")), folder.path().join(name));
+        std::fs::write(&path, scene).unwrap();
+        let output = endowire(&["run", text(&path), "--out", text(&out)]);
+        assert!(output.status.success(), "{}", said(&output));
+        (std::fs::read(out.join("frames/step_000020_fluoro.png")).unwrap(), out)
+    };
+    let (each, out) = last("each", "every = 1", true);
+    assert!(last("few", "every = 7", true).0 == each);
+    let again = endowire(&["render", text(&out), "--from", "20"]);
+    assert!(again.status.success(), "{}", said(&again));
+    assert!(std::fs::read(out.join("render/step_000020_fluoro.png")).unwrap() == each);
+    // The twin: medium from elsewhere is another picture.
+    assert!(last("inlet", "every = 1", false).0 != each);
+}

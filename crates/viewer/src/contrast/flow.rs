@@ -3,13 +3,14 @@
 //! Blood enters the centre-line tree at its inlet and divides at bifurcations ([`flow_nodes`]). It comes as the heart pumps it: a part of the
 //! flow, the pulsatility, in systole, the rest all the time.
 
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use endowire_core::flow::{FlowNode, flow_nodes};
 use endowire_core::vessel::CentrelineTree;
 use endowire_core::{Error, Result, Vec3};
 
 use super::nearest::Cells;
+use super::tip_way::TipWay;
 use super::transport::Transport;
 use crate::spec::{FlowSpec, InjectionSpec, ViewSpec};
 
@@ -42,7 +43,7 @@ pub(crate) struct Flow {
     /// Which of them is nearest to what in the lumen.
     pub(super) cells: Arc<Mutex<Cells>>,
     largest: OnceLock<Vec<f32>>,
-    carried: OnceLock<Arc<Mutex<Transport>>>,
+    carried: OnceLock<Mutex<Carried>>,
     pub(super) injections: Vec<InjectionSpec>,
     pub(super) mean_inflow_mm3_per_s: f64,
     /// Mean time that medium stays in the tissue behind an end, s.
@@ -52,6 +53,30 @@ pub(crate) struct Flow {
     beat_s: f64,
     pulsatility: f64,
     dispersion: f64,
+}
+
+/// The medium on its way, and where the tip was that injects.
+#[derive(Debug)]
+pub(super) struct Carried {
+    tip: TipWay,
+    transport: Transport,
+}
+
+impl Carried {
+    /// Notes where the tip is at a time, in the vessel at rest.
+    fn follow(&mut self, flow: &Flow, time_s: f64, place_mm: Vec3) {
+        let known_s = self.tip.follow(time_s, place_mm);
+        self.transport.forget_after(flow, known_s);
+    }
+
+    /// The medium at a time, with the tip there then.
+    pub(super) fn at(&mut self, flow: &Flow, time_s: f64, tip_mm: Option<Vec3>) -> &Transport {
+        if let Some(place_mm) = tip_mm {
+            self.follow(flow, time_s, place_mm);
+        }
+        self.transport.advance(flow, time_s, &self.tip);
+        &self.transport
+    }
 }
 
 impl Flow {
@@ -104,14 +129,28 @@ impl Flow {
         }
     }
 
-    /// The medium on its way, for all that show it: a moment is the same whoever asked for one before. What a tip injects depends on where it was
-    /// when it was asked for, and is everyone's own.
-    pub(super) fn carried(&self) -> Arc<Mutex<Transport>> {
-        let anew = || Arc::new(Mutex::new(Transport::new(self)));
-        match self.injections.iter().any(|one| one.at_tip) {
-            true => anew(),
-            false => Arc::clone(self.carried.get_or_init(anew)),
+    /// The same before anything has happened.
+    pub(crate) fn anew(&self) -> Self {
+        self.injected(&self.injections)
+    }
+
+    /// Whether an injection comes out of a tip: then its medium is that of one run.
+    pub(crate) fn follows_tip(&self) -> bool {
+        self.injections.iter().any(|one| one.at_tip)
+    }
+
+    /// Notes where the tip is at a time, in the vessel at rest. Frames do so by themselves.
+    pub(crate) fn follow_tip(&self, time_s: f64, place_mm: Vec3) {
+        if self.follows_tip() {
+            self.carried().follow(self, time_s, place_mm);
         }
+    }
+
+    /// The medium on its way, for all that show it: a moment is the same whoever asked for one before.
+    pub(super) fn carried(&self) -> MutexGuard<'_, Carried> {
+        let anew =
+            || Mutex::new(Carried { tip: TipWay::new(&self.injections), transport: Transport::new(self) });
+        self.carried.get_or_init(anew).lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The largest fraction that each cell ever has.
@@ -224,8 +263,9 @@ mod tests {
         // 100 mm of 25π mm² at 25 ml/s.
         let transit = std::f64::consts::PI * 2500.0 / 25_000.0;
         let mut transport = Transport::new(&flow);
+        let nowhere = TipWay::new(&[]);
         let mut at = |t: f64| {
-            transport.advance(&flow, t, None);
+            transport.advance(&flow, t, &nowhere);
             f64::from(transport.at(t)[end])
         };
         assert!(at(0.5) < 1e-3 && (at(1.0 + transit) - 0.1).abs() < 0.02, "half of the front has passed");

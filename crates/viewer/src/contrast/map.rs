@@ -5,14 +5,13 @@
 //! the centre line, to that node's neighbour on its side: a bolus has no steps. A frame then needs one sparse product of these shares
 //! with the nodes' fractions.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use endowire_core::Vec3;
 use endowire_core::vessel::{Displacement, SurfaceMesh};
 
 use super::flow::Flow;
 use super::nearest::{Nearest, STEP_MM};
-use super::transport::Transport;
 use crate::c_arm::CArm;
 use crate::cpu::wall_crossings;
 
@@ -35,7 +34,6 @@ const TISSUE_REACH: f64 = 16.0;
 #[derive(Debug)]
 pub(crate) struct ContrastMap {
     flow: Arc<Flow>,
-    transport: Arc<Mutex<Transport>>,
     shares: Arc<Shares>,
     displacement: Option<Displacement>,
 }
@@ -122,7 +120,7 @@ impl ContrastMap {
     /// Medium of `flow`, shared out to pixels, in a vessel that may be displaced.
     pub(crate) fn new(flow: &Arc<Flow>, shares: Arc<Shares>, displacement: Option<&Displacement>) -> Self {
         let displacement = displacement.cloned();
-        Self { flow: Arc::clone(flow), transport: flow.carried(), shares, displacement }
+        Self { flow: Arc::clone(flow), shares, displacement }
     }
 
     /// How the lumen of each pixel is shared out, which another injection does not change.
@@ -130,12 +128,12 @@ impl ContrastMap {
         self.shares
     }
 
-    /// What the pixels see that see any, rising. What is injected through a tip has come from `tip_mm` since the time asked for before.
-    pub(crate) fn at(&mut self, time_s: f64, tip_mm: Option<Vec3>) -> Vec<Medium> {
+    /// What the pixels see that see any, rising, with the tip at `tip_mm`.
+    pub(crate) fn at(&self, time_s: f64, tip_mm: Option<Vec3>) -> Vec<Medium> {
         let displacement = self.displacement.as_ref();
         let tip_mm = tip_mm.map(|tip| displacement.map_or(tip, |displacement| displacement.material(&tip)));
-        let mut transport = self.transport.lock().unwrap_or_else(PoisonError::into_inner);
-        transport.advance(&self.flow, time_s, tip_mm);
+        let mut carried = self.flow.carried();
+        let transport = carried.at(&self.flow, time_s, tip_mm);
         let mut seen = self.shares.mixed(&transport.at(time_s));
         let volumes = transport.tissue_mm3();
         let filled = self.shares.tissue.iter().filter(|end| volumes[end.0] > 0.0);

@@ -3,6 +3,7 @@
 mod flow;
 mod map;
 mod nearest;
+mod tip_way;
 mod transport;
 
 pub(crate) use flow::Flow;

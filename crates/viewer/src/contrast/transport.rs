@@ -18,6 +18,7 @@
 use endowire_core::Vec3;
 
 use super::flow::{Flow, nearest};
+use super::tip_way::TipWay;
 use crate::spec::InjectionSpec;
 
 /// Part of the step at which a cell would be emptied.
@@ -45,6 +46,8 @@ pub(super) struct Transport {
     left_mm3: f64,
     /// Flows through the faces upstream of cells, mm³/s.
     faces: Vec<f64>,
+    /// The cell that each injection goes into.
+    places: Vec<usize>,
     /// Moments on the way, rising, and the least steps between them.
     marks: Vec<Self>,
     apart: i64,
@@ -64,28 +67,35 @@ impl Transport {
             tissue_mm3: vec![0.0; cells],
             left_mm3: 0.0,
             faces: vec![0.0; cells],
+            places: flow.injections.iter().map(|i| place(flow, i.at_mm.map(Vec3::from))).collect(),
             marks: vec![],
             apart: 1,
         }
     }
 
-    /// Goes on to a time; to one that has passed, from a moment before it or from the first. Where a tip injects it does so at `tip_mm` all the
-    /// way, from the first moment on.
-    pub(super) fn advance(&mut self, flow: &Flow, time_s: f64, tip_mm: Option<Vec3>) {
+    /// Goes on to a time; to one that has passed, from a moment before it or from the first. `tip` is the way of the tip, if one injects.
+    pub(super) fn advance(&mut self, flow: &Flow, time_s: f64, tip: &TipWay) {
         let wanted = (time_s / self.step_s).ceil() as i64;
         if wanted < self.steps {
             self.go_back(flow, wanted);
         }
-        let stays = !flow.injections.iter().any(|i| i.at_tip);
-        let places: Vec<usize> = flow.injections.iter().map(|i| place(flow, i, tip_mm)).collect();
         while self.steps < wanted {
             self.wait(flow, wanted);
             if self.steps < wanted {
-                self.step(flow, &places);
-                if stays {
-                    self.mark();
-                }
+                self.step(flow, tip);
+                self.mark();
             }
+        }
+    }
+
+    /// Forgets what hangs on where the tip was after a time.
+    pub(super) fn forget_after(&mut self, flow: &Flow, time_s: f64) {
+        // A step has the tip where it is at its beginning.
+        let last = (time_s / self.step_s).floor().clamp(-1e18, 1e18) as i64 + 1;
+        if last < self.steps {
+            self.go_back(flow, last);
+            let known = self.marks.partition_point(|mark| mark.steps <= last);
+            self.marks.truncate(known);
         }
     }
 
@@ -145,8 +155,7 @@ impl Transport {
 
     /// The largest fraction that each cell ever has.
     pub(super) fn largest(flow: &Flow) -> Vec<f32> {
-        let mut transport = Self::new(flow);
-        let places: Vec<usize> = flow.injections.iter().map(|i| place(flow, i, None)).collect();
+        let (mut transport, nowhere) = (Self::new(flow), TipWay::new(&[]));
         let last = flow.injections.iter().map(|i| i.start_s + i.duration_s).fold(0.0, f64::max);
         let injected: f64 = flow.injections.iter().map(|i| i.rate_ml_per_s * i.duration_s * 1000.0).sum();
         let mut largest = vec![0.0_f64; flow.nodes.len()];
@@ -157,7 +166,7 @@ impl Transport {
                 return largest.into_iter().map(|f| f as f32).collect();
             }
             transport.wait(flow, (last / transport.step_s).ceil() as i64);
-            transport.step(flow, &places);
+            transport.step(flow, &nowhere);
             largest.iter_mut().zip(&transport.fractions).for_each(|(most, f)| *most = most.max(*f));
         }
     }
@@ -167,8 +176,8 @@ impl Transport {
         self.fractions.iter().zip(&flow.nodes).map(|(f, node)| f * node.volume_mm3).sum()
     }
 
-    /// Goes on by one step, with injection k at cell `places[k]`.
-    fn step(&mut self, flow: &Flow, places: &[usize]) {
+    /// Goes on by one step.
+    fn step(&mut self, flow: &Flow, tip: &TipWay) {
         let [start, end] = [self.steps, self.steps + 1].map(|n| n as f64 * self.step_s);
         let blood = flow.mean_inflow_mm3_per_s * flow.pulse(f64::midpoint(start, end));
         // Rates are means over the step: what is injected is injected to the end.
@@ -180,11 +189,16 @@ impl Transport {
                 1000.0 * i.rate_ml_per_s * overlap.max(0.0) / self.step_s
             })
             .collect();
+        for ((place_of, injection), rate) in self.places.iter_mut().zip(&flow.injections).zip(&rates) {
+            if injection.at_tip && *rate > 0.0 {
+                *place_of = place(flow, tip.at(start));
+            }
+        }
         let all = blood + rates.iter().sum::<f64>();
         for (face, node) in self.faces.iter_mut().zip(&flow.nodes) {
             *face = node.share * all;
         }
-        for (&place, rate) in places.iter().zip(&rates) {
+        for (&place, rate) in self.places.iter().zip(&rates) {
             let mut cell = Some(place);
             while let Some(at) = cell {
                 self.faces[at] -= rate;
@@ -213,7 +227,7 @@ impl Transport {
                 self.left_mm3 += washed;
             }
         }
-        places.iter().zip(&rates).for_each(|(&place, rate)| change[place] += rate * self.step_s);
+        self.places.iter().zip(&rates).for_each(|(&place, rate)| change[place] += rate * self.step_s);
         for (((now, before), change), node) in
             self.fractions.iter_mut().zip(before).zip(&change).zip(&flow.nodes)
         {
@@ -223,10 +237,9 @@ impl Transport {
     }
 }
 
-/// The cell that an injection goes into.
-fn place(flow: &Flow, injection: &InjectionSpec, tip_mm: Option<Vec3>) -> usize {
-    let at = if injection.at_tip { tip_mm } else { injection.at_mm.map(Vec3::from) };
-    at.map_or(0, |point| nearest(&flow.nodes, &point))
+/// The cell at a point; the inlet's without one.
+fn place(flow: &Flow, point_mm: Option<Vec3>) -> usize {
+    point_mm.map_or(0, |point| nearest(&flow.nodes, &point))
 }
 
 /// The step at which no cell gives more than a part of what it holds, whatever is injected wherever.
@@ -271,6 +284,10 @@ mod tests {
         Flow::new(&tree, spec, &[injection]).unwrap()
     }
 
+    fn nowhere() -> TipWay {
+        TipWay::new(&[])
+    }
+
     fn steady() -> FlowSpec {
         FlowSpec {
             inflow_ml_per_s: 20.0,
@@ -291,7 +308,7 @@ mod tests {
             let flow = flow(&FlowSpec { pulsatility, ..steady() }, at, rate);
             let mut transport = Transport::new(&flow);
             for time in [1.2, 1.6, 2.0, 3.0, 9.0, 40.0] {
-                transport.advance(&flow, time, None);
+                transport.advance(&flow, time, &nowhere());
                 let until = transport.steps as f64 * transport.step_s;
                 let injected = 1000.0 * rate * (until - 1.003).clamp(0.0, 0.517);
                 let found = transport.inside_mm3(&flow)
@@ -309,7 +326,7 @@ mod tests {
         let reach = |rate| {
             let flow = flow(&FlowSpec { dispersion: 0.0, ..steady() }, IN_SMALL, rate);
             let mut transport = Transport::new(&flow);
-            transport.advance(&flow, 1.5, None);
+            transport.advance(&flow, 1.5, &nowhere());
             let late = transport.at(1.5);
             let at = |x: f64, y: f64| late[nearest(&flow.nodes, &Vec3::new(x, y, 0.0))];
             // Before its place, in the other branch, at its end, in the trunk.
@@ -330,19 +347,19 @@ mod tests {
         let flow = flow(&FlowSpec { pulsatility: 0.7, ..steady() }, None, 8.0);
         let mut often = Transport::new(&flow);
         for k in 0..70 {
-            often.advance(&flow, 0.04 * f64::from(k), None);
+            often.advance(&flow, 0.04 * f64::from(k), &nowhere());
         }
         let mut once = Transport::new(&flow);
-        often.advance(&flow, 1.777, None);
-        once.advance(&flow, 1.777, None);
+        often.advance(&flow, 1.777, &nowhere());
+        once.advance(&flow, 1.777, &nowhere());
         assert_eq!(often.at(1.777), once.at(1.777));
         assert!(once.at(1.777).iter().any(|f| *f > 0.1));
         // Back from a moment that is kept: few are, and a later one is none to go on from.
         assert!(often.marks.len() <= MOST_MARKS && often.apart > 1, "{}", often.apart);
         for time in [1.21, 2.4, 1.003, 1.777] {
-            often.advance(&flow, time, None);
+            often.advance(&flow, time, &nowhere());
             let mut alone = Transport::new(&flow);
-            alone.advance(&flow, time, None);
+            alone.advance(&flow, time, &nowhere());
             assert_eq!((often.at(time), often.steps), (alone.at(time), alone.steps), "{time}");
             assert_eq!(often.tissue_mm3, alone.tissue_mm3);
         }
@@ -377,7 +394,7 @@ mod tests {
             let spec = FlowSpec { tissue_s: 0.05, ..steady() };
             let flow = flow(&spec, None, 8.0).injected(injections);
             let mut transport = Transport::new(&flow);
-            transport.advance(&flow, time_s, None);
+            transport.advance(&flow, time_s, &nowhere());
             (flow, transport)
         };
         // When the first has gone, the next step is that of the second, eleven days later.

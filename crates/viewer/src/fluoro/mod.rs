@@ -328,8 +328,8 @@ impl Fluoroscope {
     }
 
     /// The medium injected by then, pixels rising.
-    pub(crate) fn injected(&mut self, time_s: f64, tip_mm: Option<Vec3>) -> Vec<Medium> {
-        self.contrast.as_mut().map_or_else(Vec::new, |contrast| contrast.at(time_s, tip_mm))
+    pub(crate) fn injected(&self, time_s: f64, tip_mm: Option<Vec3>) -> Vec<Medium> {
+        self.contrast.as_ref().map_or_else(Vec::new, |contrast| contrast.at(time_s, tip_mm))
     }
 
     /// Signal behind path lengths over that of the open beam. Where they are those of `before`, its transmission is taken.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use endowire_core::Vec3;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
 use endowire_methods::Scene;
@@ -14,6 +15,9 @@ use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::injections::Injected;
 use crate::output::tell;
+
+/// A time before all injections, s.
+const LONG_BEFORE_S: f64 = -1e6;
 
 /// What is in after a step.
 pub(super) struct Moment {
@@ -103,6 +107,28 @@ impl Course {
             pushed,
             moments,
         })
+    }
+}
+
+impl Course {
+    /// Where the tip was when, in the vessel at rest, up to a moment; nothing where none injects. Time goes on where lines of the script
+    /// inject; elsewhere the instruments rest at a moment for all times.
+    pub(super) fn way_of_tip(&self, moment: &Moment) -> Vec<(f64, Vec3)> {
+        if !self.view.injection.iter().any(|one| one.at_tip) {
+            return vec![];
+        }
+        let before = self.moments.iter().filter(|one| one.step < moment.step && one.time_s < moment.time_s);
+        let on_the_way = before.chain([moment]).filter_map(|one| {
+            let tip_mm = self.pushed.tip_mm(&one.shape, &one.inserted_mm)?;
+            let displacement = one.displacement.as_ref();
+            Some((one.time_s, displacement.map_or(tip_mm, |displacement| displacement.material(&tip_mm))))
+        });
+        let mut way: Vec<(f64, Vec3)> = on_the_way.collect();
+        // Before all of it, so that nothing is left of what another picture was told.
+        if let Some(&(_, first_mm)) = way.first() {
+            way.insert(0, (LONG_BEFORE_S, first_mm));
+        }
+        way
     }
 }
 

@@ -63,6 +63,9 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
         for (plane, (renderer, view)) in renderers.iter_mut().zip(&views).enumerate() {
             let id = (shot * spec.moments + m) * spec.views() + plane;
             renderer.move_vessel(moment.displacement.as_ref())?;
+            for (then_s, place_mm) in course.way_of_tip(moment) {
+                renderer.follow_tip(then_s, place_mm)?;
+            }
             let frame = endowire_viewer::Moment { frame: m as u64, time_s };
             let Some(image) = renderer.render_at(&devices, frame)?.fluoro else { continue };
             let labels = renderer.labels(&devices, &contacts)?;

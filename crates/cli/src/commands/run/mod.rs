@@ -110,7 +110,7 @@ fn draw_again(
     let Some(earlier) = earlier else {
         flowing.for_each(|one| frames.inject(one));
         if let Some(&time_s) = times_s.last() {
-            frames.stood((simulation.shape(), &simulation.report().lengths_mm()), time_s);
+            frames.stood((simulation.shape(), &simulation.report().lengths_mm()), time_s)?;
         }
         return Ok(());
     };

@@ -140,6 +140,25 @@ impl<'a> Studio<'a> {
         Ok(Self { plan, wall, planes, drawn: 0, animation: None, files: vec![] })
     }
 
+    /// Whether medium comes out of a tip: then each moment before one that is drawn counts.
+    pub(super) fn follows_tip(&self) -> bool {
+        self.plan.spec.injection.iter().any(|one| one.at_tip)
+    }
+
+    /// Tells where the instruments are at a moment that is not drawn.
+    pub(super) fn follow_tip(
+        &mut self,
+        Seen { shape, inserted_mm, time_s }: Seen<'_>,
+        displacement: Option<&Displacement>,
+    ) -> Result<(), Failure> {
+        let Some(tip_mm) = self.plan.pushed.tip_mm(shape, inserted_mm) else { return Ok(()) };
+        let at_rest_mm = displacement.map_or(tip_mm, |displacement| displacement.material(&tip_mm));
+        for plane in &mut self.planes {
+            plane.renderer.follow_tip(time_s, at_rest_mm)?;
+        }
+        Ok(())
+    }
+
     /// What part of the way from the first frame to the last the next one is.
     fn part(&self) -> f64 {
         self.drawn as f64 / self.plan.frames.max(2).saturating_sub(1) as f64
