@@ -6,12 +6,15 @@ use endowire_core::Error;
 use endowire_core::insertion;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use sha2::{Digest, Sha256};
 
 use crate::error::{InputError, exception};
 use crate::report::StepReport;
 
-/// The first bytes of a saved state.
-const FORMAT: &[u8] = b"endowire.State 2\n";
+/// The first bytes of a saved state; the last are a hash of all before.
+const FORMAT: &[u8] = b"endowire.State 3\n";
+/// Bytes of that hash.
+const HASH: usize = 32;
 
 /// All that the next step of a simulation depends on, beside what surrounds the instruments.
 ///
@@ -42,15 +45,20 @@ impl State {
 
     /// A state from the bytes of `to_bytes`.
     ///
-    /// Raises InputError for bytes that are none.
+    /// Raises InputError for bytes that are none, are not whole, or have been changed.
     #[staticmethod]
     fn from_bytes(data: &[u8]) -> PyResult<Self> {
         let refuse = |what: String| InputError::new_err(format!("the bytes of a state: {what}"));
-        let Some(state) = data.strip_prefix(FORMAT) else {
+        if !data.starts_with(FORMAT) {
             return Err(refuse(format!(
                 "they do not begin with {:?}: give what State.to_bytes or State.save has written",
                 String::from_utf8_lossy(FORMAT)
             )));
+        }
+        let whole =
+            data.split_last_chunk::<HASH>().filter(|(body, hash)| Sha256::digest(body)[..] == hash[..]);
+        let Some(state) = whole.and_then(|(body, _)| body.strip_prefix(FORMAT)) else {
+            return Err(refuse("they are not whole, or were changed since they were written".to_owned()));
         };
         let state = postcard::from_bytes(state).map_err(|e| refuse(e.to_string()))?;
         Ok(Self { state })
@@ -94,7 +102,9 @@ impl State {
 
 impl State {
     fn bytes(&self) -> PyResult<Vec<u8>> {
-        postcard::to_extend(&self.state, FORMAT.to_vec())
-            .map_err(|e| InputError::new_err(format!("the state cannot be written: {e}")))
+        let mut bytes = postcard::to_extend(&self.state, FORMAT.to_vec())
+            .map_err(|e| InputError::new_err(format!("the state cannot be written: {e}")))?;
+        bytes.extend(Sha256::digest(&bytes));
+        Ok(bytes)
     }
 }

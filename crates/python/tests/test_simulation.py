@@ -49,8 +49,16 @@ def test_states_are_copied_pickled_and_saved_to_the_bit(simulation, tmp_path):
         assert np.array_equal(simulation.positions_mm, after)
     with pytest.raises(endowire.InputError, match=r"State\.save"):
         endowire.State.from_bytes(b"something else")
-    with pytest.raises(endowire.InputError):
-        endowire.State.from_bytes(state.to_bytes()[:200])
+    data = state.to_bytes()
+    assert endowire.State.from_bytes(data).to_bytes() == data
+    for place in (20, len(data) // 2, len(data) - 1):
+        changed = bytearray(data)
+        changed[place] ^= 1
+        with pytest.raises(endowire.InputError, match="changed"):
+            endowire.State.from_bytes(bytes(changed))
+    for other in (data[:200], data[:-1], data + b"0"):
+        with pytest.raises(endowire.InputError, match="not whole"):
+            endowire.State.from_bytes(other)
 
 
 def test_parts_are_pickled(vessel, wire):
