@@ -9,12 +9,13 @@
 //! y = x − Vᵢ,  h = Nᵢ·y,  τ = y − Nᵢ(Nᵢ·y)      height and offset
 //! σ = (I − hSᵢ)⁻¹ τ                                   foot of x, seen from Vᵢ along the surface
 //! Qᵢ(x) = h − ½ τᵀSᵢσ
-//! aᵢ(x) = (1 − σᵀMᵢσ)³   where positive
+//! aᵢ(x) = cᵢ (1 − σᵀMᵢσ)³   where positive
 //! wᵢ(x) = aᵢ b(Qᵢ, σᵀMᵢσ)
 //! f(x)  = Σ wᵢQᵢ / Σ wᵢ
 //! ```
 //!
-//! with Nᵢ the inward normal, Sᵢ the curvature and Mᵢ an ellipse that holds the neighbours of the vertex. The window b, e^{−Qᵢ/0.3w} for
+//! with Nᵢ the inward normal, Sᵢ the curvature, Mᵢ an ellipse that holds the neighbours of the vertex, and cᵢ = 1, or 0.02 where no quadric fits
+//! these. The window b, e^{−Qᵢ/0.3w} for
 //! small |Qᵢ| and 0 beyond a width w, leaves out the other side of a narrow lumen and the back of a thin septum; where a device
 //! touches two sides at once, the nearer holds it. Behind a quadric, towards the rim of its support, the window is narrower, by
 //! 1 − σᵀMᵢσ: over a ridge that stands into the lumen each flank would go on beyond the crest, and as the nearer of the two hold what
@@ -137,6 +138,8 @@ pub struct SmoothWall {
     insets_mm: Vec<f32>,
     /// … and the largest inset of all.
     deepest_inset_mm: f64,
+    /// How far it lies outside each triangle and its neighbours, mm.
+    outsets_mm: Vec<f32>,
     /// Depth on which what is felt in front of the surface passes into what is felt behind it, mm.
     passing_mm: f64,
 }
@@ -166,6 +169,7 @@ impl SmoothWall {
             lists: Lists::new(mesh.triangles.clone(), neighbours, thickest_mm),
             insets_mm: Vec::new(),
             deepest_inset_mm: 0.0,
+            outsets_mm: Vec::new(),
             passing_mm: PASSING * thickest_mm,
         };
         smooth.measure_insets(mesh);
@@ -173,33 +177,42 @@ impl SmoothWall {
         smooth
     }
 
-    /// How far the smooth wall lies inside each triangle, at few points, or inside one that shares a corner with it: a point that is
-    /// next to one triangle may feel the other.
+    /// How far the smooth wall lies inside each triangle and outside of it, at few points, or one that shares a corner with it: a point
+    /// that is next to one triangle may feel the other.
     fn measure_insets(&mut self, mesh: &SurfaceMesh) {
-        let insets = |part: Range<usize>| {
+        let measured = |part: Range<usize>| {
             let (mut seen, mut list) = (vec![u32::MAX; mesh.vertices_mm.len()], Vec::new());
-            let inset = |index: usize| {
+            let measure = |index: usize| {
                 self.lists.touching(&self.quadrics, index, &mut seen, &mut list);
                 let height = |x: Vec3| self.reach_from(&x, &list, None).map_or(0.0, |r| r.value_mm);
-                (-few(mesh, index).map(height).fold(0.0, f64::min)) as f32
+                few(mesh, index).map(height).fold([0.0f32; 2], |[inset, outset], height| {
+                    [inset.max(-height as f32), outset.max(height as f32)]
+                })
             };
-            part.map(inset).collect::<Vec<_>>()
+            part.map(measure).collect::<Vec<_>>()
         };
-        let own = parallel::parts(mesh.triangles.len(), insets).concat();
-        self.spread_insets(&own);
+        let own = parallel::parts(mesh.triangles.len(), measured).concat();
+        let [insets, outsets] = [0, 1].map(|k| own.iter().map(|both| both[k]).collect::<Vec<_>>());
+        self.take_insets(&insets);
+        self.outsets_mm = self.spread(&outsets);
     }
 
-    /// Gives each triangle the largest inset of those that share a corner with it.
-    fn spread_insets(&mut self, own_mm: &[f32]) {
+    /// Takes over what the smooth wall lies inside of each triangle.
+    fn take_insets(&mut self, own_mm: &[f32]) {
+        self.insets_mm = self.spread(own_mm);
+        self.deepest_inset_mm = self.insets_mm.iter().copied().fold(0.0, f32::max).into();
+    }
+
+    /// For each triangle the largest of those that share a corner with it.
+    fn spread(&self, own: &[f32]) -> Vec<f32> {
         let triangles = &self.lists.triangles;
         let mut around = vec![0.0f32; self.quadrics.len()];
-        for (triangle, inset) in triangles.iter().zip(own_mm) {
-            triangle.iter().for_each(|v| around[*v as usize] = around[*v as usize].max(*inset));
+        for (triangle, value) in triangles.iter().zip(own) {
+            triangle.iter().for_each(|v| around[*v as usize] = around[*v as usize].max(*value));
         }
         let most =
             |triangle: &[u32; 3]| triangle.iter().fold(0.0f32, |most, v| most.max(around[*v as usize]));
-        self.insets_mm = triangles.iter().map(most).collect();
-        self.deepest_inset_mm = self.insets_mm.iter().copied().fold(0.0, f32::max).into();
+        triangles.iter().map(most).collect()
     }
 
     /// Triangles that the smooth wall lies inside of by more than this, mm.
@@ -215,12 +228,17 @@ impl SmoothWall {
             let most = &mut own[triangle as usize];
             *most = most.max(inset_mm as f32);
         }
-        self.spread_insets(&own);
+        self.take_insets(&own);
     }
 
     /// How far the smooth wall lies inside a triangle, mm: 0 where it lies beyond it.
     pub fn inset_mm(&self, triangle: u32) -> f64 {
         self.insets_mm[triangle as usize].into()
+    }
+
+    /// How far the smooth wall lies outside a triangle, mm: 0 where it lies inside it.
+    pub(super) fn outset_mm(&self, triangle: u32) -> f64 {
+        self.outsets_mm[triangle as usize].into()
     }
 
     /// The largest of all [`SmoothWall::inset_mm`].
@@ -279,7 +297,7 @@ impl SmoothWall {
                 continue;
             }
             let Some(local) = q.local(x, behind.is_some()) else { continue };
-            let a = (1.0 - local.u) * (1.0 - local.u) * (1.0 - local.u);
+            let a = q.trust * (1.0 - local.u) * (1.0 - local.u) * (1.0 - local.u);
             let w = a * q.opened(&local, behind.is_some()).value;
             if w == 0.0 {
                 continue;
@@ -328,9 +346,9 @@ impl SmoothWall {
                 continue;
             }
             let [(f1, f2), (u1, u2)] = q.derivatives(&local);
-            // a = (1 − u)³ has a′(u) = −3g², a″(u) = 6g.
-            let (f, g) = (local.value, 1.0 - local.u);
-            let (a, a1, a2) = (g * g * g, -3.0 * g * g, 6.0 * g);
+            // a = cg³ with g = 1 − u has a′(u) = −3cg², a″(u) = 6cg.
+            let (f, g, c) = (local.value, 1.0 - local.u, q.trust);
+            let (a, a1, a2) = (c * g * g * g, -3.0 * c * g * g, 6.0 * c * g);
             let w = a * opened.value;
             let (in_u, in_q) = (a1 * opened.value + a * opened.in_u, a * opened.in_q);
             let in_uu = a2 * opened.value + 2.0 * a1 * opened.in_u + a * opened.in_uu;

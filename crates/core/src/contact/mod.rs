@@ -16,6 +16,8 @@ mod properties;
 mod quadric;
 #[cfg(test)]
 mod ridge_tests;
+#[cfg(test)]
+mod rim_tests;
 pub mod wall;
 
 pub use distance::{Distance, Nearness, SmoothWall};

@@ -31,6 +31,8 @@ pub(super) struct Quadric {
     pub(super) narrowing: f64,
     /// Half axes of the support, shortest and longest, mm.
     pub(super) half_axes_mm: (f64, f64),
+    /// c, how much it counts.
+    pub(super) trust: f64,
 }
 
 /// Window over the radius of the device, and over the support of a vertex: what a fit may be off by on a coarse mesh.

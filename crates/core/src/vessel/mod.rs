@@ -23,6 +23,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 mod topology;
+mod trimming;
 mod wall;
 mod weld;
 
@@ -39,4 +40,5 @@ pub use path::{CentrelinePath, OnPath};
 pub use query::{Nearest, WallQuery};
 pub use recipe::{NoStore, WallRecipe, WallStore};
 pub use survey::{LumenReport, SeptaReport, StartReport, Survey, survey};
+pub(crate) use trimming::trimmed;
 pub use wall::{NO_NEIGHBOUR, RepairReport, Wall};

@@ -29,7 +29,13 @@ impl SmoothWall {
         if let Some(front) = front.as_ref().filter(|front| front.value_mm >= 0.0) {
             return Some((told(front.value_mm, &|| derived(front)), front.coverage));
         }
-        let back = self.reach_from(x, list, Some(self.behind(list)));
+        let behind = self.behind(list);
+        // What no vertex reaches in front of the surface is not behind it for that.
+        let corner = list.first().map(|v| self.quadrics[*v as usize].position);
+        if front.is_none() && corner.is_none_or(|corner| behind.facing.dot(&(x - corner)) > 0.0) {
+            return None;
+        }
+        let back = self.reach_from(x, list, Some(behind));
         let (front, back) = match (front, back) {
             (Some(front), Some(back)) => (front, back),
             (one, None) | (None, one) => {

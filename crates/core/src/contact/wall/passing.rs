@@ -26,10 +26,11 @@ impl WallContact<'_> {
             }
             // What the smooth wall takes for the lumen may be that of another wall, seen through one that is thin, or the far side of a
             // lumen much narrower than the device. Where facets are coarse the smooth wall stands beyond them, and what is outside of
-            // those is still in front of their own piece of it: ever less, the farther behind the facet. From another it goes away.
+            // those is still in front of their own piece of it: by no more than the wall stands beyond them, or ever less, the farther
+            // behind the facet. From another it goes away.
             let beyond = |felt: &FeltWall| {
                 felt.query.nearest(&x, felt.reach_mm).is_some_and(|flat| {
-                    if flat.distance_mm >= -sunk_mm {
+                    if flat.distance_mm >= -(sunk_mm + felt.smooth.outset_mm(flat.triangle)) {
                         return false;
                     }
                     let here_mm = felt.distance_from(flat.triangle, &x);

@@ -1,0 +1,255 @@
+//! Rims with teeth are cut back to an even line.
+//!
+//! A surface that was cut out of a larger one by its triangles ends in teeth of an edge or two, each with a lean of its own. Drawn out
+//! beyond the opening they would be furrows, and spikes between these. So where a rim has teeth what is beyond an even line below them
+//! is cut off: with the height h of a point beyond the opening's plane and its angle θ about its axis,
+//!
+//! ```text
+//! φ = h − H(θ),    H(θ) = Σₖ aₖ cos kθ + bₖ sin kθ,  k = 0, 1, 2
+//! ```
+//!
+//! is 0 on the line. H fits the rim, least squares over its length, and is lowered to where no tooth is below it; k = 1 and 2 are rims that
+//! stand aslant and saddles. Triangles are cut where φ changes its sign along an edge.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{SMatrix, SVector};
+
+use super::topology::{EdgeTable, NONE};
+use super::{Opening, SurfaceMesh, Wall};
+use crate::Vec3;
+
+/// Teeth that are no higher than this, in edges of the rim, are left.
+const EVEN: f64 = 0.4;
+/// Nothing is cut back by more than this, in radii of the opening.
+const DEEPEST: f64 = 1.0;
+/// What stands higher beyond the line than the highest tooth, in teeth, is no tooth.
+const BEYOND: f64 = 1.5;
+/// A vertex nearer to the line than this, in edges of the rim, is taken to be on it: else slivers were cut.
+const ON_LINE: f64 = 0.25;
+
+/// The line that a rim is cut back to.
+struct Line {
+    opening: Opening,
+    across: [Vec3; 2],
+    heights: SVector<f64, 5>,
+    /// Height of the highest tooth over it, mm.
+    teeth_mm: f64,
+    /// Mean edge of the rim, mm.
+    edge_mm: f64,
+}
+
+impl Line {
+    /// The line below the teeth of a rim; `None` where it has none, or is no rim that goes around once.
+    fn below(mesh: &SurfaceMesh, opening: &Opening) -> Option<Self> {
+        let first = opening.direction.cross(&Vec3::ith(opening.direction.iamin(), 1.0)).normalize();
+        let across = [first, opening.direction.cross(&first)];
+        let count = opening.boundary.len();
+        let edge_mm = opening.boundary_length_mm(mesh) / count as f64;
+        let mut line =
+            Self { opening: opening.clone(), across, heights: SVector::zeros(), teeth_mm: 0.0, edge_mm };
+        let at = |k: usize| mesh.vertices_mm[opening.boundary[k % count] as usize];
+        let mut matrix = SMatrix::<f64, 5, 5>::zeros();
+        let mut right = SVector::<f64, 5>::zeros();
+        for k in 0..count {
+            let (height_mm, row) = line.seen(&at(k));
+            let weight = (at(k + 1) - at(k)).norm() + (at(k + count - 1) - at(k)).norm();
+            matrix += row * row.transpose() * weight;
+            right += row * (height_mm * weight);
+        }
+        line.heights = matrix.cholesky()?.solve(&right);
+        let [lowest, highest] =
+            (0..count).map(|k| line.beyond_mm(&at(k))).fold([0.0f64; 2], |[a, b], h| [a.min(h), b.max(h)]);
+        line.teeth_mm = highest - lowest;
+        line.heights[0] += lowest;
+        (line.teeth_mm > EVEN * edge_mm && line.teeth_mm <= DEEPEST * opening.radius_mm).then_some(line)
+    }
+
+    /// Height of a point beyond the opening's plane, mm, and what H sums up at its angle.
+    fn seen(&self, x: &Vec3) -> (f64, SVector<f64, 5>) {
+        let y = x - self.opening.centre_mm;
+        let [u, v] = self.across.map(|axis| axis.dot(&y));
+        let r = u.hypot(v).max(f64::MIN_POSITIVE);
+        let (cos, sin) = (u / r, v / r);
+        (
+            y.dot(&self.opening.direction),
+            SVector::from([1.0, cos, sin, cos * cos - sin * sin, 2.0 * cos * sin]),
+        )
+    }
+
+    /// φ, mm.
+    fn beyond_mm(&self, x: &Vec3) -> f64 {
+        let (height_mm, row) = self.seen(x);
+        height_mm - self.heights.dot(&row)
+    }
+
+    /// The triangles of `mesh` that are beyond the line in part, from the rim on; `None` where they lead on to what is no tooth.
+    fn teeth(&self, mesh: &SurfaceMesh, across: &[[u32; 3]], beside: &[Vec<u32>]) -> Option<BTreeSet<u32>> {
+        let beyond = |v: u32| self.beyond_mm(&mesh.vertices_mm[v as usize]);
+        let is_cut = |t: &u32| mesh.triangles[*t as usize].iter().any(|v| beyond(*v) > 0.0);
+        let mut next: Vec<u32> =
+            self.opening.boundary.iter().flat_map(|v| &beside[*v as usize]).copied().filter(is_cut).collect();
+        let mut found = BTreeSet::new();
+        while let Some(triangle) = next.pop() {
+            if !found.insert(triangle) {
+                continue;
+            }
+            let corners = mesh.triangles[triangle as usize];
+            if corners.iter().any(|v| beyond(*v) > BEYOND * self.teeth_mm) {
+                return None;
+            }
+            let others = across[triangle as usize].into_iter().filter(|t| *t != NONE && is_cut(t));
+            next.extend(others.filter(|t| !found.contains(t)));
+        }
+        Some(found)
+    }
+
+    /// Cuts off what of `teeth` is beyond the line.
+    fn cut(&self, mesh: &mut SurfaceMesh, teeth: &BTreeSet<u32>) {
+        let mut heights: BTreeMap<u32, f64> = BTreeMap::new();
+        for v in teeth.iter().flat_map(|t| mesh.triangles[*t as usize]) {
+            let beyond_mm = self.beyond_mm(&mesh.vertices_mm[v as usize]);
+            heights.insert(v, if beyond_mm.abs() < ON_LINE * self.edge_mm { 0.0 } else { beyond_mm });
+        }
+        let mut between: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+        let mut kept = Vec::new();
+        for corners in teeth.iter().map(|t| mesh.triangles[*t as usize]) {
+            let mut polygon = Vec::with_capacity(4);
+            for k in 0..3 {
+                let [v, w] = [corners[k], corners[(k + 1) % 3]];
+                let [at, to] = [heights[&v], heights[&w]];
+                if at <= 0.0 {
+                    polygon.push(v);
+                }
+                if at * to < 0.0 {
+                    let vertices = &mut mesh.vertices_mm;
+                    polygon.push(*between.entry((v.min(w), v.max(w))).or_insert_with(|| {
+                        vertices.push(vertices[v as usize].lerp(&vertices[w as usize], at / (at - to)));
+                        vertices.len() as u32 - 1
+                    }));
+                }
+            }
+            // What has no corner below the line is beyond it.
+            if corners.iter().any(|v| heights[v] < 0.0) {
+                let x = |k: usize| mesh.vertices_mm[polygon[k] as usize];
+                match polygon[..] {
+                    [a, b, c] => kept.push([a, b, c]),
+                    [a, b, c, d] if (x(2) - x(0)).norm() <= (x(3) - x(1)).norm() => {
+                        kept.extend([[a, b, c], [a, c, d]]);
+                    }
+                    [a, b, c, d] => kept.extend([[a, b, d], [b, c, d]]),
+                    _ => {}
+                }
+            }
+        }
+        let mut number = 0u32;
+        mesh.triangles.retain(|_| {
+            number += 1;
+            !teeth.contains(&(number - 1))
+        });
+        mesh.triangles.extend(kept);
+    }
+}
+
+/// The surface of `wall` with the teeth cut off the rims of openings wider than `radius_mm`; `None` where there are none.
+pub(crate) fn trimmed(wall: &Wall, radius_mm: f64) -> Option<SurfaceMesh> {
+    let mesh = wall.mesh();
+    let wide = wall.openings().iter().filter(|opening| opening.radius_mm > radius_mm);
+    let lines: Vec<Line> = wide.filter_map(|opening| Line::below(mesh, opening)).collect();
+    if lines.is_empty() {
+        return None;
+    }
+    let mut mesh = mesh.clone();
+    let mut changed = false;
+    for line in lines {
+        let across = EdgeTable::new(&mesh.triangles).neighbours(mesh.triangles.len());
+        let mut beside = vec![Vec::new(); mesh.vertices_mm.len()];
+        for (index, triangle) in mesh.triangles.iter().enumerate() {
+            triangle.iter().for_each(|v| beside[*v as usize].push(index as u32));
+        }
+        if let Some(teeth) = line.teeth(&mesh, &across, &beside) {
+            line.cut(&mut mesh, &teeth);
+            changed = true;
+        }
+    }
+    changed.then_some(mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tube of radius 5 mm along z with edges of about 1 mm, from which `is_off` cuts triangles at the upper end by their middles.
+    fn tube(is_off: impl Fn(&Vec3, u32) -> bool) -> Wall {
+        let (rows, columns) = (24, 32);
+        let mut mesh = SurfaceMesh::default();
+        for j in 0..rows {
+            for i in 0..columns {
+                let angle = std::f64::consts::TAU * f64::from(i) / f64::from(columns);
+                mesh.vertices_mm.push(Vec3::new(5.0 * angle.cos(), 5.0 * angle.sin(), f64::from(j)));
+            }
+        }
+        for j in 0..rows - 1 {
+            for i in 0..columns {
+                let next = (i + 1) % columns;
+                let [a, b, c, d] =
+                    [(i, j), (next, j), (next, j + 1), (i, j + 1)].map(|(i, j)| j * columns + i);
+                for triangle in [[a, b, c], [a, c, d]] {
+                    let middle: Vec3 =
+                        triangle.iter().map(|v| mesh.vertices_mm[*v as usize]).sum::<Vec3>() / 3.0;
+                    if !is_off(&middle, i) {
+                        mesh.triangles.push(triangle);
+                    }
+                }
+            }
+        }
+        Wall::welded(&mesh).unwrap()
+    }
+
+    /// Heights of the upper rim over the plane z = 15 + 0.3 x.
+    fn rim(mesh: &SurfaceMesh) -> Vec<f64> {
+        let wall = Wall::welded(mesh).unwrap();
+        assert_eq!(wall.openings().len(), 2);
+        let upper = wall.openings().iter().find(|o| o.centre_mm.z > 5.0).unwrap();
+        let at = |v: &u32| wall.mesh().vertices_mm[*v as usize];
+        upper.boundary.iter().map(|v| at(v).z - 15.0 - 0.3 * at(v).x).collect()
+    }
+
+    #[test]
+    fn teeth_are_cut_off_along_an_even_line_and_the_rest_is_as_it_was() {
+        let toothed = tube(|x, i| x.z > 15.0 + 0.3 * x.x + if i % 3 == 0 { 1.2 } else { 0.0 });
+        let spread = |heights: &[f64]| {
+            let most = heights.iter().copied().fold(f64::MIN, f64::max);
+            most - heights.iter().copied().fold(f64::MAX, f64::min)
+        };
+        let before = rim(toothed.mesh());
+        let mesh = trimmed(&toothed, 1.0).unwrap();
+        let after = rim(&mesh);
+        // What is within a quarter of an edge of the line is left as it is.
+        assert!(spread(&after) < 0.75 && spread(&before) > 1.8, "{} {}", spread(&after), spread(&before));
+        // No lower than the deepest notch.
+        let lowest = |heights: &[f64]| heights.iter().copied().fold(f64::MAX, f64::min);
+        assert!(lowest(&after) > lowest(&before) - 0.6, "{} {}", lowest(&after), lowest(&before));
+        // On the surface: of the tube's facets nothing else is left.
+        assert!(mesh.vertices_mm.iter().all(|v| (4.95..=5.0 + 1e-9).contains(&v.xy().norm())));
+        let below = |mesh: &SurfaceMesh| {
+            let low = |t: &&[u32; 3]| t.iter().all(|v| mesh.vertices_mm[*v as usize].z < 11.0);
+            mesh.triangles.iter().filter(low).count()
+        };
+        assert_eq!(below(&mesh), below(toothed.mesh()));
+    }
+
+    #[test]
+    fn even_rims_stay_also_aslant_and_so_do_those_of_small_openings() {
+        assert!(trimmed(&tube(|x, _| x.z > 15.0), 1.0).is_none());
+        let toothed = |x: &Vec3, i: u32| x.z > 15.0 + if i % 3 == 0 { 1.2 } else { 0.0 };
+        assert!(trimmed(&tube(toothed), 1.0).is_some(), "the twin");
+        assert!(trimmed(&tube(toothed), 6.0).is_none());
+    }
+
+    #[test]
+    fn what_is_higher_than_teeth_is_left_alone() {
+        // A tongue that stands on is no tooth.
+        assert!(trimmed(&tube(|x, i| x.z > 15.0 + if i < 6 { 7.0 } else { 0.0 }), 1.0).is_none());
+    }
+}
