@@ -1,5 +1,6 @@
 //! The wall that devices feel, as `endowire vessel check` writes, reports and draws it.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
@@ -48,7 +49,8 @@ impl FeltReport {
         let wall = Wall::from_surface(surface)?;
         let mut options = Conditioning::default();
         options.deviation_mm = args.deviation_mm.unwrap_or(options.deviation_mm);
-        let felt = condition(wall.mesh(), &options).map_err(|error| match error {
+        let even = wall.with_even_rims(RADIUS_MM)?;
+        let felt = condition(even.mesh(), &options).map_err(|error| match error {
             Error::Parameter { name, value, mend } if name == "deviation_mm" => {
                 Failure::from(Error::Parameter { name: "--deviation-mm".to_owned(), value, mend })
             }
@@ -69,7 +71,7 @@ impl FeltReport {
             written.push(path.clone());
         }
         Ok(Some(Self {
-            changed: felt.changed,
+            changed: felt.changed || matches!(even, Cow::Owned(_)),
             triangles: felt.mesh.triangles.len(),
             limit_mm: options.deviation_mm,
             deviation_mm: deviation.most_mm,

@@ -12,7 +12,7 @@ use super::grading::{Grading, Stiffness};
 use super::point::{FOLLOW, LOOK_AGAIN};
 use super::properties::WallProperties;
 use super::{Distance, SmoothWall};
-use crate::vessel::{Conditioning, Wall, WallQuery, WallRecipe, WallStore, trimmed};
+use crate::vessel::{Conditioning, Wall, WallQuery, WallRecipe, WallStore};
 use crate::{Result, Vec3, parallel};
 pub use deviation::Deviation;
 
@@ -54,9 +54,8 @@ fn even<'a>(
         return Ok(Cow::Borrowed(wall));
     }
     let options = Conditioning { deviation_mm: properties.deviation_mm, ..Conditioning::default() };
-    let trimmed = trimmed(wall, radius_mm).map(|mesh| Wall::welded(&mesh)).transpose()?;
-    let wall = trimmed.as_ref().unwrap_or(wall);
-    store.wall(&WallRecipe::Even { wall, options }).map(Cow::Owned)
+    let wall = wall.with_even_rims(radius_mm)?;
+    store.wall(&WallRecipe::Even { wall: &wall, options }).map(Cow::Owned)
 }
 
 impl FeltWall {

@@ -40,5 +40,4 @@ pub use path::{CentrelinePath, OnPath};
 pub use query::{Nearest, WallQuery};
 pub use recipe::{NoStore, WallRecipe, WallStore};
 pub use survey::{LumenReport, SeptaReport, StartReport, Survey, survey};
-pub(crate) use trimming::trimmed;
 pub use wall::{NO_NEIGHBOUR, RepairReport, Wall};
