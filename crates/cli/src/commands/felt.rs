@@ -49,7 +49,7 @@ impl FeltReport {
         let wall = Wall::from_surface(surface)?;
         let mut options = Conditioning::default();
         options.deviation_mm = args.deviation_mm.unwrap_or(options.deviation_mm);
-        let even = wall.with_even_rims(RADIUS_MM)?;
+        let even = wall.with_even_rims()?;
         let felt = condition(even.mesh(), &options).map_err(|error| match error {
             Error::Parameter { name, value, mend } if name == "deviation_mm" => {
                 Failure::from(Error::Parameter { name: "--deviation-mm".to_owned(), value, mend })

@@ -43,19 +43,13 @@ const OVER: (u32, f64) = (6, 0.5);
 /// Coverage below which the flat triangles take part.
 const COVERED: f64 = 0.15;
 
-/// `wall` with even rims, where openings are wider than `radius_mm`, as an even mesh; or as it is where it is felt as it is meshed.
-fn even<'a>(
-    wall: &'a Wall,
-    radius_mm: f64,
-    properties: &WallProperties,
-    store: &dyn WallStore,
-) -> Result<Cow<'a, Wall>> {
+/// `wall` as an even mesh, or as it is where it is felt as it is meshed.
+fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) -> Result<Cow<'a, Wall>> {
     if properties.deviation_mm == 0.0 {
         return Ok(Cow::Borrowed(wall));
     }
     let options = Conditioning { deviation_mm: properties.deviation_mm, ..Conditioning::default() };
-    let wall = wall.with_even_rims(radius_mm)?;
-    store.wall(&WallRecipe::Even { wall: &wall, options }).map(Cow::Owned)
+    store.wall(&WallRecipe::Even { wall, options }).map(Cow::Owned)
 }
 
 impl FeltWall {
@@ -69,7 +63,7 @@ impl FeltWall {
         properties: &WallProperties,
         store: &dyn WallStore,
     ) -> Result<Self> {
-        let felt = extended(&*even(wall, thickest_mm, properties, store)?, thickest_mm);
+        let felt = extended(&*even(wall, properties, store)?, thickest_mm);
         let felt = Wall::welded(&felt)?;
         let smooth = SmoothWall::new(&felt, thickest_mm);
         let grading = if properties.region.is_empty() { None } else { Grading::new(&smooth, properties) };

@@ -20,7 +20,7 @@ pub enum WallRecipe<'a> {
         /// The surface as it was given, mm.
         surface: &'a SurfaceMesh,
     },
-    /// The even mesh of a wall that devices feel, [`condition`].
+    /// The even mesh of a wall that devices feel, [`Wall::with_even_rims`] and [`condition`].
     Even {
         /// The wall.
         wall: &'a Wall,
@@ -39,9 +39,10 @@ impl WallRecipe<'_> {
             Self::Generated { tree, resolution } => Ok(GeneratedWall::new(tree, *resolution)?.wall),
             Self::Repaired { surface } => Wall::from_surface(surface),
             Self::Even { wall, options } => {
-                let even = condition(wall.mesh(), options)?;
+                let trimmed = wall.with_even_rims()?;
+                let even = condition(trimmed.mesh(), options)?;
                 // What is even already keeps the numbers of its vertices.
-                if even.changed { Wall::welded(&even.mesh) } else { Ok((*wall).clone()) }
+                if even.changed { Wall::welded(&even.mesh) } else { Ok(trimmed.into_owned()) }
             }
         }
     }

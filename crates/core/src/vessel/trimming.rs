@@ -153,13 +153,13 @@ impl Line {
 }
 
 impl Wall {
-    /// The wall with the teeth cut off the rims of openings wider than `radius_mm`; the wall itself where there are none.
+    /// The wall with the teeth cut off its rims; the wall itself where there are none.
     ///
     /// # Errors
     /// As [`Wall::welded`].
-    pub fn with_even_rims(&self, radius_mm: f64) -> Result<Cow<'_, Self>> {
-        let wide = self.openings().iter().filter(|opening| opening.radius_mm > radius_mm);
-        let lines: Vec<Line> = wide.filter_map(|opening| Line::below(self.mesh(), opening)).collect();
+    pub fn with_even_rims(&self) -> Result<Cow<'_, Self>> {
+        let lines: Vec<Line> =
+            self.openings().iter().filter_map(|opening| Line::below(self.mesh(), opening)).collect();
         let mut changed = None;
         for line in lines {
             let mesh = changed.as_ref().unwrap_or(self.mesh());
@@ -208,8 +208,8 @@ mod tests {
     }
 
     /// The surface of a wall whose rims were cut back, if any was.
-    fn trimmed(wall: &Wall, radius_mm: f64) -> Option<SurfaceMesh> {
-        match wall.with_even_rims(radius_mm).unwrap() {
+    fn trimmed(wall: &Wall) -> Option<SurfaceMesh> {
+        match wall.with_even_rims().unwrap() {
             Cow::Borrowed(_) => None,
             Cow::Owned(wall) => Some(wall.mesh().clone()),
         }
@@ -232,7 +232,7 @@ mod tests {
             most - heights.iter().copied().fold(f64::MAX, f64::min)
         };
         let before = rim(toothed.mesh());
-        let mesh = trimmed(&toothed, 1.0).unwrap();
+        let mesh = trimmed(&toothed).unwrap();
         let after = rim(&mesh);
         // What is within a quarter of an edge of the line is left as it is.
         assert!(spread(&after) < 0.75 && spread(&before) > 1.8, "{} {}", spread(&after), spread(&before));
@@ -249,20 +249,16 @@ mod tests {
     }
 
     #[test]
-    fn even_rims_stay_also_aslant_and_so_do_those_of_small_openings() {
-        assert!(trimmed(&tube(|x, _| x.z > 15.0), 1.0).is_none());
+    fn even_rims_stay() {
+        assert!(trimmed(&tube(|x, _| x.z > 15.0)).is_none());
         let toothed = |x: &Vec3, i: u32| x.z > 15.0 + if i.is_multiple_of(3) { 1.2 } else { 0.0 };
-        assert!(trimmed(&tube(toothed), 1.0).is_some(), "the twin");
-        assert!(trimmed(&tube(toothed), 6.0).is_none());
+        assert!(trimmed(&tube(toothed)).is_some(), "the twin");
     }
 
     #[test]
     fn what_is_higher_than_teeth_is_left_alone() {
         // Four tongues that stand on are no teeth.
-        assert!(trimmed(&tube(|x, i| x.z > 12.0 + if i % 8 < 4 { 8.0 } else { 0.0 }), 1.0).is_none());
-        assert!(
-            trimmed(&tube(|x, i| x.z > 12.0 + if i % 8 < 4 { 3.0 } else { 0.0 }), 1.0).is_some(),
-            "the twin"
-        );
+        assert!(trimmed(&tube(|x, i| x.z > 12.0 + if i % 8 < 4 { 8.0 } else { 0.0 })).is_none());
+        assert!(trimmed(&tube(|x, i| x.z > 12.0 + if i % 8 < 4 { 3.0 } else { 0.0 })).is_some(), "the twin");
     }
 }
