@@ -14,9 +14,8 @@
 //! f(x)  = Σ wᵢQᵢ / Σ wᵢ
 //! ```
 //!
-//! with Nᵢ the inward normal, Sᵢ the curvature, Mᵢ an ellipse that holds the neighbours of the vertex, and cᵢ = 1, or 0.02 where no quadric fits
-//! these. The window b, e^{−Qᵢ/0.3w} for
-//! small |Qᵢ| and 0 beyond a width w, leaves out the other side of a narrow lumen and the back of a thin septum; where a device
+//! with Nᵢ the inward normal, Sᵢ the curvature, Mᵢ an ellipse that holds the neighbours of the vertex, and cᵢ = 1, or 0.02 where no quadric
+//! fits these. The window b, e^{−Qᵢ/0.3w} for small |Qᵢ| and 0 beyond a width w, leaves out the other side of a narrow lumen and the back of a thin septum; where a device
 //! touches two sides at once, the nearer holds it. Behind a quadric, towards the rim of its support, the window is narrower, by
 //! 1 − σᵀMᵢσ: over a ridge that stands into the lumen each flank would go on beyond the crest, and as the nearer of the two hold what
 //! is not there. How well the vertices reach says their coverage Σ aᵢwᵢ / Σ wᵢ, 0.35 and more on any even mesh. Feet, not offsets,

@@ -15,8 +15,8 @@ const THINNEST: f64 = 0.01;
 /// next to it must not bend it. With n = 1, the outer ring counting most, the smooth wall was off by 0.1 mm at 3 of 100 places of
 /// coarse wide vessels, with 6 at 1 of 1,000, and from a vessel that is known it was twice as far; with 16 it is worse again.
 const NEAR: i32 = 6;
-/// How much a vertex counts whose neighbours no quadric fits, as on the teeth of a rim that was cut from triangle to triangle: it holds its
-/// plane alone, and where its support is as good as over it must not stand before those that fit.
+/// How much a vertex counts whose neighbours no quadric fits, as on the teeth of a rim: it knows a plane alone, and where vertices that
+/// fit reach as well it must not stand in front of them.
 const UNFIT: f64 = 0.02;
 /// Weight that holds the fit of a vertex with few neighbours, |g|² and tr S²: 1e-6 of what a neighbour one edge away contributes.
 const REGULAR: f64 = 1e-6;
