@@ -4,17 +4,15 @@ use std::path::PathBuf;
 
 use endowire_core::Error;
 use endowire_core::insertion;
+use endowire_sweep::seal;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use sha2::{Digest, Sha256};
 
 use crate::error::{InputError, exception};
 use crate::report::StepReport;
 
-/// The first bytes of a saved state; the last are a hash of all before.
+/// The first bytes of a saved state, which is sealed.
 const FORMAT: &[u8] = b"endowire.State 3\n";
-/// Bytes of that hash.
-const HASH: usize = 32;
 
 /// All that the next step of a simulation depends on, beside what surrounds the instruments.
 ///
@@ -55,9 +53,7 @@ impl State {
                 String::from_utf8_lossy(FORMAT)
             )));
         }
-        let whole =
-            data.split_last_chunk::<HASH>().filter(|(body, hash)| Sha256::digest(body)[..] == hash[..]);
-        let Some(state) = whole.and_then(|(body, _)| body.strip_prefix(FORMAT)) else {
+        let Some(state) = seal::opened(data).and_then(|body| body.strip_prefix(FORMAT)) else {
             return Err(refuse("they are not whole, or were changed since they were written".to_owned()));
         };
         let state = postcard::from_bytes(state).map_err(|e| refuse(e.to_string()))?;
@@ -102,9 +98,8 @@ impl State {
 
 impl State {
     fn bytes(&self) -> PyResult<Vec<u8>> {
-        let mut bytes = postcard::to_extend(&self.state, FORMAT.to_vec())
-            .map_err(|e| InputError::new_err(format!("the state cannot be written: {e}")))?;
-        bytes.extend(Sha256::digest(&bytes));
-        Ok(bytes)
+        postcard::to_extend(&self.state, FORMAT.to_vec())
+            .map(seal::sealed)
+            .map_err(|e| InputError::new_err(format!("the state cannot be written: {e}")))
     }
 }

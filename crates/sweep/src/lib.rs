@@ -31,6 +31,7 @@ mod outcome;
 mod provenance;
 mod row;
 mod run;
+pub mod seal;
 mod shard;
 mod shared;
 mod table;

@@ -9,7 +9,7 @@ use std::time::UNIX_EPOCH;
 use endowire_core::vessel::{Wall, WallRecipe};
 use sha2::{Digest, Sha256};
 
-use crate::output::seal;
+use endowire_sweep::seal;
 
 /// The first line.
 const FORMAT: &str = "endowire wall 1\n";

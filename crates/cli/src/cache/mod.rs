@@ -16,7 +16,8 @@ use endowire_core::Result;
 use endowire_core::vessel::{Wall, WallRecipe, WallStore};
 
 use crate::args::CacheArgs;
-use crate::output::{seal, tell};
+use crate::output::tell;
+use endowire_sweep::seal;
 use entry::{EXTENSION, Key};
 
 /// What takes less to make is not kept: to read it back would save nothing to speak of.

@@ -13,7 +13,6 @@ pub(crate) mod provenance;
 pub(crate) mod recorder;
 pub(crate) mod recording;
 pub(crate) mod saved;
-pub(crate) mod seal;
 pub(crate) mod vtk;
 pub(crate) mod whole;
 

@@ -8,11 +8,12 @@ use std::time::{Duration, Instant};
 
 use endowire_core::insertion::{Script, ScriptCourse, ScriptRun, Simulation, State, Step};
 use endowire_methods::Scene;
+use endowire_sweep::seal;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::injections::Injected;
-use super::{seal, whole};
+use super::whole;
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
