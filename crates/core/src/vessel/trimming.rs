@@ -85,11 +85,14 @@ impl Line {
     }
 
     /// The triangles of `mesh` that are beyond the line in part, from the rim on; `None` where they lead on to what is no tooth.
-    fn teeth(&self, mesh: &SurfaceMesh, across: &[[u32; 3]], beside: &[Vec<u32>]) -> Option<BTreeSet<u32>> {
+    fn teeth(&self, mesh: &SurfaceMesh) -> Option<BTreeSet<u32>> {
+        let across = EdgeTable::new(&mesh.triangles).neighbours(mesh.triangles.len());
         let beyond = |v: u32| self.beyond_mm(&mesh.vertices_mm[v as usize]);
         let is_cut = |t: &u32| mesh.triangles[*t as usize].iter().any(|v| beyond(*v) > 0.0);
+        let rim: BTreeSet<u32> = self.opening.boundary.iter().copied().collect();
+        let at_rim = |t: &u32| mesh.triangles[*t as usize].iter().any(|v| rim.contains(v));
         let mut next: Vec<u32> =
-            self.opening.boundary.iter().flat_map(|v| &beside[*v as usize]).copied().filter(is_cut).collect();
+            (0..mesh.triangles.len() as u32).filter(|t| at_rim(t) && is_cut(t)).collect();
         let mut found = BTreeSet::new();
         while let Some(triangle) = next.pop() {
             if !found.insert(triangle) {
@@ -143,12 +146,8 @@ impl Line {
                 }
             }
         }
-        let mut number = 0u32;
-        mesh.triangles.retain(|_| {
-            number += 1;
-            !teeth.contains(&(number - 1))
-        });
-        mesh.triangles.extend(kept);
+        let whole = (0..).zip(&mesh.triangles).filter(|(index, _)| !teeth.contains(index));
+        mesh.triangles = whole.map(|(_, triangle)| *triangle).chain(kept).collect();
     }
 }
 
@@ -163,12 +162,7 @@ impl Wall {
         let mut changed = None;
         for line in lines {
             let mesh = changed.as_ref().unwrap_or(self.mesh());
-            let across = EdgeTable::new(&mesh.triangles).neighbours(mesh.triangles.len());
-            let mut beside = vec![Vec::new(); mesh.vertices_mm.len()];
-            for (index, triangle) in mesh.triangles.iter().enumerate() {
-                triangle.iter().for_each(|v| beside[*v as usize].push(index as u32));
-            }
-            if let Some(teeth) = line.teeth(mesh, &across, &beside) {
+            if let Some(teeth) = line.teeth(mesh) {
                 line.cut(changed.get_or_insert_with(|| self.mesh().clone()), &teeth);
             }
         }
