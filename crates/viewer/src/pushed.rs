@@ -4,6 +4,7 @@ use endowire_core::device::{Device, Stack, line_mm};
 use endowire_core::methods::MethodChoice;
 use endowire_core::scene::SceneOf;
 use endowire_core::shape::Shape;
+use endowire_core::vessel::Displacement;
 use endowire_core::{Error, Result, Vec3};
 use serde::de::DeserializeOwned;
 
@@ -44,10 +45,17 @@ impl Pushed {
         Ok(Self { stack, parts })
     }
 
-    /// The tip of the innermost instrument that is in on this line, where these lengths are, mm.
-    pub fn tip_mm(&self, shape: &Shape, inserted_mm: &[f64]) -> Option<Vec3> {
+    /// The tip of the innermost instrument that is in on this line, where these lengths are, mm; in the vessel at rest, where that is
+    /// displaced.
+    pub fn tip_at_rest_mm(
+        &self,
+        shape: &Shape,
+        inserted_mm: &[f64],
+        displacement: Option<&Displacement>,
+    ) -> Option<Vec3> {
         let first_mm = inserted_mm.iter().find(|mm| **mm > 0.0)?;
-        shape.position_at(line_mm(inserted_mm.iter().copied()) - first_mm)
+        let tip_mm = shape.position_at(line_mm(inserted_mm.iter().copied()) - first_mm)?;
+        Some(displacement.map_or(tip_mm, |displacement| displacement.material(&tip_mm)))
     }
 
     /// Views of all that is in on this line, where these lengths are.

@@ -129,15 +129,17 @@ impl FrameWriter {
         (shape, inserted_mm): (&Shape, &[f64]),
         time_s: f64,
     ) -> Result<(), Failure> {
-        if self.spec.injection.iter().any(|one| one.at_tip)
-            && let Some(tip_mm) = self.pushed.tip_mm(shape, inserted_mm)
-        {
-            let displacement = self.motion.as_ref().map(|motion| motion.at(time_s));
-            let at_rest_mm = displacement.map_or(tip_mm, |displacement| displacement.material(&tip_mm));
-            self.tips.push((time_s, at_rest_mm));
-            self.planes.iter_mut().try_for_each(|plane| plane.follow_tip(time_s, at_rest_mm))?;
+        if self.planes.is_empty() {
+            return Ok(());
         }
-        if self.spec.xray.pulse_ms > 0.0 && !self.planes.is_empty() {
+        if self.spec.injects_at_tip() {
+            let displacement = self.motion.as_ref().map(|motion| motion.at(time_s));
+            if let Some(tip_mm) = self.pushed.tip_at_rest_mm(shape, inserted_mm, displacement.as_ref()) {
+                self.tips.push((time_s, tip_mm));
+                self.planes.iter_mut().try_for_each(|plane| plane.follow_tip(time_s, tip_mm))?;
+            }
+        }
+        if self.spec.xray.pulse_ms > 0.0 {
             self.before = Some(Before { shape: shape.clone(), inserted_mm: inserted_mm.to_vec(), time_s });
         }
         Ok(())

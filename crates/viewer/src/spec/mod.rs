@@ -178,6 +178,11 @@ impl ViewSpec {
         self.views.contains(&view)
     }
 
+    /// Whether medium comes out of the tip of an instrument.
+    pub fn injects_at_tip(&self) -> bool {
+        self.injection.iter().any(|one| one.at_tip)
+    }
+
     /// The view of each plane: this one, and with `biplane_deg` the fluoroscopy of the second.
     pub fn planes(&self) -> Vec<Self> {
         let first = Self { biplane_deg: None, ..self.clone() };

@@ -108,20 +108,17 @@ impl Course {
             moments,
         })
     }
-}
 
-impl Course {
     /// Where the tip was when, in the vessel at rest, up to a moment; nothing where none injects. Time goes on where lines of the script
     /// inject; elsewhere the instruments rest at a moment for all times.
     pub(super) fn way_of_tip(&self, moment: &Moment) -> Vec<(f64, Vec3)> {
-        if !self.view.injection.iter().any(|one| one.at_tip) {
+        if !self.view.injects_at_tip() {
             return vec![];
         }
         let before = self.moments.iter().filter(|one| one.step < moment.step && one.time_s < moment.time_s);
         let on_the_way = before.chain([moment]).filter_map(|one| {
-            let tip_mm = self.pushed.tip_mm(&one.shape, &one.inserted_mm)?;
             let displacement = one.displacement.as_ref();
-            Some((one.time_s, displacement.map_or(tip_mm, |displacement| displacement.material(&tip_mm))))
+            Some((one.time_s, self.pushed.tip_at_rest_mm(&one.shape, &one.inserted_mm, displacement)?))
         });
         let mut way: Vec<(f64, Vec3)> = on_the_way.collect();
         // Before all of it, so that nothing is left of what another picture was told.

@@ -56,6 +56,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
         let progress = of.within(What::Progress, spec.vary.progress);
         let moment = &course.moments[(progress * last as f64).round() as usize];
         let time_s = moment.time_s + of.within(What::Time, spec.vary.time_s);
+        let way = course.way_of_tip(moment);
         let devices = course.pushed.views(&moment.shape, &moment.inserted_mm);
         let in_line = course.instruments.iter().zip(&moment.inserted_mm).filter(|one| *one.1 > 0.0);
         let names: Vec<String> = in_line.map(|one| one.0.clone()).collect();
@@ -63,9 +64,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
         for (plane, (renderer, view)) in renderers.iter_mut().zip(&views).enumerate() {
             let id = (shot * spec.moments + m) * spec.views() + plane;
             renderer.move_vessel(moment.displacement.as_ref())?;
-            for (then_s, place_mm) in course.way_of_tip(moment) {
-                renderer.follow_tip(then_s, place_mm)?;
-            }
+            way.iter().try_for_each(|(then_s, place_mm)| renderer.follow_tip(*then_s, *place_mm))?;
             let frame = endowire_viewer::Moment { frame: m as u64, time_s };
             let Some(image) = renderer.render_at(&devices, frame)?.fluoro else { continue };
             let labels = renderer.labels(&devices, &contacts)?;

@@ -140,9 +140,9 @@ impl<'a> Studio<'a> {
         Ok(Self { plan, wall, planes, drawn: 0, animation: None, files: vec![] })
     }
 
-    /// Whether medium comes out of a tip: then each moment before one that is drawn counts.
+    /// Whether each moment before one that is drawn counts.
     pub(super) fn follows_tip(&self) -> bool {
-        self.plan.spec.injection.iter().any(|one| one.at_tip)
+        self.plan.spec.injects_at_tip()
     }
 
     /// Tells where the instruments are at a moment that is not drawn.
@@ -151,10 +151,8 @@ impl<'a> Studio<'a> {
         Seen { shape, inserted_mm, time_s }: Seen<'_>,
         displacement: Option<&Displacement>,
     ) -> Result<(), Failure> {
-        let Some(tip_mm) = self.plan.pushed.tip_mm(shape, inserted_mm) else { return Ok(()) };
-        let at_rest_mm = displacement.map_or(tip_mm, |displacement| displacement.material(&tip_mm));
-        for plane in &mut self.planes {
-            plane.renderer.follow_tip(time_s, at_rest_mm)?;
+        if let Some(tip_mm) = self.plan.pushed.tip_at_rest_mm(shape, inserted_mm, displacement) {
+            self.planes.iter_mut().try_for_each(|plane| plane.renderer.follow_tip(time_s, tip_mm))?;
         }
         Ok(())
     }
