@@ -10,6 +10,7 @@ use super::hands::{Hand, Way, lengths};
 use super::slide::Extension;
 use super::state::KirchhoffState;
 use super::substep::{AT_REST, Attempt, Found, released_mj};
+use super::trials::Trials;
 use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::{leave_mm, left_through};
 use crate::device::{Stack, line_mm};
@@ -17,10 +18,8 @@ use crate::methods::{InstrumentReport, Move, StepReport};
 use crate::vessel::Wall;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
-/// Most sub-steps that one command may be cut into, …
+/// Most sub-steps that one command may be cut into.
 const SUBSTEP_LIMIT: usize = 4096;
-/// … and the least part of it that one is.
-const LEAST_SHARE: f64 = 1e-4;
 /// Newton iterations that a command may take in all its sub-steps for every millimetre and every [`WORK_RAD`], those in vain
 /// included, before it comes to rest as it can: its cost is bounded.
 const WORK: f64 = 280.0;
@@ -28,8 +27,6 @@ const WORK: f64 = 280.0;
 const WORK_RAD: f64 = 0.1;
 /// … and never more than so many times what one solution may take.
 const WORK_OF_ONE: usize = 10;
-/// How often the last resort may find nothing in a command; after that what it comes to is taken whatever is left over.
-const RESORTS: usize = 6;
 /// How often a device that came to rest at the end of its way, but in no equilibrium, is let go on from there with the hand held still.
 const AGAIN: usize = 4;
 /// What moved by less than this in another last resort, in its least radii, is at rest.
@@ -52,11 +49,11 @@ struct Sum {
 
 impl Sum {
     /// Adds a sub-step, in which the device may have come to rest as it can.
-    fn add(&mut self, found: &Found, relaxed: bool) {
+    fn add(&mut self, found: &Found) {
         self.slides += found.slides;
         self.dissipated_mj += found.dissipated_mj;
         self.flow_mj += found.flow_mj;
-        if relaxed {
+        if found.relaxed {
             self.relaxations += 1;
             self.imbalance = self.imbalance.max(found.residual.max(found.unsettled));
         }
@@ -97,13 +94,10 @@ impl<const C: usize> Workspace<C> {
         tools.work = Work::default();
         let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD).max(1.0);
-        let mut budget = ((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most));
+        let mut trials = Trials::new(((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most)));
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
-        let mut share = 1.0f64;
-        // Last resorts that found nothing.
-        let mut failures = 0;
         let mut again = AGAIN;
         let thinnest_mm = surroundings.device.min_radius_mm();
         let mut failure = Cow::from("the way is too long for one step");
@@ -112,13 +106,7 @@ impl<const C: usize> Workspace<C> {
             again -= usize::from(done >= 1.0);
             let was = if moved { now.start() } else { Start { mesh, state: from } };
             let rest = 1.0 - done;
-            // Where the way is lost, the device is let come to rest as far as the command goes; if it does not, in parts; and in the end
-            // wherever it is.
-            let relax = budget == 0 || share < LEAST_SHARE;
-            if relax && (failures == 0 || failures == RESORTS) {
-                share = rest;
-            }
-            let part = rest.min(share);
+            let (effort, part) = trials.next(rest);
             // A rest that is rounding is none.
             let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
             way.at(to, hands);
@@ -138,12 +126,11 @@ impl<const C: usize> Workspace<C> {
                 tools.write_report(&there, hands, now);
                 break;
             }
-            let resort = relax.then_some(failures == RESORTS || done >= 1.0);
             let left = passage.map(|passage| (was, passage));
-            let attempt = Attempt { hands, blocked, resort, left };
-            match tools.try_step(&there, here, attempt, next, &mut budget) {
+            let attempt = Attempt { hands, blocked, effort, left };
+            match tools.try_step(&there, here, attempt, next, &mut trials.budget) {
                 Ok(found) => {
-                    sum.add(&found, relax);
+                    sum.add(&found);
                     // At a crease of the wall forces are those of one side or the other and never in balance; where nothing moves
                     // any more the device is at rest all the same.
                     let rests = done >= 1.0
@@ -155,21 +142,17 @@ impl<const C: usize> Workspace<C> {
                     displaced = then;
                     moved = true;
                     done = to;
-                    share = (2.0 * part).min(1.0);
+                    trials.succeeded(part);
                 }
                 // From the same place the same comes of it.
                 Err(_) if done >= 1.0 => break,
-                Err(reason) => {
-                    failure = reason;
-                    share = 0.25 * part;
-                    if relax {
-                        budget = 0;
-                        failures += 1;
-                    }
+                Err(lost) => {
+                    failure = lost.reason;
+                    trials.failed((effort, part), lost.astray);
                 }
             }
             // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
-            if done < 1.0 && (failures > RESORTS || sum.substeps > SUBSTEP_LIMIT) {
+            if done < 1.0 && (trials.are_over() || sum.substeps > SUBSTEP_LIMIT) {
                 tools.refuse_narrower(&environment.displaced(displaced.as_ref()), now, &way.commands)?;
                 return Err(Error::Computation(format!(
                     "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"

@@ -46,6 +46,7 @@ mod state;
 mod substep;
 #[cfg(test)]
 mod touch_tests;
+mod trials;
 mod workspace;
 
 pub use mesh::Mesh;

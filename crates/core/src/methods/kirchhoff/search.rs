@@ -83,6 +83,8 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) max_iterations: usize,
     /// Newton iterations that are left of the command's; none for the last resort, which has its own.
     pub(super) budget: Option<&'a mut usize>,
+    /// Whether the device may come to rest far away: softer walls need not be settled on, and the wall itself may take long.
+    pub(super) patient: bool,
     /// Newton iterations that were taken.
     pub(super) iterations: usize,
     /// How often the device slid on while the hand held still.
@@ -95,7 +97,7 @@ impl<const C: usize> Search<'_, '_, C> {
     pub(super) fn run(&mut self, near: bool) -> NewtonReport {
         let stiff = self.stiff;
         self.contact.hand_over(stiff);
-        if self.budget.is_some() && if stiff { near } else { self.rubs } {
+        if !self.patient && if stiff { near } else { self.rubs } {
             if let Some(found) = self.at_once() {
                 return if found.is_within(self.tolerance) { self.settled(found) } else { found };
             }
@@ -162,7 +164,7 @@ impl<const C: usize> Search<'_, '_, C> {
 
     /// The wall by way of softer ones.
     fn by_softer_walls(&mut self) -> NewtonReport {
-        let patient = self.budget.is_none();
+        let patient = self.patient;
         self.contact.softness = self.softest;
         loop {
             self.contact.hold_friction();
@@ -210,10 +212,9 @@ impl<const C: usize> Search<'_, '_, C> {
         self.state.copy_from(&self.guess.other);
         self.contact.rewind_friction();
         found = self.newton(STUCK, self.tolerance);
-        let (most, slides) = if self.budget.is_none() { (PATIENT[2], SLIDES[1]) } else { (SLID, SLIDES[0]) };
         let mut near = NEARLY;
-        for _ in 0..slides {
-            if !found.converged || self.is_settled() {
+        for slide in 0.. {
+            if !found.converged || self.is_settled() || slide == SLIDES[usize::from(self.budget.is_none())] {
                 break;
             }
             if self.contact.unsettled() < near {
@@ -233,10 +234,23 @@ impl<const C: usize> Search<'_, '_, C> {
             }
             self.contact.anchor_friction(self.elements, self.state);
             self.contact.hold_friction();
-            found = self.newton(most, self.tolerance);
+            found = self.slid();
             self.slides += 1;
         }
         found
+    }
+
+    /// To where it slides. What has used up the budget of its command on the way goes on from there: the last resort would begin anew and
+    /// come the same way.
+    fn slid(&mut self) -> NewtonReport {
+        if self.budget.is_some() {
+            let found = self.newton(SLID, self.tolerance);
+            if found.converged || self.budget.as_ref().is_some_and(|left| **left > 0) {
+                return found;
+            }
+            self.budget = None;
+        }
+        self.newton(PATIENT[2], self.tolerance)
     }
 
     /// Friction and wall solved for together. What is found may be no minimum, and is left then.

@@ -62,6 +62,33 @@ pub(super) struct Found {
     pub(super) unsettled: f64,
     /// Whether it is an equilibrium.
     pub(super) balanced: bool,
+    /// Whether the device was let come to rest as it can.
+    pub(super) relaxed: bool,
+}
+
+/// Why a sub-step came to nothing.
+pub(super) struct Lost {
+    pub(super) reason: Cow<'static, str>,
+    /// Whether the search did not come to an end. What it came to may be no step of this command otherwise.
+    pub(super) astray: bool,
+}
+
+impl From<&'static str> for Lost {
+    fn from(reason: &'static str) -> Self {
+        Self { reason: reason.into(), astray: false }
+    }
+}
+
+/// How hard a sub-step tries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Effort {
+    /// As long as what is near takes to be found.
+    Usual,
+    /// As long as the budget lasts: to where the device comes to rest far away.
+    Patient,
+    /// Without a budget, to where the device comes to rest as it can: what is nearly in balance, up to this residual over force scale, is
+    /// taken, or whatever there is if that is infinite.
+    Resort(f64),
 }
 
 /// How far a sub-step goes, and how hard it tries.
@@ -71,8 +98,7 @@ pub(super) struct Attempt<'a> {
     pub(super) hands: &'a [Hand],
     /// Whether the wall is in the tip's way.
     pub(super) blocked: bool,
-    /// Whether the device is let come to rest as it can, and if so, whether that is taken whatever is left over.
-    pub(super) resort: Option<bool>,
+    pub(super) effort: Effort,
     /// Where the vessel moves: what was before it did, and how it does. The sub-step then starts with the device taken along.
     pub(super) left: Option<(Start<'a>, Passage<'a>)>,
 }
@@ -138,10 +164,10 @@ impl<const C: usize> Tools<C> {
         attempt: Attempt<'_>,
         next: &mut Configuration,
         budget: &mut usize,
-    ) -> std::result::Result<Found, Cow<'static, str>> {
+    ) -> std::result::Result<Found, Lost> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
-        let Attempt { hands, blocked, resort, left } = attempt;
-        let relax = resort.is_some();
+        let Attempt { hands, blocked, effort, left } = attempt;
+        let resort = matches!(effort, Effort::Resort(_));
         self.slide_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
         let rod = &mut after.rod;
@@ -187,20 +213,20 @@ impl<const C: usize> Tools<C> {
             rubs: surroundings.properties.rubs(),
             tolerance: options.tolerance,
             max_iterations: options.max_iterations,
-            budget: (!relax).then_some(budget),
+            budget: (!resort).then_some(budget),
+            patient: effort != Effort::Usual,
             iterations: usize::from(moved),
             slides: 0,
         };
         let found = search.run(near);
         let found = search.dragged(found, surroundings.flow);
         let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
-        let (iterations, slides) = (search.iterations, search.slides);
+        let (iterations, slides, relaxed) = (search.iterations, search.slides, search.budget.is_none());
         let unsettled = if surroundings.properties.rubs() { contact.unsettled() } else { 0.0 };
         let unsettled = unsettled.max(lagging);
         // What comes to rest as it can is in equilibrium as exactly as friction is with the wall elsewhere.
-        let balanced = (found.converged || (relax && found.residual < SETTLED)) && unsettled < SETTLED;
-        let least = if resort == Some(true) { f64::MAX } else { AT_REST };
-        let at_rest = balanced || (relax && found.residual <= least);
+        let balanced = (found.converged || (relaxed && found.residual < SETTLED)) && unsettled < SETTLED;
+        let at_rest = balanced || matches!(effort, Effort::Resort(least) if found.residual <= least);
         let mut passed = false;
         if at_rest {
             contact.know_whole_base(&mesh.elements);
@@ -222,12 +248,13 @@ impl<const C: usize> Tools<C> {
         let reports = (&start.state.report, &after.report);
         let way_mm = farthest_mm(reports);
         // Without a normal force to begin with it has slid from where it touches to anywhere, and stays there.
-        if began_free && slides > 0 && !relax && way_mm > FIRST_TOUCH * surroundings.device.min_radius_mm() {
+        if began_free && slides > 0 && !relaxed && way_mm > FIRST_TOUCH * surroundings.device.min_radius_mm()
+        {
             return Err(TOUCHED.into());
         }
         let flow_mj = aside_mj + self.drag.size_n() * way_mm;
         let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
-        if !(resort == Some(true) && balanced)
+        if !(effort == Effort::Resort(f64::INFINITY) && balanced)
             && rises(environment.surroundings.stack, reports, dissipated_mj, by_wall)
         {
             return Err(STORED.into());
@@ -235,16 +262,19 @@ impl<const C: usize> Tools<C> {
         let corrections = (&start.state.correction, &mut after.correction);
         self.guess.teach(&mesh.elements, &after.rod, stiffness <= YIELDING, corrections);
         self.keep(mesh, after);
-        Ok(Found { slides, dissipated_mj, flow_mj, residual: found.residual, unsettled, balanced })
+        Ok(Found { slides, dissipated_mj, flow_mj, residual: found.residual, unsettled, balanced, relaxed })
     }
 }
 
 /// What is the matter with what was found, which is not at rest or has passed through the wall.
-fn what_is_wrong(found: &NewtonReport, at_rest: bool) -> Cow<'static, str> {
+fn what_is_wrong(found: &NewtonReport, at_rest: bool) -> Lost {
     match (at_rest, found.converged) {
         (true, _) => PASSED.into(),
         (false, true) => UNSETTLED.into(),
-        (false, false) => format!("{} (residual {:.1e})", found.reason, found.residual).into(),
+        (false, false) => Lost {
+            reason: format!("{} (residual {:.1e})", found.reason, found.residual).into(),
+            astray: true,
+        },
     }
 }
 
