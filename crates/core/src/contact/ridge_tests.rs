@@ -33,13 +33,13 @@ fn ridge() -> Wall {
     Wall::welded(&mesh).unwrap()
 }
 
-fn felt() -> FeltWall {
+pub(super) fn felt() -> FeltWall {
     let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
     FeltWall::new(&ridge(), (0.2, 0.2), &properties, &NoStore).unwrap()
 }
 
 /// Points up to a millimetre above the crest and the upper flanks.
-fn points() -> impl Iterator<Item = Vec3> {
+pub(super) fn points() -> impl Iterator<Item = Vec3> {
     (0..4000).map(|i| {
         let i = f64::from(i);
         let (x, y) = (0.8 * (2.399 * i).sin(), 1.7 * (0.37 * i).sin());

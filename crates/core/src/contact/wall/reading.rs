@@ -38,9 +38,6 @@ impl Reading {
     }
 }
 
-/// The smooth distance changes by less than this part of the way.
-const STEEPEST: f64 = 2.0;
-
 impl WallContact<'_> {
     /// How near the wall point `index` would be at the material point `x`.
     pub(super) fn read(&mut self, index: usize, x: &Vec3) -> Reading {
@@ -124,14 +121,6 @@ impl WallContact<'_> {
             (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, 0.0);
         }
         let (triangle, looked_at) = (known.triangle?, known.looked_at);
-        // Most points that are near a wall do not touch it, and are moved little.
-        let taken = &self.memory.readings[index];
-        let clear_mm = limit_mm.max(radius);
-        let spare_mm = taken.nearness.value_mm() - clear_mm - STEEPEST * stretch * (x - taken.at_mm).norm();
-        if spare_mm > 0.0 && taken.triangle == triangle {
-            self.counters.avoided += 1;
-            return Some(Reading::Free(clear_mm + spare_mm));
-        }
         if let Some(reading) = self.read_there(index, x, triangle, limit_mm) {
             self.counters.avoided += 1;
             return Some(reading);

@@ -279,6 +279,39 @@ fn what_has_come_back_out_of_the_wall_reads_what_is_nearest() {
     }
 }
 
+/// What a point reads after a move of some hundredths of a millimetre, and what it would read if nothing were known of where it was.
+fn on_the_way(contact: &mut WallContact<'_>, from: Vec3, to: Vec3) -> [f64; 2] {
+    let triangle = contact.felt.query.nearest(&from, 5.0).unwrap().triangle;
+    let radius_mm = contact.points[0].potential.radius_mm;
+    let known = &mut contact.memory.points[0];
+    (known.base_looked_at, known.base_triangle) = (from, Some(triangle));
+    (known.looked_at, known.triangle) = (from, Some(triangle));
+    contact.read_within(0, &from, radius_mm);
+    let told = contact.read_within(0, &to, radius_mm).distance_mm();
+    [told, contact.felt.nearness(&to, triangle, radius_mm).value_mm()].map(|mm| mm.min(radius_mm))
+}
+
+#[test]
+fn what_a_point_reads_hangs_on_where_it_is_not_on_where_it_was() {
+    let felt = crate::contact::ridge_tests::felt();
+    let mut rod = rod(&felt, 1, &[1.0], 1e3);
+    rod.points[0].potential.radius_mm = 0.2;
+    let mut contact = rod.contact();
+    // Over the crest what is felt changes by up to ten times the way.
+    let (mut presses, mut steep) = (0, 0);
+    for (k, from) in crate::contact::ridge_tests::points().enumerate() {
+        let k = k as f64;
+        let to = from + Vec3::new((1.7 * k).sin(), (2.3 * k).sin(), (3.1 * k).cos()) * 0.05;
+        let [told, fresh] = on_the_way(&mut contact, from, to);
+        assert!((told - fresh).abs() < 1e-12, "{from:?} {to:?}: {told} for {fresh}");
+        presses += usize::from(fresh > 0.0 && fresh < 0.2);
+        let triangle = felt.query.nearest(&from, 5.0).unwrap().triangle;
+        let lost_mm = felt.nearness(&from, triangle, f64::INFINITY).value_mm() - 0.2;
+        steep += usize::from(fresh > 0.0 && fresh < 0.2 && lost_mm > 2.0 * (to - from).norm());
+    }
+    assert!(presses > 200 && steep > 3, "{presses} {steep}");
+}
+
 /// Whether a straight rod from `start` towards `end`, 5 mm long, has passed through the wall.
 fn has_passed(felt: &FeltWall, start: Vec3, end: Vec3) -> bool {
     let mut rod = rod(felt, 5, &[0.5], 1e4);
