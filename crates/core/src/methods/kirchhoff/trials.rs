@@ -62,9 +62,10 @@ impl Trials {
 
     /// An attempt for this part has come to nothing, and gone `astray` or not.
     pub(super) fn failed(&mut self, (effort, part): (Effort, f64), astray: bool) {
-        self.astray += usize::from(astray);
-        // Where patience was in vain, it goes on as it would have without.
-        if effort != Effort::Patient {
+        let patient = effort == Effort::Patient;
+        self.astray += usize::from(astray || patient);
+        // Where patience was in vain, whatever the reason, it goes on as it would have without.
+        if !patient {
             self.share = 0.25 * part;
         }
         if matches!(effort, Effort::Resort(_)) {
@@ -93,7 +94,8 @@ mod tests {
         assert_eq!(trials.next(0.75), (Effort::Usual, 0.5));
         trials.failed((Effort::Usual, 0.5), true);
         assert_eq!(trials.next(0.75), (Effort::Patient, 0.75));
-        trials.failed((Effort::Patient, 0.75), true);
+        // What it came to may be no step of the command.
+        trials.failed((Effort::Patient, 0.75), false);
         assert_eq!(trials.next(0.75), (Effort::Usual, 0.125));
     }
 
