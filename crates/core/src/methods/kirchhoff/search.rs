@@ -40,9 +40,9 @@ const HURRIED: usize = 15;
 const STUCK: usize = 60;
 /// Newton iterations of a slide.
 const SLID: usize = 120;
-/// Newton iterations of the last resort: on a softer wall, on the wall itself, and of a slide.
+/// Newton iterations with patience: on a softer wall, on the wall itself, and of a slide of the last resort.
 const PATIENT: [usize; 3] = [60, 300, 300];
-/// Newton iterations of all of it.
+/// Newton iterations of all of the last resort.
 const LONGEST: usize = 2000;
 /// Newton iterations for friction and wall together. Those that find something mostly do in three to five.
 const TOGETHER: usize = 10;

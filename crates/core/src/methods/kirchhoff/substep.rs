@@ -98,6 +98,7 @@ pub(super) struct Attempt<'a> {
     pub(super) hands: &'a [Hand],
     /// Whether the wall is in the tip's way.
     pub(super) blocked: bool,
+    /// How hard it tries.
     pub(super) effort: Effort,
     /// Where the vessel moves: what was before it did, and how it does. The sub-step then starts with the device taken along.
     pub(super) left: Option<(Start<'a>, Passage<'a>)>,
