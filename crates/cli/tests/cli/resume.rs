@@ -225,13 +225,13 @@ fn a_state_of_another_scene_or_no_state_is_refused() {
     let bytes = std::fs::read(&state).unwrap();
     let damaged = at("damaged");
     let mut newer = bytes.clone();
-    newer["endowire state ".len()] = b'8';
+    newer["endowire state ".len()] = b'9';
     let mut changed = bytes.clone();
     let middle = changed.len() / 2;
     changed[middle] ^= 1;
     let told = [
         (text.clone().into_bytes(), "is no saved state"),
-        (newer, "its format is \"endowire state 8\""),
+        (newer, "its format is \"endowire state 9\""),
         (changed, "is not whole or was changed"),
         (bytes[..bytes.len() - 1].to_vec(), "is not whole"),
         (bytes[..20].to_vec(), "is not whole"),

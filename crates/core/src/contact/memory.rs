@@ -14,8 +14,7 @@ use super::wall::{Foreseen, Slip, Slipping, Span};
 use super::{ContactPoint, FeltWall, MovedWall};
 use crate::Vec3;
 
-/// What a point knows of its surroundings. Places are material points of the vessel, and clearances lie between those; distances that were
-/// read are in space.
+/// What a point knows of its surroundings. Places are material points of the vessel, and clearances lie between those.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct KnownPoint {
     /// Where the wall was last looked for.
@@ -83,17 +82,6 @@ impl TakenReading {
         Self { at_mm: Vec3::new(f64::NAN, f64::NAN, f64::NAN), triangle: 0, nearness: Nearness::Beyond(0.0) };
 }
 
-/// What a point that is near a wall has read last, without derivatives.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct KnownDistance {
-    /// Where, mm.
-    at_mm: Vec3,
-    /// About which triangle.
-    triangle: u32,
-    /// How near the wall was there, mm.
-    distance_mm: f64,
-}
-
 /// The memory of all contact points of a device in a step.
 #[derive(Debug, Clone)]
 pub struct WallMemory {
@@ -124,21 +112,17 @@ pub struct WallMemory {
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct KnownPoints {
     points: Vec<KnownPoint>,
-    /// None where a point has never been near a wall.
-    distances: Vec<Option<KnownDistance>>,
 }
 
 impl KnownPoints {
     /// Takes memory for `points` points.
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points.saturating_sub(self.points.len()));
-        self.distances.reserve(points.saturating_sub(self.distances.len()));
     }
 
     /// Forgets all. Keeps the memory.
     pub fn clear(&mut self) {
         self.points.clear();
-        self.distances.clear();
     }
 
     /// Number of points.
@@ -150,7 +134,6 @@ impl KnownPoints {
     pub(crate) fn fits(&self, points: usize, triangles: usize) -> bool {
         let there = |triangle: Option<u32>| triangle.is_none_or(|t| (t as usize) < triangles);
         self.points.len() == points
-            && self.distances.len() == points
             && self.points.iter().all(|p| there(p.triangle) && there(p.side) && there(p.base_triangle))
     }
 }
@@ -269,28 +252,11 @@ impl WallMemory {
             self.points.push(slid.unwrap_or(NOTHING));
         }
         self.readings.clear();
-        let reading = |known: &Option<KnownDistance>| match known {
-            Some(KnownDistance { at_mm, triangle, distance_mm }) => {
-                TakenReading { at_mm: *at_mm, triangle: *triangle, nearness: Nearness::Beyond(*distance_mm) }
-            }
-            None => TakenReading::NONE,
-        };
-        self.readings.extend(known.distances.iter().map(reading));
-    }
-
-    /// Forgets the distances that were read: those of material points change while the vessel moves.
-    pub(crate) fn forget_readings(&mut self) {
-        self.readings.fill(TakenReading::NONE);
+        self.readings.resize(self.points.len(), TakenReading::NONE);
     }
 
     /// Keeps what is known at the end of a step.
     pub fn keep(&self, known: &mut KnownPoints) {
         known.points.clone_from(&self.points);
-        known.distances.clear();
-        let distance = |reading: &TakenReading| {
-            let TakenReading { at_mm, triangle, nearness } = *reading;
-            (!at_mm.x.is_nan()).then(|| KnownDistance { at_mm, triangle, distance_mm: nearness.value_mm() })
-        };
-        known.distances.extend(self.readings.iter().map(distance));
     }
 }

@@ -5,8 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::SMatrix;
 
 use super::*;
-use crate::contact::memory::TakenReading;
-use crate::contact::{FeltWall, KnownPoints, WallPotential, WallProperties};
+use crate::contact::{FeltWall, WallPotential, WallProperties};
 use crate::rod::{Assembly, Frame, Layout, PLAIN};
 use crate::vessel::{NoStore, SurfaceMesh, Wall};
 
@@ -341,21 +340,4 @@ fn behind_a_coarse_facet_is_not_yet_through_the_wall() {
     let (both, from) = (felt(&both), Vec3::new(0.3, 0.0, 20.0));
     assert!(has_passed(&both, from, from + Vec3::x()));
     assert!(!has_passed(&both, from, from + Vec3::z()));
-}
-
-#[test]
-fn what_is_kept_of_a_reading_knows_its_triangle() {
-    let felt = slit();
-    let mut rod = rod(&felt, 1, &[1.0], 1e3);
-    let x = Vec3::new(0.4, 0.1, 20.1);
-    let triangle = rod.contact().felt.query.nearest(&x, 1.0).unwrap().triangle;
-    let nearness = felt.nearness(&x, triangle, 1.0);
-    rod.memory.look_at(&rod.points);
-    rod.memory.readings[0] = TakenReading { at_mm: x, triangle, nearness };
-    let mut known = KnownPoints::default();
-    rod.memory.keep(&mut known);
-    let mut later = WallMemory::new(&felt);
-    later.begin(&known, &rod.points, &rod.points, 0.0);
-    let kept = later.readings[0];
-    assert_eq!((kept.at_mm, kept.triangle, kept.nearness.value_mm()), (x, triangle, nearness.value_mm()));
 }

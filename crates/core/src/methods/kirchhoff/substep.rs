@@ -144,9 +144,6 @@ impl<const C: usize> Tools<C> {
         self.newton.resize(mesh.elements.len());
         let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
         self.memory.begin(&start.state.known, &start.mesh.points, &mesh.points, advance_mm);
-        if left.is_some() {
-            self.memory.forget_readings();
-        }
     }
 
     /// Gives the state what the next sub-step starts with.
