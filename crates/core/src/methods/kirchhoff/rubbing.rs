@@ -10,7 +10,7 @@ use super::mesh::Mesh;
 use super::search::Search;
 use crate::contact::{Between, HandMotion, Place, Rub, SETTLED};
 use crate::device::{Stack, line_mm};
-use crate::insertion::LateralForce;
+use crate::methods::LateralForce;
 use crate::rod::RodState;
 use crate::solve::NewtonReport;
 
