@@ -71,6 +71,8 @@ impl FeltWall {
             (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + smooth.deepest_inset_mm() + LOOK_MM
         };
         let query = WallQuery::new(&felt)?;
+        // The first step would wait for it.
+        query.prepare();
         let mut felt = Self { reach_mm: reach_mm(&smooth), smooth, query, grading, thinnest_mm };
         let crests = felt.over_crests(thickest_mm);
         felt.smooth.deepen(crests.into_iter().flatten());

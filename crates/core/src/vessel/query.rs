@@ -103,6 +103,11 @@ impl WallQuery {
         self.ready.get_or_init(|| Ready::new(&self.mesh)).as_ref()
     }
 
+    /// Makes ready for queries what the first one would.
+    pub(crate) fn prepare(&self) {
+        self.ready();
+    }
+
     /// Unit normal of a triangle, into the lumen. `triangle` is one that [`WallQuery::nearest`] returned.
     pub fn inward_normal(&self, triangle: u32) -> Vec3 {
         let [a, b, c] = self.mesh.corners(triangle as usize);
