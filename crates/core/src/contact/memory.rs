@@ -65,7 +65,7 @@ const NOTHING: KnownPoint = KnownPoint {
     force_n: 0.0,
 };
 
-/// A distance that a point has read.
+/// A distance that a point has read in a step.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TakenReading {
     /// Where, mm.
@@ -77,7 +77,7 @@ pub(super) struct TakenReading {
 }
 
 impl TakenReading {
-    /// That of a point that has never been near a wall.
+    /// That of a point that has read nothing since the step began.
     const NONE: Self =
         Self { at_mm: Vec3::new(f64::NAN, f64::NAN, f64::NAN), triangle: 0, nearness: Nearness::Beyond(0.0) };
 }

@@ -37,7 +37,8 @@ pub struct Nearest {
     pub rim: bool,
 }
 
-/// Closest-point queries on a wall. What they need is made ready with the first of them.
+/// Closest-point queries on a wall. What they need is made ready with the first of them, or before it where
+/// the first must not wait.
 #[derive(Clone)]
 pub struct WallQuery {
     mesh: SurfaceMesh,
