@@ -11,8 +11,13 @@ use crate::vessel::WallQuery;
 const CELLS: usize = 1 << 14;
 /// Cells are counted up to this from the origin.
 const FARTHEST: f64 = 1e9;
-/// How often a wall is looked for four times as far away before it is looked for anywhere.
-const FARTHER: u32 = 6;
+/// How often a wall is looked for so many times as far away before it is looked for anywhere.
+const FARTHER: i32 = 6;
+/// See [`FARTHER`].
+const FARTHER_BY: f64 = 4.0;
+/// How much farther than a triangle that is known to be there a nearer one is looked for, in parts of its distance and of the reach:
+/// against rounding.
+const CLOSE: f64 = 1e-9;
 /// Stands for no triangle.
 const NONE: u32 = u32::MAX;
 
@@ -52,6 +57,8 @@ pub(super) struct Places {
     size_mm: f64,
     reach_mm: f64,
     cells: Vec<Cell>,
+    /// The triangle that was found last.
+    last: u32,
     /// Questions to the hierarchy since they were counted last.
     pub(super) queries: u64,
 }
@@ -62,15 +69,24 @@ impl Places {
     pub(super) fn new(radius_mm: f64, reach_mm: f64) -> Self {
         let unknown = Cell { key: [i32::MIN; 3], triangle: NONE, clearance_mm: 0.0 };
         let size_mm = radius_mm * 2.0 / 3f64.sqrt();
-        Self { size_mm, reach_mm, cells: vec![unknown; CELLS], queries: 0 }
+        Self { size_mm, reach_mm, cells: vec![unknown; CELLS], last: NONE, queries: 0 }
     }
 
     /// What is nearest to `x` itself.
     fn ask(&mut self, query: &WallQuery, x: &Vec3) -> Place {
         self.queries += 1;
-        // Where no wall is near, the point may be far from it on either side. A question without a limit would look at most of the wall.
-        let reaches = (0..FARTHER).map(|k| self.reach_mm * f64::from(1u32 << (2 * k)));
-        let nearest = reaches.chain([f64::MAX]).find_map(|reach_mm| query.nearest(x, reach_mm));
+        // Where no wall is near, the point may be far from it on either side. A question without a limit would look at most of the wall;
+        // what was found last is mostly close to what is sought, and nothing farther is the answer. Which of several triangles at one
+        // distance is found does not hang on the limit.
+        let found_mm = match self.last {
+            NONE => f64::MAX,
+            last => query.distance_to(last, x) * (1.0 + CLOSE) + self.reach_mm * CLOSE,
+        };
+        let reaches = (0..FARTHER).map(|k| self.reach_mm * FARTHER_BY.powi(k)).chain([f64::MAX]);
+        let mut limits =
+            reaches.map(|reach_mm| if found_mm < FARTHER_BY * reach_mm { found_mm } else { reach_mm });
+        let nearest = limits.find_map(|limit_mm| query.nearest(x, limit_mm));
+        self.last = nearest.map_or(NONE, |n| n.triangle);
         Place {
             middle: *x,
             clearance_mm: nearest.map_or(self.reach_mm, |n| n.distance_mm),
@@ -134,6 +150,21 @@ mod tests {
         assert!(asked <= 3000);
         places.around(&query, &at(2999));
         assert_eq!(places.queries, asked);
+    }
+
+    #[test]
+    fn what_was_found_before_leads_to_the_same_answers() {
+        let query = tube(0.7);
+        let mut places = Places::new(0.2, 0.5);
+        // On a lattice about the axis many triangles are at one distance.
+        let at =
+            |k: i32| Vec3::new(f64::from(k % 7 - 3), f64::from(k / 7 % 7 - 3), f64::from(k / 49 % 40)) * 0.9;
+        for k in 0..2000 {
+            let x = at(k * 611 % 2000);
+            let place = places.ask(&query, &x);
+            let fresh = Places::new(0.2, 0.5).ask(&query, &x);
+            assert_eq!((place.triangle, place.clearance_mm), (fresh.triangle, fresh.clearance_mm), "{x}");
+        }
     }
 
     #[test]

@@ -123,12 +123,13 @@ impl WallQuery {
     /// How far a point is from the wall, mm, on whichever side. For one question: it looks at all triangles, which takes less time than
     /// to make ready for more.
     pub(crate) fn distance_mm(&self, point_mm: &Vec3) -> f64 {
-        let point = to_parry(point_mm);
-        let from = |t: usize| {
-            let [a, b, c] = self.mesh.corners(t).map(|v| to_parry(&v));
-            Triangle::new(a, b, c).distance_to_local_point(point, false)
-        };
-        (0..self.triangles()).map(from).fold(f64::INFINITY, f64::min)
+        (0..self.triangles() as u32).map(|t| self.distance_to(t, point_mm)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// How far a point is from a triangle, mm, on whichever side.
+    pub(crate) fn distance_to(&self, triangle: u32, point_mm: &Vec3) -> f64 {
+        let [a, b, c] = self.corners(triangle).map(|v| to_parry(&v));
+        Triangle::new(a, b, c).distance_to_local_point(to_parry(point_mm), false)
     }
 
     /// Where the straight way from one point to another first meets the wall, as a part of the way, up to `farthest` times its

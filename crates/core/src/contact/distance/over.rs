@@ -3,8 +3,9 @@
 //! On a mesh of many triangles a list is made when it is first asked for: a device comes near few of them, and the finer the mesh and
 //! the thicker the device the longer are the lists.
 
-use std::collections::HashSet;
 use std::sync::OnceLock;
+
+use rustc_hash::FxHashSet;
 
 use super::Quadric;
 use crate::contact::fit::Neighbours;
@@ -13,7 +14,7 @@ use crate::{Vec3, parallel};
 /// Height above the surface up to which lists are complete, in radii of the thickest device and in supports.
 const HEIGHT: (f64, f64) = (1.5, 0.5);
 /// Most triangles whose lists are all made at once.
-const AT_ONCE: usize = 100_000;
+const AT_ONCE: usize = 400_000;
 
 /// For every triangle, the vertices whose support may reach a point over it.
 #[derive(Debug, Clone)]
@@ -51,7 +52,7 @@ impl Lists {
     pub(super) fn of(&self, quadrics: &[Quadric], triangle: usize) -> &[u32] {
         self.known[triangle].get_or_init(|| {
             // Only asked, never iterated: its order cannot reach the result.
-            let mut seen = HashSet::new();
+            let mut seen = FxHashSet::default();
             let mut list = Vec::new();
             self.gather(quadrics, triangle, |q| self.reach_mm(q), |v| seen.insert(v), &mut list);
             list.into_boxed_slice()
