@@ -256,6 +256,26 @@ fn a_command_that_fails_leaves_the_state_to_the_byte() {
 }
 
 #[test]
+fn where_a_way_is_blocked_is_told_whatever_was_tried_before() {
+    let mut simulation = tube(true, 500);
+    let mut last = simulation.clone();
+    let said = loop {
+        last.restore(&simulation.state()).unwrap();
+        match simulation.step(Command::advance(1.0)) {
+            Ok(_) => {}
+            Err(error) => break error.to_string(),
+        }
+    };
+    assert!(said.contains("blocked at") && simulation.report().inserted_mm > 18.0, "{said}");
+    // A clone has tried nothing, and `last` was elsewhere before.
+    for mut other in [simulation.clone(), last, simulation] {
+        for _ in 0..2 {
+            assert_eq!(other.step(Command::advance(1.0)).unwrap_err().to_string(), said);
+        }
+    }
+}
+
+#[test]
 #[ignore = "minutes: ten thousand commands"]
 fn ten_thousand_commands_that_fail_or_not_leave_the_state_to_the_byte() {
     let mut sum = [0; 3];

@@ -4,12 +4,14 @@
 //! equilibrium is found on the way, the room across the lumen says whether that is why.
 
 use super::Environment;
-use super::configuration::Configuration;
+use super::configuration::Start;
 use super::workspace::Tools;
 use crate::contact::{FeltWall, WallContact};
 use crate::methods::Command;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
+/// Less room than this part of what the device needs is so little that a way through is not looked for with patience.
+pub(super) const FAR_TOO_LITTLE: f64 = 0.5;
 /// How far off the wall, in radii, ways across begin at most.
 const OFF: f64 = 0.3;
 /// Tangents of the angles between the normal and other ways across.
@@ -20,31 +22,34 @@ const PIECES: usize = 4;
 const ON_MM: f64 = 1e-3;
 
 impl<const C: usize> Tools<C> {
-    /// Refuses to push on where the vessel is narrower than the device, for commands of the hands that have found no equilibrium.
+    /// Refuses to push on from where there is less room than `part` of what the device needs, for commands of the hands that have found no
+    /// equilibrium.
     ///
     /// # Errors
     /// [`PhysicalEnd::Blocked`] with the narrowest place, if there is one and an instrument advances.
     pub(super) fn refuse_narrower(
         &mut self,
         environment: &Environment<'_>,
-        at: &Configuration,
+        from: Start<'_>,
         commands: &[Command],
+        part: f64,
     ) -> Result<()> {
         if commands.iter().any(|command| command.advance_mm > 0.0)
-            && let Some(end) = self.narrowest(environment, at)
+            && let Some((narrowest, end)) = self.narrowest(environment, from)
+            && narrowest < part
         {
             return Err(Error::End(end));
         }
         Ok(())
     }
 
-    /// The narrowest place at which the device presses on the wall and has less room across the lumen than its diameter.
+    /// The narrowest place at which the device presses on the wall and has less room across the lumen than its diameter, and the part of
+    /// that which it has.
     pub(super) fn narrowest(
         &mut self,
         environment: &Environment<'_>,
-        at: &Configuration,
-    ) -> Option<PhysicalEnd> {
-        let Configuration { mesh, state } = at;
+        Start { mesh, state }: Start<'_>,
+    ) -> Option<(f64, PhysicalEnd)> {
         let wall = environment.wall();
         let mut contact = WallContact::new(
             wall,
@@ -67,7 +72,7 @@ impl<const C: usize> Tools<C> {
                 least = Some((part, PhysicalEnd::Blocked { position_mm, lumen_radius_mm, device_radius_mm }));
             }
         }
-        least.map(|(_, end)| end)
+        least
     }
 }
 
@@ -148,7 +153,7 @@ mod tests {
         let mut workspace = Workspace::<{ crate::rod::PLAIN }>::new(&environment, &wire.state);
         let moves = [Move { instrument: 0, command: Command::advance(1.0) }];
         workspace.carry_out(&environment, &wire.state, &moves).unwrap();
-        workspace.tools.narrowest(&environment, &workspace.now)
+        workspace.tools.narrowest(&environment, workspace.now.start()).map(|(_, end)| end)
     }
 
     #[test]

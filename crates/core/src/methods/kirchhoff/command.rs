@@ -1,15 +1,14 @@
 //! One command: in one sub-step where that will do, in several where it will not, and to where the device comes to rest as it can where
 //! the way is lost.
 
-use std::borrow::Cow;
-
 use super::Environment;
+use super::blocked::FAR_TOO_LITTLE;
 use super::carried::{WallWork, carried};
 use super::configuration::Start;
 use super::hands::{Hand, Way, lengths};
 use super::slide::Extension;
 use super::state::KirchhoffState;
-use super::substep::{AT_REST, Attempt, Found, released_mj};
+use super::substep::{AT_REST, Attempt, Effort, Found, released_mj};
 use super::trials::Trials;
 use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::{leave_mm, left_through};
@@ -27,6 +26,8 @@ const WORK: f64 = 280.0;
 const WORK_RAD: f64 = 0.1;
 /// … and never more than so many times what one solution may take.
 const WORK_OF_ONE: usize = 10;
+/// What is in no equilibrium after so many times that is taken as it is.
+const WORK_OF_RESORTS: usize = 4;
 /// How often a device that came to rest at the end of its way, but in no equilibrium, is let go on from there with the hand held still.
 const AGAIN: usize = 4;
 /// What moved by less than this in another last resort, in its least radii, is at rest.
@@ -94,19 +95,23 @@ impl<const C: usize> Workspace<C> {
         tools.work = Work::default();
         let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD).max(1.0);
-        let mut trials = Trials::new(((WORK * travel) as usize).min(WORK_OF_ONE.saturating_mul(most)));
+        let work = (WORK * travel) as usize;
+        let mut trials = Trials::new(work.min(WORK_OF_ONE.saturating_mul(most)), WORK_OF_RESORTS * work);
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
         let mut again = AGAIN;
         let thinnest_mm = surroundings.device.min_radius_mm();
-        let mut failure = Cow::from("the way is too long for one step");
         while done < 1.0 || (!balanced && again > 0) {
             // What has come to rest without an equilibrium at the end of its way goes on from there.
             again -= usize::from(done >= 1.0);
             let was = if moved { now.start() } else { Start { mesh, state: from } };
             let rest = 1.0 - done;
             let (effort, part) = trials.next(rest);
+            let at_start = environment.displaced(displaced.as_ref());
+            if effort != Effort::Usual {
+                tools.refuse_narrower(&at_start, was, &way.commands, FAR_TOO_LITTLE)?;
+            }
             // A rest that is rounding is none.
             let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
             way.at(to, hands);
@@ -128,7 +133,10 @@ impl<const C: usize> Workspace<C> {
             }
             let left = passage.map(|passage| (was, passage));
             let attempt = Attempt { hands, blocked, effort, left };
-            match tools.try_step(&there, here, attempt, next, &mut trials.budget) {
+            let iterations = tools.work.iterations;
+            let tried = tools.try_step(&there, here, attempt, next, &mut trials.budget);
+            trials.took(effort, tools.work.iterations - iterations);
+            match tried {
                 Ok(found) => {
                     sum.add(&found);
                     // At a crease of the wall forces are those of one side or the other and never in balance; where nothing moves
@@ -147,20 +155,21 @@ impl<const C: usize> Workspace<C> {
                 // From the same place the same comes of it.
                 Err(_) if done >= 1.0 => break,
                 Err(lost) => {
-                    failure = lost.reason;
                     trials.failed((effort, part), lost.astray);
+                    // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
+                    if trials.are_over() || sum.substeps > SUBSTEP_LIMIT {
+                        tools.refuse_narrower(&at_start, was, &way.commands, 1.0)?;
+                        return Err(Error::Computation(format!(
+                            "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {}",
+                            lost.reason
+                        )));
+                    }
                 }
-            }
-            // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
-            if done < 1.0 && (trials.are_over() || sum.substeps > SUBSTEP_LIMIT) {
-                tools.refuse_narrower(&environment.displaced(displaced.as_ref()), now, &way.commands)?;
-                return Err(Error::Computation(format!(
-                    "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {failure}"
-                )));
             }
         }
         if !balanced {
-            tools.refuse_narrower(&environment.displaced(displaced.as_ref()), now, &way.commands)?;
+            let there = environment.displaced(displaced.as_ref());
+            tools.refuse_narrower(&there, now.start(), &way.commands, 1.0)?;
         }
         let report = &mut now.parts().1.report;
         sum.write(report);

@@ -166,7 +166,7 @@ impl<const C: usize> Settle<C> {
                 });
                 supports.held::<C>().into_iter().flatten().for_each(|row| self.lu.hold(row));
                 if self.lu.factor().is_ok() {
-                    Self::answer(&self.lu, newton, elements, &mut self.step);
+                    Self::answer(&self.lu, newton, (elements, supports), &mut self.step);
                     let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
                     if turn <= LARGEST_TURN {
                         return Some((Self::length(elements, &self.step), sigma));
@@ -178,12 +178,20 @@ impl<const C: usize> Settle<C> {
         None
     }
 
-    /// Sets `step` to what the factored matrix answers to the assembled residual.
-    fn answer(lu: &BandLu<C>, newton: &Newton<C>, elements: &[ElementData], step: &mut Vec<f64>) {
+    /// Sets `step` to what the factored matrix answers to the assembled residual; what is held does not move, not by rounding either.
+    fn answer(
+        lu: &BandLu<C>,
+        newton: &Newton<C>,
+        (elements, supports): (&[ElementData], &Supports),
+        step: &mut Vec<f64>,
+    ) {
+        let rows = || supports.held::<C>().into_iter().flatten();
         let (residual, correction) = (&newton.assembly.residual, &newton.assembly.correction);
         step.clear();
         step.extend(residual.iter().zip(correction).map(|(r, c)| -(r + c)));
+        rows().for_each(|row| step[row] = 0.0);
         lu.solve(step);
+        rows().for_each(|row| step[row] = 0.0);
         Newton::<C>::restore_tensions(elements, step);
     }
 

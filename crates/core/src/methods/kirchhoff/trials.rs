@@ -3,7 +3,8 @@
 //! The whole command first, and a quarter where that finds nothing; what succeeds is followed by twice as much. Where attempts have gone
 //! astray twice, the way is likely to end in a fold: parts of it only come nearer to that, and what is beyond is far away. It is looked
 //! for once, over all that is left of the command and with patience. Where the budget is used up, or parts have become too small, the
-//! device is let come to rest as it can: as far as the command goes, then in parts, and in the end whatever comes of it.
+//! device is let come to rest as it can: as far as the command goes, then in parts, and in the end whatever comes of it. That takes no more
+//! than a few times the budget: in a jam every part may find an equilibrium, and the next one as hardly.
 
 use super::substep::{AT_REST, Effort};
 
@@ -19,6 +20,8 @@ const RESORTS: usize = 6;
 pub(super) struct Trials {
     /// Newton iterations that are left.
     pub(super) budget: usize,
+    /// Those that are left for last resorts.
+    for_resorts: usize,
     /// Most of the command that the next attempt is for.
     share: f64,
     /// Attempts that went astray.
@@ -28,9 +31,10 @@ pub(super) struct Trials {
 }
 
 impl Trials {
-    /// With a budget of so many Newton iterations.
-    pub(super) fn new(budget: usize) -> Self {
-        Self { budget, share: 1.0, astray: 0, failures: 0 }
+    /// With a budget of so many Newton iterations, and so many for last resorts, after which what one comes to is taken whatever is left
+    /// over.
+    pub(super) fn new(budget: usize, for_resorts: usize) -> Self {
+        Self { budget, for_resorts, share: 1.0, astray: 0, failures: 0 }
     }
 
     /// How hard the next attempt tries, and the part of the command that it is for where this `rest` of it is left: none where the device is
@@ -39,6 +43,9 @@ impl Trials {
         let resort = self.budget == 0 || self.share < LEAST_SHARE;
         if !resort && self.astray == ASTRAY {
             return (Effort::Patient, rest);
+        }
+        if self.for_resorts == 0 {
+            self.failures = self.failures.max(RESORTS);
         }
         // Where patience over all of it was in vain, the last resort begins with parts.
         if resort && (self.failures == RESORTS || (self.failures == 0 && self.astray <= ASTRAY)) {
@@ -53,6 +60,13 @@ impl Trials {
             _ => Effort::Resort(AT_REST),
         };
         (effort, rest.min(self.share))
+    }
+
+    /// An attempt has taken so many iterations.
+    pub(super) fn took(&mut self, effort: Effort, iterations: usize) {
+        if matches!(effort, Effort::Resort(_)) {
+            self.for_resorts = self.for_resorts.saturating_sub(iterations);
+        }
     }
 
     /// An attempt for this part has succeeded.
@@ -86,7 +100,7 @@ mod tests {
 
     #[test]
     fn what_goes_astray_twice_is_tried_with_patience_once() {
-        let mut trials = Trials::new(100);
+        let mut trials = Trials::new(100, 100);
         assert_eq!(trials.next(1.0), (Effort::Usual, 1.0));
         trials.failed((Effort::Usual, 1.0), true);
         assert_eq!(trials.next(1.0), (Effort::Usual, 0.25));
@@ -101,7 +115,7 @@ mod tests {
 
     #[test]
     fn what_is_no_step_of_the_command_asks_for_parts_alone() {
-        let mut trials = Trials::new(100);
+        let mut trials = Trials::new(100, 100);
         for part in [1.0, 0.25, 0.0625] {
             assert_eq!(trials.next(1.0), (Effort::Usual, part));
             trials.failed((Effort::Usual, part), false);
@@ -110,7 +124,7 @@ mod tests {
 
     #[test]
     fn the_last_resort_takes_what_is_out_of_balance_only_after_parts_and_all_of_it_in_the_end() {
-        let mut trials = Trials::new(0);
+        let mut trials = Trials::new(0, 100);
         assert_eq!(trials.next(1.0), (Effort::Resort(0.0), 1.0));
         for part in [1.0, 0.25, 0.0625, 0.015625, 0.00390625, 0.0009765625] {
             let (effort, tried) = trials.next(1.0);
@@ -124,8 +138,22 @@ mod tests {
     }
 
     #[test]
+    fn last_resorts_come_to_an_end_that_is_taken_as_it_is() {
+        let mut trials = Trials::new(0, 100);
+        for (took, expected) in [(60, 0.0), (60, 0.0), (0, f64::INFINITY)] {
+            let (effort, part) = trials.next(1.0);
+            assert_eq!((effort, part), (Effort::Resort(expected), 1.0));
+            trials.took(effort, took);
+            trials.succeeded(part);
+        }
+        let (effort, part) = trials.next(1.0);
+        trials.failed((effort, part), false);
+        assert!(trials.are_over());
+    }
+
+    #[test]
     fn after_patience_in_vain_the_last_resort_begins_with_parts() {
-        let mut trials = Trials::new(100);
+        let mut trials = Trials::new(100, 100);
         for (effort, part) in [(Effort::Usual, 1.0), (Effort::Usual, 0.25), (Effort::Patient, 1.0)] {
             assert_eq!(trials.next(1.0), (effort, part));
             trials.failed((effort, part), true);
