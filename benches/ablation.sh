@@ -3,17 +3,31 @@
 # insertions without them at the end of BENCHMARKS.md.
 #
 #     benches/ablation.sh [PATTERN]      (only parts whose line matches; prints the table and writes nothing)
+#     benches/ablation.sh --check        (only that every line has something to change)
 #
 # Every part is built from a copy of the sources in target/ablation and run in turn with the whole; figures are ratios to the whole,
 # times medians of REPEATS (5). What was measured is kept there, and a second run of the same commit goes on from it.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+# A line that changes nothing is an error.
+check() {
+  while IFS=$'\t' read -r what file change; do
+    case $what in '' | '#'*) continue ;; esac
+    if perl -pe "$change" "crates/core/src/$file" | cmp -s - "crates/core/src/$file"; then
+      echo "benches/ablation.tsv: $what: $file has nothing to change" >&2
+      exit 1
+    fi
+  done < benches/ablation.tsv
+}
+check
+if [ "${1:-}" = --check ]; then exit; fi
 pattern=${1:-} repeats=${REPEATS:-5}
 work=$PWD/target/ablation tree=$work/tree
 commit=$(git rev-parse --short HEAD)
 mkdir -p "$tree" "$work/$commit"
 # As a build on the way: whole and parts are built alike.
 export CARGO_TARGET_DIR=$work/build CARGO_PROFILE_RELEASE_LTO=off CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16
+export CARGO_PROFILE_RELEASE_INCREMENTAL=true
 build() {
   (cd "$tree" && cargo build -q --release -p endowire-benches --bin insertions) && cp "$work/build/release/insertions" "$1"
 }
@@ -29,7 +43,6 @@ while IFS=$'\t' read -r what file change; do
   source=$tree/crates/core/src/$file
   cp "$source" "$work/before"
   perl -pi -e "$change" "$source"
-  if cmp -s "$source" "$work/before"; then echo "$what: $file has nothing to change" >&2; exit 1; fi
   build "$work/part"
   cp "$work/before" "$source"
   for ((k = 0; k < repeats; k++)); do
