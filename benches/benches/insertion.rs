@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use endowire_core::contact::{FeltWall, SmoothWall};
+use endowire_core::contact::{ContactSurface, SmoothWall};
 use endowire_core::device::{Device, Instrument, Section, Stack};
 use endowire_core::insertion::{Command, Move, Sheath, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
@@ -71,7 +71,7 @@ fn felt_walls(c: &mut Criterion) {
         let Ok(made) = vessel(triangles) else { continue };
         group.bench_function(BenchmarkId::from_parameter(triangles), |b| {
             b.iter(|| {
-                FeltWall::new(&made.wall, (RADIUS_MM, RADIUS_MM), &WallProperties::default(), &NoStore)
+                ContactSurface::new(&made.wall, (RADIUS_MM, RADIUS_MM), &WallProperties::default(), &NoStore)
             });
         });
     }

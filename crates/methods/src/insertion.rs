@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use endowire_core::contact::FeltWall;
+use endowire_core::contact::ContactSurface;
 use endowire_core::contact::extension::left_through;
 use endowire_core::error::in_range;
 use endowire_core::insertion::{Command, Energy, StepReport, Surroundings, nodes_from_tip};
@@ -67,7 +67,7 @@ const PART_RADII: f64 = 2.0;
 pub struct Insertion {
     model: Arc<dyn RodModel>,
     options: InsertionOptions,
-    wall: Arc<FeltWall>,
+    wall: Arc<ContactSurface>,
     progress: Progress,
     shape: Shape,
     report: StepReport,
@@ -118,7 +118,7 @@ impl Insertion {
         let chain = Chain { start_mm: sheath.position_mm, direction: sheath.direction, ..Chain::default() };
         let progress = Progress { posture: chain.straight(), chain, from_tip_mm: vec![0.0] };
         let Surroundings { wall, stack, properties, .. } = surroundings;
-        let wall = FeltWall::new(wall, stack.radii_mm(), properties, store)?;
+        let wall = ContactSurface::new(wall, stack.radii_mm(), properties, store)?;
         let mut insertion = Self {
             model,
             options,

@@ -4,7 +4,7 @@
 //! same that `kirchhoff` feels, and so have the same limit.
 
 use endowire_core::Vec3;
-use endowire_core::contact::FeltWall;
+use endowire_core::contact::ContactSurface;
 use endowire_core::insertion::{Contact, Surroundings};
 
 use crate::{NodalLoad, Push};
@@ -25,7 +25,7 @@ struct Known {
 
 /// The wall as a load.
 pub(crate) struct WallLoad<'a> {
-    wall: &'a FeltWall,
+    wall: &'a ContactSurface,
     known: Vec<Known>,
     radii: Vec<f64>,
     /// Stiffness of the wall for the length of device that a node stands for, N/mm; the tip's cap included.
@@ -33,7 +33,11 @@ pub(crate) struct WallLoad<'a> {
 }
 
 impl<'a> WallLoad<'a> {
-    pub(crate) fn new(wall: &'a FeltWall, surroundings: &Surroundings<'_>, from_tip_mm: &[f64]) -> Self {
+    pub(crate) fn new(
+        wall: &'a ContactSurface,
+        surroundings: &Surroundings<'_>,
+        from_tip_mm: &[f64],
+    ) -> Self {
         let n = from_tip_mm.len() - 1;
         let radii: Vec<f64> =
             from_tip_mm.iter().map(|s| surroundings.device.section_at(*s).radius_mm).collect();

@@ -7,7 +7,7 @@
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result};
 use endowire_methods::Scene;
-use endowire_viewer::{DeviceView, Image, Moment, Pushed, Renderer, ViewSpec};
+use endowire_viewer::{DeviceView, FrameTime, Image, Pushed, Renderer, ViewSpec};
 
 use crate::session::{Delivered, Snapshot};
 
@@ -234,7 +234,7 @@ fn made<'a>(
     place.as_mut().map(|(_, renderer)| renderer).ok_or_else(none)
 }
 
-fn fluoro(renderer: &mut Renderer, views: &[DeviceView], moment: Moment) -> Result<Image> {
+fn fluoro(renderer: &mut Renderer, views: &[DeviceView], moment: FrameTime) -> Result<Image> {
     let image = renderer.render_at(views, moment)?.fluoro;
     image.ok_or_else(|| Error::parameter("view.views", "fluoro", "was not drawn"))
 }

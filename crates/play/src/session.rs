@@ -3,7 +3,7 @@
 use endowire_core::insertion::{InstrumentReport, Script, Simulation};
 use endowire_core::shape::Shape;
 use endowire_core::{Error, PhysicalEnd, Result};
-use endowire_viewer::{ContactView, Moment, ViewSpec};
+use endowire_viewer::{ContactView, FrameTime, ViewSpec};
 
 use crate::TICKS_PER_S;
 use crate::demonstration::{Demonstration, Next};
@@ -46,7 +46,7 @@ pub struct Snapshot {
     /// The room.
     pub lab: Lab,
     /// Number and time of the frame.
-    pub moment: Moment,
+    pub moment: FrameTime,
     /// What is read.
     pub readout: Readout,
 }
@@ -370,7 +370,7 @@ impl Session {
             inserted_mm: report.lengths_mm(),
             contacts: report.contacts.iter().map(contact).collect(),
             lab: self.lab.clone(),
-            moment: Moment { frame, time_s: self.time_s() },
+            moment: FrameTime { frame, time_s: self.time_s() },
             readout: self.readout(),
         }
     }

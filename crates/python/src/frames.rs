@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use endowire_core::Vec3;
 use endowire_core::vessel::Wall;
-use endowire_viewer::{self as viewer, DevicePart, Image, Moment, PixelFormat, ViewSpec};
+use endowire_viewer::{self as viewer, DevicePart, FrameTime, Image, PixelFormat, ViewSpec};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -115,7 +115,7 @@ impl Renderer {
                 None => renderer.render(&views),
                 Some(frame) => {
                     let time_s = frame as f64 / renderer.spec().frames_per_s;
-                    renderer.render_at(&views, Moment { frame, time_s })
+                    renderer.render_at(&views, FrameTime { frame, time_s })
                 }
             })
             .map_err(exception)?;

@@ -12,7 +12,7 @@ use crate::error::{InputError, exception};
 use crate::report::StepReport;
 
 /// The first bytes of a saved state, which is sealed.
-const FORMAT: &[u8] = b"endowire.State 4\n";
+const FORMAT: &[u8] = b"endowire.State 5\n";
 
 /// All that the next step of a simulation depends on, beside what surrounds the instruments.
 ///

@@ -1,8 +1,8 @@
 //! C6: a wire drawn over the inner wall of a 180° bend, as over a capstan (Euler, Eytelwein).
 
 use super::Row;
-use super::bench::{Bench, Setup};
 use super::insertion::Tube;
+use super::test_rod::{Setup, TestRod};
 use endowire_core::insertion::WallProperties;
 use endowire_core::rod::Frame;
 use endowire_core::{Result, Vec3};
@@ -47,16 +47,16 @@ pub(super) fn drawn(properties: &WallProperties, edge_mm: f64) -> Result<(f64, f
     };
     let first = Frame::new(Vec3::x(), Some(Vec3::y()));
     let along = |s: f64| first.transported(((s - STRAIGHT) / BEND).clamp(0.0, PI), 0.0);
-    let mut bench = Bench::on_wall(&wall, properties, &setup, Vec3::zeros(), along)?;
-    bench.tolerance = 1e-8;
-    bench.loads.forces = vec![(bench.elements().len(), Vec3::x() * -PULL)];
+    let mut rod = TestRod::on_wall(&wall, properties, &setup, Vec3::zeros(), along)?;
+    rod.tolerance = 1e-8;
+    rod.loads.forces = vec![(rod.elements().len(), Vec3::x() * -PULL)];
     // First at rest without friction, on walls that become harder; then drawn.
     for softness in [1e-3, 1e-2, 0.1, 1.0] {
-        bench.softness = softness;
-        bench.solve()?;
+        rod.softness = softness;
+        rod.solve()?;
     }
-    bench.slide(properties.largest_friction(), -DRAWN)?;
-    let clamp = bench.clamp();
+    rod.slide(properties.largest_friction(), -DRAWN)?;
+    let clamp = rod.clamp();
     let force = clamp.force.norm();
     // The wire is pulled one way at the clamp and the same way at the tip: it has turned by 180° less the angle between.
     let angle = PI - (clamp.force / force).dot(&-Vec3::x()).clamp(-1.0, 1.0).acos();

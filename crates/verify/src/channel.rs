@@ -1,6 +1,6 @@
 //! A rod between flat walls.
 
-use super::bench::{Bench, Setup};
+use super::test_rod::{Setup, TestRod};
 use endowire_core::insertion::{WallProperties, WallRegion};
 use endowire_core::rod::Frame;
 use endowire_core::vessel::{SurfaceMesh, Wall};
@@ -13,7 +13,7 @@ const PLATES: f64 = 1e3;
 ///
 /// Two rigid plates without play hold the nodes in the plane z = 0: flat walls alone leave a buckled rod free to turn about
 /// its axis and escape. In the plane they do nothing.
-pub(super) fn channel(setup: &Setup, heights: [f64; 2]) -> Result<Bench> {
+pub(super) fn channel(setup: &Setup, heights: [f64; 2]) -> Result<TestRod> {
     with_regions(setup, heights, 0.25 * setup.length, Vec::new())
 }
 
@@ -23,7 +23,7 @@ pub(super) fn with_regions(
     [floor, ceiling]: [f64; 2],
     cell: f64,
     region: Vec<WallRegion>,
-) -> Result<Bench> {
+) -> Result<TestRod> {
     let (length, radius) = (setup.length, setup.radius);
     // So far away that no edge of the box is felt: each of three steps (the edge is drawn in, vertices reach there, points
     // feel these vertices) reaches at most a diagonal and a half of a cell.
@@ -39,8 +39,8 @@ pub(super) fn with_regions(
         ..WallProperties::default()
     };
     let straight = Frame::new(Vec3::x(), Some(Vec3::y()));
-    let mut bench = Bench::on_wall(&wall, &properties, setup, Vec3::zeros(), |_| straight)?;
-    let h = bench.elements()[0].length;
-    bench.plates = PLATES * setup.bending / (h * h * h);
-    Ok(bench)
+    let mut rod = TestRod::on_wall(&wall, &properties, setup, Vec3::zeros(), |_| straight)?;
+    let h = rod.elements()[0].length;
+    rod.plates = PLATES * setup.bending / (h * h * h);
+    Ok(rod)
 }

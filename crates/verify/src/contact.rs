@@ -1,7 +1,7 @@
 //! Part C on flat walls: the elastica in a channel, and the compliant wall.
 
-use super::bench::{Bench, Setup};
 use super::channel::channel;
+use super::test_rod::{Setup, TestRod};
 use super::{Row, observed_order};
 use endowire_core::rod::RodState;
 use endowire_core::{Error, Result, Vec3};
@@ -27,7 +27,7 @@ struct Squeezed {
 
 /// C2: a clamped-clamped rod of length and stiffness 1 under an axial load between walls. It is symmetric, so this is its first
 /// half: clamped at one end, guided at the other, which stands for the middle.
-struct Elastica(Bench);
+struct Elastica(TestRod);
 
 impl Elastica {
     /// `elements` to the whole length.
@@ -105,8 +105,8 @@ impl Elastica {
 }
 
 /// Sum of the wall's forces on the rod.
-fn wall_force(bench: &mut Bench) -> Vec3 {
-    bench.touches().iter().map(|(_, touch)| touch.contact.normal * touch.contact.force_n).sum()
+fn wall_force(rod: &mut TestRod) -> Vec3 {
+    rod.touches().iter().map(|(_, touch)| touch.contact.normal * touch.contact.force_n).sum()
 }
 
 pub(super) fn elastica() -> Result<Vec<Row>> {
@@ -160,7 +160,7 @@ const MODULUS: f64 = 1.0;
 const PRESSED: f64 = 0.02;
 
 /// C6: a rod pressed into a soft floor by its weight, `elements` of them in `length` mm.
-fn pressed(elements: usize, length: f64) -> Result<Bench> {
+fn pressed(elements: usize, length: f64) -> Result<TestRod> {
     let setup = Setup { length, bending: BENDING, radius: WIRE_RADIUS, elements, modulus: MODULUS };
     let mut channel = channel(&setup, [PRESSED - WIRE_RADIUS, 10.0])?;
     channel.loads.distributed = vec![(0, elements, Vec3::y() * -(MODULUS * PRESSED))];

@@ -2,8 +2,8 @@
 //! a horizontal cylinder, and friction along the helix. In units of EI and r.
 
 use super::Row;
-use super::bench::{Bench, Setup};
 use super::contact::falling;
+use super::test_rod::{Setup, TestRod};
 use endowire_core::rod::{Frame, PLAIN, element_energy};
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Result, Vec3};
@@ -60,7 +60,7 @@ const SOFTEST: f64 = 100.0;
 /// A rod wound into `turns` turns of about `angle` by the thrust that belongs to it: clamped at its start along the helix,
 /// otherwise free, so no moment about the cylinder's axis acts. What the ends disturb decays by a factor of 10⁴ in a turn.
 struct Helix {
-    bench: Bench,
+    rod: TestRod,
     turns: usize,
     per_turn: usize,
 }
@@ -93,20 +93,20 @@ impl Helix {
         let setup = Setup { length, bending: 1.0, radius: RADIUS, elements, modulus };
         let start = on_helix(0.0, angle).0;
         let shape = |s: f64| Frame::new(on_helix(s * sine, angle).1, None);
-        let mut bench = Bench::new(&cylinder(length, around)?, &setup, start, shape)?;
-        bench.tolerance = 1e-8;
-        bench.loads.forces = vec![(elements, Vec3::x() * -thrust(sine * sine))];
+        let mut rod = TestRod::new(&cylinder(length, around)?, &setup, start, shape)?;
+        rod.tolerance = 1e-8;
+        rod.loads.forces = vec![(elements, Vec3::x() * -thrust(sine * sine))];
         // A wall into which it presses itself by more than a hundredth of the play holds no helix: it winds up and folds.
         for softness in [(SOFTEST / hardness).max(0.1), 1.0] {
-            bench.softness = softness;
-            bench.solve()?;
+            rod.softness = softness;
+            rod.solve()?;
         }
-        Ok(Self { bench, turns, per_turn })
+        Ok(Self { rod, turns, per_turn })
     }
 
     /// Arc lengths where turn `k` begins and ends, just before the nodes there.
     fn range(&self, k: usize) -> [f64; 2] {
-        let h = self.bench.elements()[0].length;
+        let h = self.rod.elements()[0].length;
         [k, k + 1].map(|k| h * ((self.per_turn * k) as f64 - 1e-6))
     }
 
@@ -114,10 +114,10 @@ impl Helix {
     fn middle(&mut self) -> Turn {
         let k = self.turns / 2;
         let [from, to] = self.range(k);
-        let touches = self.bench.touches();
+        let touches = self.rod.touches();
         let inside = touches.iter().filter(|(s, _)| *s > from && *s < to);
         let force: f64 = inside.map(|(_, touch)| touch.contact.force_n).sum();
-        let (elements, state) = (self.bench.elements(), &self.bench.state);
+        let (elements, state) = (self.rod.elements(), &self.rod.state);
         let range = self.per_turn * k..self.per_turn * (k + 1);
         let mean =
             |value: &dyn Fn(usize) -> f64| range.clone().map(value).sum::<f64>() / self.per_turn as f64;
@@ -135,10 +135,10 @@ impl Helix {
     /// Thrust in the rod where turn `k` begins.
     fn thrust_at(&mut self, k: usize) -> f64 {
         let [end, _] = self.range(k);
-        let touches = self.bench.touches();
+        let touches = self.rod.touches();
         let before = touches.iter().filter(|(s, _)| *s < end).map(|(_, touch)| touch.contact);
         let wall: f64 = before.map(|c| (c.normal * c.force_n + c.friction_n).x).sum();
-        self.bench.clamp().force.x + wall
+        self.rod.clamp().force.x + wall
     }
 }
 
@@ -146,8 +146,8 @@ impl Helix {
 fn helix_rows(name: &str, fine: Fineness, angle: f64) -> Result<[Row; 3]> {
     let mut helix = Helix::new(fine, angle, 3)?;
     let Turn { sine2, pressure, .. } = helix.middle();
-    let clamp = helix.bench.clamp();
-    let push = clamp.push_force(&helix.bench.state.frames[0].t, 1.0, 1.0, &Vec3::zeros());
+    let clamp = helix.rod.clamp();
+    let push = clamp.push_force(&helix.rod.state.frames[0].t, 1.0, 1.0, &Vec3::zeros());
     // n·t and the moment of a helix are −F cos α − EI sin⁴α/r² and EI sin²α/r, and the push force is the same along the rod.
     let (drive, bound) = (thrust(sine2) * (1.0 - sine2).sqrt() + 0.5 * sine2 * sine2, 1e-3);
     Ok([
@@ -183,13 +183,13 @@ fn snaking(length: f64, around: u32, weight: f64) -> Result<f64> {
     // As deep as its weight presses it.
     let start = Vec3::y() * -(1.0 + weight / FLOOR);
     let along = Frame::new(Vec3::x(), None);
-    let mut bench = Bench::new(&cylinder(length, around)?, &setup, start, |_| along)?;
-    bench.loads.distributed = vec![(0, elements, Vec3::y() * -weight)];
-    bench.supports.start_tangent = false;
-    bench.supports.end_directions = vec![Vec3::y(), Vec3::z()];
-    bench.supports.end_position = start + Vec3::x() * length;
-    bench.solve()?;
-    Ok(bench.buckling_load(8.0))
+    let mut rod = TestRod::new(&cylinder(length, around)?, &setup, start, |_| along)?;
+    rod.loads.distributed = vec![(0, elements, Vec3::y() * -weight)];
+    rod.supports.start_tangent = false;
+    rod.supports.end_directions = vec![Vec3::y(), Vec3::z()];
+    rod.supports.end_position = start + Vec3::x() * length;
+    rod.solve()?;
+    Ok(rod.buckling_load(8.0))
 }
 
 /// F/√(EI w/r) of a helix without weight, for the weight w that would lift its energy to that of the straight rod at the bottom.
@@ -199,7 +199,7 @@ fn snaking(length: f64, around: u32, weight: f64) -> Result<f64> {
 /// helix uneven: minimised over its shape too, the energy vanishes 1.34 % earlier, at 2.79043 √(EI w/r).
 fn winding(angle: f64) -> Result<f64> {
     let mut helix = Helix::new(Fineness { elements: 32, around: 48, hardness: 1e3 }, angle, 3)?;
-    let load = helix.bench.clamp().force.x;
+    let load = helix.rod.clamp().force.x;
     let turn = helix.middle();
     Ok(load / ((load * turn.shortening - turn.bending) / turn.height).sqrt())
 }
@@ -242,7 +242,7 @@ struct Pushed {
 impl Pushed {
     fn new(angle: f64, friction: f64) -> Result<Self> {
         let mut helix = Helix::new(Fineness { elements: 16, around: 32, hardness: 1e3 }, angle, 7)?;
-        helix.bench.slide(friction, 0.1)?;
+        helix.rod.slide(friction, 0.1)?;
         let length = helix.range(6)[0] - helix.range(1)[0];
         let thrust = [helix.thrust_at(1), helix.thrust_at(6), thrust(angle.sin().powi(2))];
         Ok(Self { thrust, friction: 0.25 * friction * length })

@@ -4,7 +4,6 @@
 //! rods, that of insertions ([`insertion_stress`]), random commands on several instruments ([`instrument_stress`]), the insertions into the [`surfaces`] of a folder, and the exact test for a device
 //! that [crosses](crossing) its wall.
 
-mod bench;
 mod capstan;
 mod capstan_within;
 mod channel;
@@ -25,6 +24,7 @@ mod regions;
 mod spatial;
 pub mod stress;
 pub mod surfaces;
+mod test_rod;
 mod turned_within;
 mod whip;
 

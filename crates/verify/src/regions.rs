@@ -11,10 +11,10 @@
 //! needs e^{μφ} times the force.
 
 use super::Row;
-use super::bench::Setup;
 use super::capstan::{BEND, PLAY, RADIUS, STRAIGHT, drawn, rigid};
 use super::channel::with_regions;
 use super::contact::falling;
+use super::test_rod::Setup;
 use endowire_core::insertion::{WallProperties, WallRegion};
 use endowire_core::{Result, Vec3};
 

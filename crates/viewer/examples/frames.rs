@@ -8,8 +8,8 @@ use std::time::Instant;
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Result, Vec3};
 use endowire_viewer::{
-    Angiogram, Animation, Backend, CArmSpec, DevicePart, DevicePoint, DeviceView, InjectionSpec, Material,
-    Mode, Moment, Pace, Renderer, TorsoSpec, View, ViewSpec,
+    Angiogram, Animation, Backend, CArmSpec, DevicePart, DevicePoint, DeviceView, FrameTime, InjectionSpec,
+    Material, Mode, Pace, Renderer, TorsoSpec, View, ViewSpec,
 };
 
 /// A catheter up the descending aorta, its tip in the arch, and a wire that sticks out of it.
@@ -94,7 +94,7 @@ fn main() -> Result<()> {
         let mut renderer = Renderer::new(&spec, &wall)?;
         let prepared = start.elapsed();
         let start = Instant::now();
-        let frames = renderer.render_at(&devices, Moment { frame: 1, time_s })?;
+        let frames = renderer.render_at(&devices, FrameTime { frame: 1, time_s })?;
         println!(
             "{name}: {} prepared in {prepared:.1?}, first frame {:.1?}",
             renderer.backend(),
@@ -112,7 +112,7 @@ fn main() -> Result<()> {
     let mut renderer = Renderer::new(&spec, &wall)?;
     let mut series = Vec::new();
     for frame in 0..45 {
-        series.extend(renderer.render_at(&devices, Moment { frame, time_s: frame as f64 / 15.0 })?.fluoro);
+        series.extend(renderer.render_at(&devices, FrameTime { frame, time_s: frame as f64 / 15.0 })?.fluoro);
     }
     if let (Some(first), Some(c_arm), Some(exposure)) =
         (series.first(), renderer.c_arm(), renderer.exposure())

@@ -9,7 +9,7 @@ use std::time::Instant;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_core::{Result, Vec3};
 use endowire_viewer::{
-    Backend, CArmSpec, DevicePoint, DeviceView, Moment, Renderer, TorsoSpec, View, ViewSpec, XRaySpec,
+    Backend, CArmSpec, DevicePoint, DeviceView, FrameTime, Renderer, TorsoSpec, View, ViewSpec, XRaySpec,
 };
 
 const RADIUS_MM: f64 = 30.0;
@@ -129,7 +129,7 @@ fn main() -> Result<()> {
         let mut renderer = Renderer::new(&moving, &sphere(71))?;
         let pose_ms = cpu_ms(start) - before;
         let ms = mean_ms(|k| {
-            let moment = Moment { frame: u64::from(k), time_s: 0.0 };
+            let moment = FrameTime { frame: u64::from(k), time_s: 0.0 };
             renderer.render_at(&[wire(k)], moment).map(drop)
         })?;
         println!(

@@ -54,7 +54,7 @@ mod xray;
 pub use c_arm::CArm;
 pub use device::{DevicePart, DevicePoint, DeviceView};
 pub use device_file::{device_parts, section_parts};
-pub use fluoro::Moment;
+pub use fluoro::FrameTime;
 pub use material::Material;
 pub use output::{
     Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, Pace, PartLabel, PixelFormat,

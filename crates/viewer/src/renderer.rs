@@ -11,7 +11,7 @@ use crate::c_arm::CArm;
 use crate::cpu;
 use crate::device::{DeviceView, RefinedDevice};
 use crate::engine::{Engines, PathEngine};
-use crate::fluoro::{Afterglow, Anatomy, Fluoroscope, Kept, Moment, Sequence, labels};
+use crate::fluoro::{Afterglow, Anatomy, Fluoroscope, FrameTime, Kept, Sequence, labels};
 use crate::gpu;
 use crate::output::{Image, Labels};
 use crate::scene::Setup;
@@ -112,7 +112,7 @@ impl Renderer {
     /// As [`Self::render_at`].
     pub fn render(&mut self, devices: &[DeviceView]) -> Result<Frames> {
         let frame = self.next_frame;
-        let moment = Moment { frame, time_s: frame as f64 / self.setup.spec.frames_per_s };
+        let moment = FrameTime { frame, time_s: frame as f64 / self.setup.spec.frames_per_s };
         self.render_at(devices, moment)
     }
 
@@ -122,7 +122,7 @@ impl Renderer {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a device with values that are not finite, a time that is not, or a roadmap without an injection.
-    pub fn render_at(&mut self, devices: &[DeviceView], moment: Moment) -> Result<Frames> {
+    pub fn render_at(&mut self, devices: &[DeviceView], moment: FrameTime) -> Result<Frames> {
         self.render_pulse(devices, &[], moment)
     }
 
@@ -135,7 +135,7 @@ impl Renderer {
         &mut self,
         devices: &[DeviceView],
         pulse: &[Vec<DeviceView>],
-        moment: Moment,
+        moment: FrameTime,
     ) -> Result<Frames> {
         if !moment.time_s.is_finite() {
             return Err(Error::parameter("time_s", moment.time_s, "must be finite"));

@@ -14,8 +14,8 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_viewer::{
-    Backend, ContactView, DevicePart, DeviceView, ExposureSpec, Image, InjectionSpec, Material, Mode, Moment,
-    Renderer, TorsoSpec, View, ViewSpec,
+    Backend, ContactView, DevicePart, DeviceView, ExposureSpec, FrameTime, Image, InjectionSpec, Material,
+    Mode, Renderer, TorsoSpec, View, ViewSpec,
 };
 
 /// Grey levels that mathematical libraries may differ by, and the share of pixels that may differ by more.
@@ -74,7 +74,7 @@ fn catheter() -> DeviceView {
 
 fn draw(mut renderer: Renderer, device: DeviceView) -> [Image; 2] {
     renderer.show_contacts(&[ContactView { position_mm: Vec3::new(1.0, 2.0, 90.0), force_n: Vec3::x() }]);
-    let frames = renderer.render_at(&[device], Moment { frame: 3, time_s: 1.6 }).unwrap();
+    let frames = renderer.render_at(&[device], FrameTime { frame: 3, time_s: 1.6 }).unwrap();
     [frames.fluoro.unwrap(), frames.three_d.unwrap()]
 }
 
@@ -146,7 +146,7 @@ fn of_sequences(twin: bool) -> Vec<(String, Image)> {
     let mut pictures = Vec::new();
     let mut add = |name: &str, image: Image| pictures.push((format!("{name}.png"), image));
     let frame = |renderer: &mut Renderer, aside_mm: f64, frame: u64| {
-        let moment = Moment { frame, time_s: 1.6 };
+        let moment = FrameTime { frame, time_s: 1.6 };
         renderer.render_at(&[wire(aside_mm)], moment).unwrap().fluoro.unwrap()
     };
 
@@ -168,7 +168,7 @@ fn of_sequences(twin: bool) -> Vec<(String, Image)> {
     // 2 mm aside while the beam is on: wide and faint.
     let last = if twin { 1 } else { 8 };
     let pulse: Vec<_> = (0..last).map(|k| vec![wire(2.0 * f64::from(k) / 8.0)]).collect();
-    let moment = Moment { frame: 3, time_s: 1.6 };
+    let moment = FrameTime { frame: 3, time_s: 1.6 };
     add("pulse", near().render_pulse(&[wire(0.0)], &pulse, moment).unwrap().fluoro.unwrap());
 
     // A thick patient: more voltage, less contrast.

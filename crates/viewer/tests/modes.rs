@@ -8,7 +8,7 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree};
 use endowire_viewer::{
-    Backend, DetectorSpec, DeviceView, Image, InjectionSpec, Material, Mode, Moment, Renderer, TorsoSpec,
+    Backend, DetectorSpec, DeviceView, FrameTime, Image, InjectionSpec, Material, Mode, Renderer, TorsoSpec,
     ViewSpec,
 };
 
@@ -49,8 +49,8 @@ fn grey(image: &Image, x: std::ops::Range<u32>, y: std::ops::Range<u32>) -> f64 
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-fn at(frame: u64, time_s: f64) -> Moment {
-    Moment { frame, time_s }
+fn at(frame: u64, time_s: f64) -> FrameTime {
+    FrameTime { frame, time_s }
 }
 
 #[test]

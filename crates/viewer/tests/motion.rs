@@ -8,7 +8,7 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::motion::{Around, MotionMode, VesselMotion, Waveform};
 use endowire_core::vessel::{Displacement, SurfaceMesh};
-use endowire_viewer::{Backend, DetectorSpec, Mode, Moment, Renderer, TorsoSpec, View, ViewSpec};
+use endowire_viewer::{Backend, DetectorSpec, FrameTime, Mode, Renderer, TorsoSpec, View, ViewSpec};
 
 /// 5 mm along x, of the upper half alone.
 fn displacement() -> Displacement {
@@ -52,7 +52,7 @@ fn the_beam_meets_the_vessel_where_it_is_and_back_at_rest_all_is_as_before() {
     elsewhere.vertices_mm.iter_mut().for_each(|v| *v = moved.place(v));
     let view = view(Mode::Fluoro);
     let mut renderer = Renderer::new(&view, &wall).unwrap();
-    let at = |frame: u64| Moment { frame, time_s: 0.0 };
+    let at = |frame: u64| FrameTime { frame, time_s: 0.0 };
     let (rest, first) = (renderer.path_lengths(&[]).unwrap(), renderer.render_at(&[], at(0)).unwrap());
     renderer.move_vessel(Some(&moved)).unwrap();
     let now = renderer.path_lengths(&[]).unwrap();
@@ -75,7 +75,7 @@ fn a_subtraction_shows_by_how_much_the_vessel_is_elsewhere_than_in_its_mask() {
     view.xray.window = Some([-1.0, 1.0]);
     let mut renderer = Renderer::new(&view, &vessel()).unwrap();
     let off = |renderer: &mut Renderer, rows: std::ops::Range<u32>, frame: u64| {
-        let image = renderer.render_at(&[], Moment { frame, time_s: 0.0 }).unwrap().fluoro.unwrap();
+        let image = renderer.render_at(&[], FrameTime { frame, time_s: 0.0 }).unwrap().fluoro.unwrap();
         let grey = |x: u32, y: u32| f64::from(image.pixel(x, y).unwrap()[0]);
         let background = grey(5, 5);
         let pixels = rows.flat_map(|y| (0..160).map(move |x| (x, y)));
@@ -108,7 +108,7 @@ fn the_air_of_a_body_goes_with_its_vessel_and_bones_and_skin_stay() {
     let breath = VesselMotion::new(&[breath]).unwrap().unwrap().at(0.0);
     let mut renderer = Renderer::new(&view, &vessel()).unwrap();
     let rest = renderer.path_lengths(&[]).unwrap();
-    let still = renderer.render_at(&[], Moment { frame: 0, time_s: 0.0 }).unwrap().fluoro.unwrap();
+    let still = renderer.render_at(&[], FrameTime { frame: 0, time_s: 0.0 }).unwrap().fluoro.unwrap();
     renderer.move_vessel(Some(&breath)).unwrap();
     let now = renderer.path_lengths(&[]).unwrap();
     assert_eq!(now.bone_mm, rest.bone_mm);
@@ -122,7 +122,7 @@ fn the_air_of_a_body_goes_with_its_vessel_and_bones_and_skin_stay() {
     let [from, to] = [60.0, 50.0].map(|z| c_arm.project(&Vec3::new(0.0, 0.0, z))[1]);
     let shift = lowest(&now.lung_mm) - lowest(&rest.lung_mm);
     assert!((shift - (to - from)).abs() < 2.0, "{shift} {}", to - from);
-    let moved = renderer.render_at(&[], Moment { frame: 0, time_s: 0.0 }).unwrap().fluoro.unwrap();
+    let moved = renderer.render_at(&[], FrameTime { frame: 0, time_s: 0.0 }).unwrap().fluoro.unwrap();
     assert_ne!(still, moved);
     // Its picture is that of the moved surfaces, whether they moved before or after the first frame.
     let mut fresh = Renderer::new(&view, &vessel()).unwrap();

@@ -8,7 +8,7 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::SurfaceMesh;
 use endowire_viewer::{
-    Backend, CArmSpec, DetectorSpec, DeviceView, ExposureSpec, Mode, Moment, Renderer, TorsoSpec, View,
+    Backend, CArmSpec, DetectorSpec, DeviceView, ExposureSpec, FrameTime, Mode, Renderer, TorsoSpec, View,
     ViewSpec,
 };
 
@@ -34,7 +34,7 @@ fn wire(aside_mm: f64) -> DeviceView {
 }
 
 fn line_integrals(renderer: &mut Renderer, pulse: &[Vec<DeviceView>]) -> Vec<f64> {
-    let frames = renderer.render_pulse(&[wire(0.0)], pulse, Moment::default()).unwrap();
+    let frames = renderer.render_pulse(&[wire(0.0)], pulse, FrameTime::default()).unwrap();
     let image = frames.fluoro.unwrap();
     let words = image.data().chunks_exact(2).map(|b| f64::from(u16::from_be_bytes([b[0], b[1]])));
     words.map(|word| WINDOW[1] - (WINDOW[1] - WINDOW[0]) * word / 65_535.0).collect()

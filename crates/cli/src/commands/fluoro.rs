@@ -6,7 +6,7 @@ use endowire_core::insertion::{Script, Simulation};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, VesselMotion};
 use endowire_methods::Scene;
-use endowire_viewer::{ContactView, Moment};
+use endowire_viewer::{ContactView, FrameTime};
 
 use super::studio::{Plan, Still, Studio};
 use crate::args::{FluoroArgs, ViewChoice};
@@ -55,7 +55,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     let mut studio = Studio::new(plan, wall, injections).map_err(|e| e.at(args.scene.display()))?;
     for k in 0..frames {
         let time_s = args.time + k as f64 / frames_per_s;
-        let moment = Moment { frame: k as u64, time_s };
+        let moment = FrameTime { frame: k as u64, time_s };
         studio.draw(&Still {
             name: format!("frame_{k:06}"),
             moment,

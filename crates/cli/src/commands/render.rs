@@ -2,7 +2,7 @@
 
 use endowire_core::vessel::VesselMotion;
 use endowire_methods::Scene;
-use endowire_viewer::{Moment, Seen};
+use endowire_viewer::{FrameTime, Seen};
 
 use super::studio::{Plan, Still, Studio};
 use crate::args::{RenderArgs, ViewChoice};
@@ -68,7 +68,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let one = steps.len() == 1 && frames > 1;
     let moment = |k: usize| {
         let (step, later) = if one { (steps[0], k) } else { (steps[k], 0) };
-        Moment { frame: (step + later) as u64, time_s: ended_s(step) + later as f64 * frame_s }
+        FrameTime { frame: (step + later) as u64, time_s: ended_s(step) + later as f64 * frame_s }
     };
     let plan = plan.at(&(0..frames).map(|k| moment(k).time_s).collect::<Vec<_>>());
     let injections = injections::read(&args.dir)?;

@@ -8,7 +8,7 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::{VesselMotion, Wall};
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
-use endowire_viewer::{Exposure, Moment, Pushed, Renderer, Seen, View, ViewSpec};
+use endowire_viewer::{Exposure, FrameTime, Pushed, Renderer, Seen, View, ViewSpec};
 use serde::Serialize;
 
 use super::injections::Injected;
@@ -164,7 +164,7 @@ impl FrameWriter {
             self.planes.iter_mut().try_for_each(|plane| plane.move_vessel(Some(&displacement)))?;
         }
         let views = self.pushed.views(shape, inserted_mm);
-        let moment = Moment { frame: step as u64, time_s };
+        let moment = FrameTime { frame: step as u64, time_s };
         let before = self.before.as_ref();
         let before = before.map(|b| Seen { shape: &b.shape, inserted_mm: &b.inserted_mm, time_s: b.time_s });
         for (plane, names) in self.planes.iter_mut().zip([["3d", "fluoro"], ["3d_b", "fluoro_b"]]) {

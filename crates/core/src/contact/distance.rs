@@ -38,8 +38,8 @@ use std::ops::Range;
 
 use nalgebra::Matrix3;
 
-use super::fit::{Neighbours, fit};
 use super::quadric::Quadric;
+use super::quadric_fit::{Neighbours, fit};
 use crate::products::{outer, product, times};
 use crate::vessel::{SurfaceMesh, Wall, inward_vertex_normals};
 use crate::{Vec3, parallel};

@@ -30,7 +30,7 @@ mod between;
 mod coupling;
 mod moving;
 
-pub use between::{Between, Place, Rub};
+pub use between::{Between, InnerFriction, Place};
 pub use coupling::Coupling;
 
 use nalgebra::Matrix3;

@@ -29,8 +29,8 @@
 use std::ops::Deref;
 
 use super::distance::Nearness;
-use super::grading::Stiffness;
-use super::{Distance, FeltWall};
+use super::regions::Stiffness;
+use super::{ContactSurface, Distance};
 use crate::Vec3;
 use crate::products::outer;
 use crate::vessel::motion::{Displacement, Local};
@@ -39,29 +39,29 @@ use nalgebra::Matrix3;
 /// The felt wall where its vessel is at one time. What it says of itself by [`Deref`] is of the reference.
 #[derive(Debug, Clone, Copy)]
 pub struct MovedWall<'a> {
-    felt: &'a FeltWall,
+    surface: &'a ContactSurface,
     displacement: Option<&'a Displacement>,
 }
 
-impl<'a> From<&'a FeltWall> for MovedWall<'a> {
+impl<'a> From<&'a ContactSurface> for MovedWall<'a> {
     /// The wall of a vessel at rest.
-    fn from(felt: &'a FeltWall) -> Self {
-        Self { felt, displacement: None }
+    fn from(surface: &'a ContactSurface) -> Self {
+        Self { surface, displacement: None }
     }
 }
 
 impl Deref for MovedWall<'_> {
-    type Target = FeltWall;
+    type Target = ContactSurface;
 
-    fn deref(&self) -> &FeltWall {
-        self.felt
+    fn deref(&self) -> &ContactSurface {
+        self.surface
     }
 }
 
 impl<'a> MovedWall<'a> {
     /// The wall displaced.
-    pub fn new(felt: &'a FeltWall, displacement: Option<&'a Displacement>) -> Self {
-        Self { felt, displacement }
+    pub fn new(surface: &'a ContactSurface, displacement: Option<&'a Displacement>) -> Self {
+        Self { surface, displacement }
     }
 
     /// The material point that is at `x`.
@@ -85,14 +85,14 @@ impl<'a> MovedWall<'a> {
         self.displacement.map_or(1.0, Displacement::stretch)
     }
 
-    /// As [`FeltWall::nearness`] of a material point, with the distance in space.
+    /// As [`ContactSurface::nearness`] of a material point, with the distance in space.
     pub(super) fn nearness(&self, material: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
         let Some(displacement) = self.displacement else {
-            return self.felt.nearness(material, triangle, limit_mm);
+            return self.surface.nearness(material, triangle, limit_mm);
         };
         // The value in space takes the gradient in the reference.
-        let wanted_mm = limit_mm.max(self.felt.reach_mm) * displacement.stretch();
-        match self.felt.nearness(material, triangle, wanted_mm) {
+        let wanted_mm = limit_mm.max(self.surface.reach_mm) * displacement.stretch();
+        match self.surface.nearness(material, triangle, wanted_mm) {
             Nearness::Beyond(value_mm) => Nearness::Beyond(value_mm / displacement.stretch()),
             Nearness::Within(distance) => {
                 let moved = moved(&distance, &displacement.local(material));
@@ -105,9 +105,9 @@ impl<'a> MovedWall<'a> {
         }
     }
 
-    /// As [`FeltWall::stiffness`] of a material point, with derivatives in space.
+    /// As [`ContactSurface::stiffness`] of a material point, with derivatives in space.
     pub(super) fn stiffness(&self, material: &Vec3, triangle: Option<u32>, softness: f64) -> Stiffness {
-        let Stiffness { factor, slope } = self.felt.stiffness(material, triangle, softness);
+        let Stiffness { factor, slope } = self.surface.stiffness(material, triangle, softness);
         let slope = slope.map(|(s1, s2)| match self.displacement {
             Some(displacement) => displacement.local(material).in_space(&s1, &s2),
             None => (s1, s2),
@@ -266,17 +266,17 @@ mod tests {
         };
         let properties =
             WallProperties { deviation_mm: 0.0, region: vec![region], ..WallProperties::default() };
-        let felt = FeltWall::new(&wall, (0.5, 0.5), &properties, &NoStore).unwrap();
+        let surface = ContactSurface::new(&wall, (0.5, 0.5), &properties, &NoStore).unwrap();
         let still = Some(Around { centre_mm: [0.0, 0.0, 0.0], radius_mm: 10.0, fade_mm: 90.0 });
         let field = VesselMotion::new(&[MotionMode { still, ..mode() }]).unwrap().unwrap().at(0.0);
-        let moved = MovedWall::new(&felt, Some(&field));
+        let moved = MovedWall::new(&surface, Some(&field));
         let mut steepest: f64 = 0.0;
         for k in 0..12 {
             let material = Vec3::new(3.4, 0.2 * f64::from(k) - 1.0, 42.0 + f64::from(k));
-            let triangle = felt.query.nearest(&material, 5.0).map(|near| near.triangle);
+            let triangle = surface.query.nearest(&material, 5.0).map(|near| near.triangle);
             let at = |x: &Vec3| moved.stiffness(&moved.material(x), triangle, 1.0);
             let x = field.place(&material);
-            assert_eq!(at(&x).factor, felt.stiffness(&moved.material(&x), triangle, 1.0).factor);
+            assert_eq!(at(&x).factor, surface.stiffness(&moved.material(&x), triangle, 1.0).factor);
             let (s1, s2) = at(&x).slope.unwrap();
             let h = 1e-4;
             for k in 0..3 {
@@ -296,16 +296,16 @@ mod tests {
         let tree = anatomy::tree("curved_tube").unwrap();
         let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(1.5)).unwrap().wall;
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
-        let felt = FeltWall::new(&wall, (0.5, 0.5), &properties, &NoStore).unwrap();
+        let surface = ContactSurface::new(&wall, (0.5, 0.5), &properties, &NoStore).unwrap();
         let turn = Some(Turn { centre_mm: [5.0, 0.0, 20.0], axis: [1.0, 2.0, 0.5], angle_deg: 12.0 });
         let field = VesselMotion::new(&[MotionMode { turn, ..mode() }]).unwrap().unwrap().at(0.0);
-        let (at_rest, displaced) = (MovedWall::from(&felt), MovedWall::new(&felt, Some(&field)));
+        let (at_rest, displaced) = (MovedWall::from(&surface), MovedWall::new(&surface, Some(&field)));
         let rotation =
             Rotation3::from_axis_angle(&Unit::new_normalize(Vec3::new(1.0, 2.0, 0.5)), 12f64.to_radians());
         let mut seen = 0;
         for (index, vertex) in wall.mesh().vertices_mm.iter().enumerate().step_by(17) {
             let material = vertex + Vec3::new(0.3, -0.2, 0.1) * f64::from(index as u32 % 3);
-            let Some(near) = felt.query.nearest(&material, 5.0) else { continue };
+            let Some(near) = surface.query.nearest(&material, 5.0) else { continue };
             let x = field.place(&material);
             let found = displaced.nearness(&displaced.material(&x), near.triangle, 0.5);
             match (at_rest.nearness(&material, near.triangle, 0.5), found) {

@@ -47,7 +47,7 @@ impl ContactPoint {
         x0 * w0 + x1 * w1 + (t0 * s0 + t1 * s1) * length_mm
     }
 
-    /// Normal of the wall and force on it at a distance, N; `factor` as in [`Stiffness`](super::grading::Stiffness).
+    /// Normal of the wall and force on it at a distance, N; `factor` as in [`Stiffness`](super::regions::Stiffness).
     pub(super) fn pressed(&self, d: &Distance, factor: f64) -> (Vec3, f64) {
         // The smooth distance has a gradient of nearly unit length; the normal has one.
         let size = d.gradient.norm();

@@ -30,7 +30,7 @@ pub struct WallProperties {
     /// Coulomb coefficient μ of friction between device and wall; 0 is frictionless and costs nothing.
     pub friction: f64,
     /// How far the surface may be moved to be smooth, mm; where the lumen's radius is less than twenty times this, a twentieth of the radius.
-    /// How far the wall that is felt comes to be says [`FeltWall::deviation`](super::FeltWall::deviation). 0 leaves it as it is meshed, for surfaces whose meshes are known to be good.
+    /// How far the wall that is felt comes to be says [`ContactSurface::deviation`](super::ContactSurface::deviation). 0 leaves it as it is meshed, for surfaces whose meshes are known to be good.
     pub deviation_mm: f64,
     /// Where the wall is another, each laid over those before it.
     pub region: Vec<WallRegion>,
@@ -87,7 +87,7 @@ impl WallRegion {
 
 impl WallProperties {
     /// Whether there is friction anywhere.
-    pub fn rubs(&self) -> bool {
+    pub fn has_friction(&self) -> bool {
         self.largest_friction() > 0.0
     }
 
@@ -149,7 +149,7 @@ impl WallProperties {
         in_range("vessel.wall.modulus_n_per_mm2", self.modulus_n_per_mm2, LARGEST_MODULUS)?;
         check_friction("vessel.wall.friction", self.friction)?;
         if !(0.0..=LARGEST_DEVIATION_MM).contains(&self.deviation_mm) {
-            let mend = format!("must be from 0 (felt as it is meshed) to {LARGEST_DEVIATION_MM}");
+            let mend = format!("must be from 0 (surface as it is meshed) to {LARGEST_DEVIATION_MM}");
             return Err(Error::parameter("vessel.wall.deviation_mm", self.deviation_mm, mend));
         }
         for (index, region) in self.region.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! The smooth wall over a sharp ridge that stands into the lumen, finely meshed on its crest and coarsely on its flanks.
 
-use super::felt::FeltWall;
+use super::surface::ContactSurface;
 use crate::Vec3;
 use crate::insertion::WallProperties;
 use crate::vessel::{NoStore, SurfaceMesh, Wall};
@@ -33,9 +33,9 @@ fn ridge() -> Wall {
     Wall::welded(&mesh).unwrap()
 }
 
-pub(super) fn felt() -> FeltWall {
+pub(super) fn surface() -> ContactSurface {
     let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
-    FeltWall::new(&ridge(), (0.2, 0.2), &properties, &NoStore).unwrap()
+    ContactSurface::new(&ridge(), (0.2, 0.2), &properties, &NoStore).unwrap()
 }
 
 /// Points up to a millimetre above the crest and the upper flanks.
@@ -49,11 +49,11 @@ pub(super) fn points() -> impl Iterator<Item = Vec3> {
 
 #[test]
 fn neither_flank_goes_on_beyond_the_crest() {
-    let felt = felt();
+    let surface = surface();
     let mut farthest = 0.0f64;
     for x in points() {
-        let near = felt.query.nearest(&x, 5.0).unwrap();
-        let felt_mm = felt.nearness(&x, near.triangle, f64::INFINITY).value_mm();
+        let near = surface.query.nearest(&x, 5.0).unwrap();
+        let felt_mm = surface.nearness(&x, near.triangle, f64::INFINITY).value_mm();
         farthest = farthest.max((felt_mm - near.distance_mm).abs());
     }
     // The crest is rounded off by part of an edge; flanks that go on as far as their supports are felt 0.77 mm off.
@@ -62,17 +62,17 @@ fn neither_flank_goes_on_beyond_the_crest() {
 
 #[test]
 fn derivatives_are_those_of_the_value_there_too() {
-    let felt = felt();
+    let surface = surface();
     let h = 1e-6;
     let mut narrowed = 0;
     for x in points() {
-        let triangle = felt.query.nearest(&x, 5.0).unwrap().triangle;
-        let Some((here, coverage, slope)) = felt.smooth.covered(&x, triangle) else { continue };
+        let triangle = surface.query.nearest(&x, 5.0).unwrap().triangle;
+        let Some((here, coverage, slope)) = surface.smooth.covered(&x, triangle) else { continue };
         // On the surface itself what is felt in front begins to pass into what is felt behind: third derivatives jump there.
         if coverage < 0.1 || here.value_mm.abs() < 2.0 * h {
             continue;
         }
-        let at = |x: Vec3| felt.smooth.covered(&x, triangle).unwrap();
+        let at = |x: Vec3| surface.smooth.covered(&x, triangle).unwrap();
         let steep = 1e-4 * (1.0 + here.hessian.norm());
         for k in 0..3 {
             let (plus, minus) = (at(x + Vec3::ith(k, h)), at(x - Vec3::ith(k, h)));

@@ -1,6 +1,6 @@
 //! The smooth wall about a rim that was cut from triangle to triangle, aslant, in a surface made of voxels.
 
-use super::felt::FeltWall;
+use super::surface::ContactSurface;
 use crate::Vec3;
 use crate::insertion::WallProperties;
 use crate::random::{splitmix64, unit};
@@ -68,18 +68,19 @@ fn stump(seed: u64) -> Wall {
 fn no_spikes_stand_on_the_teeth_of_a_rim() {
     let mut all = [0.0f64; 2];
     for seed in 0..12 {
-        let felt = FeltWall::new(&stump(seed), (0.178, 0.178), &WallProperties::default(), &NoStore).unwrap();
+        let surface =
+            ContactSurface::new(&stump(seed), (0.178, 0.178), &WallProperties::default(), &NoStore).unwrap();
         let mut farthest = [0.0f64; 2];
         for k in 0..20_000 {
             let [angle, r, up] = [0, 1, 2].map(|n| unit(splitmix64(seed, 3 * k + n)));
             let (angle, r) = (std::f64::consts::TAU * angle, RADIUS_MM * r.sqrt());
             let x = r * angle.cos();
             let x = Vec3::new(x, r * angle.sin(), 20.0 + 0.45 * x + 6.0 * (up - 0.5));
-            let Some(near) = felt.query.nearest(&x, felt.reach_mm) else { continue };
+            let Some(near) = surface.query.nearest(&x, surface.reach_mm) else { continue };
             if near.distance_mm < 0.2 {
                 continue;
             }
-            let felt_mm = felt.nearness(&x, near.triangle, f64::INFINITY).value_mm();
+            let felt_mm = surface.nearness(&x, near.triangle, f64::INFINITY).value_mm();
             let place = usize::from(felt_mm > near.distance_mm);
             farthest[place] = farthest[place].max((felt_mm - near.distance_mm).abs());
         }

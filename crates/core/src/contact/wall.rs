@@ -5,7 +5,7 @@
 //! the tip gathers in a layer that no mesh resolves). Points are labelled from the tip, like everything on a device, so
 //! what is known of their surroundings stays with them while the device slides.
 //!
-//! On a wall with regions ψ is multiplied by eˢ, s of the place ([`super::grading`]), and so is the cap's.
+//! On a wall with regions ψ is multiplied by eˢ, s of the place ([`super::regions`]), and so is the cap's.
 //!
 //! A point asks the bounding volume hierarchy only when it may have come near something new: while it has moved less than
 //! its last clearance, nothing can touch it.
@@ -17,7 +17,7 @@ mod passing;
 mod reading;
 mod slipping;
 
-use super::memory::WallMemory;
+use super::cache::ContactCache;
 use super::point::{Contact, ContactPoint, Counters, Touch};
 use crate::Vec3;
 use crate::contact::{Between, Drag, Friction, MovedWall};
@@ -42,7 +42,7 @@ const ROUNDING: f64 = 4.0;
 
 /// The wall's energy along a device.
 pub struct WallContact<'a> {
-    felt: MovedWall<'a>,
+    surface: MovedWall<'a>,
     points: &'a [ContactPoint],
     /// Moment of the softest piece at a radius of 100 mm, N·mm.
     least_moment_nmm: f64,
@@ -54,7 +54,7 @@ pub struct WallContact<'a> {
     pub holding: bool,
     /// What the blood that flows does.
     drag: Option<&'a mut Drag>,
-    memory: &'a mut WallMemory,
+    cache: &'a mut ContactCache,
     friction: &'a mut Friction,
     /// What rounding of positions leaves of the forces at the last state, N.
     rounding_n: f64,
@@ -65,22 +65,22 @@ impl<'a> WallContact<'a> {
     /// The wall's energy at `points` (tip first), with what is known from earlier steps. `softest_nmm2` is the device's
     /// least bending stiffness.
     pub fn new(
-        felt: impl Into<MovedWall<'a>>,
+        surface: impl Into<MovedWall<'a>>,
         points: &'a [ContactPoint],
-        memory: &'a mut WallMemory,
+        cache: &'a mut ContactCache,
         friction: &'a mut Friction,
         softest_nmm2: f64,
     ) -> Self {
-        memory.look_at(points);
+        cache.look_at(points);
         Self {
-            felt: felt.into(),
+            surface: surface.into(),
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
             softness: 1.0,
             stiff: true,
             holding: false,
             drag: None,
-            memory,
+            cache,
             friction,
             rounding_n: 0.0,
             counters: Counters::default(),
@@ -89,7 +89,7 @@ impl<'a> WallContact<'a> {
 
     /// The material point of the vessel where point `index` is at a state. What is known of the wall is known of those.
     fn material(&self, index: usize, elements: &[ElementData], state: &RodState) -> Vec3 {
-        self.felt.material(&self.points[index].position(elements, state))
+        self.surface.material(&self.points[index].position(elements, state))
     }
 
     /// Has a flow drag at the device, as it does at a state; nothing where there is none. Returns its potential there, mJ.
@@ -109,7 +109,7 @@ impl<'a> WallContact<'a> {
     /// Takes the drag of a flow at a state. Returns the part by which it has changed.
     pub(crate) fn renew_drag(&mut self, flow: &BloodFlow, elements: &[ElementData], state: &RodState) -> f64 {
         let Some(drag) = &mut self.drag else { return 0.0 };
-        drag.renew(flow, self.felt, self.points, elements, state)
+        drag.renew(flow, self.surface, self.points, elements, state)
     }
 
     /// Potential of the drag as it is held, mJ; 0 where nothing flows.
@@ -124,7 +124,7 @@ impl<'a> WallContact<'a> {
 
     /// Work done and avoided since it was counted last, looking for the tip's way included.
     pub fn count(&mut self) -> Counters {
-        self.counters.queries += std::mem::take(&mut self.memory.places.queries);
+        self.counters.queries += std::mem::take(&mut self.cache.proximity.queries);
         std::mem::take(&mut self.counters)
     }
 
@@ -140,7 +140,7 @@ impl<'a> WallContact<'a> {
         if !self.friction.holds(index) {
             return;
         }
-        let (point, x) = (&self.points[index], &self.felt.place(&self.memory.points[index].base));
+        let (point, x) = (&self.points[index], &self.surface.place(&self.cache.points[index].base));
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
         let Some(f) = self.friction.derivatives(index, x, angle, radius_mm) else { return };
         into.add_value(self.friction.value(index, x, angle, radius_mm));
@@ -160,9 +160,9 @@ impl<'a> WallContact<'a> {
         index: usize,
     ) {
         self.add_friction(elements, state, into, sum, index);
-        let Some(d) = self.memory.pressed(index) else { return };
-        let (point, known) = (&self.points[index], &self.memory.points[index]);
-        let stiffness = self.felt.stiffness(&known.base, known.triangle, self.softness);
+        let Some(d) = self.cache.pressed(index) else { return };
+        let (point, known) = (&self.points[index], &self.cache.points[index]);
+        let stiffness = self.surface.stiffness(&known.base, known.triangle, self.softness);
         let w = point.weight_mm;
         let spring = stiffness.factor * w * point.potential.modulus_n_per_mm2;
         self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * spring * known.base.amax());
@@ -171,7 +171,7 @@ impl<'a> WallContact<'a> {
         } else {
             into.add_value(stiffness.factor * w * point.potential.value(d.value_mm));
             let (gradient, hessian) = stiffness.derivatives(&point.potential, d, w);
-            self.memory.points[index].force_n = gradient.norm();
+            self.cache.points[index].force_n = gradient.norm();
             (gradient, hessian)
         };
         sum.add(point.xi, &gradient, into.wants_hessian().then_some(&hessian));
@@ -181,13 +181,13 @@ impl<'a> WallContact<'a> {
     fn value_of(&mut self, elements: &[ElementData], state: &RodState, index: usize, mut sum: f64) -> f64 {
         let point = self.points[index];
         let x = point.position(elements, state);
-        let material = self.felt.material(&x);
+        let material = self.surface.material(&x);
         let radius_mm = point.potential.radius_mm;
         let limit_mm = self.asked_mm(radius_mm);
         let value_mm = self.read_within(index, &material, limit_mm).distance_mm();
         if value_mm < radius_mm {
-            let triangle = self.memory.points[index].triangle;
-            let factor = self.felt.stiffness(&material, triangle, self.softness).factor;
+            let triangle = self.cache.points[index].triangle;
+            let factor = self.surface.stiffness(&material, triangle, self.softness).factor;
             sum += factor * point.weight_mm * point.potential.value(value_mm);
         }
         if self.friction.holds(index) {
@@ -198,8 +198,8 @@ impl<'a> WallContact<'a> {
 
     /// Length that point `index` stands for at its base, times the part of the modulus that acts there, mm.
     fn weight_mm(&self, index: usize) -> f64 {
-        let known = &self.memory.points[index];
-        let factor = self.felt.stiffness(&known.base, known.triangle, self.softness).factor;
+        let known = &self.cache.points[index];
+        let factor = self.surface.stiffness(&known.base, known.triangle, self.softness).factor;
         factor * self.points[index].weight_mm
     }
 
@@ -212,16 +212,18 @@ impl<'a> WallContact<'a> {
         fraction: f64,
     ) -> f64 {
         let x = self.material(index, elements, to);
-        let known = &self.memory.points[index];
-        let safe_mm = SAFE * known.base_clearance_mm / self.felt.stretch();
+        let known = &self.cache.points[index];
+        let safe_mm = SAFE * known.base_clearance_mm / self.surface.stretch();
         if known.side.is_some() || fraction * (x - known.base).norm() <= safe_mm {
             return fraction;
         }
         self.counters.queries += 1;
-        let Some(met) = self.felt.query.crossing(&known.base, &x, fraction / SAFE) else { return fraction };
+        let Some(met) = self.surface.query.crossing(&known.base, &x, fraction / SAFE) else {
+            return fraction;
+        };
         // Near the wall flat triangles may stand into the smooth lumen, and what it says counts.
         let from_mm = known.base_clearance_mm;
-        match known.triangle.map(|triangle| self.felt.distance_from(triangle, &x)) {
+        match known.triangle.map(|triangle| self.surface.distance_from(triangle, &x)) {
             Some(to_mm) if to_mm > 0.0 => fraction,
             Some(to_mm) => fraction.min(SAFE * from_mm / (from_mm - to_mm)),
             None => SAFE * met,
@@ -237,11 +239,11 @@ impl<'a> WallContact<'a> {
     pub fn touch(&mut self, elements: &[ElementData], state: &RodState, index: usize) -> Option<Touch> {
         let point = self.points[index];
         let x = point.position(elements, state);
-        let material = self.felt.material(&x);
+        let material = self.surface.material(&x);
         let Reading::Pressed(distance) = self.read(index, &material) else { return None };
         let penetration_mm = point.potential.penetration_mm(distance.value_mm);
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
-        let stiffness = self.felt.stiffness(&material, self.memory.points[index].triangle, 1.0);
+        let stiffness = self.surface.stiffness(&material, self.cache.points[index].triangle, 1.0);
         let (mut normal, mut force_n) = point.pressed(&distance, stiffness.factor);
         if stiffness.slope.is_some() {
             let force = -stiffness.derivatives(&point.potential, &distance, point.weight_mm).0;
@@ -257,7 +259,7 @@ impl<'a> WallContact<'a> {
                 force_n,
                 friction_n: rub.map_or_else(Vec3::zeros, |f| -f.gradient),
                 penetration_mm,
-                triangle: self.memory.points[index].triangle.unwrap_or(0),
+                triangle: self.cache.points[index].triangle.unwrap_or(0),
             },
             friction_nmm: rub.map_or(0.0, |f| -f.turn),
         })
@@ -266,7 +268,7 @@ impl<'a> WallContact<'a> {
     /// What happens at all points that press on the wall at a state.
     pub fn touches(&mut self, elements: &[ElementData], state: &RodState, to: &mut Vec<(usize, Touch)>) {
         to.clear();
-        for span in 0..self.memory.spans.len() {
+        for span in 0..self.cache.spans.len() {
             for index in self.near(span, elements, state).into_iter().flatten() {
                 to.extend(self.touch(elements, state, index).map(|touch| (index, touch)));
             }
@@ -276,19 +278,19 @@ impl<'a> WallContact<'a> {
     /// How much the forces on the wall differ at a state from those of the last equilibrium, over the latter; 0 where there were none.
     pub fn misfit(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         let (mut misfit_n, mut sum_n) = (0.0, 0.0);
-        for span in 0..self.memory.spans.len() {
+        for span in 0..self.cache.spans.len() {
             for index in self.near(span, elements, state).into_iter().flatten() {
                 let point = self.points[index];
                 let x = self.material(index, elements, state);
                 let force_n = match self.read(index, &x) {
                     Reading::Pressed(d) => {
-                        let triangle = self.memory.points[index].triangle;
-                        let factor = self.felt.stiffness(&x, triangle, self.softness).factor;
+                        let triangle = self.cache.points[index].triangle;
+                        let factor = self.surface.stiffness(&x, triangle, self.softness).factor;
                         point.pressed(&d, factor).1
                     }
                     Reading::Free(_) => 0.0,
                 };
-                let was_n = self.memory.points[index].force_n;
+                let was_n = self.cache.points[index].force_n;
                 misfit_n += (force_n - was_n).abs();
                 sum_n += was_n;
             }
@@ -305,12 +307,12 @@ impl External for WallContact<'_> {
             self.press_friction();
         } else if self.friction.acts() && !self.holding {
             let least_n = self.least_force_n();
-            let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
-            let pressed = memory.all_pressed().map(|(index, d)| {
-                let known = &memory.points[index];
-                let factor = felt.stiffness(&known.base, known.triangle, softness).factor;
+            let (surface, cache, softness) = (self.surface, &*self.cache, self.softness);
+            let pressed = cache.all_pressed().map(|(index, d)| {
+                let known = &cache.points[index];
+                let factor = surface.stiffness(&known.base, known.triangle, softness).factor;
                 let (normal, force) = self.points[index].pressed(d, factor);
-                (index, (normal, force * felt.rough(&known.base, known.triangle)))
+                (index, (normal, force * surface.rough(&known.base, known.triangle)))
             });
             self.friction.follow(pressed, least_n);
         }
@@ -320,8 +322,8 @@ impl External for WallContact<'_> {
         }
         self.rounding_n = 0.0;
         let mut sum = PointSum::default();
-        for span in 0..self.memory.spans.len() {
-            let Span { ref points, element, at_base, .. } = self.memory.spans[span];
+        for span in 0..self.cache.spans.len() {
+            let Span { ref points, element, at_base, .. } = self.cache.spans[span];
             // What is not known there is clear of the wall.
             if !at_base {
                 continue;
@@ -338,7 +340,7 @@ impl External for WallContact<'_> {
     fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         let mut sum = self.friction.between.taken_mj(state);
         sum += self.drag_mj(elements, state);
-        for span in 0..self.memory.spans.len() {
+        for span in 0..self.cache.spans.len() {
             for index in self.near(span, elements, state).into_iter().flatten() {
                 sum = self.value_of(elements, state, index, sum);
             }
@@ -363,7 +365,7 @@ impl External for WallContact<'_> {
         moved: &Moved<'_>,
     ) -> bool {
         // Where the modulus changes by powers of ten from place to place, a plane and a spring are no model of what a trial has met.
-        if !self.stiff || self.felt.grading.is_some() {
+        if !self.stiff || self.surface.regions.is_some() {
             return false;
         }
         let slips = self.begin_slipping(base, moved);
@@ -389,8 +391,8 @@ impl External for WallContact<'_> {
     }
 
     fn forget(&mut self) {
-        self.memory.foreseen.clear();
-        self.memory.slipping.clear();
+        self.cache.foreseen.clear();
+        self.cache.slipping.clear();
     }
 
     fn stray(
@@ -444,7 +446,7 @@ impl External for WallContact<'_> {
     /// holds it there.
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         let mut fraction: f64 = 1.0;
-        for span in 0..self.memory.spans.len() {
+        for span in 0..self.cache.spans.len() {
             for index in self.near_way(span, elements, to, fraction).into_iter().flatten() {
                 fraction = self.safe_fraction_of(elements, to, index, fraction);
             }

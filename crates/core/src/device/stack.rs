@@ -126,7 +126,7 @@ impl Stack {
     }
 
     /// Whether any instrument rubs in another.
-    pub fn rubs(&self) -> bool {
+    pub fn has_inner_friction(&self) -> bool {
         self.frictions.iter().any(|friction| *friction > 0.0)
     }
 

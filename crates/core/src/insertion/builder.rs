@@ -84,8 +84,8 @@ impl<'a> SimulationBuilder<'a> {
         stack.devices().try_for_each(|device| check_mouth(&query, device, &sheath))?;
         motion.iter().try_for_each(|motion| check_still(&query, motion, &stack, &sheath))?;
         // Of more than three those without a shape rub along the line alone.
-        let rub = stack.rubs() && stack.instruments().len() <= MAX_ANGLES;
-        let twists = stack.is_several() && (properties.rubs() || rub);
+        let rub = stack.has_inner_friction() && stack.instruments().len() <= MAX_ANGLES;
+        let twists = stack.is_several() && (properties.has_friction() || rub);
         let stack = if twists { stack.twisted()? } else { stack };
         let scene = Environment { wall, properties, query, sheath, stack, motion, flow };
         let own = KirchhoffOptions::default();

@@ -35,7 +35,7 @@ impl Sheath {
     }
 
     /// Whether it has friction.
-    pub fn rubs(&self) -> bool {
+    pub fn has_friction(&self) -> bool {
         self.friction_n > 0.0 || self.friction > 0.0
     }
 
@@ -44,7 +44,7 @@ impl Sheath {
     /// # Errors
     /// A sheath with friction.
     pub fn refuse_friction(&self, method: &str) -> Result<()> {
-        if !self.rubs() {
+        if !self.has_friction() {
             return Ok(());
         }
         let (name, value) = if self.friction_n > 0.0 {

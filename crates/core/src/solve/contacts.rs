@@ -75,8 +75,8 @@ impl<const C: usize> Newton<C> {
             return false;
         }
         self.spare.copy_from_slice(&self.step);
-        let whisper = Self::whisper(elements);
-        let sigma = if shift > whisper { whisper + shift } else { whisper };
+        let regularisation = Self::regularisation(elements);
+        let sigma = if shift > regularisation { regularisation + shift } else { regularisation };
         let minimum = |found: Result<Inertia, FactorError>| {
             found.is_ok_and(|inertia| inertia.negative == elements.len())
         };

@@ -6,7 +6,7 @@
 
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::{StepRecord, StopReason};
-use super::shift::WHISPER;
+use super::shift::REGULARISATION;
 use super::stop::{SHORT, Turn, residual_alone};
 use crate::rod::{ElementData, Layout, RodState};
 
@@ -18,7 +18,7 @@ const ARMIJO: f64 = 1e-4;
 const STIFFENING: f64 = 1e-2;
 /// How often a step is found anew with the contacts that a trial has run into.
 const MEETINGS: usize = 3;
-/// Trials after which loads without potential may let the residual grow.
+/// StepControl after which loads without potential may let the residual grow.
 const PATIENCE: usize = 6;
 
 /// What line searches hand on from one to the next.
@@ -27,7 +27,7 @@ pub(super) struct LineSearch {
     /// Weights of the gaps of position and of direction in the merit.
     penalty: [f64; 2],
     /// Whether the first trial was taken last.
-    trusting: bool,
+    first_trial_taken: bool,
     /// Whether the state is assembled already: as the trial that was taken.
     pub(super) assembled: bool,
     /// A device in its own shape stores nothing, as the difference of terms of this size.
@@ -37,7 +37,7 @@ pub(super) struct LineSearch {
 impl LineSearch {
     pub(super) fn new(elements: &[ElementData]) -> Self {
         let straightening = elements.iter().map(ElementData::straightening_energy).sum();
-        Self { penalty: [0.0; 2], trusting: true, assembled: false, straightening }
+        Self { penalty: [0.0; 2], first_trial_taken: true, assembled: false, straightening }
     }
 
     /// Weighs the gaps of the end conditions.
@@ -106,7 +106,7 @@ impl<const C: usize> Newton<C> {
             self.stride(problem, state, search, shift)?;
         let free = problem.supports.conditions() == 0;
         // What a step gains that is less than rounding, the energies need not be asked for.
-        let blind = problem.minimum
+        let below_rounding = problem.minimum
             && free
             && turn <= SHORT
             && merit.slope <= 0.0
@@ -114,8 +114,10 @@ impl<const C: usize> Newton<C> {
         let turn_of = |part: f64, whole_turn: Turn| if part == 1.0 { whole_turn } else { Turn::NONE };
         // Where the last step's first trial was taken this one's nearly always is: the energy is asked for together with what
         // the next iteration begins with.
-        let mut bold =
-            search.trusting && free && problem.external.is_conservative() && problem.external.is_fixed();
+        let mut with_assembly = search.first_trial_taken
+            && free
+            && problem.external.is_conservative()
+            && problem.external.is_fixed();
         let multipliers = problem.supports.multipliers;
         let first = Layout::<C>.support(problem.elements.len());
         for j in 0..6 {
@@ -131,13 +133,13 @@ impl<const C: usize> Newton<C> {
             part = self.place_trial(problem, state, part, foreseen);
             search.assembled = false;
             let (mut energy_change, mut change);
-            if blind {
+            if below_rounding {
                 change = part * (1.0 - 0.5 * part) * merit.slope;
                 energy_change = change;
             } else {
                 let mut meets = part < wanted;
-                search.trusting = attempt == 0;
-                let assembles = bold && !meets;
+                search.first_trial_taken = attempt == 0;
+                let assembles = with_assembly && !meets;
                 energy_change = if assembles {
                     search.assembled = true;
                     let near =
@@ -147,7 +149,7 @@ impl<const C: usize> Newton<C> {
                 } else {
                     self.energy(problem.elements, problem.external, state) - merit.energy
                 };
-                bold = false;
+                with_assembly = false;
                 change = energy_change + search.weigh(&problem.supports.gaps(&self.trial)) - merit.gaps;
                 let accepted = self.accepts(problem, search, &merit, (residual, change, part), attempt);
                 meets |= !accepted;
@@ -263,7 +265,7 @@ impl<const C: usize> Newton<C> {
         let l = Layout::<C>;
         let elements = problem.elements;
         let pulled = (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
-        let with_forces = turn.max(STIFFENING * pulled * WHISPER / Self::whisper(elements));
+        let with_forces = turn.max(STIFFENING * pulled * REGULARISATION / Self::regularisation(elements));
         Turn { with_forces, of_nodes: turn.max(twist), pull_n: pulled }
     }
 

@@ -12,7 +12,7 @@ use crate::banded::{FactorError, Inertia};
 use crate::rod::{Assembly, ElementData, RodState, Supports};
 
 /// Part of EI/L² that is always added as a uniform tension.
-pub(super) const WHISPER: f64 = 1e-8;
+pub(super) const REGULARISATION: f64 = 1e-8;
 /// Least shift, over the one that is always on.
 const LEAST_SHIFT: f64 = 1e5;
 /// Shifts tried before a matrix is called singular.
@@ -28,7 +28,7 @@ impl<const C: usize> Newton<C> {
 
     /// Factors the assembled matrix with the shift that is always on, for [`Self::apply_inverse`].
     pub fn factor(&mut self, elements: &[ElementData], supports: &Supports) -> Option<Inertia> {
-        self.inertia(elements, supports, Self::whisper(elements))
+        self.inertia(elements, supports, Self::regularisation(elements))
     }
 
     /// Replaces a right-hand side by the step that answers it, with the matrix factored last.
@@ -60,14 +60,14 @@ impl<const C: usize> Newton<C> {
     }
 
     /// The shift that is always on.
-    pub(crate) fn whisper(elements: &[ElementData]) -> f64 {
+    pub(crate) fn regularisation(elements: &[ElementData]) -> f64 {
         let length: f64 = elements.iter().map(|e| e.length).sum();
         // EI averaged as springs in series: the stiffness the whole rod shows.
         let soft: f64 = elements.iter().map(|e| e.length / e.bending[1]).sum();
-        WHISPER / (length * soft)
+        REGULARISATION / (length * soft)
     }
 
-    /// Factors the matrix and solves for the step under the whisper. Where its inertia is not that `wanted`, if one is, contacts are made
+    /// Factors the matrix and solves for the step under the regularisation. Where its inertia is not that `wanted`, if one is, contacts are made
     /// convex first, which is all that it takes where a guess presses too hard on a crest of a wall. Then a shift is added, from an
     /// eighth of the `last` one, and grows. Returns the shift, not 0 where the matrix is not that of the state, and the inertia of that
     /// if it could be factored.
@@ -78,26 +78,26 @@ impl<const C: usize> Newton<C> {
         last: f64,
         arrived: bool,
     ) -> Result<(f64, Option<Inertia>), StopReason> {
-        let whisper = Self::whisper(problem.elements);
+        let regularisation = Self::regularisation(problem.elements);
         let wanted = problem.minimum.then(|| problem.multipliers());
         let right = |found: &Result<Inertia, FactorError>| {
             found.as_ref().is_ok_and(|inertia| wanted.is_none_or(|negative| inertia.negative == negative))
         };
-        let found = self.factor_step(whisper);
+        let found = self.factor_step(regularisation);
         let natural = found.as_ref().ok().copied();
         if right(&found) {
             return Ok((0.0, natural));
         }
         // A saddle is left along its own curvature.
         if wanted.is_some() && !arrived && self.convexify(problem, state) {
-            let found = self.factor_step(whisper);
+            let found = self.factor_step(regularisation);
             if right(&found) {
-                return Ok((whisper, natural));
+                return Ok((regularisation, natural));
             }
         }
-        let mut sigma = (LEAST_SHIFT * whisper).max(last / 8.0);
+        let mut sigma = (LEAST_SHIFT * regularisation).max(last / 8.0);
         for attempt in 0..SHIFTS {
-            let found = self.factor_step(whisper + sigma);
+            let found = self.factor_step(regularisation + sigma);
             if right(&found) {
                 return Ok((sigma, natural));
             }

@@ -29,7 +29,7 @@ use rayon::prelude::*;
 pub(crate) use anatomy::Anatomy;
 pub(crate) use labels::labels;
 use scatter::Scatter;
-pub use sequence::Moment;
+pub use sequence::FrameTime;
 pub(crate) use sequence::{Afterglow, Sequence};
 
 use crate::c_arm::CArm;

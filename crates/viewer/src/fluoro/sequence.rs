@@ -31,7 +31,7 @@ const ROADMAP_VESSEL: f32 = -0.4;
 
 /// Number and time of a frame. The number seeds its noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Moment {
+pub struct FrameTime {
     /// Number of the frame.
     pub frame: u64,
     /// Time since the start of the scene, for injections.
@@ -139,7 +139,7 @@ impl Sequence {
         fluoroscope: &mut Fluoroscope,
         engine: &mut dyn PathEngine,
         pulse: &[Vec<RefinedDevice>],
-        moment: Moment,
+        moment: FrameTime,
     ) -> Result<Image> {
         if self.mask.is_none() {
             match self.mode {

@@ -9,7 +9,7 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Resolution, Wall, anatomy};
 use endowire_core::{Error, Result, Vec3};
 
-use super::contender;
+use super::candidate;
 
 /// What one run of a method gave.
 #[derive(Debug, Clone, Copy)]
@@ -151,7 +151,7 @@ impl Case {
         match self {
             Self::Cantilever { load, tip } => {
                 let clock = Instant::now();
-                let (found, iterations) = contender::cantilever(method, elements, *load)?;
+                let (found, iterations) = candidate::cantilever(method, elements, *load)?;
                 let time_s = clock.elapsed().as_secs_f64();
                 let error = (found - tip).norm();
                 Ok(Some(Run { error, time_s, iterations: iterations as u64, unconverged: 0 }))
@@ -167,7 +167,7 @@ impl Scene {
     }
 
     fn start(&self, method: &str, elements: usize, tolerance: f64) -> Result<Simulation> {
-        contender::insertion_within(
+        candidate::insertion_within(
             method,
             (self.inserted_mm / elements as f64, tolerance),
             self.wall.clone(),
@@ -178,7 +178,7 @@ impl Scene {
     }
 
     fn run(&self, method: &str, elements: usize, limit: Duration) -> Result<Option<Run>> {
-        let mut simulation = self.start(method, elements, contender::INSERTION_TOLERANCE)?;
+        let mut simulation = self.start(method, elements, candidate::INSERTION_TOLERANCE)?;
         let (mut iterations, mut unconverged) = (0, 0);
         let clock = Instant::now();
         for _ in 0..self.steps() {

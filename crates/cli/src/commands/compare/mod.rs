@@ -3,8 +3,8 @@
 //! Every case runs with every method at several resolutions. Rows are written as they are found, and those already in the folder
 //! are not run again; nor is the truth of a case that has all its rows.
 
+pub(crate) mod candidate;
 pub(crate) mod case;
-pub(crate) mod contender;
 mod front;
 mod picture;
 

@@ -20,7 +20,7 @@ use crate::output::tell;
 const LONG_BEFORE_S: f64 = -1e6;
 
 /// What is in after a step.
-pub(super) struct Moment {
+pub(super) struct FrameTime {
     pub(super) step: usize,
     /// When it ended.
     pub(super) step_time_s: f64,
@@ -43,7 +43,7 @@ pub(super) struct Course {
     pub(super) renderer: Renderer,
     pub(super) pushed: Pushed,
     /// By step; the first is before the script.
-    pub(super) moments: Vec<Moment>,
+    pub(super) moments: Vec<FrameTime>,
 }
 
 impl Course {
@@ -72,7 +72,7 @@ impl Course {
             let report = simulation.report();
             let contacts = report.contacts.iter();
             let contacts = contacts.map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() });
-            moments.push(Moment {
+            moments.push(FrameTime {
                 step: moments.len(),
                 step_time_s,
                 time_s: if script.injects() { step_time_s } else { 0.0 },
@@ -111,7 +111,7 @@ impl Course {
 
     /// Where the tip was when, in the vessel at rest, up to a moment; nothing where none injects. Time goes on where lines of the script
     /// inject; elsewhere the instruments rest at a moment for all times.
-    pub(super) fn way_of_tip(&self, moment: &Moment) -> Vec<(f64, Vec3)> {
+    pub(super) fn way_of_tip(&self, moment: &FrameTime) -> Vec<(f64, Vec3)> {
         if !self.view.injects_at_tip() {
             return vec![];
         }

@@ -65,7 +65,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
             let id = (shot * spec.moments + m) * spec.views() + plane;
             renderer.move_vessel(moment.displacement.as_ref())?;
             way.iter().try_for_each(|(then_s, place_mm)| renderer.follow_tip(*then_s, *place_mm))?;
-            let frame = endowire_viewer::Moment { frame: m as u64, time_s };
+            let frame = endowire_viewer::FrameTime { frame: m as u64, time_s };
             let Some(image) = renderer.render_at(&devices, frame)?.fluoro else { continue };
             let labels = renderer.labels(&devices, &contacts)?;
             let [file_name, arrays] = [format!("images/{id:07}.png"), format!("arrays/{id:07}.npz")];

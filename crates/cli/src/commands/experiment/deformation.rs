@@ -15,8 +15,8 @@ use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
 use serde::{Deserialize, Serialize};
 
 use crate::args::DeformationArgs;
+use crate::commands::compare::candidate;
 use crate::commands::compare::case::rms_distance;
-use crate::commands::compare::contender;
 use crate::failure::Failure;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::{answer, progress};
@@ -98,7 +98,7 @@ struct Tube {
 impl Tube {
     /// The shape after the whole insertion, and the time it took, s.
     fn insert(&self, method: &str, l_mm: f64, h_mm: f64) -> Result<(Shape, f64), Failure> {
-        let mut simulation = contender::insertion(
+        let mut simulation = candidate::insertion(
             method,
             l_mm,
             self.made.wall.clone(),

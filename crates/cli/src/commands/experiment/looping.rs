@@ -17,7 +17,7 @@ use serde::Serialize;
 
 use super::camera::Camera;
 use crate::args::LoopArgs;
-use crate::commands::compare::contender;
+use crate::commands::compare::candidate;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, chart, progress};
@@ -70,7 +70,7 @@ pub(super) fn looping(args: &LoopArgs) -> Result<(), Failure> {
         Section::straight(INSERTED_MM, 0.445, 60.0),
     ])?;
     let mut simulation =
-        contender::insertion("kirchhoff", ELEMENT_MM, wall, WallProperties::default(), device, sheath)?;
+        candidate::insertion("kirchhoff", ELEMENT_MM, wall, WallProperties::default(), device, sheath)?;
     let mut camera = match &args.out {
         Some(folder) => {
             let spec = ViewSpec { size_px: [480, 720], ..ViewSpec::default() };

@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::camera::Camera;
 use super::catalogue::{self, Procedure};
 use crate::args::NavigationArgs;
-use crate::commands::compare::contender;
+use crate::commands::compare::candidate;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, progress};
@@ -243,7 +243,7 @@ fn steer(
     let element_mm = anatomy.tip_mm / 6.0;
     let properties = WallProperties::default();
     let mut simulation =
-        contender::insertion("kirchhoff", element_mm, made.wall.clone(), properties, wire, sheath)?;
+        candidate::insertion("kirchhoff", element_mm, made.wall.clone(), properties, wire, sheath)?;
     let mut row = Row::new(anatomy.name, target, path.length_mm(), "shaped wire".to_owned());
     let mut hand = FollowPath::new(path.clone(), Team::default(), ARRIVED_MM);
     let mut number = 0;

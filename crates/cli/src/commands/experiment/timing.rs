@@ -19,7 +19,7 @@ use endowire_methods::li2011::{Chain, Li2011, Li2011Options, LinearSolver, bande
 use serde::Serialize;
 
 use crate::args::TimingArgs;
-use crate::commands::compare::contender;
+use crate::commands::compare::candidate;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, progress};
@@ -181,7 +181,7 @@ fn time_other(
     let element = element_mm(nodes, args.repeats);
     let properties = WallProperties::default();
     let mut simulation =
-        match contender::insertion(method, element, wall.clone(), properties, device.clone(), sheath) {
+        match candidate::insertion(method, element, wall.clone(), properties, device.clone(), sheath) {
             Ok(simulation) => simulation,
             Err(refusal) => return Ok(Row::untimed(method, nodes, refusal.to_string())),
         };

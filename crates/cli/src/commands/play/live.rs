@@ -40,7 +40,7 @@ pub(crate) enum Message {
 
 /// A moment, and when the oldest input came in that no earlier picture shows.
 #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window reads or sends it"))]
-pub(crate) struct Moment {
+pub(crate) struct FrameTime {
     pub(crate) snapshot: Snapshot,
     pub(crate) input_at: Option<Instant>,
     pub(crate) step_ms: f64,
@@ -49,7 +49,7 @@ pub(crate) struct Moment {
 /// The newest moment, until it is taken.
 #[derive(Default)]
 pub(crate) struct Newest {
-    moment: Mutex<Option<Moment>>,
+    moment: Mutex<Option<FrameTime>>,
     /// What exposure control has brought.
     delivered: Mutex<Option<Delivered>>,
     there: Condvar,
@@ -61,7 +61,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Newest {
-    fn put(&self, mut moment: Moment) {
+    fn put(&self, mut moment: FrameTime) {
         let mut place = locked(&self.moment);
         let unseen = place.take().and_then(|before| before.input_at);
         moment.input_at = unseen.or(moment.input_at);
@@ -70,7 +70,7 @@ impl Newest {
     }
 
     /// The newest moment, when there is one; none at the end.
-    fn take(&self) -> Option<Moment> {
+    fn take(&self) -> Option<FrameTime> {
         let mut place = locked(&self.moment);
         loop {
             if self.ended.load(Ordering::Relaxed) {
@@ -93,7 +93,7 @@ impl Newest {
 /// What is shown of a moment.
 #[cfg_attr(not(feature = "window"), expect(dead_code, reason = "the window reads or sends it"))]
 pub(crate) struct Shown<'a> {
-    pub(crate) moment: &'a Moment,
+    pub(crate) moment: &'a FrameTime,
     /// Of each plane.
     pub(crate) fluoro: &'a [Image],
     pub(crate) three_d: Option<&'a Image>,
@@ -215,7 +215,7 @@ pub(crate) fn physics(
             steps_ms.push(step_ms);
         }
         ticks += 1;
-        newest.put(Moment { snapshot: session.snapshot(), input_at: input_at.take(), step_ms });
+        newest.put(FrameTime { snapshot: session.snapshot(), input_at: input_at.take(), step_ms });
         record.keep(&session)?;
     }
     let wall_time_s = begun.elapsed().as_secs_f64();

@@ -9,7 +9,7 @@ use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, Wall};
 use endowire_methods::Scene;
 use endowire_viewer::{
-    Animation, ContactView, DeviceView, Frames, InjectionSpec, Labels, Mask, Moment, Pace, PathLengths,
+    Animation, ContactView, DeviceView, FrameTime, Frames, InjectionSpec, Labels, Mask, Pace, PathLengths,
     Pushed, Renderer, Seen, View, ViewSpec,
 };
 use serde::Serialize;
@@ -25,7 +25,7 @@ use plane::{Plane, write_dicom};
 pub(super) struct Still<'a> {
     /// Begins the names of its files.
     pub(super) name: String,
-    pub(super) moment: Moment,
+    pub(super) moment: FrameTime,
     pub(super) shape: &'a Shape,
     /// Length in of the device, or of each instrument, mm.
     pub(super) inserted_mm: &'a [f64],

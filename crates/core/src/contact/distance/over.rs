@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use rustc_hash::FxHashSet;
 
 use super::Quadric;
-use crate::contact::fit::Neighbours;
+use crate::contact::quadric_fit::Neighbours;
 use crate::{Vec3, parallel};
 
 /// Height above the surface up to which lists are complete, in radii of the thickest device and in supports.

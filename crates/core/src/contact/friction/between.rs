@@ -30,7 +30,7 @@ use crate::rod::{RodState, Stencils};
 
 /// What one instrument does to the next one outside it at a node, as the last step has left it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Rub {
+pub struct InnerFriction {
     /// Part of the friction that may act which acts along the line, against the slip …
     pub along: f64,
     /// … and around it: Coulomb's law is that the squares of both are 1 where one slips, and less where it sticks.

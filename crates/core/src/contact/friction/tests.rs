@@ -100,7 +100,7 @@ fn slipped(slip: Vec3, stick_mm: f64) -> Slipped {
 }
 
 impl Slipped {
-    fn felt(&self) -> FrictionDerivatives {
+    fn surface(&self) -> FrictionDerivatives {
         let x = self.points[0].position(&self.elements, &self.state);
         self.friction.derivatives(0, &x, self.points[0].angle(&self.state), RADIUS_MM).unwrap()
     }
@@ -142,11 +142,11 @@ fn what_comes_to_rest_sticks_within_a_hundredth_and_no_less() {
 fn what_is_anchored_anew_is_held_as_before_and_has_taken_as_much() {
     for (slip, slips) in SLIPS.into_iter().zip([true, true, false]) {
         let mut point = slipped(slip, 0.01);
-        let (before, taken_mj) = (point.felt(), point.dissipated_mj());
+        let (before, taken_mj) = (point.surface(), point.dissipated_mj());
         assert_eq!((before.gradient.norm() - 0.5).abs() < 1e-12, slips, "{}", before.gradient.norm());
         point.anchor();
         assert!(point.friction.stick_mm < 0.004);
-        let after = point.felt();
+        let after = point.surface();
         assert!((after.gradient - before.gradient).norm() < 1e-12, "{before:?} {after:?}");
         assert!((after.turn - before.turn).abs() < 1e-12 && before.turn.abs() > 1e-3, "{before:?} {after:?}");
         assert!((point.dissipated_mj() - taken_mj).abs() < 1e-15 * (1.0 + taken_mj));
@@ -157,13 +157,13 @@ fn what_is_anchored_anew_is_held_as_before_and_has_taken_as_much() {
 fn what_goes_back_the_way_it_came_is_held_by_less_only_once_anchored() {
     for slip in [SLIPS[0], SLIPS[1]] {
         let mut point = slipped(slip, 0.01);
-        let back = -0.5 * LEAST_STICK_MM.max(STICK_AT_REST * 0.01) * point.felt().gradient.normalize();
+        let back = -0.5 * LEAST_STICK_MM.max(STICK_AT_REST * 0.01) * point.surface().gradient.normalize();
         let mut anchored = slipped(slip, 0.01);
         anchored.anchor();
         point.shift(back);
         anchored.shift(back);
         // Half of ε back: φ′ of a half.
-        let (free_n, held_n) = (point.felt().gradient.norm(), anchored.felt().gradient.norm());
+        let (free_n, held_n) = (point.surface().gradient.norm(), anchored.surface().gradient.norm());
         assert!((held_n - 0.75 * 0.5).abs() < 1e-9, "{held_n}");
         assert!((free_n - 0.5).abs() < 1e-12, "{free_n}");
     }
@@ -176,7 +176,7 @@ fn other_normal_forces_change_what_holds_and_not_what_was_taken() {
     let taken_mj = point.dissipated_mj();
     point.friction.sliders[0].seen.1 = 3.0;
     point.anchor();
-    assert!((point.felt().gradient.norm() - 0.75).abs() < 1e-12);
+    assert!((point.surface().gradient.norm() - 0.75).abs() < 1e-12);
     assert!((point.dissipated_mj() - taken_mj).abs() < 1e-15 * (1.0 + taken_mj));
 }
 

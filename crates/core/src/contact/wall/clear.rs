@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use super::{Reading, SAFE, SUNK, WallContact};
 use crate::Vec3;
-use crate::contact::memory::WallMemory;
+use crate::contact::cache::ContactCache;
 use crate::contact::point::{ContactPoint, FOLLOW};
 use crate::rod::{ElementData, RodState};
 
@@ -109,7 +109,7 @@ impl WallContact<'_> {
     /// How far a material point of the vessel at which a point of an element is moves at most, mm.
     fn motion_mm(&self, from: &Nodes, to: &Nodes, length_mm: f64) -> f64 {
         let [x0, x1, t0, t1] = [0, 1, 2, 3].map(|k| (to[k] - from[k]).norm());
-        (x0.max(x1) + BULGE * length_mm * (t0 + t1)) * self.felt.stretch()
+        (x0.max(x1) + BULGE * length_mm * (t0 + t1)) * self.surface.stretch()
     }
 
     /// The points of a span, unless none can touch the wall at a state; those that are told are known where they are at the base.
@@ -119,7 +119,7 @@ impl WallContact<'_> {
         elements: &[ElementData],
         state: &RodState,
     ) -> Option<Range<usize>> {
-        let known = &self.memory.spans[span];
+        let known = &self.cache.spans[span];
         if self.is_free(known, elements, state) {
             return None;
         }
@@ -135,7 +135,7 @@ impl WallContact<'_> {
         state: &RodState,
         part: f64,
     ) -> Option<Range<usize>> {
-        let known = &self.memory.spans[span];
+        let known = &self.cache.spans[span];
         if known.room.free_mm > 0.0 {
             let (to, length_mm) = (nodes(known.element, state), elements[known.element].length);
             let clearance_mm =
@@ -149,13 +149,13 @@ impl WallContact<'_> {
 
     /// The points of a span, which are known where they are at the base from here on.
     fn know_base(&mut self, span: usize, elements: &[ElementData]) -> Range<usize> {
-        let known = &mut self.memory.spans[span];
+        let known = &mut self.cache.spans[span];
         let (points, base, length_mm) = (known.points.clone(), known.base, elements[known.element].length);
         if !std::mem::replace(&mut known.at_base, true) {
-            self.memory.remember(points.clone());
+            self.cache.remember(points.clone());
             for index in points.clone() {
                 let x = self.points[index].between(&base, length_mm);
-                self.read_base(index, &self.felt.material(&x));
+                self.read_base(index, &self.surface.material(&x));
             }
         }
         points
@@ -163,40 +163,40 @@ impl WallContact<'_> {
 
     /// All points are known where they are at the base: what is kept of them must be, and what is looked at elsewhere.
     pub fn know_whole_base(&mut self, elements: &[ElementData]) {
-        for span in 0..self.memory.spans.len() {
+        for span in 0..self.cache.spans.len() {
             self.know_base(span, elements);
         }
     }
 
     /// Has a state be the base, and looks at the points that may touch there.
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
-        self.memory.pressing.clear();
-        for span in 0..self.memory.spans.len() {
-            let free = self.is_free(&self.memory.spans[span], elements, state);
-            let known = &mut self.memory.spans[span];
+        self.cache.pressing.clear();
+        for span in 0..self.cache.spans.len() {
+            let free = self.is_free(&self.cache.spans[span], elements, state);
+            let known = &mut self.cache.spans[span];
             known.base = nodes(known.element, state);
             known.at_base = !free;
             if free {
                 continue;
             }
             let points = known.points.clone();
-            self.memory.remember(points.clone());
+            self.cache.remember(points.clone());
             let mut room = Room::UNLIMITED;
             for index in points {
                 let x = self.material(index, elements, state);
                 let reading = self.read_base(index, &x);
-                if self.memory.points[index].presses {
-                    self.memory.pressing.push(index);
+                if self.cache.points[index].presses {
+                    self.cache.pressing.push(index);
                 }
                 room.take(self.room(index, &x, &reading));
             }
-            self.memory.spans[span].look(state, room);
+            self.cache.spans[span].look(state, room);
         }
     }
 
     /// How far point `index`, which is at `x` and has this reading, is from touching anything.
     pub(super) fn room(&self, index: usize, x: &Vec3, reading: &Reading) -> Room {
-        let known = &self.memory.points[index];
+        let known = &self.cache.points[index];
         let moved_mm = (x - known.looked_at).norm();
         // A look from within the room must change nothing that is known, so no triangle is; what has pressed in the last equilibrium may
         // be held to the wall; and what is no number has no room.
@@ -212,7 +212,7 @@ impl WallContact<'_> {
 
     /// The base before the one looked at last is the base again.
     pub(super) fn restore_base(&mut self) {
-        let WallMemory { points, before, spans, .. } = &mut *self.memory;
+        let ContactCache { points, before, spans, .. } = &mut *self.cache;
         for span in spans.iter().filter(|span| span.at_base) {
             points[span.points.clone()].copy_from_slice(&before[span.points.clone()]);
         }
@@ -221,10 +221,10 @@ impl WallContact<'_> {
     /// Notes of a point that it is at `x` at the base, and what it reads there.
     fn read_base(&mut self, index: usize, x: &Vec3) -> Reading {
         let radius_mm = self.points[index].potential.radius_mm;
-        let held = self.holding && self.memory.points[index].presses;
+        let held = self.holding && self.cache.points[index].presses;
         let limit_mm = if held { (1.0 + FOLLOW) * radius_mm } else { radius_mm };
         let reading = self.read_within(index, x, limit_mm);
-        let known = &mut self.memory.points[index];
+        let known = &mut self.cache.points[index];
         known.base = *x;
         known.base_clearance_mm = reading.distance_mm();
         known.presses = matches!(reading, Reading::Pressed(_));

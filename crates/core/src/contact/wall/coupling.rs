@@ -66,11 +66,11 @@ impl WallContact<'_> {
 
     /// Tells the derivatives of friction at the base, `state`, that lagged normal forces leave out, point by point.
     pub fn couplings(&self, state: &RodState, mut to: impl FnMut(&ContactPoint, &Coupling)) {
-        for (index, d) in self.memory.all_pressed() {
-            let (point, known) = (&self.points[index], &self.memory.points[index]);
-            let x = &self.felt.place(&known.base);
+        for (index, d) in self.cache.all_pressed() {
+            let (point, known) = (&self.points[index], &self.cache.points[index]);
+            let x = &self.surface.place(&known.base);
             let w = self.weight_mm(index);
-            let rough = self.felt.rough(&known.base, known.triangle);
+            let rough = self.surface.rough(&known.base, known.triangle);
             let (size, n) = (d.gradient.norm(), d.gradient / d.gradient.norm());
             let second = point.potential.holding(d.value_mm).1;
             // The force is −w ψ′ |∇d|. Where moduli and coefficients of friction differ they are taken as even in a step.
@@ -123,12 +123,12 @@ impl WallContact<'_> {
 
     /// What points press with at the state assembled last, held ones that pull included, goes to friction.
     pub(super) fn press_friction(&mut self) {
-        let (felt, memory, softness) = (self.felt, &*self.memory, self.softness);
+        let (surface, cache, softness) = (self.surface, &*self.cache, self.softness);
         let pressed = self.points.iter().enumerate().map(|(index, point)| {
-            let d = memory.pressed(index)?;
-            let known = &memory.points[index];
-            let w = felt.stiffness(&known.base, known.triangle, softness).factor * point.weight_mm;
-            let rough = felt.rough(&known.base, known.triangle);
+            let d = cache.pressed(index)?;
+            let known = &cache.points[index];
+            let w = surface.stiffness(&known.base, known.triangle, softness).factor * point.weight_mm;
+            let rough = surface.rough(&known.base, known.triangle);
             let size = d.gradient.norm();
             let force = -w * point.potential.holding(d.value_mm).0 * size;
             Some((d.gradient / size, force * rough, known.force_n * rough))
@@ -138,20 +138,20 @@ impl WallContact<'_> {
 
     /// The forces that a step from the base leads to: `moved` tells how much of it moves a point along a direction.
     pub fn aim(&mut self, moved: impl Fn(&ContactPoint, &Vec3) -> f64) {
-        self.memory.aims.clear();
+        self.cache.aims.clear();
         for (index, point) in self.points.iter().enumerate() {
-            let force = self.memory.pressed(index).map_or(0.0, |d| {
+            let force = self.cache.pressed(index).map_or(0.0, |d| {
                 let (first, second) = point.potential.holding(d.value_mm);
                 let along = moved(point, &d.gradient);
                 -self.weight_mm(index) * (first + second * along) * d.gradient.norm()
             });
-            self.memory.aims.push(force);
+            self.cache.aims.push(force);
         }
     }
 
     /// Takes a part of the way to the forces aimed at: points that would pull are let go.
     pub fn take_aim(&mut self, fraction: f64) {
-        for (known, aim) in self.memory.points.iter_mut().zip(&self.memory.aims).filter(|(k, _)| k.presses) {
+        for (known, aim) in self.cache.points.iter_mut().zip(&self.cache.aims).filter(|(k, _)| k.presses) {
             known.force_n += fraction * (aim - known.force_n);
             if known.force_n <= 0.0 {
                 (known.force_n, known.presses) = (0.0, false);
@@ -162,7 +162,7 @@ impl WallContact<'_> {
     /// What held points pull with, over what the others press with.
     pub fn pull(&self) -> f64 {
         let (mut pull, mut press) = (0.0, 0.0);
-        for (index, d) in self.memory.all_pressed() {
+        for (index, d) in self.cache.all_pressed() {
             let (point, w) = (&self.points[index], self.weight_mm(index));
             let force = -w * point.potential.holding(d.value_mm).0;
             if force < 0.0 {

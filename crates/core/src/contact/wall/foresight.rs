@@ -126,10 +126,10 @@ fn crest(force_n: f64, hessian: &Matrix3<f64>) -> Matrix3<f64> {
 impl WallContact<'_> {
     /// See [`External::foresee`](crate::solve::External::foresee).
     pub(super) fn foresee_contacts(&mut self, moved: &Moved<'_>) -> bool {
-        let mut foreseen = std::mem::take(&mut self.memory.foreseen);
+        let mut foreseen = std::mem::take(&mut self.cache.foreseen);
         foreseen.clear();
-        self.memory.slipping.clear();
-        for (index, d) in self.memory.all_pressed() {
+        self.cache.slipping.clear();
+        for (index, d) in self.cache.all_pressed() {
             let point = &self.points[index];
             let (gap_mm, change_mm) =
                 (d.value_mm - point.potential.radius_mm, moved(point.place()).0.dot(&d.gradient));
@@ -145,8 +145,8 @@ impl WallContact<'_> {
                 kept: false,
             });
         }
-        self.memory.foreseen = foreseen;
-        !self.memory.foreseen.is_empty()
+        self.cache.foreseen = foreseen;
+        !self.cache.foreseen.is_empty()
     }
 
     /// See [`External::meet`](crate::solve::External::meet).
@@ -157,12 +157,12 @@ impl WallContact<'_> {
         part: f64,
         moved: &Moved<'_>,
     ) -> bool {
-        let known = self.memory.foreseen.len();
+        let known = self.cache.foreseen.len();
         let (mut next, mut met) = (0, 0);
-        for span in 0..self.memory.spans.len() {
+        for span in 0..self.cache.spans.len() {
             for index in self.near(span, elements, trial).into_iter().flatten() {
-                next += self.memory.foreseen[next..known].partition_point(|contact| contact.index < index);
-                let old = self.memory.foreseen[next..known].first().filter(|contact| contact.index == index);
+                next += self.cache.foreseen[next..known].partition_point(|contact| contact.index < index);
+                let old = self.cache.foreseen[next..known].first().filter(|contact| contact.index == index);
                 // Those that press are brought back to what was foreseen of them.
                 if old.is_some_and(|contact| contact.presses) {
                     continue;
@@ -173,12 +173,12 @@ impl WallContact<'_> {
                 };
                 met += 1;
                 match old {
-                    Some(_) => self.memory.foreseen[next] = contact,
-                    None => self.memory.foreseen.push(contact),
+                    Some(_) => self.cache.foreseen[next] = contact,
+                    None => self.cache.foreseen.push(contact),
                 }
             }
         }
-        self.memory.foreseen.sort_unstable_by_key(|contact| contact.index);
+        self.cache.foreseen.sort_unstable_by_key(|contact| contact.index);
         met > 0
     }
 
@@ -195,12 +195,12 @@ impl WallContact<'_> {
         let (x, radius_mm) = (self.material(index, elements, trial), point.potential.radius_mm);
         let limit_mm = if old.is_some() { radius_mm } else { (1.0 + FOLLOW) * radius_mm };
         let Reading::Pressed(d) = self.read_within(index, &x, limit_mm) else { return None };
-        let factor = self.felt.stiffness(&x, self.memory.points[index].triangle, self.softness).factor;
+        let factor = self.surface.stiffness(&x, self.cache.points[index].triangle, self.softness).factor;
         let change_mm = moved(point.place()).0.dot(&d.gradient);
         // At the base it presses as it does there, or not at all, whatever the plane says of there.
         let at_base = old.is_some_and(|contact| contact.at_base);
         let plane_mm = d.value_mm - radius_mm - part * change_mm;
-        let base_mm = self.memory.points[index].base_clearance_mm - radius_mm;
+        let base_mm = self.cache.points[index].base_clearance_mm - radius_mm;
         let least_mm = if at_base { base_mm } else { base_mm.max(0.0) };
         let gap_mm = if plane_mm < 0.0 { least_mm } else { plane_mm };
         Some(Foreseen {
@@ -224,7 +224,7 @@ impl WallContact<'_> {
         into: &mut dyn Stencils,
     ) -> usize {
         let mut changed = 0;
-        for contact in &mut self.memory.foreseen {
+        for contact in &mut self.cache.foreseen {
             let point = &self.points[contact.index];
             contact.gap_mm[1] = moved(point.place()).0.dot(&contact.gradient);
             let presses = contact.gap_mm[0] + contact.gap_mm[1] < 0.0;
@@ -239,29 +239,29 @@ impl WallContact<'_> {
 
     /// See [`External::part_towards`](crate::solve::External::part_towards).
     pub(super) fn part_towards_contacts(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
-        let (mut ends, mut slips) = std::mem::take(&mut self.memory.ends);
+        let (mut ends, mut slips) = std::mem::take(&mut self.cache.ends);
         ends.clear();
-        ends.extend(self.memory.foreseen.iter().map(|contact| {
+        ends.extend(self.cache.foreseen.iter().map(|contact| {
             let point = &self.points[contact.index];
             moved(point.place()).0.dot(&contact.gradient)
         }));
         self.slips_to(moved, &mut slips);
         let slope = |part: f64| -> f64 {
-            let each = self.memory.foreseen.iter().zip(&ends).map(|(contact, end)| {
+            let each = self.cache.foreseen.iter().zip(&ends).map(|(contact, end)| {
                 let way = end - contact.gap_mm[1];
                 let there = contact.gap_mm[0] + contact.gap_mm[1] + part * way;
-                let felt = if contact.kept { there } else { there.min(0.0) };
+                let surface = if contact.kept { there } else { there.min(0.0) };
                 let carried = contact.carried_n + part * (contact.linear_n(*end) - contact.carried_n);
-                (contact.spring_n_per_mm * felt - carried) * way
+                (contact.spring_n_per_mm * surface - carried) * way
             });
             each.sum::<f64>() + self.slipping_slope(&slips, part)
         };
         let part = falls_until(slope).min(most);
-        for (contact, end) in self.memory.foreseen.iter_mut().zip(&ends) {
+        for (contact, end) in self.cache.foreseen.iter_mut().zip(&ends) {
             contact.carried_n += part * (contact.linear_n(*end) - contact.carried_n);
         }
         self.carry_slipping(&slips, part);
-        self.memory.ends = (ends, slips);
+        self.cache.ends = (ends, slips);
         part
     }
 
@@ -273,7 +273,7 @@ impl WallContact<'_> {
         into: &mut dyn Stencils,
     ) -> usize {
         let mut kept = 0;
-        for contact in self.memory.foreseen.iter_mut().filter(|contact| contact.at_base && !contact.presses) {
+        for contact in self.cache.foreseen.iter_mut().filter(|contact| contact.at_base && !contact.presses) {
             (contact.presses, contact.kept, kept) = (true, true, kept + 1);
             contact.switch(&self.points[contact.index], elements, base, into);
         }
@@ -289,8 +289,8 @@ impl WallContact<'_> {
         into: &mut dyn Stencils,
     ) -> f64 {
         let (mut stray_n, mut foreseen_n) = (0.0, self.least_force_n());
-        for k in 0..self.memory.foreseen.len() {
-            let contact = self.memory.foreseen[k];
+        for k in 0..self.cache.foreseen.len() {
+            let contact = self.cache.foreseen[k];
             let Foreseen { index, gap_mm: [gap, change], gradient, spring_n_per_mm, presses, .. } = contact;
             let foreseen_mm = gap + part * change;
             if !presses || foreseen_mm >= 0.0 {
@@ -318,7 +318,7 @@ impl WallContact<'_> {
         into: &mut dyn Stencils,
     ) -> bool {
         let mut any = false;
-        for (index, d) in self.memory.all_pressed() {
+        for (index, d) in self.cache.all_pressed() {
             let point = &self.points[index];
             let press = -self.weight_mm(index) * point.potential.derivatives(d.value_mm).0;
             let (e, h) = (point.element, elements[point.element].length);

@@ -3,7 +3,7 @@
 use super::clear::Room;
 use super::{SAFE, SUNK, WallContact};
 use crate::Vec3;
-use crate::contact::FeltWall;
+use crate::contact::ContactSurface;
 use crate::rod::{ElementData, RodState};
 use crate::solve::External;
 
@@ -28,27 +28,27 @@ impl WallContact<'_> {
             // lumen much narrower than the device. Where facets are coarse the smooth wall stands beyond them, and what is outside of
             // those is still in front of their own piece of it: by no more than the wall stands beyond them, or ever less, the farther
             // behind the facet. From another it goes away.
-            let beyond = |felt: &FeltWall| {
-                felt.query.nearest(&x, felt.reach_mm).is_some_and(|flat| {
-                    if flat.distance_mm >= -(sunk_mm + felt.smooth.outset_mm(flat.triangle)) {
+            let beyond = |surface: &ContactSurface| {
+                surface.query.nearest(&x, surface.reach_mm).is_some_and(|flat| {
+                    if flat.distance_mm >= -(sunk_mm + surface.smooth.outset_mm(flat.triangle)) {
                         return false;
                     }
-                    let here_mm = felt.distance_from(flat.triangle, &x);
-                    here_mm < 0.0 || here_mm >= felt.distance_from(flat.triangle, &flat.point_mm)
+                    let here_mm = surface.distance_from(flat.triangle, &x);
+                    here_mm < 0.0 || here_mm >= surface.distance_from(flat.triangle, &flat.point_mm)
                 })
             };
-            if std::mem::take(&mut sunk) && beyond(&self.felt) {
+            if std::mem::take(&mut sunk) && beyond(&self.surface) {
                 return true;
             }
             if let Some((from, clearance_mm)) = last
-                && (x - from).norm() > SAFE * clearance_mm.max(distance_mm) / self.felt.stretch()
+                && (x - from).norm() > SAFE * clearance_mm.max(distance_mm) / self.surface.stretch()
             {
                 self.counters.queries += 1;
                 // A flat triangle may stand into the smooth lumen: what has gone through is behind the piece of wall that is next to it.
-                let beside = self.memory.points[index + 1].triangle;
-                let behind = |triangle| self.felt.distance_from(triangle, &x) < 0.0;
-                if self.felt.query.crossing(&from, &x, 1.0).is_some()
-                    && (beside.is_none_or(behind) || beyond(&self.felt))
+                let beside = self.cache.points[index + 1].triangle;
+                let behind = |triangle| self.surface.distance_from(triangle, &x) < 0.0;
+                if self.surface.query.crossing(&from, &x, 1.0).is_some()
+                    && (beside.is_none_or(behind) || beyond(&self.surface))
                 {
                     return true;
                 }
@@ -60,12 +60,12 @@ impl WallContact<'_> {
 
     /// Whether a guess is none: a point sinks much deeper than where it comes from, or passes through the wall on its way from there.
     pub fn is_outside(&mut self, elements: &[ElementData], state: &RodState) -> bool {
-        let deep = (0..self.memory.spans.len()).any(|span| {
+        let deep = (0..self.cache.spans.len()).any(|span| {
             let Some(points) = self.near(span, elements, state) else { return false };
             let mut room = Room::UNLIMITED;
             for index in points {
                 let radius_mm = self.points[index].potential.radius_mm;
-                let known = &self.memory.points[index];
+                let known = &self.cache.points[index];
                 let was_mm = if known.side.is_some() { known.base_clearance_mm } else { SUNK * radius_mm };
                 let least_mm = was_mm.min(SUNK * radius_mm + DEEPER * radius_mm) - DEEPER * radius_mm;
                 let x = self.material(index, elements, state);
@@ -75,7 +75,7 @@ impl WallContact<'_> {
                 }
                 room.take(self.room(index, &x, &reading));
             }
-            self.memory.spans[span].look(state, room);
+            self.cache.spans[span].look(state, room);
             false
         });
         deep || self.safe_fraction(elements, state) < 1.0

@@ -8,8 +8,8 @@
 
 use super::{SUNK, WallContact};
 use crate::Vec3;
+use crate::contact::cache::TakenReading;
 use crate::contact::distance::{Distance, Nearness};
-use crate::contact::memory::TakenReading;
 use crate::contact::point::{FOLLOW, LOOK_AGAIN};
 
 /// How near a point stands.
@@ -46,7 +46,7 @@ impl WallContact<'_> {
 
     /// The same, with derivatives nearer than `limit_mm`.
     pub(super) fn read_within(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
-        if let Some(side) = self.memory.points[index].side {
+        if let Some(side) = self.cache.points[index].side {
             let reading = self.read_from_side(index, x, side, limit_mm);
             // What has come back out has no side any more: what it is near to may be the other one.
             if reading.distance_mm() < SUNK * self.points[index].potential.radius_mm {
@@ -65,7 +65,7 @@ impl WallContact<'_> {
 
     /// The reading that was taken at `x` about `triangle`, if it tells enough.
     pub(super) fn read_there(&self, index: usize, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<Reading> {
-        let TakenReading { at_mm, triangle: about, nearness } = self.memory.readings[index];
+        let TakenReading { at_mm, triangle: about, nearness } = self.cache.readings[index];
         let told = matches!(nearness, Nearness::Within(_)) || nearness.value_mm() >= limit_mm;
         (at_mm == *x && about == triangle && told).then(|| Reading::of(nearness, limit_mm))
     }
@@ -73,7 +73,7 @@ impl WallContact<'_> {
     /// Of a point that has sunk into the wall: followed from there along the surface.
     pub(super) fn read_from_side(&mut self, index: usize, x: &Vec3, side: u32, limit_mm: f64) -> Reading {
         let point = &self.points[index];
-        let known = &mut self.memory.points[index];
+        let known = &mut self.cache.points[index];
         let triangle = match known.base_triangle {
             Some(triangle) if (x - known.base_looked_at).norm() < LOOK_AGAIN * point.potential.radius_mm => {
                 known.looked_at = known.base_looked_at;
@@ -81,7 +81,7 @@ impl WallContact<'_> {
             }
             _ => {
                 known.looked_at = *x;
-                self.felt.smooth.walk(side, x)
+                self.surface.smooth.walk(side, x)
             }
         };
         known.from_tip_mm = point.from_tip_mm;
@@ -91,17 +91,17 @@ impl WallContact<'_> {
             return reading;
         }
         self.counters.near += 1;
-        let nearness = self.felt.nearness(x, triangle, limit_mm);
-        self.memory.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
+        let nearness = self.surface.nearness(x, triangle, limit_mm);
+        self.cache.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
         Reading::of(nearness, limit_mm)
     }
 
     /// What clearances and the last triangle say without a query.
     pub(super) fn read_known(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Option<Reading> {
         let radius = self.points[index].potential.radius_mm;
-        let stretch = self.felt.stretch();
+        let stretch = self.surface.stretch();
         let near = radius * (1.0 + FOLLOW) * stretch;
-        let known = &mut self.memory.points[index];
+        let known = &mut self.cache.points[index];
         let moved = (x - known.base_looked_at).norm();
         if moved < known.base_free_mm {
             self.counters.avoided += 1;
@@ -110,7 +110,7 @@ impl WallContact<'_> {
             return Some(Reading::Free((known.clearance_mm - moved) / stretch));
         }
         let moved = (x - known.looked_at).norm();
-        let free_mm = known.clearance_mm - near - self.felt.smooth.deepest_inset_mm();
+        let free_mm = known.clearance_mm - near - self.surface.smooth.deepest_inset_mm();
         if moved < free_mm {
             self.counters.avoided += 1;
             known.free_mm = free_mm;
@@ -128,25 +128,25 @@ impl WallContact<'_> {
         if (x - looked_at).norm() >= LOOK_AGAIN * radius {
             return None;
         }
-        let nearness = self.felt.nearness(x, triangle, limit_mm);
+        let nearness = self.surface.nearness(x, triangle, limit_mm);
         if nearness.value_mm() <= 0.0 {
             return None;
         }
         self.counters.near += 1;
-        self.memory.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
+        self.cache.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
         Some(Reading::of(nearness, limit_mm))
     }
 
     /// From the triangle that is nearest through space.
     pub(super) fn read_anew(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
         let radius = self.points[index].potential.radius_mm;
-        let stretch = self.felt.stretch();
+        let stretch = self.surface.stretch();
         let near = radius * (1.0 + FOLLOW) * stretch;
-        let known = &mut self.memory.points[index];
-        let places = &mut self.memory.places;
-        let asked = places.queries;
-        let place = places.around(&self.felt.query, x);
-        self.counters.avoided += u64::from(places.queries == asked);
+        let known = &mut self.cache.points[index];
+        let proximity = &mut self.cache.proximity;
+        let asked = proximity.queries;
+        let place = proximity.around(&self.surface.query, x);
+        self.counters.avoided += u64::from(proximity.queries == asked);
         (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
         (known.clearance_mm, known.triangle) = (place.clearance_mm, None);
         let clearance = place.clearance(x) / stretch;
@@ -155,13 +155,13 @@ impl WallContact<'_> {
             known.free_mm = (x - place.middle).norm() + LOOK_AGAIN * radius;
             return Reading::Free(clearance);
         };
-        known.free_mm = place.clearance_mm - near - self.felt.smooth.inset_mm(triangle);
+        known.free_mm = place.clearance_mm - near - self.surface.smooth.inset_mm(triangle);
         if (x - place.middle).norm() < known.free_mm {
             return Reading::Free(clearance);
         }
         (known.triangle, known.free_mm) = (Some(triangle), 0.0);
-        let nearness = self.felt.nearness(x, triangle, limit_mm);
-        self.memory.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
+        let nearness = self.surface.nearness(x, triangle, limit_mm);
+        self.cache.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
         Reading::of(nearness, limit_mm)
     }
 }

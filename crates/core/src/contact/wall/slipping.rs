@@ -125,11 +125,11 @@ impl WallContact<'_> {
 
     /// Begins to look at the friction of a step from the base; returns whether there is any.
     pub(super) fn begin_slipping(&mut self, base: &RodState, moved: &Moved<'_>) -> bool {
-        let mut slipping = std::mem::take(&mut self.memory.slipping);
+        let mut slipping = std::mem::take(&mut self.cache.slipping);
         if slipping.is_empty() && self.friction.acts() && !self.friction.is_coupled() {
             let rubbing = self.points.iter().enumerate().filter(|(index, _)| self.friction.holds(*index));
             for (index, point) in rubbing {
-                let x = self.felt.place(&self.memory.points[index].base);
+                let x = self.surface.place(&self.cache.points[index].base);
                 let (angle, radius_mm) = (point.angle(base), point.potential.radius_mm);
                 let Some(f) = self.friction.derivatives(index, &x, angle, radius_mm) else { continue };
                 let way = moved(point.place());
@@ -146,8 +146,8 @@ impl WallContact<'_> {
                 slipping.push(new);
             }
         }
-        self.memory.slipping = slipping;
-        !self.memory.slipping.is_empty()
+        self.cache.slipping = slipping;
+        !self.cache.slipping.is_empty()
     }
 
     /// Has friction be that at the end of the step; returns at how many points that changes it.
@@ -159,8 +159,8 @@ impl WallContact<'_> {
         into: &mut dyn Stencils,
     ) -> usize {
         let mut changed = 0;
-        for k in 0..self.memory.slipping.len() {
-            let mut slipping = self.memory.slipping[k];
+        for k in 0..self.cache.slipping.len() {
+            let mut slipping = self.cache.slipping[k];
             let point = &self.points[slipping.index];
             let way = moved(point.place());
             let Some(f) = self.friction_after(&slipping, &way, false) else { continue };
@@ -170,7 +170,7 @@ impl WallContact<'_> {
                 changed += 1;
                 self.switch(&mut slipping, f, (elements, base), into);
             }
-            self.memory.slipping[k] = slipping;
+            self.cache.slipping[k] = slipping;
         }
         changed
     }
@@ -201,18 +201,18 @@ impl WallContact<'_> {
         base: &RodState,
         into: &mut dyn Stencils,
     ) -> usize {
-        let Some(least) = self.memory.slipping.iter().map(|slipping| slipping.as_stiff).min() else {
+        let Some(least) = self.cache.slipping.iter().map(|slipping| slipping.as_stiff).min() else {
             return 0;
         };
         let stiffer = if least == Stiffness::Tangent { Stiffness::Secant } else { Stiffness::Base };
         let mut stiffened = 0;
-        for k in 0..self.memory.slipping.len() {
-            let mut slipping = self.memory.slipping[k];
+        for k in 0..self.cache.slipping.len() {
+            let mut slipping = self.cache.slipping[k];
             let Some(f) = self.friction_after(&slipping, &slipping.way, false) else { continue };
             if slipping.as_stiff < stiffer {
                 (slipping.as_stiff, stiffened) = (stiffer, stiffened + 1);
                 self.switch(&mut slipping, f, (elements, base), into);
-                self.memory.slipping[k] = slipping;
+                self.cache.slipping[k] = slipping;
             }
         }
         stiffened
@@ -239,12 +239,12 @@ impl WallContact<'_> {
             }
         };
         slips.clear();
-        slips.extend(self.memory.slipping.iter().map(of));
+        slips.extend(self.cache.slipping.iter().map(of));
     }
 
     /// Slope of what friction takes at a `part` of a round, less what is carried there.
     pub(super) fn slipping_slope(&self, slips: &[Slip], part: f64) -> f64 {
-        let each = self.memory.slipping.iter().zip(slips).map(|(slipping, slip)| {
+        let each = self.cache.slipping.iter().zip(slips).map(|(slipping, slip)| {
             let there = slip.begin_mm + slip.change_mm * part;
             let against = self.friction.resistance(slipping.index, &there) * there.dot(&slip.change_mm);
             against - (slip.work_mj[0] + part * slip.work_mj[1])
@@ -254,7 +254,7 @@ impl WallContact<'_> {
 
     /// What the rod's stiffness is in balance with after that part of the round.
     pub(super) fn carry_slipping(&mut self, slips: &[Slip], part: f64) {
-        for (slipping, slip) in self.memory.slipping.iter_mut().zip(slips) {
+        for (slipping, slip) in self.cache.slipping.iter_mut().zip(slips) {
             slipping.carried = plus(&slipping.carried, part, &slip.carried);
         }
     }

@@ -3,7 +3,7 @@
 use super::foresight::falls_until;
 use super::tests::{RADIUS_MM, bent, rod, straight};
 use super::*;
-use crate::contact::{FeltWall, HandMotion};
+use crate::contact::{ContactSurface, HandMotion};
 use crate::rod::{Assembly, Layout, PLAIN, Supports, TWISTED};
 use crate::solve::contacts::moved;
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
@@ -89,8 +89,8 @@ impl External for Pushed<'_> {
 }
 
 /// Presses the tip of a rod of 20 mm on the wall of a tube, hard as a rigid one, and lets the force turn about it.
-fn turned(felt: &FeltWall, foreseeing: bool) -> (NewtonReport, RodState, Vec<f64>) {
-    let mut rod = rod(felt, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);
+fn turned(surface: &ContactSurface, foreseeing: bool) -> (NewtonReport, RodState, Vec<f64>) {
+    let mut rod = rod(surface, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);
     let (mut state, elements) = (rod.at(Vec3::z() * 10.0), rod.elements.clone());
     let mut supports = Supports { start_tangent: true, ..Supports::default() };
     let mut newton = Newton::<PLAIN>::new(20);
@@ -107,8 +107,8 @@ fn turned(felt: &FeltWall, foreseeing: bool) -> (NewtonReport, RodState, Vec<f64
 
 #[test]
 fn a_rod_slides_around_a_hard_wall_in_few_steps() {
-    let felt = straight();
-    let ((with, end, strays), (without, same, none)) = (turned(&felt, true), turned(&felt, false));
+    let surface = straight();
+    let ((with, end, strays), (without, same, none)) = (turned(&surface, true), turned(&surface, false));
     assert!(with.converged && with.stable && without.converged, "{} {}", with.reason, without.reason);
     assert!(end.positions[20].y > 0.8 && (end.positions[20] - same.positions[20]).norm() < 1e-6);
     let (few, many) = (with.iterations, without.iterations);
@@ -119,8 +119,8 @@ fn a_rod_slides_around_a_hard_wall_in_few_steps() {
 
 /// Pushes the tip of a rod along the wall of a tube on which it rubs, and lets the push go; tells the iterations of both, and how far the tip
 /// went and came back, mm.
-fn rubbed(felt: &FeltWall, foreseeing: bool) -> ([usize; 2], [f64; 2]) {
-    let mut rod = rod(felt, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);
+fn rubbed(surface: &ContactSurface, foreseeing: bool) -> ([usize; 2], [f64; 2]) {
+    let mut rod = rod(surface, 20, &[1.0, 0.75, 0.5, 0.25], 1e4);
     rod.friction = Friction::new(0.3);
     let (mut state, elements) = (rod.at(Vec3::z() * 10.0), rod.elements.clone());
     let hand = HandMotion { from_mm: 20.0, to_mm: 20.0, turn_rad: 0.0 };
@@ -144,8 +144,8 @@ fn rubbed(felt: &FeltWall, foreseeing: bool) -> ([usize; 2], [f64; 2]) {
 
 #[test]
 fn a_rod_that_rubs_slips_and_sticks_in_few_steps() {
-    let felt = straight();
-    let ((few, with), (many, without)) = (rubbed(&felt, true), rubbed(&felt, false));
+    let surface = straight();
+    let ((few, with), (many, without)) = (rubbed(&surface, true), rubbed(&surface, false));
     assert!(
         (with[0] - without[0]).abs() < 1e-6 && (with[1] - without[1]).abs() < 1e-6,
         "{with:?} {without:?}"
@@ -157,8 +157,8 @@ fn a_rod_that_rubs_slips_and_sticks_in_few_steps() {
 
 #[test]
 fn what_follows_a_step_is_the_change_of_friction_that_is_renewed() {
-    let felt = bent();
-    let mut rod = rod(&felt, 6, &[1.0, 0.5], 3.0);
+    let surface = bent();
+    let mut rod = rod(&surface, 6, &[1.0, 0.5], 3.0);
     let (state, elements) = (rod.at(Vec3::new(1.5, 0.1, -3.0)), rod.elements.clone());
     rod.friction = Friction::new(0.3);
     let hand = HandMotion { from_mm: 5.5, to_mm: 6.0, turn_rad: 0.0 };
@@ -220,8 +220,8 @@ fn a_search_ends_where_a_convex_function_falls_no_more() {
 
 #[test]
 fn a_contact_that_is_met_again_is_at_the_base_as_it_was() {
-    let felt = straight();
-    let mut rod = rod(&felt, 1, &[1.0], 1e4);
+    let surface = straight();
+    let mut rod = rod(&surface, 1, &[1.0], 1e4);
     // A tip that presses where the step begins; the tube has a radius of 2 mm.
     let sunk_mm = 1e-3;
     let (base, elements) = (rod.at(Vec3::new(2.0 - RADIUS_MM + sunk_mm, 0.0, 20.0)), rod.elements.clone());

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::SMatrix;
 
 use super::*;
-use crate::contact::{FeltWall, WallPotential, WallProperties};
+use crate::contact::{ContactSurface, WallPotential, WallProperties};
 use crate::rod::{Assembly, Frame, Layout, PLAIN};
 use crate::vessel::{NoStore, SurfaceMesh, Wall};
 
@@ -15,8 +15,8 @@ pub(super) fn swept(
     outline: &[(f64, f64)],
     rings: u32,
     place: impl Fn(u32) -> (Vec3, Vec3, f64),
-) -> FeltWall {
-    felt(&sweep(outline, rings, place))
+) -> ContactSurface {
+    surface(&sweep(outline, rings, place))
 }
 
 fn sweep(outline: &[(f64, f64)], rings: u32, place: impl Fn(u32) -> (Vec3, Vec3, f64)) -> SurfaceMesh {
@@ -37,9 +37,9 @@ fn sweep(outline: &[(f64, f64)], rings: u32, place: impl Fn(u32) -> (Vec3, Vec3,
 }
 
 /// The wall as it is meshed.
-fn felt(mesh: &SurfaceMesh) -> FeltWall {
+fn surface(mesh: &SurfaceMesh) -> ContactSurface {
     let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
-    FeltWall::new(&Wall::welded(mesh).unwrap(), (RADIUS_MM, RADIUS_MM), &properties, &NoStore).unwrap()
+    ContactSurface::new(&Wall::welded(mesh).unwrap(), (RADIUS_MM, RADIUS_MM), &properties, &NoStore).unwrap()
 }
 
 /// An ellipse with these half axes, mm.
@@ -54,12 +54,12 @@ fn along_z(k: u32) -> (Vec3, Vec3, f64) {
 }
 
 /// A tube of radius 2 mm.
-pub(super) fn straight() -> FeltWall {
+pub(super) fn straight() -> ContactSurface {
     swept(&ellipse(2.0, 2.0, 24), 81, along_z)
 }
 
 /// One that is bent to a radius of 12 mm about a line through (−12, 0, 0); inside of the bend its wall is a crest.
-pub(super) fn bent() -> FeltWall {
+pub(super) fn bent() -> ContactSurface {
     swept(&ellipse(2.0, 2.0, 24), 31, |k| {
         let angle = 0.035 * (f64::from(k) - 15.0);
         let n = Vec3::new(angle.cos(), 0.0, angle.sin());
@@ -68,7 +68,7 @@ pub(super) fn bent() -> FeltWall {
 }
 
 /// A barrel, of radius 2 mm where it is widest: concave everywhere.
-fn barrel() -> FeltWall {
+fn barrel() -> ContactSurface {
     swept(&ellipse(2.0, 2.0, 24), 21, |k| {
         let z = 0.2 * (f64::from(k) - 10.0);
         (Vec3::z() * z, Vec3::x(), (1.0 - z * z / 9.0).sqrt())
@@ -76,7 +76,7 @@ fn barrel() -> FeltWall {
 }
 
 /// A slit 0.8 mm high: both sides are near everywhere.
-fn slit() -> FeltWall {
+fn slit() -> ContactSurface {
     swept(&ellipse(3.0, 0.4, 48), 81, along_z)
 }
 
@@ -84,16 +84,16 @@ pub(super) const RADIUS_MM: f64 = 0.45;
 
 /// A rod in a wall, and what it knows.
 pub(super) struct Rod<'a> {
-    pub(super) felt: &'a FeltWall,
+    pub(super) surface: &'a ContactSurface,
     pub(super) elements: Vec<ElementData>,
     pub(super) points: Vec<ContactPoint>,
-    pub(super) memory: WallMemory,
+    pub(super) cache: ContactCache,
     pub(super) friction: Friction,
 }
 
 /// A rod of elements of 1 mm with points at these ξ of each, which must fall.
 pub(super) fn rod<'a>(
-    felt: &'a FeltWall,
+    surface: &'a ContactSurface,
     elements: usize,
     places: &[f64],
     modulus_n_per_mm2: f64,
@@ -108,17 +108,17 @@ pub(super) fn rod<'a>(
         potential: WallPotential { modulus_n_per_mm2, radius_mm: RADIUS_MM },
     };
     Rod {
-        felt,
+        surface,
         elements: vec![ElementData::plain(1.0, 10.0); elements],
         points: (0..elements).rev().flat_map(|e| places.iter().map(move |xi| point(e, *xi))).collect(),
-        memory: WallMemory::new(felt),
+        cache: ContactCache::new(surface),
         friction: Friction::default(),
     }
 }
 
 impl Rod<'_> {
     pub(super) fn contact(&mut self) -> WallContact<'_> {
-        WallContact::new(self.felt, &self.points, &mut self.memory, &mut self.friction, 10.0)
+        WallContact::new(self.surface, &self.points, &mut self.cache, &mut self.friction, 10.0)
     }
 
     /// Straight, from a place.
@@ -136,8 +136,8 @@ fn positions(assembly: &Assembly<PLAIN>) -> Stiff {
 }
 
 /// What one element that presses on a wall adds to the matrix, before and after it is made convex; whether that changed it.
-fn convexified(felt: &FeltWall, places: &[f64], start: Vec3) -> (Stiff, Stiff, bool) {
-    let mut rod = rod(felt, 1, places, 1e3);
+fn convexified(surface: &ContactSurface, places: &[f64], start: Vec3) -> (Stiff, Stiff, bool) {
+    let mut rod = rod(surface, 1, places, 1e3);
     let (state, elements) = (rod.at(start), rod.elements.clone());
     let mut contact = rod.contact();
     let mut assembly = Assembly::<PLAIN>::new(1);
@@ -145,7 +145,7 @@ fn convexified(felt: &FeltWall, places: &[f64], start: Vec3) -> (Stiff, Stiff, b
     assembly.assemble(&elements, &state);
     let bare = positions(&assembly);
     contact.linearise(&elements, &state, &mut assembly);
-    assert!((0..places.len()).all(|index| contact.memory.pressed(index).is_some()), "a point does not press");
+    assert!((0..places.len()).all(|index| contact.cache.pressed(index).is_some()), "a point does not press");
     let before = positions(&assembly) - bare;
     let any = contact.convexify(&elements, &state, &mut assembly);
     (before, positions(&assembly) - bare, any)
@@ -174,8 +174,8 @@ fn where_a_wall_is_concave_there_is_little_to_make_convex() {
 
 #[test]
 fn what_does_not_press_is_convex_as_it_is() {
-    let felt = bent();
-    let mut rod = rod(&felt, 1, &[1.0, 0.5, 0.0], 1e3);
+    let surface = bent();
+    let mut rod = rod(&surface, 1, &[1.0, 0.5, 0.0], 1e3);
     let (state, elements) = (rod.at(Vec3::z() * -0.5), rod.elements.clone());
     let mut contact = rod.contact();
     let mut assembly = Assembly::<PLAIN>::new(1);
@@ -192,8 +192,8 @@ fn spread(seed: u32, step: f64) -> f64 {
 }
 
 /// Value and residual at a base before and after a trial that is refused; whether the wall is told so.
-fn refused(felt: &FeltWall, seed: u32, told: bool) -> [(f64, Vec<f64>); 2] {
-    let mut rod = rod(felt, 1, &[1.0, 0.5, 0.0], 1e3);
+fn refused(surface: &ContactSurface, seed: u32, told: bool) -> [(f64, Vec<f64>); 2] {
+    let mut rod = rod(surface, 1, &[1.0, 0.5, 0.0], 1e3);
     let (r, s) = (|step| spread(seed, step), |step| 0.35 * spread(seed, step));
     let start = Vec3::new(1.5 * r(0.618_034), 0.3 * r(0.754_878), 20.0 + r(0.569_840));
     let (base, trial) = (rod.at(start), rod.at(start + Vec3::new(s(0.819_173), s(0.671_044), s(0.549_700))));
@@ -215,13 +215,13 @@ fn refused(felt: &FeltWall, seed: u32, told: bool) -> [(f64, Vec<f64>); 2] {
 
 #[test]
 fn a_base_that_is_returned_to_is_what_it_was() {
-    let felt = slit();
+    let surface = slit();
     let (mut untold, mut pressed) = (0, 0);
     for seed in 1..300 {
-        let [first, again] = refused(&felt, seed, true);
+        let [first, again] = refused(&surface, seed, true);
         assert!(first == again, "{seed}: {} {}", first.0, again.0);
         pressed += u32::from(first.0 > 0.0);
-        let [first, again] = refused(&felt, seed, false);
+        let [first, again] = refused(&surface, seed, false);
         untold += u32::from(first != again);
     }
     assert!(pressed > 250 && untold > 10, "{pressed} press, {untold} differ where the wall is not told");
@@ -229,19 +229,19 @@ fn a_base_that_is_returned_to_is_what_it_was() {
 
 #[test]
 fn a_place_has_a_reading_for_each_triangle() {
-    let felt = slit();
+    let surface = slit();
     let x = Vec3::new(0.4, 0.1, 20.1);
-    let about = |y: f64| felt.query.nearest(&Vec3::new(0.4, y, 20.1), 1.0).unwrap().triangle;
+    let about = |y: f64| surface.query.nearest(&Vec3::new(0.4, y, 20.1), 1.0).unwrap().triangle;
     let (near, far) = (about(0.38), about(-0.38));
-    let mut rod = rod(&felt, 1, &[1.0], 1e3);
+    let mut rod = rod(&surface, 1, &[1.0], 1e3);
     let mut contact = rod.contact();
     let ask = |contact: &mut WallContact<'_>, triangle: u32| {
-        let known = &mut contact.memory.points[0];
+        let known = &mut contact.cache.points[0];
         (known.base_looked_at, known.base_triangle) = (x, Some(triangle));
         (known.looked_at, known.triangle) = (x, Some(triangle));
         contact.read_within(0, &x, 1.0).distance_mm()
     };
-    let direct = |triangle: u32| felt.nearness(&x, triangle, 1.0).value_mm();
+    let direct = |triangle: u32| surface.nearness(&x, triangle, 1.0).value_mm();
     assert!((direct(near) - 0.3).abs() < 0.02 && (direct(far) - 0.5).abs() < 0.02);
     for triangle in [near, far, near, near, far] {
         assert_eq!(ask(&mut contact, triangle), direct(triangle));
@@ -249,51 +249,51 @@ fn a_place_has_a_reading_for_each_triangle() {
     let counted = contact.count();
     assert_eq!((counted.near, counted.avoided), (4, 1));
     // What was read about one and is taken for the other is wrong.
-    contact.memory.readings[0].triangle = near;
+    contact.cache.readings[0].triangle = near;
     assert_eq!(ask(&mut contact, near), direct(far));
 }
 
 #[test]
 fn what_has_come_back_out_of_the_wall_reads_what_is_nearest() {
-    let felt = slit();
+    let surface = slit();
     let place = |y: f64| Vec3::new(0.4, y, 20.1);
-    let about = |y: f64| felt.query.nearest(&place(y), 1.0).unwrap().triangle;
+    let about = |y: f64| surface.query.nearest(&place(y), 1.0).unwrap().triangle;
     let (near, far) = (about(0.38), about(-0.38));
-    let mut rod = rod(&felt, 1, &[1.0], 1e3);
+    let mut rod = rod(&surface, 1, &[1.0], 1e3);
     let mut contact = rod.contact();
     let mut ask = |y: f64, side: u32| {
-        let known = &mut contact.memory.points[0];
+        let known = &mut contact.cache.points[0];
         (known.base_looked_at, known.base_triangle) = (place(y), Some(side));
         known.side = Some(side);
         contact.read_within(0, &place(y), 1.0).distance_mm()
     };
     // Sunk in at one side it stays with that, also behind it; across the lumen it presses on the other.
     for (y, side) in [(0.3, near), (0.42, near), (-0.3, far), (-0.42, far)] {
-        assert_eq!(ask(y, side), felt.nearness(&place(y), side, 1.0).value_mm(), "{y}");
+        assert_eq!(ask(y, side), surface.nearness(&place(y), side, 1.0).value_mm(), "{y}");
     }
     for (y, side, other) in [(0.3, far, near), (0.42, far, near), (-0.42, near, far)] {
-        let across = felt.nearness(&place(y), side, 1.0).value_mm();
+        let across = surface.nearness(&place(y), side, 1.0).value_mm();
         assert!(ask(y, side) < 0.15 && across > 0.6, "{y}: {across}");
-        assert!((ask(y, side) - felt.nearness(&place(y), other, 1.0).value_mm()).abs() < 1e-9, "{y}");
+        assert!((ask(y, side) - surface.nearness(&place(y), other, 1.0).value_mm()).abs() < 1e-9, "{y}");
     }
 }
 
 /// What a point reads after a move of some hundredths of a millimetre, and what it would read if nothing were known of where it was.
 fn on_the_way(contact: &mut WallContact<'_>, from: Vec3, to: Vec3) -> [f64; 2] {
-    let triangle = contact.felt.query.nearest(&from, 5.0).unwrap().triangle;
+    let triangle = contact.surface.query.nearest(&from, 5.0).unwrap().triangle;
     let radius_mm = contact.points[0].potential.radius_mm;
-    let known = &mut contact.memory.points[0];
+    let known = &mut contact.cache.points[0];
     (known.base_looked_at, known.base_triangle) = (from, Some(triangle));
     (known.looked_at, known.triangle) = (from, Some(triangle));
     contact.read_within(0, &from, radius_mm);
     let told = contact.read_within(0, &to, radius_mm).distance_mm();
-    [told, contact.felt.nearness(&to, triangle, radius_mm).value_mm()].map(|mm| mm.min(radius_mm))
+    [told, contact.surface.nearness(&to, triangle, radius_mm).value_mm()].map(|mm| mm.min(radius_mm))
 }
 
 #[test]
 fn what_a_point_reads_hangs_on_where_it_is_not_on_where_it_was() {
-    let felt = crate::contact::ridge_tests::felt();
-    let mut rod = rod(&felt, 1, &[1.0], 1e3);
+    let surface = crate::contact::ridge_tests::surface();
+    let mut rod = rod(&surface, 1, &[1.0], 1e3);
     rod.points[0].potential.radius_mm = 0.2;
     let mut contact = rod.contact();
     // Over the crest what is felt changes by up to ten times the way.
@@ -304,16 +304,16 @@ fn what_a_point_reads_hangs_on_where_it_is_not_on_where_it_was() {
         let [told, fresh] = on_the_way(&mut contact, from, to);
         assert!((told - fresh).abs() < 1e-12, "{from:?} {to:?}: {told} for {fresh}");
         presses += usize::from(fresh > 0.0 && fresh < 0.2);
-        let triangle = felt.query.nearest(&from, 5.0).unwrap().triangle;
-        let lost_mm = felt.nearness(&from, triangle, f64::INFINITY).value_mm() - 0.2;
+        let triangle = surface.query.nearest(&from, 5.0).unwrap().triangle;
+        let lost_mm = surface.nearness(&from, triangle, f64::INFINITY).value_mm() - 0.2;
         steep += usize::from(fresh > 0.0 && fresh < 0.2 && lost_mm > 2.0 * (to - from).norm());
     }
     assert!(presses > 200 && steep > 3, "{presses} {steep}");
 }
 
 /// Whether a straight rod from `start` towards `end`, 5 mm long, has passed through the wall.
-fn has_passed(felt: &FeltWall, start: Vec3, end: Vec3) -> bool {
-    let mut rod = rod(felt, 5, &[0.5], 1e4);
+fn has_passed(surface: &ContactSurface, start: Vec3, end: Vec3) -> bool {
+    let mut rod = rod(surface, 5, &[0.5], 1e4);
     let state =
         RodState::straight(&rod.elements, start, Frame::new((end - start).normalize(), Some(Vec3::x())));
     let elements = rod.elements.clone();
@@ -337,7 +337,7 @@ fn behind_a_coarse_facet_is_not_yet_through_the_wall() {
     let first = both.vertices_mm.len() as u32;
     both.triangles.extend(other.triangles.iter().map(|corners| corners.map(|corner| first + corner)));
     both.vertices_mm.extend(other.vertices_mm);
-    let (both, from) = (felt(&both), Vec3::new(0.3, 0.0, 20.0));
+    let (both, from) = (surface(&both), Vec3::new(0.3, 0.0, 20.0));
     assert!(has_passed(&both, from, from + Vec3::x()));
     assert!(!has_passed(&both, from, from + Vec3::z()));
 }

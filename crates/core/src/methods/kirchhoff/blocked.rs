@@ -6,7 +6,7 @@
 use super::Environment;
 use super::configuration::Start;
 use super::workspace::Tools;
-use crate::contact::{FeltWall, WallContact};
+use crate::contact::{ContactSurface, WallContact};
 use crate::methods::Command;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
@@ -54,7 +54,7 @@ impl<const C: usize> Tools<C> {
         let mut contact = WallContact::new(
             wall,
             &mesh.points,
-            &mut self.memory,
+            &mut self.cache,
             &mut self.friction,
             environment.surroundings.stack.softest_nmm2(),
         );
@@ -78,31 +78,32 @@ impl<const C: usize> Tools<C> {
 
 /// Half of the least way across the lumen at a place on the device's axis, mm, if that is less than its radius: along the normal of the
 /// nearest wall, and aslant.
-fn room_mm(felt: &FeltWall, place: &Vec3, radius_mm: f64) -> Option<f64> {
-    let near = felt.query.nearest(place, 2.0 * radius_mm)?;
+fn room_mm(surface: &ContactSurface, place: &Vec3, radius_mm: f64) -> Option<f64> {
+    let near = surface.query.nearest(place, 2.0 * radius_mm)?;
     let n = near.normal;
     // In a lumen narrower than that the middle of what there is.
-    let opposite_mm = facing_mm(felt, &(near.point_mm + n * ON_MM), &n, OFF * radius_mm);
+    let opposite_mm = facing_mm(surface, &(near.point_mm + n * ON_MM), &n, OFF * radius_mm);
     let from = near.point_mm + n * opposite_mm.map_or(OFF * radius_mm, |way_mm| 0.5 * way_mm);
     let e = n.cross(&Vec3::ith(n.iamin(), 1.0)).normalize();
     let f = n.cross(&e);
     let aslant = TILTS.into_iter().flat_map(|tilt| [e, f, -e, -f].map(|side| (n + side * tilt).normalize()));
     let ways = std::iter::once(n).chain(aslant);
     let across = ways.filter_map(|way| {
-        let ahead_mm = facing_mm(felt, &from, &way, 2.0 * radius_mm)?;
-        let (back_mm, _) = felt.query.first_met(&from, &-way, 2.0 * radius_mm - ahead_mm)?;
+        let ahead_mm = facing_mm(surface, &from, &way, 2.0 * radius_mm)?;
+        let (back_mm, _) = surface.query.first_met(&from, &-way, 2.0 * radius_mm - ahead_mm)?;
         Some(0.5 * (ahead_mm + back_mm))
     });
     across.min_by(f64::total_cmp)
 }
 
 /// How far ahead the wall that faces `from` is, mm, within `reach_mm`.
-fn facing_mm(felt: &FeltWall, from: &Vec3, way: &Vec3, reach_mm: f64) -> Option<f64> {
+fn facing_mm(surface: &ContactSurface, from: &Vec3, way: &Vec3, reach_mm: f64) -> Option<f64> {
     let mut ahead_mm = 0.0;
     for _ in 0..PIECES {
-        let (met_mm, triangle) = felt.query.first_met(&(from + way * ahead_mm), way, reach_mm - ahead_mm)?;
+        let (met_mm, triangle) =
+            surface.query.first_met(&(from + way * ahead_mm), way, reach_mm - ahead_mm)?;
         ahead_mm += met_mm;
-        if felt.query.inward_normal(triangle).dot(way) < 0.0 {
+        if surface.query.inward_normal(triangle).dot(way) < 0.0 {
             return Some(ahead_mm);
         }
         ahead_mm += ON_MM;
@@ -149,7 +150,7 @@ mod tests {
         for _ in 0..33 {
             wire.step(&surroundings, Command::advance(1.0)).unwrap();
         }
-        let environment = Environment::new(&surroundings, &wire.felt, &wire.options);
+        let environment = Environment::new(&surroundings, &wire.surface, &wire.options);
         let mut workspace = Workspace::<{ crate::rod::PLAIN }>::new(&environment, &wire.state);
         let moves = [Move { instrument: 0, command: Command::advance(1.0) }];
         workspace.carry_out(&environment, &wire.state, &moves).unwrap();

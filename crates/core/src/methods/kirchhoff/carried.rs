@@ -12,7 +12,7 @@
 //! vessel that rests; friction counts slip from the material points themselves ([`Friction::carry`](crate::contact::Friction::carry)).
 
 use super::mesh::Mesh;
-use super::slide::lay;
+use super::transport::lay;
 use crate::Vec3;
 use crate::contact::Contact;
 use crate::methods::StepReport;

@@ -131,8 +131,8 @@ impl Nodes {
                 }
                 let xi = 1.0 - (from_tip_mm - mesh.from_tip_mm[e + 1]) / mesh.elements[e].length;
                 let (element, xi) = (e, xi.clamp(0.0, 1.0));
-                let felt = ContactPoint { element, xi, instrument: index, set, from_tip_mm, ..*point };
-                mesh.points.push(felt);
+                let surface = ContactPoint { element, xi, instrument: index, set, from_tip_mm, ..*point };
+                mesh.points.push(surface);
             }
         }
     }

@@ -69,7 +69,7 @@ fn hands_put_in_what_is_stored_and_rubbed_away_and_no_force_leaves_its_cone() {
     // Of a tip that is pushed along the wall slip is told from the way that is traced in front of it, and a part of the work with it.
     for moves in [&[(WIRE, -0.1)][..], &[(CATHETER, -0.1)], &[(WIRE, -0.1), (CATHETER, -0.05)]] {
         let (mut work, mut taken) = (0.0, 0.0);
-        let felt = |simulation: &Simulation| {
+        let surface = |simulation: &Simulation| {
             let told = &simulation.report().instruments;
             moves.iter().map(|(i, mm)| told[*i].push_force_n.unwrap() * mm).sum::<f64>()
         };
@@ -79,10 +79,10 @@ fn hands_put_in_what_is_stored_and_rubbed_away_and_no_force_leaves_its_cone() {
         }
         let before = simulation.report().energy.total();
         for k in 0..50 {
-            let was = felt(&simulation);
+            let was = surface(&simulation);
             push(&mut simulation, moves).unwrap();
             assert!(simulation.report().converged, "{moves:?}, step {k}");
-            work += 0.5 * (was + felt(&simulation));
+            work += 0.5 * (was + surface(&simulation));
             taken += simulation.report().dissipated_mj;
             assert!(slipping(&simulation) > 0.5);
         }
@@ -150,8 +150,8 @@ fn a_wire_that_is_pulled_through_a_bend_obeys_the_capstan_law() {
         push(&mut smooth, &[(WIRE, way)]).unwrap();
         push(&mut rough, &[(WIRE, way)]).unwrap();
         let rubbed = |index: usize| {
-            let felt = |s: &Simulation| s.report().instruments[index].push_force_n.unwrap();
-            felt(&rough) - felt(&smooth)
+            let surface = |s: &Simulation| s.report().instruments[index].push_force_n.unwrap();
+            surface(&rough) - surface(&smooth)
         };
         let grown = 1.0 - rubbed(WIRE) / tension;
         let expected = (sign * friction * std::f64::consts::FRAC_PI_2).exp();

@@ -262,7 +262,7 @@ fn a_refused_command_changes_nothing_and_a_wire_is_exchanged() {
     assert_eq!(simulation.shape().positions_mm.len(), 1);
 }
 /// Energy and the wire's push force.
-fn felt(simulation: &Simulation) -> (f64, f64) {
+fn surface(simulation: &Simulation) -> (f64, f64) {
     let report = simulation.report();
     assert!(report.converged);
     (report.energy.total(), report.instruments[WIRE].push_force_n.unwrap())
@@ -272,9 +272,9 @@ fn felt(simulation: &Simulation) -> (f64, f64) {
 /// cut: what is smooth becomes less by squares, and a jump stays.
 fn unaccounted(simulation: &mut Simulation, way_mm: f64, bar_mj: f64) -> f64 {
     let start = simulation.clone();
-    let (before, pushed) = felt(simulation);
+    let (before, pushed) = surface(simulation);
     push(simulation, &[(WIRE, way_mm)]).unwrap();
-    let (after, pushes) = felt(simulation);
+    let (after, pushes) = surface(simulation);
     let off = (after - before - 0.5 * way_mm * (pushed + pushes)).abs();
     if off <= bar_mj || way_mm < 1e-4 {
         return off;
@@ -286,7 +286,7 @@ fn unaccounted(simulation: &mut Simulation, way_mm: f64, bar_mj: f64) -> f64 {
 
 /// Pushes the wire on by 0.1 mm at a time: its energy has no jumps, and now and then all hands feel slopes of it.
 fn feels_slopes(simulation: &mut Simulation, steps: usize) {
-    let bar_mj = 1e-6 * felt(simulation).0;
+    let bar_mj = 1e-6 * surface(simulation).0;
     for k in 0..steps {
         let off = unaccounted(simulation, 0.1, bar_mj);
         assert!(off <= bar_mj, "{off} of {bar_mj} mJ in step {k}");

@@ -6,10 +6,10 @@ use super::blocked::FAR_TOO_LITTLE;
 use super::carried::{WallWork, carried};
 use super::configuration::Start;
 use super::hands::{Hand, Way, lengths};
-use super::slide::Extension;
 use super::state::KirchhoffState;
+use super::step_control::StepControl;
 use super::substep::{AT_REST, Attempt, Effort, Found, released_mj};
-use super::trials::Trials;
+use super::transport::Extension;
 use super::workspace::{Tools, Work, Workspace};
 use crate::contact::extension::{leave_mm, left_through};
 use crate::device::{Stack, line_mm};
@@ -96,7 +96,8 @@ impl<const C: usize> Workspace<C> {
         let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD).max(1.0);
         let work = (WORK * travel) as usize;
-        let mut trials = Trials::new(work.min(WORK_OF_ONE.saturating_mul(most)), WORK_OF_RESORTS * work);
+        let mut control =
+            StepControl::new(work.min(WORK_OF_ONE.saturating_mul(most)), WORK_OF_RESORTS * work);
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
@@ -107,7 +108,7 @@ impl<const C: usize> Workspace<C> {
             again -= usize::from(done >= 1.0);
             let was = if moved { now.start() } else { Start { mesh, state: from } };
             let rest = 1.0 - done;
-            let (effort, part) = trials.next(rest);
+            let (effort, part) = control.next(rest);
             let at_start = environment.displaced(displaced.as_ref());
             if effort != Effort::Usual {
                 tools.refuse_narrower(&at_start, was, &way.commands, FAR_TOO_LITTLE)?;
@@ -134,8 +135,8 @@ impl<const C: usize> Workspace<C> {
             let left = passage.map(|passage| (was, passage));
             let attempt = Attempt { hands, blocked, effort, left };
             let iterations = tools.work.iterations;
-            let tried = tools.try_step(&there, here, attempt, next, &mut trials.budget);
-            trials.took(effort, tools.work.iterations - iterations);
+            let tried = tools.try_step(&there, here, attempt, next, &mut control.budget);
+            control.took(effort, tools.work.iterations - iterations);
             match tried {
                 Ok(found) => {
                     sum.add(&found);
@@ -150,14 +151,14 @@ impl<const C: usize> Workspace<C> {
                     displaced = then;
                     moved = true;
                     done = to;
-                    trials.succeeded(part);
+                    control.succeeded(part);
                 }
                 // From the same place the same comes of it.
                 Err(_) if done >= 1.0 => break,
                 Err(lost) => {
-                    trials.failed((effort, part), lost.astray);
+                    control.failed((effort, part), lost.astray);
                     // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
-                    if trials.are_over() || sum.substeps > SUBSTEP_LIMIT {
+                    if control.are_over() || sum.substeps > SUBSTEP_LIMIT {
                         tools.refuse_narrower(&at_start, was, &way.commands, 1.0)?;
                         return Err(Error::Computation(format!(
                             "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {}",
@@ -199,8 +200,8 @@ impl<const C: usize> Tools<C> {
         }
         let tangent = here.state.rod.frames[here.state.rod.elements()].t;
         let radius_mm = environment.surroundings.stack.tip_radius_mm(lengths(target));
-        let felt = (environment.wall(), &mut self.memory);
-        let way_mm = self.extension.trace(felt, here.state.tip_mm(), tangent, radius_mm, wanted_mm);
+        let surface = (environment.wall(), &mut self.cache);
+        let way_mm = self.extension.trace(surface, here.state.tip_mm(), tangent, radius_mm, wanted_mm);
         way_mm < (1.0 - 1e-9) * wanted_mm
     }
 }

@@ -4,9 +4,9 @@
 //! repeated too ([`Correction`]); a tip with a shape of its own may instead be carried by the device behind it.
 
 use super::configuration::Start;
+use super::extrapolation::Correction;
 use super::mesh::Mesh;
-use super::repeat::Correction;
-use super::slide::carry;
+use super::transport::carry;
 use crate::contact::{HandMotion, WallContact};
 use crate::rod::{ElementData, RodState};
 use crate::solve::Newton;

@@ -16,10 +16,10 @@
 //! the axial force: around a bend by e^{μφ}, the capstan's law, of all that slips along. What presses at a node is found with it, from the tip on.
 
 use super::coaxial::element;
+use super::inner_friction::{pair, radius_mm};
 use super::mesh::Mesh;
-use super::rubbing::{pair, radius_mm};
 use crate::Vec3;
-use crate::contact::{Contact, ContactPoint, Rub};
+use crate::contact::{Contact, ContactPoint, InnerFriction};
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
 use crate::rod::quadrature::{Point, hermite};
@@ -61,15 +61,15 @@ pub(super) struct Line<'a> {
     /// Contact points that press on the wall, and the force of it.
     pub(super) pressing: &'a [(usize, Vec3)],
     /// Friction between instruments, node by node, the innermost first; empty without.
-    pub(super) rubs: &'a [Rub],
+    pub(super) inner_friction: &'a [InnerFriction],
 }
 
 impl Line<'_> {
     /// Friction along the line on what is inside at a node, and the couple around it there, mm, both over the force across it.
     fn drag(&self, at: (usize, usize)) -> [f64; 2] {
         let pair = pair(self.mesh, at).filter(|(inner, _)| self.stack.friction(*inner) > 0.0);
-        let Some((inner, _)) = pair.filter(|_| !self.rubs.is_empty()) else { return [0.0; 2] };
-        let rub = self.rubs[at.0 * (self.mesh.inserted_mm.len() - 1) + inner];
+        let Some((inner, _)) = pair.filter(|_| !self.inner_friction.is_empty()) else { return [0.0; 2] };
+        let rub = self.inner_friction[at.0 * (self.mesh.inserted_mm.len() - 1) + inner];
         let radius_mm = radius_mm(self.stack, self.mesh, (at.0, inner));
         [rub.along, radius_mm * rub.around].map(|part| -self.stack.friction(inner) * part)
     }

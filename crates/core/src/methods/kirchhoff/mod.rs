@@ -13,6 +13,7 @@
 //! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with respect
 //! to the inserted length.
 
+mod active_set;
 mod blocked;
 mod carried;
 mod coaxial;
@@ -24,29 +25,28 @@ mod command;
 mod configuration;
 #[cfg(test)]
 mod drag_tests;
+mod extrapolation;
 mod guess;
 mod hands;
-mod hold;
+mod inner_friction;
+#[cfg(test)]
+mod inner_friction_tests;
 mod lateral;
 mod mesh;
 #[cfg(test)]
 mod motion_tests;
 mod readout;
-mod repeat;
-mod rubbing;
-#[cfg(test)]
-mod rubbing_tests;
 mod search;
 mod settle;
-mod slide;
-#[cfg(test)]
-mod slide_tests;
 mod slopes;
 mod state;
+mod step_control;
 mod substep;
 #[cfg(test)]
 mod touch_tests;
-mod trials;
+mod transport;
+#[cfg(test)]
+mod transport_tests;
 mod workspace;
 
 pub use mesh::Mesh;
@@ -56,7 +56,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::{Counters, FeltWall, MovedWall};
+use crate::contact::{ContactSurface, Counters, MovedWall};
 use crate::device::line_mm;
 use crate::methods::{Command, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
@@ -98,7 +98,7 @@ impl MethodChoice for KirchhoffOptions {
             return several(*self, surroundings, store);
         }
         // A shape turns with the device, and friction twists it.
-        let twists = surroundings.device.is_shaped() || surroundings.properties.rubs();
+        let twists = surroundings.device.is_shaped() || surroundings.properties.has_friction();
         Ok(if twists {
             Box::new(Kirchhoff::<TWISTED>::new(*self, surroundings, store)?)
         } else {
@@ -133,7 +133,7 @@ const ELEMENT_LIMIT: f64 = 100_000.0;
 /// The exact rod as an insertion method, with or without material angles.
 pub struct Kirchhoff<const C: usize> {
     options: KirchhoffOptions,
-    felt: Arc<FeltWall>,
+    surface: Arc<ContactSurface>,
     state: Arc<KirchhoffState>,
     /// That of the state, for those who ask.
     shape: Shape,
@@ -146,7 +146,7 @@ pub struct Kirchhoff<const C: usize> {
 #[derive(Clone, Copy)]
 struct Environment<'a> {
     surroundings: Surroundings<'a>,
-    felt: &'a FeltWall,
+    surface: &'a ContactSurface,
     options: &'a KirchhoffOptions,
     /// Where the vessel is; none where it never moves.
     displacement: Option<&'a Displacement>,
@@ -154,8 +154,12 @@ struct Environment<'a> {
 
 impl<'a> Environment<'a> {
     /// Of a vessel at rest.
-    fn new(surroundings: &Surroundings<'a>, felt: &'a FeltWall, options: &'a KirchhoffOptions) -> Self {
-        Self { surroundings: *surroundings, felt, options, displacement: None }
+    fn new(
+        surroundings: &Surroundings<'a>,
+        surface: &'a ContactSurface,
+        options: &'a KirchhoffOptions,
+    ) -> Self {
+        Self { surroundings: *surroundings, surface, options, displacement: None }
     }
 
     /// The same where the vessel is displaced.
@@ -168,7 +172,7 @@ impl<'a> Environment<'a> {
 
     /// The wall where it is.
     fn wall(&self) -> MovedWall<'a> {
-        MovedWall::new(self.felt, self.displacement)
+        MovedWall::new(self.surface, self.displacement)
     }
 }
 
@@ -202,10 +206,10 @@ impl<const C: usize> Kirchhoff<C> {
         let mut state = KirchhoffState::at(surroundings);
         state.report.angles = Layout::<C>::ANGLES > 0;
         let Surroundings { wall, properties, stack, .. } = *surroundings;
-        let felt = FeltWall::new(wall, stack.radii_mm(), properties, store)?;
+        let surface = ContactSurface::new(wall, stack.radii_mm(), properties, store)?;
         let mut method = Self {
             options,
-            felt: Arc::new(felt),
+            surface: Arc::new(surface),
             state: Arc::new(state),
             shape: Shape::default(),
             counters: Counters::default(),
@@ -231,7 +235,7 @@ impl<const C: usize> Clone for Kirchhoff<C> {
     fn clone(&self) -> Self {
         Self {
             options: self.options,
-            felt: Arc::clone(&self.felt),
+            surface: Arc::clone(&self.surface),
             state: Arc::clone(&self.state),
             shape: self.shape.clone(),
             counters: self.counters,
@@ -250,7 +254,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
             Arc::make_mut(&mut self.state).report.rest();
             return Ok(());
         }
-        let environment = Environment::new(surroundings, &self.felt, &self.options);
+        let environment = Environment::new(surroundings, &self.surface, &self.options);
         let mut workspace = match self.workspace.take() {
             Some(workspace) => workspace,
             None => {
@@ -283,14 +287,14 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn lateral_forces(&self, surroundings: &Surroundings<'_>, instrument: usize) -> Vec<LateralForce> {
-        let environment = Environment::new(surroundings, &self.felt, &self.options);
+        let environment = Environment::new(surroundings, &self.surface, &self.options);
         let mut hands = Vec::new();
         hands::read(&self.state.report, &mut hands);
         let mut mesh = Mesh::default();
         meshed(&environment, &hands, &mut mesh);
-        let KirchhoffState { rod, rubs, report, .. } = &*self.state;
+        let KirchhoffState { rod, inner_friction, report, .. } = &*self.state;
         let pressing = lateral::pressing(&mesh, rod, &report.contacts);
-        let line = Line { stack: surroundings.stack, mesh: &mesh, rod, pressing: &pressing, rubs };
+        let line = Line { stack: surroundings.stack, mesh: &mesh, rod, pressing: &pressing, inner_friction };
         lateral::lateral_forces::<C>(&line, instrument)
     }
 
@@ -311,17 +315,17 @@ impl<const C: usize> Method for Kirchhoff<C> {
             crate::methods::check_inserted(hand.inserted_mm, device)?;
         }
         surroundings.stack.check_places(hands.iter().map(|hand| hand.inserted_mm))?;
-        let environment = Environment::new(surroundings, &self.felt, &self.options);
+        let environment = Environment::new(surroundings, &self.surface, &self.options);
         let mut mesh = Mesh::default();
         meshed(&environment, &hands, &mut mesh);
         state.check(&Belongs {
-            felt: &self.felt,
+            surface: &self.surface,
             sheath: surroundings.sheath,
             elements: mesh.elements.len(),
             points: mesh.points.len(),
             sets: Layout::<C>::ANGLES,
-            rubs: surroundings.properties.rubs(),
-            inner: if surroundings.stack.rubs() { hands.len() - 1 } else { 0 },
+            inner_friction: surroundings.properties.has_friction(),
+            inner: if surroundings.stack.has_inner_friction() { hands.len() - 1 } else { 0 },
         })?;
         self.state = Arc::clone(state);
         self.write_shape(&mesh.from_tip_mm);

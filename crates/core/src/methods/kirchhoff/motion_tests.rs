@@ -281,13 +281,13 @@ fn a_wall_that_goes_along_with_the_device_does_not_rub() {
     // Along the straight piece, in which the wire lies on the wall: what the wall does is what the hand does with the other sign.
     let along = MotionMode { displacement_mm: [0.0, 0.0, 1.0], turn: None, ..displaced(Waveform::Breathing) };
     let setting = Setting { friction: 0.3, ..SOFT };
-    let felt = |motion: &[MotionMode], advance_mm: f64| {
+    let surface = |motion: &[MotionMode], advance_mm: f64| {
         let mut simulation = wire(setting, motion);
         push(&mut simulation, 150.0).unwrap();
         let moves = [Move { instrument: 0, command: Command::advance(advance_mm) }];
         simulation.step_until(&moves, Some(2.0)).unwrap().dissipated_mj
     };
-    let (held, alone, together) = (felt(&[along], 0.0), felt(&[], 1.0), felt(&[along], 1.0));
+    let (held, alone, together) = (surface(&[along], 0.0), surface(&[], 1.0), surface(&[along], 1.0));
     assert!(held > 0.2 * alone && alone > 0.0, "{held} {alone}");
     assert!(together < 0.2 * alone, "{together} {alone}");
 }

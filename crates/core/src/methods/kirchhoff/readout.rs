@@ -3,7 +3,7 @@
 use super::Environment;
 use super::configuration::Configuration;
 use super::hands::Hand;
-use super::rubbing::LEAST_SLIP_MM;
+use super::inner_friction::LEAST_SLIP_MM;
 use super::slopes::write_instruments;
 use super::workspace::Tools;
 use crate::Vec3;
@@ -74,7 +74,7 @@ impl<const C: usize> Tools<C> {
     /// it took, mJ.
     fn rub_in_sheath(&self, surroundings: &Surroundings<'_>, clamp: &Clamp, at: &mut Configuration) -> f64 {
         let sheath = surroundings.sheath;
-        if !sheath.rubs() {
+        if !sheath.has_friction() {
             return 0.0;
         }
         let outermost = at.mesh.inserted_mm.iter().rposition(|mm| *mm > 0.0).unwrap_or(0);

@@ -18,8 +18,8 @@
 //! the cones of Coulomb's law of its own normal forces: where a slow motion with friction comes to rest, in a few steps of it where
 //! elsewhere there is one.
 
+use super::active_set::Held;
 use super::guess::Guess;
-use super::hold::Held;
 use super::settle::Settle;
 use crate::contact::{SETTLED, WallContact};
 use crate::flow::BloodFlow;
@@ -35,7 +35,7 @@ const STIFFER: f64 = 10.0;
 /// … unless it comes so near to the wall itself.
 const LAST: f64 = 0.5;
 /// Newton iterations in which a guess that has learnt must come to its end, or the wall is approached from softer ones.
-const HURRIED: usize = 15;
+const MOST_AT_ONCE: usize = 15;
 /// Newton iterations after which a solution has gone astray: from another guess, nearer by, it is found in fewer.
 const STUCK: usize = 60;
 /// Newton iterations of a slide.
@@ -76,7 +76,7 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     /// Part of the wall's modulus from which it is approached.
     pub(super) softest: f64,
     /// Whether there is friction.
-    pub(super) rubs: bool,
+    pub(super) inner_friction: bool,
     /// Residual over force scale of an equilibrium.
     pub(super) tolerance: f64,
     /// Most Newton iterations of one solution.
@@ -97,7 +97,7 @@ impl<const C: usize> Search<'_, '_, C> {
     pub(super) fn run(&mut self, near: bool) -> NewtonReport {
         let stiff = self.stiff;
         self.contact.hand_over(stiff);
-        if !self.patient && if stiff { near } else { self.rubs } {
+        if !self.patient && if stiff { near } else { self.inner_friction } {
             if let Some(found) = self.at_once() {
                 return if found.is_within(self.tolerance) { self.settled(found) } else { found };
             }
@@ -155,7 +155,7 @@ impl<const C: usize> Search<'_, '_, C> {
     /// The wall itself, from a guess that is near.
     fn at_once(&mut self) -> Option<NewtonReport> {
         self.contact.softness = 1.0;
-        let most = if self.stiff { HURRIED } else { STUCK };
+        let most = if self.stiff { MOST_AT_ONCE } else { STUCK };
         // What presses between instruments is renewed before it is asked for more.
         let renewed = !self.stiff && self.contact.between().turns();
         let found = self.newton(most, if renewed { self.tolerance.max(RENEWED) } else { self.tolerance });
@@ -180,14 +180,14 @@ impl<const C: usize> Search<'_, '_, C> {
             self.contact.softness = if stiffer < LAST { stiffer } else { 1.0 };
             // What pressed on the softer wall presses as hard on this one.
             let Self { newton, guess, contact, supports, elements, state, .. } = self;
-            let held = guess.hold(newton, contact, supports, elements, state);
+            let held = guess.active_set_step(newton, contact, supports, elements, state);
             self.take(usize::from(held == Held::Moved));
         }
     }
 
     /// Whether friction knows the normal forces of what was found.
     fn is_settled(&self) -> bool {
-        !self.rubs || self.contact.unsettled() < SETTLED
+        !self.inner_friction || self.contact.unsettled() < SETTLED
     }
 
     /// From an equilibrium with the normal forces of others to one with its own.

@@ -37,7 +37,7 @@ const ROUNDED: f64 = 1e-13;
 /// … and a residual over force scale at that step must be below this. On a hard wall a soft thread presses by nanometres,
 /// and what rounding of positions leaves of that is far more than the tolerance.
 const LEFT: f64 = 1e-5;
-/// Trials of a step that must not lead beyond the wall.
+/// StepControl of a step that must not lead beyond the wall.
 const TRIALS: usize = 6;
 /// Part of the pressing forces that held points may pull with at the end.
 const PULL: f64 = 1e-6;
@@ -152,13 +152,13 @@ impl<const C: usize> Settle<C> {
         state: &RodState,
         last: f64,
     ) -> Option<(f64, f64)> {
-        let whisper = Newton::<C>::whisper(elements);
-        let least = LEAST_SHIFT * whisper;
+        let regularisation = Newton::<C>::regularisation(elements);
+        let least = LEAST_SHIFT * regularisation;
         let mut sigma = if last > 8.0 * least { last / 8.0 } else { 0.0 };
         for _ in 0..SHIFTS {
-            let inertia = newton.inertia(elements, supports, whisper + sigma);
+            let inertia = newton.inertia(elements, supports, regularisation + sigma);
             if inertia.is_some_and(|i| i.negative == elements.len()) {
-                self.lu.copy_from(&newton.assembly.matrix, &self.shift, whisper + sigma);
+                self.lu.copy_from(&newton.assembly.matrix, &self.shift, regularisation + sigma);
                 contact.couplings(state, |point, more| {
                     let e = point.element;
                     let place = (e, point.xi, point.set);

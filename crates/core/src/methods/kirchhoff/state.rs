@@ -4,9 +4,9 @@ use std::fmt::Display;
 
 use serde::{Deserialize, Serialize};
 
+use super::extrapolation::Correction;
 use super::hands::Hand;
-use super::repeat::Correction;
-use crate::contact::{FeltWall, KnownPoints, NormalForce, Rub};
+use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce};
 use crate::device::Stack;
 use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
 use crate::rod::{Frame, RodState};
@@ -20,7 +20,7 @@ pub struct KirchhoffState {
     /// What presses at each contact point, tip first; empty without friction.
     pub(super) forces: Vec<NormalForce>,
     /// Friction between instruments: for each node those that have one outside them, the innermost first; empty without.
-    pub(super) rubs: Vec<Rub>,
+    pub(super) inner_friction: Vec<InnerFriction>,
     pub(super) known: KnownPoints,
     pub(super) correction: Correction,
     pub(super) report: StepReport,
@@ -28,14 +28,14 @@ pub struct KirchhoffState {
 
 /// What a mesh says of the states that belong to it.
 pub(super) struct Belongs<'a> {
-    pub(super) felt: &'a FeltWall,
+    pub(super) surface: &'a ContactSurface,
     pub(super) sheath: &'a Sheath,
     /// Elements and contact points of the inserted length.
     pub(super) elements: usize,
     pub(super) points: usize,
     /// Sets of angles.
     pub(super) sets: usize,
-    pub(super) rubs: bool,
+    pub(super) inner_friction: bool,
     /// Instruments that have one outside them, if any of them rubs in that.
     pub(super) inner: usize,
 }
@@ -56,7 +56,7 @@ impl KirchhoffState {
         Self {
             rod,
             forces: Vec::new(),
-            rubs: Vec::new(),
+            inner_friction: Vec::new(),
             known: KnownPoints::default(),
             correction: Correction::default(),
             report: StepReport { converged: true, instruments, ..StepReport::default() },
@@ -88,7 +88,7 @@ impl KirchhoffState {
         self.rod.clear();
         self.turn_tails(stack, hands);
         self.forces.clear();
-        self.rubs.clear();
+        self.inner_friction.clear();
         self.known.clear();
         self.correction.clear();
     }
@@ -124,7 +124,7 @@ impl KirchhoffState {
             let mend = "it has material angles where this simulation has none, or none where it has: another device or friction";
             return Err(other("angles", self.report.angles, mend));
         }
-        let forces = if belongs.rubs { belongs.points } else { 0 };
+        let forces = if belongs.inner_friction { belongs.points } else { 0 };
         if self.forces.len() != forces {
             return Err(other(
                 "forces",
@@ -132,15 +132,15 @@ impl KirchhoffState {
                 format!("{forces} contact points feel friction here"),
             ));
         }
-        if !self.rubs.is_empty() && self.rubs.len() != belongs.inner * (n + 1) {
+        if !self.inner_friction.is_empty() && self.inner_friction.len() != belongs.inner * (n + 1) {
             let mend = format!("at {} nodes {} instruments may rub in others here", n + 1, belongs.inner);
-            return Err(other("rubs", self.rubs.len(), mend));
+            return Err(other("inner_friction", self.inner_friction.len(), mend));
         }
-        if !self.known.fits(belongs.points, belongs.felt.query.triangles()) {
+        if !self.known.fits(belongs.points, belongs.surface.query.triangles()) {
             let mend = format!(
-                "{} contact points on {} triangles are felt here: another vessel, device or wall",
+                "{} contact points on {} triangles are surface here: another vessel, device or wall",
                 belongs.points,
-                belongs.felt.query.triangles()
+                belongs.surface.query.triangles()
             );
             return Err(other("known", self.known.len(), mend));
         }
@@ -162,8 +162,9 @@ impl KirchhoffState {
         let vectors =
             r.positions.iter().chain(&r.chords).chain(r.frames.iter().flat_map(|f| [&f.t, &f.u, &f.v]));
         let numbers = [&r.tensions, &r.angles, &r.bubbles, &r.reference_twists].into_iter().flatten();
-        let rubs = self.rubs.iter().flat_map(|rub| [&rub.along, &rub.around, &rub.pressure_n_per_mm]);
-        if !vectors.flat_map(|v| v.iter()).chain(numbers).chain(rubs).all(|x| x.is_finite()) {
+        let inner_friction =
+            self.inner_friction.iter().flat_map(|rub| [&rub.along, &rub.around, &rub.pressure_n_per_mm]);
+        if !vectors.flat_map(|v| v.iter()).chain(numbers).chain(inner_friction).all(|x| x.is_finite()) {
             return Err(other("rod", "not finite", "all its numbers must be finite"));
         }
         Ok(())

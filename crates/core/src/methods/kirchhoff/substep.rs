@@ -2,17 +2,17 @@
 
 use std::borrow::Cow;
 
+use super::active_set::Held;
 use super::carried::{Passage, WallWork};
 use super::configuration::{Configuration, Start};
 use super::guess::Quality;
 use super::hands::{Hand, motions};
-use super::hold::Held;
 use super::mesh::Mesh;
 use super::search::Search;
-use super::slide::{Extension, slide, slide_together};
 use super::state::KirchhoffState;
+use super::transport::{Extension, transport, transport_together};
 use super::workspace::Tools;
-use super::{Environment, meshed, rubbing};
+use super::{Environment, inner_friction, meshed};
 use crate::contact::{SETTLED, WallContact};
 use crate::device::Stack;
 use crate::methods::StepReport;
@@ -106,7 +106,7 @@ pub(super) struct Attempt<'a> {
 
 impl<const C: usize> Tools<C> {
     /// Slides the device at `start` to where the hands are, on the mesh of what is in then, with its friction and what is known of the wall.
-    fn slide_to(
+    fn transport_to(
         &mut self,
         environment: &Environment<'_>,
         start: Start<'_>,
@@ -116,18 +116,18 @@ impl<const C: usize> Tools<C> {
         let (mesh, after) = next.parts();
         meshed(environment, hands, mesh);
         let stack = environment.surroundings.stack;
-        let slide_from = |start: Start<'_>, extension: &Extension, rod: &mut RodState| {
+        let transport_from = |start: Start<'_>, extension: &Extension, rod: &mut RodState| {
             let from = (start.mesh, &start.state.rod);
             if stack.is_several() {
-                slide_together(from, extension, mesh, stack.sets(), rod);
+                transport_together(from, extension, mesh, stack.sets(), rod);
             } else {
-                slide(from, extension, mesh, rod);
+                transport(from, extension, mesh, rod);
             }
         };
         motions(&start.state.report, hands, &mut self.guess.motions);
         if self.friction.acts() {
             // What slips is counted from the device's own curve: a tip that is bent to the wall has not slid by that.
-            slide_from(left.map_or(start, |(was, _)| was), &Extension::default(), &mut after.rod);
+            transport_from(left.map_or(start, |(was, _)| was), &Extension::default(), &mut after.rod);
             let before = (&start.mesh.points[..], &start.state.forces[..]);
             self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
             if let Some((_, passage)) = left {
@@ -136,21 +136,21 @@ impl<const C: usize> Tools<C> {
         }
         // Where nothing bends or moves it lies there already.
         if !self.friction.acts() || left.is_some() || self.extension.bends() {
-            slide_from(start, &self.extension, &mut after.rod);
+            transport_from(start, &self.extension, &mut after.rod);
         }
         let (places, moves) = (&mut self.friction.between, &self.guess.motions);
-        rubbing::begin(stack, start, (mesh, &after.rod), moves, places);
+        inner_friction::begin(stack, start, (mesh, &after.rod), moves, places);
         after.turn_tails(stack, hands);
         self.newton.resize(mesh.elements.len());
         let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
-        self.memory.begin(&start.state.known, &start.mesh.points, &mesh.points, advance_mm);
+        self.cache.begin(&start.state.known, &start.mesh.points, &mesh.points, advance_mm);
     }
 
     /// Gives the state what the next sub-step starts with.
     fn keep(&self, mesh: &Mesh, after: &mut KirchhoffState) {
         self.friction.keep(&mut after.forces);
-        rubbing::keep(&self.friction.between, &after.rod, mesh, &mut after.rubs);
-        self.memory.keep(&mut after.known);
+        inner_friction::keep(&self.friction.between, &after.rod, mesh, &mut after.inner_friction);
+        self.cache.keep(&mut after.known);
     }
 
     /// One sub-step from `start`: slides and solves on `next`, which is worth nothing if that fails. Newton iterations are taken from
@@ -166,7 +166,7 @@ impl<const C: usize> Tools<C> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
         let Attempt { hands, blocked, effort, left } = attempt;
         let resort = matches!(effort, Effort::Resort(_));
-        self.slide_to(environment, start, attempt, next);
+        self.transport_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
         let rod = &mut after.rod;
         let elements = mesh.elements.len();
@@ -174,7 +174,7 @@ impl<const C: usize> Tools<C> {
         let mut contact = WallContact::new(
             environment.wall(),
             &mesh.points,
-            &mut self.memory,
+            &mut self.cache,
             &mut self.friction,
             softest_nmm2,
         );
@@ -193,7 +193,7 @@ impl<const C: usize> Tools<C> {
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let held = match quality {
             Quality::Beyond => Held::Lost,
-            _ => self.guess.hold(&mut self.newton, &mut contact, &supports, &mesh.elements, rod),
+            _ => self.guess.active_set_step(&mut self.newton, &mut contact, &supports, &mesh.elements, rod),
         };
         let moved = held == Held::Moved;
         // A guess that has learnt from the last step or kept its contacts is near, unless it has lost them.
@@ -208,7 +208,7 @@ impl<const C: usize> Tools<C> {
             state: rod,
             stiff: stiffness > STIFF,
             softest: (SOFTEST / stiffness).min(FIRM).max(STIFF / stiffness).min(1.0),
-            rubs: surroundings.properties.rubs(),
+            inner_friction: surroundings.properties.has_friction(),
             tolerance: options.tolerance,
             max_iterations: options.max_iterations,
             budget: (!resort).then_some(budget),
@@ -220,7 +220,7 @@ impl<const C: usize> Tools<C> {
         let found = search.dragged(found, surroundings.flow);
         let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
         let (iterations, slides, relaxed) = (search.iterations, search.slides, search.budget.is_none());
-        let unsettled = if surroundings.properties.rubs() { contact.unsettled() } else { 0.0 };
+        let unsettled = if surroundings.properties.has_friction() { contact.unsettled() } else { 0.0 };
         let unsettled = unsettled.max(lagging);
         // What comes to rest as it can is in equilibrium as exactly as friction is with the wall elsewhere.
         let balanced = (found.converged || (relaxed && found.residual < SETTLED)) && unsettled < SETTLED;

@@ -5,10 +5,10 @@ use super::guess::Guess;
 use super::hands::{Hand, Way};
 use super::mesh::Mesh;
 use super::settle::Settle;
-use super::slide::Extension;
 use super::state::KirchhoffState;
+use super::transport::Extension;
 use super::{Environment, meshed};
-use crate::contact::{Counters, Drag, Friction, Touch, WallMemory};
+use crate::contact::{ContactCache, Counters, Drag, Friction, Touch};
 use crate::solve::Newton;
 
 /// The workspace of a simulation.
@@ -34,7 +34,7 @@ pub(super) struct Tools<const C: usize> {
     pub(super) guess: Guess,
     pub(super) settle: Settle<C>,
     pub(super) friction: Friction,
-    pub(super) memory: WallMemory,
+    pub(super) cache: ContactCache,
     /// What the flow does along the device.
     pub(super) drag: Drag,
     pub(super) extension: Extension,
@@ -78,7 +78,7 @@ impl<const C: usize> Workspace<C> {
             },
             settle: Settle::default(),
             friction: Friction::new(surroundings.properties.largest_friction()),
-            memory: WallMemory::new(environment.felt),
+            cache: ContactCache::new(environment.surface),
             drag: Drag::default(),
             extension: Extension::default(),
             touches: Vec::new(),
@@ -89,7 +89,7 @@ impl<const C: usize> Workspace<C> {
         tools.guess.reserve(elements);
         tools.settle.reserve(elements);
         tools.friction.reserve(points);
-        tools.memory.reserve(points);
+        tools.cache.reserve(points);
         tools.touches.reserve(points);
         let mut mesh = Mesh::default();
         let mut hands = Vec::new();

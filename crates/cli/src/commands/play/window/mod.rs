@@ -188,7 +188,7 @@ pub(super) fn write(
     let failed = |reason: String| format!("{}: {reason}", file.display());
     let mut writer = Writer::new().ok_or_else(|| failed("the font cannot be read".to_owned()))?;
     let width = WIDTHS[screen::planes(&snapshot.readout).min(2) - 1];
-    let moment = live::Moment { snapshot, input_at: None, step_ms: 0.0 };
+    let moment = live::FrameTime { snapshot, input_at: None, step_ms: 0.0 };
     let shown =
         live::Shown { moment: &moment, fluoro, three_d: Some(three_d), failure: None, frame_ms: None };
     let canvas = screen::compose(&mut writer, &shown, [width, HEIGHT].map(|side| side as usize), None, None);

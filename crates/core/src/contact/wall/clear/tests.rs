@@ -2,7 +2,7 @@
 
 use super::super::tests::{RADIUS_MM, Rod, ellipse, rod, swept};
 use super::*;
-use crate::contact::FeltWall;
+use crate::contact::ContactSurface;
 use crate::random::{splitmix64, unit};
 use crate::rod::{Assembly, Frame, PLAIN};
 use crate::solve::External;
@@ -10,7 +10,7 @@ use crate::solve::External;
 const ELEMENTS: usize = 12;
 
 /// A tube with a radius of 3 mm that a device with a radius of 0.45 mm lies in, straight.
-fn tube() -> FeltWall {
+fn tube() -> ContactSurface {
     swept(&ellipse(3.0, 3.0, 36), 61, |k| (Vec3::z() * (0.5 * f64::from(k)), Vec3::x(), 1.0))
 }
 
@@ -30,9 +30,9 @@ fn off_axis(rod: &Rod<'_>, seed: u64, off_mm: f64) -> RodState {
 
 /// Safe parts of ways and energies at trials about a base: of a device of which elements are left out, and of one that looks at all of
 /// them. `more_mm` is added to how far elements are thought to be from touching anything. And how many elements were left out.
-fn asked(felt: &FeltWall, seed: u64, more_mm: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>, usize) {
-    let places = [1.0, 0.75, 0.5, 0.25];
-    let mut knowing = rod(felt, ELEMENTS, &places, 10.0);
+fn asked(surface: &ContactSurface, seed: u64, more_mm: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>, usize) {
+    let proximity = [1.0, 0.75, 0.5, 0.25];
+    let mut knowing = rod(surface, ELEMENTS, &proximity, 10.0);
     let elements = knowing.elements.clone();
     let base = off_axis(&knowing, seed, 0.1);
     let mut trials: Vec<RodState> = Vec::new();
@@ -51,13 +51,13 @@ fn asked(felt: &FeltWall, seed: u64, more_mm: f64) -> (Vec<[f64; 2]>, Vec<[f64; 
         let mut contact = rod.contact();
         assembly.assemble(&elements, &base);
         contact.linearise(&elements, &base, &mut assembly);
-        for span in &mut contact.memory.spans {
+        for span in &mut contact.cache.spans {
             span.room.free_mm += more_mm;
             span.room.clearance_mm += more_mm;
         }
         // Once more, as a base that has been looked at.
         contact.linearise(&elements, &base, &mut assembly);
-        let left_out = contact.memory.spans.iter().filter(|span| !span.at_base).count();
+        let left_out = contact.cache.spans.iter().filter(|span| !span.at_base).count();
         let told: Vec<[f64; 2]> = trials
             .iter()
             .map(|trial| [contact.safe_fraction(&elements, trial), contact.value(&elements, trial)])
@@ -65,7 +65,7 @@ fn asked(felt: &FeltWall, seed: u64, more_mm: f64) -> (Vec<[f64; 2]>, Vec<[f64; 
         (told, left_out)
     };
     let (told, left_out) = at_base(&mut knowing, &trials, more_mm);
-    let mut other = rod(felt, ELEMENTS, &places, 10.0);
+    let mut other = rod(surface, ELEMENTS, &proximity, 10.0);
     let (whole, all) = at_base(&mut other, &trials, f64::NEG_INFINITY);
     assert_eq!(all, 0);
     (told, whole, left_out)
@@ -78,16 +78,16 @@ fn differ(told: &[[f64; 2]], whole: &[[f64; 2]]) -> usize {
 
 #[test]
 fn what_is_left_out_touches_nothing() {
-    let felt = tube();
+    let surface = tube();
     let (mut left_out, mut pressing, mut stopped, mut wrong) = (0, 0, 0, 0);
     for seed in 1..40 {
-        let (told, whole, out) = asked(&felt, seed, 0.0);
+        let (told, whole, out) = asked(&surface, seed, 0.0);
         assert_eq!(differ(&told, &whole), 0, "{seed}: {told:?} {whole:?}");
         left_out += out;
         stopped += whole.iter().filter(|[safe, _]| *safe < 1.0).count();
         pressing += whole.iter().filter(|[_, value]| *value > 0.0).count();
         // A twin: thought to be farther from the wall than they are, elements go through it.
-        let (told, whole, _) = asked(&felt, seed, 2.0);
+        let (told, whole, _) = asked(&surface, seed, 2.0);
         wrong += differ(&told, &whole);
     }
     assert!(left_out > 200 && pressing > 100 && stopped > 10, "{left_out} {pressing} {stopped}");
@@ -96,8 +96,8 @@ fn what_is_left_out_touches_nothing() {
 
 #[test]
 fn no_point_of_an_element_moves_farther_than_is_said() {
-    let felt = tube();
-    let mut rod = rod(&felt, ELEMENTS, &[1.0, 0.7, 0.5, 0.3, 0.0], 10.0);
+    let surface = tube();
+    let mut rod = rod(&surface, ELEMENTS, &[1.0, 0.7, 0.5, 0.3, 0.0], 10.0);
     let (elements, points) = (rod.elements.clone(), rod.points.clone());
     let states = [1, 2].map(|seed| off_axis(&rod, seed, 0.8));
     let contact = rod.contact();
@@ -115,8 +115,8 @@ fn no_point_of_an_element_moves_farther_than_is_said() {
 
 #[test]
 fn where_there_are_no_numbers_there_is_no_room() {
-    let felt = tube();
-    let mut rod = rod(&felt, ELEMENTS, &[1.0, 0.5], 10.0);
+    let surface = tube();
+    let mut rod = rod(&surface, ELEMENTS, &[1.0, 0.5], 10.0);
     let elements = rod.elements.clone();
     let (good, mut bad) = (rod.at(Vec3::new(0.0, 0.0, 8.0)), rod.at(Vec3::new(0.0, 0.0, 8.0)));
     bad.positions[ELEMENTS / 2] = Vec3::repeat(f64::NAN);

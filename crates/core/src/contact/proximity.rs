@@ -23,7 +23,7 @@ const NONE: u32 = u32::MAX;
 
 /// What is known of the wall around a point in space.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct Proximity {
     /// The point.
     pub(super) middle: Vec3,
     /// No wall is nearer to it than this, mm.
@@ -32,7 +32,7 @@ pub(super) struct Place {
     pub(super) triangle: Option<u32>,
 }
 
-impl Place {
+impl Proximity {
     /// Nothing is known.
     pub(super) const UNKNOWN: Self =
         Self { middle: Vec3::new(0.0, 0.0, 0.0), clearance_mm: f64::NEG_INFINITY, triangle: None };
@@ -51,9 +51,9 @@ struct Cell {
     clearance_mm: f64,
 }
 
-/// The memory of places.
+/// What was found about the cells that were asked for.
 #[derive(Debug, Clone)]
-pub(super) struct Places {
+pub(super) struct ProximityCache {
     size_mm: f64,
     reach_mm: f64,
     cells: Vec<Cell>,
@@ -63,7 +63,7 @@ pub(super) struct Places {
     pub(super) queries: u64,
 }
 
-impl Places {
+impl ProximityCache {
     /// Cells no point of which is farther than `radius_mm` from the middle, from which walls are looked for up to
     /// `reach_mm` away.
     pub(super) fn new(radius_mm: f64, reach_mm: f64) -> Self {
@@ -73,7 +73,7 @@ impl Places {
     }
 
     /// What is nearest to `x` itself.
-    fn ask(&mut self, query: &WallQuery, x: &Vec3) -> Place {
+    fn ask(&mut self, query: &WallQuery, x: &Vec3) -> Proximity {
         self.queries += 1;
         // Where no wall is near, the point may be far from it on either side. A question without a limit would look at most of the wall;
         // what was found last is mostly close to what is sought, and nothing farther is the answer. Which of several triangles at one
@@ -87,7 +87,7 @@ impl Places {
             reaches.map(|reach_mm| if found_mm < FARTHER_BY * reach_mm { found_mm } else { reach_mm });
         let nearest = limits.find_map(|limit_mm| query.nearest(x, limit_mm));
         self.last = nearest.map_or(NONE, |n| n.triangle);
-        Place {
+        Proximity {
             middle: *x,
             clearance_mm: nearest.map_or(self.reach_mm, |n| n.distance_mm),
             triangle: nearest.filter(|n| !n.rim).map(|n| n.triangle),
@@ -95,7 +95,7 @@ impl Places {
     }
 
     /// What is nearest to the middle of the cell that `x` lies in.
-    pub(super) fn around(&mut self, query: &WallQuery, x: &Vec3) -> Place {
+    pub(super) fn around(&mut self, query: &WallQuery, x: &Vec3) -> Proximity {
         let at = x.map(|c| (c / self.size_mm).floor());
         // Also for what is not a number.
         if !at.iter().all(|c| c.abs() < FARTHEST) {
@@ -107,7 +107,7 @@ impl Places {
         let known = self.cells[slot];
         if known.key == key {
             let triangle = (known.triangle != NONE).then_some(known.triangle);
-            return Place { middle, clearance_mm: known.clearance_mm, triangle };
+            return Proximity { middle, clearance_mm: known.clearance_mm, triangle };
         }
         let place = self.ask(query, &middle);
         let triangle = place.triangle.unwrap_or(NONE);
@@ -137,32 +137,32 @@ mod tests {
     #[test]
     fn a_cell_is_asked_once_and_answers_as_the_hierarchy_does() {
         let query = tube(1.0);
-        let mut places = Places::new(0.2, 3.0);
+        let mut proximity = ProximityCache::new(0.2, 3.0);
         let at = |i: i32| Vec3::new(2.5 * f64::from(i).sin(), 2.5 * f64::from(i).cos(), 0.02 * f64::from(i));
         for i in 0..3000 {
             let x = at(i);
-            let place = places.around(&query, &x);
+            let place = proximity.around(&query, &x);
             assert!((x - place.middle).norm() <= 0.2);
             let nearest = query.nearest(&place.middle, 3.0).unwrap();
             assert_eq!((place.triangle, place.clearance_mm), (Some(nearest.triangle), nearest.distance_mm));
         }
-        let asked = places.queries;
+        let asked = proximity.queries;
         assert!(asked <= 3000);
-        places.around(&query, &at(2999));
-        assert_eq!(places.queries, asked);
+        proximity.around(&query, &at(2999));
+        assert_eq!(proximity.queries, asked);
     }
 
     #[test]
     fn what_was_found_before_leads_to_the_same_answers() {
         let query = tube(0.7);
-        let mut places = Places::new(0.2, 0.5);
+        let mut proximity = ProximityCache::new(0.2, 0.5);
         // On a lattice about the axis many triangles are at one distance.
         let at =
             |k: i32| Vec3::new(f64::from(k % 7 - 3), f64::from(k / 7 % 7 - 3), f64::from(k / 49 % 40)) * 0.9;
         for k in 0..2000 {
             let x = at(k * 611 % 2000);
-            let place = places.ask(&query, &x);
-            let fresh = Places::new(0.2, 0.5).ask(&query, &x);
+            let place = proximity.ask(&query, &x);
+            let fresh = ProximityCache::new(0.2, 0.5).ask(&query, &x);
             assert_eq!((place.triangle, place.clearance_mm), (fresh.triangle, fresh.clearance_mm), "{x}");
         }
     }
@@ -170,10 +170,10 @@ mod tests {
     #[test]
     fn no_number_is_no_place_and_a_far_wall_is_found() {
         let query = tube(2.0);
-        let mut places = Places::new(0.2, 1.0);
-        let place = places.around(&query, &Vec3::repeat(f64::NAN));
+        let mut proximity = ProximityCache::new(0.2, 1.0);
+        let place = proximity.around(&query, &Vec3::repeat(f64::NAN));
         assert!(place.triangle.is_none() && place.clearance_mm == 1.0);
-        let place = places.around(&query, &Vec3::new(0.0, 0.0, 50.0));
+        let place = proximity.around(&query, &Vec3::new(0.0, 0.0, 50.0));
         assert!(place.triangle.is_some() && (3.0..4.0).contains(&place.clearance_mm));
     }
 }

@@ -8,7 +8,7 @@ use super::configuration::Start;
 use super::lateral::{Line, comes_out, lateral_forces};
 use super::mesh::Mesh;
 use super::search::Search;
-use crate::contact::{Between, HandMotion, Place, Rub, SETTLED};
+use crate::contact::{Between, HandMotion, InnerFriction, Place, SETTLED};
 use crate::device::{Stack, line_mm};
 use crate::methods::LateralForce;
 use crate::rod::RodState;
@@ -78,9 +78,9 @@ pub(super) fn begin(
 /// What pressed on an instrument in the last equilibrium, N/mm, so far from the sheath. `known` is where to start looking: calls go from the sheath
 /// to the tip.
 fn pressure(start: Start<'_>, from_sheath_mm: f64, inner: usize, known: &mut usize) -> f64 {
-    let (mesh, rubs) = (start.mesh, &start.state.rubs);
+    let (mesh, inner_friction) = (start.mesh, &start.state.inner_friction);
     let most = mesh.inserted_mm.len().saturating_sub(1);
-    if rubs.is_empty() || mesh.elements.is_empty() {
+    if inner_friction.is_empty() || mesh.elements.is_empty() {
         return 0.0;
     }
     let place = |i: usize| mesh.from_tip_mm[0] - mesh.from_tip_mm[i];
@@ -88,7 +88,7 @@ fn pressure(start: Start<'_>, from_sheath_mm: f64, inner: usize, known: &mut usi
         *known += 1;
     }
     let share = (from_sheath_mm - place(*known)) / (place(*known + 1) - place(*known));
-    let at = |i: usize| rubs[most * i + inner].pressure_n_per_mm;
+    let at = |i: usize| inner_friction[most * i + inner].pressure_n_per_mm;
     // In the sheath's mouth nothing is told.
     let near = if *known == 0 { at(1) } else { at(*known) };
     near + (at(*known + 1) - near) * share.clamp(0.0, 1.0)
@@ -107,9 +107,9 @@ impl<const C: usize> Search<'_, '_, C> {
         if self.contact.between().places().is_empty() {
             return (found, change);
         }
-        let mut rubs = Vec::new();
+        let mut inner_friction = Vec::new();
         for round in 0..=RENEWALS {
-            change = self.press(stack, mesh, &mut rubs);
+            change = self.press(stack, mesh, &mut inner_friction);
             let there = change < SETTLED && found.is_within(self.tolerance);
             if !found.converged || there || round == RENEWALS {
                 break;
@@ -120,9 +120,9 @@ impl<const C: usize> Search<'_, '_, C> {
     }
 
     /// Renews what presses between instruments; returns by what part the couples change.
-    fn press(&mut self, stack: &Stack, mesh: &Mesh, rubs: &mut Vec<Rub>) -> f64 {
+    fn press(&mut self, stack: &Stack, mesh: &Mesh, inner_friction: &mut Vec<InnerFriction>) -> f64 {
         let state = &*self.state;
-        keep(self.contact.between(), state, mesh, rubs);
+        keep(self.contact.between(), state, mesh, inner_friction);
         // The wall is asked where an instrument comes out of another alone.
         let ends: Vec<usize> = (0..mesh.inserted_mm.len()).filter_map(|k| comes_out(mesh, k)).collect();
         let beside = |e: usize| ends.iter().any(|node| e == *node || e + 1 == *node);
@@ -132,7 +132,7 @@ impl<const C: usize> Search<'_, '_, C> {
                 Some((index, self.contact.touch(&mesh.elements, state, index)?.contact.total_n()))
             })
             .collect();
-        let line = Line { stack, mesh, rod: state, pressing: &pressing, rubs };
+        let line = Line { stack, mesh, rod: state, pressing: &pressing, inner_friction };
         let told: Vec<Vec<LateralForce>> = (0..mesh.inserted_mm.len())
             .map(|inner| match stack.friction(inner) {
                 0.0 => Vec::new(),
@@ -148,16 +148,16 @@ impl<const C: usize> Search<'_, '_, C> {
 }
 
 /// Writes what friction between instruments does at the nodes of the line, for the next step and for those who ask.
-pub(super) fn keep(between: &Between, rod: &RodState, mesh: &Mesh, rubs: &mut Vec<Rub>) {
-    rubs.clear();
+pub(super) fn keep(between: &Between, rod: &RodState, mesh: &Mesh, inner_friction: &mut Vec<InnerFriction>) {
+    inner_friction.clear();
     if between.places().is_empty() {
         return;
     }
     let most = mesh.inserted_mm.len() - 1;
-    rubs.resize(most * mesh.from_tip_mm.len(), Rub::default());
+    inner_friction.resize(most * mesh.from_tip_mm.len(), InnerFriction::default());
     for place in between.places() {
         let [along, around] = place.parts(rod);
         let pressure_n_per_mm = place.force_n / place.length_mm;
-        rubs[most * place.node + place.inner] = Rub { along, around, pressure_n_per_mm };
+        inner_friction[most * place.node + place.inner] = InnerFriction { along, around, pressure_n_per_mm };
     }
 }

@@ -94,7 +94,7 @@ impl Stiffness {
 
 /// Modulus and friction of a wall with regions.
 #[derive(Debug, Clone)]
-pub struct Grading {
+pub struct RegionMap {
     /// ln(kᵢ/k₀) of every vertex; none if all are 0.
     ln_moduli: Vec<f64>,
     /// ln of the largest modulus over k₀.
@@ -103,7 +103,7 @@ pub struct Grading {
     rough: Vec<f64>,
 }
 
-impl Grading {
+impl RegionMap {
     /// What `properties` give to the vertices of `wall`; `None` where all are the same.
     pub(super) fn new(wall: &SmoothWall, properties: &WallProperties) -> Option<Self> {
         let largest = properties.largest_friction();
@@ -187,7 +187,7 @@ mod tests {
     struct Tube {
         smooth: SmoothWall,
         query: WallQuery,
-        grading: Option<Grading>,
+        regions: Option<RegionMap>,
     }
 
     fn tube(properties: &WallProperties) -> Tube {
@@ -195,8 +195,8 @@ mod tests {
             .unwrap()
             .wall;
         let smooth = SmoothWall::new(&wall, 4.0);
-        let grading = Grading::new(&smooth, properties);
-        Tube { smooth, query: WallQuery::new(&wall).unwrap(), grading }
+        let regions = RegionMap::new(&smooth, properties);
+        Tube { smooth, query: WallQuery::new(&wall).unwrap(), regions }
     }
 
     fn region(height_mm: f64, modulus: Option<f64>, friction: Option<f64>) -> WallRegion {
@@ -218,7 +218,7 @@ mod tests {
         fn energy(&self, potential: &WallPotential, x: &Vec3, softness: f64) -> (f64, Vec3, Matrix3<f64>) {
             let triangle = self.triangle(x);
             let d = self.smooth.distance(x, triangle).unwrap();
-            let stiffness = self.grading.as_ref().unwrap().stiffness(&self.smooth, x, triangle, softness);
+            let stiffness = self.regions.as_ref().unwrap().stiffness(&self.smooth, x, triangle, softness);
             let (gradient, hessian) = stiffness.derivatives(potential, &d, 1.0);
             (stiffness.factor * potential.value(d.value_mm), gradient, hessian)
         }
@@ -254,8 +254,8 @@ mod tests {
                         if d - 10.0 * h < 0.0 {
                             continue;
                         }
-                        let grading = wall.grading.as_ref().unwrap();
-                        let s = grading.stiffness(&wall.smooth, &x, triangle, softness);
+                        let regions = wall.regions.as_ref().unwrap();
+                        let s = regions.stiffness(&wall.smooth, &x, triangle, softness);
                         across += u32::from(d < radius_mm && s.slope.unwrap().0.norm() > 0.1);
                         // Differences round like the energy and its gradient.
                         let scale = here.2.norm() + 10.0 * (here.1.norm() + here.0);
@@ -284,7 +284,7 @@ mod tests {
         let x = Vec3::new(3.7, 0.0, 56.0);
         let triangle = wall.triangle(&x);
         let d = wall.smooth.distance(&x, triangle).unwrap();
-        let with = wall.grading.as_ref().unwrap().stiffness(&wall.smooth, &x, triangle, 1.0);
+        let with = wall.regions.as_ref().unwrap().stiffness(&wall.smooth, &x, triangle, 1.0);
         let without = Stiffness { slope: None, ..with };
         let off = with.derivatives(&potential, &d, 1.0).0 - without.derivatives(&potential, &d, 1.0).0;
         let h = 1e-5;
@@ -308,9 +308,9 @@ mod tests {
         let wall = tube(&properties);
         let at = |x: f64, z: f64| {
             let place = Vec3::new(x, 0.0, z);
-            let (grading, triangle) = (wall.grading.as_ref().unwrap(), wall.triangle(&place));
-            let k = 1e-2 * grading.stiffness(&wall.smooth, &place, triangle, 1.0).factor;
-            (k, 0.2 * grading.rough(&wall.smooth, &place, triangle))
+            let (regions, triangle) = (wall.regions.as_ref().unwrap(), wall.triangle(&place));
+            let k = 1e-2 * regions.stiffness(&wall.smooth, &place, triangle, 1.0).factor;
+            (k, 0.2 * regions.rough(&wall.smooth, &place, triangle))
         };
         let near = |found: (f64, f64), k: f64, friction: f64| {
             assert!((found.0 / k - 1.0).abs() < 1e-12 && (found.1 - friction).abs() < 1e-15, "{found:?}");
@@ -328,9 +328,9 @@ mod tests {
     #[test]
     fn walls_that_are_the_same_everywhere_store_nothing() {
         let alike = WallProperties { region: vec![region(50.0, Some(1.0), Some(0.0))], ..Default::default() };
-        assert!(tube(&alike).grading.is_none());
+        assert!(tube(&alike).regions.is_none());
         let rough = WallProperties { region: vec![region(50.0, None, Some(0.1))], ..Default::default() };
-        let grading = tube(&rough).grading.unwrap();
-        assert!(grading.ln_moduli.is_empty() && !grading.rough.is_empty());
+        let regions = tube(&rough).regions.unwrap();
+        assert!(regions.ln_moduli.is_empty() && !regions.rough.is_empty());
     }
 }

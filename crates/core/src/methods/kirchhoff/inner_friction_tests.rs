@@ -111,7 +111,7 @@ fn a_turned_wire_is_held_by_what_presses_and_sticks_where_its_turn_does_not_come
 #[test]
 fn a_wire_that_is_turned_is_pushed_more_easily() {
     let loose = straight_in_arc(STIFF_NMM2, 0.0, (WIRE, 0)).report().instruments[WIRE].push_force_n.unwrap();
-    let rubs = |turn_rad: f64| {
+    let inner_friction = |turn_rad: f64| {
         let mut simulation = straight_in_arc(STIFF_NMM2, FRICTION, (WIRE, 0));
         let steps = (0..4).map(|_| go(&mut simulation, &[(WIRE, 0.1, turn_rad)])[WIRE]);
         let told = steps.last().unwrap();
@@ -119,7 +119,7 @@ fn a_wire_that_is_turned_is_pushed_more_easily() {
     };
     let mut last_n = f64::INFINITY;
     for turn_rad in [0.0f64, 0.1, 0.25, 1.0] {
-        let (push_n, torque_nmm, taken_mj) = rubs(turn_rad);
+        let (push_n, torque_nmm, taken_mj) = inner_friction(turn_rad);
         let along = 0.1 / 0.1f64.hypot(RADIUS_MM * turn_rad);
         let angle = CURVATURE * LENGTH_MM;
         let expected = 0.5 * WIRE_NMM2 * CURVATURE.powi(2) * ((FRICTION * angle * along).exp() - 1.0);
@@ -199,7 +199,7 @@ fn a_step_that_turns_can_be_taken_again() {
     assert_eq!(bytes(&other), after);
     // A state that says more of friction than there are nodes is refused.
     let mut wrong: serde_json::Value = serde_json::from_slice(&before).unwrap();
-    wrong["content"]["Kirchhoff"]["rubs"].as_array_mut().unwrap().pop();
+    wrong["content"]["Kirchhoff"]["inner_friction"].as_array_mut().unwrap().pop();
     let error = other.restore(&serde_json::from_value(wrong).unwrap()).unwrap_err().to_string();
-    assert!(error.contains("state.rubs"), "{error}");
+    assert!(error.contains("state.inner_friction"), "{error}");
 }

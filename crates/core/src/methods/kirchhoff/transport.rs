@@ -4,7 +4,7 @@
 use nalgebra::Rotation3;
 
 use crate::Vec3;
-use crate::contact::{MovedWall, Nearness, WallMemory};
+use crate::contact::{ContactCache, MovedWall, Nearness};
 use crate::rod::quadrature::Point;
 use crate::rod::{Frame, RodState};
 
@@ -44,15 +44,15 @@ impl Extension {
     /// equilibrium would be that of a free tip.
     pub(super) fn trace(
         &mut self,
-        (wall, memory): (MovedWall<'_>, &mut WallMemory),
+        (wall, cache): (MovedWall<'_>, &mut ContactCache),
         tip: Vec3,
         tangent: Vec3,
         radius_mm: f64,
         wanted_mm: f64,
     ) -> f64 {
         self.curvature = Vec3::zeros();
-        memory.leave_place();
-        let at_tip = memory.nearness(wall, &tip, radius_mm).map_or(radius_mm, |near| near.value_mm());
+        cache.leave_place();
+        let at_tip = cache.nearness(wall, &tip, radius_mm).map_or(radius_mm, |near| near.value_mm());
         let touch = at_tip.clamp(SUNK * radius_mm, radius_mm);
         // Out of a soft wall that it has sunk into the tip may come in more than one piece.
         let clear = at_tip.min(CLEAR * radius_mm);
@@ -62,7 +62,7 @@ impl Extension {
         let mut pieces = 0.0;
         while pieces < count {
             let mut next = x + t * piece_mm;
-            if let Some(Nearness::Within(near)) = memory.nearness(wall, &next, touch) {
+            if let Some(Nearness::Within(near)) = cache.nearness(wall, &next, touch) {
                 let (d, normal) = (near.value_mm, near.normal());
                 if t.dot(&normal) < HEAD_ON {
                     break;
@@ -167,7 +167,12 @@ pub(super) fn lay(
 /// The state on the mesh `to` of the device that was in `state` on the mesh `from`, slid along its curve.
 ///
 /// Material angles stay with the device; what enters from the sheath has the angle that the tail has had.
-pub(super) fn slide((from, state): (&Mesh, &RodState), extension: &Extension, to: &Mesh, out: &mut RodState) {
+pub(super) fn transport(
+    (from, state): (&Mesh, &RodState),
+    extension: &Extension,
+    to: &Mesh,
+    out: &mut RodState,
+) {
     slide_curve(from, state, extension, to, out);
     let n = to.elements.len();
     // Axial forces, angles and bubbles of the same piece of device, by its distance from the tip.
@@ -202,7 +207,7 @@ pub(super) fn slide((from, state): (&Mesh, &RodState), extension: &Extension, to
 
 /// As [`slide`], of several instruments, each with its set of angles if it has one: nodes are other marks than before, so that angles are
 /// read between them.
-pub(super) fn slide_together(
+pub(super) fn transport_together(
     (from, state): (&Mesh, &RodState),
     extension: &Extension,
     to: &Mesh,

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::FeltWall;
+use super::ContactSurface;
 use crate::vessel::{SurfaceMesh, Wall, WallQuery};
 use crate::{Result, Vec3, parallel};
 
@@ -38,7 +38,7 @@ pub struct Deviation {
     pub worst_at_mm: Vec3,
 }
 
-impl FeltWall {
+impl ContactSurface {
     /// How far this wall and `given` are from each other, its extensions beyond openings left out.
     ///
     /// # Errors
@@ -47,8 +47,12 @@ impl FeltWall {
         let query = WallQuery::new(given)?;
         let from_given = |x: &Vec3| {
             let Some(near) = self.query.nearest(x, f64::MAX) else { return Some(f64::MAX) };
-            let felt = self.smooth.distance(x, near.triangle);
-            Some(felt.map_or(near.distance_mm, |felt| felt.value_mm / felt.gradient.norm().max(FLAT)).abs())
+            let surface = self.smooth.distance(x, near.triangle);
+            Some(
+                surface
+                    .map_or(near.distance_mm, |surface| surface.value_mm / surface.gradient.norm().max(FLAT))
+                    .abs(),
+            )
         };
         let extended = |x: &Vec3| {
             given.openings().iter().any(|opening| {
@@ -61,8 +65,9 @@ impl FeltWall {
                 return None;
             }
             let triangle = self.query.nearest(x, f64::MAX)?.triangle;
-            let felt = self.smooth.distance(x, triangle)?;
-            let foot = x - felt.gradient * (felt.value_mm / felt.gradient.norm_squared().max(FLAT * FLAT));
+            let surface = self.smooth.distance(x, triangle)?;
+            let foot =
+                x - surface.gradient * (surface.value_mm / surface.gradient.norm_squared().max(FLAT * FLAT));
             let near = query.nearest(&foot, f64::MAX)?;
             // Beyond a rim of the given surface there is what closes a hole.
             (!near.rim).then_some(near.distance_mm.abs())
@@ -149,15 +154,15 @@ mod tests {
     fn it_is_the_sag_of_triangles_and_the_distance_of_another_tube() {
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
         let given = tube(4.0);
-        let felt = FeltWall::new(&given, (0.2, 0.2), &properties, &NoStore).unwrap();
-        let own = felt.deviation(&given).unwrap();
+        let surface = ContactSurface::new(&given, (0.2, 0.2), &properties, &NoStore).unwrap();
+        let own = surface.deviation(&given).unwrap();
         // The middle of a chord of 1 mm, and a little more in the middle of a triangle.
         let sag_mm = 1.0 / 32.0;
         assert!((0.8..1.6).contains(&(own.most_mm / sag_mm)), "{own:?}");
         assert!(own.mean_mm < own.usual_mm && own.usual_mm <= own.most_mm, "{own:?}");
         // Caps and extensions are no part of it: nothing is 4 mm away.
         for by_mm in [-0.3, 0.3] {
-            let other = felt.deviation(&tube(4.0 + by_mm)).unwrap();
+            let other = surface.deviation(&tube(4.0 + by_mm)).unwrap();
             assert!((other.mean_mm - 0.3_f64).abs() < sag_mm, "{other:?}");
             assert!((other.most_mm - 0.3_f64).abs() < 2.0 * sag_mm, "{other:?}");
         }

@@ -1,20 +1,20 @@
 //! What the contact points of a device know of the wall about them, from one question to the next.
 //!
 //! What is known at an equilibrium ([`KnownPoints`]) belongs to the state of an insertion. A step takes it over, slides it with the device and
-//! goes on from there in its own memory ([`WallMemory`]), so that a step that fails has changed nothing.
+//! goes on from there in its own memory ([`ContactCache`]), so that a step that fails has changed nothing.
 
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, Nearness};
-use super::places::{Place, Places};
 use super::point::{FOLLOW, LOOK_AGAIN};
+use super::proximity::{Proximity, ProximityCache};
 use super::wall::{Foreseen, Slip, Slipping, Span};
-use super::{ContactPoint, FeltWall, MovedWall};
+use super::{ContactPoint, ContactSurface, MovedWall};
 use crate::Vec3;
 
-/// What a point knows of its surroundings. Places are material points of the vessel, and clearances lie between those.
+/// What a point knows of its surroundings. ProximityCache are material points of the vessel, and clearances lie between those.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct KnownPoint {
     /// Where the wall was last looked for.
@@ -84,7 +84,7 @@ impl TakenReading {
 
 /// The memory of all contact points of a device in a step.
 #[derive(Debug, Clone)]
-pub struct WallMemory {
+pub struct ContactCache {
     pub(super) points: Vec<KnownPoint>,
     /// What those that are known at the base knew before it was.
     pub(super) before: Vec<KnownPoint>,
@@ -95,9 +95,9 @@ pub struct WallMemory {
     /// Where each point last read the distance of a near wall, and what it read. Apart from `points`: most points are free, and
     /// all of them are looked at many times a step.
     pub(super) readings: Vec<TakenReading>,
-    pub(super) places: Places,
+    pub(super) proximity: ProximityCache,
     /// The place asked for last.
-    last: Place,
+    last: Proximity,
     /// Forces on the wall that a step leads to, N.
     pub(super) aims: Vec<f64>,
     /// What a step does to the contacts, to first order.
@@ -138,18 +138,18 @@ impl KnownPoints {
     }
 }
 
-impl WallMemory {
+impl ContactCache {
     /// Nothing is known yet of `felt`.
-    pub fn new(felt: &FeltWall) -> Self {
-        let places = Places::new(LOOK_AGAIN * felt.thinnest_mm, felt.reach_mm);
+    pub fn new(surface: &ContactSurface) -> Self {
+        let proximity = ProximityCache::new(LOOK_AGAIN * surface.thinnest_mm, surface.reach_mm);
         Self {
             points: Vec::new(),
             before: Vec::new(),
             spans: Vec::new(),
             pressing: Vec::new(),
             readings: Vec::new(),
-            places,
-            last: Place::UNKNOWN,
+            proximity,
+            last: Proximity::UNKNOWN,
             aims: Vec::new(),
             foreseen: Vec::new(),
             slipping: Vec::new(),
@@ -159,7 +159,7 @@ impl WallMemory {
 
     /// Forgets the place asked for last, so that answers hang on the places that are asked for from here on alone.
     pub(crate) fn leave_place(&mut self) {
-        self.last = Place::UNKNOWN;
+        self.last = Proximity::UNKNOWN;
     }
 
     /// Takes memory for `points` points.
@@ -205,15 +205,15 @@ impl WallMemory {
     }
 
     /// How near `x` is to the wall, with derivatives below `limit_mm`; `None` where it is known to be farther.
-    pub(crate) fn nearness(&mut self, felt: MovedWall<'_>, x: &Vec3, limit_mm: f64) -> Option<Nearness> {
-        let x = &felt.material(x);
-        let far_mm = limit_mm * felt.stretch() + felt.smooth.deepest_inset_mm();
+    pub(crate) fn nearness(&mut self, surface: MovedWall<'_>, x: &Vec3, limit_mm: f64) -> Option<Nearness> {
+        let x = &surface.material(x);
+        let far_mm = limit_mm * surface.stretch() + surface.smooth.deepest_inset_mm();
         if self.last.clearance(x) > far_mm {
             return None;
         }
-        self.last = self.places.around(&felt.query, x);
+        self.last = self.proximity.around(&surface.query, x);
         let near = self.last.clearance(x) <= far_mm;
-        self.last.triangle.filter(|_| near).map(|triangle| felt.nearness(x, triangle, limit_mm))
+        self.last.triangle.filter(|_| near).map(|triangle| surface.nearness(x, triangle, limit_mm))
     }
 
     /// Takes over what was known before the device advanced along its own curve: what was known of a place, the point of `after` that comes

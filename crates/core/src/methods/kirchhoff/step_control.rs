@@ -17,7 +17,7 @@ const RESORTS: usize = 6;
 
 /// What a command has tried.
 #[derive(Debug)]
-pub(super) struct Trials {
+pub(super) struct StepControl {
     /// Newton iterations that are left.
     pub(super) budget: usize,
     /// Those that are left for last resorts.
@@ -30,7 +30,7 @@ pub(super) struct Trials {
     failures: usize,
 }
 
-impl Trials {
+impl StepControl {
     /// With a budget of so many Newton iterations, and so many for last resorts, after which what one comes to is taken whatever is left
     /// over.
     pub(super) fn new(budget: usize, for_resorts: usize) -> Self {
@@ -100,65 +100,65 @@ mod tests {
 
     #[test]
     fn what_goes_astray_twice_is_tried_with_patience_once() {
-        let mut trials = Trials::new(100, 100);
-        assert_eq!(trials.next(1.0), (Effort::Usual, 1.0));
-        trials.failed((Effort::Usual, 1.0), true);
-        assert_eq!(trials.next(1.0), (Effort::Usual, 0.25));
-        trials.succeeded(0.25);
-        assert_eq!(trials.next(0.75), (Effort::Usual, 0.5));
-        trials.failed((Effort::Usual, 0.5), true);
-        assert_eq!(trials.next(0.75), (Effort::Patient, 0.75));
+        let mut control = StepControl::new(100, 100);
+        assert_eq!(control.next(1.0), (Effort::Usual, 1.0));
+        control.failed((Effort::Usual, 1.0), true);
+        assert_eq!(control.next(1.0), (Effort::Usual, 0.25));
+        control.succeeded(0.25);
+        assert_eq!(control.next(0.75), (Effort::Usual, 0.5));
+        control.failed((Effort::Usual, 0.5), true);
+        assert_eq!(control.next(0.75), (Effort::Patient, 0.75));
         // What it came to may be no step of the command.
-        trials.failed((Effort::Patient, 0.75), false);
-        assert_eq!(trials.next(0.75), (Effort::Usual, 0.125));
+        control.failed((Effort::Patient, 0.75), false);
+        assert_eq!(control.next(0.75), (Effort::Usual, 0.125));
     }
 
     #[test]
     fn what_is_no_step_of_the_command_asks_for_parts_alone() {
-        let mut trials = Trials::new(100, 100);
+        let mut control = StepControl::new(100, 100);
         for part in [1.0, 0.25, 0.0625] {
-            assert_eq!(trials.next(1.0), (Effort::Usual, part));
-            trials.failed((Effort::Usual, part), false);
+            assert_eq!(control.next(1.0), (Effort::Usual, part));
+            control.failed((Effort::Usual, part), false);
         }
     }
 
     #[test]
     fn the_last_resort_takes_what_is_out_of_balance_only_after_parts_and_all_of_it_in_the_end() {
-        let mut trials = Trials::new(0, 100);
-        assert_eq!(trials.next(1.0), (Effort::Resort(0.0), 1.0));
+        let mut control = StepControl::new(0, 100);
+        assert_eq!(control.next(1.0), (Effort::Resort(0.0), 1.0));
         for part in [1.0, 0.25, 0.0625, 0.015625, 0.00390625, 0.0009765625] {
-            let (effort, tried) = trials.next(1.0);
+            let (effort, tried) = control.next(1.0);
             assert_eq!(tried, part);
             assert_eq!(effort, Effort::Resort(if part == 1.0 { 0.0 } else { AT_REST }));
-            trials.failed((effort, part), true);
+            control.failed((effort, part), true);
         }
-        assert_eq!(trials.next(1.0), (Effort::Resort(f64::INFINITY), 1.0));
-        trials.failed((Effort::Resort(f64::INFINITY), 1.0), true);
-        assert!(trials.are_over());
+        assert_eq!(control.next(1.0), (Effort::Resort(f64::INFINITY), 1.0));
+        control.failed((Effort::Resort(f64::INFINITY), 1.0), true);
+        assert!(control.are_over());
     }
 
     #[test]
     fn last_resorts_come_to_an_end_that_is_taken_as_it_is() {
-        let mut trials = Trials::new(0, 100);
+        let mut control = StepControl::new(0, 100);
         for (took, expected) in [(60, 0.0), (60, 0.0), (0, f64::INFINITY)] {
-            let (effort, part) = trials.next(1.0);
+            let (effort, part) = control.next(1.0);
             assert_eq!((effort, part), (Effort::Resort(expected), 1.0));
-            trials.took(effort, took);
-            trials.succeeded(part);
+            control.took(effort, took);
+            control.succeeded(part);
         }
-        let (effort, part) = trials.next(1.0);
-        trials.failed((effort, part), false);
-        assert!(trials.are_over());
+        let (effort, part) = control.next(1.0);
+        control.failed((effort, part), false);
+        assert!(control.are_over());
     }
 
     #[test]
     fn after_patience_in_vain_the_last_resort_begins_with_parts() {
-        let mut trials = Trials::new(100, 100);
+        let mut control = StepControl::new(100, 100);
         for (effort, part) in [(Effort::Usual, 1.0), (Effort::Usual, 0.25), (Effort::Patient, 1.0)] {
-            assert_eq!(trials.next(1.0), (effort, part));
-            trials.failed((effort, part), true);
+            assert_eq!(control.next(1.0), (effort, part));
+            control.failed((effort, part), true);
         }
-        trials.budget = 0;
-        assert_eq!(trials.next(1.0), (Effort::Resort(0.0), 0.0625));
+        control.budget = 0;
+        assert_eq!(control.next(1.0), (Effort::Resort(0.0), 0.0625));
     }
 }

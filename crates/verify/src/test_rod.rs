@@ -1,7 +1,7 @@
 //! A rod in equilibrium with walls and loads, without the insertion around it: the bench of the contact cases.
 
 use endowire_core::contact::Touch;
-use endowire_core::contact::{FeltWall, Friction, HandMotion, SETTLED, WallContact, WallMemory};
+use endowire_core::contact::{ContactCache, ContactSurface, Friction, HandMotion, SETTLED, WallContact};
 use endowire_core::device::Device;
 use endowire_core::insertion::WallProperties;
 use endowire_core::methods::kirchhoff::Mesh;
@@ -31,11 +31,11 @@ pub(super) struct Setup {
 }
 
 /// An untwisted rod, clamped at its start, among walls.
-pub(super) struct Bench {
-    felt: FeltWall,
+pub(super) struct TestRod {
+    surface: ContactSurface,
     setup: Setup,
     mesh: Mesh,
-    memory: WallMemory,
+    cache: ContactCache,
     friction: Friction,
     newton: Newton<PLAIN>,
     /// Stiffness at a node of two plates without play along the plane z = 0, between which the rod lies.
@@ -91,7 +91,7 @@ impl External for Outside<'_> {
     }
 }
 
-impl Bench {
+impl TestRod {
     /// A rod in the shape that `tangents` gives to its nodes, by their arc length, from `start` on.
     pub(super) fn new(
         wall: &Wall,
@@ -116,10 +116,10 @@ impl Bench {
         let mut mesh = Mesh::default();
         mesh.build(&device, length, length / elements as f64, modulus);
         let frames = mesh.from_tip_mm.iter().map(|from_tip| tangents(length - from_tip)).collect();
-        let felt = FeltWall::new(wall, (radius, radius), properties, &NoStore)?;
+        let surface = ContactSurface::new(wall, (radius, radius), properties, &NoStore)?;
         Ok(Self {
-            memory: WallMemory::new(&felt),
-            felt,
+            cache: ContactCache::new(&surface),
+            surface,
             setup: *setup,
             friction: Friction::default(),
             newton: Newton::new(mesh.elements.len()),
@@ -144,7 +144,8 @@ impl Bench {
         job: impl FnOnce(&mut Newton<PLAIN>, &[ElementData], &mut Supports, &mut Outside<'_>, &mut RodState) -> T,
     ) -> T {
         let (points, bending) = (&self.mesh.points, self.setup.bending);
-        let mut contact = WallContact::new(&self.felt, points, &mut self.memory, &mut self.friction, bending);
+        let mut contact =
+            WallContact::new(&self.surface, points, &mut self.cache, &mut self.friction, bending);
         contact.softness = self.softness;
         let mut outside = Outside { contact, loads: &mut self.loads, plates: self.plates };
         job(&mut self.newton, &self.mesh.elements, &mut self.supports, &mut outside, &mut self.state)

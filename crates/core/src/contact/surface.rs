@@ -8,9 +8,9 @@ use nalgebra::Matrix3;
 
 use super::distance::Nearness;
 use super::extension::extended;
-use super::grading::{Grading, Stiffness};
 use super::point::{FOLLOW, LOOK_AGAIN};
 use super::properties::WallProperties;
+use super::regions::{RegionMap, Stiffness};
 use super::{Distance, SmoothWall};
 use crate::vessel::{Conditioning, Wall, WallQuery, WallRecipe, WallStore};
 use crate::{Result, Vec3, parallel};
@@ -18,13 +18,13 @@ pub use deviation::Deviation;
 
 /// A wall prepared for the contact of devices.
 #[derive(Debug, Clone)]
-pub struct FeltWall {
+pub struct ContactSurface {
     /// Its smooth distance.
     pub smooth: SmoothWall,
     /// Nearest triangles and clearances.
     pub query: WallQuery,
     /// Modulus and friction, where they are not the same everywhere.
-    pub grading: Option<Grading>,
+    pub regions: Option<RegionMap>,
     /// Radius of the thinnest piece of the device, mm.
     pub(super) thinnest_mm: f64,
     /// How far a point of the device must see, mm.
@@ -52,7 +52,7 @@ fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) 
     store.wall(&WallRecipe::Even { wall, options }).map(Cow::Owned)
 }
 
-impl FeltWall {
+impl ContactSurface {
     /// Prepares `wall` for devices of this smallest and largest radius, mm, with its even mesh from `store`.
     ///
     /// # Errors
@@ -63,21 +63,21 @@ impl FeltWall {
         properties: &WallProperties,
         store: &dyn WallStore,
     ) -> Result<Self> {
-        let felt = extended(&*even(wall, properties, store)?, thickest_mm);
-        let felt = Wall::welded(&felt)?;
-        let smooth = SmoothWall::new(&felt, thickest_mm);
-        let grading = if properties.region.is_empty() { None } else { Grading::new(&smooth, properties) };
+        let surface = extended(&*even(wall, properties, store)?, thickest_mm);
+        let surface = Wall::welded(&surface)?;
+        let smooth = SmoothWall::new(&surface, thickest_mm);
+        let regions = if properties.region.is_empty() { None } else { RegionMap::new(&smooth, properties) };
         let reach_mm = |smooth: &SmoothWall| {
             (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + smooth.deepest_inset_mm() + LOOK_MM
         };
-        let query = WallQuery::new(&felt)?;
+        let query = WallQuery::new(&surface)?;
         // The first step would wait for it.
         query.prepare();
-        let mut felt = Self { reach_mm: reach_mm(&smooth), smooth, query, grading, thinnest_mm };
-        let crests = felt.over_crests(thickest_mm);
-        felt.smooth.deepen(crests.into_iter().flatten());
-        felt.reach_mm = reach_mm(&felt.smooth);
-        Ok(felt)
+        let mut surface = Self { reach_mm: reach_mm(&smooth), smooth, query, regions, thinnest_mm };
+        let crests = surface.over_crests(thickest_mm);
+        surface.smooth.deepen(crests.into_iter().flatten());
+        surface.reach_mm = reach_mm(&surface.smooth);
+        Ok(surface)
     }
 
     /// How far the smooth wall lies inside the flat one over triangles where that is much, mm: beside a crest it ends farther above them than it
@@ -140,15 +140,15 @@ impl FeltWall {
     /// The wall's modulus at `x`, whose nearest triangle is `triangle` or close to it; `softness` is the part of the stiffest
     /// that acts.
     pub(super) fn stiffness(&self, x: &Vec3, triangle: Option<u32>, softness: f64) -> Stiffness {
-        match self.grading.as_ref().zip(triangle) {
-            Some((grading, triangle)) => grading.stiffness(&self.smooth, x, triangle, softness),
+        match self.regions.as_ref().zip(triangle) {
+            Some((regions, triangle)) => regions.stiffness(&self.smooth, x, triangle, softness),
             None => Stiffness { factor: softness, slope: None },
         }
     }
 
     /// Coefficient of friction there, over the largest of all.
     pub(super) fn rough(&self, x: &Vec3, triangle: Option<u32>) -> f64 {
-        self.grading.as_ref().zip(triangle).map_or(1.0, |(g, triangle)| g.rough(&self.smooth, x, triangle))
+        self.regions.as_ref().zip(triangle).map_or(1.0, |(g, triangle)| g.rough(&self.smooth, x, triangle))
     }
 }
 
@@ -165,19 +165,20 @@ mod tests {
         let tree = anatomy::tree("aortic_arch").unwrap();
         let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(6.0)).unwrap().wall;
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
-        let felt = FeltWall::new(&wall, (RADIUS_MM, RADIUS_MM), &properties, &NoStore).unwrap();
+        let surface = ContactSurface::new(&wall, (RADIUS_MM, RADIUS_MM), &properties, &NoStore).unwrap();
         // With insets as they are on the triangles alone.
         let on_them = SmoothWall::new(&Wall::welded(&extended(&wall, RADIUS_MM)).unwrap(), RADIUS_MM);
         let mut pressing = [0, 0];
-        for triangle in felt.smooth.inside_of(0.1) {
-            let ([a, b, c], normal) = (felt.query.corners(triangle), felt.query.inward_normal(triangle));
+        for triangle in surface.smooth.inside_of(0.1) {
+            let ([a, b, c], normal) =
+                (surface.query.corners(triangle), surface.query.inward_normal(triangle));
             for k in 0..60 {
                 let [u, v, up] = [0, 1, 2].map(|n| unit(splitmix64(u64::from(triangle), 3 * k + n)));
                 let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
                 let x = a + (b - a) * u + (c - a) * v + normal * (6.0 * RADIUS_MM * up);
-                let Some(flat) = felt.query.nearest(&x, felt.reach_mm) else { continue };
-                let felt_mm = felt.nearness(&x, flat.triangle, f64::NEG_INFINITY).value_mm();
-                for (smooth, count) in [&felt.smooth, &on_them].into_iter().zip(&mut pressing) {
+                let Some(flat) = surface.query.nearest(&x, surface.reach_mm) else { continue };
+                let felt_mm = surface.nearness(&x, flat.triangle, f64::NEG_INFINITY).value_mm();
+                for (smooth, count) in [&surface.smooth, &on_them].into_iter().zip(&mut pressing) {
                     let free_mm =
                         flat.distance_mm - (1.0 + FOLLOW) * RADIUS_MM - smooth.inset_mm(flat.triangle);
                     *count += u32::from(free_mm >= 0.0 && felt_mm < RADIUS_MM);

@@ -38,7 +38,7 @@ pub(super) enum Held {
 
 impl Guess {
     /// Moves `state` by a step that holds the contacts of the last equilibrium, if it needs one.
-    pub(super) fn hold<const C: usize>(
+    pub(super) fn active_set_step<const C: usize>(
         &mut self,
         newton: &mut Newton<C>,
         contact: &mut WallContact<'_>,
