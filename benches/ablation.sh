@@ -73,7 +73,7 @@ table() {
 if [ -n "$pattern" ]; then table; exit; fi
 sed -i '/^## What each part brings$/,$d' BENCHMARKS.md
 {
-  printf '## What each part brings\nWritten by `benches/ablation.sh` from commit %s: five insertions (`benches/src/bin/insertions.rs`) ' "$commit"
+  printf '## What each part brings\nWritten by `benches/ablation.sh` from commit %s: seven insertions (`benches/src/bin/insertions.rs`) ' "$commit"
   printf 'without a part of the solver, or with another constant, over those with it. '
   printf 'Ratios of Newton iterations, of questions to the hierarchy and of time (median of %s pairs); how many more commands ended in an ' "$repeats"
   printf 'equilibrium, and in the last resort.\n\n'

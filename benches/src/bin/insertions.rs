@@ -24,13 +24,30 @@ struct Insertion {
     shaped: bool,
 }
 
-const INSERTIONS: [Insertion; 5] = [
+const INSERTIONS: [Insertion; 7] = [
     insertion("arch", "aortic_arch", 300.0, 1.0, 1.0, 0.0),
     insertion("arch, friction", "aortic_arch", 300.0, 1.0, 1.0, 0.1),
     Insertion {
         shaped: true,
         turn_rad: 0.1,
         ..insertion("arch, shaped tip that turns", "aortic_arch", 300.0, 1.0, 1.0, 0.1)
+    },
+    Insertion {
+        shaped: true,
+        turn_rad: 0.1,
+        ..insertion(
+            "rigid arch III, friction, shaped tip that turns",
+            "aortic_arch_iii",
+            250.0,
+            1.0,
+            1e4,
+            0.1,
+        )
+    },
+    Insertion {
+        shaped: true,
+        turn_rad: 0.05,
+        ..insertion("hepatic, friction, shaped tip that turns", "hepatic", 250.0, 1.0, 100.0, 0.1)
     },
     insertion("rigid tube", "curved_tube", 150.0, 0.5, 1e4, 0.0),
     insertion("rigid tube, friction", "curved_tube", 150.0, 0.5, 1e4, 0.3),

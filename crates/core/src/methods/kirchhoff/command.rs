@@ -27,7 +27,7 @@ const WORK_RAD: f64 = 0.1;
 /// … and never more than so many times what one solution may take.
 const WORK_OF_ONE: usize = 10;
 /// What is in no equilibrium after so many times that is taken as it is.
-const WORK_OF_RESORTS: usize = 4;
+const WORK_OF_RESORTS: usize = 12;
 /// How often a device that came to rest at the end of its way, but in no equilibrium, is let go on from there with the hand held still.
 const AGAIN: usize = 4;
 /// What moved by less than this in another last resort, in its least radii, is at rest.
