@@ -295,7 +295,7 @@ impl SmoothWall {
             if behind.is_some_and(|b| q.normal.dot(&b.facing) < FACING) {
                 continue;
             }
-            let Some(local) = q.local(x, behind.is_some()) else { continue };
+            let Some(local) = q.local(x) else { continue };
             let a = q.trust * (1.0 - local.u) * (1.0 - local.u) * (1.0 - local.u);
             let w = a * q.opened(&local, behind.is_some()).value;
             if w == 0.0 {
@@ -339,7 +339,7 @@ impl SmoothWall {
             if reached.behind.is_some_and(|b| q.normal.dot(&b.facing) < FACING) {
                 continue;
             }
-            let Some(local) = q.local(x, reached.behind.is_some()) else { continue };
+            let Some(local) = q.local(x) else { continue };
             let opened = q.opened(&local, reached.behind.is_some());
             if opened.value == 0.0 {
                 continue;

@@ -16,8 +16,7 @@ const LEVEL: f64 = 0.4;
 pub(super) struct Quadric {
     pub(super) position: Vec3,
     pub(super) normal: Vec3,
-    /// No point that is farther from the normal than this is reached, mm; infinite until the window is open.
-    pub(super) farthest_mm: f64,
+    pub(super) extent: Extent,
     /// Principal directions, across the normal.
     pub(super) axes: [Vec3; 2],
     /// S along them, 1/mm, the larger first; positive where the wall bends around the lumen.
@@ -33,6 +32,38 @@ pub(super) struct Quadric {
     pub(super) half_axes_mm: (f64, f64),
     /// c, how much it counts.
     pub(super) trust: f64,
+    /// No point within the window that is farther from the normal than this is reached, mm; infinite until it is open.
+    pub(super) farthest_mm: f64,
+}
+
+/// How far from the normal a vertex reaches at a height h, in few numbers: feet |σ| within the longer half axis are those of offsets
+///
+/// ```text
+/// |τ| ≤ max (1 − hκ) |σ|,    1 − hκ ≥ 1 − `STEEP`
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    /// A little more than the longer half axis, mm.
+    long_mm: f32,
+    curvature: [f32; 2],
+}
+
+/// What single precision may take from an extent.
+const ROUNDED: f64 = 1.0 + 1e-5;
+
+impl Extent {
+    /// That of a support with this longer half axis, mm, and these curvatures, the larger first.
+    pub(super) fn new(long_mm: f64, curvature: [f64; 2]) -> Self {
+        Self { long_mm: (long_mm * ROUNDED) as f32, curvature: curvature.map(|c| c as f32) }
+    }
+
+    /// The farthest offset that may be reached at a height, mm.
+    #[inline]
+    fn at(&self, height_mm: f64) -> f64 {
+        let [larger, smaller] = self.curvature;
+        let t = height_mm * f64::from(if height_mm > 0.0 { smaller } else { larger });
+        f64::from(self.long_mm) * (1.0 - t.min(STEEP))
+    }
 }
 
 /// Window over the radius of the device, and over the support of a vertex: what a fit may be off by on a coarse mesh.
@@ -84,12 +115,24 @@ struct Spread {
 }
 
 impl Spread {
+    /// The value alone: of most vertices nothing else is asked.
+    #[inline]
+    fn value(height: f64, curvature: f64) -> f64 {
+        let t = height * curvature;
+        1.0 / (1.0 - if t <= STEEP { t } else { Self::levelled(t).0 })
+    }
+
+    /// What hκ is taken for beyond `STEEP`, and the part of the way on which it levels off.
+    fn levelled(t: f64) -> (f64, f64) {
+        let x = ((t - STEEP) / LEVEL).clamp(0.0, 1.0);
+        (STEEP + LEVEL * (x - x * x * x + 0.5 * x * x * x * x), x)
+    }
+
     #[inline]
     fn at(height: f64, curvature: f64) -> Self {
         let t = height * curvature;
-        let x = ((t - STEEP) / LEVEL).clamp(0.0, 1.0);
-        // Slope 1 − 3x² + 2x³ where it levels off.
-        let s = if t <= STEEP { t } else { STEEP + LEVEL * (x - x * x * x + 0.5 * x * x * x * x) };
+        let (s, x) = if t <= STEEP { (t, 0.0) } else { Self::levelled(t) };
+        // It levels off with the slope 1 − 3x² + 2x³.
         let slope = (1.0 - 3.0 * x * x + 2.0 * x * x * x) * curvature;
         let bend = 6.0 * (x * x - x) / LEVEL * curvature * curvature;
         let value = 1.0 / (1.0 - s);
@@ -112,7 +155,8 @@ pub(super) struct Opened {
 /// A point seen from a vertex, along its principal directions.
 pub(super) struct Local {
     pub(super) tau: Vector2<f64>,
-    spread: [Spread; 2],
+    /// Along the normal, mm.
+    rise: f64,
     /// Mσ.
     pub(super) across: Vector2<f64>,
     /// u = σᵀMσ.
@@ -122,19 +166,18 @@ pub(super) struct Local {
 }
 
 impl Quadric {
-    /// What is seen of `x`; `None` beyond the support. `farthest_mm` holds for points within the window; one that is deep behind
-    /// the surface may be farther from the normal.
+    /// What is seen of `x`; `None` beyond the support.
     #[inline]
-    pub(super) fn local(&self, x: &Vec3, deep: bool) -> Option<Local> {
+    pub(super) fn local(&self, x: &Vec3) -> Option<Local> {
         let y = x - self.position;
         let rise = self.normal.dot(&y);
-        if !deep && y.norm_squared() - rise * rise >= self.farthest_mm * self.farthest_mm {
+        let farthest = self.extent.at(rise);
+        if y.norm_squared() - rise * rise >= farthest * farthest {
             return None;
         }
         let [k, l] = self.curvature;
         let tau = Vector2::new(self.axes[0].dot(&y), self.axes[1].dot(&y));
-        let spread = [Spread::at(rise, k), Spread::at(rise, l)];
-        let sigma = Vector2::new(spread[0].value * tau.x, spread[1].value * tau.y);
+        let sigma = Vector2::new(Spread::value(rise, k) * tau.x, Spread::value(rise, l) * tau.y);
         // Written out: it is the innermost product of all.
         let s = &self.support;
         let across = Vector2::new(
@@ -143,13 +186,14 @@ impl Quadric {
         );
         let u = sigma.dot(&across);
         let value = rise - 0.5 * (k * sigma.x * tau.x + l * sigma.y * tau.y);
-        (u < 1.0).then_some(Local { tau, spread, across, u, value })
+        (u < 1.0).then_some(Local { tau, rise, across, u, value })
     }
 
     /// Derivatives of Q and of u along the principal directions and the normal.
     #[inline]
     pub(super) fn derivatives(&self, local: &Local) -> [(Vec3, Matrix3<f64>); 2] {
-        let Local { tau, spread, across, .. } = local;
+        let Local { tau, rise, across, .. } = local;
+        let spread = self.curvature.map(|curvature| Spread::at(*rise, curvature));
         let (mut f1, mut u1) = (Vec3::z(), Vec3::zeros());
         let (mut f2, mut u2) = (Matrix3::zeros(), Matrix3::zeros());
         for i in 0..2 {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-use super::quadric::Quadric;
+use super::quadric::{Extent, Quadric};
 use crate::Vec3;
 
 /// Support of a vertex over its edges: every point of a triangle lies well inside that of its three corners.
@@ -152,10 +152,12 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &Ne
     let apart = half.hypot(pq);
     let (sin, cos) = (0.5 * pq.atan2(half)).sin_cos();
     let axes = [p * cos + q * sin, q * cos - p * sin];
+    let curvature = [mean + apart, mean - apart];
     Quadric {
         position: origin,
         normal,
-        curvature: [mean + apart, mean - apart],
+        extent: Extent::new(half_axes_mm.1, curvature),
+        curvature,
         support: Matrix2::from_fn(|i, j| seen(&plane, &axes[i], &axes[j])),
         axes,
         half_axes_mm,
