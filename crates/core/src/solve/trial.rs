@@ -27,17 +27,8 @@ impl<const C: usize> Newton<C> {
         external: &mut dyn External,
         state: &RodState,
     ) -> f64 {
-        self.energy_at(elements, external, &self.trial) - external.work(state, &self.trial)
-    }
-
-    /// Potential energy of any state.
-    pub(crate) fn energy_at(
-        &self,
-        elements: &[ElementData],
-        external: &mut dyn External,
-        state: &RodState,
-    ) -> f64 {
-        stored_energy::<C>(elements, state) + external.value(elements, state)
+        let energy = stored_energy::<C>(elements, &self.trial) + external.value(elements, &self.trial);
+        energy - external.work(state, &self.trial)
     }
 
     /// Second-order corrections of the end conditions with the factorisation at hand.

@@ -125,7 +125,7 @@ impl<const C: usize> Workspace<C> {
             });
             let here = taken.as_ref().map_or(was, |state| Start { mesh: was.mesh, state });
             let there = environment.displaced(then.as_ref());
-            let blocked = tools.look_ahead(&there, here, &way.target, (target - start) * part);
+            tools.look_ahead(&there, here, &way.target, (target - start) * part);
             sum.substeps += 1;
             if line_mm(lengths(hands)) == 0.0 {
                 now.withdraw(surroundings.stack, hands);
@@ -133,7 +133,7 @@ impl<const C: usize> Workspace<C> {
                 break;
             }
             let left = passage.map(|passage| (was, passage));
-            let attempt = Attempt { hands, blocked, effort, left };
+            let attempt = Attempt { hands, effort, left };
             let iterations = tools.work.iterations;
             let tried = tools.try_step(&there, here, attempt, next, &mut control.budget);
             control.took(effort, tools.work.iterations - iterations);
@@ -186,23 +186,22 @@ impl<const C: usize> Workspace<C> {
 }
 
 impl<const C: usize> Tools<C> {
-    /// Traces the way of `wanted_mm` in front of the tip, towards where the hands will be; tells whether the wall is in it.
+    /// Traces the way of `wanted_mm` in front of the tip, towards where the hands will be.
     fn look_ahead(
         &mut self,
         environment: &Environment<'_>,
         here: Start<'_>,
         target: &[Hand],
         wanted_mm: f64,
-    ) -> bool {
+    ) {
         self.extension = Extension::default();
         if wanted_mm <= 0.0 {
-            return false;
+            return;
         }
         let tangent = here.state.rod.frames[here.state.rod.elements()].t;
         let radius_mm = environment.surroundings.stack.tip_radius_mm(lengths(target));
         let surface = (environment.wall(), &mut self.cache);
-        let way_mm = self.extension.trace(surface, here.state.tip_mm(), tangent, radius_mm, wanted_mm);
-        way_mm < (1.0 - 1e-9) * wanted_mm
+        self.extension.trace(surface, here.state.tip_mm(), tangent, radius_mm, wanted_mm);
     }
 }
 

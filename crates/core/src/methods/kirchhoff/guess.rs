@@ -1,15 +1,13 @@
 //! Where a sub-step looks for the next equilibrium first.
 //!
 //! The device slid along its own curve is the plain guess. Where the hand repeats its motion, what the last step changed on it is
-//! repeated too ([`Correction`]); a tip with a shape of its own may instead be carried by the device behind it.
+//! repeated too ([`Correction`]).
 
 use super::configuration::Start;
 use super::extrapolation::Correction;
 use super::mesh::Mesh;
-use super::transport::carry;
 use crate::contact::{HandMotion, WallContact};
 use crate::rod::{ElementData, RodState};
-use crate::solve::Newton;
 
 /// How good a guess is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,11 +20,9 @@ pub(super) enum Quality {
     Beyond,
 }
 
-/// The candidates. By default those of several instruments, whose tips are carried by nothing.
+/// The candidates.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Guess {
-    /// Length from the tip within which the device has a shape of its own, mm.
-    pub(super) shaped_mm: f64,
     /// What each hand does in the sub-step.
     pub(super) motions: Vec<HandMotion>,
     /// What was learnt, on the nodes of the sub-step.
@@ -36,25 +32,17 @@ pub(super) struct Guess {
 }
 
 impl Guess {
-    /// For a device alone with a shape of its own within `shaped_mm` of its tip.
-    pub(super) fn new(shaped_mm: f64) -> Self {
-        Self { shaped_mm, ..Self::default() }
-    }
-
     /// Takes memory for `elements` elements.
     pub(super) fn reserve(&mut self, elements: usize) {
         self.slid.reserve(elements);
         self.other.reserve(elements);
     }
 
-    /// Replaces the slid device in `state` by the best candidate. Where the tip's way is `blocked`, the one that carries the tip's
-    /// shape comes first.
-    pub(super) fn choose<const C: usize>(
+    /// Replaces the slid device in `state` by one that repeats what was learnt, unless that is beyond the wall.
+    pub(super) fn choose(
         &mut self,
-        newton: &Newton<C>,
         contact: &mut WallContact<'_>,
         (start, mesh, state): (Start<'_>, &Mesh, &mut RodState),
-        blocked: bool,
     ) -> Quality {
         self.slid.copy_from(state);
         let elements = &mesh.elements;
@@ -72,27 +60,7 @@ impl Guess {
             }
             state.copy_from(&self.slid);
         }
-        let outside = contact.is_outside(elements, state);
-        if self.shaped_mm > 0.0 {
-            self.other.copy_from(state);
-            carry(
-                (start.mesh, &start.state.rod),
-                mesh,
-                self.shaped_mm,
-                self.motions[0].turn_rad,
-                &mut self.other,
-            );
-            if !contact.is_outside(elements, &self.other)
-                && (outside
-                    || blocked
-                    || newton.energy_at(elements, contact, &self.other)
-                        < newton.energy_at(elements, contact, state))
-            {
-                std::mem::swap(state, &mut self.other);
-                return Quality::Near;
-            }
-        }
-        if outside { Quality::Beyond } else { Quality::Near }
+        if contact.is_outside(elements, state) { Quality::Beyond } else { Quality::Near }
     }
 
     /// Goes back to the slid device.

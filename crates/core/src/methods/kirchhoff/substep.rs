@@ -96,8 +96,6 @@ pub(super) enum Effort {
 pub(super) struct Attempt<'a> {
     /// Where the hands are after it.
     pub(super) hands: &'a [Hand],
-    /// Whether the wall is in the tip's way.
-    pub(super) blocked: bool,
     /// How hard it tries.
     pub(super) effort: Effort,
     /// Where the vessel moves: what was before it did, and how it does. The sub-step then starts with the device taken along.
@@ -164,7 +162,7 @@ impl<const C: usize> Tools<C> {
         budget: &mut usize,
     ) -> std::result::Result<Found, Lost> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
-        let Attempt { hands, blocked, effort, left } = attempt;
+        let Attempt { hands, effort, left } = attempt;
         let resort = matches!(effort, Effort::Resort(_));
         self.transport_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
@@ -189,7 +187,7 @@ impl<const C: usize> Tools<C> {
         }
         let began_free = contact.began_free();
         let candidates = (start, &*mesh, &mut *rod);
-        let quality = self.guess.choose(&self.newton, &mut contact, candidates, blocked);
+        let quality = self.guess.choose(&mut contact, candidates);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let held = match quality {
             Quality::Beyond => Held::Lost,

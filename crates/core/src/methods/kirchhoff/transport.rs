@@ -38,7 +38,7 @@ const BENT_RADII: f64 = 20.0;
 
 impl Extension {
     /// Traces up to `wanted_mm` in front of the tip: straight on while the wall is farther than the tip's radius, then
-    /// along it. Returns how far it came.
+    /// along it.
     ///
     /// A tip that presses on the wall goes on pressing as much: seen from a guess that has let go of the wall, the next
     /// equilibrium would be that of a free tip.
@@ -49,7 +49,7 @@ impl Extension {
         tangent: Vec3,
         radius_mm: f64,
         wanted_mm: f64,
-    ) -> f64 {
+    ) {
         self.curvature = Vec3::zeros();
         cache.leave_place();
         let at_tip = cache.nearness(wall, &tip, radius_mm).map_or(radius_mm, |near| near.value_mm());
@@ -87,7 +87,6 @@ impl Extension {
         // An even bend over a length l moves its end aside by ½κl².
         let aside = x - tip;
         self.curvature = tangent.cross(&aside) * (2.0 / (self.bent_mm * self.bent_mm));
-        way
     }
 
     /// Whether the device is bent to the wall.
@@ -263,47 +262,4 @@ pub(super) fn transport_together(
             out.bubbles[count * e + set] = middle - 0.5 * ends;
         }
     }
-}
-
-/// Changes a guess of [`slide`] so that the last `shaped_mm` of the device keep the shape they had, carried along by the
-/// device behind them and turned with it by `turn_rad`.
-pub(super) fn carry(
-    (from, state): (&Mesh, &RodState),
-    to: &Mesh,
-    shaped_mm: f64,
-    turn_rad: f64,
-    out: &mut RodState,
-) {
-    let (n, old) = (to.elements.len(), state.elements());
-    for angle in &mut out.angles[1..] {
-        *angle += turn_rad;
-    }
-    // The first node of the shape that is inside the vessel before and after.
-    let first = (1..=n).find(|&i| i + old > n && to.from_tip_mm[i] <= shaped_mm * (1.0 + 1e-9));
-    let Some(first) = first else { return };
-    let known = |i: usize| i + old - n;
-    // What comes to lie where the shape began goes on straight, not along the shape.
-    let was = state.material_frame(known(first));
-    let begins = from.from_tip_mm[0] - from.from_tip_mm[known(first)];
-    for e in 0..first {
-        let straight = |from_tip_mm: f64| to.from_tip_mm[0] - from_tip_mm > begins;
-        let m = if straight(0.5 * (to.from_tip_mm[e] + to.from_tip_mm[e + 1])) {
-            was.t
-        } else {
-            out.chords[e] * 1.5 - (out.frames[e].t + out.frames[e + 1].t) * 0.25
-        };
-        let t = if straight(to.from_tip_mm[e + 1]) { was.t } else { out.frames[e + 1].t };
-        out.frames[e + 1] = out.frames[e].transported_to(&t);
-        out.chords[e] = (m + (out.frames[e].t + t) * 0.25) / 1.5;
-    }
-    let is = out.material_frame(first);
-    let moved = |w: &Vec3| {
-        let c = was.local(w);
-        is.t * c.x + is.u * c.y + is.v * c.z
-    };
-    for e in first..n {
-        out.frames[e + 1] = out.frames[e].transported_to(&moved(&state.frames[known(e + 1)].t));
-        out.chords[e] = moved(&state.chords[known(e)]);
-    }
-    out.place(&to.elements);
 }

@@ -1,9 +1,7 @@
 //! Guesses against the curves that they follow.
 
-use std::f64::consts::PI;
-
 use super::mesh::Mesh;
-use super::transport::{Extension, carry, transport, transport_together};
+use super::transport::{Extension, transport, transport_together};
 use crate::Vec3;
 use crate::device::Device;
 use crate::rod::{Frame, RodState};
@@ -97,29 +95,5 @@ fn several_instruments_slide_as_one_where_there_is_one() {
     assert_eq!((&together.positions, &together.chords), (&alone.positions, &alone.chords));
     for (a, b) in together.angles.iter().zip(&alone.angles).skip(2) {
         assert!((a - b).abs() < 1e-12, "{a} {b}");
-    }
-}
-
-#[test]
-fn a_carried_hook_keeps_its_shape_and_turns_with_the_hand() {
-    const HOOK_MM: f64 = 8.0;
-    let (from, to) = (mesh(40.0), mesh(42.0));
-    let state = bent(&from, |s| 0.15 * (s - 40.0 + HOOK_MM).max(0.0));
-    let hooked_by = |state: &RodState, mesh: &Mesh| {
-        let begin = mesh.from_tip_mm.iter().position(|s| *s <= HOOK_MM + 1e-9).unwrap();
-        let (near, tip) = (&state.frames[begin], &state.frames[state.elements()]);
-        (near.t.angle(&tip.t), near.t.cross(&tip.t).y)
-    };
-    let (angle, side) = hooked_by(&state, &from);
-    for (turn_rad, sign) in [(0.0, 1.0), (PI, -1.0)] {
-        let mut out = slid(&from, &state, &to);
-        // What slides along its curve loses the last 2 mm of the hook's bend.
-        assert!(hooked_by(&out, &to).0 < 0.8 * angle);
-        carry((&from, &state), &to, HOOK_MM, turn_rad, &mut out);
-        let (kept, on_side) = hooked_by(&out, &to);
-        assert!((kept - angle).abs() < 1e-9, "{kept} {angle}");
-        assert!(on_side * side * sign > 0.0, "{on_side} {side}");
-        // The shaft behind it is straight.
-        assert!(out.positions[1..to.elements.len() - 4].iter().all(|x| x.x.abs() < 1e-9));
     }
 }

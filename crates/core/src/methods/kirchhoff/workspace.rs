@@ -71,11 +71,7 @@ impl<const C: usize> Workspace<C> {
         let nothing = Configuration::at(&surroundings);
         let mut tools = Tools {
             newton: Newton::new(1),
-            guess: if surroundings.stack.is_several() {
-                Guess::default()
-            } else {
-                Guess::new(surroundings.device.shaped_mm())
-            },
+            guess: Guess::default(),
             settle: Settle::default(),
             friction: Friction::new(surroundings.properties.largest_friction()),
             cache: ContactCache::new(environment.surface),
