@@ -4,7 +4,7 @@
 //! astray twice, the way is likely to end in a fold: parts of it only come nearer to that, and what is beyond is far away. It is looked
 //! for once, over all that is left of the command and with patience. Where the budget is used up, or parts have become too small, the
 //! device is let come to rest as it can: as far as the command goes, then in parts, and in the end whatever comes of it. That takes no more
-//! than a few times the budget: in a jam every part may find an equilibrium, and the next one as hardly.
+//! than a dozen budgets: in a jam every part may find an equilibrium, and the next one as hardly.
 
 use super::substep::{AT_REST, Effort};
 
