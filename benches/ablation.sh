@@ -9,15 +9,15 @@
 # times medians of REPEATS (5). What was measured is kept there, and a second run of the same commit goes on from it.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+parts() { grep -v -e '^#' -e '^$' benches/ablation.tsv; }
 # A line that changes nothing is an error.
 check() {
   while IFS=$'\t' read -r what file change; do
-    case $what in '' | '#'*) continue ;; esac
     if perl -pe "$change" "crates/core/src/$file" | cmp -s - "crates/core/src/$file"; then
       echo "benches/ablation.tsv: $what: $file has nothing to change" >&2
       exit 1
     fi
-  done < benches/ablation.tsv
+  done < <(parts)
 }
 check
 if [ "${1:-}" = --check ]; then exit; fi
@@ -37,7 +37,6 @@ build "$work/whole"
 rows=$work/$commit/rows.tsv
 touch "$rows"
 while IFS=$'\t' read -r what file change; do
-  case $what in '' | '#'*) continue ;; esac
   case "$what $file" in *"$pattern"*) ;; *) continue ;; esac
   if cut -f1 "$rows" | grep -qxF -- "$what"; then continue; fi
   source=$tree/crates/core/src/$file
@@ -63,7 +62,7 @@ while IFS=$'\t' read -r what file change; do
       printf "%s\t%.2f\t%.2f\t%.2f\t%.2f\t%+d\t%+d\n", what, its[1] / its[0], worst, asked[1] / asked[0],
         ratios[int((repeats + 1) / 2)], (good[1] - good[0]) / repeats, (rest[1] - rest[0]) / repeats }' >> "$rows"
   tail -1 "$rows" >&2
-done < benches/ablation.tsv
+done < <(parts)
 
 table() {
   echo '| without, or changed | iterations | largest of a scene | questions | time | equilibria | last resorts |'

@@ -14,7 +14,7 @@ use super::wall::{Foreseen, Slip, Slipping, Span};
 use super::{ContactPoint, ContactSurface, MovedWall};
 use crate::Vec3;
 
-/// What a point knows of its surroundings. ProximityCache are material points of the vessel, and clearances lie between those.
+/// What a point knows of its surroundings. Places are material points of the vessel, and clearances lie between those.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct KnownPoint {
     /// Where the wall was last looked for.
@@ -139,7 +139,7 @@ impl KnownPoints {
 }
 
 impl ContactCache {
-    /// Nothing is known yet of `felt`.
+    /// Nothing is known yet of `surface`.
     pub fn new(surface: &ContactSurface) -> Self {
         let proximity = ProximityCache::new(LOOK_AGAIN * surface.thinnest_mm, surface.reach_mm);
         Self {

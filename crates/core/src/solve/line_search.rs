@@ -18,7 +18,7 @@ const ARMIJO: f64 = 1e-4;
 const STIFFENING: f64 = 1e-2;
 /// How often a step is found anew with the contacts that a trial has run into.
 const MEETINGS: usize = 3;
-/// StepControl after which loads without potential may let the residual grow.
+/// Trials after which loads without potential may let the residual grow.
 const PATIENCE: usize = 6;
 
 /// What line searches hand on from one to the next.

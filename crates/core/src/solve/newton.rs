@@ -8,7 +8,7 @@
 //! Each iteration: assemble, factor, look at the inertia. Minima have one negative pivot per multiplier; with more contacts
 //! are made convex, and then the matrix is shifted by the stiffness of a uniform tension ([`Assembly::unit_shift`]) until they are right, so every
 //! step descends. At an equilibrium that is not a minimum the method leaves along the direction of most negative
-//! curvature (inverse iteration with the shifted factor). A regularisation of the shift stays on always: it makes states that
+//! curvature (inverse iteration with the shifted factor). A whisper of the shift stays on always, for regularisation: it makes states that
 //! can turn freely (a buckled column about its axis) solvable and cannot be seen in the result, since the
 //! residual is never shifted.
 

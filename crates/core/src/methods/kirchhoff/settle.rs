@@ -37,7 +37,7 @@ const ROUNDED: f64 = 1e-13;
 /// … and a residual over force scale at that step must be below this. On a hard wall a soft thread presses by nanometres,
 /// and what rounding of positions leaves of that is far more than the tolerance.
 const LEFT: f64 = 1e-5;
-/// StepControl of a step that must not lead beyond the wall.
+/// Trials of a step that must not lead beyond the wall.
 const TRIALS: usize = 6;
 /// Part of the pressing forces that held points may pull with at the end.
 const PULL: f64 = 1e-6;

@@ -1,5 +1,4 @@
 //! The warm start: the rod slides along its own curve, and beyond its tip goes on straight, or along the wall it meets.
-//! A tip with a shape of its own does not follow its curve through free space: it is carried by what is behind it.
 
 use nalgebra::Rotation3;
 
@@ -204,7 +203,7 @@ pub(super) fn transport(
     out.angles[0] = tail;
 }
 
-/// As [`slide`], of several instruments, each with its set of angles if it has one: nodes are other marks than before, so that angles are
+/// As [`transport`], of several instruments, each with its set of angles if it has one: nodes are other marks than before, so that angles are
 /// read between them.
 pub(super) fn transport_together(
     (from, state): (&Mesh, &RodState),
