@@ -259,10 +259,6 @@ impl External for Channel {
         self.points(elements, state, |_, _, weight, (value, ..)| sum += weight * value);
         sum
     }
-
-    fn is_fixed(&self) -> bool {
-        true
-    }
 }
 
 /// D4: straight instruments in a close-fitting arc.

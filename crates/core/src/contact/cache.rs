@@ -3,15 +3,13 @@
 //! What is known at an equilibrium ([`KnownPoints`]) belongs to the state of an insertion. A step takes it over, slides it with the device and
 //! goes on from there in its own memory ([`ContactCache`]), so that a step that fails has changed nothing.
 
-use std::ops::Range;
-
 use serde::{Deserialize, Serialize};
 
 use super::distance::{Distance, Nearness};
 use super::point::{FOLLOW, LOOK_AGAIN};
-use super::proximity::{Proximity, ProximityCache};
+use super::proximity::ProximityCache;
 use super::wall::{Foreseen, Slip, Slipping, Span};
-use super::{ContactPoint, ContactSurface, MovedWall};
+use super::{ContactPoint, ContactSurface};
 use crate::Vec3;
 
 /// What a point knows of its surroundings. Places are material points of the vessel, and clearances lie between those.
@@ -86,8 +84,6 @@ impl TakenReading {
 #[derive(Debug, Clone)]
 pub struct ContactCache {
     pub(super) points: Vec<KnownPoint>,
-    /// What those that are known at the base knew before it was.
-    pub(super) before: Vec<KnownPoint>,
     /// The points element by element.
     pub(super) spans: Vec<Span>,
     /// Numbers of the points that press at the base.
@@ -96,8 +92,6 @@ pub struct ContactCache {
     /// all of them are looked at many times a step.
     pub(super) readings: Vec<TakenReading>,
     pub(super) proximity: ProximityCache,
-    /// The place asked for last.
-    last: Proximity,
     /// Forces on the wall that a step leads to, N.
     pub(super) aims: Vec<f64>,
     /// What a step does to the contacts, to first order.
@@ -144,12 +138,10 @@ impl ContactCache {
         let proximity = ProximityCache::new(LOOK_AGAIN * surface.thinnest_mm, surface.reach_mm);
         Self {
             points: Vec::new(),
-            before: Vec::new(),
             spans: Vec::new(),
             pressing: Vec::new(),
             readings: Vec::new(),
             proximity,
-            last: Proximity::UNKNOWN,
             aims: Vec::new(),
             foreseen: Vec::new(),
             slipping: Vec::new(),
@@ -157,15 +149,9 @@ impl ContactCache {
         }
     }
 
-    /// Forgets the place asked for last, so that answers hang on the places that are asked for from here on alone.
-    pub(crate) fn leave_place(&mut self) {
-        self.last = Proximity::UNKNOWN;
-    }
-
     /// Takes memory for `points` points.
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points.saturating_sub(self.points.len()));
-        self.before.reserve(points.saturating_sub(self.before.len()));
         self.spans.reserve(points.saturating_sub(self.spans.len()));
         self.pressing.reserve(points.saturating_sub(self.pressing.len()));
         self.aims.reserve(points.saturating_sub(self.aims.len()));
@@ -179,16 +165,10 @@ impl ContactCache {
     /// Is of these points, of none of which is known that it is clear of the wall.
     pub(super) fn look_at(&mut self, points: &[ContactPoint]) {
         self.points.resize(points.len(), NOTHING);
-        self.before.resize(points.len(), NOTHING);
         self.readings.resize(points.len(), TakenReading::NONE);
         self.spans.clear();
         self.spans.extend(Span::all(points));
         self.pressing.clear();
-    }
-
-    /// What these points know can be gone back to.
-    pub(super) fn remember(&mut self, points: Range<usize>) {
-        self.before[points.clone()].copy_from_slice(&self.points[points]);
     }
 
     /// The distance that point `index` read at its base, if it presses on the wall there.
@@ -202,18 +182,6 @@ impl ContactCache {
     /// The points that press at the base, ascending, and the distance that each read there.
     pub(super) fn all_pressed(&self) -> impl Iterator<Item = (usize, &Distance)> {
         self.pressing.iter().filter_map(|&index| Some((index, self.pressed(index)?)))
-    }
-
-    /// How near `x` is to the wall, with derivatives below `limit_mm`; `None` where it is known to be farther.
-    pub(crate) fn nearness(&mut self, surface: MovedWall<'_>, x: &Vec3, limit_mm: f64) -> Option<Nearness> {
-        let x = &surface.material(x);
-        let far_mm = limit_mm * surface.stretch() + surface.smooth.deepest_inset_mm();
-        if self.last.clearance(x) > far_mm {
-            return None;
-        }
-        self.last = self.proximity.around(&surface.query, x);
-        let near = self.last.clearance(x) <= far_mm;
-        self.last.triangle.filter(|_| near).map(|triangle| surface.nearness(x, triangle, limit_mm))
     }
 
     /// Takes over what was known before the device advanced along its own curve: what was known of a place, the point of `after` that comes

@@ -33,11 +33,7 @@ pub(super) struct Proximity {
 }
 
 impl Proximity {
-    /// Nothing is known.
-    pub(super) const UNKNOWN: Self =
-        Self { middle: Vec3::new(0.0, 0.0, 0.0), clearance_mm: f64::NEG_INFINITY, triangle: None };
-
-    /// No wall is nearer to `x` than this, mm; negative where nothing is known.
+    /// No wall is nearer to `x` than this, mm.
     pub(super) fn clearance(&self, x: &Vec3) -> f64 {
         self.clearance_mm - (x - self.middle).norm()
     }

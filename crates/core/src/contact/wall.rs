@@ -348,10 +348,6 @@ impl External for WallContact<'_> {
         sum
     }
 
-    fn return_to_base(&mut self) {
-        self.restore_base();
-    }
-
     /// Where the wall yields more than an element, a trial does not lose its contacts.
     fn foresee(&mut self, moved: &Moved<'_>) -> bool {
         self.stiff && self.foresee_contacts(moved)
@@ -430,11 +426,6 @@ impl External for WallContact<'_> {
 
     fn is_steep(&self) -> bool {
         true
-    }
-
-    /// Friction renews the normal forces it works with.
-    fn is_fixed(&self) -> bool {
-        !self.friction.acts()
     }
 
     fn is_lagged(&self) -> bool {

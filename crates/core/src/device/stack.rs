@@ -201,12 +201,6 @@ impl Stack {
         sections.map(|s| s.bending_stiffness_nmm2).fold(f64::MAX, f64::min)
     }
 
-    /// Outer radius of the outermost instrument at the tip of the line, mm, with these lengths inserted.
-    pub(crate) fn tip_radius_mm(&self, inserted_mm: impl Iterator<Item = f64>) -> f64 {
-        let farthest = self.devices().zip(inserted_mm).max_by(|a, b| a.1.total_cmp(&b.1));
-        farthest.map_or(0.0, |(device, _)| device.section_at(0.0).radius_mm)
-    }
-
     /// Outer radius of the outermost instrument at a place so far from the tip of the line, mm, with these lengths inserted.
     pub fn felt_radius_mm(&self, inserted_mm: &[f64], from_tip_mm: f64) -> f64 {
         let line_mm = line_mm(inserted_mm.iter().copied());

@@ -16,9 +16,8 @@ pub type Moved<'a> = dyn Fn((usize, f64, usize)) -> (Vec3, f64) + 'a;
 /// 3. [`value`](External::value) at that trial; as often as it takes, trials being nearer and nearer to the base.
 /// 4. [`linearise`](External::linearise) at the trial that was taken.
 ///
-/// Where the energy hangs on the state alone ([`is_fixed`](External::is_fixed)), steps 3 and 4 may be one: the first trial is linearised
-/// at once, and the base again if that trial is refused. Where it does not, something in it is lagged, as the normal forces are that
-/// friction follows: what is lagged is renewed when a base is linearised and at no other time, so that one step lowers one energy.
+/// Where something in the energy is lagged, as the normal forces are that friction follows, it is renewed when a base is linearised and at
+/// no other time, so that one step lowers one energy.
 pub trait External {
     /// Adds value, gradient and Hessian at a state, which becomes the base.
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils);
@@ -30,9 +29,6 @@ pub trait External {
     fn safe_fraction(&mut self, _elements: &[ElementData], _to: &RodState) -> f64 {
         1.0
     }
-
-    /// The state linearised last was a trial that is refused: the base before it is the base again, and is linearised next.
-    fn return_to_base(&mut self) {}
 
     /// Notes what a step from the base does to contacts, to first order. Returns whether there are any: a trial may then [`stray`](External::stray).
     fn foresee(&mut self, _moved: &Moved<'_>) -> bool {
@@ -93,11 +89,6 @@ pub trait External {
     /// Takes the negative curvature of contacts on crests out of the Hessian at the base; what the modulus of the wall does from place to
     /// place stays. Returns whether there was any.
     fn convexify(&mut self, _elements: &[ElementData], _base: &RodState, _into: &mut dyn Stencils) -> bool {
-        false
-    }
-
-    /// Whether the energy hangs on the state alone, and nothing in it is lagged.
-    fn is_fixed(&self) -> bool {
         false
     }
 

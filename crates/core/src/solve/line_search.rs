@@ -7,7 +7,7 @@
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::{StepRecord, StopReason};
 use super::shift::REGULARISATION;
-use super::stop::{SHORT, Turn, residual_alone};
+use super::stop::{SHORT, Turn};
 use crate::rod::{ElementData, Layout, RodState};
 
 /// Most trials.
@@ -26,8 +26,6 @@ const PATIENCE: usize = 6;
 pub(super) struct LineSearch {
     /// Weights of the gaps of position and of direction in the merit.
     penalty: [f64; 2],
-    /// Whether the first trial was taken last.
-    first_trial_taken: bool,
     /// Whether the state is assembled already: as the trial that was taken.
     pub(super) assembled: bool,
     /// A device in its own shape stores nothing, as the difference of terms of this size.
@@ -37,7 +35,7 @@ pub(super) struct LineSearch {
 impl LineSearch {
     pub(super) fn new(elements: &[ElementData]) -> Self {
         let straightening = elements.iter().map(ElementData::straightening_energy).sum();
-        Self { penalty: [0.0; 2], first_trial_taken: true, assembled: false, straightening }
+        Self { penalty: [0.0; 2], assembled: false, straightening }
     }
 
     /// Weighs the gaps of the end conditions.
@@ -112,12 +110,6 @@ impl<const C: usize> Newton<C> {
             && merit.slope <= 0.0
             && -merit.slope <= merit.rounding();
         let turn_of = |part: f64, whole_turn: Turn| if part == 1.0 { whole_turn } else { Turn::NONE };
-        // Where the last step's first trial was taken this one's nearly always is: the energy is asked for together with what
-        // the next iteration begins with.
-        let mut with_assembly = search.first_trial_taken
-            && free
-            && problem.external.is_conservative()
-            && problem.external.is_fixed();
         let multipliers = problem.supports.multipliers;
         let first = Layout::<C>.support(problem.elements.len());
         for j in 0..6 {
@@ -137,28 +129,11 @@ impl<const C: usize> Newton<C> {
                 change = part * (1.0 - 0.5 * part) * merit.slope;
                 energy_change = change;
             } else {
-                let mut meets = part < wanted;
-                search.first_trial_taken = attempt == 0;
-                let assembles = with_assembly && !meets;
-                energy_change = if assembles {
-                    search.assembled = true;
-                    let near =
-                        residual_alone(turn_of(part, whole_turn).with_forces, problem.options.tolerance);
-                    self.assemble_trial(problem, !near);
-                    self.assembly.energy.total() + self.assembly.external_energy - merit.energy
-                } else {
-                    self.energy(problem.elements, problem.external, state) - merit.energy
-                };
-                with_assembly = false;
+                energy_change = self.energy(problem.elements, problem.external, state) - merit.energy;
                 change = energy_change + search.weigh(&problem.supports.gaps(&self.trial)) - merit.gaps;
                 let accepted = self.accepts(problem, search, &merit, (residual, change, part), attempt);
-                meets |= !accepted;
-                if meets && meetings > 0 {
+                if (part < wanted || !accepted) && meetings > 0 {
                     meetings -= 1;
-                    if assembles {
-                        problem.external.return_to_base();
-                        self.assemble_base(problem, state, shift);
-                    }
                     if self.meet_contacts(problem, state, part, shift) {
                         let stride = self.stride(problem, state, search, shift)?;
                         if stride.merit.slope < 0.0 {
@@ -172,11 +147,6 @@ impl<const C: usize> Newton<C> {
                     meetings = 0;
                 }
                 if !accepted {
-                    if assembles && !modelled {
-                        problem.external.return_to_base();
-                        self.assembly.hessian = false;
-                        self.assemble_parts(problem.elements, problem.supports, problem.external, state);
-                    }
                     if problem.external.is_steep() {
                         refused = Some(part);
                     }
@@ -188,7 +158,7 @@ impl<const C: usize> Newton<C> {
                     let ends = (part, refused, energy_change);
                     (part, energy_change) =
                         self.reach_wall(problem.elements, problem.external, state, merit.energy, ends);
-                    (change, search.assembled) = (energy_change, false);
+                    change = energy_change;
                 }
             }
             self.steps.push(StepRecord {
@@ -223,14 +193,6 @@ impl<const C: usize> Newton<C> {
         let most = problem.options.max_turn;
         let part = if turn > most { most / turn } else { 1.0 };
         Ok(Stride { merit, part, turn, whole_turn: self.whole_turn(problem, (turn, twist), shift) })
-    }
-
-    /// Assembles the base with its matrix again, as it was for the step.
-    fn assemble_base(&mut self, problem: &mut Problem<'_>, state: &RodState, shift: f64) {
-        self.assemble(problem.elements, problem.supports, problem.external, state);
-        if shift > 0.0 {
-            self.convexify(problem, state);
-        }
     }
 
     /// Weighs the end conditions above the reactions that the step leads to, and measures the merit along it.
@@ -297,14 +259,6 @@ impl<const C: usize> Newton<C> {
         part
     }
 
-    /// Assembles the system at the trial.
-    fn assemble_trial(&mut self, problem: &mut Problem<'_>, hessian: bool) {
-        self.assembly.hessian = hessian;
-        let trial = std::mem::take(&mut self.trial);
-        self.assemble_parts(problem.elements, problem.supports, problem.external, &trial);
-        self.trial = trial;
-    }
-
     /// Whether a trial, the `attempt`th, at a `part` of the step with this `change` of merit is taken.
     fn accepts(
         &mut self,
@@ -325,8 +279,10 @@ impl<const C: usize> Newton<C> {
         }
         // Where loads have no potential a smaller residual is as good; it costs an assembly, so it is asked last.
         search.assembled = true;
-        self.assemble_trial(problem, true);
         let Problem { elements, supports, external, options, .. } = problem;
+        let trial = std::mem::take(&mut self.trial);
+        self.assemble(elements, supports, *external, &trial);
+        self.trial = trial;
         let found = self.residual(elements, *external, supports, options.tolerance).relative;
         found < 0.9 * residual || (attempt > PATIENCE && found < 2.0 * residual)
     }

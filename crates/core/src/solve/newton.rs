@@ -158,7 +158,7 @@ impl<const C: usize> Newton<C> {
             if !size.relative.is_finite() {
                 return report.stopped(StopReason::NotFinite);
             }
-            let arrived = progress.has_arrived(&size, &self.steps);
+            let arrived = progress.has_arrived(&size, options.tolerance, &self.steps);
             if arrived && minimum && !self.assembly.hessian && !progress.tells_inertia(&state.tensions) {
                 self.assemble(elements, problem.supports, problem.external, state);
             }

@@ -23,6 +23,9 @@ const SHRINKS: f64 = 0.1;
 /// Where axial forces have changed by more than this part of the largest since factors were taken, their inertia says nothing of the
 /// state: a column is pressed beyond what buckles it without a turn.
 const PRESSED: f64 = 0.1;
+/// States at rounding that did not halve their residual after which it is as small as it gets, though steps still turn nodes by more than
+/// the tolerance.
+const HIDDEN: usize = 3;
 /// A residual that is as small as this, relative, and shrinks no more, is rounding.
 const ROUNDED: f64 = 1e-6;
 
@@ -116,13 +119,16 @@ impl Progress {
     }
 
     /// Takes note of the residual of a state; returns whether it is an equilibrium.
-    pub(super) fn has_arrived(&mut self, size: &ResidualSize, steps: &[StepRecord]) -> bool {
+    ///
+    /// Rounding hides in the stiffest rows what is left in others. Where steps with factors of an earlier state cease to shrink it, the
+    /// last of them says how far the state still is.
+    pub(super) fn has_arrived(&mut self, size: &ResidualSize, tolerance: f64, steps: &[StepRecord]) -> bool {
         self.stalled = if size.relative < 0.5 * self.best { 0 } else { self.stalled + 1 };
         self.best = self.best.min(size.relative);
         let is_rounding = |s: &StepRecord| s.energy_change.abs() <= ENERGY_ROUNDING * s.energy_scale;
         let tiny_steps = steps.len() >= 3 && steps.iter().rev().take(3).all(is_rounding);
         size.small
-            || (size.rounding && self.stalled >= 1)
+            || (size.rounding && self.stalled >= if self.last_turn <= tolerance { 1 } else { HIDDEN })
             || (self.stalled >= 3 && tiny_steps && size.relative < ROUNDED)
     }
 
@@ -141,7 +147,7 @@ impl ResidualSize {
 
 /// Whether a whole step of Newton's method that turned nodes by no more than `last_turn` ends so near to the equilibrium that the
 /// residual alone is looked at.
-pub(super) fn residual_alone(last_turn: f64, tolerance: f64) -> bool {
+fn residual_alone(last_turn: f64, tolerance: f64) -> bool {
     last_turn <= SHORT || (last_turn <= NEAR && QUADRATIC * last_turn * last_turn <= tolerance)
 }
 
@@ -183,6 +189,22 @@ mod tests {
         assert!(near.wants_hessian(TOLERANCE, false));
         assert!(Progress::going_on(Since { turn: 2.0 * SHORT, ..Since::NOW }).wants_hessian(TOLERANCE, true));
         assert!(Progress::default().wants_hessian(TOLERANCE, true));
+    }
+
+    #[test]
+    fn what_rounding_hides_shows_in_the_last_turn() {
+        let size = |relative: f64| ResidualSize { relative, small: false, rounding: true };
+        // States at rounding that are looked at until one has arrived, each after a step that turned nodes by so much.
+        let looks = |turn: f64| {
+            let mut progress = Progress::default();
+            assert!(!progress.has_arrived(&size(2e-8), TOLERANCE, &[]));
+            let arrives = |progress: &mut Progress| {
+                progress.has_turned(Turn { with_forces: turn, of_nodes: turn, pull_n: 0.0 }, false);
+                progress.has_arrived(&size(1.9e-8), TOLERANCE, &[])
+            };
+            (1..10).find(|_| arrives(&mut progress))
+        };
+        assert_eq!((looks(0.9 * TOLERANCE), looks(2.0 * TOLERANCE)), (Some(1), Some(HIDDEN)));
     }
 
     #[test]

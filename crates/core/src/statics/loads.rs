@@ -127,10 +127,6 @@ impl External for Loads {
         sum * self.factor
     }
 
-    fn is_fixed(&self) -> bool {
-        true
-    }
-
     fn is_conservative(&self) -> bool {
         self.moments.is_empty() && self.followers.is_empty()
     }

@@ -17,7 +17,6 @@ use std::ops::Range;
 
 use super::{Reading, SAFE, SUNK, WallContact};
 use crate::Vec3;
-use crate::contact::cache::ContactCache;
 use crate::contact::point::{ContactPoint, FOLLOW};
 use crate::rod::{ElementData, RodState};
 
@@ -152,7 +151,6 @@ impl WallContact<'_> {
         let known = &mut self.cache.spans[span];
         let (points, base, length_mm) = (known.points.clone(), known.base, elements[known.element].length);
         if !std::mem::replace(&mut known.at_base, true) {
-            self.cache.remember(points.clone());
             for index in points.clone() {
                 let x = self.points[index].between(&base, length_mm);
                 self.read_base(index, &self.surface.material(&x));
@@ -180,7 +178,6 @@ impl WallContact<'_> {
                 continue;
             }
             let points = known.points.clone();
-            self.cache.remember(points.clone());
             let mut room = Room::UNLIMITED;
             for index in points {
                 let x = self.material(index, elements, state);
@@ -208,14 +205,6 @@ impl WallContact<'_> {
             && known.free_mm > moved_mm;
         let free_mm = if free { known.free_mm - moved_mm } else { 0.0 };
         Room { free_mm, clearance_mm: known.clearance_mm - moved_mm }
-    }
-
-    /// The base before the one looked at last is the base again.
-    pub(super) fn restore_base(&mut self) {
-        let ContactCache { points, before, spans, .. } = &mut *self.cache;
-        for span in spans.iter().filter(|span| span.at_base) {
-            points[span.points.clone()].copy_from_slice(&before[span.points.clone()]);
-        }
     }
 
     /// Notes of a point that it is at `x` at the base, and what it reads there.

@@ -30,9 +30,6 @@ impl External for Pushed<'_> {
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         self.wall.safe_fraction(elements, to)
     }
-    fn return_to_base(&mut self) {
-        self.wall.return_to_base();
-    }
     fn foresee(&mut self, moved: &Moved<'_>) -> bool {
         self.foreseeing && self.wall.foresee(moved)
     }
@@ -73,9 +70,6 @@ impl External for Pushed<'_> {
     }
     fn convexify(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> bool {
         self.foreseeing && self.wall.convexify(elements, base, into)
-    }
-    fn is_fixed(&self) -> bool {
-        self.wall.is_fixed()
     }
     fn is_steep(&self) -> bool {
         true

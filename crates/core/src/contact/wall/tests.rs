@@ -186,47 +186,6 @@ fn what_does_not_press_is_convex_as_it_is() {
     assert!(!contact.convexify(&elements, &state, &mut assembly) && positions(&assembly) == before);
 }
 
-/// Numbers that are spread evenly over −1…1, from a seed.
-fn spread(seed: u32, step: f64) -> f64 {
-    2.0 * (f64::from(seed) * step).fract() - 1.0
-}
-
-/// Value and residual at a base before and after a trial that is refused; whether the wall is told so.
-fn refused(surface: &ContactSurface, seed: u32, told: bool) -> [(f64, Vec<f64>); 2] {
-    let mut rod = rod(surface, 1, &[1.0, 0.5, 0.0], 1e3);
-    let (r, s) = (|step| spread(seed, step), |step| 0.35 * spread(seed, step));
-    let start = Vec3::new(1.5 * r(0.618_034), 0.3 * r(0.754_878), 20.0 + r(0.569_840));
-    let (base, trial) = (rod.at(start), rod.at(start + Vec3::new(s(0.819_173), s(0.671_044), s(0.549_700))));
-    let elements = rod.elements.clone();
-    let mut contact = rod.contact();
-    let mut assembly = Assembly::<PLAIN>::new(1);
-    let mut linearise = |contact: &mut WallContact<'_>, state: &RodState| {
-        assembly.assemble(&elements, state);
-        contact.linearise(&elements, state, &mut assembly);
-        (assembly.external_energy, assembly.residual.clone())
-    };
-    let first = linearise(&mut contact, &base);
-    linearise(&mut contact, &trial);
-    if told {
-        contact.return_to_base();
-    }
-    [first, linearise(&mut contact, &base)]
-}
-
-#[test]
-fn a_base_that_is_returned_to_is_what_it_was() {
-    let surface = slit();
-    let (mut untold, mut pressed) = (0, 0);
-    for seed in 1..300 {
-        let [first, again] = refused(&surface, seed, true);
-        assert!(first == again, "{seed}: {} {}", first.0, again.0);
-        pressed += u32::from(first.0 > 0.0);
-        let [first, again] = refused(&surface, seed, false);
-        untold += u32::from(first != again);
-    }
-    assert!(pressed > 250 && untold > 10, "{pressed} press, {untold} differ where the wall is not told");
-}
-
 #[test]
 fn a_place_has_a_reading_for_each_triangle() {
     let surface = slit();

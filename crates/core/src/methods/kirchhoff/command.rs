@@ -5,12 +5,11 @@ use super::Environment;
 use super::blocked::FAR_TOO_LITTLE;
 use super::carried::{WallWork, carried};
 use super::configuration::Start;
-use super::hands::{Hand, Way, lengths};
+use super::hands::{Way, lengths};
 use super::state::KirchhoffState;
 use super::step_control::StepControl;
 use super::substep::{AT_REST, Attempt, Effort, Found, released_mj};
-use super::transport::Extension;
-use super::workspace::{Tools, Work, Workspace};
+use super::workspace::{Work, Workspace};
 use crate::contact::extension::{leave_mm, left_through};
 use crate::device::{Stack, line_mm};
 use crate::methods::{InstrumentReport, Move, StepReport};
@@ -125,7 +124,6 @@ impl<const C: usize> Workspace<C> {
             });
             let here = taken.as_ref().map_or(was, |state| Start { mesh: was.mesh, state });
             let there = environment.displaced(then.as_ref());
-            tools.look_ahead(&there, here, &way.target, (target - start) * part);
             sum.substeps += 1;
             if line_mm(lengths(hands)) == 0.0 {
                 now.withdraw(surroundings.stack, hands);
@@ -182,26 +180,6 @@ impl<const C: usize> Workspace<C> {
         let by_wall = WallWork::new(passage, (&from.report, report)).with_flow(sum.flow_mj);
         report.jumped = jumped(surroundings.stack, (&from.report, report), way, by_wall);
         Ok(())
-    }
-}
-
-impl<const C: usize> Tools<C> {
-    /// Traces the way of `wanted_mm` in front of the tip, towards where the hands will be.
-    fn look_ahead(
-        &mut self,
-        environment: &Environment<'_>,
-        here: Start<'_>,
-        target: &[Hand],
-        wanted_mm: f64,
-    ) {
-        self.extension = Extension::default();
-        if wanted_mm <= 0.0 {
-            return;
-        }
-        let tangent = here.state.rod.frames[here.state.rod.elements()].t;
-        let radius_mm = environment.surroundings.stack.tip_radius_mm(lengths(target));
-        let surface = (environment.wall(), &mut self.cache);
-        self.extension.trace(surface, here.state.tip_mm(), tangent, radius_mm, wanted_mm);
     }
 }
 

@@ -10,7 +10,7 @@ use super::hands::{Hand, motions};
 use super::mesh::Mesh;
 use super::search::Search;
 use super::state::KirchhoffState;
-use super::transport::{Extension, transport, transport_together};
+use super::transport::{transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
 use crate::contact::{SETTLED, WallContact};
@@ -114,27 +114,27 @@ impl<const C: usize> Tools<C> {
         let (mesh, after) = next.parts();
         meshed(environment, hands, mesh);
         let stack = environment.surroundings.stack;
-        let transport_from = |start: Start<'_>, extension: &Extension, rod: &mut RodState| {
+        let transport_from = |start: Start<'_>, rod: &mut RodState| {
             let from = (start.mesh, &start.state.rod);
             if stack.is_several() {
-                transport_together(from, extension, mesh, stack.sets(), rod);
+                transport_together(from, mesh, stack.sets(), rod);
             } else {
-                transport(from, extension, mesh, rod);
+                transport(from, mesh, rod);
             }
         };
         motions(&start.state.report, hands, &mut self.guess.motions);
         if self.friction.acts() {
-            // What slips is counted from the device's own curve: a tip that is bent to the wall has not slid by that.
-            transport_from(left.map_or(start, |(was, _)| was), &Extension::default(), &mut after.rod);
+            // What slips is counted from where the device lay before the vessel moved.
+            transport_from(left.map_or(start, |(was, _)| was), &mut after.rod);
             let before = (&start.mesh.points[..], &start.state.forces[..]);
             self.friction.begin(&mesh.elements, &after.rod, &mesh.points, before, &self.guess.motions);
             if let Some((_, passage)) = left {
                 self.friction.carry(passage, &self.guess.motions);
             }
         }
-        // Where nothing bends or moves it lies there already.
-        if !self.friction.acts() || left.is_some() || self.extension.bends() {
-            transport_from(start, &self.extension, &mut after.rod);
+        // Where the vessel did not move it lies there already.
+        if !self.friction.acts() || left.is_some() {
+            transport_from(start, &mut after.rod);
         }
         let (places, moves) = (&mut self.friction.between, &self.guess.motions);
         inner_friction::begin(stack, start, (mesh, &after.rod), moves, places);

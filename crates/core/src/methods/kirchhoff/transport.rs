@@ -1,107 +1,10 @@
-//! The warm start: the rod slides along its own curve, and beyond its tip goes on straight, or along the wall it meets.
-
-use nalgebra::Rotation3;
+//! The warm start: the rod slides along its own curve, and beyond its tip goes on straight.
 
 use crate::Vec3;
-use crate::contact::{ContactCache, MovedWall, Nearness};
 use crate::rod::quadrature::Point;
 use crate::rod::{Frame, RodState};
 
 use super::mesh::Mesh;
-
-/// The way in front of the tip.
-///
-/// A tip is free of moment, so its curve goes on straight. Where that leads into the wall, the way along the wall says
-/// where the tip should come to lie, and the device is bent towards it evenly over some length: a kink at the tip
-/// would store more energy than the whole device.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Extension {
-    /// Axis of the bend times its curvature, 1/mm.
-    curvature: Vec3,
-    /// Length of device from the tip that bends, mm.
-    bent_mm: f64,
-}
-
-/// Longest piece of the way in front of the tip, as a part of the tip's radius.
-const PIECE: f64 = 0.4;
-/// Cosine between the tip's direction and the wall's inward normal below which it stands head-on and cannot slide.
-const HEAD_ON: f64 = -0.995;
-/// Part of its radius that the axis of a tip keeps from a soft wall at least, where it is pushed on.
-const SUNK: f64 = 0.6;
-/// Part of its radius that the axis keeps from the wall on its way.
-const CLEAR: f64 = 0.5;
-/// Length over which the device bends to the wall, in advances …
-const BENT_ADVANCES: f64 = 8.0;
-/// … and at least in radii.
-const BENT_RADII: f64 = 20.0;
-
-impl Extension {
-    /// Traces up to `wanted_mm` in front of the tip: straight on while the wall is farther than the tip's radius, then
-    /// along it.
-    ///
-    /// A tip that presses on the wall goes on pressing as much: seen from a guess that has let go of the wall, the next
-    /// equilibrium would be that of a free tip.
-    pub(super) fn trace(
-        &mut self,
-        (wall, cache): (MovedWall<'_>, &mut ContactCache),
-        tip: Vec3,
-        tangent: Vec3,
-        radius_mm: f64,
-        wanted_mm: f64,
-    ) {
-        self.curvature = Vec3::zeros();
-        cache.leave_place();
-        let at_tip = cache.nearness(wall, &tip, radius_mm).map_or(radius_mm, |near| near.value_mm());
-        let touch = at_tip.clamp(SUNK * radius_mm, radius_mm);
-        // Out of a soft wall that it has sunk into the tip may come in more than one piece.
-        let clear = at_tip.min(CLEAR * radius_mm);
-        let count = (wanted_mm / (PIECE * radius_mm)).ceil().max(1.0);
-        let piece_mm = wanted_mm / count;
-        let (mut x, mut t) = (tip, tangent);
-        let mut pieces = 0.0;
-        while pieces < count {
-            let mut next = x + t * piece_mm;
-            if let Some(Nearness::Within(near)) = cache.nearness(wall, &next, touch) {
-                let (d, normal) = (near.value_mm, near.normal());
-                if t.dot(&normal) < HEAD_ON {
-                    break;
-                }
-                // The piece ends where it presses as the tip does, as far as one piece can turn.
-                let along = (t - normal * t.dot(&normal)).normalize();
-                let lift = (t.dot(&normal) + (touch - d) / piece_mm).clamp(-0.5, 0.5);
-                t = (along + normal * lift).normalize();
-                let turned = x + t * piece_mm;
-                // So near by, the distance is that to a plane.
-                let d = d + normal.dot(&(turned - next));
-                if d < clear {
-                    break;
-                }
-                next = turned + normal * (touch - d).max(0.0);
-            }
-            x = next;
-            pieces += 1.0;
-        }
-        let way = wanted_mm * (pieces / count);
-        self.bent_mm = (BENT_ADVANCES * way).max(BENT_RADII * radius_mm);
-        // An even bend over a length l moves its end aside by ½κl².
-        let aside = x - tip;
-        self.curvature = tangent.cross(&aside) * (2.0 / (self.bent_mm * self.bent_mm));
-    }
-
-    /// Whether the device is bent to the wall.
-    pub(super) fn bends(&self) -> bool {
-        self.curvature != Vec3::zeros()
-    }
-
-    /// A direction at `from_tip_mm` of the device that has moved on, bent to the wall.
-    fn bend(&self, from_tip_mm: f64, t: Vec3) -> Vec3 {
-        let length = self.bent_mm - from_tip_mm;
-        if length <= 0.0 || !self.bends() {
-            return t;
-        }
-        Rotation3::new(self.curvature * length) * t
-    }
-}
 
 /// Unit tangent at an arc length from the sheath on the curve of `state`.
 ///
@@ -126,13 +29,10 @@ fn on_curve(mesh: &Mesh, state: &RodState, from_sheath_mm: f64, element: &mut us
 }
 
 /// Triads and chords on the mesh `to` of the rod that was in `state` on the mesh `from`, slid along its curve.
-fn slide_curve(from: &Mesh, state: &RodState, extension: &Extension, to: &Mesh, out: &mut RodState) {
+fn slide_curve(from: &Mesh, state: &RodState, to: &Mesh, out: &mut RodState) {
     let inserted = to.from_tip_mm[0];
     let mut element = 0;
-    let direction = |from_tip_mm: f64| {
-        let t = on_curve(from, state, inserted - from_tip_mm, &mut element);
-        extension.bend(from_tip_mm, t)
-    };
+    let direction = |from_tip_mm: f64| on_curve(from, state, inserted - from_tip_mm, &mut element);
     lay((&state.frames[0], &state.positions[0]), to, direction, out);
 }
 
@@ -165,13 +65,8 @@ pub(super) fn lay(
 /// The state on the mesh `to` of the device that was in `state` on the mesh `from`, slid along its curve.
 ///
 /// Material angles stay with the device; what enters from the sheath has the angle that the tail has had.
-pub(super) fn transport(
-    (from, state): (&Mesh, &RodState),
-    extension: &Extension,
-    to: &Mesh,
-    out: &mut RodState,
-) {
-    slide_curve(from, state, extension, to, out);
+pub(super) fn transport((from, state): (&Mesh, &RodState), to: &Mesh, out: &mut RodState) {
+    slide_curve(from, state, to, out);
     let n = to.elements.len();
     // Axial forces, angles and bubbles of the same piece of device, by its distance from the tip.
     let old = state.elements();
@@ -207,12 +102,11 @@ pub(super) fn transport(
 /// read between them.
 pub(super) fn transport_together(
     (from, state): (&Mesh, &RodState),
-    extension: &Extension,
     to: &Mesh,
     sets: &[Option<usize>],
     out: &mut RodState,
 ) {
-    slide_curve(from, state, extension, to, out);
+    slide_curve(from, state, to, out);
     let (n, old) = (to.elements.len(), state.elements());
     // The first element whose far end is not before a place; elements are in order, sheath first.
     let holding = |from_tip: f64| from.from_tip_mm[1..].partition_point(|end| *end > from_tip);

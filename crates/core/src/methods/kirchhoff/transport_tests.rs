@@ -1,7 +1,7 @@
 //! Guesses against the curves that they follow.
 
 use super::mesh::Mesh;
-use super::transport::{Extension, transport, transport_together};
+use super::transport::{transport, transport_together};
 use crate::Vec3;
 use crate::device::Device;
 use crate::rod::{Frame, RodState};
@@ -29,7 +29,7 @@ fn bent(mesh: &Mesh, angle: impl Fn(f64) -> f64) -> RodState {
 
 fn slid(from: &Mesh, state: &RodState, to: &Mesh) -> RodState {
     let mut out = RodState::default();
-    transport((from, state), &Extension::default(), to, &mut out);
+    transport((from, state), to, &mut out);
     out
 }
 
@@ -91,7 +91,7 @@ fn several_instruments_slide_as_one_where_there_is_one() {
     }
     let alone = slid(&from, &state, &to);
     let mut together = RodState::default();
-    transport_together((&from, &state), &Extension::default(), &to, &[Some(0)], &mut together);
+    transport_together((&from, &state), &to, &[Some(0)], &mut together);
     assert_eq!((&together.positions, &together.chords), (&alone.positions, &alone.chords));
     for (a, b) in together.angles.iter().zip(&alone.angles).skip(2) {
         assert!((a - b).abs() < 1e-12, "{a} {b}");

@@ -6,7 +6,6 @@ use super::hands::{Hand, Way};
 use super::mesh::Mesh;
 use super::settle::Settle;
 use super::state::KirchhoffState;
-use super::transport::Extension;
 use super::{Environment, meshed};
 use crate::contact::{ContactCache, Counters, Drag, Friction, Touch};
 use crate::solve::Newton;
@@ -37,7 +36,6 @@ pub(super) struct Tools<const C: usize> {
     pub(super) cache: ContactCache,
     /// What the flow does along the device.
     pub(super) drag: Drag,
-    pub(super) extension: Extension,
     /// Points that press in the equilibrium found last, and what happens there.
     pub(super) touches: Vec<(usize, Touch)>,
     /// What the sub-steps of the command took.
@@ -76,7 +74,6 @@ impl<const C: usize> Workspace<C> {
             friction: Friction::new(surroundings.properties.largest_friction()),
             cache: ContactCache::new(environment.surface),
             drag: Drag::default(),
-            extension: Extension::default(),
             touches: Vec::new(),
             work: Work::default(),
             counters: Counters::default(),
