@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Instant;
 
-use endowire_core::insertion::{Command, Simulation};
+use endowire_core::insertion::{Command, Move, Simulation};
 
 use crate::crossing::CrossingTest;
 
@@ -41,12 +41,22 @@ impl Tally {
         self.crossings.is_empty() && self.unconverged.is_empty() && self.disturbed.is_empty()
     }
 
-    /// Carries out one command and checks it. Returns whether it was carried out.
+    /// Carries out a command of the innermost instrument and checks it. Returns whether it was carried out.
     pub fn step(&mut self, simulation: &mut Simulation, crossing: &CrossingTest, command: Command) -> bool {
+        self.step_together(simulation, crossing, &[Move { instrument: 0, command }])
+    }
+
+    /// Carries out one command, moves of several instruments at a time, and checks it. Returns whether it was carried out.
+    pub fn step_together(
+        &mut self,
+        simulation: &mut Simulation,
+        crossing: &CrossingTest,
+        moves: &[Move],
+    ) -> bool {
         let number = self.steps + self.failures.len();
         let (shape, report) = (simulation.shape().clone(), simulation.report().clone());
         let clock = Instant::now();
-        let done = simulation.step(command).map(|_| ());
+        let done = simulation.step_together(moves).map(|_| ());
         self.seconds.push(clock.elapsed().as_secs_f64());
         if let Err(error) = done {
             if simulation.shape() != &shape || simulation.report() != &report {

@@ -6,7 +6,7 @@
 
 #![allow(clippy::print_stdout, reason = "tables are printed")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
@@ -21,140 +21,7 @@ use endowire_tests::noise::Noise;
 use endowire_tests::sweep::Tally;
 use endowire_verify::insertion_stress::InsertionStress;
 
-fn asset(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets").join(name)
-}
-
-/// A scene on a mesh of another size, with the wall to share between its runs.
-fn scene(name: &str, triangles: usize) -> (Scene, Wall) {
-    let mut scene = Scene::read(&asset(&format!("scenes/{name}.toml"))).unwrap();
-    if let Some(file) = scene.vessel.file.take() {
-        scene.vessel.tree = Some(file.with_extension("csv"));
-    }
-    scene.vessel.edge_mm = None;
-    scene.vessel.triangles = Some(triangles);
-    let wall = scene.wall(&NoStore).unwrap();
-    (scene, wall)
-}
-
-/// Runs a scene in other increments, up to the first command that fails.
-fn run_scene(
-    (scene, wall): &mut (Scene, Wall),
-    crossing: &CrossingTest,
-    step_mm: f64,
-) -> (Simulation, Tally) {
-    for line in &mut scene.script {
-        line.step_mm = Some(step_mm);
-    }
-    let sheath = scene.sheath(wall).unwrap();
-    let device = scene.device().unwrap();
-    let commands = scene.commands(&device).unwrap();
-    let mut simulation = Simulation::builder(wall.clone(), device, sheath)
-        .properties(scene.vessel.wall.clone())
-        .method(&scene.method)
-        .build()
-        .unwrap();
-    let mut tally = Tally::default();
-    tally.drive(&mut simulation, crossing, &commands);
-    (simulation, tally)
-}
-
-/// Scenes, and where their tips come to lie: a point and how near, mm.
-const NAVIGATION: [(&str, [f64; 3], f64); 7] = [
-    ("curved_tube_exact", [81.2, 0.0, 127.4], 1.0),
-    ("arch_subclavian", [13.0, -9.5, 267.5], 5.0),
-    ("arch_carotid", [-11.0, -26.5, 280.7], 5.0),
-    ("arch_innominate", [-44.5, -42.5, 267.5], 5.0),
-    // Into the left or the right hepatic artery, from the artery of both.
-    ("hepatic", [-54.5, -37.5, 87.0], 8.0),
-    // A loop that has slipped out of the narrow end lies anywhere along the tube, at nearly the same energy: only that it comes there
-    // cleanly is asked.
-    ("loop", [0.0, 0.0, 60.0], 65.0),
-    ("arch_plaque", [-11.0, -26.5, 280.7], 5.0),
-];
-
-/// Triangles of the mesh that nothing may cross, where a scene's own has fewer: facets of a few thousand cut through the vessel's own
-/// surface, by more than a wire's radius at a fork, and the smooth wall through them does not.
-const FINE: usize = 40_000;
-
-fn navigate(which: usize, triangles: &[usize], steps_mm: &[f64]) {
-    let (name, target, near_mm) = NAVIGATION[which];
-    let mut bad = Vec::new();
-    let fine = CrossingTest::new(scene(name, FINE).1.mesh());
-    for &triangles in triangles {
-        let mut scene = scene(name, triangles);
-        let own = (triangles > FINE).then(|| CrossingTest::new(scene.1.mesh()));
-        let crossing = own.as_ref().unwrap_or(&fine);
-        for &step_mm in steps_mm {
-            let (simulation, tally) = run_scene(&mut scene, crossing, step_mm);
-            let tip = simulation.shape().tip_mm().unwrap();
-            let arrived = (tip - Vec3::from(target)).norm() < near_mm;
-            println!(
-                "{name:<18} {triangles:>7} triangles {step_mm:>4} mm: tip [{:>6.1} {:>6.1} {:>6.1}] {} {tally}",
-                tip.x,
-                tip.y,
-                tip.z,
-                if arrived { "arrived" } else { "ELSEWHERE" }
-            );
-            if !tally.is_clean() || !arrived {
-                bad.push(format!("{name}, {triangles} triangles, {step_mm} mm: {tally}"));
-            }
-        }
-    }
-    assert!(bad.is_empty(), "{}", bad.join("\n"));
-}
-
-#[test]
-fn every_scene_arrives_on_a_coarse_mesh_in_large_steps() {
-    (0..NAVIGATION.len()).for_each(|which| navigate(which, &[5_000], &[5.0]));
-}
-
-/// The table of a scene: every mesh, every increment.
-fn table(which: usize) {
-    navigate(which, &[5_000, 40_000, 200_000], &[0.1, 1.0, 5.0]);
-}
-
-#[test]
-#[ignore = "a minute"]
-fn table_of_the_curved_tube() {
-    table(0);
-}
-
-#[test]
-#[ignore = "a minute"]
-fn table_of_the_arch_into_the_subclavian_artery() {
-    table(1);
-}
-
-#[test]
-#[ignore = "a minute"]
-fn table_of_the_arch_into_the_carotid_artery() {
-    table(2);
-}
-
-#[test]
-#[ignore = "a minute"]
-fn table_of_the_arch_into_the_innominate_artery() {
-    table(3);
-}
-
-#[test]
-#[ignore = "a minute"]
-fn table_of_the_liver() {
-    table(4);
-}
-
-#[test]
-#[ignore = "a minute"]
-fn table_of_the_loop() {
-    table(5);
-}
-
-#[test]
-#[ignore = "a minute"]
-fn table_of_the_arch_with_plaque() {
-    table(6);
-}
+use super::arrival::{asset, run_scene, scene};
 
 /// Resident memory of this process, MiB; none where the system does not tell.
 fn resident_mib() -> Option<f64> {
