@@ -158,7 +158,7 @@ impl<const C: usize> Newton<C> {
                     let ends = (part, refused, energy_change);
                     (part, energy_change) =
                         self.reach_wall(problem.elements, problem.external, state, merit.energy, ends);
-                    change = energy_change;
+                    (change, search.assembled) = (energy_change, false);
                 }
             }
             self.steps.push(StepRecord {
