@@ -32,23 +32,31 @@ pub(super) fn scene(name: &str, triangles: usize) -> (Scene, Wall) {
     (scene, wall)
 }
 
+/// The commands of a scene's script in other increments.
+fn commands(scene: &mut Scene, step_mm: f64) -> Vec<Command> {
+    for line in &mut scene.script {
+        line.step_mm = Some(step_mm);
+    }
+    scene.commands(&scene.device().unwrap()).unwrap()
+}
+
+/// These instruments at the sheath of a scene.
+fn start(scene: &Scene, wall: &Wall, instruments: impl Into<Stack>) -> Simulation {
+    Simulation::builder(wall.clone(), instruments, scene.sheath(wall).unwrap())
+        .properties(scene.vessel.wall.clone())
+        .method(&scene.method)
+        .build()
+        .unwrap()
+}
+
 /// Runs a scene in other increments, up to the first command that fails.
 pub(super) fn run_scene(
     (scene, wall): &mut (Scene, Wall),
     crossing: &CrossingTest,
     step_mm: f64,
 ) -> (Simulation, Tally) {
-    for line in &mut scene.script {
-        line.step_mm = Some(step_mm);
-    }
-    let sheath = scene.sheath(wall).unwrap();
-    let device = scene.device().unwrap();
-    let commands = scene.commands(&device).unwrap();
-    let mut simulation = Simulation::builder(wall.clone(), device, sheath)
-        .properties(scene.vessel.wall.clone())
-        .method(&scene.method)
-        .build()
-        .unwrap();
+    let commands = commands(scene, step_mm);
+    let mut simulation = start(scene, wall, scene.device().unwrap());
     let mut tally = Tally::default();
     tally.drive(&mut simulation, crossing, &commands);
     (simulation, tally)
@@ -113,23 +121,15 @@ fn run_in_a_catheter(
     crossing: &CrossingTest,
     step_mm: f64,
 ) -> (Simulation, Tally) {
-    for line in &mut scene.script {
-        line.step_mm = Some(step_mm);
-    }
-    let wire = scene.device().unwrap();
-    let commands = scene.commands(&wire).unwrap();
+    let commands = commands(scene, step_mm);
     // Of exchange length: its tail must not slip into the catheter's.
-    let mut sections = wire.sections().to_vec();
+    let mut sections = scene.device().unwrap().sections().to_vec();
     sections.last_mut().unwrap().length_mm += 1500.0;
     let wire = Device::new(sections).unwrap();
     let catheter = DeviceFile::read(&asset("devices/catheter_4f_vertebral.toml")).unwrap().device;
     let one = |name: &str, device| Instrument { name: name.to_owned(), device, may_lead: true };
     let stack = Stack::new(vec![one("wire", wire), one("catheter", catheter)]).unwrap();
-    let mut simulation = Simulation::builder(wall.clone(), stack, scene.sheath(wall).unwrap())
-        .properties(scene.vessel.wall.clone())
-        .method(&scene.method)
-        .build()
-        .unwrap();
+    let mut simulation = start(scene, wall, stack);
     let behind_mm = |simulation: &Simulation| {
         let [wire, catheter] = [0, 1]
             .map(|k| simulation.report().instruments.get(k).map_or(0.0, |instrument| instrument.inserted_mm));
