@@ -4,7 +4,7 @@ use endowire_core::contact::Touch;
 use endowire_core::contact::{ContactCache, ContactSurface, Friction, HandMotion, SETTLED, WallContact};
 use endowire_core::device::Device;
 use endowire_core::insertion::WallProperties;
-use endowire_core::methods::kirchhoff::Mesh;
+use endowire_core::methods::kirchhoff::{Fineness, Mesh};
 use endowire_core::rod::{Clamp, ElementData, PLAIN, RodState, Stencils, Supports};
 use endowire_core::solve::{External, Newton, NewtonOptions};
 use endowire_core::statics::Loads;
@@ -114,7 +114,7 @@ impl TestRod {
         let Setup { length, bending, radius, elements, modulus } = *setup;
         let device = Device::uniform(length, radius, bending)?;
         let mut mesh = Mesh::default();
-        mesh.build(&device, length, length / elements as f64, modulus);
+        mesh.build(&device, length, Fineness::of_elements(length / elements as f64), modulus);
         let frames = mesh.from_tip_mm.iter().map(|from_tip| tangents(length - from_tip)).collect();
         let surface = ContactSurface::new(wall, (radius, radius), properties, &NoStore)?;
         Ok(Self {

@@ -71,6 +71,27 @@ fn a_tolerance_saves_iterations_and_costs_little() {
     assert!(refused.contains("method.tolerance"), "{refused}");
 }
 
+#[test]
+fn contact_points_farther_apart_save_time_and_cost_little_where_no_crest_is() {
+    let run = |contact_spacing_radii: f64| {
+        let (wall, sheath) = curved_tube();
+        let wire = Device::uniform(400.0, 0.445, 10.0).unwrap();
+        let method =
+            KirchhoffOptions { element_mm: 7.5, contact_spacing_radii, ..KirchhoffOptions::default() };
+        let mut simulation = Simulation::builder(wall, wire, sheath).method(&method).build()?;
+        for _ in 0..100 {
+            simulation.step(Command::advance(2.0))?;
+        }
+        Ok::<_, endowire_core::Error>(simulation.shape().tip_mm().unwrap())
+    };
+    let off = (run(4.0).unwrap() - run(1.5).unwrap()).norm();
+    assert!(off > 0.0 && off < 0.02, "{off:e}");
+    for wrong in [0.0, -1.5, 10.1, f64::NAN, f64::INFINITY] {
+        let refused = run(wrong).unwrap_err().to_string();
+        assert!(refused.contains("method.contact_spacing_radii"), "{refused}");
+    }
+}
+
 /// On 40 mm long elements the slid device comes off the wall by hundredths of a millimetre. Where its contacts are not held,
 /// Newton's method looks for them one by one: 306 iterations.
 #[test]

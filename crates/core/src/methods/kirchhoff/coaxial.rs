@@ -8,7 +8,7 @@
 //! The wall is felt by the outermost instrument at a place, at the points that it would have alone: they are marks on it, and their
 //! weights end where it begins to be covered. So energies change without a jump as ends pass nodes.
 
-use super::mesh::{Mesh, NEAR, section_ends};
+use super::mesh::{Fineness, Mesh, NEAR, section_ends};
 use crate::contact::ContactPoint;
 use crate::device::{Device, Section, Stack, line_mm};
 use crate::rod::quadrature::GAUSS;
@@ -29,12 +29,13 @@ enum Anchor {
 #[derive(Debug, Clone)]
 pub(super) struct Nodes {
     anchors: Vec<Anchor>,
-    element_mm: f64,
+    fineness: Fineness,
 }
 
 impl Nodes {
     /// Nodes of these lengths inserted of the instruments, one of them above 0.
-    pub(super) fn new(stack: &Stack, inserted_mm: &[f64], element_mm: f64) -> Self {
+    pub(super) fn new(stack: &Stack, inserted_mm: &[f64], fineness: Fineness) -> Self {
+        let element_mm = fineness.element_mm;
         let line = line_mm(inserted_mm.iter().copied());
         let near = NEAR * element_mm;
         let mut breaks: Vec<(f64, Anchor)> = Vec::new();
@@ -55,7 +56,7 @@ impl Nodes {
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         let inner = all.into_iter().map(|(_, anchor)| anchor);
         let anchors = [Anchor::Mouth].into_iter().chain(inner).chain([Anchor::Mark(0)]).collect();
-        Self { anchors, element_mm }
+        Self { anchors, fineness }
     }
 
     /// Meshes the line, with the same nodes also where other lengths are inserted than they were made for.
@@ -102,7 +103,7 @@ impl Nodes {
         mesh.from_tip_mm.clear();
         mesh.from_tip_mm.extend(self.anchors.iter().map(|anchor| match *anchor {
             Anchor::Mouth => line,
-            Anchor::Mark(k) => k as f64 * self.element_mm,
+            Anchor::Mark(k) => k as f64 * self.fineness.element_mm,
             Anchor::Break(index, from_tip) => line - inserted_mm[index] + from_tip,
         }));
         mesh.inserted_mm.clear();
@@ -121,7 +122,7 @@ impl Nodes {
             if inserted <= covered {
                 continue;
             }
-            alone.build_points(device, inserted, self.element_mm, modulus_n_per_mm2);
+            alone.build_points(device, inserted, self.fineness, modulus_n_per_mm2);
             cover(device, inserted, covered, &mut alone.points);
             let set = stack.sets()[index].unwrap_or(0);
             for point in &alone.points {

@@ -1,7 +1,7 @@
 //! Insertions of several instruments.
 
 use super::coaxial::Nodes;
-use super::mesh::Mesh;
+use super::mesh::{Fineness, Mesh};
 use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, LateralForce, Move, Sheath, Simulation, WallProperties};
 use crate::methods::kirchhoff::KirchhoffOptions;
@@ -177,7 +177,7 @@ fn a_mesh_beside_another_is_the_one_made_anew() {
     let (stack, modulus, by_mm) = (wire_in_catheter(), 1.0, 0.005);
     // Lengths before and after, what was made from the mesh before and what anew, and the elements said to be others.
     let both = |lengths: [f64; 2], moved: [f64; 2], within_mm: f64| {
-        let nodes = Nodes::new(&stack, &lengths, 2.0);
+        let nodes = Nodes::new(&stack, &lengths, Fineness::of_elements(2.0));
         let [mut known, mut anew, mut beside] = [(); 3].map(|()| Mesh::default());
         nodes.mesh(&stack, &lengths, modulus, &mut known);
         nodes.mesh(&stack, &moved, modulus, &mut anew);

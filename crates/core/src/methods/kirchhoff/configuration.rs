@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::hands::Hand;
-use super::mesh::Mesh;
+use super::mesh::{Fineness, Mesh};
 use super::state::KirchhoffState;
 use crate::device::Stack;
 use crate::methods::Surroundings;
@@ -56,11 +56,11 @@ impl Configuration {
 }
 
 /// Elements and contact points of whole devices: most that a step works on.
-pub(super) fn largest(stack: &Stack, element_mm: f64) -> (usize, usize) {
+pub(super) fn largest(stack: &Stack, fineness: Fineness) -> (usize, usize) {
     let (mut elements, mut points) = (0, 0);
     let mut mesh = Mesh::default();
     for device in stack.devices() {
-        mesh.build(device, device.length_mm(), element_mm, 1.0);
+        mesh.build(device, device.length_mm(), fineness, 1.0);
         elements = elements.max(mesh.elements.len());
         points += mesh.points.len();
     }

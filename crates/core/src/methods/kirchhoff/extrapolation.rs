@@ -244,6 +244,7 @@ impl Correction {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::methods::kirchhoff::mesh::Fineness;
 
     const ELEMENT_MM: f64 = 2.0;
     const NODES: usize = 12;
@@ -364,7 +365,7 @@ mod tests {
         let device = crate::device::Device::uniform(100.0, 0.5, 1.0).unwrap();
         let mesh = |element_mm: f64| {
             let mut mesh = Mesh::default();
-            mesh.build(&device, ELEMENT_MM * NODES as f64, element_mm, 1.0);
+            mesh.build(&device, ELEMENT_MM * NODES as f64, Fineness::of_elements(element_mm), 1.0);
             mesh
         };
         let (from, fine) = (mesh(ELEMENT_MM), mesh(0.5 * ELEMENT_MM));

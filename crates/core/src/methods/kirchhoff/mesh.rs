@@ -5,9 +5,6 @@ use crate::device::Device;
 use crate::rod::quadrature::GAUSS;
 use crate::rod::{ElementData, Material};
 
-/// Contact points lie no farther apart than this many radii of the device: a sharp crest between two of them is felt when it is two thirds
-/// of a radius from the axis. At 2 radii it would reach it.
-const SPACING_RADII: f64 = 1.5;
 /// At the tip they begin this close, in radii, and double: a tip that touches the wall at an angle leaves it within a
 /// tenth of its radius.
 const TIP_SPACING_RADII: f64 = 1.0 / 256.0;
@@ -21,6 +18,25 @@ const LARGEST_TURN: f64 = 0.75;
 /// No element has more contact points: at the tip of the thinnest device they double from 4·10⁻⁹ mm up to half of the longest element,
 /// ten metres, 42 times at most.
 pub(super) const MOST_POINTS: usize = 64;
+
+/// How finely a device is meshed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fineness {
+    /// Length of elements, mm.
+    pub element_mm: f64,
+    /// Most distance of contact points, in radii of the device.
+    pub contact_spacing_radii: f64,
+}
+
+impl Fineness {
+    /// A sharp crest between two contact points is felt when it is two thirds of a radius from the axis. At 2 radii it would reach it.
+    pub const CONTACT_SPACING_RADII: f64 = 1.5;
+
+    /// Elements of this length, with contact points that feel any crest.
+    pub fn of_elements(element_mm: f64) -> Self {
+        Self { element_mm, contact_spacing_radii: Self::CONTACT_SPACING_RADII }
+    }
+}
 
 /// Elements and contact points of an inserted length.
 #[derive(Debug, Clone, Default)]
@@ -126,11 +142,11 @@ impl Mesh {
         self.points.reserve(points.saturating_sub(self.points.len()));
     }
 
-    /// Meshes `inserted_mm` (above 0) of `device` with elements of `element_mm`.
+    /// Meshes `inserted_mm` (above 0) of `device`.
     ///
     /// Nodes are the ends of its sections, and even marks between them.
-    pub fn build(&mut self, device: &Device, inserted_mm: f64, element_mm: f64, modulus_n_per_mm2: f64) {
-        self.build_points(device, inserted_mm, element_mm, modulus_n_per_mm2);
+    pub fn build(&mut self, device: &Device, inserted_mm: f64, fineness: Fineness, modulus_n_per_mm2: f64) {
+        self.build_points(device, inserted_mm, fineness, modulus_n_per_mm2);
         // Only what one device needs is written: of elements that were here before the rest is empty.
         self.elements.resize(self.from_tip_mm.len() - 1, ElementData::EMPTY);
         for (ends, data) in self.from_tip_mm.windows(2).zip(&mut self.elements) {
@@ -153,9 +169,10 @@ impl Mesh {
         &mut self,
         device: &Device,
         inserted_mm: f64,
-        element_mm: f64,
+        fineness: Fineness,
         modulus_n_per_mm2: f64,
     ) {
+        let Fineness { element_mm, contact_spacing_radii } = fineness;
         nodes_from_tip(device, inserted_mm, element_mm, &mut self.from_tip_mm);
         self.points.clear();
         // Half of the interval beyond the point at hand; beyond the tip there is its cap.
@@ -164,7 +181,8 @@ impl Mesh {
         for (e, ends) in self.from_tip_mm.windows(2).enumerate().rev() {
             let length = ends[0] - ends[1];
             let radius_mm = device.section_at(ends[1]).radius_mm;
-            let intervals = (length / (SPACING_RADII * radius_mm)).ceil().clamp(INTERVALS.0, INTERVALS.1);
+            let intervals =
+                (length / (contact_spacing_radii * radius_mm)).ceil().clamp(INTERVALS.0, INTERVALS.1);
             let spacing = length / intervals;
             // Distance from the element's far end.
             let mut at = 0.0;
@@ -201,11 +219,29 @@ mod tests {
     fn a_crest_between_two_contact_points_is_felt_before_it_reaches_the_axis() {
         let mut mesh = Mesh::default();
         for (radius_mm, element_mm) in [(0.178, 1.0), (0.178, 4.0), (0.445, 2.0), (0.445, 4.0), (0.9, 4.0)] {
-            mesh.build(&Device::uniform(100.0, radius_mm, 5.0).unwrap(), 50.0, element_mm, 1.0);
+            let device = Device::uniform(100.0, radius_mm, 5.0).unwrap();
+            mesh.build(&device, 50.0, Fineness::of_elements(element_mm), 1.0);
             let gaps = mesh.points.windows(2).map(|pair| pair[1].from_tip_mm - pair[0].from_tip_mm);
             let half = 0.5 * gaps.fold(0.0, f64::max) / radius_mm;
             assert!((1.0 - half * half).sqrt() > 0.6, "{radius_mm} mm, {element_mm} mm: {half} radii");
         }
+    }
+
+    #[test]
+    fn contact_points_lie_no_farther_apart_than_asked_for() {
+        let device = Device::uniform(100.0, 0.445, 5.0).unwrap();
+        let (mut points, mut widest) = ([0; 2], [0.0; 2]);
+        for (k, contact_spacing_radii) in [1.5, 3.0].into_iter().enumerate() {
+            let mut mesh = Mesh::default();
+            mesh.build(&device, 50.0, Fineness { element_mm: 5.0, contact_spacing_radii }, 1.0);
+            let gaps = mesh.points.windows(2).map(|pair| pair[1].from_tip_mm - pair[0].from_tip_mm);
+            (points[k], widest[k]) = (mesh.points.len(), gaps.fold(0.0, f64::max) / 0.445);
+            assert!(widest[k] <= contact_spacing_radii && widest[k] > 0.9 * contact_spacing_radii);
+            // Together they stand for all of the device and its cap.
+            let all_mm: f64 = mesh.points.iter().map(|point| point.weight_mm).sum();
+            assert!((all_mm - 50.0 - 0.445).abs() < 0.5 * contact_spacing_radii * 0.445 + 1e-9, "{all_mm}");
+        }
+        assert!(points[1] < 3 * points[0] / 4, "{points:?}");
     }
 
     #[test]
@@ -244,7 +280,7 @@ mod tests {
             let device = Device::new(sections).unwrap();
             for element_mm in [1e4, 3000.0, 1.0] {
                 let mut mesh = Mesh::default();
-                mesh.build(&device, device.length_mm(), element_mm, 1.0);
+                mesh.build(&device, device.length_mm(), Fineness::of_elements(element_mm), 1.0);
                 let most = MOST_POINTS + INTERVALS.1 as usize * mesh.elements.len();
                 assert!(mesh.points.len() <= most, "{} points, {element_mm} mm", mesh.points.len());
                 let first = mesh.points.iter().filter(|p| p.element + 1 == mesh.elements.len()).count();

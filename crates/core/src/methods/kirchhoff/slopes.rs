@@ -36,7 +36,7 @@ pub(super) fn write_instruments<const C: usize>(
     let sets = environment.surroundings.stack.sets();
     let inserted: Vec<f64> = lengths(hands).collect();
     let line = line_mm(lengths(hands));
-    let nodes = Nodes::new(environment.surroundings.stack, &inserted, environment.options.element_mm);
+    let nodes = Nodes::new(environment.surroundings.stack, &inserted, environment.options.fineness());
     let turning = turning(between, at.start());
     let touching = (pressed, &turning[..], drag);
     let mut told = Vec::with_capacity(hands.len());

@@ -1,6 +1,6 @@
 //! Guesses against the curves that they follow.
 
-use super::mesh::Mesh;
+use super::mesh::{Fineness, Mesh};
 use super::transport::{transport, transport_together};
 use crate::Vec3;
 use crate::device::Device;
@@ -10,7 +10,12 @@ const ELEMENT_MM: f64 = 2.0;
 
 fn mesh(inserted_mm: f64) -> Mesh {
     let mut mesh = Mesh::default();
-    mesh.build(&Device::uniform(100.0, 0.5, 1.0).unwrap(), inserted_mm, ELEMENT_MM, 1.0);
+    mesh.build(
+        &Device::uniform(100.0, 0.5, 1.0).unwrap(),
+        inserted_mm,
+        Fineness::of_elements(ELEMENT_MM),
+        1.0,
+    );
     mesh
 }
 

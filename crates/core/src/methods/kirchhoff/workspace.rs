@@ -65,7 +65,7 @@ impl<const C: usize> Workspace<C> {
     /// Memory for the whole device, so that steps take none.
     pub(super) fn new(environment: &Environment<'_>, state: &KirchhoffState) -> Box<Self> {
         let surroundings = environment.surroundings;
-        let (elements, points) = largest(surroundings.stack, environment.options.element_mm);
+        let (elements, points) = largest(surroundings.stack, environment.options.fineness());
         let nothing = Configuration::at(&surroundings);
         let mut tools = Tools {
             newton: Newton::new(1),

@@ -22,15 +22,20 @@ pub(super) struct Pieces {
     pub(super) means: Vec<[f64; 3]>,
 }
 
-/// Both ends of an edge.
-fn ends(edge: usize) -> [[usize; 3]; 2] {
-    let axis = edge / 4;
-    let mut from = [0; 3];
-    (from[(axis + 1) % 3], from[(axis + 2) % 3]) = (edge & 1, edge >> 1 & 1);
-    let mut to = from;
-    to[axis] = 1;
-    [from, to]
-}
+/// Both ends of every edge.
+const ENDS: [[[usize; 3]; 2]; EDGES] = {
+    let mut ends = [[[0; 3]; 2]; EDGES];
+    let mut edge = 0;
+    while edge < EDGES {
+        let axis = edge / 4;
+        ends[edge][0][(axis + 1) % 3] = edge & 1;
+        ends[edge][0][(axis + 2) % 3] = edge >> 1 & 1;
+        ends[edge][1] = ends[edge][0];
+        ends[edge][1][axis] = 1;
+        edge += 1;
+    }
+    ends
+};
 
 impl Pieces {
     /// What the surface does in a cell of these values at its corners (x + 2 y + 4 z), if anything.
@@ -41,7 +46,7 @@ impl Pieces {
         }
         let value = |[x, y, z]: [usize; 3]| values[x + 2 * y + 4 * z];
         let crossing = |edge: usize| {
-            let [from, to] = ends(edge);
+            let [from, to] = ENDS[edge];
             let (a, b) = (value(from), value(to));
             ((a < 0.0) != (b < 0.0)).then(|| {
                 let mut at = Vec3::from_fn(|k, _| from[k] as f64);
@@ -136,7 +141,7 @@ mod tests {
     fn two_pieces_share_no_edge_and_pass_through_their_own_sides() {
         let two = pieces(&[0, 7], 1.0).unwrap();
         for edge in 0..EDGES {
-            let [from, to] = ends(edge);
+            let [from, to] = ENDS[edge];
             let of_first = from == [0; 3];
             let of_last = to == [1; 3];
             let expected = if of_first {

@@ -50,6 +50,8 @@ pub(super) struct Branch {
     pub(super) samples: Vec<Sample>,
     /// Spacing of samples in mm.
     pub(super) step: f64,
+    /// Largest radius, also of what goes on straight beyond its ends, mm.
+    pub(super) thickest: f64,
     /// Row of the root, if the branch begins there: an open end.
     pub(super) root_row: Option<usize>,
     /// Row of the leaf, if the branch ends in one: an open end.
@@ -256,7 +258,11 @@ fn fit(tree: &CentrelineTree, rows: &[usize], leaves_parent: bool, ends_in_leaf:
         root_row: (!leaves_parent).then_some(rows[0]),
         leaf_row: ends_in_leaf.then_some(rows[rows.len() - 1]),
         at_samples: Vec::new(),
+        thickest: 0.0,
     };
+    let radii = branch.samples.iter().map(|sample| sample.radius);
+    let beyond = [f64::MIN, f64::MAX].map(|s| branch.width(s).0);
+    branch.thickest = radii.chain(beyond).fold(0.0, f64::max);
     branch.at_samples = (0..branch.samples.len()).map(|k| branch.course(step * k as f64)).collect();
     Ok(branch)
 }

@@ -56,12 +56,22 @@ pub(super) struct Local {
     parts: Vec<(usize, Vec<u32>)>,
     centre: Vec3,
     reach: f64,
-    /// Parts by their values at the centre, the least first, with those values.
-    order: Vec<(usize, f64)>,
+    /// Parts by their values at the centre, the least first.
+    order: Vec<Ranked>,
     /// How far blends of all but the first of them can lie below the least of these.
     sag: f64,
     /// What holds farther out.
     wider: Option<Arc<Local>>,
+}
+
+/// A part of those near a ball.
+#[derive(Debug, Clone, Copy)]
+struct Ranked {
+    part: usize,
+    /// Its value at the centre.
+    value: f64,
+    /// Most width of a blend with it or with one that is ranked behind it, mm: its radius may be the thinner one.
+    widest: f64,
 }
 
 /// What each branch near a point is there.
@@ -82,11 +92,28 @@ fn blended(mut values: impl Iterator<Item = Value>) -> Value {
 }
 
 impl Local {
-    fn new(parts: Vec<(usize, Vec<u32>)>, at_centre: &[Value], centre: Vec3, reach: f64) -> Self {
-        let mut order: Vec<(usize, f64)> = at_centre.iter().map(|v| v.f).enumerate().collect();
-        order.sort_by(|a, b| a.1.total_cmp(&b.1));
+    fn new(
+        branches: &[Branch],
+        parts: Vec<(usize, Vec<u32>)>,
+        at_centre: &[Value],
+        centre: Vec3,
+        reach: f64,
+    ) -> Self {
+        let rank = |(part, value): (usize, &Value)| Ranked {
+            part,
+            value: value.f,
+            widest: BLEND * branches[parts[part].0].thickest,
+        };
+        let mut order: Vec<Ranked> = at_centre.iter().enumerate().map(rank).collect();
+        order.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let mut behind = 0.0_f64;
+        for ranked in order.iter_mut().rev() {
+            behind = behind.max(ranked.widest);
+            ranked.widest = behind;
+        }
         // Each blend of two of them lowers the lesser by a sixth of its width at most.
-        let widest = order.iter().skip(1).map(|&(k, _)| BLEND * at_centre[k].radius).fold(0.0, f64::max);
+        let widest =
+            order.iter().skip(1).map(|ranked| BLEND * at_centre[ranked.part].radius).fold(0.0, f64::max);
         let sag = widest / 6.0 * parts.len().saturating_sub(2) as f64;
         Self { parts, centre, reach, order, sag, wider: None }
     }
@@ -128,7 +155,7 @@ impl Field {
         let slack = 2.0 * self.steepness() * reach;
         let matters = |v: &Value| v.f <= least + slack + BLEND * v.radius;
         let (parts, here): (Vec<_>, Vec<_>) = parts.into_iter().zip(here).filter(|(_, v)| matters(v)).unzip();
-        Local::new(parts, &here, *centre, reach)
+        Local::new(&self.branches, parts, &here, *centre, reach)
     }
 
     /// `wide` for a ball inside its own: the same branches, of which one by one is left out by the value at a point, with fewer
@@ -142,7 +169,7 @@ impl Field {
             (*index, samples.iter().copied().filter(|&k| distance(k) <= limit).collect())
         };
         let parts = wide.parts.iter().zip(feet).map(nearer).collect();
-        Local { wider: Some(Arc::clone(wide)), ..Local::new(parts, here, *at, reach) }
+        Local { wider: Some(Arc::clone(wide)), ..Local::new(&self.branches, parts, here, *at, reach) }
     }
 
     /// All branches of `local` at a point, one by one.
@@ -172,24 +199,26 @@ impl Field {
         let change = self.steepness * (point - local.centre).norm();
         let mut near: [Option<(usize, Value)>; FEW] = [None; FEW];
         let (mut count, mut highest, mut widest) = (0, f64::NEG_INFINITY, 0.0_f64);
-        let mut others = f64::INFINITY;
-        for &(k, at_centre) in &local.order {
-            let reached = |f: f64| count == 0 || f - local.sag <= highest + widest;
-            if !reached(at_centre - change) {
-                others = others.min(at_centre - change);
+        // The least value of those left out, and the most width of a blend with them.
+        let mut others = (f64::INFINITY, 0.0_f64);
+        for ranked in &local.order {
+            let reached = |f: f64| count == 0 || f - local.sag <= highest + widest.min(ranked.widest);
+            let least = ranked.value - change;
+            if !reached(least) {
+                others = (others.0.min(least), others.1.max(ranked.widest));
                 break;
             }
-            let value = self.branch_value(&local.parts[k], point);
+            let value = self.branch_value(&local.parts[ranked.part], point);
             if !reached(value.f) {
-                others = others.min(value.f);
+                others = (others.0.min(value.f), others.1.max(ranked.widest));
                 continue;
             }
-            *near.get_mut(count)? = Some((k, value));
+            *near.get_mut(count)? = Some((ranked.part, value));
             count += 1;
             highest = highest.max(value.f);
             widest = widest.max(BLEND * value.radius);
         }
-        if others - local.sag <= highest + widest {
+        if others.0 - local.sag <= highest + widest.min(others.1) {
             return None;
         }
         near[..count].sort_by_key(|kept| kept.map(|(k, _)| k));
