@@ -1,12 +1,12 @@
 //! All steps of a session, done and undone, and states to go back and forth to.
 
 use endowire_core::Result;
-use endowire_core::device::Stack;
-use endowire_core::insertion::{Move, Simulation, State};
+use endowire_core::insertion::{Move, Simulation, State, StepReport};
+use endowire_core::vessel::VesselMotion;
 use endowire_viewer::InjectionSpec;
 
 use crate::hand::Motion;
-use crate::script;
+use crate::script::{self, Lines};
 
 /// A state is kept each so many steps: those between are carried out once more, which takes less than a second.
 const EVERY: usize = 64;
@@ -28,9 +28,27 @@ pub(crate) struct Injected {
 /// A step that was carried out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Done {
+    /// None where hands rest and a vessel moves.
     pub(crate) motions: Vec<Motion>,
     /// How many such steps a second has.
     pub(crate) per_s: f64,
+}
+
+impl Done {
+    /// Carries the step out; where the vessel moves, time goes by as it does in the script's line.
+    ///
+    /// # Errors
+    /// As [`Simulation::step_until`].
+    pub(crate) fn carry_out<'a>(&self, simulation: &'a mut Simulation) -> Result<&'a StepReport> {
+        let moves: Vec<Move> = self.motions.iter().map(|motion| motion.as_move()).collect();
+        let until_s = moves_by_itself(simulation).then(|| simulation.time_s() + script::step_s(self, 1));
+        simulation.step_until(&moves, until_s)
+    }
+}
+
+/// Whether the vessel moves while hands rest.
+pub(crate) fn moves_by_itself(simulation: &Simulation) -> bool {
+    simulation.motion().is_some_and(VesselMotion::changes)
 }
 
 /// What was done, step by step. What was undone stays behind it until something else is done.
@@ -104,12 +122,12 @@ impl History {
     /// Brings the simulation to the moment after step `step` of those there are, forth or back.
     ///
     /// # Errors
-    /// As [`Simulation::step_together`]; steps that were carried out once can be again.
+    /// As [`Simulation::step_until`]; steps that were carried out once can be again.
     pub(crate) fn go_to(&mut self, step: usize, simulation: &mut Simulation) -> Result<()> {
         let kept = step / EVERY;
         simulation.restore(&self.states[kept])?;
         for done in &self.steps[kept * EVERY..step] {
-            simulation.step_together(&moves(&done.motions))?;
+            done.carry_out(simulation)?;
         }
         self.done = step;
         self.begins = false;
@@ -132,12 +150,9 @@ impl History {
     }
 
     /// What is done, as a script.
-    pub(crate) fn script(&self, stack: &Stack) -> String {
+    pub(crate) fn script(&self, simulation: &Simulation) -> String {
         let injected = self.injected.iter().filter(|one| one.after_step <= self.done);
-        script::script(&self.steps[..self.done], injected, stack)
+        let lines = Lines { stack: simulation.stack(), timed: moves_by_itself(simulation) };
+        lines.of(&self.steps[..self.done], injected)
     }
-}
-
-pub(crate) fn moves(motions: &[Motion]) -> Vec<Move> {
-    motions.iter().map(|motion| motion.as_move()).collect()
 }

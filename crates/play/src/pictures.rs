@@ -189,6 +189,7 @@ impl Pictures {
                     made(&mut plane.coarse, sharp, (revision, &coarse), &self.wall)?
                 }
             };
+            renderer.move_vessel(snapshot.displacement.as_ref())?;
             images.push(fluoro(renderer, &views, snapshot.moment)?);
         }
         Ok(images)
@@ -202,6 +203,7 @@ impl Pictures {
         let room = (snapshot.lab.revisions()[1], snapshot.lab.three_d());
         let views = self.pushed.views(&snapshot.shape, &snapshot.inserted_mm);
         let renderer = made(&mut self.three_d, None, room, &self.wall)?;
+        renderer.move_vessel(snapshot.displacement.as_ref())?;
         renderer.show_contacts(&snapshot.contacts);
         let image = renderer.render_at(&views, snapshot.moment)?.three_d;
         image.ok_or_else(|| Error::parameter("view.views", "3d", "was not drawn"))

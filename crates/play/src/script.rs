@@ -10,36 +10,59 @@ use crate::history::{Done, Injected};
 /// Least increment of a line, mm and degrees: less than that a line does in one step.
 const LEAST: f64 = 1e-9;
 
-/// Steps with what was injected between them, by steps rising. Alike steps in a row are one line where that has the same bits.
-pub(crate) fn script<'a>(
-    steps: &[Done],
-    injected: impl Iterator<Item = &'a Injected>,
-    stack: &Stack,
-) -> String {
-    let mut text = String::new();
-    let mut told = 0;
-    for one in injected {
-        lines(&mut text, &steps[told..one.after_step], stack);
-        told = one.after_step;
-        inject(&mut text, one, stack);
-    }
-    lines(&mut text, &steps[told..], stack);
-    text
+/// How steps become lines.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lines<'a> {
+    pub(crate) stack: &'a Stack,
+    /// Whether what is done hangs on the time: then lines keep that to the bit too.
+    pub(crate) timed: bool,
 }
 
-fn lines(text: &mut String, steps: &[Done], stack: &Stack) {
-    for run in steps.chunk_by(|a, b| a == b) {
-        let mut left = run.len();
-        while left > 0 {
-            let count = (1..=left).rev().find(|count| cuts_evenly(&run[0].motions, *count)).unwrap_or(1);
-            line(text, stack, &run[0], count);
-            left -= count;
+impl Lines<'_> {
+    /// Steps with what was injected between them, by steps rising. Alike steps in a row are one line where that has the same bits.
+    pub(crate) fn of<'a>(self, steps: &[Done], injected: impl Iterator<Item = &'a Injected>) -> String {
+        let mut text = String::new();
+        let mut told = 0;
+        for one in injected {
+            self.write(&mut text, &steps[told..one.after_step]);
+            told = one.after_step;
+            inject(&mut text, one, self.stack);
+        }
+        self.write(&mut text, &steps[told..]);
+        text
+    }
+
+    fn write(self, text: &mut String, steps: &[Done]) {
+        for run in steps.chunk_by(|a, b| a == b) {
+            let mut left = run.len();
+            while left > 0 {
+                let count = (1..=left).rev().find(|count| self.cuts_evenly(&run[0], *count)).unwrap_or(1);
+                line(text, self.stack, &run[0], count);
+                left -= count;
+            }
         }
     }
+
+    /// Whether a line of `count` such steps is cut into them to the bit.
+    fn cuts_evenly(self, step: &Done, count: usize) -> bool {
+        moves_evenly(&step.motions, count) && !(self.timed && step_s(step, count) != step_s(step, 1))
+    }
 }
 
-/// Whether a line of `count` times these motions is cut into them to the bit (see `Motion::steps` of scripts).
-fn cuts_evenly(motions: &[Motion], count: usize) -> bool {
+/// How long each step of a line of `count` such steps takes, s, as `Motion::steps` of scripts has it to the bit.
+pub(crate) fn step_s(Done { motions, per_s }: &Done, count: usize) -> f64 {
+    let many = count as f64;
+    let each = motions.iter().map(|one| {
+        let (mm, deg) = (one.advance_mm.abs(), (one.rotate_deg * many).to_radians().to_degrees().abs());
+        let length_s = if mm == 0.0 { 0.0 } else { mm * many / (mm * per_s) };
+        length_s.max(if deg == 0.0 { 0.0 } else { deg / (one.rotate_deg.abs() * per_s) })
+    });
+    let duration_s = if motions.is_empty() { many / per_s } else { each.fold(0.0, f64::max) };
+    duration_s * (1.0 / many)
+}
+
+/// The same of motions alone (see `Motion::steps` of scripts).
+fn moves_evenly(motions: &[Motion], count: usize) -> bool {
     let share = 1.0 / count as f64;
     let small = |value: f64| value != 0.0 && value.abs() < LEAST;
     motions.iter().all(|one| {
@@ -72,7 +95,11 @@ fn line(text: &mut String, stack: &Stack, Done { motions, per_s }: &Done, count:
         }
         keys
     };
-    let Some((first, others)) = motions.split_first() else { return };
+    let Some((first, others)) = motions.split_first() else {
+        let (wait_s, step_s) = (count as f64 / per_s, 1.0 / per_s);
+        let _ = writeln!(text, "[[script]]\nwait_s = {wait_s:?}\nstep_s = {step_s:?}\n");
+        return;
+    };
     let with: Vec<String> = others.iter().map(|one| format!("{{ {} }}", keys(one).join(", "))).collect();
     // Writing into a string cannot fail.
     let _ = writeln!(text, "[[script]]\n{}", keys(first).join("\n"));

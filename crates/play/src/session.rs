@@ -2,13 +2,14 @@
 
 use endowire_core::insertion::{InstrumentReport, Script, Simulation};
 use endowire_core::shape::Shape;
-use endowire_core::{Error, PhysicalEnd, Result};
+use endowire_core::vessel::Displacement;
+use endowire_core::{Error, PhysicalEnd, Result, Vec3};
 use endowire_viewer::{ContactView, FrameTime, ViewSpec};
 
 use crate::TICKS_PER_S;
 use crate::demonstration::{Demonstration, Next};
 use crate::hand::{Hand, Motion};
-use crate::history::{self, Done, History, Injected};
+use crate::history::{Done, History, Injected, moves_by_itself};
 use crate::input::Input;
 use crate::lab::Lab;
 use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout};
@@ -30,6 +31,8 @@ pub struct Session {
     ticks: u64,
     /// Whether a hand moved in the last tick.
     moving: bool,
+    /// Whether a vessel that moves holds still: after undo, until a hand moves, so that what was undone is still there.
+    holds_still: bool,
     events: Vec<Event>,
     events_in_all: usize,
 }
@@ -43,6 +46,8 @@ pub struct Snapshot {
     pub inserted_mm: Vec<f64>,
     /// Contacts with the wall.
     pub contacts: Vec<ContactView>,
+    /// Where the vessel is; none where it never moves.
+    pub displacement: Option<Displacement>,
     /// The room.
     pub lab: Lab,
     /// Number and time of the frame.
@@ -70,14 +75,10 @@ impl Session {
     /// A session of a simulation as it is, in the room that `view` describes, with a square fluoroscopic picture of `side_px` pixels.
     ///
     /// # Errors
-    /// Limits that are not above 0, and a vessel that moves; as [`ViewSpec::validate`].
+    /// Limits that are not above 0; as [`ViewSpec::validate`].
     pub fn new(simulation: Simulation, view: ViewSpec, side_px: u32, limits: Limits) -> Result<Self> {
         for (name, limit) in [("warn_n", limits.push_n), ("warn_nmm", limits.torque_nmm)] {
             endowire_core::error::in_range(name, limit, 1e6)?;
-        }
-        if simulation.motion().is_some() {
-            let mend = "by hand a vessel is at rest: leave motion out";
-            return Err(Error::parameter("vessel.motion", "given", mend));
         }
         let lab = Lab::new(view, side_px, simulation.wall().mesh())?;
         let hands = vec![Hand::default(); simulation.stack().instruments().len()];
@@ -93,6 +94,7 @@ impl Session {
             demonstration: None,
             ticks: 0,
             moving: false,
+            holds_still: false,
             events: Vec::new(),
             events_in_all: 0,
         })
@@ -198,6 +200,7 @@ impl Session {
         self.stop();
         self.demonstration = None;
         self.moving = false;
+        self.holds_still = true;
         let before = self.history.steps();
         self.history.go_to(step, &mut self.simulation)?;
         let again = self.history.inject_again(before, self.time_s());
@@ -205,7 +208,11 @@ impl Session {
     }
 
     fn inject(&mut self, instrument: Option<usize>, ml: f64, ml_per_s: f64) -> Result<()> {
-        let at_mm = instrument.and_then(|one| self.simulation.tip_of_mm(one));
+        // Medium is told where it is in the vessel at rest.
+        let displacement = self.simulation.displacement();
+        let at_rest =
+            |tip: Vec3| displacement.as_ref().map_or(tip, |displacement| displacement.material(&tip));
+        let at_mm = instrument.and_then(|one| self.simulation.tip_of_mm(one)).map(at_rest);
         let flow = self.lab.inject((ml, ml_per_s), at_mm, self.time_s())?;
         let after_step = self.history.steps();
         self.history.inject(Injected { instrument, ml, ml_per_s, after_step, flow });
@@ -241,6 +248,8 @@ impl Session {
                 self.history.begin_motion();
             }
             self.step(motions, TICKS_PER_S);
+        } else if self.demonstration.is_none() && !self.holds_still && moves_by_itself(&self.simulation) {
+            self.step(vec![], TICKS_PER_S);
         }
         self.moving = moving;
     }
@@ -265,7 +274,8 @@ impl Session {
                     if begins {
                         self.history.begin_motion();
                     }
-                    if !motions.is_empty() && !self.step(motions, per_s) {
+                    let rests = motions.is_empty() && !moves_by_itself(&self.simulation);
+                    if !rests && !self.step(motions, per_s) {
                         return None;
                     }
                 }
@@ -281,10 +291,12 @@ impl Session {
     fn step(&mut self, motions: Vec<Motion>, per_s: f64) -> bool {
         let before = self.simulation.report();
         let (was_out, warned) = (before.left_through, self.warns());
-        match self.simulation.step_together(&history::moves(&motions)) {
+        let step = Done { motions, per_s };
+        match step.carry_out(&mut self.simulation) {
             Ok(report) => {
                 let (jumped, out) = (report.jumped, report.left_through);
-                self.history.push(Done { motions, per_s }, &self.simulation);
+                self.holds_still = false;
+                self.history.push(step, &self.simulation);
                 if jumped {
                     self.happened(EventKind::Jumped, "jumped: it let go of energy".to_owned());
                 }
@@ -349,7 +361,7 @@ impl Session {
 
     /// All motions, and what was injected, as `[[script]]` tables of a scene file, which carry them out to the bit.
     pub fn script(&self) -> String {
-        self.history.script(self.simulation.stack())
+        self.history.script(&self.simulation)
     }
 
     /// Hears what exposure control has brought to the detectors since the room is as it is; until then what is wanted counts.
@@ -369,6 +381,7 @@ impl Session {
             shape: self.simulation.shape().clone(),
             inserted_mm: report.lengths_mm(),
             contacts: report.contacts.iter().map(contact).collect(),
+            displacement: self.simulation.displacement(),
             lab: self.lab.clone(),
             moment: FrameTime { frame, time_s: self.time_s() },
             readout: self.readout(),

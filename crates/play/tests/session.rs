@@ -4,11 +4,12 @@
 
 use std::path::{Path, PathBuf};
 
+use endowire_core::Vec3;
 use endowire_core::insertion::{Injection, Simulation};
 use endowire_core::vessel::NoStore;
 use endowire_methods::Scene;
 use endowire_play::{EventKind, Input, Limits, Pictures, Session};
-use endowire_viewer::{ExposureSpec, Mode, ViewSpec};
+use endowire_viewer::{ExposureSpec, Image, Mode, ViewSpec};
 
 fn scene(name: &str) -> (PathBuf, Scene) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/scenes").join(name);
@@ -91,8 +92,10 @@ fn replayed_with_injections(mut scene: Scene, session: &Session) -> (Simulation,
     let script = scene.steps(simulation.stack()).unwrap();
     assert_eq!(script.len(), session.steps());
     let mut run = script.begin();
-    while let Some(step) = run.next(&simulation).unwrap().map(|step| step.moves.to_vec()) {
-        simulation.step_together(&step).unwrap();
+    let moves = simulation.motion().is_some();
+    while let Some(step) = run.next(&simulation).unwrap() {
+        let (moves, time_s) = (step.moves.to_vec(), step.time_s.filter(|_| moves));
+        simulation.step_until(&moves, time_s).unwrap();
         run.carried_out();
     }
     let injections = run.injections().to_vec();
@@ -168,6 +171,71 @@ fn go(session: &mut Session, instrument: &str, mm_per_s: f64, ticks: usize) {
     (0..ticks).for_each(|_| session.tick());
     session.apply(&Input::Stop {}).unwrap();
     session.tick();
+}
+
+/// Hands push and rest while the liver breathes; time goes by in ticks, and the script has it to the bit.
+#[test]
+fn a_vessel_breathes_while_hands_rest_and_what_is_recorded_has_the_same_bits() {
+    let (scene, mut session) = session("hepatic_breathing.toml");
+    let ticks = |session: &mut Session, count: usize| (0..count).for_each(|_| session.tick());
+    let hold = |session: &mut Session, mm_per_s: f64, deg_per_s: f64| {
+        session.apply(&Input::Move { instrument: None, mm_per_s, deg_per_s }).unwrap();
+    };
+    hold(&mut session, 13.7, 0.0);
+    ticks(&mut session, 75);
+    hold(&mut session, 3.1, 47.0);
+    ticks(&mut session, 40);
+    hold(&mut session, 0.0, 0.0);
+    ticks(&mut session, 77);
+    let at_s = session.simulation().time_s();
+    assert!(session.steps() == 192 && (at_s - 192.0 / 60.0).abs() < 1e-9, "{} {at_s}", session.steps());
+    let moved_mm =
+        |session: &Session| session.snapshot().displacement.unwrap().place(&Vec3::new(-90.0, -35.0, 100.0));
+    let before_mm = moved_mm(&session);
+    ticks(&mut session, 30);
+    assert!((moved_mm(&session) - before_mm).norm() > 0.1);
+    // Pushed, with a nudge: the steps of one second.
+    session.apply(&Input::Nudge { instrument: None, mm: 0.7, deg: 11.0 }).unwrap();
+    ticks(&mut session, 60);
+    let again = replayed(scene, &session);
+    assert_eq!(again.time_s().to_bits(), session.simulation().time_s().to_bits());
+    assert_eq!(again.shape(), session.simulation().shape());
+    assert_eq!(again.report(), session.simulation().report());
+    // Rests are few lines.
+    assert!(session.script().matches("wait_s").count() < 30, "{}", session.script());
+
+    // What was undone is there until a hand moves: the vessel holds still meanwhile.
+    let (steps, tip) = (session.steps(), session.simulation().shape().tip_mm());
+    session.apply(&Input::Undo {}).unwrap();
+    let (undone, held_mm) = (session.steps(), moved_mm(&session));
+    assert!(undone < steps);
+    ticks(&mut session, 20);
+    assert_eq!((session.steps(), moved_mm(&session)), (undone, held_mm));
+    session.apply(&Input::Redo {}).unwrap();
+    assert_eq!((session.steps(), session.simulation().shape().tip_mm()), (steps, tip));
+    hold(&mut session, -5.0, 0.0);
+    ticks(&mut session, 5);
+    hold(&mut session, 0.0, 0.0);
+    ticks(&mut session, 5);
+    assert_eq!(session.steps(), steps + 10);
+}
+
+#[test]
+fn pictures_show_where_the_vessel_is() {
+    let (scene, mut session) = session("hepatic_breathing.toml");
+    let wall = session.simulation().wall().clone();
+    let mut pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
+    let rest = pictures.three_d(&session.snapshot()).unwrap();
+    (0..120).for_each(|_| session.tick());
+    let inhaled = pictures.three_d(&session.snapshot()).unwrap();
+    // A breath takes four seconds.
+    (0..120).for_each(|_| session.tick());
+    let exhaled = pictures.three_d(&session.snapshot()).unwrap();
+    let differ =
+        |a: &Image, b: &Image| a.data().iter().zip(b.data()).filter(|(a, b)| a.abs_diff(**b) > 8).count();
+    let all = rest.data().len();
+    assert!(differ(&rest, &inhaled) > all / 100, "{} of {all}", differ(&rest, &inhaled));
+    assert!(differ(&rest, &exhaled) < all / 10_000, "{} of {all}", differ(&rest, &exhaled));
 }
 
 #[test]
