@@ -154,7 +154,7 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
         ("dose_ngy = [20.0, 90.0]", "dose_ngy = [90.0, 20.0]", "vary.dose_ngy"),
         ("moments = 3", "moments = 0", "moments"),
         ("size_px = [256, 192]", "size_px = [0, 192]", "size_px"),
-        ("kvp = [70.0, 80.0]", "kvp = [71.0]", "spec.toml: vary.kvp = [71]: must be 50 to 125"),
+        ("kvp = [70.0, 80.0]", "kvp = [71.0]", "vary.kvp: view.xray.kvp = 71: the table has 50, 55"),
         ("kvp = [70.0, 80.0]", "kvp = []", "vary.kvp = []"),
         ("\"scene.toml\"", "\"nix.toml\"", "spec.toml: scenes = [\"nix.toml\"]"),
         ("devices = [", "devices = [\"nix.toml\", ", "spec.toml: devices = [\"nix.toml\"]"),

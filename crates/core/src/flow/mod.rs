@@ -46,8 +46,6 @@ const MOST_INFLOW_ML_PER_S: f64 = 1000.0;
 const MOST_VISCOSITY_MPA_S: f64 = 1000.0;
 /// Largest exponent by which flow divides.
 const MOST_EXPONENT: f64 = 10.0;
-/// An inlet is at most so many radii from the end that it tells.
-const INLET_RADII: f64 = 5.0;
 /// Most points of the centre line that are looked for in a vessel.
 const POINTS_ASKED: usize = 200;
 /// Beyond so many radii of the axis there is no flow.
@@ -119,10 +117,7 @@ impl BloodFlow {
             let mend = "must be finite, in mm";
             return Err(Error::parameter("vessel.flow.inlet_mm", error::vector(&inlet), mend));
         }
-        let nodes = flow_nodes(tree, inlet_mm, flow.split_exponent, "vessel.flow")?;
-        if let (Some(inlet), Some(end)) = (inlet_mm, nodes.first()) {
-            check_inlet(&inlet, end)?;
-        }
+        let nodes = flow_nodes(tree, inlet_mm, flow.split_exponent, ["vessel.flow", "vessel.flow.inlet_mm"])?;
         let mut stretches = Vec::new();
         let mut downstream = Vec::new();
         for (index, node) in nodes.iter().enumerate() {
@@ -185,20 +180,6 @@ impl BloodFlow {
                 / (std::f64::consts::PI * radius_mm.powi(4)),
         })
     }
-}
-
-/// Refuses an inlet that is not next to the end of the centre line nearest to it.
-fn check_inlet(inlet_mm: &Vec3, end: &FlowNode) -> Result<()> {
-    let distance_mm = (end.position_mm - inlet_mm).norm();
-    if distance_mm <= INLET_RADII * end.radius_mm {
-        return Ok(());
-    }
-    let mend = format!(
-        "the nearest end of the centre line, at {}, is {distance_mm:.3} mm away, and at most {INLET_RADII} of its radii may be: give a \
-         place next to the end where blood comes in",
-        error::vector(&end.position_mm)
-    );
-    Err(Error::parameter("vessel.flow.inlet_mm", error::vector(inlet_mm), mend))
 }
 
 fn vector(x: &Vec3) -> Vector {

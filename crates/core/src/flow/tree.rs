@@ -3,9 +3,12 @@
 //! Blood enters at the inlet and divides at bifurcations in proportion to radiusⁿ: n = 2 gives all branches the same mean velocity, as in
 //! large arteries, n = 3 is Murray's law for small ones (Proceedings of the National Academy of Sciences 12, 1926).
 
+use crate::error;
 use crate::vessel::{CentrelineNode, CentrelineTree};
 use crate::{Error, Result, Vec3};
 
+/// An inlet is at most so many radii from the end that it tells.
+const INLET_RADII: f64 = 5.0;
 /// Points are set at most this far apart, mm.
 const SPACING_MM: f64 = 2.0;
 /// Most points: every cell of a lumen asks all of them which is nearest.
@@ -35,12 +38,13 @@ pub struct FlowNode {
 /// The points of a tree and some between them, from the inlet downstream.
 ///
 /// # Errors
-/// A tree of too many points, and one that has no end; `key` is where it was given.
+/// A tree of too many points, one that has no end, and an inlet that is not next to the end nearest to it; `keys` are those that gave the tree
+/// and the inlet.
 pub fn flow_nodes(
     tree: &CentrelineTree,
     inlet_mm: Option<Vec3>,
     split_exponent: f64,
-    key: &str,
+    keys: [&str; 2],
 ) -> Result<Vec<FlowNode>> {
     let points = tree.nodes();
     let pieces = |a: &Vec3, b: &Vec3| ((b - a).norm() / SPACING_MM).ceil().max(1.0);
@@ -53,7 +57,7 @@ pub fn flow_nodes(
             "with a point each {SPACING_MM} mm it has {count:.0} points, at most {MOST_NODES} are followed: mend the unit (mm), or \
              leave out branches or points"
         );
-        return Err(Error::parameter(key, format!("{} rows", points.len()), mend));
+        return Err(Error::parameter(keys[0], format!("{} rows", points.len()), mend));
     }
     let mut neighbours: Vec<Vec<usize>> = vec![vec![]; points.len()];
     for (i, point) in points.iter().enumerate() {
@@ -71,10 +75,20 @@ pub fn flow_nodes(
         }
     };
     let inlet = inlet.ok_or_else(|| {
-        Error::parameter(key, format!("{} rows", points.len()), "has no end where blood comes in")
+        Error::parameter(keys[0], format!("{} rows", points.len()), "has no end where blood comes in")
     })?;
     let place = |i: usize| (points[i].position_mm, points[i].radius_mm);
     let (position_mm, radius_mm) = place(inlet);
+    let away_mm = |near: &Vec3| (position_mm - near).norm();
+    if let Some(near) = inlet_mm.filter(|near| away_mm(near) > INLET_RADII * radius_mm) {
+        let mend = format!(
+            "the nearest end of the centre line, at {}, is {:.3} mm away, and at most {INLET_RADII} of its radii may be: give a \
+             place next to the end where blood comes in",
+            error::vector(&position_mm),
+            away_mm(&near)
+        );
+        return Err(Error::parameter(keys[1], error::vector(&near), mend));
+    }
     let mut nodes = vec![FlowNode {
         position_mm,
         radius_mm,

@@ -194,7 +194,12 @@ pub(super) fn nearest(nodes: &[Node], point: &Vec3) -> usize {
 
 /// The tree's points and some between them, with the lumen before each.
 fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
-    let found = flow_nodes(tree, spec.inlet_mm.map(Vec3::from), spec.split_exponent, "view.flow.tree")?;
+    let found = flow_nodes(
+        tree,
+        spec.inlet_mm.map(Vec3::from),
+        spec.split_exponent,
+        ["view.flow.tree", "view.flow.inlet_mm"],
+    )?;
     let mut nodes: Vec<Node> = found.iter().map(Node::from).collect();
     found.iter().filter_map(|node| node.upstream).for_each(|up| nodes[up].is_end = false);
     // The inlet itself has the volume of the first stretch.
@@ -318,6 +323,9 @@ mod tests {
             FlowSpec { inlet_mm: Some([150.0, 30.0, 0.0]), split_exponent: 3.0, ..FlowSpec::default() };
         let flow = Flow::new(&tree(), &spec, &[injection(None)]).unwrap();
         assert_eq!(flow.nodes[0].position_mm, Vec3::new(140.0, 30.0, 0.0));
+        let astray = FlowSpec { inlet_mm: Some([150.0, 300.0, 0.0]), ..spec };
+        let refused = Flow::new(&tree(), &astray, &[injection(None)]).unwrap_err().to_string();
+        assert!(refused.starts_with("view.flow.inlet_mm = [150, 300, 0]: the nearest end"), "{refused}");
         // At the bifurcation the trunk and the small branch are downstream now.
         let share = |x: f64, y: f64| flow.nodes[nearest(&flow.nodes, &Vec3::new(x, y, 0.0))].share;
         assert!((share(0.0, 0.0) / share(140.0, -30.0) - 125.0 / 8.0).abs() < 1e-9);

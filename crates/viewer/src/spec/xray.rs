@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::finite_within;
 use crate::material::Material;
+use crate::xray::check_kvp;
 
 /// What the fluoroscopic view shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize)]
@@ -99,7 +100,7 @@ impl XRaySpec {
         if let Some(energy) = self.energy_kev {
             Material::SoftTissue.attenuation_per_mm(energy)?;
         }
-        finite_within("view.xray.kvp", self.kvp, [50.0, 125.0])?;
+        check_kvp(self.kvp)?;
         finite_within("view.xray.aluminium_mm", self.aluminium_mm, [0.0, 20.0])?;
         finite_within("view.xray.copper_mm", self.copper_mm, [0.0, 5.0])?;
         if let Some(count) = self.energy_bins.filter(|count| !(1..=1000).contains(count)) {

@@ -16,3 +16,4 @@ pub(crate) use exp::{LANES, ln_lanes};
 pub(crate) use exposure::check as check_exposure;
 pub use exposure::{Exposure, Pulse};
 pub use path::PathLengths;
+pub(crate) use spectrum::check_kvp;

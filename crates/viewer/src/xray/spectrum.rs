@@ -12,6 +12,19 @@ pub(crate) struct Spectrum {
     pub(crate) lines: Vec<(f64, f64)>,
 }
 
+/// Refuses a voltage that no spectrum is known of.
+pub(crate) fn check_kvp(kvp: f64) -> Result<()> {
+    anode(kvp).map(drop)
+}
+
+/// Photons of the anode at each energy of the table.
+fn anode(kvp: f64) -> Result<&'static [f64]> {
+    ANODE.column(&format!("{kvp}")).ok_or_else(|| {
+        let mend = format!("the table has {} kV", ANODE.names().join(", "));
+        Error::parameter("view.xray.kvp", kvp, mend)
+    })
+}
+
 impl Spectrum {
     /// A single energy.
     pub(crate) fn mono(energy_kev: f64) -> Self {
@@ -28,10 +41,7 @@ impl Spectrum {
 
     /// The same, and what share of the anode's photons the filters let through.
     pub(crate) fn filtered(kvp: f64, aluminium_mm: f64, copper_mm: f64) -> Result<(Self, f64)> {
-        let anode = ANODE.column(&format!("{kvp}")).ok_or_else(|| {
-            let mend = format!("the table has {} kV", ANODE.names().join(", "));
-            Error::parameter("view.xray.kvp", kvp, mend)
-        })?;
+        let anode = anode(kvp)?;
         let mut lines = Vec::new();
         for (&energy, &photons) in ANODE.energies_kev.iter().zip(anode) {
             let filter = Material::Aluminium.attenuation_per_mm(energy)? * aluminium_mm
