@@ -6,7 +6,7 @@ use endowire_core::Vec3;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
 use endowire_methods::Scene;
-use endowire_viewer::{ContactView, Pushed, Renderer, View, ViewSpec, XRaySpec};
+use endowire_viewer::{ContactView, Pushed, Renderer, View, ViewSpec};
 use serde_json::{Map, Value};
 
 use super::shot;
@@ -164,11 +164,6 @@ fn view(spec: &Spec, scene: &Scene, file: &Path) -> Result<ViewSpec, Failure> {
         return Err(Failure::Input(text.to_owned()).at(file.display()));
     }
     view.validate().map_err(|e| Failure::from(e).at(file.display()))?;
-    for &kvp in spec.vary.kvp.iter().flatten() {
-        let one = XRaySpec { kvp, ..view.xray.clone() };
-        let one = ViewSpec { xray: one, ..view.clone() };
-        one.validate().map_err(|e| Failure::from(e).at(format!("{}: vary.kvp", file.display())))?;
-    }
     Ok(view)
 }
 

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use endowire_core::input::from_toml;
+use endowire_viewer::{ViewSpec, XRaySpec};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -140,6 +141,11 @@ impl Spec {
         }
         if let Some([]) = vary.kvp.as_deref() {
             return refuse("vary.kvp = []: name at least one voltage, or leave the key out".to_owned());
+        }
+        for &kvp in vary.kvp.iter().flatten() {
+            let xray = XRaySpec { kvp, ..XRaySpec::default() };
+            let view = ViewSpec { xray, ..ViewSpec::default() };
+            view.validate().map_err(|e| Failure::from(e).at("vary.kvp"))?;
         }
         self.check_view()?;
         match self.biplane_deg {
