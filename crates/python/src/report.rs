@@ -145,6 +145,18 @@ impl StepReport {
         self.report.iterations
     }
 
+    /// Parts that the command was cut into.
+    #[getter]
+    fn substeps(&self) -> u32 {
+        self.report.substeps
+    }
+
+    /// How often the instruments slid on while the hands held still, because friction and wall forces were not to be had in one step.
+    #[getter]
+    fn slides(&self) -> u32 {
+        self.report.slides
+    }
+
     /// Parts of the command in which the way from the last equilibrium was lost; 0 nearly always.
     #[getter]
     fn relaxations(&self) -> u32 {

@@ -18,7 +18,9 @@ def test_a_step_tells_what_is_seen_and_felt(simulation):
         == (len(report.contact_normal_forces_n), 3)
     )
     assert len(report.contact_normal_forces_n) > 0 and (report.contact_normal_forces_n > 0).all()
-    assert report.to_dict()["push_force_n"] == report.push_force_n[0]
+    told = report.to_dict()
+    assert told["push_force_n"] == report.push_force_n[0]
+    assert told["substeps"] == report.substeps >= 1 and told["slides"] == report.slides
     assert simulation.positions_mm.shape == simulation.tangents.shape == (len(simulation.from_tip_mm), 3)
     assert np.array_equal(simulation.positions_mm[-1], simulation.tip_mm)
     assert np.array_equal(simulation.points_mm(simulation.from_tip_mm), simulation.positions_mm)

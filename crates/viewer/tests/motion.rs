@@ -8,7 +8,7 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::motion::{Around, MotionMode, VesselMotion, Waveform};
 use endowire_core::vessel::{Displacement, SurfaceMesh};
-use endowire_viewer::{Backend, DetectorSpec, FrameTime, Mode, Renderer, TorsoSpec, View, ViewSpec};
+use endowire_viewer::{Backend, CtSpec, DetectorSpec, FrameTime, Mode, Renderer, TorsoSpec, View, ViewSpec};
 
 /// 5 mm along x, of the upper half alone.
 fn displacement() -> Displacement {
@@ -130,4 +130,71 @@ fn the_air_of_a_body_goes_with_its_vessel_and_bones_and_skin_stay() {
     assert_eq!(fresh.path_lengths(&[]).unwrap().lung_mm, now.lung_mm);
     renderer.move_vessel(None).unwrap();
     assert_eq!(renderer.path_lengths(&[]).unwrap().lung_mm, rest.lung_mm);
+}
+
+/// A NIfTI-1 file of 40³ voxels of 4 mm about the origin: a ball of water with a core of bone, in air.
+fn ball_of_water(path: &std::path::Path) {
+    let mut bytes = vec![0_u8; 352];
+    let mut put = |at: usize, data: &[u8]| bytes[at..at + data.len()].copy_from_slice(data);
+    put(0, &348_i32.to_le_bytes());
+    [3_i16, 40, 40, 40, 1, 1, 1, 1].iter().enumerate().for_each(|(k, n)| put(40 + 2 * k, &n.to_le_bytes()));
+    put(70, &16_i16.to_le_bytes());
+    put(72, &32_i16.to_le_bytes());
+    (0..4).for_each(|k| put(76 + 4 * k, &4_f32.to_le_bytes()));
+    put(108, &352_f32.to_le_bytes());
+    put(123, &[2]);
+    put(254, &1_i16.to_le_bytes());
+    for k in 0..3 {
+        put(280 + 20 * k, &4_f32.to_le_bytes());
+        put(292 + 16 * k, &(-78_f32).to_le_bytes());
+    }
+    put(344, b"n+1\0");
+    let hu = |n: usize| {
+        let at = [n % 40, n / 40 % 40, n / 1600].map(|k| 4.0 * k as f32 - 78.0);
+        let radius = at.iter().map(|x| x * x).sum::<f32>().sqrt();
+        if radius < 8.0 { 1790.0_f32 } else { -1000.0 * ((radius - 28.0) / 4.0 + 0.5).clamp(0.0, 1.0) }
+    };
+    bytes.extend((0..40 * 40 * 40).flat_map(|n| hu(n).to_le_bytes()));
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn the_tissue_of_a_tomogram_goes_with_its_vessel_and_bone_stays() {
+    let file = std::env::temp_dir().join(format!("endowire-moving-{}.nii", std::process::id()));
+    ball_of_water(&file);
+    let mut view = view(Mode::Fluoro);
+    view.patient.ct = Some(CtSpec { file: file.clone(), offset_mm: [0.0; 3] });
+    let mut renderer = Renderer::new(&view, &vessel()).unwrap();
+    let rest = renderer.path_lengths(&[]).unwrap();
+    // Five millimetres to the left of the patient.
+    let mode = MotionMode {
+        waveform: Waveform::Steady,
+        period_s: None,
+        phase: 0.0,
+        displacement_mm: [5.0, 0.0, 0.0],
+        turn: None,
+        still: None,
+        within: None,
+    };
+    let moved = VesselMotion::new(&[mode]).unwrap().unwrap().at(0.0);
+    renderer.move_vessel(Some(&moved)).unwrap();
+    let now = renderer.path_lengths(&[]).unwrap();
+    assert_eq!(now.bone_mm, rest.bone_mm);
+    // It is the picture at rest, shifted.
+    let c_arm = renderer.c_arm().unwrap();
+    let [from, to] = [0.0, 5.0].map(|x| c_arm.project(&Vec3::new(x, 0.0, 0.0))[0]);
+    let row = 80 * 160;
+    let middle = |of: &[f32]| {
+        let line = &of[row..row + 160];
+        line.iter().enumerate().map(|(x, mm)| x as f64 * f64::from(*mm)).sum::<f64>()
+            / line.iter().map(|mm| f64::from(*mm)).sum::<f64>()
+    };
+    let shift = middle(&now.body_mm) - middle(&rest.body_mm);
+    assert!((shift - (to - from)).abs() < 0.5, "{shift} {}", to - from);
+    let mut fresh = Renderer::new(&view, &vessel()).unwrap();
+    fresh.move_vessel(Some(&moved)).unwrap();
+    assert_eq!(fresh.path_lengths(&[]).unwrap().body_mm, now.body_mm);
+    renderer.move_vessel(None).unwrap();
+    assert_eq!(renderer.path_lengths(&[]).unwrap().body_mm, rest.body_mm);
+    std::fs::remove_file(&file).unwrap();
 }

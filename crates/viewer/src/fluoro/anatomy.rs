@@ -48,15 +48,17 @@ impl Anatomy {
                 maps.lung = air(setup, c_arm, rays, engine)?;
             }
             Patient::Tomogram(volume) => {
-                let [tissue, bone] = volume.project(view);
-                maps.body = tissue.iter().zip(&bone).map(|(a, b)| a + b).collect();
-                maps.bone = bone;
+                [maps.body, maps.bone] = volume.project(view);
+                if let Some(displacement) = setup.displacement() {
+                    maps.body = volume.project_moved(view, displacement);
+                }
             }
         }
         Ok(maps)
     }
 
-    /// The same with the vessel, and the air of a generated body, where they have moved to; bones, skin and tomograms stay.
+    /// The same with the vessel, and the air of a generated body or the soft tissue of a tomogram, where they have moved to; bones and the skin of
+    /// a generated body stay.
     pub(crate) fn moved(
         &self,
         setup: &Setup,
@@ -69,6 +71,13 @@ impl Anatomy {
             moved.lumen = engine.mesh(&c_arm.refined(rays), setup.filled_now())?;
         }
         moved.lung = air(setup, c_arm, rays, engine)?;
+        if let Patient::Tomogram(volume) = &*setup.patient {
+            let view = &c_arm.refined(rays);
+            moved.body = match setup.displacement() {
+                Some(displacement) => volume.project_moved(view, displacement),
+                None => volume.project(view)[0].clone(),
+            };
+        }
         Ok(moved)
     }
 

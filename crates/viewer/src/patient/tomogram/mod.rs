@@ -6,13 +6,16 @@
 
 mod dicom;
 mod nifti;
+mod warp;
 
 use endowire_core::nalgebra::Matrix3;
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::{Displacement, SurfaceMesh};
 use endowire_core::{Error, Result, Vec3};
+use rayon::prelude::*;
 
 use crate::c_arm::CArm;
 use crate::spec::CtSpec;
+use warp::Warp;
 
 /// Sides of a voxel that can be meant, mm: a unit mistake is easily a factor of a thousand, and rays march by half a side.
 const VOXEL_MM: std::ops::RangeInclusive<f64> = 1e-3..=1e3;
@@ -30,6 +33,9 @@ const POSSIBLE_HU: std::ops::RangeInclusive<f32> = -32_768.0..=65_535.0;
 const SCALED: f32 = 2.0;
 /// Part of the smallest voxel side that a ray advances at once.
 const STEP: f64 = 0.5;
+
+/// Rays from one that is marched to the next, along rows and columns: least and most.
+const EVERY: [f64; 2] = [2.0, 16.0];
 
 /// Equivalent lengths per length in a voxel: soft tissue, cortical bone.
 fn materials(hu: f32) -> [f32; 2] {
@@ -156,31 +162,51 @@ impl Volume {
         Some(Self { size, into, origin_mm, step_mm: STEP * smallest, voxels })
     }
 
-    /// Lengths in soft tissue and bone of the central ray of each pixel.
+    /// Lengths in all of the body and in its bone of the central ray of each pixel.
     pub(crate) fn project(&self, view: &CArm) -> [Vec<f32>; 2] {
-        // Voxels are wider than rays: every fourth ray is marched, those between are interpolated.
-        const EVERY: usize = 2;
-        let [width, height] = view.size_px().map(|n| n as usize);
-        let nodes = [width, height].map(|n| n.div_ceil(EVERY) + 1);
-        let mut coarse = Vec::with_capacity(nodes[0] * nodes[1]);
-        for j in 0..nodes[1] {
-            for i in 0..nodes[0] {
-                coarse.push(self.march(view, [(i * EVERY) as f64, (j * EVERY) as f64]));
-            }
-        }
-        let at = |pixel: usize, k: usize| {
-            let place = |n: usize| ((n as f32 + 0.5) / EVERY as f32, n / EVERY);
-            let ((x, i), (y, j)) = (place(pixel % width), place(pixel / width));
-            let (u, v) = (x - i as f32, y - j as f32);
-            let row =
-                |j: usize| coarse[j * nodes[0] + i][k] * (1.0 - u) + coarse[j * nodes[0] + i + 1][k] * u;
-            row(j) * (1.0 - v) + row(j + 1) * v
-        };
-        [0, 1].map(|k| (0..width * height).map(|pixel| at(pixel, k)).collect())
+        let marched = self.rays(view, |pixel| {
+            let [tissue, bone] = self.march(view, pixel, None);
+            [tissue + bone, bone]
+        });
+        [0, 1].map(|k| marched.iter().map(|lengths| lengths[k]).collect())
     }
 
-    /// Lengths along one ray.
-    fn march(&self, view: &CArm, pixel: [f64; 2]) -> [f32; 2] {
+    /// Lengths in all of the body where it has moved to.
+    pub(crate) fn project_moved(&self, view: &CArm, displacement: &Displacement) -> Vec<f32> {
+        let warp = Warp::new(self, displacement);
+        self.rays(view, |pixel| {
+            let [tissue, bone] = self.march(view, pixel, Some(&warp));
+            [tissue + bone]
+        })
+        .into_iter()
+        .map(|[body]| body)
+        .collect()
+    }
+
+    /// What `of` says of rays, for each pixel. Rays that are asked for are half a voxel apart at the isocentre, and at least every fourth is; those
+    /// between are interpolated.
+    fn rays<const K: usize>(&self, view: &CArm, of: impl Fn([f64; 2]) -> [f32; K] + Sync) -> Vec<[f32; K]> {
+        let ray_mm = view.pixel_mm() * view.sod_mm() / view.sid_mm();
+        let every = (self.step_mm / ray_mm).clamp(EVERY[0], EVERY[1]) as usize;
+        let [width, height] = view.size_px().map(|n| n as usize);
+        let [columns, rows] = [width, height].map(|n| n.div_ceil(every) + 1);
+        let node = |n: usize| of([(n % columns * every) as f64, (n / columns * every) as f64]);
+        let coarse: Vec<[f32; K]> = (0..columns * rows).into_par_iter().map(node).collect();
+        let at = |pixel: usize| {
+            let place = |n: usize| ((n as f32 + 0.5) / every as f32, n / every);
+            let ((x, i), (y, j)) = (place(pixel % width), place(pixel / width));
+            let (u, v) = (x - i as f32, y - j as f32);
+            std::array::from_fn(|k| {
+                let row =
+                    |j: usize| coarse[j * columns + i][k] * (1.0 - u) + coarse[j * columns + i + 1][k] * u;
+                row(j) * (1.0 - v) + row(j + 1) * v
+            })
+        };
+        (0..width * height).map(at).collect()
+    }
+
+    /// Lengths in soft tissue and bone along one ray, through the volume at rest or where it has moved to.
+    fn march(&self, view: &CArm, pixel: [f64; 2], moved: Option<&Warp>) -> [f32; 2] {
         let (source, direction) = view.ray(pixel);
         let (start, slope) = (self.into * (source - self.origin_mm), self.into * direction);
         // Where the ray is between the middles of the outermost voxels, in millimetres.
@@ -202,33 +228,57 @@ impl Volume {
         let steps = ((far - near) / self.step_mm).ceil();
         let step = (far - near) / steps;
         let mut sum = [0.0; 2];
-        for n in 0..steps as usize {
-            let at = start + slope * (near + (n as f64 + 0.5) * step);
-            let value = self.value([at.x as f32, at.y as f32, at.z as f32]);
+        let mut add = |at: [f32; 3]| {
+            let value = self.value(at);
             sum = [sum[0] + value[0], sum[1] + value[1]];
+        };
+        let place = |along: f64| {
+            let at = start + slope * (near + along * step);
+            [at.x as f32, at.y as f32, at.z as f32]
+        };
+        let Some(warp) = moved else {
+            (0..steps as usize).for_each(|n| add(place(n as f64 + 0.5)));
+            return sum.map(|s| s * step as f32);
+        };
+        // Ways back are asked for now and then, and are straight between.
+        let stretch = (warp::ASKED_MM / step).ceil() as usize;
+        let (mut begin, mut from) = (0, warp.material(place(0.0)));
+        while begin < steps as usize {
+            let end = (begin + stretch).min(steps as usize);
+            let to = warp.material(place(end as f64));
+            for n in begin..end {
+                let part = (n as f32 + 0.5 - begin as f32) / (end - begin) as f32;
+                add(std::array::from_fn(|k| from[k] + (to[k] - from[k]) * part));
+            }
+            (begin, from) = (end, to);
         }
         sum.map(|s| s * step as f32)
     }
 
     /// Trilinear interpolation at voxel coordinates.
     fn value(&self, at: [f32; 3]) -> [f32; 2] {
-        let place = |k: usize| {
-            let x = at[k].clamp(0.0, (self.size[k] - 1) as f32);
-            let i = (x as usize).min(self.size[k] - 2);
-            (i, x - i as f32)
-        };
-        let [(i, u), (j, v), (k, w)] = [place(0), place(1), place(2)];
-        let row = self.size[0];
-        let slice = row * self.size[1];
-        let first = k * slice + j * row + i;
-        let mix = |a: [f32; 2], b: [f32; 2], t: f32| [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t];
-        let along = |at: usize| mix(self.voxels[at], self.voxels[at + 1], u);
-        mix(
-            mix(along(first), along(first + row), v),
-            mix(along(first + slice), along(first + slice + row), v),
-            w,
-        )
+        trilinear(self.size, &self.voxels, at)
     }
+}
+
+/// Interpolation of values on a lattice, the first index fastest; level beyond its outermost ones.
+#[inline]
+fn trilinear<const K: usize>(size: [usize; 3], values: &[[f32; K]], at: [f32; 3]) -> [f32; K] {
+    let place = |k: usize| {
+        let x = at[k].clamp(0.0, (size[k] - 1) as f32);
+        let i = (x as usize).min(size[k] - 2);
+        (i, x - i as f32)
+    };
+    let [(i, u), (j, v), (k, w)] = [place(0), place(1), place(2)];
+    let row = size[0];
+    let slice = row * size[1];
+    let first = k * slice + j * row + i;
+    let mix = |mut a: [f32; K], b: [f32; K], t: f32| {
+        a.iter_mut().zip(b).for_each(|(a, b)| *a += (b - *a) * t);
+        a
+    };
+    let along = |at: usize| mix(values[at], values[at + 1], u);
+    mix(mix(along(first), along(first + row), v), mix(along(first + slice), along(first + slice + row), v), w)
 }
 
 #[cfg(test)]

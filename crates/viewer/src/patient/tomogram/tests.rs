@@ -1,6 +1,7 @@
 //! Volumes as rays meet them, and as files tell them.
 
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::motion::{Around, MotionMode, Waveform};
+use endowire_core::vessel::{SurfaceMesh, VesselMotion};
 
 use super::*;
 use crate::spec::CArmSpec;
@@ -37,7 +38,8 @@ fn rays_through_a_ball_are_as_long_as_its_chords() {
         [CArmSpec::default(), CArmSpec { primary_deg: 40.0, secondary_deg: 25.0, ..CArmSpec::default() }]
     {
         let arm = arm(&spec);
-        let [tissue, bone] = ball.project(&arm);
+        let [body, bone] = ball.project(&arm);
+        let tissue: Vec<f32> = body.iter().zip(&bone).map(|(body, bone)| body - bone).collect();
         let middle = 32 * 64 + 32;
         assert!((bone[middle] - 20.0).abs() < 1.0, "{}", bone[middle]);
         assert!((tissue[middle] - 40.0).abs() < 1.5, "{}", tissue[middle]);
@@ -50,6 +52,48 @@ fn rays_through_a_ball_are_as_long_as_its_chords() {
         assert!((f64::from(tissue[beside]) - chord).abs() < 1.5, "{} {chord}", tissue[beside]);
         assert!(bone[beside] < 0.01);
     }
+}
+
+#[test]
+fn a_volume_goes_with_its_vessel() {
+    let ball = ball();
+    let arm = arm(&CArmSpec { primary_deg: 25.0, ..CArmSpec::default() });
+    let body = |displacement: &Displacement| ball.project_moved(&arm, displacement);
+    let steady = |displacement_mm: [f64; 3], within: Option<Around>| {
+        let mode = MotionMode {
+            waveform: Waveform::Steady,
+            period_s: None,
+            phase: 0.0,
+            displacement_mm,
+            turn: None,
+            still: None,
+            within,
+        };
+        VesselMotion::new(&[mode]).unwrap().unwrap().at(0.0)
+    };
+    let apart = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    // Moved by whole voxels it is the ball that begins there, but for where steps along rays begin.
+    let there =
+        Volume { origin_mm: ball.origin_mm + Vec3::new(0.0, 4.0, 6.0), voxels: ball.voxels.clone(), ..ball };
+    let moved = body(&steady([0.0, 4.0, 6.0], None));
+    let rest = ball.project(&arm)[0].clone();
+    assert!(apart(&moved, &there.project(&arm)[0]) < 0.1, "{}", apart(&moved, &there.project(&arm)[0]));
+    assert!(apart(&moved, &rest) > 5.0, "the twin: it has moved");
+    // A field that fades, against the inverse at each place.
+    let field =
+        steady([1.0, 2.0, 7.0], Some(Around { centre_mm: [5.0, 0.0, 5.0], radius_mm: 10.0, fade_mm: 30.0 }));
+    let warp = Warp::new(&ball, &field);
+    let mut farthest: f64 = 0.0;
+    for n in 0..500 {
+        let x = Vec3::new(f64::from(n % 10), f64::from(n / 10 % 10), f64::from(n / 100)) * 7.0
+            - Vec3::repeat(33.0);
+        let at = ball.into * (x - ball.origin_mm);
+        let found = warp.material([at.x as f32, at.y as f32, at.z as f32]).map(f64::from);
+        let found = ball.origin_mm + Vec3::from(found) * 2.0;
+        farthest = farthest.max((found - field.material(&x)).norm());
+        assert!((found - field.material(&x)).norm() < 0.4, "{x} {found}");
+    }
+    assert!(farthest > 1e-3, "{farthest}");
 }
 
 #[test]

@@ -1,0 +1,54 @@
+//! A volume that moves with its vessel: where what is at a place has come from.
+//!
+//! A voxel's material goes along with the field of the motion, x = X + u(X), so that at x there is what the volume has at X. X takes Newton's
+//! method ([`Displacement::material`]); it is found on a lattice, and X − x is interpolated between its points. Over [`LATTICE_MM`] that is off by
+//! h²/8 |∂²u|: a tenth of a millimetre for a breath of 12 mm that fades over 85 mm.
+
+use endowire_core::Vec3;
+use endowire_core::vessel::Displacement;
+
+use super::{Volume, trilinear};
+
+/// Most distance of the lattice's points, mm.
+const LATTICE_MM: f64 = 8.0;
+/// Distance along a ray at which ways back are asked for, mm.
+pub(super) const ASKED_MM: f64 = 0.5 * LATTICE_MM;
+
+/// Ways back from places of a volume, on a lattice over its voxels.
+pub(super) struct Warp {
+    size: [usize; 3],
+    /// Points of the lattice for each voxel.
+    per_voxel: [f32; 3],
+    /// X − x in voxels, the first index fastest.
+    back: Vec<[f32; 3]>,
+}
+
+impl Warp {
+    pub(super) fn new(volume: &Volume, displacement: &Displacement) -> Self {
+        let axes = volume.into.try_inverse().unwrap_or_default();
+        let last = volume.size.map(|n| (n - 1) as f64);
+        let intervals: [usize; 3] = std::array::from_fn(|k| {
+            let length_mm = last[k] * axes.column(k).norm();
+            ((length_mm / LATTICE_MM).ceil() as usize).max(1)
+        });
+        let size = intervals.map(|n| n + 1);
+        let voxels = |at: [usize; 3]| Vec3::from_fn(|k, _| at[k] as f64 * last[k] / intervals[k] as f64);
+        let point = |n: usize| {
+            let at = voxels([n % size[0], n / size[0] % size[1], n / size[0] / size[1]]);
+            let x = volume.origin_mm + axes * at;
+            let back = volume.into * (displacement.material(&x) - x);
+            [back.x as f32, back.y as f32, back.z as f32]
+        };
+        Self {
+            size,
+            per_voxel: std::array::from_fn(|k| (intervals[k] as f64 / last[k]) as f32),
+            back: (0..size.iter().product()).map(point).collect(),
+        }
+    }
+
+    /// The voxel coordinates that what is at `at` has at rest.
+    pub(super) fn material(&self, at: [f32; 3]) -> [f32; 3] {
+        let back = trilinear(self.size, &self.back, std::array::from_fn(|k| at[k] * self.per_voxel[k]));
+        std::array::from_fn(|k| at[k] + back[k])
+    }
+}
