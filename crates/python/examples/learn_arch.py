@@ -44,8 +44,6 @@ EVALUATION = (
 )
 #: A row every so many steps: shares and means are of the last hundred episodes.
 CURVE, EVERY = ("steps", "processor_s", "reached", "return"), 1024
-#: Shorter elements than the task's own: those that the guide's figures were made with.
-METHOD = {"name": "kirchhoff", "element_mm": 5.0}
 
 
 def learning_task():
@@ -58,13 +56,12 @@ def learning_task():
         observations=SEEN,
         rewards=[rewards.Reached(2.0), rewards.EachStep(-0.01), rewards.Approach(0.01)],
         ends=[ends.TargetReached(), left, ends.Laborious(), ends.StepLimit(250)],
-        method=METHOD,
     )
 
 
 def unseen_task():
     """The task with a new arch in each episode."""
-    return tasks.arch_variety(vessels=arches.ArchVariety(count=None), observations=SEEN, method=METHOD)
+    return tasks.arch_variety(vessels=arches.ArchVariety(count=None), observations=SEEN)
 
 
 def remember(model, normalize, policy, steps):

@@ -194,7 +194,7 @@ def arch(rng: np.random.Generator) -> tuple[Array, int]:
 class ArchVariety:
     """An arch of type I for each episode, with walls whose edges are about ``edge_mm``.
 
-    An arch takes a few tenths of a second to make. With ``count``, there are so many, made from ``seed`` when they first come, and kept; with None there is
+    An arch takes a tenth of a second to make. With ``count``, there are so many, made from ``seed`` when they first come, and kept; with None there is
     a new one for each episode.
     """
 
