@@ -272,14 +272,12 @@ fn a_tip_on_a_carina_takes_a_side_or_stops_with_a_reason() {
     }
 }
 
-/// A segmented surface as it came: folded in spots, edges of several radii in tight bends.
+/// A segmented surface as it came: folded in spots, edges of several radii in tight bends. `ENDOWIRE_SURFACES` is a folder with carotids.stl.
 #[test]
+#[ignore = "needs a surface that is not part of the project"]
 fn a_real_carotid_is_passed() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/carotids.stl");
-    let Ok(surface) = SurfaceMesh::read(&file, 1.0) else {
-        println!("skipped: {} is not there", file.display());
-        return;
-    };
+    let folder = std::env::var_os("ENDOWIRE_SURFACES").unwrap();
+    let surface = SurfaceMesh::read(&Path::new(&folder).join("carotids.stl"), 1.0).unwrap();
     let wall = Wall::from_surface(&surface).unwrap();
     for (step_mm, radius_mm) in [(1.0, 0.3), (5.0, 0.3), (1.0, 0.445)] {
         let sheath = Sheath::at_opening(&wall, 0, 1.0).unwrap();
