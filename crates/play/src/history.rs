@@ -8,8 +8,11 @@ use endowire_viewer::InjectionSpec;
 use crate::hand::Motion;
 use crate::script::{self, Lines};
 
-/// A state is kept each so many steps: those between are carried out once more, which takes less than a second.
+/// A state is kept each so many steps at first: those between are carried out once more, which takes less than a second.
 const EVERY: usize = 64;
+/// Most states that are kept, of some hundred kilobytes each: where there are more every other one goes. Of a vessel that moves for an hour
+/// there is one each 512 steps then.
+const MOST_STATES: usize = 512;
 
 /// Contrast medium that a hand has injected.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,8 +60,10 @@ pub(crate) struct History {
     steps: Vec<Done>,
     /// How many of the steps are done; those after them are undone.
     done: usize,
-    /// State after step `EVERY · index`.
+    /// State after step `every · index`.
     states: Vec<State>,
+    every: usize,
+    most_states: usize,
     /// Steps after which a hand began to move.
     begun: Vec<usize>,
     /// Whether a hand begins to move with the next step.
@@ -70,7 +75,16 @@ pub(crate) struct History {
 impl History {
     pub(crate) fn new(start: &Simulation) -> Self {
         let states = vec![start.state()];
-        Self { steps: Vec::new(), done: 0, states, begun: Vec::new(), begins: false, injected: Vec::new() }
+        Self {
+            steps: Vec::new(),
+            done: 0,
+            states,
+            every: EVERY,
+            most_states: MOST_STATES,
+            begun: Vec::new(),
+            begins: false,
+            injected: Vec::new(),
+        }
     }
 
     pub(crate) fn steps(&self) -> usize {
@@ -100,8 +114,13 @@ impl History {
         }
         self.steps.push(step);
         self.done += 1;
-        if self.done.is_multiple_of(EVERY) {
+        if self.done.is_multiple_of(self.every) {
             self.states.push(after.state());
+        }
+        if self.states.len() > self.most_states {
+            let mut index = 0..;
+            self.states.retain(|_| index.next().is_some_and(|index: usize| index.is_multiple_of(2)));
+            self.every *= 2;
         }
     }
 
@@ -114,7 +133,7 @@ impl History {
     fn forget_undone(&mut self) {
         let done = self.done;
         self.steps.truncate(done);
-        self.states.truncate(done / EVERY + 1);
+        self.states.truncate(done / self.every + 1);
         self.begun.retain(|begun| *begun < done);
         self.injected.retain(|one| one.after_step <= done);
     }
@@ -124,9 +143,9 @@ impl History {
     /// # Errors
     /// As [`Simulation::step_until`]; steps that were carried out once can be again.
     pub(crate) fn go_to(&mut self, step: usize, simulation: &mut Simulation) -> Result<()> {
-        let kept = step / EVERY;
+        let kept = step / self.every;
         simulation.restore(&self.states[kept])?;
-        for done in &self.steps[kept * EVERY..step] {
+        for done in &self.steps[kept * self.every..step] {
             done.carry_out(simulation)?;
         }
         self.done = step;
@@ -154,5 +173,40 @@ impl History {
         let injected = self.injected.iter().filter(|one| one.after_step <= self.done);
         let lines = Lines { stack: simulation.stack(), timed: moves_by_itself(simulation) };
         lines.of(&self.steps[..self.done], injected)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use endowire_core::device::Device;
+    use endowire_core::insertion::Sheath;
+    use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
+
+    use super::*;
+
+    #[test]
+    fn states_are_few_and_any_moment_can_be_had_again() {
+        let made =
+            GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(2.0)).unwrap();
+        let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
+        let wire = Device::uniform(300.0, 0.445, 10.0).unwrap();
+        let mut simulation = Simulation::builder(made.wall, wire, sheath).build().unwrap();
+        let mut history = History::new(&simulation);
+        (history.every, history.most_states) = (4, 5);
+        let mut tips = vec![simulation.shape().tip_mm()];
+        for k in 0..150 {
+            let advance_mm = if k % 5 == 4 { -0.3 } else { 0.7 };
+            let step =
+                Done { motions: vec![Motion { instrument: 0, advance_mm, rotate_deg: 0.0 }], per_s: 60.0 };
+            step.carry_out(&mut simulation).unwrap();
+            history.push(step, &simulation);
+            tips.push(simulation.shape().tip_mm());
+            assert!(history.states.len() <= 5 && history.states.len() == history.done / history.every + 1);
+        }
+        assert_eq!(history.every, 32);
+        for step in [150, 3, 64, 127, 0, 128, 149] {
+            history.go_to(step, &mut simulation).unwrap();
+            assert_eq!(simulation.shape().tip_mm(), tips[step], "{step}");
+        }
     }
 }

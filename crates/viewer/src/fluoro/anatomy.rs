@@ -75,7 +75,10 @@ impl Anatomy {
             let view = &c_arm.refined(rays);
             moved.body = match setup.displacement() {
                 Some(displacement) => volume.project_moved(view, displacement),
-                None => volume.project(view)[0].clone(),
+                None => {
+                    let [body, _] = volume.project(view);
+                    body
+                }
             };
         }
         Ok(moved)
