@@ -118,8 +118,7 @@ impl History {
             self.states.push(after.state());
         }
         if self.states.len() > self.most_states {
-            let mut index = 0..;
-            self.states.retain(|_| index.next().is_some_and(|index: usize| index.is_multiple_of(2)));
+            self.states = std::mem::take(&mut self.states).into_iter().step_by(2).collect();
             self.every *= 2;
         }
     }

@@ -10,19 +10,24 @@ use endowire_core::vessel::motion::{Around, MotionMode, VesselMotion, Waveform};
 use endowire_core::vessel::{Displacement, SurfaceMesh};
 use endowire_viewer::{Backend, CtSpec, DetectorSpec, FrameTime, Mode, Renderer, TorsoSpec, View, ViewSpec};
 
-/// 5 mm along x, of the upper half alone.
-fn displacement() -> Displacement {
-    let within = Some(Around { centre_mm: [0.0, 0.0, 60.0], radius_mm: 20.0, fade_mm: 30.0 });
+/// By so much all the time, of all of the vessel or of a part.
+fn steady(displacement_mm: [f64; 3], within: Option<Around>) -> Displacement {
     let mode = MotionMode {
         waveform: Waveform::Steady,
         period_s: None,
         phase: 0.0,
-        displacement_mm: [5.0, 0.0, 0.0],
+        displacement_mm,
         turn: None,
         still: None,
         within,
     };
     VesselMotion::new(&[mode]).unwrap().unwrap().at(0.0)
+}
+
+/// 5 mm along x, of the upper half alone.
+fn displacement() -> Displacement {
+    let within = Around { centre_mm: [0.0, 0.0, 60.0], radius_mm: 20.0, fade_mm: 30.0 };
+    steady([5.0, 0.0, 0.0], Some(within))
 }
 
 fn vessel() -> SurfaceMesh {
@@ -96,16 +101,7 @@ fn the_air_of_a_body_goes_with_its_vessel_and_bones_and_skin_stay() {
     // The domes of the diaphragm lie in the middle of what moves.
     view.patient.torso = Some(TorsoSpec { diaphragm_mm: Some(60.0), ..TorsoSpec::default() });
     view.c_arm.isocentre_mm = Some([0.0, 0.0, 60.0]);
-    let breath = MotionMode {
-        waveform: Waveform::Steady,
-        period_s: None,
-        phase: 0.0,
-        displacement_mm: [0.0, 0.0, -10.0],
-        turn: None,
-        still: None,
-        within: None,
-    };
-    let breath = VesselMotion::new(&[breath]).unwrap().unwrap().at(0.0);
+    let breath = steady([0.0, 0.0, -10.0], None);
     let mut renderer = Renderer::new(&view, &vessel()).unwrap();
     let rest = renderer.path_lengths(&[]).unwrap();
     let still = renderer.render_at(&[], FrameTime { frame: 0, time_s: 0.0 }).unwrap().fluoro.unwrap();
@@ -167,16 +163,7 @@ fn the_tissue_of_a_tomogram_goes_with_its_vessel_and_bone_stays() {
     let mut renderer = Renderer::new(&view, &vessel()).unwrap();
     let rest = renderer.path_lengths(&[]).unwrap();
     // Five millimetres to the left of the patient.
-    let mode = MotionMode {
-        waveform: Waveform::Steady,
-        period_s: None,
-        phase: 0.0,
-        displacement_mm: [5.0, 0.0, 0.0],
-        turn: None,
-        still: None,
-        within: None,
-    };
-    let moved = VesselMotion::new(&[mode]).unwrap().unwrap().at(0.0);
+    let moved = steady([5.0, 0.0, 0.0], None);
     renderer.move_vessel(Some(&moved)).unwrap();
     let now = renderer.path_lengths(&[]).unwrap();
     assert_eq!(now.bone_mm, rest.bone_mm);

@@ -3,9 +3,8 @@
 //! Blood enters at the inlet and divides at bifurcations in proportion to radiusⁿ: n = 2 gives all branches the same mean velocity, as in
 //! large arteries, n = 3 is Murray's law for small ones (Proceedings of the National Academy of Sciences 12, 1926).
 
-use crate::error;
 use crate::vessel::{CentrelineNode, CentrelineTree};
-use crate::{Error, Result, Vec3};
+use crate::{Error, Result, Vec3, error};
 
 /// An inlet is at most so many radii from the end that it tells.
 const INLET_RADII: f64 = 5.0;
