@@ -2,16 +2,16 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use endowire_core::Vec3;
-use endowire_methods::li2011::{Chain, PlaneContact, banded, dense};
+use endowire_methods::li2011::{Chain, Spring, banded, dense};
 
-/// A wire with every other node on a wall.
+/// A wire of unit tangents with every other node on a wall.
 fn chain(elements: usize) -> Chain {
     let mut chain = Chain::uniform(Vec3::zeros(), Vec3::x(), 200.0, elements, 20.0);
-    chain.wall_stiffness_n_per_mm = 1.0;
+    chain.directions = vec![Vec3::x(); elements];
     for node in (2..=elements).step_by(2) {
         let angle = node as f64;
-        let normal = Vec3::new(0.0, angle.cos(), angle.sin());
-        chain.contacts.push(PlaneContact { node, normal, offset_mm: 0.1, triangle: 0 });
+        let direction = Vec3::new(0.0, angle.cos(), angle.sin());
+        chain.springs.push(Spring { node, direction, offset_mm: 0.1, stiffness_n_per_mm: 1.0 });
     }
     chain
 }

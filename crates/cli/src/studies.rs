@@ -1,5 +1,25 @@
 //! What comparisons and experiments are made of, by name: their arguments list it, and they carry it out.
 
+/// What is compared: every method, ours first, and the paper's in its other readings: with unit tangents and the planes of triangles, and as
+/// printed.
+pub(crate) const CANDIDATES: [&str; 11] = [
+    "kirchhoff",
+    "li2011-dense",
+    "li2011-banded",
+    TRIANGLE,
+    PRINTED,
+    "rigid-links",
+    "mass-spring",
+    "beam-fem",
+    "beam-fem-damped",
+    "chord-energy",
+    "discrete-rod",
+];
+/// The paper's method with unit tangents and the planes of triangles.
+pub(crate) const TRIANGLE: &str = "li2011-banded-triangle";
+/// The paper's method as printed: free tangents and the planes of triangles.
+pub(crate) const PRINTED: &str = "li2011-banded-printed";
+
 /// Names of the cases, the unit of their errors, and the error at which speeds are compared.
 pub(crate) const CASES: [(&str, &str, f64); 5] = [
     ("cantilever-1", "L", 1e-4),
@@ -19,4 +39,16 @@ pub(crate) const HEPATIC_TARGETS: [&str; 5] =
 /// Names of all targets.
 pub(crate) fn targets() -> impl Iterator<Item = &'static str> {
     ARCH_TARGETS.into_iter().chain(HEPATIC_TARGETS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use endowire_methods::NAMES;
+
+    #[test]
+    fn every_method_is_a_candidate() {
+        assert!(NAMES.iter().all(|name| CANDIDATES.contains(name)));
+        assert_eq!(CANDIDATES.len(), NAMES.len() + 2);
+    }
 }

@@ -122,7 +122,7 @@ impl MethodChoice for AnyMethod {
 
     fn start(&self, surroundings: &Surroundings<'_>, store: &dyn WallStore) -> Result<Box<dyn Method>> {
         let paper = |options: &Li2011Options, solver| -> Result<Box<dyn Method>> {
-            Ok(Box::new(Li2011::new(*options, solver, surroundings)?))
+            Ok(Box::new(Li2011::new(*options, solver, surroundings, store)?))
         };
         match self {
             Self::Kirchhoff(options) => options.start(surroundings, store),

@@ -4,17 +4,16 @@ use std::path::PathBuf;
 
 use clap::Subcommand;
 use clap::builder::PossibleValuesParser;
-use endowire_methods::NAMES;
 
-use crate::studies::{CASES, targets};
+use crate::studies::{CANDIDATES, CASES, PRINTED, targets};
 
 /// The methods that are compared. A wrong name is answered with the nearest right one.
 fn method_names() -> PossibleValuesParser {
-    PossibleValuesParser::new(NAMES)
+    PossibleValuesParser::new(CANDIDATES)
 }
 
 fn all_or_method_names() -> PossibleValuesParser {
-    PossibleValuesParser::new(std::iter::once("all").chain(NAMES))
+    PossibleValuesParser::new(std::iter::once("all").chain(CANDIDATES))
 }
 
 fn case_names() -> PossibleValuesParser {
@@ -47,7 +46,8 @@ pub(crate) struct CompareArgs {
 pub(crate) enum ExperimentCommand {
     /// Experiment 1: time per calculation against the number of nodes (the paper's Table 1)
     Timing(TimingArgs),
-    /// Experiment 2: a shaped wire steered to every named target of the aortic arch and the hepatic arteries
+    /// Experiment 2: straight wires pushed into the aortic arch and the hepatic arteries by the paper's method and by ours, and a shaped wire
+    /// steered to every named target
     Navigation(NavigationArgs),
     /// Experiment 3: a soft tip stopped in a tube, and the loop that grows (the paper's figure 4)
     Loop(LoopArgs),
@@ -81,7 +81,10 @@ impl NavigationArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct LoopArgs {
-    /// Folder for loop.csv, loop.json, four frames of both views, and loop.svg and .png
+    /// Methods
+    #[arg(long, visible_alias = "method", value_delimiter = ',', default_values_t = ["li2011-banded", "kirchhoff"].map(String::from), value_name = "METHOD,…", value_parser = method_names())]
+    pub(crate) methods: Vec<String>,
+    /// Folder for loop.csv, loop.json, four frames of both views for each method, and loop.svg and .png
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the rows as one JSON document on stdout
@@ -94,16 +97,16 @@ pub(crate) struct DeformationArgs {
     /// Measured points (CSV: x_mm,y_mm,z_mm from the sheath to the tip) instead of the computed ground truth
     #[arg(long, value_name = "FILE")]
     pub(crate) measured: Option<PathBuf>,
-    /// Method
-    #[arg(long, default_value = "kirchhoff", value_name = "METHOD", value_parser = method_names())]
-    pub(crate) method: String,
+    /// Methods
+    #[arg(long, visible_alias = "method", value_delimiter = ',', default_values_t = ["li2011-banded", PRINTED, "kirchhoff"].map(String::from), value_name = "METHOD,…", value_parser = method_names())]
+    pub(crate) methods: Vec<String>,
     /// Segment lengths of Table 2 to run (1, 2, 3); all if absent
     #[arg(long, value_delimiter = ',', value_name = "L,…")]
     pub(crate) l_mm: Vec<f64>,
     /// Increments a segment of Table 2 to run (40, 20, 10, 5, 3); all if absent
     #[arg(long, value_delimiter = ',', value_name = "COUNT,…")]
     pub(crate) l_over_h: Vec<u32>,
-    /// Folder for deformation.csv and deformation.json
+    /// Folder for deformation.csv, .json, .svg and .png, and frames of both views of each method's wire
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the rows as one JSON document on stdout
@@ -125,7 +128,7 @@ pub(crate) struct TimingArgs {
     /// Longest time for a method to be brought in position; one that takes longer is told in a note
     #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true)]
     pub(crate) limit_s: f64,
-    /// Folder for timing.csv and timing.json
+    /// Folder for timing.csv, .json, .svg and .png
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Print the rows as one JSON document on stdout

@@ -12,11 +12,13 @@ use crate::failure::Failure;
 /// What drawing on a backend returns.
 pub(crate) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
-/// Colours that people with any colour vision can tell apart (Okabe and Ito 2008), and three greys.
-pub(crate) const COLOURS: [RGBColor; 9] = [
+/// Colours that people with any colour vision can tell apart (Okabe and Ito 2008), and four greys.
+pub(crate) const COLOURS: [RGBColor; 11] = [
     RGBColor(0, 90, 160),
     RGBColor(90, 90, 90),
-    RGBColor(160, 160, 160),
+    RGBColor(20, 20, 20),
+    RGBColor(130, 130, 130),
+    RGBColor(180, 180, 180),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),

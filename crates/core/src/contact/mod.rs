@@ -12,6 +12,7 @@ mod properties;
 mod proximity;
 mod quadric;
 mod quadric_fit;
+mod reader;
 pub mod regions;
 #[cfg(test)]
 mod ridge_tests;
@@ -29,6 +30,7 @@ pub use point::{Contact, ContactPoint, Counters, Touch};
 pub use potential::WallPotential;
 pub use properties::{WallProperties, WallRegion};
 pub(crate) use properties::{check_friction, check_valve};
+pub use reader::WallReader;
 pub use regions::RegionMap;
 pub use surface::{ContactSurface, Deviation};
 pub use wall::WallContact;

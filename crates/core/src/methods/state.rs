@@ -78,6 +78,8 @@ pub struct TouchedPlane {
     pub triangle: u32,
     /// How far the device's surface is in the wall, mm.
     pub depth_mm: f64,
+    /// Force with which the wall pressed in the last step, N; negative where it pulled, 0 where it was not felt.
+    pub force_n: f64,
 }
 
 /// Nodes and triads of a chain.

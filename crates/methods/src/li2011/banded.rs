@@ -10,6 +10,12 @@
 //! Vᵢ = ½xᵀXx + xᵀYt + ½tᵀTt − qₓ·x − q_t·t. Block elimination from the tip carries X, Y, T, qₓ, q_t to the sheath;
 //! back-substitution from the sheath, where x₀ and t₀ are known, gives all uᵢ. Per element it factors one 3×3 matrix,
 //! H_uu = α/h + (contributions of what lies beyond), positive definite for α > 0: no pivoting is ever needed.
+//!
+//! With unit tangents the row t̂·(t + u) = 1 and its multiplier λ stand beside u, and both are eliminated together:
+//!
+//! ```text
+//! H u + λ t̂ = r,  t̂·u = 1 − t̂·t   ⇒   u = P H⁻¹r + w (1 − t̂·t),   w = H⁻¹t̂ / (t̂·H⁻¹t̂),   P = I − w t̂ᵀ
+//! ```
 
 use nalgebra::{Cholesky, Matrix3};
 
@@ -49,7 +55,6 @@ pub fn solve(
     tangents: &mut Vec<Vec3>,
 ) {
     let n = chain.elements();
-    let kappa = chain.wall_stiffness_n_per_mm;
     workspace.eliminations.clear();
     let mut beyond = Beyond {
         xx: Matrix3::zeros(),
@@ -58,15 +63,16 @@ pub fn solve(
         qx: Vec3::zeros(),
         qt: Vec3::zeros(),
     };
-    let mut contacts = chain.contacts.iter().rev().peekable();
+    let mut springs = chain.springs.iter().rev().peekable();
     for i in (1..=n).rev() {
         beyond.qx += chain.forces_n[i - 1];
-        while let Some(contact) = contacts.next_if(|c| c.node == i) {
-            let stiff_normal = contact.normal * kappa;
-            beyond.xx += stiff_normal * contact.normal.transpose();
-            beyond.qx += stiff_normal * (contact.offset_mm - contact.normal.dot(&chain.start_mm));
+        while let Some(spring) = springs.next_if(|spring| spring.node == i) {
+            let stiff = spring.direction * spring.stiffness_n_per_mm;
+            beyond.xx += stiff * spring.direction.transpose();
+            beyond.qx += stiff * (spring.offset_mm - spring.direction.dot(&chain.start_mm));
         }
-        let elimination = beyond.eliminate(chain.lengths_mm[i - 1], chain.bending_stiffness_nmm2[i - 1]);
+        let (h, alpha) = (chain.lengths_mm[i - 1], chain.bending_stiffness_nmm2[i - 1]);
+        let elimination = beyond.eliminate(h, alpha, chain.direction(i));
         workspace.eliminations.push(elimination);
     }
 
@@ -83,8 +89,8 @@ pub fn solve(
 }
 
 impl Beyond {
-    /// Moves the quadratic one element of length `h` towards the sheath.
-    fn eliminate(&mut self, h: f64, alpha: f64) -> Elimination {
+    /// Moves the quadratic one element of length `h` towards the sheath; its end's tangent is of unit length about `direction`.
+    fn eliminate(&mut self, h: f64, alpha: f64, direction: Option<&Vec3>) -> Elimination {
         let (x, y, t) = (self.xx, self.xt, self.tt);
         let yt = y.transpose();
         // Second derivatives of α/(2h)|u|² + V(x + h t + ½h u, t + u).
@@ -94,7 +100,14 @@ impl Beyond {
         let qu = self.qx * (0.5 * h) + self.qt;
         // Positive definite by construction; only NaN in the input gets here, and goes through as NaN.
         let inverse = Cholesky::new(uu).map_or(Matrix3::repeat(f64::NAN), |c| c.inverse());
-        let (free, by_x, by_t) = (inverse * qu, inverse * ux, inverse * ut);
+        let (mut free, mut by_x, mut by_t) = (inverse * qu, inverse * ux, inverse * ut);
+        if let Some(direction) = direction {
+            let w = inverse * direction;
+            let w = w / direction.dot(&w);
+            free += w * (1.0 - direction.dot(&free));
+            by_x -= w * (direction.transpose() * by_x);
+            by_t += w * (direction.transpose() - direction.transpose() * by_t);
+        }
         self.substitute(h, alpha, &free, &by_x, &by_t);
         Elimination { free, by_x, by_t }
     }

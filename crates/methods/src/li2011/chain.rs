@@ -1,29 +1,50 @@
-//! The discrete energy of the paper, eqs. 1–9.
+//! The discrete energy of the paper, eqs. 1–9, and the constraint that the paper leaves out.
 //!
 //! Nodes 0…n, element i of length hᵢ between nodes i−1 and i. With tangents linear in between,
 //!
 //! ```text
 //! xᵢ = xᵢ₋₁ + ½ hᵢ (tᵢ₋₁ + tᵢ)                      (5, 8)
 //! Ue = ½ Σᵢ αᵢ |tᵢ − tᵢ₋₁|² / hᵢ                    (2, 6)
-//! Up = ½ Σⱼ κ (nⱼ·xⱼ − dⱼ)²                         (7)   over the contact nodes j
+//! Up = ½ Σⱼ kⱼ (nⱼ·xⱼ − dⱼ)²                        (7)   over the springs j of the wall
 //! W  = −Σᵢ fᵢ·(xᵢ − xᵢ⁰)                            (9)
 //! ```
 //!
 //! x₀ and t₀ are the sheath (section 2.2.4) and do not vary; t₁…tₙ are the unknowns.
+//!
+//! With unit tangents each node has one more row, and one multiplier λᵢ. |tᵢ| = 1 is not linear; about a direction t̂ᵢ that is close
+//! to tᵢ it is
+//!
+//! ```text
+//! t̂ᵢ·tᵢ = 1,      ∂U/∂tᵢ + λᵢ t̂ᵢ = 0
+//! ```
+//!
+//! exact but for second order in the angle between them. What is left of that order goes when tangents are divided by their length
+//! ([`Chain::normalise`]).
 
 use endowire_core::Vec3;
 
-/// A node held off one wall triangle: the plane n·x = d, penalised with stiffness κ (eq. 7).
+/// A spring of the wall at a node: energy ½ k (n·x − d)².
+///
+/// A triangle is one spring, whose direction n is its normal and whose stiffness k is κ (eq. 7). A smooth wall adds one across the
+/// device, for the curvature of the lumen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlaneContact {
+pub struct Spring {
     /// The node, 1…n.
     pub node: usize,
-    /// Unit normal n of the triangle, into the lumen.
-    pub normal: Vec3,
-    /// Offset d in mm: the node's axis touches where n·x = d.
+    /// Unit direction n.
+    pub direction: Vec3,
+    /// Offset d, mm: the spring is at rest where n·x = d.
     pub offset_mm: f64,
-    /// The wall triangle.
-    pub triangle: u32,
+    /// Stiffness k, N/mm.
+    pub stiffness_n_per_mm: f64,
+}
+
+impl Spring {
+    /// Force on the node at `x`, N along the spring's direction; negative where it pulls, which eq. 7 allows since it is quadratic on
+    /// both sides of the plane.
+    pub fn force_n(&self, x: &Vec3) -> f64 {
+        self.stiffness_n_per_mm * (self.offset_mm - self.direction.dot(x))
+    }
 }
 
 /// One catheter as the paper discretises it.
@@ -39,14 +60,14 @@ pub struct Chain {
     pub bending_stiffness_nmm2: Vec<f64>,
     /// External forces f₁…fₙ on the nodes, N.
     pub forces_n: Vec<Vec3>,
-    /// Contacts, in ascending order of their nodes.
-    pub contacts: Vec<PlaneContact>,
-    /// Wall stiffness κ per contact node, N/mm.
-    pub wall_stiffness_n_per_mm: f64,
+    /// Springs of the wall, in ascending order of their nodes.
+    pub springs: Vec<Spring>,
+    /// Directions t̂₁…t̂ₙ about which tangents are of unit length; empty where tangents are free, as printed.
+    pub directions: Vec<Vec3>,
 }
 
 impl Chain {
-    /// A straight chain of `elements` equal elements from the sheath, without load or contact.
+    /// A straight chain of `elements` equal elements from the sheath, without load or contact, its tangents free.
     pub fn uniform(
         start_mm: Vec3,
         start_tangent: Vec3,
@@ -60,14 +81,19 @@ impl Chain {
             lengths_mm: vec![length_mm / elements as f64; elements],
             bending_stiffness_nmm2: vec![stiffness_nmm2; elements],
             forces_n: vec![Vec3::zeros(); elements],
-            contacts: Vec::new(),
-            wall_stiffness_n_per_mm: 0.0,
+            springs: Vec::new(),
+            directions: Vec::new(),
         }
     }
 
     /// Number of elements n: also the number of unknown tangents.
     pub fn elements(&self) -> usize {
         self.lengths_mm.len()
+    }
+
+    /// The direction t̂ of a node, 1…n; none where tangents are free.
+    pub fn direction(&self, node: usize) -> Option<&Vec3> {
+        self.directions.get(node - 1)
     }
 
     /// Bending energy Ue in mJ of the tangents t₁…tₙ (eq. 6).
@@ -81,22 +107,13 @@ impl Chain {
         energy
     }
 
-    /// Wall energy Up in mJ of the positions x₁…xₙ (eq. 7).
-    pub fn wall_energy_mj(&self, positions_mm: &[Vec3]) -> f64 {
-        self.contacts
-            .iter()
-            .map(|c| {
-                let p = c.normal.dot(&positions_mm[c.node - 1]) - c.offset_mm;
-                0.5 * self.wall_stiffness_n_per_mm * p * p
-            })
-            .sum()
-    }
-
-    /// Force of the wall on the node of `contact`, N along its normal; negative where the wall would pull,
-    /// which eq. 7 allows since it is quadratic on both sides of the plane.
-    pub fn contact_force_n(&self, contact: &PlaneContact, positions_mm: &[Vec3]) -> f64 {
-        self.wall_stiffness_n_per_mm
-            * (contact.offset_mm - contact.normal.dot(&positions_mm[contact.node - 1]))
+    /// Energy of the springs in mJ at the positions x₁…xₙ (eq. 7).
+    pub fn spring_energy_mj(&self, positions_mm: &[Vec3]) -> f64 {
+        let energy = |s: &Spring| {
+            let p = s.direction.dot(&positions_mm[s.node - 1]) - s.offset_mm;
+            0.5 * s.stiffness_n_per_mm * p * p
+        };
+        self.springs.iter().map(energy).sum()
     }
 
     /// Positions x₁…xₙ of the tangents t₁…tₙ (eq. 8).
@@ -110,7 +127,13 @@ impl Chain {
         }
     }
 
-    /// −∂U/∂tᵢ at the tangents t₁…tₙ and their positions: what is left of eq. 10.
+    /// Divides tangents by their length, and takes the positions that follow from them.
+    pub fn normalise(&self, tangents: &mut [Vec3], positions_mm: &mut Vec<Vec3>) {
+        tangents.iter_mut().for_each(|t| *t /= t.norm());
+        self.integrate(tangents, positions_mm);
+    }
+
+    /// −∂U/∂tᵢ at the tangents t₁…tₙ and their positions: what is left of eq. 10, without the multipliers' share.
     ///
     /// Summed as a person would: the force on everything beyond an element acts on its tangents with the lever ½h, and
     /// wall forces come from penetrations. The same residual as b − At, but free of the cancellation between
@@ -119,8 +142,9 @@ impl Chain {
         let n = self.elements();
         residual.clear();
         residual.extend_from_slice(&self.forces_n);
-        for contact in &self.contacts {
-            residual[contact.node - 1] += contact.normal * self.contact_force_n(contact, positions_mm);
+        for spring in &self.springs {
+            let node = spring.node - 1;
+            residual[node] += spring.direction * spring.force_n(&positions_mm[node]);
         }
         // Force on node i and all beyond it, then its levers, both from the tip.
         for i in (1..n).rev() {

@@ -1,6 +1,6 @@
 //! Facts about the two solves, without a vessel.
 
-use super::chain::{Chain, PlaneContact};
+use super::chain::{Chain, Spring};
 use super::{banded, dense};
 use endowire_core::Vec3;
 
@@ -37,23 +37,42 @@ fn irregular_chain(elements: usize) -> Chain {
         chain.forces_n[i] = Vec3::new(wave, -0.5 * wave, 0.2) * 1e-3;
         if i % 3 == 1 {
             let normal = Vec3::new(wave, 1.0, -wave * wave).normalize();
-            chain.contacts.push(PlaneContact {
+            chain.springs.push(Spring {
                 node: i + 1,
-                normal,
+                direction: normal,
                 offset_mm: normal.dot(&chain.start_mm) + 0.1 * i as f64,
-                triangle: 0,
+                stiffness_n_per_mm: 1.0,
             });
         }
     }
-    chain.wall_stiffness_n_per_mm = 1.0;
     chain
 }
 
-/// Largest component of ∂U/∂t.
+/// The same with unit tangents about the directions of a helix, and a second spring at every sixth node.
+fn unit_chain(elements: usize) -> Chain {
+    let mut chain = irregular_chain(elements);
+    chain.directions = (0..elements)
+        .map(|i| {
+            let angle = 0.9 + 0.15 * i as f64;
+            Vec3::new(angle.cos(), angle.sin(), 0.4).normalize()
+        })
+        .collect();
+    for spring in chain.springs.clone().iter().step_by(2) {
+        let direction = spring.direction.cross(&chain.directions[spring.node - 1]).normalize();
+        chain.springs.push(Spring { direction, stiffness_n_per_mm: 0.02, ..*spring });
+    }
+    chain.springs.sort_by_key(|spring| spring.node);
+    chain
+}
+
+/// Largest component of ∂U/∂t, but for what multipliers hold.
 fn largest_slope(chain: &Chain, tangents: &[Vec3]) -> f64 {
     let (mut x, mut residual) = (Vec::new(), Vec::new());
     chain.integrate(tangents, &mut x);
     chain.residual(tangents, &x, &mut residual);
+    for (r, direction) in residual.iter_mut().zip(&chain.directions) {
+        *r -= direction * direction.dot(r);
+    }
     residual.iter().map(|r| r.amax()).fold(0.0, f64::max)
 }
 
@@ -65,7 +84,7 @@ fn the_residual_is_minus_the_slope_of_the_energy() {
         let mut x = Vec::new();
         chain.integrate(tangents, &mut x);
         let work: f64 = x.iter().zip(&chain.forces_n).map(|(x, f)| x.dot(f)).sum();
-        chain.bending_energy_mj(tangents) + chain.wall_energy_mj(&x) - work
+        chain.bending_energy_mj(tangents) + chain.spring_energy_mj(&x) - work
     };
     let (mut x, mut residual) = (Vec::new(), Vec::new());
     chain.integrate(&tangents, &mut x);
@@ -94,12 +113,30 @@ fn without_load_or_contact_the_chain_stays_straight() {
 
 #[test]
 fn both_solves_make_the_energy_stationary() {
-    let chain = irregular_chain(30);
-    for mut solution in [solve_dense(&chain), solve_banded(&chain)] {
-        assert!(largest_slope(&chain, &solution.tangents) < 1e-10);
-        solution.tangents[7].x += 1e-8;
-        assert!(largest_slope(&chain, &solution.tangents) > 1e-8, "the check must be able to fail");
+    for chain in [irregular_chain(30), unit_chain(30)] {
+        for mut solution in [solve_dense(&chain), solve_banded(&chain)] {
+            assert!(largest_slope(&chain, &solution.tangents) < 1e-9);
+            solution.tangents[7].x += 1e-8;
+            assert!(largest_slope(&chain, &solution.tangents) > 1e-8, "the check must be able to fail");
+        }
     }
+}
+
+#[test]
+fn tangents_are_of_unit_length_about_their_directions() {
+    let off = |chain: &Chain, tangents: &[Vec3]| {
+        let rows = tangents.iter().zip(&chain.directions).map(|(t, d)| (t.dot(d) - 1.0).abs());
+        rows.fold(0.0, f64::max)
+    };
+    let chain = unit_chain(40);
+    for mut solution in [solve_dense(&chain), solve_banded(&chain)] {
+        assert!(off(&chain, &solution.tangents) < 1e-12);
+        chain.normalise(&mut solution.tangents, &mut solution.positions_mm);
+        assert!(solution.tangents.iter().all(|t| (t.norm() - 1.0).abs() < 1e-15));
+    }
+    // The twin: free tangents are of any length.
+    let free = Chain { directions: Vec::new(), ..unit_chain(40) };
+    assert!(off(&chain, &solve_banded(&free).tangents) > 0.1);
 }
 
 #[test]
@@ -114,8 +151,11 @@ fn positions_are_the_integral_of_the_tangents() {
 
 #[test]
 fn dense_and_banded_agree_far_below_a_nanometre() {
-    for elements in [1, 2, 3, 17, 100] {
-        let mut chain = irregular_chain(elements);
+    for (elements, make) in [1, 2, 3, 17, 100]
+        .into_iter()
+        .flat_map(|n| [(n, irregular_chain as fn(usize) -> Chain), (n, unit_chain)])
+    {
+        let mut chain = make(elements);
         let dense = solve_dense(&chain);
         let difference = largest_difference(&dense.positions_mm, &solve_banded(&chain).positions_mm);
         assert!(difference < 1e-9, "{elements} elements: {difference:e} mm");

@@ -5,8 +5,15 @@
 //! tᵢ = 2(xᵢ − xᵢ₋₁)/hᵢ − tᵢ₋₁ without any factorisation, as section 2.2.4 remarks. Setting ∂U/∂t = 0,
 //!
 //! ```text
-//! A = K + κ Σⱼ Bⱼᵀ nⱼ nⱼᵀ Bⱼ                K: bending, block tridiagonal
-//! b = K₁₀ t₀ + Σⱼ κ (dⱼ − nⱼ·c) Bⱼᵀ nⱼ + Bᵀ f
+//! A = K + Σⱼ kⱼ Bⱼᵀ nⱼ nⱼᵀ Bⱼ               K: bending, block tridiagonal
+//! b = K₁₀ t₀ + Σⱼ kⱼ (dⱼ − nⱼ·c) Bⱼᵀ nⱼ + Bᵀ f
+//! ```
+//!
+//! Unit tangents add the rows t̂ᵢ·tᵢ = 1 with their multipliers λ. With T the matrix that has t̂ᵢ in the rows of node i and column i,
+//!
+//! ```text
+//! ⎡ A B⁻¹    T ⎤ ⎡ x − c ⎤   ⎡ b ⎤
+//! ⎣ Tᵀ B⁻¹   0 ⎦ ⎣   λ   ⎦ = ⎣ 1 ⎦
 //! ```
 //!
 //! A B⁻¹ mixes levers of the whole length with those of one element: its condition number reaches 10¹⁰ at 300 nodes, and
@@ -23,7 +30,7 @@ use endowire_core::Vec3;
 
 /// Solves for positions x₁…xₙ and tangents t₁…tₙ at the minimum of the energy of `chain`.
 ///
-/// O(n³) time, O(n²) memory: four dense matrices of (3n)² numbers.
+/// O(n³) time, O(n²) memory: four dense matrices of (3n)² numbers, (4n)² with unit tangents.
 pub fn solve(chain: &Chain, positions_mm: &mut Vec<Vec3>, tangents: &mut Vec<Vec3>) {
     positions_mm.clear();
     tangents.clear();
@@ -32,27 +39,50 @@ pub fn solve(chain: &Chain, positions_mm: &mut Vec<Vec3>, tangents: &mut Vec<Vec
         return;
     }
     let (a, b) = stationarity(chain);
-    let mut system = Mat::<f64>::zeros(3 * n, 3 * n);
+    let inverse_of_b = inverse_of_b(chain);
+    let held = chain.directions.len();
+    let size = 3 * n + held;
+    let mut system = Mat::<f64>::zeros(size, size);
     triangular::matmul(
-        system.as_mut(),
+        system.as_mut().submatrix_mut(0, 0, 3 * n, 3 * n),
         BlockStructure::Rectangular,
         Accum::Replace,
         a.as_ref(),
         BlockStructure::Rectangular,
-        inverse_of_b(chain).as_ref(),
+        inverse_of_b.as_ref(),
         BlockStructure::TriangularLower,
         1.0,
         Par::Seq,
     );
+    for (i, direction) in chain.directions.iter().enumerate() {
+        let row = 3 * n + i;
+        for (k, component) in direction.iter().enumerate() {
+            system[(3 * i + k, row)] = *component;
+            for j in 0..=i {
+                system[(row, 3 * j + k)] = component * inverse_of_b[(3 * i + k, 3 * j + k)];
+            }
+        }
+    }
     let factors = system.partial_piv_lu();
+    let right = Mat::from_fn(size, 1, |row, _| if row < 3 * n { b[(row, 0)] } else { 1.0 });
+    let solution = factors.solve(&right);
     tangents.resize(n, Vec3::zeros());
-    add_tangents(chain, &factors.solve(&b), tangents);
+    add_tangents(chain, &solution, tangents);
+    let mut multipliers: Vec<f64> = (0..held).map(|i| solution[(3 * n + i, 0)]).collect();
     let mut residual = Vec::with_capacity(n);
     for _ in 0..REFINEMENTS {
         chain.integrate(tangents, positions_mm);
         chain.residual(tangents, positions_mm, &mut residual);
-        let right = Mat::from_fn(3 * n, 1, |row, _| residual[row / 3][row % 3]);
-        add_tangents(chain, &factors.solve(&right), tangents);
+        for ((left, direction), multiplier) in residual.iter_mut().zip(&chain.directions).zip(&multipliers) {
+            *left -= direction * *multiplier;
+        }
+        let right = Mat::from_fn(size, 1, |row, _| match row.checked_sub(3 * n) {
+            None => residual[row / 3][row % 3],
+            Some(i) => 1.0 - chain.directions[i].dot(&tangents[i]),
+        });
+        let correction = factors.solve(&right);
+        add_tangents(chain, &correction, tangents);
+        multipliers.iter_mut().enumerate().for_each(|(i, m)| *m += correction[(3 * n + i, 0)]);
     }
     chain.integrate(tangents, positions_mm);
 }
@@ -128,19 +158,18 @@ fn stationarity(chain: &Chain) -> (Mat<f64>, Mat<f64>) {
         }
     }
 
-    // Contact rows √κ nⱼᵀBⱼ: their Gram matrix is the wall's share of A.
-    let kappa = chain.wall_stiffness_n_per_mm;
-    let mut rows = Mat::<f64>::zeros(chain.contacts.len(), 3 * n);
+    // Rows √k nⱼᵀBⱼ of the springs: their Gram matrix is the wall's share of A.
+    let mut rows = Mat::<f64>::zeros(chain.springs.len(), 3 * n);
     let sheath_part = sheath_part(chain);
-    for (row, contact) in chain.contacts.iter().enumerate() {
-        let i = contact.node - 1;
-        let gap = contact.offset_mm - contact.normal.dot(&sheath_part);
+    for (row, spring) in chain.springs.iter().enumerate() {
+        let (i, stiffness) = (spring.node - 1, spring.stiffness_n_per_mm);
+        let gap = spring.offset_mm - spring.direction.dot(&sheath_part);
         for j in 0..=i {
             let weight = b_entry(chain, i, j);
             for k in 0..3 {
-                let entry = weight * contact.normal[k];
-                rows[(row, 3 * j + k)] = kappa.sqrt() * entry;
-                b[(3 * j + k, 0)] += kappa * gap * entry;
+                let entry = weight * spring.direction[k];
+                rows[(row, 3 * j + k)] = stiffness.sqrt() * entry;
+                b[(3 * j + k, 0)] += stiffness * gap * entry;
             }
         }
     }

@@ -30,10 +30,17 @@
 pub mod banded;
 pub mod chain;
 pub mod dense;
+mod input;
+mod options;
+mod slide;
 pub mod stepper;
+mod wall;
 
 #[cfg(test)]
 mod chain_tests;
 
-pub use chain::{Chain, PlaneContact};
-pub use stepper::{Li2011, Li2011Options, LinearSolver};
+pub use chain::{Chain, Spring};
+pub use options::{Li2011Options, LinearSolver};
+pub use slide::TangentReading;
+pub use stepper::Li2011;
+pub use wall::ContactReading;

@@ -6,9 +6,11 @@ use endowire_core::methods::kirchhoff::KirchhoffOptions;
 use endowire_core::statics::LoadKind;
 use endowire_core::vessel::Wall;
 use endowire_core::{Error, Result, Vec3};
-use endowire_methods::li2011::{Chain, banded, dense};
+use endowire_methods::li2011::{Chain, ContactReading, Li2011Options, TangentReading, banded, dense};
 use endowire_methods::{AnyMethod, static_model};
 use endowire_verify::{at_end, unit_rod};
+
+use crate::studies::{PRINTED, TRIANGLE};
 
 /// Tolerance of `kirchhoff` that compares with those of the others in an insertion. They may leave a force of 0.01 EI/L² out of balance
 /// in all ([`endowire_methods::InsertionOptions`]); this is the part of the largest force that may be left at a node, and walls push with up to
@@ -40,7 +42,7 @@ pub(crate) fn insertion_within(
     device: Device,
     sheath: Sheath,
 ) -> Result<Simulation> {
-    let mut choice = AnyMethod::named(method)?.with_element_mm(element_mm);
+    let mut choice = named(method)?.with_element_mm(element_mm);
     match &mut choice {
         AnyMethod::Kirchhoff(options) => options.tolerance = tolerance,
         // Wall stiffness is per node in Li et al.: the same wall as the others' is the modulus times the element.
@@ -50,6 +52,52 @@ pub(crate) fn insertion_within(
         _ => {}
     }
     Simulation::builder(wall, device, sheath).properties(properties).method(&choice).build()
+}
+
+/// The method of a candidate: one by name, or the paper's in another reading.
+///
+/// # Errors
+/// A name that is no candidate's.
+pub(crate) fn named(candidate: &str) -> Result<AnyMethod> {
+    let readings = match candidate {
+        TRIANGLE => Some(TangentReading::Unit),
+        PRINTED => Some(TangentReading::Free),
+        _ => None,
+    };
+    match readings {
+        Some(tangents) => Ok(AnyMethod::Li2011Banded(Li2011Options {
+            tangents,
+            contact: ContactReading::Triangle,
+            ..Default::default()
+        })),
+        None => AnyMethod::named(candidate),
+    }
+}
+
+/// Most inputs of a static solve by the paper's method with unit tangents, over which the load grows evenly in the first ones; and the
+/// motion of the tip, over the length, with which an input is the last.
+const STATIC_INPUTS: (usize, usize) = (200, 10);
+const STATIC_MOTION: f64 = 1e-10;
+
+/// Tip and inputs of a cantilever by the paper's method with unit tangents: each input is one linear solve about the tangents that the one
+/// before has left.
+fn unit_cantilever(mut chain: Chain, force: Vec3, solve: impl Fn(&Chain, &mut Vec<Vec3>, &mut Vec<Vec3>)) -> Result<(Vec3, usize)> {
+    let last = chain.elements() - 1;
+    let (mut x, mut t) = (Vec::new(), Vec::new());
+    chain.directions = vec![chain.start_tangent; chain.elements()];
+    let mut tip = Vec3::zeros();
+    for input in 1..=STATIC_INPUTS.0 {
+        chain.forces_n[last] = force * (input as f64 / STATIC_INPUTS.1 as f64).min(1.0);
+        solve(&chain, &mut x, &mut t);
+        chain.normalise(&mut t, &mut x);
+        chain.directions.clone_from(&t);
+        let motion = (x[last] - tip).norm();
+        tip = x[last];
+        if input > STATIC_INPUTS.1 && motion < STATIC_MOTION {
+            return Ok((tip, input));
+        }
+    }
+    Err(Error::Computation(format!("li2011: no equilibrium after {} inputs", STATIC_INPUTS.0)))
 }
 
 /// Out-of-balance force of a static solve on n elements, in EI/L² over 1/n²: below what the elements get wrong.
@@ -73,16 +121,22 @@ pub(crate) fn cantilever(method: &str, elements: usize, a: f64) -> Result<(Vec3,
             let solution = case.solve()?.checked()?;
             Ok((Vec3::from(solution.tip), solution.iterations))
         }
-        "li2011-dense" | "li2011-banded" => {
+        "li2011-dense" | "li2011-banded" | TRIANGLE | PRINTED => {
             let mut chain = Chain::uniform(Vec3::zeros(), Vec3::x(), 1.0, elements, 1.0);
-            chain.forces_n[elements - 1] = Vec3::new(0.0, -a, 0.0);
-            let (mut x, mut t) = (Vec::new(), Vec::new());
-            if method == "li2011-dense" {
-                dense::solve(&chain, &mut x, &mut t);
-            } else {
-                banded::solve(&chain, &mut banded::Workspace::default(), &mut x, &mut t);
+            let force = Vec3::new(0.0, -a, 0.0);
+            let solve_banded = |chain: &Chain, x: &mut Vec<Vec3>, t: &mut Vec<Vec3>| {
+                banded::solve(chain, &mut banded::Workspace::default(), x, t);
+            };
+            match method {
+                "li2011-dense" => unit_cantilever(chain, force, dense::solve),
+                PRINTED => {
+                    chain.forces_n[elements - 1] = force;
+                    let (mut x, mut t) = (Vec::new(), Vec::new());
+                    solve_banded(&chain, &mut x, &mut t);
+                    Ok((x[elements - 1], 1))
+                }
+                _ => unit_cantilever(chain, force, solve_banded),
             }
-            Ok((x[elements - 1], 1))
         }
         _ => {
             let model = static_model(method)

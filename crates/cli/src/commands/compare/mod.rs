@@ -11,7 +11,6 @@ mod picture;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use endowire_methods::NAMES;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +18,7 @@ use crate::args::CompareArgs;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, progress, to_json};
-use crate::studies::CASES;
+use crate::studies::{CANDIDATES, CASES};
 use case::{Case, TruthNote};
 use front::Front;
 
@@ -77,7 +76,7 @@ pub(crate) fn compare(args: &CompareArgs) -> Result<(), Failure> {
     }
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::write(&args.out, &e))?;
     let wanted = |list: &[String], name: &str| list.is_empty() || list.iter().any(|w| w == name);
-    let methods: Vec<&str> = NAMES.into_iter().filter(|name| wanted(&args.methods, name)).collect();
+    let methods: Vec<&str> = CANDIDATES.into_iter().filter(|name| wanted(&args.methods, name)).collect();
     let cases: Vec<_> = CASES.into_iter().filter(|case| wanted(&args.cases, case.0)).collect();
     let cells: Vec<(&str, &str, usize)> = cases
         .iter()
@@ -119,7 +118,7 @@ fn finish(
 ) -> Result<(), Failure> {
     let Found { mut rows, truths, table, .. } = found;
     let order = |names: &[&str], name: &str| names.iter().position(|known| *known == name);
-    let (case_names, methods) = (CASES.map(|case| case.0), NAMES);
+    let (case_names, methods) = (CASES.map(|case| case.0), CANDIDATES);
     rows.sort_by_key(|row| (order(&case_names, &row.case), order(&methods, &row.method), row.resolution));
     let fronts: Vec<Front> = cases
         .iter()

@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use endowire_methods::NAMES;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::Row;
 use crate::failure::Failure;
 use crate::output::chart;
+use crate::studies::CANDIDATES;
 
 /// Size in pixels.
 const SIZE: (u32, u32) = (1650, 1060);
@@ -39,7 +39,7 @@ pub(super) fn write(
 
 /// Colour and mark of a method: ours stands out, the others differ also without colour.
 fn style(method: &str) -> (RGBColor, usize, u32) {
-    let index = NAMES.iter().position(|name| *name == method).unwrap_or(0);
+    let index = CANDIDATES.iter().position(|name| *name == method).unwrap_or(0);
     let width = if index == 0 { 4 } else { 2 };
     (chart::COLOURS[index % chart::COLOURS.len()], index, width)
 }
@@ -68,7 +68,7 @@ fn panel_of<B: DrawingBackend>(
     unit: &str,
     rows: &[Row],
 ) -> chart::Drawn<B> {
-    let all: Vec<(f64, f64)> = NAMES.iter().flat_map(|method| points(rows, case, method)).collect();
+    let all: Vec<(f64, f64)> = CANDIDATES.iter().flat_map(|method| points(rows, case, method)).collect();
     if all.is_empty() {
         return Ok(());
     }
@@ -95,7 +95,7 @@ fn panel_of<B: DrawingBackend>(
         .y_label_formatter(&chart::power)
         .draw()?;
     // Ours last, so that it lies on top.
-    for method in NAMES.iter().rev() {
+    for method in CANDIDATES.iter().rev() {
         let (colour, mark, width) = style(method);
         let line = points(rows, case, method);
         plot.draw_series(LineSeries::new(line.clone(), colour.stroke_width(width)))?;
@@ -113,7 +113,7 @@ fn panel_of<B: DrawingBackend>(
 
 fn legend<B: DrawingBackend>(panel: &DrawingArea<B, Shift>, rows: &[Row]) -> chart::Drawn<B> {
     let (x, mut y) = (70, 70);
-    for method in NAMES {
+    for method in CANDIDATES {
         if !rows.iter().any(|row| row.method == method) {
             continue;
         }

@@ -13,8 +13,7 @@ use endowire_core::Vec3;
 use endowire_core::device::{Device, Stack};
 use endowire_core::insertion::{Command, Sheath, Surroundings, WallProperties};
 use endowire_core::methods::Method;
-use endowire_core::vessel::{GeneratedWall, Resolution, Wall, WallQuery, anatomy};
-use endowire_methods::NAMES;
+use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, Wall, WallQuery, anatomy};
 use endowire_methods::li2011::{Chain, Li2011, Li2011Options, LinearSolver, banded, dense};
 use serde::Serialize;
 
@@ -107,7 +106,8 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
     };
 
     let methods = methods(&args.methods);
-    let (paper, others): (Vec<&str>, Vec<&str>) = methods.iter().partition(|m| m.starts_with("li2011"));
+    let (paper, others): (Vec<&str>, Vec<&str>) =
+        methods.iter().partition(|m| ["li2011-dense", "li2011-banded"].contains(m));
     let bar = progress::bar(args.nodes.len() * (usize::from(!paper.is_empty()) + others.len()), "row");
     let mut rows: Vec<Row> = Vec::new();
     for &nodes in &args.nodes {
@@ -161,7 +161,7 @@ fn paper_ms(nodes: usize) -> Option<f64> {
 /// The methods asked for, in the order of the table.
 fn methods(asked: &[String]) -> Vec<&'static str> {
     let is_asked = |name: &&str| asked.iter().any(|wanted| wanted == "all" || wanted == name);
-    NAMES.into_iter().filter(is_asked).collect()
+    CANDIDATES.into_iter().filter(is_asked).collect()
 }
 
 /// Element length with which `nodes` nodes, the sheath's too, are inserted; the timed increments stay within one element.
@@ -222,7 +222,7 @@ fn time_paper(
     let repeats = args.repeats;
     let options = Li2011Options { element_mm: element_mm(nodes, repeats), ..Default::default() };
     let mut refusal = None;
-    let mut dense_method = match Li2011::new(options, LinearSolver::Dense, surroundings) {
+    let mut dense_method = match Li2011::new(options, LinearSolver::Dense, surroundings, &NoStore) {
         Ok(method) => Some(method).filter(|_| dense),
         Err(reason) => {
             refusal = Some(reason.to_string()).filter(|_| dense);
@@ -231,7 +231,7 @@ fn time_paper(
     };
     let dense = dense_method.is_some();
     let follows = dense && nodes <= MOST_FOLLOWED;
-    let mut banded_method = Li2011::new(options, LinearSolver::Banded, surroundings)?;
+    let mut banded_method = Li2011::new(options, LinearSolver::Banded, surroundings, &NoStore)?;
     let mut max_difference_mm: f64 = 0.0;
     let mut step_both = |command: Command| -> Result<[f64; 2], Failure> {
         let clock = Instant::now();

@@ -1,0 +1,228 @@
+//! Algorithm 1 of the paper for one input of the hand: translate, collide, solve, and what is left over.
+//!
+//! The paper leaves open what collides. A node does here if its surface reaches the wall before or after the translation: seen only
+//! after it, pulling would lift every node off the outside of a bend, and the next solve would shoot the wire straight through the
+//! wall.
+//!
+//! One linear solve is exact but for second order in what the input moves. What that leaves is measured: how far the wall is at each node from
+//! where the solve took it to be, and how far nodes of unit tangents are from those of the solve. Forces are those of the solve,
+//! with which bending is in balance.
+
+use endowire_core::contact::extension::left_through;
+use endowire_core::insertion::{Contact, Energy, Surroundings, nodes_from_tip};
+use endowire_core::methods::{ChainState, TouchedPlane};
+
+use endowire_core::{Error, Result, Vec3};
+
+use super::chain::{Chain, Spring};
+use super::options::{Li2011Options, LinearSolver};
+use super::slide::{TangentReading, translate};
+use super::wall::{FeltWall, Met};
+use super::{banded, dense};
+
+/// A node that pressed at the last input is held to the wall while it is not farther from it than this part of its radius.
+const HOLD_RADII: f64 = 0.5;
+
+/// What inputs are worked out with. An input reads a state and leaves its result here.
+#[derive(Debug, Clone)]
+pub(super) struct Input {
+    pub(super) options: Li2011Options,
+    pub(super) solver: LinearSolver,
+    pub(super) wall: FeltWall,
+    pub(super) chain: Chain,
+    pub(super) from_tip_mm: Vec<f64>,
+    workspace: banded::Workspace,
+    /// What nodes met before the solve, by node.
+    met: Vec<Option<Met>>,
+    /// Positions as solved for, before tangents were made of unit length: forces are in balance there.
+    solved_mm: Vec<Vec3>,
+    positions_mm: Vec<Vec3>,
+    tangents: Vec<Vec3>,
+    /// How far the surface of each node is in the wall.
+    depths_mm: Vec<f64>,
+    /// Largest distance of the wall from where the solve took it to be, mm.
+    misfit_mm: f64,
+}
+
+impl Input {
+    pub(super) fn new(options: Li2011Options, solver: LinearSolver, wall: FeltWall, chain: Chain) -> Self {
+        Self {
+            options,
+            solver,
+            wall,
+            chain,
+            from_tip_mm: Vec::new(),
+            workspace: banded::Workspace::default(),
+            met: Vec::new(),
+            solved_mm: Vec::new(),
+            positions_mm: Vec::new(),
+            tangents: Vec::new(),
+            depths_mm: Vec::new(),
+            misfit_mm: 0.0,
+        }
+    }
+
+    /// Steps 2 to 5 of Algorithm 1 from `state` to a new inserted length. Returns the largest distance by which something is off, over
+    /// the radius of the device there.
+    pub(super) fn work_out(
+        &mut self,
+        surroundings: &Surroundings<'_>,
+        state: &ChainState,
+        inserted_mm: f64,
+    ) -> Result<f64> {
+        self.translate(surroundings, state, inserted_mm);
+        self.collide(surroundings, state);
+        self.solve()?;
+        Ok(self.left_over_radii(surroundings))
+    }
+
+    /// Step 2: the nodes of the new inserted length, before the solve.
+    fn translate(&mut self, surroundings: &Surroundings<'_>, state: &ChainState, inserted_mm: f64) {
+        let travel_mm = inserted_mm - state.report.inserted_mm;
+        nodes_from_tip(inserted_mm, self.options.element_mm, &mut self.from_tip_mm);
+        let Chain { lengths_mm, bending_stiffness_nmm2, forces_n, directions, .. } = &mut self.chain;
+        let from_tip_mm = &self.from_tip_mm;
+        let moved = (&mut self.positions_mm, directions);
+        translate(self.options.tangents, &state.shape, from_tip_mm, travel_mm, moved);
+        lengths_mm.clear();
+        bending_stiffness_nmm2.clear();
+        for ends in from_tip_mm.windows(2) {
+            lengths_mm.push(ends[0] - ends[1]);
+            let middle = 0.5 * (ends[0] + ends[1]);
+            bending_stiffness_nmm2.push(surroundings.device.section_at(middle).bending_stiffness_nmm2);
+        }
+        forces_n.clear();
+        forces_n.resize(from_tip_mm.len() - 1, Vec3::zeros());
+    }
+
+    /// Step 3: what the nodes collide with, as springs.
+    fn collide(&mut self, surroundings: &Surroundings<'_>, state: &ChainState) {
+        self.chain.springs.clear();
+        self.met.clear();
+        let nodes = self.positions_mm.len();
+        let stiffness_n_per_mm = self.options.wall_stiffness_n_per_mm;
+        for (index, x) in self.positions_mm.iter().enumerate() {
+            let radius_mm = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
+            let before = state.touched.get(nodes - 1 - index).copied().flatten();
+            let gap_mm = if before.is_some() { HOLD_RADII * radius_mm } else { 0.0 };
+            let direction = self.chain.directions.get(index).unwrap_or(&self.chain.start_tangent);
+            let met = self.wall.met(surroundings.query, x, direction, (radius_mm, gap_mm));
+            // A plane goes on where its triangle does not.
+            let met = match self.wall {
+                FeltWall::Triangle => met.or(before.map(|plane| Met { plane, across: None })),
+                FeltWall::Smooth(..) => met,
+            };
+            self.met.push(met);
+            let Some(Met { plane, across }) = met else { continue };
+            let spring = Spring {
+                node: index + 1,
+                direction: plane.normal,
+                offset_mm: plane.offset_mm,
+                stiffness_n_per_mm,
+            };
+            self.chain.springs.push(spring);
+            let pressed_n = before.map_or(stiffness_n_per_mm * plane.depth_mm, |plane| plane.force_n);
+            if let Some((direction, curvature_per_mm)) = across.filter(|_| pressed_n > 0.0) {
+                let (offset_mm, stiffness_n_per_mm) = (direction.dot(x), pressed_n * curvature_per_mm);
+                self.chain.springs.push(Spring { direction, offset_mm, stiffness_n_per_mm, ..spring });
+            }
+        }
+    }
+
+    /// Steps 4 and 5: the linear system.
+    fn solve(&mut self) -> Result<()> {
+        match self.solver {
+            LinearSolver::Dense => dense::solve(&self.chain, &mut self.solved_mm, &mut self.tangents),
+            LinearSolver::Banded => {
+                banded::solve(&self.chain, &mut self.workspace, &mut self.solved_mm, &mut self.tangents);
+            }
+        }
+        match self.options.tangents {
+            TangentReading::Unit => self.chain.normalise(&mut self.tangents, &mut self.positions_mm),
+            TangentReading::Free => self.positions_mm.clone_from(&self.solved_mm),
+        }
+        if self.positions_mm.iter().chain(&self.tangents).all(|v| v.iter().all(|c| c.is_finite())) {
+            return Ok(());
+        }
+        Err(Error::Computation(format!(
+            "li2011: the linear system of {} nodes and {} contacts has no finite solution: \
+             lower method.wall_stiffness_n_per_mm or use longer elements",
+            self.chain.elements(),
+            self.met.iter().flatten().count()
+        )))
+    }
+
+    /// The largest distance by which the result is off, over the radius of the device there.
+    fn left_over_radii(&mut self, surroundings: &Surroundings<'_>) -> f64 {
+        self.depths_mm.clear();
+        self.misfit_mm = 0.0;
+        let mut left_over = 0.0f64;
+        for (index, (x, solved)) in self.positions_mm.iter().zip(&self.solved_mm).enumerate() {
+            let radius_mm = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
+            let depth_mm = self.wall.depth_mm(surroundings.query, x, radius_mm);
+            let taken_mm = self.met[index].map_or(0.0, |met| met.plane.offset_mm - met.plane.normal.dot(x));
+            let misfit_mm = (taken_mm - depth_mm).abs();
+            self.misfit_mm = self.misfit_mm.max(misfit_mm);
+            left_over = left_over.max(misfit_mm.max((x - solved).norm()) / radius_mm);
+            self.depths_mm.push(depth_mm);
+        }
+        left_over
+    }
+
+    /// Step 6: the new state, but for what the hand has done.
+    pub(super) fn read_out(&self, surroundings: &Surroundings<'_>, state: &mut ChainState) {
+        let sheath = surroundings.sheath;
+        let ChainState { shape, report, touched } = state;
+        shape.positions_mm.clear();
+        shape.positions_mm.push(sheath.position_mm);
+        shape.positions_mm.extend_from_slice(&self.positions_mm);
+        shape.tangents.clear();
+        shape.tangents.push(sheath.direction);
+        shape.tangents.extend_from_slice(&self.tangents);
+        shape.from_tip_mm.clone_from(&self.from_tip_mm);
+
+        report.contacts.clear();
+        touched.clear();
+        let stiffness_n_per_mm = self.options.wall_stiffness_n_per_mm;
+        let (mut held_by, mut wall_mj, mut largest_n) = (Vec3::zeros(), 0.0, 0.0f64);
+        let nodes = self.positions_mm.iter().zip(&self.solved_mm).zip(&self.depths_mm);
+        for (((x, solved), &depth_mm), met) in nodes.zip(&self.met) {
+            let Some(Met { plane, .. }) = met else {
+                touched.push(None);
+                continue;
+            };
+            let taken_mm = plane.offset_mm - plane.normal.dot(solved);
+            let force_n = stiffness_n_per_mm * taken_mm;
+            largest_n = largest_n.max(force_n.abs());
+            wall_mj += 0.5 * force_n * taken_mm;
+            held_by += plane.normal * force_n;
+            report.contacts.push(Contact {
+                position_mm: *x,
+                normal: plane.normal,
+                force_n,
+                friction_n: Vec3::zeros(),
+                penetration_mm: depth_mm,
+                triangle: plane.triangle,
+            });
+            let touches = force_n > 0.0 || depth_mm > 0.0;
+            touched.push(touches.then_some(TouchedPlane { depth_mm, force_n, ..*plane }));
+        }
+        touched.reverse();
+        report.inserted_mm = self.from_tip_mm[0];
+        report.max_penetration_mm = self.depths_mm.iter().copied().fold(0.0, f64::max);
+        let misfit_n = stiffness_n_per_mm * self.misfit_mm;
+        report.imbalance = if misfit_n > 0.0 { misfit_n / largest_n.max(misfit_n) } else { 0.0 };
+        let bend = self.chain.bending_energy_mj(&self.tangents);
+        report.energy = Energy { bend, twist: 0.0, wall: wall_mj };
+        report.push_force_n = match (self.tangents.first(), self.chain.lengths_mm.first()) {
+            (Some(t1), Some(h1)) => {
+                let bending = t1 - sheath.direction;
+                -held_by.dot(&sheath.direction)
+                    - 0.5 * self.chain.bending_stiffness_nmm2[0] * bending.norm_squared() / (h1 * h1)
+            }
+            _ => 0.0,
+        };
+        let tip = self.positions_mm.last().unwrap_or(&sheath.position_mm);
+        report.left_through = left_through(surroundings.wall, tip).map(|(opening, _)| opening.index);
+    }
+}
