@@ -81,7 +81,11 @@ const STATIC_MOTION: f64 = 1e-10;
 
 /// Tip and inputs of a cantilever by the paper's method with unit tangents: each input is one linear solve about the tangents that the one
 /// before has left.
-fn unit_cantilever(mut chain: Chain, force: Vec3, solve: impl Fn(&Chain, &mut Vec<Vec3>, &mut Vec<Vec3>)) -> Result<(Vec3, usize)> {
+fn unit_cantilever(
+    mut chain: Chain,
+    force: Vec3,
+    solve: impl Fn(&Chain, &mut Vec<Vec3>, &mut Vec<Vec3>),
+) -> Result<(Vec3, usize)> {
     let last = chain.elements() - 1;
     let (mut x, mut t) = (Vec::new(), Vec::new());
     chain.directions = vec![chain.start_tangent; chain.elements()];

@@ -4,16 +4,19 @@
 //! The paper's truth is a real catheter in a plastic tube, whose points it does not print. Here it is our own converged
 //! solution, with its convergence shown, or a user's measured points.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use endowire_core::Vec3;
 use endowire_core::device::Device;
-use endowire_core::insertion::{Command, Sheath, WallProperties};
+use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
+use endowire_viewer::ViewSpec;
 use serde::{Deserialize, Serialize};
 
+use super::camera::Camera;
+use super::lines::{Line, Lines};
 use crate::args::DeformationArgs;
 use crate::commands::compare::candidate;
 use crate::commands::compare::case::rms_distance;
@@ -66,6 +69,13 @@ struct Row {
     paper_time_s: f64,
     /// The paper's time over ours.
     speedup: f64,
+    /// Linear solves, or iterations as the method counts them, of all steps.
+    iterations: u64,
+    steps: usize,
+    /// Steps that did not meet the method's own convergence test.
+    unconverged: usize,
+    /// Length of the polygon of nodes over what is inserted, less 1.
+    length_off: f64,
 }
 
 /// Change of the truth from one of its meshes to the next.
@@ -84,8 +94,18 @@ struct Document {
     ground_truth: String,
     convergence: Vec<Refinement>,
     rows: Vec<Row>,
-    total_time_s: f64,
-    paper_total_time_s: f64,
+    totals: Vec<Total>,
+    frames: Vec<PathBuf>,
+}
+
+/// A method over all cells that were asked for.
+#[derive(Debug, Serialize)]
+struct Total {
+    method: String,
+    time_s: f64,
+    paper_time_s: f64,
+    /// The paper's time over ours.
+    speedup: f64,
 }
 
 /// Vessel, sheath and wire of all cells.
@@ -95,9 +115,18 @@ struct Tube {
     wire: Device,
 }
 
+/// What an insertion has come to.
+struct Inserted {
+    simulation: Simulation,
+    time_s: f64,
+    iterations: u64,
+    steps: usize,
+    unconverged: usize,
+}
+
 impl Tube {
-    /// The shape after the whole insertion, and the time it took, s.
-    fn insert(&self, method: &str, l_mm: f64, h_mm: f64) -> Result<(Shape, f64), Failure> {
+    /// The whole insertion.
+    fn insert(&self, method: &str, l_mm: f64, h_mm: f64) -> Result<Inserted, Failure> {
         let mut simulation = candidate::insertion(
             method,
             l_mm,
@@ -107,13 +136,41 @@ impl Tube {
             self.sheath,
         )?;
         let steps = (INSERTED_MM / h_mm - 1e-9).ceil() as usize;
+        let (mut iterations, mut unconverged) = (0, 0);
         let clock = Instant::now();
         for k in 0..steps {
             let inserted = simulation.report().inserted_mm;
             let target = if k + 1 == steps { INSERTED_MM } else { h_mm * (k + 1) as f64 };
-            simulation.step(Command::advance(target - inserted))?;
+            let report = simulation.step(Command::advance(target - inserted))?;
+            iterations += u64::from(report.iterations);
+            unconverged += usize::from(!report.converged);
         }
-        Ok((simulation.shape().clone(), clock.elapsed().as_secs_f64()))
+        Ok(Inserted { time_s: clock.elapsed().as_secs_f64(), simulation, iterations, steps, unconverged })
+    }
+}
+
+impl Row {
+    fn new(method: &str, cell: Cell, inserted: &Inserted, truth: &Shape) -> Self {
+        let (l_mm, l_over_h, paper_rms_mm, paper_max_mm, paper_time_s) = cell;
+        let shape = inserted.simulation.shape();
+        let (rms_mm, max_mm) = rms_distance(shape, truth);
+        let length_mm: f64 = shape.positions_mm.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum();
+        Self {
+            method: method.to_owned(),
+            l_mm,
+            l_over_h,
+            rms_mm,
+            max_mm,
+            time_s: inserted.time_s,
+            paper_rms_mm,
+            paper_max_mm,
+            paper_time_s,
+            speedup: paper_time_s / inserted.time_s,
+            iterations: inserted.iterations,
+            steps: inserted.steps,
+            unconverged: inserted.unconverged,
+            length_off: length_mm / INSERTED_MM - 1.0,
+        }
     }
 }
 
@@ -124,10 +181,10 @@ pub(super) fn deformation(args: &DeformationArgs) -> Result<(), Failure> {
     let made = GeneratedWall::new(&tree, Resolution::EdgeMm(EDGE_MM))?;
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0)?;
     let tube = Tube { made, sheath, wire: Device::uniform(INSERTED_MM + 1.0, RADIUS_MM, STIFFNESS_NMM2)? };
-    let bar = progress::bar(cells.len() + TRUTH_MM.len(), "cell");
+    let bar = progress::bar(cells.len() * args.methods.len() + TRUTH_MM.len(), "cell");
 
     let mut inputs = vec![
-        format!("experiment deformation {} {:?} {:?}", args.method, args.l_mm, args.l_over_h).into_bytes(),
+        format!("experiment deformation {:?} {:?} {:?}", args.methods, args.l_mm, args.l_over_h).into_bytes(),
     ];
     let mut convergence = Vec::new();
     let (truth, ground_truth) = if let Some(path) = &args.measured {
@@ -138,7 +195,7 @@ pub(super) fn deformation(args: &DeformationArgs) -> Result<(), Failure> {
         let mut shapes: Vec<Shape> = Vec::new();
         for l_mm in TRUTH_MM {
             bar.set_message(format!("truth, {l_mm} mm"));
-            shapes.push(tube.insert("kirchhoff", l_mm, TRUTH_STEP_MM)?.0);
+            shapes.push(tube.insert("kirchhoff", l_mm, TRUTH_STEP_MM)?.simulation.shape().clone());
             bar.inc(1);
         }
         for (k, pair) in shapes.windows(2).enumerate() {
@@ -151,38 +208,71 @@ pub(super) fn deformation(args: &DeformationArgs) -> Result<(), Failure> {
         (shapes.swap_remove(TRUTH_MM.len() - 1), text)
     };
 
-    let mut rows = Vec::new();
-    for (l_mm, l_over_h, paper_rms_mm, paper_max_mm, paper_time_s) in cells {
-        bar.set_message(format!("l = {l_mm} mm, h = l/{l_over_h}"));
-        let (shape, time_s) = tube.insert(&args.method, l_mm, l_mm / f64::from(l_over_h))?;
-        let (rms_mm, max_mm) = rms_distance(&shape, &truth);
-        rows.push(Row {
-            method: args.method.clone(),
-            l_mm,
-            l_over_h,
-            rms_mm,
-            max_mm,
-            time_s,
-            paper_rms_mm,
-            paper_max_mm,
-            paper_time_s,
-            speedup: paper_time_s / time_s,
-        });
-        bar.inc(1);
+    let (mut rows, mut frames, mut totals) = (Vec::new(), Vec::new(), Vec::new());
+    for method in &args.methods {
+        let begin = rows.len();
+        for &cell in &cells {
+            let (l_mm, l_over_h, ..) = cell;
+            bar.set_message(format!("{method}, l = {l_mm} mm, h = l/{l_over_h}"));
+            let inserted = tube.insert(method, l_mm, l_mm / f64::from(l_over_h))?;
+            rows.push(Row::new(method, cell, &inserted, &truth));
+            bar.inc(1);
+            // The last cell of the table is the one that is drawn.
+            if let Some(folder) = args.out.as_ref().filter(|_| rows.len() == begin + cells.len()) {
+                let spec = ViewSpec { size_px: [640, 640], ..ViewSpec::default() };
+                let mut camera =
+                    Camera::new(folder, &format!("deformation_{method}"), spec, &tube.made.wall)?;
+                camera.take(&inserted.simulation)?;
+                frames.extend(camera.frames);
+            }
+        }
+        totals.push(Total::new(method, &rows[begin..]));
     }
     bar.finish_and_clear();
-    let document = Document {
-        provenance: Provenance::new(&inputs, 0),
-        ground_truth,
-        convergence,
-        total_time_s: rows.iter().map(|row| row.time_s).sum(),
-        paper_total_time_s: rows.iter().map(|row| row.paper_time_s).sum(),
-        rows,
-    };
+    if let Some(folder) = &args.out {
+        frames.extend(picture(&rows).write(folder, "deformation")?);
+    }
+    let document =
+        Document { provenance: Provenance::new(&inputs, 0), ground_truth, convergence, rows, totals, frames };
     if let Some(folder) = &args.out {
         super::write(folder, "deformation", &document.rows, &document)?;
     }
     answer(&document, args.json, || table(&document))
+}
+
+impl Total {
+    fn new(method: &str, rows: &[Row]) -> Self {
+        let time_s = rows.iter().map(|row| row.time_s).sum();
+        let paper_time_s: f64 = rows.iter().map(|row| row.paper_time_s).sum();
+        Self { method: method.to_owned(), time_s, paper_time_s, speedup: paper_time_s / time_s }
+    }
+}
+
+/// Error against increment, a line for each method and segment.
+fn picture(rows: &[Row]) -> Lines {
+    let mut lines: Vec<Line> = Vec::new();
+    let mut add = |name: String, point: (f64, f64), paper: bool| match lines
+        .iter_mut()
+        .find(|line| line.name == name)
+    {
+        Some(line) => line.points.push(point),
+        None => lines.push(Line { name, points: vec![point], paper }),
+    };
+    for (l_mm, l_over_h, rms_mm, ..) in PAPER {
+        let name = format!("Li et al. 2011, l = {l_mm} mm");
+        add(name, (l_mm / f64::from(l_over_h), rms_mm), true);
+    }
+    for row in rows {
+        let name = format!("{}, l = {} mm", row.method, row.l_mm);
+        add(name, (row.l_mm / f64::from(row.l_over_h), row.rms_mm), false);
+    }
+    Lines {
+        title: "experiment 4: distance from the truth",
+        across: "increment h, mm",
+        up: "RMS, mm",
+        logarithmic: true,
+        lines,
+    }
 }
 
 /// The cells of Table 2 that are asked for.
@@ -259,28 +349,44 @@ fn table(document: &Document) -> String {
         ));
     }
     lines.push(format!(
-        "{:>5} {:>5} {:>10} {:>10} {:>9}   {:>9} {:>9} {:>9} {:>9}",
-        "l mm", "h/l", "RMS mm", "max mm", "time s", "paper RMS", "paper max", "paper s", "faster"
+        "{:<22} {:>5} {:>5} {:>10} {:>10} {:>9} {:>10} {:>11} {:>9}   {:>9} {:>9} {:>9} {:>9}",
+        "method",
+        "l mm",
+        "h/l",
+        "RMS mm",
+        "max mm",
+        "time s",
+        "iterations",
+        "unconverged",
+        "length %",
+        "paper RMS",
+        "paper max",
+        "paper s",
+        "faster"
     ));
     for row in &document.rows {
         lines.push(format!(
-            "{:>5} {:>5} {:>10.5} {:>10.5} {:>9.3}   {:>9.2} {:>9.2} {:>9.1} {:>8.0}×",
+            "{:<22} {:>5} {:>5} {:>10.5} {:>10.5} {:>9.3} {:>10} {:>11} {:>9.3}   {:>9.2} {:>9.2} {:>9.1} {:>8.0}×",
+            row.method,
             row.l_mm,
             format!("1/{}", row.l_over_h),
             row.rms_mm,
             row.max_mm,
             row.time_s,
+            row.iterations,
+            format!("{}/{}", row.unconverged, row.steps),
+            1e2 * row.length_off,
             row.paper_rms_mm,
             row.paper_max_mm,
             row.paper_time_s,
             row.speedup
         ));
     }
-    lines.push(format!(
-        "whole grid: {:.2} s, the paper's {:.1} s: {:.0}× faster",
-        document.total_time_s,
-        document.paper_total_time_s,
-        document.paper_total_time_s / document.total_time_s
-    ));
+    for total in &document.totals {
+        lines.push(format!(
+            "{}: {:.2} s, the paper's {:.1} s: {:.0}× faster",
+            total.method, total.time_s, total.paper_time_s, total.speedup
+        ));
+    }
     lines.join("\n")
 }

@@ -4,23 +4,23 @@
 //! tube is closed by a half sphere, in which the tip is stopped; the paper does not say what stopped its catheter.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_viewer::ViewSpec;
-use plotters::coord::Shift;
-use plotters::prelude::*;
+use indicatif::ProgressBar;
 use serde::Serialize;
 
 use super::camera::Camera;
+use super::lines::{Line, Lines};
 use crate::args::LoopArgs;
 use crate::commands::compare::candidate;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
-use crate::output::{answer, chart, progress};
+use crate::output::{answer, progress};
 
 /// The tube: inner radius and length of its straight part, edge of its triangles; mm.
 const TUBE_RADIUS_MM: f64 = 15.0;
@@ -37,6 +37,7 @@ const ELEMENT_MM: f64 = 3.0;
 
 #[derive(Debug, Serialize)]
 struct Row {
+    method: String,
     inserted_mm: f64,
     /// Advance since the tip was stopped.
     advance_mm: f64,
@@ -48,6 +49,7 @@ struct Row {
     turned_deg: f64,
     push_force_n: f64,
     max_penetration_mm: f64,
+    converged: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -60,48 +62,22 @@ struct Document {
     failure: Option<String>,
 }
 
-/// Pushes, measures and draws.
+/// Pushes, measures and draws, method by method.
 pub(super) fn looping(args: &LoopArgs) -> Result<(), Failure> {
     let wall = Wall::from_surface(&closed_tube())?;
-    let sheath = Sheath::new(Vec3::new(OFFSET_MM, 0.0, 2.0), Vec3::z())?;
-    let device = Device::new(vec![
-        Section::straight(70.0, 0.445, 3.0),
-        Section::straight(30.0, 0.445, 15.0),
-        Section::straight(INSERTED_MM, 0.445, 60.0),
-    ])?;
-    let mut simulation =
-        candidate::insertion("kirchhoff", ELEMENT_MM, wall, WallProperties::default(), device, sheath)?;
-    let mut camera = match &args.out {
-        Some(folder) => {
-            let spec = ViewSpec { size_px: [480, 720], ..ViewSpec::default() };
-            Some(Camera::new(folder, "loop", spec, simulation.wall())?)
+    let bar = progress::bar(args.methods.len() * STEPS, "step");
+    let (mut rows, mut frames, mut failure) = (Vec::new(), Vec::new(), None);
+    for method in &args.methods {
+        bar.set_message(method.clone());
+        if let Err(error) = push(method, &wall, args.out.as_deref(), (&mut rows, &mut frames), &bar)? {
+            failure = failure.or(Some(format!("{method}: {error}")));
         }
-        None => None,
-    };
-    let steps = (INSERTED_MM / STEP_MM) as usize;
-    let bar = progress::bar(steps, "step");
-    let (mut rows, mut failure) = (Vec::new(), None);
-    let mut stopped_at: Option<f64> = None;
-    for _ in 0..steps {
-        if let Err(error) = simulation.step(Command::advance(STEP_MM)) {
-            failure = Some(error.to_string());
-            break;
-        }
-        let row = measure(&simulation, &mut stopped_at);
-        let due =
-            |camera: &&mut Camera| PICTURES_MM.get(camera.taken()).is_some_and(|mm| row.advance_mm >= *mm);
-        if let Some(camera) = camera.as_mut().filter(due) {
-            camera.take(&simulation)?;
-        }
-        rows.push(row);
-        bar.inc(1);
     }
     bar.finish_and_clear();
-    let mut frames = camera.map_or_else(Vec::new, |camera| camera.frames);
     if let Some(folder) = &args.out {
-        frames.extend(chart::write(folder, "loop", (900, 560), &Growth(&rows))?);
+        frames.extend(growth(&rows).write(folder, "loop")?);
     }
-    let provenance = Provenance::of_program("experiment loop");
+    let provenance = Provenance::of_program(&format!("experiment loop {:?}", args.methods));
     let document = Document { provenance, rows, frames, failure };
     if let Some(folder) = &args.out {
         super::write(folder, "loop", &document.rows, &document)?;
@@ -113,7 +89,52 @@ pub(super) fn looping(args: &LoopArgs) -> Result<(), Failure> {
     }
 }
 
-fn measure(simulation: &Simulation, stopped_at: &mut Option<f64>) -> Row {
+/// Steps of the whole insertion.
+const STEPS: usize = (INSERTED_MM / STEP_MM) as usize;
+
+/// Pushes the wire by one method. The inner error is that of a step, before which all is kept.
+fn push(
+    method: &str,
+    wall: &Wall,
+    out: Option<&Path>,
+    (rows, frames): (&mut Vec<Row>, &mut Vec<PathBuf>),
+    bar: &ProgressBar,
+) -> Result<endowire_core::Result<()>, Failure> {
+    let sheath = Sheath::new(Vec3::new(OFFSET_MM, 0.0, 2.0), Vec3::z())?;
+    let device = Device::new(vec![
+        Section::straight(70.0, 0.445, 3.0),
+        Section::straight(30.0, 0.445, 15.0),
+        Section::straight(INSERTED_MM, 0.445, 60.0),
+    ])?;
+    let properties = WallProperties::default();
+    let mut simulation = candidate::insertion(method, ELEMENT_MM, wall.clone(), properties, device, sheath)?;
+    let mut camera = match out {
+        Some(folder) => {
+            let spec = ViewSpec { size_px: [480, 720], ..ViewSpec::default() };
+            Some(Camera::new(folder, &format!("loop_{method}"), spec, simulation.wall())?)
+        }
+        None => None,
+    };
+    let (mut stopped_at, mut failed) = (None, Ok(()));
+    for _ in 0..STEPS {
+        if let Err(error) = simulation.step(Command::advance(STEP_MM)) {
+            failed = Err(error);
+            break;
+        }
+        let row = measure(method, &simulation, &mut stopped_at);
+        let due =
+            |camera: &&mut Camera| PICTURES_MM.get(camera.taken()).is_some_and(|mm| row.advance_mm >= *mm);
+        if let Some(camera) = camera.as_mut().filter(due) {
+            camera.take(&simulation)?;
+        }
+        rows.push(row);
+        bar.inc(1);
+    }
+    frames.extend(camera.into_iter().flat_map(|camera| camera.frames));
+    Ok(failed)
+}
+
+fn measure(method: &str, simulation: &Simulation, stopped_at: &mut Option<f64>) -> Row {
     let (shape, report) = (simulation.shape(), simulation.report());
     let x = &shape.positions_mm;
     let tip = x[x.len() - 1];
@@ -125,6 +146,7 @@ fn measure(simulation: &Simulation, stopped_at: &mut Option<f64>) -> Row {
     let beyond: Vec<&Vec3> = x.iter().filter(|x| x.z >= tip.z).collect();
     let across = |a: &Vec3| beyond.iter().map(|b| (a - *b).xy().norm()).fold(0.0, f64::max);
     Row {
+        method: method.to_owned(),
         inserted_mm: report.inserted_mm,
         advance_mm: stopped_at.map_or(0.0, |at| report.inserted_mm - at),
         loop_depth_mm: farthest - tip.z,
@@ -132,6 +154,7 @@ fn measure(simulation: &Simulation, stopped_at: &mut Option<f64>) -> Row {
         turned_deg: shape.tangents[shape.len() - 1].z.clamp(-1.0, 1.0).acos().to_degrees(),
         push_force_n: report.push_force_n,
         max_penetration_mm: report.max_penetration_mm,
+        converged: report.converged,
     }
 }
 
@@ -173,51 +196,41 @@ fn closed_tube() -> SurfaceMesh {
 }
 
 /// Loop size against advance.
-struct Growth<'a>(&'a [Row]);
-
-impl chart::Chart for Growth<'_> {
-    fn draw<B: DrawingBackend>(&self, root: &DrawingArea<B, Shift>) -> chart::Drawn<B> {
-        let rows = self.0;
-        let far = rows.last().map_or(1.0, |row| row.advance_mm).max(1.0);
-        let high = rows.iter().map(|r| r.loop_depth_mm.max(r.loop_width_mm)).fold(1.0, f64::max);
-        let mut plot = ChartBuilder::on(root)
-            .caption("growth of the loop after the tip was stopped", chart::font(22))
-            .margin(14)
-            .x_label_area_size(48)
-            .y_label_area_size(64)
-            .build_cartesian_2d(0.0..far, 0.0..1.15 * high)?;
-        plot.configure_mesh()
-            .light_line_style(WHITE)
-            .bold_line_style(RGBColor(225, 225, 225))
-            .x_desc("advance, mm")
-            .y_desc("mm")
-            .label_style(chart::font(15))
-            .axis_desc_style(chart::font(17))
-            .draw()?;
-        type Value = fn(&Row) -> f64;
-        let depth: Value = |row| row.loop_depth_mm;
-        let width: Value = |row| row.loop_width_mm;
-        let series = [("depth", depth, chart::COLOURS[0]), ("width", width, chart::COLOURS[3])];
-        for (name, value, colour) in series {
-            let line = rows.iter().filter(|r| r.advance_mm > 0.0).map(|r| (r.advance_mm, value(r)));
-            plot.draw_series(LineSeries::new(line, colour.stroke_width(3)))?;
-            if let Some(last) = rows.last() {
-                let at = (0.92 * far, value(last) + 0.08 * high);
-                plot.draw_series([Text::new(name, at, chart::font(18).color(&colour))])?;
-            }
-        }
-        Ok(())
+fn growth(rows: &[Row]) -> Lines {
+    type Value = fn(&Row) -> f64;
+    let values: [(&str, Value); 2] = [("depth", |row| row.loop_depth_mm), ("width", |row| row.loop_width_mm)];
+    let mut methods: Vec<&str> = rows.iter().map(|row| row.method.as_str()).collect();
+    methods.dedup();
+    let line = |method: &str, (name, value): &(&str, Value)| {
+        let own = rows.iter().filter(|row| row.method == method && row.advance_mm > 0.0);
+        let points = own.map(|row| (row.advance_mm, value(row))).collect();
+        Line { name: format!("{name}, {method}"), points, paper: false }
+    };
+    Lines {
+        title: "experiment 3: growth of the loop after the tip was stopped",
+        across: "advance, mm",
+        up: "mm",
+        logarithmic: false,
+        lines: methods.iter().flat_map(|method| values.iter().map(|value| line(method, value))).collect(),
     }
 }
 
 fn table(document: &Document) -> String {
     let mut lines = vec![format!(
-        "{:>11} {:>11} {:>9} {:>9} {:>11} {:>9} {:>15}",
-        "inserted mm", "advance mm", "depth mm", "width mm", "turned deg", "push N", "penetration mm"
+        "{:<22} {:>11} {:>11} {:>9} {:>9} {:>11} {:>9} {:>15}",
+        "method",
+        "inserted mm",
+        "advance mm",
+        "depth mm",
+        "width mm",
+        "turned deg",
+        "push N",
+        "penetration mm"
     )];
     for row in document.rows.iter().filter(|row| row.advance_mm > 0.0 && row.inserted_mm % 10.0 < 1e-6) {
         lines.push(format!(
-            "{:>11.1} {:>11.1} {:>9.2} {:>9.2} {:>11.1} {:>9.4} {:>15.4}",
+            "{:<22} {:>11.1} {:>11.1} {:>9.2} {:>9.2} {:>11.1} {:>9.4} {:>15.4}",
+            row.method,
             row.inserted_mm,
             row.advance_mm,
             row.loop_depth_mm,
@@ -226,6 +239,13 @@ fn table(document: &Document) -> String {
             row.push_force_n,
             row.max_penetration_mm
         ));
+    }
+    let mut methods: Vec<&str> = document.rows.iter().map(|row| row.method.as_str()).collect();
+    methods.dedup();
+    for method in methods {
+        let own = document.rows.iter().filter(|row| row.method == method);
+        let unconverged = own.clone().filter(|row| !row.converged).count();
+        lines.push(format!("{method}: {unconverged} of {} steps unconverged", own.count()));
     }
     lines.join("\n")
 }

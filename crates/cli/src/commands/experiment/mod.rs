@@ -3,8 +3,10 @@
 mod camera;
 mod catalogue;
 mod deformation;
+mod lines;
 mod looping;
 mod navigation;
+mod straight;
 mod timing;
 
 use std::path::Path;

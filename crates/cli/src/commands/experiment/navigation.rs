@@ -1,7 +1,7 @@
 //! `endowire experiment navigation`: the paper's experiment 2, figure 3.
 //!
-//! A shaped wire is steered to every named target of the aortic arch and the hepatic arteries by a hand that follows the centre line
-//! ([`FollowPath`]); with `--catalogue`, several instruments of the catalogue by hands that follow or search ([`catalogue`]).
+//! A straight wire is pushed into the aortic arch and the hepatic arteries by the paper's method and by ours ([`straight`](super::straight)), and a
+//! shaped wire of ours is steered to every named target by a hand that follows the centre line ([`FollowPath`]); with `--catalogue`, several instruments of the catalogue by hands that follow or search ([`catalogue`]).
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use super::camera::Camera;
 use super::catalogue::{self, Procedure};
+use super::straight::Straight;
 use crate::args::NavigationArgs;
 use crate::commands::compare::candidate;
 use crate::failure::Failure;
@@ -24,13 +25,13 @@ use crate::output::{answer, progress};
 use crate::studies::{ARCH_TARGETS, HEPATIC_TARGETS, targets};
 
 /// An anatomy, its targets in the order of their rows in the centre-line table, and how its wall and wire are made.
-struct Anatomy {
-    name: &'static str,
+pub(super) struct Anatomy {
+    pub(super) name: &'static str,
     targets: &'static [&'static str],
     edge_mm: f64,
-    radius_mm: f64,
+    pub(super) radius_mm: f64,
     tip_curvature_per_mm: f64,
-    tip_mm: f64,
+    pub(super) tip_mm: f64,
     primary_deg: f64,
 }
 
@@ -62,25 +63,31 @@ const ARRIVED_MM: f64 = 6.0;
 const FRAME_EVERY: usize = 50;
 
 #[derive(Debug, Serialize)]
-struct Row {
+pub(super) struct Row {
     anatomy: &'static str,
     target: &'static str,
-    success: bool,
-    commands: usize,
+    method: &'static str,
+    pub(super) success: bool,
+    pub(super) commands: usize,
     /// Times that the wire was pulled back.
     retries: usize,
     /// Length of the way.
     path_mm: f64,
-    inserted_mm: f64,
+    pub(super) inserted_mm: f64,
     /// Distance of the tip from the end of the way.
     from_target_mm: f64,
-    largest_push_n: f64,
-    largest_wall_force_n: f64,
-    largest_penetration_mm: f64,
+    pub(super) largest_push_n: f64,
+    pub(super) largest_wall_force_n: f64,
+    pub(super) largest_penetration_mm: f64,
+    /// Steps that did not meet the method's own convergence test.
+    pub(super) unconverged: usize,
+    /// Of straight wires: distance of the tips of both methods when the first of them leaves the vessel, and the largest on the way, mm.
+    pub(super) tip_apart_mm: Option<f64>,
+    pub(super) largest_tip_apart_mm: Option<f64>,
     /// Time of steps and hand, without frames.
-    time_s: f64,
+    pub(super) time_s: f64,
     /// Why it ended, where it did not arrive.
-    note: String,
+    pub(super) note: String,
     /// What is steered.
     instruments: String,
 }
@@ -105,15 +112,19 @@ pub(super) fn navigation(args: &NavigationArgs) -> Result<(), Failure> {
     for anatomy in ANATOMIES.iter().filter(|anatomy| anatomy.targets.iter().any(|name| wanted(name))) {
         let tree = built_in(anatomy.name)?;
         let made = GeneratedWall::new(&tree, Resolution::EdgeMm(anatomy.edge_mm))?;
-        let mut ends: Vec<usize> = made.ends.iter().skip(1).map(|end| end.0).collect();
+        let mut ends = made.ends[1..].to_vec();
         ends.sort_unstable();
-        for (target, end) in anatomy.targets.iter().zip(ends).filter(|(name, _)| wanted(name)) {
+        bar.set_message(format!("{}: straight wires", anatomy.name));
+        let straight = Straight::push(anatomy, &made)?;
+        for (target, (end, opening)) in anatomy.targets.iter().zip(ends).filter(|(name, _)| wanted(name)) {
             bar.set_message(format!("{}: {target}", anatomy.name));
             let mut camera = match &args.out {
                 Some(folder) => Some(camera(folder, anatomy, target, &made)?),
                 None => None,
             };
             let Some(path) = tree.path_to(end) else { continue };
+            let of_target = (anatomy, *target, opening);
+            rows.extend(straight.rows(of_target, &path, &made, args.out.as_deref(), &mut frames)?);
             rows.push(steer(anatomy, target, &path, &made, camera.as_mut())?);
             frames.extend(camera.into_iter().flat_map(|camera| camera.frames));
             bar.inc(1);
@@ -165,10 +176,17 @@ fn publish(args: &NavigationArgs, rows: Vec<Row>, frames: Vec<PathBuf>) -> Resul
 
 impl Row {
     /// Of a way that has not been begun.
-    fn new(anatomy: &'static str, target: &'static str, path_mm: f64, instruments: String) -> Self {
+    pub(super) fn new(
+        anatomy: &'static str,
+        target: &'static str,
+        path_mm: f64,
+        method: &'static str,
+        instruments: String,
+    ) -> Self {
         Self {
             anatomy,
             target,
+            method,
             success: false,
             commands: 0,
             retries: 0,
@@ -178,6 +196,9 @@ impl Row {
             largest_push_n: 0.0,
             largest_wall_force_n: 0.0,
             largest_penetration_mm: 0.0,
+            unconverged: 0,
+            tip_apart_mm: None,
+            largest_tip_apart_mm: None,
             time_s: 0.0,
             note: String::new(),
             instruments,
@@ -198,6 +219,7 @@ impl Row {
             let report = simulation.report();
             self.largest_push_n = self.largest_push_n.max(report.push_force_n);
             self.largest_penetration_mm = self.largest_penetration_mm.max(report.max_penetration_mm);
+            self.unconverged += usize::from(!report.converged);
             let force: f64 = report.contacts.iter().map(|c| c.force_n).sum();
             self.largest_wall_force_n = self.largest_wall_force_n.max(force);
             let clock = Instant::now();
@@ -218,7 +240,7 @@ impl Row {
     }
 
     /// How far the tip is from the end of the way.
-    fn end(&mut self, simulation: &Simulation, path: &CentrelinePath) {
+    pub(super) fn end(&mut self, simulation: &Simulation, path: &CentrelinePath) {
         let tip = simulation.shape().tip_mm().unwrap_or_default();
         self.from_target_mm = (tip - path.end_mm()).norm();
     }
@@ -244,7 +266,7 @@ fn steer(
     let properties = WallProperties::default();
     let mut simulation =
         candidate::insertion("kirchhoff", element_mm, made.wall.clone(), properties, wire, sheath)?;
-    let mut row = Row::new(anatomy.name, target, path.length_mm(), "shaped wire".to_owned());
+    let mut row = Row::new(anatomy.name, target, path.length_mm(), "kirchhoff", "shaped wire".to_owned());
     let mut hand = FollowPath::new(path.clone(), Team::default(), ARRIVED_MM);
     let mut number = 0;
     row.success = row.drive(&mut simulation, &mut hand, |simulation| {
@@ -270,7 +292,7 @@ fn carry_out(
 ) -> Result<Row, Failure> {
     let path = tree.path_to(tree.target(target)?.row);
     let path = path.ok_or_else(|| Failure::Input(format!("{target} is where the vessel begins")))?;
-    let mut row = Row::new(procedure.anatomy, target, path.length_mm(), procedure.instruments());
+    let mut row = Row::new(procedure.anatomy, target, path.length_mm(), "kirchhoff", procedure.instruments());
     row.success = true;
     for (number, stage) in procedure.stages.iter().enumerate() {
         let Some(mut hand) = stage.controller(tree, target)? else { continue };
@@ -285,7 +307,12 @@ fn carry_out(
 }
 
 /// A camera for one target.
-fn camera(folder: &Path, anatomy: &Anatomy, target: &str, made: &GeneratedWall) -> Result<Camera, Failure> {
+pub(super) fn camera(
+    folder: &Path,
+    anatomy: &Anatomy,
+    target: &str,
+    made: &GeneratedWall,
+) -> Result<Camera, Failure> {
     let spec = ViewSpec {
         size_px: [512, 512],
         c_arm: CArmSpec { primary_deg: anatomy.primary_deg, ..CArmSpec::default() },
@@ -298,9 +325,11 @@ fn camera(folder: &Path, anatomy: &Anatomy, target: &str, made: &GeneratedWall) 
 
 fn table(rows: &[Row]) -> String {
     let mut lines = vec![format!(
-        "{:<15} {:<16} {:>7} {:>8} {:>7} {:>8} {:>11} {:>7} {:>7} {:>14} {:>7}  note",
+        "{:<15} {:<16} {:<13} {:<25} {:>7} {:>8} {:>7} {:>8} {:>11} {:>7} {:>7} {:>14} {:>11} {:>8} {:>7}  note",
         "anatomy",
         "target",
+        "method",
+        "instruments",
         "arrived",
         "commands",
         "retries",
@@ -309,14 +338,18 @@ fn table(rows: &[Row]) -> String {
         "push N",
         "wall N",
         "penetration mm",
+        "unconverged",
+        "apart mm",
         "time s"
     )];
     for row in rows {
         lines.push(
             format!(
-                "{:<15} {:<16} {:>7} {:>8} {:>7} {:>8.1} {:>11.1} {:>7.4} {:>7.4} {:>14.4} {:>7.2}  {}",
+                "{:<15} {:<16} {:<13} {:<25} {:>7} {:>8} {:>7} {:>8.1} {:>11.1} {:>7.4} {:>7.4} {:>14.4} {:>11} {:>8} {:>7.2}  {}",
                 row.anatomy,
                 row.target,
+                row.method,
+                row.instruments,
                 if row.success { "yes" } else { "no" },
                 row.commands,
                 row.retries,
@@ -325,6 +358,8 @@ fn table(rows: &[Row]) -> String {
                 row.largest_push_n,
                 row.largest_wall_force_n,
                 row.largest_penetration_mm,
+                row.unconverged,
+                row.tip_apart_mm.map_or_else(|| "–".to_owned(), |mm| format!("{mm:.3}")),
                 row.time_s,
                 row.note
             )
@@ -332,7 +367,21 @@ fn table(rows: &[Row]) -> String {
             .to_owned(),
         );
     }
-    let arrived = rows.iter().filter(|row| row.success).count();
-    lines.push(format!("{arrived} of {} targets reached", rows.len()));
+    let mut who: Vec<(&str, &str)> = Vec::new();
+    for row in rows {
+        let one =
+            (row.method, if row.tip_apart_mm.is_some() { "straight wire, not turned" } else { "steered" });
+        if !who.contains(&one) {
+            who.push(one);
+        }
+    }
+    for (method, how) in who {
+        let own = || {
+            let straight = how != "steered";
+            rows.iter().filter(move |row| row.method == method && row.tip_apart_mm.is_some() == straight)
+        };
+        let arrived = own().filter(|row| row.success).count();
+        lines.push(format!("{method}, {how}: {arrived} of {} targets reached", own().count()));
+    }
     lines.join("\n")
 }

@@ -7,6 +7,7 @@
 //!
 //! A method that cannot be brought into position within the time limit says so in its row, and larger numbers of nodes are not begun.
 
+use std::path::PathBuf;
 use std::time::Instant;
 
 use endowire_core::Vec3;
@@ -17,11 +18,13 @@ use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, Wall, WallQuery,
 use endowire_methods::li2011::{Chain, Li2011, Li2011Options, LinearSolver, banded, dense};
 use serde::Serialize;
 
+use super::lines::{Line, Lines};
 use crate::args::TimingArgs;
 use crate::commands::compare::candidate;
 use crate::failure::Failure;
 use crate::output::provenance::Provenance;
 use crate::output::{answer, progress};
+use crate::studies::CANDIDATES;
 
 /// The paper's Table 1: nodes, milliseconds, on an Intel Core2 6700 with a GeForce 8800.
 const PAPER_MS: [(usize, f64); 5] = [(50, 9.2), (100, 15.4), (150, 24.8), (200, 36.7), (300, 58.4)];
@@ -50,6 +53,8 @@ struct Document {
     #[serde(flatten)]
     provenance: Provenance,
     rows: Vec<Row>,
+    /// The picture of the table.
+    frames: Vec<PathBuf>,
 }
 
 #[derive(Debug, Serialize)]
@@ -131,7 +136,11 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
     bar.finish_and_clear();
 
     let arguments = format!("experiment timing {:?} {} {methods:?}", args.nodes, args.repeats);
-    let document = Document { provenance: Provenance::of_program(&arguments), rows };
+    let frames = match &args.out {
+        Some(folder) => picture(&rows).write(folder, "timing")?,
+        None => Vec::new(),
+    };
+    let document = Document { provenance: Provenance::of_program(&arguments), rows, frames };
     if let Some(folder) = &args.out {
         super::write(folder, "timing", &document.rows, &document)?;
     }
@@ -327,6 +336,30 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
     if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
+}
+
+/// Time of a whole calculation against the number of nodes.
+fn picture(rows: &[Row]) -> Lines {
+    let mut lines = vec![Line {
+        name: "Li et al. 2011, on a graphics processor".to_owned(),
+        points: PAPER_MS.map(|(nodes, ms)| (nodes as f64, ms)).to_vec(),
+        paper: true,
+    }];
+    for method in CANDIDATES {
+        let own = rows.iter().filter(|row| row.method == method);
+        let points: Vec<_> =
+            own.filter_map(|row| Some((row.nodes as f64, row.step_ms.or(row.median_ms)?))).collect();
+        if !points.is_empty() {
+            lines.push(Line { name: method.to_owned(), points, paper: false });
+        }
+    }
+    Lines {
+        title: "experiment 1: time of one calculation",
+        across: "nodes",
+        up: "ms",
+        logarithmic: true,
+        lines,
+    }
 }
 
 /// The table for a person.
