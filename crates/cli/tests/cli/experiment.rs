@@ -66,8 +66,15 @@ fn a_target_is_reached_and_drawn() {
     let out = folder.path().to_str().unwrap();
     let found = told(&experiment(&["navigation", "--target", "aorta", "--out", out, "--json"]));
     assert_written(folder.path(), "navigation", &found);
-    let [row] = rows(&found) else { panic!("one target was asked for") };
+    let [paper, exact, row] = rows(&found) else { panic!("one target was asked for, of two wires") };
     assert_eq!((&row["target"], &row["success"]), (&"aorta".into(), &true.into()));
+    assert_eq!((&paper["method"], &exact["method"]), (&"li2011-banded".into(), &"kirchhoff".into()));
+    // Both straight wires go where the aorta goes on, with the same hand.
+    for straight in [paper, exact] {
+        assert_eq!(straight["success"], true, "{straight}");
+        assert!(straight["tip_apart_mm"].as_f64().unwrap() < 3.0, "{straight}");
+    }
+    assert!(row["tip_apart_mm"].is_null());
     assert!(row["from_target_mm"].as_f64().unwrap() < row["path_mm"].as_f64().unwrap() / 4.0, "{row}");
     assert!(row["largest_wall_force_n"].as_f64().unwrap() > 0.0, "{row}");
     let frames = found["frames"].as_array().unwrap();
@@ -83,19 +90,22 @@ fn the_loop_grows_with_the_advance() {
     let folder = tempfile::tempdir().unwrap();
     let found = told(&experiment(&["loop", "--out", folder.path().to_str().unwrap(), "--json"]));
     assert_written(folder.path(), "loop", &found);
-    // The paper's four pictures in two views, and the chart as SVG and PNG.
+    // The paper's four pictures in two views by two methods, and the chart as SVG and PNG.
     let frames = found["frames"].as_array().unwrap();
-    assert_eq!(frames.len(), 4 * 2 + 2, "{frames:?}");
+    assert_eq!(frames.len(), 2 * 4 * 2 + 2, "{frames:?}");
     assert!(frames.iter().all(|frame| Path::new(frame.as_str().unwrap()).exists()), "{frames:?}");
     assert!(found["failure"].is_null(), "{}", found["failure"]);
     let value = |row: &Value, key: &str| row[key].as_f64().unwrap();
-    let stopped: Vec<&Value> = rows(&found).iter().filter(|row| value(row, "advance_mm") > 0.0).collect();
-    assert!(stopped.len() > 90, "the tip is stopped long before the end");
-    let at = |advance: f64| stopped.iter().find(|row| value(row, "advance_mm") >= advance).unwrap();
-    assert!(value(at(60.0), "loop_depth_mm") > value(at(20.0), "loop_depth_mm") + 10.0);
-    assert!(value(at(90.0), "loop_depth_mm") > value(at(60.0), "loop_depth_mm") + 10.0);
-    assert!(value(at(90.0), "turned_deg") > 150.0, "the tip points back");
-    assert!(stopped.iter().all(|row| value(row, "loop_width_mm") < 30.1), "no wider than the tube");
+    for method in ["li2011-banded", "kirchhoff"] {
+        let own = rows(&found).iter().filter(|row| row["method"] == method);
+        let stopped: Vec<&Value> = own.filter(|row| value(row, "advance_mm") > 0.0).collect();
+        assert!(stopped.len() > 90, "{method}: the tip is stopped long before the end");
+        let at = |advance: f64| stopped.iter().find(|row| value(row, "advance_mm") >= advance).unwrap();
+        assert!(value(at(60.0), "loop_depth_mm") > value(at(20.0), "loop_depth_mm") + 10.0, "{method}");
+        assert!(value(at(90.0), "loop_depth_mm") > value(at(60.0), "loop_depth_mm") + 10.0, "{method}");
+        assert!(value(at(90.0), "turned_deg") > 150.0, "{method}: the tip points back");
+        assert!(stopped.iter().all(|row| value(row, "loop_width_mm") < 30.1), "{method}: no wider than the tube");
+    }
 }
 
 #[test]
@@ -111,12 +121,22 @@ fn measured_points_stand_in_for_the_computed_truth() {
     assert_written(folder.path(), "deformation", &found);
     assert!(found["ground_truth"].as_str().unwrap().starts_with("measured points of"), "{found}");
     assert!(found["convergence"].as_array().unwrap().is_empty());
-    let [row] = rows(&found) else { panic!("one cell was asked for") };
-    assert_eq!((&row["l_mm"], &row["l_over_h"]), (&3.0.into(), &3.into()));
-    assert_eq!(row["paper_rms_mm"], 1.62);
-    let (rms, max) = (row["rms_mm"].as_f64().unwrap(), row["max_mm"].as_f64().unwrap());
-    assert!(rms > 10.0 && max > rms, "a straight wire is not in the bend: {rms}, {max}");
-    assert!((row["speedup"].as_f64().unwrap() * row["time_s"].as_f64().unwrap() - 2.1).abs() < 1e-9);
+    let methods: Vec<&Value> = rows(&found).iter().map(|row| &row["method"]).collect();
+    assert_eq!(methods, ["li2011-banded", "li2011-banded-printed", "kirchhoff"]);
+    for row in rows(&found) {
+        assert_eq!((&row["l_mm"], &row["l_over_h"]), (&3.0.into(), &3.into()));
+        assert_eq!(row["paper_rms_mm"], 1.62);
+        let (rms, max) = (row["rms_mm"].as_f64().unwrap(), row["max_mm"].as_f64().unwrap());
+        assert!(rms > 10.0 && max > rms, "a straight wire is not in the bend: {rms}, {max}");
+        assert!((row["speedup"].as_f64().unwrap() * row["time_s"].as_f64().unwrap() - 2.1).abs() < 1e-9);
+    }
+    let off = |row: &Value| row["length_off"].as_f64().unwrap().abs();
+    assert!(off(&rows(&found)[0]) < 1e-3 && off(&rows(&found)[1]) > 0.1, "as printed the wire shortens");
+    assert_eq!(rows(&found)[0]["unconverged"], 0);
+    // Two views of each, and the chart as SVG and PNG.
+    let frames = found["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 3 * 2 + 2, "{frames:?}");
+    assert!(frames.iter().all(|frame| Path::new(frame.as_str().unwrap()).exists()), "{frames:?}");
 }
 
 #[test]

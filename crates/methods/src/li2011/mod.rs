@@ -1,5 +1,5 @@
 //! The method of Li, Qin, Guo, Chui and Heng, *A Novel FEM-Based Numeric Solver for Interactive Catheter
-//! Simulation in Virtual Catheterization*, International Journal of Biomedical Imaging 2011 — as printed.
+//! Simulation in Virtual Catheterization*, International Journal of Biomedical Imaging 2011.
 //!
 //! A catheter is a chain of nodes with positions x and tangents t = x′. Tangents are linear between nodes
 //! (eq. 5), positions their integral (eq. 8), and the total potential energy U = Ue + W + Up (eq. 1) is
@@ -9,18 +9,26 @@
 //! - [`chain`]: the discrete energy and its data;
 //! - [`dense`]: the system A B⁻¹ x = b solved as the paper does, O(n³);
 //! - [`banded`]: the same minimum by block elimination along the chain, O(n);
-//! - [`stepper`]: Algorithm 1 as an insertion method.
+//! - `slide`, `wall`, `input`: one input of Algorithm 1; [`stepper`]: commands as inputs.
+//!
+//! # Three readings
+//! As printed the method cannot pass the bend of its own tube: nothing holds |t| at 1, and through a half-turn the cheapest path of
+//! tangents leads through zero. Three readings of the paper close that gap, and still one linear system is solved for each input:
+//!
+//! 1. "Translate each node by disp": every node moves by disp along the wire's own curve, as a wire that slides does (`slide`).
+//! 2. t(s) = x′(s) is a unit vector: one row t̂·t = 1 and one multiplier a node, t̂ the slid tangent; tangents are divided by their length
+//!    after the solve, and x = B t ([`chain`]).
+//! 3. A contact knows the curvature of the lumen across the device (`wall`).
+//!
+//! `tangents = "unit"` is 1 and 2, `contact = "smooth"` is 3. `tangents = "free"` with `contact = "triangle"` is the paper as printed.
 //!
 //! # What it cannot do
-//! Kept on purpose, since this is the faithful method:
-//! - **No unit length.** Nothing holds |t| at 1. A cantilever under a tip load P L²/EI = 1, 2, 5, 10 deflects
-//!   10 %, 35 %, 133 %, 311 % too far, and no mesh cures it: it is a small-bending model.
-//! - **Wall stiffness per node** (eq. 7): refining the chain stiffens the wall.
-//! - **One linear solve per input**: a contact found at the translated position acts for the whole step; what the
-//!   solve pushes into the wall elsewhere is found at the next input. A step is reported as converged if the nodes and
-//!   triangles in contact after the solve are those that it was solved with; where they are not, the wire may be
-//!   millimetres beyond the wall for that step (`endowire run` reports how far).
+//! - **Wall stiffness per node** (eq. 7): refining the chain stiffens the wall, and between nodes nothing is felt.
+//! - **One linear solve per input**: what is met during an input is found at the next. What an input leaves is measured and told
+//!   (`input`), and with unit tangents inputs that leave much are halved ([`stepper`]).
 //! - No twist, no rest curvature, no friction.
+//! - With free tangents, no unit length: a cantilever under a tip load P L²/EI = 1, 2, 5, 10 deflects 10 %, 35 %, 133 %, 311 % too far, and no
+//!   mesh cures it.
 //!
 //! # Misprints read as meant
 //! Eq. 4 and 6 drop the ½ of eq. 2: it is kept here. Eq. 5's first weight must read (sᵢ − s)/(sᵢ − sᵢ₋₁) for the

@@ -5,9 +5,9 @@
 //! between the sheath and the first such node, has another length: between half and one and a half elements, so that
 //! no sliver arises.
 //!
-//! The inputs h of the paper's Table 2 are a third to a fortieth of a segment l, one linear solve each. As printed (`tangents = "free"`)
-//! a command is one input, whatever its length. With unit tangents it is cut into inputs within that range: as long as l/3, and where
-//! one leaves something that is off by more than a tenth of the device's radius, shorter by halves down to l/40.
+//! The inputs h of the paper's Table 2 are at most a third of a segment l, and a fortieth of a millimetre at least, one linear solve each. As
+//! printed (`tangents = "free"`) a command is one input, whatever its length. With unit tangents it is cut into inputs within that range: as
+//! long as l/3, and where one leaves something that is off by more than a tenth of the device's radius, shorter by halves.
 
 use std::sync::Arc;
 
@@ -26,9 +26,10 @@ use super::wall::{ContactReading, FeltWall};
 
 /// An input has converged if nothing is off by more than this part of the device's radius.
 const CONVERGED_RADII: f64 = 0.1;
-/// Longest input and shortest, over the segment: those of Table 2.
+/// Longest input over the segment: that of Table 2.
 const LONGEST_INPUT: f64 = 1.0 / 3.0;
-const SHORTEST_INPUT: f64 = 1.0 / 40.0;
+/// Shortest input, mm: that of Table 2, a fortieth of a millimetre.
+const SHORTEST_INPUT_MM: f64 = 0.025;
 /// A command is not cut for the rounding of its length over the longest input.
 const ROUNDING: f64 = 1e-6;
 /// Retracting to within this of the sheath, mm, is retracting to it: the rounding of summed increments.
@@ -105,7 +106,7 @@ impl Li2011 {
             solves += 1;
             let off = left_over > CONVERGED_RADII;
             let half_mm = 0.5 * (next_mm - now_mm).abs();
-            if off && tangents == TangentReading::Unit && half_mm >= SHORTEST_INPUT * element_mm {
+            if off && tangents == TangentReading::Unit && half_mm >= SHORTEST_INPUT_MM {
                 input_mm = half_mm;
                 continue;
             }

@@ -18,6 +18,7 @@ pub use exposure::ExposureSpec;
 pub use xray::{DetectorSpec, Mode, XRaySpec};
 
 use crate::device::DevicePart;
+use crate::output::Animation;
 use crate::xray::check_exposure;
 
 /// Largest side of a frame. Flat detectors have up to about 3000 pixels a side, and with two rays across a
@@ -76,6 +77,9 @@ pub struct ViewSpec {
     /// A frame each so many recorded steps; the last step always gets one. From 1. This is the recorder's to
     /// obey.
     pub every: u32,
+    /// Name of a moving picture of all frames in the folder of the recording, the views side by side, its kind by the end of its name: `.gif`, `.png` or
+    /// `.apng`, and `.mp4` with the feature of that name. It too is the recorder's to obey.
+    pub film: Option<String>,
     /// What computes the frames.
     pub backend: Backend,
     /// Position of the C-arm.
@@ -112,6 +116,7 @@ impl Default for ViewSpec {
             size_px: [640, 640],
             views: Vec::new(),
             every: 10,
+            film: None,
             backend: Backend::Auto,
             c_arm: CArmSpec::default(),
             biplane_deg: None,
@@ -221,6 +226,14 @@ impl ViewSpec {
         if self.every == 0 {
             return Err(Error::parameter("view.every", 0, "must be at least 1"));
         }
+        if let Some(film) = &self.film {
+            let name = Path::new(film);
+            if name.file_name() != Some(name.as_os_str()) {
+                let mend = "is no name of a file in the folder of the recording: leave folders out of it";
+                return Err(Error::parameter("view.film", film, mend));
+            }
+            Animation::check_name(name)?;
+        }
         self.c_arm.validate()?;
         if let Some(turn_deg) = self.biplane_deg {
             finite_within("view.biplane_deg", turn_deg, [-180.0, 180.0])?;
@@ -328,10 +341,11 @@ mod tests {
     #[test]
     fn each_bad_value_names_its_key() {
         type Spoil = fn(&mut ViewSpec);
-        let cases: [(&str, Spoil); 48] = [
+        let cases: [(&str, Spoil); 49] = [
             ("size_px", |s| s.size_px = [0, 10]),
             ("size_px", |s| s.size_px = [10, 9000]),
             ("every", |s| s.every = 0),
+            ("film", |s| s.film = Some("../a.gif".to_owned())),
             ("primary_deg", |s| s.c_arm.primary_deg = f64::NAN),
             ("secondary_deg", |s| s.c_arm.secondary_deg = 91.0),
             ("sid_mm", |s| s.c_arm.sid_mm = 0.0),
