@@ -1,4 +1,4 @@
-//! The paper's own solve: A B⁻¹ x = b as a dense system (eqs. 10–12), by faer's LU.
+//! The paper's own solve: A B⁻¹ x = b as a dense system (eqs. 10–12), by an LU factorisation.
 //!
 //! With c = x₀ + ½h₁t₀ the part of every xᵢ that the sheath alone gives, eq. 11 reads B t = x − c.
 //! B is block lower triangular with Bᵢⱼ = ½(hⱼ + hⱼ₊₁) for j < i and Bᵢᵢ = ½hᵢ, and its inverse follows from
@@ -13,12 +13,10 @@
 //! one solve leaves a micrometre. Iterative refinement with the residual of the equations themselves
 //! ([`Chain::residual`]) removes it for the price of a few triangular solves.
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::matmul::triangular::{self, BlockStructure};
-use faer::linalg::solvers::Solve;
-use faer::{Accum, Mat, Par};
+use nalgebra::DMatrix;
 
 use super::chain::Chain;
+use crate::full::{Factors, times_lower};
 use endowire_core::Vec3;
 
 /// Solves for positions x₁…xₙ and tangents t₁…tₙ at the minimum of the energy of `chain`.
@@ -32,26 +30,14 @@ pub fn solve(chain: &Chain, positions_mm: &mut Vec<Vec3>, tangents: &mut Vec<Vec
         return;
     }
     let (a, b) = stationarity(chain);
-    let mut system = Mat::<f64>::zeros(3 * n, 3 * n);
-    triangular::matmul(
-        system.as_mut(),
-        BlockStructure::Rectangular,
-        Accum::Replace,
-        a.as_ref(),
-        BlockStructure::Rectangular,
-        inverse_of_b(chain).as_ref(),
-        BlockStructure::TriangularLower,
-        1.0,
-        Par::Seq,
-    );
-    let factors = system.partial_piv_lu();
+    let factors = Factors::of(times_lower(&a, &inverse_of_b(chain)));
     tangents.resize(n, Vec3::zeros());
     add_tangents(chain, &factors.solve(&b), tangents);
     let mut residual = Vec::with_capacity(n);
     for _ in 0..REFINEMENTS {
         chain.integrate(tangents, positions_mm);
         chain.residual(tangents, positions_mm, &mut residual);
-        let right = Mat::from_fn(3 * n, 1, |row, _| residual[row / 3][row % 3]);
+        let right = DMatrix::from_fn(3 * n, 1, |row, _| residual[row / 3][row % 3]);
         add_tangents(chain, &factors.solve(&right), tangents);
     }
     chain.integrate(tangents, positions_mm);
@@ -61,7 +47,7 @@ pub fn solve(chain: &Chain, positions_mm: &mut Vec<Vec3>, tangents: &mut Vec<Vec
 const REFINEMENTS: usize = 2;
 
 /// t += B⁻¹ x for a column x.
-fn add_tangents(chain: &Chain, x: &Mat<f64>, tangents: &mut [Vec3]) {
+fn add_tangents(chain: &Chain, x: &DMatrix<f64>, tangents: &mut [Vec3]) {
     let (mut x_previous, mut t_previous) = (Vec3::zeros(), Vec3::zeros());
     for (i, tangent) in tangents.iter_mut().enumerate() {
         let x = Vec3::from_fn(|k, _| x[(3 * i + k, 0)]);
@@ -83,10 +69,10 @@ fn b_entry(chain: &Chain, i: usize, j: usize) -> f64 {
 }
 
 /// B⁻¹: row i is 2/hᵢ (row of xᵢ − xᵢ₋₁) minus row i−1, so its entries alternate in sign down each column.
-fn inverse_of_b(chain: &Chain) -> Mat<f64> {
+fn inverse_of_b(chain: &Chain) -> DMatrix<f64> {
     let n = chain.elements();
     let h = &chain.lengths_mm;
-    let mut inverse = Mat::<f64>::zeros(3 * n, 3 * n);
+    let mut inverse = DMatrix::<f64>::zeros(3 * n, 3 * n);
     for j in 0..n {
         let mut entry = 2.0 / h[j];
         for i in j..n {
@@ -103,10 +89,10 @@ fn inverse_of_b(chain: &Chain) -> Mat<f64> {
 }
 
 /// A and b of eq. 10.
-fn stationarity(chain: &Chain) -> (Mat<f64>, Mat<f64>) {
+fn stationarity(chain: &Chain) -> (DMatrix<f64>, DMatrix<f64>) {
     let n = chain.elements();
-    let mut a = Mat::<f64>::zeros(3 * n, 3 * n);
-    let mut b = Mat::<f64>::zeros(3 * n, 1);
+    let mut a = DMatrix::<f64>::zeros(3 * n, 3 * n);
+    let mut b = DMatrix::<f64>::zeros(3 * n, 1);
     for i in 0..n {
         let stiffness = chain.bending_stiffness_nmm2[i] / chain.lengths_mm[i];
         for k in 0..3 {
@@ -130,7 +116,7 @@ fn stationarity(chain: &Chain) -> (Mat<f64>, Mat<f64>) {
 
     // Contact rows √κ nⱼᵀBⱼ: their Gram matrix is the wall's share of A.
     let kappa = chain.wall_stiffness_n_per_mm;
-    let mut rows = Mat::<f64>::zeros(chain.contacts.len(), 3 * n);
+    let mut rows = DMatrix::<f64>::zeros(chain.contacts.len(), 3 * n);
     let sheath_part = sheath_part(chain);
     for (row, contact) in chain.contacts.iter().enumerate() {
         let i = contact.node - 1;
@@ -144,6 +130,6 @@ fn stationarity(chain: &Chain) -> (Mat<f64>, Mat<f64>) {
             }
         }
     }
-    matmul(a.as_mut(), Accum::Add, rows.transpose(), rows.as_ref(), 1.0, Par::Seq);
+    a.gemm_tr(1.0, &rows, &rows, 1.0);
     (a, b)
 }
