@@ -18,8 +18,9 @@ if ! git diff --quiet HEAD -- crates; then
   commit="$commit with changes"
 fi
 mkdir -p "$out"
-cargo build --release
-endowire=target/release/endowire
+# As it is published, optimised across crates.
+cargo build --profile dist -p endowire-cli --features gpu
+endowire=target/dist/endowire
 target=$out
 compare=() timing=(--methods all --nodes 50,100,150,200,300,500,1000,2000 --limit-s 10) deformation=() navigation=()
 if [ -n "$quick" ]; then

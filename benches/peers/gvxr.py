@@ -1,6 +1,6 @@
 """CPU time and error of gVirtualXray on the spheres that `examples/speed.rs` of endowire-viewer writes.
 
-    cargo run --release -p endowire-viewer --example speed -- FOLDER
+    cargo run --profile dist -p endowire-viewer --example speed -- FOLDER
     pip install gvxr numpy && python benches/peers/gvxr.py FOLDER
 
 Run both at once on one machine: only ratios of the same run mean anything. Time is that of all threads of the process; the error is

@@ -1,7 +1,7 @@
 //! Searches the parameters that the papers leave open: least time to equilibrium, on the cantilever of the reference cases and
 //! on an insertion into the curved tube. Prints, for every method and task, the best sets of a grid and the defaults among them.
 //!
-//! `cargo run --release -p endowire-methods --example tune [METHOD …]`
+//! `cargo run --profile dist -p endowire-methods --example tune [METHOD …]`
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

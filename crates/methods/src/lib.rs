@@ -18,7 +18,7 @@
 //! limit under refinement), and the slide along the own curve that starts each step.
 //!
 //! Papers leave parameters open (time steps, damping, stiffness of springs). The defaults are those with which a method
-//! reaches a given error soonest; `cargo run --release -p endowire-methods --example tune` repeats the search.
+//! reaches a given error soonest; `cargo run --profile dist -p endowire-methods --example tune` repeats the search.
 
 pub mod beam_fem;
 pub mod cantilever;

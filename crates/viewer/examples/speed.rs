@@ -1,7 +1,7 @@
 //! What frames cost in CPU time, and how exact they are: spheres of about 20,000 and 100,000 triangles at 512² and 1024², and a
 //! wire that moves over a still anatomy through the whole detector chain.
 //!
-//! `cargo run --release -p endowire-viewer --example speed [FOLDER FOR THE SPHERES AS STL]`
+//! `cargo run --profile dist -p endowire-viewer --example speed [FOLDER FOR THE SPHERES AS STL]`
 
 use std::f64::consts::{PI, TAU};
 use std::time::Instant;

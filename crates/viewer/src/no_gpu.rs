@@ -8,5 +8,5 @@ use crate::scene::Setup;
 /// # Errors
 /// That there is none, as a clause.
 pub(crate) fn engines(_: &Setup, _software: bool) -> Result<Engines, String> {
-    Err("this program was built without graphics processors (feature gpu)".into())
+    Err("built without the feature gpu: cargo build --release --features gpu".into())
 }

@@ -49,7 +49,9 @@ fn text(findings: &Findings) -> String {
         (None, true) => {
             "none: endowire play needs --headless here; all other commands need no display".to_owned()
         }
-        (None, false) => "not used: this program was built without a window".to_owned(),
+        (None, false) => {
+            "not used: built without the feature window: cargo build --release --features window".to_owned()
+        }
     };
     let cache = findings.cache.as_ref().map_or_else(
         || "none: set ENDOWIRE_CACHE to a folder for walls that take long to make".to_owned(),

@@ -3,6 +3,8 @@
 Units everywhere: millimetre, newton, second, radian; names carry them. ``endowire.gym`` has environments for Gymnasium.
 """
 
+from pathlib import Path as _Path
+
 from ._endowire import (
     Batch,
     Controller,
@@ -36,8 +38,16 @@ __all__ = [
     "State",
     "StepReport",
     "Vessel",
+    "assets_path",
     "check_vessel",
     "merge_sweeps",
     "solve_rod",
     "sweep",
 ]
+
+
+def assets_path() -> _Path:
+    """The folder of what comes with the package: ``scenes``, ``devices`` (the catalogue) and ``vessels``.
+
+    ``endowire.Scene(endowire.assets_path() / "scenes" / "arch_carotid.toml")`` reads one of them."""
+    return _Path(__file__).parent / "assets"

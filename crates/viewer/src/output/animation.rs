@@ -144,11 +144,17 @@ fn kind(path: &Path) -> Result<Kind> {
         "png" | "apng" => Ok(Kind::Png),
         #[cfg(feature = "mp4")]
         "mp4" => Ok(Kind::Film),
-        _ => {
-            let mend = "is no moving picture that is written: end its name in .png, .apng or .gif, or in .mp4 where the program was built with \
-                        the feature \"mp4\"";
-            Err(Error::parameter("animate", path.display(), mend))
+        _ => Err(Error::parameter("animate", path.display(), unknown(&extension))),
+    }
+}
+
+/// What to do about a name that stands for nothing that is written.
+fn unknown(extension: &str) -> &'static str {
+    match extension {
+        "mp4" => {
+            "films need the feature mp4: cargo build --release --features mp4; or end its name in .png, .apng or .gif"
         }
+        _ => "is no moving picture that is written: end its name in .png, .apng, .gif or .mp4",
     }
 }
 
@@ -202,6 +208,12 @@ mod tests {
             assert!(told.contains(name) && told.contains(".gif"), "{told}");
         }
         assert!(Animation::check_name(Path::new("A.GIF")).is_ok());
+        let film = Animation::check_name(Path::new("a.mp4")).map_err(|e| e.to_string());
+        if cfg!(feature = "mp4") {
+            assert_eq!(film, Ok(()));
+        } else {
+            assert!(film.is_err_and(|told| told.contains("cargo build --release --features mp4")));
+        }
     }
 
     #[test]

@@ -86,5 +86,5 @@ fn whole_window(file: &Path, snapshot: Snapshot, planes: &[Image], three_d: &Ima
 
 #[cfg(not(feature = "window"))]
 fn whole_window(_: &Path, _: Snapshot, _: &[Image], _: &Image) -> Result<(), String> {
-    Err("window: this program was built without a window: leave it out, or build it with the feature \"window\"".to_owned())
+    Err("window: this program was built without the feature window: leave it out, or cargo build --release --features window".to_owned())
 }

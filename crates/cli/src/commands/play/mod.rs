@@ -105,7 +105,7 @@ fn in_window(
     _: Channel,
     _: &mut Record,
 ) -> Result<(Session, live::Pace), Failure> {
-    let text = "play: this program was built without a window: give --headless, or build it with the feature \"window\"; endowire run SCENE \
-                carries out a script";
+    let text = "play: this program was built without the feature window: give --headless, or cargo build --release --features window; \
+                endowire run SCENE carries out a script";
     Err(Failure::Input(text.to_owned()))
 }
