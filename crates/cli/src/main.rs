@@ -6,6 +6,7 @@ mod commands;
 mod environment;
 mod failure;
 mod output;
+mod scenes;
 mod studies;
 
 use std::process::ExitCode;

@@ -131,7 +131,7 @@ pub fn number(value: f64) -> String {
 }
 
 /// The name most like one that is not there; none where there are no names.
-pub(crate) fn nearest_name<'a>(known: impl Iterator<Item = &'a str>, wrong: &str) -> Option<&'a str> {
+pub fn nearest_name<'a>(known: impl Iterator<Item = &'a str>, wrong: &str) -> Option<&'a str> {
     let alike = |name: &str| strsim::jaro_winkler(name, wrong);
     known.max_by(|a, b| alike(a).total_cmp(&alike(b)))
 }

@@ -74,9 +74,15 @@ fn explain(error: &toml::de::Error, text: &str, fits: impl Fn(&str) -> bool) -> 
             None => culprit(text, line, fits).unwrap_or_else(|| format!("line {line}: ")),
         }
     });
-    // serde's wording for names it does not know: "unknown field `a`, expected one of `b`, `c`".
+    let hint = nearest(&message);
+    format!("{place}{message}{hint}")
+}
+
+/// The nearest of the names that serde knows, for its message on one that it does not: "unknown field `a`, expected one of `b`, `c`". Empty
+/// for other messages, and where none is near.
+pub fn nearest(message: &str) -> String {
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-    let hint = match quoted.split_first() {
+    match quoted.split_first() {
         Some((wrong, known)) if message.starts_with("unknown ") => {
             let best =
                 known.iter().map(|k| (strsim::jaro_winkler(wrong, k), k)).max_by(|a, b| a.0.total_cmp(&b.0));
@@ -86,8 +92,7 @@ fn explain(error: &toml::de::Error, text: &str, fits: impl Fn(&str) -> bool) -> 
             }
         }
         _ => String::new(),
-    };
-    format!("{place}{message}{hint}")
+    }
 }
 
 #[cfg(test)]

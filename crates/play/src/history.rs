@@ -6,6 +6,7 @@ use endowire_core::vessel::VesselMotion;
 use endowire_viewer::InjectionSpec;
 
 use crate::hand::Motion;
+use crate::readout::Went;
 use crate::script::{self, Lines};
 
 /// A state is kept each so many steps at first: those between are carried out once more, which takes less than a second.
@@ -60,6 +61,8 @@ pub(crate) struct History {
     steps: Vec<Done>,
     /// How many of the steps are done; those after them are undone.
     done: usize,
+    /// How all steps up to each went, the first before any.
+    went: Vec<Went>,
     /// State after step `every · index`.
     states: Vec<State>,
     every: usize,
@@ -78,6 +81,7 @@ impl History {
         Self {
             steps: Vec::new(),
             done: 0,
+            went: vec![Went::default()],
             states,
             every: EVERY,
             most_states: MOST_STATES,
@@ -89,6 +93,11 @@ impl History {
 
     pub(crate) fn steps(&self) -> usize {
         self.done
+    }
+
+    /// How the steps that are done went.
+    pub(crate) fn went(&self) -> Went {
+        self.went[self.done]
     }
 
     /// Notes that a motion begins with the next step.
@@ -113,6 +122,7 @@ impl History {
             self.begun.push(self.done);
         }
         self.steps.push(step);
+        self.went.push(self.went().and(after.report()));
         self.done += 1;
         if self.done.is_multiple_of(self.every) {
             self.states.push(after.state());
@@ -132,6 +142,7 @@ impl History {
     fn forget_undone(&mut self) {
         let done = self.done;
         self.steps.truncate(done);
+        self.went.truncate(done + 1);
         self.states.truncate(done / self.every + 1);
         self.begun.retain(|begun| *begun < done);
         self.injected.retain(|one| one.after_step <= done);
@@ -193,6 +204,7 @@ mod tests {
         let mut history = History::new(&simulation);
         (history.every, history.most_states) = (4, 5);
         let mut tips = vec![simulation.shape().tip_mm()];
+        let mut went = vec![history.went()];
         for k in 0..150 {
             let advance_mm = if k % 5 == 4 { -0.3 } else { 0.7 };
             let step =
@@ -200,12 +212,27 @@ mod tests {
             step.carry_out(&mut simulation).unwrap();
             history.push(step, &simulation);
             tips.push(simulation.shape().tip_mm());
+            went.push(history.went());
             assert!(history.states.len() <= 5 && history.states.len() == history.done / history.every + 1);
         }
         assert_eq!(history.every, 32);
         for step in [150, 3, 64, 127, 0, 128, 149] {
             history.go_to(step, &mut simulation).unwrap();
             assert_eq!(simulation.shape().tip_mm(), tips[step], "{step}");
+            assert_eq!(history.went(), went[step], "{step}");
         }
+    }
+
+    #[test]
+    fn what_went_otherwise_is_counted() {
+        let report = |converged, jumped, relaxations| StepReport {
+            converged,
+            jumped,
+            relaxations,
+            ..StepReport::default()
+        };
+        let steps = [report(true, false, 0), report(false, true, 2), report(false, false, 1)];
+        let went = steps.iter().fold(Went::default(), Went::and);
+        assert_eq!(went, Went { unconverged_steps: 2, jumps: 1, relaxations: 3 });
     }
 }

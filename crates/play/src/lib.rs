@@ -18,7 +18,7 @@ pub use hand::Motion;
 pub use input::Input;
 pub use lab::Lab;
 pub use pictures::{Pictures, Sharpened, Sharpening};
-pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout};
+pub use readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
 pub use session::{Delivered, Session, Snapshot};
 
 /// Ticks of a session in a second.

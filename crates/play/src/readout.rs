@@ -1,5 +1,6 @@
 //! What the operator reads.
 
+use endowire_core::insertion::StepReport;
 use endowire_viewer::Mode;
 use serde::Serialize;
 
@@ -94,11 +95,36 @@ pub struct LabReadout {
     pub dose_ugy: f64,
 }
 
+/// How the steps so far went, less those taken back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Went {
+    /// Steps that found no equilibrium.
+    pub unconverged_steps: u64,
+    /// Steps in which a device jumped.
+    pub jumps: u64,
+    /// Last resorts ([`StepReport::relaxations`]).
+    pub relaxations: u64,
+}
+
+impl Went {
+    /// With one more step.
+    pub(crate) fn and(self, report: &StepReport) -> Self {
+        Self {
+            unconverged_steps: self.unconverged_steps + u64::from(!report.converged),
+            jumps: self.jumps + u64::from(report.jumped),
+            relaxations: self.relaxations + u64::from(report.relaxations),
+        }
+    }
+}
+
 /// All that is read at one moment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Readout {
     /// Steps carried out.
     pub step: usize,
+    /// How they went.
+    #[serde(flatten)]
+    pub went: Went,
     /// Time of the session, s.
     pub time_s: f64,
     /// Whether the scene's script is shown.

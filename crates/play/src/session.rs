@@ -12,7 +12,7 @@ use crate::hand::{Hand, Motion};
 use crate::history::{Done, History, Injected, moves_by_itself};
 use crate::input::Input;
 use crate::lab::Lab;
-use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout};
+use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
 
 /// Events that are kept.
 const MOST_EVENTS: usize = 1000;
@@ -349,6 +349,11 @@ impl Session {
         self.history.steps()
     }
 
+    /// How these steps went.
+    pub fn went(&self) -> Went {
+        self.history.went()
+    }
+
     /// The last events, at most a thousand.
     pub fn events(&self) -> &[Event] {
         &self.events
@@ -395,6 +400,7 @@ impl Session {
         let forces = report.contacts.iter().map(|contact| contact.total_n().norm());
         Readout {
             step: self.history.steps(),
+            went: self.history.went(),
             time_s: self.time_s(),
             demonstrates: self.demonstrates(),
             selected: self.simulation.stack().instruments()[self.selected].name.clone(),

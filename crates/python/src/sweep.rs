@@ -19,7 +19,7 @@ const PROGRAM: Program =
 /// Does the runs of a sweep file that have no row in the folder `out` yet, `jobs` at the same time (the number of cores unless told), and writes
 /// runs.parquet there when all have one, as `endowire sweep` does. `shard` is the part to do: "1/4" is the first of four.
 ///
-/// Returns a dictionary of `runs`, `earlier` (those that had a row before), `failed` and `table` (its path). Ctrl-C stops it; the same call goes on.
+/// Returns a dictionary of `runs`, `earlier` (those that had a row before), `failed`, `unconverged` (those with steps that are no equilibria) and `table` (its path). Ctrl-C stops it; the same call goes on.
 /// Raises InputError for a sweep that does not fit, for `record` in it, and for a folder that holds another sweep. What fails in a run is in its row.
 #[pyfunction]
 #[pyo3(signature = (path, out, *, jobs=None, shard="1/1"))]
@@ -56,6 +56,7 @@ pub(crate) fn sweep<'py>(
     document.set_item("runs", told.progress.runs)?;
     document.set_item("earlier", told.earlier)?;
     document.set_item("failed", told.progress.failed)?;
+    document.set_item("unconverged", told.progress.unconverged)?;
     document.set_item("table", told.table)?;
     Ok(document)
 }

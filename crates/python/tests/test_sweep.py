@@ -51,7 +51,7 @@ def path(tmp_path):
 
 def test_shards_give_the_table_of_one_piece(path, tmp_path):
     told = endowire.sweep(path, tmp_path / "whole", jobs=2)
-    assert told == {"runs": 8, "earlier": 0, "failed": 4, "table": tmp_path / "whole" / "runs.parquet"}
+    assert told == {"runs": 8, "earlier": 0, "failed": 4, "unconverged": 0, "table": tmp_path / "whole" / "runs.parquet"}
     assert endowire.sweep(path, tmp_path / "whole")["earlier"] == 8
     for shard in ("2/2", "1/2"):
         assert endowire.sweep(path, tmp_path / "parts", shard=shard)["runs"] == 4

@@ -13,6 +13,7 @@ use crate::axis::{Axis, AxisSpec, RUN_LIMIT};
 use crate::key::Key;
 use crate::provenance::hash_inputs;
 use crate::row::{Columns, ParameterKind};
+use crate::setting::{Setting, assign, document_of, scene_of, text_of, try_in};
 
 /// A sweep file as it is written.
 #[derive(Debug, Deserialize)]
@@ -59,7 +60,17 @@ impl Sweep {
     /// Names file, key and value of what does not fit: a key that the scene does not know, a value that its key does not take, an axis
     /// without values, more than a million runs.
     pub fn read(path: &Path) -> Result<Self> {
-        let (spec, text) = from_toml(path)?;
+        Self::read_with(path, &[])
+    }
+
+    /// Reads a sweep file that has these settings in its table `[set]` too, in place of its own of the same keys.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_with(path: &Path, settings: &[Setting]) -> Result<Self> {
+        let (mut spec, text): (SweepSpec, String) = from_toml(path)?;
+        let settings = settings.iter().map(|setting| (setting.key.to_string(), setting.value.clone()));
+        spec.set.extend(settings);
         Self::of_spec(&spec, text, path)
     }
 
@@ -83,12 +94,12 @@ impl Sweep {
             }
             other => other,
         })?;
-        let mut base = toml::from_str::<Value>(scene.text())
-            .map_err(|error| Error::content(&scene_path, error.message().to_owned()))?;
+        let mut base = document_of(&scene, &scene_path)?;
         for (key, value) in &spec.set {
             let key = Key::parse(key).map_err(at_path)?;
-            try_in(&scene_path, &base, &key, value).map_err(|e| in_table(path, "[set]", &e))?;
-            key.set(&mut base, value.clone()).map_err(at_path)?;
+            let tried = try_in(&scene_path, &base, &key, value, |_| Ok(()));
+            tried.map_err(|e| in_table(path, "[set]", &e))?;
+            assign(&scene_path, &mut base, &key, value).map_err(at_path)?;
         }
         let samples = samples(spec).map_err(at_path)?;
         let axes = spec.axis.iter().enumerate();
@@ -97,7 +108,7 @@ impl Sweep {
         check_axes(&axes, spec).map_err(at_path)?;
         for (index, axis) in axes.iter().enumerate() {
             for value in axis.examples() {
-                let tried = try_in(&scene_path, &base, &axis.key, &value);
+                let tried = try_in(&scene_path, &base, &axis.key, &value, |_| Ok(()));
                 tried.map_err(|e| in_table(path, &format!("axis[{index}]"), &e))?;
             }
         }
@@ -106,7 +117,9 @@ impl Sweep {
             let reason = "script = []: give at least one [[script]] table, what the hand does";
             return Err(Error::content(&scene_path, reason));
         }
-        let mut inputs = vec![text.into_bytes(), scene.text().as_bytes().to_vec()];
+        // What is set may have come from files that the scene does not name any more.
+        let set = text_of(&scene_path, &base)?;
+        let mut inputs = vec![text.into_bytes(), scene.text().as_bytes().to_vec(), set.into_bytes()];
         for input in base_scene.input_paths() {
             inputs.push(endowire_core::file::read(&input, u64::MAX)?);
         }
@@ -114,7 +127,36 @@ impl Sweep {
         let instruments = base_scene.instrument.iter().map(|one| one.name.clone());
         let columns = Columns { parameters: parameters.collect(), instruments: instruments.collect() };
         let recorded = spec.record;
-        Ok(Self { scene_path, base, axes, samples, recorded, columns, hash: hash_inputs(&inputs) })
+        let sweep = Self { scene_path, base, axes, samples, recorded, columns, hash: hash_inputs(&inputs) };
+        sweep.check_devices().map_err(at_path)?;
+        Ok(sweep)
+    }
+
+    /// Refuses axes in device files of which none of the first runs can make a device: a value beside another way to say the same makes none
+    /// in any.
+    fn check_devices(&self) -> Result<()> {
+        if self.axes.iter().all(|axis| !axis.key.is_of_device()) {
+            return Ok(());
+        }
+        let device = |number| self.scene(&self.run(number).values).and_then(|scene| self.stack_of(&scene));
+        let mut tried = (0..self.len().min(TRIED)).map(device);
+        match tried.next() {
+            Some(Err(error)) if tried.all(|other| other.is_err()) => Err(error),
+            _ => Ok(()),
+        }
+    }
+
+    fn stack_of(&self, scene: &Value) -> Result<()> {
+        scene_of(&self.scene_path, scene)?.stack().map(drop)
+    }
+
+    /// What its reader should know before it is carried out: an axis that changes nothing. None where there is none.
+    pub fn remark(&self) -> Option<String> {
+        let index = self.axes.iter().position(|axis| axis.key.to_string() == SEED)?;
+        Some(format!(
+            "axis[{index}].key = {SEED}: nothing in a scene is random, so runs that differ in it alone are the same; what is drawn has the \
+             seed of the sweep, noise of frames view.detector.seed"
+        ))
     }
 
     /// Number of runs.
@@ -144,8 +186,13 @@ impl Sweep {
     /// The scene with these values of the axes.
     pub(crate) fn scene(&self, values: &[Value]) -> Result<Value> {
         let mut scene = self.base.clone();
-        for (axis, value) in self.axes.iter().zip(values) {
-            axis.key.set(&mut scene, value.clone())?;
+        let of_device = |axis: &&(&Axis, &Value)| axis.0.key.is_of_device();
+        let pairs: Vec<(&Axis, &Value)> = self.axes.iter().zip(values).collect();
+        // A device file may be a value itself.
+        for (axis, value) in
+            pairs.iter().filter(|pair| !of_device(pair)).chain(pairs.iter().filter(of_device))
+        {
+            assign(&self.scene_path, &mut scene, &axis.key, value)?;
         }
         Ok(scene)
     }
@@ -155,6 +202,12 @@ impl Sweep {
         &self.scene_path
     }
 }
+
+/// The key of a scene that recordings carry and no step reads.
+const SEED: &str = "seed";
+
+/// Runs whose devices are tried before the first.
+const TRIED: usize = 16;
 
 /// Number of samples: 1 where nothing is drawn.
 fn samples(spec: &SweepSpec) -> Result<usize> {
@@ -211,32 +264,6 @@ fn check_axes(axes: &[Axis], spec: &SweepSpec) -> Result<()> {
             Err(Error::parameter("axis", format!("{runs} runs"), format!("at most {RUN_LIMIT} in all")))
         }
     }
-}
-
-/// The scene that a document says.
-pub(crate) fn scene_of(path: &Path, document: &Value) -> Result<Scene> {
-    Scene::from_toml(&text_of(path, document)?, path)
-}
-
-/// A document as the text of a scene file.
-pub(crate) fn text_of(path: &Path, document: &Value) -> Result<String> {
-    toml::to_string(document).map_err(|error| Error::content(path, error.to_string()))
-}
-
-/// Whether the scene takes this value.
-fn try_in(scene_path: &Path, base: &Value, key: &Key, value: &Value) -> Result<()> {
-    let mut tried = base.clone();
-    key.set(&mut tried, value.clone())?;
-    scene_of(scene_path, &tried).map(drop).map_err(|error| match error {
-        Error::Content { reason, .. } => Error::parameter(key, value, without_line(&reason)),
-        other => other,
-    })
-}
-
-/// The reason without the number of a line that nobody has written.
-fn without_line(reason: &str) -> &str {
-    let rest = reason.strip_prefix("line ").and_then(|rest| rest.split_once(": "));
-    rest.filter(|(number, _)| number.parse::<usize>().is_ok()).map_or(reason, |(_, rest)| rest)
 }
 
 /// The same error, of a table of the sweep file.

@@ -29,7 +29,7 @@ pub(crate) struct Header {
 }
 
 /// The format and its version.
-const FORMAT: &str = "endowire sweep 1";
+const FORMAT: &str = "endowire sweep 2";
 
 /// A power failure takes no more than the rows of so long.
 const SYNC: Duration = Duration::from_secs(1);

@@ -2,8 +2,14 @@
 
 use std::fmt;
 
+use endowire_core::error::nearest_name;
 use endowire_core::{Error, Result};
 use toml::{Table, Value};
+
+/// Keys of a scene file that are lists of tables, for hints.
+const LISTS: [&str; 6] = ["script", "instrument", "section", "part", "motion", "injection"];
+/// Keys of a device file that a table of the scene may have itself.
+const OF_DEVICES: [&str; 5] = ["kind", "length_mm", "length_cm", "section", "part"];
 
 /// A key of a scene file as it is written in a sweep: names with dots between them, and the number of one of several tables in brackets, as
 /// in `device.section[0].radius_mm`.
@@ -37,7 +43,7 @@ impl Key {
     }
 
     /// The first name: that of a table or key of the scene itself.
-    pub(crate) fn begins(&self) -> &str {
+    pub fn begins(&self) -> &str {
         match self.parts.first() {
             Some(Part::Name(name)) => name,
             _ => "",
@@ -49,12 +55,32 @@ impl Key {
         other.parts.starts_with(&self.parts)
     }
 
+    /// Whether it may lie in a device file.
+    pub(crate) fn is_of_device(&self) -> bool {
+        let of = |key: &Part| matches!(key, Part::Name(key) if OF_DEVICES.contains(&key.as_str()));
+        match self.parts.as_slice() {
+            [Part::Name(first), key, ..] if first == "device" => of(key),
+            [Part::Name(first), Part::Index(_), key, ..] if first == "instrument" => of(key),
+            _ => false,
+        }
+    }
+
+    /// The table of `scene` for the device or instrument that the key is of, where it may lie in a device file.
+    pub(crate) fn device_table<'a>(&self, scene: &'a mut Value) -> Option<&'a mut Table> {
+        let table = scene.get_mut(self.begins()).filter(|_| self.is_of_device())?;
+        match self.parts.get(1) {
+            Some(Part::Index(index)) => table.get_mut(*index)?.as_table_mut(),
+            _ => table.as_table_mut(),
+        }
+    }
+
     /// Gives the key of `scene` a value; tables on the way that are not there are made.
     ///
     /// # Errors
     /// A way through what is no table, or to one of several that is not there ([`Error::Parameter`]).
     pub fn set(&self, scene: &mut Value, value: Value) -> Result<()> {
         let mut place = scene;
+        let mut last = "";
         for part in &self.parts {
             place = match (part, place) {
                 (Part::Name(name), Value::Table(table)) => {
@@ -72,10 +98,16 @@ impl Key {
                     return Err(Error::parameter(&self.text, &value, mend));
                 }
                 (Part::Index(index), _) => {
-                    let mend = format!("the scene has no list where [{index}] is asked for");
+                    let mut mend = format!("the scene has no list where [{index}] is asked for");
+                    if let Some(name) = nearest_name(LISTS.into_iter(), last).filter(|name| *name != last) {
+                        mend += &format!(" – did you mean `{name}[{index}]`?");
+                    }
                     return Err(Error::parameter(&self.text, &value, mend));
                 }
             };
+            if let Part::Name(name) = part {
+                last = name;
+            }
         }
         *place = value;
         Ok(())
@@ -149,7 +181,11 @@ mod tests {
         for (key, told) in [
             ("script[2].advance_mm", "script[2].advance_mm = 1: the scene has 2"),
             ("seed.first", "seed.first = 1: what first should lie in is no table"),
-            ("device.section[0]", "device.section[0] = 1: the scene has no list"),
+            ("device.section[0]", "device.section[0] = 1: the scene has no list where [0] is asked for"),
+            (
+                "device.prt[0].a",
+                "device.prt[0].a = 1: the scene has no list where [0] is asked for – did you mean `part[0]`?",
+            ),
         ] {
             let error = Key::parse(key).unwrap().set(&mut scene(), 1.into()).unwrap_err().to_string();
             assert!(error.starts_with(told), "{error}");

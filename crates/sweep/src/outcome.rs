@@ -1,6 +1,7 @@
 //! What a scripted insertion has come to.
 
-use endowire_core::insertion::{Energy, InstrumentReport, Met, ScriptRun, Simulation};
+use endowire_core::insertion::{Energy, InstrumentReport, Met, ScriptRun, Simulation, Tally, WallForce};
+use endowire_core::{Error, PhysicalEnd};
 use serde::{Deserialize, Serialize};
 
 /// The end of a run, or where it is while it goes on.
@@ -12,6 +13,8 @@ pub struct RunOutcome {
     pub steps_asked: usize,
     /// Whether all steps were carried out and every one met its convergence test.
     pub converged: bool,
+    /// What ended it; none while it goes on.
+    pub ended_by: Option<EndedBy>,
     /// The step that failed and why, if one did.
     pub failure: Option<StepFailure>,
     /// Length inserted at the end, mm.
@@ -32,8 +35,11 @@ pub struct RunOutcome {
     pub instruments: Vec<InstrumentOutcome>,
     /// Energy at the end, mJ.
     pub energy_mj: Energy,
-    /// Deepest penetration of the wall in any step, mm.
-    pub max_penetration_mm: f64,
+    /// How hard the wall holds the device at the end.
+    pub wall_force: WallForce,
+    /// How its steps went.
+    #[serde(flatten)]
+    pub tally: Tally,
     /// The opening through which the tip has left the vessel at the end.
     pub left_through: Option<usize>,
 }
@@ -45,6 +51,8 @@ pub struct UntilOutcome {
     pub line: String,
     /// Its steps.
     pub steps: usize,
+    /// The step of the script after which it ended.
+    pub after_step: usize,
     /// What has ended it; none where it went all of its way.
     pub met: Option<Met>,
 }
@@ -59,6 +67,53 @@ pub struct InstrumentOutcome {
     pub report: InstrumentReport,
 }
 
+/// What ended a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EndedBy {
+    /// All lines of the script went all of their way, or were ended by a condition that another line followed.
+    Script,
+    /// The condition of the last line: the tip is as near to its target as was asked for.
+    Arrived,
+    /// The condition of the last line: the hand pushes as hard as was said.
+    PushForce,
+    /// The vessel is narrower than the device.
+    Blocked,
+    /// The tip has left the vessel, farther than anything is known.
+    Left,
+    /// A step that found no equilibrium or could not be carried out.
+    Failed,
+    /// An interrupt.
+    Interrupted,
+    /// What could not be written.
+    Unrecorded,
+}
+
+impl EndedBy {
+    /// As it is written.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Script => "script",
+            Self::Arrived => "arrived",
+            Self::PushForce => "push_force",
+            Self::Blocked => "blocked",
+            Self::Left => "left",
+            Self::Failed => "failed",
+            Self::Interrupted => "interrupted",
+            Self::Unrecorded => "unrecorded",
+        }
+    }
+}
+
+impl From<Met> for EndedBy {
+    fn from(met: Met) -> Self {
+        match met {
+            Met::TipWithinMm => Self::Arrived,
+            Met::PushForceN => Self::PushForce,
+        }
+    }
+}
+
 /// What ended a run early: no equilibrium, a recording or frame that could not be written, or an interrupt.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StepFailure {
@@ -66,25 +121,41 @@ pub struct StepFailure {
     pub step: usize,
     /// What was said.
     pub reason: String,
+    /// What kind of end it is.
+    pub kind: EndedBy,
+}
+
+impl StepFailure {
+    /// That of a step which the simulation or its script refused.
+    pub fn new(step: usize, error: &Error) -> Self {
+        let kind = match error {
+            Error::End(PhysicalEnd::Blocked { .. }) => EndedBy::Blocked,
+            Error::End(PhysicalEnd::Left { .. }) => EndedBy::Left,
+            _ => EndedBy::Failed,
+        };
+        Self { step, reason: error.to_string(), kind }
+    }
 }
 
 impl RunOutcome {
-    /// That of a script of at most `steps_asked` steps after `steps` of them, which all `converged` and went as deep into the wall as
-    /// `max_penetration_mm`.
+    /// That of a script of at most `steps_asked` steps after `steps` of them, which went as `tally` says.
     pub fn new(
         simulation: &Simulation,
         hand: &ScriptRun<'_>,
         (steps, steps_asked): (usize, usize),
-        (converged, max_penetration_mm): (bool, f64),
+        tally: Tally,
         failure: Option<StepFailure>,
     ) -> Self {
         let report = simulation.report();
         let names = simulation.stack().instruments().iter().map(|one| one.name.clone());
         let instruments = names.zip(&report.instruments);
+        let condition = || hand.course().motions.last().and_then(|line| line.met);
+        let at_its_end = || hand.has_ended().then(|| condition().map_or(EndedBy::Script, EndedBy::from));
         Self {
             steps,
             steps_asked,
-            converged: converged && failure.is_none(),
+            converged: tally.unconverged_steps == 0 && failure.is_none(),
+            ended_by: failure.as_ref().map(|failure| failure.kind).or_else(at_its_end),
             failure,
             inserted_mm: report.inserted_mm,
             rotation_rad: report.rotation_rad,
@@ -93,9 +164,10 @@ impl RunOutcome {
             torque_nmm: report.torque_nmm,
             until: hand
                 .conditions()
-                .map(|(line, course)| UntilOutcome {
+                .map(|(line, course, after_step)| UntilOutcome {
                     line: line.to_owned(),
                     steps: course.steps,
+                    after_step,
                     met: course.met,
                 })
                 .collect(),
@@ -103,7 +175,8 @@ impl RunOutcome {
                 .map(|(name, report)| InstrumentOutcome { name, report: *report })
                 .collect(),
             energy_mj: report.energy,
-            max_penetration_mm,
+            wall_force: simulation.wall_force(),
+            tally,
             left_through: report.left_through,
         }
     }

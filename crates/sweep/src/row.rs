@@ -34,6 +34,11 @@ impl Row {
         let step = self.outcome.as_ref().and_then(|outcome| outcome.failure.as_ref());
         self.refused.as_deref().or(step.map(|failure| failure.reason.as_str()))
     }
+
+    /// Whether steps of the run were no equilibria.
+    pub fn is_unconverged(&self) -> bool {
+        self.outcome.as_ref().is_some_and(|outcome| outcome.tally.unconverged_steps > 0)
+    }
 }
 
 /// What of its columns a table has from its sweep.

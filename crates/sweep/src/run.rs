@@ -4,15 +4,16 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use endowire_core::Result;
-use endowire_core::insertion::{Move, Script, Simulation};
+use endowire_core::insertion::{Move, Script, Simulation, Tally};
 use endowire_core::vessel::WallStore;
 use endowire_methods::Scene;
 use toml::Value;
 
-use crate::file::{Sweep, text_of};
+use crate::file::Sweep;
 use crate::outcome::{RunOutcome, StepFailure};
 use crate::provenance::{Program, hash_inputs};
 use crate::row::{Row, json};
+use crate::setting::text_of;
 use crate::shared::Shared;
 
 /// One run: the scene of a sweep with a value for each axis.
@@ -166,36 +167,30 @@ impl Run<'_> {
         let begin = |record: &dyn Record| record.begin(self, &simulation);
         let mut recorder = workshop.record.map(begin).transpose().map_err(Interrupted::Unrecorded)?;
         let mut hand = script.begin();
-        let (mut steps, mut converged, mut max_penetration_mm) = (0, true, 0.0f64);
+        let (mut steps, mut tally) = (0, Tally::default());
         let failure = loop {
             if workshop.stop.load(Ordering::Relaxed) {
                 return Err(Interrupted::Stopped);
             }
-            let failed = |error: endowire_core::Error| {
-                Some(StepFailure { step: steps + 1, reason: error.to_string() })
-            };
+            let failed = |error: endowire_core::Error| Some(StepFailure::new(steps + 1, &error));
             let (moves, time_s) = match hand.next(&simulation) {
                 Ok(Some(step)) => (step.moves.to_vec(), step.time_s),
                 Ok(None) => break None,
                 Err(error) => break failed(error),
             };
-            match simulation.step_until(&moves, time_s) {
-                Ok(report) => {
-                    converged &= report.converged;
-                    max_penetration_mm = max_penetration_mm.max(report.max_penetration_mm);
-                }
-                Err(error) => break failed(error),
+            if let Err(error) = simulation.step_until(&moves, time_s) {
+                break failed(error);
             }
             hand.carried_out();
             steps += 1;
+            tally.count(steps, &simulation);
             if let Some(recorder) = &mut recorder {
                 // What comes next is asked twice, and changes nothing.
                 let last = matches!(hand.clone().next(&simulation), Ok(None));
                 recorder.step(&moves, time_s, last, &simulation).map_err(Interrupted::Unrecorded)?;
             }
         };
-        let so_far = (converged, max_penetration_mm);
-        let outcome = RunOutcome::new(&simulation, &hand, (steps, script.len()), so_far, failure);
+        let outcome = RunOutcome::new(&simulation, &hand, (steps, script.len()), tally, failure);
         if let Some(recorder) = recorder {
             recorder.end(&outcome).map_err(Interrupted::Unrecorded)?;
         }

@@ -113,6 +113,7 @@ fn results(rows: &[Row]) -> Vec<Column> {
         numbers(name, rows, |row| row.outcome.as_ref().and_then(of))
     };
     let count = |number: usize| Some(number as i64);
+    let ended_by = |row: &Row| Some(row.outcome.as_ref()?.ended_by?.name().to_owned());
     let converged = |row: &Row| Some(row.outcome.as_ref().is_some_and(|outcome| outcome.converged));
     let until = |row: &Row| {
         let lines = row.outcome.as_ref().filter(|outcome| !outcome.until.is_empty())?;
@@ -134,7 +135,18 @@ fn results(rows: &[Row]) -> Vec<Column> {
         number("bend_mj", |o| Some(o.energy_mj.bend)),
         number("twist_mj", |o| Some(o.energy_mj.twist)),
         number("wall_mj", |o| Some(o.energy_mj.wall)),
-        number("max_penetration_mm", |o| Some(o.max_penetration_mm)),
+        number("max_penetration_mm", |o| Some(o.tally.max_penetration_mm)),
+        number("wall_force_sum_n", |o| Some(o.wall_force.sum_n)),
+        number("wall_force_largest_n", |o| Some(o.wall_force.largest_n)),
+        number("wall_force_tip_n", |o| Some(o.wall_force.tip_n)),
+        number("max_wall_force_sum_n", |o| Some(o.tally.max_wall_force.sum_n)),
+        number("max_wall_force_largest_n", |o| Some(o.tally.max_wall_force.largest_n)),
+        number("max_wall_force_tip_n", |o| Some(o.tally.max_wall_force.tip_n)),
+        integer("unconverged_steps", |o| Some(o.tally.unconverged_steps as i64)),
+        integer("jumps", |o| Some(o.tally.jumps as i64)),
+        integer("relaxations", |o| i64::try_from(o.tally.relaxations).ok()),
+        number("max_imbalance", |o| Some(o.tally.max_imbalance)),
+        texts("ended_by", rows, ended_by),
         integer("left_through", |o| o.left_through.map(|opening| opening as i64)),
         texts("until", rows, until),
     ]

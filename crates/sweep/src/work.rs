@@ -46,6 +46,19 @@ pub struct Progress {
     pub done: usize,
     /// Those of them that failed.
     pub failed: usize,
+    /// Those of them with steps that are no equilibria.
+    pub unconverged: usize,
+}
+
+impl Progress {
+    /// Counts rows.
+    fn add<'a>(&mut self, rows: impl IntoIterator<Item = &'a Row>) {
+        for row in rows {
+            self.done += 1;
+            self.failed += usize::from(row.failure().is_some());
+            self.unconverged += usize::from(row.is_unconverged());
+        }
+    }
 }
 
 /// What has come of a sweep.
@@ -74,12 +87,11 @@ impl Sweep {
         let left: Vec<usize> =
             (0..self.len()).filter(|run| order.shard.has(*run) && !has_row[*run]).collect();
         let earlier = rows.len();
-        let failed = rows.iter().filter(|row| row.failure().is_some()).count();
-        let mut progress = Progress { runs: earlier + left.len(), done: earlier, failed };
+        let mut progress = Progress { runs: earlier + left.len(), done: 0, failed: 0, unconverged: 0 };
+        progress.add(&rows);
         (order.progress)(progress);
         let new = self.work(&left, &journal, order, progress)?;
-        progress.done += new.len();
-        progress.failed += new.iter().filter(|row| row.failure().is_some()).count();
+        progress.add(&new);
         rows.extend(new);
         if progress.done < progress.runs {
             return Ok(Told { progress, earlier, table: None });
@@ -127,8 +139,7 @@ impl Sweep {
                 let mut told = told.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
                 match row {
                     Ok(row) => {
-                        told.1.done += 1;
-                        told.1.failed += usize::from(row.failure().is_some());
+                        told.1.add([&row]);
                         told.0.push(row);
                         (order.progress)(told.1);
                     }

@@ -7,7 +7,7 @@ mod studies;
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
-use endowire_sweep::Shard;
+use endowire_sweep::{Setting, Shard};
 
 pub(crate) use inputs::{DeviceCommand, FeltArgs, GenerateArgs, VesselCommand};
 pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
@@ -17,7 +17,8 @@ pub(crate) use studies::{
 
 /// Simulates catheters and guidewires in blood vessels: scripted insertions, experiments, 3D and fluoroscopic frames.
 ///
-/// Exit codes: 0 done; 1 the computation failed or was interrupted (Ctrl-C; what was recorded is kept); 2 bad input or usage.
+/// Exit codes: 0 done; 1 the computation failed, steps found no equilibrium (--allow-unconverged takes them), or it was interrupted (Ctrl-C);
+/// what was recorded is kept; 2 bad input or usage.
 #[derive(Debug, Parser)]
 #[command(name = "endowire", version, propagate_version = true)]
 pub(crate) struct Args {
@@ -79,6 +80,24 @@ pub(crate) enum Command {
     },
 }
 
+/// What a scene has otherwise than its file.
+#[derive(Debug, Default, clap::Args)]
+pub(crate) struct SetArgs {
+    /// Give a key of the scene another value than its file does (repeatable). Keys are called from the top of the scene, as in a sweep:
+    /// vessel.wall.friction=0.1, script[0].step_mm=2, device.part[0].length_mm=60 (of a device file too), view.every=10. Values are
+    /// written as in the file, texts also without quotes; paths start from the scene's folder
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<Setting>,
+}
+
+/// What is made of steps without an equilibrium.
+#[derive(Debug, Default, Clone, Copy, clap::Args)]
+pub(crate) struct ConvergenceArgs {
+    /// End with exit code 0 also where steps have found no equilibrium; they are told and recorded either way
+    #[arg(long)]
+    pub(crate) allow_unconverged: bool,
+}
+
 #[derive(Debug, clap::Args)]
 pub(crate) struct RunArgs {
     /// Scene file (TOML)
@@ -86,6 +105,8 @@ pub(crate) struct RunArgs {
     /// Carry out the script of this file, tables `script` alone, in place of the scene's own: what `play` has recorded
     #[arg(long, value_name = "FILE")]
     pub(crate) script: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) set: SetArgs,
     /// Folder for the recording; out/NAME OF THE SCENE if absent. An earlier recording in it is replaced
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -99,9 +120,12 @@ pub(crate) struct RunArgs {
     pub(crate) save_state: Option<PathBuf>,
     /// Go on from a saved state of the same scene. The recording in DIR goes on after the step the state was saved at: what was recorded
     /// later is dropped, and what follows has the bits of a run that was never interrupted. A new or empty DIR gets the steps from
-    /// there on. With --save-state of the same file a run can be killed and resumed any number of times
+    /// there on. A FILE that is not there yet is no failure: the run begins from the start, and says so. With --save-state of the same file
+    /// one line serves a run that is killed and begun again any number of times
     #[arg(long, value_name = "FILE")]
     pub(crate) resume: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) convergence: ConvergenceArgs,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
     /// Print the summary as one JSON document on stdout
@@ -122,6 +146,9 @@ pub(crate) struct ReportArgs {
     /// Scene file, where it is not the one that summary.json names
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
+    /// Give a key of the scene another value, beside those that the run had by its --set, which summary.json tells (repeatable)
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<Setting>,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
 }
@@ -142,6 +169,8 @@ pub(crate) struct NewArgs {
 pub(crate) struct PlayArgs {
     /// Scene file (TOML)
     pub(crate) scene: PathBuf,
+    #[command(flatten)]
+    pub(crate) set: SetArgs,
     /// Show the scene's script in the time that it takes, until an instrument is moved by hand
     #[arg(long)]
     pub(crate) watch: bool,
@@ -198,6 +227,8 @@ pub(crate) struct SweepArgs {
     /// Runs at the same time; the number of cores if absent
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) jobs: Option<u16>,
+    #[command(flatten)]
+    pub(crate) set: SetArgs,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
     /// Print what has come of it as one JSON document on stdout

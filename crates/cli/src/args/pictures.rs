@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+use endowire_sweep::Setting;
 use endowire_viewer::{Mode, Pose};
 
-use super::CacheArgs;
+use super::{CacheArgs, ConvergenceArgs, SetArgs};
 
 /// Which views are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
@@ -34,7 +35,8 @@ pub(crate) struct FrameArgs {
     /// Bits a pixel of fluoroscopic frames, 8 or 16
     #[arg(long)]
     pub(crate) bits: Option<u32>,
-    /// Set any other key of the scene's view table, as in c_arm.sid_mm=1000 (repeatable)
+    /// Set any other key of the scene's view table, as in c_arm.sid_mm=1000, or any key of the scene as it is called from its top, as in
+    /// vessel.wall.friction=0.1 or device.part[0].length_mm=60 (repeatable). A recorded run has what it was given itself
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
     /// Turn the camera of the 3D view by so many degrees from the first frame to the last
@@ -123,6 +125,8 @@ pub(crate) struct FluoroArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
+    pub(crate) convergence: ConvergenceArgs,
+    #[command(flatten)]
     pub(crate) frames: FrameArgs,
 }
 
@@ -133,6 +137,10 @@ pub(crate) struct DatasetArgs {
     /// Folder for images, arrays and annotations.json; a call that was ended goes on in it
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) set: SetArgs,
+    #[command(flatten)]
+    pub(crate) convergence: ConvergenceArgs,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
     /// Print what was written as one JSON document on stdout
@@ -151,6 +159,9 @@ pub(crate) struct ExportArgs {
     /// Scene file of the run, if it is no longer where it was
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
+    /// Give a key of the scene another value, beside those that the run had by its --set, which summary.json tells (repeatable)
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<Setting>,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
 }

@@ -2,7 +2,6 @@
 
 use endowire_core::Vec3;
 use endowire_core::device::{Stack, line_mm};
-use endowire_methods::Scene;
 
 use crate::args::ExportArgs;
 use crate::cache::Cache;
@@ -11,6 +10,7 @@ use crate::output::instruments::Lengths;
 use crate::output::recording::Recording;
 use crate::output::vtk::{PointArray, PolyData, write_series};
 use crate::output::{folder, progress, tell};
+use crate::scenes;
 
 /// Number that points of contacts have in place of an instrument's.
 const CONTACT: f64 = -1.0;
@@ -18,8 +18,7 @@ const CONTACT: f64 = -1.0;
 /// Writes the vessel, a file for each step, and the list of them.
 pub(crate) fn export(args: &ExportArgs) -> Result<(), Failure> {
     let recording = Recording::read(&args.dir, args.scene.as_deref())?;
-    let path = args.scene.as_ref().unwrap_or(&recording.summary.scene_file);
-    let scene = Scene::read(path)?;
+    let (path, scene) = scenes::of_recording(&recording.summary, args.scene.as_deref(), &args.set)?;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let stack = scene.stack().map_err(in_scene)?;
     let wall = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?;

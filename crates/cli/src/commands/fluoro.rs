@@ -2,18 +2,18 @@
 
 use std::path::Path;
 
-use endowire_core::insertion::{Script, Simulation};
+use endowire_core::insertion::{Script, Simulation, Tally};
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, VesselMotion};
-use endowire_methods::Scene;
 use endowire_viewer::{ContactView, FrameTime};
 
-use super::studio::{Plan, Still, Studio};
+use super::studio::{Plan, Still, Studio, Went};
 use crate::args::{FluoroArgs, ViewChoice};
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::injections::Injected;
 use crate::output::progress;
+use crate::scenes;
 
 /// Carries out the script, then draws.
 pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
@@ -24,7 +24,8 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     if !args.time.is_finite() {
         return Err(Failure::Input(format!("--time {}: must be finite", args.time)));
     }
-    let scene = Scene::read(&args.scene)?;
+    let (settings, _) = scenes::of_scene_and_view(&args.frames.set)?;
+    let scene = scenes::read(&args.scene, &settings)?;
     let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(in_scene)?;
     let steps = args.steps.unwrap_or(script.len());
     if steps > script.len() {
@@ -66,7 +67,12 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
             displacement: now.displacement.as_ref(),
         })?;
     }
-    studio.finish()?.tell(args.frames.json)
+    let mut written = studio.finish()?;
+    let (taken, kept) = (now.steps, format!("the frames are in {}", written.folder.display()));
+    written.went = (taken > 0).then_some(Went { steps: taken, tally: now.tally });
+    written.tell(args.frames.json)?;
+    let allowed = args.convergence.allow_unconverged;
+    scenes::check_converged(args.scene.display(), &now.tally, taken, allowed, kept)
 }
 
 /// What is in the vessel when frames are drawn.
@@ -78,6 +84,9 @@ struct Now {
     injections: Vec<Injected>,
     /// Where the vessel is.
     displacement: Option<Displacement>,
+    /// Steps carried out, and how they went.
+    steps: usize,
+    tally: Tally,
 }
 
 /// Carries out the first steps of the script.
@@ -90,7 +99,7 @@ fn after(
 ) -> Result<Now, Failure> {
     let bar = progress::bar(steps, "step");
     let mut run = script.begin();
-    let mut injections = Vec::new();
+    let (mut injections, mut taken, mut tally) = (Vec::new(), 0, Tally::default());
     for index in 0..=steps {
         let step = run.next(simulation)?.map(|step| (step.moves.to_vec(), step.time_s));
         injections.extend(Injected::begun(&run, injections.len(), frames_per_s, simulation));
@@ -100,6 +109,8 @@ fn after(
             Failure::Computation(format!("{}: step {}: {e}", args.scene.display(), index + 1))
         })?;
         run.carried_out();
+        taken += 1;
+        tally.count(taken, simulation);
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -113,5 +124,7 @@ fn after(
             .collect(),
         injections,
         displacement: simulation.displacement(),
+        steps: taken,
+        tally,
     })
 }

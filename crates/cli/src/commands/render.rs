@@ -1,7 +1,6 @@
 //! `endowire render`: frames of a recorded run.
 
 use endowire_core::vessel::VesselMotion;
-use endowire_methods::Scene;
 use endowire_viewer::{FrameTime, Seen};
 
 use super::studio::{Plan, Still, Studio};
@@ -11,21 +10,20 @@ use crate::failure::Failure;
 use crate::output::folder::step_times;
 use crate::output::injections::{self, Injected};
 use crate::output::instruments::Lengths;
-use crate::output::provenance::{Provenance, read_input};
+use crate::output::provenance::Provenance;
 use crate::output::recording::Recording;
 use crate::output::{progress, tell};
+use crate::scenes;
 
 /// Draws the wanted steps.
 pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let recording = Recording::read(&args.dir, args.scene.as_deref())?;
-    let path = args.scene.as_ref().unwrap_or(&recording.summary.scene_file);
-    let scene = Scene::read(path)?;
-    let mut inputs = vec![scene.text().as_bytes().to_vec()];
-    for path in scene.input_paths() {
-        inputs.push(read_input(&path)?);
-    }
-    let hash = Provenance::new(&inputs, scene.seed);
-    if recording.summary.scene_hash.as_ref().is_some_and(|recorded| recorded != hash.scene_hash()) {
+    let (settings, _) = scenes::of_scene_and_view(&args.frames.set)?;
+    let (path, scene) = scenes::of_recording(&recording.summary, args.scene.as_deref(), &settings)?;
+    let hash = Provenance::of_scene(&scene, &settings)?;
+    // What is set anew is meant to differ.
+    let same = settings.is_empty();
+    if same && recording.summary.scene_hash.as_ref().is_some_and(|recorded| recorded != hash.scene_hash()) {
         tell(format_args!(
             "endowire: {} or a file it names has changed since the run in {} was recorded",
             path.display(),
@@ -37,6 +35,14 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
             "endowire: the run in {} goes on or was ended from outside: {} steps of it are recorded",
             args.dir.display(),
             recording.steps()
+        ));
+    }
+    let unconverged = recording.summary.unconverged_steps;
+    if unconverged > 0 {
+        tell(format_args!(
+            "endowire: {unconverged} of the {} steps in {} are no equilibria: steps.csv says which (converged)",
+            recording.steps(),
+            args.dir.display()
         ));
     }
     if recording.steps() == 0 {

@@ -15,7 +15,7 @@ use crate::args::{SweepArgs, SweepCommand};
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::frames::FrameWriter;
-use crate::output::provenance::{PROGRAM, Provenance, read_input};
+use crate::output::provenance::{PROGRAM, Provenance};
 use crate::output::recorder::{Recorder, Summary};
 use crate::output::{print_json, progress, tell, whole};
 
@@ -29,6 +29,8 @@ struct Document {
     earlier: usize,
     /// Those that did not do all of their script.
     failed: usize,
+    /// Those with steps that found no equilibrium.
+    unconverged: usize,
     table: Option<PathBuf>,
 }
 
@@ -47,7 +49,10 @@ pub(crate) fn sweep(args: &SweepArgs) -> Result<(), Failure> {
 }
 
 fn carry_out(args: &SweepArgs, file: &Path, folder: &Path) -> Result<(), Failure> {
-    let sweep = Sweep::read(file)?;
+    let sweep = Sweep::read_with(file, &args.set.set)?;
+    if let Some(remark) = sweep.remark() {
+        tell(format_args!("endowire: {}: {remark}", file.display()));
+    }
     let recordings = sweep.recorded().map(|what| Recordings { folder: folder.join("recordings"), what });
     let stop = interrupts();
     let bar = progress::bar(sweep.len(), "run");
@@ -63,13 +68,18 @@ fn carry_out(args: &SweepArgs, file: &Path, folder: &Path) -> Result<(), Failure
     };
     let told = sweep.carry_out(&order)?;
     bar.finish_and_clear();
-    let Progress { runs, done, failed } = told.progress;
+    let Progress { runs, done, failed, unconverged } = told.progress;
     if args.json {
-        print_json(&Document { runs, done, earlier: told.earlier, failed, table: told.table.clone() })?;
+        let (earlier, table) = (told.earlier, told.table.clone());
+        print_json(&Document { runs, done, earlier, failed, unconverged, table })?;
     }
     match told.table {
         Some(table) => {
-            tell(format_args!("{runs} runs in {}, {failed} of them failed", table.display()));
+            let steps = match unconverged {
+                0 => String::new(),
+                count => format!(", {count} have steps without an equilibrium (unconverged_steps)"),
+            };
+            tell(format_args!("{runs} runs in {}, {failed} of them failed{steps}", table.display()));
             Ok(())
         }
         None => Err(Failure::Computation(format!(
@@ -87,9 +97,9 @@ fn show(bar: &ProgressBar, progress: Progress) {
     if begins {
         bar.reset_eta();
     }
-    if progress.failed > 0 {
-        bar.set_message(format!("{} failed", progress.failed));
-    }
+    let counts = [(progress.failed, "failed"), (progress.unconverged, "without equilibria")];
+    let told = counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
+    bar.set_message(told.collect::<Vec<_>>().join(", "));
 }
 
 /// Recordings of all runs: each a folder as `endowire run` makes it, and its scene beside it.
@@ -132,14 +142,10 @@ impl Recordings {
         let text = run.standalone()?;
         whole::write_bytes(&scene_file, text.as_bytes()).map_err(|e| Failure::write(&scene_file, &e))?;
         let scene = Scene::read(&scene_file)?;
-        let mut inputs = vec![text.into_bytes()];
-        for path in scene.input_paths() {
-            inputs.push(read_input(&path)?);
-        }
         let drawn = (self.what == Recorded::Frames).then_some(simulation);
         Ok(Recording {
             frames: FrameWriter::new(&scene_file, &scene, drawn)?,
-            provenance: Provenance::new(&inputs, scene.seed),
+            provenance: Provenance::of_scene(&scene, &[])?,
             scene_file,
             scene,
             recorder,

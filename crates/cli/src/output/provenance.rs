@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use endowire_sweep::{Program, hash_inputs};
+use endowire_methods::Scene;
+use endowire_sweep::{Program, Setting, hash_inputs};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -19,6 +20,9 @@ pub(crate) struct Provenance {
     /// SHA-256 of the scene's text and of the files it names; of nothing where there is no scene.
     scene_hash: String,
     seed: u64,
+    /// What of the scene was set on the command line, `KEY=VALUE`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    set: Vec<String>,
 }
 
 impl Provenance {
@@ -29,7 +33,22 @@ impl Provenance {
             git_revision: PROGRAM.git_revision,
             scene_hash: hash_inputs(inputs),
             seed,
+            set: Vec::new(),
         }
+    }
+
+    /// For a result of a scene with these settings, and of the files that it names.
+    pub(crate) fn of_scene(scene: &Scene, settings: &[Setting]) -> Result<Self, Failure> {
+        let mut inputs = vec![scene.text().as_bytes().to_vec()];
+        for path in scene.input_paths() {
+            inputs.push(read_input(&path)?);
+        }
+        Ok(Self::new(&inputs, scene.seed).with(settings))
+    }
+
+    /// The same with what was set on the command line.
+    pub(crate) fn with(self, settings: &[Setting]) -> Self {
+        Self { set: settings.iter().map(Setting::to_string).collect(), ..self }
     }
 
     /// SHA-256 of the inputs.

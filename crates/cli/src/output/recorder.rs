@@ -78,6 +78,11 @@ struct Row {
     nodes_solved: u64,
     angles: bool,
     converged: bool,
+    relaxations: u32,
+    imbalance: f64,
+    wall_force_sum_n: f64,
+    wall_force_largest_n: f64,
+    wall_force_tip_n: f64,
     drag_n: f64,
     time_s: f64,
 }
@@ -189,6 +194,7 @@ impl Recorder {
         let (report, shape) = (simulation.report(), simulation.shape());
         let command = moves.first().map(|one| one.command).unwrap_or_default();
         let tip = shape.tip_mm().unwrap_or_default();
+        let force = simulation.wall_force();
         let row = Row {
             step: self.steps + 1,
             advance_mm: command.advance_mm,
@@ -215,6 +221,11 @@ impl Recorder {
             nodes_solved: report.nodes_solved,
             angles: report.angles,
             converged: report.converged,
+            relaxations: report.relaxations,
+            imbalance: report.imbalance,
+            wall_force_sum_n: force.sum_n,
+            wall_force_largest_n: force.largest_n,
+            wall_force_tip_n: force.tip_n,
             drag_n: report.drag_n.norm(),
             time_s,
         };

@@ -19,6 +19,12 @@ pub(crate) struct RecordedSummary {
     pub(crate) scene_file: PathBuf,
     /// Hash of the scene's text and of the files it names.
     pub(crate) scene_hash: Option<String>,
+    /// What of the scene was set on the command line.
+    #[serde(default)]
+    pub(crate) set: Vec<String>,
+    /// Steps without an equilibrium; none in recordings of versions that did not count them.
+    #[serde(default)]
+    pub(crate) unconverged_steps: usize,
     /// Whether the run has ended by itself; recordings of versions that packed them only then do not say it.
     #[serde(default = "yes")]
     pub(crate) complete: bool,
@@ -51,7 +57,14 @@ impl Recording {
         let summary = match (read(), scene) {
             (Ok(summary), _) => summary,
             (Err(_), Some(scene)) => {
-                RecordedSummary { scene_file: scene.to_path_buf(), scene_hash: None, complete: false }
+                let scene_file = scene.to_path_buf();
+                RecordedSummary {
+                    scene_file,
+                    scene_hash: None,
+                    set: vec![],
+                    unconverged_steps: 0,
+                    complete: false,
+                }
             }
             (Err(e), None) => return Err(unreadable(&path, &e)),
         };

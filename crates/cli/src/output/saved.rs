@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use endowire_core::insertion::{Script, ScriptCourse, ScriptRun, Simulation, State, Step};
+use endowire_core::insertion::{Script, ScriptCourse, ScriptRun, Simulation, State, Step, Tally};
 use endowire_methods::Scene;
 use endowire_sweep::seal;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ use super::whole;
 use crate::failure::Failure;
 
 /// The first line of a saved state, and its beginning in every version.
-const FORMAT: &str = "endowire state 9";
+const FORMAT: &str = "endowire state 10";
 const ANY_FORMAT: &str = "endowire state ";
 
 /// What a state belongs to: hashes of all that its steps depended on.
@@ -124,10 +124,8 @@ pub(crate) struct Course {
     pub(crate) steps: usize,
     /// Time of the simulation, s.
     pub(crate) step_time_s: f64,
-    /// Deepest penetration of the wall in any step, mm.
-    pub(crate) max_penetration_mm: f64,
-    /// Whether every step met its convergence test.
-    pub(crate) converged: bool,
+    /// How its steps went.
+    pub(crate) tally: Tally,
     /// What was injected.
     #[serde(default)]
     pub(crate) injected: Vec<Injected>,
@@ -136,7 +134,7 @@ pub(crate) struct Course {
 impl Course {
     /// Of a run that begins.
     pub(crate) fn begin() -> Self {
-        Self { steps: 0, step_time_s: 0.0, max_penetration_mm: 0.0, converged: true, injected: vec![] }
+        Self { steps: 0, step_time_s: 0.0, tally: Tally::default(), injected: vec![] }
     }
 }
 

@@ -22,7 +22,10 @@ fn endless_scene(folder: &Path, views: &str) -> PathBuf {
 }
 
 fn start(scene: &Path, out: &Path) -> Child {
-    endowire().args(["run".as_ref(), scene, "--out".as_ref(), out]).stderr(Stdio::piped()).spawn().unwrap()
+    let allowed = "--allow-unconverged".as_ref();
+    let mut command = endowire();
+    command.args(["run".as_ref(), scene, "--out".as_ref(), out, allowed]);
+    command.stderr(Stdio::piped()).spawn().unwrap()
 }
 
 fn render(recording: &Path) -> Output {

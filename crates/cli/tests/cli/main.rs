@@ -24,5 +24,7 @@ mod render;
 mod report;
 mod resume;
 mod rod;
+mod set;
 mod sweep;
 mod terminal;
+mod told;

@@ -63,17 +63,17 @@ impl Kind {
 /// The tables of a device file.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FileTable {
+pub(crate) struct FileTable {
     #[serde(default)]
-    name: String,
-    kind: Option<Kind>,
-    length_mm: Option<f64>,
-    length_cm: Option<f64>,
-    source: Option<String>,
+    pub(crate) name: String,
+    pub(crate) kind: Option<Kind>,
+    pub(crate) length_mm: Option<f64>,
+    pub(crate) length_cm: Option<f64>,
+    pub(crate) source: Option<String>,
     #[serde(default)]
-    section: Vec<Section>,
+    pub(crate) section: Vec<Section>,
     #[serde(default)]
-    part: Vec<PartTable>,
+    pub(crate) part: Vec<PartTable>,
 }
 
 /// A device file: parts with their names, materials and sources, and the device they make.
@@ -108,7 +108,23 @@ impl DeviceFile {
 }
 
 impl FileTable {
-    fn resolve(self) -> Result<DeviceFile> {
+    /// The first of its keys that is given, for messages; none where sections alone are, or nothing is.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        let keys = [
+            ("kind", self.kind.is_some()),
+            ("length_mm", self.length_mm.is_some()),
+            ("length_cm", self.length_cm.is_some()),
+            ("source", self.source.is_some()),
+            ("part", !self.part.is_empty()),
+        ];
+        keys.into_iter().find(|(_, given)| *given).map(|(key, _)| key)
+    }
+
+    /// The device that the tables say.
+    ///
+    /// # Errors
+    /// Values that are missing, out of range, given twice, or contradict each other, by part and key.
+    pub(crate) fn resolve(self) -> Result<DeviceFile> {
         let length = one_of("device", length_ways(self.length_mm, self.length_cm), LENGTH_LIMIT_MM)?;
         let length_mm = length.map(|length| length.ends.at(0.0));
         let (parts, device) = match (self.section.is_empty(), self.part.is_empty()) {

@@ -11,7 +11,9 @@ mod quantity;
 mod rest_shape;
 mod stack;
 
+pub(crate) use file::FileTable;
 pub use file::{DeviceFile, Kind};
+pub(crate) use part::PartTable;
 pub use part::{Coat, CutError, Part};
 pub(crate) use stack::LENGTH_SLACK_MM;
 pub use stack::{Instrument, Stack, line_mm};

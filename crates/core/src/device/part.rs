@@ -20,7 +20,7 @@ const MOST_ANGLE_DEG: f64 = 1080.0;
 /// A `[[part]]` table as it stands in the file. Values that may be tapered are a number or two.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct PartTable {
+pub(crate) struct PartTable {
     pub(super) name: String,
     length_mm: Option<f64>,
     length_cm: Option<f64>,

@@ -5,10 +5,11 @@ mod builder;
 mod nodes;
 mod script;
 mod simulation;
+mod tally;
 
 pub use crate::contact::{Contact, WallProperties, WallRegion};
 pub use crate::methods::{
-    Command, Energy, InstrumentReport, LateralForce, Move, Sheath, State, StepReport, Surroundings,
+    Command, Energy, InstrumentReport, LateralForce, Move, Sheath, State, StepReport, Surroundings, WallForce,
 };
 pub use batch::Batch;
 pub use builder::SimulationBuilder;
@@ -18,3 +19,4 @@ pub use script::{
     script_commands,
 };
 pub use simulation::Simulation;
+pub use tally::Tally;

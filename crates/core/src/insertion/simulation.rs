@@ -3,10 +3,12 @@
 use std::sync::Arc;
 
 use crate::contact::{Counters, WallProperties};
-use crate::device::{Device, LENGTH_SLACK_MM, Stack};
+use crate::device::{Device, LENGTH_SLACK_MM, Stack, line_mm};
 use crate::flow::BloodFlow;
 use crate::insertion::SimulationBuilder;
-use crate::methods::{Command, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings};
+use crate::methods::{
+    Command, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings, WallForce,
+};
 use crate::shape::Shape;
 use crate::vessel::{Displacement, VesselMotion, Wall, WallQuery};
 use crate::{Error, Result, Vec3};
@@ -175,6 +177,16 @@ impl Simulation {
     /// What the last step found.
     pub fn report(&self) -> &StepReport {
         self.method.report()
+    }
+
+    /// How hard the wall holds what is in ([`StepReport::wall_force`]); the tip is that of the farthest instrument, of several as far in the
+    /// thickest.
+    pub fn wall_force(&self) -> WallForce {
+        let lengths_mm = self.report().lengths_mm();
+        let line_mm = line_mm(lengths_mm.iter().copied());
+        let farthest = self.scene.stack.devices().zip(&lengths_mm).filter(|(_, mm)| **mm >= line_mm);
+        let radius_mm = farthest.map(|(device, _)| device.section_at(0.0).radius_mm).fold(0.0, f64::max);
+        self.report().wall_force(self.shape(), radius_mm)
     }
 
     /// Time since the start, s.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Vec3;
 use crate::contact::Contact;
+use crate::shape::Shape;
 
 /// The terms of the total potential energy, mJ.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -54,6 +55,24 @@ impl StepReport {
         self.each_hand().map(|hand| hand.inserted_mm).collect()
     }
 
+    /// How hard the wall holds the device, whose line `shape` is and whose outer radius at the tip is `tip_radius_mm`.
+    ///
+    /// A contact is at the tip where its place on the device's axis is no farther from the end of the line than that radius: there the wall
+    /// is felt by the end itself, and not by the shaft beside it.
+    pub fn wall_force(&self, shape: &Shape, tip_radius_mm: f64) -> WallForce {
+        let tip_mm = shape.tip_mm();
+        let mut force = WallForce::default();
+        for contact in &self.contacts {
+            let size_n = contact.total_n().norm();
+            force.sum_n += size_n;
+            force.largest_n = force.largest_n.max(size_n);
+            if tip_mm.is_some_and(|tip_mm| (contact.position_mm - tip_mm).norm() <= tip_radius_mm) {
+                force.tip_n += size_n;
+            }
+        }
+        force
+    }
+
     fn each_hand(&self) -> impl Iterator<Item = InstrumentReport> {
         (0..self.instruments.len().max(1)).map(|index| self.hand(index))
     }
@@ -73,6 +92,17 @@ pub struct InstrumentReport {
     pub push_force_n: Option<f64>,
     /// Torque with which its hand must hold it, N·mm: the slope of the energy with respect to its turn.
     pub torque_nmm: f64,
+}
+
+/// How hard the wall holds a device: sizes of the forces at its contacts, each of normal and friction together.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct WallForce {
+    /// Their sum, N.
+    pub sum_n: f64,
+    /// The largest one, N. Contacts stand for lengths of the device: it depends on how far they are apart.
+    pub largest_n: f64,
+    /// The sum of those at the tip ([`StepReport::wall_force`]), N.
+    pub tip_n: f64,
 }
 
 /// Force across the line, at a node, by which instruments that lie in one another hold each other.
@@ -142,4 +172,39 @@ pub struct StepReport {
     pub nodes_solved: u64,
     /// Whether the step met the method's own convergence test.
     pub converged: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_force_at_the_tip_is_that_within_a_radius_of_it() {
+        let at = |x_mm: f64, force_n: f64, friction_n: f64| Contact {
+            position_mm: Vec3::new(x_mm, 0.0, 0.0),
+            normal: Vec3::y(),
+            force_n,
+            friction_n: Vec3::new(friction_n, 0.0, 0.0),
+            penetration_mm: 0.0,
+            triangle: 0,
+        };
+        let shape = Shape {
+            positions_mm: vec![Vec3::zeros(), Vec3::new(10.0, 0.0, 0.0)],
+            tangents: vec![Vec3::x(); 2],
+            from_tip_mm: vec![10.0, 0.0],
+        };
+        let contacts = vec![at(2.0, 0.3, 0.4), at(9.6, 0.1, 0.0), at(10.0, 0.2, 0.0)];
+        let report = StepReport { contacts, ..StepReport::default() };
+        let close = |force: WallForce, expected: [f64; 3]| {
+            let told = [force.sum_n, force.largest_n, force.tip_n];
+            assert!(told.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{told:?}");
+        };
+        close(report.wall_force(&shape, 0.5), [0.8, 0.5, 0.3]);
+        // A thinner tip has the last alone, one as thick as the way is long all of them.
+        close(report.wall_force(&shape, 0.3), [0.8, 0.5, 0.2]);
+        close(report.wall_force(&shape, 10.0), [0.8, 0.5, 0.8]);
+        // Nothing inserted, and nothing touched.
+        close(report.wall_force(&Shape::default(), 0.5), [0.8, 0.5, 0.0]);
+        close(StepReport::default().wall_force(&shape, 0.5), [0.0; 3]);
+    }
 }

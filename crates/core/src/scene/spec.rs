@@ -7,7 +7,7 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 
 use super::method_table;
 use super::tables::{DEPTH_MM, DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};
-use crate::device::{Device, DeviceFile, Instrument, Section, Stack, line_mm};
+use crate::device::{Device, DeviceFile, FileTable, Instrument, Stack, line_mm};
 use crate::flow::BloodFlow;
 use crate::input::{from_toml, parse_toml};
 use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
@@ -52,6 +52,8 @@ pub struct SceneOf<M> {
     #[serde(skip)]
     script_file: Option<PathBuf>,
     #[serde(skip)]
+    path: PathBuf,
+    #[serde(skip)]
     folder: PathBuf,
     #[serde(skip)]
     text: String,
@@ -67,6 +69,20 @@ struct ScriptFile {
 
 /// Instruments that are in at the start are pushed there together, the farthest by so much a step, mm.
 const START_MM: f64 = 1.0;
+
+/// An error of a device that stands in a table of the scene.
+fn in_table(table: &str, error: Error) -> Error {
+    match error {
+        Error::Parameter { name, value, mend } => {
+            let name = match name.strip_prefix("device.") {
+                Some(key) => format!("{table}.{key}"),
+                None => format!("{table}.{name}"),
+            };
+            Error::Parameter { name, value, mend }
+        }
+        other => other,
+    }
+}
 
 /// A file that cannot be read, with the key that names it in front.
 fn missing(key: &str, error: Error) -> Error {
@@ -122,6 +138,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     }
 
     fn of_file(mut self, text: String, path: &Path) -> Result<Self> {
+        self.path = path.to_path_buf();
         self.folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
         self.text = text;
         if self.name.is_empty() {
@@ -243,15 +260,17 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// [`Stack::sealed`].
     pub fn stack(&self) -> Result<Stack> {
         match (&self.device, self.instrument.is_empty()) {
-            (Some(spec), true) => self.read_device("device", &spec.file, &spec.section).map(Stack::from),
+            (Some(spec), true) => {
+                self.read_device("device", spec.file.as_deref(), spec.tables()).map(Stack::from)
+            }
             (None, false) => {
                 if let Some(may_lead) = self.instrument.first().and_then(|first| first.may_lead) {
                     let mend = "nothing lies in the first instrument, which it could lead: leave it out";
                     return Err(Error::parameter("instrument[0].may_lead", may_lead, mend));
                 }
                 let each = self.instrument.iter().enumerate().map(|(index, spec)| {
-                    let device =
-                        self.read_device(&format!("instrument[{index}]"), &spec.file, &spec.section)?;
+                    let name = format!("instrument[{index}]");
+                    let device = self.read_device(&name, spec.file.as_deref(), spec.tables())?;
                     Ok(Instrument {
                         name: spec.name.clone(),
                         device,
@@ -295,41 +314,48 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     }
 
     /// The device files with their paths, and with parts, materials and sources, of the device or of each instrument, where the scene
-    /// names them.
+    /// names them; parts that stand in the scene are those of a file of its own path.
     ///
     /// # Errors
-    /// A missing or unusable file, values out of range, sections in the scene too.
+    /// A missing or unusable file, values out of range, sections or parts in the scene too.
     pub fn device_files(&self) -> Result<Vec<Option<(PathBuf, DeviceFile)>>> {
-        let device = self.device.iter().map(|spec| ("device".to_owned(), &spec.file, &spec.section));
+        let device = self.device.iter().map(|spec| ("device".to_owned(), &spec.file, spec.tables()));
         let each = self.instrument.iter().enumerate();
-        let each = each.map(|(index, spec)| (format!("instrument[{index}]"), &spec.file, &spec.section));
-        device.chain(each).map(|(name, file, section)| self.read_file(&name, file, section)).collect()
+        let each = each.map(|(index, spec)| (format!("instrument[{index}]"), &spec.file, spec.tables()));
+        let all = device.chain(each);
+        all.map(|(name, file, tables)| self.read_file(&name, file.as_deref(), tables)).collect()
     }
 
     /// A device of the scene by its table's name.
-    fn read_device(&self, name: &str, file: &Option<PathBuf>, section: &[Section]) -> Result<Device> {
-        match self.read_file(name, file, section)? {
+    fn read_device(&self, name: &str, file: Option<&Path>, tables: FileTable) -> Result<Device> {
+        let sections = tables.section.clone();
+        match self.read_file(name, file, tables)? {
             Some((_, file)) => Ok(file.device),
-            None => Device::new(section.to_vec()).map_err(|error| match error {
-                Error::Parameter { name: key, value, mend } => {
-                    Error::Parameter { name: key.replacen("device", name, 1), value, mend }
-                }
-                other => other,
-            }),
+            None => Device::new(sections).map_err(|error| in_table(name, error)),
         }
     }
 
-    /// The device file that a table names, if it does.
+    /// The device file that a table names or is; none where it has sections alone.
     fn read_file(
         &self,
         name: &str,
-        file: &Option<PathBuf>,
-        section: &[Section],
+        file: Option<&Path>,
+        tables: FileTable,
     ) -> Result<Option<(PathBuf, DeviceFile)>> {
-        let Some(file) = file else { return Ok(None) };
+        let given = tables.given();
+        let Some(file) = file else {
+            if given.is_none() {
+                return Ok(None);
+            }
+            let named = if tables.name.is_empty() { name.to_owned() } else { tables.name.clone() };
+            let resolved = FileTable { name: named, ..tables }.resolve();
+            return resolved
+                .map(|file| Some((self.path.clone(), file)))
+                .map_err(|error| in_table(name, error));
+        };
         let key = format!("{name}.file");
-        if !section.is_empty() {
-            let mend = format!("{name}.section is given too: keep one of the two");
+        if let Some(given) = given.or((!tables.section.is_empty()).then_some("section")) {
+            let mend = format!("{name}.{given} is given too: keep one of the two");
             return Err(Error::parameter(key, file.display(), mend));
         }
         let path = self.resolve(file);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Deserialize;
 
-use crate::device::Section;
+use crate::device::{FileTable, Kind, PartTable, Section};
 use crate::flow::VesselFlow;
 use crate::insertion::{Sheath, WallProperties};
 use crate::vessel::{CentrelineTree, MotionMode, Resolution, Wall};
@@ -52,7 +52,7 @@ impl VesselSpec {
     }
 }
 
-/// `[device]`: sections here, or a file that has them.
+/// `[device]`: sections or parts here, or a file that has them.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DeviceSpec {
@@ -61,9 +61,31 @@ pub struct DeviceSpec {
     /// Sections, tip first.
     #[serde(default)]
     pub section: Vec<Section>,
+    /// What it is, where it is told by parts: as in a device file.
+    kind: Option<Kind>,
+    length_mm: Option<f64>,
+    length_cm: Option<f64>,
+    source: Option<String>,
+    #[serde(default)]
+    part: Vec<PartTable>,
 }
 
-/// `[[instrument]]`: one of several that lie in one another, with sections here, or a file that has them.
+impl DeviceSpec {
+    /// What a file would say.
+    pub(super) fn tables(&self) -> FileTable {
+        FileTable {
+            name: String::new(),
+            kind: self.kind,
+            length_mm: self.length_mm,
+            length_cm: self.length_cm,
+            source: self.source.clone(),
+            section: self.section.clone(),
+            part: self.part.clone(),
+        }
+    }
+}
+
+/// `[[instrument]]`: one of several that lie in one another, with sections or parts here, or a file that has them.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentSpec {
@@ -74,6 +96,13 @@ pub struct InstrumentSpec {
     /// Sections, tip first.
     #[serde(default)]
     pub section: Vec<Section>,
+    /// What it is, where it is told by parts: as in a device file.
+    kind: Option<Kind>,
+    length_mm: Option<f64>,
+    length_cm: Option<f64>,
+    source: Option<String>,
+    #[serde(default)]
+    part: Vec<PartTable>,
     /// Length that is in at the start, mm.
     #[serde(default)]
     pub inserted_mm: f64,
@@ -85,6 +114,21 @@ pub struct InstrumentSpec {
     /// Friction of the valve on its hub, which seals what lies in it, N; 0 is none and costs nothing.
     #[serde(default)]
     pub valve_n: f64,
+}
+
+impl InstrumentSpec {
+    /// What a file would say.
+    pub(super) fn tables(&self) -> FileTable {
+        FileTable {
+            name: self.name.clone(),
+            kind: self.kind,
+            length_mm: self.length_mm,
+            length_cm: self.length_cm,
+            source: self.source.clone(),
+            section: self.section.clone(),
+            part: self.part.clone(),
+        }
+    }
 }
 
 /// `[sheath]`: an opening of the vessel, or a point and a direction.

@@ -47,6 +47,9 @@ pub(super) struct ImageRow {
     pub(super) device: Option<String>,
     pub(super) instruments: Vec<String>,
     pub(super) step: usize,
+    /// Whether the step found an equilibrium; one that was drawn by a version that did not tell is taken to have.
+    #[serde(default = "yes")]
+    pub(super) converged: bool,
     /// When the step ended, in the time of the script and of a vessel that moves.
     pub(super) step_time_s: f64,
     /// Time of injections.
@@ -60,6 +63,10 @@ pub(super) struct ImageRow {
     pub(super) kvp: f64,
     pub(super) dose_ngy: f64,
     pub(super) camera_matrix: [[f64; 4]; 3],
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// One thing in a picture.

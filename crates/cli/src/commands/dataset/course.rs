@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use endowire_core::Vec3;
+use endowire_core::insertion::Tally;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::Displacement;
 use endowire_methods::Scene;
+use endowire_sweep::{Key, Setting};
 use endowire_viewer::{ContactView, Pushed, Renderer, View, ViewSpec};
 use serde_json::{Map, Value};
 
@@ -15,6 +17,7 @@ use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::injections::Injected;
 use crate::output::tell;
+use crate::scenes;
 
 /// A time before all injections, s.
 const LONG_BEFORE_S: f64 = -1e6;
@@ -22,6 +25,8 @@ const LONG_BEFORE_S: f64 = -1e6;
 /// What is in after a step.
 pub(super) struct FrameTime {
     pub(super) step: usize,
+    /// Whether it found an equilibrium.
+    pub(super) converged: bool,
     /// When it ended.
     pub(super) step_time_s: f64,
     /// From when on times of injections are told, s: the end of the step where the script injects, else 0.
@@ -53,13 +58,10 @@ impl Course {
         first: usize,
         file: &Path,
         device: Option<&Path>,
-        cache: &Cache,
+        (settings, cache): (&[Setting], &Cache),
     ) -> Result<Self, Failure> {
         let failed = |e: endowire_core::Error| Failure::from(e).at(file.display());
-        let scene = match device {
-            None => Scene::read(file)?,
-            Some(device) => with_device(file, device)?,
-        };
+        let scene = scene(file, device, settings)?;
         let mut view = view(spec, &scene, file)?;
         let pushed = Pushed::new(&scene, &view).map_err(|e| Failure::from(e).at(file.display()))?;
         let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(failed)?;
@@ -67,13 +69,15 @@ impl Course {
         let instruments = simulation.stack().instruments().iter().map(|i| i.name.clone()).collect();
         let mut moments = Vec::new();
         let mut run = script.begin();
-        let (mut injected, mut step_time_s) = (Vec::new(), 0.0);
+        let (mut injected, mut step_time_s, mut tally) = (Vec::new(), 0.0, Tally::default());
         loop {
             let report = simulation.report();
             let contacts = report.contacts.iter();
             let contacts = contacts.map(|c| ContactView { position_mm: c.position_mm, force_n: c.total_n() });
             moments.push(FrameTime {
                 step: moments.len(),
+                // Before the first there is nothing to find.
+                converged: moments.is_empty() || report.converged,
                 step_time_s,
                 time_s: if script.injects() { step_time_s } else { 0.0 },
                 shape: simulation.shape().clone(),
@@ -93,7 +97,11 @@ impl Course {
                 break;
             }
             run.carried_out();
+            tally.count(moments.len(), &simulation);
             step_time_s = ends_s.unwrap_or(moments.len() as f64 / view.frames_per_s);
+        }
+        if let (Some(remarks), true) = (tally.remarks(moments.len() - 1), tally.unconverged_steps > 0) {
+            tell(format_args!("endowire: {}: {remarks}", file.display()));
         }
         view.injection.extend(injected.iter().map(Injected::spec));
         view.validate().map_err(failed)?;
@@ -129,12 +137,11 @@ impl Course {
     }
 }
 
-/// A scene with another device.
-fn with_device(file: &Path, device: &Path) -> Result<Scene, Failure> {
+/// A scene with what is set, and with another device if one is given.
+fn scene(file: &Path, device: Option<&Path>, settings: &[Setting]) -> Result<Scene, Failure> {
     let bad = |text: String| Failure::Input(text).at(file.display());
-    let text = std::fs::read_to_string(file).map_err(|e| bad(e.to_string()))?;
-    let mut table: toml::Table = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
-    if table.contains_key("instrument") {
+    let Some(device) = device else { return scenes::read(file, settings) };
+    if !Scene::read(file)?.instrument.is_empty() {
         return Err(bad(
             "devices are given, and the scene has instruments of its own: give it without devices".to_owned(),
         ));
@@ -144,9 +151,10 @@ fn with_device(file: &Path, device: &Path) -> Result<Scene, Failure> {
         "file".to_owned(),
         toml::Value::from(device.to_string_lossy().into_owned()),
     )]);
-    table.insert("device".to_owned(), named.into());
-    let text = toml::to_string(&table).map_err(|e| bad(e.to_string()))?;
-    Ok(Scene::from_toml(&text, file)?)
+    let key = Key::parse("device")?;
+    // The device comes first: what is set may be of its parts.
+    let with_device = [&[Setting { key, value: named.into() }], settings].concat();
+    scenes::read(file, &with_device)
 }
 
 /// The view of a scene with the keys of the specification in their places.

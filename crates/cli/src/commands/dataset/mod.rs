@@ -13,7 +13,6 @@ mod spec;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use endowire_methods::Scene;
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::Value;
@@ -23,6 +22,7 @@ use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::provenance::{Provenance, read_input};
 use crate::output::{print_json, progress, tell, to_json, whole};
+use crate::scenes;
 use coco::{Annotation, Category, ImageRow, categories};
 use course::Course;
 use shot::Part;
@@ -53,6 +53,8 @@ struct Written {
     pictures: usize,
     /// Pictures of this call; the others were there.
     drawn: usize,
+    /// Pictures of steps that found no equilibrium.
+    unconverged: usize,
     courses: usize,
     simulation_time_s: f64,
     drawing_time_s: f64,
@@ -86,7 +88,9 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     let run = |(k, (scene, device)): (usize, &(&PathBuf, Option<&Path>))| {
         let wanted = open.iter().any(|shot| shot / spec.poses == k);
         let course = wanted
-            .then(|| Course::run(&spec, k * spec.poses, scene, *device, &Cache::new(&args.cache)))
+            .then(|| {
+                Course::run(&spec, k * spec.poses, scene, *device, (&args.set.set, &Cache::new(&args.cache)))
+            })
             .transpose();
         bar.inc(1);
         course
@@ -107,7 +111,7 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     bar.finish_and_clear();
     let drawing_time_s = start.elapsed().as_secs_f64();
 
-    join(folder, shots, &provenance)?;
+    let unconverged = join(folder, shots, &provenance)?;
     let each = spec.moments * spec.views();
     let drawn = open.len() * each;
     let written = Written {
@@ -115,35 +119,49 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
         folder: folder.clone(),
         pictures: shots * each,
         drawn,
+        unconverged,
         courses: pairs.len(),
         simulation_time_s,
         drawing_time_s,
         pictures_per_s: if drawn > 0 { drawn as f64 / drawing_time_s } else { 0.0 },
     };
     if args.json {
-        return print_json(&written);
+        print_json(&written)?;
+    } else {
+        tell(format_args!(
+            "{} pictures in {}, {} of them drawn now: {:.1} a second (simulations took {:.1} s before)",
+            written.pictures,
+            folder.display(),
+            drawn,
+            written.pictures_per_s,
+            simulation_time_s
+        ));
     }
-    tell(format_args!(
-        "{} pictures in {}, {} of them drawn now: {:.1} a second (simulations took {:.1} s before)",
-        written.pictures,
-        folder.display(),
-        drawn,
-        written.pictures_per_s,
-        simulation_time_s
-    ));
+    if unconverged > 0 && !args.convergence.allow_unconverged {
+        return Err(Failure::Computation(format!(
+            "{}: {unconverged} of {} pictures are of steps that found no equilibrium (\"converged\": false in annotations.json): take \
+             shorter steps in the scenes, or give --allow-unconverged to take them as they are (all are kept in {})",
+            args.spec.display(),
+            written.pictures,
+            folder.display()
+        )));
+    }
     Ok(())
 }
 
 /// What the dataset is made of.
 fn provenance(args: &DatasetArgs, spec: &Spec) -> Result<Provenance, Failure> {
+    // Parts of devices that are given are those of other files.
+    let of_scene = if spec.devices.is_empty() { args.set.set.as_slice() } else { &[] };
     let mut paths = vec![args.spec.clone()];
     for scene in &spec.scenes {
         paths.push(scene.clone());
-        paths.extend(Scene::read(scene)?.input_paths());
+        paths.extend(scenes::read(scene, of_scene)?.input_paths());
     }
     paths.extend(spec.devices.iter().cloned());
-    let inputs = paths.iter().map(|path| read_input(path)).collect::<Result<Vec<_>, _>>()?;
-    Ok(Provenance::new(&inputs, spec.seed))
+    let mut inputs = paths.iter().map(|path| read_input(path)).collect::<Result<Vec<_>, _>>()?;
+    inputs.extend(args.set.set.iter().map(|setting| setting.to_string().into_bytes()));
+    Ok(Provenance::new(&inputs, spec.seed).with(&args.set.set))
 }
 
 /// Takes a folder for a dataset; one that holds another is refused.
@@ -165,8 +183,8 @@ fn claim(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Writes the annotations of all shots.
-fn join(folder: &Path, shots: usize, provenance: &Provenance) -> Result<(), Failure> {
+/// Writes the annotations of all shots; how many pictures are of steps without an equilibrium.
+fn join(folder: &Path, shots: usize, provenance: &Provenance) -> Result<usize, Failure> {
     let info = Info { description: "endowire: simulated fluoroscopy", provenance: provenance.clone() };
     let mut document = Document { info, images: vec![], categories: categories(), annotations: vec![] };
     for path in (0..shots).map(|shot| shot::list(folder, shot)) {
@@ -179,5 +197,6 @@ fn join(folder: &Path, shots: usize, provenance: &Provenance) -> Result<(), Fail
     let text = serde_json::to_string(&document)
         .map_err(|e| Failure::Computation(format!("annotations cannot be written as JSON: {e}")))?;
     let path = folder.join("annotations.json");
-    whole::write_bytes(&path, text.as_bytes()).map_err(|e| Failure::write(&path, &e))
+    whole::write_bytes(&path, text.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
+    Ok(document.images.iter().filter(|image| !image.converged).count())
 }

@@ -84,6 +84,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
                 device: course.device.clone(),
                 instruments: names.clone(),
                 step: moment.step,
+                converged: moment.converged,
                 step_time_s: moment.step_time_s,
                 time_s,
                 plane,

@@ -12,21 +12,30 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 use std::sync::mpsc;
 
-use endowire_methods::Scene;
-use endowire_play::{Input, Limits, Pictures, Session};
+use endowire_play::{Input, Limits, Pictures, Session, Went};
 use endowire_viewer::ViewSpec;
+use serde::Serialize;
 
 use crate::args::PlayArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::{print_json, tell};
+use crate::scenes;
 use live::Message;
 use record::Record;
 
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Document {
+    #[serde(flatten)]
+    pace: live::Pace,
+    #[serde(flatten)]
+    went: Went,
+}
+
 /// Opens a session in the way that was asked for, and records what was done.
 pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
-    let mut scene = Scene::read(&args.scene)?;
-    args.script.as_deref().map_or(Ok(()), |path| scene.take_script(path))?;
+    let scene = scenes::with_script(&args.scene, &args.set.set, args.script.as_deref())?;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
     let view = ViewSpec::of_scene(&scene, &args.scene)?;
     let simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
@@ -55,7 +64,7 @@ pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
     };
     record.finish(&session)?;
     if args.json && !args.headless {
-        return print_json(&pace);
+        return print_json(&Document { pace, went: session.went() });
     }
     tell(pace);
     Ok(())

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use endowire_methods::Scene;
-use endowire_play::Session;
+use endowire_play::{Session, Went};
 
 use crate::args::PlayArgs;
 use crate::failure::Failure;
@@ -26,8 +26,11 @@ impl Record {
             args.record.clone().unwrap_or_else(|| Path::new("out").join(&scene.name).join("played.toml"));
         // A name with a line break would end the comment.
         let shown = |path: &Path| path.display().to_string().replace(char::is_control, " ");
+        let set = args.set.set.iter().filter(|setting| setting.key.begins() != "script");
+        let set: String =
+            set.map(|setting| format!(" --set '{setting}'").replace(char::is_control, " ")).collect();
         let head = format!(
-            "# What hands have done in {0}; carried out again by\n# endowire run {0} --script {1}\n\n",
+            "# What hands have done in {0}; carried out again by\n# endowire run {0} --script {1}{set}\n\n",
             shown(&args.scene),
             shown(&path)
         );
@@ -54,7 +57,16 @@ impl Record {
     /// Writes the whole session and says where.
     pub(crate) fn finish(&self, session: &Session) -> Result<(), Failure> {
         self.write(session)?;
-        tell(format_args!("{} steps are recorded in {}", session.steps(), self.path.display()));
+        let Went { unconverged_steps, jumps, relaxations } = session.went();
+        let counts = [
+            (unconverged_steps, "without an equilibrium"),
+            (jumps, "with a jump"),
+            (relaxations, "last resorts"),
+        ];
+        let told =
+            counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!(", {count} {what}"));
+        let told: String = told.collect();
+        tell(format_args!("{} steps are recorded in {}{told}", session.steps(), self.path.display()));
         Ok(())
     }
 }

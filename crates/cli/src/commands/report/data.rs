@@ -5,6 +5,7 @@ use std::path::Path;
 use endowire_core::Vec3;
 use endowire_core::device::Stack;
 use endowire_core::vessel::SurfaceMesh;
+use endowire_sweep::{EndedBy, UntilOutcome};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -55,6 +56,11 @@ struct Series {
     energy_mj: Vec<f64>,
     wall_mj: Vec<f64>,
     max_penetration_mm: Vec<f64>,
+    /// None in recordings of versions that did not tell them.
+    wall_force_sum_n: Vec<Option<f64>>,
+    wall_force_largest_n: Vec<Option<f64>>,
+    wall_force_tip_n: Vec<Option<f64>>,
+    imbalance: Vec<Option<f64>>,
 }
 
 #[derive(Serialize)]
@@ -85,6 +91,12 @@ struct Row {
     jumped: bool,
     left_through: Option<usize>,
     converged: bool,
+    #[serde(default)]
+    relaxations: u32,
+    imbalance: Option<f64>,
+    wall_force_sum_n: Option<f64>,
+    wall_force_largest_n: Option<f64>,
+    wall_force_tip_n: Option<f64>,
 }
 
 /// Gathers what was recorded in `folder`.
@@ -113,6 +125,10 @@ pub(super) fn collect(
             energy_mj: rows.iter().map(|row| row.bend_mj + row.twist_mj + row.wall_mj).collect(),
             wall_mj: rows.iter().map(|row| row.wall_mj).collect(),
             max_penetration_mm: rows.iter().map(|row| row.max_penetration_mm).collect(),
+            wall_force_sum_n: rows.iter().map(|row| row.wall_force_sum_n).collect(),
+            wall_force_largest_n: rows.iter().map(|row| row.wall_force_largest_n).collect(),
+            wall_force_tip_n: rows.iter().map(|row| row.wall_force_tip_n).collect(),
+            imbalance: rows.iter().map(|row| row.imbalance).collect(),
         },
         frames: frames(folder),
         summary,
@@ -170,16 +186,34 @@ fn events(rows: &[Row], summary: &Value) -> Vec<EventData> {
             happened("left", format!("at {:.1} mm: the tip is out of opening {opening}", row.inserted_mm));
         }
         if !row.converged {
-            happened("not converged", format!("at {:.1} mm", row.inserted_mm));
+            happened("not converged", format!("at {:.1} mm: the step found no equilibrium", row.inserted_mm));
+        }
+        if row.relaxations > 0 {
+            let left = row.imbalance.unwrap_or_default();
+            let text =
+                format!("at {:.1} mm: left to come to rest, {left:.1e} out of balance", row.inserted_mm);
+            happened("last resort", text);
         }
         out = row.left_through;
     }
     if let (Some(step), Some(reason)) =
         (summary["failure"]["step"].as_u64(), summary["failure"]["reason"].as_str())
     {
-        let what = if reason.starts_with("blocked") { "blocked" } else { "ended" };
+        // Earlier versions told no kind.
+        let kind = serde_json::from_value::<EndedBy>(summary["failure"]["kind"].clone());
+        let blocked = reason.starts_with("blocked");
+        let what = kind.map_or(if blocked { "blocked" } else { "ended" }, EndedBy::name);
         events.push(EventData { step: step as usize, what, text: reason.to_owned() });
     }
+    for line in serde_json::from_value::<Vec<UntilOutcome>>(summary["until"].clone()).unwrap_or_default() {
+        let (what, how) = match line.met {
+            Some(met) => (EndedBy::from(met).name(), "its condition (until) was met"),
+            None => ("went on", "its condition (until) was not met on all of its way"),
+        };
+        let text = format!("{}: {how}, {} steps", line.line, line.steps);
+        events.push(EventData { step: line.after_step, what, text });
+    }
+    events.sort_by_key(|event| event.step);
     events
 }
 

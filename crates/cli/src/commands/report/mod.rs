@@ -5,15 +5,12 @@ mod data;
 mod tables;
 mod wall;
 
-use std::path::PathBuf;
-
-use endowire_methods::Scene;
-
 use crate::args::ReportArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::recording::Recording;
 use crate::output::{tell, whole};
+use crate::scenes;
 
 /// The pages; their scripts read the data where this mark is.
 const RUN: &str = concat!(include_str!("head.html"), include_str!("page.html"));
@@ -44,8 +41,7 @@ fn run(args: &ReportArgs) -> Result<data::Data, Failure> {
         let text = "the run has recorded no step; run its scene again (endowire run)";
         return Err(Failure::Input(text.to_owned()).at(args.dir.display()));
     }
-    let path: &PathBuf = args.scene.as_ref().unwrap_or(&recording.summary.scene_file);
-    let scene = Scene::read(path)?;
+    let (path, scene) = scenes::of_recording(&recording.summary, args.scene.as_deref(), &args.set)?;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
     let stack = scene.stack().map_err(in_scene)?;
     let vessel = scene.wall(&Cache::new(&args.cache)).map_err(in_scene)?;

@@ -7,7 +7,7 @@ use std::time::Instant;
 use endowire_core::insertion::{Move, Script, ScriptRun, Simulation, Step};
 use endowire_core::methods::MethodChoice;
 use endowire_methods::Scene;
-use endowire_sweep::{RunOutcome, StepFailure};
+use endowire_sweep::{EndedBy, RunOutcome, StepFailure};
 use indicatif::ProgressBar;
 
 use super::told::live;
@@ -42,9 +42,8 @@ pub(super) struct SoFar<'a> {
 
 impl SoFar<'_> {
     fn summary(&self, recorder: &Recorder) -> Summary {
-        let &Course { converged, max_penetration_mm, step_time_s, .. } = &self.course;
+        let &Course { tally, step_time_s, .. } = &self.course;
         let steps = (recorder.steps(), self.script.len());
-        let so_far = (converged, max_penetration_mm);
         let failure = self.failure.clone();
         Summary {
             provenance: self.provenance.clone(),
@@ -52,7 +51,7 @@ impl SoFar<'_> {
             scene: self.scene.name.clone(),
             scene_file: std::path::absolute(self.scene_file).unwrap_or_else(|_| self.scene_file.to_owned()),
             method: self.scene.method.name(),
-            outcome: RunOutcome::new(&self.simulation, &self.hand, steps, so_far, failure),
+            outcome: RunOutcome::new(&self.simulation, &self.hand, steps, tally, failure),
             step_time_s,
             wall_time_s: self.started.elapsed().as_secs_f64(),
             renderer: self.frames.renderer(),
@@ -61,9 +60,9 @@ impl SoFar<'_> {
         }
     }
 
-    /// Notes that the step after so many was not done, or not recorded.
-    fn fail(&mut self, after: usize, reason: String) {
-        self.failure = Some(StepFailure { step: after + 1, reason });
+    /// Notes that the step after so many was not done.
+    fn fail(&mut self, after: usize, error: &endowire_core::Error) {
+        self.failure = Some(StepFailure::new(after + 1, error));
     }
 
     /// Moves the instruments.
@@ -71,9 +70,8 @@ impl SoFar<'_> {
         let clock = Instant::now();
         let result = self.simulation.step_until(moves, time_s);
         self.course.step_time_s += clock.elapsed().as_secs_f64();
-        let report = result?;
-        self.course.max_penetration_mm = self.course.max_penetration_mm.max(report.max_penetration_mm);
-        self.course.converged &= report.converged;
+        result?;
+        self.course.tally.count(self.course.steps + 1, &self.simulation);
         self.hand.carried_out();
         Ok(())
     }
@@ -120,18 +118,16 @@ impl Going<'_> {
         interrupted: &AtomicBool,
         bar: &ProgressBar,
     ) {
-        let mut jumps = 0;
         while let Some(step) = next.take() {
             if interrupted.load(Ordering::Relaxed) {
-                self.so_far.fail(self.so_far.course.steps, "interrupted before it".to_owned());
+                let (step, reason) = (self.so_far.course.steps + 1, "interrupted before it".to_owned());
+                self.so_far.failure = Some(StepFailure { step, reason, kind: EndedBy::Interrupted });
                 break;
             }
             let recorded = self.times_s.len();
             next = self.step(step);
             if self.times_s.len() > recorded {
-                let report = self.so_far.simulation.report();
-                jumps += usize::from(report.jumped);
-                bar.set_message(live(report, jumps));
+                bar.set_message(live(self.so_far.simulation.report(), &self.so_far.course.tally));
                 bar.inc(1);
             }
         }
@@ -141,19 +137,20 @@ impl Going<'_> {
     fn step(&mut self, (moves, time_s): OwnStep) -> Option<OwnStep> {
         let before = self.so_far.course.steps;
         if let Err(error) = self.so_far.simulate(&moves, time_s) {
-            self.so_far.fail(before, error.to_string());
+            self.so_far.fail(before, &error);
             return None;
         }
         let time_s = time_s.unwrap_or_else(|| self.so_far.frames.time_s(before + 1));
         let next = match self.so_far.hand.next(&self.so_far.simulation) {
             Ok(step) => own(step),
             Err(error) => {
-                self.so_far.fail(before, error.to_string());
+                self.so_far.fail(before, &error);
                 None
             }
         };
         if let Err(error) = self.record(&moves, time_s, next.is_none()) {
-            self.so_far.fail(before, error.to_string());
+            let (step, reason) = (before + 1, error.to_string());
+            self.so_far.failure = Some(StepFailure { step, reason, kind: EndedBy::Unrecorded });
             self.ahead = self.recorder.steps() == before;
             return None;
         }

@@ -9,29 +9,27 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use endowire_core::insertion::Simulation;
-use endowire_methods::Scene;
 
 use crate::args::RunArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::injections::Injected;
 use crate::output::instruments::Lengths;
-use crate::output::progress;
-use crate::output::provenance::{Provenance, read_input};
+use crate::output::provenance::Provenance;
 use crate::output::recorder::Recorder;
 use crate::output::recording::Recording;
 use crate::output::saved::{Course, Saved, Saver};
-use crate::output::{frames::FrameWriter, whole};
+use crate::output::{frames::FrameWriter, progress, tell, whole};
+use crate::scenes;
 use going::{Going, SoFar, own};
 
 /// Runs the scene's script and records every step.
 pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let started = Instant::now();
-    let mut scene = Scene::read(&args.scene)?;
-    args.script.as_deref().map_or(Ok(()), |path| scene.take_script(path))?;
-    let scene = scene;
+    let scene = scenes::with_script(&args.scene, &args.set.set, args.script.as_deref())?;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
-    let saved = args.resume.as_deref().map(Saved::read).transpose()?;
+    let resume = args.resume.as_deref().filter(|path| is_there(path));
+    let saved = resume.map(Saved::read).transpose()?;
     let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(in_scene)?;
     if script.is_empty() {
         let text = "script = []: give at least one [[script]] table, what the hand does".to_owned();
@@ -49,14 +47,10 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         None => script.begin(),
     };
     let next = own(hand.next(&simulation)?);
-    let mut inputs = vec![scene.text().as_bytes().to_vec()];
-    for path in scene.input_paths() {
-        inputs.push(read_input(&path)?);
-    }
-    let provenance = Provenance::new(&inputs, scene.seed);
+    let provenance = Provenance::of_scene(&scene, &args.set.set)?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let course = saved.map_or_else(Course::begin, |saved| saved.course());
-    let recorder = if args.resume.is_some() {
+    let recorder = if resume.is_some() {
         let (mut recorder, earlier) = Recorder::go_on(&folder, args.force, course.steps, &simulation)?;
         let times = (times_s.as_slice(), next.is_none());
         let seen = (earlier.as_ref(), course.injected.as_slice());
@@ -91,6 +85,18 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     going.carry_out(next, &interrupted, &bar);
     bar.finish_and_clear();
     told::tell_end(args, &folder, going.end())
+}
+
+/// Whether there is a state to go on from. A job script has the same line for its first call.
+fn is_there(path: &Path) -> bool {
+    let there = path.symlink_metadata().is_ok();
+    if !there {
+        tell(format_args!(
+            "endowire: --resume {}: is not there yet: the run begins from the start",
+            path.display()
+        ));
+    }
+    there
 }
 
 /// Removes the state of an earlier run: until this one has saved its own, there is none to go on from.

@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use endowire_core::insertion::{Simulation, StepReport};
-use endowire_sweep::StepFailure;
+use endowire_core::insertion::{Met, Simulation, StepReport, Tally};
+use endowire_sweep::{EndedBy, RunOutcome, StepFailure};
 
 use super::going::Ended;
 use crate::args::RunArgs;
 use crate::failure::Failure;
 use crate::output::recorder::Summary;
 use crate::output::{print_json, tell};
+use crate::scenes::check_converged;
 
 /// Tells what a run has come to, and fails as it has failed.
 pub(super) fn tell_end(args: &RunArgs, folder: &Path, ended: Ended) -> Result<(), Failure> {
@@ -24,27 +25,53 @@ pub(super) fn tell_end(args: &RunArgs, folder: &Path, ended: Ended) -> Result<()
         tell(text(&summary, folder, &simulation));
     }
     match &summary.outcome.failure {
-        Some(StepFailure { step, reason }) => {
+        Some(StepFailure { step, reason, .. }) => {
             let kept = match written {
                 Ok(()) => format!("{} steps are kept in {}", summary.outcome.steps, folder.display()),
                 Err(error) => error.to_string(),
             };
             Err(Failure::Computation(format!("{}: step {step}: {reason} ({kept})", args.scene.display())))
         }
-        None => written,
+        None => written.and_then(|()| {
+            let (outcome, kept) = (&summary.outcome, format!("all are kept in {}", folder.display()));
+            let allowed = args.convergence.allow_unconverged;
+            check_converged(args.scene.display(), &outcome.tally, outcome.steps, allowed, kept)
+        }),
     }
 }
 
 /// What a person wants to see while it goes on.
-pub(super) fn live(report: &StepReport, jumps: usize) -> String {
+pub(super) fn live(report: &StepReport, tally: &Tally) -> String {
     let mut line = format!("{:.1} mm in, push {:.3} N", report.inserted_mm, report.push_force_n);
-    if jumps > 0 {
-        line += &format!(", {jumps} jumped");
+    if tally.jumps > 0 {
+        line += &format!(", {} jumped", tally.jumps);
+    }
+    if tally.unconverged_steps > 0 {
+        line += &format!(", {} without an equilibrium", tally.unconverged_steps);
     }
     if report.left_through.is_some() {
         line += ", tip outside";
     }
     line
+}
+
+/// How a run ended, where it is not by the end of its script alone.
+fn ended(outcome: &RunOutcome) -> Option<String> {
+    let ended_by = outcome.ended_by.filter(|ended_by| *ended_by != EndedBy::Script)?;
+    let last = outcome.until.last().filter(|_| outcome.failure.is_none());
+    Some(match last.and_then(|line| Some((line, line.met?))) {
+        Some((line, met)) => {
+            let what = match met {
+                Met::TipWithinMm => "the tip is at its target (tip_within_mm)",
+                Met::PushForceN => "the hand pushes as hard as was said (push_force_n)",
+            };
+            format!("{}: {}: {what}, after {} steps of the line", ended_by.name(), line.line, line.steps)
+        }
+        None => match &outcome.failure {
+            Some(failure) => format!("{}, in step {}", ended_by.name(), failure.step),
+            None => ended_by.name().to_owned(),
+        },
+    })
 }
 
 /// The summary for a person, for stderr: stdout is for documents.
@@ -72,12 +99,21 @@ fn text(summary: &Summary, folder: &Path, simulation: &Simulation) -> String {
     }));
     let contacts = simulation.report().contacts.len();
     lines.push(format!(
-        "  wall           {contacts} contacts, deepest penetration {:.3} mm",
-        outcome.max_penetration_mm
+        "  wall           {contacts} contacts, {:.4} N in all, {:.4} N at most in one, {:.4} N at the tip; deepest penetration {:.3} mm",
+        outcome.wall_force.sum_n,
+        outcome.wall_force.largest_n,
+        outcome.wall_force.tip_n,
+        outcome.tally.max_penetration_mm
+    ));
+    let remarks = outcome.tally.remarks(outcome.steps);
+    lines.push(format!(
+        "  steps          {}",
+        remarks.unwrap_or_else(|| "all in equilibrium, no jump".to_owned())
     ));
     if let Some(opening) = outcome.left_through {
         lines.push(format!("  left           the tip is out of opening {opening}"));
     }
+    lines.extend(ended(outcome).map(|how| format!("  ended          {how}")));
     let renderer = summary.renderer.as_ref().map_or(String::new(), |r| format!(" by {r}"));
     lines.push(format!("  recorded       {} frames{renderer} in {}", summary.frames.len(), folder.display()));
     lines.join("\n")

@@ -5,6 +5,7 @@ mod wishes;
 
 use std::path::{Path, PathBuf};
 
+use endowire_core::insertion::Tally;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{Displacement, Wall};
 use endowire_methods::Scene;
@@ -45,6 +46,18 @@ pub(super) struct Written {
     pub(super) folder: PathBuf,
     /// Every file, relative to the folder where it lies there.
     pub(super) files: Vec<PathBuf>,
+    /// How the steps before them went, where any were carried out.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub(super) went: Option<Went>,
+}
+
+/// How steps went.
+#[derive(Debug, Serialize)]
+pub(super) struct Went {
+    /// How many.
+    pub(super) steps: usize,
+    #[serde(flatten)]
+    pub(super) tally: Tally,
 }
 
 impl Written {
@@ -53,7 +66,10 @@ impl Written {
         if json {
             return print_json(self);
         }
-        tell(format_args!("{} files by {} in {}", self.files.len(), self.renderer, self.folder.display()));
+        let remarks = self.went.as_ref().and_then(|went| went.tally.remarks(went.steps));
+        let remarks = remarks.map_or_else(String::new, |remarks| format!("; {remarks}"));
+        let (files, folder) = (self.files.len(), self.folder.display());
+        tell(format_args!("{files} files by {} in {folder}{remarks}", self.renderer));
         Ok(())
     }
 }
@@ -300,7 +316,8 @@ impl<'a> Studio<'a> {
             self.files.extend(write_dicom(&self.planes, path, step_deg, &self.plan.pace)?);
         }
         let renderer = self.planes.first().map(|plane| plane.renderer.backend().to_owned());
-        Ok(Written { renderer: renderer.unwrap_or_default(), folder: self.plan.folder, files: self.files })
+        let (renderer, folder) = (renderer.unwrap_or_default(), self.plan.folder);
+        Ok(Written { renderer, folder, files: self.files, went: None })
     }
 }
 

@@ -1,10 +1,12 @@
 //! What the command line wishes of frames.
 
+use endowire_core::input::nearest;
 use endowire_viewer::{View, ViewSpec};
 use serde_json::Value;
 
 use crate::args::{FrameArgs, ViewChoice};
 use crate::failure::Failure;
+use crate::scenes::of_scene_and_view;
 
 /// A hundred turns.
 const MOST_TURN_DEG: f64 = 36_000.0;
@@ -79,12 +81,13 @@ pub(super) fn wished(mut spec: ViewSpec, args: &FrameArgs, default: ViewChoice) 
         Some([width, height]) => spec.size_px = [*width, *height],
         Some(other) => return Err(Failure::Input(format!("--size {other:?}: give WIDTH or WIDTHxHEIGHT"))),
     }
-    if args.set.is_empty() {
+    let (_, set) = of_scene_and_view(&args.set)?;
+    if set.is_empty() {
         return Ok(spec);
     }
     let failed = |text: String| Failure::Input(format!("--set: {text}"));
     let mut table = serde_json::to_value(&spec).map_err(|e| failed(e.to_string()))?;
-    for set in &args.set {
+    for set in set {
         let (key, value) = set.split_once('=').ok_or_else(|| failed(format!("{set}: say KEY=VALUE")))?;
         // The document that the table is kept in has no such numbers, and no key takes them.
         if value.trim().parse::<f64>().is_ok_and(|v| !v.is_finite()) {
@@ -103,7 +106,8 @@ pub(super) fn wished(mut spec: ViewSpec, args: &FrameArgs, default: ViewChoice) 
         }
         *place = value;
         // One by one, so that the message names the one at fault.
-        serde_json::from_value::<ViewSpec>(table.clone()).map_err(|e| failed(format!("{set}: {e}")))?;
+        let fits = serde_json::from_value::<ViewSpec>(table.clone()).map_err(|e| e.to_string());
+        fits.map_err(|e| failed(format!("{set}: {e}{}", nearest(&e))))?;
     }
     serde_json::from_value(table).map_err(|e| failed(e.to_string()))
 }

@@ -145,6 +145,11 @@ impl<'a> ScriptRun<'a> {
         }
     }
 
+    /// Whether the script is at its end: there is no next step.
+    pub fn has_ended(&self) -> bool {
+        self.steps.is_none() && self.course.motions.len() >= self.script.motions.len()
+    }
+
     /// The injections that have begun, the next step's included where it is the first of its line.
     pub fn injections(&self) -> &[Injection] {
         &self.injections
@@ -163,12 +168,16 @@ impl<'a> ScriptRun<'a> {
         decided.filter_map(|(index, (motion, _))| Some((index, motion.until.as_ref()?)))
     }
 
-    /// Lines with a condition that have ended: how messages call each, and what it has come to.
-    pub fn conditions(&self) -> impl Iterator<Item = (&str, LineCourse)> {
-        let begun = self.script.motions.iter().zip(&self.course.motions);
+    /// Lines with a condition that have ended: how messages call each, what it has come to, and the step of the script after which it ended.
+    pub fn conditions(&self) -> impl Iterator<Item = (&str, LineCourse, usize)> {
+        let steps = self.course.motions.iter().scan(0, |steps, line| {
+            *steps += line.steps;
+            Some(*steps)
+        });
+        let begun = self.script.motions.iter().zip(&self.course.motions).zip(steps);
         let ended = self.course.motions.len() - usize::from(self.steps.is_some());
-        let ended = begun.take(ended).filter(|(motion, _)| motion.until.is_some());
-        ended.map(|(motion, line)| (motion.name.as_str(), *line))
+        let ended = begun.take(ended).filter(|((motion, _), _)| motion.until.is_some());
+        ended.map(|((motion, line), after)| (motion.name.as_str(), *line, after))
     }
 
     /// Begins the next motion; whether there is one.

@@ -311,12 +311,15 @@ fn a_script_goes_on_from_its_course_in_the_middle_of_a_line_with_a_condition() {
             let mut again = script.go_on(run.course(), |step| before.push(step.moves.to_vec())).unwrap();
             let told = again.next_where(|_| (k >= met_after).then_some(Met::PushForceN)).unwrap().unwrap();
             assert_eq!((told.moves.to_vec(), told.time_s), step, "{met_after} {k}");
+            assert!(!again.has_ended(), "{met_after} {k}");
             assert!(before.iter().eq(seen.iter()), "{met_after} {k}");
             run.carried_out();
             seen.push(step.0);
             k += 1;
         }
-        let told: Vec<LineCourse> = run.conditions().map(|(_, line)| line).collect();
+        assert!(run.has_ended());
+        let told: Vec<LineCourse> = run.conditions().map(|(_, line, _)| line).collect();
+        assert!(run.conditions().all(|(_, _, after_step)| after_step == met_after));
         let met = (met_after <= 134).then_some(Met::PushForceN);
         assert_eq!(told, [LineCourse { steps: met_after, met }]);
         let wrong = ScriptCourse { motions: vec![LineCourse { steps: 1000, met: None }] };

@@ -1,0 +1,118 @@
+//! Scenes with what a command line sets, and how their runs went.
+
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+use endowire_core::insertion::Tally;
+use endowire_methods::Scene;
+use endowire_sweep::{Setting, scene_with};
+use endowire_viewer::ViewSpec;
+
+use crate::failure::Failure;
+use crate::output::recording::RecordedSummary;
+
+/// Reads a scene with these values of its keys.
+pub(crate) fn read(path: &Path, settings: &[Setting]) -> Result<Scene, Failure> {
+    Ok(scene_with(path, settings, |scene| ViewSpec::of_scene(scene, path).map(drop))?)
+}
+
+/// Reads the scene of a recording once more, from `scene` if that is given: with what was set in the run, and `more`. Its file too.
+pub(crate) fn of_recording(
+    summary: &RecordedSummary,
+    scene: Option<&Path>,
+    more: &[Setting],
+) -> Result<(PathBuf, Scene), Failure> {
+    let path = scene.unwrap_or(&summary.scene_file).to_path_buf();
+    let recorded = summary.set.iter().map(|text| text.parse::<Setting>());
+    let mut settings = recorded.collect::<Result<Vec<_>, _>>()?;
+    settings.extend_from_slice(more);
+    let scene = read(&path, &settings)?;
+    Ok((path, scene))
+}
+
+/// The same with the script of a file in place of its own, if one is given.
+pub(crate) fn with_script(
+    path: &Path,
+    settings: &[Setting],
+    script: Option<&Path>,
+) -> Result<Scene, Failure> {
+    let mut scene = read(path, settings)?;
+    let Some(file) = script else { return Ok(scene) };
+    if let Some(setting) = settings.iter().find(|setting| setting.key.begins() == "script") {
+        return Err(Failure::Input(format!(
+            "--set {setting}: the script is that of --script {}: change its lines there",
+            file.display()
+        )));
+    }
+    scene.take_script(file)?;
+    Ok(scene)
+}
+
+/// Tables and keys at the top of a scene file.
+const TOP: [&str; 9] =
+    ["vessel", "device", "instrument", "sheath", "method", "script", "view", "seed", "name"];
+
+/// Of the texts `KEY=VALUE` for frames those that are of the scene, and those of its table `view`, whose keys are called from there.
+pub(crate) fn of_scene_and_view(texts: &[String]) -> Result<(Vec<Setting>, Vec<&str>), Failure> {
+    let (mut of_scene, mut of_view) = (Vec::new(), Vec::new());
+    for text in texts {
+        let key = text.split('=').next().unwrap_or_default().trim();
+        let first = key.split(['.', '[']).next().unwrap_or_default();
+        // The view has a key `device` of its own, a list.
+        if TOP.contains(&first) && key != "device" {
+            of_scene.push(text.parse()?);
+        } else {
+            of_view.push(text.as_str());
+        }
+    }
+    Ok((of_scene, of_view))
+}
+
+/// Fails where steps found no equilibrium and that was not allowed; `kept` says where all of them are.
+pub(crate) fn check_converged(
+    place: impl Display,
+    tally: &Tally,
+    steps: usize,
+    allowed: bool,
+    kept: impl Display,
+) -> Result<(), Failure> {
+    match tally.first_unconverged_step {
+        Some(first) if !allowed => Err(Failure::Computation(format!(
+            "{place}: {} of {steps} steps found no equilibrium, the first step {first}: take shorter steps (step_mm), shorter elements or another \
+             method, or give --allow-unconverged to take them as they are ({kept})",
+            tally.unconverged_steps
+        ))),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_of_the_scene_and_of_its_view_are_told_apart() {
+        let texts = [
+            "c_arm.sid_mm=1000",
+            "vessel.wall.friction=0.1",
+            "device=[]",
+            "device.part[0].length_mm=6",
+            "seed = 3",
+        ];
+        let texts = texts.map(str::to_owned);
+        let (of_scene, of_view) = of_scene_and_view(&texts).unwrap();
+        assert_eq!(of_view, ["c_arm.sid_mm=1000", "device=[]"]);
+        let keys: Vec<String> = of_scene.iter().map(|setting| setting.key.to_string()).collect();
+        assert_eq!(keys, ["vessel.wall.friction", "device.part[0].length_mm", "seed"]);
+    }
+
+    #[test]
+    fn steps_without_an_equilibrium_fail_unless_they_are_allowed() {
+        let tally = Tally { unconverged_steps: 2, first_unconverged_step: Some(7), ..Tally::default() };
+        let told = check_converged("a.toml", &tally, 9, false, "all are kept").unwrap_err().to_string();
+        assert!(told.starts_with("a.toml: 2 of 9 steps found no equilibrium, the first step 7: "), "{told}");
+        assert!(told.contains("--allow-unconverged"), "{told}");
+        assert!(check_converged("a.toml", &tally, 9, true, "").is_ok());
+        assert!(check_converged("a.toml", &Tally::default(), 9, false, "").is_ok());
+    }
+}

@@ -1,0 +1,83 @@
+//! How a run went, counted over its steps.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Simulation, WallForce};
+
+/// What is counted over the steps of a run, whatever carries it out.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Tally {
+    /// Steps that did not meet the method's own convergence test: their shapes are no equilibria.
+    pub unconverged_steps: usize,
+    /// The first of them, from 1.
+    pub first_unconverged_step: Option<usize>,
+    /// Steps in which the device jumped to a lower minimum.
+    pub jumps: usize,
+    /// Last resorts of all steps ([`StepReport::relaxations`](super::StepReport::relaxations)).
+    pub relaxations: u64,
+    /// Largest imbalance of any step ([`StepReport::imbalance`](super::StepReport::imbalance)).
+    pub max_imbalance: f64,
+    /// Deepest penetration of the wall in any step, mm.
+    pub max_penetration_mm: f64,
+    /// Each of these forces where it was largest.
+    pub max_wall_force: WallForce,
+}
+
+impl Tally {
+    /// Counts step number `step`, from 1, which the simulation has just carried out.
+    pub fn count(&mut self, step: usize, simulation: &Simulation) {
+        let (report, force) = (simulation.report(), simulation.wall_force());
+        if !report.converged {
+            self.unconverged_steps += 1;
+            self.first_unconverged_step.get_or_insert(step);
+        }
+        self.jumps += usize::from(report.jumped);
+        self.relaxations += u64::from(report.relaxations);
+        // A tally is written as JSON, which has no infinite numbers.
+        if report.imbalance.is_finite() {
+            self.max_imbalance = self.max_imbalance.max(report.imbalance);
+        }
+        self.max_penetration_mm = self.max_penetration_mm.max(report.max_penetration_mm);
+        let most = &mut self.max_wall_force;
+        most.sum_n = most.sum_n.max(force.sum_n);
+        most.largest_n = most.largest_n.max(force.largest_n);
+        most.tip_n = most.tip_n.max(force.tip_n);
+    }
+
+    /// What went otherwise than it should, in words: "3 of 60 steps without an equilibrium, the first step 12; 1 jump". None where nothing did.
+    pub fn remarks(&self, steps: usize) -> Option<String> {
+        let mut remarks = Vec::new();
+        if let Some(first) = self.first_unconverged_step {
+            let count = self.unconverged_steps;
+            remarks.push(format!("{count} of {steps} steps without an equilibrium, the first step {first}"));
+        }
+        let several = |count: u64, one: &str| format!("{count} {one}{}", if count == 1 { "" } else { "s" });
+        if self.jumps > 0 {
+            remarks.push(several(self.jumps as u64, "jump"));
+        }
+        if self.relaxations > 0 {
+            remarks.push(several(self.relaxations, "last resort"));
+        }
+        (!remarks.is_empty()).then(|| remarks.join("; "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_went_wrong_is_told_and_nothing_else() {
+        assert_eq!(Tally::default().remarks(60), None);
+        let tally = Tally {
+            unconverged_steps: 3,
+            first_unconverged_step: Some(12),
+            jumps: 1,
+            relaxations: 2,
+            ..Tally::default()
+        };
+        let told = "3 of 60 steps without an equilibrium, the first step 12; 1 jump; 2 last resorts";
+        assert_eq!(tally.remarks(60).unwrap(), told);
+        assert_eq!(Tally { jumps: 2, ..Tally::default() }.remarks(9).unwrap(), "2 jumps");
+    }
+}

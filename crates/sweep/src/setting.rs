@@ -1,0 +1,231 @@
+//! Keys of a scene that are given other values than its file has: by a sweep, or on a command line.
+
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr;
+
+use endowire_core::input::from_toml;
+use endowire_core::{Error, Result};
+use endowire_methods::Scene;
+use toml::{Table, Value};
+
+use crate::key::Key;
+
+/// A key of a scene and its value, `KEY=VALUE`. The key is one as in a sweep, the value one as in the scene file; text needs no quotes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// The key.
+    pub key: Key,
+    /// Its value.
+    pub value: Value,
+}
+
+impl FromStr for Setting {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let Some((key, value)) = text.split_once('=') else {
+            let mend = "write KEY=VALUE, as in vessel.wall.friction=0.1";
+            return Err(Error::parameter("set", format!("{text:?}"), mend));
+        };
+        let (key, value) = (Key::parse(key.trim())?, value.trim());
+        // What is no value of TOML is text: names of methods and files.
+        let document = toml::from_str::<Table>(&format!("value = {value}"));
+        let document = document.ok().filter(|document| document.len() == 1);
+        let read = document.and_then(|mut document| document.remove("value"));
+        Ok(Self { key, value: read.unwrap_or_else(|| Value::from(value)) })
+    }
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.key, self.value)
+    }
+}
+
+/// Reads a scene with these values of its keys, one after the other; parts of a device file come last, as the file may be one of the values.
+/// `check` looks at what the core leaves to others.
+///
+/// The scene's text is that of all that is set: it has another hash than the file, and that of a run of a sweep which sets the same.
+///
+/// # Errors
+/// Those of the file; a key that the scene does not know, with the nearest right one, and a value that its key does not take.
+pub fn scene_with(path: &Path, settings: &[Setting], check: impl Fn(&Scene) -> Result<()>) -> Result<Scene> {
+    let scene = Scene::read(path)?;
+    if settings.is_empty() {
+        return Ok(scene);
+    }
+    check(&scene)?;
+    let mut document = document_of(&scene, path)?;
+    let of_device = |setting: &&Setting| setting.key.is_of_device();
+    let first = settings.iter().filter(|setting| !of_device(setting));
+    for Setting { key, value } in first.chain(settings.iter().filter(of_device)) {
+        let tried = try_in(path, &document, key, value, &check);
+        tried.map_err(|error| match error {
+            Error::Parameter { .. } => Error::content(path, format!("--set: {error}")),
+            other => other,
+        })?;
+        assign(path, &mut document, key, value)?;
+    }
+    scene_of(path, &document)
+}
+
+/// The tables of a scene.
+pub(crate) fn document_of(scene: &Scene, path: &Path) -> Result<Value> {
+    toml::from_str(scene.text()).map_err(|error| Error::content(path, error.message().to_owned()))
+}
+
+/// Gives a key a value in the document of the scene file `path`. Where it is one of a device file, that stands in the scene from then on.
+pub(crate) fn assign(path: &Path, document: &mut Value, key: &Key, value: &Value) -> Result<()> {
+    if let Some(table) = key.device_table(document) {
+        open_device(path, table)?;
+    }
+    key.set(document, value.clone())
+}
+
+/// Takes what the device file says into the table that names it.
+fn open_device(path: &Path, table: &mut Table) -> Result<()> {
+    let Some(Value::String(file)) = table.get("file") else { return Ok(()) };
+    let file = path.parent().unwrap_or(Path::new("")).join(file);
+    let (mut device, _): (Table, String) = from_toml(&file)?;
+    // A table of an instrument has a name of its own.
+    device.remove("name");
+    table.remove("file");
+    table.extend(device);
+    Ok(())
+}
+
+/// The scene that a document says.
+pub(crate) fn scene_of(path: &Path, document: &Value) -> Result<Scene> {
+    Scene::from_toml(&text_of(path, document)?, path)
+}
+
+/// A document as the text of a scene file.
+pub(crate) fn text_of(path: &Path, document: &Value) -> Result<String> {
+    toml::to_string(document).map_err(|error| Error::content(path, error.to_string()))
+}
+
+/// Whether the scene takes this value.
+pub(crate) fn try_in(
+    path: &Path,
+    document: &Value,
+    key: &Key,
+    value: &Value,
+    check: impl Fn(&Scene) -> Result<()>,
+) -> Result<()> {
+    let mut tried = document.clone();
+    assign(path, &mut tried, key, value)?;
+    scene_of(path, &tried).and_then(|scene| check(&scene)).map_err(|error| match error {
+        Error::Content { reason, .. } => Error::parameter(key, value, without_line(&reason)),
+        other => other,
+    })
+}
+
+/// The reason without the number of a line that nobody has written.
+fn without_line(reason: &str) -> &str {
+    let rest = reason.strip_prefix("line ").and_then(|rest| rest.split_once(": "));
+    rest.filter(|(number, _)| number.parse::<usize>().is_ok()).map_or(reason, |(_, rest)| rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = "[vessel]\nfile = \"a.stl\"\n[device]\nfile = \"wire.toml\"\n[sheath]\nopening = 0\n";
+    const WIRE: &str = "name = \"wire\"\nkind = \"guidewire\"\n[[part]]\nname = \"tip\"\nlength_mm = 50.0\n\
+                        outer_diameter_mm = 0.9\nbending_stiffness_nmm2 = 5.0\n[[part]]\nname = \"shaft\"\nlength_mm = 450.0\n\
+                        outer_diameter_mm = 0.9\nbending_stiffness_nmm2 = 50.0\n";
+
+    fn setting(text: &str) -> Setting {
+        text.parse().unwrap()
+    }
+
+    fn with(settings: &[&str]) -> Result<Scene> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, SCENE).unwrap();
+        std::fs::write(folder.path().join("wire.toml"), WIRE).unwrap();
+        std::fs::write(folder.path().join("other.toml"), WIRE.replace("450.0", "250.0")).unwrap();
+        let settings: Vec<Setting> = settings.iter().map(|text| setting(text)).collect();
+        let scene = scene_with(&path, &settings, |_| Ok(()))?;
+        // The device is read while its file is there.
+        scene.stack().map(|_| scene)
+    }
+
+    #[test]
+    fn values_are_those_of_toml_or_text() {
+        for (text, value) in [
+            ("a.b=2", Value::from(2)),
+            ("a.b = 2.5", Value::from(2.5)),
+            ("a.b=true", Value::from(true)),
+            ("a.b=li2011-banded", Value::from("li2011-banded")),
+            ("a.b=\"2\"", Value::from("2")),
+            ("a.b=[0.5, 1.0]", Value::from(vec![0.5, 1.0])),
+            ("a.b=1\nc = 2", Value::from("1\nc = 2")),
+            ("a.b=x=y", Value::from("x=y")),
+        ] {
+            assert_eq!(setting(text), Setting { key: Key::parse("a.b").unwrap(), value }, "{text}");
+            assert_eq!(setting(&setting(text).to_string()), setting(text), "{text}");
+        }
+        for wrong in ["a.b", "=1", "a..b=1", ""] {
+            assert!(
+                wrong.parse::<Setting>().unwrap_err().to_string().contains("vessel.wall.friction"),
+                "{wrong}"
+            );
+        }
+    }
+
+    #[test]
+    fn parts_of_a_device_file_are_set_and_the_file_may_be_set_too() {
+        let length_mm = |settings: &[&str]| with(settings).unwrap().device;
+        assert!(length_mm(&[]).unwrap().file.is_some());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, SCENE).unwrap();
+        std::fs::write(folder.path().join("wire.toml"), WIRE).unwrap();
+        std::fs::write(folder.path().join("other.toml"), WIRE.replace("450.0", "250.0")).unwrap();
+        let device = |settings: &[&str]| {
+            let settings: Vec<Setting> = settings.iter().map(|text| setting(text)).collect();
+            scene_with(&path, &settings, |_| Ok(())).unwrap().device().unwrap()
+        };
+        assert_eq!(device(&[]).length_mm(), 500.0);
+        let stiffer = device(&["device.part[0].bending_stiffness_nmm2=7"]);
+        assert_eq!(stiffer.sections()[0].bending_stiffness_nmm2, 7.0);
+        assert_eq!(stiffer.sections()[1..], device(&[]).sections()[1..]);
+        // Whatever their order.
+        let both = ["device.part[0].length_mm=60", "device.file=other.toml"];
+        assert_eq!(device(&both).length_mm(), 310.0);
+        assert_eq!(device(&[both[1], both[0]]), device(&both));
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_with_key_value_and_the_nearest_right_one() {
+        for (set, told) in [
+            ("vessel.wall.frction=0.1", "scene.toml: --set: vessel.wall.frction = 0.1: "),
+            ("vessel.wall.frction=0.1", "did you mean `friction`?"),
+            ("vesel.wall.friction=0.1", "did you mean `vessel`?"),
+            ("vessel.wall.friction=much", "vessel.wall.friction = \"much\": friction: invalid type"),
+            ("device.part[2].length_mm=1", "the scene has 2 in that list"),
+            ("device.prt[0].length_mm=1", "did you mean `part[0]`?"),
+            ("device.part[0].lenth_mm=1", "did you mean `length_mm`?"),
+            // Only where the device is made: another key gives the same.
+            (
+                "device.part[0].radius_mm=0.4",
+                "device.part \"tip\".outer_diameter_mm = 0.9: radius_mm is given too",
+            ),
+        ] {
+            let error = with(&[set]).unwrap_err().to_string();
+            assert!(error.contains(told), "{set}: {error}");
+        }
+    }
+
+    #[test]
+    fn what_is_set_is_in_the_text_of_the_scene() {
+        let text = |settings: &[&str]| with(settings).unwrap().text().to_owned();
+        assert_eq!(text(&[]), SCENE);
+        let soft = text(&["vessel.wall.friction=0.1"]);
+        assert!(soft.contains("friction = 0.1") && soft != text(&["vessel.wall.friction=0.2"]));
+        let part = text(&["device.part[0].bending_stiffness_nmm2=7"]);
+        assert!(part.contains("bending_stiffness_nmm2 = 7") && !part.contains("wire.toml"), "{part}");
+    }
+}
