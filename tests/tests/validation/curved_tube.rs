@@ -48,8 +48,7 @@ fn largest_difference(a: &dyn MethodChoice, b: &dyn MethodChoice) -> f64 {
 
 /// A wire of 10 N·mm² pushed 200 mm into the tube of Table 2 by increments; its shape, and steps that did not converge.
 fn pushed(method: &dyn MethodChoice, h_mm: f64) -> (Shape, usize) {
-    let made =
-        GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(0.8)).unwrap();
+    let made = GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(0.8)).unwrap();
     let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
     let wire = Device::uniform(201.0, 0.445, 10.0).unwrap();
     let mut simulation = Simulation::builder(made.wall, wire, sheath).method(method).build().unwrap();

@@ -11,6 +11,7 @@ use endowire_methods::Scene;
 use endowire_viewer::{Exposure, FrameTime, Pushed, Renderer, Seen, View, ViewSpec};
 use serde::Serialize;
 
+use super::film;
 use super::injections::Injected;
 use super::recorder::Recorder;
 use crate::failure::Failure;
@@ -121,6 +122,12 @@ impl FrameWriter {
         let due = last || step.is_multiple_of(self.spec.every as usize);
         let drawn = if due { self.draw((step, time_s), seen, recorder) } else { Ok(()) };
         self.stood(seen, time_s).and(drawn)
+    }
+
+    /// Makes one moving picture of all frames that were written, if the scene wants one; its name in the folder.
+    pub(crate) fn film(&self, recorder: &Recorder) -> Result<Option<String>, Failure> {
+        let Some(kind) = &self.spec.film else { return Ok(None) };
+        film::write(recorder.folder(), kind, &recorder.frames, self.spec.frames_per_s)
     }
 
     /// Notes what is in at a moment: a pulse of the next step begins on the way from there, and what a tip injects goes where it was.

@@ -48,6 +48,8 @@ pub(crate) struct Summary {
     pub(crate) planes: Vec<PlaneTold>,
     /// Frames, relative to the folder of this file.
     pub(crate) frames: Vec<String>,
+    /// The moving picture of them.
+    pub(crate) film: Option<String>,
 }
 
 /// One line of steps.csv.

@@ -47,8 +47,8 @@ fn rows_pictures_and_the_front_are_written() {
         })
         .collect();
     let case = "cantilever-1";
-    let expected =
-        ["kirchhoff", "li2011-banded", "li2011-banded-printed", "mass-spring"].map(|method| [(case, method, 8), (case, method, 16)]);
+    let expected = ["kirchhoff", "li2011-banded", "li2011-banded-printed", "mass-spring"]
+        .map(|method| [(case, method, 8), (case, method, 16)]);
     assert_eq!(cells, expected.concat());
     for row in rows(&found) {
         assert!(row["time_s"].as_f64().unwrap() > 0.0, "{row}");

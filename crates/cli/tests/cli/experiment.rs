@@ -104,7 +104,10 @@ fn the_loop_grows_with_the_advance() {
         assert!(value(at(60.0), "loop_depth_mm") > value(at(20.0), "loop_depth_mm") + 10.0, "{method}");
         assert!(value(at(90.0), "loop_depth_mm") > value(at(60.0), "loop_depth_mm") + 10.0, "{method}");
         assert!(value(at(90.0), "turned_deg") > 150.0, "{method}: the tip points back");
-        assert!(stopped.iter().all(|row| value(row, "loop_width_mm") < 30.1), "{method}: no wider than the tube");
+        assert!(
+            stopped.iter().all(|row| value(row, "loop_width_mm") < 30.1),
+            "{method}: no wider than the tube"
+        );
     }
 }
 

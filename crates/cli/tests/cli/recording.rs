@@ -96,6 +96,29 @@ fn a_run_is_recorded_whole_and_the_parts_agree() {
 }
 
 #[test]
+fn a_film_has_all_frames_the_views_side_by_side() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, out) = (folder.path().join("film.toml"), folder.path().join("out"));
+    let text = scene_text("curved_tube.toml", &SHORT).replace("[view]", "[view]\nfilm = \"apng\"");
+    std::fs::write(&scene, &text).unwrap();
+    let (code, summary) = run(&scene, &out);
+    assert_eq!((code, &summary["film"]), (Some(0), &"film.apng".into()));
+    let decoder = png::Decoder::new(std::io::BufReader::new(File::open(out.join("film.apng")).unwrap()));
+    let reader = decoder.read_info().unwrap();
+    assert_eq!((reader.info().width, reader.info().height), (2 * 96, 64));
+    assert_eq!(reader.info().animation_control().unwrap().num_frames, 3);
+    assert!(!out.join("part-film.apng").exists());
+    // The recording that takes its place has none.
+    let (_, again) = run(&short_scene(folder.path()), &out);
+    assert!(again["film"].is_null() && !out.join("film.apng").exists());
+
+    std::fs::write(&scene, text.replace("apng", "avi")).unwrap();
+    let refused = endowire().arg("run").arg(&scene).output().unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(said(&refused).contains("view.film = avi"), "{}", said(&refused));
+}
+
+#[test]
 fn the_same_scene_gives_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let scene = short_scene(folder.path());

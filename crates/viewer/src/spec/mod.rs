@@ -77,8 +77,8 @@ pub struct ViewSpec {
     /// A frame each so many recorded steps; the last step always gets one. From 1. This is the recorder's to
     /// obey.
     pub every: u32,
-    /// Name of a moving picture of all frames in the folder of the recording, the views side by side, its kind by the end of its name: `.gif`, `.png` or
-    /// `.apng`, and `.mp4` with the feature of that name. It too is the recorder's to obey.
+    /// A moving picture of all frames, the views side by side: `gif`, `png` or `apng`, and `mp4` with the feature of that name. It too is the
+    /// recorder's to obey.
     pub film: Option<String>,
     /// What computes the frames.
     pub backend: Backend,
@@ -109,6 +109,9 @@ pub struct ViewSpec {
     /// Direction from which the 3D view looks.
     pub camera: CameraSpec,
 }
+
+/// What films there are.
+const FILMS: &str = "is no moving picture that is written: gif, png, apng, or mp4 where the program was built with that feature";
 
 impl Default for ViewSpec {
     fn default() -> Self {
@@ -227,12 +230,8 @@ impl ViewSpec {
             return Err(Error::parameter("view.every", 0, "must be at least 1"));
         }
         if let Some(film) = &self.film {
-            let name = Path::new(film);
-            if name.file_name() != Some(name.as_os_str()) {
-                let mend = "is no name of a file in the folder of the recording: leave folders out of it";
-                return Err(Error::parameter("view.film", film, mend));
-            }
-            Animation::check_name(name)?;
+            Animation::check_name(&Path::new("film").with_extension(film))
+                .map_err(|_| Error::parameter("view.film", film, FILMS))?;
         }
         self.c_arm.validate()?;
         if let Some(turn_deg) = self.biplane_deg {
@@ -345,7 +344,7 @@ mod tests {
             ("size_px", |s| s.size_px = [0, 10]),
             ("size_px", |s| s.size_px = [10, 9000]),
             ("every", |s| s.every = 0),
-            ("film", |s| s.film = Some("../a.gif".to_owned())),
+            ("film", |s| s.film = Some("avi".to_owned())),
             ("primary_deg", |s| s.c_arm.primary_deg = f64::NAN),
             ("secondary_deg", |s| s.c_arm.secondary_deg = 91.0),
             ("sid_mm", |s| s.c_arm.sid_mm = 0.0),

@@ -57,6 +57,7 @@ impl SoFar<'_> {
             renderer: self.frames.renderer(),
             planes: self.frames.planes(),
             frames: recorder.frames.clone(),
+            film: None,
         }
     }
 
@@ -199,7 +200,9 @@ impl Going<'_> {
             let _ = self.so_far.draw(now, true, &mut self.recorder);
         }
         let mut summary = self.so_far.summary(&self.recorder);
-        let written = self.recorder.finish(&mut summary).and(saved).map_err(Failure::into_computation);
+        let film = self.so_far.frames.film(&self.recorder).map(|film| summary.film = film);
+        let written =
+            self.recorder.finish(&mut summary).and(saved).and(film).map_err(Failure::into_computation);
         Ended { summary, simulation: self.so_far.simulation, written }
     }
 }

@@ -116,5 +116,9 @@ fn text(summary: &Summary, folder: &Path, simulation: &Simulation) -> String {
     lines.extend(ended(outcome).map(|how| format!("  ended          {how}")));
     let renderer = summary.renderer.as_ref().map_or(String::new(), |r| format!(" by {r}"));
     lines.push(format!("  recorded       {} frames{renderer} in {}", summary.frames.len(), folder.display()));
+    if let Some(frame) = summary.frames.last() {
+        let shown = summary.film.as_ref().unwrap_or(frame);
+        lines.push(format!("  look at        {}", folder.join(shown).display()));
+    }
     lines.join("\n")
 }
