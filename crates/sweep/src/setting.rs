@@ -177,8 +177,6 @@ mod tests {
 
     #[test]
     fn parts_of_a_device_file_are_set_and_the_file_may_be_set_too() {
-        let length_mm = |settings: &[&str]| with(settings).unwrap().device;
-        assert!(length_mm(&[]).unwrap().file.is_some());
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.toml");
         std::fs::write(&path, SCENE).unwrap();

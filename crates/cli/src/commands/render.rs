@@ -1,6 +1,10 @@
 //! `endowire render`: frames of a recorded run.
 
+use std::path::Path;
+
 use endowire_core::vessel::VesselMotion;
+use endowire_methods::Scene;
+use endowire_sweep::Setting;
 use endowire_viewer::{FrameTime, Seen};
 
 use super::studio::{Plan, Still, Studio};
@@ -20,31 +24,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let recording = Recording::read(&args.dir, args.scene.as_deref())?;
     let (settings, _) = scenes::of_scene_and_view(&args.frames.set)?;
     let (path, scene) = scenes::of_recording(&recording.summary, args.scene.as_deref(), &settings)?;
-    let hash = Provenance::of_scene(&scene, &settings)?;
-    // What is set anew is meant to differ.
-    let same = settings.is_empty();
-    if same && recording.summary.scene_hash.as_ref().is_some_and(|recorded| recorded != hash.scene_hash()) {
-        tell(format_args!(
-            "endowire: {} or a file it names has changed since the run in {} was recorded",
-            path.display(),
-            args.dir.display()
-        ));
-    }
-    if !recording.summary.complete {
-        tell(format_args!(
-            "endowire: the run in {} goes on or was ended from outside: {} steps of it are recorded",
-            args.dir.display(),
-            recording.steps()
-        ));
-    }
-    let unconverged = recording.summary.unconverged_steps;
-    if unconverged > 0 {
-        tell(format_args!(
-            "endowire: {unconverged} of the {} steps in {} are no equilibria: steps.csv says which (converged)",
-            recording.steps(),
-            args.dir.display()
-        ));
-    }
+    tell_of(args, &recording, (&path, &scene), &settings)?;
     if recording.steps() == 0 {
         return Err(Failure::Input(format!(
             "{}: the run has recorded no step; run its scene again (endowire run)",
@@ -123,6 +103,37 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     }
     bar.finish_and_clear();
     studio.finish()?.tell(args.frames.json)
+}
+
+/// Says what is to be known of a recording that is drawn in this scene, in which `settings` are new.
+fn tell_of(
+    args: &RenderArgs,
+    recording: &Recording,
+    (path, scene): (&Path, &Scene),
+    settings: &[Setting],
+) -> Result<(), Failure> {
+    let (summary, dir, steps) = (&recording.summary, args.dir.display(), recording.steps());
+    let hash = Provenance::of_scene(scene, settings)?;
+    let changed = summary.scene_hash.as_ref().is_some_and(|recorded| recorded != hash.scene_hash());
+    // What is set anew is meant to differ.
+    if changed && settings.is_empty() {
+        let path = path.display();
+        tell(format_args!(
+            "endowire: {path} or a file it names has changed since the run in {dir} was recorded"
+        ));
+    }
+    if !summary.complete {
+        tell(format_args!(
+            "endowire: the run in {dir} goes on or was ended from outside: {steps} steps of it are recorded"
+        ));
+    }
+    if summary.unconverged_steps > 0 {
+        tell(format_args!(
+            "endowire: {} of the {steps} steps in {dir} are no equilibria: steps.csv says which (converged)",
+            summary.unconverged_steps
+        ));
+    }
+    Ok(())
 }
 
 /// Steps to draw of those that are recorded; the last of them always.

@@ -66,7 +66,7 @@ fn call(command: &str, file: &Path, out: &Path, more: &[&str]) -> Output {
 }
 
 fn done(output: &Output) {
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", said(output));
 }
 
 /// The steps of a recording.
