@@ -176,6 +176,7 @@ impl endowire_sweep::Recorder for Recording {
     }
 
     fn end(self: Box<Self>, outcome: &RunOutcome) -> Result<(), String> {
+        let film = self.frames.film(&self.recorder).map_err(|failure| failure.to_string())?;
         let mut summary = Summary {
             provenance: self.provenance,
             complete: false,
@@ -188,6 +189,7 @@ impl endowire_sweep::Recorder for Recording {
             renderer: self.frames.renderer(),
             planes: self.frames.planes(),
             frames: self.recorder.frames.clone(),
+            film,
         };
         self.recorder.finish(&mut summary).map_err(|failure| failure.to_string())
     }

@@ -35,7 +35,7 @@ pub(crate) fn scene_text(name: &str, changes: &[(&str, &str)]) -> String {
 
 /// The curved tube pushed into for 30 mm, with small pictures.
 pub(crate) const SHORT: [(&str, &str); 2] =
-    [("advance_mm = 220.0", "advance_mm = 30.0"), ("size_px = [640, 640]", "size_px = [96, 64]")];
+    [("advance_mm = 200.0", "advance_mm = 30.0"), ("size_px = [640, 640]", "size_px = [96, 64]")];
 
 /// What the program says on stderr.
 pub(crate) fn said(output: &Output) -> String {

@@ -8,7 +8,7 @@ use crate::common::{endowire, said, scene_text};
 /// A run in the curved tube with two frames, and its page.
 fn page(folder: &Path) -> PathBuf {
     let changes =
-        [("advance_mm = 220.0", "advance_mm = 90.0"), ("size_px = [640, 640]", "size_px = [96, 64]")];
+        [("advance_mm = 200.0", "advance_mm = 90.0"), ("size_px = [640, 640]", "size_px = [96, 64]")];
     let text = scene_text("curved_tube.toml", &changes);
     let (scene, run) = (folder.join("short.toml"), folder.join("run"));
     std::fs::write(&scene, text).unwrap();
@@ -53,7 +53,7 @@ fn an_experiment_has_a_page_of_its_tables() {
 
 /// A sweep of three runs in the curved tube, one of which must fail, and its page.
 fn sweep_page(folder: &Path) -> PathBuf {
-    let changes = [("advance_mm = 220.0", "advance_mm = 20.0"), ("[\"3d\", \"fluoro\"]", "[]")];
+    let changes = [("advance_mm = 200.0", "advance_mm = 20.0"), ("[\"3d\", \"fluoro\"]", "[]")];
     std::fs::write(folder.join("short.toml"), scene_text("curved_tube.toml", &changes)).unwrap();
     let axis = "scene = \"short.toml\"\n[[axis]]\nkey = \"vessel.wall.friction\"\nlist = [0.0, 0.1, -1.0]\n";
     std::fs::write(folder.join("sweep.toml"), axis).unwrap();

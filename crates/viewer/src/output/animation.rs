@@ -4,14 +4,17 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
+use color_quant::NeuQuant;
 use endowire_core::{Error, Result};
 
 #[cfg(feature = "mp4")]
 use super::film::Film;
 use super::{Image, Pace, PixelFormat};
 
-/// Effort of choosing 256 colours, 1 to 30: the crate's own middle.
-const GIF_SPEED: i32 = 10;
+/// Of so many pixels one is looked at to choose 256 colours.
+const SAMPLED: i32 = 30;
+/// Bits of each colour by which pixels are told apart when the nearest of the 256 is looked for: once for each, not for each pixel.
+const BITS: u32 = 6;
 
 /// Writes frames into one moving picture as they come.
 pub struct Animation {
@@ -169,7 +172,14 @@ fn gif_frame(image: &Image, delay: u16) -> gif::Frame<'static> {
             gif::Frame::from_palette_pixels(width, height, high, greys(), None)
         }
         PixelFormat::Rgba8 => {
-            gif::Frame::from_rgba_speed(width, height, &mut image.data().to_vec(), GIF_SPEED)
+            let colours = NeuQuant::new(SAMPLED, 256, image.data());
+            let mut known = vec![None; 1 << (3 * BITS)];
+            let nearest = |pixel: &[u8]| {
+                let part = |k: usize| usize::from(pixel[k] >> (8 - BITS)) << (BITS as usize * k);
+                *known[part(0) | part(1) | part(2)].get_or_insert_with(|| colours.index_of(pixel) as u8)
+            };
+            let pixels: Vec<u8> = image.data().chunks_exact(4).map(nearest).collect();
+            gif::Frame::from_palette_pixels(width, height, pixels, colours.color_map_rgb(), None)
         }
     };
     frame.delay = delay;
