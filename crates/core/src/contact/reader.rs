@@ -28,21 +28,27 @@ impl WallReader {
         }
     }
 
-    /// How near `x` is to the wall, with derivatives below `limit_mm`, and the triangle of the felt mesh that is nearest to its surroundings;
-    /// none past the end of the vessel, and where all is farther than the limit, or the radius of the device, by more than half of that
-    /// radius.
-    pub fn read(&mut self, surface: &ContactSurface, x: &Vec3, limit_mm: f64) -> Option<(Nearness, u32)> {
+    /// How near `x` is to the wall, with derivatives below `limit_mm`, and the triangle of the felt mesh that is nearest to its surroundings.
+    ///
+    /// Where the wall is farther than the limit, or the radius of the device, by more than half of that radius, no triangle is told, and a
+    /// distance that may be less than it is; past the end of the vessel that is infinite.
+    pub fn read(&mut self, surface: &ContactSurface, x: &Vec3, limit_mm: f64) -> (Nearness, Option<u32>) {
         let near_mm = limit_mm.max(surface.thinnest_mm) + self.near_mm;
         let deepest_mm = surface.smooth.deepest_inset_mm();
-        if self.wide.is_some_and(|place| place.clearance(x) - deepest_mm > near_mm) {
-            return None;
+        if let Some(place) = &self.wide {
+            let clear_mm = place.clearance(x) - deepest_mm;
+            if clear_mm > near_mm {
+                return (Nearness::Beyond(clear_mm), None);
+            }
         }
         let place = self.proximity.around(&surface.query, x);
-        let triangle = place.triangle?;
-        if place.clearance(x) - surface.smooth.inset_mm(triangle) > near_mm {
+        let Some(triangle) = place.triangle else { return (Nearness::Beyond(f64::INFINITY), None) };
+        let clear_mm = place.clearance(x) - surface.smooth.inset_mm(triangle);
+        if clear_mm > near_mm {
             self.wide = Some(place);
-            return None;
+            // By as much as holds all around.
+            return (Nearness::Beyond(place.clearance(x) - deepest_mm), None);
         }
-        Some((surface.nearness(x, triangle, limit_mm), triangle))
+        (surface.nearness(x, triangle, limit_mm), Some(triangle))
     }
 }

@@ -34,6 +34,9 @@ pub(super) struct Input {
     workspace: banded::Workspace,
     /// What nodes met before the solve, by node.
     met: Vec<Option<Met>>,
+    /// Positions before the solve, and by how much each node is clear of the wall there in all directions, mm.
+    predicted_mm: Vec<Vec3>,
+    clear_mm: Vec<f64>,
     /// Positions as solved for, before tangents were made of unit length: forces are in balance there.
     solved_mm: Vec<Vec3>,
     positions_mm: Vec<Vec3>,
@@ -54,6 +57,8 @@ impl Input {
             from_tip_mm: Vec::new(),
             workspace: banded::Workspace::default(),
             met: Vec::new(),
+            predicted_mm: Vec::new(),
+            clear_mm: Vec::new(),
             solved_mm: Vec::new(),
             positions_mm: Vec::new(),
             tangents: Vec::new(),
@@ -99,6 +104,8 @@ impl Input {
     fn collide(&mut self, surroundings: &Surroundings<'_>, state: &ChainState) {
         self.chain.springs.clear();
         self.met.clear();
+        self.clear_mm.clear();
+        self.predicted_mm.clone_from(&self.positions_mm);
         let nodes = self.positions_mm.len();
         let stiffness_n_per_mm = self.options.wall_stiffness_n_per_mm;
         for (index, x) in self.positions_mm.iter().enumerate() {
@@ -107,10 +114,11 @@ impl Input {
             let gap_mm = if before.is_some() { HOLD_RADII * radius_mm } else { 0.0 };
             let direction = self.chain.directions.get(index).unwrap_or(&self.chain.start_tangent);
             let met = self.wall.met(surroundings.query, x, direction, (radius_mm, gap_mm));
+            self.clear_mm.push(met.err().unwrap_or(0.0));
             // A plane goes on where its triangle does not.
             let met = match self.wall {
-                FeltWall::Triangle => met.or(before.map(|plane| Met { plane, across: None })),
-                FeltWall::Smooth(..) => met,
+                FeltWall::Triangle => met.ok().or(before.map(|plane| Met { plane, across: None })),
+                FeltWall::Smooth(..) => met.ok(),
             };
             self.met.push(met);
             let Some(Met { plane, across }) = met else { continue };
@@ -159,7 +167,8 @@ impl Input {
         let mut left_over = 0.0f64;
         for (index, (x, solved)) in self.positions_mm.iter().zip(&self.solved_mm).enumerate() {
             let radius_mm = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
-            let depth_mm = self.wall.depth_mm(surroundings.query, x, radius_mm);
+            let clear = (x - self.predicted_mm[index]).norm() < self.clear_mm[index];
+            let depth_mm = if clear { 0.0 } else { self.wall.depth_mm(surroundings.query, x, radius_mm) };
             let taken_mm = self.met[index].map_or(0.0, |met| met.plane.offset_mm - met.plane.normal.dot(x));
             let misfit_mm = (taken_mm - depth_mm).abs();
             self.misfit_mm = self.misfit_mm.max(misfit_mm);

@@ -64,27 +64,30 @@ impl FeltWall {
         }
     }
 
-    /// What a node at `x` with the tangent `t` meets, whose surface of radius `radius_mm` is less than `gap_mm` from the wall.
+    /// What a node at `x` with the tangent `t` meets, whose surface of radius `radius_mm` is less than `gap_mm` from the wall; or by how much it is
+    /// clear of the wall in all directions, mm, as far as that is known.
     pub(super) fn met(
         &mut self,
         query: &WallQuery,
         x: &Vec3,
         t: &Vec3,
         (radius_mm, gap_mm): (f64, f64),
-    ) -> Option<Met> {
+    ) -> Result<Met, f64> {
         let (surface, reader) = match self {
             Self::Smooth(surface, reader) => (surface, reader),
-            Self::Triangle => return reached(query, x, radius_mm),
+            Self::Triangle => return reached(query, x, radius_mm).ok_or(0.0),
         };
         let reader = reader.get_or_insert_with(|| WallReader::new(surface));
-        let (Nearness::Within(d), triangle) = reader.read(surface, x, radius_mm + gap_mm)? else {
-            return None;
+        let (d, triangle) = match reader.read(surface, x, radius_mm + gap_mm) {
+            (Nearness::Within(d), Some(triangle)) => (d, triangle),
+            (near, None) => return Err(near.value_mm() - radius_mm),
+            (_, Some(_)) => return Err(0.0),
         };
         let size = d.gradient.norm();
         let normal = d.gradient / size;
         let depth_mm = radius_mm - d.value_mm;
         let across = t.cross(&normal).try_normalize(0.0).map(|b| (b, -b.dot(&(d.hessian * b)) / size));
-        Some(Met {
+        Ok(Met {
             plane: TouchedPlane {
                 normal,
                 offset_mm: normal.dot(x) + depth_mm / size,
@@ -101,8 +104,8 @@ impl FeltWall {
         match self {
             Self::Smooth(surface, reader) => {
                 let reader = reader.get_or_insert_with(|| WallReader::new(surface));
-                let near = reader.read(surface, x, f64::NEG_INFINITY);
-                near.map_or(0.0, |(near, _)| (radius_mm - near.value_mm()).max(0.0))
+                let (near, _) = reader.read(surface, x, f64::NEG_INFINITY);
+                (radius_mm - near.value_mm()).max(0.0)
             }
             Self::Triangle => reached(query, x, radius_mm).map_or(0.0, |met| met.plane.depth_mm),
         }
