@@ -130,6 +130,7 @@ fn stationarity(chain: &Chain) -> (DMatrix<f64>, DMatrix<f64>) {
             }
         }
     }
-    a.gemm_tr(1.0, &rows, &rows, 1.0);
+    // As a product of two: nalgebra has no fast one of a transposed matrix.
+    a.gemm(1.0, &rows.transpose(), &rows, 1.0);
     (a, b)
 }
