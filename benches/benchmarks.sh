@@ -19,7 +19,7 @@ if ! git diff --quiet HEAD -- crates; then
 fi
 mkdir -p "$out"
 # As it is published, optimised across crates.
-cargo build --profile dist -p endowire-cli --features gpu
+cargo build --profile dist -p endowire-cli
 endowire=target/dist/endowire
 target=$out
 compare=() timing=(--methods all --nodes 50,100,150,200,300,500,1000,2000 --limit-s 10) deformation=() navigation=()

@@ -2,7 +2,7 @@
 //!
 //! A [`ViewSpec`] says which frames are wanted, a [`Renderer`] prepares them for a vessel wall and draws
 //! devices in it. Frames come from a graphics processor through wgpu where there is one, and otherwise from
-//! plain Rust, which is also the exact reference for path lengths. Without the feature `gpu` (off by default) there is
+//! plain Rust, which is also the exact reference for path lengths. Without the feature `gpu` (on by default) there is
 //! plain Rust alone. Units: millimetre, degree and keV where a name says so.
 //!
 //! ```
