@@ -1,5 +1,10 @@
 //! Command line arguments.
 
+#![allow(
+    rustdoc::broken_intra_doc_links,
+    reason = "doc comments here are help texts, in which script[0] is no link"
+)]
+
 mod inputs;
 mod pictures;
 mod studies;

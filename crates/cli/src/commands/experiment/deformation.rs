@@ -16,7 +16,7 @@ use endowire_viewer::ViewSpec;
 use serde::{Deserialize, Serialize};
 
 use super::camera::Camera;
-use super::lines::{Line, Lines};
+use super::lines::{Line, Lines, PAPER};
 use crate::args::DeformationArgs;
 use crate::commands::compare::candidate;
 use crate::commands::compare::case::rms_distance;
@@ -27,7 +27,7 @@ use crate::output::{answer, progress};
 /// A cell of the paper's Table 2: segment length l in mm, h/l as 1 over, RMS mm, maximum mm, run time s.
 type Cell = (f64, u32, f64, f64, f64);
 /// The whole table.
-const PAPER: [Cell; 15] = [
+const TABLE_2: [Cell; 15] = [
     (1.0, 40, 1.38, 2.32, 180.7),
     (2.0, 40, 1.54, 2.42, 49.7),
     (3.0, 40, 1.76, 2.74, 29.5),
@@ -251,20 +251,18 @@ impl Total {
 /// Error against increment, a line for each method and segment.
 fn picture(rows: &[Row]) -> Lines {
     let mut lines: Vec<Line> = Vec::new();
-    let mut add = |name: String, point: (f64, f64), paper: bool| match lines
-        .iter_mut()
-        .find(|line| line.name == name)
-    {
-        Some(line) => line.points.push(point),
-        None => lines.push(Line { name, points: vec![point], paper }),
+    let mut add = |method: &str, l_mm: f64, point: (f64, f64)| {
+        let of = format!("l = {l_mm} mm");
+        match lines.iter_mut().find(|line| line.method == method && line.of == of) {
+            Some(line) => line.points.push(point),
+            None => lines.push(Line { method: method.to_owned(), of, points: vec![point] }),
+        }
     };
-    for (l_mm, l_over_h, rms_mm, ..) in PAPER {
-        let name = format!("Li et al. 2011, l = {l_mm} mm");
-        add(name, (l_mm / f64::from(l_over_h), rms_mm), true);
+    for (l_mm, l_over_h, rms_mm, ..) in TABLE_2 {
+        add(PAPER, l_mm, (l_mm / f64::from(l_over_h), rms_mm));
     }
     for row in rows {
-        let name = format!("{}, l = {} mm", row.method, row.l_mm);
-        add(name, (row.l_mm / f64::from(row.l_over_h), row.rms_mm), false);
+        add(&row.method, row.l_mm, (row.l_mm / f64::from(row.l_over_h), row.rms_mm));
     }
     Lines {
         title: "experiment 4: distance from the truth",
@@ -277,17 +275,17 @@ fn picture(rows: &[Row]) -> Lines {
 
 /// The cells of Table 2 that are asked for.
 fn cells(args: &DeformationArgs) -> Result<Vec<Cell>, Failure> {
-    if let Some(l) = args.l_mm.iter().find(|l| PAPER.iter().all(|cell| cell.0 != **l)) {
+    if let Some(l) = args.l_mm.iter().find(|l| TABLE_2.iter().all(|cell| cell.0 != **l)) {
         return Err(Failure::Input(format!("--l-mm {l}: the paper has 1, 2 and 3")));
     }
-    if let Some(parts) = args.l_over_h.iter().find(|parts| PAPER.iter().all(|cell| cell.1 != **parts)) {
+    if let Some(parts) = args.l_over_h.iter().find(|parts| TABLE_2.iter().all(|cell| cell.1 != **parts)) {
         return Err(Failure::Input(format!("--l-over-h {parts}: the paper has 40, 20, 10, 5 and 3")));
     }
     let wanted = |cell: &Cell| {
         (args.l_mm.is_empty() || args.l_mm.contains(&cell.0))
             && (args.l_over_h.is_empty() || args.l_over_h.contains(&cell.1))
     };
-    Ok(PAPER.into_iter().filter(wanted).collect())
+    Ok(TABLE_2.into_iter().filter(wanted).collect())
 }
 
 /// One measured point, mm, in the tube's coordinates.

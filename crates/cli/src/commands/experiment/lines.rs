@@ -1,4 +1,4 @@
-//! One chart of lines with their names beside them: what an experiment has measured, and what the paper has.
+//! One chart of lines with a legend beside it: what an experiment has measured, and what the paper has.
 
 use std::path::{Path, PathBuf};
 
@@ -9,15 +9,25 @@ use crate::failure::Failure;
 use crate::output::chart;
 
 /// Size in pixels.
-const SIZE: (u32, u32) = (1000, 600);
+const SIZE: (u32, u32) = (1150, 600);
+/// Width of the legend and height of its rows, in pixels.
+const LEGEND: (i32, i32) = (270, 26);
 /// Part of a logarithmic axis that is left free before the first and after the last value.
 const LOG_ROOM: f64 = 1.4;
+/// Each line of a method is lighter than the one before by this part.
+const LIGHTER: f64 = 0.32;
+/// Lines of fewer points have a mark at each.
+const MARKED: usize = 60;
+/// The method of lines that the paper prints: they are grey.
+pub(super) const PAPER: &str = "Li et al. 2011";
+/// Colours of [`chart::COLOURS`] for the paper and for methods in the order of their lines.
+const COLOURS: [usize; 8] = [3, 0, 5, 6, 9, 8, 7, 10];
 
-/// A line: name, points, and whether it is the paper's, which is drawn in grey.
+/// A line: the method, which gives its colour, what else tells it apart, and its points.
 pub(super) struct Line {
-    pub(super) name: String,
+    pub(super) method: String,
+    pub(super) of: String,
     pub(super) points: Vec<(f64, f64)>,
-    pub(super) paper: bool,
 }
 
 /// A chart of lines.
@@ -42,9 +52,25 @@ impl Lines {
         let all = self.lines.iter().flat_map(|line| line.points.iter().map(value));
         all.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)))
     }
+
+    /// The lines with their colours.
+    fn coloured(&self) -> Vec<(&Line, RGBAColor)> {
+        let mut seen = vec![(PAPER, 0)];
+        let mut coloured = Vec::new();
+        for line in &self.lines {
+            let method = seen.iter().position(|(name, _)| *name == line.method).unwrap_or_else(|| {
+                seen.push((&line.method, 0));
+                seen.len() - 1
+            });
+            let strength = (1.0 - LIGHTER * f64::from(seen[method].1)).max(LIGHTER);
+            seen[method].1 += 1;
+            coloured.push((line, chart::COLOURS[COLOURS[method % COLOURS.len()]].mix(strength)));
+        }
+        coloured
+    }
 }
 
-/// Draws mesh, lines and names on a chart with either kind of axes.
+/// Draws mesh and lines on a chart with either kind of axes.
 macro_rules! draw_on {
     ($self:ident, $plot:ident, $format:expr) => {{
         let mut mesh = $plot.configure_mesh();
@@ -52,33 +78,18 @@ macro_rules! draw_on {
             .bold_line_style(RGBColor(225, 225, 225))
             .x_desc($self.across)
             .y_desc($self.up)
+            .x_labels(6)
             .label_style(chart::font(15))
             .axis_desc_style(chart::font(17))
             .x_label_formatter($format)
             .y_label_formatter($format);
         mesh.draw()?;
-        // Colours that stand out, for what is measured.
-        let mut colours = [0, 5, 6, 7, 8, 9, 10].into_iter().cycle().map(|k: usize| chart::COLOURS[k]);
-        for line in &$self.lines {
-            let colour = if line.paper { chart::COLOURS[3] } else { colours.next().unwrap_or(BLACK) };
-            let (width, points) = (if line.paper { 2 } else { 3 }, line.points.clone());
-            $plot.draw_series(LineSeries::new(points.clone(), colour.stroke_width(width)))?;
-            if points.len() < 100 {
-                $plot.draw_series(points.iter().map(|p| Circle::new(*p, 4, colour.filled())))?;
+        for (line, colour) in $self.coloured() {
+            $plot.draw_series(LineSeries::new(line.points.clone(), colour.stroke_width(3)))?;
+            if line.points.len() < MARKED {
+                $plot.draw_series(line.points.iter().map(|p| Circle::new(*p, 4, colour.filled())))?;
             }
-            // The chart calls for its legend after it is drawn.
-            $plot
-                .draw_series(std::iter::once(PathElement::new(Vec::new(), colour)))?
-                .label(line.name.clone())
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], colour.stroke_width(3)));
         }
-        $plot
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
-            .background_style(WHITE.mix(0.8))
-            .label_font(chart::font(16))
-            .draw()?;
-        Ok(())
     }};
 }
 
@@ -88,17 +99,26 @@ impl chart::Chart for Lines {
         if left > right {
             return Ok(());
         }
-        let mut chart = ChartBuilder::on(root);
+        let (plane, legend) = root.split_horizontally(SIZE.0 as i32 - LEGEND.0);
+        let mut chart = ChartBuilder::on(&plane);
         chart.caption(self.title, chart::font(22)).margin(14).x_label_area_size(48).y_label_area_size(72);
         if self.logarithmic {
             let across = (left / LOG_ROOM..right * LOG_ROOM).log_scale();
             let up = (low / LOG_ROOM..high * LOG_ROOM).log_scale();
             let mut plot = chart.build_cartesian_2d(across, up)?;
-            draw_on!(self, plot, &chart::power)
+            draw_on!(self, plot, &chart::power);
         } else {
             let number = |value: &f64| format!("{}", (value * 1e6).round() / 1e6);
             let mut plot = chart.build_cartesian_2d(left..right, low.min(0.0)..1.1 * high)?;
-            draw_on!(self, plot, &number)
+            draw_on!(self, plot, &number);
         }
+        let mut y = 3 * LEGEND.1;
+        for (line, colour) in self.coloured() {
+            legend.draw(&PathElement::new([(0, y), (22, y)], colour.stroke_width(4)))?;
+            let name = format!("{} {}", line.method, line.of);
+            legend.draw(&Text::new(name, (30, y - 9), chart::font(16)))?;
+            y += LEGEND.1;
+        }
+        Ok(())
     }
 }

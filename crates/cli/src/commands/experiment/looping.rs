@@ -204,7 +204,7 @@ fn growth(rows: &[Row]) -> Lines {
     let line = |method: &str, (name, value): &(&str, Value)| {
         let own = rows.iter().filter(|row| row.method == method && row.advance_mm > 0.0);
         let points = own.map(|row| (row.advance_mm, value(row))).collect();
-        Line { name: format!("{name}, {method}"), points, paper: false }
+        Line { method: method.to_owned(), of: (*name).to_owned(), points }
     };
     Lines {
         title: "experiment 3: growth of the loop after the tip was stopped",

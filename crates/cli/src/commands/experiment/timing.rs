@@ -18,7 +18,7 @@ use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, Wall, WallQuery,
 use endowire_methods::li2011::{Chain, Li2011, Li2011Options, LinearSolver, banded, dense};
 use serde::Serialize;
 
-use super::lines::{Line, Lines};
+use super::lines::{Line, Lines, PAPER};
 use crate::args::TimingArgs;
 use crate::commands::compare::candidate;
 use crate::failure::Failure;
@@ -341,16 +341,16 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// Time of a whole calculation against the number of nodes.
 fn picture(rows: &[Row]) -> Lines {
     let mut lines = vec![Line {
-        name: "Li et al. 2011, on a graphics processor".to_owned(),
+        method: PAPER.to_owned(),
+        of: String::new(),
         points: PAPER_MS.map(|(nodes, ms)| (nodes as f64, ms)).to_vec(),
-        paper: true,
     }];
     for method in CANDIDATES {
         let own = rows.iter().filter(|row| row.method == method);
         let points: Vec<_> =
             own.filter_map(|row| Some((row.nodes as f64, row.step_ms.or(row.median_ms)?))).collect();
         if !points.is_empty() {
-            lines.push(Line { name: method.to_owned(), points, paper: false });
+            lines.push(Line { method: method.to_owned(), of: String::new(), points });
         }
     }
     Lines {
