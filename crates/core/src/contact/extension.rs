@@ -17,8 +17,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::Matrix3;
 
-use crate::Vec3;
 use crate::vessel::{Opening, SurfaceMesh, Wall};
+use crate::{Error, PhysicalEnd, Result, Vec3};
 
 /// How much is left of an extension, mm, where a tip that goes there has left.
 const LEFT_MM: f64 = 2.0;
@@ -156,6 +156,19 @@ pub fn left_through<'a>(wall: &'a Wall, x: &Vec3) -> Option<(&'a Opening, f64)> 
         let (beyond, aside) = o.beyond_and_aside_mm(x);
         (beyond > 0.0 && beyond <= o.beyond_mm && aside < 1.5 * o.radius_mm).then_some((o, beyond))
     })
+}
+
+/// Refuses a tip that, `ahead_mm` farther, would be beyond an opening where nothing is known any more.
+///
+/// # Errors
+/// [`PhysicalEnd::Left`].
+pub fn check_inside(wall: &Wall, tip_mm: &Vec3, ahead_mm: f64) -> Result<()> {
+    let Some((opening, beyond_mm)) = left_through(wall, tip_mm) else { return Ok(()) };
+    let limit_mm = leave_mm(opening);
+    if beyond_mm + ahead_mm > limit_mm {
+        return Err(Error::End(PhysicalEnd::Left { opening: opening.index, beyond_mm, limit_mm }));
+    }
+    Ok(())
 }
 
 #[cfg(test)]

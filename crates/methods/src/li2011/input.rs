@@ -5,7 +5,9 @@
 //! wall.
 //!
 //! One linear solve is exact but for second order in what the input moves. What that leaves is measured: how far the wall is at each node from
-//! where the solve took it to be, and how far nodes of unit tangents are from those of the solve. Forces are those of the solve,
+//! where the solve took it to be, and how far nodes of unit tangents are from those of the solve. And a wall holds nothing: planes that the solve took for
+//! springs on both sides may pull at nodes that have come off, on a stiff wall by micrometres with as much force as others press. Let go
+//! at the next input and met again at the one after, such nodes hold a wire back for tens of inputs. Forces are those of the solve,
 //! with which bending is in balance.
 
 use endowire_core::contact::extension::left_through;
@@ -20,6 +22,10 @@ use super::slide::{TangentReading, translate};
 use super::wall::{FeltWall, Met};
 use super::{banded, dense};
 
+/// An input has converged if nothing is off by more than this part of the device's radius, and …
+const CONVERGED_RADII: f64 = 0.1;
+/// … if no plane pulls by more than this part of the largest force by which one presses.
+const CONVERGED_PULL: f64 = 0.2;
 /// A node that pressed at the last input is held to the wall while it is not farther from it than this part of its radius.
 const HOLD_RADII: f64 = 0.5;
 
@@ -67,8 +73,7 @@ impl Input {
         }
     }
 
-    /// Steps 2 to 5 of Algorithm 1 from `state` to a new inserted length. Returns the largest distance by which something is off, over
-    /// the radius of the device there.
+    /// Steps 2 to 5 of Algorithm 1 from `state` to a new inserted length. Returns how much that leaves: it has converged up to 1.
     pub(super) fn work_out(
         &mut self,
         surroundings: &Surroundings<'_>,
@@ -78,7 +83,7 @@ impl Input {
         self.translate(surroundings, state, inserted_mm);
         self.collide(surroundings, state);
         self.solve()?;
-        Ok(self.left_over_radii(surroundings))
+        Ok(self.left_over(surroundings))
     }
 
     /// Step 2: the nodes of the new inserted length, before the solve.
@@ -160,11 +165,11 @@ impl Input {
         )))
     }
 
-    /// The largest distance by which the result is off, over the radius of the device there.
-    fn left_over_radii(&mut self, surroundings: &Surroundings<'_>) -> f64 {
+    /// How much the input leaves: 1 where it has just converged.
+    fn left_over(&mut self, surroundings: &Surroundings<'_>) -> f64 {
         self.depths_mm.clear();
         self.misfit_mm = 0.0;
-        let mut left_over = 0.0f64;
+        let mut left_over = self.pull() / CONVERGED_PULL;
         for (index, (x, solved)) in self.positions_mm.iter().zip(&self.solved_mm).enumerate() {
             let radius_mm = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
             let clear = (x - self.predicted_mm[index]).norm() < self.clear_mm[index];
@@ -172,10 +177,21 @@ impl Input {
             let taken_mm = self.met[index].map_or(0.0, |met| met.plane.offset_mm - met.plane.normal.dot(x));
             let misfit_mm = (taken_mm - depth_mm).abs();
             self.misfit_mm = self.misfit_mm.max(misfit_mm);
-            left_over = left_over.max(misfit_mm.max((x - solved).norm()) / radius_mm);
+            left_over = left_over.max(misfit_mm.max((x - solved).norm()) / (CONVERGED_RADII * radius_mm));
             self.depths_mm.push(depth_mm);
         }
         left_over
+    }
+
+    /// Largest force by which a plane pulls a node, over the largest by which one presses: a wall holds nothing.
+    fn pull(&self) -> f64 {
+        let (mut pull_n, mut press_n) = (0.0f64, 0.0f64);
+        for (met, x) in self.met.iter().zip(&self.solved_mm) {
+            let Some(Met { plane, .. }) = met else { continue };
+            let force_n = plane.offset_mm - plane.normal.dot(x);
+            (pull_n, press_n) = (pull_n.max(-force_n), press_n.max(force_n));
+        }
+        if pull_n > 0.0 { pull_n / press_n.max(pull_n) } else { 0.0 }
     }
 
     /// Step 6: the new state, but for what the hand has done.

@@ -25,7 +25,7 @@
 //! # What it cannot do
 //! - **Wall stiffness per node** (eq. 7): refining the chain stiffens the wall, and between nodes nothing is felt.
 //! - **One linear solve per input**: what is met during an input is found at the next. What an input leaves is measured and told
-//!   (`input`), and with unit tangents inputs that leave much are halved ([`stepper`]).
+//!   (`input`), and with unit tangents inputs that have not converged are halved ([`stepper`]).
 //! - No twist, no rest curvature, no friction.
 //! - With free tangents, no unit length: a cantilever under a tip load P L²/EI = 1, 2, 5, 10 deflects 10 %, 35 %, 133 %, 311 % too far, and no
 //!   mesh cures it.

@@ -77,6 +77,11 @@ impl Li2011Options {
     /// that moves.
     pub(super) fn check(&self, solver: LinearSolver, surroundings: &Surroundings<'_>) -> Result<()> {
         let length_mm = surroundings.device.length_mm();
+        crate::refuse_shape(
+            "the paper's method",
+            surroundings.device,
+            "bends a wire that is straight at rest",
+        )?;
         in_range("method.element_mm", self.element_mm, length_mm)?;
         in_range("method.wall_stiffness_n_per_mm", self.wall_stiffness_n_per_mm, STIFFEST_N_PER_MM)?;
         surroundings.properties.refuse_regions("the paper's method")?;

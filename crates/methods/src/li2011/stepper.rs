@@ -7,11 +7,12 @@
 //!
 //! The inputs h of the paper's Table 2 are at most a third of a segment l, and a fortieth of a millimetre at least, one linear solve each. As
 //! printed (`tangents = "free"`) a command is one input, whatever its length. With unit tangents it is cut into inputs within that range: as
-//! long as l/3, and where one leaves something that is off by more than a tenth of the device's radius, shorter by halves.
+//! long as l/3, and where one has not converged, shorter by halves; at the end of a command the hand holds still until one has.
 
 use std::sync::Arc;
 
 use endowire_core::contact::ContactSurface;
+use endowire_core::contact::extension::check_inside;
 use endowire_core::insertion::{Command, StepReport, Surroundings, nodes_from_tip};
 use endowire_core::methods::{ChainState, Content, Method, State, check_inserted};
 use endowire_core::shape::Shape;
@@ -24,14 +25,17 @@ use super::options::{Li2011Options, LinearSolver};
 use super::slide::TangentReading;
 use super::wall::{ContactReading, FeltWall};
 
-/// An input has converged if nothing is off by more than this part of the device's radius.
-const CONVERGED_RADII: f64 = 0.1;
+/// An input that leaves so many times as much as one that has just converged has thrown the wire through the wall, by ten radii: wherever it comes to
+/// rest then, the command has not converged.
+const LOST: f64 = 100.0;
 /// Longest input over the segment: that of Table 2.
 const LONGEST_INPUT: f64 = 1.0 / 3.0;
 /// Shortest input, mm: that of Table 2, a fortieth of a millimetre.
 const SHORTEST_INPUT_MM: f64 = 0.025;
 /// A command is not cut for the rounding of its length over the longest input.
 const ROUNDING: f64 = 1e-6;
+/// Most inputs at the end of a command with the hand held still.
+const SETTLING: u32 = 20;
 /// Retracting to within this of the sheath, mm, is retracting to it: the rounding of summed increments.
 const ZERO_LENGTH_MM: f64 = 1e-9;
 
@@ -84,9 +88,9 @@ impl Li2011 {
     }
 
     /// Carries the hand to a new inserted length by inputs. Returns their number, those that were halved included, how many were
-    /// accepted, and whether all of these have converged.
+    /// accepted, and whether the last of these has converged and none has lost the wire.
     fn carry(&mut self, surroundings: &Surroundings<'_>, target_mm: f64) -> Result<(u32, u32, bool)> {
-        let (mut solves, mut inputs, mut converged) = (0, 0, true);
+        let (mut solves, mut inputs, mut lost) = (0, 0, false);
         let Li2011Options { element_mm, tangents, .. } = self.input.options;
         let whole_mm = (target_mm - self.state.report.inserted_mm).abs();
         let longest_mm = match tangents {
@@ -97,6 +101,7 @@ impl Li2011 {
             TangentReading::Free => whole_mm,
         };
         let mut input_mm = longest_mm;
+        let mut settling = SETTLING;
         loop {
             let now_mm = self.state.report.inserted_mm;
             let way_mm = target_mm - now_mm;
@@ -104,17 +109,22 @@ impl Li2011 {
             let next_mm = if last { target_mm } else { now_mm + input_mm.copysign(way_mm) };
             let left_over = self.input.work_out(surroundings, &self.state, next_mm)?;
             solves += 1;
-            let off = left_over > CONVERGED_RADII;
+            let off = left_over > 1.0;
             let half_mm = 0.5 * (next_mm - now_mm).abs();
             if off && tangents == TangentReading::Unit && half_mm >= SHORTEST_INPUT_MM {
                 input_mm = half_mm;
                 continue;
             }
+            lost |= left_over > LOST;
             self.input.read_out(surroundings, &mut self.state);
             inputs += 1;
-            converged &= !off;
             if last {
-                return Ok((solves, inputs, converged));
+                // The hand holds still until what is left over is worked off.
+                if off && tangents == TangentReading::Unit && settling > 0 {
+                    settling -= 1;
+                    continue;
+                }
+                return Ok((solves, inputs, !off && !lost));
             }
             input_mm = (2.0 * input_mm).min(longest_mm);
         }
@@ -125,6 +135,11 @@ impl Method for Li2011 {
     fn step(&mut self, surroundings: &Surroundings<'_>, command: Command) -> Result<()> {
         let target_mm = self.state.report.inserted_mm + command.advance_mm;
         let target_mm = if target_mm < ZERO_LENGTH_MM { 0.0 } else { target_mm };
+        let travel_mm = target_mm - self.state.report.inserted_mm;
+        if travel_mm > 0.0 {
+            let tip_mm = self.state.shape.tip_mm().unwrap_or(surroundings.sheath.position_mm);
+            check_inside(surroundings.wall, &tip_mm, travel_mm)?;
+        }
         let before = self.state.clone();
         match self.carry(surroundings, target_mm) {
             Ok((solves, inputs, converged)) => {

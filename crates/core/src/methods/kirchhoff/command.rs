@@ -10,11 +10,10 @@ use super::state::KirchhoffState;
 use super::step_control::StepControl;
 use super::substep::{AT_REST, Attempt, Effort, Found, released_mj};
 use super::workspace::{Work, Workspace};
-use crate::contact::extension::{leave_mm, left_through};
+use crate::contact::extension::check_inside;
 use crate::device::{Stack, line_mm};
 use crate::methods::{InstrumentReport, Move, StepReport};
-use crate::vessel::Wall;
-use crate::{Error, PhysicalEnd, Result, Vec3};
+use crate::{Error, Result};
 
 /// Most sub-steps that one command may be cut into.
 const SUBSTEP_LIMIT: usize = 4096;
@@ -199,14 +198,4 @@ fn jumped(stack: &Stack, (before, after): (&StepReport, &StepReport), way: &Way,
     let released = released_mj(stack, before, after);
     let lost = work - after.dissipated_mj - (now - energy - released);
     lost > JUMP * energy.max(now).max(released.abs()).max(JUMP_FLOOR_MJ)
-}
-
-/// Refuses a tip that, `ahead_mm` farther, would be beyond an opening where nothing is known any more.
-fn check_inside(wall: &Wall, tip_mm: &Vec3, ahead_mm: f64) -> Result<()> {
-    let Some((opening, beyond_mm)) = left_through(wall, tip_mm) else { return Ok(()) };
-    let limit_mm = leave_mm(opening);
-    if beyond_mm + ahead_mm > limit_mm {
-        return Err(Error::End(PhysicalEnd::Left { opening: opening.index, beyond_mm, limit_mm }));
-    }
-    Ok(())
 }
