@@ -12,19 +12,19 @@ use crate::failure::Failure;
 /// What drawing on a backend returns.
 pub(crate) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
-/// Colours that people with any colour vision can tell apart (Okabe and Ito 2008), and four greys.
+/// Colours that people with any colour vision can tell apart (Okabe and Ito 2008), two greys, black and brown.
 pub(crate) const COLOURS: [RGBColor; 11] = [
     RGBColor(0, 90, 160),
     RGBColor(90, 90, 90),
-    RGBColor(20, 20, 20),
-    RGBColor(130, 130, 130),
-    RGBColor(180, 180, 180),
+    RGBColor(160, 160, 160),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
     RGBColor(120, 60, 110),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
+    RGBColor(20, 20, 20),
+    RGBColor(130, 90, 60),
 ];
 
 const FAMILY: &str = "sans-serif";

@@ -21,7 +21,7 @@ const MARKED: usize = 60;
 /// The method of lines that the paper prints: they are grey.
 pub(super) const PAPER: &str = "Li et al. 2011";
 /// Colours of [`chart::COLOURS`] for the paper and for methods in the order of their lines.
-const COLOURS: [usize; 8] = [3, 0, 5, 6, 9, 8, 7, 10];
+const COLOURS: [usize; 8] = [1, 0, 3, 4, 6, 7, 5, 8];
 
 /// A line: the method, which gives its colour, what else tells it apart, and its points.
 pub(super) struct Line {
