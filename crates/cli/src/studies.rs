@@ -1,20 +1,14 @@
 //! What comparisons and experiments are made of, by name: their arguments list it, and they carry it out.
 
+use endowire_methods::NAMES;
+
 /// What is compared: every method, ours first, and the paper's in its other readings: with unit tangents and the planes of triangles, and as
 /// printed.
-pub(crate) const CANDIDATES: [&str; 11] = [
-    "kirchhoff",
-    "li2011-dense",
-    "li2011-banded",
-    TRIANGLE,
-    PRINTED,
-    "rigid-links",
-    "mass-spring",
-    "beam-fem",
-    "beam-fem-damped",
-    "chord-energy",
-    "discrete-rod",
-];
+pub(crate) const CANDIDATES: [&str; NAMES.len() + 2] = {
+    let [ours, dense, banded, rest @ ..] = NAMES;
+    let [a, b, c, d, e, f] = rest;
+    [ours, dense, banded, TRIANGLE, PRINTED, a, b, c, d, e, f]
+};
 /// The paper's method with unit tangents and the planes of triangles.
 pub(crate) const TRIANGLE: &str = "li2011-banded-triangle";
 /// The paper's method as printed: free tangents and the planes of triangles.
@@ -44,7 +38,6 @@ pub(crate) fn targets() -> impl Iterator<Item = &'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use endowire_methods::NAMES;
 
     #[test]
     fn every_method_is_a_candidate() {
