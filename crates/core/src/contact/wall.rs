@@ -14,6 +14,7 @@ mod clear;
 mod coupling;
 mod foresight;
 mod passing;
+mod predicted;
 mod reading;
 mod slipping;
 
@@ -27,6 +28,7 @@ use crate::solve::{External, Moved};
 
 pub(super) use clear::Span;
 pub(super) use foresight::Foreseen;
+pub(super) use predicted::Predicted;
 use reading::Reading;
 pub(super) use slipping::{Slip, Slipping};
 

@@ -24,8 +24,6 @@ const WORK: f64 = 280.0;
 const WORK_RAD: f64 = 0.1;
 /// … and never more than so many times what one solution may take.
 const WORK_OF_ONE: usize = 10;
-/// What is in no equilibrium after so many times that is taken as it is.
-const WORK_OF_RESORTS: usize = 12;
 /// How often a device that came to rest at the end of its way, but in no equilibrium, is let go on from there with the hand held still.
 const AGAIN: usize = 4;
 /// What moved by less than this in another last resort, in its least radii, is at rest.
@@ -95,7 +93,7 @@ impl<const C: usize> Workspace<C> {
         let travel = way.travel_mm(WORK_RAD).max(1.0);
         let work = (WORK * travel) as usize;
         let mut control =
-            StepControl::new(work.min(WORK_OF_ONE.saturating_mul(most)), WORK_OF_RESORTS * work);
+            StepControl::new(work.min(WORK_OF_ONE.saturating_mul(most)), from.part_mm);
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
@@ -106,7 +104,8 @@ impl<const C: usize> Workspace<C> {
             again -= usize::from(done >= 1.0);
             let was = if moved { now.start() } else { Start { mesh, state: from } };
             let rest = 1.0 - done;
-            let (effort, part) = control.next(rest);
+            let (effort, part_mm) = control.next(rest * travel);
+            let part = part_mm / travel;
             let at_start = environment.displaced(displaced.as_ref());
             if effort != Effort::Usual {
                 tools.refuse_narrower(&at_start, was, &way.commands, FAR_TOO_LITTLE)?;
@@ -131,9 +130,12 @@ impl<const C: usize> Workspace<C> {
             }
             let left = passage.map(|passage| (was, passage));
             let attempt = Attempt { hands, effort, left };
-            let iterations = tools.work.iterations;
+            let before = tools.work.iterations;
             let tried = tools.try_step(&there, here, attempt, next, &mut control.budget);
-            control.took(effort, tools.work.iterations - iterations);
+            if std::env::var_os("DEBUG").is_some() {
+                #[allow(clippy::print_stderr)]
+                { eprintln!("at {:.3} part {part_mm:.3} of {travel:.3} {effort:?} its {} : {}", line_mm(lengths(hands)), tools.work.iterations - before, match &tried { Ok(f) => format!("ok off {:.3} slides {} balanced {} res {:.1e} uns {:.1e}", f.off_prediction, f.slides, f.balanced, f.residual, f.unsettled), Err(l) => l.reason.to_string() }); }
+            }
             match tried {
                 Ok(found) => {
                     sum.add(&found);
@@ -148,14 +150,13 @@ impl<const C: usize> Workspace<C> {
                     displaced = then;
                     moved = true;
                     done = to;
-                    control.succeeded(part);
+                    control.succeeded(part_mm, found.off_prediction);
                 }
                 // From the same place the same comes of it.
                 Err(_) if done >= 1.0 => break,
                 Err(lost) => {
-                    control.failed((effort, part), lost.astray);
                     // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
-                    if control.are_over() || sum.substeps > SUBSTEP_LIMIT {
+                    if control.failed(part_mm) || sum.substeps > SUBSTEP_LIMIT {
                         tools.refuse_narrower(&at_start, was, &way.commands, 1.0)?;
                         return Err(Error::Computation(format!(
                             "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {}",
@@ -169,7 +170,9 @@ impl<const C: usize> Workspace<C> {
             let there = environment.displaced(displaced.as_ref());
             tools.refuse_narrower(&there, now.start(), &way.commands, 1.0)?;
         }
-        let report = &mut now.parts().1.report;
+        let state = now.parts().1;
+        state.part_mm = control.part_mm;
+        let report = &mut state.report;
         sum.write(report);
         report.converged = balanced;
         report.angles = from.report.angles;

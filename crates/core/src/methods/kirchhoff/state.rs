@@ -23,6 +23,8 @@ pub struct KirchhoffState {
     pub(super) inner_friction: Vec<InnerFriction>,
     pub(super) known: KnownPoints,
     pub(super) correction: Correction,
+    /// Longest way of the hands in the next part of a command, mm.
+    pub(super) part_mm: f64,
     pub(super) report: StepReport,
 }
 
@@ -59,6 +61,7 @@ impl KirchhoffState {
             inner_friction: Vec::new(),
             known: KnownPoints::default(),
             correction: Correction::default(),
+            part_mm: f64::INFINITY,
             report: StepReport { converged: true, instruments, ..StepReport::default() },
         }
     }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::active_set::Held;
-use super::carried::{Passage, WallWork};
+use super::carried::Passage;
 use super::configuration::{Configuration, Start};
 use super::guess::Quality;
 use super::hands::{Hand, motions};
@@ -32,21 +32,14 @@ const FIRM: f64 = 0.1;
 pub(super) const AT_REST: f64 = 0.05;
 /// What is the matter where an equilibrium is on the other side of the wall.
 const PASSED: &str = "the device would pass through the wall";
-/// An equilibrium is on another branch where more energy is stored than the hand gives: than this many times what the larger of its
-/// forces before and after does on the way, …
-const LARGEST_RISE: f64 = 10.0;
-/// … and this part of what was stored before, …
-const RISE_SHARE: f64 = 0.02;
-/// … beyond what is too little to tell, mJ.
-const RISE_FLOOR_MJ: f64 = 1e-3;
-/// What is the matter where it is.
-const STORED: &str = "more energy would be stored than the hand gives";
+/// What is the matter where an equilibrium is another than the one that was predicted.
+const FAR: &str = "the equilibrium is far from where the device was predicted";
+pub(super) fn near_limit() -> f64 {
+    static V: std::sync::OnceLock<f64> = std::sync::OnceLock::new();
+    *V.get_or_init(|| std::env::var("NEAR").map_or(1.0, |v| v.parse().unwrap()))
+}
 /// What is the matter where they do not.
 const UNSETTLED: &str = "friction and wall forces do not settle";
-/// A device with friction on which nothing pressed may first touch the wall in a step of this part of its radius; …
-const FIRST_TOUCH: f64 = 0.05;
-/// … what is the matter with a longer one.
-const TOUCHED: &str = "the wall is first touched on the way";
 
 /// How an equilibrium was found.
 pub(super) struct Found {
@@ -64,6 +57,8 @@ pub(super) struct Found {
     pub(super) balanced: bool,
     /// Whether the device was let come to rest as it can.
     pub(super) relaxed: bool,
+    /// The farthest that a point is from where it was predicted, over the room that it has there.
+    pub(super) off_prediction: f64,
 }
 
 /// Why a sub-step came to nothing.
@@ -84,8 +79,6 @@ impl From<&'static str> for Lost {
 pub(super) enum Effort {
     /// As long as what is near takes to be found.
     Usual,
-    /// As long as the budget lasts: to where the device comes to rest far away.
-    Patient,
     /// Without a budget, to where the device comes to rest as it can: what is nearly in balance, up to this residual over force scale, is
     /// taken, or whatever there is if that is infinite.
     Resort(f64),
@@ -185,9 +178,9 @@ impl<const C: usize> Tools<C> {
         if !contact.stiff {
             contact.trust_guess();
         }
-        let began_free = contact.began_free();
         let candidates = (start, &*mesh, &mut *rod);
         let quality = self.guess.choose(&mut contact, candidates);
+        contact.predict(&mesh.elements, rod);
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let held = match quality {
             Quality::Beyond => Held::Lost,
@@ -224,6 +217,12 @@ impl<const C: usize> Tools<C> {
         let balanced = (found.converged || (relaxed && found.residual < SETTLED)) && unsettled < SETTLED;
         let at_rest = balanced || matches!(effort, Effort::Resort(least) if found.residual <= least);
         let mut passed = false;
+        let off_prediction = contact.off_prediction(&mesh.elements, rod);
+        if effort == Effort::Usual && at_rest && off_prediction > near_limit() {
+            self.counters.add(&contact.count());
+            self.work.add(iterations, elements);
+            return Err(FAR.into());
+        }
         if at_rest {
             contact.know_whole_base(&mesh.elements);
             passed = contact.passes_through(&mesh.elements, rod);
@@ -243,22 +242,11 @@ impl<const C: usize> Tools<C> {
         let (mesh, after) = next.parts();
         let reports = (&start.state.report, &after.report);
         let way_mm = farthest_mm(reports);
-        // Without a normal force to begin with it has slid from where it touches to anywhere, and stays there.
-        if began_free && slides > 0 && !relaxed && way_mm > FIRST_TOUCH * surroundings.device.min_radius_mm()
-        {
-            return Err(TOUCHED.into());
-        }
         let flow_mj = aside_mj + self.drag.size_n() * way_mm;
-        let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
-        if !(effort == Effort::Resort(f64::INFINITY) && balanced)
-            && rises(environment.surroundings.stack, reports, dissipated_mj, by_wall)
-        {
-            return Err(STORED.into());
-        }
         let corrections = (&start.state.correction, &mut after.correction);
         self.guess.teach(&mesh.elements, &after.rod, stiffness <= YIELDING, corrections);
         self.keep(mesh, after);
-        Ok(Found { slides, dissipated_mj, flow_mj, residual: found.residual, unsettled, balanced, relaxed })
+        Ok(Found { slides, dissipated_mj, flow_mj, residual: found.residual, unsettled, balanced, relaxed, off_prediction })
     }
 }
 
@@ -287,29 +275,4 @@ pub(super) fn released_mj(stack: &Stack, before: &StepReport, after: &StepReport
         straightening(after) - straightening(before)
     });
     each.sum()
-}
-
-/// Whether more energy is stored, or taken by friction, than the hand can have put in. A device that was led to the far side of a
-/// crest, or into a corner of the wall that holds it from both sides, is in equilibrium there, at any energy, and nothing leads
-/// there from where it was; shorter steps stay on the branch on which it is.
-fn rises(
-    stack: &Stack,
-    (before, after): (&StepReport, &StepReport),
-    dissipated_mj: f64,
-    by_wall: WallWork,
-) -> bool {
-    let most = |before: f64, after: f64, way: f64| before.abs().max(after.abs()) * way.abs();
-    let mut work = by_wall.most_mj;
-    for index in 0..after.instruments.len().max(1) {
-        let (was, is) = (before.hand(index), after.hand(index));
-        let (Some(push), Some(pushes)) = (was.push_force_n, is.push_force_n) else {
-            // At the tip of another its force jumps, and nothing can be said.
-            return false;
-        };
-        work += most(push, pushes, is.inserted_mm - was.inserted_mm)
-            + most(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
-    }
-    let gained = after.energy.total() - before.energy.total() - released_mj(stack, before, after);
-    let stored = gained + dissipated_mj;
-    stored > LARGEST_RISE * work + RISE_SHARE * before.energy.total() + RISE_FLOOR_MJ
 }
