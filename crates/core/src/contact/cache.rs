@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::distance::{Distance, Nearness};
 use super::point::{FOLLOW, LOOK_AGAIN};
 use super::proximity::ProximityCache;
-use super::wall::{Foreseen, Predicted, Slip, Slipping, Span};
+use super::wall::{Foreseen, Slip, Slipping, Span};
 use super::{ContactPoint, ContactSurface};
 use crate::Vec3;
 
@@ -100,8 +100,6 @@ pub struct ContactCache {
     pub(super) slipping: Vec<Slipping>,
     /// Changes of gaps by a round of that, mm, and what it does to points with friction.
     pub(super) ends: (Vec<f64>, Vec<Slip>),
-    /// Where the points were predicted.
-    pub(super) predicted: Vec<Predicted>,
 }
 
 /// What the points of a device know of the wall at an equilibrium.
@@ -148,7 +146,6 @@ impl ContactCache {
             foreseen: Vec::new(),
             slipping: Vec::new(),
             ends: (Vec::new(), Vec::new()),
-            predicted: Vec::new(),
         }
     }
 
@@ -163,7 +160,6 @@ impl ContactCache {
         self.ends.0.reserve(points.saturating_sub(self.ends.0.len()));
         self.ends.1.reserve(points.saturating_sub(self.ends.1.len()));
         self.readings.reserve(points.saturating_sub(self.readings.len()));
-        self.predicted.reserve(points.saturating_sub(self.predicted.len()));
     }
 
     /// Is of these points, of none of which is known that it is clear of the wall.

@@ -60,10 +60,8 @@ const TIP_RADII: f64 = 10.0;
 const STEADY: f64 = 0.3;
 /// … and no more once they differ from the lagged ones by less than this part.
 pub const SETTLED: f64 = 1e-4;
-/// Renewals of a step that take the forces as they are; where they have not settled by then they overshoot, …
-const WHOLE_RENEWALS: usize = 8;
-/// … and from then on they take this part of the way.
-const RELAXATION: f64 = 0.1;
+/// Renewals of a step; forces that have not settled by then seldom do, and are left alone.
+const RENEWALS: usize = 4;
 
 /// A contact point in a step with friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,12 +118,8 @@ pub struct Friction {
     least_stick_mm: f64,
     /// Whether normal forces are no longer renewed in this step.
     settled: bool,
-    /// Whether they are those of the state looked at last, and are renewed again at the next.
-    renewed: bool,
     /// How often normal forces were renewed in this step.
     renewals: usize,
-    /// Whether they are left alone once they should have settled, for another method to go on from there.
-    hands_over: bool,
     /// Whether normal forces follow the state at once: see [`coupling`].
     coupled: bool,
     /// Energy that was taken before the points were anchored anew, mJ.
@@ -190,9 +184,7 @@ impl Friction {
     ) {
         self.sliders.clear();
         self.settled = false;
-        self.renewed = false;
         self.renewals = 0;
-        self.hands_over = false;
         self.coupled = false;
         self.taken_mj = 0.0;
         if !self.acts() {
@@ -388,7 +380,6 @@ impl Friction {
     /// Looks at what presses at the state that Newton's method has come to, the numbers of the points that do, ascending, each with a normal
     /// and a force, and renews the lagged ones unless they are still on their way or have settled. `least_n` is a force not worth settling.
     pub fn follow(&mut self, pressed: impl Iterator<Item = (usize, (Vec3, f64))>, least_n: f64) {
-        self.renewed = false;
         let (mut moved, mut sum) = (0.0, least_n);
         let mut pressed = pressed.peekable();
         for (index, slider) in self.sliders.iter_mut().enumerate() {
@@ -401,34 +392,14 @@ impl Friction {
             }
             slider.seen = now;
         }
-        if self.settled || moved > STEADY * sum || self.handed_over() {
+        if self.settled || moved > STEADY * sum || self.renewals >= RENEWALS {
             return;
         }
         self.settled = self.unsettled(least_n) < SETTLED;
         self.renewals += 1;
-        let relaxed = !self.settled && self.renewals > WHOLE_RENEWALS;
-        self.renewed = !self.settled && !relaxed;
         for slider in &mut self.sliders {
-            let (normal, force) = slider.seen;
-            if relaxed {
-                let pressure = slider.normal * slider.force_n;
-                let pressure = pressure + (normal * force - pressure) * RELAXATION;
-                slider.force_n = pressure.norm();
-                slider.normal = if slider.force_n > 0.0 { pressure / slider.force_n } else { normal };
-            } else {
-                (slider.normal, slider.force_n) = slider.seen;
-            }
+            (slider.normal, slider.force_n) = slider.seen;
         }
-    }
-
-    /// Whether normal forces are those of the state looked at last, and are renewed again at the next.
-    pub(crate) fn is_renewed(&self) -> bool {
-        self.renewed
-    }
-
-    /// What was seen last is what the step begins with: normal forces are renewed at the first state that presses nearly so.
-    pub(crate) fn begin_seen(&mut self) {
-        self.sliders.iter_mut().for_each(|s| s.seen = s.begun);
     }
 
     /// How much of the normal force has changed since it was last renewed.
@@ -444,11 +415,6 @@ impl Friction {
     /// Normal forces are renewed no more.
     pub fn hold(&mut self) {
         self.settled = true;
-    }
-
-    /// Whether nothing pressed where the step began.
-    pub fn began_free(&self) -> bool {
-        self.acts() && self.sliders.iter().all(|s| s.begun.1 == 0.0)
     }
 
     /// The normal forces are those that it can be rewound to.

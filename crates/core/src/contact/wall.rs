@@ -14,7 +14,6 @@ mod clear;
 mod coupling;
 mod foresight;
 mod passing;
-mod predicted;
 mod reading;
 mod slipping;
 
@@ -28,7 +27,6 @@ use crate::solve::{External, Moved};
 
 pub(super) use clear::Span;
 pub(super) use foresight::Foreseen;
-pub(super) use predicted::Predicted;
 use reading::Reading;
 pub(super) use slipping::{Slip, Slipping};
 
@@ -50,8 +48,6 @@ pub struct WallContact<'a> {
     least_moment_nmm: f64,
     /// Part of the (stiffest) modulus that acts: a rigid wall is approached from a softer one.
     pub softness: f64,
-    /// Whether the wall is stiffer than an element of the rod. A trial that runs into a softer one costs less than finding the step anew.
-    pub stiff: bool,
     /// Whether points that pressed in the last equilibrium are held to the wall, should they have come off it.
     pub holding: bool,
     /// What the blood that flows does.
@@ -79,7 +75,6 @@ impl<'a> WallContact<'a> {
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
             softness: 1.0,
-            stiff: true,
             holding: false,
             drag: None,
             cache,
@@ -350,9 +345,8 @@ impl External for WallContact<'_> {
         sum
     }
 
-    /// Where the wall yields more than an element, a trial does not lose its contacts.
     fn foresee(&mut self, moved: &Moved<'_>) -> bool {
-        self.stiff && self.foresee_contacts(moved)
+        self.foresee_contacts(moved)
     }
 
     fn meet(
@@ -363,7 +357,7 @@ impl External for WallContact<'_> {
         moved: &Moved<'_>,
     ) -> bool {
         // Where the modulus changes by powers of ten from place to place, a plane and a spring are no model of what a trial has met.
-        if !self.stiff || self.surface.regions.is_some() {
+        if self.surface.regions.is_some() {
             return false;
         }
         let slips = self.begin_slipping(base, moved);
@@ -403,20 +397,6 @@ impl External for WallContact<'_> {
         self.stray_contacts(elements, states, part, into)
     }
 
-    fn follow(
-        &mut self,
-        elements: &[ElementData],
-        base: &RodState,
-        moved: &Moved<'_>,
-        into: &mut dyn Stencils,
-    ) -> bool {
-        self.follow_contacts(elements, base, moved, into)
-    }
-
-    fn convexify(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> bool {
-        self.convexify_contacts(elements, base, into)
-    }
-
     /// In a device that carries less, force and moment have no scale of their own to be compared with.
     fn scale(&self) -> [f64; 2] {
         [self.least_force_n(), self.least_moment_nmm]
@@ -428,10 +408,6 @@ impl External for WallContact<'_> {
 
     fn is_steep(&self) -> bool {
         true
-    }
-
-    fn is_lagged(&self) -> bool {
-        (self.friction.acts() || !self.friction.between.places().is_empty()) && !self.stiff
     }
 
     /// A point may move by nearly its clearance, whatever the direction: the ball about it holds no wall. Farther it may go where its

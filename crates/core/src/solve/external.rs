@@ -86,30 +86,6 @@ pub trait External {
         0.0
     }
 
-    /// Takes the negative curvature of contacts on crests out of the Hessian at the base; what the modulus of the wall does from place to
-    /// place stays. Returns whether there was any.
-    fn convexify(&mut self, _elements: &[ElementData], _base: &RodState, _into: &mut dyn Stencils) -> bool {
-        false
-    }
-
-    /// Whether something in it is lagged, and all else changes little within a step: then it is what is renewed that is left in a residual,
-    /// and factors of an earlier state serve as well.
-    fn is_lagged(&self) -> bool {
-        false
-    }
-
-    /// Adds, as a gradient at the base, by how much its forces there change where what is lagged follows a step, to first order: what its
-    /// Hessian leaves out. Returns whether anything follows.
-    fn follow(
-        &mut self,
-        _elements: &[ElementData],
-        _base: &RodState,
-        _moved: &Moved<'_>,
-        _into: &mut dyn Stencils,
-    ) -> bool {
-        false
-    }
-
     /// Whether it rises so steeply within a step that a trial may have to be looked for between one that was taken and one that was
     /// refused, as a wall does.
     fn is_steep(&self) -> bool {

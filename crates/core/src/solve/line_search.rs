@@ -7,7 +7,7 @@
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::{StepRecord, StopReason};
 use super::shift::REGULARISATION;
-use super::stop::{SHORT, Turn};
+use super::stop::SHORT;
 use crate::rod::{ElementData, Layout, RodState};
 
 /// Most trials.
@@ -67,7 +67,7 @@ struct Stride {
     /// How far it turns nodes, rad, …
     turn: f64,
     /// … and where it says how near the minimum is.
-    whole_turn: Turn,
+    whole_turn: f64,
 }
 
 impl Merit {
@@ -99,7 +99,7 @@ impl<const C: usize> Newton<C> {
         search: &mut LineSearch,
         residual: f64,
         shift: f64,
-    ) -> Result<Turn, StopReason> {
+    ) -> Result<f64, StopReason> {
         let Stride { mut merit, mut part, mut whole_turn, turn } =
             self.stride(problem, state, search, shift)?;
         let free = problem.supports.conditions() == 0;
@@ -109,7 +109,7 @@ impl<const C: usize> Newton<C> {
             && turn <= SHORT
             && merit.slope <= 0.0
             && -merit.slope <= merit.rounding();
-        let turn_of = |part: f64, whole_turn: Turn| if part == 1.0 { whole_turn } else { Turn::NONE };
+        let turn_of = |part: f64, whole_turn: f64| if part == 1.0 { whole_turn } else { f64::INFINITY };
         let multipliers = problem.supports.multipliers;
         let first = Layout::<C>.support(problem.elements.len());
         for j in 0..6 {
@@ -186,13 +186,13 @@ impl<const C: usize> Newton<C> {
         shift: f64,
     ) -> Result<Stride, StopReason> {
         let merit = self.merit_along(problem, state, search);
-        let (turn, twist) = RodState::largest_turn::<C>(problem.elements, state, &self.step);
+        let (turn, _) = RodState::largest_turn::<C>(problem.elements, state, &self.step);
         if !turn.is_finite() {
             return Err(StopReason::NotFinite);
         }
         let most = problem.options.max_turn;
         let part = if turn > most { most / turn } else { 1.0 };
-        Ok(Stride { merit, part, turn, whole_turn: self.whole_turn(problem, (turn, twist), shift) })
+        Ok(Stride { merit, part, turn, whole_turn: self.whole_turn(problem, turn, shift) })
     }
 
     /// Weighs the end conditions above the reactions that the step leads to, and measures the merit along it.
@@ -220,15 +220,14 @@ impl<const C: usize> Newton<C> {
 
     /// How far a whole step turns nodes, where it is Newton's own and the matrix says that it leads to a minimum.
     /// Axial forces stiffen the rod against bending over its length.
-    fn whole_turn(&self, problem: &Problem<'_>, (turn, twist): (f64, f64), shift: f64) -> Turn {
+    fn whole_turn(&self, problem: &Problem<'_>, turn: f64, shift: f64) -> f64 {
         if !(problem.minimum && shift == 0.0 && problem.supports.conditions() == 0) {
-            return Turn::NONE;
+            return f64::INFINITY;
         }
         let l = Layout::<C>;
         let elements = problem.elements;
         let pulled = (0..elements.len()).fold(0.0f64, |most, e| most.max(self.step[l.tension(e)].abs()));
-        let with_forces = turn.max(STIFFENING * pulled * REGULARISATION / Self::regularisation(elements));
-        Turn { with_forces, of_nodes: turn.max(twist), pull_n: pulled }
+        turn.max(STIFFENING * pulled * REGULARISATION / Self::regularisation(elements))
     }
 
     /// Sets the trial to a part of the step, at most `part`, that crosses nothing; returns the part.

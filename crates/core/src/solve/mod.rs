@@ -6,8 +6,8 @@
 
 pub(crate) mod contacts;
 pub mod external;
-mod lagged;
 mod line_search;
+pub(crate) mod neighbourhood;
 pub mod newton;
 pub mod report;
 mod residual;

@@ -14,9 +14,10 @@
 
 use super::external::External;
 use super::line_search::LineSearch;
+use super::neighbourhood::Neighbourhood;
 use super::report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 use super::residual::ResidualSize;
-use super::stop::{Progress, Since};
+use super::stop::Progress;
 use crate::banded::{Factor, Inertia, Shift};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
 
@@ -34,8 +35,6 @@ pub struct Newton<const C: usize> {
     pub start_residual: [f64; C],
     pub(super) unit_shift: Shift,
     pub(super) factor: Factor<C>,
-    /// What has changed since the factors at hand were taken.
-    pub(super) since: Since,
     pub(super) step: Vec<f64>,
     pub(super) spare: Vec<f64>,
     /// The step before, while contacts within one are looked for.
@@ -45,6 +44,8 @@ pub struct Newton<const C: usize> {
     pub(super) other: RodState,
     /// The steps that the last solution took.
     pub steps: Vec<StepRecord>,
+    /// Where solutions are looked for.
+    pub(crate) neighbourhood: Neighbourhood,
 }
 
 impl<const C: usize> Newton<C> {
@@ -56,7 +57,6 @@ impl<const C: usize> Newton<C> {
             start_residual: [0.0; C],
             unit_shift: Shift::default(),
             factor: Factor::new(n),
-            since: Since::NEVER,
             step: vec![0.0; n],
             spare: vec![0.0; n],
             before: vec![0.0; n],
@@ -64,6 +64,7 @@ impl<const C: usize> Newton<C> {
             trial: RodState::default(),
             other: RodState::default(),
             steps: Vec::with_capacity(STEPS),
+            neighbourhood: Neighbourhood::default(),
         }
     }
 
@@ -74,6 +75,7 @@ impl<const C: usize> Newton<C> {
         self.resize(now);
         self.trial.reserve(elements);
         self.other.reserve(elements);
+        self.neighbourhood.reserve(elements);
     }
 
     /// Changes the size; keeps the memory.
@@ -147,8 +149,7 @@ impl<const C: usize> Newton<C> {
         // Loads without potential make the stiffness unsymmetric: its symmetric part says nothing about minima.
         let minimum = options.minimum && external.is_conservative();
         let mut problem = Problem { elements, supports, external, options, minimum };
-        let since = std::mem::replace(&mut self.since, Since::NEVER);
-        let mut progress = if options.goes_on { Progress::going_on(since) } else { Progress::default() };
+        let mut progress = Progress::default();
         let mut search = LineSearch::new(elements);
         let mut shift = 0.0;
         loop {
@@ -159,18 +160,13 @@ impl<const C: usize> Newton<C> {
                 return report.stopped(StopReason::NotFinite);
             }
             let arrived = progress.has_arrived(&size, options.tolerance, &self.steps);
-            if arrived && minimum && !self.assembly.hessian && !progress.tells_inertia(&state.tensions) {
-                self.assemble(elements, problem.supports, problem.external, state);
-            }
-            let natural = match self.descent_step(&mut problem, state, &mut shift, arrived) {
+            let natural = match self.descent_step(&problem, &mut shift, arrived) {
                 Ok(inertia) => inertia,
                 Err(reason) => return report.stopped(reason),
             };
             if arrived {
                 self.judge(&problem, natural, &mut report);
                 if report.stable || !minimum {
-                    let own = self.assembly.hessian && shift == 0.0;
-                    self.since = if own { Since::NOW } else { progress.since() };
                     return report.converged(size.reason());
                 }
             }
@@ -190,13 +186,10 @@ impl<const C: usize> Newton<C> {
             }
             report.iterations += 1;
             self.unsymmetric();
-            if shift == 0.0 && minimum && problem.external.is_lagged() {
-                self.follow_step(&mut problem, state);
-            }
             Self::restore_tensions(elements, &mut self.step);
-            let factored = self.assembly.hessian;
             match self.line_search(&mut problem, state, &mut search, size.relative, shift) {
-                Ok(turn) => progress.has_turned(turn, factored),
+                Ok(_) if self.neighbourhood.is_left_by(state) => return report.stopped(StopReason::Left),
+                Ok(turn) => progress.has_turned(turn),
                 Err(StopReason::NoDescent) => {
                     return self.without_descent(&mut problem, state, &progress, natural, report);
                 }
@@ -215,13 +208,12 @@ impl<const C: usize> Newton<C> {
         assembled: bool,
     ) -> ResidualSize {
         let Problem { elements, supports, external, options, .. } = problem;
-        let lagged = external.is_lagged();
         if !assembled {
-            self.assembly.hessian = progress.wants_hessian(options.tolerance, lagged);
+            self.assembly.hessian = progress.wants_hessian(options.tolerance);
             self.assemble_parts(elements, supports, *external, state);
         }
         let size = self.residual(elements, *external, supports, options.tolerance);
-        if self.assembly.hessian || size.small || progress.shrinks_enough(&size, options.tolerance, lagged) {
+        if self.assembly.hessian || size.small || progress.shrinks_enough(&size, options.tolerance) {
             return size;
         }
         self.assemble(elements, supports, *external, state);
@@ -232,8 +224,7 @@ impl<const C: usize> Newton<C> {
     /// without it, if that is known.
     fn descent_step(
         &mut self,
-        problem: &mut Problem<'_>,
-        state: &RodState,
+        problem: &Problem<'_>,
         shift: &mut f64,
         arrived: bool,
     ) -> Result<Option<Inertia>, StopReason> {
@@ -246,7 +237,7 @@ impl<const C: usize> Newton<C> {
             *shift = 0.0;
             return Ok(Some(self.factor.inertia()));
         }
-        let (sigma, natural) = self.factor_shifted(problem, state, *shift, arrived)?;
+        let (sigma, natural) = self.factor_shifted(problem, *shift)?;
         *shift = sigma;
         Ok(natural)
     }

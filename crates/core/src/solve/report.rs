@@ -14,13 +14,11 @@ pub struct NewtonOptions {
     pub max_turn: f64,
     /// Whether to look for a minimum (or take any equilibrium, as continuation does).
     pub minimum: bool,
-    /// Whether the state is the one that the last solution ended at, and next to nothing has changed: its factors serve first.
-    pub goes_on: bool,
 }
 
 impl Default for NewtonOptions {
     fn default() -> Self {
-        Self { max_iterations: 500, tolerance: 1e-10, max_turn: 1.4, minimum: true, goes_on: false }
+        Self { max_iterations: 500, tolerance: 1e-10, max_turn: 1.4, minimum: true }
     }
 }
 
@@ -37,6 +35,8 @@ pub enum StopReason {
     NoDescent,
     /// The matrix stayed singular or of wrong inertia under every shift.
     Singular,
+    /// It has come too far from where the state was predicted.
+    Left,
     /// The state or the matrix holds a number that is not finite.
     NotFinite,
 }
@@ -49,6 +49,7 @@ impl std::fmt::Display for StopReason {
             Self::MaxIterations => "iterations used up",
             Self::NoDescent => "no step lowers the energy",
             Self::Singular => "the stiffness matrix is singular",
+            Self::Left => "what was found is far from where the device was predicted",
             Self::NotFinite => "a number is not finite",
         })
     }

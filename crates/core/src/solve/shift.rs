@@ -1,15 +1,12 @@
 //! Inertia and shift: a matrix that is not that of a minimum is made one by a uniform tension.
 //!
-//! A minimum has one negative pivot for each multiplier. With more, contacts that press on crests are made convex first: where a guess
-//! presses too hard, −F ∇∇d is too large by as much, and is local (J. Teran et al., *Robust quasistatic finite elements and flesh
-//! simulation*, SCA 2005, for elements). Then the stiffness of a uniform tension ([`Assembly::unit_shift`]) is added until they are right
+//! A minimum has one negative pivot for each multiplier. With more, the stiffness of a uniform tension ([`Assembly::unit_shift`]) is added until they are right
 //! (Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 3.4, with the inertia in the place of a failed Cholesky factorisation).
 
 use super::newton::{Newton, Problem};
 use super::report::StopReason;
-use super::stop::Since;
 use crate::banded::{FactorError, Inertia};
-use crate::rod::{Assembly, ElementData, RodState, Supports};
+use crate::rod::{Assembly, ElementData, Supports};
 
 /// Part of EI/L² that is always added as a uniform tension.
 pub(super) const REGULARISATION: f64 = 1e-8;
@@ -22,7 +19,6 @@ impl<const C: usize> Newton<C> {
     /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
     pub fn inertia(&mut self, elements: &[ElementData], supports: &Supports, sigma: f64) -> Option<Inertia> {
         Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
-        self.since = Since::NEVER;
         self.factor.factor_shifted(&self.assembly.matrix, &self.unit_shift, sigma).ok()
     }
 
@@ -67,16 +63,13 @@ impl<const C: usize> Newton<C> {
         REGULARISATION / (length * soft)
     }
 
-    /// Factors the matrix and solves for the step under the regularisation. Where its inertia is not that `wanted`, if one is, contacts are made
-    /// convex first, which is all that it takes where a guess presses too hard on a crest of a wall. Then a shift is added, from an
-    /// eighth of the `last` one, and grows. Returns the shift, not 0 where the matrix is not that of the state, and the inertia of that
+    /// Factors the matrix and solves for the step under the regularisation. Where its inertia is not that of a minimum, if one is looked for, a
+    /// shift is added, from an eighth of the `last` one, and grows. Returns the shift, not 0 where the matrix is not that of the state, and the inertia of that
     /// if it could be factored.
     pub(super) fn factor_shifted(
         &mut self,
-        problem: &mut Problem<'_>,
-        state: &RodState,
+        problem: &Problem<'_>,
         last: f64,
-        arrived: bool,
     ) -> Result<(f64, Option<Inertia>), StopReason> {
         let regularisation = Self::regularisation(problem.elements);
         let wanted = problem.minimum.then(|| problem.multipliers());
@@ -87,13 +80,6 @@ impl<const C: usize> Newton<C> {
         let natural = found.as_ref().ok().copied();
         if right(&found) {
             return Ok((0.0, natural));
-        }
-        // A saddle is left along its own curvature.
-        if wanted.is_some() && !arrived && self.convexify(problem, state) {
-            let found = self.factor_step(regularisation);
-            if right(&found) {
-                return Ok((regularisation, natural));
-            }
         }
         let mut sigma = (LEAST_SHIFT * regularisation).max(last / 8.0);
         for attempt in 0..SHIFTS {
@@ -107,14 +93,6 @@ impl<const C: usize> Newton<C> {
             sigma *= 4.0;
         }
         Err(StopReason::Singular)
-    }
-
-    /// Makes the contacts in the assembled matrix convex; returns whether some were not.
-    pub(super) fn convexify(&mut self, problem: &mut Problem<'_>, state: &RodState) -> bool {
-        let Problem { elements, supports, external, .. } = problem;
-        let any = external.convexify(elements, state, &mut self.assembly);
-        supports.hold(&mut self.assembly);
-        any
     }
 
     /// Factors the assembled matrix with a shift, and sets the step that it answers.

@@ -147,11 +147,6 @@ impl Between {
         &self.places
     }
 
-    /// Whether couples hang on what presses: not where instruments slide in one another without being turned, and all of friction is along the line.
-    pub(crate) fn turns(&self) -> bool {
-        self.places.iter().any(|p| p.sets.is_some() && (p.advance_mm == 0.0 || p.turn_rad != 0.0))
-    }
-
     /// Forces across the line of each node and the length that it stands for, N and mm; returns by what part of the largest couples those that act change with them.
     pub(crate) fn renew(&mut self, state: &RodState, forces: impl Fn(&Place) -> (f64, f64)) -> f64 {
         let (mut change, mut sum) = (0.0, 0.0);
@@ -221,17 +216,6 @@ mod tests {
             let slope = (plus.1.0 - minus.1.0) / (2.0 * h);
             assert!((slope - here.1.1).abs() < 1e-4 * (1.0 + here.1.1), "{slope} {here:?}");
         }
-    }
-
-    #[test]
-    fn couples_hang_on_what_presses_where_nothing_slides_or_a_hand_turns() {
-        let turns = |advance_mm: f64, turn_rad: f64, sets: Option<(usize, usize)>| {
-            let place = Place { advance_mm, turn_rad, sets, ..Place::new((1, 0, 1), 0.25, 0.4) };
-            Between { places: vec![place] }.turns()
-        };
-        assert!(turns(0.0, 0.0, Some((0, 1))) && turns(0.2, 0.1, Some((0, 1))));
-        assert!(!turns(0.2, 0.0, Some((0, 1))) && !turns(0.0, 0.1, None));
-        assert!(!Between::default().turns());
     }
 
     #[test]

@@ -15,11 +15,8 @@
 
 use nalgebra::Matrix3;
 
-use super::{Friction, WHOLE_RENEWALS, rates};
+use super::{Friction, rates};
 use crate::Vec3;
-
-/// Renewals on a hard wall, where they seldom settle and cost many iterations each.
-const HARD_RENEWALS: usize = 4;
 
 /// Derivatives of a point's friction that lagged normal forces leave out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,18 +44,6 @@ impl Friction {
         for slider in &mut self.sliders {
             slider.force_n = slider.force_n.max(0.0);
         }
-    }
-
-    /// Renewals of lagged normal forces begin anew, and end once they should have settled; on a hard
-    /// wall `soon`.
-    pub fn hand_over(&mut self, soon: bool) {
-        let left = if soon { HARD_RENEWALS } else { WHOLE_RENEWALS };
-        (self.hands_over, self.renewals) = (true, WHOLE_RENEWALS - left);
-    }
-
-    /// Whether lagged normal forces should have settled, have not, and are left alone.
-    pub fn handed_over(&self) -> bool {
-        self.hands_over && self.renewals >= WHOLE_RENEWALS
     }
 
     /// Normal forces of the state: for each point the normal, the force of the state, and that in the matrix, where it presses.

@@ -166,6 +166,22 @@ impl WallContact<'_> {
         }
     }
 
+    /// The room that each node of a device has at a state, mm: how far it can move without coming near a wall, as far as is known of the
+    /// points on the element before it, or their radius where that is more. The first node has that of the second.
+    pub fn rooms(&self, elements: &[ElementData], state: &RodState, room_mm: &mut Vec<f64>) {
+        room_mm.clear();
+        room_mm.resize(elements.len() + 1, f64::INFINITY);
+        for span in &self.cache.spans {
+            let e = span.element;
+            let motion_mm = self.motion_mm(&span.looked_at, &nodes(e, state), elements[e].length);
+            // Where nothing is known it is no number.
+            let clearance_mm = (span.room.clearance_mm - motion_mm).max(0.0);
+            let radius_mm = self.points[span.points.start].potential.radius_mm;
+            room_mm[e + 1] = clearance_mm.max(radius_mm);
+        }
+        room_mm[0] = room_mm[1];
+    }
+
     /// Has a state be the base, and looks at the points that may touch there.
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
         self.cache.pressing.clear();

@@ -1,12 +1,10 @@
-//! What the matrix of lagged normal forces leaves out, for a step that they follow and for wall and friction solved for together, and what
-//! a point feels.
+//! What the matrix of lagged normal forces leaves out, for wall and friction solved for together, and what a point feels.
 
 use super::WallContact;
 use crate::Vec3;
 use crate::contact::ContactPoint;
 use crate::contact::friction::Coupling;
-use crate::rod::{ElementData, PointSum, RodState, Stencils};
-use crate::solve::Moved;
+use crate::rod::{ElementData, RodState};
 
 impl WallContact<'_> {
     /// From now on the normal forces of friction follow the state at once.
@@ -17,16 +15,6 @@ impl WallContact<'_> {
     /// The normal forces of friction stay as they are.
     pub fn uncouple(&mut self) {
         self.friction.uncouple();
-    }
-
-    /// Lagged normal forces may be renewed anew, and are left alone if they do not settle, on a hard wall `soon`.
-    pub fn hand_over(&mut self, soon: bool) {
-        self.friction.hand_over(soon);
-    }
-
-    /// Whether that has come to pass.
-    pub fn handed_over(&self) -> bool {
-        self.friction.handed_over()
     }
 
     /// Normal forces of friction stay as they are.
@@ -42,11 +30,6 @@ impl WallContact<'_> {
     /// Normal forces of friction are again those with which the step began, or that were marked, and are held.
     pub fn rewind_friction(&mut self) {
         self.friction.rewind();
-    }
-
-    /// Whether nothing pressed where the step began, as far as friction knows.
-    pub fn began_free(&self) -> bool {
-        self.friction.began_free()
     }
 
     /// The normal forces of friction are those that it can be rewound to.
@@ -84,41 +67,6 @@ impl WallContact<'_> {
             };
             to(point, &more);
         }
-    }
-
-    /// Normal forces of friction are those of the last equilibrium at first, and are renewed where a guess presses nearly as it did.
-    pub fn trust_guess(&mut self) {
-        self.friction.begin_seen();
-    }
-
-    /// Adds the change of friction where its normal forces follow a step; returns whether they do.
-    pub(super) fn follow_contacts(
-        &self,
-        elements: &[ElementData],
-        base: &RodState,
-        moved: &Moved<'_>,
-        into: &mut dyn Stencils,
-    ) -> bool {
-        if !self.friction.is_renewed() {
-            return false;
-        }
-        let mut sum = PointSum::default();
-        let mut at = 0;
-        self.couplings(base, |point, more| {
-            let e = point.element;
-            if e != at && !sum.is_empty() {
-                into.add_points(base, &elements[at], at, &std::mem::take(&mut sum));
-            }
-            at = e;
-            let place = (e, point.xi, point.set);
-            let (way, _) = moved(place);
-            sum.add(point.xi, &(more.force * way), None);
-            into.add_spin(base, &elements[e], place, &Vec3::zeros(), (more.turn.dot(&way), 0.0));
-        });
-        if !sum.is_empty() {
-            into.add_points(base, &elements[at], at, &sum);
-        }
-        true
     }
 
     /// What points press with at the state assembled last, held ones that pull included, goes to friction.

@@ -20,8 +20,6 @@ use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::Moved;
 
-/// A wall that bends away from the lumen by less than this, 1/mm, has no crest.
-const CREST_PER_MM: f64 = 1e-3;
 /// A search ends where this part of the slope is left, …
 const SEARCHED: f64 = 1e-3;
 /// … and after so many trials.
@@ -114,13 +112,6 @@ pub(super) fn straighten(
         let back = share * element.length * force.dot(&base.frames[node].t);
         into.add_turn(node, &Vec3::zeros(), &Matrix3::from_diagonal(&Vec3::new(back, back, 0.0)));
     }
-}
-
-/// What a wall that bends away from the lumen does to a force on it, N, as a crest does.
-fn crest(force_n: f64, hessian: &Matrix3<f64>) -> Matrix3<f64> {
-    let principal = hessian.symmetric_eigen();
-    let ways = principal.eigenvalues.iter().zip(principal.eigenvectors.column_iter());
-    ways.map(|(value, way)| way * way.transpose() * (force_n * value.max(0.0))).sum()
 }
 
 impl WallContact<'_> {
@@ -308,38 +299,5 @@ impl WallContact<'_> {
             into.add_points(base, &elements[point.element], point.element, &sum);
         }
         stray_n / foreseen_n
-    }
-
-    /// See [`External::convexify`](crate::solve::External::convexify).
-    pub(super) fn convexify_contacts(
-        &mut self,
-        elements: &[ElementData],
-        base: &RodState,
-        into: &mut dyn Stencils,
-    ) -> bool {
-        let mut any = false;
-        for (index, d) in self.cache.all_pressed() {
-            let point = &self.points[index];
-            let press = -self.weight_mm(index) * point.potential.derivatives(d.value_mm).0;
-            let (e, h) = (point.element, elements[point.element].length);
-            let crest = crest(press, &d.hessian);
-            if crest.trace() > CREST_PER_MM * press {
-                any = true;
-                let mut sum = PointSum::default();
-                sum.add(point.xi, &Vec3::zeros(), Some(&crest));
-                into.add_points(base, &elements[e], e, &sum);
-            }
-            // A tangent that turns on its sphere moves back along itself by ½ δ² as well.
-            let [_, near, _, far] = hermite(point.xi);
-            for (node, share) in [(e, near), (e + 1, far)] {
-                let back = -press * share * h * d.gradient.dot(&base.frames[node].t);
-                if back > 0.0 {
-                    any = true;
-                    let turn = Matrix3::from_diagonal(&Vec3::new(back, back, 0.0));
-                    into.add_turn(node, &Vec3::zeros(), &turn);
-                }
-            }
-        }
-        any
     }
 }

@@ -11,8 +11,7 @@
 //!
 //! with the force F of the last equilibrium in place of w k (r − d), as sequential quadratic programming has the multipliers of the
 //! last iterate in its Hessian (Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 18.1): the forces of the guess itself
-//! are too large by powers of ten, and of either sign. What is left is of second order in the step. On a wall softer than an element
-//! nothing is lost, and Newton's method goes on from any guess.
+//! are too large by powers of ten, and of either sign. What is left is of second order in the step.
 
 use super::guess::Guess;
 use crate::contact::WallContact;
@@ -25,19 +24,8 @@ const MISFIT: f64 = 0.4;
 /// A step that turns a node by more than this, rad, leads to another shape, not to a better guess.
 const LARGEST_TURN: f64 = 0.3;
 
-/// What became of a guess that was to be held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Held {
-    /// It presses as the last equilibrium does.
-    Fits,
-    /// A step was taken.
-    Moved,
-    /// It presses otherwise, and there is no such step.
-    Lost,
-}
-
 impl Guess {
-    /// Moves `state` by a step that holds the contacts of the last equilibrium, if it needs one.
+    /// Moves `state` by a step that holds the contacts of the last equilibrium, if it needs one and there is one. Returns whether there was.
     pub(super) fn active_set_step<const C: usize>(
         &mut self,
         newton: &mut Newton<C>,
@@ -45,26 +33,26 @@ impl Guess {
         supports: &Supports,
         elements: &[ElementData],
         state: &mut RodState,
-    ) -> Held {
-        if !contact.stiff || contact.misfit(elements, state) <= MISFIT {
-            return Held::Fits;
+    ) -> bool {
+        if contact.misfit(elements, state) <= MISFIT {
+            return false;
         }
         contact.holding = true;
         newton.assemble(elements, supports, contact, state);
         contact.holding = false;
-        let Some((inertia, step)) = newton.full_step(elements, supports) else { return Held::Lost };
+        let Some((inertia, step)) = newton.full_step(elements, supports) else { return false };
         let (turn, _) = RodState::largest_turn::<C>(elements, state, step);
         // Only towards a minimum: one negative pivot for each axial force.
         if inertia.negative != elements.len() || turn.is_nan() || turn > LARGEST_TURN {
-            return Held::Lost;
+            return false;
         }
         self.other.copy_from(state);
         self.other.advance::<C>(elements, state, step, 1.0);
         self.other.take_tensions::<C>(elements, state, step);
         if contact.is_outside(elements, &self.other) {
-            return Held::Lost;
+            return false;
         }
         std::mem::swap(state, &mut self.other);
-        Held::Moved
+        true
     }
 }

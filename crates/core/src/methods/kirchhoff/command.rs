@@ -3,16 +3,16 @@
 
 use super::Environment;
 use super::blocked::FAR_TOO_LITTLE;
-use super::carried::{WallWork, carried};
+use super::carried::carried;
 use super::configuration::Start;
-use super::hands::{Way, lengths};
+use super::hands::lengths;
 use super::state::KirchhoffState;
 use super::step_control::StepControl;
-use super::substep::{AT_REST, Attempt, Effort, Found, released_mj};
+use super::substep::{Attempt, Effort, Found};
 use super::workspace::{Work, Workspace};
 use crate::contact::extension::check_inside;
-use crate::device::{Stack, line_mm};
-use crate::methods::{InstrumentReport, Move, StepReport};
+use crate::device::line_mm;
+use crate::methods::{Move, StepReport};
 use crate::{Error, Result};
 
 /// Most sub-steps that one command may be cut into.
@@ -28,10 +28,8 @@ const WORK_OF_ONE: usize = 10;
 const AGAIN: usize = 4;
 /// What moved by less than this in another last resort, in its least radii, is at rest.
 const REST_RADII: f64 = 1e-3;
-/// A step is a jump if more than this part of the energy was set free that is stored, or came out of the sheath.
-const JUMP: f64 = 0.02;
-/// Stored energy below which nothing is called a jump, mJ.
-const JUMP_FLOOR_MJ: f64 = 1e-6;
+/// Residual over force scale above which what has stopped is not at rest.
+const AT_REST: f64 = 0.05;
 
 /// What the sub-steps of a command come to.
 #[derive(Debug, Clone, Copy, Default)]
@@ -41,16 +39,16 @@ struct Sum {
     slides: u32,
     imbalance: f64,
     dissipated_mj: f64,
-    flow_mj: f64,
+    jumped: bool,
 }
 
 impl Sum {
-    /// Adds a sub-step, in which the device may have come to rest as it can.
-    fn add(&mut self, found: &Found) {
+    /// Adds a part.
+    fn add(&mut self, found: &Found, effort: Effort) {
         self.slides += found.slides;
         self.dissipated_mj += found.dissipated_mj;
-        self.flow_mj += found.flow_mj;
-        if found.relaxed {
+        self.jumped |= found.jumped;
+        if effort == Effort::Flight {
             self.relaxations += 1;
             self.imbalance = self.imbalance.max(found.residual.max(found.unsettled));
         }
@@ -60,6 +58,7 @@ impl Sum {
         report.substeps = self.substeps as u32;
         (report.relaxations, report.slides) = (self.relaxations, self.slides);
         (report.imbalance, report.dissipated_mj) = (self.imbalance, self.dissipated_mj);
+        report.jumped = self.jumped;
     }
 }
 
@@ -79,8 +78,7 @@ impl<const C: usize> Workspace<C> {
         next.own(*elements, *points);
         let surroundings = &environment.surroundings;
         let displacement = |part: f64| surroundings.displacement(part);
-        let start_displacement = displacement(0.0);
-        let mut displaced = start_displacement.clone();
+        let mut displaced = displacement(0.0);
         way.begin(surroundings.stack, &from.report, moves);
         let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
         if target > start {
@@ -107,7 +105,7 @@ impl<const C: usize> Workspace<C> {
             let (effort, part_mm) = control.next(rest * travel);
             let part = part_mm / travel;
             let at_start = environment.displaced(displaced.as_ref());
-            if effort != Effort::Usual {
+            if effort == Effort::Flight {
                 tools.refuse_narrower(&at_start, was, &way.commands, FAR_TOO_LITTLE)?;
             }
             // A rest that is rounding is none.
@@ -129,16 +127,14 @@ impl<const C: usize> Workspace<C> {
                 break;
             }
             let left = passage.map(|passage| (was, passage));
-            let attempt = Attempt { hands, effort, left };
-            let before = tools.work.iterations;
-            let tried = tools.try_step(&there, here, attempt, next, &mut control.budget);
-            if std::env::var_os("DEBUG").is_some() {
-                #[allow(clippy::print_stderr)]
-                { eprintln!("at {:.3} part {part_mm:.3} of {travel:.3} {effort:?} its {} : {}", line_mm(lengths(hands)), tools.work.iterations - before, match &tried { Ok(f) => format!("ok off {:.3} slides {} balanced {} res {:.1e} uns {:.1e}", f.off_prediction, f.slides, f.balanced, f.residual, f.unsettled), Err(l) => l.reason.to_string() }); }
-            }
+            let attempt = Attempt { hands, effort, most: control.budget(), left };
+            let iterations = tools.work.iterations;
+            let tried = tools.try_step(&there, here, attempt, next);
+            let iterations = tools.work.iterations - iterations;
+            control.took(iterations);
             match tried {
                 Ok(found) => {
-                    sum.add(&found);
+                    sum.add(&found, effort);
                     // At a crease of the wall forces are those of one side or the other and never in balance; where nothing moves
                     // any more the device is at rest all the same.
                     let rests = done >= 1.0
@@ -150,7 +146,7 @@ impl<const C: usize> Workspace<C> {
                     displaced = then;
                     moved = true;
                     done = to;
-                    control.succeeded(part_mm, found.off_prediction);
+                    control.succeeded(part_mm, &found);
                 }
                 // From the same place the same comes of it.
                 Err(_) if done >= 1.0 => break,
@@ -160,7 +156,7 @@ impl<const C: usize> Workspace<C> {
                         tools.refuse_narrower(&at_start, was, &way.commands, 1.0)?;
                         return Err(Error::Computation(format!(
                             "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {}",
-                            lost.reason
+                            lost
                         )));
                     }
                 }
@@ -171,34 +167,13 @@ impl<const C: usize> Workspace<C> {
             tools.refuse_narrower(&there, now.start(), &way.commands, 1.0)?;
         }
         let state = now.parts().1;
-        state.part_mm = control.part_mm;
+        state.part_mm = control.part_mm();
         let report = &mut state.report;
         sum.write(report);
         report.converged = balanced;
         report.angles = from.report.angles;
         report.iterations = tools.work.iterations as u32;
         report.nodes_solved = from.report.nodes_solved + tools.work.nodes_solved;
-        let passage = start_displacement.as_ref().zip(displaced.as_ref());
-        let by_wall = WallWork::new(passage, (&from.report, report)).with_flow(sum.flow_mj);
-        report.jumped = jumped(surroundings.stack, (&from.report, report), way, by_wall);
         Ok(())
     }
-}
-
-/// Whether energy was set free that the hand had put in.
-fn jumped(stack: &Stack, (before, after): (&StepReport, &StepReport), way: &Way, by_wall: WallWork) -> bool {
-    // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between
-    // what it is at the ends.
-    let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
-    let mut work = by_wall.least_mj;
-    for (index, (start, target)) in way.start.iter().zip(&way.target).enumerate() {
-        let (was, is) = (before.hand(index), after.hand(index));
-        let push = |hand: &InstrumentReport| hand.push_force_n.unwrap_or(0.0);
-        work += least(push(&was), push(&is), target.inserted_mm - start.inserted_mm)
-            + least(was.torque_nmm, is.torque_nmm, way.commands[index].rotate_rad);
-    }
-    let (energy, now) = (before.energy.total(), after.energy.total());
-    let released = released_mj(stack, before, after);
-    let lost = work - after.dissipated_mj - (now - energy - released);
-    lost > JUMP * energy.max(now).max(released.abs()).max(JUMP_FLOOR_MJ)
 }

@@ -52,8 +52,7 @@ pub(super) struct Correction {
 const SAME: f64 = 1e-6;
 /// … times a factor of at most this, or over it.
 const LONGER: f64 = 5.0;
-/// Where a tangent turned by more than this, rad, beside what the curve turns by over the advance, the device let go of something. A hook
-/// that keeps its shape departs from the slid device by the latter. …
+/// Where a tangent turned by more than this, rad, the device let go of something. …
 const LARGEST: f64 = 0.2;
 /// … Unless all tangents turned as in the step before, but for this, rad: a device that is stuck does not follow its own curve, but bends on.
 const AS_BEFORE: f64 = 0.1;
@@ -119,28 +118,19 @@ impl Correction {
         (n == 0 || n == elements) && self.turns.len() == n * sets
     }
 
-    /// Remembers the way from the slid device to the equilibrium that was found, also of `hooks`, where `before` was learnt in the step
-    /// before. Repeated, a hook's is right to second order in its turn: near enough for a wall that yields, not for a rigid one, where
-    /// contacts are lost by less.
+    /// Remembers the way from the slid device to the equilibrium that was found, where `before` was learnt in the step
+    /// before.
     pub(super) fn learn(
         &mut self,
         motions: &[HandMotion],
-        elements: &[ElementData],
         (slid, found): (&RodState, &RodState),
-        hooks: bool,
         before: &Self,
     ) {
         self.clear();
         self.motions.extend(motions.iter().map(HandMotion::parts));
         let n = slid.elements();
-        let advance_mm = self.motions.iter().fold(0.0f64, |most, motion| most.max(motion[0].abs()));
         let changed = |a: &Vec3, b: &Vec3| (a - b).norm();
-        let far = |(e, data): (usize, &ElementData)| {
-            let bent_per_mm = changed(&slid.frames[e + 1].t, &slid.frames[e].t) / data.length;
-            changed(&found.frames[e + 1].t, &slid.frames[e + 1].t)
-                > LARGEST + if hooks { bent_per_mm * advance_mm } else { 0.0 }
-        };
-        let snapped = elements.iter().enumerate().any(far);
+        let snapped = (1..=n).any(|i| changed(&found.frames[i].t, &slid.frames[i].t) > LARGEST);
         let mut twist: f64 = found.reference_twists.iter().sum();
         for e in (0..n).rev() {
             let (f, i) = (&slid.frames[e], e + 1);

@@ -7,18 +7,7 @@ use super::configuration::Start;
 use super::extrapolation::Correction;
 use super::mesh::Mesh;
 use crate::contact::{HandMotion, WallContact};
-use crate::rod::{ElementData, RodState};
-
-/// How good a guess is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Quality {
-    /// It repeats what the last step has taught.
-    Learnt,
-    /// It follows the last equilibrium.
-    Near,
-    /// It is beyond the wall.
-    Beyond,
-}
+use crate::rod::RodState;
 
 /// The candidates.
 #[derive(Debug, Clone, Default)]
@@ -29,6 +18,7 @@ pub(super) struct Guess {
     learnt: Correction,
     slid: RodState,
     pub(super) other: RodState,
+    pub(super) room_mm: Vec<f64>,
 }
 
 impl Guess {
@@ -38,12 +28,13 @@ impl Guess {
         self.other.reserve(elements);
     }
 
-    /// Replaces the slid device in `state` by one that repeats what was learnt, unless that is beyond the wall.
+    /// Replaces the slid device in `state` by one that repeats what was learnt, unless that is beyond the wall. Returns whether what it is
+    /// now is not.
     pub(super) fn choose(
         &mut self,
         contact: &mut WallContact<'_>,
         (start, mesh, state): (Start<'_>, &Mesh, &mut RodState),
-    ) -> Quality {
+    ) -> bool {
         self.slid.copy_from(state);
         let elements = &mesh.elements;
         let correction = &start.state.correction;
@@ -56,26 +47,19 @@ impl Guess {
                 self.learnt.apply(factor, elements, state);
             }
             if !contact.is_outside(elements, state) {
-                return Quality::Learnt;
+                return true;
             }
             state.copy_from(&self.slid);
         }
-        if contact.is_outside(elements, state) { Quality::Beyond } else { Quality::Near }
+        !contact.is_outside(elements, state)
     }
 
-    /// Goes back to the slid device.
-    pub(super) fn plain(&self, state: &mut RodState) {
-        state.copy_from(&self.slid);
-    }
-
-    /// What an equilibrium that was found teaches, of `hooks` too, after what was learnt `before`.
+    /// What an equilibrium that was found teaches, after what was learnt `before`.
     pub(super) fn teach(
         &self,
-        elements: &[ElementData],
         found: &RodState,
-        hooks: bool,
         (before, correction): (&Correction, &mut Correction),
     ) {
-        correction.learn(&self.motions, elements, (&self.slid, found), hooks, before);
+        correction.learn(&self.motions, (&self.slid, found), before);
     }
 }

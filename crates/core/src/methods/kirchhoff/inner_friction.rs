@@ -114,7 +114,7 @@ impl<const C: usize> Search<'_, '_, C> {
             if !found.converged || there || round == RENEWALS {
                 break;
             }
-            found = self.on(change < SETTLED);
+            found = self.on();
         }
         (found, change)
     }

@@ -2,10 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::active_set::Held;
-use super::carried::Passage;
+use super::carried::{Passage, WallWork};
 use super::configuration::{Configuration, Start};
-use super::guess::Quality;
 use super::hands::{Hand, motions};
 use super::mesh::Mesh;
 use super::search::Search;
@@ -15,83 +13,63 @@ use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
 use crate::contact::{SETTLED, WallContact};
 use crate::device::Stack;
-use crate::methods::StepReport;
+use crate::methods::{InstrumentReport, StepReport};
 use crate::rod::{RodState, Supports};
 use crate::solve::NewtonReport;
 
-/// A wall is stiff that is stiffer than this many elements of the rod, EI/h⁴, …
-const STIFF: f64 = 30.0;
-/// … and yields where it is not stiffer than this many. …
-const YIELDING: f64 = 300.0;
-/// … One that is stiff is approached from softer walls: from one that is as stiff as so many elements, …
-const SOFTEST: f64 = 3000.0;
-/// … or from this part of its modulus, if that is softer, but none that is not stiff itself: near enough for contacts to stay where they
-/// are, and the device where it is.
-const FIRM: f64 = 0.1;
-/// Residual over force scale above which the last resort has found nothing.
-pub(super) const AT_REST: f64 = 0.05;
-/// What is the matter where an equilibrium is on the other side of the wall.
+/// What is the matter where a prediction is on the other side of the wall, …
+const BEYOND: &str = "the device would be predicted beyond the wall";
+/// … where an equilibrium is, …
 const PASSED: &str = "the device would pass through the wall";
-/// What is the matter where an equilibrium is another than the one that was predicted.
-const FAR: &str = "the equilibrium is far from where the device was predicted";
-pub(super) fn near_limit() -> f64 {
-    static V: std::sync::OnceLock<f64> = std::sync::OnceLock::new();
-    *V.get_or_init(|| std::env::var("NEAR").map_or(1.0, |v| v.parse().unwrap()))
-}
-/// What is the matter where they do not.
+/// … where it is another than the one that was predicted, …
+const FAR: &str = "what was found is far from where the device was predicted";
+/// … and where friction and the wall disagree.
 const UNSETTLED: &str = "friction and wall forces do not settle";
+/// A part has set free energy that the hand had put in if it is more than this part of the energy that is stored, or came out of the sheath.
+const SET_FREE: f64 = 0.02;
+/// Energy below which nothing is set free, mJ.
+const SET_FREE_FLOOR_MJ: f64 = 1e-6;
 
-/// How an equilibrium was found.
+/// How a part of a command is gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Effort {
+    /// To the equilibrium near the prediction.
+    Near,
+    /// To where the device comes to rest, however far away.
+    Flight,
+}
+
+/// What a part of a command has come to.
 pub(super) struct Found {
     /// How often the device slid on while the hand held still.
     pub(super) slides: u32,
     /// Energy that friction took, mJ.
     pub(super) dissipated_mj: f64,
-    /// Work that blood may have done, or had done against it, mJ.
-    pub(super) flow_mj: f64,
     /// Residual over force scale.
     pub(super) residual: f64,
     /// Part by which the normal forces that friction follows differ from those of the wall.
     pub(super) unsettled: f64,
     /// Whether it is an equilibrium.
     pub(super) balanced: bool,
-    /// Whether the device was let come to rest as it can.
-    pub(super) relaxed: bool,
-    /// The farthest that a point is from where it was predicted, over the room that it has there.
-    pub(super) off_prediction: f64,
+    /// How far it is from the prediction, over how far is near.
+    pub(super) off: f64,
+    /// Whether energy was set free that the hand had put in.
+    pub(super) jumped: bool,
 }
 
-/// Why a sub-step came to nothing.
-pub(super) struct Lost {
-    pub(super) reason: Cow<'static, str>,
-    /// Whether the search did not come to an end. What it came to may be no step of this command otherwise.
-    pub(super) astray: bool,
-}
+/// Why a part came to nothing.
+pub(super) type Lost = Cow<'static, str>;
 
-impl From<&'static str> for Lost {
-    fn from(reason: &'static str) -> Self {
-        Self { reason: reason.into(), astray: false }
-    }
-}
-
-/// How hard a sub-step tries.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Effort {
-    /// As long as what is near takes to be found.
-    Usual,
-    /// Without a budget, to where the device comes to rest as it can: what is nearly in balance, up to this residual over force scale, is
-    /// taken, or whatever there is if that is infinite.
-    Resort(f64),
-}
-
-/// How far a sub-step goes, and how hard it tries.
+/// How far a part goes, and how.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Attempt<'a> {
     /// Where the hands are after it.
     pub(super) hands: &'a [Hand],
-    /// How hard it tries.
+    /// How it is gone.
     pub(super) effort: Effort,
-    /// Where the vessel moves: what was before it did, and how it does. The sub-step then starts with the device taken along.
+    /// Most Newton iterations.
+    pub(super) most: usize,
+    /// Where the vessel moves: what was before it did, and how it does. The part then starts with the device taken along.
     pub(super) left: Option<(Start<'a>, Passage<'a>)>,
 }
 
@@ -144,51 +122,32 @@ impl<const C: usize> Tools<C> {
         self.cache.keep(&mut after.known);
     }
 
-    /// One sub-step from `start`: slides and solves on `next`, which is worth nothing if that fails. Newton iterations are taken from
-    /// `budget`.
+    /// One part from `start`: slides and solves on `next`, which is worth nothing if that fails.
     pub(super) fn try_step(
         &mut self,
         environment: &Environment<'_>,
         start: Start<'_>,
         attempt: Attempt<'_>,
         next: &mut Configuration,
-        budget: &mut usize,
     ) -> std::result::Result<Found, Lost> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
-        let Attempt { hands, effort, left } = attempt;
-        let resort = matches!(effort, Effort::Resort(_));
+        let Attempt { hands, effort, most, left } = attempt;
         self.transport_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
         let rod = &mut after.rod;
-        let elements = mesh.elements.len();
         let softest_nmm2 = surroundings.stack.softest_nmm2();
-        let mut contact = WallContact::new(
-            environment.wall(),
-            &mesh.points,
-            &mut self.cache,
-            &mut self.friction,
-            softest_nmm2,
-        );
-        let data = &mesh.elements[elements - 1];
-        let element_stiffness = data.bending[2] / options.element_mm.powi(4);
-        // How many elements the wall is as stiff as.
-        let stiffness = surroundings.properties.stiffest_n_per_mm2() / element_stiffness;
-        contact.stiff = stiffness > 1.0;
+        let (cache, friction) = (&mut self.cache, &mut self.friction);
+        let mut contact = WallContact::new(environment.wall(), &mesh.points, cache, friction, softest_nmm2);
         let slid_mj = contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
-        if !contact.stiff {
-            contact.trust_guess();
+        let inside = self.guess.choose(&mut contact, (start, &*mesh, &mut *rod));
+        let near = effort == Effort::Near;
+        if near && !inside {
+            return Err(BEYOND.into());
         }
-        let candidates = (start, &*mesh, &mut *rod);
-        let quality = self.guess.choose(&mut contact, candidates);
-        contact.predict(&mesh.elements, rod);
+        contact.rooms(&mesh.elements, rod, &mut self.guess.room_mm);
+        self.newton.neighbourhood.begin(rod, &self.guess.room_mm);
+        self.newton.neighbourhood.bounds = near;
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
-        let held = match quality {
-            Quality::Beyond => Held::Lost,
-            _ => self.guess.active_set_step(&mut self.newton, &mut contact, &supports, &mesh.elements, rod),
-        };
-        let moved = held == Held::Moved;
-        // A guess that has learnt from the last step or kept its contacts is near, unless it has lost them.
-        let near = moved || (quality == Quality::Learnt && held == Held::Fits);
         let mut search = Search {
             newton: &mut self.newton,
             settle: &mut self.settle,
@@ -197,69 +156,68 @@ impl<const C: usize> Tools<C> {
             supports: &mut supports,
             elements: &mesh.elements,
             state: rod,
-            stiff: stiffness > STIFF,
-            softest: (SOFTEST / stiffness).min(FIRM).max(STIFF / stiffness).min(1.0),
-            inner_friction: surroundings.properties.has_friction(),
+            has_friction: surroundings.properties.has_friction(),
             tolerance: options.tolerance,
-            max_iterations: options.max_iterations,
-            budget: (!resort).then_some(budget),
-            patient: effort != Effort::Usual,
-            iterations: usize::from(moved),
+            effort,
+            most: most.min(options.max_iterations),
+            iterations: 0,
             slides: 0,
         };
-        let found = search.run(near);
+        let found = search.run();
         let found = search.dragged(found, surroundings.flow);
         let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
-        let (iterations, slides, relaxed) = (search.iterations, search.slides, search.budget.is_none());
+        let (iterations, slides) = (search.iterations, search.slides);
+        let off = self.newton.neighbourhood.off(rod);
         let unsettled = if surroundings.properties.has_friction() { contact.unsettled() } else { 0.0 };
         let unsettled = unsettled.max(lagging);
-        // What comes to rest as it can is in equilibrium as exactly as friction is with the wall elsewhere.
-        let balanced = (found.converged || (relaxed && found.residual < SETTLED)) && unsettled < SETTLED;
-        let at_rest = balanced || matches!(effort, Effort::Resort(least) if found.residual <= least);
-        let mut passed = false;
-        let off_prediction = contact.off_prediction(&mesh.elements, rod);
-        if effort == Effort::Usual && at_rest && off_prediction > near_limit() {
-            self.counters.add(&contact.count());
-            self.work.add(iterations, elements);
-            return Err(FAR.into());
-        }
-        if at_rest {
-            contact.know_whole_base(&mesh.elements);
-            passed = contact.passes_through(&mesh.elements, rod);
-            if !passed {
-                contact.touches(&mesh.elements, rod, &mut self.touches);
+        // What has come to rest is in equilibrium as exactly as friction is with the wall elsewhere.
+        let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
+        let wrong = match (near, &found) {
+            (true, found) if !found.converged => Some(what_is_left(found)),
+            (true, _) if !balanced => Some(UNSETTLED.into()),
+            (true, _) if off > 1.0 => Some(FAR.into()),
+            (false, found) if !found.residual.is_finite() => Some(what_is_left(found)),
+            _ => {
+                contact.know_whole_base(&mesh.elements);
+                let passes = contact.passes_through(&mesh.elements, rod);
+                passes.then_some(PASSED.into())
             }
+        };
+        if wrong.is_none() {
+            contact.touches(&mesh.elements, rod, &mut self.touches);
         }
         let aside_mj = (contact.drag_mj(&mesh.elements, rod) - slid_mj).abs();
         self.counters.add(&contact.count());
-        self.work.add(iterations, elements);
-        if !at_rest || passed {
-            return Err(what_is_wrong(&found, at_rest));
+        self.work.add(iterations, mesh.elements.len());
+        if let Some(wrong) = wrong {
+            return Err(wrong);
         }
         let along_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
         let dissipated_mj = along_mj + self.friction.between.taken_mj(rod);
         let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
         let (mesh, after) = next.parts();
         let reports = (&start.state.report, &after.report);
-        let way_mm = farthest_mm(reports);
-        let flow_mj = aside_mj + self.drag.size_n() * way_mm;
+        let flow_mj = aside_mj + self.drag.size_n() * farthest_mm(reports);
+        let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
+        let jumped = (!near && off > 1.0) || sets_free(surroundings.stack, reports, dissipated_mj, by_wall);
         let corrections = (&start.state.correction, &mut after.correction);
-        self.guess.teach(&mesh.elements, &after.rod, stiffness <= YIELDING, corrections);
+        self.guess.teach(&after.rod, corrections);
         self.keep(mesh, after);
-        Ok(Found { slides, dissipated_mj, flow_mj, residual: found.residual, unsettled, balanced, relaxed, off_prediction })
+        Ok(Found {
+            slides,
+            dissipated_mj,
+            residual: found.residual,
+            unsettled,
+            balanced,
+            off,
+            jumped,
+        })
     }
 }
 
-/// What is the matter with what was found, which is not at rest or has passed through the wall.
-fn what_is_wrong(found: &NewtonReport, at_rest: bool) -> Lost {
-    match (at_rest, found.converged) {
-        (true, _) => PASSED.into(),
-        (false, true) => UNSETTLED.into(),
-        (false, false) => Lost {
-            reason: format!("{} (residual {:.1e})", found.reason, found.residual).into(),
-            astray: true,
-        },
-    }
+/// What is left over where no equilibrium was found.
+fn what_is_left(found: &NewtonReport) -> Lost {
+    format!("{} (residual {:.1e})", found.reason, found.residual).into()
 }
 
 /// The farthest way of a hand, mm.
@@ -269,10 +227,33 @@ fn farthest_mm((before, after): (&StepReport, &StepReport)) -> f64 {
 }
 
 /// Energy that the sheath no longer stores, mJ: of the shape of what has come out of it, which is straight in it.
-pub(super) fn released_mj(stack: &Stack, before: &StepReport, after: &StepReport) -> f64 {
+fn released_mj(stack: &Stack, before: &StepReport, after: &StepReport) -> f64 {
     let each = stack.devices().enumerate().map(|(index, device)| {
         let straightening = |report: &StepReport| device.straightening_mj(report.hand(index).inserted_mm);
         straightening(after) - straightening(before)
     });
     each.sum()
+}
+
+/// Whether energy was set free that the hand had put in.
+fn sets_free(
+    stack: &Stack,
+    (before, after): (&StepReport, &StepReport),
+    dissipated_mj: f64,
+    by_wall: WallWork,
+) -> bool {
+    // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between
+    // what it is at the ends.
+    let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
+    let mut work = by_wall.least_mj;
+    for index in 0..after.instruments.len().max(1) {
+        let (was, is) = (before.hand(index), after.hand(index));
+        let push = |hand: &InstrumentReport| hand.push_force_n.unwrap_or(0.0);
+        work += least(push(&was), push(&is), is.inserted_mm - was.inserted_mm)
+            + least(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
+    }
+    let (energy, now) = (before.energy.total(), after.energy.total());
+    let released = released_mj(stack, before, after);
+    let lost = work - dissipated_mj - (now - energy - released);
+    lost > SET_FREE * energy.max(now).max(released.abs()).max(SET_FREE_FLOOR_MJ)
 }

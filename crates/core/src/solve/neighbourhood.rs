@@ -1,0 +1,66 @@
+//! What is near a prediction.
+//!
+//! A device that is moved slowly follows its path of equilibria. An equilibrium that Newton's method finds is the next one on that path if it
+//! lies near the one that was predicted, and may be any other one if not: continuation methods cut their steps until it is near
+//! (E. L. Allgower, K. Georg, *Numerical Continuation Methods*, 1990, chapter 6; P. Deuflhard, *Newton Methods for Nonlinear Problems*,
+//! 2004, chapter 5). What is near in a vessel says the vessel: a node has as much room as it has clearance, and one that touches has its
+//! radius.
+
+use crate::Vec3;
+use crate::rod::RodState;
+
+/// A node may be this many times the room that it has from where it was predicted.
+const ROOMS: f64 = 2.0;
+/// A node's material angle may be off by this, rad.
+const LARGEST_TURN: f64 = 1.0;
+/// A solution that strays so many times as far does not come back: the first steps from a prediction may be long where contacts are lost.
+const STRAY: f64 = 3.0;
+
+/// Where the nodes of a rod were predicted, and how far each may be from there.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Neighbourhood {
+    nodes: Vec<(Vec3, f64)>,
+    angles: Vec<f64>,
+    /// Whether solutions that leave it are given up.
+    pub(crate) bounds: bool,
+}
+
+impl Neighbourhood {
+    /// Takes memory for rods of up to `elements` elements.
+    pub(crate) fn reserve(&mut self, elements: usize) {
+        self.nodes.reserve((elements + 1).saturating_sub(self.nodes.len()));
+    }
+
+    /// Is that of a prediction in which nodes, the first one included, have this much room, mm.
+    pub(crate) fn begin(&mut self, state: &RodState, room_mm: &[f64]) {
+        let places = state.positions.iter().zip(room_mm);
+        self.nodes.clear();
+        self.nodes.extend(places.map(|(at_mm, room_mm)| (*at_mm, ROOMS * room_mm)));
+        self.angles.clear();
+        self.angles.extend(carried(state));
+    }
+
+    /// How far a state is from the prediction, over how far it may be.
+    pub(crate) fn off(&self, state: &RodState) -> f64 {
+        let places = state.positions.iter().zip(&self.nodes);
+        let off = places.map(|(x, (at_mm, most_mm))| (x - at_mm).norm() / most_mm).fold(0.0, f64::max);
+        let turns = carried(state).zip(&self.angles).map(|(angle, was)| (angle - was).abs() / LARGEST_TURN);
+        turns.fold(off, f64::max)
+    }
+
+    /// Whether a solution that has come to this state is given up.
+    pub(crate) fn is_left_by(&self, state: &RodState) -> bool {
+        self.bounds && self.off(state) > STRAY
+    }
+}
+
+/// The angles of all sets at all nodes, counted from triads carried along the rod without twist.
+fn carried(state: &RodState) -> impl Iterator<Item = f64> {
+    let sets = state.sets();
+    let twists = std::iter::once(&0.0).chain(&state.reference_twists);
+    let nodes = twists.scan(0.0, |sum, twist| {
+        *sum += twist;
+        Some(*sum)
+    });
+    nodes.zip(state.angles.chunks(sets)).flat_map(|(twist, angles)| angles.iter().map(move |angle| angle + twist))
+}
