@@ -6,7 +6,7 @@ use endowire_core::device::Device;
 use endowire_core::insertion::WallProperties;
 use endowire_core::methods::kirchhoff::{Fineness, Mesh};
 use endowire_core::rod::{Clamp, ElementData, PLAIN, RodState, Stencils, Supports};
-use endowire_core::solve::{External, Newton, NewtonOptions};
+use endowire_core::solve::{External, Moved, Newton, NewtonOptions};
 use endowire_core::statics::Loads;
 use endowire_core::vessel::{NoStore, Wall};
 use endowire_core::{Error, Result, Vec3};
@@ -79,7 +79,57 @@ impl External for Outside<'_> {
     }
 
     fn is_steep(&self) -> bool {
-        true
+        self.contact.is_steep()
+    }
+
+    fn foresee(&mut self, moved: &Moved<'_>) -> bool {
+        self.contact.foresee(moved)
+    }
+
+    fn meet(
+        &mut self,
+        elements: &[ElementData],
+        states: (&RodState, &RodState),
+        part: f64,
+        moved: &Moved<'_>,
+    ) -> bool {
+        self.contact.meet(elements, states, part, moved)
+    }
+
+    fn press_or_let_go(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        moved: &Moved<'_>,
+        into: &mut dyn Stencils,
+    ) -> usize {
+        self.contact.press_or_let_go(elements, base, moved, into)
+    }
+
+    fn part_towards(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
+        self.contact.part_towards(moved, most)
+    }
+
+    fn hold_on(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> usize {
+        self.contact.hold_on(elements, base, into)
+    }
+
+    fn forget(&mut self) {
+        self.contact.forget();
+    }
+
+    fn stray(
+        &mut self,
+        elements: &[ElementData],
+        states: (&RodState, &RodState),
+        part: f64,
+        into: &mut dyn Stencils,
+    ) -> f64 {
+        self.contact.stray(elements, states, part, into)
+    }
+
+    fn rounding(&self) -> f64 {
+        self.contact.rounding()
     }
 
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {

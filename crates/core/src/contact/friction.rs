@@ -431,7 +431,7 @@ impl Friction {
 
     /// Lets the normal forces be renewed again.
     pub fn unsettle(&mut self) {
-        self.settled = false;
+        (self.settled, self.renewals) = (false, 0);
     }
 }
 

@@ -62,5 +62,7 @@ fn carried(state: &RodState) -> impl Iterator<Item = f64> {
         *sum += twist;
         Some(*sum)
     });
-    nodes.zip(state.angles.chunks(sets)).flat_map(|(twist, angles)| angles.iter().map(move |angle| angle + twist))
+    nodes
+        .zip(state.angles.chunks(sets))
+        .flat_map(|(twist, angles)| angles.iter().map(move |angle| angle + twist))
 }

@@ -56,20 +56,6 @@ fn a_slipping_point_is_held_by_mu_times_its_normal_force_and_a_stuck_one_by_less
     assert!(stuck.derivatives(0, &x, 0.7, RADIUS_MM).unwrap().gradient.norm() < 0.4);
 }
 
-/// A wall that answers a change of the lagged force with one and a half of it, the other way.
-#[test]
-fn forces_that_overshoot_settle_too() {
-    let (mut friction, _) = friction(Vec3::new(0.3, 0.2, -0.1));
-    let normal = friction.sliders[0].normal;
-    for _ in 0..100 {
-        let answer = (4.0 - 1.5 * friction.sliders[0].force_n).max(0.0);
-        // Newton's method looks twice: the second look finds nothing moved.
-        friction.follow(std::iter::once((0, (normal, answer))), 1e-9);
-        friction.follow(std::iter::once((0, (normal, answer))), 1e-9);
-    }
-    assert!(friction.settled && (friction.sliders[0].force_n - 1.6).abs() < 1e-3);
-}
-
 /// A point at the end of a rod that has slipped to where `state` has its end, after a step in which it stuck within `stick_mm`.
 struct Slipped {
     friction: Friction,

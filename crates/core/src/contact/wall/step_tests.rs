@@ -1,11 +1,10 @@
 //! Steps of Newton's method on a wall: what they do to contacts and to friction.
 
 use super::foresight::falls_until;
-use super::tests::{RADIUS_MM, bent, rod, straight};
+use super::tests::{RADIUS_MM, rod, straight};
 use super::*;
 use crate::contact::{ContactSurface, HandMotion};
-use crate::rod::{Assembly, Layout, PLAIN, Supports, TWISTED};
-use crate::solve::contacts::moved;
+use crate::rod::{Assembly, PLAIN, Supports};
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
 
 /// A wall and a force on the tip; where it is not `foreseeing`, Newton's method is told nothing of contacts within a step.
@@ -67,9 +66,6 @@ impl External for Pushed<'_> {
         let stray = self.wall.stray(elements, states, part, into);
         self.strays.push(stray);
         stray
-    }
-    fn convexify(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> bool {
-        self.foreseeing && self.wall.convexify(elements, base, into)
     }
     fn is_steep(&self) -> bool {
         true
@@ -147,58 +143,6 @@ fn a_rod_that_rubs_slips_and_sticks_in_few_steps() {
     // It comes back to within what it sticks by, as it is held by less than it is bent.
     assert!(with[0] > 0.8 && with[1].abs() < 0.01, "{with:?}");
     assert!(few[0] + few[1] <= 30 && many[0] + many[1] > 2 * (few[0] + few[1]), "{few:?} {many:?}");
-}
-
-#[test]
-fn what_follows_a_step_is_the_change_of_friction_that_is_renewed() {
-    let surface = bent();
-    let mut rod = rod(&surface, 6, &[1.0, 0.5], 3.0);
-    let (state, elements) = (rod.at(Vec3::new(1.5, 0.1, -3.0)), rod.elements.clone());
-    rod.friction = Friction::new(0.3);
-    let hand = HandMotion { from_mm: 5.5, to_mm: 6.0, turn_rad: 0.0 };
-    rod.friction.begin(&elements, &state, &rod.points, (&[], &[]), &[hand]);
-    let mut contact = rod.contact();
-    let mut assembly = Assembly::<TWISTED>::new(6);
-    // Moved as it is, and twisted.
-    let mut step = vec![0.0; Layout::<TWISTED>::dimension(6)];
-    for i in 0..=6 {
-        let x = Layout::<TWISTED>.position(i);
-        step[x..x + 3].copy_from_slice(&[0.8, -0.3, 0.5]);
-        step[Layout::<TWISTED>.angle(i, 0)] = 0.2 * i as f64;
-    }
-    let moved = moved::<TWISTED>(&elements, &state, &step);
-    let mut gradient = |contact: &mut WallContact<'_>, part: f64| {
-        let mut there = state.clone();
-        there.advance::<TWISTED>(&elements, &state, &step, part);
-        assembly.assemble(&elements, &there);
-        contact.linearise(&elements, &there, &mut assembly);
-        assembly.residual.clone()
-    };
-    // At the base, where forces are renewed once they hardly change; and at either side of it as they are there, and renewed.
-    for _ in 0..2 {
-        gradient(&mut contact, 0.0);
-    }
-    let mut follows = vec![0.0; step.len()];
-    let mut beside = Assembly::<TWISTED>::new(6);
-    assert!(beside.beside(&mut follows, |into| contact.follow(&elements, &state, &moved, into)));
-    let h = 1e-6;
-    let mut sides = |renewed: bool| {
-        [h, -h].map(|part| {
-            contact.hold_friction();
-            if renewed {
-                contact.unsettle_friction();
-            }
-            gradient(&mut contact, part)
-        })
-    };
-    let [lagged, renewed] = [sides(false), sides(true)];
-    let change = |k: usize| (renewed[0][k] - lagged[0][k] - renewed[1][k] + lagged[1][k]) / (2.0 * h);
-    let most = follows.iter().fold(0.0f64, |most, f| most.max(f.abs()));
-    for (k, follows) in follows.iter().enumerate() {
-        assert!((change(k) - follows).abs() < 1e-6 * most, "row {k}: {} {follows}", change(k));
-    }
-    // It has something to say.
-    assert!(most > 0.1, "{most}");
 }
 
 #[test]

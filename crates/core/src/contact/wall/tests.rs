@@ -2,11 +2,9 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::SMatrix;
-
 use super::*;
 use crate::contact::{ContactSurface, WallPotential, WallProperties};
-use crate::rod::{Assembly, Frame, Layout, PLAIN};
+use crate::rod::Frame;
 use crate::vessel::{NoStore, SurfaceMesh, Wall};
 
 /// A closed outline that is swept along: `place` gives the k-th of `rings` its middle, the direction of the outline's first axis and its
@@ -56,23 +54,6 @@ fn along_z(k: u32) -> (Vec3, Vec3, f64) {
 /// A tube of radius 2 mm.
 pub(super) fn straight() -> ContactSurface {
     swept(&ellipse(2.0, 2.0, 24), 81, along_z)
-}
-
-/// One that is bent to a radius of 12 mm about a line through (−12, 0, 0); inside of the bend its wall is a crest.
-pub(super) fn bent() -> ContactSurface {
-    swept(&ellipse(2.0, 2.0, 24), 31, |k| {
-        let angle = 0.035 * (f64::from(k) - 15.0);
-        let n = Vec3::new(angle.cos(), 0.0, angle.sin());
-        ((n - Vec3::x()) * 12.0, n, 1.0)
-    })
-}
-
-/// A barrel, of radius 2 mm where it is widest: concave everywhere.
-fn barrel() -> ContactSurface {
-    swept(&ellipse(2.0, 2.0, 24), 21, |k| {
-        let z = 0.2 * (f64::from(k) - 10.0);
-        (Vec3::z() * z, Vec3::x(), (1.0 - z * z / 9.0).sqrt())
-    })
 }
 
 /// A slit 0.8 mm high: both sides are near everywhere.
@@ -125,65 +106,6 @@ impl Rod<'_> {
     pub(super) fn at(&self, start: Vec3) -> RodState {
         RodState::straight(&self.elements, start, Frame::new(Vec3::z(), Some(Vec3::x())))
     }
-}
-
-type Stiff = SMatrix<f64, 10, 10>;
-
-/// Positions and tangents of the matrix of a single element.
-fn positions(assembly: &Assembly<PLAIN>) -> Stiff {
-    let row = |i: usize| Layout::<PLAIN>.position(i / 5) + i % 5;
-    Stiff::from_fn(|i, j| assembly.matrix.get(row(i), row(j)))
-}
-
-/// What one element that presses on a wall adds to the matrix, before and after it is made convex; whether that changed it.
-fn convexified(surface: &ContactSurface, places: &[f64], start: Vec3) -> (Stiff, Stiff, bool) {
-    let mut rod = rod(surface, 1, places, 1e3);
-    let (state, elements) = (rod.at(start), rod.elements.clone());
-    let mut contact = rod.contact();
-    let mut assembly = Assembly::<PLAIN>::new(1);
-    assembly.hessian = true;
-    assembly.assemble(&elements, &state);
-    let bare = positions(&assembly);
-    contact.linearise(&elements, &state, &mut assembly);
-    assert!((0..places.len()).all(|index| contact.cache.pressed(index).is_some()), "a point does not press");
-    let before = positions(&assembly) - bare;
-    let any = contact.convexify(&elements, &state, &mut assembly);
-    (before, positions(&assembly) - bare, any)
-}
-
-#[test]
-fn on_a_crest_the_matrix_is_made_convex() {
-    // Inside of the bend, along its crest and askew.
-    for start in [Vec3::new(-1.6, 0.0, -0.5), Vec3::new(-1.6, 0.1, -0.3), Vec3::new(-1.58, -0.2, -0.8)] {
-        let (before, after, any) = convexified(&bent(), &[1.0, 0.5, 0.0], start);
-        let [least, convex] = [&before, &after].map(|m| m.symmetric_eigenvalues().min());
-        assert!(any && least < -1e-3 * before.norm(), "{least:e} of {:e}", before.norm());
-        assert!(convex > -1e-12 * after.norm(), "{convex:e} of {:e}", after.norm());
-    }
-}
-
-/// What is 0 on an exact wall, the curvature along the normal, is not quite so on a blended one.
-#[test]
-fn where_a_wall_is_concave_there_is_little_to_make_convex() {
-    let (before, after, _) = convexified(&barrel(), &[1.0, 0.0], Vec3::new(1.6, 0.0, -0.5));
-    assert!(before.symmetric_eigenvalues().min() > -1e-12 * before.norm());
-    let crest = convexified(&bent(), &[1.0, 0.0], Vec3::new(-1.6, 0.0, -0.5));
-    let [little, much] = [(after - before).norm(), (crest.1 - crest.0).norm()];
-    assert!(little < 1e-2 * much, "{little:e} {much:e}");
-}
-
-#[test]
-fn what_does_not_press_is_convex_as_it_is() {
-    let surface = bent();
-    let mut rod = rod(&surface, 1, &[1.0, 0.5, 0.0], 1e3);
-    let (state, elements) = (rod.at(Vec3::z() * -0.5), rod.elements.clone());
-    let mut contact = rod.contact();
-    let mut assembly = Assembly::<PLAIN>::new(1);
-    assembly.hessian = true;
-    assembly.assemble(&elements, &state);
-    contact.linearise(&elements, &state, &mut assembly);
-    let before = positions(&assembly);
-    assert!(!contact.convexify(&elements, &state, &mut assembly) && positions(&assembly) == before);
 }
 
 #[test]

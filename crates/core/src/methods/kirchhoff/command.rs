@@ -90,8 +90,7 @@ impl<const C: usize> Workspace<C> {
         let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD).max(1.0);
         let work = (WORK * travel) as usize;
-        let mut control =
-            StepControl::new(work.min(WORK_OF_ONE.saturating_mul(most)), from.part_mm);
+        let mut control = StepControl::new(work.min(WORK_OF_ONE.saturating_mul(most)), from.part_mm);
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;

@@ -252,38 +252,13 @@ mod tests {
     }
 
     #[test]
-    fn a_hook_that_keeps_its_shape_is_learnt_and_a_snap_is_not() {
-        let elements = [ElementData::plain(ELEMENT_MM, 1.0); NODES];
-        let motions = [HandMotion { from_mm: 20.0, to_mm: 21.0, turn_rad: 0.0 }];
-        // Slid along its own curve the hook begins 1 mm farther from the tip than it does in its shape.
-        let (slid, found) = (hooked(&elements, 7.0), hooked(&elements, 6.0));
-        let nothing = Correction::default();
-        let mut correction = nothing.clone();
-        correction.learn(&motions, &elements, (&slid, &found), false, &nothing);
-        assert_eq!(correction.repeats(&motions), None);
-        correction.learn(&motions, &elements, (&slid, &found), true, &nothing);
-        assert_eq!(correction.len(), NODES);
-        assert_eq!(correction.repeats(&motions), Some(1.0));
-        let mut guess = slid.clone();
-        correction.apply(1.0, &elements, &mut guess);
-        assert!(guess.farthest_mm(&found) < 0.05 * slid.farthest_mm(&found));
-        // The same change in a step that is far too short for it.
-        let short = [HandMotion { from_mm: 20.0, to_mm: 20.1, turn_rad: 0.0 }];
-        correction.learn(&short, &elements, (&slid, &found), true, &nothing);
-        assert_eq!(correction.repeats(&short), None);
-        // A hook that has sprung open.
-        correction.learn(&motions, &elements, (&slid, &hooked(&elements, 3.0)), true, &nothing);
-        assert_eq!(correction.repeats(&motions), None);
-    }
-
-    #[test]
     fn a_device_that_bends_on_as_before_has_let_go_of_nothing() {
         let elements = [ElementData::plain(ELEMENT_MM, 1.0); NODES];
         let motions = [advance(1.0, 0.0)];
         let step = |before: &Correction, from_mm: f64, to_mm: f64| {
             let mut now = Correction::default();
             let states = (&hooked(&elements, from_mm), &hooked(&elements, to_mm));
-            now.learn(&motions, &elements, states, false, before);
+            now.learn(&motions, states, before);
             now
         };
         let first = step(&Correction::default(), 7.0, 6.0);
@@ -298,14 +273,9 @@ mod tests {
         assert_eq!(step(&snap, 7.0, 6.0).repeats(&motions), None);
     }
 
-    fn learnt(
-        motions: &[HandMotion],
-        elements: &[ElementData],
-        slid: &RodState,
-        found: &RodState,
-    ) -> Correction {
+    fn learnt(motions: &[HandMotion], slid: &RodState, found: &RodState) -> Correction {
         let mut correction = Correction::default();
-        correction.learn(motions, elements, (slid, found), true, &Correction::default());
+        correction.learn(motions, (slid, found), &Correction::default());
         correction
     }
 
@@ -317,7 +287,7 @@ mod tests {
     fn motions_repeat_by_a_factor_or_not_at_all() {
         let elements = [ElementData::plain(ELEMENT_MM, 1.0); NODES];
         let (slid, found) = (hooked(&elements, 6.0), hooked(&elements, 6.1));
-        let known = learnt(&[advance(1.0, 0.2)], &elements, &slid, &found);
+        let known = learnt(&[advance(1.0, 0.2)], &slid, &found);
         let factor = |mm: f64, rad: f64| known.repeats(&[advance(mm, rad)]);
         assert!((factor(1.0, 0.2).unwrap() - 1.0).abs() < 1e-12);
         assert!((factor(0.5, 0.1).unwrap() - 0.5).abs() < 1e-12);
@@ -328,7 +298,7 @@ mod tests {
         }
         assert_eq!(Correction::default().repeats(&[advance(1.0, 0.2)]), None);
         // Of two hands each must repeat its own.
-        let both = learnt(&[advance(1.0, 0.0), advance(0.5, 0.0)], &elements, &slid, &found);
+        let both = learnt(&[advance(1.0, 0.0), advance(0.5, 0.0)], &slid, &found);
         assert!((both.repeats(&[advance(2.0, 0.0), advance(1.0, 0.0)]).unwrap() - 2.0).abs() < 1e-12);
         assert_eq!(both.repeats(&[advance(1.0, 0.0), advance(1.0, 0.0)]), None);
     }
@@ -341,7 +311,7 @@ mod tests {
         let off = |by_mm: f64| {
             let [before, now, next] = [0.0, 1.0, 2.0].map(|k| hooked(&elements, 6.0 + k * by_mm));
             let mut guess = now.clone();
-            learnt(&motions, &elements, &before, &now).apply(1.0, &elements, &mut guess);
+            learnt(&motions, &before, &now).apply(1.0, &elements, &mut guess);
             (guess.farthest_mm(&next), now.farthest_mm(&next))
         };
         let ((coarse, without), (fine, _)) = (off(0.1), off(0.05));
@@ -360,7 +330,7 @@ mod tests {
         };
         let (from, fine) = (mesh(ELEMENT_MM), mesh(0.5 * ELEMENT_MM));
         let (slid, found) = (hooked(&from.elements, 6.0), hooked(&from.elements, 6.1));
-        let known = learnt(&[advance(1.0, 0.0)], &from.elements, &slid, &found);
+        let known = learnt(&[advance(1.0, 0.0)], &slid, &found);
         let mut out = Correction::default();
         known.transfer(&from, &from, &mut out);
         for (a, b) in out.departures.iter().zip(&known.departures) {

@@ -55,11 +55,7 @@ impl Guess {
     }
 
     /// What an equilibrium that was found teaches, after what was learnt `before`.
-    pub(super) fn teach(
-        &self,
-        found: &RodState,
-        (before, correction): (&Correction, &mut Correction),
-    ) {
+    pub(super) fn teach(&self, found: &RodState, (before, correction): (&Correction, &mut Correction)) {
         correction.learn(&self.motions, (&self.slid, found), before);
     }
 }

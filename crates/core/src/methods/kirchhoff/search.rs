@@ -116,8 +116,7 @@ impl<const C: usize> Search<'_, '_, C> {
     fn newton(&mut self) -> NewtonReport {
         let most = if self.effort == Effort::Near { MOST_NEAR } else { MOST_MOVING };
         let max_iterations = most.min(self.most.saturating_sub(self.iterations));
-        let options =
-            NewtonOptions { max_iterations, tolerance: self.tolerance, ..NewtonOptions::default() };
+        let options = NewtonOptions { max_iterations, tolerance: self.tolerance, ..NewtonOptions::default() };
         let found = self.newton.solve(self.elements, self.supports, self.contact, self.state, &options);
         self.iterations += found.iterations;
         found

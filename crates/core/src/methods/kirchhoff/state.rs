@@ -61,7 +61,7 @@ impl KirchhoffState {
             inner_friction: Vec::new(),
             known: KnownPoints::default(),
             correction: Correction::default(),
-            part_mm: f64::INFINITY,
+            part_mm: stack.length_mm(),
             report: StepReport { converged: true, instruments, ..StepReport::default() },
         }
     }
@@ -146,6 +146,9 @@ impl KirchhoffState {
                 belongs.surface.query.triangles()
             );
             return Err(other("known", self.known.len(), mend));
+        }
+        if !(self.part_mm.is_finite() && self.part_mm > 0.0) {
+            return Err(other("part_mm", self.part_mm, "a way that is longer than 0"));
         }
         if !self.correction.fits(n, sets) {
             return Err(other(

@@ -203,15 +203,7 @@ impl<const C: usize> Tools<C> {
         let corrections = (&start.state.correction, &mut after.correction);
         self.guess.teach(&after.rod, corrections);
         self.keep(mesh, after);
-        Ok(Found {
-            slides,
-            dissipated_mj,
-            residual: found.residual,
-            unsettled,
-            balanced,
-            off,
-            jumped,
-        })
+        Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, off, jumped })
     }
 }
 
