@@ -4,6 +4,7 @@
 
 mod curved_tube;
 mod insertion;
+mod path;
 mod rod;
 mod spoiled_surfaces;
 mod wall_regions;

@@ -157,8 +157,8 @@ pub struct StepReport {
     pub substeps: u32,
     /// How often the device slid on while the hand held still, because friction and wall forces were not to be had in one step.
     pub slides: u32,
-    /// Parts of the command in which the way from the last equilibrium was lost, and the device was let come to rest as it could: the
-    /// last resort. 0 nearly always.
+    /// Parts of the command in which no equilibrium was near, at a fold or in a jam, and the device moved until it came to rest: the last
+    /// resort. 0 nearly always.
     pub relaxations: u32,
     /// What is left over where it came to rest, over the largest force in the device: of the forces at a node, or of those on the wall
     /// that friction goes with.

@@ -66,3 +66,36 @@ fn carried(state: &RodState) -> impl Iterator<Item = f64> {
         .zip(state.angles.chunks(sets))
         .flat_map(|(twist, angles)| angles.iter().map(move |angle| angle + twist))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::{ElementData, Frame};
+
+    #[test]
+    fn a_node_is_near_within_its_room_and_an_angle_within_a_radian() {
+        let elements = [ElementData::plain(2.0, 1.0); 2];
+        let rod = RodState::straight(&elements, Vec3::zeros(), Frame::new(Vec3::z(), None));
+        let mut near = Neighbourhood { bounds: true, ..Neighbourhood::default() };
+        near.begin(&rod, &[0.5, 0.5, 4.0]);
+        let moved = |node: usize, by_mm: f64| {
+            let mut there = rod.clone();
+            there.positions[node].x += by_mm;
+            there
+        };
+        assert_eq!(near.off(&rod), 0.0);
+        assert!(
+            (near.off(&moved(1, 0.5)) - 0.5).abs() < 1e-12
+                && (near.off(&moved(2, 0.5)) - 0.0625).abs() < 1e-12
+        );
+        assert!(!near.is_left_by(&moved(1, 2.9)) && near.is_left_by(&moved(1, 3.1)));
+        near.bounds = false;
+        assert!(!near.is_left_by(&moved(1, 3.1)));
+        let mut turned = rod.clone();
+        turned.angles[2] += 0.3;
+        assert!((near.off(&turned) - 0.3).abs() < 1e-12);
+        // The triads that it is counted from have turned back by as much.
+        turned.reference_twists[1] -= 0.3;
+        assert!(near.off(&turned) < 1e-12);
+    }
+}

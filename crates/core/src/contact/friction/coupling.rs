@@ -1,7 +1,7 @@
 //! Friction whose normal forces follow the state at once, or a step: what its derivatives are then.
 //!
 //! With lagged normal forces friction has a potential; with those of the state itself it has none, and its Newton matrix is not
-//! symmetric (`methods/kirchhoff/settle.rs`, `solve/lagged.rs`). With the normal force f of the state, and a(y) = φ′/y,
+//! symmetric (`methods/kirchhoff/settle.rs`). With the normal force f of the state, and a(y) = φ′/y,
 //!
 //! ```text
 //! g  = μ N a u,    N = f                                    friction on the wall, minus that on the device

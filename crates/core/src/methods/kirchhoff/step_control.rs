@@ -9,7 +9,7 @@ use super::substep::{Effort, Found};
 const FOLD_MM: f64 = 0.05;
 /// An equilibrium nearer to its prediction than this part of what is far is followed by a part twice as long. Predictions of first order are
 /// twice as far then, those of second order four times.
-const NEARER: f64 = 0.125;
+const NEARER: f64 = 0.2;
 
 /// What a command has come to.
 #[derive(Debug)]
@@ -42,7 +42,8 @@ impl StepControl {
     pub(super) fn next(&self, rest_mm: f64) -> (Effort, f64) {
         match self.flight_mm {
             Some(most_mm) => (Effort::Flight, rest_mm.min(most_mm)),
-            None => (Effort::Near, rest_mm.min(self.part_mm)),
+            // In equal parts, so that none is a small rest.
+            None => (Effort::Near, rest_mm / (rest_mm / self.part_mm).ceil().max(1.0)),
         }
     }
 
@@ -61,7 +62,7 @@ impl StepControl {
             }
             Some(_) => self.flight_mm = None,
             None if nearer => self.part_mm = self.part_mm.max(2.0 * part_mm),
-            None => self.part_mm = part_mm,
+            None => {}
         }
     }
 
@@ -76,5 +77,60 @@ impl StepControl {
             self.part_mm = 0.5 * part_mm;
         }
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(off: f64) -> Found {
+        Found {
+            slides: 0,
+            dissipated_mj: 0.0,
+            residual: 0.0,
+            unsettled: 0.0,
+            balanced: true,
+            off,
+            jumped: false,
+        }
+    }
+
+    #[test]
+    fn what_is_far_is_halved_and_what_is_much_nearer_doubled() {
+        let mut control = StepControl::new(100, 10.0);
+        assert_eq!(control.next(4.0), (Effort::Near, 4.0));
+        assert!(!control.failed(4.0));
+        assert_eq!(control.next(4.0), (Effort::Near, 2.0));
+        control.succeeded(2.0, &found(0.5));
+        assert_eq!(control.next(2.0), (Effort::Near, 2.0));
+        control.succeeded(2.0, &found(0.01));
+        // In equal parts.
+        assert_eq!(control.next(6.0), (Effort::Near, 3.0));
+        assert_eq!(control.part_mm(), 4.0);
+    }
+
+    #[test]
+    fn at_a_fold_it_moves_once_and_goes_on_as_before() {
+        let mut control = StepControl::new(100, 0.06);
+        assert!(!control.failed(0.06));
+        assert_eq!(control.next(1.0).0, Effort::Near);
+        assert!(!control.failed(0.03));
+        assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
+        control.succeeded(FOLD_MM, &found(7.0));
+        assert_eq!(control.next(1.0).0, Effort::Near);
+    }
+
+    #[test]
+    fn in_a_jam_it_moves_on_and_what_does_not_come_to_rest_is_the_end() {
+        let mut control = StepControl::new(100, 1.0);
+        control.took(200);
+        assert!(!control.failed(1.0));
+        assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
+        control.succeeded(FOLD_MM, &found(0.01));
+        assert_eq!(control.next(1.0), (Effort::Flight, 2.0 * FOLD_MM));
+        control.succeeded(2.0 * FOLD_MM, &found(0.9));
+        assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
+        assert!(control.failed(FOLD_MM));
     }
 }
