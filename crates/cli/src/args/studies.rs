@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Subcommand;
 use clap::builder::PossibleValuesParser;
 
-use crate::studies::{CANDIDATES, CASES, PRINTED, targets};
+use crate::studies::{CANDIDATES, CASES, targets};
 
 /// The methods that are compared. A wrong name is answered with the nearest right one.
 fn method_names() -> PossibleValuesParser {
@@ -82,7 +82,7 @@ impl NavigationArgs {
 #[derive(Debug, clap::Args)]
 pub(crate) struct LoopArgs {
     /// Methods
-    #[arg(long, visible_alias = "method", value_delimiter = ',', default_values_t = ["li2011-banded", "kirchhoff"].map(String::from), value_name = "METHOD,…", value_parser = method_names())]
+    #[arg(long, visible_alias = "method", value_delimiter = ',', default_value = "li2011-banded,kirchhoff", value_name = "METHOD,…", value_parser = method_names())]
     pub(crate) methods: Vec<String>,
     /// Folder for loop.csv, loop.json, four frames of both views for each method, and loop.svg and .png
     #[arg(long, value_name = "DIR")]
@@ -98,7 +98,7 @@ pub(crate) struct DeformationArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) measured: Option<PathBuf>,
     /// Methods
-    #[arg(long, visible_alias = "method", value_delimiter = ',', default_values_t = ["li2011-banded", PRINTED, "kirchhoff"].map(String::from), value_name = "METHOD,…", value_parser = method_names())]
+    #[arg(long, visible_alias = "method", value_delimiter = ',', default_value = "li2011-banded,li2011-banded-printed,kirchhoff", value_name = "METHOD,…", value_parser = method_names())]
     pub(crate) methods: Vec<String>,
     /// Segment lengths of Table 2 to run (1, 2, 3); all if absent
     #[arg(long, value_delimiter = ',', value_name = "L,…")]
@@ -117,13 +117,13 @@ pub(crate) struct DeformationArgs {
 #[derive(Debug, clap::Args)]
 pub(crate) struct TimingArgs {
     /// Numbers of nodes
-    #[arg(long, value_delimiter = ',', default_values_t = [50, 100, 150, 200, 300], value_name = "N,N,…")]
+    #[arg(long, value_delimiter = ',', default_value = "50,100,150,200,300", value_name = "N,N,…")]
     pub(crate) nodes: Vec<usize>,
     /// Timed calculations for each number of nodes
     #[arg(long, default_value_t = 15, value_name = "COUNT")]
     pub(crate) repeats: usize,
     /// Methods: all, or some of them
-    #[arg(long, visible_alias = "method", value_delimiter = ',', default_values_t = ["li2011-dense", "li2011-banded", "kirchhoff"].map(String::from), value_name = "METHOD,…", value_parser = all_or_method_names())]
+    #[arg(long, visible_alias = "method", value_delimiter = ',', default_value = "li2011-dense,li2011-banded,kirchhoff", value_name = "METHOD,…", value_parser = all_or_method_names())]
     pub(crate) methods: Vec<String>,
     /// Longest time for a method to be brought in position; one that takes longer is told in a note
     #[arg(long, default_value_t = 10.0, value_name = "S", allow_negative_numbers = true)]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use endowire_viewer::{Animation, Image, Pace};
 
-use super::whole;
+use super::{tell, whole};
 use crate::failure::Failure;
 
 /// What films are called: one for each of their kinds.
@@ -19,8 +19,11 @@ pub(crate) fn write(
     frames_per_s: f64,
 ) -> Result<Option<String>, Failure> {
     let steps: Vec<&[String]> = frames.chunk_by(|a, b| step_of(a) == step_of(b)).collect();
-    let Some(first) = steps.first() else { return Ok(None) };
     let name = format!("film.{kind}");
+    let Some(first) = steps.first() else {
+        tell(format_args!("endowire: no {name} in {}: no frame was drawn", folder.display()));
+        return Ok(None);
+    };
     // The kind is told by the end of a name, so that what is not whole yet has another beginning.
     let part = folder.join(format!("part-{name}"));
     let made = || -> endowire_core::Result<()> {

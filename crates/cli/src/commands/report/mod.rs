@@ -30,7 +30,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<(), Failure> {
     let page = page.replacen(MARK, &data, 1);
     let out = args.out.clone().unwrap_or_else(|| args.dir.join("report.html"));
     whole::write_bytes(&out, page.as_bytes()).map_err(|e| Failure::write(&out, &e))?;
-    tell(format_args!("{:.1} MB in {}", page.len() as f64 / 1e6, out.display()));
+    tell(format_args!("{} kB in {}", page.len().div_ceil(1000), out.display()));
     Ok(())
 }
 
