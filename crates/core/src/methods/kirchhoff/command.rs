@@ -154,8 +154,7 @@ impl<const C: usize> Workspace<C> {
                     if control.failed(part_mm) || sum.substeps > SUBSTEP_LIMIT {
                         tools.refuse_narrower(&at_start, was, &way.commands, 1.0)?;
                         return Err(Error::Computation(format!(
-                            "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {}",
-                            lost
+                            "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {lost}"
                         )));
                     }
                 }
