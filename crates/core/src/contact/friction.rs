@@ -76,7 +76,7 @@ struct Slider {
     normal: Vec3,
     /// N: normal force, less where the wall is smoother.
     force_n: f64,
-    /// Normal and force with which the step began, or that were marked.
+    /// Normal and force with which the step began.
     begun: (Vec3, f64),
     /// Normal and force at the state seen last.
     seen: (Vec3, f64),
@@ -417,12 +417,7 @@ impl Friction {
         self.settled = true;
     }
 
-    /// The normal forces are those that it can be rewound to.
-    pub fn mark(&mut self) {
-        self.sliders.iter_mut().for_each(|s| s.begun = (s.normal, s.force_n));
-    }
-
-    /// Normal forces are again those with which the step began, or that were marked, and are held.
+    /// Normal forces are again those with which the step began, and are held.
     pub fn rewind(&mut self) {
         self.coupled = false;
         self.settled = true;

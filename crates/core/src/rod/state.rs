@@ -135,6 +135,14 @@ impl RodState {
         self.angle(i, set) - self.angle(0, set) + self.reference_twists[..i].iter().sum::<f64>()
     }
 
+    /// By how much each node's triad is turned from one that is carried along the rod without twist, rad.
+    pub(crate) fn carried_twists(&self) -> impl Iterator<Item = f64> {
+        std::iter::once(0.0).chain(self.reference_twists.iter().scan(0.0, |sum, twist| {
+            *sum += twist;
+            Some(*sum)
+        }))
+    }
+
     /// The material triad (t, d₁, d₂) of node `i`, of the first instrument that has angles.
     pub(crate) fn material_frame(&self, i: usize) -> Frame {
         self.frames[i].turned(self.angle(i, 0))

@@ -26,9 +26,10 @@ pub(crate) struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    /// Takes memory for rods of up to `elements` elements.
-    pub(crate) fn reserve(&mut self, elements: usize) {
+    /// Takes memory for rods of up to `elements` elements with so many sets of angles.
+    pub(crate) fn reserve(&mut self, elements: usize, sets: usize) {
         self.nodes.reserve((elements + 1).saturating_sub(self.nodes.len()));
+        self.angles.reserve((sets * (elements + 1)).saturating_sub(self.angles.len()));
     }
 
     /// Is that of a prediction in which nodes, the first one included, have this much room, mm.
@@ -56,15 +57,8 @@ impl Neighbourhood {
 
 /// The angles of all sets at all nodes, counted from triads carried along the rod without twist.
 fn carried(state: &RodState) -> impl Iterator<Item = f64> {
-    let sets = state.sets();
-    let twists = std::iter::once(&0.0).chain(&state.reference_twists);
-    let nodes = twists.scan(0.0, |sum, twist| {
-        *sum += twist;
-        Some(*sum)
-    });
-    nodes
-        .zip(state.angles.chunks(sets))
-        .flat_map(|(twist, angles)| angles.iter().map(move |angle| angle + twist))
+    let nodes = state.carried_twists().zip(state.angles.chunks(state.sets()));
+    nodes.flat_map(|(twist, angles)| angles.iter().map(move |angle| angle + twist))
 }
 
 #[cfg(test)]

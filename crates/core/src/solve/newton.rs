@@ -5,8 +5,8 @@
 //! conditions is added with a weight above the reactions (an exact penalty), after second-order corrections that
 //! re-use the factorisation; once the conditions hold the merit is the energy again. Every accepted step lowers the merit.
 //!
-//! Each iteration: assemble, factor, look at the inertia. Minima have one negative pivot per multiplier; with more contacts
-//! are made convex, and then the matrix is shifted by the stiffness of a uniform tension ([`Assembly::unit_shift`]) until they are right, so every
+//! Each iteration: assemble, factor, look at the inertia. Minima have one negative pivot per multiplier; with more
+//! the matrix is shifted by the stiffness of a uniform tension ([`Assembly::unit_shift`]) until they are right, so every
 //! step descends. At an equilibrium that is not a minimum the method leaves along the direction of most negative
 //! curvature (inverse iteration with the shifted factor). A whisper of the shift stays on always, for regularisation: it makes states that
 //! can turn freely (a buckled column about its axis) solvable and cannot be seen in the result, since the
@@ -75,7 +75,7 @@ impl<const C: usize> Newton<C> {
         self.resize(now);
         self.trial.reserve(elements);
         self.other.reserve(elements);
-        self.neighbourhood.reserve(elements);
+        self.neighbourhood.reserve(elements, Layout::<C>::ANGLES.max(1));
     }
 
     /// Changes the size; keeps the memory.

@@ -1,4 +1,4 @@
-//! Friction whose normal forces follow the state at once, or a step: what its derivatives are then.
+//! Friction whose normal forces follow the state at once: what its derivatives are then.
 //!
 //! With lagged normal forces friction has a potential; with those of the state itself it has none, and its Newton matrix is not
 //! symmetric (`methods/kirchhoff/settle.rs`). With the normal force f of the state, and a(y) = φ′/y,

@@ -27,14 +27,9 @@ impl WallContact<'_> {
         self.friction.unsettle();
     }
 
-    /// Normal forces of friction are again those with which the step began, or that were marked, and are held.
+    /// Normal forces of friction are again those with which the step began, and are held.
     pub fn rewind_friction(&mut self) {
         self.friction.rewind();
-    }
-
-    /// The normal forces of friction are those that it can be rewound to.
-    pub fn mark_friction(&mut self) {
-        self.friction.mark();
     }
 
     /// Slip begins anew at `state`, the state assembled last, with the normal forces there.

@@ -18,6 +18,7 @@ pub(super) struct Guess {
     learnt: Correction,
     slid: RodState,
     pub(super) other: RodState,
+    /// The room that each node has where the device is predicted, mm.
     pub(super) room_mm: Vec<f64>,
 }
 
@@ -26,6 +27,7 @@ impl Guess {
     pub(super) fn reserve(&mut self, elements: usize) {
         self.slid.reserve(elements);
         self.other.reserve(elements);
+        self.room_mm.reserve((elements + 1).saturating_sub(self.room_mm.len()));
     }
 
     /// Replaces the slid device in `state` by one that repeats what was learnt, unless that is beyond the wall. Returns whether what it is

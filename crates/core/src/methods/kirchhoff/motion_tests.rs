@@ -284,13 +284,18 @@ fn a_wall_that_goes_along_with_the_device_does_not_rub() {
     let surface = |motion: &[MotionMode], advance_mm: f64| {
         let mut simulation = wire(setting, motion);
         push(&mut simulation, 150.0).unwrap();
-        let moves = [Move { instrument: 0, command: Command::advance(advance_mm) }];
-        simulation.step_until(&moves, Some(2.0)).unwrap().dissipated_mj
+        // The hand goes as a breath does, 1 mm in 2 s: what they differ by on the way would rub.
+        let breath = VesselMotion::new(&[along]).unwrap().unwrap();
+        let at_mm = |k: u32| advance_mm * breath.at(0.1 * f64::from(k)).place(&Vec3::zeros()).z;
+        let mut step = |k: u32| {
+            let moves = [Move { instrument: 0, command: Command::advance(at_mm(k) - at_mm(k - 1)) }];
+            simulation.step_until(&moves, Some(0.1 * f64::from(k))).unwrap().dissipated_mj
+        };
+        (1..=20).map(&mut step).sum::<f64>()
     };
     let (held, alone, together) = (surface(&[along], 0.0), surface(&[], 1.0), surface(&[along], 1.0));
     assert!(held > 0.2 * alone && alone > 0.0, "{held} {alone}");
-    // The hand goes evenly and a breath does not: what they differ by on the way rubs where the command is cut into parts.
-    assert!(together < 0.3 * alone, "{together} {alone}");
+    assert!(together < 0.2 * alone, "{together} {alone}");
 }
 
 #[test]

@@ -15,14 +15,12 @@ use crate::contact::{SETTLED, WallContact};
 use crate::device::Stack;
 use crate::methods::{InstrumentReport, StepReport};
 use crate::rod::{RodState, Supports};
-use crate::solve::NewtonReport;
+use crate::solve::{NewtonReport, StopReason};
 
 /// What is the matter where a prediction is on the other side of the wall, …
 const BEYOND: &str = "the device would be predicted beyond the wall";
 /// … where an equilibrium is, …
 const PASSED: &str = "the device would pass through the wall";
-/// … where it is another than the one that was predicted, …
-const FAR: &str = "what was found is far from where the device was predicted";
 /// … and where friction and the wall disagree.
 const UNSETTLED: &str = "friction and wall forces do not settle";
 /// A part has set free energy that the hand had put in if it is more than this part of the energy that is stored, or came out of the sheath.
@@ -142,6 +140,7 @@ impl<const C: usize> Tools<C> {
         let inside = self.guess.choose(&mut contact, (start, &*mesh, &mut *rod));
         let near = effort == Effort::Near;
         if near && !inside {
+            self.counters.add(&contact.count());
             return Err(BEYOND.into());
         }
         contact.rooms(&mesh.elements, rod, &mut self.guess.room_mm);
@@ -175,7 +174,7 @@ impl<const C: usize> Tools<C> {
         let wrong = match (near, &found) {
             (true, found) if !found.converged => Some(what_is_left(found)),
             (true, _) if !balanced => Some(UNSETTLED.into()),
-            (true, _) if off > 1.0 => Some(FAR.into()),
+            (true, _) if off > 1.0 => Some(StopReason::Left.to_string().into()),
             (false, found) if !found.residual.is_finite() => Some(what_is_left(found)),
             _ => {
                 contact.know_whole_base(&mesh.elements);

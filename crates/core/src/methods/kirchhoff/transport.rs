@@ -118,12 +118,7 @@ pub(super) fn transport_together(
         out.tensions.push(if is_in { state.tensions[known] } else { 0.0 });
     }
     // Triads carried without twist are those that angles are counted from.
-    let carried: Vec<f64> = std::iter::once(0.0)
-        .chain(state.reference_twists.iter().scan(0.0, |sum, twist| {
-            *sum += twist;
-            Some(*sum)
-        }))
-        .collect();
+    let carried: Vec<f64> = state.carried_twists().collect();
     let count = state.sets();
     out.angles.clear();
     out.angles.resize(count * (n + 1), 0.0);
