@@ -6,6 +6,7 @@ mod drag;
 pub mod extension;
 pub mod friction;
 mod moved;
+pub(crate) mod passage;
 pub mod point;
 pub mod potential;
 mod properties;

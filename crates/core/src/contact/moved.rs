@@ -72,7 +72,7 @@ impl<'a> MovedWall<'a> {
     }
 
     /// Where a material point is.
-    pub(super) fn place(&self, material: &Vec3) -> Vec3 {
+    pub(crate) fn place(&self, material: &Vec3) -> Vec3 {
         self.displacement.map_or(*material, |displacement| displacement.place(material))
     }
 

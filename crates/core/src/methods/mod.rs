@@ -8,7 +8,7 @@ mod sheath;
 mod state;
 
 pub use command::{Command, Move};
-pub use report::{Energy, InstrumentReport, LateralForce, StepReport, WallForce};
+pub use report::{Energy, InstrumentReport, Jump, LateralForce, StepReport, WallForce};
 pub use sheath::Sheath;
 pub use state::{ChainState, Content, NodesState, State, TouchedPlane, check_inserted};
 

@@ -28,7 +28,7 @@ impl StepReport {
     /// What a step tells in which the hand does nothing.
     pub(crate) fn rest(&mut self) {
         (self.iterations, self.substeps) = (0, 0);
-        (self.dissipated_mj, self.jumped) = (0.0, false);
+        (self.dissipated_mj, self.jumped, self.jump) = (0.0, false, None);
         (self.relaxations, self.slides) = (0, 0);
     }
 }
@@ -120,6 +120,15 @@ pub struct LateralForce {
     pub friction_nmm: f64,
 }
 
+/// A jump: from the end of a path of equilibria to where the device comes to rest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Jump {
+    /// Energy that was lost in it, to motion and friction, mJ. Work of hands, wall and blood = energy stored + `dissipated_mj` + this.
+    pub released_mj: f64,
+    /// Where the device has moved farthest for the room that it had, mm: its place after the jump.
+    pub position_mm: Vec3,
+}
+
 /// What is seen and felt of an insertion after a step.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct StepReport {
@@ -143,7 +152,7 @@ pub struct StepReport {
     pub instruments: Vec<InstrumentReport>,
     /// Deepest penetration of the device's surface into the wall at any node, mm; 0 without contact.
     pub max_penetration_mm: f64,
-    /// Energy that friction took in this step, mJ.
+    /// Energy that friction took in this step, mJ; in jumps it is not told apart ([`Jump`]).
     pub dissipated_mj: f64,
     /// Where the wall holds the device.
     pub contacts: Vec<Contact>,
@@ -165,6 +174,8 @@ pub struct StepReport {
     pub imbalance: f64,
     /// Whether the device jumped to a lower minimum: it set free energy that the hand had put in.
     pub jumped: bool,
+    /// What was set free, and where; none where nothing was, or the method does not tell.
+    pub jump: Option<Jump>,
     /// Whether the device carries material angles: only with a shape or friction.
     pub angles: bool,
     /// Nodes of sub-steps in which the device moved to a new equilibrium, since the start; where it is in one as it has slid, nothing is

@@ -49,6 +49,14 @@ impl Neighbourhood {
         turns.fold(off, f64::max)
     }
 
+    /// Where the node is that is farthest from its prediction for the room that it has, mm.
+    pub(crate) fn farthest(&self, state: &RodState) -> Vec3 {
+        let off = |(x, (at_mm, most_mm)): (&Vec3, &(Vec3, f64))| (x - at_mm).norm() / most_mm;
+        let places = state.positions.iter().zip(&self.nodes);
+        let farthest = places.max_by(|a, b| off(*a).total_cmp(&off(*b)));
+        farthest.map_or_else(Vec3::zeros, |(x, _)| *x)
+    }
+
     /// Whether a solution that has come to this state is given up.
     pub(crate) fn is_left_by(&self, state: &RodState) -> bool {
         self.bounds && self.off(state) > STRAY

@@ -1,114 +1,81 @@
 //! Where a vessel is narrower than the device that is pushed into it.
 //!
-//! A wall that yields lets a device through a vessel somewhat narrower than itself, and then there is nothing to tell. Where no
-//! equilibrium is found on the way, the room across the lumen says whether that is why.
+//! A device is blocked where no sphere of its radius passes on from its front ([`passage`]). Anything else that finds no
+//! equilibrium is a computation that failed, and says so. A wall that yields lets a device through a vessel somewhat narrower than
+//! itself, and then there is nothing to tell.
 
 use super::Environment;
 use super::configuration::Start;
-use super::workspace::Tools;
-use crate::contact::{ContactSurface, WallContact};
+use super::hands::{Hand, lengths};
+use super::mesh::Mesh;
+use crate::contact::passage::{Narrow, narrow_ahead};
+use crate::device::line_mm;
 use crate::methods::Command;
+use crate::rod::RodState;
+use crate::rod::quadrature::hermite;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
-/// Less room than this part of what the device needs is so little that a way through is not looked for with patience.
+/// Less room than this part of what the device needs is so little that it is not let go on with its tip held.
 pub(super) const FAR_TOO_LITTLE: f64 = 0.5;
-/// How far off the wall, in radii, ways across begin at most.
-const OFF: f64 = 0.3;
-/// Tangents of the angles between the normal and other ways across.
-const TILTS: [f64; 2] = [0.4, 1.0];
-/// Pieces of the near wall that the way across may meet before it has left them behind.
-const PIECES: usize = 4;
-/// From one of them the way goes on so much farther, mm.
-const ON_MM: f64 = 1e-3;
+/// Length of the device in which its front is looked for, in radii: a hooked tip that is folded back is as long.
+const FRONT: usize = 60;
 
-impl<const C: usize> Tools<C> {
-    /// Refuses to push on from where there is less room than `part` of what the device needs, for commands of the hands that have found no
-    /// equilibrium.
-    ///
-    /// # Errors
-    /// [`PhysicalEnd::Blocked`] with the narrowest place, if there is one and an instrument advances.
-    pub(super) fn refuse_narrower(
-        &mut self,
-        environment: &Environment<'_>,
-        from: Start<'_>,
-        commands: &[Command],
-        part: f64,
-    ) -> Result<()> {
-        if commands.iter().any(|command| command.advance_mm > 0.0)
-            && let Some((narrowest, end)) = self.narrowest(environment, from)
-            && narrowest < part
+/// Refuses to push on from where the way ahead of an instrument that advances has less room than `part` of what it needs, for commands of
+/// the hands that have found no equilibrium.
+///
+/// # Errors
+/// [`PhysicalEnd::Blocked`] with the narrowest place.
+pub(super) fn refuse_narrower(
+    environment: &Environment<'_>,
+    from: Start<'_>,
+    commands: &[Command],
+    part: f64,
+) -> Result<()> {
+    let mut hands = Vec::new();
+    super::hands::read(&from.state.report, &mut hands);
+    for (instrument, command) in commands.iter().enumerate() {
+        if command.advance_mm > 0.0
+            && let Some((narrow, device_radius_mm)) = narrow(environment, from, &hands, instrument)
+            && narrow.radius_mm < part * device_radius_mm
         {
-            return Err(Error::End(end));
+            let position_mm = environment.wall().place(&narrow.place_mm);
+            let lumen_radius_mm = narrow.radius_mm;
+            return Err(Error::End(PhysicalEnd::Blocked { position_mm, lumen_radius_mm, device_radius_mm }));
         }
-        Ok(())
     }
-
-    /// The narrowest place at which the device presses on the wall and has less room across the lumen than its diameter, and the part of
-    /// that which it has.
-    pub(super) fn narrowest(
-        &mut self,
-        environment: &Environment<'_>,
-        Start { mesh, state }: Start<'_>,
-    ) -> Option<(f64, PhysicalEnd)> {
-        let wall = environment.wall();
-        let mut contact = WallContact::new(
-            wall,
-            &mesh.points,
-            &mut self.cache,
-            &mut self.friction,
-            environment.surroundings.stack.softest_nmm2(),
-        );
-        let mut least: Option<(f64, PhysicalEnd)> = None;
-        contact.touches(&mesh.elements, &state.rod, &mut self.touches);
-        for (index, touch) in &self.touches {
-            let device_radius_mm = mesh.points[*index].potential.radius_mm;
-            let place = wall.material(&touch.contact.position_mm);
-            let Some(lumen_radius_mm) = room_mm(&wall, &place, device_radius_mm) else {
-                continue;
-            };
-            let part = lumen_radius_mm / device_radius_mm;
-            if least.is_none_or(|(narrowest, _)| part < narrowest) {
-                let position_mm = touch.contact.position_mm;
-                least = Some((part, PhysicalEnd::Blocked { position_mm, lumen_radius_mm, device_radius_mm }));
-            }
-        }
-        least
-    }
+    Ok(())
 }
 
-/// Half of the least way across the lumen at a place on the device's axis, mm, if that is less than its radius: along the normal of the
-/// nearest wall, and aslant.
-fn room_mm(surface: &ContactSurface, place: &Vec3, radius_mm: f64) -> Option<f64> {
-    let near = surface.query.nearest(place, 2.0 * radius_mm)?;
-    let n = near.normal;
-    // In a lumen narrower than that the middle of what there is.
-    let opposite_mm = facing_mm(surface, &(near.point_mm + n * ON_MM), &n, OFF * radius_mm);
-    let from = near.point_mm + n * opposite_mm.map_or(OFF * radius_mm, |way_mm| 0.5 * way_mm);
-    let e = n.cross(&Vec3::ith(n.iamin(), 1.0)).normalize();
-    let f = n.cross(&e);
-    let aslant = TILTS.into_iter().flat_map(|tilt| [e, f, -e, -f].map(|side| (n + side * tilt).normalize()));
-    let ways = std::iter::once(n).chain(aslant);
-    let across = ways.filter_map(|way| {
-        let ahead_mm = facing_mm(surface, &from, &way, 2.0 * radius_mm)?;
-        let (back_mm, _) = surface.query.first_met(&from, &-way, 2.0 * radius_mm - ahead_mm)?;
-        Some(0.5 * (ahead_mm + back_mm))
-    });
-    across.min_by(f64::total_cmp)
+/// What the way ahead of an instrument is, where it is narrower than that, and its radius there.
+fn narrow(
+    environment: &Environment<'_>,
+    Start { mesh, state }: Start<'_>,
+    hands: &[Hand],
+    instrument: usize,
+) -> Option<(Narrow, f64)> {
+    let stack = environment.surroundings.stack;
+    let (line_mm, inserted_mm) = (line_mm(lengths(hands)), hands[instrument].inserted_mm);
+    // What is inside another one feels no wall.
+    if lengths(&hands[instrument + 1..]).any(|outer_mm| outer_mm >= inserted_mm) {
+        return None;
+    }
+    let tip_mm = line_mm - inserted_mm;
+    let lengths_mm: Vec<f64> = lengths(hands).collect();
+    let radius_mm = stack.felt_radius_mm(&lengths_mm, tip_mm);
+    let wall = environment.wall();
+    let places = (0..FRONT).map(|k| tip_mm + k as f64 * radius_mm).take_while(|mm| *mm < line_mm);
+    let axis_mm: Vec<Vec3> = places.map(|mm| wall.material(&place(mesh, &state.rod, mm))).collect();
+    let narrow = narrow_ahead(&wall, environment.surroundings.wall, &axis_mm, radius_mm)?;
+    Some((narrow, radius_mm))
 }
 
-/// How far ahead the wall that faces `from` is, mm, within `reach_mm`.
-fn facing_mm(surface: &ContactSurface, from: &Vec3, way: &Vec3, reach_mm: f64) -> Option<f64> {
-    let mut ahead_mm = 0.0;
-    for _ in 0..PIECES {
-        let (met_mm, triangle) =
-            surface.query.first_met(&(from + way * ahead_mm), way, reach_mm - ahead_mm)?;
-        ahead_mm += met_mm;
-        if surface.query.inward_normal(triangle).dot(way) < 0.0 {
-            return Some(ahead_mm);
-        }
-        ahead_mm += ON_MM;
-    }
-    None
+/// A place on the axis, so far from the tip of the line, less than it is long, mm.
+fn place(mesh: &Mesh, rod: &RodState, from_tip_mm: f64) -> Vec3 {
+    let after = mesh.from_tip_mm.partition_point(|mm| *mm > from_tip_mm).clamp(1, mesh.elements.len());
+    let (e, length_mm) = (after - 1, mesh.elements[after - 1].length);
+    let [w0, s0, w1, s1] = hermite(((mesh.from_tip_mm[e] - from_tip_mm) / length_mm).clamp(0.0, 1.0));
+    let (x, frames) = (&rod.positions, &rod.frames);
+    x[e] * w0 + x[after] * w1 + (frames[e].t * s0 + frames[after].t * s1) * length_mm
 }
 
 #[cfg(test)]
@@ -154,11 +121,15 @@ mod tests {
         let mut workspace = Workspace::<{ crate::rod::PLAIN }>::new(&environment, &wire.state);
         let moves = [Move { instrument: 0, command: Command::advance(1.0) }];
         workspace.carry_out(&environment, &wire.state, &moves).unwrap();
-        workspace.tools.narrowest(&environment, workspace.now.start()).map(|(_, end)| end)
+        let forward = [Command::advance(1.0)];
+        match refuse_narrower(&environment, workspace.now.start(), &forward, 1.0) {
+            Err(Error::End(end)) => Some(end),
+            _ => None,
+        }
     }
 
     #[test]
-    fn the_room_across_is_that_of_the_narrow_tube_and_a_wide_one_has_enough() {
+    fn the_room_ahead_is_that_of_the_narrow_tube_and_a_wide_one_has_enough() {
         match pushed_into(0.3) {
             Some(PhysicalEnd::Blocked { position_mm, lumen_radius_mm, device_radius_mm }) => {
                 assert!((lumen_radius_mm - 0.3).abs() < 0.05, "{lumen_radius_mm}");

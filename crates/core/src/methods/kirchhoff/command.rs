@@ -2,7 +2,7 @@
 //! the way is lost.
 
 use super::Environment;
-use super::blocked::FAR_TOO_LITTLE;
+use super::blocked::{FAR_TOO_LITTLE, refuse_narrower};
 use super::carried::carried;
 use super::configuration::Start;
 use super::hands::lengths;
@@ -12,7 +12,7 @@ use super::substep::{Attempt, Effort, Found};
 use super::workspace::{Work, Workspace};
 use crate::contact::extension::check_inside;
 use crate::device::line_mm;
-use crate::methods::{Move, StepReport};
+use crate::methods::{Jump, Move, StepReport};
 use crate::{Error, Result};
 
 /// Most sub-steps that one command may be cut into.
@@ -39,7 +39,8 @@ struct Sum {
     slides: u32,
     imbalance: f64,
     dissipated_mj: f64,
-    jumped: bool,
+    jump: Option<Jump>,
+    largest_mj: f64,
 }
 
 impl Sum {
@@ -47,7 +48,14 @@ impl Sum {
     fn add(&mut self, found: &Found, effort: Effort) {
         self.slides += found.slides;
         self.dissipated_mj += found.dissipated_mj;
-        self.jumped |= found.jumped;
+        if let Some(jump) = found.jump {
+            let so_far = self.jump.get_or_insert(Jump { released_mj: 0.0, ..jump });
+            // The place is that of the largest.
+            if jump.released_mj > self.largest_mj {
+                (self.largest_mj, so_far.position_mm) = (jump.released_mj, jump.position_mm);
+            }
+            so_far.released_mj += jump.released_mj;
+        }
         if effort == Effort::Flight {
             self.relaxations += 1;
             self.imbalance = self.imbalance.max(found.residual.max(found.unsettled));
@@ -58,7 +66,7 @@ impl Sum {
         report.substeps = self.substeps as u32;
         (report.relaxations, report.slides) = (self.relaxations, self.slides);
         (report.imbalance, report.dissipated_mj) = (self.imbalance, self.dissipated_mj);
-        report.jumped = self.jumped;
+        (report.jump, report.jumped) = (self.jump, self.jump.is_some());
     }
 }
 
@@ -105,7 +113,7 @@ impl<const C: usize> Workspace<C> {
             let part = part_mm / travel;
             let at_start = environment.displaced(displaced.as_ref());
             if effort == Effort::Flight {
-                tools.refuse_narrower(&at_start, was, &way.commands, FAR_TOO_LITTLE)?;
+                refuse_narrower(&at_start, was, &way.commands, FAR_TOO_LITTLE)?;
             }
             // A rest that is rounding is none.
             let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
@@ -152,7 +160,7 @@ impl<const C: usize> Workspace<C> {
                 Err(lost) => {
                     // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
                     if control.failed(part_mm) || sum.substeps > SUBSTEP_LIMIT {
-                        tools.refuse_narrower(&at_start, was, &way.commands, 1.0)?;
+                        refuse_narrower(&at_start, was, &way.commands, 1.0)?;
                         return Err(Error::Computation(format!(
                             "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {lost}"
                         )));
@@ -162,7 +170,7 @@ impl<const C: usize> Workspace<C> {
         }
         if !balanced {
             let there = environment.displaced(displaced.as_ref());
-            tools.refuse_narrower(&there, now.start(), &way.commands, 1.0)?;
+            refuse_narrower(&there, now.start(), &way.commands, 1.0)?;
         }
         let state = now.parts().1;
         state.part_mm = control.part_mm();

@@ -14,6 +14,7 @@
 //! to the inserted length.
 
 mod active_set;
+mod balance;
 mod blocked;
 mod carried;
 mod coaxial;

@@ -92,7 +92,7 @@ mod tests {
             unsettled: 0.0,
             balanced: true,
             off,
-            jumped: false,
+            jump: None,
         }
     }
 

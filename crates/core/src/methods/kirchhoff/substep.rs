@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::balance::Balance;
 use super::carried::{Passage, WallWork};
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, motions};
@@ -12,8 +13,7 @@ use super::transport::{transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
 use crate::contact::{SETTLED, WallContact};
-use crate::device::Stack;
-use crate::methods::{InstrumentReport, StepReport};
+use crate::methods::{Jump, StepReport};
 use crate::rod::{RodState, Supports};
 use crate::solve::{NewtonReport, StopReason};
 
@@ -21,12 +21,10 @@ use crate::solve::{NewtonReport, StopReason};
 const BEYOND: &str = "the device would be predicted beyond the wall";
 /// … where an equilibrium is, …
 const PASSED: &str = "the device would pass through the wall";
-/// … and where friction and the wall disagree.
+/// … where friction and the wall disagree, …
 const UNSETTLED: &str = "friction and wall forces do not settle";
-/// A part has set free energy that the hand had put in if it is more than this part of the energy that is stored, or came out of the sheath.
-const SET_FREE: f64 = 0.02;
-/// Energy below which nothing is set free, mJ.
-const SET_FREE_FLOOR_MJ: f64 = 1e-6;
+/// … and where energy came from nowhere.
+const UNBALANCED: &str = "more energy is stored and taken by friction than was put in";
 
 /// How a part of a command is gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,8 +49,8 @@ pub(super) struct Found {
     pub(super) balanced: bool,
     /// How far it is from the prediction, over how far is near.
     pub(super) off: f64,
-    /// Whether energy was set free that the hand had put in.
-    pub(super) jumped: bool,
+    /// The jump, if it is one.
+    pub(super) jump: Option<Jump>,
 }
 
 /// Why a part came to nothing.
@@ -198,11 +196,18 @@ impl<const C: usize> Tools<C> {
         let reports = (&start.state.report, &after.report);
         let flow_mj = aside_mj + self.drag.size_n() * farthest_mm(reports);
         let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
-        let jumped = (!near && off > 1.0) || sets_free(surroundings.stack, reports, dissipated_mj, by_wall);
+        let balance = Balance::new(surroundings.stack, reports, by_wall);
+        if near && balance.lacks(dissipated_mj) {
+            return Err(UNBALANCED.into());
+        }
+        let jumps = (!near && off > 1.0) || balance.is_set_free(dissipated_mj);
+        let (dissipated_mj, released_mj) = balance.lost_mj(dissipated_mj, jumps);
+        let position_mm = self.newton.neighbourhood.farthest(&after.rod);
+        let jump = jumps.then_some(Jump { released_mj, position_mm });
         let corrections = (&start.state.correction, &mut after.correction);
         self.guess.teach(&after.rod, corrections);
         self.keep(mesh, after);
-        Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, off, jumped })
+        Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, off, jump })
     }
 }
 
@@ -215,36 +220,4 @@ fn what_is_left(found: &NewtonReport) -> Lost {
 fn farthest_mm((before, after): (&StepReport, &StepReport)) -> f64 {
     let way = |index: usize| (after.hand(index).inserted_mm - before.hand(index).inserted_mm).abs();
     (0..after.instruments.len().max(1)).map(way).fold(0.0, f64::max)
-}
-
-/// Energy that the sheath no longer stores, mJ: of the shape of what has come out of it, which is straight in it.
-fn released_mj(stack: &Stack, before: &StepReport, after: &StepReport) -> f64 {
-    let each = stack.devices().enumerate().map(|(index, device)| {
-        let straightening = |report: &StepReport| device.straightening_mj(report.hand(index).inserted_mm);
-        straightening(after) - straightening(before)
-    });
-    each.sum()
-}
-
-/// Whether energy was set free that the hand had put in.
-fn sets_free(
-    stack: &Stack,
-    (before, after): (&StepReport, &StepReport),
-    dissipated_mj: f64,
-    by_wall: WallWork,
-) -> bool {
-    // The least that the hand put in on a way without jumps, and the rod did not keep: along one the force stays between
-    // what it is at the ends.
-    let least = |before: f64, after: f64, way: f64| (before * way).min(after * way);
-    let mut work = by_wall.least_mj;
-    for index in 0..after.instruments.len().max(1) {
-        let (was, is) = (before.hand(index), after.hand(index));
-        let push = |hand: &InstrumentReport| hand.push_force_n.unwrap_or(0.0);
-        work += least(push(&was), push(&is), is.inserted_mm - was.inserted_mm)
-            + least(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
-    }
-    let (energy, now) = (before.energy.total(), after.energy.total());
-    let released = released_mj(stack, before, after);
-    let lost = work - dissipated_mj - (now - energy - released);
-    lost > SET_FREE * energy.max(now).max(released.abs()).max(SET_FREE_FLOOR_MJ)
 }

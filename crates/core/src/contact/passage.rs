@@ -1,0 +1,304 @@
+//! How wide the way on from a device's front is: the radius of the largest sphere that passes.
+//!
+//! The lumen about the front is looked at on a grid. A way is as wide as its least clearance, and the widest of all ways is found as
+//! shortest ones are, with the least clearance of a way in place of the sum of its lengths (Pollack, "The maximum capacity through a
+//! network", Operations Research 8, 1960). Ways begin beside the last piece of the device, end at a stated distance from it, and do not go
+//! back past the cross-section of the lumen at which that piece begins.
+//!
+//! A place is no farther than √3/2 h from a place of a grid of spacing h, and a clearance changes by no more than the distance. So a
+//! sphere of radius r passes nowhere where the widest way on the grid is narrower than r − √3/2 h, and it does where that is r. Between the
+//! two a finer grid tells.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use rustc_hash::FxHashSet;
+
+use super::ContactSurface;
+use super::extension::left_through;
+use crate::Vec3;
+use crate::vessel::Wall;
+
+/// Spacings of the grids, in radii of the device.
+const SPACINGS: [f64; 2] = [0.25, 0.0625];
+/// A way ends so far from the front, in radii of the device: what is farther ahead does not hold it.
+const AHEAD: f64 = 6.0;
+/// Length of the front at least, and how far beside it ways begin, in radii.
+const BESIDE: f64 = 2.0;
+/// Most places that are asked for one answer: what is not known by then is not narrow.
+const MOST_ASKED: usize = 400_000;
+
+/// Places of a grid.
+type Cell = [i32; 3];
+
+/// A way that is narrower than the device.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Narrow {
+    /// Radius of the largest sphere that passes, mm: 0 where the lumen ends.
+    pub(crate) radius_mm: f64,
+    /// Where it is narrowest, in the reference.
+    pub(crate) place_mm: Vec3,
+}
+
+/// The narrowest place of the widest way on from the front of a device of this radius, if that is narrower than the device. `axis_mm` are
+/// places of the device in the reference, from the tip on, a radius or two apart; at least two of them.
+pub(crate) fn narrow_ahead(
+    surface: &ContactSurface,
+    wall: &Wall,
+    axis_mm: &[Vec3],
+    radius_mm: f64,
+) -> Option<Narrow> {
+    let front = front(axis_mm, radius_mm)?;
+    for spacing in SPACINGS {
+        let grid = Grid { surface, wall, front, radius_mm, spacing_mm: spacing * radius_mm };
+        let widest = grid.widest()?;
+        if widest.radius_mm >= radius_mm {
+            return None;
+        }
+        if widest.radius_mm < radius_mm - 0.75f64.sqrt() * grid.spacing_mm {
+            return Some(widest);
+        }
+    }
+    None
+}
+
+/// The last piece of a device, from its tip to a cross-section that all of it is ahead of, and one place more.
+fn front(axis_mm: &[Vec3], radius_mm: f64) -> Option<&[Vec3]> {
+    let mut length_mm = 0.0;
+    for last in 1..axis_mm.len().checked_sub(1)? {
+        length_mm += (axis_mm[last] - axis_mm[last - 1]).norm();
+        let along = axis_mm[last - 1] - axis_mm[last + 1];
+        if length_mm >= BESIDE * radius_mm
+            && axis_mm[..last].iter().all(|x| (x - axis_mm[last]).dot(&along) > 0.0)
+        {
+            return Some(&axis_mm[..last + 2]);
+        }
+    }
+    None
+}
+
+/// The lumen about a front, on a grid about its tip.
+struct Grid<'a> {
+    surface: &'a ContactSurface,
+    wall: &'a Wall,
+    /// Places of the device from the tip to one behind the cross-section, the last but one.
+    front: &'a [Vec3],
+    radius_mm: f64,
+    spacing_mm: f64,
+}
+
+/// A way to a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Way {
+    /// Its least clearance, mm, and where that is.
+    least_mm: f64,
+    narrowest: Cell,
+    to: Cell,
+}
+
+impl Eq for Way {}
+
+impl Ord for Way {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.least_mm.total_cmp(&other.least_mm).then_with(|| other.to.cmp(&self.to))
+    }
+}
+
+impl PartialOrd for Way {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Grid<'_> {
+    /// The narrowest place of the widest way; none where the front is not in the lumen, or where that takes too long to find.
+    fn widest(&self) -> Option<Narrow> {
+        let section = self.section();
+        let mut ways = self.beside();
+        if ways.is_empty() {
+            return None;
+        }
+        let mut seen: FxHashSet<Cell> = ways.iter().map(|way| way.to).collect();
+        while let Some(way) = ways.pop() {
+            let at = self.place(way.to);
+            if self.distance_mm(&at).0 >= AHEAD * self.radius_mm || left_through(self.wall, &at).is_some() {
+                return Some(Narrow { radius_mm: way.least_mm, place_mm: self.place(way.narrowest) });
+            }
+            if seen.len() > MOST_ASKED {
+                return None;
+            }
+            for to in beside(way.to) {
+                let x = self.place(to);
+                if self.passes_section(&at, &x, &section) || !seen.insert(to) {
+                    continue;
+                }
+                let clearance_mm = self.clearance_mm(&x);
+                if clearance_mm > way.least_mm {
+                    ways.push(Way { to, ..way });
+                } else if clearance_mm > 0.0 {
+                    ways.push(Way { least_mm: clearance_mm, narrowest: to, to });
+                }
+            }
+        }
+        Some(Narrow { radius_mm: 0.0, place_mm: self.front[0] })
+    }
+
+    fn place(&self, cell: Cell) -> Vec3 {
+        self.front[0] + Vec3::from(cell.map(f64::from)) * self.spacing_mm
+    }
+
+    fn cell(&self, x: &Vec3) -> Cell {
+        ((x - self.front[0]) / self.spacing_mm).map(|c| c.round() as i32).into()
+    }
+
+    /// How far a place is from the felt wall, at least as far as a device sees; not positive outside the lumen.
+    fn clearance_mm(&self, x: &Vec3) -> f64 {
+        let reach_mm = self.surface.reach_mm;
+        match self.surface.query.nearest(x, reach_mm) {
+            Some(flat) if flat.distance_mm > -self.radius_mm => {
+                self.surface.nearness(x, flat.triangle, f64::NEG_INFINITY).value_mm()
+            }
+            Some(flat) => flat.distance_mm,
+            None => reach_mm,
+        }
+    }
+
+    /// The device's own piece.
+    fn piece(&self) -> &[Vec3] {
+        &self.front[..self.front.len() - 1]
+    }
+
+    /// How far a place is from the front, mm, and whether that is ahead of its tip.
+    fn distance_mm(&self, x: &Vec3) -> (f64, bool) {
+        let mut least = (f64::INFINITY, false);
+        for (k, side) in self.piece().windows(2).enumerate() {
+            let along = side[1] - side[0];
+            let part = (x - side[0]).dot(&along) / along.norm_squared();
+            let distance_mm = (x - (side[0] + along * part.clamp(0.0, 1.0))).norm();
+            if distance_mm < least.0 {
+                least = (distance_mm, k == 0 && part < 0.0);
+            }
+        }
+        least
+    }
+
+    /// The ways of no length that begin beside the front, in the lumen that it lies in.
+    fn beside(&self) -> BinaryHeap<Way> {
+        let mut ways = BinaryHeap::new();
+        let mut seen: FxHashSet<Cell> = self.piece().iter().map(|x| self.cell(x)).collect();
+        let mut left: Vec<Cell> = self.piece().iter().map(|x| self.cell(x)).collect();
+        while let Some(to) = left.pop() {
+            let x = self.place(to);
+            let (distance_mm, ahead) = self.distance_mm(&x);
+            let least_mm = self.clearance_mm(&x);
+            if ahead || distance_mm > BESIDE * self.radius_mm || self.is_behind(&x) || least_mm <= 0.0 {
+                continue;
+            }
+            ways.push(Way { least_mm, narrowest: to, to });
+            left.extend(beside(to).filter(|to| seen.insert(*to)));
+        }
+        ways
+    }
+
+    /// The middle of the cross-section, and two directions in it and the one across, towards the tip.
+    fn frame(&self) -> (Vec3, [Vec3; 3]) {
+        let [.., ahead, middle, behind] = self.front else { return (self.front[0], [Vec3::zeros(); 3]) };
+        let across = (ahead - behind).normalize();
+        let e = across.cross(&Vec3::ith(across.iamin(), 1.0)).normalize();
+        (*middle, [e, across.cross(&e), across])
+    }
+
+    fn is_behind(&self, x: &Vec3) -> bool {
+        let (middle, [.., across]) = self.frame();
+        (x - middle).dot(&across) < 0.0
+    }
+
+    /// The cells of the cross-section at which the front begins: what of its plane is in the lumen next to the device.
+    fn section(&self) -> FxHashSet<[i32; 2]> {
+        let (middle, [e, f, _]) = self.frame();
+        let most = (AHEAD / self.spacing_mm * self.radius_mm) as i32;
+        let mut seen = FxHashSet::default();
+        let mut left: Vec<[i32; 2]> = vec![[0, 0]];
+        while let Some([i, j]) = left.pop() {
+            let x = middle + (e * f64::from(i) + f * f64::from(j)) * self.spacing_mm;
+            if i.abs().max(j.abs()) > most || self.clearance_mm(&x) <= 0.0 || !seen.insert([i, j]) {
+                continue;
+            }
+            left.extend([[i + 1, j], [i - 1, j], [i, j + 1], [i, j - 1]].iter().filter(|c| !seen.contains(*c)));
+        }
+        seen
+    }
+
+    /// Whether a step leads through the cross-section.
+    fn passes_section(&self, from: &Vec3, to: &Vec3, section: &FxHashSet<[i32; 2]>) -> bool {
+        let (middle, [e, f, across]) = self.frame();
+        let (before, after) = ((from - middle).dot(&across), (to - middle).dot(&across));
+        if (before < 0.0) == (after < 0.0) {
+            return false;
+        }
+        let at = from + (to - from) * (before / (before - after)) - middle;
+        section.contains(&[e, f].map(|side| (at.dot(&side) / self.spacing_mm).round() as i32))
+    }
+}
+
+/// The cells about one.
+fn beside([i, j, k]: Cell) -> impl Iterator<Item = Cell> {
+    (0..27).filter(|n| *n != 13).map(move |n| [i + n % 3 - 1, j + n / 3 % 3 - 1, k + n / 9 - 1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::WallProperties;
+    use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution};
+
+    /// A vessel along z whose radius changes as stated, with a side branch of 1 mm at z = 20 mm where one is wanted.
+    fn vessel(radius_mm: impl Fn(f64) -> f64, branch: bool) -> (ContactSurface, Wall) {
+        let along = (0..81).map(|k| {
+            let z = 0.5 * f64::from(k);
+            let parent = usize::try_from(k - 1).ok();
+            CentrelineNode { position_mm: Vec3::z() * z, radius_mm: radius_mm(z), parent }
+        });
+        let aside = (1..30).map(|k| CentrelineNode {
+            position_mm: Vec3::new(0.5 * f64::from(k), 0.0, 20.0),
+            radius_mm: 1.0,
+            parent: Some(if k == 1 { 40 } else { 79 + k as usize }),
+        });
+        let nodes = along.chain(aside.take(if branch { 29 } else { 0 }));
+        let tree = CentrelineTree::new(nodes.collect()).unwrap();
+        let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(0.2)).unwrap().wall;
+        let surface = ContactSurface::new(&wall, (0.4, 0.4), &WallProperties::default(), &NoStore).unwrap();
+        (surface, wall)
+    }
+
+    /// What is said of a wire of radius 0.4 mm whose tip is at z, aside by x.
+    fn ahead((surface, wall): &(ContactSurface, Wall), z: f64, x: f64) -> Option<Narrow> {
+        let axis: Vec<Vec3> = (0..20).map(|k| Vec3::new(x, 0.0, z - 0.6 * f64::from(k))).collect();
+        narrow_ahead(surface, wall, &axis, 0.4)
+    }
+
+    #[test]
+    fn a_tube_that_narrows_is_as_wide_as_its_narrowest_place_ahead() {
+        // 2 mm wide up to 20 mm, and 0.25 mm from 21 mm to 24 mm.
+        let throat = |z: f64| (2.0 - 1.75 * (z - 19.0).clamp(0.0, 1.0)) + 1.75 * (z - 24.0).clamp(0.0, 1.0);
+        let narrowing = vessel(throat, false);
+        for x in [0.0, 0.1] {
+            let found = ahead(&narrowing, 20.0, x).unwrap();
+            assert!((found.radius_mm - 0.25).abs() < 0.09 && found.place_mm.z > 19.5, "{found:?}");
+        }
+        // Far ahead it does not hold the device, and behind it neither.
+        assert_eq!(ahead(&narrowing, 15.0, 0.0), None);
+        assert_eq!(ahead(&narrowing, 27.0, 0.0), None);
+        // A hair wider than the device.
+        let enough = vessel(|z| 2.0 - 1.57 * (z - 19.0).clamp(0.0, 1.0), false);
+        assert_eq!(ahead(&enough, 20.0, 0.0), None);
+    }
+
+    #[test]
+    fn a_way_aside_is_a_way_and_one_back_is_none() {
+        let narrow = |z: f64| 2.0 - 1.8 * (z - 19.0).clamp(0.0, 1.0);
+        let found = ahead(&vessel(narrow, false), 20.0, 0.0).unwrap();
+        assert!((found.radius_mm - 0.2).abs() < 0.09, "{found:?}");
+        assert_eq!(ahead(&vessel(narrow, true), 19.6, 0.0), None);
+    }
+}
