@@ -304,22 +304,51 @@ impl Friction {
         force * phi(self.slip(index, x, angle, radius_mm).0.norm(), self.stick_mm)
     }
 
-    /// Energy that friction has taken in the step, mJ.
-    pub fn dissipated_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> f64 {
-        let each = points.iter().enumerate().take(self.sliders.len());
-        let taken = each.filter(|(index, _)| self.largest_n(*index) > 0.0).map(|(index, point)| {
+    /// Energy that friction has taken in the step with the normal forces of its end, mJ.
+    fn taken_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> f64 {
+        self.taken_mj + self.taken_by_mj(elements, state, points, |slider| slider.force_n)
+    }
+
+    /// The least and the most that friction has taken in the step, mJ: with the normal forces of its beginning, and with those of its end.
+    pub fn dissipated_mj(
+        &self,
+        elements: &[ElementData],
+        state: &RodState,
+        points: &[ContactPoint],
+    ) -> (f64, f64) {
+        let at_end_mj = self.taken_mj(elements, state, points);
+        // Once slip has begun anew those of the beginning are long gone.
+        if self.taken_mj != 0.0 {
+            return (at_end_mj, at_end_mj);
+        }
+        let at_start_mj = self.taken_by_mj(elements, state, points, |slider| slider.begun.1);
+        (at_start_mj.min(at_end_mj), at_start_mj.max(at_end_mj))
+    }
+
+    /// What friction with such normal forces takes from slip, mJ.
+    fn taken_by_mj(
+        &self,
+        elements: &[ElementData],
+        state: &RodState,
+        points: &[ContactPoint],
+        force_n: impl Fn(&Slider) -> f64,
+    ) -> f64 {
+        let each =
+            self.sliders.iter().zip(points).enumerate().filter(|(_, (slider, _))| force_n(slider) > 0.0);
+        let taken = each.map(|(index, (slider, point))| {
             let x = point.position(elements, state);
-            let value = self.value(index, &x, point.angle(state), point.potential.radius_mm);
+            let slip_mm = self.slip(index, &x, point.angle(state), point.potential.radius_mm).0.norm();
             // What sticks takes nothing.
-            value - self.largest_n(index) * phi(0.0, self.stick_mm)
+            let way_mm = phi(slip_mm, self.stick_mm) - phi(0.0, self.stick_mm);
+            self.coefficient * force_n(slider) * way_mm
         });
-        self.taken_mj + taken.sum::<f64>()
+        taken.sum::<f64>()
     }
 
     /// Slip begins anew at `state`, with the normal forces seen there: the hand holds still, and the device slides on to where it comes
     /// to rest. What a point has slipped within ε it has slipped within the new, smaller one, in proportion: friction holds it as it did.
     pub fn anchor(&mut self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) {
-        let taken_mj = self.dissipated_mj(elements, state, points);
+        let taken_mj = self.taken_mj(elements, state, points);
         let stick_mm = (self.stick_mm * STICK_AT_REST).max(self.least_stick_mm);
         for (index, point) in points.iter().enumerate().take(self.sliders.len()) {
             let (x, angle) = (point.position(elements, state), point.angle(state));
@@ -334,7 +363,7 @@ impl Friction {
         }
         self.stick_mm = stick_mm;
         self.taken_mj = 0.0;
-        self.taken_mj = taken_mj - self.dissipated_mj(elements, state, points);
+        self.taken_mj = taken_mj - self.taken_mj(elements, state, points);
     }
 
     /// Derivatives of a point's friction energy; `None` where nothing presses.

@@ -224,7 +224,9 @@ impl Grid<'_> {
             if i.abs().max(j.abs()) > most || self.clearance_mm(&x) <= 0.0 || !seen.insert([i, j]) {
                 continue;
             }
-            left.extend([[i + 1, j], [i - 1, j], [i, j + 1], [i, j - 1]].iter().filter(|c| !seen.contains(*c)));
+            left.extend(
+                [[i + 1, j], [i - 1, j], [i, j + 1], [i, j - 1]].iter().filter(|c| !seen.contains(*c)),
+            );
         }
         seen
     }

@@ -9,7 +9,8 @@ mod tally;
 
 pub use crate::contact::{Contact, WallProperties, WallRegion};
 pub use crate::methods::{
-    Command, Energy, InstrumentReport, Jump, LateralForce, Move, Sheath, State, StepReport, Surroundings, WallForce,
+    Command, Energy, InstrumentReport, Jump, LateralForce, Move, Sheath, State, StepReport, Surroundings,
+    WallForce,
 };
 pub use batch::Batch;
 pub use builder::SimulationBuilder;

@@ -37,6 +37,8 @@ pub enum StopReason {
     Singular,
     /// It has come too far from where the state was predicted.
     Left,
+    /// It is one with normal forces of friction that are not those of the wall.
+    Unsettled,
     /// The state or the matrix holds a number that is not finite.
     NotFinite,
 }
@@ -50,6 +52,7 @@ impl std::fmt::Display for StopReason {
             Self::NoDescent => "no step lowers the energy",
             Self::Singular => "the stiffness matrix is singular",
             Self::Left => "what was found is far from where the device was predicted",
+            Self::Unsettled => "friction and wall forces do not settle",
             Self::NotFinite => "a number is not finite",
         })
     }
@@ -116,7 +119,7 @@ impl NewtonReport {
     }
 
     /// None.
-    pub(super) fn stopped(self, reason: StopReason) -> Self {
-        Self { reason, ..self }
+    pub(crate) fn stopped(self, reason: StopReason) -> Self {
+        Self { reason, converged: false, ..self }
     }
 }

@@ -92,7 +92,7 @@ impl Slipped {
     }
 
     fn dissipated_mj(&self) -> f64 {
-        self.friction.dissipated_mj(&self.elements, &self.state, &self.points)
+        self.friction.taken_mj(&self.elements, &self.state, &self.points)
     }
 
     fn anchor(&mut self) {

@@ -1,7 +1,8 @@
 //! What was put in on the way from one state to the next, and where it went.
 //!
 //! Along a way of equilibria a force stays between what it is at the ends, so what hands, wall and blood put in lies between the least and
-//! the most of what the forces at the ends do. What is not stored, friction took; of more that is lost, the device has jumped.
+//! the most of what the forces at the ends do; and so does what friction took. What is put in and neither stored nor taken was set free: the
+//! device has jumped.
 
 use super::carried::WallWork;
 use crate::device::Stack;
@@ -23,19 +24,28 @@ pub(super) struct Balance {
     most_mj: f64,
     /// What is stored more than before.
     stored_mj: f64,
+    /// What friction took, at least and at most.
+    rubbed_mj: (f64, f64),
     /// What counts.
     notable_mj: f64,
 }
 
 impl Balance {
-    /// That from the state before to the one after, with what wall and blood did.
+    /// That from the state before to the one after, with what wall and blood did and what friction took, at least and at most.
     pub(super) fn new(
         stack: &Stack,
         (before, after): (&StepReport, &StepReport),
         by_wall: WallWork,
+        rubbed_mj: (f64, f64),
     ) -> Self {
         let (mut least_mj, mut most_mj) = (by_wall.least_mj, by_wall.most_mj);
         let mut mean_mj = 0.5 * (least_mj + most_mj);
+        // What has come out of the sheath was straight in it.
+        let each = stack.devices().enumerate().map(|(index, device)| {
+            let straightening = |report: &StepReport| device.straightening_mj(report.hand(index).inserted_mm);
+            straightening(after) - straightening(before)
+        });
+        let from_sheath_mj: f64 = each.sum();
         let mut add = |was: f64, is: f64, way: f64| {
             least_mj += (was * way).min(is * way);
             most_mj += (was * way).max(is * way);
@@ -44,35 +54,33 @@ impl Balance {
         for index in 0..after.instruments.len().max(1) {
             let (was, is) = (before.hand(index), after.hand(index));
             let push = |hand: &InstrumentReport| hand.push_force_n.unwrap_or(0.0);
-            add(push(&was), push(&is), is.inserted_mm - was.inserted_mm);
+            // With nothing inserted a hand feels nothing, and all that comes out of the sheath may pull at it.
+            let at_first =
+                if was.inserted_mm == 0.0 { -from_sheath_mj.abs() / is.inserted_mm } else { push(&was) };
+            add(at_first, push(&is), is.inserted_mm - was.inserted_mm);
             add(was.torque_nmm, is.torque_nmm, is.rotation_rad - was.rotation_rad);
         }
         let (was, is) = (before.energy.total(), after.energy.total());
-        // What has come out of the sheath was straight in it.
-        let each = stack.devices().enumerate().map(|(index, device)| {
-            let straightening = |report: &StepReport| device.straightening_mj(report.hand(index).inserted_mm);
-            straightening(after) - straightening(before)
-        });
-        let from_sheath_mj: f64 = each.sum();
         let notable_mj = NOTABLE * is.max(was).max(from_sheath_mj.abs()).max(NOTABLE_FLOOR_MJ);
-        Self { least_mj, mean_mj, most_mj, stored_mj: is - was - from_sheath_mj, notable_mj }
+        Self { least_mj, mean_mj, most_mj, stored_mj: is - was - from_sheath_mj, rubbed_mj, notable_mj }
     }
 
-    /// Whether energy was set free that had been put in, beside what friction is said to have taken.
-    pub(super) fn is_set_free(&self, dissipated_mj: f64) -> bool {
-        self.least_mj - self.stored_mj - dissipated_mj > self.notable_mj
+    /// Whether energy was set free that had been put in.
+    pub(super) fn is_set_free(&self) -> bool {
+        self.least_mj - self.stored_mj - self.rubbed_mj.1 > self.notable_mj
     }
 
-    /// Whether more is stored and said to be taken by friction than can have been put in.
-    pub(super) fn lacks(&self, dissipated_mj: f64) -> bool {
-        self.stored_mj + dissipated_mj - self.most_mj > self.notable_mj
+    /// Whether more is stored and taken by friction than can have been put in.
+    pub(super) fn lacks(&self) -> bool {
+        self.stored_mj + self.rubbed_mj.0 - self.most_mj > self.notable_mj
     }
 
-    /// What friction took and what a jump set free. In a jump they are not told apart: the normal forces on its way are not those at its end.
-    pub(super) fn lost_mj(&self, dissipated_mj: f64, jumps: bool) -> (f64, f64) {
+    /// What friction took and what a jump set free. In a jump they are not told apart: the normal forces on its way are not those at its ends.
+    pub(super) fn lost_mj(&self, jumps: bool) -> (f64, f64) {
         if jumps {
             return (0.0, (self.mean_mj - self.stored_mj).max(0.0));
         }
-        (dissipated_mj.min((self.most_mj - self.stored_mj + self.notable_mj).max(0.0)), 0.0)
+        let rubbed_mj = 0.5 * (self.rubbed_mj.0 + self.rubbed_mj.1);
+        (rubbed_mj.min((self.most_mj - self.stored_mj + self.notable_mj).max(0.0)), 0.0)
     }
 }

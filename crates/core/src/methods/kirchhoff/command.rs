@@ -140,6 +140,8 @@ impl<const C: usize> Workspace<C> {
             let iterations = tools.work.iterations - iterations;
             control.took(iterations);
             match tried {
+                // Where the device has come to rest with energy that nobody put in, it was too far from where it was.
+                Ok(found) if found.lacks && control.can_shorten(part_mm) => control.shorten(part_mm),
                 Ok(found) => {
                     sum.add(&found, effort);
                     // At a crease of the wall forces are those of one side or the other and never in balance; where nothing moves
@@ -147,7 +149,7 @@ impl<const C: usize> Workspace<C> {
                     let rests = done >= 1.0
                         && found.residual <= AT_REST
                         && was.state.rod.farthest_mm(&next.state.rod) <= REST_RADII * thinnest_mm;
-                    balanced = found.balanced || rests;
+                    balanced = (found.balanced && !found.lacks) || rests;
                     check_inside(surroundings.wall, &there.wall().material(&next.state.tip_mm()), 0.0)?;
                     std::mem::swap(now, next);
                     displaced = then;

@@ -23,7 +23,7 @@ use super::substep::Effort;
 use crate::contact::{SETTLED, WallContact};
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
-use crate::solve::{Newton, NewtonOptions, NewtonReport};
+use crate::solve::{Newton, NewtonOptions, NewtonReport, StopReason};
 
 /// Newton iterations of a solution near its prediction: from another one, nearer by, it is found in fewer.
 const MOST_NEAR: usize = 60;
@@ -103,7 +103,7 @@ impl<const C: usize> Search<'_, '_, C> {
             return found;
         }
         match self.effort {
-            Effort::Near => found,
+            Effort::Near => found.stopped(StopReason::Unsettled),
             Effort::Flight => {
                 self.state.copy_from(&self.guess.other);
                 self.contact.rewind_friction();

@@ -7,6 +7,8 @@ use super::substep::{Effort, Found};
 
 /// Longest way of the hands in which the device moves from a fold, mm: how exactly the place of a fold is known.
 const FOLD_MM: f64 = 0.05;
+/// Shortest way of the hands in which it moves, mm.
+const LEAST_MM: f64 = 1e-3;
 /// An equilibrium nearer to its prediction than this part of what is far is followed by a part twice as long. Predictions of first order are
 /// twice as far then, those of second order four times.
 const NEARER: f64 = 0.2;
@@ -72,11 +74,21 @@ impl StepControl {
             return true;
         }
         if part_mm <= FOLD_MM || self.budget == 0 {
-            self.flight_mm = Some(FOLD_MM);
+            self.flight_mm = Some(part_mm.min(FOLD_MM));
         } else {
             self.part_mm = 0.5 * part_mm;
         }
         false
+    }
+
+    /// Whether a part of this length, in which the device has moved, can be shorter.
+    pub(super) fn can_shorten(&self, part_mm: f64) -> bool {
+        part_mm > LEAST_MM && self.budget > 0
+    }
+
+    /// Goes on with parts of half that length, and looks for an equilibrium near by again.
+    pub(super) fn shorten(&mut self, part_mm: f64) {
+        (self.part_mm, self.flight_mm) = (0.5 * part_mm, None);
     }
 }
 
@@ -91,6 +103,7 @@ mod tests {
             residual: 0.0,
             unsettled: 0.0,
             balanced: true,
+            lacks: false,
             off,
             jump: None,
         }
@@ -116,8 +129,13 @@ mod tests {
         assert!(!control.failed(0.06));
         assert_eq!(control.next(1.0).0, Effort::Near);
         assert!(!control.failed(0.03));
-        assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
-        control.succeeded(FOLD_MM, &found(7.0));
+        assert_eq!(control.next(1.0), (Effort::Flight, 0.03));
+        // With energy that nobody put in it goes less far.
+        assert!(control.can_shorten(0.03) && !control.can_shorten(LEAST_MM));
+        control.shorten(0.03);
+        assert!(matches!(control.next(1.0), (Effort::Near, part_mm) if part_mm <= 0.015));
+        assert!(!control.failed(0.015));
+        control.succeeded(0.015, &found(7.0));
         assert_eq!(control.next(1.0).0, Effort::Near);
     }
 

@@ -21,8 +21,6 @@ use crate::solve::{NewtonReport, StopReason};
 const BEYOND: &str = "the device would be predicted beyond the wall";
 /// … where an equilibrium is, …
 const PASSED: &str = "the device would pass through the wall";
-/// … where friction and the wall disagree, …
-const UNSETTLED: &str = "friction and wall forces do not settle";
 /// … and where energy came from nowhere.
 const UNBALANCED: &str = "more energy is stored and taken by friction than was put in";
 
@@ -47,6 +45,8 @@ pub(super) struct Found {
     pub(super) unsettled: f64,
     /// Whether it is an equilibrium.
     pub(super) balanced: bool,
+    /// Whether more energy is stored and taken by friction than was put in: it is none that a motion of this part leads to.
+    pub(super) lacks: bool,
     /// How far it is from the prediction, over how far is near.
     pub(super) off: f64,
     /// The jump, if it is one.
@@ -171,7 +171,7 @@ impl<const C: usize> Tools<C> {
         let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
         let wrong = match (near, &found) {
             (true, found) if !found.converged => Some(what_is_left(found)),
-            (true, _) if !balanced => Some(UNSETTLED.into()),
+            (true, _) if !balanced => Some(StopReason::Unsettled.to_string().into()),
             (true, _) if off > 1.0 => Some(StopReason::Left.to_string().into()),
             (false, found) if !found.residual.is_finite() => Some(what_is_left(found)),
             _ => {
@@ -189,25 +189,26 @@ impl<const C: usize> Tools<C> {
         if let Some(wrong) = wrong {
             return Err(wrong);
         }
-        let along_mj = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
-        let dissipated_mj = along_mj + self.friction.between.taken_mj(rod);
-        let dissipated_mj = dissipated_mj + self.write_report(environment, hands, next);
+        let (least_mj, most_mj) = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
+        let elsewhere_mj = self.friction.between.taken_mj(rod) + self.write_report(environment, hands, next);
+        let rubbed_mj = (least_mj + elsewhere_mj, most_mj + elsewhere_mj);
         let (mesh, after) = next.parts();
         let reports = (&start.state.report, &after.report);
         let flow_mj = aside_mj + self.drag.size_n() * farthest_mm(reports);
         let by_wall = WallWork::new(left.map(|(_, passage)| passage), reports).with_flow(flow_mj);
-        let balance = Balance::new(surroundings.stack, reports, by_wall);
-        if near && balance.lacks(dissipated_mj) {
+        let balance = Balance::new(surroundings.stack, reports, by_wall, rubbed_mj);
+        let lacks = balance.lacks();
+        if near && lacks {
             return Err(UNBALANCED.into());
         }
-        let jumps = (!near && off > 1.0) || balance.is_set_free(dissipated_mj);
-        let (dissipated_mj, released_mj) = balance.lost_mj(dissipated_mj, jumps);
+        let jumps = (!near && off > 1.0) || balance.is_set_free();
+        let (dissipated_mj, released_mj) = balance.lost_mj(jumps);
         let position_mm = self.newton.neighbourhood.farthest(&after.rod);
         let jump = jumps.then_some(Jump { released_mj, position_mm });
         let corrections = (&start.state.correction, &mut after.correction);
         self.guess.teach(&after.rod, corrections);
         self.keep(mesh, after);
-        Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, off, jump })
+        Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, lacks, off, jump })
     }
 }
 
