@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use endowire_verify::insertion_stress::{InsertionRow, InsertionStress};
 use endowire_verify::instrument_stress::{self, InstrumentRow, InstrumentStress};
+use endowire_verify::sequences::{self, SEQUENCES, SequenceRow};
 use endowire_verify::{FAMILIES, Row, stress};
 use serde::Serialize;
 
@@ -26,6 +27,8 @@ struct Document {
     insertion_stress: Option<Vec<InsertionRow>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     instrument_stress: Option<Vec<Instruments>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sequences: Option<Vec<SequenceRow>>,
 }
 
 /// Random commands on several instruments, and the time they took.
@@ -53,7 +56,8 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
     let insertion = args.stress.then(InsertionStress::new).transpose()?;
     let combinations = insertion.as_ref().map_or_else(Vec::new, InsertionStress::cases);
     let together = if args.stress { instrument_stress::cases() } else { Vec::new() };
-    let count = FAMILIES.len() + stressed.len() + combinations.len() + together.len();
+    let seeds = if args.stress { 0..SEQUENCES } else { 0..0 };
+    let count = FAMILIES.len() + stressed.len() + combinations.len() + together.len() + seeds.end as usize;
     let bar = progress::bar(count, "case");
     let mut cases = Vec::new();
     for family in FAMILIES {
@@ -86,6 +90,12 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
         instruments.push(Instruments { row, time_s: clock.elapsed().as_secs_f64() });
         bar.inc(1);
     }
+    let mut random = Vec::new();
+    for seed in seeds {
+        bar.set_message(format!("random commands {seed}"));
+        random.push(sequences::run(seed)?);
+        bar.inc(1);
+    }
     bar.finish_and_clear();
 
     let passed = cases.iter().filter(|row| row.pass).count();
@@ -97,6 +107,7 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
         stress: args.stress.then_some(rows),
         insertion_stress: insertions,
         instrument_stress: args.stress.then_some(instruments),
+        sequences: args.stress.then_some(random),
     };
     if args.json {
         print_json(&document)?;
@@ -105,7 +116,8 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
     }
     let unexplained = document.stress.iter().flatten().filter(|s| !s.row.pass).count()
         + document.insertion_stress.iter().flatten().filter(|row| !row.pass).count()
-        + document.instrument_stress.iter().flatten().filter(|one| !one.row.pass).count();
+        + document.instrument_stress.iter().flatten().filter(|one| !one.row.pass).count()
+        + document.sequences.iter().flatten().filter(|row| !row.pass).count();
     if document.failed > 0 || unexplained > 0 {
         return Err(Failure::Computation(format!(
             "{} of {} reference rows and {unexplained} stressed cases fail",
@@ -145,6 +157,11 @@ fn print_cases(document: &Document) {
     }
     if let Some(rows) = &document.instrument_stress {
         print_instruments(rows);
+    }
+    if let Some(rows) = &document.sequences {
+        println!();
+        println!("{}", SequenceRow::HEAD);
+        rows.iter().for_each(|row| println!("{row}"));
     }
 }
 

@@ -1,0 +1,169 @@
+//! Scenes that are hard to simulate, each as its script has it and again in small steps.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use endowire_core::insertion::{Command, Move, Simulation};
+use endowire_core::scene::Scene;
+use endowire_core::vessel::NoStore;
+use endowire_core::{Error, Result};
+
+/// Small steps, mm and rad.
+const SMALL_MM: f64 = 0.1;
+const SMALL_RAD: f64 = 0.02;
+/// How far apart tips may be, mm: without friction and with it, which leaves a device anywhere within its cones.
+const APART_MM: [f64; 2] = [0.05, 0.5];
+
+/// One way through a script.
+struct Course {
+    simulation: Simulation,
+    commands: usize,
+    iterations: u64,
+    flights: u64,
+    jumps: usize,
+    unconverged: usize,
+    seconds: f64,
+    slowest_s: f64,
+    end: Option<String>,
+}
+
+impl Course {
+    fn new(simulation: Simulation) -> Self {
+        let (commands, iterations, flights, jumps, unconverged) = (0, 0, 0, 0, 0);
+        let (seconds, slowest_s, end) = (0.0, 0.0, None);
+        Self { simulation, commands, iterations, flights, jumps, unconverged, seconds, slowest_s, end }
+    }
+
+    /// Carries out a step in equal parts, from one time to another; not once something has ended the way.
+    fn go(&mut self, moves: &[Move], times_s: Option<(f64, f64)>, parts: usize) {
+        for k in 1..=parts {
+            if self.end.is_some() {
+                return;
+            }
+            let share = |Command { advance_mm, rotate_rad }| Command {
+                advance_mm: advance_mm / parts as f64,
+                rotate_rad: rotate_rad / parts as f64,
+            };
+            let part: Vec<Move> =
+                moves.iter().map(|one| Move { command: share(one.command), ..*one }).collect();
+            let time_s = times_s.map(|(from, to)| from + (to - from) * k as f64 / parts as f64);
+            let begun = Instant::now();
+            let done = self.simulation.step_until(&part, time_s);
+            let took_s = begun.elapsed().as_secs_f64();
+            self.seconds += took_s;
+            self.slowest_s = self.slowest_s.max(took_s);
+            match done {
+                Ok(report) => {
+                    self.commands += 1;
+                    self.iterations += u64::from(report.iterations);
+                    self.flights += u64::from(report.relaxations);
+                    self.jumps += usize::from(report.jumped);
+                    self.unconverged += usize::from(!report.converged);
+                }
+                Err(error) => self.end = Some(error.to_string()),
+            }
+        }
+    }
+
+    fn tip_mm(&self) -> endowire_core::Vec3 {
+        self.simulation.shape().tip_mm().unwrap_or_default()
+    }
+}
+
+/// How many small steps moves are.
+fn parts(moves: &[Move]) -> usize {
+    let each = moves
+        .iter()
+        .map(|one| (one.command.advance_mm.abs() / SMALL_MM).max(one.command.rotate_rad.abs() / SMALL_RAD));
+    each.fold(1.0, f64::max).ceil() as usize
+}
+
+/// One case. Returns whether the path was kept, or both ways tell jumps.
+fn case(path: &Path) -> Result<bool> {
+    let scene = Scene::read(path)?;
+    let start = scene.simulation(&NoStore)?;
+    let script = scene.steps(start.stack())?;
+    let most_mm = APART_MM[usize::from(scene.vessel.wall.friction > 0.0)];
+    let (mut given, mut small) = (Course::new(start.clone()), Course::new(start));
+    let mut run = script.begin();
+    let mut now_s = 0.0;
+    let mut apart: (f64, usize) = (0.0, 0);
+    let mut left: Option<usize> = None;
+    while let Some(step) = run.next(&given.simulation)? {
+        let moves = step.moves.to_vec();
+        let times_s = step.time_s.map(|to| (std::mem::replace(&mut now_s, to), to));
+        run.carried_out();
+        given.go(&moves, times_s, 1);
+        small.go(&moves, times_s, parts(&moves).max(if times_s.is_some() { 5 } else { 1 }));
+        if given.end.is_some() || small.end.is_some() {
+            break;
+        }
+        let apart_mm = (given.tip_mm() - small.tip_mm()).norm();
+        if apart_mm > apart.0 {
+            apart = (apart_mm, given.commands);
+        }
+        if apart_mm > most_mm && left.is_none() {
+            left = Some(given.commands);
+        }
+    }
+    let told = given.jumps > 0 && small.jumps > 0;
+    let ends = [&given, &small].map(|one| one.end.is_some());
+    let kept = match (left, ends[0] == ends[1]) {
+        (None, true) => "kept",
+        _ if told => "told",
+        _ => "LEFT",
+    };
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    println!(
+        "{name:<28} {kept:<5} {:>8.3} {:>5} {:>8.1} {:>5} {:>7} {:>7} {:>8.0} {:>8.0} {:>4} {:>4} {:>5} {:>5} {:>3}  {}",
+        apart.0,
+        left.map_or_else(|| "–".to_owned(), |k| k.to_string()),
+        given.simulation.report().inserted_mm,
+        given.commands,
+        given.iterations,
+        small.iterations,
+        1e3 * given.seconds,
+        1e3 * given.slowest_s,
+        given.jumps,
+        small.jumps,
+        given.flights,
+        small.flights,
+        given.unconverged,
+        given.end.or(small.end).map(|end| end.chars().take(60).collect::<String>()).unwrap_or_default()
+    );
+    Ok(kept != "LEFT")
+}
+
+/// Cases of which the path was left in silence.
+pub(crate) fn cases(only: Option<&str>) -> Result<usize> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("hard");
+    let entries = std::fs::read_dir(&folder).map_err(|error| Error::file(&folder, error))?;
+    let mut paths: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
+    paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
+    paths.retain(|path| only.is_none_or(|only| path.to_string_lossy().contains(only)));
+    paths.sort();
+    println!(
+        "{:<28} {:<5} {:>8} {:>5} {:>8} {:>5} {:>7} {:>7} {:>8} {:>8} {:>4} {:>4} {:>5} {:>5} {:>3}  ends",
+        "case",
+        "path",
+        "apart mm",
+        "from",
+        "in mm",
+        "cmds",
+        "iter.",
+        "small",
+        "ms",
+        "slowest",
+        "jump",
+        "sm.",
+        "fly",
+        "sm.",
+        "unb"
+    );
+    let mut wrong = 0;
+    for path in &paths {
+        wrong += usize::from(!case(path)?);
+    }
+    println!("{} cases", paths.len());
+    Ok(wrong)
+}

@@ -1,0 +1,47 @@
+//! Hard insertions: whether where a device ends depends on how the hand's motion is cut into commands.
+//!
+//! ```sh
+//! cargo run --release -p endowire-benches --bin hard -- cases [NAME]         # scenes of benches/hard, each against steps of 0.1 mm
+//! cargo run --release -p endowire-benches --bin hard -- turned [SCENE]       # 480 insertions of four scenes against steps of 0.25 mm
+//! cargo run --release -p endowire-benches --bin hard -- sequences [SEEDS]    # random commands, each against its parts of 1 mm
+//! ```
+//!
+//! Ends with 1 where one ends elsewhere in silence.
+#![allow(clippy::print_stdout, reason = "a table is what it is for")]
+
+mod cases;
+mod turned;
+
+use std::process::ExitCode;
+
+use endowire_core::{Error, Result};
+use endowire_verify::sequences::{SEQUENCES, SequenceRow, run};
+
+/// Sequences in which something is wrong.
+fn sequences(count: u64) -> Result<usize> {
+    println!("{}", SequenceRow::HEAD);
+    let mut wrong = 0;
+    for seed in 0..count {
+        let row = run(seed)?;
+        wrong += usize::from(!row.pass);
+        println!("{row}");
+    }
+    Ok(wrong)
+}
+
+fn main() -> Result<ExitCode> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mend = "say `cases [NAME]`, `turned [SCENE]` or `sequences [SEEDS]`";
+    let second = arguments.get(1).map(String::as_str);
+    let wrong = match arguments.first().map(String::as_str) {
+        Some("cases") => cases::cases(second)?,
+        Some("turned") => turned::turned(second)?,
+        Some("sequences") => {
+            let seeds = second.map_or(Ok(SEQUENCES), str::parse);
+            sequences(seeds.map_err(|_| Error::parameter("SEEDS", &arguments[1], mend))?)?
+        }
+        other => return Err(Error::parameter("study", other.unwrap_or("none"), mend)),
+    };
+    println!("{wrong} are wrong");
+    Ok(ExitCode::from(u8::from(wrong > 0)))
+}

@@ -1,0 +1,282 @@
+//! Random commands of up to 40 mm in random vessels, each against the same motion in parts of a millimetre: what `endowire verify --stress`
+//! runs beside the stress of insertions.
+//!
+//! Whatever the hand does at once, the device ends where it would if it were done bit by bit: no state is accepted with much more energy than
+//! that of the parts, none is beyond the wall by more than it says, none is longer or shorter than what is inserted.
+
+use endowire_core::device::{Device, Instrument, Section, Stack};
+use endowire_core::insertion::{Command, Move, Sheath, Simulation, WallProperties};
+use endowire_core::methods::kirchhoff::KirchhoffOptions;
+use endowire_core::random::{splitmix64, unit};
+use endowire_core::shape::Shape;
+use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
+use endowire_core::{Error, Result};
+use serde::Serialize;
+
+use crate::crossing::{CrossingTest, curve};
+
+/// Sequences of the whole stress.
+pub const SEQUENCES: u64 = 300;
+/// Commands of a sequence.
+const COMMANDS: usize = 60;
+/// More energy than this many times that of the parts, and …
+const MORE: f64 = 1.5;
+/// … this, mJ, beyond that, is another equilibrium.
+const MORE_MJ: f64 = 1e-3;
+/// Largest part of what is inserted by which a device may be longer or shorter.
+const STRETCHED: f64 = 1e-3;
+/// How far apart tips may be, mm: without friction and with it, which leaves a device anywhere within its cones.
+const APART_MM: [f64; 2] = [0.05, 0.5];
+/// A device deeper behind the triangles than it says by this, mm, has gone through them: more than the wall that is felt is off.
+const CROSSED_MM: f64 = 0.3;
+
+/// What became of a sequence.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SequenceRow {
+    /// Its number.
+    pub seed: u64,
+    /// Vessel, wall and device.
+    pub what: String,
+    /// Commands carried out.
+    pub commands: usize,
+    /// Newton iterations of them, …
+    pub iterations: u64,
+    /// … and of their parts.
+    pub iterations_of_parts: u64,
+    /// Parts in which the device moved to where it came to rest.
+    pub flights: u64,
+    /// Commands that ended without an equilibrium, and said so.
+    pub unconverged: usize,
+    /// Accepted states of more than 1.5 times the energy of the parts, …
+    pub stored_more: usize,
+    /// … of numbers that are not finite, …
+    pub not_finite: usize,
+    /// … of another length than what is inserted, …
+    pub stretched: usize,
+    /// … and beyond the wall by more than they say.
+    pub crossed: usize,
+    /// Commands that failed though their parts did not, or the other way round.
+    pub failed: usize,
+    /// Commands that end elsewhere than their parts without a jump in both. Where friction holds a device loosely, parts tell what they can.
+    pub apart: usize,
+    /// The first thing that went wrong.
+    pub first: String,
+    /// Whether nothing did.
+    pub pass: bool,
+}
+
+impl SequenceRow {
+    /// The heads of what a row shows.
+    pub const HEAD: &str = "seed  cmds  iter.  parts' fly  unb  energy nan length crossed failed apart  what, and what was first";
+}
+
+impl std::fmt::Display for SequenceRow {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { seed, commands, iterations, iterations_of_parts, flights, unconverged, .. } = self;
+        let Self { stored_more, not_finite, stretched, crossed, failed, apart, what, first, .. } = self;
+        write!(
+            f,
+            "{seed:>4} {commands:>5} {iterations:>6} {iterations_of_parts:>7} {flights:>3} {unconverged:>4} {stored_more:>7} {not_finite:>3} \
+             {stretched:>6} {crossed:>7} {failed:>6} {apart:>5}  {what} {first}"
+        )
+    }
+}
+
+/// Random numbers of a seed.
+struct Random(u64, u64);
+
+impl Random {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.1 += 1;
+        low + (high - low) * unit(splitmix64(self.0, self.1))
+    }
+
+    fn one_of<T: Copy>(&mut self, list: &[T]) -> T {
+        list[self.between(0.0, list.len() as f64) as usize]
+    }
+}
+
+/// A random wire, now and then in a catheter, in a random anatomy.
+struct Scene {
+    start: Simulation,
+    wall: Wall,
+    hands: usize,
+    friction: f64,
+    what: String,
+}
+
+impl Scene {
+    fn new(random: &mut Random) -> Result<Self> {
+        let name = random.one_of(&anatomy::NAMES);
+        let tree = anatomy::tree(name).ok_or_else(|| Error::parameter("vessel", name, "is not built in"))?;
+        let edge_mm = random.one_of(&[0.8, 1.2, 2.0]);
+        let made = GeneratedWall::new(&tree, Resolution::EdgeMm(edge_mm))?;
+        let sheath = Sheath::at_opening(&made.wall, made.inlet, 2.0)?;
+        let radius_mm = random.between(0.15, 0.45);
+        let bending_nmm2 = 10f64.powf(random.between(0.0, 1.5));
+        let hook = [random.one_of(&[0.0, 1.0, 1.0]) * random.between(0.0, 0.12), 0.0];
+        let tip = Section::straight(random.between(8.0, 50.0), radius_mm, bending_nmm2);
+        let tip = Section { rest_curvature_per_mm: hook, ..tip };
+        let shaft = Section::straight(400.0, radius_mm, bending_nmm2 * random.between(1.0, 8.0));
+        let wire = Device::new(vec![tip, shaft])?;
+        let several = random.between(0.0, 1.0) < 0.3;
+        let stack = if several { within_catheter(wire, radius_mm, random)? } else { Stack::from(wire) };
+        let friction = random.one_of(&[0.0, 0.0, 0.1, 0.3]);
+        let modulus_n_per_mm2 = random.one_of(&[0.05, 1.0, 30.0, 1e3, 1e6]);
+        let element_mm = random.one_of(&[1.0, 2.0, 4.0, 6.0]);
+        let options = KirchhoffOptions { element_mm, ..KirchhoffOptions::default() };
+        let hands = stack.instruments().len();
+        let start = Simulation::builder(made.wall.clone(), stack, sheath)
+            .properties(WallProperties { modulus_n_per_mm2, friction, ..WallProperties::default() })
+            .method(&options)
+            .build()?;
+        let what = format!(
+            "{name}, edges {edge_mm}, wall {modulus_n_per_mm2}, μ {friction}, wire {radius_mm:.2} mm of {bending_nmm2:.1} N·mm², elements \
+             {element_mm}{}",
+            if several { ", in a catheter" } else { "" }
+        );
+        Ok(Self { start, wall: made.wall, hands, friction, what })
+    }
+}
+
+/// The wire in a catheter that fits it.
+fn within_catheter(wire: Device, radius_mm: f64, random: &mut Random) -> Result<Stack> {
+    let bending_nmm2 = 10f64.powf(random.between(0.0, 1.5));
+    let bend = random.one_of(&[0.0, 1.0]) * random.between(0.0, 0.06);
+    let straight = |length_mm: f64, bending_nmm2: f64| Section {
+        inner_radius_mm: Some(1.15 * radius_mm),
+        ..Section::straight(length_mm, 1.6 * radius_mm, bending_nmm2)
+    };
+    let tip = straight(random.between(8.0, 30.0), bending_nmm2);
+    let tip = Section { rest_curvature_per_mm: [bend, 0.0], ..tip };
+    let catheter = Device::new(vec![tip, straight(350.0, 2.0 * bending_nmm2)])?;
+    let instrument =
+        |name: &str, device: Device| Instrument { name: name.to_owned(), device, may_lead: true };
+    Stack::new(vec![instrument("wire", wire), instrument("catheter", catheter)])
+}
+
+/// What a motion came to.
+#[derive(Default)]
+struct Done {
+    iterations: u64,
+    flights: u64,
+    jumped: bool,
+    unconverged: bool,
+    failed: Option<Error>,
+}
+
+/// Moves in equal parts.
+fn go(simulation: &mut Simulation, moves: &[Move], parts: usize) -> Done {
+    let mut done = Done::default();
+    let share = |command: Command| Command {
+        advance_mm: command.advance_mm / parts as f64,
+        rotate_rad: command.rotate_rad / parts as f64,
+    };
+    let part: Vec<Move> = moves.iter().map(|one| Move { command: share(one.command), ..*one }).collect();
+    for _ in 0..parts {
+        match simulation.step_together(&part) {
+            Ok(report) => {
+                done.iterations += u64::from(report.iterations);
+                done.flights += u64::from(report.relaxations);
+                done.jumped |= report.jumped;
+                done.unconverged |= !report.converged;
+            }
+            Err(error) => {
+                done.failed = Some(error);
+                break;
+            }
+        }
+    }
+    done
+}
+
+/// Length of a device, mm.
+fn length_mm(shape: &Shape) -> f64 {
+    curve(shape).windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
+}
+
+/// Runs a sequence.
+///
+/// # Errors
+/// None that a seed is to blame for.
+pub fn run(seed: u64) -> Result<SequenceRow> {
+    let mut random = Random(seed, 0);
+    let scene = Scene::new(&mut random)?;
+    let crossing = CrossingTest::new(scene.wall.mesh());
+    let mut row = SequenceRow {
+        seed,
+        what: scene.what.clone(),
+        commands: 0,
+        iterations: 0,
+        iterations_of_parts: 0,
+        flights: 0,
+        unconverged: 0,
+        stored_more: 0,
+        not_finite: 0,
+        stretched: 0,
+        crossed: 0,
+        failed: 0,
+        apart: 0,
+        first: String::new(),
+        pass: true,
+    };
+    let mut simulation = scene.start.clone();
+    for number in 0..COMMANDS {
+        let moves: Vec<Move> = (0..scene.hands)
+            .map(|instrument| {
+                let advance_mm = random.one_of(&[0.0, 1.0, 1.0, 1.0, 1.0]) * random.between(-25.0, 40.0);
+                let rotate_rad = random.one_of(&[0.0, 1.0]) * random.between(-3.0, 3.0);
+                Move { instrument, command: Command { advance_mm, rotate_rad } }
+            })
+            .collect();
+        let millimetres =
+            moves.iter().map(|one| one.command.advance_mm.abs().max(10.0 * one.command.rotate_rad.abs()));
+        let parts = millimetres.fold(1.0, f64::max).ceil() as usize;
+        let (mut one, mut many) = (simulation.clone(), simulation.clone());
+        let (by_one, by_many) = (go(&mut one, &moves, 1), go(&mut many, &moves, parts));
+        row.iterations += by_one.iterations;
+        row.iterations_of_parts += by_many.iterations;
+        row.flights += by_one.flights;
+        row.unconverged += usize::from(by_one.unconverged);
+        let mut wrong = |count: &mut usize, what: String| {
+            *count += 1;
+            if row.first.is_empty() {
+                row.first = format!("command {number}: {what}");
+            }
+        };
+        match (&by_one.failed, &by_many.failed) {
+            (None, None) => {}
+            // What ends in the vessel may be met by parts that have come less far.
+            (Some(error), _) | (None, Some(error)) => {
+                let explained = |error: &Error| matches!(error, Error::End(_)) || error.is_input();
+                if !explained(error) {
+                    wrong(&mut row.failed, error.to_string());
+                }
+                continue;
+            }
+        }
+        row.commands += 1;
+        let [energy_mj, of_parts_mj] = [&one, &many].map(|s| s.report().energy.total());
+        let (inserted_mm, length_mm) = (one.report().inserted_mm, length_mm(one.shape()));
+        let accepted = !by_one.unconverged;
+        if accepted && energy_mj > MORE * of_parts_mj + MORE_MJ {
+            wrong(&mut row.stored_more, format!("{energy_mj:.4} mJ, and its parts {of_parts_mj:.4}"));
+        }
+        if !energy_mj.is_finite() || !length_mm.is_finite() {
+            wrong(&mut row.not_finite, "a number that is not finite".to_owned());
+        }
+        if accepted && (length_mm - inserted_mm).abs() > STRETCHED * inserted_mm {
+            wrong(&mut row.stretched, format!("{length_mm:.3} mm of {inserted_mm:.3} inserted"));
+        }
+        if let Some(missing_mm) = crossing.missing_mm(&scene.wall, &one).filter(|mm| *mm > CROSSED_MM) {
+            wrong(&mut row.crossed, format!("{missing_mm:.3} mm deeper in the wall than told"));
+        }
+        let tips = one.shape().tip_mm().zip(many.shape().tip_mm());
+        let apart_mm = tips.map_or(0.0, |(a, b)| (a - b).norm());
+        let told = by_one.jumped && by_many.jumped;
+        row.apart += usize::from(apart_mm > APART_MM[usize::from(scene.friction > 0.0)] && !told);
+        simulation = many;
+    }
+    row.pass = row.stored_more + row.not_finite + row.stretched + row.crossed + row.failed == 0;
+    Ok(row)
+}
