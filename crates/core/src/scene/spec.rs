@@ -202,12 +202,12 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         let path = self.vessel_path()?;
         let spec = &self.vessel;
         if spec.tree.is_some() {
+            let mend = "only with vessel.file: a tree is in millimetres, in the axes of the scene";
             if let Some(unit_mm) = spec.unit_mm {
-                return Err(Error::parameter(
-                    "vessel.unit_mm",
-                    unit_mm,
-                    "only with vessel.file: a tree is in millimetres",
-                ));
+                return Err(Error::parameter("vessel.unit_mm", unit_mm, mend));
+            }
+            if let Some(axes) = spec.axes {
+                return Err(Error::parameter("vessel.axes", axes.name(), mend));
             }
             self.centreline_path()?;
             let tree = CentrelineTree::read(&path).map_err(|e| missing_tree(&path, e))?;
@@ -228,7 +228,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 return Err(Error::parameter(name, value, "only with vessel.tree: a file has its own mesh"));
             }
         }
-        let surface = SurfaceMesh::read(&path, spec.unit_mm.unwrap_or(1.0)).map_err(|error| match error {
+        let surface = SurfaceMesh::read(&path, spec.frame()).map_err(|error| match error {
             Error::Parameter { name, value, mend } => {
                 Error::Parameter { name: format!("vessel.{name}"), value, mend }
             }

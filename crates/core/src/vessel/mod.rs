@@ -30,6 +30,7 @@ mod weld;
 pub use centreline::{CentrelineNode, CentrelineTree, Target};
 pub use check::{CheckReport, OpeningReport, check, check_with};
 pub use conditioning::{Conditioned, Conditioning, condition};
+pub use files::{PatientAxes, SurfaceFrame};
 pub use generate::{GeneratedWall, Resolution};
 pub use hints::unit_hint;
 pub use mesh::SurfaceMesh;
