@@ -1,6 +1,7 @@
 //! What instruments are pushed into.
 
 use std::collections::BTreeMap;
+use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -10,6 +11,7 @@ use endowire_core::vessel::{
     anatomy, check_with,
 };
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::Serialize;
@@ -51,13 +53,22 @@ impl Vessel {
     /// Reads a surface file (STL, OBJ, PLY, VTP, VTK) and mends what can be mended; `unit_mm` is millimetres per unit of the file, `axes`
     /// "LPS" or "RAS" where the file's header does not tell or is wrong (without either: LPS, the axes of scenes).
     ///
-    /// Raises InputError for a file that cannot be read or serves as no wall.
+    /// Warns (UserWarning) where the unit may be another, and where openings face each other. Raises InputError for a file that cannot be
+    /// read or serves as no wall.
     #[staticmethod]
     #[pyo3(signature = (path, unit_mm = 1.0, axes = None))]
     fn read(py: Python<'_>, path: PathBuf, unit_mm: f64, axes: Option<&str>) -> PyResult<Self> {
         let frame = frame(unit_mm, axes)?;
-        let made = interruptible(py, move || Wall::from_surface(&SurfaceMesh::read(&path, frame)?))?;
-        Ok(Self::of_wall(made.map_err(exception)?))
+        let told = path.display().to_string();
+        let made = interruptible(py, move || {
+            let wall = Wall::from_surface(&SurfaceMesh::read(&path, frame)?)?;
+            wall_hints(&wall, frame.unit_mm).map(|hints| (wall, hints))
+        })?;
+        let (wall, hints) = made.map_err(exception)?;
+        for hint in hints {
+            warn(py, &format!("{told}: {hint}"))?;
+        }
+        Ok(Self::of_wall(wall))
     }
 
     /// The wall of a triangle surface: vertices in mm, shape (n, 3), and triangles of vertex indices, shape (m, 3), counter-clockwise seen
@@ -258,6 +269,12 @@ impl Tree<'_> {
 /// The built-in anatomy of that name, unless a file is called so.
 fn built_in(path: &Path) -> Option<CentrelineTree> {
     path.to_str().filter(|_| !path.exists()).and_then(anatomy::tree)
+}
+
+/// Warns as `warnings.warn` does, at the line that called.
+fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+    let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
 }
 
 /// How the coordinates of a surface file are meant.

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use endowire_core::device::DeviceFile;
-use endowire_core::vessel::{GeneratedWall, Opening, Resolution, SurfaceFrame, SurfaceMesh, Wall, anatomy};
+use endowire_core::vessel::{
+    GeneratedWall, Opening, Resolution, SurfaceFrame, SurfaceMesh, Wall, anatomy, wall_hints,
+};
 
 use crate::args::NewArgs;
 use crate::failure::Failure;
@@ -80,6 +82,9 @@ fn vessel(wanted: &Path, frame: SurfaceFrame, folder: &Path) -> Result<Vessel, F
         )));
     }
     let wall = Wall::from_surface(&SurfaceMesh::read(wanted, frame)?)?;
+    for hint in wall_hints(&wall, frame.unit_mm)? {
+        tell(format_args!("{}: {hint}", wanted.display()));
+    }
     let mut file = PathBuf::from("vessel");
     file.set_extension(wanted.extension().unwrap_or_default());
     let copied = folder.join(&file);

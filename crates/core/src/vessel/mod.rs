@@ -32,7 +32,7 @@ pub use check::{CheckReport, OpeningReport, check, check_with};
 pub use conditioning::{Conditioned, Conditioning, condition};
 pub use files::{PatientAxes, SurfaceFrame};
 pub use generate::{GeneratedWall, Resolution};
-pub use hints::unit_hint;
+pub use hints::wall_hints;
 pub use mesh::SurfaceMesh;
 pub(crate) use mesh::inward_vertex_normals;
 pub use motion::{Displacement, MotionMode, VesselMotion};

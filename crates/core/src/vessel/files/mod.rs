@@ -189,7 +189,8 @@ fn placed(parsed: Parsed, frame: SurfaceFrame) -> std::result::Result<SurfaceMes
             "with unit_mm = {} the surface is {extent_mm:.1e} mm across, and no vessel more than {EXTENT_LIMIT_MM:.0e}: give \
              the millimetres per unit of the file{}",
             crate::error::number(unit_mm),
-            super::unit_hint(extent_mm, unit_mm).map_or_else(String::new, |hint| format!(" ({hint})"))
+            super::hints::unit_hint(extent_mm, None, unit_mm)
+                .map_or_else(String::new, |hint| format!(" ({hint})"))
         ));
     }
     Ok(mesh)
