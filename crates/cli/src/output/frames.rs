@@ -76,6 +76,12 @@ impl FrameWriter {
         self.planes.first().map(|r| r.backend().to_owned())
     }
 
+    /// How much of the vessel the patient's tomogram holds, for people; nothing without one.
+    pub(crate) fn held(&self) -> Option<String> {
+        let part = self.planes.first()?.vessel_held()?;
+        Some(format!("the tomogram (view.patient.ct) holds {:.0} % of the vessel's surface", 100.0 * part))
+    }
+
     /// Where the C-arm stands in each plane of fluoroscopy, for the summary.
     pub(crate) fn planes(&self) -> Vec<PlaneTold> {
         let arms = self.planes.iter().filter_map(|plane| Some((plane.c_arm()?, plane.exposure())));

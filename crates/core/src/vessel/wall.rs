@@ -180,6 +180,11 @@ impl Wall {
         if whole {
             repair::join_sheets(&mut mesh, &mut edges, tolerance_mm, &mut report);
         }
+        if mesh.triangles.is_empty() {
+            return Err(Error::Mesh(
+                "nothing is left of it where its edges are joined; check the file and its unit".into(),
+            ));
+        }
         let before = mesh.triangles.clone();
         let consistency = orient::make_consistent(&mut mesh.triangles, &mut edges);
         turn_outward(&mut mesh, &mut edges, &consistency);

@@ -44,6 +44,9 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
     let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation))?;
     frames.check(&script).map_err(in_scene)?;
+    if let Some(held) = frames.held().filter(|_| !args.quiet) {
+        tell(format_args!("{}: {held}", args.scene.display()));
+    }
     let mut times_s = Vec::new();
     let mut hand = match &saved {
         Some(saved) => saved.restore(&scene, &mut simulation, &script, |step| {

@@ -107,7 +107,9 @@ fn splits(mesh: &SurfaceMesh, open: &[EdgeUse]) -> Vec<Split> {
         near.sort_unstable();
         near.dedup();
         let width = (WIDTH * length).min(cell);
-        for &v in near.iter().filter(|v| **v != edge.low && **v != edge.high) {
+        // A flat triangle is no seam.
+        let own = mesh.triangles[edge.triangle as usize];
+        for &v in near.iter().filter(|v| !own.contains(*v)) {
             let along = (at(v) - a).dot(&(b - a)) / (length * length);
             let off = (at(v) - a - (b - a) * along).norm();
             if along > 0.0 && along < 1.0 && off <= width && nearest.get(&v).is_none_or(|best| off < best.0) {
@@ -143,7 +145,6 @@ fn apply(mesh: &mut SurfaceMesh, split: &Split) {
     let (from, apex) = (triangle[side], triangle[(side + 2) % 3]);
     let is_forward = from == split.edge.low;
     let turned = |(p, q): (u32, u32)| if is_forward { [p, q, apex] } else { [q, p, apex] };
-    // A vertex that is the corner across makes a triangle without area, which is removed with its like.
     let mut parts = split.parts().map(turned);
     if let Some(first) = parts.next() {
         mesh.triangles[index] = first;
