@@ -34,7 +34,8 @@ pub(super) fn join_sheets(
     if report.cracks_closed > 0 {
         edges.changed();
     }
-    report.edges_sewn = seams::sew(mesh, edges.of(&mesh.triangles));
+    let (sewn, merged) = seams::sew(mesh, edges.of(&mesh.triangles));
+    (report.edges_sewn, report.cracks_closed) = (sewn, report.cracks_closed + merged);
     if report.cracks_closed + report.edges_sewn > 0 {
         edges.changed();
         report.degenerate_removed += sliver::remove_degenerate(mesh, tolerance_mm);

@@ -2,7 +2,7 @@
 //!
 //! Parts that were meshed apart meet along a line, and each has vertices of its own there. An open edge is split at the open
 //! vertices that lie on it, so that both sides share all of them; gaps and overlaps are closed by that, since an edge goes where its new
-//! vertices are. An edge is split where most of its parts then meet an open edge of the other side, and else stays as it is.
+//! vertices are. Vertices that stand opposite each other over a gap are merged. An edge is split where most of its parts then meet an open edge of the other side, and else stays as it is.
 
 use std::collections::{HashMap, HashSet};
 
@@ -38,94 +38,169 @@ fn undirected((a, b): (u32, u32)) -> (u32, u32) {
     (a.min(b), a.max(b))
 }
 
-/// Splits open edges of a mesh, whose edges `table` holds, at the vertices of the other side of a seam; returns how many.
-pub(super) fn sew(mesh: &mut SurfaceMesh, table: &EdgeTable) -> usize {
+/// Splits open edges of a mesh, whose edges `table` holds, at the vertices of the other side of a seam, and merges those that stand
+/// opposite each other; returns how many edges were split and vertices merged.
+pub(super) fn sew(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
     let open: Vec<EdgeUse> = table.edges().filter(|uses| uses.len() == 1).map(|uses| uses[0]).collect();
-    let mut splits = splits(mesh, &open);
-    if splits.is_empty() {
-        return 0;
-    }
-    // Only looked up, never iterated: their order cannot reach the result.
+    let Some(rims) = Rims::new(mesh, &open) else { return (0, 0) };
+    let opposite = rims.opposite();
+    let merged = |v: u32| opposite.get(&v).copied().unwrap_or(v);
+    let mut splits = rims.splits(&opposite);
+    // How often an edge is there when all is sewn. Only looked up, never iterated: their order cannot reach the result.
     let split: HashSet<(u32, u32)> = splits.iter().map(|s| (s.edge.low, s.edge.high)).collect();
     let mut sides: HashMap<(u32, u32), usize> = HashMap::new();
     let whole = open.iter().map(|edge| (edge.low, edge.high)).filter(|edge| !split.contains(edge));
-    for edge in whole.chain(splits.iter().flat_map(Split::parts).map(undirected)) {
-        *sides.entry(edge).or_default() += 1;
+    let parts: Vec<(u32, u32)> = whole.chain(splits.iter().flat_map(Split::parts)).collect();
+    let sewn = |(a, b): (u32, u32)| undirected((merged(a), merged(b)));
+    for part in &parts {
+        *sides.entry(sewn(*part)).or_default() += 1;
     }
-    splits.retain(|split| {
-        let met = split.parts().filter(|part| sides.get(&undirected(*part)) == Some(&2)).count();
-        2 * met > split.parts().count()
-    });
+    let is_met = |part: &(u32, u32)| sides.get(&sewn(*part)) == Some(&2);
+    splits.retain(|split| 2 * split.parts().filter(is_met).count() > split.parts().count());
+    // Vertices at edges that meet nothing stay where they are.
+    let at_seams: HashSet<u32> =
+        parts.iter().filter(|part| is_met(part)).flat_map(|(a, b)| [merged(*a), merged(*b)]).collect();
     for split in &splits {
         apply(mesh, split);
     }
-    splits.len()
+    let mut target: Vec<(u32, u32)> =
+        opposite.iter().map(|(from, to)| (*from, *to)).filter(|(_, to)| at_seams.contains(to)).collect();
+    target.sort_unstable();
+    let moved = |v: u32| target.binary_search_by_key(&v, |(from, _)| *from).map_or(v, |at| target[at].1);
+    for triangle in &mut mesh.triangles {
+        let own = triangle.map(moved);
+        if own[0] != own[1] && own[1] != own[2] && own[2] != own[0] {
+            *triangle = own;
+        }
+    }
+    (splits.len(), target.len())
 }
 
-/// The open edges on which open vertices lie: each vertex on the one that it is nearest to.
-fn splits(mesh: &SurfaceMesh, open: &[EdgeUse]) -> Vec<Split> {
-    let at = |v: u32| mesh.vertices_mm[v as usize];
-    let mut lengths: Vec<f64> = open.iter().map(|edge| (at(edge.low) - at(edge.high)).norm()).collect();
-    if lengths.is_empty() {
-        return Vec::new();
-    }
-    let middle = lengths.len() / 2;
-    let cell = *lengths.select_nth_unstable_by(middle, f64::total_cmp).1;
-    if cell <= 0.0 || !cell.is_finite() {
-        return Vec::new();
-    }
-    let place = |p: &Vec3| [p.x, p.y, p.z].map(|c| (c / cell).floor() as i64);
-    let mut vertices: Vec<u32> = open.iter().flat_map(|edge| [edge.low, edge.high]).collect();
-    vertices.sort_unstable();
-    vertices.dedup();
-    let mut grid: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(vertices.len());
-    for &v in &vertices {
-        grid.entry(place(&at(v))).or_default().push(v);
-    }
-    // For each vertex the nearest edge that it lies on: distance, edge, and how far along it.
-    let mut nearest: HashMap<u32, (f64, usize, f64)> = HashMap::new();
-    let mut near = Vec::new();
-    for (index, edge) in open.iter().enumerate() {
-        let (a, b) = (at(edge.low), at(edge.high));
-        let length = (b - a).norm();
-        let steps = (length / cell).ceil().max(1.0);
-        if steps > MOST_CELLS {
-            continue;
+/// The open edges of a mesh and their vertices, by place.
+struct Rims<'a> {
+    mesh: &'a SurfaceMesh,
+    open: &'a [EdgeUse],
+    /// Side of a cell of the grid, mm: the median open edge.
+    cell: f64,
+    /// Vertices of open edges, in order, and the shortest open edge at each, mm.
+    vertices: Vec<(u32, f64)>,
+    grid: HashMap<[i64; 3], Vec<u32>>,
+}
+
+impl<'a> Rims<'a> {
+    /// None where edges have no length.
+    fn new(mesh: &'a SurfaceMesh, open: &'a [EdgeUse]) -> Option<Self> {
+        let at = |v: u32| mesh.vertices_mm[v as usize];
+        let length = |edge: &EdgeUse| (at(edge.low) - at(edge.high)).norm();
+        let mut lengths: Vec<f64> = open.iter().map(length).collect();
+        let middle = lengths.len().checked_sub(1)? / 2;
+        let cell = *lengths.select_nth_unstable_by(middle, f64::total_cmp).1;
+        if cell <= 0.0 || !cell.is_finite() {
+            return None;
         }
-        near.clear();
-        for step in 0..=steps as u32 {
-            let [x, y, z] = place(&(a + (b - a) * (f64::from(step) / steps)));
-            for k in 0..27_i64 {
-                let beside = [
-                    x.saturating_add(k % 3 - 1),
-                    y.saturating_add(k / 3 % 3 - 1),
-                    z.saturating_add(k / 9 - 1),
-                ];
-                near.extend(grid.get(&beside).filter(|crowd| crowd.len() <= CROWD).into_iter().flatten());
+        let mut vertices: Vec<(u32, f64)> =
+            open.iter().flat_map(|edge| [edge.low, edge.high].map(|v| (v, length(edge)))).collect();
+        vertices.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        vertices.dedup_by_key(|(v, _)| *v);
+        let mut rims = Self { mesh, open, cell, grid: HashMap::with_capacity(vertices.len()), vertices };
+        for &(v, _) in &rims.vertices {
+            rims.grid.entry(rims.place(&at(v))).or_default().push(v);
+        }
+        Some(rims)
+    }
+
+    fn at(&self, v: u32) -> Vec3 {
+        self.mesh.vertices_mm[v as usize]
+    }
+
+    fn place(&self, p: &Vec3) -> [i64; 3] {
+        [p.x, p.y, p.z].map(|c| (c / self.cell).floor() as i64)
+    }
+
+    /// Vertices in the cell of a place and those around it, but for crowds.
+    fn around(&self, p: &Vec3) -> impl Iterator<Item = u32> {
+        let [x, y, z] = self.place(p);
+        let cells = (0..27_i64).map(move |k| {
+            [x.saturating_add(k % 3 - 1), y.saturating_add(k / 3 % 3 - 1), z.saturating_add(k / 9 - 1)]
+        });
+        cells.filter_map(|cell| self.grid.get(&cell)).filter(|crowd| crowd.len() <= CROWD).flatten().copied()
+    }
+
+    /// Pairs of vertices that are each other's nearest and as near as a vertex on an edge is: the later with the earlier one.
+    fn opposite(&self) -> HashMap<u32, u32> {
+        let mut beside: HashSet<(u32, u32)> = HashSet::new();
+        for edge in self.open {
+            let t = self.mesh.triangles[edge.triangle as usize];
+            beside.extend([(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(undirected));
+        }
+        let nearest: HashMap<u32, u32> = self
+            .vertices
+            .iter()
+            .filter_map(|&(v, reach)| {
+                let p = self.at(v);
+                let off = |w: &u32| (self.at(*w) - p).norm();
+                let other = self
+                    .around(&p)
+                    .filter(|w| *w != v && !beside.contains(&undirected((v, *w))))
+                    .min_by(|a, b| off(a).total_cmp(&off(b)).then(a.cmp(b)))?;
+                (off(&other) <= WIDTH * reach).then_some((v, other))
+            })
+            .collect();
+        let is_mutual = |(v, w): &(&u32, &u32)| w < v && nearest.get(w) == Some(v);
+        nearest.iter().filter(is_mutual).map(|(v, w)| (*v, *w)).collect()
+    }
+
+    /// The open edges on which open vertices lie: each vertex on the one that it is nearest to, if it is not to become an end of it.
+    fn splits(&self, opposite: &HashMap<u32, u32>) -> Vec<Split> {
+        let merged = |v: u32| opposite.get(&v).copied().unwrap_or(v);
+        // For each vertex the nearest edge that it lies on: distance, edge, and how far along it.
+        let mut nearest: HashMap<u32, (f64, usize, f64)> = HashMap::new();
+        let mut near = Vec::new();
+        for (index, edge) in self.open.iter().enumerate() {
+            let (a, b) = (self.at(edge.low), self.at(edge.high));
+            let length = (b - a).norm();
+            let steps = (length / self.cell).ceil().max(1.0);
+            if steps > MOST_CELLS {
+                continue;
+            }
+            near.clear();
+            for step in 0..=steps as u32 {
+                near.extend(self.around(&(a + (b - a) * (f64::from(step) / steps))));
+            }
+            near.sort_unstable();
+            near.dedup();
+            let width = (WIDTH * length).min(self.cell);
+            // A flat triangle is no seam.
+            let own = self.mesh.triangles[edge.triangle as usize].map(merged);
+            for &v in near.iter().filter(|v| !own.contains(&merged(**v))) {
+                let along = (self.at(v) - a).dot(&(b - a)) / (length * length);
+                let off = (self.at(v) - a - (b - a) * along).norm();
+                if along > 0.0
+                    && along < 1.0
+                    && off <= width
+                    && nearest.get(&v).is_none_or(|best| off < best.0)
+                {
+                    nearest.insert(v, (off, index, along));
+                }
             }
         }
-        near.sort_unstable();
-        near.dedup();
-        let width = (WIDTH * length).min(cell);
-        // A flat triangle is no seam.
-        let own = mesh.triangles[edge.triangle as usize];
-        for &v in near.iter().filter(|v| !own.contains(*v)) {
-            let along = (at(v) - a).dot(&(b - a)) / (length * length);
-            let off = (at(v) - a - (b - a) * along).norm();
-            if along > 0.0 && along < 1.0 && off <= width && nearest.get(&v).is_none_or(|best| off < best.0) {
-                nearest.insert(v, (off, index, along));
-            }
-        }
+        let mut on: Vec<(usize, f64, u32)> = self
+            .vertices
+            .iter()
+            .filter_map(|(v, _)| nearest.get(v).map(|(_, edge, along)| (*edge, *along, *v)))
+            .collect();
+        on.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+        on.chunk_by(|a, b| a.0 == b.0)
+            .map(|of_edge| {
+                let edge = self.open[of_edge[0].0];
+                Split {
+                    edge,
+                    ends: [edge.low, edge.high],
+                    vertices: of_edge.iter().map(|(.., v)| *v).collect(),
+                }
+            })
+            .collect()
     }
-    let mut on: Vec<(usize, f64, u32)> =
-        vertices.iter().filter_map(|v| nearest.get(v).map(|(_, edge, along)| (*edge, *along, *v))).collect();
-    on.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
-    on.chunk_by(|a, b| a.0 == b.0)
-        .map(|of_edge| {
-            let edge = open[of_edge[0].0];
-            Split { edge, ends: [edge.low, edge.high], vertices: of_edge.iter().map(|(.., v)| *v).collect() }
-        })
-        .collect()
 }
 
 /// Cuts the triangle at a split edge into a fan around the corner across.
