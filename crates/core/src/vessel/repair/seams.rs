@@ -1,8 +1,9 @@
 //! Seams whose two sides have other vertices: T-junctions.
 //!
 //! Parts that were meshed apart meet along a line, and each has vertices of its own there. An open edge is split at the open
-//! vertices that lie on it, so that both sides share all of them; gaps and overlaps are closed by that, since an edge goes where its new
-//! vertices are. Vertices that stand opposite each other over a gap are merged. An edge is split where most of its parts then meet an open edge of the other side, and else stays as it is.
+//! vertices that lie on it, so that both sides share all of them; gaps and overlaps are closed by that, since an edge goes where
+//! its new vertices are. Vertices that stand opposite each other over a gap are merged. An edge is split where most of its parts
+//! then meet an open edge of the other side, and else stays as it is: rims that only pass each other are no seam.
 
 use std::collections::{HashMap, HashSet};
 
@@ -46,7 +47,8 @@ pub(super) fn sew(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
     let opposite = rims.opposite();
     let merged = |v: u32| opposite.get(&v).copied().unwrap_or(v);
     let mut splits = rims.splits(&opposite);
-    // How often an edge is there when all is sewn. Only looked up, never iterated: their order cannot reach the result.
+    // How often an edge is there when all is sewn. Maps are looked up, and what is taken from them is sorted: their order cannot
+    // reach the result.
     let split: HashSet<(u32, u32)> = splits.iter().map(|s| (s.edge.low, s.edge.high)).collect();
     let mut sides: HashMap<(u32, u32), usize> = HashMap::new();
     let whole = open.iter().map(|edge| (edge.low, edge.high)).filter(|edge| !split.contains(edge));
@@ -55,7 +57,10 @@ pub(super) fn sew(mesh: &mut SurfaceMesh, table: &EdgeTable) -> (usize, usize) {
     for part in &parts {
         *sides.entry(sewn(*part)).or_default() += 1;
     }
-    let is_met = |part: &(u32, u32)| sides.get(&sewn(*part)) == Some(&2);
+    let is_met = |part: &(u32, u32)| {
+        let (a, b) = sewn(*part);
+        a != b && sides.get(&(a, b)) == Some(&2)
+    };
     splits.retain(|split| 2 * split.parts().filter(is_met).count() > split.parts().count());
     // Vertices at edges that meet nothing stay where they are.
     let at_seams: HashSet<u32> =
