@@ -263,6 +263,7 @@ fn damaged_tomograms() {
         "dim[",
         "pair",
         "its values",
+        "scl_inter",
         "nothing of the vessel",
     ];
     let files = [nifti(1, 4, &short), nifti(0, 16, &float), second_nifti(&short)];

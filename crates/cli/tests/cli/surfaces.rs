@@ -53,7 +53,11 @@ fn axes_are_obeyed_and_can_be_said() {
     ] {
         let told = check(path, options);
         assert_eq!(told["sound"], true, "{told}");
-        assert_eq!(told["high_mm"] == right["high_mm"], same, "{options:?} {told}");
+        // Text and bytes are rounded in their own ways.
+        let high =
+            |report: &Value| (0..3).map(|k| report["high_mm"][k].as_f64().unwrap()).collect::<Vec<_>>();
+        let off = high(&told).iter().zip(high(&right)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert_eq!(off < 1e-4, same, "{options:?} {told}");
     }
     let refused = endowire().args(["vessel", "check", text(&plain), "--axes", "LAS"]).output().unwrap();
     assert!(refused.status.code() == Some(2) && said(&refused).contains("LPS"), "{}", said(&refused));
@@ -68,7 +72,7 @@ fn a_unit_that_may_be_another_is_told_and_never_taken() {
     let hint = "if the file is in centimetres";
     let told = check(&path, &[]);
     assert!(told["hints"][0].as_str().is_some_and(|said| said.contains(hint)), "{told}");
-    assert!(told["high_mm"][2].as_f64().is_some_and(|mm| mm < 10.0), "{told}");
+    assert!(told["high_mm"][2].as_f64().is_some_and(|mm| mm < 20.0), "{told}");
     assert_eq!(check(&path, &["--unit-mm", "10"])["hints"], serde_json::json!([]));
     let new = |name: &str, options: &[&str]| {
         let made = folder.path().join(name);

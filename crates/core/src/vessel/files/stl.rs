@@ -31,7 +31,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
     }
     match declared {
         // The size says what the count does not.
-        Some(count) if UNKNOWN.contains(&count) && room > 0 && room % RECORD == 0 => {
+        Some(count) if UNKNOWN.contains(&count) && room > 0 && room.is_multiple_of(RECORD) => {
             Ok(parse_binary(bytes, room / RECORD))
         }
         // Trailing bytes are harmless; missing ones are not.
