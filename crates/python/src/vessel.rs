@@ -8,7 +8,7 @@ use std::sync::Arc;
 use endowire_core::Vec3;
 use endowire_core::vessel::{
     CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceFrame, SurfaceMesh, Target, Wall,
-    anatomy, check_with,
+    anatomy, check_with, wall_hints,
 };
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyUserWarning;
