@@ -453,7 +453,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.
             Error::Parameter { .. } | Error::Content { .. } => {
                 let told = self.wall(store).and_then(|wall| self.hints(&wall)).unwrap_or_default();
-                told.into_iter().fold(error, with_hint)
+                told.iter().fold(error, |error, hint| with_hint(error, hint))
             }
             _ => error,
         };
@@ -511,7 +511,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
 }
 
 /// An error about input with a hint behind its mend.
-fn with_hint(error: Error, hint: String) -> Error {
+fn with_hint(error: Error, hint: &str) -> Error {
     match error {
         Error::Parameter { name, value, mend } => {
             Error::Parameter { name, value, mend: format!("{mend}; {hint}") }
