@@ -128,7 +128,8 @@ def test_surfaces_of_vtk_are_read(vessel, tmp_path, kind):
     read = endowire.Vessel.read(tmp_path / "a.vtp")
     assert np.array_equal(read.vertices_mm, vessel.vertices_mm)
     assert np.array_equal(read.triangles, vessel.triangles)
-    turned = endowire.Vessel.read(tmp_path / "a.vtp", unit_mm=10.0, axes="RAS")
+    with pytest.warns(UserWarning, match="if the file is in millimetres"):
+        turned = endowire.Vessel.read(tmp_path / "a.vtp", unit_mm=10.0, axes="RAS")
     assert np.array_equal(turned.vertices_mm, 10.0 * vessel.vertices_mm * [-1.0, -1.0, 1.0])
     with pytest.raises(endowire.InputError, match="LAS"):
         endowire.Vessel.read(tmp_path / "a.vtp", axes="LAS")
@@ -164,7 +165,7 @@ def test_pieces_of_a_surface_keep_their_own_points(tmp_path):
     assert both.vertices_mm.tolist() == [*corners.tolist(), *(corners + 50).tolist()]
     assert len(both.triangles) == 8
     # Without the check this corner would be one of the piece behind it.
-    with pytest.raises(endowire.InputError, match="a.vtp: piece 0: polygon 3 names vertex 3"):
+    with pytest.raises(endowire.InputError, match="a.vtp: piece 0: polygon 1 names vertex 3"):
         read(piece(corners[:3], faces), piece(corners + 50, faces))
 
 
