@@ -40,6 +40,22 @@ pub fn ply(bytes: &[u8]) -> Result<()> {
     surface(bytes, "a.ply")
 }
 
+/// A surface of VTK's XML format.
+///
+/// # Errors
+/// As [`SurfaceMesh::from_bytes`].
+pub fn vtp(bytes: &[u8]) -> Result<()> {
+    surface(bytes, "a.vtp")
+}
+
+/// A surface of VTK's older format, of either kind.
+///
+/// # Errors
+/// As [`SurfaceMesh::from_bytes`].
+pub fn vtk(bytes: &[u8]) -> Result<()> {
+    surface(bytes, "a.vtk")
+}
+
 /// A table of a centre-line tree.
 ///
 /// # Errors

@@ -101,6 +101,12 @@ impl Renderer {
         self.with(py, |renderer| renderer.backend().to_owned())
     }
 
+    /// How much of the vessel's surface the tomogram of its patient holds, 0 to 1; None without a tomogram.
+    #[getter]
+    fn vessel_held(&self, py: Python<'_>) -> Option<f64> {
+        self.with(py, |renderer| renderer.vessel_held())
+    }
+
     /// Draws the views of a simulation as it is. `frame` is the number of the frame, which seeds its noise and tells its time; the next one
     /// unless told.
     ///

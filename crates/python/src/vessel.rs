@@ -1,14 +1,17 @@
 //! What instruments are pushed into.
 
 use std::collections::BTreeMap;
+use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use endowire_core::Vec3;
 use endowire_core::vessel::{
-    CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, Target, Wall, anatomy, check_with,
+    CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceFrame, SurfaceMesh, Target, Wall,
+    anatomy, check_with, wall_hints,
 };
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::Serialize;
@@ -47,14 +50,25 @@ struct OpeningDocument {
 
 #[pymethods]
 impl Vessel {
-    /// Reads a surface file (STL, OBJ, PLY) and mends what can be mended; `unit_mm` is millimetres per unit of the file.
+    /// Reads a surface file (STL, OBJ, PLY, VTP, VTK) and mends what can be mended; `unit_mm` is millimetres per unit of the file, `axes`
+    /// "LPS" or "RAS" where the file's header does not tell or is wrong (without either: LPS, the axes of scenes).
     ///
-    /// Raises InputError for a file that cannot be read or serves as no wall.
+    /// Warns (UserWarning) where the unit may be another, and where openings face each other. Raises InputError for a file that cannot be
+    /// read or serves as no wall.
     #[staticmethod]
-    #[pyo3(signature = (path, unit_mm = 1.0))]
-    fn read(py: Python<'_>, path: PathBuf, unit_mm: f64) -> PyResult<Self> {
-        let made = interruptible(py, move || Wall::from_surface(&SurfaceMesh::read(&path, unit_mm)?))?;
-        Ok(Self::of_wall(made.map_err(exception)?))
+    #[pyo3(signature = (path, unit_mm = 1.0, axes = None))]
+    fn read(py: Python<'_>, path: PathBuf, unit_mm: f64, axes: Option<&str>) -> PyResult<Self> {
+        let frame = frame(unit_mm, axes)?;
+        let told = path.display().to_string();
+        let made = interruptible(py, move || {
+            let wall = Wall::from_surface(&SurfaceMesh::read(&path, frame)?)?;
+            wall_hints(&wall, frame.unit_mm).map(|hints| (wall, hints))
+        })?;
+        let (wall, hints) = made.map_err(exception)?;
+        for hint in hints {
+            warn(py, &format!("{told}: {hint}"))?;
+        }
+        Ok(Self::of_wall(wall))
     }
 
     /// The wall of a triangle surface: vertices in mm, shape (n, 3), and triangles of vertex indices, shape (m, 3), counter-clockwise seen
@@ -257,17 +271,32 @@ fn built_in(path: &Path) -> Option<CentrelineTree> {
     path.to_str().filter(|_| !path.exists()).and_then(anatomy::tree)
 }
 
-/// Checks a surface file as `endowire vessel check` does: a dictionary of what was found, and `sound`.
+/// Warns as `warnings.warn` does, at the line that called.
+fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
+    let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)
+}
+
+/// How the coordinates of a surface file are meant.
+fn frame(unit_mm: f64, axes: Option<&str>) -> PyResult<SurfaceFrame> {
+    let axes = axes.map(str::parse).transpose().map_err(exception)?;
+    Ok(SurfaceFrame { unit_mm, axes })
+}
+
+/// Checks a surface file as `endowire vessel check` does: a dictionary of what was found, and `sound`. Arguments as those of `Vessel.read`;
+/// septa thinner than `septum_mm` are counted.
 #[pyfunction]
-#[pyo3(signature = (path, unit_mm = 1.0, septum_mm = 1.0))]
+#[pyo3(signature = (path, unit_mm = 1.0, septum_mm = 1.0, axes = None))]
 pub(crate) fn check_vessel<'py>(
     py: Python<'py>,
     path: PathBuf,
     unit_mm: f64,
     septum_mm: f64,
+    axes: Option<&str>,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let frame = frame(unit_mm, axes)?;
     let report =
-        interruptible(py, move || check_with(&SurfaceMesh::read(&path, unit_mm)?, unit_mm, septum_mm))?
+        interruptible(py, move || check_with(&SurfaceMesh::read(&path, frame)?, unit_mm, septum_mm))?
             .map_err(exception)?;
     let told = document::write(py, &report)?;
     told.set_item("sound", report.is_sound())?;

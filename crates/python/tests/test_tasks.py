@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 
 import endowire
 import endowire.gym
-from endowire.gym import originals, vtp
+from endowire.gym import originals
 
 VIEW = {"views": ["3d"], "size_px": [32, 32], "backend": "cpu"}
 
@@ -125,47 +125,48 @@ def vtp_file(path, vessel, kind):
 @pytest.mark.parametrize("kind", ["ascii", "binary", "raw", "base64"])
 def test_surfaces_of_vtk_are_read(vessel, tmp_path, kind):
     vtp_file(tmp_path / "a.vtp", vessel, kind)
-    points, triangles = vtp.read_vtp(tmp_path / "a.vtp")
-    assert np.array_equal(points, vessel.vertices_mm) and np.array_equal(triangles, vessel.triangles)
+    read = endowire.Vessel.read(tmp_path / "a.vtp")
+    assert np.array_equal(read.vertices_mm, vessel.vertices_mm)
+    assert np.array_equal(read.triangles, vessel.triangles)
+    with pytest.warns(UserWarning, match="if the file is in millimetres"):
+        turned = endowire.Vessel.read(tmp_path / "a.vtp", unit_mm=10.0, axes="RAS")
+    assert np.array_equal(turned.vertices_mm, 10.0 * vessel.vertices_mm * [-1.0, -1.0, 1.0])
+    with pytest.raises(endowire.InputError, match="LAS"):
+        endowire.Vessel.read(tmp_path / "a.vtp", axes="LAS")
+    assert endowire.check_vessel(tmp_path / "a.vtp", axes="LPS")["sound"]
     damaged = (tmp_path / "a.vtp").read_bytes()
     for end in (0, 100, len(damaged) // 3):
         (tmp_path / "a.vtp").write_bytes(damaged[:end])
         with pytest.raises(endowire.InputError, match="a.vtp"):
-            vtp.read_vtp(tmp_path / "a.vtp")
+            endowire.Vessel.read(tmp_path / "a.vtp")
 
 
-def test_pieces_of_a_surface_are_joined_and_what_is_no_triangle_is_refused(tmp_path):
+def test_pieces_of_a_surface_keep_their_own_points(tmp_path):
     def array(name, type_, numbers):
         text = " ".join(map(str, numbers))
         return f'<DataArray type="{type_}" Name="{name}" format="ascii">{text}</DataArray>'
 
-    def piece(points, corners, counts=""):
+    def piece(points, corners):
         connectivity = array("connectivity", "Int32", np.ravel(corners))
         offsets = array("offsets", "Int32", 3 * np.arange(1, len(corners) + 1))
         return (
-            f"<Piece {counts}><Points>{array('Points', 'Float32', np.ravel(points))}</Points>"
+            f"<Piece><Points>{array('Points', 'Float32', np.ravel(points))}</Points>"
             f"<Polys>{connectivity}{offsets}</Polys></Piece>"
         )
 
     def read(*pieces):
         text = f'<VTKFile type="PolyData"><PolyData>{"".join(pieces)}</PolyData></VTKFile>'
         (tmp_path / "a.vtp").write_text(text)
-        return vtp.read_vtp(tmp_path / "a.vtp")
+        return endowire.Vessel.read(tmp_path / "a.vtp")
 
-    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    first = piece(square, [[0, 1, 2], [0, 2, 3]])
-    points, triangles = read(first, piece(np.zeros((0, 3)), []), piece(square[:3] + 5, [[2, 1, 0]]))
-    assert points.tolist() == [*square.tolist(), *(square[:3] + 5).tolist()]
-    assert triangles.tolist() == [[0, 1, 2], [0, 2, 3], [6, 5, 4]]
+    corners = np.array([[0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]])
+    faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    both = read(piece(corners, faces), piece(np.zeros((0, 3)), []), piece(corners + 50, faces))
+    assert both.vertices_mm.tolist() == [*corners.tolist(), *(corners + 50).tolist()]
+    assert len(both.triangles) == 8
     # Without the check this corner would be one of the piece behind it.
-    for refused, words in (
-        ((piece(square[:3], [[0, 1, 3]]), first), "a corner that is none of the 3 points of its piece"),
-        ((first, piece(square, [[0, 1, 2]], 'NumberOfStrips="2"')), "2 Strips: write it as triangles"),
-        ((piece(square, [[0, 1, 2]], 'NumberOfVerts="0" NumberOfLines="1"'),), "1 Lines"),
-        ((), "it has no piece"),
-    ):
-        with pytest.raises(endowire.InputError, match=f"a.vtp: no surface of triangles .*{words}"):
-            read(*refused)
+    with pytest.raises(endowire.InputError, match="a.vtp: piece 0: polygon 1 names vertex 3"):
+        read(piece(corners[:3], faces), piece(corners + 50, faces))
 
 
 def test_the_vessel_of_basic_wire_nav_is_read_from_its_files(tmp_path):

@@ -100,6 +100,11 @@ impl Renderer {
         self.setup.c_arm.as_ref()
     }
 
+    /// How much of the vessel's surface the tomogram of its patient holds, 0 to 1; `None` without a tomogram, or fluoroscopy.
+    pub fn vessel_held(&self) -> Option<f64> {
+        self.setup.patient.vessel_held()
+    }
+
     /// What the renderer was made for.
     pub fn spec(&self) -> &ViewSpec {
         &self.setup.spec

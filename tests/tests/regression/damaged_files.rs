@@ -117,6 +117,82 @@ fn damaged_ply_files() {
     reads_or_refuses(&[written("ply"), text.into_bytes()], &places, readers::ply);
 }
 
+/// What every format of VTK tells of a fault.
+const VTK: [&str; 9] =
+    ["line ", "vertex ", "no triangles", "is empty", "mm across", "cut off", "array ", "offset ", "PolyData"];
+
+#[test]
+fn damaged_vtp_files() {
+    let mesh = patch();
+    let ends = (1..=mesh.triangles.len()).map(|k| 3 * k as u32);
+    let corners: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    let (mut text, mut bytes) = (Vec::new(), Vec::new());
+    let mut array = |name: &str, kind: &str, words: String, raw: Vec<u8>| {
+        text.push(format!("<DataArray type=\"{kind}\" Name=\"{name}\" format=\"ascii\">{words}</DataArray>"));
+        let head = format!(
+            "<DataArray type=\"{kind}\" Name=\"{name}\" format=\"appended\" offset=\"{}\"/>",
+            bytes.len()
+        );
+        bytes.extend((raw.len() as u32).to_le_bytes());
+        bytes.extend(raw);
+        head
+    };
+    let coordinates: Vec<f64> = mesh.vertices_mm.iter().flatten().copied().collect();
+    let of = |numbers: &[u32]| {
+        let words: Vec<String> = numbers.iter().map(u32::to_string).collect();
+        (words.join(" "), numbers.iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>())
+    };
+    let words: Vec<String> = coordinates.iter().map(f64::to_string).collect();
+    let raw = coordinates.iter().flat_map(|c| c.to_le_bytes()).collect();
+    let ((corner_words, corner_bytes), (end_words, end_bytes)) =
+        (of(&corners), of(&ends.collect::<Vec<_>>()));
+    let heads = [
+        array("Points", "Float64", words.join("\n"), raw),
+        array("connectivity", "UInt32", corner_words, corner_bytes),
+        array("offsets", "UInt32", end_words, end_bytes),
+    ];
+    let file = |arrays: &[String], tail: &[u8]| {
+        let head = format!(
+            "<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\"><PolyData>\n<Piece NumberOfPolys=\"{}\">\n<Points>{}</Points>\n\
+             <Polys>{}\n{}</Polys>\n</Piece></PolyData>",
+            mesh.triangles.len(),
+            arrays[0],
+            arrays[1],
+            arrays[2]
+        );
+        [head.as_bytes(), tail, b"</VTKFile>"].concat()
+    };
+    let appended = [&b"<AppendedData encoding=\"raw\">_"[..], &bytes, b"</AppendedData>"].concat();
+    let places = [&VTK[..], &["no XML", "begins with", "is not known", "piece "]].concat();
+    reads_or_refuses(&[file(&text, b""), file(&heads, &appended)], &places, readers::vtp);
+}
+
+#[test]
+fn damaged_vtk_files() {
+    let mesh = patch();
+    let file = |kind: &str, number: &dyn Fn(f64) -> Vec<u8>, whole: &dyn Fn(u32) -> Vec<u8>| {
+        let mut bytes = format!(
+            "# vtk DataFile Version 3.0\na\n{kind}\nDATASET POLYDATA\nPOINTS {} double\n",
+            mesh.vertices_mm.len()
+        )
+        .into_bytes();
+        mesh.vertices_mm.iter().flatten().for_each(|c| bytes.extend(number(*c)));
+        let count = mesh.triangles.len();
+        bytes.extend(format!("\nPOLYGONS {count} {}\n", 4 * count).bytes());
+        mesh.triangles.iter().for_each(|t| [3].iter().chain(t).for_each(|n| bytes.extend(whole(*n))));
+        bytes.push(b'\n');
+        bytes
+    };
+    let files = [
+        file("ASCII", &|c| format!("{c}\n").into_bytes(), &|n| format!("{n} ").into_bytes()),
+        file("BINARY", &|c| c.to_be_bytes().to_vec(), &|n| n.to_be_bytes().to_vec()),
+    ];
+    let places =
+        [&VTK[..], &["has no corners", "is no keyword", "is no count", "is no surface", "is no type"]]
+            .concat();
+    reads_or_refuses(&files, &places, readers::vtk);
+}
+
 #[test]
 fn damaged_centre_lines() {
     let places = ["line ", "centre-line points"];
@@ -187,6 +263,7 @@ fn damaged_tomograms() {
         "dim[",
         "pair",
         "its values",
+        "scl_inter",
         "nothing of the vessel",
     ];
     let files = [nifti(1, 4, &short), nifti(0, 16, &float), second_nifti(&short)];

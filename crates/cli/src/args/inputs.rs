@@ -3,16 +3,16 @@
 use std::path::PathBuf;
 
 use clap::Subcommand;
+use endowire_core::vessel::{PatientAxes, SurfaceFrame};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum VesselCommand {
     /// Report on a surface: openings, flipped and degenerate triangles, self-intersections, volume
     Check {
-        /// Surface mesh (STL, OBJ or PLY)
+        /// Surface mesh (STL, OBJ, PLY, VTP or VTK)
         file: PathBuf,
-        /// Millimetres per unit of the file
-        #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
-        unit_mm: f64,
+        #[command(flatten)]
+        frame: CoordinateArgs,
         /// Count septa between lumens that are thinner than so many mm
         #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
         septum_mm: f64,
@@ -51,6 +51,23 @@ pub(crate) enum DeviceCommand {
         #[arg(long)]
         json: bool,
     },
+}
+
+/// How the coordinates of a surface file are meant.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub(crate) struct CoordinateArgs {
+    /// Millimetres per unit of the file
+    #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) unit_mm: f64,
+    /// Axes of the file, LPS or RAS; as its header says, or LPS, if absent
+    #[arg(long, value_name = "AXES")]
+    pub(crate) axes: Option<PatientAxes>,
+}
+
+impl From<CoordinateArgs> for SurfaceFrame {
+    fn from(CoordinateArgs { unit_mm, axes }: CoordinateArgs) -> Self {
+        Self { unit_mm, axes }
+    }
 }
 
 /// What is wanted of the wall that devices feel; with none of these it is not made.

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand};
 use endowire_sweep::{Setting, Shard};
 
-pub(crate) use inputs::{DeviceCommand, FeltArgs, GenerateArgs, VesselCommand};
+pub(crate) use inputs::{CoordinateArgs, DeviceCommand, FeltArgs, GenerateArgs, VesselCommand};
 pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
 pub(crate) use studies::{
     CompareArgs, DeformationArgs, ExperimentCommand, LoopArgs, NavigationArgs, TimingArgs,
@@ -162,9 +162,11 @@ pub(crate) struct ReportArgs {
 pub(crate) struct NewArgs {
     /// Folder to make; it must not be there, or be empty
     pub(crate) dir: PathBuf,
-    /// Surface of a vessel (STL, OBJ or PLY, in mm), which is copied, or a built-in anatomy
+    /// Surface of a vessel (STL, OBJ, PLY, VTP or VTK), which is copied, or a built-in anatomy
     #[arg(long, default_value = "aortic_arch", value_name = "FILE|NAME")]
     pub(crate) vessel: PathBuf,
+    #[command(flatten)]
+    pub(crate) frame: CoordinateArgs,
     /// Device file, such as one of the catalogue in assets/devices, which is copied; an angled hydrophilic wire of 0.035 in if absent
     #[arg(long, value_name = "FILE")]
     pub(crate) device: Option<PathBuf>,

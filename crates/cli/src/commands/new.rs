@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use endowire_core::device::DeviceFile;
-use endowire_core::vessel::{GeneratedWall, Opening, Resolution, SurfaceMesh, Wall, anatomy};
+use endowire_core::vessel::{
+    GeneratedWall, Opening, Resolution, SurfaceFrame, SurfaceMesh, Wall, anatomy, wall_hints,
+};
 
 use crate::args::NewArgs;
 use crate::failure::Failure;
@@ -38,7 +40,7 @@ pub(crate) fn new(args: &NewArgs) -> Result<(), Failure> {
         None => WIRE.to_owned(),
     };
     std::fs::create_dir_all(folder).map_err(|e| refuse(e.to_string()))?;
-    let vessel = vessel(&args.vessel, folder)?;
+    let vessel = vessel(&args.vessel, args.frame.into(), folder)?;
     let opening = entry(&vessel.wall).ok_or_else(|| {
         Failure::Input(format!("{}: has no opening for a sheath: cut its ends off", args.vessel.display()))
     })?;
@@ -57,7 +59,7 @@ pub(crate) fn new(args: &NewArgs) -> Result<(), Failure> {
 }
 
 /// Copies or draws the vessel.
-fn vessel(wanted: &Path, folder: &Path) -> Result<Vessel, Failure> {
+fn vessel(wanted: &Path, frame: SurfaceFrame, folder: &Path) -> Result<Vessel, Failure> {
     let built_in =
         wanted.to_str().and_then(|name| Some((anatomy::tree(name)?, anatomy::description(name)?, name)));
     if let Some((tree, about, name)) = built_in {
@@ -79,12 +81,22 @@ fn vessel(wanted: &Path, folder: &Path) -> Result<Vessel, Failure> {
             wanted.display()
         )));
     }
-    let wall = Wall::from_surface(&SurfaceMesh::read(wanted, 1.0)?)?;
+    let wall = Wall::from_surface(&SurfaceMesh::read(wanted, frame)?)?;
+    for hint in wall_hints(&wall, frame.unit_mm)? {
+        tell(format_args!("{}: {hint}", wanted.display()));
+    }
     let mut file = PathBuf::from("vessel");
     file.set_extension(wanted.extension().unwrap_or_default());
     let copied = folder.join(&file);
     std::fs::copy(wanted, &copied).map_err(|e| Failure::write(&copied, &e))?;
-    Ok(Vessel { table: format!("file = {:?}", file.display().to_string()), wall, pose: "AP" })
+    let mut table = format!("file = {:?}", file.display().to_string());
+    if frame.unit_mm != 1.0 {
+        table += &format!("\nunit_mm = {:?}", frame.unit_mm);
+    }
+    if let Some(axes) = frame.axes {
+        table += &format!("\naxes = {:?}", axes.name());
+    }
+    Ok(Vessel { table, wall, pose: "AP" })
 }
 
 /// The opening that instruments come in by: the lowest of the wide ones, as from the groin.

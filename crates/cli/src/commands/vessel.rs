@@ -4,7 +4,7 @@ use std::path::Path;
 
 use endowire_core::Error;
 use endowire_core::vessel::{
-    CentrelineTree, CheckReport, GeneratedWall, Resolution, SurfaceMesh, anatomy, check_with,
+    CentrelineTree, CheckReport, GeneratedWall, Resolution, SurfaceFrame, SurfaceMesh, anatomy, check_with,
 };
 use serde::Serialize;
 
@@ -29,13 +29,13 @@ struct Document {
 /// Reports on a surface file.
 pub(crate) fn check_file(
     file: &Path,
-    unit_mm: f64,
+    frame: SurfaceFrame,
     septum_mm: f64,
     felt: &FeltArgs,
     json: bool,
 ) -> Result<(), Failure> {
     let provenance = Provenance::new(&[&read_input(file)?], 0);
-    report_on(file, unit_mm, septum_mm, felt, provenance, json)
+    report_on(file, frame, septum_mm, felt, provenance, json)
 }
 
 /// Builds a wall from a tree, writes it, and reports on what was written.
@@ -55,7 +55,7 @@ pub(crate) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     };
     let generated = GeneratedWall::new(&tree, resolution).map_err(|e| as_flag(e).at(args.tree.display()))?;
     generated.wall.mesh().write(&args.out)?;
-    report_on(&args.out, 1.0, 1.0, &FeltArgs::default(), provenance, args.json)
+    report_on(&args.out, 1.0.into(), 1.0, &FeltArgs::default(), provenance, args.json)
 }
 
 /// Calls what the core calls by its field by the flag of the command line.
@@ -80,14 +80,14 @@ fn built_ins(failure: Failure) -> Failure {
 
 fn report_on(
     file: &Path,
-    unit_mm: f64,
+    frame: SurfaceFrame,
     septum_mm: f64,
     felt: &FeltArgs,
     provenance: Provenance,
     json: bool,
 ) -> Result<(), Failure> {
-    let surface = SurfaceMesh::read(file, unit_mm)?;
-    let report = check_with(&surface, unit_mm, septum_mm).map_err(|error| match error {
+    let surface = SurfaceMesh::read(file, frame)?;
+    let report = check_with(&surface, frame.unit_mm, septum_mm).map_err(|error| match error {
         Error::Parameter { name, value, mend } if name == "septum_mm" => {
             Failure::from(Error::Parameter { name: "--septum-mm".to_owned(), value, mend })
         }

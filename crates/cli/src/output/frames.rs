@@ -57,6 +57,12 @@ fn planes(spec: &ViewSpec, wall: &Wall) -> Result<Vec<Renderer>, Error> {
     spec.planes().iter().map(|plane| Renderer::of_wall(plane, wall)).collect()
 }
 
+/// How much of the vessel the tomogram of a renderer's patient holds, for people; nothing without one.
+pub(crate) fn tomogram_holds(renderer: &Renderer) -> Option<String> {
+    let part = renderer.vessel_held()?;
+    Some(format!("the tomogram (view.patient.ct) holds {:.0} % of the vessel's surface", 100.0 * part))
+}
+
 impl FrameWriter {
     /// Prepares what the scene file asks for; without a simulation nothing is drawn.
     pub(crate) fn new(path: &Path, scene: &Scene, drawn: Option<&Simulation>) -> Result<Self, Failure> {
@@ -74,6 +80,11 @@ impl FrameWriter {
     /// What draws, for the summary.
     pub(crate) fn renderer(&self) -> Option<String> {
         self.planes.first().map(|r| r.backend().to_owned())
+    }
+
+    /// How much of the vessel the patient's tomogram holds, for people; nothing without one.
+    pub(crate) fn held(&self) -> Option<String> {
+        self.planes.first().and_then(tomogram_holds)
     }
 
     /// Where the C-arm stands in each plane of fluoroscopy, for the summary.

@@ -25,6 +25,7 @@ mod report;
 mod resume;
 mod rod;
 mod set;
+mod surfaces;
 mod sweep;
 mod terminal;
 mod told;

@@ -13,7 +13,7 @@ use crate::input::{from_toml, parse_toml};
 use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
 use crate::vessel::{
-    CentrelineTree, SurfaceMesh, VesselMotion, Wall, WallRecipe, WallStore, anatomy, unit_hint,
+    CentrelineTree, SurfaceMesh, VesselMotion, Wall, WallRecipe, WallStore, anatomy, wall_hints,
 };
 use crate::{Error, Result};
 
@@ -202,12 +202,12 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         let path = self.vessel_path()?;
         let spec = &self.vessel;
         if spec.tree.is_some() {
+            let mend = "only with vessel.file: a tree is in millimetres, in the axes of the scene";
             if let Some(unit_mm) = spec.unit_mm {
-                return Err(Error::parameter(
-                    "vessel.unit_mm",
-                    unit_mm,
-                    "only with vessel.file: a tree is in millimetres",
-                ));
+                return Err(Error::parameter("vessel.unit_mm", unit_mm, mend));
+            }
+            if let Some(axes) = spec.axes {
+                return Err(Error::parameter("vessel.axes", axes.name(), mend));
             }
             self.centreline_path()?;
             let tree = CentrelineTree::read(&path).map_err(|e| missing_tree(&path, e))?;
@@ -228,7 +228,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 return Err(Error::parameter(name, value, "only with vessel.tree: a file has its own mesh"));
             }
         }
-        let surface = SurfaceMesh::read(&path, spec.unit_mm.unwrap_or(1.0)).map_err(|error| match error {
+        let surface = SurfaceMesh::read(&path, spec.frame()).map_err(|error| match error {
             Error::Parameter { name, value, mend } => {
                 Error::Parameter { name: format!("vessel.{name}"), value, mend }
             }
@@ -449,19 +449,27 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// As [`SceneOf::wall`], [`SceneOf::stack`], [`SceneOf::sheath`], [`SceneOf::inserted_mm`], [`Simulation::step_together`] and [`SimulationBuilder::build`](crate::insertion::SimulationBuilder::build).
     pub fn simulation(&self, store: &dyn WallStore) -> Result<Simulation> {
         let wall = self.wall(store)?;
-        // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.
-        let size_mm = wall.mesh().bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
-        let hint =
-            self.vessel.file.as_ref().and_then(|_| unit_hint(size_mm, self.vessel.unit_mm.unwrap_or(1.0)));
-        self.simulation_in(wall, store).map_err(|error| match (hint, error) {
-            (Some(hint), Error::Parameter { name, value, mend }) => {
-                Error::Parameter { name, value, mend: format!("{mend}; {hint}") }
+        let hints = |error| match &error {
+            // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.
+            Error::Parameter { .. } | Error::Content { .. } => {
+                let told = self.wall(store).and_then(|wall| self.hints(&wall)).unwrap_or_default();
+                told.iter().fold(error, |error, hint| with_hint(error, hint))
             }
-            (Some(hint), Error::Content { path, reason }) => {
-                Error::Content { path, reason: format!("{reason}; {hint}") }
-            }
-            (_, error) => error,
-        })
+            _ => error,
+        };
+        self.simulation_in(wall, store).map_err(hints)
+    }
+
+    /// What the user may want to know of the wall of a surface file, a sentence each, as
+    /// [`wall_hints`](crate::vessel::wall_hints); nothing of a wall from a tree.
+    ///
+    /// # Errors
+    /// As [`wall_hints`](crate::vessel::wall_hints).
+    pub fn hints(&self, wall: &Wall) -> Result<Vec<String>> {
+        match self.vessel.file {
+            Some(_) => wall_hints(wall, self.vessel.frame().unit_mm),
+            None => Ok(Vec::new()),
+        }
     }
 
     fn simulation_in(&self, wall: Wall, store: &dyn WallStore) -> Result<Simulation> {
@@ -499,6 +507,17 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 }
                 other => other,
             })
+    }
+}
+
+/// An error about input with a hint behind its mend.
+fn with_hint(error: Error, hint: &str) -> Error {
+    match error {
+        Error::Parameter { name, value, mend } => {
+            Error::Parameter { name, value, mend: format!("{mend}; {hint}") }
+        }
+        Error::Content { path, reason } => Error::Content { path, reason: format!("{reason}; {hint}") },
+        other => other,
     }
 }
 

@@ -7,17 +7,19 @@ use serde::Deserialize;
 use crate::device::{FileTable, Kind, PartTable, Section};
 use crate::flow::VesselFlow;
 use crate::insertion::{Sheath, WallProperties};
-use crate::vessel::{CentrelineTree, MotionMode, Resolution, Wall};
+use crate::vessel::{CentrelineTree, MotionMode, PatientAxes, Resolution, SurfaceFrame, Wall};
 use crate::{Error, Result, Vec3};
 
 /// `[vessel]`: a surface file, or a centre-line tree to build the surface from.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VesselSpec {
-    /// Surface mesh (STL, OBJ or PLY).
+    /// Surface mesh (STL, OBJ, PLY, VTP or VTK).
     pub file: Option<PathBuf>,
     /// Millimetres per unit of the surface file; 1 if absent.
     pub unit_mm: Option<f64>,
+    /// Axes of the surface file, in place of those that its header tells.
+    pub axes: Option<PatientAxes>,
     /// Centre-line table (x y z radius parent, mm) that the wall is built from; rows may name targets.
     pub tree: Option<PathBuf>,
     /// Centre-line table beside `file`, for its targets.
@@ -37,6 +39,11 @@ pub struct VesselSpec {
 }
 
 impl VesselSpec {
+    /// How the coordinates of `file` are meant.
+    pub(super) fn frame(&self) -> SurfaceFrame {
+        SurfaceFrame { unit_mm: self.unit_mm.unwrap_or(1.0), axes: self.axes }
+    }
+
     /// How fine the wall is built from `tree`.
     pub(super) fn resolution(&self, tree: &CentrelineTree) -> Result<Resolution> {
         match (self.edge_mm, self.triangles) {

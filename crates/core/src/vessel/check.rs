@@ -1,12 +1,12 @@
 //! What is right and wrong with a surface, as it is.
 
 use super::crossings::crossings;
-use super::hints::unit_hint;
+use super::hints::{facing_hints, unit_hint};
 use super::survey::{Survey, survey};
 use super::topology::EdgeTable;
 use super::wall::{duplicate_pairs, flat_volume_mm3};
 use super::weld::Welding;
-use super::{RepairReport, SurfaceMesh, Wall, sliver};
+use super::{RepairReport, SurfaceMesh, Wall, opening, sliver};
 use crate::{Error, Result};
 
 /// Intersecting pairs named in a report; a list of thousands helps nobody.
@@ -49,6 +49,8 @@ pub struct CheckReport {
     pub stray_edges: usize,
     /// The loops of open edges.
     pub openings: Vec<OpeningReport>,
+    /// Pairs of openings of like size that face each other within a radius: a vessel that is cut through there.
+    pub facing_openings: Vec<[usize; 2]>,
     /// Edges of more than two triangles.
     pub non_manifold_edges: usize,
     /// Triangles wound against their neighbours or inwards.
@@ -97,8 +99,8 @@ pub struct CheckReport {
 const SEPTUM_MM: f64 = 1.0;
 
 impl CheckReport {
-    /// Whether a device can be simulated in this wall as it is: consistent, outward, manifold, free of faults, around a volume.
-    /// Open ends are fine.
+    /// Whether a device can be simulated in this wall as it is: consistent, outward, manifold, free of faults, in one, around a
+    /// volume. Open ends are fine.
     pub fn is_sound(&self) -> bool {
         let faults = [
             self.non_manifold_edges,
@@ -107,6 +109,8 @@ impl CheckReport {
             self.duplicate_triangles,
             self.self_intersections,
             self.stray_edges,
+            self.repair.edges_sewn,
+            self.facing_openings.len(),
         ];
         faults.iter().all(|count| *count == 0) && !self.flat
     }
@@ -179,6 +183,7 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
                 edges: o.boundary.len(),
             })
             .collect(),
+        facing_openings: opening::facing(wall.openings()),
         non_manifold_edges,
         flipped_triangles: report.triangles_flipped,
         inside_out: report.inside_out,
@@ -204,7 +209,9 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
 
 /// What the user may want to know or change, a sentence each.
 fn hints(wall: &Wall, survey: &Survey, diagonal_mm: f64, unit_mm: f64) -> Vec<String> {
-    let mut hints: Vec<String> = unit_hint(diagonal_mm, unit_mm).into_iter().collect();
+    let half_lumen_mm = survey.lumen.as_ref().map(|lumen| lumen.median_mm);
+    let unit = unit_hint(diagonal_mm, half_lumen_mm, unit_mm);
+    let mut hints: Vec<String> = unit.into_iter().chain(facing_hints(wall.openings())).collect();
     if wall.openings().is_empty() {
         let list = |v: &[f64; 3]| format!("[{:.3}, {:.3}, {:.3}]", v[0], v[1], v[2]);
         hints.push(match &survey.start {

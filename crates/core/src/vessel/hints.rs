@@ -1,30 +1,82 @@
 //! Guesses at what a user may have meant. They are said, never taken.
 
-/// Diagonals of a surface in mm between which its unit is believed: a single small artery, and a whole body.
-const BELIEVED_MM: [f64; 2] = [5.0, 3000.0];
-/// Units of files, millimetres each.
-const UNITS: [(&str, f64); 4] =
-    [("metres", 1000.0), ("centimetres", 10.0), ("inches", 25.4), ("micrometres", 1e-3)];
-/// Diagonals of vessels that are usual, mm.
-const USUAL_MM: [f64; 2] = [20.0, 1500.0];
+use std::ops::RangeInclusive;
 
-/// A guess at the unit of a surface that is `diagonal_mm` across when read with `unit_mm`; none if that may be right.
-pub fn unit_hint(diagonal_mm: f64, unit_mm: f64) -> Option<String> {
-    if !(diagonal_mm > 0.0 && diagonal_mm.is_finite())
-        || (BELIEVED_MM[0]..=BELIEVED_MM[1]).contains(&diagonal_mm)
-    {
+use super::{Opening, Wall, opening, survey};
+use crate::Result;
+
+/// Diagonals of a surface in mm between which its unit is believed: a single small artery, and a whole body.
+const BELIEVED_MM: RangeInclusive<f64> = 5.0..=3000.0;
+/// Medians of half of the lumen, mm, between which its unit is believed: a distal artery, and a wide aneurysm.
+const BELIEVED_LUMEN_MM: RangeInclusive<f64> = 1.0..=30.0;
+/// Units of files, millimetres each.
+const UNITS: [(&str, f64); 5] = [
+    ("metres", 1000.0),
+    ("centimetres", 10.0),
+    ("inches", 25.4),
+    ("micrometres", 1e-3),
+    ("millimetres", 1.0),
+];
+/// Diagonals of vessels that are usual, mm.
+const USUAL_MM: RangeInclusive<f64> = 20.0..=1500.0;
+
+/// What a user may want to know of a wall that was read with `unit_mm`, a sentence each: a unit that may be another, and openings that
+/// face each other.
+///
+/// # Errors
+/// [`Error::Mesh`](crate::Error::Mesh) if the wall cannot be queried.
+pub fn wall_hints(wall: &Wall, unit_mm: f64) -> Result<Vec<String>> {
+    let (low, high) = wall.mesh().used_bounds_mm().unwrap_or_default();
+    let unit = unit_hint((high - low).norm(), survey::median_half_lumen_mm(wall)?, unit_mm);
+    Ok(unit.into_iter().chain(facing_hints(wall.openings())).collect())
+}
+
+/// A sentence for each pair of openings that face each other.
+pub(super) fn facing_hints(openings: &[Opening]) -> impl Iterator<Item = String> {
+    opening::facing(openings).into_iter().map(|[i, j]| {
+        let (a, b) = (&openings[i], &openings[j]);
+        format!(
+            "openings {i} and {j}, of radius {} and {} mm, face each other {} mm apart: the vessel is cut through there, and a device leaves \
+             it; join its parts",
+            rounded(a.radius_mm),
+            rounded(b.radius_mm),
+            rounded((a.centre_mm - b.centre_mm).norm())
+        )
+    })
+}
+
+/// A guess at the unit of a surface that is `diagonal_mm` across, with half of its lumen in the median where that is known, when it is read with
+/// `unit_mm`; none if that may be right or no other unit is likelier.
+pub(crate) fn unit_hint(diagonal_mm: f64, half_lumen_mm: Option<f64>, unit_mm: f64) -> Option<String> {
+    let is_odd = !BELIEVED_MM.contains(&diagonal_mm);
+    let is_odd_inside = half_lumen_mm.is_some_and(|mm| !BELIEVED_LUMEN_MM.contains(&mm));
+    if !(diagonal_mm > 0.0 && diagonal_mm.is_finite() && (is_odd || is_odd_inside)) {
         return None;
     }
-    let mut text = format!("the surface is {} mm across", rounded(diagonal_mm));
-    let in_file = diagonal_mm / unit_mm;
-    let usual = |mm: f64| (USUAL_MM[0]..=USUAL_MM[1]).contains(&(in_file * mm));
-    let guess = UNITS.iter().chain([&("millimetres", 1.0)]).find(|(_, mm)| usual(*mm) && *mm != unit_mm);
-    text += &match guess {
-        Some((name, mm)) => format!(": if the file is in {name}, set vessel.unit_mm = {mm} (--unit-mm {mm})"),
-        None => ", unlike any vessel: set vessel.unit_mm (--unit-mm) to the millimetres per unit of the file"
-            .to_owned(),
+    let measures = |scale: f64| {
+        let lumen = half_lumen_mm.map_or_else(String::new, |mm| {
+            format!(", half of its lumen {} mm in the median", rounded(mm * scale))
+        });
+        format!("{} mm across{lumen}", rounded(diagonal_mm * scale))
     };
-    Some(text)
+    let is_usual = |mm: f64| {
+        let scale = mm / unit_mm;
+        USUAL_MM.contains(&(diagonal_mm * scale))
+            && half_lumen_mm.is_none_or(|half| BELIEVED_LUMEN_MM.contains(&(half * scale)))
+    };
+    match UNITS.iter().find(|(_, mm)| *mm != unit_mm && is_usual(*mm)) {
+        Some((name, mm)) => Some(format!(
+            "the surface is {}, as it is read; if the file is in {name}, it is {}: then set vessel.unit_mm = {mm} (--unit-mm {mm})",
+            measures(1.0),
+            measures(mm / unit_mm)
+        )),
+        None if is_odd => Some(format!(
+            "the surface is {}, unlike any vessel: set vessel.unit_mm (--unit-mm) to the millimetres per unit of the file",
+            measures(1.0)
+        )),
+        // A small vessel that is nothing else in another unit.
+        None => None,
+    }
 }
 
 /// Three digits.
@@ -39,21 +91,34 @@ mod tests {
 
     #[test]
     fn odd_sizes_get_a_guess_and_usual_ones_none() {
-        for (diagonal, unit, part) in [
+        for (diagonal, lumen, unit, part) in [
             (
                 0.34,
+                None,
                 1.0,
-                "0.34 mm across: if the file is in metres, set vessel.unit_mm = 1000 (--unit-mm 1000)",
+                "0.34 mm across, as it is read; if the file is in metres, it is 340 mm across: then set vessel.unit_mm = 1000 (--unit-mm 1000)",
             ),
-            (3.1, 1.0, "centimetres, set vessel.unit_mm = 10"),
-            (340_000.0, 1000.0, "millimetres, set vessel.unit_mm = 1 "),
-            (1e-9, 1.0, "1e-9 mm across, unlike any vessel"),
+            (3.1, None, 1.0, "centimetres, it is 31 mm across: then set vessel.unit_mm = 10"),
+            (340_000.0, None, 1000.0, "millimetres, it is 340 mm across: then set vessel.unit_mm = 1 "),
+            (1e-9, None, 1.0, "1e-9 mm across, unlike any vessel"),
+            (
+                6.0,
+                Some(0.4),
+                1.0,
+                "6 mm across, half of its lumen 0.4 mm in the median, as it is read; if the file is in centimetres, it is 60 mm across, \
+                 half of its lumen 4 mm",
+            ),
+            (0.06, Some(0.004), 1.0, "if the file is in metres"),
+            (600.0, Some(40.0), 10.0, "if the file is in millimetres, it is 60 mm across"),
         ] {
-            let hint = unit_hint(diagonal, unit).unwrap();
+            let hint = unit_hint(diagonal, lumen, unit).unwrap();
             assert!(hint.contains(part), "{hint}");
         }
         for usual in [6.0, 340.0, 2000.0, 0.0, f64::NAN, f64::INFINITY] {
-            assert_eq!(unit_hint(usual, 1.0), None);
+            assert_eq!(unit_hint(usual, None, 1.0), None);
+        }
+        for (diagonal, lumen) in [(60.0, 4.0), (340.0, 12.0), (200.0, 0.8)] {
+            assert_eq!(unit_hint(diagonal, Some(lumen), 1.0), None);
         }
     }
 }

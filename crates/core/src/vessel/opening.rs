@@ -124,6 +124,31 @@ fn apart(a: &Opening, b: &Opening, length_mm: f64) -> f64 {
     (r + d * s - e * t).norm()
 }
 
+/// Cosine of the angle between the directions of openings that face each other, at most.
+const OPPOSITE: f64 = -0.8;
+/// The smaller radius of such openings over the larger one, at least.
+const ALIKE: f64 = 0.7;
+
+/// Part of the radius by which the parts of such a vessel may overlap.
+const OVERLAP: f64 = 0.25;
+
+/// Pairs of openings of like size that face each other no farther apart than the larger radius.
+pub(super) fn facing(openings: &[Opening]) -> Vec<[usize; 2]> {
+    let mut pairs = Vec::new();
+    for (i, a) in openings.iter().enumerate() {
+        // The largest come first.
+        for b in openings[i + 1..].iter().take_while(|b| b.radius_mm >= ALIKE * a.radius_mm) {
+            let offset = b.centre_mm - a.centre_mm;
+            // The ends of a short tube look away from each other.
+            let is_before = offset.dot(&a.direction) >= -OVERLAP * a.radius_mm;
+            if is_before && offset.norm() <= a.radius_mm && a.direction.dot(&b.direction) <= OPPOSITE {
+                pairs.push([a.index, b.index]);
+            }
+        }
+    }
+    pairs
+}
+
 /// Boundary loops of a consistently oriented mesh.
 #[derive(Debug)]
 pub(crate) struct Boundary {

@@ -55,6 +55,8 @@ pub struct RepairReport {
     pub one_sided_edges: usize,
     /// Vertices merged over cracks wider than the tolerance of welding.
     pub cracks_closed: usize,
+    /// Open edges split at the vertices of the other side of a seam, and joined to it.
+    pub edges_sewn: usize,
     /// Triangles of fins, second layers and membranes removed: edges had more than two triangles.
     pub sheets_removed: usize,
     /// Edges of more than two triangles along which the surface was cut apart, nothing moved.
@@ -86,6 +88,7 @@ impl RepairReport {
             self.degenerate_removed,
             self.duplicates_removed,
             self.cracks_closed,
+            self.edges_sewn,
             self.sheets_removed,
             self.edges_cut,
             self.pieces_dropped,
@@ -112,6 +115,7 @@ impl RepairReport {
         note(self.duplicates_removed, "duplicate triangles removed");
         note(self.triangles_flipped, "triangles turned over");
         note(self.cracks_closed, "vertices merged over cracks");
+        note(self.edges_sewn, "edges sewn to vertices of the other side of a seam");
         note(self.sheets_removed, "triangles of fins and second layers removed");
         note(self.edges_cut, "edges of more than two triangles cut apart");
         note(self.pieces_dropped, "small or flat pieces dropped");
@@ -175,6 +179,11 @@ impl Wall {
         report.duplicates_removed = remove_duplicates(&mut mesh.triangles, &mut edges);
         if whole {
             repair::join_sheets(&mut mesh, &mut edges, tolerance_mm, &mut report);
+        }
+        if mesh.triangles.is_empty() {
+            return Err(Error::Mesh(
+                "nothing is left of it where its edges are joined; check the file and its unit".into(),
+            ));
         }
         let before = mesh.triangles.clone();
         let consistency = orient::make_consistent(&mut mesh.triangles, &mut edges);

@@ -43,6 +43,14 @@ impl Patient {
         Ok(Self::Slab { tissue_mm: spec.xray.tissue_mm })
     }
 
+    /// Part of the vessel's surface that a tomogram holds, 0 to 1.
+    pub(crate) fn vessel_held(&self) -> Option<f64> {
+        match self {
+            Self::Tomogram(volume) => Some(volume.vessel_held()),
+            Self::Slab { .. } | Self::Torso(_) => None,
+        }
+    }
+
     /// The air of a generated body.
     pub(crate) fn air(&self) -> Option<&SurfaceMesh> {
         match self {

@@ -36,9 +36,17 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
         return Err(Failure::Input(text).at(args.scene.display()));
     }
     let mut simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
+    if !args.quiet {
+        for hint in scene.hints(simulation.wall()).map_err(in_scene)? {
+            tell(format_args!("{}: {hint}", args.scene.display()));
+        }
+    }
     let saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
     let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation))?;
     frames.check(&script).map_err(in_scene)?;
+    if let Some(held) = frames.held().filter(|_| !args.quiet) {
+        tell(format_args!("{}: {held}", args.scene.display()));
+    }
     let mut times_s = Vec::new();
     let mut hand = match &saved {
         Some(saved) => saved.restore(&scene, &mut simulation, &script, |step| {

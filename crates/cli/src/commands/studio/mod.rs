@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use crate::args::{FrameArgs, ViewChoice};
 use crate::failure::Failure;
+use crate::output::frames::tomogram_holds;
 use crate::output::manifest::Manifest;
 use crate::output::npz::write_map;
 use crate::output::{print_json, tell, to_json};
@@ -153,6 +154,9 @@ impl<'a> Studio<'a> {
     ) -> Result<Self, Failure> {
         plan.spec.injection.extend(injections);
         let planes = Plane::all(&plan.spec, &wall)?;
+        if let Some(held) = planes.first().and_then(|plane| tomogram_holds(&plane.renderer)) {
+            tell(format_args!("endowire: {held}"));
+        }
         Ok(Self { plan, wall, planes, drawn: 0, animation: None, files: vec![] })
     }
 

@@ -5,30 +5,61 @@
 
 use std::fmt::Write;
 
-use super::Reason;
+use super::faces::Faces;
+use super::text::lines;
+use super::{Parsed, Reason};
 use crate::vessel::SurfaceMesh;
 
-pub(super) fn parse(bytes: &[u8]) -> Result<SurfaceMesh, Reason> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
     // Comments and names may be in any encoding; what counts is ASCII.
     let text = String::from_utf8_lossy(bytes);
-    let mut mesh = SurfaceMesh::default();
-    let mut polygon = Vec::new();
-    for (index, line) in text.lines().enumerate() {
-        let mut words = line.split('#').next().unwrap_or_default().split_whitespace();
-        let what = || format!("line {}", index + 1);
-        match words.next() {
-            Some("v") => mesh.vertices_mm.push(super::coordinates(words, what)?),
-            Some("f") => {
-                polygon.clear();
-                for word in words {
-                    polygon.push(vertex_index(word, mesh.vertices_mm.len(), what)?);
-                }
-                super::push_fan(&mut mesh, &polygon, what)?;
+    let (mut parsed, mut faces) = (Parsed::default(), Faces::default());
+    // What lines that go on have said so far.
+    let mut begun = String::new();
+    for (number, line) in lines(&text) {
+        let content = match line.split_once('#') {
+            Some((content, comment)) => {
+                parsed.axes.look_in(comment);
+                content
             }
-            _ => {}
+            None => match line.trim_end().strip_suffix('\\') {
+                Some(part) => {
+                    begun += part;
+                    begun.push(' ');
+                    continue;
+                }
+                None => line,
+            },
+        };
+        if begun.is_empty() {
+            statement(content, number, &mut parsed.mesh, &mut faces)?;
+        } else {
+            begun += content;
+            statement(&std::mem::take(&mut begun), number, &mut parsed.mesh, &mut faces)?;
         }
     }
-    Ok(mesh)
+    if !begun.is_empty() {
+        return Err("the last line goes on (\\), but nothing follows: the file is cut off".into());
+    }
+    faces.fill(&mut parsed.mesh, |number| format!("line {number}"))?;
+    Ok(parsed)
+}
+
+/// Carries out a line without its comment; `number` is that of its end.
+fn statement(line: &str, number: usize, mesh: &mut SurfaceMesh, faces: &mut Faces) -> Result<(), Reason> {
+    let mut words = line.split_whitespace();
+    let what = || format!("line {number}");
+    match words.next() {
+        Some("v") => mesh.vertices_mm.push(super::coordinates(words, what)?),
+        Some("f") => {
+            let count = mesh.vertices_mm.len();
+            let polygon: Vec<i64> =
+                words.map(|word| vertex_index(word, count, what)).collect::<Result<_, _>>()?;
+            faces.push(polygon, number);
+        }
+        _ => {}
+    }
+    Ok(())
 }
 
 /// The vertex of `v`, `v/vt`, `v//vn` or `v/vt/vn`, counted from 0. OBJ counts from 1, or back from the end by negative numbers.

@@ -4,47 +4,64 @@
 //! `solid`, takes a binary file whose header begins with "solid" for text, and narrows ASCII numbers to 32 bits. The format
 //! itself is 50 bytes a triangle.
 
-use super::Reason;
+use super::faces::Faces;
+use super::text::lines;
+use super::{Parsed, Reason, ToldAxes};
 use crate::Vec3;
 use crate::vessel::SurfaceMesh;
 
 /// Header of free text, then the triangle count.
 const HEADER: usize = 80;
+/// Header and count.
+const BEGIN: usize = HEADER + 4;
 /// Normal and three corners as 12 floats, and two spare bytes.
 const RECORD: usize = 50;
+/// Counts of programs that write the header before they know how many triangles follow.
+const UNKNOWN: [usize; 2] = [0, u32::MAX as usize];
 
-pub(super) fn parse(bytes: &[u8]) -> Result<SurfaceMesh, Reason> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Reason> {
     let declared = declared_triangles(bytes);
+    let room = bytes.len().saturating_sub(BEGIN);
     // The length decides, not the word "solid": many binary files begin with it.
-    if declared.is_some_and(|count| count.checked_mul(RECORD) == Some(bytes.len() - HEADER - 4)) {
-        return Ok(parse_binary(bytes));
+    if declared.is_some_and(|count| count.checked_mul(RECORD) == Some(room)) {
+        return Ok(parse_binary(bytes, room / RECORD));
     }
-    let text = String::from_utf8_lossy(bytes);
-    let begins_solid = text.trim_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case("solid"));
+    if holds_facets(bytes) {
+        return parse_ascii(&String::from_utf8_lossy(bytes));
+    }
     match declared {
-        _ if begins_solid && text.to_ascii_lowercase().contains("facet") => parse_ascii(&text),
+        // The size says what the count does not.
+        Some(count) if UNKNOWN.contains(&count) && room > 0 && room.is_multiple_of(RECORD) => {
+            Ok(parse_binary(bytes, room / RECORD))
+        }
         // Trailing bytes are harmless; missing ones are not.
-        Some(count) if count.checked_mul(RECORD).is_some_and(|n| n < bytes.len() - HEADER - 4) => {
-            Ok(parse_binary(bytes))
+        Some(count) if count > 0 && count.checked_mul(RECORD).is_some_and(|n| n < room) => {
+            Ok(parse_binary(bytes, count))
         }
         Some(count) => Err(format!(
-            "binary STL declares {count} triangles, but only {} are there: the file is cut off, or not an STL",
-            (bytes.len() - HEADER - 4) / RECORD
+            "binary STL declares {count} triangles of {RECORD} bytes, and {room} bytes are there: the file is cut off, or not an STL"
         )),
         None => Err(format!("not an STL: {} bytes, and no 'solid … facet' text", bytes.len())),
     }
 }
 
 fn declared_triangles(bytes: &[u8]) -> Option<usize> {
-    let count = bytes.get(HEADER..HEADER + 4)?;
-    Some(u32::from_le_bytes([count[0], count[1], count[2], count[3]]) as usize)
+    let count = bytes.get(HEADER..)?.first_chunk()?;
+    Some(u32::from_le_bytes(*count) as usize)
 }
 
-/// Reads as many records as the header declares; the caller has checked that they are there.
-fn parse_binary(bytes: &[u8]) -> SurfaceMesh {
-    let mut mesh = SurfaceMesh::default();
-    let count = declared_triangles(bytes).unwrap_or(0);
-    for record in bytes[HEADER + 4..].chunks_exact(RECORD).take(count) {
+/// Whether the text of a facet is there, behind what may be the header of a binary file.
+fn holds_facets(bytes: &[u8]) -> bool {
+    let text = if bytes.len() < 4 * HEADER { bytes } else { &bytes[BEGIN..] };
+    text.windows(5).any(|word| word.eq_ignore_ascii_case(b"facet"))
+}
+
+/// Reads records that the caller knows to be there.
+fn parse_binary(bytes: &[u8], count: usize) -> Parsed {
+    let mut parsed = Parsed::default();
+    parsed.axes.look_in(&String::from_utf8_lossy(&bytes[..HEADER]));
+    let mesh = &mut parsed.mesh;
+    for record in bytes[BEGIN..].chunks_exact(RECORD).take(count) {
         let float = |k: usize| {
             let b = &record[4 * k..4 * k + 4];
             f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
@@ -53,46 +70,50 @@ fn parse_binary(bytes: &[u8]) -> SurfaceMesh {
         for corner in 1..4 {
             mesh.vertices_mm.push(Vec3::new(float(3 * corner), float(3 * corner + 1), float(3 * corner + 2)));
         }
-        push_last_three(&mut mesh);
+        let end = mesh.vertices_mm.len() as u32;
+        mesh.triangles.push([end - 3, end - 2, end - 1]);
     }
-    mesh
+    parsed
 }
 
-fn push_last_three(mesh: &mut SurfaceMesh) {
-    let end = mesh.vertices_mm.len() as u32;
-    mesh.triangles.push([end - 3, end - 2, end - 1]);
-}
-
-/// All solids of the file, as one surface.
-fn parse_ascii(text: &str) -> Result<SurfaceMesh, Reason> {
+/// All solids of the file, as one surface. Words count, not lines: some files have one line only.
+fn parse_ascii(text: &str) -> Result<Parsed, Reason> {
     let mut mesh = SurfaceMesh::default();
-    let mut corners = 0;
-    for (index, line) in text.lines().enumerate() {
-        let mut words = line.split_whitespace();
-        let what = || format!("line {}", index + 1);
-        match words.next().map(str::to_ascii_lowercase).as_deref() {
-            Some("vertex") => {
-                mesh.vertices_mm.push(super::coordinates(words, what)?);
-                corners += 1;
+    let (mut faces, mut axes) = (Faces::default(), ToldAxes::default());
+    // Vertices before those of the facet that is being read.
+    let mut facet: Option<usize> = None;
+    for (number, line) in lines(text) {
+        let mut words = line.split_whitespace().peekable();
+        while let Some(word) = words.next() {
+            let is = |keyword: &str| word.eq_ignore_ascii_case(keyword);
+            if is("vertex") {
+                facet.get_or_insert(mesh.vertices_mm.len());
+                mesh.vertices_mm.push(super::coordinates(&mut words, || format!("line {number}"))?);
+            } else if is("facet") && facet.is_some() {
+                return Err(format!(
+                    "line {number}: a facet begins before the last one is closed by endfacet; mend it"
+                ));
+            } else if is("endfacet") {
+                let first = facet.take().unwrap_or(mesh.vertices_mm.len());
+                faces.push(first as i64..mesh.vertices_mm.len() as i64, number);
+            } else if is("solid") || is("endsolid") {
+                // A name may hold any word, and ends with its line or where a facet begins.
+                while words.peek().is_some_and(|word| !word.eq_ignore_ascii_case("facet")) {
+                    axes.look_in(words.next().unwrap_or_default());
+                }
             }
-            Some("endfacet") => {
-                let first = (mesh.vertices_mm.len() - corners) as i64;
-                let polygon: Vec<i64> = (first..first + corners as i64).collect();
-                super::push_fan(&mut mesh, &polygon, what)?;
-                corners = 0;
-            }
-            _ => {}
         }
     }
-    if corners != 0 {
+    if facet.is_some() {
         return Err("the last facet is not closed: the file is cut off".into());
     }
-    Ok(mesh)
+    faces.fill(&mut mesh, |number| format!("line {number}"))?;
+    Ok(Parsed { mesh, axes })
 }
 
 /// Binary STL with unit normals.
 pub(super) fn bytes(mesh: &SurfaceMesh) -> Vec<u8> {
-    let mut out = Vec::with_capacity(HEADER + 4 + RECORD * mesh.triangles.len());
+    let mut out = Vec::with_capacity(BEGIN + RECORD * mesh.triangles.len());
     // Must not begin with "solid", or careless readers take it for text.
     let title = b"endowire surface, unit mm";
     out.extend_from_slice(title);

@@ -72,7 +72,7 @@ proptest! {
 
     #[test]
     fn foreign_variants_read_to_the_same_surface(mesh in any_surface()) {
-        let same = |format, bytes: &[u8]| soup(&parse(format, bytes).unwrap()) == soup(&mesh);
+        let same = |format, bytes: &[u8]| soup(&parse(format, bytes).unwrap().mesh) == soup(&mesh);
         prop_assert!(same(Format::Stl, ascii_stl(&mesh).as_bytes()));
         prop_assert!(same(Format::Stl, ascii_stl(&mesh).to_ascii_uppercase().as_bytes()));
         let mut misleading = stl::bytes(&mesh);
@@ -95,14 +95,14 @@ proptest! {
             let mut changed = bytes.clone();
             changed[(bytes.len() as f64 * at) as usize] = byte;
             if let Ok(surface) = parse(format, &changed) {
-                let _ = crate::vessel::Wall::from_surface(&surface);
+                let _ = crate::vessel::Wall::from_surface(&surface.mesh);
             }
         }
     }
 
     #[test]
     fn noise_never_panics(bytes in prop::collection::vec(any::<u8>(), 0..400), text in "(ply|solid|v|f|facet|[ 0-9\n-])*") {
-        for format in [Format::Stl, Format::Obj, Format::Ply] {
+        for format in [Format::Stl, Format::Obj, Format::Ply, Format::Vtp, Format::Vtk] {
             let _ = parse(format, &bytes);
             let _ = parse(format, text.as_bytes());
         }
@@ -125,7 +125,7 @@ fn absurd_counts_end_at_once_with_a_reason() {
 #[test]
 fn polygons_become_fans_and_negative_indices_count_back() {
     let quad = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1 2//2 3/3/3 -1 # a square\n";
-    assert_eq!(parse(Format::Obj, quad).unwrap().triangles, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(parse(Format::Obj, quad).unwrap().mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
 }
 
 #[test]
@@ -137,13 +137,13 @@ fn faces_without_three_corners_are_counted_and_the_others_stay() {
     for (format, bytes, degenerate) in
         [(Format::Obj, &obj[..], 3), (Format::Stl, &stl[..], 1), (Format::Ply, &ply[..], 1)]
     {
-        let surface = scaled(parse(format, bytes).unwrap(), 2.0).unwrap();
+        let surface = placed(parse(format, bytes).unwrap(), 2.0.into()).unwrap();
         let wall = crate::vessel::Wall::from_surface(&surface).unwrap();
         assert_eq!((wall.mesh().triangles.len(), wall.report().degenerate_removed), (1, degenerate));
     }
     // The twin: a vertex that is used must be somewhere.
     let used = parse(Format::Obj, b"v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n").unwrap();
-    let reason = scaled(used, 1.0).unwrap_err();
+    let reason = placed(used, 1.0.into()).unwrap_err();
     assert!(reason.contains("vertex 2 is at (NaN") && reason.contains("1 triangles"), "{reason}");
 }
 
@@ -154,8 +154,10 @@ fn errors_name_the_place_and_the_way_out() {
     assert!(reason(Format::Obj, "v 0 0 0\nf 1 2 3\n").contains("line 2 names vertex 1"));
     assert!(reason(Format::Obj, "v 0 0 0\n").contains("no triangles"));
     assert!(reason(Format::Stl, "solid x\nfacet\nvertex 0 0\nendfacet\n").contains("line 3"));
-    let unknown = SurfaceMesh::read(Path::new("wall.vtk"), 1.0).unwrap_err().to_string();
-    assert!(unknown.contains(".vtk") && unknown.contains(".stl, .obj or .ply"), "{unknown}");
+    let unknown = SurfaceMesh::read(Path::new("wall.vtu"), 1.0).unwrap_err().to_string();
+    assert!(unknown.contains(".vtu") && unknown.contains(".stl, .obj, .ply, .vtp or .vtk"), "{unknown}");
+    let written = SurfaceMesh::default().write(Path::new("wall.vtp")).unwrap_err().to_string();
+    assert!(written.contains("read, not written"), "{written}");
     for unit in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(SurfaceMesh::read(Path::new("a.stl"), unit).unwrap_err().to_string().starts_with("unit_mm"));
     }
@@ -173,19 +175,22 @@ fn errors_of_ply_files_are_one_line_with_place_cause_and_mend() {
         (long, "line 2, \"nonsense nonsense"),
         ("ply\nformat ascii 9.0\nelement nonsense\n".to_owned(), "line 3, \"element nonsense\": "),
         ("ply\nelement vertex 1\n".to_owned(), "line 3: "),
-        (with("0 0 x\n"), "line 10, \"0 0 x\": cannot be read as the header declares it: mend it"),
-        (with("0 0\n"), "line 10, \"0 0\": has fewer values than its element has properties"),
         (
-            with("0 0 0\n"),
-            "line 11: Unexpected end of file while reading element 'vertex' (expected 2, got 1)",
+            with("0 0 x\n"),
+            "line 10, \"0 0 x\": \"x\" is no number, in row 0 of the 2 of element \"vertex\": mend it",
         ),
-        (with("0 0 0\n1 0 0\n3 0 1\n"), "line 12, \"3 0 1\": expected 3 list elements, but found only 2"),
+        (with("0 0\n"), "line 10, \"0 0\": has fewer values than its element has properties"),
+        (with("0 0 0\n"), "line 11: the file ends here, in row 1 of the 2 of element \"vertex\""),
+        (with("0 0 0\n1 0 0\n3 0 1\n"), "line 12, \"3 0 1\": has fewer values"),
         (with("0 0 0\n1 0 0\n3 0 1 7\n"), "face 0 names vertex 7"),
         (
             with("").replace("ascii", "binary_little_endian"),
-            "Unexpected end of file while reading binary element 'vertex'",
+            "the file ends here: it is cut off, in row 0 of the 2 of element \"vertex\"",
         ),
-        (with("0 0 0\n1 0 0\n3 0 1 1\n").replace("float z", "float w"), "vertex 0 lacks x, y or z"),
+        (
+            with("0 0 0\n1 0 0\n3 0 1 1\n").replace("float z", "float w"),
+            "the element 'vertex' lacks x, y or z",
+        ),
     ];
     for (text, begins) in cases {
         let reason = parse(Format::Ply, text.as_bytes()).unwrap_err();

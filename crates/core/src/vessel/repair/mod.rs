@@ -8,6 +8,7 @@ mod fill;
 mod folds;
 mod holes;
 mod pieces;
+mod seams;
 mod sheets;
 #[cfg(test)]
 mod tests;
@@ -32,13 +33,19 @@ pub(super) fn join_sheets(
     report.cracks_closed = cracks::close_cracks(mesh, edges.of(&mesh.triangles));
     if report.cracks_closed > 0 {
         edges.changed();
+    }
+    let (sewn, merged) = seams::sew(mesh, edges.of(&mesh.triangles));
+    (report.edges_sewn, report.cracks_closed) = (sewn, report.cracks_closed + merged);
+    if report.cracks_closed + report.edges_sewn > 0 {
+        edges.changed();
         report.degenerate_removed += sliver::remove_degenerate(mesh, tolerance_mm);
         report.duplicates_removed += remove_duplicates(&mut mesh.triangles, edges);
     }
     let resolved = sheets::resolve(mesh, edges);
     report.sheets_removed = resolved.removed;
     report.edges_cut = resolved.cut;
-    if report.pieces_dropped + report.cracks_closed + resolved.removed + resolved.cut > 0 {
+    if report.pieces_dropped + report.cracks_closed + report.edges_sewn + resolved.removed + resolved.cut > 0
+    {
         edges.changed();
         drop_unreferenced(mesh);
     }

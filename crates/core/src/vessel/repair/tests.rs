@@ -156,7 +156,7 @@ fn a_vertex_on_an_edge_opens_no_slit() {
     spoiled.triangles[t] = [a, m, c];
     spoiled.triangles.push([m, b, c]);
     let report = repaired(&spoiled, &clean, 1e-9);
-    assert_eq!(report.holes_filled, 1, "{report:?}");
+    assert_eq!((report.edges_sewn, report.holes_filled), (1, 0), "{report:?}");
 }
 
 #[test]

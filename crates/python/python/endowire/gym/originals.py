@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from .. import InputError, Vessel
 from .centreline import Centreline
 from .vessels import Site
-from .vtp import read_vtp
 
 Array = NDArray[np.float64]
 
@@ -70,9 +69,9 @@ def basic_wire_nav(folder: str | PathLike[str]) -> OriginalVessel:
         [[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]]
     )
     # Centimetres there.
+    surface = Vessel.read(_files(root / "Meshes", "*.vtp")[0], unit_mm=10.0)
+    vessel = Vessel.from_arrays(surface.vertices_mm @ turn.T, surface.triangles)
     turn *= 10.0
-    points, triangles = read_vtp(_files(root / "Meshes", "*.vtp")[0])
-    vessel = Vessel.from_arrays(points @ turn.T, triangles)
     curves = {}
     for path in _files(root / "Paths", "*.pth"):
         points_mm = _simvascular_path(path) @ turn.T

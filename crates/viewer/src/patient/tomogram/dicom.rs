@@ -29,6 +29,12 @@ const NATIVE: [&str; 3] =
 const DIRECTION: f64 = 1e-3;
 /// Part of the distance between slices by which one may be off its place.
 const UNEVEN: f64 = 0.02;
+/// Slices that may be missing in a row for a gap to be told as such, and the one behind it.
+const MOST_MISSING: f64 = 20.0;
+/// Missing slices that are named.
+const NAMED: usize = 5;
+/// Part of a spacing by which that of another slice may differ: numbers are written in 16 letters at most, and computed before.
+const SPACING: f64 = 1e-4;
 /// What is taken in place of padding: air.
 const PADDED_HU: f32 = -1000.0;
 
@@ -268,6 +274,28 @@ fn chain(error: &dyn std::error::Error) -> String {
     told.chars().map(|c| if c.is_control() { ' ' } else { c }).take(300).collect()
 }
 
+/// Whether spacings are the same but for rounding.
+fn alike(a: [f64; 2], b: [f64; 2]) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SPACING * b.abs())
+}
+
+/// Where slices are missing from a row of them that is even but for that: along the normal, mm; `None` of an uneven one. `at`: places
+/// along the normal, in order.
+fn missing(at: &[f64]) -> Option<Vec<f64>> {
+    let apart: Vec<f64> = at.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = apart.len().checked_sub(1)? / 2;
+    let step = *apart.clone().select_nth_unstable_by(middle, f64::total_cmp).1;
+    let mut missing = Vec::new();
+    for (before, apart) in at.iter().zip(&apart) {
+        let steps = (*apart / step).round();
+        if !(1.0..=MOST_MISSING).contains(&steps) || (*apart - steps * step).abs() > UNEVEN * step {
+            return None;
+        }
+        missing.extend((1..steps as u32).map(|k| before + f64::from(k) * step));
+    }
+    Some(missing)
+}
+
 /// One volume of slices.
 fn joined(mut slices: Vec<Slice>) -> Told<Scan> {
     let name = |slice: &Slice| {
@@ -285,7 +313,7 @@ fn joined(mut slices: Vec<Slice>) -> Told<Scan> {
         let differs = match () {
             () if other.series != first.series => "are of two series (SeriesInstanceUID)",
             () if other.size != first.size => "have other rows or columns",
-            () if other.spacing_mm != first.spacing_mm => "have another PixelSpacing",
+            () if !alike(other.spacing_mm, first.spacing_mm) => "have another PixelSpacing",
             () if turned => "have another ImageOrientationPatient, as a scout has",
             () => continue,
         };
@@ -316,8 +344,30 @@ fn joined(mut slices: Vec<Slice>) -> Told<Scan> {
         if off > UNEVEN * step.norm() {
             let distances = slices.windows(2).map(apart);
             let (least, most) = distances.fold((f64::MAX, 0.0_f64), |(l, m), d| (l.min(d), m.max(d)));
+            let at: Vec<f64> = slices.iter().map(|slice| slice.position_mm.dot(&normal)).collect();
+            if let Some(missing) = missing(&at).filter(|missing| !missing.is_empty()) {
+                let gaps: Vec<String> = missing
+                    .iter()
+                    .take(NAMED)
+                    .map(|mm| {
+                        let behind = at.partition_point(|at| at < mm);
+                        format!(
+                            "{mm:.2} mm (between {} and {})",
+                            name(&slices[behind - 1]),
+                            name(&slices[behind])
+                        )
+                    })
+                    .collect();
+                let more = if missing.len() > NAMED { ", …" } else { "" };
+                return Err(format!(
+                    "{} of {} slices are missing, which are {least:.3} mm apart: along their normal at {}{more}; add them, or resample the series, as to NIfTI",
+                    missing.len(),
+                    count + missing.len(),
+                    gaps.join(", ")
+                ));
+            }
             return Err(format!(
-                "{} is {off:.3} mm off its place in an even row of {count} slices, which are {least:.3} to {most:.3} mm apart: one may be missing; resample the series, as to NIfTI",
+                "{} is {off:.3} mm off its place in an even row of {count} slices, which are {least:.3} to {most:.3} mm apart; resample the series, as to NIfTI",
                 name(slice)
             ));
         }

@@ -312,8 +312,9 @@ fn what_is_not_one_even_series_of_tomograms_is_refused_with_its_file_and_the_men
         }
     };
     let word = |tag: Tag, value: u16| move |_: usize, o: &mut InMemDicomObject| put_word(o, tag, value);
-    let cases: [(Change, &str); 16] = [
-        (&place(2, 16.25), "one may be missing"),
+    let cases: [(Change, &str); 17] = [
+        (&place(2, 16.0), "mm off its place"),
+        (&place(2, 16.25), "1 of 4 slices are missing"),
         (&place(1, 12.5), "are of one place"),
         (&of_one(tags::SERIES_INSTANCE_UID, VR::UI, "2.25.78"), "two series"),
         (&of_one(tags::IMAGE_ORIENTATION_PATIENT, VR::DS, "1\\0\\0\\0\\1\\0"), "as a scout has"),
@@ -335,6 +336,14 @@ fn what_is_not_one_even_series_of_tomograms_is_refused_with_its_file_and_the_men
         let error = read(folder.path()).unwrap_err();
         assert!(error.contains(said) && !error.contains('\n'), "{said}: {error}");
     }
+    // The gap is named by the slices beside it: names are in another order than places.
+    let folder = series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &place(2, 17.5));
+    let error = read(folder.path()).unwrap_err();
+    let named = "2 of 5 slices are missing, which are 1.250 mm apart: along their normal at 15.00 mm (between 0.dcm and 1.dcm), 16.25 mm";
+    assert!(error.contains(named), "{error}");
+    // Spacings are compared within rounding.
+    let rounded = of_one(tags::PIXEL_SPACING, VR::DS, "0.50000001\\0.74999999");
+    assert!(read(series(uids::EXPLICIT_VR_LITTLE_ENDIAN, &rounded).path()).is_ok());
     let packed = series("1.2.840.10008.1.2.4.70", &|_, _| ());
     let error = read(packed.path()).unwrap_err();
     assert!(error.contains("compressed") && error.contains("1.2.840.10008.1.2.4.70"), "{error}");

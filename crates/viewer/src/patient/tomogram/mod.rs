@@ -96,6 +96,8 @@ pub(crate) struct Volume {
     step_mm: f64,
     /// Soft tissue and bone of each voxel, the first index fastest.
     voxels: Vec<[f32; 2]>,
+    /// Part of the vessel's surface that is in the volume, 0 to 1.
+    vessel_held: f64,
 }
 
 impl Volume {
@@ -117,20 +119,42 @@ impl Volume {
         scan.check_values().map_err(bad)?;
         let voxels = scan.hu.into_iter().map(materials).collect();
         let volume = Self::new(scan.size, scan.axes, scan.origin_mm + Vec3::from(spec.offset_mm), voxels);
-        let volume = volume.ok_or_else(|| {
+        let mut volume = volume.ok_or_else(|| {
             bad("its axes do not span space, or its voxels are no 0.001 to 1000 mm wide; mend its sform or pixdim, or PixelSpacing and ImagePositionPatient".into())
         })?;
         volume.check_holds(wall).map_err(bad)?;
+        volume.vessel_held = volume.part_held(wall);
         Ok(volume)
+    }
+
+    /// Part of the vessel's surface that is in the volume, 0 to 1.
+    pub(crate) fn vessel_held(&self) -> f64 {
+        self.vessel_held
+    }
+
+    /// Whether a point is in one of its voxels.
+    fn holds(&self, point: &Vec3) -> bool {
+        let at = self.into * (point - self.origin_mm);
+        (0..3).all(|k| (-0.5..=self.size[k] as f64 - 0.5).contains(&at[k]))
+    }
+
+    /// How much of the area of a surface has its middle in the volume, 0 to 1.
+    fn part_held(&self, wall: &SurfaceMesh) -> f64 {
+        let (mut held, mut all) = (0.0, 0.0);
+        for index in 0..wall.triangles.len() {
+            let [a, b, c] = wall.corners(index);
+            let area = (b - a).cross(&(c - a)).norm();
+            all += area;
+            if self.holds(&((a + b + c) / 3.0)) {
+                held += area;
+            }
+        }
+        if all > 0.0 { held / all } else { 1.0 }
     }
 
     /// Refuses a vessel of which no vertex is in the volume.
     fn check_holds(&self, wall: &SurfaceMesh) -> std::result::Result<(), String> {
-        let within = |v: &Vec3| {
-            let at = self.into * (v - self.origin_mm);
-            (0..3).all(|k| (-0.5..=self.size[k] as f64 - 0.5).contains(&at[k]))
-        };
-        if wall.vertices_mm.is_empty() || wall.vertices_mm.iter().any(within) {
+        if wall.vertices_mm.is_empty() || wall.vertices_mm.iter().any(|v| self.holds(v)) {
             return Ok(());
         }
         let axes = self.into.try_inverse().unwrap_or_default();
@@ -159,7 +183,7 @@ impl Volume {
             return None;
         }
         let into = axes.try_inverse().filter(|m| m.iter().all(|x| x.is_finite()))?;
-        Some(Self { size, into, origin_mm, step_mm: STEP * smallest, voxels })
+        Some(Self { size, into, origin_mm, step_mm: STEP * smallest, voxels, vessel_held: 1.0 })
     }
 
     /// Lengths in all of the body and in its bone of the central ray of each pixel.

@@ -33,8 +33,9 @@ pub(super) fn read(path: &Path) -> Result<Scan> {
     let unreadable = |error: NiftiError| bad(format!("is no NIfTI volume: {error}"));
     let header = second(path).map_err(bad)?;
     let (header, placed, volume) = match header {
-        Some((header, placed, offset)) => {
+        Some((mut header, placed, offset)) => {
             check_size(&header).map_err(bad)?;
+            scaled(&mut header).map_err(bad)?;
             let mut voxels = plain(path).map_err(|e| unreadable(e.into()))?;
             io::copy(&mut (&mut voxels).take(offset), &mut io::sink()).map_err(|e| unreadable(e.into()))?;
             let volume = InMemNiftiVolume::from_reader(voxels, &header).map_err(unreadable)?;
@@ -42,11 +43,19 @@ pub(super) fn read(path: &Path) -> Result<Scan> {
         }
         None => {
             // The header first: it says how much memory the volume asks for.
-            check_size(&NiftiHeader::from_file(path).map_err(unreadable)?).map_err(bad)?;
-            let object: InMemNiftiObject = ReaderOptions::new().read_file(path).map_err(unreadable)?;
-            let header = object.header().clone();
+            let mut header = NiftiHeader::from_file(path).map_err(unreadable)?;
+            check_size(&header).map_err(bad)?;
+            let is_scaled = scaled(&mut header).map_err(bad)?;
             let placed = Placed::first(&header);
-            (header, placed, object.into_volume())
+            let object: InMemNiftiObject = ReaderOptions::new().read_file(path).map_err(unreadable)?;
+            let read = object.into_volume();
+            // The library scales by what the file says.
+            let volume = match is_scaled {
+                true => read,
+                false => InMemNiftiVolume::from_reader(read.into_raw_data().as_slice(), &header)
+                    .map_err(unreadable)?,
+            };
+            (header, placed, volume)
         }
     };
     let dim = volume.dim().to_vec();
@@ -67,6 +76,19 @@ pub(super) fn read(path: &Path) -> Result<Scan> {
     }
     let (axes, origin_mm) = placed.in_lps(header.xyzt_units).map_err(bad)?;
     Ok(Scan { size: [nx, ny, nz].map(usize::from), axes, origin_mm, hu })
+}
+
+/// Whether values are to be scaled; a slope of 0, or one that is no number, says that they are as they are stored (as nibabel has it), and
+/// becomes 1.
+fn scaled(header: &mut NiftiHeader) -> std::result::Result<bool, String> {
+    if header.scl_slope == 0.0 || !header.scl_slope.is_finite() {
+        (header.scl_slope, header.scl_inter) = (1.0, 0.0);
+        return Ok(false);
+    }
+    match header.scl_inter.is_finite() {
+        true => Ok(true),
+        false => Err(format!("says scl_inter = {} beside a slope; mend its header", header.scl_inter)),
+    }
 }
 
 /// A file's bytes, unpacked if they are compressed.

@@ -161,6 +161,47 @@ fn integers_and_floats_are_read_with_their_slope_and_what_is_no_volume_is_refuse
 }
 
 #[test]
+fn a_slope_that_is_none_leaves_values_as_they_are_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.nii");
+    let spec = CtSpec { file: path.clone(), offset_mm: [0.0; 3] };
+    let short: Vec<u8> = (0..8_i16).flat_map(|k| (25 * k - 200).to_le_bytes()).collect();
+    for (slope, intercept, first) in
+        [(f32::NAN, -1000.0, 0.8), (0.0, -1000.0, 0.8), (f32::INFINITY, f32::NAN, 0.8), (2.0, 0.0, 0.6)]
+    {
+        let mut bytes = file(4, &short);
+        bytes[112..116].copy_from_slice(&slope.to_le_bytes());
+        bytes[116..120].copy_from_slice(&intercept.to_le_bytes());
+        std::fs::write(&path, bytes).unwrap();
+        let volume = Volume::read(&spec, &SurfaceMesh::default()).unwrap();
+        assert!((volume.voxels[0][0] - first).abs() < 1e-6, "{slope}: {}", volume.voxels[0][0]);
+    }
+    let mut bytes = file(4, &short);
+    bytes[116..120].copy_from_slice(&f32::NAN.to_le_bytes());
+    std::fs::write(&path, bytes).unwrap();
+    let refused = Volume::read(&spec, &SurfaceMesh::default()).unwrap_err().to_string();
+    assert!(refused.contains("scl_inter = NaN"), "{refused}");
+}
+
+#[test]
+fn how_much_of_the_vessel_is_in_the_volume_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.nii");
+    let short: Vec<u8> = (0..8_i16).flat_map(|k| (400 + 25 * k).to_le_bytes()).collect();
+    std::fs::write(&path, file(4, &short)).unwrap();
+    let spec = CtSpec { file: path, offset_mm: [0.0; 3] };
+    // Voxels of 10 mm from -15 to 5 in x and y, and from -5 to 15 in z.
+    for (low, high, held) in [
+        (Vec3::new(-10.0, -10.0, 0.0), Vec3::new(0.0, 0.0, 10.0), 1.0),
+        // Half of four sides, and one end.
+        (Vec3::new(-10.0, -10.0, 0.0), Vec3::new(0.0, 0.0, 30.0), 0.5),
+    ] {
+        let volume = Volume::read(&spec, &SurfaceMesh::cuboid(low, high, 1.0)).unwrap();
+        assert!((volume.vessel_held() - held).abs() < 1e-9, "{}", volume.vessel_held());
+    }
+}
+
+#[test]
 fn a_missing_file_is_named_by_its_key() {
     let spec = CtSpec { file: "no-such.nii".into(), offset_mm: [0.0; 3] };
     let error = Volume::read(&spec, &SurfaceMesh::default()).unwrap_err().to_string();
