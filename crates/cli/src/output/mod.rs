@@ -15,11 +15,11 @@ pub(crate) mod recorder;
 pub(crate) mod recording;
 pub(crate) mod saved;
 pub(crate) mod vtk;
-pub(crate) mod whole;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};
 
+pub(crate) use endowire_sweep::whole;
 use serde::Serialize;
 
 use crate::failure::Failure;
