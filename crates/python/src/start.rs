@@ -18,7 +18,7 @@ use crate::scene::Scene;
 use crate::vessel::Vessel;
 
 /// A simulation before its first step, and what it was made of. For pickles of simulations; nothing else needs one.
-#[pyclass(frozen, module = "endowire._endowire", name = "Start")]
+#[pyclass(frozen, module = "endowire._endowire", name = "_Start")]
 pub(crate) struct Start {
     pub(crate) instruments: Vec<Instrument>,
     simulation: Mutex<insertion::Simulation>,
