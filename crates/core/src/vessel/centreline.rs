@@ -47,7 +47,7 @@ impl CentrelineTree {
     ///
     /// # Errors
     /// [`Error::Parameter`] naming the row if a number is not finite, a radius is below 10⁻⁶ mm, a parent is not an earlier
-    /// row, a point coincides with its parent, or there is not exactly one root with at least one child.
+    /// row, a point coincides with its parent or is farther than 2 m from it, or there is not exactly one root with at least one child.
     pub fn new(nodes: Vec<CentrelineNode>) -> Result<Self> {
         for row in 0..nodes.len() {
             check_row(&nodes, row).map_err(|(column, value, mend)| {
@@ -247,6 +247,8 @@ const SIZE_LIMIT: u64 = 64 << 20;
 
 /// Largest usable number: distances and their squares stay well inside f64, and no vessel is a kilometre long.
 const LARGEST_MM: f64 = 1e6;
+/// Longest way from a point to its parent, mm: as long as a body. One number that is wrong would have a vessel made that takes minutes.
+const LONGEST_SEGMENT_MM: f64 = 2000.0;
 
 /// Least radius: powers of it, as flow takes them, stay numbers, and no vessel is thinner than a molecule.
 const LEAST_RADIUS_MM: f64 = 1e-6;
@@ -277,6 +279,12 @@ fn check_row(
         }
         Some(parent) if (nodes[parent].position_mm - node.position_mm).norm() <= 1e-9 => {
             Err(("parent", describe(node.parent), "the point lies on its parent; remove one of them".into()))
+        }
+        Some(parent) if (nodes[parent].position_mm - node.position_mm).norm() > LONGEST_SEGMENT_MM => {
+            let mend = format!(
+                "the point is more than {LONGEST_SEGMENT_MM} mm from its parent: check the unit, or points between them"
+            );
+            Err(("parent", describe(node.parent), mend))
         }
         Some(_) => Ok(()),
     }

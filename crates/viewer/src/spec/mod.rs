@@ -392,6 +392,7 @@ mod tests {
                 s.injection = vec![injection(1.0, 1.0), injection(1.0, 1e308)];
             }),
             ("injection[0].duration_s", |s| s.injection = vec![injection(1e-308, 1.0)]),
+            ("injection[0].duration_s", |s| s.injection = vec![injection(1e4, 1.0)]),
             ("view.injection = 1001 tables", |s| s.injection = vec![injection(1.0, 1.0); 1001]),
             ("diaphragm_mm", |s| {
                 s.patient.torso = Some(TorsoSpec { diaphragm_mm: Some(1e300), ..TorsoSpec::default() });
