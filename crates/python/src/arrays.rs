@@ -62,7 +62,10 @@ impl<'a, 'py> FromPyObject<'a, 'py> for Numbers<'py> {
                 return Err(too_many("array", array.len(), MOST_NUMBERS));
             }
             Ok(_) => {}
-            Err(_) => count(&object, &mut MOST_ITEMS.clone(), DEEPEST)?,
+            Err(_) => {
+                let mut left = MOST_ITEMS;
+                count(&object, &mut left, DEEPEST)?;
+            }
         }
         object.extract().map(Self)
     }

@@ -194,12 +194,12 @@ fn claim(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
 
 /// What is in the places of a dataset in a folder that is none.
 fn taken(folder: &Path) -> Option<PathBuf> {
-    let places = FOLDERS.iter().chain([&ANNOTATIONS, &"dataset.json"]).map(|name| folder.join(name));
+    let mut places = FOLDERS.iter().chain([&ANNOTATIONS, &"dataset.json"]).map(|name| folder.join(name));
     let is_taken = |path: &PathBuf| match std::fs::read_dir(path) {
         Ok(mut entries) => entries.next().is_some(),
         Err(_) => path.symlink_metadata().is_ok(),
     };
-    places.filter(is_taken).next()
+    places.find(is_taken)
 }
 
 /// Writes the annotations of all shots; how many pictures are of steps without an equilibrium.
