@@ -201,7 +201,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
         ),
         (
             [&still(&["--labels", "--out"])[..], &[text(&labels)]].concat(),
-            &["cannot write", "frame_000000_labels.json", "directory"],
+            &["cannot write", "frame_000000_labels.json", "is there already"],
         ),
         // Pixels, kernels and volumes of numbers that nobody means: told before anything is computed.
         (
