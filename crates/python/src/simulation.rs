@@ -20,6 +20,9 @@ use crate::start::{Arguments, Start};
 use crate::state::State;
 use crate::vessel::Vessel;
 
+/// What a simulation has come from, and where it is.
+type Pickled = (Py<Start>, State);
+
 /// An instrument, or several.
 #[derive(FromPyObject)]
 pub(crate) enum Instruments {
@@ -320,7 +323,7 @@ impl Simulation {
         self.copy(py)
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Py<Start>, State))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
         let (py, simulation) = (slf.py(), slf.get());
         let parts = (simulation.start.clone_ref(py), simulation.state(py));
         Ok((slf.get_type().getattr("_unpickled")?, parts))

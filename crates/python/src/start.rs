@@ -26,7 +26,7 @@ pub(crate) struct Start {
 }
 
 enum MadeOf {
-    Arguments(Py<Vessel>, Arguments),
+    Arguments(Py<Vessel>, Box<Arguments>),
     Scene(Py<Scene>),
 }
 
@@ -65,7 +65,7 @@ impl Start {
             builder.properties(properties).method(&method).store(&NoStore).build()
         })?;
         let simulation = Mutex::new(built.map_err(exception)?);
-        Ok(Self { instruments, simulation, made_of: MadeOf::Arguments(vessel, arguments) })
+        Ok(Self { instruments, simulation, made_of: MadeOf::Arguments(vessel, Box::new(arguments)) })
     }
 
     /// What a scene says.
