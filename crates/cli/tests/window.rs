@@ -6,7 +6,6 @@
 #![cfg(all(target_os = "linux", feature = "window"))]
 
 use std::io::{BufRead, BufReader, Write};
-use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, PoisonError};
@@ -16,7 +15,7 @@ use serde_json::{Value, json};
 #[path = "cli/common.rs"]
 #[allow(dead_code, reason = "the other program uses all of it")]
 mod common;
-use common::{address, play};
+use common::{Listening, play};
 
 /// Held while a window is open.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -55,10 +54,9 @@ fn paced(scene: &str, record: &Path, lines: &[(Value, u64)], also: impl Fn(&str,
     // What draws is what the program takes by itself: the pace is not that of a graphics processor that a test forces on it in software.
     let mut child = command.env_remove("ENDOWIRE_REQUIRE_GPU").spawn().unwrap();
     let mut said = BufReader::new(child.stderr.take().unwrap());
-    let mut stream = TcpStream::connect(address(&mut said)).unwrap();
-    let mut answers = BufReader::new(stream.try_clone().unwrap());
+    let mut answers = Listening::read(&mut said).connect();
     for (number, (line, pause_ms)) in lines.iter().enumerate() {
-        writeln!(stream, "{line}").unwrap();
+        answers.get_mut().write_all(format!("{line}\n").as_bytes()).unwrap();
         let mut answer = String::new();
         answers.read_line(&mut answer).unwrap();
         assert_eq!(serde_json::from_str::<Value>(&answer).unwrap()["ok"], true, "{answer}");

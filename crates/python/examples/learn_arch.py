@@ -67,7 +67,7 @@ def unseen_task():
 def remember(model, normalize, policy, steps):
     """Puts so many steps of a policy into the memory."""
     environments = normalize.venv
-    limits, observed = environments.task.action_space().high, environments.reset()
+    limits, observed = environments.task.limits(), environments.reset()
     for _ in range(steps):
         action = np.clip(policy.act(environments.episodes) / limits, -1.0, 1.0)
         following, reward, over, infos = environments.step(action)

@@ -1,10 +1,17 @@
 //! Numbers to and from Python and numpy.
 
 use endowire_core::Vec3;
+use numpy::ndarray::ArrayViewD;
 use numpy::ndarray::Dimension;
 use numpy::ndarray::IntoDimension;
-use numpy::{AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods};
+use numpy::{
+    AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
+use pyo3::conversion::FromPyObjectOwned;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyFloat, PyInt, PyList, PySequence, PyString, PyTuple};
 
 use crate::error::refuse;
 
@@ -30,8 +37,85 @@ pub(crate) fn points<'py>(
     array(py, numbers, [rows, 3])
 }
 
+/// Most numbers of an array: 800 MB. An array that repeats itself takes no memory until it is copied.
+const MOST_NUMBERS: usize = 100_000_000;
+/// Most items of any other sequence, all within it counted. `range(10**12)` takes no memory either.
+const MOST_ITEMS: usize = 10_000_000;
+/// Deepest sequence of sequences; numpy has no more dimensions.
+const DEEPEST: usize = 64;
+
 /// Numbers of anything like an array. Of any shape, so that one of another is refused by the argument's name.
-pub(crate) type Numbers<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
+pub(crate) struct Numbers<'py>(PyArrayLikeDyn<'py, f64, AllowTypeChange>);
+
+impl Numbers<'_> {
+    pub(crate) fn as_array(&self) -> ArrayViewD<'_, f64> {
+        self.0.as_array()
+    }
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Numbers<'py> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        match object.cast::<PyUntypedArray>() {
+            Ok(array) if array.len() > MOST_NUMBERS => {
+                return Err(too_many("array", array.len(), MOST_NUMBERS));
+            }
+            Ok(_) => {}
+            Err(_) => {
+                let mut left = MOST_ITEMS;
+                count(&object, &mut left, DEEPEST)?;
+            }
+        }
+        object.extract().map(Self)
+    }
+}
+
+/// Takes the items of a sequence, and of those in it, from those that are left.
+fn count(object: &Bound<'_, PyAny>, left: &mut usize, depth: usize) -> PyResult<()> {
+    let items = if object.is_instance_of::<PyFloat>() || object.is_instance_of::<PyInt>() || depth == 0 {
+        1
+    } else if let Ok(list) = object.cast::<PyList>() {
+        list.iter().try_for_each(|item| count(&item, left, depth - 1))?;
+        1
+    } else if let Ok(tuple) = object.cast::<PyTuple>() {
+        tuple.iter().try_for_each(|item| count(&item, left, depth - 1))?;
+        1
+    } else if let Ok(array) = object.cast::<PyUntypedArray>() {
+        array.len()
+    } else if let Ok(sequence) = object.cast::<PySequence>() {
+        sequence.len()?
+    } else {
+        1
+    };
+    *left = left.checked_sub(items).ok_or_else(|| too_many("sequence", items, MOST_ITEMS))?;
+    Ok(())
+}
+
+fn too_many(what: &str, items: usize, most: usize) -> PyErr {
+    refuse(what, format!("{items} items and more"), &format!("at most {most} are taken at once"))
+}
+
+/// The items of a sequence that is no text.
+pub(crate) struct List<T>(pub(crate) Vec<T>);
+
+impl<'a, 'py, T: FromPyObjectOwned<'py>> FromPyObject<'a, 'py> for List<T> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        // Arrays are no `Sequence`, and serve.
+        let items = match object.len() {
+            Ok(items) if !object.is_instance_of::<PyString>() && !object.is_instance_of::<PyDict>() => items,
+            _ => return Err(PyTypeError::new_err(format!("{} is no list", object.repr()?))),
+        };
+        if items > MOST_ITEMS {
+            return Err(too_many("sequence", items, MOST_ITEMS));
+        }
+        // One after the other, as many as it says that it has.
+        let item = |index| object.get_item(index)?.extract::<T>().map_err(Into::into);
+        (0..items).map(item).collect::<PyResult<_>>().map(Self)
+    }
+}
 
 /// The numbers of a one-dimensional array, all finite.
 pub(crate) fn numbers(name: &str, list: &Numbers<'_>) -> PyResult<Vec<f64>> {

@@ -1,6 +1,6 @@
 //! Many simulations, stepped side by side.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use endowire_core::insertion::{self, InstrumentReport};
 use numpy::{PyArray1, PyArray2, PyArray3};
@@ -8,11 +8,12 @@ use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Numbers, array, numbers, points};
+use crate::arrays::{List, Numbers, array, numbers, points};
 use crate::error::{exception, refuse};
-use crate::instrument::Instrument;
+use crate::forked::on_own_threads;
 use crate::report::push_force_n;
 use crate::simulation::{Simulation, points_at, tip_mm, tips_mm};
+use crate::start::Start;
 use crate::state::State;
 
 /// Simulations stepped side by side on all cores (or on RAYON_NUM_THREADS threads), each to the bit as if it were alone.
@@ -21,9 +22,11 @@ pub(crate) struct Batch {
     inner: Mutex<Members>,
 }
 
+#[derive(Clone)]
 struct Members {
     batch: insertion::Batch,
-    instruments: Vec<std::sync::Arc<[Instrument]>>,
+    /// What each has come from.
+    starts: Vec<Arc<Py<Start>>>,
 }
 
 impl Batch {
@@ -44,7 +47,7 @@ impl Batch {
         work: impl FnOnce(&mut Members, usize) -> PyResult<T> + Send,
     ) -> PyResult<T> {
         self.with(py, |members| {
-            let count = members.instruments.len();
+            let count = members.starts.len();
             let place = if index < 0 { index.checked_add_unsigned(count) } else { Some(index) };
             match place.and_then(|place| usize::try_from(place).ok()).filter(|place| *place < count) {
                 Some(place) => work(members, place),
@@ -75,7 +78,7 @@ impl Batch {
             let reports = members.batch.simulations().iter().map(insertion::Simulation::report);
             let list: Vec<f64> =
                 reports.flat_map(insertion::StepReport::hands).map(|hand| of(&hand)).collect();
-            (members.instruments.len(), members.hands(), list)
+            (members.starts.len(), members.hands(), list)
         });
         array(py, list, [rows, hands])
     }
@@ -84,17 +87,17 @@ impl Batch {
 impl Members {
     /// Instruments of each.
     fn hands(&self) -> usize {
-        self.instruments.first().map_or(1, |instruments| instruments.len())
+        self.starts.first().map_or(1, |start| start.get().instruments.len())
     }
 
     /// Refuses a simulation with another number of instruments.
-    fn check_hands(&self, instruments: &[Instrument]) -> PyResult<()> {
-        let hands = self.hands();
-        if self.instruments.is_empty() || instruments.len() == hands {
+    fn check_hands(&self, start: &Start) -> PyResult<()> {
+        let (hands, instruments) = (self.hands(), start.instruments.len());
+        if self.starts.is_empty() || instruments == hands {
             return Ok(());
         }
         let mend = format!("a batch has simulations of the same number of instruments, here {hands}");
-        Err(refuse("instruments", instruments.len(), &mend))
+        Err(refuse("instruments", instruments, &mend))
     }
 }
 
@@ -102,19 +105,19 @@ impl Members {
 impl Batch {
     /// A batch of copies of simulations, in this order. They may differ in everything but the number of instruments.
     #[new]
-    fn new(py: Python<'_>, simulations: Vec<Py<Simulation>>) -> PyResult<Self> {
-        let copied = simulations.iter().map(|one| {
+    fn new(py: Python<'_>, simulations: List<Py<Simulation>>) -> PyResult<Self> {
+        let copied = simulations.0.iter().map(|one| {
             let one = one.get();
-            (one.with(py, |simulation| simulation.clone()), std::sync::Arc::clone(&one.instruments))
+            (one.with(py, |simulation| simulation.clone()), one.start())
         });
-        let (list, instruments): (Vec<_>, Vec<_>) = copied.unzip();
-        let members = Members { batch: insertion::Batch::new(list), instruments };
-        members.instruments.iter().try_for_each(|instruments| members.check_hands(instruments))?;
+        let (list, starts): (Vec<_>, Vec<_>) = copied.unzip();
+        let members = Members { batch: insertion::Batch::new(list), starts };
+        members.starts.iter().try_for_each(|start| members.check_hands(start.get()))?;
         Ok(Self { inner: Mutex::new(members) })
     }
 
     fn __len__(&self, py: Python<'_>) -> usize {
-        self.with(py, |members| members.instruments.len())
+        self.with(py, |members| members.starts.len())
     }
 
     /// Carries out one command in each: an array of shape (n, n_instruments, 2) of advance_mm and rotate_rad. Where both are 0, nothing is
@@ -123,9 +126,10 @@ impl Batch {
     /// Returns the failures: a dictionary from the index of a simulation to the exception that `Simulation.step` would have raised; empty
     /// where all went well. Those that failed are as before, and do not concern the others.
     fn step<'py>(&self, py: Python<'py>, moves: Numbers<'_>) -> PyResult<Bound<'py, PyDict>> {
-        let (count, hands) = self.with(py, |members| (members.instruments.len(), members.hands()));
+        let (count, hands) = self.with(py, |members| (members.starts.len(), members.hands()));
         let moves = crate::moves::moves(&moves, Some(count), hands)?;
-        let told = self.with(py, |members| members.batch.step_together(&moves)).map_err(exception)?;
+        let told = self.with(py, |members| on_own_threads(|| members.batch.step_together(&moves)));
+        let told = told?.map_err(exception)?;
         let failures = PyDict::new(py);
         for (index, failed) in told.into_iter().enumerate().filter_map(|(k, told)| told.err().map(|e| (k, e)))
         {
@@ -137,8 +141,7 @@ impl Batch {
     /// A copy of one of them.
     fn simulation(&self, py: Python<'_>, index: isize) -> PyResult<Simulation> {
         self.at(py, index, |members, k| {
-            let simulation = members.batch.simulations()[k].clone();
-            Ok(Simulation::new(simulation, members.instruments[k].to_vec()))
+            Ok(Simulation::new(members.batch.simulations()[k].clone(), Arc::clone(&members.starts[k])))
         })
     }
 
@@ -146,9 +149,9 @@ impl Batch {
     fn replace(&self, py: Python<'_>, index: isize, simulation: &Simulation) -> PyResult<()> {
         let new = simulation.with(py, |simulation| simulation.clone());
         self.at(py, index, |members, k| {
-            members.check_hands(&simulation.instruments)?;
+            members.check_hands(simulation.start().get())?;
             members.batch.simulations_mut()[k] = new;
-            members.instruments[k] = std::sync::Arc::clone(&simulation.instruments);
+            members.starts[k] = simulation.start();
             Ok(())
         })
     }
@@ -177,7 +180,7 @@ impl Batch {
     fn tips_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (rows, hands, list) = self.with(py, |members| {
             let tips = members.batch.simulations().iter().flat_map(tips_mm).flat_map(|p| [p.x, p.y, p.z]);
-            (members.instruments.len(), members.hands(), tips.collect::<Vec<f64>>())
+            (members.starts.len(), members.hands(), tips.collect::<Vec<f64>>())
         });
         array(py, list, [rows, hands, 3])
     }
@@ -245,6 +248,27 @@ impl Batch {
     #[getter]
     fn converged<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
         self.of_each(py, |report| report.converged)
+    }
+
+    /// A batch of copies that share their vessels.
+    fn copy(&self, py: Python<'_>) -> Self {
+        self.with(py, |members| Self { inner: Mutex::new(members.clone()) })
+    }
+
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        self.copy(py)
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: Bound<'_, PyAny>) -> Self {
+        self.copy(py)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Vec<Simulation>,))> {
+        let simulations = slf.get().with(slf.py(), |members| {
+            let each = members.batch.simulations().iter().zip(&members.starts);
+            each.map(|(one, start)| Simulation::new(one.clone(), Arc::clone(start))).collect()
+        });
+        Ok((slf.get_type().into_any(), (simulations,)))
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {

@@ -8,7 +8,7 @@ use endowire_core::{Error, Vec3};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-use crate::arrays::{Numbers, array, natural, rows};
+use crate::arrays::{List, Numbers, array, natural, rows};
 use crate::error::{exception, refuse};
 use crate::simulation::Simulation;
 
@@ -47,7 +47,7 @@ impl Controller {
         path_mm: Numbers<'_>,
         arrived_mm: f64,
         lead: i64,
-        followers: Option<Vec<(i64, f64)>>,
+        followers: Option<List<(i64, f64)>>,
     ) -> PyResult<Self> {
         Ok(Self::of(FollowPath::new(path(&path_mm)?, team(lead, followers)?, arrived_mm)))
     }
@@ -62,12 +62,14 @@ impl Controller {
         path_mm: Numbers<'_>,
         arrived_mm: f64,
         lead: i64,
-        followers: Option<Vec<(i64, f64)>>,
-        turned: Option<Vec<i64>>,
+        followers: Option<List<(i64, f64)>>,
+        turned: Option<List<i64>>,
     ) -> PyResult<Self> {
         let team = team(lead, followers)?;
         let turned = match turned {
-            Some(turned) => turned.into_iter().map(|one| natural("turned", one)).collect::<PyResult<_>>()?,
+            Some(List(turned)) => {
+                turned.into_iter().map(|one| natural("turned", one)).collect::<PyResult<_>>()?
+            }
             None => vec![team.lead],
         };
         Ok(Self::of(SearchAhead::new(path(&path_mm)?, team, turned, arrived_mm)))
@@ -82,7 +84,7 @@ impl Controller {
         py: Python<'py>,
         simulation: &Simulation,
     ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let hands = simulation.instruments.len();
+        let hands = simulation.pushed().len();
         // A copy, so that others may look at the simulation meanwhile.
         let copy = simulation.with(py, |simulation| simulation.clone());
         let told = self.with(py, move |hand| {
@@ -126,9 +128,10 @@ fn path(table: &Numbers<'_>) -> PyResult<CentrelinePath> {
     made.ok_or_else(|| refuse("path_mm", format!("{count} rows"), mend))
 }
 
-fn team(lead: i64, followers: Option<Vec<(i64, f64)>>) -> PyResult<Team> {
+fn team(lead: i64, followers: Option<List<(i64, f64)>>) -> PyResult<Team> {
     let follower =
         |(instrument, behind_mm)| Ok(Follower { instrument: natural("followers", instrument)?, behind_mm });
-    let followers = followers.unwrap_or_default().into_iter().map(follower).collect::<PyResult<_>>()?;
+    let followers =
+        followers.map_or_else(Vec::new, |list| list.0).into_iter().map(follower).collect::<PyResult<_>>()?;
     Ok(Team { lead: natural("lead", lead)?, followers })
 }

@@ -12,6 +12,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::arrays::{array, natural};
 use crate::document;
 use crate::error::{exception, refuse};
+use crate::forked::on_own_threads;
 use crate::interrupt::interruptible;
 use crate::simulation::Simulation;
 use crate::vessel::Vessel;
@@ -59,8 +60,16 @@ impl Renderer {
         Ok(Self { inner: Mutex::new(made.map_err(exception)?) })
     }
 
-    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut viewer::Renderer) -> T + Send) -> T {
-        py.detach(|| work(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner)))
+    /// Does something with the renderer, without the interpreter.
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut viewer::Renderer) -> endowire_core::Result<T> + Send,
+    ) -> PyResult<T> {
+        let worked = py.detach(|| {
+            on_own_threads(|| work(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner)))
+        });
+        worked?.map_err(exception)
     }
 
     /// The instruments, made of what the table of the view says, if it says so.
@@ -69,8 +78,8 @@ impl Renderer {
         let several = views.len() > 1;
         let own = self.with(py, |renderer| {
             renderer.spec().own_parts(several).map(|parts| parts.map(<[DevicePart]>::to_vec))
-        });
-        if let Some(own) = own.map_err(exception)? {
+        })?;
+        if let Some(own) = own {
             views[0].parts = own;
         }
         Ok(views)
@@ -79,7 +88,7 @@ impl Renderer {
     /// Takes the vessel to where it is in a simulation.
     fn move_vessel(&self, py: Python<'_>, simulation: &Simulation) -> PyResult<()> {
         let displacement = simulation.with(py, |simulation| simulation.displacement());
-        self.with(py, |renderer| renderer.move_vessel(displacement.as_ref())).map_err(exception)
+        self.with(py, |renderer| renderer.move_vessel(displacement.as_ref()))
     }
 }
 
@@ -97,14 +106,14 @@ impl Renderer {
 
     /// What draws: "CPU reference", or the graphics interface and adapter.
     #[getter]
-    fn backend(&self, py: Python<'_>) -> String {
-        self.with(py, |renderer| renderer.backend().to_owned())
+    fn backend(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |renderer| Ok(renderer.backend().to_owned()))
     }
 
     /// How much of the vessel's surface the tomogram of its patient holds, 0 to 1; None without a tomogram.
     #[getter]
-    fn vessel_held(&self, py: Python<'_>) -> Option<f64> {
-        self.with(py, |renderer| renderer.vessel_held())
+    fn vessel_held(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+        self.with(py, |renderer| Ok(renderer.vessel_held()))
     }
 
     /// Draws the views of a simulation as it is. `frame` is the number of the frame, which seeds its noise and tells its time; the next one
@@ -116,15 +125,13 @@ impl Renderer {
         let frame: Option<u64> = frame.map(|frame| natural("frame", frame)).transpose()?;
         let views = self.views(py, simulation)?;
         self.move_vessel(py, simulation)?;
-        let frames = self
-            .with(py, |renderer| match frame {
-                None => renderer.render(&views),
-                Some(frame) => {
-                    let time_s = frame as f64 / renderer.spec().frames_per_s;
-                    renderer.render_at(&views, FrameTime { frame, time_s })
-                }
-            })
-            .map_err(exception)?;
+        let frames = self.with(py, |renderer| match frame {
+            None => renderer.render(&views),
+            Some(frame) => {
+                let time_s = frame as f64 / renderer.spec().frames_per_s;
+                renderer.render_at(&views, FrameTime { frame, time_s })
+            }
+        })?;
         let of = |image: Option<Image>| image.map(|image| pixels(py, image)).transpose();
         Ok(Frames { three_d: of(frames.three_d)?, fluoro: of(frames.fluoro)? })
     }
@@ -138,7 +145,7 @@ impl Renderer {
         self.move_vessel(py, simulation)?;
         let contacts: Vec<Vec3> = simulation
             .with(py, |simulation| simulation.report().contacts.iter().map(|c| c.position_mm).collect());
-        let labels = self.with(py, |renderer| renderer.labels(&views, &contacts)).map_err(exception)?;
+        let labels = self.with(py, |renderer| renderer.labels(&views, &contacts))?;
         let told = PyDict::new(py);
         let devices = PyList::empty(py);
         for device in labels.devices {

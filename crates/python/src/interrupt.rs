@@ -8,6 +8,7 @@ use std::time::Duration;
 use pyo3::prelude::*;
 
 use crate::error::ComputationError;
+use crate::forked::on_own_threads;
 
 /// How long a signal waits at most.
 const PATIENCE: Duration = Duration::from_millis(50);
@@ -44,12 +45,12 @@ fn waited_for<T: Send + 'static>(
     let (sender, mut receiver) = sync_channel(1);
     thread::Builder::new().name("endowire".to_owned()).spawn(move || {
         // Nobody may listen after a signal.
-        let _ = sender.send(work());
+        let _ = sender.send(on_own_threads(work));
     })?;
     loop {
         let listening = &mut receiver;
         match py.detach(move || listening.recv_timeout(PATIENCE)) {
-            Ok(made) => return Ok(made),
+            Ok(made) => return made,
             Err(RecvTimeoutError::Timeout) => {
                 let Err(signal) = py.check_signals() else { continue };
                 if let Some(stop) = stop {

@@ -10,6 +10,7 @@ mod batch;
 mod control;
 mod document;
 mod error;
+mod forked;
 mod frames;
 mod instrument;
 mod interrupt;
@@ -18,6 +19,7 @@ mod report;
 mod rod;
 mod scene;
 mod simulation;
+mod start;
 mod state;
 mod sweep;
 mod vessel;
@@ -27,6 +29,8 @@ use pyo3::prelude::*;
 /// The native part of `endowire`; import that instead.
 #[pymodule(gil_used = false)]
 mod _endowire {
+    use pyo3::prelude::*;
+
     #[pymodule_export]
     use super::batch::Batch;
     #[pymodule_export]
@@ -44,9 +48,17 @@ mod _endowire {
     #[pymodule_export]
     use super::simulation::Simulation;
     #[pymodule_export]
+    use super::start::Start;
+    #[pymodule_export]
     use super::state::State;
     #[pymodule_export]
     use super::sweep::{merge_sweeps, sweep};
     #[pymodule_export]
     use super::vessel::{Vessel, check_vessel};
+
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::forked::imported();
+        Ok(())
+    }
 }

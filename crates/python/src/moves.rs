@@ -4,7 +4,7 @@ use endowire_core::insertion::{Command, Move};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use crate::arrays::{Numbers, misshapen};
+use crate::arrays::{List, Numbers, misshapen};
 use crate::error::refuse;
 
 /// What all of `instruments` do, for each of `count`, or of any count: an array of shape (count, instruments, 2).
@@ -49,11 +49,12 @@ pub(crate) fn of_each(
         1 => "must be a number, or 1: one for each instrument".to_owned(),
         count => format!("must be {count} numbers: one for each instrument, the innermost first"),
     };
-    match (value.extract::<f64>(), value.extract::<Vec<f64>>()) {
+    match (value.extract::<f64>(), value.extract::<List<f64>>()) {
         (Ok(number), _) if instruments == 1 => Ok(vec![number]),
-        (_, Ok(list)) if list.len() == instruments => Ok(list),
+        (_, Ok(List(list))) if list.len() == instruments => Ok(list),
         (Ok(number), _) => Err(refuse(name, number, &wanted)),
-        (_, Ok(list)) => Err(refuse(name, format!("{} numbers", list.len()), &wanted)),
+        (_, Ok(List(list))) => Err(refuse(name, format!("{} numbers", list.len()), &wanted)),
+        (_, Err(error)) if !error.is_instance_of::<PyTypeError>(value.py()) => Err(error),
         _ => Err(PyTypeError::new_err(format!("{name} = {}: {wanted}", value.repr()?))),
     }
 }

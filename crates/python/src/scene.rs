@@ -17,6 +17,7 @@ use crate::instrument::Instrument;
 use crate::interrupt::interruptible;
 use crate::report::StepReport;
 use crate::simulation::Simulation;
+use crate::start::Start;
 use crate::vessel::Vessel;
 
 /// A scene file: what is pushed into what, how, and how it is seen.
@@ -54,16 +55,8 @@ impl Scene {
     }
 
     /// The simulation, nothing inserted but what its instruments say.
-    fn simulation(&self, py: Python<'_>) -> PyResult<Simulation> {
-        let scene = Arc::clone(&self.scene);
-        let built = interruptible(py, move || scene.simulation(&NoStore))?.map_err(exception)?;
-        let files = self.scene.device_files().map_err(exception)?;
-        let instruments = files.into_iter().zip(built.stack().devices()).map(|(file, device)| match file {
-            Some((_, file)) => Instrument::of_file(file),
-            None => Ok(Instrument::of_device(device.clone())),
-        });
-        let instruments = instruments.collect::<PyResult<_>>()?;
-        Ok(Simulation::new(built, instruments))
+    fn simulation(slf: &Bound<'_, Self>) -> PyResult<Simulation> {
+        Simulation::begin(slf.py(), Start::of_scene(slf)?)
     }
 
     /// Its vessel.
@@ -134,7 +127,37 @@ impl Scene {
         Renderer::prepare(py, &spec, view, plane, wall)
     }
 
+    /// Nothing changes a scene: its copy is itself.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, _memo: Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (PathBuf, String))> {
+        let scene = slf.get();
+        let path = std::path::absolute(&scene.path).map_err(|e| exception(Error::file(&scene.path, e)))?;
+        Ok((slf.get_type().into_any(), (path, scene.scene.text().to_owned())))
+    }
+
     fn __repr__(&self) -> String {
         format!("<endowire.Scene {:?}>", self.scene.name)
+    }
+}
+
+impl Scene {
+    /// The simulation, and what is pushed in it.
+    pub(crate) fn built(&self, py: Python<'_>) -> PyResult<(insertion::Simulation, Vec<Instrument>)> {
+        let scene = Arc::clone(&self.scene);
+        let built = interruptible(py, move || scene.simulation(&NoStore))?.map_err(exception)?;
+        let files = self.scene.device_files().map_err(exception)?;
+        let instruments = files.into_iter().zip(built.stack().devices()).map(|(file, device)| match file {
+            Some((_, file)) => Instrument::of_file(file),
+            None => Ok(Instrument::of_device(device.clone())),
+        });
+        let instruments = instruments.collect::<PyResult<_>>()?;
+        Ok((built, instruments))
     }
 }

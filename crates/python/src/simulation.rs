@@ -2,52 +2,70 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use endowire_core::device::{self, Stack, line_mm};
-use endowire_core::insertion::{self, Command, InstrumentReport, LateralForce, WallProperties};
-use endowire_core::scene::SheathSpec;
-use endowire_core::vessel::NoStore;
-use endowire_core::{Result, Vec3};
-use endowire_methods::AnyMethod;
+use endowire_core::Vec3;
+use endowire_core::device::line_mm;
+use endowire_core::insertion::{self, Command, InstrumentReport, LateralForce};
 use endowire_viewer::DeviceView;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Numbers, natural, numbers, points};
+use crate::arrays::{List, Numbers, natural, numbers, points};
 use crate::document;
 use crate::error::{exception, refuse};
 use crate::instrument::Instrument;
-use crate::interrupt::interruptible;
 use crate::moves::{of_each, together};
 use crate::report::StepReport;
+use crate::start::{Arguments, Start};
 use crate::state::State;
 use crate::vessel::Vessel;
+
+/// What a simulation has come from, and where it is.
+type Pickled = (Py<Start>, State);
 
 /// An instrument, or several.
 #[derive(FromPyObject)]
 pub(crate) enum Instruments {
     One(Instrument),
-    List(Vec<Instrument>),
+    List(List<Instrument>),
 }
 
 /// An insertion under way: instruments in a vessel, stepped by what the hand does.
 ///
-/// Copies share the vessel and cost microseconds. A step that raises leaves everything as it was, to the bit.
-#[pyclass(frozen, from_py_object, module = "endowire", name = "Simulation")]
+/// Copies share the vessel and cost microseconds. A pickle has the state and what the simulation was made of, once for all simulations in it that are copies
+/// of one; that of a scene needs the scene's files where they were. A step that raises leaves everything as it was, to the bit.
+#[pyclass(frozen, module = "endowire", name = "Simulation")]
 pub(crate) struct Simulation {
     inner: Mutex<insertion::Simulation>,
-    pub(crate) instruments: Arc<[Instrument]>,
+    /// Counted here, since the interpreter may be let go of where it is copied.
+    start: Arc<Py<Start>>,
 }
 
 impl Clone for Simulation {
     fn clone(&self) -> Self {
-        Self { inner: Mutex::new(self.lock().clone()), instruments: Arc::clone(&self.instruments) }
+        Self::new(self.lock().clone(), self.start())
     }
 }
 
 impl Simulation {
-    pub(crate) fn new(simulation: insertion::Simulation, instruments: Vec<Instrument>) -> Self {
-        Self { inner: Mutex::new(simulation), instruments: instruments.into() }
+    /// A simulation that has come from `start`.
+    pub(crate) fn new(simulation: insertion::Simulation, start: Arc<Py<Start>>) -> Self {
+        Self { inner: Mutex::new(simulation), start }
+    }
+
+    /// A simulation at its start.
+    pub(crate) fn begin(py: Python<'_>, start: Start) -> PyResult<Self> {
+        Ok(Self::new(start.simulation(), Arc::new(Py::new(py, start)?)))
+    }
+
+    /// What it has come from.
+    pub(crate) fn start(&self) -> Arc<Py<Start>> {
+        Arc::clone(&self.start)
+    }
+
+    /// What is pushed.
+    pub(crate) fn pushed(&self) -> &[Instrument] {
+        &self.start.get().instruments
     }
 
     /// The simulation, alone. Never wait for it with the interpreter held: whoever has it may step for long.
@@ -69,7 +87,7 @@ impl Simulation {
         let (shape, lengths_mm) =
             self.with(py, |simulation| (simulation.shape().clone(), simulation.report().lengths_mm()));
         let line_mm = line_mm(lengths_mm.iter().copied());
-        let each = self.instruments.iter().zip(lengths_mm);
+        let each = self.pushed().iter().zip(lengths_mm);
         each.map(|(instrument, mm)| match mm {
             0.0 => DeviceView::default(),
             mm => DeviceView::of_device(&shape.behind(line_mm - mm), &instrument.device, &instrument.parts),
@@ -105,7 +123,7 @@ impl Simulation {
     #[allow(clippy::too_many_arguments, reason = "keywords of Python")]
     fn py_new(
         py: Python<'_>,
-        vessel: &Vessel,
+        vessel: Py<Vessel>,
         instruments: Instruments,
         opening: Option<i64>,
         depth_mm: Option<f64>,
@@ -115,40 +133,30 @@ impl Simulation {
         method: Option<&Bound<'_, PyAny>>,
         sheath_friction_n: f64,
         sheath_friction: f64,
-        names: Option<Vec<String>>,
-        friction: Option<Vec<f64>>,
-        may_lead: Option<Vec<bool>>,
+        names: Option<List<String>>,
+        friction: Option<List<f64>>,
+        may_lead: Option<List<bool>>,
     ) -> PyResult<Self> {
         let instruments = match instruments {
             Instruments::One(instrument) => vec![instrument],
-            Instruments::List(list) => list,
+            Instruments::List(List(list)) => list,
         };
-        let stack = stack(&instruments, names, friction, may_lead)?;
-        let properties: WallProperties =
-            wall.map(|table| document::read("wall", table)).transpose()?.unwrap_or_default();
-        let method: AnyMethod =
-            method.map(|table| document::read("method", table)).transpose()?.unwrap_or_default();
         let opening = opening.map(|opening| natural("opening", opening)).transpose()?;
         let nowhere = opening.is_none() && position_mm.is_none() && direction.is_none();
-        let opening = opening.or_else(|| nowhere.then(|| vessel.inlet().unwrap_or(0)));
-        let sheath = SheathSpec {
-            opening,
+        let arguments = Arguments {
+            opening: opening.or_else(|| nowhere.then(|| vessel.get().inlet().unwrap_or(0))),
             depth_mm,
             position_mm,
             direction,
-            friction_n: sheath_friction_n,
-            friction: sheath_friction,
+            wall: wall.map(|table| document::read("wall", table)).transpose()?.unwrap_or_default(),
+            method: method.map(|table| document::read("method", table)).transpose()?.unwrap_or_default(),
+            sheath_friction_n,
+            sheath_friction,
+            names: names.map(|list| list.0),
+            friction: friction.map(|list| list.0),
+            may_lead: may_lead.map(|list| list.0),
         };
-        let wall = Arc::clone(&vessel.wall);
-        let built = interruptible(py, move || -> Result<insertion::Simulation> {
-            let sheath = sheath.place(&wall)?;
-            insertion::Simulation::builder((*wall).clone(), stack, sheath)
-                .properties(properties)
-                .method(&method)
-                .store(&NoStore)
-                .build()
-        })?;
-        Ok(Self::new(built.map_err(exception)?, instruments))
+        Self::begin(py, Start::of_arguments(py, vessel, instruments, arguments)?)
     }
 
     /// Carries out one command: the length pushed in (negative: pulled back), mm, and the turn of the tail, rad; one for each
@@ -165,7 +173,7 @@ impl Simulation {
         rotate_rad: Option<&Bound<'_, PyAny>>,
         time_s: Option<f64>,
     ) -> PyResult<StepReport> {
-        let hands = self.instruments.len();
+        let hands = self.pushed().len();
         let lengths_mm = of_each("advance_mm", advance_mm, hands)?;
         let turns_rad = of_each("rotate_rad", rotate_rad, hands)?;
         let commands = lengths_mm.into_iter().zip(turns_rad);
@@ -179,7 +187,7 @@ impl Simulation {
     ///
     /// Raises what `step` raises, after the steps before.
     fn run(&self, py: Python<'_>, moves: Numbers<'_>) -> PyResult<StepReport> {
-        for moves in crate::moves::moves(&moves, None, self.instruments.len())? {
+        for moves in crate::moves::moves(&moves, None, self.pushed().len())? {
             self.with(py, |simulation| simulation.step_together(&moves).map(drop)).map_err(exception)?;
             py.check_signals()?;
         }
@@ -201,13 +209,13 @@ impl Simulation {
     /// Number of instruments.
     #[getter]
     fn n_instruments(&self) -> usize {
-        self.instruments.len()
+        self.pushed().len()
     }
 
     /// The instruments.
     #[getter]
     fn instruments(&self) -> Vec<Instrument> {
-        self.instruments.to_vec()
+        self.pushed().to_vec()
     }
 
     /// The inserted centre line, from the sheath to the tip, mm, shape (n, 3).
@@ -249,7 +257,7 @@ impl Simulation {
     ///
     /// Raises InputError for an instrument that is not there.
     fn lateral_forces<'py>(&self, py: Python<'py>, instrument: i64) -> PyResult<Bound<'py, PyDict>> {
-        let count = self.instruments.len();
+        let count = self.pushed().len();
         let Some(place) = usize::try_from(instrument).ok().filter(|place| *place < count) else {
             let mend = format!("there are {count}, the innermost is 0");
             return Err(refuse("instrument", instrument, &mend));
@@ -315,6 +323,19 @@ impl Simulation {
         self.copy(py)
     }
 
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled)> {
+        let (py, simulation) = (slf.py(), slf.get());
+        let parts = (simulation.start.clone_ref(py), simulation.state(py));
+        Ok((slf.get_type().getattr("_unpickled")?, parts))
+    }
+
+    #[staticmethod]
+    fn _unpickled(start: Py<Start>, state: &State) -> PyResult<Self> {
+        let mut simulation = start.get().simulation();
+        simulation.restore(&state.state).map_err(exception)?;
+        Ok(Self::new(simulation, Arc::new(start)))
+    }
+
     fn __repr__(&self, py: Python<'_>) -> String {
         let inserted_mm = self.with(py, |simulation| simulation.report().inserted_mm);
         format!("<endowire.Simulation: {inserted_mm} mm inserted>")
@@ -331,39 +352,6 @@ pub(crate) fn tips_mm(simulation: &insertion::Simulation) -> Vec<Vec3> {
     let lengths_mm = simulation.report().lengths_mm();
     let line_mm = simulation.report().inserted_mm;
     points_at(simulation, &lengths_mm.iter().map(|mm| line_mm - mm).collect::<Vec<f64>>())
-}
-
-/// Instruments as the library has them.
-fn stack(
-    instruments: &[Instrument],
-    names: Option<Vec<String>>,
-    friction: Option<Vec<f64>>,
-    may_lead: Option<Vec<bool>>,
-) -> PyResult<Stack> {
-    let count = instruments.len();
-    let told = [
-        ("names", names.as_ref().map(Vec::len)),
-        ("friction", friction.as_ref().map(Vec::len)),
-        ("may_lead", may_lead.as_ref().map(Vec::len)),
-    ];
-    for (name, given) in told {
-        if let Some(given) = given.filter(|given| *given != count) {
-            return Err(refuse(name, given, &format!("there are {count} instruments: give one for each")));
-        }
-    }
-    let names = names.unwrap_or_else(|| (0..count).map(|index| format!("instrument {index}")).collect());
-    let may_lead = may_lead.unwrap_or_else(|| vec![true; count]);
-    let each = instruments.iter().zip(names).zip(may_lead);
-    let each =
-        each.map(|((one, name), may_lead)| device::Instrument { name, device: one.device.clone(), may_lead });
-    let stack = match instruments {
-        [only] => Stack::from(only.device.clone()),
-        _ => Stack::new(each.collect()).map_err(exception)?,
-    };
-    match friction {
-        Some(friction) => stack.rubbing(friction).map_err(exception),
-        None => Ok(stack),
-    }
 }
 
 /// Points at arc lengths from the tip.

@@ -1,18 +1,28 @@
 //! All that the next step depends on.
 
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
+use std::path::{Path, PathBuf};
 
 use endowire_core::Error;
 use endowire_core::insertion;
-use endowire_sweep::seal;
+use endowire_sweep::{seal, whole};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::error::{InputError, exception};
 use crate::report::StepReport;
 
-/// The first bytes of a saved state, which is sealed.
+/// The first bytes of a saved state, which is sealed, and those of every version.
 const FORMAT: &[u8] = b"endowire.State 5\n";
+const ANY_FORMAT: &[u8] = b"endowire.State ";
+
+/// Whether a file has been written by `State.save`, of whatever version, or is empty, so that nothing of it can be lost.
+fn is_state(path: &Path) -> io::Result<bool> {
+    let mut begins = Vec::new();
+    File::open(path)?.take(ANY_FORMAT.len() as u64).read_to_end(&mut begins)?;
+    Ok(begins.is_empty() || begins == ANY_FORMAT)
+}
 
 /// All that the next step of a simulation depends on, beside what surrounds the instruments.
 ///
@@ -60,9 +70,24 @@ impl State {
         Ok(Self { state })
     }
 
-    /// Writes the state into a file.
+    /// Writes the state into a file, which is that of before or this one, whole, whenever the program or the power ends.
+    ///
+    /// Raises InputError for a file that is there and holds no state: it is not written over; and for one that cannot be written.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        std::fs::write(&path, self.bytes()?).map_err(|e| exception(Error::file(&path, e)))
+        let failed = |e| exception(Error::file(&path, e));
+        // A link stays one: the file that it leads to is replaced.
+        let place = match path.canonicalize() {
+            Ok(place) => place,
+            Err(e) if e.kind() == ErrorKind::NotFound && path.symlink_metadata().is_err() => path.clone(),
+            Err(e) => return Err(failed(e)),
+        };
+        if place.exists() && !is_state(&place).map_err(failed)? {
+            return Err(InputError::new_err(format!(
+                "{}: is there and no state of endowire: give another name, or remove it first",
+                path.display()
+            )));
+        }
+        whole::write_bytes(&place, &self.bytes()?).map_err(failed)
     }
 
     /// Reads a state from a file of `save`.

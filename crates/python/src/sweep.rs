@@ -9,7 +9,7 @@ use endowire_sweep::{Order, Program, Shard, Sweep, merge};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::natural;
+use crate::arrays::{List, natural};
 use crate::error::{exception, refuse};
 use crate::interrupt::{interruptible, stoppable};
 
@@ -65,6 +65,6 @@ pub(crate) fn sweep<'py>(
 ///
 /// Raises InputError for rows of different sweeps, and where runs are missing.
 #[pyfunction]
-pub(crate) fn merge_sweeps(py: Python<'_>, folders: Vec<PathBuf>, out: PathBuf) -> PyResult<usize> {
-    interruptible(py, move || merge(&folders, &out))?.map_err(exception)
+pub(crate) fn merge_sweeps(py: Python<'_>, folders: List<PathBuf>, out: PathBuf) -> PyResult<usize> {
+    interruptible(py, move || merge(&folders.0, &out))?.map_err(exception)
 }

@@ -1,3 +1,4 @@
+import itertools
 import pickle
 
 import gymnasium
@@ -67,7 +68,7 @@ def test_a_seed_decides_everything_and_a_vector_does_what_single_ones_do(task):
 def test_one_that_fails_is_told_and_the_others_go_on(task):
     vector = InsertionVectorEnv(task, 3)
     vector.reset(seed=1)
-    actions = np.full((3, 1, 2), 10.0)
+    actions = np.full((3, 1, 2), 0.3)
     actions[1, 0, 0] = np.nan
     _, _, _, truncated, info = vector.step(actions)
     assert (
@@ -75,7 +76,7 @@ def test_one_that_fails_is_told_and_the_others_go_on(task):
         and "NaN" in info["failure"][1]
         and info["failure"][0] == ""
     )
-    _, _, _, truncated, info = vector.step(np.full((3, 1, 2), 10.0))
+    _, _, _, truncated, info = vector.step(np.full((3, 1, 2), 0.3))
     assert not truncated.any() and not info["failure"].any()
     with pytest.raises(endowire.InputError, match=r"must have the shape \(3, 1, 2\)"):
         vector.step(np.zeros((3, 2)))
@@ -85,9 +86,9 @@ def test_an_action_that_is_no_number_is_not_the_last_action(vessel, wire):
     seen = {"last_action": observations.LastAction()}
     vector = InsertionVectorEnv(Task([wire], vessels.FixedVessel(vessel), observations=seen), 2)
     vector.reset(seed=1)
-    actions = np.array([[[10.0, 1.0]], [[20.0, 2.0]]])
+    actions = np.array([[[0.3, 0.3]], [[0.6, 0.6]]])
     before = vector.step(actions)[0]
-    actions[1, 0] = [30.0, np.nan]
+    actions[1, 0] = [0.9, np.nan]
     observed, *_, info = vector.step(actions)
     assert "NaN" in info["failure"][1] and vector.observation_space.contains(observed)
     assert np.array_equal(observed["last_action"], before["last_action"])
@@ -100,7 +101,7 @@ def test_wrong_actions_of_one_are_exceptions(task):
         env.step(np.array([[np.nan, 0.0]]))
     with pytest.raises(endowire.InputError, match="shape"):
         env.step(np.zeros(2))
-    assert env.step(np.array([[10.0, 0.0]]))[4]["failure"] == ""
+    assert env.step(np.array([[0.3, 0.0]]))[4]["failure"] == ""
 
 
 def test_reset_comes_first(task):
@@ -111,6 +112,55 @@ def test_reset_comes_first(task):
             env.step(env.action_space.sample())
         with pytest.raises(gymnasium.error.ResetNeeded, match="reset comes before render"):
             env.render()
+
+
+def test_an_action_is_a_part_of_the_limits_or_a_velocity(vessel, wire):
+    seen = {"last_action": observations.LastAction(), "tip_mm": observations.Tip()}
+    made = {
+        unit: endowire.gym.InsertionEnv(
+            Task([wire], vessels.FixedVessel(vessel), observations=seen, actions=unit)
+        )
+        for unit in ("scaled", "physical")
+    }
+    assert made["scaled"].action_space.high.tolist() == [[1.0, 1.0]]
+    assert np.allclose(made["physical"].action_space.high, [[35.0, 3.14]])
+    told = {}
+    for unit, action in (("scaled", [[0.5, -2.0]]), ("physical", [[17.5, -6.28]])):
+        made[unit].reset(seed=1)
+        told[unit] = made[unit].step(np.array(action))[0]
+    assert np.array_equal(told["scaled"]["tip_mm"], told["physical"]["tip_mm"])
+    assert told["scaled"]["last_action"].tolist() == [[0.5, -1.0]]
+    assert np.allclose(told["physical"]["last_action"], [[17.5, -3.14]])
+    with pytest.raises(endowire.InputError, match="actions = 'metres'"):
+        Task([wire], vessels.FixedVessel(vessel), actions="metres")
+
+
+def test_an_episode_is_as_long_as_make_says():
+    def steps(env):
+        env.reset(seed=0)
+        for step in range(1, 12):
+            *_, truncated, _ = env.step(np.zeros(env.action_space.shape))
+            if np.any(truncated):
+                return step
+        return None
+
+    name = "endowire/CurvedTube-v0"
+    assert steps(gymnasium.make(name, max_episode_steps=5)) == 5
+    assert steps(gymnasium.make_vec(name, num_envs=2, max_episode_steps=5)) == 5
+    assert steps(gymnasium.make_vec(name, num_envs=2, vectorization_mode="sync", max_episode_steps=5)) == 5
+    assert steps(gymnasium.make_vec(name, num_envs=2)) is None, "the twin"
+
+
+def test_a_window_is_refused_with_the_wrapper_that_has_one():
+    with pytest.raises(endowire.InputError, match="HumanRendering"):
+        gymnasium.make("endowire/CurvedTube-v0", render_mode="human")
+    with pytest.raises(endowire.InputError, match="give rgb_array"):
+        gymnasium.make_vec("endowire/CurvedTube-v0", num_envs=2, render_mode="ansi")
+
+
+def test_seeds_without_end_are_refused(task):
+    with pytest.raises(endowire.InputError, match="seed = 3 and more numbers"):
+        InsertionVectorEnv(task, 2).reset(seed=itertools.count())
 
 
 def test_pictures_of_two_planes_are_observed(vessel, wire):
@@ -148,7 +198,7 @@ def test_an_arch_has_its_targets_in_its_branches():
     assert not np.array_equal(first["target_mm"], other["target_mm"])
     assert env.observation_space.contains(first)
     for _ in range(5):
-        *_, info = env.step(np.array([[30.0, 1.0]]))
+        *_, info = env.step(np.array([[0.9, 0.3]]))
     assert info["failure"] == "" and info["way_mm"] > 0.0
 
 

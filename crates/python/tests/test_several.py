@@ -213,6 +213,7 @@ def test_environments_move_each_instrument(vessel):
         wire_and_catheter(),
         gym.vessels.FixedVessel(vessel),
         coupling={"friction": [0.1, 0.0], "names": ["wire", "catheter"]},
+        actions="physical",
     )
     env = gym.InsertionEnv(task)
     assert env.action_space.shape == (2, 2)

@@ -49,6 +49,13 @@ def test_states_are_copied_pickled_and_saved_to_the_bit(simulation, tmp_path):
         assert np.array_equal(simulation.positions_mm, shape)
         simulation.step(3.0)
         assert np.array_equal(simulation.positions_mm, after)
+    theirs = tmp_path / "thesis.txt"
+    theirs.write_text("mine")
+    with pytest.raises(endowire.InputError, match="no state of endowire"):
+        state.save(theirs)
+    assert theirs.read_text() == "mine"
+    state.save(tmp_path / "state")
+    assert not list(tmp_path.glob("*.part"))
     with pytest.raises(endowire.InputError, match=r"State\.save"):
         endowire.State.from_bytes(b"something else")
     data = state.to_bytes()

@@ -1,7 +1,9 @@
 """The registered tasks, and the files of the original ones."""
 
 import base64
+import contextlib
 import json
+import warnings
 import zlib
 
 import gymnasium
@@ -19,23 +21,38 @@ VIEW = {"views": ["3d"], "size_px": [32, 32], "backend": "cpu"}
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", ["BasicWireNav", "DualDeviceNav", "CathSim", "Navigation"])
 def test_registered_ids_pass_the_checker(name):
-    env = gymnasium.make(f"endowire/{name}-v0", render_mode="rgb_array", view=VIEW).unwrapped
-    check_env(env)
+    # That a vessel stands in for another is warned of, and told.
+    warned = contextlib.nullcontext()
+    if name != "Navigation":
+        warned = pytest.warns(UserWarning, match=f"{name}: the built-in")
+    with warned:
+        env = gymnasium.make(f"endowire/{name}-v0", render_mode="rgb_array", view=VIEW).unwrapped
+        # It makes another.
+        check_env(env)
     env.reset(seed=3)
     for _ in range(8):
         *_, info = env.step(env.action_space.high * np.array([0.5, 0.2], dtype=np.float32))
     assert info["failure"] == ""
+    assert info.get("stand_in", "").startswith("aortic_arch in place of") == (name != "Navigation")
+
+
+def test_vessels_that_are_given_stand_in_for_nothing():
+    vessels = endowire.gym.vessels.FixedVessel(endowire.Vessel.generate("aortic_arch", edge_mm=4.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gymnasium.make("endowire/CathSim-v0", vessels=vessels)
+    assert "stand_in" not in env.reset(seed=1)[1]
 
 
 def test_a_navigation_ends_where_it_is_not_safe():
     env = gymnasium.make("endowire/Navigation-v0", target="innominate", force_limit_n=-1.0).unwrapped
     env.reset(seed=1)
     assert np.allclose(env._episodes.target_mm[0], env.task.vessels.site.vessel.targets["innominate"])
-    _, _, terminated, _, info = env.step(np.array([[30.0, 0.0]]))
+    _, _, terminated, _, info = env.step(np.array([[0.9, 0.0]]))
     assert info["safety"] == 0.0 and not terminated
     env = gymnasium.make("endowire/Navigation-v0", ends=[endowire.gym.ends.ForceLimit(-1.0)]).unwrapped
     env.reset(seed=1)
-    _, _, terminated, _, info = env.step(np.array([[30.0, 0.0]]))
+    _, _, terminated, _, info = env.step(np.array([[0.9, 0.0]]))
     assert terminated and info["safety"] == 1.0
     with pytest.raises(endowire.InputError, match="target = 'left foot': aortic_arch has ascending aorta"):
         gymnasium.make("endowire/Navigation-v0", target="left foot")
@@ -75,7 +92,7 @@ def test_the_vessel_of_dual_device_nav_is_read_from_its_files(tmp_path):
     env = gymnasium.make("endowire/DualDeviceNav-v0", data=tmp_path).unwrapped
     env.reset(seed=1)
     for _ in range(5):
-        *_, info = env.step(np.array([[35.0, 0.5], [20.0, 0.0]]))
+        *_, info = env.step(np.array([[1.0, 0.2], [0.6, 0.0]]))
     assert info["failure"] == ""
     (lines / "Centerline curve (0).mrk.json").write_text("{}")
     with pytest.raises(endowire.InputError, match=r"curve \(0\).*no curve of 3D Slicer"):
@@ -188,7 +205,7 @@ def test_the_vessel_of_basic_wire_nav_is_read_from_its_files(tmp_path):
     env = gymnasium.make("endowire/BasicWireNav-v0", data=tmp_path).unwrapped
     first, _ = env.reset(seed=1)
     assert first["target_mm"][2] > 120.0
-    assert env.step(np.array([[30.0, 0.0]]))[4]["failure"] == ""
+    assert env.step(np.array([[0.9, 0.0]]))[4]["failure"] == ""
     (tmp_path / "Paths" / "aorta.pth").write_text("<path/>")
     with pytest.raises(endowire.InputError, match="aorta.pth: no path of SimVascular: it has 0 points"):
         originals.basic_wire_nav(tmp_path)

@@ -36,6 +36,7 @@ mod setting;
 mod shard;
 mod shared;
 mod table;
+pub mod whole;
 mod work;
 
 pub use axis::{Axis, AxisSpec, Grid, Range};

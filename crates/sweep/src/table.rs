@@ -14,6 +14,7 @@ use serde_json::Value as Json;
 
 use crate::outcome::{InstrumentOutcome, RunOutcome};
 use crate::row::{Columns, ParameterKind, Row};
+use crate::whole;
 
 /// The values of a column, one a row.
 enum Cells {
@@ -46,19 +47,12 @@ struct Column {
 /// # Errors
 /// A file that cannot be written.
 pub(crate) fn write(path: &Path, columns: &Columns, rows: &[Row]) -> Result<()> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    let part = Path::new(&part);
     let columns = self::columns(columns, rows);
-    let written = File::create(part)
-        .map_err(|e| Error::file(path, e))
-        .and_then(|file| write_to(file, &columns).map_err(|e| Error::content(path, e.to_string())))
-        .and_then(|()| std::fs::rename(part, path).map_err(|e| Error::file(path, e)));
-    if written.is_err() {
-        // What is left of it is of no use, and the first failure is the one to tell.
-        let _ = std::fs::remove_file(part);
-    }
-    written
+    let written = whole::write(path, |part| {
+        let file = File::create(part)?;
+        write_to(file, &columns).map_err(std::io::Error::other)
+    });
+    written.map_err(|e| Error::file(path, e))
 }
 
 /// Names of all columns, and rows of their values as texts.

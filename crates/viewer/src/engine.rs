@@ -36,4 +36,22 @@ pub(crate) struct Engines {
     pub(crate) three_d: Option<Box<dyn ThreeDEngine>>,
     /// Name for people.
     pub(crate) name: String,
+    /// The process that they were made in. One that is forked from it has neither the threads nor the device of a graphics processor.
+    pub(crate) process: u32,
+}
+
+impl Engines {
+    /// Whether this process was forked from the one that made them.
+    pub(crate) fn are_forked(&self) -> bool {
+        self.process != std::process::id()
+    }
+}
+
+impl Drop for Engines {
+    fn drop(&mut self) {
+        // A driver would wait for its threads, which are not there.
+        if self.are_forked() {
+            std::mem::forget((self.paths.take(), self.three_d.take()));
+        }
+    }
 }

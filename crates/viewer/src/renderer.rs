@@ -347,16 +347,24 @@ impl Renderer {
         &mut self,
         job: impl Fn(&Setup, &mut Engines, &mut Option<(Fluoroscope, Sequence)>, Option<&Kept>) -> Result<T>,
     ) -> Result<T> {
+        if !self.is_cpu && self.engines.are_forked() {
+            self.hand_over("it does not outlive a fork");
+        }
         match job(&self.setup, &mut self.engines, &mut self.fluoro, self.kept.as_ref()) {
             Err(Error::Computation(reason)) if !self.is_cpu => {
-                let mut engines = cpu::engines(self.setup.c_arm.is_some());
-                engines.name = format!("{} ({} failed: {reason})", engines.name, self.engines.name);
-                self.engines = engines;
-                self.is_cpu = true;
+                self.hand_over(&reason);
                 job(&self.setup, &mut self.engines, &mut self.fluoro, self.kept.as_ref())
             }
             done => done,
         }
+    }
+
+    /// Goes on with the CPU.
+    fn hand_over(&mut self, reason: &str) {
+        let mut engines = cpu::engines(self.setup.c_arm.is_some());
+        engines.name = format!("{} ({} failed: {reason})", engines.name, self.engines.name);
+        self.engines = engines;
+        self.is_cpu = true;
     }
 }
 

@@ -58,13 +58,20 @@ fn a_lost_adapter_hands_over_to_the_cpu_and_says_so() {
             paths: Some(Box::new(Broken)),
             three_d: Some(Box::new(Broken)),
             name: "adapter".into(),
+            process: std::process::id(),
         };
         renderer
     };
     let mut renderer = Renderer { is_cpu: false, ..broken() };
-    assert_eq!(renderer.render(&wire).unwrap(), whole.render(&wire).unwrap());
+    let first = whole.render(&wire).unwrap();
+    assert_eq!(renderer.render(&wire).unwrap(), first);
     assert_eq!(renderer.backend(), "CPU reference (adapter failed: the device was lost)");
     assert_eq!(renderer.path_lengths(&wire).unwrap(), whole.path_lengths(&wire).unwrap());
+    // What another process has made, this one being forked from it, is not asked at all.
+    let mut renderer = Renderer { is_cpu: false, ..broken() };
+    renderer.engines.process += 1;
+    assert_eq!(renderer.render(&wire).unwrap(), first);
+    assert_eq!(renderer.backend(), "CPU reference (adapter failed: it does not outlive a fork)");
     // The twin: without anything to fall back on, the failure is reported.
     assert!(broken().render(&wire).is_err());
 }

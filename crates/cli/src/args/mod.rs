@@ -200,9 +200,13 @@ pub(crate) struct PlayArgs {
     /// With --headless: time goes by as on a clock, and pictures are drawn as for the window
     #[arg(long, requires = "headless")]
     pub(crate) realtime: bool,
-    /// Take inputs, lines of JSON, also from programs that connect to this address, such as 127.0.0.1:7000
-    #[arg(long, value_name = "ADDRESS")]
-    pub(crate) listen: Option<std::net::SocketAddr>,
+    /// Take inputs, lines of JSON, also from programs of this machine that connect to this port, such as 7000, or address, such as [::1]:7000.
+    /// A connection begins with the line that is told as its first; pictures go into the folder of --record
+    #[arg(long, value_name = "PORT|ADDRESS")]
+    pub(crate) listen: Option<crate::commands::play::Address>,
+    /// Let --listen take an address that other machines reach; what goes over it is not encrypted
+    #[arg(long, requires = "listen")]
+    pub(crate) allow_remote: bool,
     /// Width and height of the fluoroscopic picture in pixels, 64 to 1024
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(64..=1024))]
     pub(crate) size: u32,

@@ -9,7 +9,7 @@ mod export;
 mod felt;
 mod fluoro;
 mod new;
-mod play;
+pub(crate) mod play;
 mod render;
 mod report;
 mod rod;

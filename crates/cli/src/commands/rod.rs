@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use crate::args::RodArgs;
 use crate::failure::Failure;
-use crate::output::print_json;
 use crate::output::provenance::{Provenance, read_input};
+use crate::output::{print_json, printable};
 
 #[derive(Serialize)]
 struct Document {
@@ -41,7 +41,7 @@ fn print_solution(document: &Document) {
         (true, false) => format!("unstable equilibrium, {} unstable directions", s.negative_modes),
         (false, _) => "no equilibrium".to_owned(),
     };
-    println!("{}: {verdict}", document.case);
+    println!("{}: {verdict}", printable(&document.case));
     println!("  solver        {} iterations, residual {:.1e}: {}", s.iterations, s.residual, s.stop);
     println!("  elements      {}", s.tensions.len());
     println!("  tip           {}", vector(&s.tip));
@@ -63,7 +63,7 @@ fn print_solution(document: &Document) {
         let push = i.push_force.map_or("jumps here".to_owned(), |force| format!("{force:.9}"));
         println!(
             "  {:<13} {} beyond the start, tip {}, twist {:.9} rad, push force {push}, torque {:.9}",
-            i.name,
+            printable(&i.name),
             i.inserted,
             vector(&i.tip),
             i.twist,

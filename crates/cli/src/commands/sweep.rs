@@ -63,7 +63,7 @@ fn carry_out(args: &SweepArgs, file: &Path, folder: &Path) -> Result<(), Failure
         store: &Cache::new(&args.cache),
         program: PROGRAM,
         record: recordings.as_ref().map(|recordings| recordings as &dyn Record),
-        stop: &stop,
+        stop,
         progress: &|progress| show(&bar, progress),
     };
     let told = sweep.carry_out(&order)?;

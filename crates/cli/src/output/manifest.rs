@@ -1,5 +1,6 @@
 //! A list of what a command has written into a folder, kept beside it, so that the next call replaces these files and no others.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
@@ -8,7 +9,9 @@ use super::whole::remove;
 
 /// The list of a call that goes on.
 pub(crate) struct Manifest {
+    folder: PathBuf,
     file: File,
+    names: BTreeSet<String>,
 }
 
 impl Manifest {
@@ -22,12 +25,25 @@ impl Manifest {
                 removed += 1;
             }
         }
-        Ok((Self { file: File::create(path)? }, removed))
+        let file = File::create(path)?;
+        Ok((Self { folder: folder.to_owned(), file, names: BTreeSet::new() }, removed))
     }
 
-    /// Notes a file of the folder; to be called before it is written, or a call that is killed would leave it for ever.
+    /// Notes a file of the folder; to be called before it is written, or a call that is killed would leave it for ever. Refuses a name that
+    /// is taken: what was there at the beginning and is not on the list of an earlier call is somebody else's.
     pub(crate) fn add(&mut self, name: &str) -> io::Result<()> {
-        self.file.write_all(format!("{name}\n").as_bytes())
+        if self.names.contains(name) {
+            return Ok(());
+        }
+        if self.folder.join(name).symlink_metadata().is_ok() {
+            let text = format!(
+                "{name} is there already, and no earlier call of this command has written it: move it, or give another folder"
+            );
+            return Err(io::Error::new(io::ErrorKind::AlreadyExists, text));
+        }
+        self.file.write_all(format!("{name}\n").as_bytes())?;
+        self.names.insert(name.to_owned());
+        Ok(())
     }
 }
 
@@ -63,5 +79,11 @@ mod tests {
         assert_eq!(Manifest::begin(&folder, "render").unwrap().1, 2);
         assert!(!folder.join("a.png").exists());
         assert!(folder.join("mine.png").exists() && outer.path().join("outside.png").exists());
+        // What is not ours is not written over, and does not become ours by the trial.
+        let (mut manifest, _) = Manifest::begin(&folder, "render").unwrap();
+        assert!(manifest.add("a.png").is_ok() && manifest.add("a.png").is_ok(), "the twin");
+        assert_eq!(manifest.add("mine.png").unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        Manifest::begin(&folder, "render").unwrap();
+        assert!(folder.join("mine.png").exists());
     }
 }

@@ -15,11 +15,11 @@ pub(crate) mod recorder;
 pub(crate) mod recording;
 pub(crate) mod saved;
 pub(crate) mod vtk;
-pub(crate) mod whole;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};
 
+pub(crate) use endowire_sweep::whole;
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -40,7 +40,20 @@ pub(crate) fn print(document: impl Display) -> Result<(), Failure> {
 
 /// Tells a person on stderr, who may have closed it: what was computed does not depend on it.
 pub(crate) fn tell(text: impl Display) {
-    let _ = writeln!(stderr().lock(), "{text}");
+    let _ = writeln!(stderr().lock(), "{}", printable(text));
+}
+
+/// Text for a terminal: a name in it may have control characters, which would move its cursor, change its colours or its title.
+pub(crate) fn printable(text: impl Display) -> String {
+    let mut shown = String::new();
+    for character in text.to_string().chars() {
+        match character {
+            '\n' | '\t' => shown.push(character),
+            _ if character.is_control() => shown.extend(character.escape_default()),
+            _ => shown.push(character),
+        }
+    }
+    shown
 }
 
 /// Prints one JSON document on stdout.
@@ -54,11 +67,24 @@ pub(crate) fn answer(
     json: bool,
     text: impl FnOnce() -> String,
 ) -> Result<(), Failure> {
-    if json { print_json(document) } else { print(text()) }
+    if json { print_json(document) } else { print(printable(text())) }
 }
 
 /// A document as indented JSON.
 pub(crate) fn to_json(document: &impl Serialize) -> Result<String, Failure> {
     serde_json::to_string_pretty(document)
         .map_err(|e| Failure::Computation(format!("the result cannot be written as JSON: {e}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::printable;
+
+    #[test]
+    fn what_a_terminal_would_obey_is_shown() {
+        assert_eq!(
+            printable("a\u{1b}]0;title\u{7}\u{9b}31m\r\nb\tµ"),
+            "a\\u{1b}]0;title\\u{7}\\u{9b}31m\\r\nb\tµ"
+        );
+    }
 }

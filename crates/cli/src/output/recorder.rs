@@ -251,6 +251,7 @@ impl Recorder {
             return Ok(());
         }
         self.sync()?;
+        self.check_there()?;
         write_summary(&self.folder, &summary(self))?;
         self.checkpoint = Some(Instant::now());
         Ok(())
@@ -264,6 +265,19 @@ impl Recorder {
         synced.map_err(|e| Failure::write(&self.folder, &e))
     }
 
+    /// Fails where the table of steps is not in its place any more: a file that is open takes what is written to it, also without a name.
+    fn check_there(&self) -> Result<(), Failure> {
+        let path = self.folder.join(folder::TABLE);
+        let own = self.table.get_ref().metadata().map(|own| own.len());
+        match (own, path.metadata()) {
+            (Ok(own), Ok(there)) if there.len() == own => Ok(()),
+            _ => Err(Failure::Computation(format!(
+                "{}: was removed or replaced while the run went on, and steps with it; run the scene again",
+                path.display()
+            ))),
+        }
+    }
+
     /// Writes a frame of a step with `write`, and notes it for the summary.
     pub(crate) fn frame(
         &mut self,
@@ -272,7 +286,11 @@ impl Recorder {
         write: impl FnOnce(&Path) -> io::Result<()>,
     ) -> Result<(), Failure> {
         let folder = self.folder.join("frames");
-        std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, &e))?;
+        // Not the folder of the recording: one that has vanished took the steps before with it.
+        match std::fs::create_dir(&folder) {
+            Err(e) if e.kind() != io::ErrorKind::AlreadyExists => return Err(Failure::write(&folder, &e)),
+            _ => {}
+        }
         let name = folder::frame_name(step, view);
         let path = folder.join(&name);
         whole::write(&path, write).map_err(|e| Failure::write(&path, &e))?;
@@ -292,6 +310,7 @@ impl Recorder {
 
     /// Packs shapes.npz and writes summary.json; the second also where the first cannot be written.
     pub(crate) fn finish(self, summary: &mut Summary) -> Result<(), Failure> {
+        self.check_there()?;
         // The claim ends with this function, when all is written.
         let Self { folder, arrays, _claim, .. } = self;
         let packed = arrays.pack(&folder).map_err(|e| Failure::write(&folder.join(arrays::PACKED), &e));

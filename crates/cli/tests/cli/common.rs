@@ -1,6 +1,7 @@
 //! The program under test, and scenes of the assets for it.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{ChildStderr, Command, Output, Stdio};
 
@@ -78,9 +79,28 @@ pub(crate) fn play(name: &str, record: &Path, more: &[&str]) -> Command {
     command
 }
 
-/// Where a program of `play` listens.
-pub(crate) fn address(said: &mut BufReader<ChildStderr>) -> String {
-    let mut line = String::new();
-    said.read_line(&mut line).unwrap();
-    line.trim().strip_prefix("endowire: listens at ").unwrap_or_else(|| panic!("{line}")).to_owned()
+/// A program of `play` that listens.
+pub(crate) struct Listening {
+    pub(crate) address: String,
+    pub(crate) token: String,
+}
+
+impl Listening {
+    /// What it says of itself.
+    pub(crate) fn read(said: &mut BufReader<ChildStderr>) -> Self {
+        let mut told = |begins: &str| {
+            let mut line = String::new();
+            said.read_line(&mut line).unwrap();
+            line.trim().strip_prefix(begins).unwrap_or_else(|| panic!("{line}")).to_owned()
+        };
+        let address = told("endowire: listens at ");
+        Self { address, token: told("endowire: the first line of a connection is ") }
+    }
+
+    /// A connection that has shown the token.
+    pub(crate) fn connect(&self) -> BufReader<TcpStream> {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        stream.write_all(format!("{}\n", self.token).as_bytes()).unwrap();
+        BufReader::new(stream)
+    }
 }

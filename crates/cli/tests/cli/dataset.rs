@@ -219,3 +219,26 @@ fn what_a_script_injects_is_in_pictures_of_its_steps_and_later() {
     told(&endowire(&["fluoro", text(&path), "--time", "1.6", "--out", text(&out), "--json"], "2"));
     assert!(medium == bytes(out.join("frame_000000_fluoro.png")));
 }
+
+#[test]
+fn a_dataset_leaves_the_files_of_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = specification(folder.path(), "");
+    for (k, theirs) in
+        ["images/0000000.png", "annotations.json", "dataset.json", "parts/000001.json"].iter().enumerate()
+    {
+        let out = folder.path().join(k.to_string());
+        let path = out.join(theirs);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, "theirs").unwrap();
+        let refused = endowire(&["dataset", text(&spec), "--out", text(&out)], "2");
+        assert_eq!(refused.status.code(), Some(2), "{theirs}: {}", said(&refused));
+        assert_eq!(files(&out), BTreeMap::from([((*theirs).to_owned(), b"theirs".to_vec())]));
+    }
+    // The twin: what lies in no place of a dataset is no reason.
+    let out = folder.path().join("beside");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("notes.txt"), "mine").unwrap();
+    told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+    assert_eq!(files(&out)["notes.txt"], b"mine");
+}

@@ -138,3 +138,20 @@ fn a_second_run_into_the_same_folder_stops_until_the_first_is_gone() {
     assert!(told.contains("replaces the earlier recording") && told.contains("shapes.part/"), "{told}");
     assert!(out.join("shapes.npz").exists() && !out.join("shapes.part").exists());
 }
+
+#[test]
+fn a_run_whose_folder_vanishes_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, views) in [("without", "[]"), ("with", "[\"3d\", \"fluoro\"]")] {
+        let scene = endless_scene(folder.path(), views);
+        let out = folder.path().join(name);
+        let run = start(&scene, &out);
+        wait_until(|| rows(&out) >= 3);
+        // A file may be added meanwhile.
+        wait_until(|| std::fs::remove_dir_all(&out).is_ok());
+        let output = run.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+        assert!(said(&output).contains(name), "{}", said(&output));
+        assert!(!out.join("shapes.npz").exists() && !out.join("summary.json").exists());
+    }
+}

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::process::Child;
 
-use crate::common::{address, endowire, play, scene};
+use crate::common::{Listening, endowire, play, scene};
 use serde_json::{Value, json};
 
 /// Sends lines, and has the answers.
@@ -121,6 +121,14 @@ fn a_script_file_has_scripts_alone() {
     assert!(said.contains("script.toml") && said.contains("vessel"), "{said}");
 }
 
+/// Sends a line, and has the answer.
+fn ask(stream: &mut BufReader<TcpStream>, line: &str) -> Value {
+    stream.get_mut().write_all(line.as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_line(&mut answer).unwrap();
+    serde_json::from_str(&answer).unwrap()
+}
+
 #[test]
 fn a_program_that_leaves_takes_nothing_with_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -128,14 +136,8 @@ fn a_program_that_leaves_takes_nothing_with_it() {
     let more = ["--headless", "--realtime", "--size", "64", "--listen", "127.0.0.1:0"];
     let mut child = play("curved_tube.toml", &record, &more).spawn().unwrap();
     let mut said = BufReader::new(child.stderr.take().unwrap());
-    let address = address(&mut said);
-    let ask = |stream: &mut BufReader<TcpStream>, line: &str| -> Value {
-        stream.get_mut().write_all(line.as_bytes()).unwrap();
-        let mut answer = String::new();
-        stream.read_line(&mut answer).unwrap();
-        serde_json::from_str(&answer).unwrap()
-    };
-    let connect = || BufReader::new(TcpStream::connect(&address).unwrap());
+    let listening = Listening::read(&mut said);
+    let connect = || listening.connect();
     let mut first = connect();
     assert_eq!(ask(&mut first, "{\"do\": \"nudge\", \"mm\": 12.5}\n")["ok"], true);
     // One leaves in the middle of a line, one sends what is no line.
@@ -154,6 +156,140 @@ fn a_program_that_leaves_takes_nothing_with_it() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
     let text = std::fs::read_to_string(&record).unwrap();
     assert!(text.contains("advance_mm = 12.0") && text.contains("advance_mm = 0.5"), "{text}");
+}
+
+/// Random lines of bytes from a fixed seed, some of them nearly commands.
+fn random_lines(count: usize) -> impl Iterator<Item = Vec<u8>> {
+    let mut word = 1_u64;
+    let mut next = move || {
+        word = word.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (word >> 33) as usize
+    };
+    let pieces: [&[u8]; 12] = [
+        b"{\"do\": \"",
+        b"picture",
+        b"nudge",
+        b"wait",
+        b"\"",
+        b", \"file\": \"",
+        b"../",
+        b"/tmp/",
+        b".png\"}",
+        b"\xff\xfe",
+        b"{}",
+        b"\0",
+    ];
+    (0..count).map(move |_| {
+        let mut line: Vec<u8> =
+            (0..next() % 12).flat_map(|_| pieces[next() % pieces.len()].to_vec()).collect();
+        line.extend((0..next() % 40).map(|_| (next() % 256) as u8).filter(|byte| *byte != b'\n'));
+        // Never empty, which would have no answer.
+        line.push(b'!');
+        line
+    })
+}
+
+/// Files in a folder and below it.
+fn files(folder: &std::path::Path) -> Vec<std::path::PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+}
+
+#[test]
+fn a_socket_asks_for_its_token_and_writes_into_its_folder_alone() {
+    let outer = tempfile::tempdir().unwrap();
+    let record = outer.path().join("session/played.toml");
+    let more = ["--headless", "--size", "64", "--listen", "0"];
+    let mut child = play("curved_tube.toml", &record, &more).current_dir(outer.path()).spawn().unwrap();
+    let listening = Listening::read(&mut BufReader::new(child.stderr.take().unwrap()));
+    assert!(listening.address.starts_with("127.0.0.1:"), "{}", listening.address);
+
+    // A page that a browser shows may send requests; lines of the protocol in one are not carried out.
+    let command =
+        "{\"do\": \"picture\", \"file\": \"http.png\"}\n{\"do\": \"nudge\", \"mm\": 5}\n{\"do\": \"quit\"}\n";
+    for k in 0..200 {
+        let head = format!("Host: {}\r\nContent-Length: {}\r\n\r\n", listening.address, command.len());
+        let mut stream = TcpStream::connect(&listening.address).unwrap();
+        let begin = ["POST / HTTP/1.1\r\n", "GET / HTTP/1.1\r\n", "", "\n"][k % 4];
+        // The connection may be hung up on before all of it is sent.
+        let _ = stream.write_all(format!("{begin}{head}{command}").as_bytes());
+        let mut told = String::new();
+        let _ = BufReader::new(stream).read_line(&mut told);
+        assert!(told.is_empty() || told.contains("\"ok\":false") && told.contains("token"), "{told}");
+    }
+    let mut known = listening.connect();
+    for line in random_lines(10_000) {
+        known.get_mut().write_all(&[&line[..], b"\n"].concat()).unwrap();
+        let mut told = String::new();
+        known.read_line(&mut told).unwrap();
+        assert!(told.starts_with("{\"ok\":false"), "{told} to {}", String::from_utf8_lossy(&line));
+    }
+    let _ = TcpStream::connect(&listening.address).unwrap().write_all(&[b'x'; 100_000]);
+    for place in [
+        "/tmp/endowire-outside.png",
+        "../outside.png",
+        "session/../../outside.png",
+        "seen.toml",
+        "played.toml",
+    ] {
+        let told = ask(&mut known, &format!("{}\n", json!({"do": "picture", "file": place})));
+        assert_eq!(told["ok"], false, "{place}");
+    }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(outer.path().join("linked.png"), outer.path().join("session/link.png"))
+            .unwrap();
+        assert_eq!(ask(&mut known, "{\"do\": \"picture\", \"file\": \"link.png\"}\n")["ok"], false);
+        std::fs::remove_file(outer.path().join("session/link.png")).unwrap();
+    }
+    assert!(files(outer.path()).iter().all(|path| *path == record), "{:?}", files(outer.path()));
+
+    // The twin: what is allowed is done, and the session has not moved before it.
+    let told = ask(&mut known, "{\"do\": \"picture\", \"file\": \"seen.png\"}\n");
+    assert_eq!((&told["ok"], &told["readout"]["step"]), (&json!(true), &json!(0)));
+    assert!(outer.path().join("session/seen.png").exists());
+    assert_eq!(ask(&mut known, "{\"do\": \"quit\"}\n")["ok"], true);
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn other_machines_are_listened_to_only_where_that_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("played.toml");
+    let output =
+        play("curved_tube.toml", &record, &["--headless", "--listen", "0.0.0.0:0"]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("--allow-remote"), "{said}");
+    let more = ["--headless", "--listen", "0.0.0.0:0", "--allow-remote"];
+    let mut child = play("curved_tube.toml", &record, &more).spawn().unwrap();
+    drop(child.stdin.take());
+    assert_eq!(child.wait().unwrap().code(), Some(0), "the twin");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_long_wait_is_interrupted_and_recorded_as_far_as_it_went() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("played.toml");
+    let mut child = play("curved_tube.toml", &record, &["--headless", "--size", "64"]).spawn().unwrap();
+    let mut input = child.stdin.take().unwrap();
+    for line in [json!({"do": "move", "mm_per_s": 1}), json!({"do": "wait", "ticks": 4_000_000_000_u32})] {
+        input.write_all(format!("{line}\n").as_bytes()).unwrap();
+    }
+    // Recorded while it goes on: what a kill would leave.
+    let begun = std::time::Instant::now();
+    while !record.exists() && begun.elapsed().as_secs() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    assert!(record.exists());
+    let pid = child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("steps are recorded") && !said.contains(" 0 steps"), "{said}");
+    assert!(std::fs::read_to_string(&record).unwrap().contains("advance_mm"));
 }
 
 #[test]

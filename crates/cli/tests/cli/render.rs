@@ -201,7 +201,7 @@ fn what_cannot_be_drawn_is_refused_by_key_value_and_mend() {
         ),
         (
             [&still(&["--labels", "--out"])[..], &[text(&labels)]].concat(),
-            &["cannot write", "frame_000000_labels.json", "directory"],
+            &["cannot write", "frame_000000_labels.json", "is there already"],
         ),
         // Pixels, kernels and volumes of numbers that nobody means: told before anything is computed.
         (
@@ -257,4 +257,30 @@ fn medium_from_a_tip_is_where_the_tip_was_whichever_frames_are_drawn() {
     assert!(std::fs::read(out.join("render/step_000020_fluoro.png")).unwrap() == each);
     // The twin: medium from elsewhere is another picture.
     assert!(last("inlet", "every = 1", false).0 != each);
+}
+
+#[test]
+fn frames_leave_the_files_of_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, run) = recorded(folder.path());
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    let draw = || {
+        let few = ["--from", "106", "--view", "3d", "--size", "24x16", "--out", text(&out)];
+        endowire(&[&["render", text(&run)], &few[..]].concat())
+    };
+    let frame = out.join("step_000106_3d.png");
+    std::fs::write(&frame, "theirs").unwrap();
+    for _ in 0..2 {
+        let refused = draw();
+        assert_eq!(refused.status.code(), Some(2), "{}", said(&refused));
+        assert!(said(&refused).contains("step_000106_3d.png"), "{}", said(&refused));
+        assert_eq!(std::fs::read(&frame).unwrap(), b"theirs");
+    }
+    // The twin: its own it replaces.
+    std::fs::remove_file(&frame).unwrap();
+    for _ in 0..2 {
+        assert!(draw().status.success());
+    }
+    assert_eq!(png_size(&frame), (24, 16));
 }

@@ -81,6 +81,17 @@ impl Section {
             let mend = format!("must be at least {LEAST_RADIUS_MM} mm: no device is thinner");
             return Err(Error::parameter(format!("{name}.radius_mm"), self.radius_mm, mend));
         }
+        let stiffness = [
+            ("bending_stiffness_nmm2", Some(self.bending_stiffness_nmm2)),
+            ("torsional_stiffness_nmm2", self.torsional_stiffness_nmm2),
+        ];
+        for (field, value) in stiffness {
+            if let Some(value) = value.filter(|value| *value < LEAST_STIFFNESS_NMM2) {
+                let mend =
+                    format!("must be at least {LEAST_STIFFNESS_NMM2} N·mm²: no device is more flexible");
+                return Err(Error::parameter(format!("{name}.{field}"), value, mend));
+            }
+        }
         if let Some(inner) = self.inner_radius_mm.filter(|inner| !(*inner > 0.0 && *inner < self.radius_mm)) {
             let mend = format!(
                 "must be above 0 and less than the outer radius, {} mm; leave it out where the device is solid",
@@ -119,6 +130,9 @@ const RADIUS_LIMIT_MM: f64 = 50.0;
 const LEAST_RADIUS_MM: f64 = 1e-6;
 /// Most sections: each point of a device looks for its own among them.
 const MOST_SECTIONS: usize = 1000;
+/// Most flexible device accepted, N·mm²: a nylon thread of 0.01 mm diameter. What is a millionth of the walls' forces and less has no shape in
+/// them that double precision finds.
+const LEAST_STIFFNESS_NMM2: f64 = 1e-6;
 /// Stiffest device accepted, N·mm²: a solid steel rod of 12 mm diameter.
 const STIFFNESS_LIMIT_NMM2: f64 = 2e8;
 
@@ -264,6 +278,14 @@ mod tests {
             assert!(error.starts_with("device.section[1].radius_mm = 1e-"), "{error}");
             assert!(error.contains("at least 0.000001 mm"), "{error}");
         }
+        for stiffness in [9e-7, 5e-324] {
+            let error = told(vec![straight(1.0), Section::straight(10.0, 1.0, stiffness)]);
+            assert!(error.starts_with("device.section[1].bending_stiffness_nmm2 = "), "{error}");
+            let limp = Section { torsional_stiffness_nmm2: Some(stiffness), ..straight(1.0) };
+            let error = told(vec![limp]);
+            assert!(error.starts_with("device.section[0].torsional_stiffness_nmm2 = "), "{error}");
+        }
+        assert!(Device::uniform(10.0, 1.0, 1e-6).is_ok());
         let error = told(vec![Section::straight(1.0, 1.0, 1.0); 1001]);
         assert!(error.starts_with("device.section = 1001 sections: at most 1000"), "{error}");
     }

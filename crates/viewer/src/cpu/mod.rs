@@ -28,7 +28,8 @@ pub(crate) const NAME: &str = "CPU reference";
 
 /// Prepares the fluoroscopic view where it is wanted; the 3D view is made with the first frame ([`three_d`]).
 pub(crate) fn engines(fluoro: bool) -> Engines {
-    Engines { paths: fluoro.then(|| Box::new(CpuPaths) as _), three_d: None, name: NAME.into() }
+    let paths = fluoro.then(|| Box::new(CpuPaths) as _);
+    Engines { paths, three_d: None, name: NAME.into(), process: std::process::id() }
 }
 
 /// The 3D view with the picture of the wall.

@@ -4,7 +4,7 @@
 //! handler keeps the first report, and every read-back returns it as an error: a failing adapter costs a
 //! frame, never the program.
 
-use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
 
 use endowire_core::{Error, Result};
 
@@ -29,6 +29,11 @@ impl Gpu {
     /// # Errors
     /// Why there is none, as a clause.
     pub(crate) fn open(features: wgpu::Features, software: bool) -> std::result::Result<Self, String> {
+        // Drivers keep threads and locks of a process that one forked from it does not have: they would be waited for without end.
+        static PROCESS: OnceLock<u32> = OnceLock::new();
+        if *PROCESS.get_or_init(std::process::id) != std::process::id() {
+            return Err("graphics were in use before this process was forked".into());
+        }
         let descriptor = wgpu::InstanceDescriptor {
             flags: wgpu::InstanceFlags::empty(),
             ..wgpu::InstanceDescriptor::new_without_display_handle()

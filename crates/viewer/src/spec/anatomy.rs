@@ -154,7 +154,7 @@ impl FlowSpec {
 pub struct InjectionSpec {
     /// When it begins, in the time of the frames, -10,000 to 10,000.
     pub start_s: f64,
-    /// How long it takes, 0.001 to 10,000.
+    /// How long it takes, 0.001 to 200.
     pub duration_s: f64,
     /// How fast, 0.001 to 10,000.
     pub rate_ml_per_s: f64,
@@ -165,11 +165,14 @@ pub struct InjectionSpec {
     pub at_tip: bool,
 }
 
+/// Longest injection, s: medium is followed in hundredths of a second.
+const LONGEST_S: f64 = 200.0;
+
 impl InjectionSpec {
     pub(super) fn validate(&self, index: usize) -> Result<()> {
         let key = |name: &str| format!("view.injection[{index}].{name}");
         finite_within(&key("start_s"), self.start_s, [-1e4, 1e4])?;
-        finite_within(&key("duration_s"), self.duration_s, [0.001, 1e4])?;
+        finite_within(&key("duration_s"), self.duration_s, [0.001, LONGEST_S])?;
         finite_within(&key("rate_ml_per_s"), self.rate_ml_per_s, [0.001, 1e4])?;
         for x in self.at_mm.into_iter().flatten() {
             finite_within(&key("at_mm"), x, COORDINATE_MM)?;

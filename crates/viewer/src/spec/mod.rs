@@ -340,7 +340,7 @@ mod tests {
     #[test]
     fn each_bad_value_names_its_key() {
         type Spoil = fn(&mut ViewSpec);
-        let cases: [(&str, Spoil); 49] = [
+        let cases: [(&str, Spoil); 50] = [
             ("size_px", |s| s.size_px = [0, 10]),
             ("size_px", |s| s.size_px = [10, 9000]),
             ("every", |s| s.every = 0),
@@ -392,6 +392,7 @@ mod tests {
                 s.injection = vec![injection(1.0, 1.0), injection(1.0, 1e308)];
             }),
             ("injection[0].duration_s", |s| s.injection = vec![injection(1e-308, 1.0)]),
+            ("injection[0].duration_s", |s| s.injection = vec![injection(1e4, 1.0)]),
             ("view.injection = 1001 tables", |s| s.injection = vec![injection(1.0, 1.0); 1001]),
             ("diaphragm_mm", |s| {
                 s.patient.torso = Some(TorsoSpec { diaphragm_mm: Some(1e300), ..TorsoSpec::default() });

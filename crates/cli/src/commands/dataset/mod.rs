@@ -66,10 +66,6 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     let spec = Spec::read(&args.spec)?;
     let provenance = provenance(args, &spec)?;
     let folder = &args.out;
-    for name in ["images", "arrays", "parts"] {
-        let path = folder.join(name);
-        std::fs::create_dir_all(&path).map_err(|e| Failure::write(&path, &e))?;
-    }
     claim(&provenance, folder)?;
     let pairs: Vec<_> = spec
         .scenes
@@ -103,7 +99,8 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     let bar = progress::bar(open.len(), "pose");
     open.par_iter().try_for_each(|&shot| {
         if let Some(course) = &courses[shot / spec.poses] {
-            shot::draw(&spec, course, shot, folder)?;
+            // What cannot be written now could be when the folder was claimed.
+            shot::draw(&spec, course, shot, folder).map_err(Failure::into_computation)?;
         }
         bar.inc(1);
         Ok::<(), Failure>(())
@@ -111,7 +108,7 @@ pub(crate) fn dataset(args: &DatasetArgs) -> Result<(), Failure> {
     bar.finish_and_clear();
     let drawing_time_s = start.elapsed().as_secs_f64();
 
-    let unconverged = join(folder, shots, &provenance)?;
+    let unconverged = join(folder, shots, &provenance).map_err(Failure::into_computation)?;
     let each = spec.moments * spec.views();
     let drawn = open.len() * each;
     let written = Written {
@@ -164,23 +161,45 @@ fn provenance(args: &DatasetArgs, spec: &Spec) -> Result<Provenance, Failure> {
     Ok(Provenance::new(&inputs, spec.seed).with(&args.set.set))
 }
 
-/// Takes a folder for a dataset; one that holds another is refused.
+/// Folders of a dataset, and the file of all annotations.
+const FOLDERS: [&str; 3] = ["images", "arrays", "parts"];
+const ANNOTATIONS: &str = "annotations.json";
+
+/// Takes a folder for a dataset; one that holds another, or somebody's files where those of a dataset go, is refused.
 fn claim(provenance: &Provenance, folder: &Path) -> Result<(), Failure> {
     let path = folder.join("dataset.json");
     let told = to_json(provenance)?;
-    match std::fs::read_to_string(&path) {
-        Ok(text) => {
-            let there: Value = serde_json::from_str(&text).unwrap_or_default();
-            if there["scene_hash"] == provenance.scene_hash() {
-                return Ok(());
-            }
-            Err(Failure::Input(format!(
+    if let Ok(text) = std::fs::read_to_string(&path) {
+        let there: Value = serde_json::from_str(&text).unwrap_or_default();
+        if there["scene_hash"] != provenance.scene_hash() {
+            return Err(Failure::Input(format!(
                 "--out {}: holds another dataset, or this one before its specification or a file it names was changed; give another folder",
                 folder.display()
-            )))
+            )));
         }
-        Err(_) => whole::write_bytes(&path, told.as_bytes()).map_err(|e| Failure::write(&path, &e)),
+    } else if let Some(theirs) = taken(folder) {
+        return Err(Failure::Input(format!(
+            "--out {}: holds no dataset, and files of one would take the place of others ({}): give a new or an empty folder",
+            folder.display(),
+            theirs.display()
+        )));
     }
+    let made = FOLDERS.iter().try_for_each(|name| std::fs::create_dir_all(folder.join(name)));
+    made.map_err(|e| Failure::write(folder, &e))?;
+    if !path.exists() {
+        whole::write_bytes(&path, told.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
+    }
+    Ok(())
+}
+
+/// What is in the places of a dataset in a folder that is none.
+fn taken(folder: &Path) -> Option<PathBuf> {
+    let mut places = FOLDERS.iter().chain([&ANNOTATIONS, &"dataset.json"]).map(|name| folder.join(name));
+    let is_taken = |path: &PathBuf| match std::fs::read_dir(path) {
+        Ok(mut entries) => entries.next().is_some(),
+        Err(_) => path.symlink_metadata().is_ok(),
+    };
+    places.find(is_taken)
 }
 
 /// Writes the annotations of all shots; how many pictures are of steps without an equilibrium.
@@ -196,7 +215,7 @@ fn join(folder: &Path, shots: usize, provenance: &Provenance) -> Result<usize, F
     }
     let text = serde_json::to_string(&document)
         .map_err(|e| Failure::Computation(format!("annotations cannot be written as JSON: {e}")))?;
-    let path = folder.join("annotations.json");
+    let path = folder.join(ANNOTATIONS);
     whole::write_bytes(&path, text.as_bytes()).map_err(|e| Failure::write(&path, &e))?;
     Ok(document.images.iter().filter(|image| !image.converged).count())
 }

@@ -1,7 +1,6 @@
 //! The protocol: one line of JSON a command, one line of JSON an answer, on stdin and stdout or a socket.
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::io::{self, BufRead, Read};
 use std::path::PathBuf;
 use std::sync::mpsc::Sender;
 
@@ -9,10 +8,9 @@ use endowire_play::{Input, Readout};
 use serde::{Deserialize, Serialize};
 
 use super::live::Message;
-use crate::failure::Failure;
-use crate::output::{print, tell};
+use crate::output::print;
 
-/// Longest line that is read.
+/// Longest line that is read, bytes.
 const LONGEST: u64 = 65_536;
 
 /// What is asked of the program and not of the session.
@@ -41,7 +39,7 @@ pub(crate) enum Line {
 }
 
 /// What a line asks for, or what is wrong with it.
-pub(crate) fn parse(text: &str) -> Result<Line, String> {
+fn parse(text: &str) -> Result<Line, String> {
     #[derive(Deserialize)]
     struct Name {
         #[serde(rename = "do")]
@@ -71,54 +69,44 @@ pub(crate) fn answer(done: Result<(), String>, readout: &Readout) -> String {
     serde_json::to_string(&answer).unwrap_or_else(|e| format!("{{\"ok\":false,\"error\":\"{e}\"}}"))
 }
 
-/// Reads lines until the end and has each answered before the next; what answers cannot be told to has left.
-pub(crate) fn read(mut from: impl BufRead, to: &Sender<Message>, mut tell: impl FnMut(&str) -> bool) {
-    loop {
-        let mut text = String::new();
-        match from.by_ref().take(LONGEST).read_line(&mut text) {
-            Ok(0) | Err(_) => break,
-            Ok(_) if text.trim().is_empty() => continue,
-            Ok(_) => {}
+/// Reads lines until the end and has each answered before the next. `allowed` may refuse or change what a line asks for; `tell` says
+/// whether its answer was heard.
+pub(crate) fn read(
+    mut from: impl BufRead,
+    to: &Sender<Message>,
+    allowed: impl Fn(Line) -> Result<Line, String>,
+    mut tell: impl FnMut(&str) -> bool,
+) {
+    while let Ok(Some(text)) = next_line(&mut from) {
+        if text.as_ref().is_ok_and(|text| text.trim().is_empty()) {
+            continue;
         }
+        let line = text.and_then(|text| parse(&text)).and_then(&allowed);
         let (reply, answered) = std::sync::mpsc::channel();
-        if to.send(Message::Line(text, reply)).is_err() {
+        if to.send(Message::Line(line, reply)).is_err() {
             return;
         }
         match answered.recv() {
             Ok(line) if tell(&line) => {}
-            _ => break,
+            _ => return,
         }
     }
-    let _ = to.send(Message::Ended);
+}
+
+/// The next line, or why it is none; nothing at the end. A line that is too long is passed over.
+fn next_line(from: &mut impl BufRead) -> io::Result<Option<Result<String, String>>> {
+    let mut bytes = Vec::new();
+    from.by_ref().take(LONGEST).read_until(b'\n', &mut bytes)?;
+    if bytes.is_empty() {
+        return Ok(None);
+    }
+    if bytes.len() as u64 == LONGEST && bytes.last() != Some(&b'\n') {
+        from.skip_until(b'\n')?;
+        return Ok(Some(Err(format!("no command: a line has at most {LONGEST} bytes"))));
+    }
+    Ok(Some(String::from_utf8(bytes).map_err(|e| format!("no command: {e}"))))
 }
 
 pub(crate) fn to_stdout(line: &str) -> bool {
     print(line).is_ok()
-}
-
-/// Takes lines from programs that connect.
-pub(crate) fn listen(address: SocketAddr, to: &Sender<Message>) -> Result<(), Failure> {
-    let failed = |e: std::io::Error| Failure::Input(format!("--listen {address}: {e}"));
-    let listener = TcpListener::bind(address).map_err(failed)?;
-    tell(format_args!("endowire: listens at {}", listener.local_addr().map_err(failed)?));
-    let to = to.clone();
-    std::thread::spawn(move || {
-        for stream in listener.incoming().flatten() {
-            let to = to.clone();
-            std::thread::spawn(move || serve(stream, &to));
-        }
-    });
-    Ok(())
-}
-
-/// Answers one program until it leaves; the session goes on.
-fn serve(stream: TcpStream, to: &Sender<Message>) {
-    let Ok(mut back) = stream.try_clone() else { return };
-    // Its end is not that of the session.
-    let (own, relayed) = std::sync::mpsc::channel();
-    let to = to.clone();
-    std::thread::spawn(move || {
-        relayed.into_iter().filter(|message| !matches!(message, Message::Ended)).try_for_each(|m| to.send(m))
-    });
-    read(BufReader::new(stream), &own, |line| writeln!(back, "{line}").is_ok());
 }

@@ -30,8 +30,8 @@ const LATE: Duration = Duration::from_millis(100);
 pub(crate) enum Message {
     /// From the window.
     Input(Input),
-    /// A line of the protocol, and who waits for its answer.
-    Line(String, Sender<String>),
+    /// A line of the protocol or what is wrong with it, and who waits for its answer.
+    Line(std::result::Result<Line, String>, Sender<String>),
     /// The standard input has ended.
     Ended,
     /// The window was closed.
@@ -194,9 +194,8 @@ pub(crate) fn physics(
                     // What is refused is an event of the session.
                     let _ = session.apply(&input);
                 }
-                Ok(Message::Line(text, reply)) => {
+                Ok(Message::Line(line, reply)) => {
                     input_at.get_or_insert_with(Instant::now);
-                    let line = lines::parse(&text);
                     goes_on &= !matches!(line, Ok(Line::Order(Order::Quit {})));
                     let _ = reply.send(lines::answer(said(line, &mut session), &session.readout()));
                 }

@@ -1,7 +1,7 @@
 //! A session in which time goes by as inputs say: the same lines, the same bits.
 
 use std::path::Path;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
@@ -16,6 +16,9 @@ use crate::failure::Failure;
 
 /// How soon an interrupt is heard.
 const PATIENCE: Duration = Duration::from_millis(100);
+
+/// What became of a line.
+type Done = Result<(), String>;
 
 /// Answers lines until their end.
 pub(crate) fn run(
@@ -33,13 +36,20 @@ pub(crate) fn run(
                 // What is refused is an event of the session.
                 let _ = session.apply(&input);
             }
-            Ok(Message::Line(text, reply)) => {
-                let line = lines::parse(&text);
+            Ok(Message::Line(line, reply)) => {
                 let quits = matches!(line, Ok(Line::Order(Order::Quit {})));
-                let done = line.and_then(|line| match line {
-                    Line::Input(input) => session.apply(&input).map_err(|e| e.to_string()),
-                    Line::Order(order) => carry_out(order, &mut session, &mut pictures),
-                });
+                let done = match line {
+                    Err(refused) => Err(refused),
+                    Ok(Line::Input(input)) => session.apply(&input).map_err(|e| e.to_string()),
+                    Ok(Line::Order(Order::Read {} | Order::Quit {})) => Ok(()),
+                    Ok(Line::Order(Order::Wait { ticks })) => {
+                        let waited = wait(ticks, &mut session, record, interrupted)?;
+                        waited.and_then(|()| expose(&mut session, &mut pictures))
+                    }
+                    Ok(Line::Order(Order::Picture { file, window })) => {
+                        picture(&file, window, &session, &mut pictures)
+                    }
+                };
                 let _ = reply.send(lines::answer(done, &session.readout()));
                 if quits {
                     break;
@@ -51,20 +61,30 @@ pub(crate) fn run(
     Ok(session)
 }
 
-fn carry_out(order: Order, session: &mut Session, pictures: &mut Pictures) -> Result<(), String> {
-    match order {
-        Order::Read {} | Order::Quit {} => {}
-        Order::Wait { ticks } => {
-            (0..ticks).for_each(|_| session.tick());
-            let delivered = pictures.expose(&session.snapshot()).map_err(|e| e.to_string())?;
-            delivered.into_iter().for_each(|delivered| session.exposed(delivered));
+/// Lets time go by until an interrupt ends it; what was done is recorded meanwhile.
+fn wait(
+    ticks: u32,
+    session: &mut Session,
+    record: &mut Record,
+    interrupted: &AtomicBool,
+) -> Result<Done, Failure> {
+    for tick in 0..ticks {
+        if interrupted.load(Ordering::Relaxed) {
+            return Ok(Err(format!("wait: interrupted after {tick} of {ticks} ticks")));
         }
-        Order::Picture { file, window } => picture(&file, window, session, pictures)?,
+        session.tick();
+        record.keep(session)?;
     }
+    Ok(Ok(()))
+}
+
+fn expose(session: &mut Session, pictures: &mut Pictures) -> Done {
+    let delivered = pictures.expose(&session.snapshot()).map_err(|e| e.to_string())?;
+    delivered.into_iter().for_each(|delivered| session.exposed(delivered));
     Ok(())
 }
 
-fn picture(file: &Path, window: bool, session: &Session, pictures: &mut Pictures) -> Result<(), String> {
+fn picture(file: &Path, window: bool, session: &Session, pictures: &mut Pictures) -> Done {
     let snapshot = session.snapshot();
     let three_d = pictures.three_d(&snapshot).map_err(|e| e.to_string())?;
     let planes = pictures.fluoro(&snapshot).map_err(|e| e.to_string())?;
@@ -80,11 +100,11 @@ fn picture(file: &Path, window: bool, session: &Session, pictures: &mut Pictures
 }
 
 #[cfg(feature = "window")]
-fn whole_window(file: &Path, snapshot: Snapshot, planes: &[Image], three_d: &Image) -> Result<(), String> {
+fn whole_window(file: &Path, snapshot: Snapshot, planes: &[Image], three_d: &Image) -> Done {
     super::window::write(file, snapshot, planes, three_d)
 }
 
 #[cfg(not(feature = "window"))]
-fn whole_window(_: &Path, _: Snapshot, _: &[Image], _: &Image) -> Result<(), String> {
+fn whole_window(_: &Path, _: Snapshot, _: &[Image], _: &Image) -> Done {
     Err("window: this program was built without the feature window: leave it out, or cargo build --release --features window".to_owned())
 }

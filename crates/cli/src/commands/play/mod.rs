@@ -4,12 +4,14 @@ mod lines;
 mod live;
 mod lockstep;
 mod record;
+mod socket;
 #[cfg(feature = "window")]
 mod window;
 
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc;
 
 use endowire_play::{Input, Limits, Pictures, Session, Went};
@@ -18,11 +20,13 @@ use serde::Serialize;
 
 use crate::args::PlayArgs;
 use crate::cache::Cache;
+use crate::commands::run::interrupts;
 use crate::failure::Failure;
 use crate::output::{print_json, tell};
 use crate::scenes;
 use live::Message;
 use record::Record;
+pub(crate) use socket::Address;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -48,7 +52,7 @@ pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
     let mut record = Record::new(args, &scene);
     let (sender, messages) = mpsc::channel();
     if let Some(address) = args.listen {
-        lines::listen(address, &sender)?;
+        socket::listen(address.allowed(args.allow_remote)?, record.folder(), &sender)?;
     }
     if args.headless {
         read_inputs(args.inputs.as_deref(), sender.clone())?;
@@ -75,7 +79,8 @@ fn begun(mut session: Session, args: &PlayArgs) -> endowire_core::Result<Session
     if args.watch || args.after_script {
         session.apply(&Input::Script {})?;
     }
-    while args.after_script && session.demonstrates() {
+    let interrupted = interrupts();
+    while args.after_script && session.demonstrates() && !interrupted.load(Ordering::Relaxed) {
         session.tick();
     }
     Ok(session)
@@ -89,7 +94,11 @@ fn read_inputs(file: Option<&Path>, to: mpsc::Sender<Message>) -> Result<(), Fai
         ),
         None => Box::new(std::io::stdin()),
     };
-    std::thread::spawn(move || lines::read(BufReader::new(lines), &to, lines::to_stdout));
+    std::thread::spawn(move || {
+        lines::read(BufReader::new(lines), &to, Ok, lines::to_stdout);
+        // Nobody may listen any more.
+        let _ = to.send(Message::Ended);
+    });
     Ok(())
 }
 

@@ -37,6 +37,11 @@ impl Record {
         Self { path, head, written: Instant::now() }
     }
 
+    /// The folder that the script goes into.
+    pub(crate) fn folder(&self) -> &Path {
+        self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    }
+
     /// Writes the session now and then: what a kill leaves.
     pub(crate) fn keep(&mut self, session: &Session) -> Result<(), Failure> {
         if self.written.elapsed() < EVERY {
@@ -47,9 +52,8 @@ impl Record {
     }
 
     fn write(&self, session: &Session) -> Result<(), Failure> {
-        if let Some(folder) = self.path.parent() {
-            std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
-        }
+        let folder = self.folder();
+        std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
         let text = format!("{}{}", self.head, session.script());
         whole::write_bytes(&self.path, text.as_bytes()).map_err(|e| Failure::write(&self.path, &e))
     }

@@ -48,10 +48,23 @@ fn run(args: &ReportArgs) -> Result<data::Data, Failure> {
     data::collect(&args.dir, &recording, &stack, vessel.mesh())
 }
 
-/// A document for a script: "</" would end it.
+/// A document for a script. "<" stands in strings alone, and could end the script ("</script>") or keep it from ending ("<!--<script>").
 fn json(document: &impl serde::Serialize) -> Result<String, Failure> {
     let text = serde_json::to_string(document);
     let text =
         text.map_err(|e| Failure::Computation(format!("the report cannot be written as JSON: {e}")))?;
-    Ok(text.replace("</", "<\\/"))
+    Ok(text.replace('<', "\\u003c"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::json;
+
+    #[test]
+    fn no_name_leaves_the_script_of_a_page() {
+        let name = "<!--<script></script>\u{2028}";
+        let text = json(&name).unwrap();
+        assert!(!text.contains('<'), "{text}");
+        assert_eq!(serde_json::from_str::<String>(&text).unwrap(), name);
+    }
 }

@@ -4,7 +4,7 @@ mod going;
 mod told;
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -90,7 +90,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let bar = if args.quiet { progress::hidden() } else { progress::bar(script.len(), "step") };
     bar.inc(going.so_far.course.steps as u64);
     going.begin()?;
-    going.carry_out(next, &interrupted, &bar);
+    going.carry_out(next, interrupted, &bar);
     bar.finish_and_clear();
     told::tell_end(args, &folder, going.end())
 }
@@ -144,15 +144,18 @@ fn draw_again(
     Ok(())
 }
 
-/// Set by Ctrl-C, or by a request to terminate: the step under way is finished and recorded. A second one ends at once.
-pub(crate) fn interrupts() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let heard = Arc::clone(&flag);
-    // Without a handler an interrupt ends the program at once, as elsewhere.
-    let _ = ctrlc::set_handler(move || {
-        if heard.swap(true, Ordering::Relaxed) {
-            std::process::exit(1);
-        }
+/// Set by Ctrl-C, or by a request to terminate: the step under way is finished and recorded. A second one ends at once. The same flag for all
+/// who ask.
+pub(crate) fn interrupts() -> &'static AtomicBool {
+    static FLAG: AtomicBool = AtomicBool::new(false);
+    static HEARD: Once = Once::new();
+    HEARD.call_once(|| {
+        // Without a handler an interrupt ends the program at once, as elsewhere.
+        let _ = ctrlc::set_handler(|| {
+            if FLAG.swap(true, Ordering::Relaxed) {
+                std::process::exit(1);
+            }
+        });
     });
-    flag
+    &FLAG
 }

@@ -46,6 +46,8 @@ pub(super) struct Bolus {
 /// Least and most of a volume, ml, and of a rate, ml/s.
 const ML: [f64; 2] = [0.1, 100.0];
 const ML_PER_S: [f64; 2] = [0.01, 100.0];
+/// Longest injection, s. Those of angiography take seconds, of perfusion a minute; medium is followed in hundredths of a second.
+const LONGEST_S: f64 = 200.0;
 
 impl Bolus {
     /// `own` is the number of the line's instrument.
@@ -58,6 +60,11 @@ impl Bolus {
                 let mend = format!("must be a number from {least} to {most}");
                 return Err(Error::parameter(format!("{name}.{key}"), value, mend));
             }
+        }
+        let duration_s = inject.ml / inject.ml_per_s;
+        if duration_s > LONGEST_S {
+            let mend = format!("takes {duration_s} s with {} ml: at most {LONGEST_S} s are taken", inject.ml);
+            return Err(Error::parameter(format!("{name}.ml_per_s"), inject.ml_per_s, mend));
         }
         let through = format!("{name}.through");
         let instrument = match &inject.through {

@@ -377,6 +377,10 @@ fn an_injection_that_cannot_be_is_told_before_the_script_begins_or_where_its_lin
         (go(inject(-1.0, 1.0, Some("catheter"))), "script[0].inject.ml = -1: must"),
         (go(inject(1.0, f64::NAN, Some("catheter"))), "script[0].inject.ml_per_s = NaN: must"),
         (
+            go(inject(100.0, 0.01, Some("catheter"))),
+            "script[0].inject.ml_per_s = 0.01: takes 10000 s with 100 ml",
+        ),
+        (
             go(inject(1.0, 1.0, Some("cathter"))),
             "script[0].inject.through = \"cathter\": did you mean \"catheter\"?",
         ),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .. import InputError
 from .episodes import Episodes
-from .pictures import picture
+from .pictures import check_mode, picture
 from .task import Task
 
 
@@ -20,9 +20,11 @@ class InsertionEnv(gymnasium.Env[dict[str, NDArray[Any]], NDArray[np.float32]]):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 8}
 
     def __init__(self, task: Task, render_mode: str | None = None) -> None:
+        check_mode(render_mode)
         self.task, self.render_mode = task, render_mode
         self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / task.control_period_s))}
         self._episodes = Episodes(task, 1)
+        self._unit = task.action_unit()
         self.action_space = self._episodes.action_space
         self.observation_space = self._episodes.observation_space
 
@@ -36,19 +38,20 @@ class InsertionEnv(gymnasium.Env[dict[str, NDArray[Any]], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[dict[str, NDArray[Any]], float, bool, bool, dict[str, Any]]:
-        """Moves by velocities, shape (n_instruments, 2): mm/s and rad/s, clipped to the limits.
+        """Moves each instrument by a push and a turn, shape (n_instruments, 2): parts of the task's limits, from -1 to 1, or velocities, mm/s and
+        rad/s, as ``task.actions`` says; what is beyond the limits is clipped to them.
 
         Raises InputError for an action of another shape, and for one that is not finite, and ResetNeeded of Gymnasium before the first `reset`;
         then nothing has moved.
         """
-        velocities = np.asarray(action, dtype=float)
-        if velocities.shape != self.action_space.shape:
+        moved = np.asarray(action, dtype=float)
+        if moved.shape != self.action_space.shape:
             raise InputError(
-                f"action = an array of shape {velocities.shape}: must have the shape {self.action_space.shape}"
+                f"action = an array of shape {moved.shape}: must have the shape {self.action_space.shape}"
             )
-        if not np.isfinite(velocities).all():
-            raise InputError(f"action = {velocities.tolist()}: every number must be finite")
-        self._episodes.step(velocities[None], np.array([True]))
+        if not np.isfinite(moved).all():
+            raise InputError(f"action = {moved.tolist()}: every number must be finite")
+        self._episodes.step((moved * self._unit)[None], np.array([True]))
         terminated, truncated = self._episodes.ended()
         reward = float(self._episodes.rewards()[0])
         return self._observation(), reward, bool(terminated[0]), bool(truncated[0]), self._info()

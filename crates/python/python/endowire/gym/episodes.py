@@ -24,6 +24,7 @@ class Episodes:
     def __init__(self, task: Task, n: int) -> None:
         self.task = task
         self.action_space = task.action_space()
+        self._limits = task.limits()
         self._spaces = task.observation_spaces()
         self.observation_space = spaces.Dict(self._spaces)
         instruments = len(task.instruments)
@@ -48,7 +49,7 @@ class Episodes:
         self.safe_steps = np.zeros(n, dtype=int)
         #: Number of the frame that shows it, shape (n,): seeds the noise of pictures.
         self.frame = np.zeros(n, dtype=np.int64)
-        #: Last actions within the limits, shape (n, n_instruments, 2); one that was no number leaves that before it.
+        #: Last velocities within the limits, mm/s and rad/s, shape (n, n_instruments, 2); one that was no number leaves that before it.
         self.action = np.zeros((n, instruments, 2))
         #: What went wrong in the last step: exceptions by environment.
         self.failures: dict[int, EndowireError] = {}
@@ -77,15 +78,14 @@ class Episodes:
         for k in generators:
             self.way_before_mm[k] = self.way_mm[k]
 
-    def step(self, actions: NDArray[np.float64], moving: NDArray[np.bool_]) -> None:
-        """Moves those environments by velocities, shape (n, n_instruments, 2); the others wait. Where one is NaN the simulation refuses it, and
-        that is its failure.
+    def step(self, velocities: NDArray[np.float64], moving: NDArray[np.bool_]) -> None:
+        """Moves those environments by velocities, mm/s and rad/s, shape (n, n_instruments, 2), clipped to the limits; the others wait. Where one is NaN the
+        simulation refuses it, and that is its failure.
 
         Raises ResetNeeded of Gymnasium before the first `begin`.
         """
         self.check_begun("step")
-        limits = self.action_space.high
-        velocities = np.clip(actions, -limits, limits)
+        velocities = np.clip(velocities, -self._limits, self._limits)
         done = moving & ~np.isnan(velocities).any(axis=(1, 2))
         self.action = np.where(done[:, None, None], velocities, self.action)
         moves = velocities * self.task.control_period_s
@@ -138,7 +138,10 @@ class Episodes:
         failed = np.array([str(self.failures.get(k, "")) for k in range(len(self.sites))], dtype=object)
         safety = np.where(self.steps > 0, self.safe_steps / np.maximum(self.steps, 1), 1.0)
         told = {"reached": self.reached.copy(), "way_mm": self.way_mm.copy()}
-        return {**told, "safety": safety, "failure": failed}
+        told |= {"safety": safety, "failure": failed}
+        if self.task.stand_in:
+            told["stand_in"] = np.full(len(self.sites), self.task.stand_in, dtype=object)
+        return told
 
     def _look(self) -> None:
         self.tip_mm = self.batch.tip_mm

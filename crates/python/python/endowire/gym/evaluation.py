@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from math import sqrt
 
 import numpy as np
@@ -40,8 +41,8 @@ def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8
     if not len(seeds):
         return []
     episodes = Episodes(task, min(num_envs, len(seeds)))
-    waiting = list(enumerate(seeds))[::-1]
-    current = {k: waiting.pop() for k in range(len(episodes.target_mm))}
+    waiting = iter(enumerate(seeds))
+    current = dict(enumerate(islice(waiting, len(episodes.target_mm))))
     episodes.begin({k: seeding.np_random(seed)[0] for k, (_, seed) in current.items()})
     outcomes: dict[int, Outcome] = {}
     while current:
@@ -60,9 +61,10 @@ def evaluate(task: Task, policy: Policy, seeds: Sequence[int], num_envs: int = 8
                 float(info["safety"][k]),
                 str(info["failure"][k]),
             )
-            if waiting:
-                current[k] = waiting.pop()
-                begun[k] = seeding.np_random(current[k][1])[0]
+            following = next(waiting, None)
+            if following is not None:
+                current[k] = following
+                begun[k] = seeding.np_random(following[1])[0]
         if begun:
             episodes.begin(begun)
     return [outcomes[place] for place in range(len(seeds))]

@@ -148,13 +148,13 @@ class Forces:
 
 
 class LastAction:
-    """The action before, within its limits, shape (n_instruments, 2)."""
+    """The action before, within its limits and in the task's own unit of actions, shape (n_instruments, 2)."""
 
     def space(self, task: Task) -> spaces.Box:
         return task.action_space()
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
-        return episodes.action
+        return episodes.action / episodes.task.action_unit()
 
 
 class Fluoroscopy:

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .. import InputError
 from .episodes import Episodes
+
+
+def check_mode(render_mode: str | None) -> None:
+    """Raises InputError for a mode of rendering that there is not."""
+    if render_mode not in (None, "rgb_array"):
+        window = "; gymnasium.wrappers.HumanRendering shows its pictures in a window" * (render_mode == "human")
+        raise InputError(f"render_mode = {render_mode!r}: give rgb_array, or none{window}")
 
 
 def picture(episodes: Episodes, k: int) -> NDArray[np.uint8]:

@@ -31,7 +31,7 @@ class SB3VecEnv(VecEnv):
         self.task = task
         #: What parts of a task and policies look at.
         self.episodes = Episodes(task, num_envs)
-        self._limits = self.episodes.action_space.high
+        self._limits = task.limits()
         self.render_mode = None
         actions = spaces.Box(-1.0, 1.0, self._limits.shape, dtype=np.float32)
         super().__init__(num_envs, self.episodes.observation_space, actions)
@@ -100,11 +100,12 @@ class Learned:
     """A model of stable-baselines3 as a `Policy`, without its noise; ``normalize`` is what its observations were normalised with."""
 
     def __init__(self, model: BaseAlgorithm, normalize: VecNormalize | None = None) -> None:
-        self.model, self.normalize = model, normalize
+        assert isinstance(model.action_space, spaces.Box)
+        self.model, self.normalize, self._high = model, normalize, model.action_space.high
 
     def act(self, episodes: Episodes) -> NDArray[np.float64]:
         observed: Any = episodes.observe()
         if self.normalize is not None:
             observed = self.normalize.normalize_obs(observed)
         actions, _ = self.model.predict(observed, deterministic=True)
-        return np.asarray(actions, dtype=float) * episodes.action_space.high
+        return np.asarray(actions, dtype=float) / self._high * episodes.task.limits()

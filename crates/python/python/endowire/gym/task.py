@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
-from .. import Instrument, Simulation
+from .. import InputError, Instrument, Simulation
 from . import ends, observations, rewards
 from .targets import CentrelineTarget, TargetSampler
 from .vessels import Site, VesselSource
@@ -50,6 +51,8 @@ class Task:
     control_period_s: float = 1.0 / 7.5
     #: Fastest push in mm/s and turn in rad/s of a hand.
     speed_limits: tuple[float, float] = (35.0, 3.14)
+    #: What an action of an environment is: parts of these limits, from -1 to 1, which policies learn from as they are; or velocities, mm/s and rad/s.
+    actions: Literal["scaled", "physical"] = "scaled"
     #: Keys of `[vessel.wall]` of a scene file.
     wall: Mapping[str, Any] = field(default_factory=dict)
     #: Keys of `[method]` of a scene file.
@@ -58,10 +61,25 @@ class Task:
     coupling: Mapping[str, Any] = field(default_factory=dict)
     #: Keys of `[view]` of a scene file for `render()`.
     view: Mapping[str, Any] = field(default_factory=lambda: {"views": ["3d"], "size_px": [480, 480]})
+    #: What the vessel stands in for, where it is not that of the task's name; told in ``info["stand_in"]``.
+    stand_in: str = ""
+
+    def __post_init__(self) -> None:
+        if self.actions not in ("scaled", "physical"):
+            raise InputError(f"actions = {self.actions!r}: give scaled or physical")
+
+    def limits(self) -> NDArray[np.float64]:
+        """Fastest push in mm/s and turn in rad/s of each instrument, shape (n_instruments, 2)."""
+        return np.tile(np.asarray(self.speed_limits, dtype=float), (len(self.instruments), 1))
+
+    def action_unit(self) -> NDArray[np.float64]:
+        """The velocities that an action of 1 is, mm/s and rad/s, shape (n_instruments, 2)."""
+        limits = self.limits()
+        return limits if self.actions == "scaled" else np.ones_like(limits)
 
     def action_space(self) -> spaces.Box:
-        """Velocities of each instrument: push in mm/s, turn in rad/s, shape (n_instruments, 2)."""
-        high = np.tile(np.asarray(self.speed_limits, dtype=np.float32), (len(self.instruments), 1))
+        """A push and a turn of each instrument, shape (n_instruments, 2), as `actions` says."""
+        high = (self.limits() / self.action_unit()).astype(np.float32)
         return spaces.Box(-high, high, dtype=np.float32)
 
     def observation_spaces(self) -> dict[str, spaces.Box]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from os import PathLike
 from typing import Any
 
@@ -33,9 +34,14 @@ def hooked_wire() -> Instrument:
 
 
 def curved_tube(**parts: Any) -> Task:
-    """The hooked wire in a tube that bends by 180°."""
+    """The hooked wire in a tube that bends by 180°.
+
+    Elements of 7.5 mm and contact points four radii apart are enough in a tube without crests: after 1700 random steps in 15 episodes the tip is within
+    0.002 mm of that with elements of 5 mm and points 1.5 radii apart, in two thirds of the time.
+    """
     vessels = FixedVessel(Vessel.generate("curved_tube", edge_mm=1.5))
-    return Task(**{"instruments": [hooked_wire()], "vessels": vessels, **parts})
+    method = {"name": "kirchhoff", "element_mm": 7.5, "contact_spacing_radii": 4.0}
+    return Task(**{"instruments": [hooked_wire()], "vessels": vessels, "method": method, **parts})
 
 
 def aortic_arch(**parts: Any) -> Task:
@@ -79,8 +85,9 @@ def arch_variety(**parts: Any) -> Task:
 
 def basic_wire_nav(data: str | PathLike[str] | None = None, **parts: Any) -> Task:
     """The wire of ArchVariety in the vessel of BasicWireNav, read from the folder ``data``; without one in the built-in arch instead."""
-    vessels = originals.basic_wire_nav(data) if data is not None else _arch()
-    return arch_variety(**{"vessels": vessels, **parts})
+    if data is not None:
+        return arch_variety(**{"vessels": originals.basic_wire_nav(data), **parts})
+    return arch_variety(**_stand_in("BasicWireNav", "the model 0011_H_AO_H: give its folder as data", parts))
 
 
 def dual_device_nav(data: str | PathLike[str] | None = None, **parts: Any) -> Task:
@@ -109,10 +116,12 @@ def dual_device_nav(data: str | PathLike[str] | None = None, **parts: Any) -> Ta
     defaults = {
         "instruments": [wire, catheter],
         "coupling": {"names": ["wire", "catheter"]},
-        "vessels": originals.dual_device_nav(data) if data is not None else _arch(),
         "wall": {"friction": 0.001},
     }
-    return arch_variety(**{**defaults, **parts})
+    if data is not None:
+        return arch_variety(**{**defaults, "vessels": originals.dual_device_nav(data), **parts})
+    original = "the vessel of stEVE_bench: give its folder data/dualdevicenav as data"
+    return arch_variety(**{**defaults, **_stand_in("DualDeviceNav", original, parts)})
 
 
 def cath_sim(**parts: Any) -> Task:
@@ -126,7 +135,6 @@ def cath_sim(**parts: Any) -> Task:
     wire = Instrument([tip, {"length_mm": 492.0, "radius_mm": 0.5, "bending_stiffness_nmm2": 20.0}])
     defaults = {
         "instruments": [wire],
-        "vessels": _arch(),
         "target": targets.NamedTarget("innominate", "left carotid"),
         "rewards": [rewards.Distance(-0.001), rewards.Reached(10.0)],
         "ends": [ends.TargetReached(), ends.LeftVessel(), ends.StepLimit(300)],
@@ -135,7 +143,7 @@ def cath_sim(**parts: Any) -> Task:
         # The fastest that its actuators move the wire without a load.
         "speed_limits": (714.0, 20.0),
     }
-    return Task(**{**defaults, **parts})
+    return Task(**{**defaults, **_stand_in("CathSim", "its phantom, which is not free: give vessels", parts)})
 
 
 def navigation(vessel: str = "aortic_arch", target: str | None = None, **parts: Any) -> Task:
@@ -169,8 +177,13 @@ def navigation(vessel: str = "aortic_arch", target: str | None = None, **parts: 
     return Task(**{**defaults, **parts})
 
 
-def _arch() -> FixedVessel:
-    return FixedVessel(Vessel.generate("aortic_arch", edge_mm=3.0))
+def _stand_in(task: str, original: str, parts: dict[str, Any]) -> dict[str, Any]:
+    """The built-in arch in place of an original, unless ``parts`` have vessels; warns of it."""
+    if "vessels" in parts:
+        return parts
+    warnings.warn(f"{task}: the built-in aortic_arch stands in for {original}", stacklevel=2)
+    vessels = FixedVessel(Vessel.generate("aortic_arch", edge_mm=3.0))
+    return {"vessels": vessels, "stand_in": f"aortic_arch in place of {original.split(':')[0]}", **parts}
 
 
 TASKS = {
@@ -190,7 +203,15 @@ def make_env(task: str, render_mode: str | None = None, **parts: Any) -> Inserti
 
 
 def make_vector_env(
-    task: str, num_envs: int = 1, render_mode: str | None = None, **parts: Any
+    task: str,
+    num_envs: int = 1,
+    render_mode: str | None = None,
+    max_episode_steps: int | None = None,
+    **parts: Any,
 ) -> InsertionVectorEnv:
-    """The vector environment of a task of `TASKS`; keywords replace its parts."""
-    return InsertionVectorEnv(TASKS[task](**parts), num_envs, render_mode)
+    """The vector environment of a task of `TASKS`; keywords replace its parts. An episode is truncated after ``max_episode_steps``, as
+    `gymnasium.make` has it for one."""
+    made = TASKS[task](**parts)
+    if max_episode_steps is not None:
+        made.ends = [*made.ends, ends.StepLimit(max_episode_steps)]
+    return InsertionVectorEnv(made, num_envs, render_mode)

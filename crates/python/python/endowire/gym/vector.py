@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from .. import InputError
 from .episodes import Episodes
-from .pictures import picture
+from .pictures import check_mode, picture
 from .task import Task
 
 
@@ -28,8 +29,10 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
 
     def __init__(self, task: Task, num_envs: int = 1, render_mode: str | None = None) -> None:
         super().__init__()
+        check_mode(render_mode)
         self.task, self.num_envs, self.render_mode = task, num_envs, render_mode
         self._episodes = Episodes(task, num_envs)
+        self._unit = task.action_unit()
         self.single_action_space = self._episodes.action_space
         self.single_observation_space = self._episodes.observation_space
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -45,15 +48,18 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
             seeds = (
                 [seed + k for k in range(self.num_envs)]
                 if isinstance(seed, (int, np.integer))
-                else list(seed)
+                # One more than is wanted is enough to tell that there are too many, if they ever end.
+                else list(islice(seed, self.num_envs + 1))
             )
             if len(seeds) != self.num_envs:
+                count = f"{len(seeds)}{' and more' if len(seeds) > self.num_envs else ''}"
                 raise InputError(
-                    f"seed = {len(seeds)} numbers: give one, or one for each of {self.num_envs} environments"
+                    f"seed = {count} numbers: give one, or one for each of {self.num_envs} environments"
                 )
             for k, own in enumerate(seeds):
                 if own is not None:
                     self._generators[k] = seeding.np_random(int(own))[0]
+            super().reset(seed=seeds[0])
         self._episodes.begin(dict(enumerate(self._generators)))
         self._over[:] = False
         return self._episodes.observe(), self._info()
@@ -63,17 +69,17 @@ class InsertionVectorEnv(VectorEnv[dict[str, NDArray[Any]], NDArray[np.float32],
     ) -> tuple[
         dict[str, NDArray[Any]], NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]
     ]:
-        """Moves all by velocities, shape (num_envs, n_instruments, 2): mm/s and rad/s, clipped to the limits.
+        """Moves all as `InsertionEnv.step` moves one: shape (num_envs, n_instruments, 2).
 
         Raises InputError for actions of another shape, and ResetNeeded of Gymnasium before the first `reset`; then nothing has moved.
         """
-        velocities = np.asarray(actions, dtype=float)
-        if velocities.shape != self.action_space.shape:
+        moved = np.asarray(actions, dtype=float)
+        if moved.shape != self.action_space.shape:
             raise InputError(
-                f"actions = an array of shape {velocities.shape}: must have the shape {self.action_space.shape}"
+                f"actions = an array of shape {moved.shape}: must have the shape {self.action_space.shape}"
             )
         over = self._over
-        self._episodes.step(velocities, ~over)
+        self._episodes.step(moved * self._unit, ~over)
         rewards = np.where(over, 0.0, self._episodes.rewards())
         terminated, truncated = (ended & ~over for ended in self._episodes.ended())
         if over.any():

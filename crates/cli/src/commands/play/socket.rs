@@ -1,0 +1,176 @@
+//! The protocol on a socket. Who connects shows with a first line that he may: a token that only this call has told. Web pages can send
+//! requests to any port of the machine that shows them, and so can its other users; they do not know it.
+
+use std::fmt::Write as _;
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::path::{Component, Path, PathBuf};
+use std::str::FromStr;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::time::Duration;
+
+use super::lines::{self, Line, Order};
+use super::live::Message;
+use crate::failure::Failure;
+use crate::output::tell;
+
+/// Random bytes of a token: too many to be guessed.
+const TOKEN_BYTES: usize = 16;
+/// Longest first line, bytes: the token as hexadecimal digits and a line break.
+const LONGEST_TOKEN: u64 = 2 * TOKEN_BYTES as u64 + 2;
+/// Most connections at the same time.
+const MOST: usize = 64;
+/// How long a connection may take to show the token. Each holds a thread.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Where `--listen` listens: a port of this machine alone, or an address.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Address(SocketAddr);
+
+impl FromStr for Address {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let port = text.parse().map(|port| SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port));
+        let address = port.or_else(|_| text.parse());
+        address
+            .map(Self)
+            .map_err(|_| "give a port, such as 7000, or an address, such as 127.0.0.1:7000".to_owned())
+    }
+}
+
+impl Address {
+    /// The address, if no other machine reaches it or `remote` allows that.
+    pub(super) fn allowed(self, remote: bool) -> Result<SocketAddr, Failure> {
+        if self.0.ip().is_loopback() || remote {
+            return Ok(self.0);
+        }
+        Err(Failure::Input(format!(
+            "--listen {}: other machines reach this address, and what goes over it can be read on its way: give a port alone, which \
+             listens on this machine, or --allow-remote if that is meant",
+            self.0
+        )))
+    }
+}
+
+/// Takes lines from programs that connect and know the token. They may write pictures into `folder` and nowhere else.
+pub(super) fn listen(address: SocketAddr, folder: &Path, to: &Sender<Message>) -> Result<(), Failure> {
+    let failed = |e: io::Error| Failure::Input(format!("--listen {address}: {e}"));
+    std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, &e))?;
+    let token = token().map_err(failed)?;
+    let listener = TcpListener::bind(address).map_err(failed)?;
+    tell(format_args!("endowire: listens at {}", listener.local_addr().map_err(failed)?));
+    tell(format_args!("endowire: the first line of a connection is {token}"));
+    let (token, folder, to): (Arc<str>, Arc<Path>, _) = (token.into(), folder.into(), to.clone());
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            let (token, folder, to) = (Arc::clone(&token), Arc::clone(&folder), to.clone());
+            // Each has a token of its own beside that of this thread. What is too many is hung up on, and so is what gets no thread.
+            if Arc::strong_count(&token) <= MOST + 1 {
+                let _ = std::thread::Builder::new().spawn(move || serve(stream, &token, &folder, &to));
+            }
+        }
+    });
+    Ok(())
+}
+
+fn token() -> io::Result<String> {
+    let mut bytes = [0; TOKEN_BYTES];
+    getrandom::fill(&mut bytes)?;
+    Ok(bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing into a string cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    }))
+}
+
+/// Answers one program until it leaves; the session goes on.
+fn serve(stream: TcpStream, token: &str, folder: &Path, to: &Sender<Message>) {
+    let Ok(mut back) = stream.try_clone() else { return };
+    let mut lines = BufReader::new(stream);
+    // One packet a line: what waits to be joined by more comes a twentieth of a second late.
+    let mut answer = |line: &str| back.write_all(format!("{line}\n").as_bytes()).is_ok();
+    match opened(&mut lines, token) {
+        Ok(true) => lines::read(lines, to, |line| confined(line, folder), answer),
+        Ok(false) => {
+            let error =
+                "the first line must be the token that endowire play has printed on its standard error";
+            answer(&serde_json::json!({ "ok": false, "error": error }).to_string());
+        }
+        // Who says nothing is told nothing.
+        Err(_) => {}
+    }
+}
+
+/// Whether the first line is the token.
+fn opened(lines: &mut BufReader<TcpStream>, token: &str) -> io::Result<bool> {
+    let stream = lines.get_ref();
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(PATIENCE))?;
+    let mut first = Vec::new();
+    lines.by_ref().take(LONGEST_TOKEN).read_until(b'\n', &mut first)?;
+    lines.get_ref().set_read_timeout(None)?;
+    Ok(first.trim_ascii_end() == token.as_bytes())
+}
+
+/// A line of a program that connects: its pictures have names, and lie in the session's folder.
+fn confined(line: Line, folder: &Path) -> Result<Line, String> {
+    match line {
+        Line::Order(Order::Picture { file, window }) => {
+            let file = inside(&file, folder)?;
+            Ok(Line::Order(Order::Picture { file, window }))
+        }
+        line => Ok(line),
+    }
+}
+
+/// Where a picture of that name lies in a folder.
+fn inside(file: &Path, folder: &Path) -> Result<PathBuf, String> {
+    let refused = |what: &str| format!("picture: file = {:?}: {what}", file.display().to_string());
+    let mut parts = file.components();
+    let is_name = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
+    if !is_name || file.extension().is_none_or(|ending| ending != "png") {
+        return Err(refused(
+            "over a socket it must be a name alone that ends in .png; it goes into the session's folder",
+        ));
+    }
+    let path = folder.join(file);
+    match path.symlink_metadata() {
+        Ok(there) if !there.is_file() => Err(refused("is there and no file: give another name")),
+        _ => Ok(path),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_stays_in_its_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| inside(Path::new(name), folder.path());
+        assert_eq!(place("seen.png").unwrap(), folder.path().join("seen.png"));
+        std::fs::create_dir(folder.path().join("dir.png")).unwrap();
+        for name in
+            ["/tmp/seen.png", "../seen.png", "a/seen.png", "..", ".", "", "played.toml", ".png", "dir.png"]
+        {
+            assert!(place(name).is_err(), "{name}");
+        }
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink("/tmp/elsewhere.png", folder.path().join("link.png")).unwrap();
+            assert!(place("link.png").is_err());
+        }
+    }
+
+    #[test]
+    fn other_machines_reach_it_only_where_that_is_said() {
+        let address = |text: &str| text.parse::<Address>().unwrap();
+        assert!(address("7000").allowed(false).unwrap().ip().is_loopback());
+        assert!(address("[::1]:7000").allowed(false).is_ok());
+        assert!(address("0.0.0.0:7000").allowed(false).is_err());
+        assert!(address("0.0.0.0:7000").allowed(true).is_ok(), "the twin");
+        assert!("somewhere".parse::<Address>().is_err());
+    }
+}

@@ -1,0 +1,152 @@
+//! What simulations begin from. Copies have it in common, and so it is written once into a pickle of many; what each has of its own is its state.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use endowire_core::device::{self, Stack};
+use endowire_core::insertion::{self, WallProperties};
+use endowire_core::scene::SheathSpec;
+use endowire_core::vessel::NoStore;
+use endowire_methods::AnyMethod;
+use pyo3::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::arrays::List;
+use crate::error::{InputError, exception, refuse};
+use crate::instrument::Instrument;
+use crate::interrupt::interruptible;
+use crate::scene::Scene;
+use crate::vessel::Vessel;
+
+/// A simulation before its first step, and what it was made of. For pickles of simulations; nothing else needs one.
+#[pyclass(frozen, module = "endowire._endowire", name = "_Start")]
+pub(crate) struct Start {
+    pub(crate) instruments: Vec<Instrument>,
+    simulation: Mutex<insertion::Simulation>,
+    made_of: MadeOf,
+}
+
+enum MadeOf {
+    Arguments(Py<Vessel>, Box<Arguments>),
+    Scene(Py<Scene>),
+}
+
+/// What `Simulation` is told beside vessel and instruments.
+#[derive(Clone, Serialize, Deserialize)]
+pub(crate) struct Arguments {
+    pub(crate) opening: Option<usize>,
+    pub(crate) depth_mm: Option<f64>,
+    pub(crate) position_mm: Option<[f64; 3]>,
+    pub(crate) direction: Option<[f64; 3]>,
+    pub(crate) wall: WallProperties,
+    pub(crate) method: AnyMethod,
+    pub(crate) sheath_friction_n: f64,
+    pub(crate) sheath_friction: f64,
+    pub(crate) names: Option<Vec<String>>,
+    pub(crate) friction: Option<Vec<f64>>,
+    pub(crate) may_lead: Option<Vec<bool>>,
+}
+
+impl Start {
+    /// Instruments at the mouth of a sheath in a vessel.
+    pub(crate) fn of_arguments(
+        py: Python<'_>,
+        vessel: Py<Vessel>,
+        instruments: Vec<Instrument>,
+        arguments: Arguments,
+    ) -> PyResult<Self> {
+        let (stack, wall) = (arguments.stack(&instruments)?, Arc::clone(&vessel.get().wall));
+        let Arguments { opening, depth_mm, position_mm, direction, .. } = arguments;
+        let (friction_n, friction) = (arguments.sheath_friction_n, arguments.sheath_friction);
+        let sheath = SheathSpec { opening, depth_mm, position_mm, direction, friction_n, friction };
+        let (properties, method) = (arguments.wall.clone(), arguments.method.clone());
+        let built = interruptible(py, move || {
+            let sheath = sheath.place(&wall)?;
+            let builder = insertion::Simulation::builder((*wall).clone(), stack, sheath);
+            builder.properties(properties).method(&method).store(&NoStore).build()
+        })?;
+        let simulation = Mutex::new(built.map_err(exception)?);
+        Ok(Self { instruments, simulation, made_of: MadeOf::Arguments(vessel, Box::new(arguments)) })
+    }
+
+    /// What a scene says.
+    pub(crate) fn of_scene(scene: &Bound<'_, Scene>) -> PyResult<Self> {
+        let (simulation, instruments) = scene.get().built(scene.py())?;
+        let made_of = MadeOf::Scene(scene.clone().unbind());
+        Ok(Self { instruments, simulation: Mutex::new(simulation), made_of })
+    }
+
+    /// The simulation.
+    pub(crate) fn simulation(&self) -> insertion::Simulation {
+        self.simulation.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+#[pymethods]
+impl Start {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, start) = (slf.py(), slf.get());
+        match &start.made_of {
+            MadeOf::Arguments(vessel, arguments) => {
+                let arguments = serde_json::to_string(arguments)
+                    .map_err(|e| InputError::new_err(format!("the simulation cannot be written: {e}")))?;
+                let parts = (vessel, start.instruments.clone(), arguments).into_pyobject(py)?;
+                Ok((slf.get_type().getattr("_of_arguments")?, parts.into_any()))
+            }
+            MadeOf::Scene(scene) => {
+                Ok((slf.get_type().getattr("_of_scene")?, (scene,).into_pyobject(py)?.into_any()))
+            }
+        }
+    }
+
+    #[staticmethod]
+    fn _of_arguments(
+        py: Python<'_>,
+        vessel: Py<Vessel>,
+        instruments: List<Instrument>,
+        arguments: &str,
+    ) -> PyResult<Self> {
+        let arguments = serde_json::from_str(arguments)
+            .map_err(|e| InputError::new_err(format!("the arguments of a simulation: {e}")))?;
+        Self::of_arguments(py, vessel, instruments.0, arguments)
+    }
+
+    #[staticmethod]
+    fn _of_scene(scene: &Bound<'_, Scene>) -> PyResult<Self> {
+        Self::of_scene(scene)
+    }
+}
+
+impl Arguments {
+    /// Instruments as the library has them.
+    fn stack(&self, instruments: &[Instrument]) -> PyResult<Stack> {
+        let count = instruments.len();
+        let told = [
+            ("names", self.names.as_ref().map(Vec::len)),
+            ("friction", self.friction.as_ref().map(Vec::len)),
+            ("may_lead", self.may_lead.as_ref().map(Vec::len)),
+        ];
+        for (name, given) in told {
+            if let Some(given) = given.filter(|given| *given != count) {
+                let mend = format!("there are {count} instruments: give one for each");
+                return Err(refuse(name, given, &mend));
+            }
+        }
+        let names = self.names.clone();
+        let names = names.unwrap_or_else(|| (0..count).map(|index| format!("instrument {index}")).collect());
+        let may_lead = self.may_lead.clone().unwrap_or_else(|| vec![true; count]);
+        let each = instruments.iter().zip(names).zip(may_lead);
+        let each = each.map(|((one, name), may_lead)| device::Instrument {
+            name,
+            device: one.device.clone(),
+            may_lead,
+        });
+        let stack = match instruments {
+            [only] => Stack::from(only.device.clone()),
+            _ => Stack::new(each.collect()).map_err(exception)?,
+        };
+        match &self.friction {
+            Some(friction) => stack.rubbing(friction.clone()).map_err(exception),
+            None => Ok(stack),
+        }
+    }
+}
