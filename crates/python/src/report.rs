@@ -169,6 +169,18 @@ impl StepReport {
         self.report.imbalance
     }
 
+    /// Energy that was lost in jumps, to motion and friction together, mJ; 0 without.
+    #[getter]
+    fn released_mj(&self) -> f64 {
+        self.report.jump.map_or(0.0, |jump| jump.released_mj)
+    }
+
+    /// Where the largest jump has led, mm, shape (3,); None without one.
+    #[getter]
+    fn jump_position_mm<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.report.jump.map(|jump| PyArray1::from_slice(py, jump.position_mm.as_slice()))
+    }
+
     /// Whether the instruments jumped to a lower minimum.
     #[getter]
     fn jumped(&self) -> bool {

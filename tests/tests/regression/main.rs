@@ -7,5 +7,6 @@ mod catalogue;
 mod damaged_files;
 mod instruments;
 mod robust_insertion;
+mod sequences;
 mod state;
 mod wedged;

@@ -91,14 +91,15 @@ fn wander(count: usize) -> Tally {
 #[test]
 fn random_commands_leave_the_vessel_and_the_rod_sound() {
     let tally = wander(400);
-    assert!(tally.is_safe(), "{tally}");
+    // A solver that refuses every command would be safe. Some lead out of the vessel.
+    assert!(tally.is_safe() && tally.steps >= 350, "{tally}");
 }
 
 #[test]
 #[ignore = "minutes"]
 fn a_hundred_thousand_random_commands() {
     let tally = wander(100_000);
-    assert!(tally.is_safe(), "{tally}");
+    assert!(tally.is_safe() && tally.steps >= 87_500, "{tally}");
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! `endowire verify`: the reference cases, and the stress table.
 
+use std::panic::resume_unwind;
 use std::time::Instant;
 
+use endowire_core::Result;
 use endowire_verify::insertion_stress::{InsertionRow, InsertionStress};
 use endowire_verify::instrument_stress::{self, InstrumentRow, InstrumentStress};
 use endowire_verify::sequences::{self, SEQUENCES, SequenceRow};
@@ -48,7 +50,7 @@ struct Stress {
 }
 
 /// Runs every reference case and prints the table.
-pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
+pub(crate) fn verify(args: &VerifyArgs) -> std::result::Result<(), Failure> {
     if let Some(folder) = &args.surfaces {
         return super::surfaces::surfaces(args, folder);
     }
@@ -90,12 +92,12 @@ pub(crate) fn verify(args: &VerifyArgs) -> Result<(), Failure> {
         instruments.push(Instruments { row, time_s: clock.elapsed().as_secs_f64() });
         bar.inc(1);
     }
-    let mut random = Vec::new();
-    for seed in seeds {
-        bar.set_message(format!("random commands {seed}"));
-        random.push(sequences::run(seed)?);
+    bar.set_message("random commands");
+    let random = in_parallel(seeds.end, |seed| {
+        let row = sequences::run(seed);
         bar.inc(1);
-    }
+        row
+    })?;
     bar.finish_and_clear();
 
     let passed = cases.iter().filter(|row| row.pass).count();
@@ -163,6 +165,23 @@ fn print_cases(document: &Document) {
         println!("{}", SequenceRow::HEAD);
         rows.iter().for_each(|row| println!("{row}"));
     }
+}
+
+/// What is run for every number below `count`, on all processors, in their order.
+fn in_parallel<T: Send>(count: u64, run: impl Fn(u64) -> Result<T> + Sync) -> Result<Vec<T>> {
+    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get) as u64;
+    let each =
+        |thread: u64| (thread..count).step_by(threads as usize).map(|k| (k, run(k))).collect::<Vec<_>>();
+    let mut all: Vec<(u64, Result<T>)> = std::thread::scope(|scope| {
+        let each = &each;
+        let started: Vec<_> = (0..threads).map(|thread| scope.spawn(move || each(thread))).collect();
+        started
+            .into_iter()
+            .flat_map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
+            .collect()
+    });
+    all.sort_by_key(|(k, _)| *k);
+    all.into_iter().map(|(_, done)| done).collect()
 }
 
 /// What became of random commands on several instruments.

@@ -286,8 +286,12 @@ mod tests {
 
     #[test]
     fn a_tree_of_too_many_points_is_refused_before_it_is_made() {
-        let node = |x: f64, parent| CentrelineNode { position_mm: Vec3::x() * x, radius_mm: 5.0, parent };
-        let long = CentrelineTree::new(vec![node(0.0, None), node(9e5, Some(0))]).unwrap();
+        let node = |k: usize| CentrelineNode {
+            position_mm: Vec3::x() * (1800.0 * k as f64),
+            radius_mm: 5.0,
+            parent: k.checked_sub(1),
+        };
+        let long = CentrelineTree::new((0..=500).map(node).collect()).unwrap();
         let error = Flow::new(&long, &FlowSpec::default(), &[injection(None)]).unwrap_err().to_string();
         assert!(error.contains("view.flow.tree") && error.contains("450000"), "{error}");
     }

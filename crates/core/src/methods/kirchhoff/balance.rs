@@ -75,12 +75,11 @@ impl Balance {
         self.stored_mj + self.rubbed_mj.0 - self.most_mj > self.notable_mj
     }
 
-    /// What friction took and what a jump set free. In a jump they are not told apart: the normal forces on its way are not those at its ends.
+    /// What friction took and what a jump set free. Without a jump friction took what was lost, as far as its forces reach. In one they are not
+    /// told apart: the normal forces on its way are not those at its ends.
     pub(super) fn lost_mj(&self, jumps: bool) -> (f64, f64) {
-        if jumps {
-            return (0.0, (self.mean_mj - self.stored_mj).max(0.0));
-        }
-        let rubbed_mj = 0.5 * (self.rubbed_mj.0 + self.rubbed_mj.1);
-        (rubbed_mj.min((self.most_mj - self.stored_mj + self.notable_mj).max(0.0)), 0.0)
+        let lost_mj = self.mean_mj - self.stored_mj;
+        let (least_mj, most_mj) = self.rubbed_mj;
+        if jumps { (0.0, lost_mj.max(0.0)) } else { (lost_mj.clamp(least_mj, most_mj), 0.0) }
     }
 }

@@ -15,28 +15,49 @@ use crate::rod::RodState;
 use crate::rod::quadrature::hermite;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
-/// Less room than this part of what the device needs is so little that it is not let go on with its tip held.
-pub(super) const FAR_TOO_LITTLE: f64 = 0.5;
+/// A front is wedged where no larger sphere than this, in radii, has room beside it. At the wall of a wider lumen it is not: a device that is
+/// pushed on there folds.
+const WEDGED: f64 = 1.5;
 /// Length of the device in which its front is looked for, in radii: a hooked tip that is folded back is as long.
 const FRONT: usize = 60;
 
-/// Refuses to push on from where the way ahead of an instrument that advances has less room than `part` of what it needs, for commands of
-/// the hands that have found no equilibrium.
+/// Refuses to push on from where the way ahead of an instrument that advances is narrower than that, for commands of the hands that have
+/// found no equilibrium.
 ///
 /// # Errors
 /// [`PhysicalEnd::Blocked`] with the narrowest place.
-pub(super) fn refuse_narrower(
+pub(super) fn refuse_narrow(
     environment: &Environment<'_>,
     from: Start<'_>,
     commands: &[Command],
-    part: f64,
+) -> Result<()> {
+    refuse_where(environment, from, commands, |_, _| true)
+}
+
+/// The same where the front is wedged there, for a device that would be let go from a fold.
+///
+/// # Errors
+/// As [`refuse_narrow`].
+pub(super) fn refuse_wedged(
+    environment: &Environment<'_>,
+    from: Start<'_>,
+    commands: &[Command],
+) -> Result<()> {
+    refuse_where(environment, from, commands, |narrow, radius_mm| narrow.beside_mm < WEDGED * radius_mm)
+}
+
+fn refuse_where(
+    environment: &Environment<'_>,
+    from: Start<'_>,
+    commands: &[Command],
+    counts: impl Fn(&Narrow, f64) -> bool,
 ) -> Result<()> {
     let mut hands = Vec::new();
     super::hands::read(&from.state.report, &mut hands);
     for (instrument, command) in commands.iter().enumerate() {
         if command.advance_mm > 0.0
             && let Some((narrow, device_radius_mm)) = narrow(environment, from, &hands, instrument)
-            && narrow.radius_mm < part * device_radius_mm
+            && counts(&narrow, device_radius_mm)
         {
             let position_mm = environment.wall().place(&narrow.place_mm);
             let lumen_radius_mm = narrow.radius_mm;
@@ -122,7 +143,7 @@ mod tests {
         let moves = [Move { instrument: 0, command: Command::advance(1.0) }];
         workspace.carry_out(&environment, &wire.state, &moves).unwrap();
         let forward = [Command::advance(1.0)];
-        match refuse_narrower(&environment, workspace.now.start(), &forward, 1.0) {
+        match refuse_narrow(&environment, workspace.now.start(), &forward) {
             Err(Error::End(end)) => Some(end),
             _ => None,
         }

@@ -2,7 +2,7 @@
 //! the way is lost.
 
 use super::Environment;
-use super::blocked::{FAR_TOO_LITTLE, refuse_narrower};
+use super::blocked::{refuse_narrow, refuse_wedged};
 use super::carried::carried;
 use super::configuration::Start;
 use super::hands::lengths;
@@ -113,7 +113,7 @@ impl<const C: usize> Workspace<C> {
             let part = part_mm / travel;
             let at_start = environment.displaced(displaced.as_ref());
             if effort == Effort::Flight {
-                refuse_narrower(&at_start, was, &way.commands, FAR_TOO_LITTLE)?;
+                refuse_wedged(&at_start, was, &way.commands)?;
             }
             // A rest that is rounding is none.
             let to = if part >= (1.0 - 1e-9) * rest { 1.0 } else { done + part };
@@ -162,7 +162,7 @@ impl<const C: usize> Workspace<C> {
                 Err(lost) => {
                     // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
                     if control.failed(part_mm) || sum.substeps > SUBSTEP_LIMIT {
-                        refuse_narrower(&at_start, was, &way.commands, 1.0)?;
+                        refuse_narrow(&at_start, was, &way.commands)?;
                         return Err(Error::Computation(format!(
                             "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {lost}"
                         )));
@@ -172,7 +172,7 @@ impl<const C: usize> Workspace<C> {
         }
         if !balanced {
             let there = environment.displaced(displaced.as_ref());
-            refuse_narrower(&there, now.start(), &way.commands, 1.0)?;
+            refuse_narrow(&there, now.start(), &way.commands)?;
         }
         let state = now.parts().1;
         state.part_mm = control.part_mm();
