@@ -19,6 +19,7 @@ pub mod input;
 pub mod insertion;
 pub mod methods;
 mod parallel;
+pub mod passable;
 mod products;
 pub mod random;
 pub mod rod;

@@ -5,11 +5,12 @@ use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use endowire_core::Vec3;
+use endowire_core::passable::{NO_FORCE_N, passable};
 use endowire_core::vessel::{
-    CentrelineNode, CentrelineTree, GeneratedWall, Resolution, SurfaceFrame, SurfaceMesh, Target, Wall,
-    anatomy, check_with, wall_hints,
+    CentrelineEnd, CentrelineNode, CentrelineTree, ExtractedCentreline, GeneratedWall, Resolution,
+    SurfaceFrame, SurfaceMesh, Target, Wall, anatomy, check_with, wall_hints,
 };
+use endowire_core::{Error, Vec3};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -19,14 +20,51 @@ use serde::Serialize;
 use crate::arrays::{Numbers, array, natural, points, rows};
 use crate::document;
 use crate::error::{InputError, exception, refuse};
+use crate::instrument::Instrument;
 use crate::interrupt::interruptible;
 
-/// A vessel's wall, and its centre line where it was made from one. It never changes.
+/// A vessel's wall, and its centre line where it was made from one or one was found in it. It never changes.
 #[pyclass(frozen, module = "endowire", name = "Vessel")]
 pub(crate) struct Vessel {
     pub(crate) wall: Arc<Wall>,
-    /// The tree it was made from, with the opening at its root.
-    tree: Option<(CentrelineTree, usize)>,
+    /// The tree it was made from or that was found in it, with the opening at its root; a tree that begins inside has none.
+    tree: Option<(CentrelineTree, Option<usize>)>,
+}
+
+/// Where a centre line begins or ends: the number of an opening, or a place in mm.
+#[derive(FromPyObject)]
+enum End {
+    Opening(usize),
+    Place([f64; 3]),
+}
+
+impl End {
+    fn core(self) -> CentrelineEnd {
+        match self {
+            Self::Opening(opening) => CentrelineEnd::Opening(opening),
+            Self::Place(place) => CentrelineEnd::Place(place.into()),
+        }
+    }
+}
+
+/// Where a way leads: the name of a target, or a place in mm.
+#[derive(FromPyObject)]
+enum Goal {
+    Name(String),
+    Place([f64; 3]),
+}
+
+/// Calls what the core calls `from` and `to` by the arguments of the method.
+fn as_argument(error: Error) -> Error {
+    match error {
+        Error::Parameter { name, value, mend } if name == "from" => {
+            Error::Parameter { name: "start".into(), value, mend }
+        }
+        Error::Parameter { name, value, mend } if name == "to" => {
+            Error::Parameter { name: "ends".into(), value, mend }
+        }
+        other => other,
+    }
 }
 
 /// The bytes of a wall, its centre line, its inlet, and names with their rows.
@@ -118,7 +156,7 @@ impl Vessel {
         };
         let made = interruptible(py, move || GeneratedWall::new(&tree, resolution).map(|made| (made, tree)))?;
         let (made, tree) = made.map_err(exception)?;
-        Ok(Self { wall: Arc::new(made.wall), tree: Some((tree, made.inlet)) })
+        Ok(Self { wall: Arc::new(made.wall), tree: Some((tree, Some(made.inlet))) })
     }
 
     /// Vertices of the wall, mm, shape (n, 3).
@@ -148,7 +186,7 @@ impl Vessel {
         document::write(py, &openings)
     }
 
-    /// The centre line it was generated from, shape (n, 5): x, y, z, radius (mm) and the row of the parent; None without one.
+    /// The centre line it was generated from or that was found in it, shape (n, 5): x, y, z, radius (mm) and the row of the parent; None without one.
     #[getter]
     fn centreline<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
         let Some((tree, _)) = &self.tree else { return Ok(None) };
@@ -160,18 +198,77 @@ impl Vessel {
         array(py, numbers, [tree.nodes().len(), 5]).map(Some)
     }
 
-    /// The opening at the root of the centre line it was generated from; None without one.
+    /// The opening at the root of its centre line; None without one.
     #[getter]
     pub(crate) fn inlet(&self) -> Option<usize> {
-        self.tree.as_ref().map(|(_, inlet)| *inlet)
+        self.tree.as_ref().and_then(|(_, inlet)| *inlet)
     }
 
-    /// Named points of the centre line it was generated from: positions in mm by name; empty without one.
+    /// Named points of its centre line: positions in mm by name; empty without one.
     #[getter]
     fn targets(&self) -> BTreeMap<String, [f64; 3]> {
         let Some((tree, _)) = &self.tree else { return BTreeMap::new() };
         let place = |target: &Target| tree.nodes()[target.row].position_mm.into();
         tree.targets().iter().map(|target| (target.name.clone(), place(target))).collect()
+    }
+
+    /// This vessel with the centre line that is found in its lumen: `centreline`, `inlet`, `targets` ("opening 3", "place 1") and
+    /// `branches` are those of it. Radii are of the largest spheres inside; points lie where the sphere is the largest of its cross-section
+    /// (ways of least ∫ ds/radius: Antiga et al., IEEE Transactions on Medical Imaging 22, 2003).
+    ///
+    /// `start` is the number of an opening, or a place inside in mm; the widest opening without it. `ends` are such numbers and places; all
+    /// other openings without them. Openings that no way leads to are no targets.
+    ///
+    /// Raises InputError naming `start` or `ends` for an opening that is not there, a place outside, and one that no way leads to.
+    #[pyo3(signature = (start = None, ends = None))]
+    fn with_centreline(&self, py: Python<'_>, start: Option<End>, ends: Option<Vec<End>>) -> PyResult<Self> {
+        let wall = self.wall.clone();
+        let from = start.map(End::core);
+        let to: Vec<CentrelineEnd> = ends.unwrap_or_default().into_iter().map(End::core).collect();
+        let found = interruptible(py, move || ExtractedCentreline::of(&wall, from, &to))?;
+        let found = found.map_err(|error| exception(as_argument(error)))?;
+        let inlet = match from {
+            None => Some(0),
+            Some(CentrelineEnd::Opening(opening)) => Some(opening),
+            Some(CentrelineEnd::Place(_)) => None,
+        };
+        Ok(Self { wall: self.wall.clone(), tree: Some((found.tree, inlet)) })
+    }
+
+    /// Stretches of its centre line between root, forks and ends: dictionaries of from and to (rows of `centreline`), length_mm and
+    /// least_radius_mm; empty without one.
+    #[getter]
+    fn branches<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let branches = self.tree.as_ref().map_or_else(Vec::new, |(tree, _)| tree.branches());
+        document::write(py, &branches)
+    }
+
+    /// Whether an instrument can follow the way to a target, which takes milliseconds: a dictionary of `passage` ("passes", "tight", "blocked",
+    /// "short"), length_mm, the points `narrowest` and `sharpest`, and `way`, all points: arc_mm, position_mm, lumen_radius_mm,
+    /// device_radius_mm, clearance_mm, bend_radius_mm (of the centre line), cut_radius_mm (what the room makes of it), bears_radius_mm (what
+    /// the instrument takes without force: bending that costs at most `force_n`); radii of what is straight are None.
+    ///
+    /// The way is that of the centre line, see `with_centreline`. `to` is the name of a target, or a place in mm: its nearest point.
+    ///
+    /// Raises InputError for a vessel without a centre line, an unknown name and a force that is not positive.
+    #[pyo3(signature = (instrument, to, force_n = NO_FORCE_N))]
+    fn passable<'py>(
+        &self,
+        py: Python<'py>,
+        instrument: &Instrument,
+        to: Goal,
+        force_n: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let Some((tree, _)) = &self.tree else {
+            return Err(InputError::new_err("the vessel has no centre line: take vessel.with_centreline()"));
+        };
+        let row = match to {
+            Goal::Name(name) => tree.target(&name).map_err(exception)?.row,
+            Goal::Place(place) => tree.nearest_row(&place.into()),
+        };
+        let way = tree.path_to(row).ok_or_else(|| refuse("to", row, "is the root, where the way begins"))?;
+        let found = py.detach(|| passable(&way, &instrument.device, force_n)).map_err(exception)?;
+        document::write(py, &found)
     }
 
     /// Whether points (mm, shape (n, 3)) are inside: booleans of shape (n,).
@@ -218,7 +315,11 @@ impl Vessel {
             .map_err(|e| InputError::new_err(format!("the bytes of a vessel: {e}")))?;
         let targets: Vec<Target> = targets.into_iter().map(|(name, row)| Target { name, row }).collect();
         let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?;
-        let tree = tree.map(|tree| tree.with_targets(targets)).transpose().map_err(exception)?.zip(inlet);
+        let tree = tree
+            .map(|tree| tree.with_targets(targets))
+            .transpose()
+            .map_err(exception)?
+            .map(|tree| (tree, inlet));
         Ok(Self { wall: Arc::new(wall), tree })
     }
 

@@ -165,3 +165,26 @@ def test_vessels_are_made_checked_and_written(vessel, tmp_path):
     assert vessel.contains(line[1:-1]).all() and not vessel.contains(line + [0.0, 50.0, 0.0]).any()
     table = np.array([[0, 0, 0, 3.0, -1], [0, 0, 40, 3.0, 0]])
     assert len(endowire.Vessel.generate(table, triangles=800).openings) == 2
+
+
+def test_a_centre_line_is_found_in_a_surface_and_devices_are_held_against_it(vessel, wire):
+    surface = endowire.Vessel.from_arrays(vessel.vertices_mm, vessel.triangles)
+    assert surface.centreline is None and surface.branches == []
+    with pytest.raises(endowire.InputError, match="no centre line"):
+        surface.passable(wire, "opening 1")
+    found = surface.with_centreline()
+    assert found.inlet == 0 and list(found.targets) == ["opening 1"]
+    (branch,) = found.branches
+    assert abs(branch["length_mm"] - sum(np.linalg.norm(np.diff(vessel.centreline[:, :3], axis=0), axis=1))) < 1.0
+    assert np.abs(found.centreline[:, 3] - 4.0).max() < 0.3
+    place = found.centreline[30, :3].tolist()
+    assert list(surface.with_centreline(place, [1]).targets) == ["opening 1"]
+    for start, ends, words in ((9, None, "start = opening 9"), (0, [[0.0, 50.0, 0.0]], "ends = ")):
+        with pytest.raises(endowire.InputError, match=words):
+            surface.with_centreline(start, ends)
+    thin = endowire.Instrument.uniform(500.0, 0.4, 10.0)
+    thick = endowire.Instrument.uniform(500.0, 4.5, 10.0)
+    assert found.passable(thin, "opening 1")["passage"] == "passes"
+    told = found.passable(thick, found.targets["opening 1"])
+    assert told["passage"] == "blocked" and told["narrowest"]["clearance_mm"] < 0.0
+    assert pickle.loads(pickle.dumps(found)).targets == found.targets

@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Subcommand;
-use endowire_core::vessel::{PatientAxes, SurfaceFrame};
+use endowire_core::passable::NO_FORCE_N;
+use endowire_core::vessel::{CentrelineEnd, PatientAxes, SurfaceFrame};
+
+use crate::commands::parse_end;
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum VesselCommand {
@@ -24,6 +27,10 @@ pub(crate) enum VesselCommand {
     },
     /// Build a wall from a centre-line tree
     Generate(GenerateArgs),
+    /// Find the centre line of a surface, with the radius of the largest sphere about each point
+    Centreline(CentrelineArgs),
+    /// Say whether a device can follow the way to a target: room, narrowest place, sharpest bend; passes, tight, blocked or short
+    Passable(PassableArgs),
 }
 
 #[derive(Debug, Subcommand)]
@@ -98,6 +105,54 @@ pub(crate) struct GenerateArgs {
     #[arg(long, value_name = "COUNT")]
     pub(crate) triangles: Option<usize>,
     /// Print the report as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct CentrelineArgs {
+    /// Surface mesh (STL, OBJ or PLY)
+    pub(crate) file: PathBuf,
+    /// Where the centre line begins: the number of an opening, or a place x,y,z inside in mm; the widest opening, 0, if absent
+    #[arg(long, value_name = "END", value_parser = parse_end, allow_hyphen_values = true)]
+    pub(crate) from: Option<CentrelineEnd>,
+    /// Where it leads: the number of an opening, or a place x,y,z inside in mm (repeatable); all other openings if absent
+    #[arg(long, value_name = "END", value_parser = parse_end, allow_hyphen_values = true)]
+    pub(crate) to: Vec<CentrelineEnd>,
+    /// Write the centre-line table (x,y,z,radius,parent and the names of ends)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Millimetres per unit of the surface file
+    #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) unit_mm: f64,
+    /// Print the branches as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct PassableArgs {
+    /// Surface mesh (STL, OBJ or PLY)
+    pub(crate) file: PathBuf,
+    /// Device file (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) device: PathBuf,
+    /// Where its tip goes: the number of an opening, a place x,y,z inside in mm, or with --centreline the name of a target
+    #[arg(long, value_name = "END", allow_hyphen_values = true)]
+    pub(crate) to: String,
+    /// Where it comes in: the number of an opening, or a place x,y,z inside in mm; the widest opening, 0, if absent
+    #[arg(long, value_name = "END", value_parser = parse_end, allow_hyphen_values = true, conflicts_with = "centreline")]
+    pub(crate) from: Option<CentrelineEnd>,
+    /// Centre-line table of the surface, with names; the way is found in the surface if absent
+    #[arg(long, value_name = "FILE")]
+    pub(crate) centreline: Option<PathBuf>,
+    /// Force along the device, N, that is taken for none: a section takes a bend if pushing it in costs no more
+    #[arg(long, default_value_t = NO_FORCE_N, value_name = "N", allow_negative_numbers = true)]
+    pub(crate) force_n: f64,
+    /// Millimetres per unit of the surface file
+    #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) unit_mm: f64,
+    /// Print what was found as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -14,7 +14,9 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand};
 use endowire_sweep::{Setting, Shard};
 
-pub(crate) use inputs::{CoordinateArgs, DeviceCommand, FeltArgs, GenerateArgs, VesselCommand};
+pub(crate) use inputs::{
+    CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, GenerateArgs, PassableArgs, VesselCommand,
+};
 pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
 pub(crate) use studies::{
     CompareArgs, DeformationArgs, ExperimentCommand, LoopArgs, NavigationArgs, TimingArgs,

@@ -1,5 +1,6 @@
 //! One file a command.
 
+mod centreline;
 mod compare;
 mod dataset;
 mod device;
@@ -9,6 +10,7 @@ mod export;
 mod felt;
 mod fluoro;
 mod new;
+mod passable;
 pub(crate) mod play;
 mod render;
 mod report;
@@ -20,6 +22,8 @@ mod surfaces;
 mod sweep;
 mod verify;
 mod vessel;
+
+pub(crate) use centreline::parse_end;
 
 use crate::args::{Args, Command, DeviceCommand, VesselCommand};
 use crate::failure::Failure;
@@ -40,6 +44,8 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
             vessel::check_file(file, (*frame).into(), *septum_mm, felt, *json)
         }
         Command::Vessel(VesselCommand::Generate(args)) => vessel::generate(args),
+        Command::Vessel(VesselCommand::Centreline(args)) => centreline::centreline(args),
+        Command::Vessel(VesselCommand::Passable(args)) => passable::passable_file(args),
         Command::Device(DeviceCommand::Show { file, out, json }) => device::show(file, out.as_deref(), *json),
         Command::Device(DeviceCommand::List { folder, out, json }) => {
             device::list(folder, out.as_deref(), *json)

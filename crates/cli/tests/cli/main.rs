@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod cache;
+mod centreline;
 mod common;
 mod compare;
 mod dataset;

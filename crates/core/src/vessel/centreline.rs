@@ -2,7 +2,8 @@
 //!
 //! As a table, one point a line: `x y z radius parent`, separated by blanks, tabs, commas or semicolons; millimetres; `parent`
 //! is the row (counted from 0, without comments and header) of an earlier point, −1 for the root. Words behind it name the point as a
-//! target. `#` starts a comment, and the first line that is not a comment may be a header of words.
+//! target. `#` starts a comment, and the first line that is not a comment may be a header of words. Lists of points without parents are read
+//! too where the header names their columns ([`super::point_lists`]).
 
 use std::fmt::Write;
 use std::path::Path;
@@ -10,6 +11,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::CentrelinePath;
+use super::point_lists::{self, Columns};
 use crate::error::nearest_name;
 use crate::{Error, Result, Vec3};
 
@@ -99,6 +101,12 @@ impl CentrelineTree {
         })
     }
 
+    /// The row nearest to a place.
+    pub fn nearest_row(&self, place_mm: &Vec3) -> usize {
+        let away_mm = |row: &usize| (self.nodes[*row].position_mm - place_mm).norm();
+        (0..self.nodes.len()).min_by(|a, b| away_mm(a).total_cmp(&away_mm(b))).unwrap_or(0)
+    }
+
     /// The way from the root to a row; `None` where the tree has no such row, or it is the root.
     pub fn path_to(&self, row: usize) -> Option<CentrelinePath> {
         let mut points = Vec::new();
@@ -135,6 +143,7 @@ impl CentrelineTree {
         let mut nodes: Vec<CentrelineNode> = Vec::new();
         let mut targets: Vec<Target> = Vec::new();
         let mut may_be_header = true;
+        let mut columns: Option<Columns> = None;
         for (index, line) in text.lines().enumerate() {
             let words: Vec<&str> = line
                 .split('#')
@@ -149,6 +158,22 @@ impl CentrelineTree {
             let is_header = may_be_header && words.iter().all(|word| word.parse::<f64>().is_err());
             may_be_header = false;
             if is_header {
+                columns = Columns::of_header(&words);
+                continue;
+            }
+            // A header may name the first four columns alone.
+            if nodes.is_empty() && columns.is_some_and(|columns| columns.count != words.len()) {
+                columns = None;
+            }
+            if let Some(columns) = columns {
+                let told = |reason| format!("line {}: {reason}", index + 1);
+                if words.len() != columns.count {
+                    return Err(told(format!("{} values; the header has {}", words.len(), columns.count)));
+                }
+                let node = columns.point(&words).map_err(told)?;
+                check_numbers(&node)
+                    .map_err(|(column, value, mend)| told(format!("{column} = {value}: {mend}")))?;
+                nodes.push(node);
                 continue;
             }
             let (row, name) = words.split_at(words.len().min(COLUMNS));
@@ -161,6 +186,9 @@ impl CentrelineTree {
             }
             check_row(&nodes, nodes.len() - 1)
                 .map_err(|(column, value, mend)| format!("line {}: {column} = {value}: {mend}", index + 1))?;
+        }
+        if columns.is_some() {
+            nodes = point_lists::tree(&nodes)?;
         }
         if nodes.len() < 2 {
             return Err(format!("{} centre-line points; a vessel needs at least 2", nodes.len()));
@@ -226,6 +254,12 @@ fn check_name(name: &str, others: &[Target]) -> std::result::Result<(), String> 
     }
 }
 
+/// A whole number, which may be written as a decimal one: `numpy.savetxt` writes `3.000000000000000000e+00`.
+fn whole(word: &str) -> Option<i64> {
+    let as_decimal = || word.parse().ok().filter(|number: &f64| number.fract() == 0.0 && number.abs() < 1e15);
+    word.parse().ok().or_else(|| as_decimal().map(|number| number as i64))
+}
+
 fn parse_row(words: &[&str]) -> std::result::Result<CentrelineNode, String> {
     let [x, y, z, radius, parent] = words else {
         return Err(format!("{} values; expected 5: x y z radius parent", words.len()));
@@ -233,7 +267,7 @@ fn parse_row(words: &[&str]) -> std::result::Result<CentrelineNode, String> {
     let number = |name: &str, word: &str| {
         word.parse::<f64>().map_err(|_| format!("{name} = {word:?} is not a number"))
     };
-    let parent: i64 = parent.parse().map_err(|_| format!("parent = {parent:?} is not a whole number"))?;
+    let parent = whole(parent).ok_or_else(|| format!("parent = {parent:?} is not a whole number"))?;
     Ok(CentrelineNode {
         position_mm: Vec3::new(number("x", x)?, number("y", y)?, number("z", z)?),
         radius_mm: number("radius", radius)?,
@@ -259,15 +293,7 @@ fn check_row(
     row: usize,
 ) -> std::result::Result<(), (&'static str, String, String)> {
     let node = &nodes[row];
-    for (name, value) in ["x", "y", "z"].into_iter().zip(node.position_mm.iter()) {
-        if value.is_nan() || value.abs() > LARGEST_MM {
-            return Err((name, value.to_string(), format!("must be finite and at most {LARGEST_MM} mm")));
-        }
-    }
-    if !(LEAST_RADIUS_MM..=LARGEST_MM).contains(&node.radius_mm) {
-        let mend = format!("must be {LEAST_RADIUS_MM} to {LARGEST_MM} mm");
-        return Err(("radius", crate::error::number(node.radius_mm), mend));
-    }
+    check_numbers(node)?;
     match node.parent {
         None if row == 0 => Ok(()),
         None => Err(("parent", "-1".into(), "only the first row is a root; name an earlier row".into())),
@@ -288,6 +314,20 @@ fn check_row(
         }
         Some(_) => Ok(()),
     }
+}
+
+/// Checks what a point is by itself.
+fn check_numbers(node: &CentrelineNode) -> std::result::Result<(), (&'static str, String, String)> {
+    for (name, value) in ["x", "y", "z"].into_iter().zip(node.position_mm.iter()) {
+        if value.is_nan() || value.abs() > LARGEST_MM {
+            return Err((name, value.to_string(), format!("must be finite and at most {LARGEST_MM} mm")));
+        }
+    }
+    if !(LEAST_RADIUS_MM..=LARGEST_MM).contains(&node.radius_mm) {
+        let mend = format!("must be {LEAST_RADIUS_MM} to {LARGEST_MM} mm");
+        return Err(("radius", crate::error::number(node.radius_mm), mend));
+    }
+    Ok(())
 }
 
 fn describe(parent: Option<usize>) -> String {

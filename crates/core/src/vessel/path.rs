@@ -36,6 +36,11 @@ impl CentrelinePath {
         self.points[self.points.len() - 1].0
     }
 
+    /// The least radius at its points, mm.
+    pub fn least_radius_mm(&self) -> f64 {
+        self.points.iter().map(|point| point.1).fold(f64::INFINITY, f64::min)
+    }
+
     /// The point of the path nearest to `x`.
     pub fn nearest(&self, x: &Vec3) -> OnPath {
         let mut best = OnPath { arc_mm: 0.0, distance_mm: f64::MAX, radius_mm: 0.0 };
@@ -55,16 +60,22 @@ impl CentrelinePath {
     }
 
     /// The point at an arc length from the inlet; beyond the end the end.
-    pub fn at(&self, mut arc_mm: f64) -> Vec3 {
+    pub fn at(&self, arc_mm: f64) -> Vec3 {
+        self.place(arc_mm).0
+    }
+
+    /// The point at an arc length from the inlet, and the radius there, which changes evenly between points, mm; beyond the end the end.
+    pub fn place(&self, mut arc_mm: f64) -> (Vec3, f64) {
         for pair in self.points.windows(2) {
             let piece = pair[1].0 - pair[0].0;
             let length = piece.norm();
             if arc_mm <= length {
-                return pair[0].0 + piece * (arc_mm / length);
+                let part = arc_mm / length;
+                return (pair[0].0 + piece * part, pair[0].1 + (pair[1].1 - pair[0].1) * part);
             }
             arc_mm -= length;
         }
-        self.end_mm()
+        self.points[self.points.len() - 1]
     }
 }
 

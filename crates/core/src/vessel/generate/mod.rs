@@ -176,6 +176,13 @@ impl GeneratedWall {
     }
 }
 
+/// The axes of the walls of `tree`, branch by branch: places and radii, mm.
+#[cfg(test)]
+pub(super) fn axes(tree: &CentrelineTree) -> Result<Vec<Vec<(Vec3, f64)>>> {
+    let of_samples = |branch: curve::Branch| branch.samples.iter().map(|s| (s.position, s.radius)).collect();
+    Ok(curve::branches(tree)?.into_iter().map(of_samples).collect())
+}
+
 /// Refuses a tube that runs into itself: between samples of the centre line a bend can be tighter than at them, a polygon of
 /// rings folds before its axis does, and a vessel may simply cross itself.
 fn check_apart(mesh: &SurfaceMesh) -> Result<()> {

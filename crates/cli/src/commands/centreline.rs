@@ -1,0 +1,97 @@
+//! `endowire vessel centreline`: the centre line of a surface.
+
+use endowire_core::Error;
+use endowire_core::vessel::{CentrelineBranch, CentrelineEnd, ExtractedCentreline, SurfaceMesh, Wall};
+use serde::Serialize;
+
+use crate::args::CentrelineArgs;
+use crate::failure::Failure;
+use crate::output::answer;
+use crate::output::provenance::{Provenance, read_input};
+
+#[derive(Serialize)]
+struct Document {
+    #[serde(flatten)]
+    provenance: Provenance,
+    file: String,
+    out: Option<String>,
+    rows: usize,
+    branches: Vec<CentrelineBranch>,
+    targets: Vec<NamedRow>,
+    unreached_openings: Vec<usize>,
+}
+
+#[derive(Serialize)]
+struct NamedRow {
+    name: String,
+    row: usize,
+}
+
+/// Finds the centre line of a surface file, writes its table where one is wanted, and tells its branches.
+pub(crate) fn centreline(args: &CentrelineArgs) -> Result<(), Failure> {
+    let provenance = Provenance::new(&[&read_input(&args.file)?], 0);
+    let wall = Wall::from_surface(&SurfaceMesh::read(&args.file, args.unit_mm)?)?;
+    let found = ExtractedCentreline::of(&wall, args.from, &args.to)
+        .map_err(|error| as_flag(error).at(args.file.display()))?;
+    if let Some(out) = &args.out {
+        found.tree.write(out, &format!("centre line of {}, mm", args.file.display()))?;
+    }
+    let targets = found.tree.targets().iter();
+    let document = Document {
+        provenance,
+        file: args.file.display().to_string(),
+        out: args.out.as_ref().map(|out| out.display().to_string()),
+        rows: found.tree.nodes().len(),
+        branches: found.tree.branches(),
+        targets: targets.map(|target| NamedRow { name: target.name.clone(), row: target.row }).collect(),
+        unreached_openings: found.unreached,
+    };
+    answer(&document, args.json, || text(&document))
+}
+
+/// Calls what the core calls `from`, `to` and a target by the flags of the command line.
+pub(super) fn as_flag(error: Error) -> Failure {
+    Failure::from(match error {
+        Error::Parameter { name, value, mend } if ["from", "to", "target"].contains(&name.as_str()) => {
+            let flag = if name == "from" { "--from" } else { "--to" };
+            Error::Parameter { name: flag.to_owned(), value, mend }
+        }
+        other => other,
+    })
+}
+
+/// An end as it is given to `--from` and `--to`: the number of an opening, or a place `x,y,z`.
+pub(crate) fn parse_end(text: &str) -> Result<CentrelineEnd, String> {
+    let mend = "expected the number of an opening (endowire vessel check lists them) or a place x,y,z in mm";
+    let numbers: Vec<&str> = text.split(',').map(str::trim).collect();
+    match numbers.as_slice() {
+        [opening] => opening.parse().map(CentrelineEnd::Opening).map_err(|_| mend.to_owned()),
+        [x, y, z] => match (x.parse(), y.parse(), z.parse()) {
+            (Ok(x), Ok(y), Ok(z)) => Ok(CentrelineEnd::Place([x, y, z].into())),
+            _ => Err(mend.to_owned()),
+        },
+        _ => Err(mend.to_owned()),
+    }
+}
+
+/// The branches for a person.
+fn text(document: &Document) -> String {
+    let mut lines = vec![
+        format!("{}: {} rows, {} branches", document.file, document.rows, document.branches.len()),
+        "    from      to   length mm   least radius mm   end".to_owned(),
+    ];
+    lines.extend(document.branches.iter().map(|branch| {
+        let end = document.targets.iter().find(|target| target.row == branch.to);
+        let end = end.map_or("fork", |target| target.name.as_str());
+        let (length_mm, radius_mm) = (branch.length_mm, branch.least_radius_mm);
+        format!("{:>8}{:>8}{length_mm:>12.1}{radius_mm:>18.3}   {end}", branch.from, branch.to)
+    }));
+    if !document.unreached_openings.is_empty() {
+        let numbers: Vec<String> = document.unreached_openings.iter().map(usize::to_string).collect();
+        lines.push(format!(
+            "no way inside leads to openings {}: they are of other pieces",
+            numbers.join(", ")
+        ));
+    }
+    lines.join("\n")
+}

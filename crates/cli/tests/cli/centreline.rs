@@ -1,0 +1,98 @@
+//! `endowire vessel centreline` and `endowire vessel passable`.
+
+use std::path::Path;
+
+use crate::common::{assets, said, text, told};
+use serde_json::Value;
+
+fn vessel(arguments: &[&str]) -> std::process::Output {
+    crate::common::endowire().arg("vessel").args(arguments).output().unwrap()
+}
+
+fn tube() -> String {
+    text(&assets().join("vessels/curved_tube.stl")).to_owned()
+}
+
+fn wire() -> String {
+    text(&assets().join("devices/wire_035_hydrophilic_angled.toml")).to_owned()
+}
+
+/// The centre line of the tube, in a folder.
+fn found(folder: &Path) -> (String, Value) {
+    let table = text(&folder.join("tree.csv")).to_owned();
+    let document = told(&vessel(&["centreline", &tube(), "--out", &table, "--json"]));
+    (table, document)
+}
+
+#[test]
+fn the_centre_line_of_a_surface_is_a_table_that_makes_the_surface_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let (table, document) = found(folder.path());
+    let branch = &document["branches"][0];
+    let length_mm = 95.0 + 45.0 * std::f64::consts::PI + 20.0;
+    assert!((branch["length_mm"].as_f64().unwrap() - length_mm).abs() < 1.0, "{document}");
+    assert!((branch["least_radius_mm"].as_f64().unwrap() - 4.0).abs() < 0.1, "{document}");
+    assert_eq!((&branch["from"], &branch["to"]), (&0.into(), &document["targets"][0]["row"]));
+    assert_eq!(document["rows"], branch["to"].as_u64().unwrap() + 1);
+    let again = text(&folder.path().join("again.stl")).to_owned();
+    let report = told(&vessel(&["generate", &table, "--out", &again, "--edge-mm", "2", "--json"]));
+    assert_eq!((&report["sound"], report["openings"].as_array().unwrap().len()), (&true.into(), 2));
+    let lines = String::from_utf8(vessel(&["centreline", &tube()]).stdout).unwrap();
+    assert!(lines.contains("opening 1") && lines.contains("least radius mm"), "{lines}");
+}
+
+#[test]
+fn a_thin_wire_passes_and_a_thick_one_is_blocked() {
+    let folder = tempfile::tempdir().unwrap();
+    let (table, _) = found(folder.path());
+    let thick = text(&folder.path().join("thick.toml")).to_owned();
+    let section = "[[section]]\nlength_mm = 400.0\nradius_mm = 4.5\nbending_stiffness_nmm2 = 10.0\n";
+    std::fs::write(&thick, section).unwrap();
+    let file = tube();
+    let passage = |device: &str, more: &[&str]| {
+        let given: Vec<&str> = ["passable", &file, "--device", device, "--json"]
+            .into_iter()
+            .chain(more.iter().copied())
+            .collect();
+        told(&vessel(&given))
+    };
+    let thin = passage(&wire(), &["--to", "1"]);
+    assert!(["passes", "tight"].contains(&thin["passage"].as_str().unwrap()), "{thin}");
+    assert!(
+        (thin["sharpest"]["bend_radius_mm"].as_f64().unwrap() - 45.0).abs() < 3.0,
+        "{}",
+        thin["sharpest"]
+    );
+    let named = passage(&wire(), &["--to", "opening 1", "--centreline", &table]);
+    assert_eq!(named["passage"], thin["passage"]);
+    let blocked = passage(&thick, &["--to", "0,0,50", "--from", "1"]);
+    assert_eq!(blocked["passage"], "blocked");
+    let lines =
+        String::from_utf8(vessel(&["passable", &tube(), "--device", &wire(), "--to", "1"]).stdout).unwrap();
+    assert!(lines.contains("narrowest") && lines.contains("sharpest bend"), "{lines}");
+}
+
+#[test]
+fn ends_that_are_none_are_refused_by_their_flag() {
+    let folder = tempfile::tempdir().unwrap();
+    let (table, _) = found(folder.path());
+    let device = wire();
+    for (arguments, words) in [
+        (vec!["centreline", "--from", "5"], "--from = opening 5: the surface has 2 openings"),
+        (vec!["centreline", "--to", "100,0,0"], "--to = [100, 0, 0]: is not inside"),
+        (vec!["centreline", "--to", "1,2"], "a place x,y,z in mm"),
+        (vec!["passable", "--to", "nowhere"], "--centreline FILE"),
+        (vec!["passable", "--to", "opening 2", "--centreline", &table], "did you mean \"opening 1\""),
+        (vec!["passable", "--to", "1", "--force-n", "0"], "--force-n = 0: must be positive"),
+    ] {
+        let file = tube();
+        let mut given = vec![arguments[0], &file];
+        if arguments[0] == "passable" {
+            given.extend(["--device", &device]);
+        }
+        given.extend(&arguments[1..]);
+        let output = vessel(&given);
+        assert_eq!(output.status.code(), Some(2), "{given:?}");
+        assert!(said(&output).contains(words), "{given:?}: {}", said(&output));
+    }
+}

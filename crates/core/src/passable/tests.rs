@@ -1,0 +1,94 @@
+use super::*;
+use crate::device::Section;
+use crate::vessel::anatomy;
+
+/// A way along z of radius 2 mm that is 1 mm wide in the middle.
+fn narrowing() -> CentrelinePath {
+    let radius_mm = |z: f64| 0.5 + 1.5 * ((z - 50.0).abs() / 10.0).min(1.0);
+    let points = (0..=100).map(f64::from).map(|z| (Vec3::z() * z, radius_mm(z)));
+    CentrelinePath::new(points.collect()).unwrap()
+}
+
+/// Straight for 60 mm, a bend, and straight again, in a lumen of this radius.
+fn bend(bend_mm: f64, degrees: f64, radius_mm: f64) -> CentrelinePath {
+    let leg = 60.0;
+    let arc = bend_mm * degrees.to_radians();
+    let at = |s: f64| {
+        let angle = (s - leg).clamp(0.0, arc) / bend_mm;
+        let corner = Vec3::new(bend_mm * (1.0 - angle.cos()), 0.0, s.min(leg) + bend_mm * angle.sin());
+        corner + Vec3::new(angle.sin(), 0.0, angle.cos()) * (s - leg - arc).max(0.0)
+    };
+    let count = ((2.0 * leg + arc) / 0.5) as usize;
+    let points = (0..=count).map(|k| (at((2.0 * leg + arc) * k as f64 / count as f64), radius_mm));
+    CentrelinePath::new(points.collect()).unwrap()
+}
+
+fn wire(radius_mm: f64, stiffness: f64) -> Device {
+    Device::uniform(400.0, radius_mm, stiffness).unwrap()
+}
+
+#[test]
+fn a_narrowing_lets_pass_what_is_thinner() {
+    for (radius_mm, passage) in [(0.4, Passage::Passes), (0.48, Passage::Tight), (0.52, Passage::Blocked)] {
+        let found = passable(&narrowing(), &wire(radius_mm, 10.0), NO_FORCE_N).unwrap();
+        assert_eq!(found.passage, passage, "{radius_mm}: {:?}", found.narrowest);
+        assert!((found.narrowest.arc_mm - 50.0).abs() < 1.0, "{:?}", found.narrowest);
+        assert!((found.narrowest.clearance_mm - (0.5 - radius_mm)).abs() < 0.08, "{:?}", found.narrowest);
+    }
+    // A thick shaft that stays before the narrow place holds nothing up, and one that must go in does.
+    let shaft = |tip_mm: f64| {
+        let sections = vec![Section::straight(tip_mm, 0.3, 10.0), Section::straight(300.0, 1.0, 10.0)];
+        passable(&narrowing(), &Device::new(sections).unwrap(), NO_FORCE_N).unwrap().passage
+    };
+    assert_eq!([shaft(60.0), shaft(40.0)], [Passage::Passes, Passage::Blocked]);
+    let short = Device::uniform(99.0, 0.3, 10.0).unwrap();
+    assert_eq!(passable(&narrowing(), &short, NO_FORCE_N).unwrap().passage, Passage::Short);
+}
+
+#[test]
+fn the_room_lets_a_device_cut_a_bend() {
+    let sharpest = |way: &CentrelinePath| passable(way, &wire(0.5, 10.0), NO_FORCE_N).unwrap().sharpest;
+    // With hardly any room the way is the centre line's.
+    let narrow = sharpest(&bend(30.0, 90.0, 0.52));
+    assert!((narrow.cut_radius_mm / 30.0 - 1.0).abs() < 0.1, "{narrow:?}");
+    // A wire that touches the outer wall, the inner one in the middle of the bend and the outer one again has a moment that is a triangle:
+    // for a small angle θ the radius in the middle is ¾ρ + 12 room/θ².
+    let (bend_mm, degrees, room_mm) = (100.0, 20.0_f64, 1.0);
+    let expected_mm = 0.75 * bend_mm + 12.0 * room_mm / degrees.to_radians().powi(2);
+    let wide = sharpest(&bend(bend_mm, degrees, 0.5 + room_mm));
+    assert!((wide.cut_radius_mm / expected_mm - 1.0).abs() < 0.05, "{wide:?} {expected_mm}");
+    assert!((wide.bend_radius_mm / bend_mm - 1.0).abs() < 0.1, "{wide:?}");
+    // A bend by little is straight for a wire that has room.
+    let slight = sharpest(&bend(30.0, 5.0, 3.0));
+    assert!(slight.cut_radius_mm > 1e4 && slight.bend_radius_mm < 100.0, "{slight:?}");
+}
+
+#[test]
+fn a_stiff_device_is_tight_in_a_bend_that_a_soft_or_a_curved_one_takes() {
+    let way = bend(30.0, 90.0, 1.0);
+    let of = |device: &Device| passable(&way, device, NO_FORCE_N).unwrap();
+    // √(EI / 2F): 22 mm and 71 mm.
+    let (soft, stiff) = (of(&wire(0.5, 100.0)), of(&wire(0.5, 1000.0)));
+    assert_eq!([soft.passage, stiff.passage], [Passage::Passes, Passage::Tight]);
+    assert!((stiff.sharpest.bears_radius_mm - 5000.0_f64.sqrt()).abs() < 1e-9);
+    assert!((60.0..120.0).contains(&stiff.sharpest.arc_mm), "{:?}", stiff.sharpest);
+    let curved =
+        Section { rest_curvature_per_mm: [0.0, 1.0 / 30.0], ..Section::straight(400.0, 0.5, 1000.0) };
+    assert_eq!(of(&Device::new(vec![curved]).unwrap()).passage, Passage::Passes);
+    let more = passable(&way, &wire(0.5, 1000.0), 2.0).unwrap();
+    assert_eq!(more.passage, Passage::Passes);
+    for force_n in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(passable(&way, &wire(0.5, 10.0), force_n).unwrap_err().to_string().starts_with("force_n = "));
+    }
+}
+
+#[test]
+fn a_whole_anatomy_is_looked_at() {
+    let tree = anatomy::tree("hepatic").unwrap();
+    let way = tree.path_to(tree.target("left hepatic").unwrap().row).unwrap();
+    let thin = passable(&way, &wire(0.4, 5.0), NO_FORCE_N).unwrap();
+    let thick = passable(&way, &wire(1.4, 5.0), NO_FORCE_N).unwrap();
+    assert_eq!(thick.passage, Passage::Blocked);
+    assert_ne!(thin.passage, Passage::Blocked);
+    assert!((thick.narrowest.lumen_radius_mm - 1.25).abs() < 1e-9, "{:?}", thick.narrowest);
+}

@@ -1,0 +1,191 @@
+//! The centre line of a surface, found in its lumen.
+//!
+//! The lumen is filled with spheres about chords across it ([`lumen`]); the ways through them that are cheapest, length being dear where
+//! spheres are small, lead from one end to all others ([`ways`]); each is moved to the middle of the lumen and smoothed ([`line`]). Where a
+//! way enters the spheres of another it joins that one ([`growing`]).
+
+mod growing;
+mod line;
+mod lumen;
+#[cfg(test)]
+mod tests;
+mod ways;
+
+pub(super) use self::growing::Growing;
+pub(super) use self::lumen::Sphere;
+use self::lumen::{Lumen, Spheres};
+use self::ways::Ways;
+use super::{CentrelineTree, Target, Wall};
+use crate::{Error, Result, Vec3};
+
+/// Parts of a triangle are at most so large, in radii of the lumen there; where an end is not reached, the next.
+const SPACINGS: [f64; 3] = [0.5, 0.25, 0.125];
+
+/// Where a centre line begins or ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CentrelineEnd {
+    /// An opening of the wall, by its number.
+    Opening(usize),
+    /// A place in the lumen, mm.
+    Place(Vec3),
+}
+
+/// A centre line that was found in a wall.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExtractedCentreline {
+    /// The tree, from the first end on. Ends are targets of it: `opening 3`, `place 1` (counted from 1, as given).
+    pub tree: CentrelineTree,
+    /// Openings that no way leads to: of another piece of the surface.
+    pub unreached: Vec<usize>,
+}
+
+/// A stretch of a tree without a fork.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct CentrelineBranch {
+    /// Row of the root or of the fork where it begins.
+    pub from: usize,
+    /// Row of the end or of the fork where it ends.
+    pub to: usize,
+    /// Its length, mm.
+    pub length_mm: f64,
+    /// The least radius of its points, but for the fork where it begins, mm.
+    pub least_radius_mm: f64,
+}
+
+impl ExtractedCentreline {
+    /// Finds the centre line of `wall` from one end to others: from the widest opening (number 0) without `from`, to all other openings
+    /// without `to`.
+    ///
+    /// Radii are those of the largest spheres in the lumen about each point. Lines are the ways along which the integral of 1/radius is least
+    /// (Antiga et al., IEEE Transactions on Medical Imaging 22, 2003), moved to where the sphere is the largest of its cross-section.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming `from` or `to` for an opening that is not there, a place outside the lumen, or one that no way leads to, and
+    /// for a surface without the openings that are needed.
+    pub fn of(wall: &Wall, from: Option<CentrelineEnd>, to: &[CentrelineEnd]) -> Result<Self> {
+        let lumen = Lumen::new(wall)?;
+        let first = from.unwrap_or(CentrelineEnd::Opening(0));
+        let root = end(&lumen, &first, "from")?;
+        let all: Vec<CentrelineEnd> = match to {
+            [] => {
+                (0..wall.openings().len()).map(CentrelineEnd::Opening).filter(|end| *end != first).collect()
+            }
+            given => given.to_vec(),
+        };
+        if all.is_empty() {
+            let mend = "the surface has no other opening to lead to: give places inside";
+            return Err(Error::parameter("to", "none", mend));
+        }
+        let ends = all.iter().map(|to| end(&lumen, to, "to")).collect::<Result<Vec<Sphere>>>()?;
+        let ways = found_ways(&lumen, root, &ends);
+        if let Some(missed) = (0..all.len()).find(|&k| ways[k].is_none() && !to.is_empty()) {
+            let mend =
+                "no way inside the vessel leads there: check that it is in the same piece of the surface";
+            return Err(Error::parameter("to", name(&all[missed], missed), mend));
+        }
+        let is_missed = |(k, end): (usize, &CentrelineEnd)| match end {
+            CentrelineEnd::Opening(opening) if ways[k].is_none() => Some(*opening),
+            _ => None,
+        };
+        let unreached: Vec<usize> = all.iter().enumerate().filter_map(is_missed).collect();
+        let mut order: Vec<usize> = (0..ends.len()).filter(|&k| ways[k].is_some()).collect();
+        // Narrower branches join wider ones.
+        order.sort_by(|&a, &b| ends[b].radius_mm.total_cmp(&ends[a].radius_mm).then(a.cmp(&b)));
+        let (mut growing, mut targets) = (Growing::default(), Vec::new());
+        for k in order {
+            let (entry, own) = growing.own_part(ways[k].as_deref().unwrap_or_default());
+            let row = growing.join(entry, &line::centred(&lumen, &own, entry.is_none()));
+            targets.extend(row.map(|row| Target { name: name(&all[k], k), row }));
+        }
+        if growing.nodes.is_empty() {
+            let mend = "no way leads from there to any other opening: choose another with `from`";
+            return Err(Error::parameter("from", name(&first, 0), mend));
+        }
+        Ok(Self { tree: CentrelineTree::new(growing.nodes)?.with_targets(targets)?, unreached })
+    }
+}
+
+impl CentrelineTree {
+    /// The stretches of the tree between its root, its forks and its ends, in the order of their last rows.
+    pub fn branches(&self) -> Vec<CentrelineBranch> {
+        let (nodes, children) = (self.nodes(), self.children());
+        let is_end = |row: usize| children[row].len() != 1;
+        (1..nodes.len())
+            .filter(|&row| is_end(row))
+            .map(|to| {
+                let mut branch =
+                    CentrelineBranch { from: to, to, length_mm: 0.0, least_radius_mm: nodes[to].radius_mm };
+                while let Some(parent) = nodes[branch.from].parent {
+                    branch.least_radius_mm = branch.least_radius_mm.min(nodes[branch.from].radius_mm);
+                    branch.length_mm += (nodes[parent].position_mm - nodes[branch.from].position_mm).norm();
+                    branch.from = parent;
+                    if is_end(parent) {
+                        break;
+                    }
+                }
+                branch
+            })
+            .collect()
+    }
+}
+
+/// What an end is called as a target.
+fn name(end: &CentrelineEnd, index: usize) -> String {
+    match end {
+        CentrelineEnd::Opening(opening) => format!("opening {opening}"),
+        CentrelineEnd::Place(_) => format!("place {}", index + 1),
+    }
+}
+
+/// The sphere at an end.
+fn end(lumen: &Lumen<'_>, end: &CentrelineEnd, key: &str) -> Result<Sphere> {
+    let openings = lumen.wall.openings();
+    let centre_mm = match *end {
+        CentrelineEnd::Opening(number) => {
+            let opening = openings.get(number).ok_or_else(|| {
+                let mend = match openings.len() {
+                    0 => "the surface has no opening: give a place inside".to_owned(),
+                    count => format!("the surface has {count} openings, counted from 0"),
+                };
+                Error::parameter(key, format!("opening {number}"), mend)
+            })?;
+            opening.centre_mm
+        }
+        CentrelineEnd::Place(place) => place,
+    };
+    let radius_mm = lumen.clearance_mm(&centre_mm);
+    if radius_mm > 0.0 {
+        return Ok(Sphere { centre_mm, radius_mm });
+    }
+    match *end {
+        // The middle of a crooked rim may be outside; what is next to it is not.
+        CentrelineEnd::Opening(number) => Ok(Sphere { centre_mm, radius_mm: openings[number].radius_mm }),
+        CentrelineEnd::Place(place) => Err(Error::parameter(
+            key,
+            crate::error::vector(&place),
+            "is not inside the vessel: give a place in the lumen, mm",
+        )),
+    }
+}
+
+/// The ways from the first sphere to the ends, through spheres that are nearer to each other where that is needed.
+fn found_ways(lumen: &Lumen<'_>, root: Sphere, ends: &[Sphere]) -> Vec<Option<Vec<Sphere>>> {
+    let mut found = vec![None; ends.len()];
+    for spacing in SPACINGS {
+        let mut spheres = Spheres::default();
+        for sphere in [root].iter().chain(ends).copied().chain(lumen.spheres(spacing)) {
+            spheres.push(sphere);
+        }
+        let ways = Ways::from(0, &spheres);
+        for (k, way) in found.iter_mut().enumerate() {
+            if way.is_none() {
+                let numbers = ways.to(k + 1);
+                *way = numbers.map(|way| way.into_iter().map(|sphere| spheres.all[sphere]).collect());
+            }
+        }
+        if found.iter().all(Option::is_some) {
+            break;
+        }
+    }
+    found
+}

@@ -1,0 +1,148 @@
+use super::*;
+use crate::vessel::generate::axes;
+use crate::vessel::{GeneratedWall, anatomy};
+
+/// How far centre lines that were found are from the exact ones, over what is allowed: half a millimetre, or a twentieth of the radius where
+/// that is more. Ends within a radius and places that two branches are about are left out.
+#[derive(Debug, Default)]
+struct Miss {
+    position: f64,
+    radius: f64,
+    /// How far what was found is from any exact line, over the radius there.
+    stray: f64,
+}
+
+type Axis = Vec<(Vec3, f64)>;
+
+fn allowed_mm(radius_mm: f64) -> f64 {
+    (0.05 * radius_mm).max(0.5)
+}
+
+/// The nearest place of the tree to a point, and the radius there.
+fn nearest(tree: &CentrelineTree, x: &Vec3) -> (f64, f64) {
+    let nodes = tree.nodes();
+    let sides = nodes.iter().filter_map(|b| b.parent.map(|a| (&nodes[a], b)));
+    let away = sides.map(|(a, b)| {
+        let way = b.position_mm - a.position_mm;
+        let part = ((x - a.position_mm).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+        ((a.position_mm + way * part - x).norm(), a.radius_mm + (b.radius_mm - a.radius_mm) * part)
+    });
+    away.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap()
+}
+
+/// Whether a place of one axis is near an end of it or in the region of another.
+fn is_left_out(axes: &[Axis], own: usize, (x, radius_mm): &(Vec3, f64)) -> bool {
+    let near_end =
+        [axes[own].first(), axes[own].last()].iter().flatten().any(|e| (e.0 - x).norm() < *radius_mm);
+    let near = |other: &Axis| other.iter().any(|(y, other)| (y - x).norm() < radius_mm + other);
+    near_end || axes.iter().enumerate().any(|(k, other)| k != own && near(other))
+}
+
+fn miss(axes: &[Axis], tree: &CentrelineTree) -> Miss {
+    let mut miss = Miss::default();
+    for (k, axis) in axes.iter().enumerate() {
+        for place in axis.iter().filter(|place| !is_left_out(axes, k, place)) {
+            let (away_mm, radius_mm) = nearest(tree, &place.0);
+            miss.position = miss.position.max(away_mm / allowed_mm(place.1));
+            miss.radius = miss.radius.max((radius_mm - place.1).abs() / allowed_mm(place.1));
+        }
+    }
+    for node in tree.nodes() {
+        let away = axes.iter().flatten().map(|(x, r)| (x - node.position_mm).norm() / r);
+        miss.stray = miss.stray.max(away.fold(f64::INFINITY, f64::min));
+    }
+    miss
+}
+
+fn wall_of(name: &str) -> GeneratedWall {
+    GeneratedWall::new(&anatomy::tree(name).unwrap(), anatomy::asset_resolution(name)).unwrap()
+}
+
+/// The centre line from the inlet of a built-in anatomy to these openings, or to all.
+fn found(made: &GeneratedWall, to: &[CentrelineEnd]) -> ExtractedCentreline {
+    ExtractedCentreline::of(&made.wall, Some(CentrelineEnd::Opening(made.inlet)), to).unwrap()
+}
+
+#[test]
+fn trees_of_walls_are_those_that_the_walls_were_made_from() {
+    for name in ["curved_tube", "aortic_arch", "aortic_arch_iii", "hepatic"] {
+        let made = wall_of(name);
+        let found = found(&made, &[]);
+        assert!(found.unreached.is_empty(), "{name}: {:?}", found.unreached);
+        assert_eq!(found.tree.targets().len(), made.wall.openings().len() - 1, "{name}");
+        let mut exact = axes(&anatomy::tree(name).unwrap()).unwrap();
+        let missed = miss(&exact, &found.tree);
+        assert!(missed.position < 0.3 && missed.radius < 0.7 && missed.stray < 1.0, "{name}: {missed:?}");
+
+        // Axes and radii that are a little elsewhere are told from these.
+        exact.iter_mut().flatten().for_each(|(x, _)| *x += Vec3::new(0.5, 0.4, 0.6));
+        assert!(miss(&exact, &found.tree).position > 0.7, "{name}");
+        exact.iter_mut().flatten().for_each(|(_, radius_mm)| *radius_mm *= 1.25);
+        assert!(miss(&exact, &found.tree).radius > 1.0, "{name}");
+    }
+}
+
+#[test]
+fn a_branch_that_is_left_out_is_missed() {
+    let made = wall_of("hepatic");
+    let wide: Vec<CentrelineEnd> =
+        made.wall.openings()[..4].iter().map(|o| CentrelineEnd::Opening(o.index)).collect();
+    let to: Vec<CentrelineEnd> =
+        wide.into_iter().filter(|end| *end != CentrelineEnd::Opening(made.inlet)).collect();
+    let exact = axes(&anatomy::tree("hepatic").unwrap()).unwrap();
+    assert!(miss(&exact, &found(&made, &to).tree).position > 10.0);
+}
+
+#[test]
+fn the_same_wall_has_the_same_tree_and_its_table_is_read_back() {
+    let made = wall_of("hepatic");
+    let tree = found(&made, &[]).tree;
+    assert_eq!(found(&made, &[]).tree, tree);
+    let table = tree.table("a centre line");
+    assert_eq!(CentrelineTree::from_bytes(table.as_bytes(), "tree.csv".as_ref()).unwrap(), tree);
+    let branches = tree.branches();
+    let sum_mm: f64 = branches.iter().map(|branch| branch.length_mm).sum();
+    let sides = tree.nodes().iter().filter_map(|b| b.parent.map(|a| (tree.nodes()[a].position_mm, b)));
+    let whole_mm: f64 = sides.map(|(a, b)| (b.position_mm - a).norm()).sum();
+    assert!((sum_mm - whole_mm).abs() < 1e-9 * whole_mm && branches.len() >= 9, "{branches:?}");
+}
+
+#[test]
+fn places_inside_are_ends_too_and_others_are_refused() {
+    let made = wall_of("curved_tube");
+    let place = |x: f64, y: f64, z: f64| CentrelineEnd::Place(Vec3::new(x, y, z));
+    let of = |from: CentrelineEnd, to: CentrelineEnd| ExtractedCentreline::of(&made.wall, Some(from), &[to]);
+    let tree = of(place(0.0, 0.0, 20.0), place(1.0, 0.0, 60.0)).unwrap().tree;
+    assert!((tree.branches()[0].length_mm - 40.0).abs() < 1.5, "{:?}", tree.branches());
+    assert_eq!(tree.target("place 1").unwrap().row, tree.nodes().len() - 1);
+    for (from, to, told) in [
+        (place(0.0, 0.0, 20.0), place(8.0, 0.0, 60.0), "to = [8, 0, 60]: is not inside"),
+        (place(0.0, 0.0, -5.0), place(0.0, 0.0, 60.0), "from = [0, 0, -5]: is not inside"),
+        (place(f64::NAN, 0.0, 0.0), place(0.0, 0.0, 60.0), "from = [NaN, 0, 0]: is not inside"),
+        (CentrelineEnd::Opening(2), place(0.0, 0.0, 60.0), "from = opening 2: the surface has 2 openings"),
+    ] {
+        let error = of(from, to).unwrap_err().to_string();
+        assert!(error.starts_with(told), "{error}");
+    }
+    let closed = Wall::welded(&made.wall.closed_mesh()).unwrap();
+    let error = ExtractedCentreline::of(&closed, None, &[]).unwrap_err().to_string();
+    assert!(error.contains("has no opening: give a place inside"), "{error}");
+}
+
+#[test]
+fn openings_of_another_piece_are_told() {
+    let made = wall_of("straight_tube");
+    let mut mesh = made.wall.mesh().clone();
+    let count = mesh.vertices_mm.len() as u32;
+    mesh.vertices_mm.extend_from_within(..);
+    mesh.vertices_mm[count as usize..].iter_mut().for_each(|v| v.x += 20.0);
+    mesh.triangles.extend_from_within(..);
+    let half = mesh.triangles.len() / 2;
+    mesh.triangles[half..].iter_mut().flatten().for_each(|v| *v += count);
+    let wall = Wall::welded(&mesh).unwrap();
+    let found = ExtractedCentreline::of(&wall, None, &[]).unwrap();
+    assert_eq!((found.tree.targets().len(), found.unreached.len()), (1, 2));
+    let missed = CentrelineEnd::Opening(found.unreached[0]);
+    let error = ExtractedCentreline::of(&wall, None, &[missed]).unwrap_err().to_string();
+    assert!(error.contains("no way inside the vessel leads there"), "{error}");
+}

@@ -1,0 +1,92 @@
+//! The ways through spheres whose sum of length over radius is least.
+//!
+//! Antiga, Ene-Iordache and Remuzzi, "Computational geometry for patient-specific reconstruction and meshing of blood vessels from MR and
+//! CT angiography", IEEE Transactions on Medical Imaging 22, 2003: a centre line is the way along which ∫ ds/R is least, R being the radius
+//! of the inscribed sphere. Shortest ways by Dijkstra's method.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use super::lumen::{Sphere, Spheres};
+
+/// The shortest ways from one sphere to all others.
+pub(super) struct Ways {
+    /// The sphere before each on its way; its own number for the first, none for what is not reached.
+    before: Vec<Option<usize>>,
+}
+
+/// The end of a way, cheapest first.
+#[derive(PartialEq)]
+struct Reached {
+    cost: f64,
+    sphere: usize,
+}
+
+impl Eq for Reached {}
+
+impl Ord for Reached {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.cost.total_cmp(&self.cost).then_with(|| other.sphere.cmp(&self.sphere))
+    }
+}
+
+impl PartialOrd for Reached {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ways {
+    pub(super) fn from(first: usize, spheres: &Spheres) -> Self {
+        let all = &spheres.all;
+        let mut beside: Vec<Vec<usize>> = vec![Vec::new(); all.len()];
+        for (k, sphere) in all.iter().enumerate() {
+            for other in spheres.overlapping(sphere).filter(|&other| other != k) {
+                beside[k].push(other);
+                beside[other].push(k);
+            }
+        }
+        let mut cost = vec![f64::INFINITY; all.len()];
+        let mut before = vec![None; all.len()];
+        (cost[first], before[first]) = (0.0, Some(first));
+        let mut open = BinaryHeap::from([Reached { cost: 0.0, sphere: first }]);
+        while let Some(at) = open.pop() {
+            if at.cost > cost[at.sphere] {
+                continue;
+            }
+            for &next in &beside[at.sphere] {
+                let through = at.cost + length_over_radius(&all[at.sphere], &all[next]);
+                if through < cost[next] {
+                    (cost[next], before[next]) = (through, Some(at.sphere));
+                    open.push(Reached { cost: through, sphere: next });
+                }
+            }
+        }
+        Self { before }
+    }
+
+    /// The spheres from the first to this one; none if no way leads there.
+    pub(super) fn to(&self, sphere: usize) -> Option<Vec<usize>> {
+        let mut way = vec![sphere];
+        loop {
+            let last = way[way.len() - 1];
+            match self.before[last]? {
+                before if before == last => break,
+                before => way.push(before),
+            }
+        }
+        way.reverse();
+        Some(way)
+    }
+}
+
+/// ∫ ds/R between two centres, with a radius that changes evenly.
+fn length_over_radius(a: &Sphere, b: &Sphere) -> f64 {
+    let length_mm = (b.centre_mm - a.centre_mm).norm();
+    let ratio = b.radius_mm / a.radius_mm;
+    let mean_mm = match (ratio - 1.0).abs() < 1e-6 {
+        true => a.radius_mm,
+        false => (b.radius_mm - a.radius_mm) / ratio.ln(),
+    };
+    length_mm / mean_mm
+}
