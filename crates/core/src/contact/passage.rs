@@ -38,8 +38,6 @@ pub(crate) struct Narrow {
     pub(crate) radius_mm: f64,
     /// Where it is narrowest, in the reference.
     pub(crate) place_mm: Vec3,
-    /// Radius of the largest sphere beside the front, mm: how wide the lumen is that it lies in, up to some radii of the device.
-    pub(crate) beside_mm: f64,
 }
 
 /// The narrowest place of the widest way on from the front of a device of this radius, if that is narrower than the device. `axis_mm` are
@@ -120,16 +118,11 @@ impl Grid<'_> {
         if ways.is_empty() {
             return None;
         }
-        let beside_mm = ways.peek().map_or(0.0, |way| way.least_mm);
         let mut seen: FxHashSet<Cell> = ways.iter().map(|way| way.to).collect();
         while let Some(way) = ways.pop() {
             let at = self.place(way.to);
             if self.distance_mm(&at).0 >= AHEAD * self.radius_mm || left_through(self.wall, &at).is_some() {
-                return Some(Narrow {
-                    radius_mm: way.least_mm,
-                    place_mm: self.place(way.narrowest),
-                    beside_mm,
-                });
+                return Some(Narrow { radius_mm: way.least_mm, place_mm: self.place(way.narrowest) });
             }
             if seen.len() > MOST_ASKED {
                 return None;
@@ -147,7 +140,7 @@ impl Grid<'_> {
                 }
             }
         }
-        Some(Narrow { radius_mm: 0.0, place_mm: self.front[0], beside_mm })
+        Some(Narrow { radius_mm: 0.0, place_mm: self.front[0] })
     }
 
     fn place(&self, cell: Cell) -> Vec3 {

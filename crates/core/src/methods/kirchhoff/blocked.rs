@@ -15,9 +15,8 @@ use crate::rod::RodState;
 use crate::rod::quadrature::hermite;
 use crate::{Error, PhysicalEnd, Result, Vec3};
 
-/// A front is wedged where no larger sphere than this, in radii, has room beside it. At the wall of a wider lumen it is not: a device that is
-/// pushed on there folds.
-const WEDGED: f64 = 1.5;
+/// A device is wedged that has sunk into the wall by this part of its radius.
+const WEDGED: f64 = 0.5;
 /// Length of the device in which its front is looked for, in radii: a hooked tip that is folded back is as long.
 const FRONT: usize = 60;
 
@@ -31,10 +30,22 @@ pub(super) fn refuse_narrow(
     from: Start<'_>,
     commands: &[Command],
 ) -> Result<()> {
-    refuse_where(environment, from, commands, |_, _| true)
+    let mut hands = Vec::new();
+    super::hands::read(&from.state.report, &mut hands);
+    for (instrument, command) in commands.iter().enumerate() {
+        if command.advance_mm > 0.0
+            && let Some((narrow, device_radius_mm)) = narrow(environment, from, &hands, instrument)
+        {
+            let position_mm = environment.wall().place(&narrow.place_mm);
+            let lumen_radius_mm = narrow.radius_mm;
+            return Err(Error::End(PhysicalEnd::Blocked { position_mm, lumen_radius_mm, device_radius_mm }));
+        }
+    }
+    Ok(())
 }
 
-/// The same where the front is wedged there, for a device that would be let go from a fold.
+/// The same where the device is wedged, for one that would be let go from a fold: where a wall hardly yields it folds behind its held tip, as in the
+/// paper's third experiment.
 ///
 /// # Errors
 /// As [`refuse_narrow`].
@@ -43,28 +54,11 @@ pub(super) fn refuse_wedged(
     from: Start<'_>,
     commands: &[Command],
 ) -> Result<()> {
-    refuse_where(environment, from, commands, |narrow, radius_mm| narrow.beside_mm < WEDGED * radius_mm)
-}
-
-fn refuse_where(
-    environment: &Environment<'_>,
-    from: Start<'_>,
-    commands: &[Command],
-    counts: impl Fn(&Narrow, f64) -> bool,
-) -> Result<()> {
-    let mut hands = Vec::new();
-    super::hands::read(&from.state.report, &mut hands);
-    for (instrument, command) in commands.iter().enumerate() {
-        if command.advance_mm > 0.0
-            && let Some((narrow, device_radius_mm)) = narrow(environment, from, &hands, instrument)
-            && counts(&narrow, device_radius_mm)
-        {
-            let position_mm = environment.wall().place(&narrow.place_mm);
-            let lumen_radius_mm = narrow.radius_mm;
-            return Err(Error::End(PhysicalEnd::Blocked { position_mm, lumen_radius_mm, device_radius_mm }));
-        }
+    let (thinnest_mm, _) = environment.surroundings.stack.radii_mm();
+    if from.state.report.max_penetration_mm < WEDGED * thinnest_mm {
+        return Ok(());
     }
-    Ok(())
+    refuse_narrow(environment, from, commands)
 }
 
 /// What the way ahead of an instrument is, where it is narrower than that, and its radius there.
