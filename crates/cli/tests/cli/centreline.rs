@@ -48,8 +48,9 @@ fn a_thin_wire_passes_and_a_thick_one_is_blocked() {
     let thick = text(&folder.path().join("thick.toml")).to_owned();
     let section = "[[section]]\nlength_mm = 400.0\nradius_mm = 4.5\nbending_stiffness_nmm2 = 10.0\n";
     std::fs::write(&thick, section).unwrap();
+    let file = tube();
     let passage = |device: &str, more: &[&str]| {
-        let given: Vec<&str> = ["passable", &tube(), "--device", device, "--json"]
+        let given: Vec<&str> = ["passable", &file, "--device", device, "--json"]
             .into_iter()
             .chain(more.iter().copied())
             .collect();
