@@ -5,7 +5,7 @@ use std::ffi::CString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use endowire_core::passable::{NO_FORCE_N, passable};
+use endowire_core::passable::passable;
 use endowire_core::vessel::{
     CentrelineEnd, CentrelineNode, CentrelineTree, ExtractedCentreline, GeneratedWall, Resolution,
     SurfaceFrame, SurfaceMesh, Target, Wall, anatomy, check_with, wall_hints,
@@ -251,7 +251,7 @@ impl Vessel {
     /// The way is that of the centre line, see `with_centreline`. `to` is the name of a target, or a place in mm: its nearest point.
     ///
     /// Raises InputError for a vessel without a centre line, an unknown name and a force that is not positive.
-    #[pyo3(signature = (instrument, to, force_n = NO_FORCE_N))]
+    #[pyo3(signature = (instrument, to, force_n = 0.1))]
     fn passable<'py>(
         &self,
         py: Python<'py>,
