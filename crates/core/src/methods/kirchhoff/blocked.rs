@@ -1,6 +1,6 @@
 //! Where a vessel is narrower than the device that is pushed into it.
 //!
-//! A device is blocked where no sphere of its radius passes on from its front ([`passage`]). Anything else that finds no
+//! A device is blocked where no sphere of its radius passes on from its front (`contact/passage.rs`). Anything else that finds no
 //! equilibrium is a computation that failed, and says so. A wall that yields lets a device through a vessel somewhat narrower than
 //! itself, and then there is nothing to tell.
 
