@@ -48,7 +48,7 @@ fn run(args: &ReportArgs) -> Result<data::Data, Failure> {
     data::collect(&args.dir, &recording, &stack, vessel.mesh())
 }
 
-/// A document for a script. "<" stands in strings alone, and could end the script ("</script>") or keep it from ending ("<!--<script>").
+/// A document for a script. "<" stands in strings alone, and could end the script (`</script>`) or keep it from ending (`<!--<script>`).
 fn json(document: &impl serde::Serialize) -> Result<String, Failure> {
     let text = serde_json::to_string(document);
     let text =
