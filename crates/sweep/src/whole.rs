@@ -39,7 +39,7 @@ pub fn remove(path: &Path) -> io::Result<()> {
 /// Writes bytes, and waits for the disk before they take the place of what was there.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write(path, |part| {
         let mut file = File::create(part)?;
