@@ -111,7 +111,7 @@ pub(crate) struct GenerateArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct CentrelineArgs {
-    /// Surface mesh (STL, OBJ or PLY)
+    /// Surface mesh (STL, OBJ, PLY, VTP or VTK)
     pub(crate) file: PathBuf,
     /// Where the centre line begins: the number of an opening, or a place x,y,z inside in mm; the widest opening, 0, if absent
     #[arg(long, value_name = "END", value_parser = parse_end, allow_hyphen_values = true)]
@@ -122,9 +122,8 @@ pub(crate) struct CentrelineArgs {
     /// Write the centre-line table (x,y,z,radius,parent and the names of ends)
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
-    /// Millimetres per unit of the surface file
-    #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
-    pub(crate) unit_mm: f64,
+    #[command(flatten)]
+    pub(crate) frame: CoordinateArgs,
     /// Print the branches as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
@@ -132,7 +131,7 @@ pub(crate) struct CentrelineArgs {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct PassableArgs {
-    /// Surface mesh (STL, OBJ or PLY)
+    /// Surface mesh (STL, OBJ, PLY, VTP or VTK)
     pub(crate) file: PathBuf,
     /// Device file (TOML)
     #[arg(long, value_name = "FILE")]
@@ -149,9 +148,8 @@ pub(crate) struct PassableArgs {
     /// Force along the device, N, that is taken for none: a section takes a bend if pushing it in costs no more
     #[arg(long, default_value_t = NO_FORCE_N, value_name = "N", allow_negative_numbers = true)]
     pub(crate) force_n: f64,
-    /// Millimetres per unit of the surface file
-    #[arg(long, default_value_t = 1.0, value_name = "MM", allow_negative_numbers = true)]
-    pub(crate) unit_mm: f64,
+    #[command(flatten)]
+    pub(crate) frame: CoordinateArgs,
     /// Print what was found as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,

@@ -30,7 +30,7 @@ struct NamedRow {
 /// Finds the centre line of a surface file, writes its table where one is wanted, and tells its branches.
 pub(crate) fn centreline(args: &CentrelineArgs) -> Result<(), Failure> {
     let provenance = Provenance::new(&[&read_input(&args.file)?], 0);
-    let wall = Wall::from_surface(&SurfaceMesh::read(&args.file, args.unit_mm)?)?;
+    let wall = Wall::from_surface(&SurfaceMesh::read(&args.file, args.frame)?)?;
     let found = ExtractedCentreline::of(&wall, args.from, &args.to)
         .map_err(|error| as_flag(error).at(args.file.display()))?;
     if let Some(out) = &args.out {

@@ -74,7 +74,7 @@ fn way_in_surface(args: &PassableArgs) -> Result<CentrelinePath, Failure> {
         let more = "a name needs the table that has it: --centreline FILE";
         Failure::Input(format!("--to = {:?}: {mend}; {more}", args.to))
     })?;
-    let wall = Wall::from_surface(&SurfaceMesh::read(&args.file, args.unit_mm)?)?;
+    let wall = Wall::from_surface(&SurfaceMesh::read(&args.file, args.frame)?)?;
     let found = ExtractedCentreline::of(&wall, args.from, &[to])
         .map_err(|error| as_flag(error).at(args.file.display()))?;
     let row = found.tree.targets().first().map_or(0, |target| target.row);
