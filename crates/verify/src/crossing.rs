@@ -166,12 +166,17 @@ impl CrossingTest {
 
 /// Points along the device's curve: the cubics through positions and tangents of the nodes.
 pub fn curve(shape: &Shape) -> Vec<Vec3> {
+    curve_in(shape, CHORDS)
+}
+
+/// The same with so many chords an element.
+pub(crate) fn curve_in(shape: &Shape, chords: usize) -> Vec<Vec3> {
     let (x, t, s) = (&shape.positions_mm, &shape.tangents, &shape.from_tip_mm);
     let mut points: Vec<Vec3> = x.first().copied().into_iter().collect();
     for e in 0..x.len().saturating_sub(1) {
         let h = s[e] - s[e + 1];
-        points.extend((1..=CHORDS).map(|k| {
-            let u = k as f64 / CHORDS as f64;
+        points.extend((1..=chords).map(|k| {
+            let u = k as f64 / chords as f64;
             let (v, w) = (u * u, u * u * u);
             x[e] * (1.0 - 3.0 * v + 2.0 * w)
                 + t[e] * (h * (u - 2.0 * v + w))

@@ -13,7 +13,7 @@ use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
 use endowire_core::{Error, Result};
 use serde::Serialize;
 
-use crate::crossing::CrossingTest;
+use crate::crossing::{CrossingTest, curve_in};
 
 /// Sequences of the whole stress.
 pub const SEQUENCES: u64 = 300;
@@ -26,9 +26,9 @@ const MORE_MJ: f64 = 1e-3;
 /// Largest part of what is inserted by which a device may be longer or shorter.
 const STRETCHED: f64 = 1e-3;
 /// How far apart tips may be, mm: without friction and with it, which leaves a device anywhere within its cones.
-const APART_MM: [f64; 2] = [0.05, 0.5];
+pub const APART_MM: [f64; 2] = [0.05, 0.5];
 /// Chords of an element whose lengths are summed: of one that turns by a radian they are 4·10⁻⁵ shorter.
-const CHORDS: u32 = 32;
+const CHORDS: usize = 32;
 /// A device deeper behind the triangles than it says by this, mm, has gone through them: more than the wall that is felt is off.
 const CROSSED_MM: f64 = 0.3;
 
@@ -167,14 +167,19 @@ struct Done {
     failed: Option<Error>,
 }
 
+/// One of so many equal parts of moves.
+pub fn part_of(moves: &[Move], parts: usize) -> Vec<Move> {
+    let share = |Command { advance_mm, rotate_rad }| Command {
+        advance_mm: advance_mm / parts as f64,
+        rotate_rad: rotate_rad / parts as f64,
+    };
+    moves.iter().map(|one| Move { command: share(one.command), ..*one }).collect()
+}
+
 /// Moves in equal parts.
 fn go(simulation: &mut Simulation, moves: &[Move], parts: usize) -> Done {
     let mut done = Done::default();
-    let share = |command: Command| Command {
-        advance_mm: command.advance_mm / parts as f64,
-        rotate_rad: command.rotate_rad / parts as f64,
-    };
-    let part: Vec<Move> = moves.iter().map(|one| Move { command: share(one.command), ..*one }).collect();
+    let part = part_of(moves, parts);
     for _ in 0..parts {
         match simulation.step_together(&part) {
             Ok(report) => {
@@ -194,19 +199,7 @@ fn go(simulation: &mut Simulation, moves: &[Move], parts: usize) -> Done {
 
 /// Length of a device, mm: of cubic curves between its nodes, as chords.
 fn length_mm(shape: &Shape) -> f64 {
-    let mut sum_mm = 0.0;
-    let nodes = shape.positions_mm.iter().zip(&shape.tangents).zip(&shape.from_tip_mm);
-    for (((x0, t0), s0), ((x1, t1), s1)) in nodes.clone().zip(nodes.skip(1)) {
-        let h = s0 - s1;
-        let at = |k: u32| {
-            let (u, v) = (f64::from(k) / f64::from(CHORDS), 1.0 - f64::from(k) / f64::from(CHORDS));
-            x0 * (v * v * (1.0 + 2.0 * u))
-                + x1 * (u * u * (1.0 + 2.0 * v))
-                + (t0 * (u * v * v) - t1 * (u * u * v)) * h
-        };
-        sum_mm += (0..CHORDS).map(|k| (at(k + 1) - at(k)).norm()).sum::<f64>();
-    }
-    sum_mm
+    curve_in(shape, CHORDS).windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
 }
 
 /// Runs a sequence.

@@ -1,75 +1,18 @@
 //! Scenes that are hard to simulate, each as its script has it and again in small steps.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
-use endowire_core::insertion::{Command, Move, Simulation};
+use endowire_core::insertion::Move;
 use endowire_core::scene::Scene;
 use endowire_core::vessel::NoStore;
 use endowire_core::{Error, Result};
+use endowire_verify::sequences::APART_MM;
+
+use crate::course::Course;
 
 /// Small steps, mm and rad.
 const SMALL_MM: f64 = 0.1;
 const SMALL_RAD: f64 = 0.02;
-/// How far apart tips may be, mm: without friction and with it, which leaves a device anywhere within its cones.
-const APART_MM: [f64; 2] = [0.05, 0.5];
-
-/// One way through a script.
-struct Course {
-    simulation: Simulation,
-    commands: usize,
-    iterations: u64,
-    flights: u64,
-    jumps: usize,
-    unconverged: usize,
-    seconds: f64,
-    slowest_s: f64,
-    end: Option<String>,
-}
-
-impl Course {
-    fn new(simulation: Simulation) -> Self {
-        let (commands, iterations, flights, jumps, unconverged) = (0, 0, 0, 0, 0);
-        let (seconds, slowest_s, end) = (0.0, 0.0, None);
-        Self { simulation, commands, iterations, flights, jumps, unconverged, seconds, slowest_s, end }
-    }
-
-    /// Carries out a step in equal parts, from one time to another; not once something has ended the way.
-    fn go(&mut self, moves: &[Move], times_s: Option<(f64, f64)>, parts: usize) {
-        for k in 1..=parts {
-            if self.end.is_some() {
-                return;
-            }
-            let share = |Command { advance_mm, rotate_rad }| Command {
-                advance_mm: advance_mm / parts as f64,
-                rotate_rad: rotate_rad / parts as f64,
-            };
-            let part: Vec<Move> =
-                moves.iter().map(|one| Move { command: share(one.command), ..*one }).collect();
-            let time_s = times_s.map(|(from, to)| from + (to - from) * k as f64 / parts as f64);
-            let begun = Instant::now();
-            let done = self.simulation.step_until(&part, time_s);
-            let took_s = begun.elapsed().as_secs_f64();
-            self.seconds += took_s;
-            self.slowest_s = self.slowest_s.max(took_s);
-            match done {
-                Ok(report) => {
-                    self.commands += 1;
-                    self.iterations += u64::from(report.iterations);
-                    self.flights += u64::from(report.relaxations);
-                    self.jumps += usize::from(report.jumped);
-                    self.unconverged += usize::from(!report.converged);
-                }
-                Err(error) => self.end = Some(error.to_string()),
-            }
-        }
-    }
-
-    fn tip_mm(&self) -> endowire_core::Vec3 {
-        self.simulation.shape().tip_mm().unwrap_or_default()
-    }
-}
-
 /// How many small steps moves are.
 fn parts(moves: &[Move]) -> usize {
     let each = moves
@@ -98,7 +41,7 @@ fn case(path: &Path) -> Result<bool> {
         if given.end.is_some() || small.end.is_some() {
             break;
         }
-        let apart_mm = (given.tip_mm() - small.tip_mm()).norm();
+        let apart_mm = given.apart_mm(&small);
         if apart_mm > apart.0 {
             apart = (apart_mm, given.commands);
         }

@@ -10,6 +10,7 @@
 #![allow(clippy::print_stdout, reason = "a table is what it is for")]
 
 mod cases;
+mod course;
 mod turned;
 
 use std::process::ExitCode;

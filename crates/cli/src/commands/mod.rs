@@ -10,6 +10,7 @@ mod export;
 mod felt;
 mod fluoro;
 mod new;
+mod parallel;
 mod passable;
 pub(crate) mod play;
 mod render;

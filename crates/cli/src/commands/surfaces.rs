@@ -3,8 +3,6 @@
 use std::fmt::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use endowire_verify::surfaces::{
@@ -12,6 +10,7 @@ use endowire_verify::surfaces::{
 };
 use serde::Serialize;
 
+use super::parallel::in_parallel;
 use crate::args::VerifyArgs;
 use crate::cache::Cache;
 use crate::failure::Failure;
@@ -118,41 +117,23 @@ fn verdict(document: &Document) -> Result<(), Failure> {
 
 /// Runs the cells on several threads; the rows are in the order of the cells.
 fn run_all(jobs: &[(&Surface, Cell)], args: &VerifyArgs, cache: &Cache) -> Vec<CellRow> {
-    let available = std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = args.jobs.unwrap_or(available).clamp(1, jobs.len().max(1));
-    let rows: Vec<OnceLock<CellRow>> = jobs.iter().map(|_| OnceLock::new()).collect();
-    let next = AtomicUsize::new(0);
     let bar = progress::bar(jobs.len(), "cell");
     let start = Instant::now();
     let clock = || start.elapsed().as_secs_f64();
-    let work = || {
-        while let Some((index, (surface, cell))) = take(&next, jobs) {
-            bar.set_message(cell.name_in(surface));
-            // One cell that panics must not take the others with it.
-            let row = catch_unwind(AssertUnwindSafe(|| run(surface, cell, cache, args.limit_s, &clock)));
-            let row = row.unwrap_or_else(|_| {
-                let mut row = CellRow::new(surface, cell);
-                row.end(Ending::Failed, "panicked".to_owned());
-                row
-            });
-            // Each number is taken once.
-            let _ = rows[index].set(row);
-            bar.inc(1);
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 0..threads {
-            scope.spawn(work);
-        }
+    let rows = in_parallel(jobs.len(), args.jobs, |index| {
+        let (surface, cell) = &jobs[index];
+        bar.set_message(cell.name_in(surface));
+        // One cell that panics must not take the others with it.
+        let row = catch_unwind(AssertUnwindSafe(|| run(surface, cell, cache, args.limit_s, &clock)));
+        bar.inc(1);
+        row.unwrap_or_else(|_| {
+            let mut row = CellRow::new(surface, cell);
+            row.end(Ending::Failed, "panicked".to_owned());
+            row
+        })
     });
     bar.finish_and_clear();
-    rows.into_iter().filter_map(OnceLock::into_inner).collect()
-}
-
-/// The next job that nobody has taken.
-fn take<'a, T>(next: &AtomicUsize, jobs: &'a [T]) -> Option<(usize, &'a T)> {
-    let index = next.fetch_add(1, Ordering::Relaxed);
-    jobs.get(index).map(|job| (index, job))
+    rows
 }
 
 fn surface_row(file: &SurfaceFile, surface: &Result<Surface, String>) -> SurfaceRow {

@@ -1,6 +1,5 @@
 //! `endowire verify`: the reference cases, and the stress table.
 
-use std::panic::resume_unwind;
 use std::time::Instant;
 
 use endowire_core::Result;
@@ -10,6 +9,7 @@ use endowire_verify::sequences::{self, SEQUENCES, SequenceRow};
 use endowire_verify::{FAMILIES, Row, stress};
 use serde::Serialize;
 
+use super::parallel::in_parallel;
 use crate::args::VerifyArgs;
 use crate::failure::Failure;
 use crate::output::print_json;
@@ -93,11 +93,12 @@ pub(crate) fn verify(args: &VerifyArgs) -> std::result::Result<(), Failure> {
         bar.inc(1);
     }
     bar.set_message("random commands");
-    let random = in_parallel(seeds.end, |seed| {
-        let row = sequences::run(seed);
+    let random = in_parallel(seeds.end as usize, None, |seed| {
+        let row = sequences::run(seed as u64);
         bar.inc(1);
         row
-    })?;
+    });
+    let random: Vec<SequenceRow> = random.into_iter().collect::<Result<_>>()?;
     bar.finish_and_clear();
 
     let passed = cases.iter().filter(|row| row.pass).count();
@@ -165,23 +166,6 @@ fn print_cases(document: &Document) {
         println!("{}", SequenceRow::HEAD);
         rows.iter().for_each(|row| println!("{row}"));
     }
-}
-
-/// What is run for every number below `count`, on all processors, in their order.
-fn in_parallel<T: Send>(count: u64, run: impl Fn(u64) -> Result<T> + Sync) -> Result<Vec<T>> {
-    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get) as u64;
-    let each =
-        |thread: u64| (thread..count).step_by(threads as usize).map(|k| (k, run(k))).collect::<Vec<_>>();
-    let mut all: Vec<(u64, Result<T>)> = std::thread::scope(|scope| {
-        let each = &each;
-        let started: Vec<_> = (0..threads).map(|thread| scope.spawn(move || each(thread))).collect();
-        started
-            .into_iter()
-            .flat_map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)))
-            .collect()
-    });
-    all.sort_by_key(|(k, _)| *k);
-    all.into_iter().map(|(_, done)| done).collect()
 }
 
 /// What became of random commands on several instruments.

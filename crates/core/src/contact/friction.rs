@@ -306,7 +306,7 @@ impl Friction {
 
     /// Energy that friction has taken in the step with the normal forces of its end, mJ.
     fn taken_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> f64 {
-        self.taken_mj + self.taken_by_mj(elements, state, points, |slider| slider.force_n)
+        self.taken_mj + self.rubbed_mj(elements, state, points)[1]
     }
 
     /// The least and the most that friction has taken in the step, mJ: with the normal forces of its beginning, and with those of its end.
@@ -316,33 +316,32 @@ impl Friction {
         state: &RodState,
         points: &[ContactPoint],
     ) -> (f64, f64) {
-        let at_end_mj = self.taken_mj(elements, state, points);
-        // Once slip has begun anew those of the beginning are long gone.
+        let [at_start_mj, at_end_mj] = self.rubbed_mj(elements, state, points);
+        // Once slip has begun anew the forces of the beginning are long gone.
         if self.taken_mj != 0.0 {
-            return (at_end_mj, at_end_mj);
+            let taken_mj = self.taken_mj + at_end_mj;
+            return (taken_mj, taken_mj);
         }
-        let at_start_mj = self.taken_by_mj(elements, state, points, |slider| slider.begun.1);
         (at_start_mj.min(at_end_mj), at_start_mj.max(at_end_mj))
     }
 
-    /// What friction with such normal forces takes from slip, mJ.
-    fn taken_by_mj(
-        &self,
-        elements: &[ElementData],
-        state: &RodState,
-        points: &[ContactPoint],
-        force_n: impl Fn(&Slider) -> f64,
-    ) -> f64 {
-        let each =
-            self.sliders.iter().zip(points).enumerate().filter(|(_, (slider, _))| force_n(slider) > 0.0);
-        let taken = each.map(|(index, (slider, point))| {
+    /// What friction takes from the slip that has begun last, mJ: with the normal forces of the step's beginning, and with those of its end.
+    fn rubbed_mj(&self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) -> [f64; 2] {
+        let mut sums_mj = [0.0; 2];
+        for (index, (slider, point)) in self.sliders.iter().zip(points).enumerate() {
+            let forces_n = [slider.begun.1, slider.force_n];
+            if forces_n.iter().all(|force_n| *force_n <= 0.0) {
+                continue;
+            }
             let x = point.position(elements, state);
             let slip_mm = self.slip(index, &x, point.angle(state), point.potential.radius_mm).0.norm();
             // What sticks takes nothing.
             let way_mm = phi(slip_mm, self.stick_mm) - phi(0.0, self.stick_mm);
-            self.coefficient * force_n(slider) * way_mm
-        });
-        taken.sum::<f64>()
+            for (sum_mj, force_n) in sums_mj.iter_mut().zip(forces_n) {
+                *sum_mj += self.coefficient * force_n.max(0.0) * way_mm;
+            }
+        }
+        sums_mj
     }
 
     /// Slip begins anew at `state`, with the normal forces seen there: the hand holds still, and the device slides on to where it comes

@@ -17,6 +17,7 @@ use rustc_hash::FxHashSet;
 use super::ContactSurface;
 use super::extension::left_through;
 use crate::Vec3;
+use crate::rod::Frame;
 use crate::vessel::Wall;
 
 /// Spacings of the grids, in radii of the device.
@@ -50,7 +51,7 @@ pub(crate) fn narrow_ahead(
 ) -> Option<Narrow> {
     let front = front(axis_mm, radius_mm)?;
     for spacing in SPACINGS {
-        let grid = Grid { surface, wall, front, radius_mm, spacing_mm: spacing * radius_mm };
+        let grid = Grid::new((surface, wall), front, radius_mm, spacing * radius_mm)?;
         let widest = grid.widest()?;
         if widest.radius_mm >= radius_mm {
             return None;
@@ -81,8 +82,11 @@ fn front(axis_mm: &[Vec3], radius_mm: f64) -> Option<&[Vec3]> {
 struct Grid<'a> {
     surface: &'a ContactSurface,
     wall: &'a Wall,
-    /// Places of the device from the tip to one behind the cross-section, the last but one.
-    front: &'a [Vec3],
+    /// Places of the device from the tip to the cross-section at which its front begins.
+    piece: &'a [Vec3],
+    /// The middle of that cross-section, and its triad: across it towards the tip, and two directions in it.
+    middle: Vec3,
+    frame: Frame,
     radius_mm: f64,
     spacing_mm: f64,
 }
@@ -110,7 +114,20 @@ impl PartialOrd for Way {
     }
 }
 
-impl Grid<'_> {
+impl<'a> Grid<'a> {
+    /// About a front, places from the tip to one behind its cross-section, the last but one.
+    fn new(
+        (surface, wall): (&'a ContactSurface, &'a Wall),
+        front: &'a [Vec3],
+        radius_mm: f64,
+        spacing_mm: f64,
+    ) -> Option<Self> {
+        let [piece @ .., behind] = front else { return None };
+        let [.., ahead, middle] = piece else { return None };
+        let frame = Frame::new(ahead - behind, None);
+        Some(Self { surface, wall, piece, middle: *middle, frame, radius_mm, spacing_mm })
+    }
+
     /// The narrowest place of the widest way; none where the front is not in the lumen, or where that takes too long to find.
     fn widest(&self) -> Option<Narrow> {
         let section = self.section();
@@ -127,7 +144,7 @@ impl Grid<'_> {
             if seen.len() > MOST_ASKED {
                 return None;
             }
-            for to in beside(way.to) {
+            for to in around(way.to) {
                 let x = self.place(to);
                 if self.passes_section(&at, &x, &section) || !seen.insert(to) {
                     continue;
@@ -140,15 +157,15 @@ impl Grid<'_> {
                 }
             }
         }
-        Some(Narrow { radius_mm: 0.0, place_mm: self.front[0] })
+        Some(Narrow { radius_mm: 0.0, place_mm: self.piece[0] })
     }
 
     fn place(&self, cell: Cell) -> Vec3 {
-        self.front[0] + Vec3::from(cell.map(f64::from)) * self.spacing_mm
+        self.piece[0] + Vec3::from(cell.map(f64::from)) * self.spacing_mm
     }
 
     fn cell(&self, x: &Vec3) -> Cell {
-        ((x - self.front[0]) / self.spacing_mm).map(|c| c.round() as i32).into()
+        ((x - self.piece[0]) / self.spacing_mm).map(|c| c.round() as i32).into()
     }
 
     /// How far a place is from the felt wall, at least as far as a device sees; not positive outside the lumen.
@@ -163,15 +180,10 @@ impl Grid<'_> {
         }
     }
 
-    /// The device's own piece.
-    fn piece(&self) -> &[Vec3] {
-        &self.front[..self.front.len() - 1]
-    }
-
     /// How far a place is from the front, mm, and whether that is ahead of its tip.
     fn distance_mm(&self, x: &Vec3) -> (f64, bool) {
         let mut least = (f64::INFINITY, false);
-        for (k, side) in self.piece().windows(2).enumerate() {
+        for (k, side) in self.piece.windows(2).enumerate() {
             let along = side[1] - side[0];
             let part = (x - side[0]).dot(&along) / along.norm_squared();
             let distance_mm = (x - (side[0] + along * part.clamp(0.0, 1.0))).norm();
@@ -185,42 +197,35 @@ impl Grid<'_> {
     /// The ways of no length that begin beside the front, in the lumen that it lies in.
     fn beside(&self) -> BinaryHeap<Way> {
         let mut ways = BinaryHeap::new();
-        let mut seen: FxHashSet<Cell> = self.piece().iter().map(|x| self.cell(x)).collect();
-        let mut left: Vec<Cell> = self.piece().iter().map(|x| self.cell(x)).collect();
+        let mut seen = FxHashSet::default();
+        let mut left: Vec<Cell> =
+            self.piece.iter().map(|x| self.cell(x)).filter(|to| seen.insert(*to)).collect();
         while let Some(to) = left.pop() {
             let x = self.place(to);
             let (distance_mm, ahead) = self.distance_mm(&x);
             let least_mm = self.clearance_mm(&x);
-            if ahead || distance_mm > BESIDE * self.radius_mm || self.is_behind(&x) || least_mm <= 0.0 {
+            if ahead || distance_mm > BESIDE * self.radius_mm || self.ahead_mm(&x) < 0.0 || least_mm <= 0.0 {
                 continue;
             }
             ways.push(Way { least_mm, narrowest: to, to });
-            left.extend(beside(to).filter(|to| seen.insert(*to)));
+            left.extend(around(to).filter(|to| seen.insert(*to)));
         }
         ways
     }
 
-    /// The middle of the cross-section, and two directions in it and the one across, towards the tip.
-    fn frame(&self) -> (Vec3, [Vec3; 3]) {
-        let [.., ahead, middle, behind] = self.front else { return (self.front[0], [Vec3::zeros(); 3]) };
-        let across = (ahead - behind).normalize();
-        let e = across.cross(&Vec3::ith(across.iamin(), 1.0)).normalize();
-        (*middle, [e, across.cross(&e), across])
-    }
-
-    fn is_behind(&self, x: &Vec3) -> bool {
-        let (middle, [.., across]) = self.frame();
-        (x - middle).dot(&across) < 0.0
+    /// How far a place is ahead of the cross-section, mm.
+    fn ahead_mm(&self, x: &Vec3) -> f64 {
+        (x - self.middle).dot(&self.frame.t)
     }
 
     /// The cells of the cross-section at which the front begins: what of its plane is in the lumen next to the device.
     fn section(&self) -> FxHashSet<[i32; 2]> {
-        let (middle, [e, f, _]) = self.frame();
+        let Frame { u, v, .. } = self.frame;
         let most = (AHEAD / self.spacing_mm * self.radius_mm) as i32;
         let mut seen = FxHashSet::default();
         let mut left: Vec<[i32; 2]> = vec![[0, 0]];
         while let Some([i, j]) = left.pop() {
-            let x = middle + (e * f64::from(i) + f * f64::from(j)) * self.spacing_mm;
+            let x = self.middle + (u * f64::from(i) + v * f64::from(j)) * self.spacing_mm;
             if i.abs().max(j.abs()) > most || self.clearance_mm(&x) <= 0.0 || !seen.insert([i, j]) {
                 continue;
             }
@@ -233,18 +238,19 @@ impl Grid<'_> {
 
     /// Whether a step leads through the cross-section.
     fn passes_section(&self, from: &Vec3, to: &Vec3, section: &FxHashSet<[i32; 2]>) -> bool {
-        let (middle, [e, f, across]) = self.frame();
-        let (before, after) = ((from - middle).dot(&across), (to - middle).dot(&across));
+        let (before, after) = (self.ahead_mm(from), self.ahead_mm(to));
         if (before < 0.0) == (after < 0.0) {
             return false;
         }
-        let at = from + (to - from) * (before / (before - after)) - middle;
-        section.contains(&[e, f].map(|side| (at.dot(&side) / self.spacing_mm).round() as i32))
+        let at = from + (to - from) * (before / (before - after)) - self.middle;
+        section.contains(
+            &[self.frame.u, self.frame.v].map(|side| (at.dot(&side) / self.spacing_mm).round() as i32),
+        )
     }
 }
 
 /// The cells about one.
-fn beside([i, j, k]: Cell) -> impl Iterator<Item = Cell> {
+fn around([i, j, k]: Cell) -> impl Iterator<Item = Cell> {
     (0..27).filter(|n| *n != 13).map(move |n| [i + n % 3 - 1, j + n / 3 % 3 - 1, k + n / 9 - 1])
 }
 

@@ -6,7 +6,6 @@
 
 use super::Environment;
 use super::configuration::Start;
-use super::hands::{Hand, lengths};
 use super::mesh::Mesh;
 use crate::contact::passage::{Narrow, narrow_ahead};
 use crate::device::line_mm;
@@ -30,11 +29,10 @@ pub(super) fn refuse_narrow(
     from: Start<'_>,
     commands: &[Command],
 ) -> Result<()> {
-    let mut hands = Vec::new();
-    super::hands::read(&from.state.report, &mut hands);
+    let lengths_mm = from.state.report.lengths_mm();
     for (instrument, command) in commands.iter().enumerate() {
         if command.advance_mm > 0.0
-            && let Some((narrow, device_radius_mm)) = narrow(environment, from, &hands, instrument)
+            && let Some((narrow, device_radius_mm)) = narrow(environment, from, &lengths_mm, instrument)
         {
             let position_mm = environment.wall().place(&narrow.place_mm);
             let lumen_radius_mm = narrow.radius_mm;
@@ -65,18 +63,17 @@ pub(super) fn refuse_wedged(
 fn narrow(
     environment: &Environment<'_>,
     Start { mesh, state }: Start<'_>,
-    hands: &[Hand],
+    lengths_mm: &[f64],
     instrument: usize,
 ) -> Option<(Narrow, f64)> {
     let stack = environment.surroundings.stack;
-    let (line_mm, inserted_mm) = (line_mm(lengths(hands)), hands[instrument].inserted_mm);
+    let (line_mm, inserted_mm) = (line_mm(lengths_mm.iter().copied()), lengths_mm[instrument]);
     // What is inside another one feels no wall.
-    if lengths(&hands[instrument + 1..]).any(|outer_mm| outer_mm >= inserted_mm) {
+    if lengths_mm[instrument + 1..].iter().any(|outer_mm| *outer_mm >= inserted_mm) {
         return None;
     }
     let tip_mm = line_mm - inserted_mm;
-    let lengths_mm: Vec<f64> = lengths(hands).collect();
-    let radius_mm = stack.felt_radius_mm(&lengths_mm, tip_mm);
+    let radius_mm = stack.felt_radius_mm(lengths_mm, tip_mm);
     let wall = environment.wall();
     let places = (0..FRONT).map(|k| tip_mm + k as f64 * radius_mm).take_while(|mm| *mm < line_mm);
     let axis_mm: Vec<Vec3> = places.map(|mm| wall.material(&place(mesh, &state.rod, mm))).collect();

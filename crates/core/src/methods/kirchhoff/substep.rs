@@ -203,8 +203,8 @@ impl<const C: usize> Tools<C> {
         }
         let jumps = (!near && off > 1.0) || balance.is_set_free();
         let (dissipated_mj, released_mj) = balance.lost_mj(jumps);
-        let position_mm = self.newton.neighbourhood.farthest(&after.rod);
-        let jump = jumps.then_some(Jump { released_mj, position_mm });
+        let farthest = || self.newton.neighbourhood.farthest(&after.rod);
+        let jump = jumps.then(|| Jump { released_mj, position_mm: farthest() });
         let corrections = (&start.state.correction, &mut after.correction);
         self.guess.teach(&after.rod, corrections);
         self.keep(mesh, after);

@@ -1,0 +1,59 @@
+//! Commands carried out one after the other, whole or in equal parts.
+
+use std::time::Instant;
+
+use endowire_core::insertion::{Move, Simulation};
+use endowire_verify::sequences::part_of;
+
+/// One way through commands, and what it took.
+pub(crate) struct Course {
+    pub(crate) simulation: Simulation,
+    pub(crate) commands: usize,
+    pub(crate) iterations: u64,
+    pub(crate) flights: u64,
+    pub(crate) jumps: usize,
+    pub(crate) unconverged: usize,
+    pub(crate) seconds: f64,
+    pub(crate) slowest_s: f64,
+    pub(crate) end: Option<String>,
+}
+
+impl Course {
+    pub(crate) fn new(simulation: Simulation) -> Self {
+        let (commands, iterations, flights, jumps, unconverged) = (0, 0, 0, 0, 0);
+        let (seconds, slowest_s, end) = (0.0, 0.0, None);
+        Self { simulation, commands, iterations, flights, jumps, unconverged, seconds, slowest_s, end }
+    }
+
+    /// Carries out a step in equal parts, from one time to another; not once something has ended the way.
+    pub(crate) fn go(&mut self, moves: &[Move], times_s: Option<(f64, f64)>, parts: usize) {
+        let part = part_of(moves, parts);
+        for k in 1..=parts {
+            if self.end.is_some() {
+                return;
+            }
+            let time_s = times_s.map(|(from, to)| from + (to - from) * k as f64 / parts as f64);
+            let begun = Instant::now();
+            let done = self.simulation.step_until(&part, time_s);
+            let took_s = begun.elapsed().as_secs_f64();
+            self.seconds += took_s;
+            self.slowest_s = self.slowest_s.max(took_s);
+            match done {
+                Ok(report) => {
+                    self.commands += 1;
+                    self.iterations += u64::from(report.iterations);
+                    self.flights += u64::from(report.relaxations);
+                    self.jumps += usize::from(report.jumped);
+                    self.unconverged += usize::from(!report.converged);
+                }
+                Err(error) => self.end = Some(error.to_string()),
+            }
+        }
+    }
+
+    /// Distance of its tip from that of another, mm.
+    pub(crate) fn apart_mm(&self, other: &Self) -> f64 {
+        let tip_mm = |course: &Self| course.simulation.shape().tip_mm().unwrap_or_default();
+        (tip_mm(self) - tip_mm(other)).norm()
+    }
+}
