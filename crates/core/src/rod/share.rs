@@ -3,6 +3,9 @@
 use super::element::Material;
 use super::quadrature::GAUSS;
 
+/// Shares below which a section touches an element and is not in it: as rounding leaves them of places that are the same.
+const ROUNDING: f64 = 1e-9;
+
 /// Weights of the Gauss points in the integral over a part of an element, in units of their weights in that over all of it.
 pub fn shares(from: f64, to: f64) -> [f64; 3] {
     let power = |n: i32| (to.powi(n) - from.powi(n)) / f64::from(n);
@@ -19,6 +22,10 @@ pub fn shares(from: f64, to: f64) -> [f64; 3] {
 impl Material {
     /// Adds a share of a section to what else an instrument is made of there; rest states are means, weighed by stiffness.
     pub(crate) fn add_share(&mut self, part: &Self, shares: &[f64; 3]) {
+        // A mean weighed by a stiffness of nothing is no number.
+        if shares.iter().all(|share| share.abs() < ROUNDING) {
+            return;
+        }
         for k in 0..3 {
             let (bending, torsion) = (shares[k] * part.bending[k], shares[k] * part.torsion[k]);
             let (all_bending, all_torsion) = (self.bending[k] + bending, self.torsion[k] + torsion);
@@ -31,5 +38,29 @@ impl Material {
                 (self.torsion[k] * self.rest_twist[k] + torsion * part.rest_twist[k]) / all_torsion;
             (self.bending[k], self.torsion[k]) = (all_bending, all_torsion);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_section_that_only_touches_an_element_leaves_its_material_as_it_is() {
+        let straight = Material { bending: [2.0; 3], torsion: [1.5; 3], ..Material::NONE };
+        let bent = Material { rest_curvature: [[0.1, 0.0]; 3], ..straight };
+        for from in [0.0, 0.3, 1.0] {
+            let mut sum = Material::NONE;
+            sum.add_share(&bent, &shares(from, from + 1e-17));
+            sum.add_share(&straight, &shares(0.0, 1.0));
+            assert!(sum.rest_curvature.iter().flatten().all(|curvature| *curvature == 0.0));
+            assert!(sum.bending.iter().all(|bending| (bending - 2.0).abs() < 1e-12));
+        }
+        // One that is in half of it counts by half.
+        let mut sum = Material::NONE;
+        sum.add_share(&bent, &shares(0.0, 0.5));
+        sum.add_share(&straight, &shares(0.5, 1.0));
+        let mean: f64 = (0..3).map(|k| GAUSS[k].weight * sum.bending[k] * sum.rest_curvature[k][0]).sum();
+        assert!((mean - 0.5 * 2.0 * 0.1).abs() < 1e-12, "{mean}");
     }
 }

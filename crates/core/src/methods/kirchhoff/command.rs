@@ -98,7 +98,9 @@ impl<const C: usize> Workspace<C> {
         let most = environment.options.max_iterations;
         let travel = way.travel_mm(WORK_RAD).max(1.0);
         let work = (WORK * travel) as usize;
-        let mut control = StepControl::new(work.min(WORK_OF_ONE.saturating_mul(most)), from.part_mm);
+        let has_friction = surroundings.properties.has_friction();
+        let mut control =
+            StepControl::new(work.min(WORK_OF_ONE.saturating_mul(most)), from.stride, has_friction);
         let mut moved = false;
         // Progress of the command, 0 to 1: advance and turn go together.
         let mut done = 0.0f64;
@@ -161,7 +163,7 @@ impl<const C: usize> Workspace<C> {
                 Err(_) if done >= 1.0 => break,
                 Err(lost) => {
                     // No equilibrium: if the vessel is too narrow to go on, that is told, here and below.
-                    if control.failed(part_mm) || sum.substeps > SUBSTEP_LIMIT {
+                    if control.failed(part_mm, lost) || sum.substeps > SUBSTEP_LIMIT {
                         refuse_narrow(&at_start, was, &way.commands)?;
                         return Err(Error::Computation(format!(
                             "kirchhoff: no equilibrium between {start:.3} and {target:.3} mm inserted: {lost}"
@@ -175,7 +177,7 @@ impl<const C: usize> Workspace<C> {
             refuse_narrow(&there, now.start(), &way.commands)?;
         }
         let state = now.parts().1;
-        state.part_mm = control.part_mm();
+        state.stride = control.stride();
         let report = &mut state.report;
         sum.write(report);
         report.converged = balanced;

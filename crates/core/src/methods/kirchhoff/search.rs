@@ -70,9 +70,11 @@ impl<const C: usize> Search<'_, '_, C> {
     pub(super) fn run(&mut self) -> NewtonReport {
         if self.effort == Effort::Flight {
             self.most = LONGEST;
+        }
+        if self.effort != Effort::Near {
             self.contact.hold_friction();
         }
-        if self.effort == Effort::Near {
+        if self.effort != Effort::Flight {
             let Self { newton, guess, contact, supports, elements, state, .. } = self;
             let moved = guess.active_set_step(newton, contact, supports, elements, state);
             self.iterations += usize::from(moved);
@@ -104,7 +106,7 @@ impl<const C: usize> Search<'_, '_, C> {
         }
         match self.effort {
             Effort::Near => found.stopped(StopReason::Unsettled),
-            Effort::Flight => {
+            Effort::Held | Effort::Flight => {
                 self.state.copy_from(&self.guess.other);
                 self.contact.rewind_friction();
                 self.slide()
@@ -114,7 +116,7 @@ impl<const C: usize> Search<'_, '_, C> {
 
     /// Newton's method from the state on.
     fn newton(&mut self) -> NewtonReport {
-        let most = if self.effort == Effort::Near { MOST_NEAR } else { MOST_MOVING };
+        let most = if self.effort == Effort::Flight { MOST_MOVING } else { MOST_NEAR };
         let max_iterations = most.min(self.most.saturating_sub(self.iterations));
         let options = NewtonOptions { max_iterations, tolerance: self.tolerance, ..NewtonOptions::default() };
         let found = self.newton.solve(self.elements, self.supports, self.contact, self.state, &options);

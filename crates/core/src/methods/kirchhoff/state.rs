@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::extrapolation::Correction;
 use super::hands::Hand;
+use super::step_control::Stride;
 use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce};
 use crate::device::Stack;
 use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
@@ -23,8 +24,8 @@ pub struct KirchhoffState {
     pub(super) inner_friction: Vec<InnerFriction>,
     pub(super) known: KnownPoints,
     pub(super) correction: Correction,
-    /// Longest way of the hands in the next part of a command, mm.
-    pub(super) part_mm: f64,
+    /// How the next part of a command goes.
+    pub(super) stride: Stride,
     pub(super) report: StepReport,
 }
 
@@ -61,7 +62,7 @@ impl KirchhoffState {
             inner_friction: Vec::new(),
             known: KnownPoints::default(),
             correction: Correction::default(),
-            part_mm: stack.length_mm(),
+            stride: Stride { part_mm: stack.length_mm(), held: false },
             report: StepReport { converged: true, instruments, ..StepReport::default() },
         }
     }
@@ -147,8 +148,9 @@ impl KirchhoffState {
             );
             return Err(other("known", self.known.len(), mend));
         }
-        if !(self.part_mm.is_finite() && self.part_mm > 0.0) {
-            return Err(other("part_mm", self.part_mm, "a way that is longer than 0"));
+        let part_mm = self.stride.part_mm;
+        if !(part_mm.is_finite() && part_mm > 0.0) {
+            return Err(other("stride.part_mm", part_mm, "a way that is longer than 0"));
         }
         if !self.correction.fits(n, sets) {
             return Err(other(

@@ -1,7 +1,5 @@
 //! One sub-step: a guess of where the device will be, and Newton's method from there.
 
-use std::borrow::Cow;
-
 use super::balance::Balance;
 use super::carried::{Passage, WallWork};
 use super::configuration::{Configuration, Start};
@@ -15,20 +13,15 @@ use super::{Environment, inner_friction, meshed};
 use crate::contact::{SETTLED, WallContact};
 use crate::methods::{Jump, StepReport};
 use crate::rod::{RodState, Supports};
-use crate::solve::{NewtonReport, StopReason};
-
-/// What is the matter where a prediction is on the other side of the wall, …
-const BEYOND: &str = "the device would be predicted beyond the wall";
-/// … where an equilibrium is, …
-const PASSED: &str = "the device would pass through the wall";
-/// … and where energy came from nowhere.
-const UNBALANCED: &str = "more energy is stored and taken by friction than was put in";
+use crate::solve::StopReason;
 
 /// How a part of a command is gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Effort {
-    /// To the equilibrium near the prediction.
+    /// To the equilibrium near the prediction, friction following the wall's forces.
     Near,
+    /// The same, friction held to the wall's forces where the part begins; then the device slides to where it rests.
+    Held,
     /// To where the device comes to rest, however far away.
     Flight,
 }
@@ -54,7 +47,35 @@ pub(super) struct Found {
 }
 
 /// Why a part came to nothing.
-pub(super) type Lost = Cow<'static, str>;
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Lost {
+    /// The prediction is on the other side of the wall.
+    Beyond,
+    /// What was found is.
+    Passed,
+    /// Energy came from nowhere.
+    Unbalanced,
+    /// No equilibrium was found, and that residual over force scale is left.
+    Unsolved(StopReason, f64),
+}
+
+impl Lost {
+    /// Whether friction that follows the wall's forces may be what was in the way.
+    pub(super) fn is_by_friction(self) -> bool {
+        matches!(self, Self::Unsolved(StopReason::Unsettled | StopReason::MaxIterations, _))
+    }
+}
+
+impl std::fmt::Display for Lost {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Beyond => f.write_str("the device would be predicted beyond the wall"),
+            Self::Passed => f.write_str("the device would pass through the wall"),
+            Self::Unbalanced => f.write_str("more energy is stored and taken by friction than was put in"),
+            Self::Unsolved(reason, residual) => write!(f, "{reason} (residual {residual:.1e})"),
+        }
+    }
+}
 
 /// How far a part goes, and how.
 #[derive(Debug, Clone, Copy)]
@@ -136,10 +157,10 @@ impl<const C: usize> Tools<C> {
         let mut contact = WallContact::new(environment.wall(), &mesh.points, cache, friction, softest_nmm2);
         let slid_mj = contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
         let inside = self.guess.choose(&mut contact, (start, &*mesh, &mut *rod));
-        let near = effort == Effort::Near;
+        let near = effort != Effort::Flight;
         if near && !inside {
             self.counters.add(&contact.count());
-            return Err(BEYOND.into());
+            return Err(Lost::Beyond);
         }
         contact.rooms(&mesh.elements, rod, &mut self.guess.room_mm);
         self.newton.neighbourhood.begin(rod, &self.guess.room_mm);
@@ -170,14 +191,16 @@ impl<const C: usize> Tools<C> {
         // What has come to rest is in equilibrium as exactly as friction is with the wall elsewhere.
         let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
         let wrong = match (near, &found) {
-            (true, found) if !found.converged => Some(what_is_left(found)),
-            (true, _) if !balanced => Some(StopReason::Unsettled.to_string().into()),
-            (true, _) if off > 1.0 => Some(StopReason::Left.to_string().into()),
-            (false, found) if !found.residual.is_finite() => Some(what_is_left(found)),
+            (true, found) if !found.converged => Some(Lost::Unsolved(found.reason, found.residual)),
+            (true, found) if !balanced => Some(Lost::Unsolved(StopReason::Unsettled, found.residual)),
+            (true, found) if off > 1.0 => Some(Lost::Unsolved(StopReason::Left, found.residual)),
+            (false, found) if !found.residual.is_finite() => {
+                Some(Lost::Unsolved(found.reason, found.residual))
+            }
             _ => {
                 contact.know_whole_base(&mesh.elements);
                 let passes = contact.passes_through(&mesh.elements, rod);
-                passes.then_some(PASSED.into())
+                passes.then_some(Lost::Passed)
             }
         };
         if wrong.is_none() {
@@ -199,7 +222,7 @@ impl<const C: usize> Tools<C> {
         let balance = Balance::new(surroundings.stack, reports, by_wall, rubbed_mj);
         let lacks = balance.lacks();
         if near && lacks {
-            return Err(UNBALANCED.into());
+            return Err(Lost::Unbalanced);
         }
         let jumps = (!near && off > 1.0) || balance.is_set_free();
         let (dissipated_mj, released_mj) = balance.lost_mj(jumps);
@@ -210,11 +233,6 @@ impl<const C: usize> Tools<C> {
         self.keep(mesh, after);
         Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, lacks, off, jump })
     }
-}
-
-/// What is left over where no equilibrium was found.
-fn what_is_left(found: &NewtonReport) -> Lost {
-    format!("{} (residual {:.1e})", found.reason, found.residual).into()
 }
 
 /// The farthest way of a hand, mm.
