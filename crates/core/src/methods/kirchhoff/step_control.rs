@@ -6,11 +6,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::substep::{Effort, Found, Lost};
+use super::substep::{Effort, Found};
 
 /// Longest way of the hands in which the device moves from a fold, mm: how exactly the place of a fold is known.
 const FOLD_MM: f64 = 0.05;
-/// Longest part, mm, in which friction is held where what was found was far: longer ones mostly fail since they are too long.
+/// Longest part in which friction is held for the first time, mm: longer ones mostly fail since they are too long.
 const HELD_MM: f64 = 0.5;
 /// Shortest way of the hands in which it moves, mm.
 const LEAST_MM: f64 = 1e-3;
@@ -93,12 +93,11 @@ impl StepControl {
     }
 
     /// A part of this length has come to nothing. Returns whether that is all.
-    pub(super) fn failed(&mut self, part_mm: f64, why: Lost) -> bool {
+    pub(super) fn failed(&mut self, part_mm: f64) -> bool {
         if self.flight_mm.is_some() {
             return true;
         }
-        let may_hold = self.has_friction && !self.stride.held && self.budget > 0;
-        if may_hold && (part_mm <= HELD_MM || why.is_by_friction()) {
+        if self.has_friction && !self.stride.held && part_mm <= HELD_MM && self.budget > 0 {
             self.stride = Stride { part_mm, held: true };
         } else if part_mm <= FOLD_MM || self.budget == 0 {
             self.flight_mm = Some(part_mm.min(FOLD_MM));
@@ -123,7 +122,6 @@ impl StepControl {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solve::StopReason;
 
     fn control(part_mm: f64) -> StepControl {
         StepControl::new(100, Stride { part_mm, held: false }, false)
@@ -146,7 +144,7 @@ mod tests {
     fn what_is_far_is_halved_and_what_is_much_nearer_doubled() {
         let mut control = control(10.0);
         assert_eq!(control.next(4.0), (Effort::Near, 4.0));
-        assert!(!control.failed(4.0, Lost::Beyond));
+        assert!(!control.failed(4.0));
         assert_eq!(control.next(4.0), (Effort::Near, 2.0));
         control.succeeded(2.0, &found(0.5));
         assert_eq!(control.next(2.0), (Effort::Near, 2.0));
@@ -159,35 +157,31 @@ mod tests {
     #[test]
     fn friction_is_held_in_short_parts_until_the_device_need_not_slide() {
         let mut control = StepControl { has_friction: true, ..control(1.0) };
-        assert!(!control.failed(1.0, Lost::Beyond));
+        assert!(!control.failed(1.0));
         assert_eq!(control.next(1.0), (Effort::Near, 0.5));
-        assert!(!control.failed(0.5, Lost::Beyond));
+        assert!(!control.failed(0.5));
         assert_eq!(control.next(1.0), (Effort::Held, 0.5));
         control.succeeded(0.5, &Found { slides: 2, ..found(0.1) });
         assert_eq!(control.next(1.0), (Effort::Held, 1.0));
         control.succeeded(1.0, &found(0.5));
         assert_eq!(control.next(1.0), (Effort::Near, 1.0));
-        // Longer ones where friction was in the way.
-        assert!(!control.failed(1.0, Lost::Unsolved(StopReason::Unsettled, 0.1)));
-        assert_eq!(control.next(1.0), (Effort::Held, 1.0));
-        control.succeeded(1.0, &found(0.5));
         // What it does not find either is a fold.
-        assert!(!control.failed(FOLD_MM, Lost::Beyond) && !control.failed(FOLD_MM, Lost::Beyond));
+        assert!(!control.failed(FOLD_MM) && !control.failed(FOLD_MM));
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
     }
 
     #[test]
     fn at_a_fold_it_moves_once_and_goes_on_as_before() {
         let mut control = control(0.06);
-        assert!(!control.failed(0.06, Lost::Beyond));
+        assert!(!control.failed(0.06));
         assert_eq!(control.next(1.0).0, Effort::Near);
-        assert!(!control.failed(0.03, Lost::Beyond));
+        assert!(!control.failed(0.03));
         assert_eq!(control.next(1.0), (Effort::Flight, 0.03));
         // With energy that nobody put in it goes less far.
         assert!(control.can_shorten(0.03) && !control.can_shorten(LEAST_MM));
         control.shorten(0.03);
         assert!(matches!(control.next(1.0), (Effort::Near, part_mm) if part_mm <= 0.015));
-        assert!(!control.failed(0.015, Lost::Beyond));
+        assert!(!control.failed(0.015));
         control.succeeded(0.015, &found(7.0));
         assert_eq!(control.next(1.0).0, Effort::Near);
     }
@@ -196,12 +190,12 @@ mod tests {
     fn in_a_jam_it_moves_on_and_what_does_not_come_to_rest_is_the_end() {
         let mut control = control(1.0);
         control.took(200);
-        assert!(!control.failed(1.0, Lost::Beyond));
+        assert!(!control.failed(1.0));
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
         control.succeeded(FOLD_MM, &found(0.01));
         assert_eq!(control.next(1.0), (Effort::Flight, 2.0 * FOLD_MM));
         control.succeeded(2.0 * FOLD_MM, &found(0.9));
         assert_eq!(control.next(1.0), (Effort::Flight, FOLD_MM));
-        assert!(control.failed(FOLD_MM, Lost::Beyond));
+        assert!(control.failed(FOLD_MM));
     }
 }

@@ -59,13 +59,6 @@ pub(super) enum Lost {
     Unsolved(StopReason, f64),
 }
 
-impl Lost {
-    /// Whether friction that follows the wall's forces may be what was in the way.
-    pub(super) fn is_by_friction(self) -> bool {
-        matches!(self, Self::Unsolved(StopReason::Unsettled | StopReason::MaxIterations, _))
-    }
-}
-
 impl std::fmt::Display for Lost {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
