@@ -37,6 +37,16 @@ fn the_centre_line_of_a_surface_is_a_table_that_makes_the_surface_again() {
     let again = text(&folder.path().join("again.stl")).to_owned();
     let report = told(&vessel(&["generate", &table, "--out", &again, "--edge-mm", "2", "--json"]));
     assert_eq!((&report["sound"], report["openings"].as_array().unwrap().len()), (&true.into(), 2));
+    // It begins where devices come in: in an arch at its narrower end, from the groin.
+    let arch = text(&assets().join("vessels/aortic_arch.stl")).to_owned();
+    for (file, inlet) in [(tube(), 0), (arch, 1)] {
+        let report = told(&vessel(&["check", &file, "--json"]));
+        assert_eq!(report["inlet"], inlet, "{file}");
+        assert!(report["openings"][inlet]["centre_mm"][2].as_f64().unwrap().abs() < 1.0, "{file}");
+        let lines = String::from_utf8(vessel(&["check", &file]).stdout).unwrap();
+        let told = lines.lines().find(|line| line.contains("devices come in here")).unwrap();
+        assert!(told.contains(&format!("opening {inlet}")), "{told}");
+    }
     let lines = String::from_utf8(vessel(&["centreline", &tube()]).stdout).unwrap();
     assert!(lines.contains("opening 1") && lines.contains("least radius mm"), "{lines}");
 }
@@ -67,9 +77,22 @@ fn a_thin_wire_passes_and_a_thick_one_is_blocked() {
     assert_eq!(named["passage"], thin["passage"]);
     let blocked = passage(&thick, &["--to", "0,0,50", "--from", "1"]);
     assert_eq!(blocked["passage"], "blocked");
+    assert_eq!((blocked["reaches_mm"].as_f64(), &thin["reaches_mm"]), (Some(0.0), &thin["length_mm"]));
     let lines =
         String::from_utf8(vessel(&["passable", &tube(), "--device", &wire(), "--to", "1"]).stdout).unwrap();
     assert!(lines.contains("narrowest") && lines.contains("sharpest bend"), "{lines}");
+    let pictures = [&wire(), &thick].map(|device| {
+        let path = folder.path().join("way.png");
+        passage(device, &["--to", "1", "--picture", text(&path)]);
+        let decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()));
+        let mut reader = decoder.read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        pixels
+    });
+    // The way of what is blocked has the colour of no room, and that of what passes has it in the mark of its narrowest place alone.
+    let red = pictures.map(|pixels| pixels.chunks(3).filter(|rgb| *rgb == [200, 30, 30]).count());
+    assert!(red[1] > 5 * red[0] && red[0] > 0, "{red:?}");
 }
 
 #[test]
@@ -84,6 +107,7 @@ fn ends_that_are_none_are_refused_by_their_flag() {
         (vec!["passable", "--to", "nowhere"], "--centreline FILE"),
         (vec!["passable", "--to", "opening 2", "--centreline", &table], "did you mean \"opening 1\""),
         (vec!["passable", "--to", "1", "--force-n", "0"], "--force-n = 0: must be positive"),
+        (vec!["passable", "--to", "1", "--picture", "way.svg"], "--picture way.svg: name a file .png"),
     ] {
         let file = tube();
         let mut given = vec![arguments[0], &file];
