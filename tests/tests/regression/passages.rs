@@ -21,7 +21,8 @@ fn what_is_said_is_what_is_done_and_of_others_it_is_not() {
     // The twin: what is said of one and done by another that is told something else.
     let arrives = |row: &Row| [Passage::Passes, Passage::Tight].contains(&row.told.passage);
     for (told, done) in rows.iter().flat_map(|told| rows.iter().map(move |done| (told, done))) {
-        if arrives(told) != arrives(done) {
+        // What is tight may stop at any of its tight places.
+        if told.told.passage != Passage::Tight && arrives(told) != arrives(done) {
             let against = disagreement(&told.told, &told.question.device, &done.pushed);
             assert!(against.is_some(), "{told}\n{done}");
         }
