@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Draws the pictures of README.md and of chapters 0, 5 and 15 of the guide anew, in assets/pictures; a test runs it and compares
+# Draws the pictures of README.md and of chapters 0, 1, 5 and 15 of the guide anew, in assets/pictures; a test runs it and compares
 # (crates/cli/tests/cli/pictures.rs). That of chapter 16 is a curve of learning:
 # `python crates/python/examples/learn_arch.py plot out/learn --picture assets/pictures/learning.png`.
 #
@@ -27,6 +27,10 @@ sed -n '/^```json file=hand.jsonl$/,/^```$/p' docs/guide/0-first-five-minutes.md
 scene=$PWD/assets/scenes/arch_carotid.toml
 (cd "$out" && "$endowire" play "$scene" --headless --inputs hand.jsonl --record played.toml >/dev/null)
 cp "$out/play.png" "$to"
+
+# Chapter 1: the way of a catheter.
+"$endowire" vessel passable assets/vessels/hepatic.stl --centreline assets/vessels/hepatic.csv --device assets/devices/catheter_4f_vertebral.toml \
+  --to "right hepatic" --picture "$to"/passable.png >/dev/null
 
 # README.md: the last frames of a run.
 "$endowire" run assets/scenes/aortic_arch.toml --out "$out/arch" --quiet

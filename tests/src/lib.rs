@@ -2,6 +2,7 @@
 
 pub mod bent_rod;
 pub mod damage;
+pub mod passages;
 pub mod readers;
 pub mod spoiled;
 pub mod sweep;

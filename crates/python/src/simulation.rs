@@ -110,7 +110,7 @@ impl Simulation {
     /// Instruments at the mouth of a sheath in a vessel, nothing inserted.
     ///
     /// The sheath is at an `opening` of the vessel, `depth_mm` inside it (1 unless told), or at `position_mm` with a `direction`; told
-    /// nothing, at the opening at the root of a generated vessel, and at the largest of any other. `wall` has the keys of `[vessel.wall]`
+    /// nothing, at the inlet of the vessel's centre line, and of one without at the lowest of its wide openings. `wall` has the keys of `[vessel.wall]`
     /// of a scene file (modulus_n_per_mm2, friction, region), `method` those of `[method]` (name, element_mm, …). `sheath_friction_n` is the
     /// friction of the sheath's valve, N, and `sheath_friction` the coefficient in its mouth.
     ///
@@ -143,8 +143,12 @@ impl Simulation {
         };
         let opening = opening.map(|opening| natural("opening", opening)).transpose()?;
         let nowhere = opening.is_none() && position_mm.is_none() && direction.is_none();
+        let inlet = || {
+            let vessel = vessel.get();
+            vessel.inlet().or_else(|| vessel.wall.inlet().map(|opening| opening.index)).unwrap_or(0)
+        };
         let arguments = Arguments {
-            opening: opening.or_else(|| nowhere.then(|| vessel.get().inlet().unwrap_or(0))),
+            opening: opening.or_else(|| nowhere.then(inlet)),
             depth_mm,
             position_mm,
             direction,

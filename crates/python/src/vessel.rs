@@ -216,7 +216,8 @@ impl Vessel {
     /// `branches` are those of it. Radii are of the largest spheres inside; points lie where the sphere is the largest of its cross-section
     /// (ways of least ∫ ds/radius: Antiga et al., IEEE Transactions on Medical Imaging 22, 2003).
     ///
-    /// `start` is the number of an opening, or a place inside in mm; the widest opening without it. `ends` are such numbers and places; all
+    /// `start` is the number of an opening, or a place inside in mm; without it the inlet,
+    /// the lowest of the openings of at least 0.4 of the widest one's radius. `ends` are such numbers and places; all
     /// other openings without them. Openings that no way leads to are no targets.
     ///
     /// Raises InputError naming `start` or `ends` for an opening that is not there, a place outside, and one that no way leads to.
@@ -228,7 +229,7 @@ impl Vessel {
         let found = interruptible(py, move || ExtractedCentreline::of(&wall, from, &to))?;
         let found = found.map_err(|error| exception(as_argument(error)))?;
         let inlet = match from {
-            None => Some(0),
+            None => self.wall.inlet().map(|opening| opening.index),
             Some(CentrelineEnd::Opening(opening)) => Some(opening),
             Some(CentrelineEnd::Place(_)) => None,
         };
@@ -243,8 +244,8 @@ impl Vessel {
         document::write(py, &branches)
     }
 
-    /// Whether an instrument can follow the way to a target, which takes milliseconds: a dictionary of `passage` ("passes", "tight", "blocked",
-    /// "short"), length_mm, the points `narrowest` and `sharpest`, and `way`, all points: arc_mm, position_mm, lumen_radius_mm,
+    /// Whether an instrument can follow the way to a target, which takes hundredths of a second: a dictionary of `passage` ("passes", "tight",
+    /// "blocked", "short"), length_mm, taken_mm (the instrument that lies in it), reaches_mm (how far the tip comes), the points `narrowest` and `sharpest`, and `way`, all points: arc_mm, position_mm, lumen_radius_mm,
     /// device_radius_mm, clearance_mm, bend_radius_mm (of the centre line), cut_radius_mm (what the room makes of it), bears_radius_mm (what
     /// the instrument takes without force: bending that costs at most `force_n`); radii of what is straight are None.
     ///

@@ -170,10 +170,11 @@ def test_vessels_are_made_checked_and_written(vessel, tmp_path):
 def test_a_centre_line_is_found_in_a_surface_and_devices_are_held_against_it(vessel, wire):
     surface = endowire.Vessel.from_arrays(vessel.vertices_mm, vessel.triangles)
     assert surface.centreline is None and surface.branches == []
+    end = f"opening {1 - vessel.inlet}"
     with pytest.raises(endowire.InputError, match="no centre line"):
-        surface.passable(wire, "opening 1")
+        surface.passable(wire, end)
     found = surface.with_centreline()
-    assert found.inlet == 0 and list(found.targets) == ["opening 1"]
+    assert found.inlet == vessel.inlet and list(found.targets) == [end]
     (branch,) = found.branches
     assert abs(branch["length_mm"] - sum(np.linalg.norm(np.diff(vessel.centreline[:, :3], axis=0), axis=1))) < 1.0
     assert np.abs(found.centreline[:, 3] - 4.0).max() < 0.3
@@ -184,7 +185,7 @@ def test_a_centre_line_is_found_in_a_surface_and_devices_are_held_against_it(ves
             surface.with_centreline(start, ends)
     thin = endowire.Instrument.uniform(500.0, 0.4, 10.0)
     thick = endowire.Instrument.uniform(500.0, 4.5, 10.0)
-    assert found.passable(thin, "opening 1")["passage"] == "passes"
-    told = found.passable(thick, found.targets["opening 1"])
+    assert found.passable(thin, end)["passage"] == "passes"
+    told = found.passable(thick, found.targets[end])
     assert told["passage"] == "blocked" and told["narrowest"]["clearance_mm"] < 0.0
     assert pickle.loads(pickle.dumps(found)).targets == found.targets

@@ -103,7 +103,18 @@ impl Journal {
             file.sync_data().map_err(failed)?;
             *synced = Instant::now();
         }
-        Ok(())
+        self.check_there(file)
+    }
+
+    /// Fails where the journal is not in its place any more: a file that is open takes what is written to it, also without a name.
+    fn check_there(&self, file: &File) -> Result<()> {
+        match (file.metadata(), self.path.metadata()) {
+            (Ok(own), Ok(there)) if there.len() == own.len() => Ok(()),
+            _ => Err(Error::Computation(format!(
+                "{}: was removed or replaced while the sweep went on, and its rows with it: carry it out again",
+                self.path.display()
+            ))),
+        }
     }
 }
 

@@ -98,7 +98,8 @@ impl Sweep {
         }
         rows.sort_by_key(|row| row.run);
         let path = order.folder.join(order.shard.file_name("parquet"));
-        table::write(&path, self.columns(), &rows)?;
+        // What cannot be written now could be when the folder was made.
+        table::write(&path, self.columns(), &rows).map_err(|error| Error::Computation(error.to_string()))?;
         Ok(Told { progress, earlier, table: Some(path) })
     }
 

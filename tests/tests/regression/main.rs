@@ -6,6 +6,7 @@ mod arrival;
 mod catalogue;
 mod damaged_files;
 mod instruments;
+mod passages;
 mod robust_insertion;
 mod sequences;
 mod state;

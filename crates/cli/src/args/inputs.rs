@@ -113,7 +113,7 @@ pub(crate) struct GenerateArgs {
 pub(crate) struct CentrelineArgs {
     /// Surface mesh (STL, OBJ, PLY, VTP or VTK)
     pub(crate) file: PathBuf,
-    /// Where the centre line begins: the number of an opening, or a place x,y,z inside in mm; the widest opening, 0, if absent
+    /// Where the centre line begins: the number of an opening, or a place x,y,z inside in mm; the inlet that `vessel check` tells if absent
     #[arg(long, value_name = "END", value_parser = parse_end, allow_hyphen_values = true)]
     pub(crate) from: Option<CentrelineEnd>,
     /// Where it leads: the number of an opening, or a place x,y,z inside in mm (repeatable); all other openings if absent
@@ -139,7 +139,7 @@ pub(crate) struct PassableArgs {
     /// Where its tip goes: the number of an opening, a place x,y,z inside in mm, or with --centreline the name of a target
     #[arg(long, value_name = "END", allow_hyphen_values = true)]
     pub(crate) to: String,
-    /// Where it comes in: the number of an opening, or a place x,y,z inside in mm; the widest opening, 0, if absent
+    /// Where it comes in: the number of an opening, or a place x,y,z inside in mm; the inlet that `vessel check` tells if absent
     #[arg(long, value_name = "END", value_parser = parse_end, allow_hyphen_values = true, conflicts_with = "centreline")]
     pub(crate) from: Option<CentrelineEnd>,
     /// Centre-line table of the surface, with names; the way is found in the surface if absent
@@ -148,6 +148,9 @@ pub(crate) struct PassableArgs {
     /// Force along the device, N, that is taken for none: a section takes a bend if pushing it in costs no more
     #[arg(long, default_value_t = NO_FORCE_N, value_name = "N", allow_negative_numbers = true)]
     pub(crate) force_n: f64,
+    /// Draw the way through the vessel, coloured by its room, and room and bends along it (.png)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) picture: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) frame: CoordinateArgs,
     /// Print what was found as one JSON document on stdout

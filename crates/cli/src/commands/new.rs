@@ -41,7 +41,7 @@ pub(crate) fn new(args: &NewArgs) -> Result<(), Failure> {
     };
     std::fs::create_dir_all(folder).map_err(|e| refuse(e.to_string()))?;
     let vessel = vessel(&args.vessel, args.frame.into(), folder)?;
-    let opening = entry(&vessel.wall).ok_or_else(|| {
+    let opening = vessel.wall.inlet().ok_or_else(|| {
         Failure::Input(format!("{}: has no opening for a sheath: cut its ends off", args.vessel.display()))
     })?;
     let name =
@@ -97,13 +97,6 @@ fn vessel(wanted: &Path, frame: SurfaceFrame, folder: &Path) -> Result<Vessel, F
         table += &format!("\naxes = {:?}", axes.name());
     }
     Ok(Vessel { table, wall, pose: "AP" })
-}
-
-/// The opening that instruments come in by: the lowest of the wide ones, as from the groin.
-fn entry(wall: &Wall) -> Option<&Opening> {
-    let widest_mm = wall.openings().iter().map(|opening| opening.radius_mm).fold(0.0, f64::max);
-    let wide = wall.openings().iter().filter(|opening| opening.radius_mm >= 0.4 * widest_mm);
-    wide.min_by(|a, b| a.centre_mm.z.total_cmp(&b.centre_mm.z))
 }
 
 fn scene(name: &str, vessel: &Vessel, entry: &Opening) -> String {

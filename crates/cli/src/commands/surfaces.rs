@@ -5,6 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Instant;
 
+use endowire_core::vessel::PatientAxes;
 use endowire_verify::surfaces::{
     Cell, CellRow, Ending, Summary, Surface, SurfaceFile, cells, matches, run, surfaces_in,
 };
@@ -31,6 +32,9 @@ struct Document {
 struct SurfaceRow {
     name: String,
     unit_mm: f64,
+    /// As the sidecar says; absent where it does not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    axes: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     refused: Option<String>,
     triangles: usize,
@@ -139,7 +143,8 @@ fn run_all(jobs: &[(&Surface, Cell)], args: &VerifyArgs, cache: &Cache) -> Vec<C
 fn surface_row(file: &SurfaceFile, surface: &Result<Surface, String>) -> SurfaceRow {
     let mut row = SurfaceRow {
         name: file.name.clone(),
-        unit_mm: file.unit_mm,
+        unit_mm: file.frame.unit_mm,
+        axes: file.frame.axes.map(PatientAxes::name),
         refused: surface.as_ref().err().cloned(),
         triangles: 0,
         openings: 0,

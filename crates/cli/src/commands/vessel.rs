@@ -125,8 +125,11 @@ fn text(document: &Document) -> String {
         let [x, y, z] = opening.centre_mm;
         let [u, v, w] = opening.direction;
         lines.push(format!(
-            "    opening {:<3}        radius {:.2} mm at [{x:.2}, {y:.2}, {z:.2}], outward [{u:.2}, {v:.2}, {w:.2}], {} edges",
-            opening.index, opening.radius_mm, opening.edges
+            "    opening {:<3}        radius {:.2} mm at [{x:.2}, {y:.2}, {z:.2}], outward [{u:.2}, {v:.2}, {w:.2}], {} edges{}",
+            opening.index,
+            opening.radius_mm,
+            opening.edges,
+            if r.inlet == Some(opening.index) { "; devices come in here unless told" } else { "" }
         ));
     }
     if r.openings.len() > OPENINGS_LISTED {

@@ -10,6 +10,7 @@ use super::whole::remove;
 /// The list of a call that goes on.
 pub(crate) struct Manifest {
     folder: PathBuf,
+    path: PathBuf,
     file: File,
     names: BTreeSet<String>,
 }
@@ -25,8 +26,15 @@ impl Manifest {
                 removed += 1;
             }
         }
-        let file = File::create(path)?;
-        Ok((Self { folder: folder.to_owned(), file, names: BTreeSet::new() }, removed))
+        let file = File::create(&path)?;
+        Ok((Self { folder: folder.to_owned(), path, file, names: BTreeSet::new() }, removed))
+    }
+
+    /// Whether the list is in its place yet: a file that is open takes what is written to it, also without a name.
+    pub(crate) fn is_there(&self) -> bool {
+        let own = self.file.metadata().map(|own| own.len());
+        let there = self.path.metadata().map(|there| there.len());
+        own.ok().zip(there.ok()).is_some_and(|(own, there)| own == there)
     }
 
     /// Notes a file of the folder; to be called before it is written, or a call that is killed would leave it for ever. Refuses a name that

@@ -37,8 +37,18 @@ fn the_centre_line_of_a_surface_is_a_table_that_makes_the_surface_again() {
     let again = text(&folder.path().join("again.stl")).to_owned();
     let report = told(&vessel(&["generate", &table, "--out", &again, "--edge-mm", "2", "--json"]));
     assert_eq!((&report["sound"], report["openings"].as_array().unwrap().len()), (&true.into(), 2));
+    // It begins where devices come in: in an arch at its narrower end, from the groin.
+    let arch = text(&assets().join("vessels/aortic_arch.stl")).to_owned();
+    for (file, inlet) in [(tube(), 1), (arch, 1)] {
+        let report = told(&vessel(&["check", &file, "--json"]));
+        assert_eq!(report["inlet"], inlet, "{file}");
+        assert!(report["openings"][inlet]["centre_mm"][2].as_f64().unwrap().abs() < 1.0, "{file}");
+        let lines = String::from_utf8(vessel(&["check", &file]).stdout).unwrap();
+        let told = lines.lines().find(|line| line.contains("devices come in here")).unwrap();
+        assert!(told.contains(&format!("opening {inlet}")), "{told}");
+    }
     let lines = String::from_utf8(vessel(&["centreline", &tube()]).stdout).unwrap();
-    assert!(lines.contains("opening 1") && lines.contains("least radius mm"), "{lines}");
+    assert!(lines.contains("opening 0") && lines.contains("least radius mm"), "{lines}");
 }
 
 #[test]
@@ -56,20 +66,33 @@ fn a_thin_wire_passes_and_a_thick_one_is_blocked() {
             .collect();
         told(&vessel(&given))
     };
-    let thin = passage(&wire(), &["--to", "1"]);
+    let thin = passage(&wire(), &["--to", "0"]);
     assert!(["passes", "tight"].contains(&thin["passage"].as_str().unwrap()), "{thin}");
     assert!(
         (thin["sharpest"]["bend_radius_mm"].as_f64().unwrap() - 45.0).abs() < 3.0,
         "{}",
         thin["sharpest"]
     );
-    let named = passage(&wire(), &["--to", "opening 1", "--centreline", &table]);
+    let named = passage(&wire(), &["--to", "opening 0", "--centreline", &table]);
     assert_eq!(named["passage"], thin["passage"]);
     let blocked = passage(&thick, &["--to", "0,0,50", "--from", "1"]);
     assert_eq!(blocked["passage"], "blocked");
+    assert_eq!((blocked["reaches_mm"].as_f64(), &thin["reaches_mm"]), (Some(0.0), &thin["length_mm"]));
     let lines =
-        String::from_utf8(vessel(&["passable", &tube(), "--device", &wire(), "--to", "1"]).stdout).unwrap();
+        String::from_utf8(vessel(&["passable", &tube(), "--device", &wire(), "--to", "0"]).stdout).unwrap();
     assert!(lines.contains("narrowest") && lines.contains("sharpest bend"), "{lines}");
+    let pictures = [&wire(), &thick].map(|device| {
+        let path = folder.path().join("way.png");
+        passage(device, &["--to", "0", "--picture", text(&path)]);
+        let decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()));
+        let mut reader = decoder.read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut pixels).unwrap();
+        pixels
+    });
+    // The way of what is blocked has the colour of no room, and that of what passes has it in the mark of its narrowest place alone.
+    let red = pictures.map(|pixels| pixels.chunks(3).filter(|rgb| *rgb == [200, 30, 30]).count());
+    assert!(red[1] > 5 * red[0] && red[0] > 0, "{red:?}");
 }
 
 #[test]
@@ -82,8 +105,9 @@ fn ends_that_are_none_are_refused_by_their_flag() {
         (vec!["centreline", "--to", "100,0,0"], "--to = [100, 0, 0]: is not inside"),
         (vec!["centreline", "--to", "1,2"], "a place x,y,z in mm"),
         (vec!["passable", "--to", "nowhere"], "--centreline FILE"),
-        (vec!["passable", "--to", "opening 2", "--centreline", &table], "did you mean \"opening 1\""),
-        (vec!["passable", "--to", "1", "--force-n", "0"], "--force-n = 0: must be positive"),
+        (vec!["passable", "--to", "opening 2", "--centreline", &table], "did you mean \"opening 0\""),
+        (vec!["passable", "--to", "0", "--force-n", "0"], "--force-n = 0: must be positive"),
+        (vec!["passable", "--to", "0", "--picture", "way.svg"], "--picture way.svg: name a file .png"),
     ] {
         let file = tube();
         let mut given = vec![arguments[0], &file];

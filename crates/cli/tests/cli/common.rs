@@ -4,6 +4,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{ChildStderr, Command, Output, Stdio};
+use std::time::Duration;
 
 use serde_json::Value;
 
@@ -37,6 +38,17 @@ pub(crate) fn scene_text(name: &str, changes: &[(&str, &str)]) -> String {
 /// The curved tube pushed into for 30 mm, with small pictures.
 pub(crate) const SHORT: [(&str, &str); 2] =
     [("advance_mm = 200.0", "advance_mm = 30.0"), ("size_px = [640, 640]", "size_px = [96, 64]")];
+
+/// Looks again and again, for a minute at most, until something is so.
+pub(crate) fn wait_until(mut done: impl FnMut() -> bool) {
+    for _ in 0..6000 {
+        if done() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("waited for a minute");
+}
 
 /// What the program says on stderr.
 pub(crate) fn said(output: &Output) -> String {

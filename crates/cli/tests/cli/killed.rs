@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};
-use std::time::Duration;
 
-use crate::common::{endowire, said, scene_text};
+use crate::common::{endowire, said, scene_text, wait_until};
 use serde_json::Value;
 
 /// A run in the curved tube of so many steps that it never ends by itself, without frames unless `views` asks for them.
@@ -40,16 +39,6 @@ fn render(recording: &Path) -> Output {
 fn rows(out: &Path) -> usize {
     std::fs::read(out.join("steps.csv"))
         .map_or(0, |text| text.iter().filter(|byte| **byte == b'\n').count().saturating_sub(1))
-}
-
-fn wait_until(mut done: impl FnMut() -> bool) {
-    for _ in 0..6000 {
-        if done() {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    panic!("waited for a minute");
 }
 
 /// Ends a run as a power failure would, without a last word.

@@ -30,3 +30,4 @@ mod surfaces;
 mod sweep;
 mod terminal;
 mod told;
+mod vanished;

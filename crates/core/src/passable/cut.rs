@@ -1,73 +1,181 @@
-//! The least bent way through a tube: how far the lumen lets a device cut bends.
+//! The least bent way through a tube: how far the lumen lets a device cut bends, and how long it is then.
 //!
-//! Least ∫κ² of a line through evenly spaced points, each of which may be so far from its place of the centre line: a convex problem, by
-//! the alternating direction method of multipliers (Boyd et al., Foundations and Trends in Machine Learning 3, 2011, sections 3.4.1 and 5).
+//! Least ½∫κ² ds of a line through points, each of which may be so far from its place of the centre line, across it: what bends a uniform
+//! wire in a smooth wall, and in a wide bend lies on its outer side, where it is longer and less bent. By the method of Levenberg and
+//! Marquardt (Nocedal and Wright, Numerical Optimization, 2006, section 10.3), with springs in the place of the wall.
 
+use nalgebra::Matrix3;
+
+use crate::Vec3;
 use crate::banded::{BandMatrix, Factor};
-use crate::{Error, Result, Vec3};
 
-/// Weight of the condition that the line is in the tube, over that of bending between neighbouring points: where it begins, the factor by
-/// which it changes, and after how many rounds it may.
-const PENALTY: f64 = 1e-5;
-const CHANGE: f64 = 2.0;
-const CHANGE_ROUNDS: usize = 20;
-/// It changes where the line is so many times farther from the tube than the tube's places move in a round, or the other way round.
-const UNBALANCED: f64 = 5.0;
-/// Rounds at most, and how small both are in the end, over the distance of points.
-const ROUNDS: usize = 3000;
-const NEAR: f64 = 1e-5;
+/// Points move in planes across the centre line's chord over so many times their room: planes along a sharp corner then meet beyond the room, and
+/// leave a line the way through the corner's inner side.
+const CHORD_ROOMS: f64 = 1.3;
+/// Stiffness of the wall, over that of bending between neighbouring points: the line gives way to it by some thousandths of their distance.
+const WALL: f64 = 10.0;
+/// Damping at first, and how much less and more it becomes after a step that lowers the energy and one that does not; at least, where long
+/// lines move as a whole, and at most, where no step is left.
+const DAMPING: f64 = 1e-3;
+const DAMPING_CHANGE: f64 = 8.0;
+const DAMPING_RANGE: [f64; 2] = [1e-12, 1e8];
+/// A step so short, over the distance of points, is the last, if there is no more damping than this.
+const NEAR: f64 = 1e-3;
+const UNDAMPED: f64 = 1e-6;
+/// Steps at most.
+const STEPS: usize = 500;
 
-/// The line nearest to straight whose points are at most `room_mm` from these, `spacing_mm` apart. At least four points, an even number of them.
-pub(super) fn least_bent(points: &[Vec3], room_mm: &[f64], spacing_mm: f64) -> Result<Vec<Vec3>> {
-    let count = points.len();
-    // Second differences, squared and summed. Two points make a block of the matrix.
-    let mut matrix = BandMatrix::<12>::zeros(3 * count);
-    for k in 1..count - 1 {
-        let weights = [(k - 1, 1.0), (k, -2.0), (k + 1, 1.0)];
-        for (n, (i, a)) in weights.into_iter().enumerate() {
-            for (j, b) in &weights[n..] {
-                (0..3).for_each(|axis| matrix.add(3 * i + axis, 3 * j + axis, a * b));
+/// The least bent line whose points are at most `room_mm` beside these, `spacing_mm` apart. At least four points, an even number of them.
+pub(super) fn least_bent(points: &[Vec3], room_mm: &[f64], spacing_mm: f64) -> Vec<Vec3> {
+    let last = points.len() - 1;
+    let along = |k: usize| {
+        let reach = 1 + (CHORD_ROOMS * room_mm[k] / spacing_mm) as usize;
+        // As far to both sides, so that the chord is along the line also next to its ends.
+        let reach = reach.min(k.max(1)).min((last - k).max(1));
+        let chord = points[(k + reach).min(last)] - points[k.saturating_sub(reach)];
+        chord.try_normalize(f64::MIN_POSITIVE).unwrap_or_else(Vec3::z)
+    };
+    let along: Vec<Vec3> = (0..points.len()).map(along).collect();
+    let tube = Tube { points, along: &along, room_mm, spacing_mm };
+    let mut line = points.to_vec();
+    let mut energy = tube.energy(&line);
+    let mut damping = DAMPING;
+    let mut factor = Factor::new(3 * points.len());
+    for _ in 0..STEPS {
+        let (mut matrix, downhill) = tube.slopes(&line);
+        let mut added = 0.0;
+        let step = loop {
+            (0..3 * points.len()).for_each(|row| matrix.add(row, row, damping - added));
+            added = damping;
+            // What rounding leaves of the softest ways of a long line may be nothing.
+            if factor.factor(&matrix).is_ok() {
+                let mut step = downhill.clone();
+                factor.solve(&mut step);
+                let steps = step.chunks_exact(3).map(Vec3::from_column_slice);
+                let moved: Vec<Vec3> = line.iter().zip(steps).map(|(x, step)| x + step).collect();
+                let lower = tube.energy(&moved);
+                if lower < energy {
+                    (line, energy) = (moved, lower);
+                    break step;
+                }
             }
-        }
-    }
-    let mut penalty = PENALTY;
-    (0..3 * count).for_each(|row| matrix.add(row, row, penalty));
-    let mut factor = Factor::new(3 * count);
-    let failed = |error| Error::Computation(format!("the least bent way: {error}"));
-    factor.factor(&matrix).map_err(failed)?;
-
-    let (mut inside, mut price) = (points.to_vec(), vec![Vec3::zeros(); count]);
-    let mut line = inside.clone();
-    let mut unknowns = vec![0.0; 3 * count];
-    for round in 1..=ROUNDS {
-        for (wanted, (x, u)) in unknowns.chunks_exact_mut(3).zip(inside.iter().zip(&price)) {
-            wanted.copy_from_slice(((x - u) * penalty).as_slice());
-        }
-        factor.solve(&mut unknowns);
-        line.iter_mut()
-            .zip(unknowns.chunks_exact(3))
-            .for_each(|(x, found)| *x = Vec3::from_column_slice(found));
-        let (mut outside_mm, mut moved_mm) = (0.0_f64, 0.0_f64);
-        for k in 0..count {
-            let wanted = line[k] + price[k];
-            let within = points[k] + (wanted - points[k]).cap_magnitude(room_mm[k]);
-            outside_mm = outside_mm.max((line[k] - within).norm());
-            moved_mm = moved_mm.max((within - inside[k]).norm());
-            inside[k] = within;
-            price[k] = wanted - within;
-        }
-        if outside_mm.max(moved_mm) <= NEAR * spacing_mm {
+            damping *= DAMPING_CHANGE;
+            if damping > DAMPING_RANGE[1] {
+                return line;
+            }
+        };
+        let longest_mm = step.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+        if longest_mm <= NEAR * spacing_mm && damping <= UNDAMPED {
             break;
         }
-        let change = match round % CHANGE_ROUNDS {
-            0 if outside_mm > UNBALANCED * moved_mm => CHANGE,
-            0 if moved_mm > UNBALANCED * outside_mm => 1.0 / CHANGE,
-            _ => continue,
-        };
-        (0..3 * count).for_each(|row| matrix.add(row, row, penalty * (change - 1.0)));
-        penalty *= change;
-        price.iter_mut().for_each(|price| *price /= change);
-        factor.factor(&matrix).map_err(failed)?;
+        damping = (damping / DAMPING_CHANGE).max(DAMPING_RANGE[0]);
     }
-    Ok(line)
+    line
+}
+
+/// What a line is in.
+struct Tube<'a> {
+    points: &'a [Vec3],
+    /// Across these the points of a line move.
+    along: &'a [Vec3],
+    room_mm: &'a [f64],
+    spacing_mm: f64,
+}
+
+/// A point of a line whose sides are these, towards the point and on from it.
+struct Corner {
+    lengths_mm: [f64; 2],
+    tangents: [Vec3; 2],
+    /// Mean of both lengths, mm.
+    mean_mm: f64,
+    /// By what the turn of the tangent is multiplied, so that half of its square is the energy, in units of a point's distance cubed.
+    scale: f64,
+}
+
+impl Corner {
+    fn turn(&self) -> Vec3 {
+        self.tangents[1] - self.tangents[0]
+    }
+
+    /// Derivatives of the scaled turn with respect to both sides.
+    fn derivatives(&self) -> [Matrix3<f64>; 2] {
+        let turn = self.turn();
+        [0, 1].map(|side| {
+            let (t, length_mm) = (self.tangents[side], self.lengths_mm[side]);
+            let sign = [-1.0, 1.0][side];
+            let across = (Matrix3::identity() - t * t.transpose()) * (sign / length_mm);
+            // A longer side is less bent by the same turn.
+            (across - turn * t.transpose() * (0.25 / self.mean_mm)) * self.scale
+        })
+    }
+}
+
+impl Tube<'_> {
+    fn corner(&self, line: &[Vec3], k: usize) -> Corner {
+        let sides = [line[k + 1] - line[k], line[k + 2] - line[k + 1]];
+        // Points that meet have no direction, and a great energy.
+        let lengths_mm = sides.map(|side| side.norm().max(f64::MIN_POSITIVE.sqrt()));
+        let tangents = [sides[0] / lengths_mm[0], sides[1] / lengths_mm[1]];
+        let mean_mm = 0.5 * (lengths_mm[0] + lengths_mm[1]);
+        Corner { lengths_mm, tangents, mean_mm, scale: self.spacing_mm * (self.spacing_mm / mean_mm).sqrt() }
+    }
+
+    /// How far a point is from its place: the direction along, by how much along it, and across it.
+    fn beside(&self, line: &[Vec3], k: usize) -> (Vec3, f64, Vec3) {
+        let along = self.along[k];
+        let offset = line[k] - self.points[k];
+        let along_mm = offset.dot(&along);
+        (along, along_mm, offset - along * along_mm)
+    }
+
+    /// Of bending and springs.
+    fn energy(&self, line: &[Vec3]) -> f64 {
+        let bent = (0..line.len() - 2).map(|k| {
+            let corner = self.corner(line, k);
+            (corner.turn() * corner.scale).norm_squared()
+        });
+        let held = (0..line.len()).map(|k| {
+            let (_, along_mm, across) = self.beside(line, k);
+            let beyond_mm = (across.norm() - self.room_mm[k]).max(0.0);
+            WALL * (along_mm * along_mm + beyond_mm * beyond_mm)
+        });
+        0.5 * (bent.sum::<f64>() + held.sum::<f64>())
+    }
+
+    /// Its matrix by Gauss and Newton, and its negative gradient. Two points make a block of the matrix.
+    fn slopes(&self, line: &[Vec3]) -> (BandMatrix<12>, Vec<f64>) {
+        let mut matrix = BandMatrix::<12>::zeros(3 * line.len());
+        let mut downhill = vec![0.0; 3 * line.len()];
+        let mut add = |i: usize, j: usize, block: &Matrix3<f64>| {
+            for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
+                let (row_at, column_at) = (3 * i + row, 3 * j + column);
+                if row_at <= column_at {
+                    matrix.add(row_at, column_at, block[(row, column)]);
+                }
+            }
+        };
+        let mut pull = |k: usize, force: Vec3| (0..3).for_each(|axis| downhill[3 * k + axis] += force[axis]);
+        for k in 0..line.len() - 2 {
+            let corner = self.corner(line, k);
+            let [before, after] = corner.derivatives();
+            let each = [-before, before - after, after];
+            for (i, a) in each.iter().enumerate() {
+                pull(k + i, -(a.transpose() * corner.turn()) * corner.scale);
+                each.iter().enumerate().skip(i).for_each(|(j, b)| add(k + i, k + j, &(a.transpose() * b)));
+            }
+        }
+        for k in 0..line.len() {
+            let (along, along_mm, across) = self.beside(line, k);
+            add(k, k, &(along * along.transpose() * WALL));
+            pull(k, -along * (WALL * along_mm));
+            let (off_mm, room_mm) = (across.norm(), self.room_mm[k]);
+            if off_mm > room_mm {
+                let out = across / off_mm;
+                let round = Matrix3::identity() - along * along.transpose() - out * out.transpose();
+                add(k, k, &((out * out.transpose() + round * (1.0 - room_mm / off_mm)) * WALL));
+                pull(k, -out * (WALL * (off_mm - room_mm)));
+            }
+        }
+        (matrix, downhill)
+    }
 }

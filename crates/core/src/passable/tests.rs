@@ -29,11 +29,17 @@ fn wire(radius_mm: f64, stiffness: f64) -> Device {
 
 #[test]
 fn a_narrowing_lets_pass_what_is_thinner() {
-    for (radius_mm, passage) in [(0.4, Passage::Passes), (0.48, Passage::Tight), (0.52, Passage::Blocked)] {
+    for (radius_mm, passage) in
+        [(0.4, Passage::Passes), (0.48, Passage::Tight), (0.515, Passage::Tight), (0.56, Passage::Blocked)]
+    {
         let found = passable(&narrowing(), &wire(radius_mm, 10.0), NO_FORCE_N).unwrap();
         assert_eq!(found.passage, passage, "{radius_mm}: {:?}", found.narrowest);
         assert!((found.narrowest.arc_mm - 50.0).abs() < 1.0, "{:?}", found.narrowest);
         assert!((found.narrowest.clearance_mm - (0.5 - radius_mm)).abs() < 0.08, "{:?}", found.narrowest);
+        // What is blocked comes to where the lumen, and what the wall may be off, is as wide as the device.
+        let reaches_mm =
+            if passage == Passage::Blocked { 50.0 - 10.0 * (0.56 / 1.05 - 0.5) / 1.5 } else { 100.0 };
+        assert!((found.reaches_mm - reaches_mm).abs() < 0.3, "{radius_mm}: {}", found.reaches_mm);
     }
     // A thick shaft that stays before the narrow place holds nothing up, and one that must go in does.
     let shaft = |tip_mm: f64| {
@@ -41,8 +47,9 @@ fn a_narrowing_lets_pass_what_is_thinner() {
         passable(&narrowing(), &Device::new(sections).unwrap(), NO_FORCE_N).unwrap().passage
     };
     assert_eq!([shaft(60.0), shaft(40.0)], [Passage::Passes, Passage::Blocked]);
-    let short = Device::uniform(99.0, 0.3, 10.0).unwrap();
-    assert_eq!(passable(&narrowing(), &short, NO_FORCE_N).unwrap().passage, Passage::Short);
+    let short = passable(&narrowing(), &Device::uniform(80.0, 0.3, 10.0).unwrap(), NO_FORCE_N).unwrap();
+    assert_eq!(short.passage, Passage::Short);
+    assert!((short.reaches_mm - 80.0).abs() < 0.1, "{}", short.reaches_mm);
 }
 
 #[test]
@@ -59,8 +66,31 @@ fn the_room_lets_a_device_cut_a_bend() {
     assert!((wide.cut_radius_mm / expected_mm - 1.0).abs() < 0.05, "{wide:?} {expected_mm}");
     assert!((wide.bend_radius_mm / bend_mm - 1.0).abs() < 0.1, "{wide:?}");
     // A bend by little is straight for a wire that has room.
-    let slight = sharpest(&bend(30.0, 5.0, 3.0));
+    let slight = sharpest(&bend(30.0, 3.0, 4.0));
     assert!(slight.cut_radius_mm > 1e4 && slight.bend_radius_mm < 100.0, "{slight:?}");
+}
+
+#[test]
+fn a_sharp_corner_in_a_wide_lumen_is_cut() {
+    // An artery of 4 mm leaves one of 11 mm at a right angle, as tables of anatomies have it.
+    let points = [(0.0, 0.0, 11.0), (0.0, 60.0, 11.0), (14.0, 60.0, 4.0), (60.0, 60.0, 4.0)];
+    let way = points.map(|(x, z, radius_mm)| (Vec3::new(x, 0.0, z), radius_mm)).to_vec();
+    let found = passable(&CentrelinePath::new(way).unwrap(), &wire(0.3, 1.0), NO_FORCE_N).unwrap();
+    assert!(found.sharpest.cut_radius_mm > 8.0, "{:?}", found.sharpest);
+}
+
+#[test]
+fn a_device_lies_on_the_outer_side_of_a_wide_bend_and_is_longer_there() {
+    let (bend_mm, room_mm) = (33.0, 13.0);
+    let way = bend(bend_mm, 180.0, room_mm);
+    let found = passable(&way, &wire(0.01, 1.0), NO_FORCE_N).unwrap();
+    // Half a circle about the outer side; a little less, as a wire cuts where the bend begins and ends.
+    let longer_mm = found.taken_mm - found.length_mm;
+    assert!((0.75..1.0).contains(&(longer_mm / (std::f64::consts::PI * room_mm))), "{longer_mm}");
+    assert!((bend_mm..bend_mm + room_mm).contains(&found.sharpest.cut_radius_mm), "{:?}", found.sharpest);
+    // So one of the centre line's length is too short.
+    let short = Device::uniform(found.length_mm, 0.01, 1.0).unwrap();
+    assert_eq!(passable(&way, &short, NO_FORCE_N).unwrap().passage, Passage::Short);
 }
 
 #[test]

@@ -49,6 +49,8 @@ pub struct CheckReport {
     pub stray_edges: usize,
     /// The loops of open edges.
     pub openings: Vec<OpeningReport>,
+    /// The number of the opening that devices come in by unless told ([`Wall::inlet`]).
+    pub inlet: Option<usize>,
     /// Pairs of openings of like size that face each other within a radius: a vessel that is cut through there.
     pub facing_openings: Vec<[usize; 2]>,
     /// Edges of more than two triangles.
@@ -183,6 +185,7 @@ pub fn check_with(surface: &SurfaceMesh, unit_mm: f64, septum_mm: f64) -> Result
                 edges: o.boundary.len(),
             })
             .collect(),
+        inlet: wall.inlet().map(|opening| opening.index),
         facing_openings: opening::facing(wall.openings()),
         non_manifold_edges,
         flipped_triangles: report.triangles_flipped,

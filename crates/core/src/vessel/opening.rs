@@ -12,6 +12,8 @@ const MOST_BEYOND_MM: f64 = 32.0;
 const LEAST_BEYOND_MM: f64 = 3.0;
 /// What is drawn out of an opening keeps so many of its radii free about its middle.
 const FREE_RADII: f64 = 1.1;
+/// Devices come in by an opening of at least this part of the widest one's radius: narrower ones are branches.
+const TRUNK: f64 = 0.4;
 
 /// An open end of a wall: one closed loop of edges that belong to a single triangle each.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,6 +75,13 @@ impl Opening {
         let next = self.boundary.iter().cycle().skip(1);
         mesh.triangles.extend(self.boundary.iter().zip(next).map(|(&a, &b)| [a, b, centre]));
     }
+}
+
+/// The opening that devices come in by, as [`Wall::inlet`](super::Wall::inlet) says.
+pub(super) fn inlet(openings: &[Opening]) -> Option<&Opening> {
+    let widest_mm = openings.iter().map(|opening| opening.radius_mm).fold(0.0, f64::max);
+    let trunks = openings.iter().filter(|opening| opening.radius_mm >= TRUNK * widest_mm);
+    trunks.min_by(|a, b| a.centre_mm.z.total_cmp(&b.centre_mm.z))
 }
 
 /// Shortens what may be drawn out beyond the openings of `mesh` to where it meets nothing.

@@ -22,7 +22,11 @@ impl Cell {
         line(format_args!("# {}", self.name_in(surface)));
         line(format_args!("name = \"surface_cell\"\n\n[vessel]"));
         line(format_args!("file = {}", toml::Value::from(path.to_string_lossy().into_owned())));
-        line(format_args!("unit_mm = {:?}\n\n[vessel.wall]", surface.unit_mm));
+        line(format_args!("unit_mm = {:?}", surface.frame.unit_mm));
+        if let Some(axes) = surface.frame.axes {
+            line(format_args!("axes = {:?}", axes.name()));
+        }
+        line(format_args!("\n[vessel.wall]"));
         line(format_args!(
             "modulus_n_per_mm2 = {:?}\nfriction = {:?}",
             self.modulus_n_per_mm2, self.friction
@@ -59,21 +63,42 @@ impl Cell {
 mod tests {
     use super::*;
     use crate::surfaces::{cells, surfaces_in};
+    use endowire_core::Vec3;
     use endowire_core::insertion::script_commands;
     use endowire_core::scene::Scene;
-    use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, anatomy};
+    use endowire_core::vessel::{GeneratedWall, NoStore, PatientAxes, Resolution, SurfaceMesh, anatomy};
+
+    /// A mesh in VTK's older format.
+    fn vtk(mesh: &SurfaceMesh) -> String {
+        let mut text = "# vtk DataFile Version 3.0\na tube\nASCII\nDATASET POLYDATA\n".to_owned();
+        text += &format!("POINTS {} double\n", mesh.vertices_mm.len());
+        mesh.vertices_mm.iter().for_each(|v| text += &format!("{} {} {}\n", v.x, v.y, v.z));
+        text += &format!("POLYGONS {} {}\n", mesh.triangles.len(), 4 * mesh.triangles.len());
+        mesh.triangles.iter().for_each(|[a, b, c]| text += &format!("3 {a} {b} {c}\n"));
+        text
+    }
 
     #[test]
     fn the_scene_of_a_cell_is_the_cell() {
         let made =
             GeneratedWall::new(&anatomy::tree("straight_tube").unwrap(), Resolution::EdgeMm(2.0)).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        made.wall.mesh().write(&folder.path().join("tube.stl")).unwrap();
+        std::fs::write(folder.path().join("tube.vtk"), vtk(made.wall.mesh())).unwrap();
+        std::fs::write(folder.path().join("tube.toml"), "axes = \"RAS\"").unwrap();
         let surface = Surface::read(&surfaces_in(folder.path()).unwrap()[0], &NoStore).unwrap();
+        // x and y of LPS have the other sign: the front is another side than the back.
+        let turned =
+            |mesh: &SurfaceMesh| mesh.vertices_mm.iter().map(|v| Vec3::new(-v.x, -v.y, v.z)).collect();
+        let [given, there]: [Vec<Vec3>; 2] =
+            [turned(made.wall.mesh()), surface.wall.mesh().vertices_mm.clone()];
+        let apart_mm =
+            |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        assert!(apart_mm(&given, &there) < 1e-9 && apart_mm(&made.wall.mesh().vertices_mm, &there) > 1.0);
         for cell in cells(surface.places.len(), false) {
             let path = folder.path().join("cell.toml");
             std::fs::write(&path, cell.scene(&surface).unwrap()).unwrap();
             let scene = Scene::read(&path).unwrap();
+            assert_eq!(scene.vessel.axes, Some(PatientAxes::Ras));
             let place = &surface.places[cell.wire];
             let device = scene.device().unwrap();
             assert_eq!(device, place.wire.device(surface.length_mm).unwrap());

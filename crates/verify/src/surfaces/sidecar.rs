@@ -6,6 +6,7 @@ use serde::Deserialize;
 
 use endowire_core::input::{from_toml, parse_toml};
 use endowire_core::scene::SheathSpec;
+use endowire_core::vessel::{PatientAxes, SurfaceFrame, SurfaceMesh};
 use endowire_core::{Error, Result};
 
 /// A number, or several.
@@ -30,6 +31,8 @@ impl OneOrMore {
 #[serde(deny_unknown_fields, default)]
 pub struct Sidecar {
     unit_mm: Option<OneOrMore>,
+    /// Axes of the file, `LPS` or `RAS`; as its header says, or LPS, if absent.
+    axes: Option<PatientAxes>,
     /// `[sheath]`: `opening` (and `depth_mm`), or `position_mm` and `direction`, as in a scene.
     pub sheath: Option<SheathSpec>,
     /// Length to insert, mm.
@@ -92,14 +95,11 @@ pub struct SurfaceFile {
     pub path: PathBuf,
     /// File name, with `@UNIT` where the sidecar gives several units.
     pub name: String,
-    /// Millimetres per unit.
-    pub unit_mm: f64,
+    /// How its coordinates are meant.
+    pub frame: SurfaceFrame,
     /// What is said of it.
     pub sidecar: Sidecar,
 }
-
-/// Extensions of surface files.
-const EXTENSIONS: [&str; 3] = ["stl", "obj", "ply"];
 
 /// The surfaces of a folder in the order of their names, with their sidecars.
 ///
@@ -110,14 +110,16 @@ pub fn surfaces_in(folder: &Path) -> Result<Vec<SurfaceFile>> {
     let mut paths = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        if extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str())) {
+        if SurfaceMesh::is_named_by(&path) {
             paths.push(path);
         }
     }
     paths.sort();
     if paths.is_empty() {
-        return Err(Error::content(folder, "holds no surface: give a folder of .stl, .obj or .ply files"));
+        return Err(Error::content(
+            folder,
+            "holds no surface: give a folder of .stl, .obj, .ply, .vtp or .vtk files",
+        ));
     }
     let mut files = Vec::new();
     for path in paths {
@@ -131,7 +133,8 @@ pub fn surfaces_in(folder: &Path) -> Result<Vec<SurfaceFile>> {
         let units = sidecar.units_mm();
         for &unit_mm in &units {
             let name = if units.len() > 1 { format!("{name}@{unit_mm}") } else { name.clone() };
-            files.push(SurfaceFile { path: path.clone(), name, unit_mm, sidecar: sidecar.clone() });
+            let frame = SurfaceFrame { unit_mm, axes: sidecar.axes };
+            files.push(SurfaceFile { path: path.clone(), name, frame, sidecar: sidecar.clone() });
         }
     }
     Ok(files)
@@ -145,21 +148,25 @@ mod tests {
     fn surfaces_come_in_order_with_what_is_said_of_them() {
         let folder = tempfile::tempdir().unwrap();
         assert!(surfaces_in(folder.path()).unwrap_err().to_string().contains("holds no surface"));
-        for name in ["b.obj", "a.STL", "notes.txt"] {
+        for name in ["b.obj", "a.STL", "c.vtp", "d.vtk", "notes.txt"] {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
         let said = |text: &str| std::fs::write(folder.path().join("b.toml"), text).unwrap();
-        said("unit_mm = [1, 3.0]\nlength_mm = 20.0\ndevice_radius_mm = 0.3\n[sheath]\nopening = 2");
+        said(
+            "unit_mm = [1, 3.0]\naxes = \"RAS\"\nlength_mm = 20.0\ndevice_radius_mm = 0.3\n[sheath]\nopening = 2",
+        );
         let files = surfaces_in(folder.path()).unwrap();
         let names: Vec<&str> = files.iter().map(|f| f.name.as_str()).collect();
-        assert_eq!(names, ["a.STL", "b.obj@1", "b.obj@3"]);
-        assert_eq!(files[2].unit_mm, 3.0);
+        assert_eq!(names, ["a.STL", "b.obj@1", "b.obj@3", "c.vtp", "d.vtk"]);
+        assert_eq!(files[2].frame, SurfaceFrame { unit_mm: 3.0, axes: Some(PatientAxes::Ras) });
+        assert_eq!(files[3].frame, 1.0.into());
         assert_eq!(files[2].sidecar.radii_mm(), Some(vec![0.3]));
         for (text, at_fault) in [
             ("unit_mm = []", "unit_mm"),
             ("device_radius_mm = -1.0", "device_radius_mm"),
             ("lenght_mm = 1.0", "did you mean `length_mm`"),
             ("length_mm = 0.0", "length_mm"),
+            ("axes = \"RSA\"", "axes"),
             ("unit_mm = [1, 2]\n[sheath]\nposition_mm = [0, 0, 0]\ndirection = [0, 0, 1]", "one unit_mm"),
         ] {
             said(text);

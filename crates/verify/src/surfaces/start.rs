@@ -12,7 +12,7 @@ use endowire_core::vessel::{Wall, WallQuery};
 pub enum Found {
     /// It was given.
     Given,
-    /// The largest opening that admits the device; its number.
+    /// The wall's inlet, or the largest opening that admits the device; its number.
     Opening(usize),
     /// Somewhere inside: there is no opening to enter.
     Inside,
@@ -49,11 +49,11 @@ fn room_mm(wall: &Wall, query: &WallQuery, sheath: &Sheath) -> Option<f64> {
     inside.then_some(room)
 }
 
-/// The largest opening that a device of `radius_mm` fits into.
+/// The wall's inlet, or if a device of `radius_mm` does not fit into it the largest opening that it fits into.
 pub(super) fn at_opening(wall: &Wall, query: &WallQuery, radius_mm: f64) -> Option<(Sheath, Found)> {
-    for opening in wall.openings().iter().take(OPENINGS_TRIED) {
+    for opening in wall.inlet().into_iter().chain(wall.openings().iter().take(OPENINGS_TRIED)) {
         if opening.radius_mm < radius_mm {
-            return None;
+            continue;
         }
         // The usual depth first; an opening cut askew needs more.
         for depth_mm in [1.0, opening.radius_mm, 2.0 * opening.radius_mm] {

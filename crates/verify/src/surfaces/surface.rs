@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use crate::crossing::CrossingTest;
 use endowire_core::contact::{ContactSurface, WallProperties};
 use endowire_core::insertion::Sheath;
-use endowire_core::vessel::{Conditioning, NoStore, SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore};
+use endowire_core::vessel::{
+    Conditioning, NoStore, SurfaceFrame, SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore,
+};
 use endowire_core::{Error, Result};
 
 use super::start::{Found, at_opening, inside};
@@ -38,8 +40,8 @@ pub struct Surface {
     pub name: String,
     /// File.
     pub path: PathBuf,
-    /// Millimetres per unit of the file.
-    pub unit_mm: f64,
+    /// How the coordinates of the file are meant.
+    pub frame: SurfaceFrame,
     /// The wall to insert into.
     pub wall: Wall,
     /// The triangles as they were given, before any repair.
@@ -64,7 +66,7 @@ impl Surface {
     /// # Errors
     /// A file that cannot be read or repaired, a sheath that cannot be meant.
     pub fn read(file: &SurfaceFile, store: &dyn WallStore) -> Result<Self> {
-        let mesh = SurfaceMesh::read(&file.path, file.unit_mm)?;
+        let mesh = SurfaceMesh::read(&file.path, file.frame)?;
         let wall = store
             .wall(&WallRecipe::Repaired { surface: &mesh })
             .map_err(|e| Error::content(&file.path, e.to_string()))?;
@@ -77,7 +79,7 @@ impl Surface {
         let mut surface = Self {
             name: file.name.clone(),
             path: file.path.clone(),
-            unit_mm: file.unit_mm,
+            frame: file.frame,
             given: CrossingTest::new(&mesh),
             felt: CrossingTest::new(even.mesh()),
             size_mm,

@@ -184,6 +184,23 @@ impl<'a> Studio<'a> {
 
     /// Draws a moment and writes what is wanted of it.
     pub(super) fn draw(&mut self, still: &Still) -> Result<(), Failure> {
+        let drawn = self.draw_all(still);
+        self.check_there()?;
+        drawn
+    }
+
+    /// Fails where the folder of the frames has gone, which is the reason then for whatever else has failed.
+    fn check_there(&self) -> Result<(), Failure> {
+        if self.plan.manifest.is_there() {
+            return Ok(());
+        }
+        Err(Failure::Computation(format!(
+            "{}: was removed or replaced while frames were drawn, and those before with it: draw them again",
+            self.plan.folder.display()
+        )))
+    }
+
+    fn draw_all(&mut self, still: &Still) -> Result<(), Failure> {
         let views = self.plan.pushed.views(still.shape, still.inserted_mm);
         let orbited = match self.plan.args.orbit.filter(|_| self.plan.spec.wants(View::ThreeD)) {
             Some(orbit_deg) => Some(self.orbited(orbit_deg, &views, still)?),
@@ -303,6 +320,15 @@ impl<'a> Studio<'a> {
 
     /// Ends animation and series.
     pub(super) fn finish(mut self) -> Result<Written, Failure> {
+        let ended = self.end();
+        self.check_there()?;
+        ended?;
+        let renderer = self.planes.first().map(|plane| plane.renderer.backend().to_owned());
+        let (renderer, folder) = (renderer.unwrap_or_default(), self.plan.folder);
+        Ok(Written { renderer, folder, files: self.files, went: None })
+    }
+
+    fn end(&mut self) -> Result<(), Failure> {
         if let (Some(animation), Some(path)) = (self.animation.take(), &self.plan.args.animate) {
             animation.finish()?;
             self.files.push(path.clone());
@@ -319,9 +345,7 @@ impl<'a> Studio<'a> {
                 self.plan.args.turn.unwrap_or(0.0) / self.plan.frames.max(2).saturating_sub(1) as f64;
             self.files.extend(write_dicom(&self.planes, path, step_deg, &self.plan.pace)?);
         }
-        let renderer = self.planes.first().map(|plane| plane.renderer.backend().to_owned());
-        let (renderer, folder) = (renderer.unwrap_or_default(), self.plan.folder);
-        Ok(Written { renderer, folder, files: self.files, went: None })
+        Ok(())
     }
 }
 

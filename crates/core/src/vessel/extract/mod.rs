@@ -53,7 +53,7 @@ pub struct CentrelineBranch {
 }
 
 impl ExtractedCentreline {
-    /// Finds the centre line of `wall` from one end to others: from the widest opening (number 0) without `from`, to all other openings
+    /// Finds the centre line of `wall` from one end to others: from its inlet ([`Wall::inlet`]) without `from`, to all other openings
     /// without `to`.
     ///
     /// Radii are those of the largest spheres in the lumen about each point. Lines are the ways along which the integral of 1/radius is least
@@ -64,7 +64,8 @@ impl ExtractedCentreline {
     /// for a surface without the openings that are needed.
     pub fn of(wall: &Wall, from: Option<CentrelineEnd>, to: &[CentrelineEnd]) -> Result<Self> {
         let lumen = Lumen::new(wall)?;
-        let first = from.unwrap_or(CentrelineEnd::Opening(0));
+        let inlet = wall.inlet().map_or(0, |opening| opening.index);
+        let first = from.unwrap_or(CentrelineEnd::Opening(inlet));
         let root = end(&lumen, &first, "from")?;
         let all: Vec<CentrelineEnd> = match to {
             [] => {

@@ -89,6 +89,11 @@ fn format_of(path: &Path) -> Result<Format> {
 }
 
 impl SurfaceMesh {
+    /// Whether the extension of a file's name is that of a format that is read.
+    pub fn is_named_by(path: &Path) -> bool {
+        format_of(path).is_ok()
+    }
+
     /// Reads an STL (ASCII or binary), OBJ, PLY (ASCII or binary), VTP or legacy VTK (all encodings) surface. Polygons are cut into
     /// fans of triangles, strips into their triangles; faces of fewer than three corners become triangles without area, which the
     /// repair removes and counts. The surface is returned as it is in the file, in millimetres and in the axes of scenes;

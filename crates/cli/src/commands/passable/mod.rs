@@ -1,5 +1,10 @@
 //! `endowire vessel passable`: whether a device can follow a way.
 
+mod glass;
+mod picture;
+
+use std::path::Path;
+
 use endowire_core::device::DeviceFile;
 use endowire_core::passable::{Passable, Passage, WayPoint, passable};
 use endowire_core::vessel::{
@@ -35,9 +40,18 @@ pub(crate) fn passable_file(args: &PassableArgs) -> Result<(), Failure> {
         inputs.push(read_input(table)?);
     }
     let device = DeviceFile::read(&args.device)?;
-    let way = match &args.centreline {
-        Some(table) => way_in_table(&CentrelineTree::read(table)?, &args.to)?,
-        None => way_in_surface(args)?,
+    args.picture.as_deref().map_or(Ok(()), check_name)?;
+    let wall = || Ok::<_, Failure>(Wall::from_surface(&SurfaceMesh::read(&args.file, args.frame)?)?);
+    let (way, wall) = match &args.centreline {
+        // What is not looked at need not be mended.
+        Some(table) => {
+            let way = way_in_table(&CentrelineTree::read(table)?, &args.to)?;
+            (way, args.picture.as_ref().map(|_| wall()).transpose()?)
+        }
+        None => {
+            let wall = wall()?;
+            (way_in_surface(args, &wall)?, Some(wall))
+        }
     };
     let found = passable(&way, &device.device, args.force_n).map_err(|error| match error {
         endowire_core::Error::Parameter { name, value, mend } if name == "force_n" => {
@@ -53,6 +67,16 @@ pub(crate) fn passable_file(args: &PassableArgs) -> Result<(), Failure> {
         force_n: args.force_n,
         found,
     };
+    if let (Some(path), Some(wall)) = (&args.picture, &wall) {
+        let title = format!(
+            "{} to {} in {}: {}",
+            name_of(&args.device),
+            document.to,
+            name_of(&args.file),
+            word(&document.found)
+        );
+        picture::write(path, title, &document.found, wall.mesh())?;
+    }
     answer(&document, args.json, || text(&document))
 }
 
@@ -67,34 +91,51 @@ fn way_in_table(tree: &CentrelineTree, to: &str) -> Result<CentrelinePath, Failu
     })
 }
 
+/// Refuses a picture that is no PNG: a vessel of a hundred thousand pixels is no drawing of lines.
+fn check_name(path: &Path) -> Result<(), Failure> {
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("png") => Ok(()),
+        _ => Err(Failure::Input(format!("--picture {}: name a file .png", path.display()))),
+    }
+}
+
+/// The name of a file without its folder.
+fn name_of(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
 /// The way that is found in the surface.
-fn way_in_surface(args: &PassableArgs) -> Result<CentrelinePath, Failure> {
+fn way_in_surface(args: &PassableArgs, wall: &Wall) -> Result<CentrelinePath, Failure> {
     let opening = args.to.strip_prefix("opening ").unwrap_or(&args.to);
     let to = parse_end(opening).map_err(|mend| {
         let more = "a name needs the table that has it: --centreline FILE";
         Failure::Input(format!("--to = {:?}: {mend}; {more}", args.to))
     })?;
-    let wall = Wall::from_surface(&SurfaceMesh::read(&args.file, args.frame)?)?;
-    let found = ExtractedCentreline::of(&wall, args.from, &[to])
+    let found = ExtractedCentreline::of(wall, args.from, &[to])
         .map_err(|error| as_flag(error).at(args.file.display()))?;
     let row = found.tree.targets().first().map_or(0, |target| target.row);
     found.tree.path_to(row).ok_or_else(|| Failure::Input("--to: is where the way begins".into()))
 }
 
+/// What was found, in a word or some.
+fn word(found: &Passable) -> String {
+    match found.passage {
+        Passage::Passes => "passes".to_owned(),
+        Passage::Tight => "tight".to_owned(),
+        Passage::Blocked => format!("blocked: the tip comes to {:.1} mm", found.reaches_mm),
+        Passage::Short => format!("short: the tip comes to {:.1} mm", found.reaches_mm),
+    }
+}
+
 /// The table for a person.
 fn text(document: &Document) -> String {
     let found = &document.found;
-    let passage = match found.passage {
-        Passage::Passes => "passes",
-        Passage::Tight => "tight",
-        Passage::Blocked => "blocked",
-        Passage::Short => "short: the device does not reach the target",
-    };
+    let passage = word(found);
     let mut lines = vec![
         format!("{} to {} in {}: {passage}", document.device, document.to, document.file),
         format!(
-            "  {:.1} mm of way; bends that take at most {} N are none",
-            found.length_mm, document.force_n
+            "  {:.1} mm of way, {:.1} mm of device; bends that take at most {} N are none",
+            found.length_mm, found.taken_mm, document.force_n
         ),
         "     way mm   lumen mm   device mm   clearance mm   bend mm   cut mm   bears mm".into(),
     ];
