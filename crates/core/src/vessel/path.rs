@@ -26,6 +26,11 @@ impl CentrelinePath {
         (points.len() > 1 && apart).then_some(Self { points })
     }
 
+    /// Its points with the vessel's radius at each, mm.
+    pub fn points(&self) -> &[(Vec3, f64)] {
+        &self.points
+    }
+
     /// Its length, mm.
     pub fn length_mm(&self) -> f64 {
         self.points.windows(2).map(|pair| (pair[1].0 - pair[0].0).norm()).sum()
