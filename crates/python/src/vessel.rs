@@ -42,7 +42,6 @@ struct Line {
     tree: CentrelineTree,
     /// The opening at its root; one that begins inside has none.
     inlet: Option<usize>,
-    is_found: bool,
 }
 
 /// Where a centre line begins or ends: the number of an opening, or a place in mm.
@@ -81,9 +80,9 @@ fn as_argument(error: Error) -> Error {
     }
 }
 
-/// The bytes of a wall, its centre line, its inlet, names with their rows, and whether the line was found.
+/// The bytes of a wall, its centre line, its inlet, and names with their rows.
 type Pickled<'py> =
-    (Bound<'py, PyBytes>, Option<Bound<'py, PyArray2<f64>>>, Option<usize>, Vec<(String, usize)>, bool);
+    (Bound<'py, PyBytes>, Option<Bound<'py, PyArray2<f64>>>, Option<usize>, Vec<(String, usize)>);
 
 /// A centre-line tree: the path of its table or the name of a built-in anatomy, or an array.
 #[derive(FromPyObject)]
@@ -170,7 +169,7 @@ impl Vessel {
         };
         let made = interruptible(py, move || GeneratedWall::new(&tree, resolution).map(|made| (made, tree)))?;
         let (made, tree) = made.map_err(exception)?;
-        Ok(Self::of_line(Arc::new(made.wall), Some(Line { tree, inlet: Some(made.inlet), is_found: false })))
+        Ok(Self::of_line(Arc::new(made.wall), Some(Line { tree, inlet: Some(made.inlet) })))
     }
 
     /// Vertices of the wall, mm, shape (n, 3).
@@ -208,10 +207,10 @@ impl Vessel {
         table(py, &self.line(py)?.tree)
     }
 
-    /// Whether its centre line is one that is found in its lumen, and none that it was made from.
+    /// Whether its centre line is found by itself: it was made from none, and `with_centreline` did not say where one begins.
     #[getter]
     fn centreline_found(&self) -> bool {
-        self.given.as_ref().is_none_or(|line| line.is_found)
+        self.given.is_none()
     }
 
     /// The opening at the root of its centre line; None of one that begins inside.
@@ -264,7 +263,7 @@ impl Vessel {
             Some(CentrelineEnd::Opening(opening)) => Some(opening),
             Some(CentrelineEnd::Place(_)) => None,
         };
-        Ok(Self::of_line(self.wall.clone(), Some(Line { tree: found.tree, inlet, is_found: true })))
+        Ok(Self::of_line(self.wall.clone(), Some(Line { tree: found.tree, inlet })))
     }
 
     /// Stretches of its centre line between root, forks and ends: dictionaries of from and to (rows of `centreline`), length_mm and
@@ -328,7 +327,7 @@ impl Vessel {
         let targets = given.iter().flat_map(|line| line.tree.targets());
         let targets = targets.map(|target| (target.name.clone(), target.row)).collect();
         let rows = given.map(|line| table(py, &line.tree)).transpose()?;
-        let parts = (PyBytes::new(py, &wall), rows, vessel.inlet(), targets, vessel.centreline_found());
+        let parts = (PyBytes::new(py, &wall), rows, vessel.inlet(), targets);
         Ok((slf.get_type().getattr("_unpickled")?, parts))
     }
 
@@ -338,14 +337,13 @@ impl Vessel {
         centreline: Option<Numbers<'_>>,
         inlet: Option<usize>,
         targets: Vec<(String, usize)>,
-        is_found: bool,
     ) -> PyResult<Self> {
         let wall = postcard::from_bytes(wall)
             .map_err(|e| InputError::new_err(format!("the bytes of a vessel: {e}")))?;
         let targets: Vec<Target> = targets.into_iter().map(|(name, row)| Target { name, row }).collect();
         let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?;
         let tree = tree.map(|tree| tree.with_targets(targets)).transpose().map_err(exception)?;
-        let line = tree.map(|tree| Line { tree, inlet, is_found });
+        let line = tree.map(|tree| Line { tree, inlet });
         Ok(Self { begins: inlet.unwrap_or(0), ..Self::of_line(Arc::new(wall), line) })
     }
 
@@ -375,7 +373,7 @@ impl Vessel {
         let root_mm = tree.nodes()[0].position_mm;
         let at_root = |opening: &&Opening| (opening.centre_mm - root_mm).norm() < opening.radius_mm;
         let inlet = wall.openings().iter().find(at_root).map(|opening| opening.index);
-        Ok(Self::of_line(Arc::new(wall), Some(Line { tree, inlet, is_found: false })))
+        Ok(Self::of_line(Arc::new(wall), Some(Line { tree, inlet })))
     }
 
     fn of_line(wall: Arc<Wall>, given: Option<Line>) -> Self {
@@ -394,7 +392,7 @@ impl Vessel {
             let mend = format!("none is found in the vessel ({error}): take vessel.with_centreline(start, ends), of openings or places inside");
             refuse("centreline", "None", &mend)
         })?;
-        Ok(self.found.get_or_init(|| Line { tree: found.tree, inlet, is_found: true }))
+        Ok(self.found.get_or_init(|| Line { tree: found.tree, inlet }))
     }
 
     /// Its centre line for contrast medium in pictures.

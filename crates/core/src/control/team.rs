@@ -53,6 +53,11 @@ impl Team {
         path.nearest(&self.shape(simulation).tip_mm().unwrap_or_default())
     }
 
+    /// In which place of a path's vessel the tip of the one that leads is.
+    pub(super) fn in_path(&self, simulation: &Simulation, path: &CentrelinePath) -> OnPath {
+        path.deepest(&self.shape(simulation).tip_mm().unwrap_or_default())
+    }
+
     /// Whether the tip of the one that leads is in the vessel and no more than `arrived_mm` before the end of a path.
     pub(super) fn has_arrived(
         &self,

@@ -77,6 +77,8 @@ def arch_variety(**parts: Any) -> Task:
             "target_mm": observations.Target(),
             "last_action": observations.LastAction(),
         },
+        # As the original has it.
+        "rewards": [rewards.Reached(), rewards.EachStep(), rewards.Approach()],
         "wall": {"friction": 0.1, "deviation_mm": 0.0},
         "method": {"name": "kirchhoff", "element_mm": 7.5, "contact_spacing_radii": 4.0},
     }
