@@ -22,25 +22,16 @@ use endowire_core::{Error, Result};
 /// Built-in anatomies, and the length of their triangles' edges, mm.
 const BUILT_IN: [(&str, f64); 4] =
     [("aortic_arch", 3.0), ("aortic_arch_ii", 3.0), ("aortic_arch_iii", 3.0), ("hepatic", 1.1)];
-/// Vessels narrower than this take the thinner wire, mm.
-const NARROW_MM: f64 = 3.5;
-/// The wires: radius, length and curvature of the tip, stiffness of tip and shaft, elements; mm and N·mm².
+/// Wires by the least radius of the vessel: from so much on, mm, radius, mm, stiffness of tip and shaft, N·mm², and elements, mm. A wide vessel
+/// takes one of 0.035 inch.
 const WIRES: [Wire; 2] = [
-    Wire {
-        radius_mm: 0.178,
-        tip_mm: 12.0,
-        curvature_per_mm: 0.1,
-        stiffness_nmm2: [0.1, 1.0],
-        element_mm: 3.0,
-    },
-    Wire {
-        radius_mm: 0.445,
-        tip_mm: 25.0,
-        curvature_per_mm: 0.06,
-        stiffness_nmm2: [1.0, 12.0],
-        element_mm: 5.0,
-    },
+    Wire { from_mm: 3.5, radius_mm: 0.445, stiffness_nmm2: [0.5, 5.0], element_mm: 5.0 },
+    Wire { from_mm: 0.0, radius_mm: 0.2, stiffness_nmm2: [0.3, 1.0], element_mm: 3.0 },
 ];
+/// Angle of the tip, rad, and its length over the radius of the vessel where it comes in, within limits, mm: it reaches from the axis to the wall.
+const TIP_RAD: f64 = 1.5;
+const TIP_RADII: f64 = 2.0;
+const TIP_MM: [f64; 2] = [12.0, 25.0];
 /// Length of the wires, mm, depth of the sheath, mm, and friction of the wall.
 const LENGTH_MM: f64 = 1500.0;
 const DEPTH_MM: f64 = 2.0;
@@ -52,21 +43,22 @@ const MOST_STEPS: usize = 1500;
 const LEAST: f64 = 0.9;
 
 struct Wire {
+    from_mm: f64,
     radius_mm: f64,
-    tip_mm: f64,
-    curvature_per_mm: f64,
     stiffness_nmm2: [f64; 2],
     element_mm: f64,
 }
 
 impl Wire {
-    fn device(&self) -> Result<Device> {
+    /// The wire for a vessel of this radius where it comes in.
+    fn device(&self, inlet_mm: f64) -> Result<Device> {
         let [tip, shaft] = self.stiffness_nmm2;
+        let tip_mm = (TIP_RADII * inlet_mm).clamp(TIP_MM[0], TIP_MM[1]);
         let tip = Section {
-            rest_curvature_per_mm: [self.curvature_per_mm, 0.0],
-            ..Section::straight(self.tip_mm, self.radius_mm, tip)
+            rest_curvature_per_mm: [TIP_RAD / tip_mm, 0.0],
+            ..Section::straight(tip_mm, self.radius_mm, tip)
         };
-        Device::new(vec![tip, Section::straight(LENGTH_MM - self.tip_mm, self.radius_mm, shaft)])
+        Device::new(vec![tip, Section::straight(LENGTH_MM - tip_mm, self.radius_mm, shaft)])
     }
 }
 
@@ -81,10 +73,10 @@ fn read(told: &str) -> Result<Wall> {
 fn follow(name: &str, wall: &Wall, inlet: usize) -> Result<[usize; 2]> {
     let tree = ExtractedCentreline::of(wall, Some(CentrelineEnd::Opening(inlet)), &[])?.tree;
     let least_mm = tree.nodes().iter().map(|node| node.radius_mm).fold(f64::INFINITY, f64::min);
-    let wire = &WIRES[usize::from(least_mm > NARROW_MM)];
+    let wire = WIRES.iter().find(|wire| least_mm >= wire.from_mm).unwrap_or(&WIRES[1]);
     let sheath = Sheath::at_opening(wall, inlet, DEPTH_MM)?;
     let options = KirchhoffOptions { element_mm: wire.element_mm, ..KirchhoffOptions::default() };
-    let start = Simulation::builder(wall.clone(), wire.device()?, sheath)
+    let start = Simulation::builder(wall.clone(), wire.device(tree.nodes()[0].radius_mm)?, sheath)
         .properties(WallProperties { friction: FRICTION, ..WallProperties::default() })
         .method(&options)
         .build()?;

@@ -99,10 +99,10 @@ impl FollowPath {
 
     fn command(&mut self, simulation: &Simulation, tip_mm: f64) -> Command {
         let inserted = self.team.inserted_mm(simulation);
-        let on = self.team.in_path(simulation, &self.path);
-        let is_within = on.distance_mm < on.radius_mm;
+        let (on, within) = self.team.on_and_in(simulation, &self.path);
+        let is_within = within.distance_mm < within.radius_mm;
         if self.back_mm > 0.0 {
-            if is_within && on.arc_mm > self.failed_mm + FARTHER_MM {
+            if is_within && within.arc_mm > self.failed_mm + FARTHER_MM {
                 self.back_mm = 0.0;
                 (self.best_mm, self.best_inserted_mm) = (on.arc_mm, inserted);
             } else {
@@ -117,12 +117,12 @@ impl FollowPath {
             (self.best_mm, self.best_inserted_mm) = (on.arc_mm, inserted);
         }
         if is_within {
-            self.within_mm = self.within_mm.max(on.arc_mm);
-            if on.arc_mm > self.failed_mm + PAST_MM {
+            self.within_mm = self.within_mm.max(within.arc_mm);
+            if within.arc_mm > self.failed_mm + PAST_MM {
                 self.aside_rad = 0.0;
             }
         }
-        let astray = on.distance_mm > on.radius_mm + ASTRAY_MM;
+        let astray = within.distance_mm > within.radius_mm + ASTRAY_MM;
         let stuck = inserted - self.best_inserted_mm > PATIENCE_MM;
         if (astray || stuck) && inserted > BACK_MM + tip_mm {
             self.retries += 1;
@@ -131,7 +131,9 @@ impl FollowPath {
             self.aside_rad = (self.aside_rad + GOLDEN_RAD) % TAU;
             return Command::rotate(0.0);
         }
-        let turn = self.aim(simulation, on.arc_mm, on.radius_mm, tip_mm);
+        // The two differ at the mouths of branches. Which of them leads on there is not known beforehand: every second try goes by the other.
+        let from = if self.retries.is_multiple_of(2) { on } else { within };
+        let turn = self.aim(simulation, from.arc_mm, from.radius_mm, tip_mm);
         // Far off the mark, the hand turns before it pushes on.
         if turn.abs() > 0.5 * TURN_RAD && self.turns < TURNS {
             self.turns += 1;
