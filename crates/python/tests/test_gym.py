@@ -151,7 +151,7 @@ def test_observations_are_numbers_of_about_one_or_physical(vessel, wire):
     low, high = made["scaled"].task.vessels.bounds_mm
     assert np.allclose((low + high) / 2 + scaled["tip"] * (high - low).max() / 2, physical["tip_mm"], atol=1e-3)
     assert np.allclose(scaled["hands"][0] * [wire.length_mm, 1.0, 1.0], physical["hands"][0], atol=1e-3)
-    assert np.allclose(scaled["forces"] * 1.5, physical["forces"], atol=1e-4)
+    assert np.allclose(scaled["forces"], np.clip(physical["forces"], -10.0, 10.0), atol=1e-4)
     assert all(np.abs(part).max() <= 1.0 for part in (scaled["tip"], scaled["hands"]))
     # The twin: in mm they are none.
     assert np.abs(physical["tip_mm"]).max() > 10.0

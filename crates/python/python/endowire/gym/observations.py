@@ -165,8 +165,8 @@ class Forces:
         return spaces.Box(-self.largest, self.largest, (2 * len(task.instruments) + 1,), dtype=np.float32)
 
     def unit(self, task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Forces are scaled to parts of the task's limit, torques to that a millimetre away."""
-        return np.zeros(1), np.array([task.force_limit_n])
+        """Newtons and newton millimetres are of about 1 as they are."""
+        return np.zeros(1), np.ones(1)
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         batch = episodes.batch
