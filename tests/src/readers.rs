@@ -5,7 +5,7 @@ use std::path::Path;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Sheath, Simulation, State};
 use endowire_core::statics::{StaticCase, StaticProblem};
-use endowire_core::vessel::{CentrelineTree, GeneratedWall, Resolution, SurfaceMesh, anatomy};
+use endowire_core::vessel::{CentrelineTree, GeneratedWall, NoStore, Resolution, SurfaceMesh, anatomy};
 use endowire_core::{Error, Result, Vec3};
 use endowire_methods::Scene;
 use endowire_sweep::Sweep;
@@ -75,7 +75,7 @@ pub fn scene(bytes: &[u8]) -> Result<()> {
     {
         return Ok(());
     }
-    scene.steps(&scene.stack()?).map(drop)
+    scene.steps(&scene.stack()?, &NoStore).map(drop)
 }
 
 /// A case of rods, up to the problem that would be solved.

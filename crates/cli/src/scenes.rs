@@ -8,8 +8,10 @@ use endowire_methods::Scene;
 use endowire_sweep::{Setting, scene_with};
 use endowire_viewer::ViewSpec;
 
+use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::recording::RecordedSummary;
+use crate::output::tell;
 
 /// Reads a scene with these values of its keys.
 pub(crate) fn read(path: &Path, settings: &[Setting]) -> Result<Scene, Failure> {
@@ -46,6 +48,28 @@ pub(crate) fn with_script(
     }
     scene.take_script(file)?;
     Ok(scene)
+}
+
+/// Has contrast medium flow along the vessel's centre line, which is looked for where medium flows and the scene names none.
+pub(crate) fn let_medium_flow(
+    view: &mut ViewSpec,
+    scene: &Scene,
+    store: &Cache,
+) -> endowire_core::Result<()> {
+    let flows = !view.injection.is_empty() || scene.script.iter().any(|line| line.inject.is_some());
+    if flows { view.take_centreline(scene, store) } else { Ok(()) }
+}
+
+/// Says that the centre line was found in the surface, if one was needed and the scene names none.
+pub(crate) fn tell_found_centreline(path: &Path, scene: &Scene) {
+    let Some(tree) = scene.found_centreline() else { return };
+    let targets: Vec<&str> = tree.targets().iter().map(|target| target.name.as_str()).collect();
+    tell(format_args!(
+        "{}: the centre line is found in the surface, {} points to {}; vessel.centreline names a table in its place",
+        path.display(),
+        tree.nodes().len(),
+        targets.join(", ")
+    ));
 }
 
 /// Tables and keys at the top of a scene file.

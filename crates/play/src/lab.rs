@@ -1,6 +1,6 @@
 //! The room: C-arm, table, blades, pedal, injector, camera.
 
-use endowire_core::vessel::SurfaceMesh;
+use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Error, Result, Vec3};
 use endowire_viewer::{CameraSpec, InjectionSpec, Mode, Pose, View, ViewSpec};
 
@@ -167,9 +167,10 @@ impl Lab {
         Ok(())
     }
 
-    /// Injects `ml` at `at_mm`, or at the inlet, from `time_s` on; what flows of it.
+    /// Injects `ml` at `at_mm` of the vessel with this wall, or at the inlet, from `time_s` on; what flows of it.
     pub(crate) fn inject(
         &mut self,
+        wall: &Wall,
         (ml, ml_per_s): (f64, f64),
         at_mm: Option<Vec3>,
         time_s: f64,
@@ -179,10 +180,7 @@ impl Lab {
                 return Err(Error::parameter(name, value, "must be a number from 0.1 to 100"));
             }
         }
-        if self.fluoro.flow.tree.is_none() {
-            let mend = "contrast medium flows along a centre line: give view.flow.tree in the scene";
-            return Err(Error::parameter("inject", format!("{ml} ml"), mend));
-        }
+        self.fluoro.find_centreline(wall)?;
         let bolus = InjectionSpec {
             start_s: time_s,
             duration_s: ml / ml_per_s,

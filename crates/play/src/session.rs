@@ -213,7 +213,8 @@ impl Session {
         let at_rest =
             |tip: Vec3| displacement.as_ref().map_or(tip, |displacement| displacement.material(&tip));
         let at_mm = instrument.and_then(|one| self.simulation.tip_of_mm(one)).map(at_rest);
-        let flow = self.lab.inject((ml, ml_per_s), at_mm, self.time_s())?;
+        let time_s = self.time_s();
+        let flow = self.lab.inject(self.simulation.wall(), (ml, ml_per_s), at_mm, time_s)?;
         let after_step = self.history.steps();
         self.history.inject(Injected { instrument, ml, ml_per_s, after_step, flow });
         Ok(())

@@ -46,7 +46,7 @@ fn session(script: &str) -> Session {
     let mut view = ViewSpec::of_scene(&scene, &assets).unwrap();
     view.flow.tree = Some(assets.with_file_name("../vessels/aortic_arch.csv"));
     let simulation = scene.simulation(&NoStore).unwrap();
-    let script = scene.steps(simulation.stack()).unwrap();
+    let script = scene.steps(simulation.stack(), &NoStore).unwrap();
     Session::new(simulation, view, 64, Limits::default()).unwrap().with_script(script)
 }
 
@@ -54,7 +54,7 @@ fn session(script: &str) -> Session {
 fn run(script: &str) -> (Simulation, Vec<Injection>) {
     let scene = scene(script);
     let mut simulation = scene.simulation(&NoStore).unwrap();
-    let mut run = scene.steps(simulation.stack()).unwrap().into_run();
+    let mut run = scene.steps(simulation.stack(), &NoStore).unwrap().into_run();
     while let Some(moves) = run.next(&simulation).unwrap().map(|step| step.moves.to_vec()) {
         if !moves.is_empty() {
             simulation.step_together(&moves).unwrap();

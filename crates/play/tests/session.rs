@@ -89,7 +89,7 @@ fn replayed_with_injections(mut scene: Scene, session: &Session) -> (Simulation,
     scene.take_script(&file).unwrap();
     std::fs::remove_file(&file).unwrap();
     let mut simulation = scene.simulation(&NoStore).unwrap();
-    let script = scene.steps(simulation.stack()).unwrap();
+    let script = scene.steps(simulation.stack(), &NoStore).unwrap();
     assert_eq!(script.len(), session.steps());
     let mut run = script.begin();
     let moves = simulation.motion().is_some();

@@ -3,8 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use endowire_core::Vec3;
-use endowire_core::vessel::Wall;
-use endowire_viewer::{self as viewer, DevicePart, FrameTime, Image, PixelFormat, ViewSpec};
+use endowire_viewer::{self as viewer, DevicePart, FrameTime, Image, PixelFormat, View, ViewSpec};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -40,13 +39,17 @@ impl Renderer {
         spec: &ViewSpec,
         view: Option<&Bound<'_, PyAny>>,
         plane: i64,
-        wall: Arc<Wall>,
+        vessel: &Vessel,
     ) -> PyResult<Self> {
-        let spec = match view {
+        let mut spec = match view {
             Some(table) => document::read_over("view", spec, table)?,
             None => spec.clone(),
         };
         spec.validate().map_err(exception)?;
+        if spec.wants(View::Fluoro) && !spec.injection.is_empty() && spec.flow.tree.is_none() {
+            spec.flow.centreline = Some(Arc::new(vessel.tree(py)?.clone()));
+        }
+        let wall = Arc::clone(&vessel.wall);
         let mut planes = spec.planes();
         let Some(place) = usize::try_from(plane).ok().filter(|place| *place < planes.len()) else {
             let mend = match planes.len() {
@@ -101,7 +104,7 @@ impl Renderer {
     #[new]
     #[pyo3(signature = (vessel, view, plane=0))]
     fn new(py: Python<'_>, vessel: &Vessel, view: &Bound<'_, PyAny>, plane: i64) -> PyResult<Self> {
-        Self::prepare(py, &ViewSpec::default(), Some(view), plane, Arc::clone(&vessel.wall))
+        Self::prepare(py, &ViewSpec::default(), Some(view), plane, vessel)
     }
 
     /// What draws: "CPU reference", or the graphics interface and adapter.

@@ -62,8 +62,7 @@ impl Scene {
     /// Its vessel.
     fn vessel(&self, py: Python<'_>) -> PyResult<Vessel> {
         let scene = Arc::clone(&self.scene);
-        let wall = interruptible(py, move || scene.wall(&NoStore))?.map_err(exception)?;
-        Ok(Vessel::of_wall(wall))
+        interruptible(py, move || Vessel::of_scene(&scene))?.map_err(exception)
     }
 
     /// The moves of its script, shape (steps, n_instruments, 2): advance_mm and rotate_rad.
@@ -72,7 +71,7 @@ impl Scene {
     #[getter]
     fn moves<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let stack = self.scene.stack().map_err(exception)?;
-        let steps = self.scene.steps(&stack).and_then(|script| script.moves());
+        let steps = self.scene.steps(&stack, &NoStore).and_then(|script| script.moves());
         let steps = steps.map_err(|error| match error {
             Error::Parameter { name, value, mend } => {
                 exception(Error::Parameter { name, value, mend: mend + " (Scene.run)" })
@@ -95,7 +94,8 @@ impl Scene {
     ///
     /// Raises what `Simulation.step` raises, after the steps before.
     fn run(&self, py: Python<'_>, simulation: &Simulation) -> PyResult<StepReport> {
-        let script = self.scene.stack().and_then(|stack| self.scene.steps(&stack)).map_err(exception)?;
+        let script =
+            self.scene.stack().and_then(|stack| self.scene.steps(&stack, &NoStore)).map_err(exception)?;
         let mut hand = script.begin();
         let mut step = |simulation: &mut insertion::Simulation| -> endowire_core::Result<bool> {
             let Some(next) = hand.next(simulation)? else { return Ok(false) };
@@ -120,11 +120,10 @@ impl Scene {
         plane: i64,
     ) -> PyResult<Renderer> {
         let spec = ViewSpec::of_scene(&self.scene, &self.path).map_err(exception)?;
-        let wall = match vessel {
-            Some(vessel) => Arc::clone(&vessel.wall),
-            None => self.vessel(py)?.wall,
-        };
-        Renderer::prepare(py, &spec, view, plane, wall)
+        match vessel {
+            Some(vessel) => Renderer::prepare(py, &spec, view, plane, vessel),
+            None => Renderer::prepare(py, &spec, view, plane, &self.vessel(py)?),
+        }
     }
 
     /// Nothing changes a scene: its copy is itself.

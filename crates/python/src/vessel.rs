@@ -3,14 +3,15 @@
 use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use endowire_core::passable::passable;
 use endowire_core::vessel::{
-    CentrelineEnd, CentrelineNode, CentrelineTree, ExtractedCentreline, GeneratedWall, Resolution,
-    SurfaceFrame, SurfaceMesh, Target, Wall, anatomy, check_with, wall_hints,
+    CentrelineEnd, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline, GeneratedWall,
+    NoStore, Opening, Resolution, SurfaceFrame, SurfaceMesh, Target, Wall, anatomy, check_with, wall_hints,
 };
 use endowire_core::{Error, Vec3};
+use endowire_methods::Scene;
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -23,12 +24,24 @@ use crate::error::{InputError, exception, refuse};
 use crate::instrument::Instrument;
 use crate::interrupt::interruptible;
 
-/// A vessel's wall, and its centre line where it was made from one or one was found in it. It never changes.
+/// A vessel's wall, and its centre line: the one it was made from, or else one that is found in its lumen when something first needs it, from
+/// the widest opening (from the sheath's in the vessel of a scene) to all others. It never changes.
 #[pyclass(frozen, module = "endowire", name = "Vessel")]
 pub(crate) struct Vessel {
     pub(crate) wall: Arc<Wall>,
-    /// The tree it was made from or that was found in it, with the opening at its root; a tree that begins inside has none.
-    tree: Option<(CentrelineTree, Option<usize>)>,
+    /// The centre line it was made with.
+    given: Option<Line>,
+    /// Without one, that which was found, once one was needed, …
+    found: OnceLock<Line>,
+    /// … and the opening where it begins.
+    begins: usize,
+}
+
+/// A centre line.
+struct Line {
+    tree: CentrelineTree,
+    /// The opening at its root; one that begins inside has none.
+    inlet: Option<usize>,
 }
 
 /// Where a centre line begins or ends: the number of an opening, or a place in mm.
@@ -156,7 +169,7 @@ impl Vessel {
         };
         let made = interruptible(py, move || GeneratedWall::new(&tree, resolution).map(|made| (made, tree)))?;
         let (made, tree) = made.map_err(exception)?;
-        Ok(Self { wall: Arc::new(made.wall), tree: Some((tree, Some(made.inlet))) })
+        Ok(Self::of_line(Arc::new(made.wall), Some(Line { tree, inlet: Some(made.inlet) })))
     }
 
     /// Vertices of the wall, mm, shape (n, 3).
@@ -186,33 +199,51 @@ impl Vessel {
         document::write(py, &openings)
     }
 
-    /// The centre line it was generated from or that was found in it, shape (n, 5): x, y, z, radius (mm) and the row of the parent; None without one.
+    /// Its centre line, shape (n, 5): x, y, z, radius (mm) and the row of the parent (-1 for the root).
+    ///
+    /// Raises InputError where it was made from none and none is found (`with_centreline` says where one begins and ends).
     #[getter]
-    fn centreline<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let Some((tree, _)) = &self.tree else { return Ok(None) };
-        let row = |node: &CentrelineNode| {
-            let (p, parent) = (node.position_mm, node.parent.map_or(-1.0, |row| row as f64));
-            [p.x, p.y, p.z, node.radius_mm, parent]
-        };
-        let numbers: Vec<f64> = tree.nodes().iter().flat_map(row).collect();
-        array(py, numbers, [tree.nodes().len(), 5]).map(Some)
+    fn centreline<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        table(py, &self.line(py)?.tree)
     }
 
-    /// The opening at the root of its centre line; None without one.
+    /// Whether its centre line is found by itself: it was made from none, and `with_centreline` did not say where one begins.
+    #[getter]
+    fn centreline_found(&self) -> bool {
+        self.given.is_none()
+    }
+
+    /// The opening at the root of its centre line; None of one that begins inside.
     #[getter]
     pub(crate) fn inlet(&self) -> Option<usize> {
-        self.tree.as_ref().and_then(|(_, inlet)| *inlet)
+        match &self.given {
+            Some(line) => line.inlet,
+            None => Some(self.begins).filter(|opening| *opening < self.wall.openings().len()),
+        }
     }
 
-    /// Named points of its centre line: positions in mm by name; empty without one.
+    /// Named points of its centre line: positions in mm by name; `opening 1` and so on of one that was found.
+    ///
+    /// Raises InputError as `centreline`.
     #[getter]
-    fn targets(&self) -> BTreeMap<String, [f64; 3]> {
-        let Some((tree, _)) = &self.tree else { return BTreeMap::new() };
+    fn targets(&self, py: Python<'_>) -> PyResult<BTreeMap<String, [f64; 3]>> {
+        let tree = &self.line(py)?.tree;
         let place = |target: &Target| tree.nodes()[target.row].position_mm.into();
-        tree.targets().iter().map(|target| (target.name.clone(), place(target))).collect()
+        Ok(tree.targets().iter().map(|target| (target.name.clone(), place(target))).collect())
     }
 
-    /// This vessel with the centre line that is found in its lumen: `centreline`, `inlet`, `targets` ("opening 3", "place 1") and
+    /// The way along its centre line from the root to the target of that name, or to the point nearest to a place in mm: shape (n, 4), x, y, z
+    /// and radius in mm, as `Controller.follow_path` and `search_ahead` take it.
+    ///
+    /// Raises InputError for an unknown name, for the root, where the way begins, and as `centreline`.
+    fn path<'py>(&self, py: Python<'py>, to: Goal) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let way = self.way(py, to)?;
+        let numbers: Vec<f64> =
+            way.points().iter().flat_map(|(p, radius_mm)| [p.x, p.y, p.z, *radius_mm]).collect();
+        array(py, numbers, [way.points().len(), 4])
+    }
+
+    /// This vessel with the centre line that is found in its lumen between these ends: `centreline`, `inlet`, `targets` ("opening 3", "place 1") and
     /// `branches` are those of it. Radii are of the largest spheres inside; points lie where the sphere is the largest of its cross-section
     /// (ways of least ∫ ds/radius: Antiga et al., IEEE Transactions on Medical Imaging 22, 2003).
     ///
@@ -233,15 +264,16 @@ impl Vessel {
             Some(CentrelineEnd::Opening(opening)) => Some(opening),
             Some(CentrelineEnd::Place(_)) => None,
         };
-        Ok(Self { wall: self.wall.clone(), tree: Some((found.tree, inlet)) })
+        Ok(Self::of_line(self.wall.clone(), Some(Line { tree: found.tree, inlet })))
     }
 
     /// Stretches of its centre line between root, forks and ends: dictionaries of from and to (rows of `centreline`), length_mm and
-    /// least_radius_mm; empty without one.
+    /// least_radius_mm.
+    ///
+    /// Raises InputError as `centreline`.
     #[getter]
     fn branches<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let branches = self.tree.as_ref().map_or_else(Vec::new, |(tree, _)| tree.branches());
-        document::write(py, &branches)
+        document::write(py, &self.line(py)?.tree.branches())
     }
 
     /// Whether an instrument can follow the way to a target, which takes hundredths of a second: a dictionary of `passage` ("passes", "tight",
@@ -249,9 +281,9 @@ impl Vessel {
     /// device_radius_mm, clearance_mm, bend_radius_mm (of the centre line), cut_radius_mm (what the room makes of it), bears_radius_mm (what
     /// the instrument takes without force: bending that costs at most `force_n`); radii of what is straight are None.
     ///
-    /// The way is that of the centre line, see `with_centreline`. `to` is the name of a target, or a place in mm: its nearest point.
+    /// The way is that of `path`: `to` is the name of a target, or a place in mm.
     ///
-    /// Raises InputError for a vessel without a centre line, an unknown name and a force that is not positive.
+    /// Raises InputError as `path`, and for a force that is not positive.
     #[pyo3(signature = (instrument, to, force_n = 0.1))]
     fn passable<'py>(
         &self,
@@ -260,14 +292,7 @@ impl Vessel {
         to: Goal,
         force_n: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let Some((tree, _)) = &self.tree else {
-            return Err(InputError::new_err("the vessel has no centre line: take vessel.with_centreline()"));
-        };
-        let row = match to {
-            Goal::Name(name) => tree.target(&name).map_err(exception)?.row,
-            Goal::Place(place) => tree.nearest_row(&place.into()),
-        };
-        let way = tree.path_to(row).ok_or_else(|| refuse("to", row, "is the root, where the way begins"))?;
+        let way = self.way(py, to)?;
         let found = py.detach(|| passable(&way, &instrument.device, force_n)).map_err(exception)?;
         document::write(py, &found)
     }
@@ -299,9 +324,11 @@ impl Vessel {
         let (py, vessel) = (slf.py(), slf.get());
         let wall = postcard::to_allocvec(&*vessel.wall)
             .map_err(|e| InputError::new_err(format!("the vessel cannot be written: {e}")))?;
-        let targets = vessel.tree.iter().flat_map(|(tree, _)| tree.targets());
+        let given = vessel.given.as_ref();
+        let targets = given.iter().flat_map(|line| line.tree.targets());
         let targets = targets.map(|target| (target.name.clone(), target.row)).collect();
-        let parts = (PyBytes::new(py, &wall), vessel.centreline(py)?, vessel.inlet(), targets);
+        let rows = given.map(|line| table(py, &line.tree)).transpose()?;
+        let parts = (PyBytes::new(py, &wall), rows, vessel.inlet(), targets);
         Ok((slf.get_type().getattr("_unpickled")?, parts))
     }
 
@@ -316,12 +343,9 @@ impl Vessel {
             .map_err(|e| InputError::new_err(format!("the bytes of a vessel: {e}")))?;
         let targets: Vec<Target> = targets.into_iter().map(|(name, row)| Target { name, row }).collect();
         let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?;
-        let tree = tree
-            .map(|tree| tree.with_targets(targets))
-            .transpose()
-            .map_err(exception)?
-            .map(|tree| (tree, inlet));
-        Ok(Self { wall: Arc::new(wall), tree })
+        let tree = tree.map(|tree| tree.with_targets(targets)).transpose().map_err(exception)?;
+        let line = tree.map(|tree| Line { tree, inlet });
+        Ok(Self { begins: inlet.unwrap_or(0), ..Self::of_line(Arc::new(wall), line) })
     }
 
     fn __repr__(&self) -> String {
@@ -334,9 +358,68 @@ impl Vessel {
 }
 
 impl Vessel {
+    /// That of a surface alone.
     pub(crate) fn of_wall(wall: Wall) -> Self {
-        Self { wall: Arc::new(wall), tree: None }
+        Self::of_line(Arc::new(wall), None)
     }
+
+    /// The vessel of a scene.
+    pub(crate) fn of_scene(scene: &Scene) -> endowire_core::Result<Self> {
+        let wall = scene.wall(&NoStore)?;
+        let begins = scene.sheath.opening.unwrap_or(0);
+        if scene.vessel.tree.is_none() && scene.vessel.centreline.is_none() {
+            return Ok(Self { begins, ..Self::of_wall(wall) });
+        }
+        let tree = scene.centreline(&NoStore)?.clone();
+        let root_mm = tree.nodes()[0].position_mm;
+        let at_root = |opening: &&Opening| (opening.centre_mm - root_mm).norm() < opening.radius_mm;
+        let inlet = wall.openings().iter().find(at_root).map(|opening| opening.index);
+        Ok(Self::of_line(Arc::new(wall), Some(Line { tree, inlet })))
+    }
+
+    fn of_line(wall: Arc<Wall>, given: Option<Line>) -> Self {
+        Self { wall, given, found: OnceLock::new(), begins: 0 }
+    }
+
+    /// Its centre line, found if there is none.
+    fn line(&self, py: Python<'_>) -> PyResult<&Line> {
+        if let Some(line) = self.given.as_ref().or(self.found.get()) {
+            return Ok(line);
+        }
+        let (wall, inlet) = (self.wall.clone(), self.inlet());
+        let from = inlet.map(CentrelineEnd::Opening);
+        let found = interruptible(py, move || ExtractedCentreline::of(&wall, from, &[]))?;
+        let found = found.map_err(|error| {
+            let mend = format!("none is found in the vessel ({error}): take vessel.with_centreline(start, ends), of openings or places inside");
+            refuse("centreline", "None", &mend)
+        })?;
+        Ok(self.found.get_or_init(|| Line { tree: found.tree, inlet }))
+    }
+
+    /// Its centre line for contrast medium in pictures.
+    pub(crate) fn tree(&self, py: Python<'_>) -> PyResult<&CentrelineTree> {
+        self.line(py).map(|line| &line.tree)
+    }
+
+    /// The way along its centre line.
+    fn way(&self, py: Python<'_>, to: Goal) -> PyResult<CentrelinePath> {
+        let tree = self.tree(py)?;
+        let row = match to {
+            Goal::Name(name) => tree.target(&name).map_err(exception)?.row,
+            Goal::Place(place) => tree.nearest_row(&place.into()),
+        };
+        tree.path_to(row).ok_or_else(|| refuse("to", row, "is the root, where the way begins"))
+    }
+}
+
+/// The rows of a tree, the parent of the root -1.
+fn table<'py>(py: Python<'py>, tree: &CentrelineTree) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let row = |node: &CentrelineNode| {
+        let (p, parent) = (node.position_mm, node.parent.map_or(-1.0, |row| row as f64));
+        [p.x, p.y, p.z, node.radius_mm, parent]
+    };
+    let numbers: Vec<f64> = tree.nodes().iter().flat_map(row).collect();
+    array(py, numbers, [tree.nodes().len(), 5])
 }
 
 impl Tree<'_> {

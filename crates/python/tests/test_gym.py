@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode
 
 import endowire
 import endowire.gym
-from endowire.gym import InsertionVectorEnv, Task, arches, ends, observations, rewards, vessels
+from endowire.gym import InsertionVectorEnv, Task, arches, ends, observations, rewards, targets, vessels
 
 
 @pytest.fixture(scope="module")
@@ -128,11 +128,63 @@ def test_an_action_is_a_part_of_the_limits_or_a_velocity(vessel, wire):
     for unit, action in (("scaled", [[0.5, -2.0]]), ("physical", [[17.5, -6.28]])):
         made[unit].reset(seed=1)
         told[unit] = made[unit].step(np.array(action))[0]
-    assert np.array_equal(told["scaled"]["tip_mm"], told["physical"]["tip_mm"])
+    assert np.array_equal(told["scaled"]["tip"], told["physical"]["tip"])
     assert told["scaled"]["last_action"].tolist() == [[0.5, -1.0]]
     assert np.allclose(told["physical"]["last_action"], [[17.5, -3.14]])
     with pytest.raises(endowire.InputError, match="actions = 'metres'"):
         Task([wire], vessels.FixedVessel(vessel), actions="metres")
+
+
+def test_observations_are_numbers_of_about_one_or_physical(vessel, wire):
+    parts = {"tip_mm": observations.Tip(), "hands": observations.Hands(), "forces": observations.Forces()}
+    made = {
+        unit: endowire.gym.InsertionEnv(Task([wire], vessels.FixedVessel(vessel), observations=parts, observed=unit))
+        for unit in ("scaled", "physical")
+    }
+    told = {}
+    for unit, env in made.items():
+        env.reset(seed=1)
+        for _ in range(20):
+            told[unit] = env.step(np.array([[1.0, 0.0]]))[0]
+            assert env.observation_space.contains(told[unit])
+    scaled, physical = told["scaled"], told["physical"]
+    low, high = made["scaled"].task.vessels.bounds_mm
+    assert np.allclose((low + high) / 2 + scaled["tip"] * (high - low).max() / 2, physical["tip_mm"], atol=1e-3)
+    assert np.allclose(scaled["hands"][0] * [wire.length_mm, 1.0, 1.0], physical["hands"][0], atol=1e-3)
+    assert np.allclose(scaled["forces"], np.clip(physical["forces"], -10.0, 10.0), atol=1e-4)
+    assert all(np.abs(part).max() <= 1.0 for part in (scaled["tip"], scaled["hands"]))
+    # The twin: in mm they are none.
+    assert np.abs(physical["tip_mm"]).max() > 10.0
+    with pytest.raises(endowire.InputError, match="observed = 'metres'"):
+        Task([wire], vessels.FixedVessel(vessel), observed="metres")
+
+
+def test_progress_is_the_difference_of_a_potential(vessel, wire):
+    env = endowire.gym.InsertionEnv(Task([wire], vessels.FixedVessel(vessel), rewards=[rewards.Progress()]))
+    _, begun = env.reset(seed=3)
+    sums = []
+    for push in (1.0, 1.0, -1.0, 1.0, 1.0, 1.0):
+        sums.append(env.step(np.array([[push, 0.3]]))[1])
+        left = env._episodes.way_mm[0] / begun["way_mm"]
+        assert abs(sum(sums) - (1.0 - left)) < 1e-9
+    assert sums[2] < 0.0 < sums[0]
+
+
+def test_a_surface_alone_is_learnt_in_as_the_vessel_that_it_is_of(vessel, wire):
+    surface = endowire.Vessel.from_arrays(vessel.vertices_mm, vessel.triangles)
+    target = targets.FixedTarget(tuple(vessel.centreline[-1, :3]))
+    ways = {}
+    for name, made in (("known", vessel), ("found", surface)):
+        env = endowire.gym.InsertionEnv(Task([wire], vessels.FixedVessel(made, opening=vessel.inlet), target))
+        env.reset(seed=1)
+        ways[name] = [env.step(np.array([[1.0, 0.0]]))[4]["way_mm"] for _ in range(6)]
+    assert np.abs(np.subtract(ways["found"], ways["known"])).max() < 1.0
+    # The twin: a step later the way is another by more.
+    assert np.abs(np.subtract(ways["found"][1:], ways["known"][:-1])).max() > 3.0
+    # Ways begin at the sheath.
+    entered = vessels.FixedVessel(surface, opening=1)
+    begun = entered.site.centreline.positions_mm[0] - surface.openings[1]["centre_mm"]
+    assert np.linalg.norm(begun) < 2.0
 
 
 def test_an_episode_is_as_long_as_make_says():
@@ -195,7 +247,7 @@ def test_an_arch_has_its_targets_in_its_branches():
     env = gymnasium.make("endowire/ArchVariety-v0", vessels=variety).unwrapped
     first, _ = env.reset(seed=1)
     other, _ = env.reset(seed=2)
-    assert not np.array_equal(first["target_mm"], other["target_mm"])
+    assert not np.array_equal(first["target"], other["target"])
     assert env.observation_space.contains(first)
     for _ in range(5):
         *_, info = env.step(np.array([[0.9, 0.3]]))

@@ -22,7 +22,7 @@ def task(vessel, wire):
         "hands": observations.Hands(),
         "fluoro": observations.Fluoroscopy(planes=((0.0, 0.0), (90.0, 0.0)), size_px=(64, 48)),
     }
-    return Task([wire], vessels.FixedVessel(vessel), observations=seen, ends=[ends.StepLimit(5)], actions="physical")
+    return Task([wire], vessels.FixedVessel(vessel), observations=seen, ends=[ends.StepLimit(5)], actions="physical", observed="physical")
 
 
 def actions(length, seed):

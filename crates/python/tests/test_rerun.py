@@ -31,7 +31,7 @@ def test_an_episode_is_a_recording(vessel, wire, tmp_path):
     for episode in range(2):
         first, _ = env.reset(seed=episode)
         again, info = twin.reset(seed=episode)
-        assert np.array_equal(first["tip_mm"], again["tip_mm"])
+        assert np.array_equal(first["tip"], again["tip"])
         rewards, ways, tips = [], [info["way_mm"]], [twin._episodes.tip_mm[0].copy()]
         for _ in range(4):
             *_, truncated, _ = env.step(np.array([[30.0, 1.0]]))

@@ -160,7 +160,7 @@ def test_vessels_are_made_checked_and_written(vessel, tmp_path):
     told = endowire.check_vessel(tmp_path / "tube.stl")
     assert told["sound"] and len(told["openings"]) == 2
     again = endowire.Vessel.read(tmp_path / "tube.stl")
-    assert len(again.triangles) == len(vessel.triangles) and again.centreline is None
+    assert len(again.triangles) == len(vessel.triangles) and again.centreline_found
     line = vessel.centreline[:, :3]
     assert vessel.contains(line[1:-1]).all() and not vessel.contains(line + [0.0, 50.0, 0.0]).any()
     table = np.array([[0, 0, 0, 3.0, -1], [0, 0, 40, 3.0, 0]])
@@ -169,12 +169,20 @@ def test_vessels_are_made_checked_and_written(vessel, tmp_path):
 
 def test_a_centre_line_is_found_in_a_surface_and_devices_are_held_against_it(vessel, wire):
     surface = endowire.Vessel.from_arrays(vessel.vertices_mm, vessel.triangles)
-    assert surface.centreline is None and surface.branches == []
     end = f"opening {1 - vessel.inlet}"
-    with pytest.raises(endowire.InputError, match="no centre line"):
-        surface.passable(wire, end)
+    assert surface.centreline_found and not vessel.centreline_found
     found = surface.with_centreline()
-    assert found.inlet == vessel.inlet and list(found.targets) == [end]
+    assert found.inlet == vessel.inlet and list(found.targets) == [end] and not found.centreline_found
+    # What needs one takes the same by itself.
+    assert np.array_equal(surface.centreline, found.centreline) and surface.targets == found.targets
+    assert surface.passable(wire, end) == found.passable(wire, end)
+    assert np.array_equal(surface.path(end), found.centreline[:, :4])
+    low, high = surface.vertices_mm.min(axis=0), surface.vertices_mm.max(axis=0)
+    box = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    sides = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+    closed = endowire.Vessel.from_arrays(low + np.array(box) * (high - low), np.array(sides))
+    with pytest.raises(endowire.InputError, match="take vessel.with_centreline"):
+        closed.path([0.0, 0.0, 0.0])
     (branch,) = found.branches
     assert abs(branch["length_mm"] - sum(np.linalg.norm(np.diff(vessel.centreline[:, :3], axis=0), axis=1))) < 1.0
     assert np.abs(found.centreline[:, 3] - 4.0).max() < 0.3

@@ -202,7 +202,7 @@ def test_the_vessel_of_basic_wire_nav_is_read_from_its_files(tmp_path):
     vessels = originals.basic_wire_nav(tmp_path)
     assert vessels.site.vessel.vertices_mm[:, 2].max() > 150.0
     assert vessels.site.sheath["direction"][2] > 0.0
-    env = gymnasium.make("endowire/BasicWireNav-v0", data=tmp_path).unwrapped
+    env = gymnasium.make("endowire/BasicWireNav-v0", data=tmp_path, observed="physical").unwrapped
     first, _ = env.reset(seed=1)
     assert first["target_mm"][2] > 120.0
     assert env.step(np.array([[0.9, 0.0]]))[4]["failure"] == ""

@@ -148,7 +148,7 @@ impl Run<'_> {
             inputs.push(endowire_core::file::read(&input, u64::MAX)?);
         }
         row.scene_hash = hash_inputs(&inputs);
-        let script = scene.steps(&scene.stack()?)?;
+        let script = scene.steps(&scene.stack()?, workshop.store)?;
         if let Value::Table(table) = &mut document {
             table.retain(|key, _| !LATER.contains(&key));
         }

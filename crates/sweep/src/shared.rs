@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use endowire_core::Result;
-use endowire_core::vessel::{Wall, WallRecipe, WallStore};
+use endowire_core::vessel::{CentrelineRecipe, CentrelineTree, Wall, WallRecipe, WallStore};
 use sha2::{Digest, Sha256};
 
 /// Things that several threads want, found by what they are made of; as many as were wanted last are kept.
@@ -46,16 +46,17 @@ impl<T: Clone> Shared<T> {
     }
 }
 
-/// Walls of another store, the latest of them in memory.
+/// Walls and centre lines of another store, the latest of them in memory.
 pub(crate) struct SharedWalls<'a> {
     below: &'a (dyn WallStore + Sync),
     walls: Shared<Wall>,
+    centrelines: Shared<CentrelineTree>,
 }
 
 impl<'a> SharedWalls<'a> {
     /// Keeps the last `most` of `below`.
     pub(crate) fn new(below: &'a (dyn WallStore + Sync), most: usize) -> Self {
-        Self { below, walls: Shared::new(most) }
+        Self { below, walls: Shared::new(most), centrelines: Shared::new(most) }
     }
 }
 
@@ -64,6 +65,13 @@ impl WallStore for SharedWalls<'_> {
         match postcard::to_extend(recipe, Vec::new()) {
             Ok(key) => self.walls.get(&key, || self.below.wall(recipe)),
             Err(_) => self.below.wall(recipe),
+        }
+    }
+
+    fn centreline(&self, recipe: &CentrelineRecipe<'_>) -> Result<CentrelineTree> {
+        match postcard::to_extend(recipe, Vec::new()) {
+            Ok(key) => self.centrelines.get(&key, || self.below.centreline(recipe)),
+            Err(_) => self.below.centreline(recipe),
         }
     }
 }

@@ -65,13 +65,17 @@ impl Renderer {
     }
 
     /// The same for a wall with openings: the 3D view shows them closed, and in the beam vessels taper off there, as if they went on
-    /// into branches too fine to be seen.
+    /// into branches too fine to be seen. Contrast medium flows along the centre line that is found in the wall where `spec` has none.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// As [`Self::new`], and a wall in which no centre line is found where one is needed.
     pub fn of_wall(spec: &ViewSpec, wall: &Wall) -> Result<Self> {
+        let mut spec = spec.clone();
+        if spec.wants(View::Fluoro) && !spec.injection.is_empty() {
+            spec.find_centreline(wall)?;
+        }
         let closed = Arc::new(wall.closed_mesh());
-        Self::of_setup(Setup::filled(spec, closed, Arc::new(with_tails(wall)))?)
+        Self::of_setup(Setup::filled(&spec, closed, Arc::new(with_tails(wall)))?)
     }
 
     fn of_setup(setup: Setup) -> Result<Self> {

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod curved_tube;
+mod found_centreline;
 mod insertion;
 mod path;
 mod rod;

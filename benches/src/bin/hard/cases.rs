@@ -25,7 +25,7 @@ fn parts(moves: &[Move]) -> usize {
 fn case(path: &Path) -> Result<bool> {
     let scene = Scene::read(path)?;
     let start = scene.simulation(&NoStore)?;
-    let script = scene.steps(start.stack())?;
+    let script = scene.steps(start.stack(), &NoStore)?;
     let most_mm = APART_MM[usize::from(scene.vessel.wall.friction > 0.0)];
     let (mut given, mut small) = (Course::new(start.clone()), Course::new(start));
     let mut run = script.begin();

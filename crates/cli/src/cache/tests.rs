@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use endowire_core::vessel::{CentrelineTree, Resolution, anatomy};
+use endowire_core::vessel::{CentrelineEnd, CentrelineTree, Resolution, anatomy};
 
 use super::*;
 
@@ -108,7 +108,7 @@ fn many_may_want_the_same_wall_at_once() {
         for _ in 0..4 {
             scope.spawn(|| {
                 for _ in 0..20 {
-                    let key = entry::key(&recipe(&tree)).unwrap();
+                    let key = entry::key(&Recipe::Wall(&recipe(&tree))).unwrap();
                     write(folder.path(), &key, &made).unwrap();
                     assert_eq!(cache(folder.path()).wall(&recipe(&tree)).unwrap().mesh(), made.mesh());
                 }
@@ -116,4 +116,24 @@ fn many_may_want_the_same_wall_at_once() {
         }
     });
     assert_eq!(files(folder.path()).len(), 1);
+}
+
+#[test]
+fn a_kept_centre_line_is_the_one_that_was_found_with_its_targets_and_is_that_of_its_beginning() {
+    let folder = tempfile::tempdir().unwrap();
+    let (tree, cache) = (tube(), cache(folder.path()));
+    let wall = recipe(&tree).make().unwrap();
+    let of = |opening| CentrelineRecipe { wall: &wall, from: Some(CentrelineEnd::Opening(opening)) };
+    let found = cache.centreline(&of(0)).unwrap();
+    let [file] = files(folder.path()).try_into().unwrap();
+    assert_eq!(cache.centreline(&of(0)).unwrap(), found);
+    assert_eq!(found.targets()[0].name, "opening 1");
+    assert_eq!(cache.centreline(&of(1)).unwrap().targets()[0].name, "opening 0");
+    assert_eq!(files(folder.path()).len(), 2);
+    // A digit in the table: it comes back only if the file is what is read.
+    forge(&file, |bytes| {
+        let at = 16 + 32 + "x,y,z,radius,parent,target\n".len();
+        bytes[at..at + 2].copy_from_slice(b"7,");
+    });
+    assert_ne!(cache.centreline(&of(0)).unwrap(), found);
 }

@@ -26,7 +26,8 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     }
     let (settings, _) = scenes::of_scene_and_view(&args.frames.set)?;
     let scene = scenes::read(&args.scene, &settings)?;
-    let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(in_scene)?;
+    let cache = Cache::new(&args.frames.cache);
+    let script = scene.stack().and_then(|stack| scene.steps(&stack, &cache)).map_err(in_scene)?;
     let steps = args.steps.unwrap_or(script.len());
     if steps > script.len() {
         return Err(Failure::Input(format!("--steps {steps}: the script has {} steps", script.len())));
@@ -34,7 +35,6 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(&scene.name));
     let frames = args.count as usize;
     let plan = Plan::new("fluoro", &args.frames, (&args.scene, &scene), ViewChoice::Fluoro, folder, frames)?;
-    let cache = Cache::new(&args.frames.cache);
     // An empty vessel needs no wall that can be felt, which takes far longer to make than a picture.
     let mut simulation = match steps {
         0 => None,
@@ -53,7 +53,9 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
     };
     let (frames, frames_per_s) = (plan.frames(), plan.frames_per_s());
     let injections = now.injections.iter().map(Injected::spec);
-    let mut studio = Studio::new(plan, wall, injections).map_err(|e| e.at(args.scene.display()))?;
+    let mut studio =
+        Studio::new(plan, wall, injections, (&scene, &cache)).map_err(|e| e.at(args.scene.display()))?;
+    scenes::tell_found_centreline(&args.scene, &scene);
     for k in 0..frames {
         let time_s = args.time + k as f64 / frames_per_s;
         let moment = FrameTime { frame: k as u64, time_s };

@@ -43,8 +43,8 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
         }
     };
     let folder = args.out.clone().unwrap_or_else(|| args.dir.join("render"));
-    let wall =
-        scene.wall(&Cache::new(&args.frames.cache)).map_err(|e| Failure::from(e).at(path.display()))?;
+    let cache = Cache::new(&args.frames.cache);
+    let wall = scene.wall(&cache).map_err(|e| Failure::from(e).at(path.display()))?;
     let seen = (path.as_path(), &scene);
     let plan = Plan::new("render", &args.frames, seen, ViewChoice::Both, folder, frames)?;
     let (frames, frame_s) = (plan.frames(), 1.0 / plan.frames_per_s());
@@ -59,7 +59,9 @@ pub(crate) fn render(args: &RenderArgs) -> Result<(), Failure> {
     let plan = plan.at(&(0..frames).map(|k| moment(k).time_s).collect::<Vec<_>>());
     let injections = injections::read(&args.dir)?;
     let injections = injections.iter().map(Injected::spec);
-    let mut studio = Studio::new(plan, wall, injections).map_err(|e| e.at(path.display()))?;
+    let mut studio =
+        Studio::new(plan, wall, injections, (&scene, &cache)).map_err(|e| e.at(path.display()))?;
+    scenes::tell_found_centreline(&path, &scene);
     let motion = VesselMotion::new(&scene.vessel.motion).map_err(|e| Failure::from(e).at(path.display()))?;
     let stack = scene.stack().map_err(|e| Failure::from(e).at(path.display()))?;
     let lengths = Lengths::read(&args.dir, &stack)?;

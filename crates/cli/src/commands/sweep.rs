@@ -53,14 +53,16 @@ fn carry_out(args: &SweepArgs, file: &Path, folder: &Path) -> Result<(), Failure
     if let Some(remark) = sweep.remark() {
         tell(format_args!("endowire: {}: {remark}", file.display()));
     }
-    let recordings = sweep.recorded().map(|what| Recordings { folder: folder.join("recordings"), what });
+    let store = &Cache::new(&args.cache);
+    let recordings =
+        sweep.recorded().map(|what| Recordings { folder: folder.join("recordings"), store, what });
     let stop = interrupts();
     let bar = progress::bar(sweep.len(), "run");
     let order = Order {
         folder,
         shard: args.shard,
         jobs: args.jobs.map(usize::from),
-        store: &Cache::new(&args.cache),
+        store,
         program: PROGRAM,
         record: recordings.as_ref().map(|recordings| recordings as &dyn Record),
         stop,
@@ -103,8 +105,9 @@ fn show(bar: &ProgressBar, progress: Progress) {
 }
 
 /// Recordings of all runs: each a folder as `endowire run` makes it, and its scene beside it.
-struct Recordings {
+struct Recordings<'a> {
     folder: PathBuf,
+    store: &'a Cache,
     what: Recorded,
 }
 
@@ -122,7 +125,7 @@ struct Recording {
     steps: Duration,
 }
 
-impl Record for Recordings {
+impl Record for Recordings<'_> {
     fn begin(
         &self,
         run: &Run<'_>,
@@ -134,7 +137,7 @@ impl Record for Recordings {
     }
 }
 
-impl Recordings {
+impl Recordings<'_> {
     fn recording(&self, run: &Run<'_>, simulation: &Simulation) -> Result<Recording, Failure> {
         let name = format!("{:06}", run.number());
         let (folder, scene_file) = (self.folder.join(&name), self.folder.join(name + ".toml"));
@@ -144,7 +147,7 @@ impl Recordings {
         let scene = Scene::read(&scene_file)?;
         let drawn = (self.what == Recorded::Frames).then_some(simulation);
         Ok(Recording {
-            frames: FrameWriter::new(&scene_file, &scene, drawn)?,
+            frames: FrameWriter::new(&scene_file, &scene, drawn, self.store)?,
             provenance: Provenance::of_scene(&scene, &[])?,
             scene_file,
             scene,
@@ -183,6 +186,7 @@ impl endowire_sweep::Recorder for Recording {
             scene: self.scene.name.clone(),
             scene_file: std::path::absolute(&self.scene_file).unwrap_or(self.scene_file),
             method: self.scene.method.name(),
+            centreline_found: self.scene.finds_centreline(),
             outcome: outcome.clone(),
             step_time_s: self.steps.as_secs_f64(),
             wall_time_s: self.started.elapsed().as_secs_f64(),

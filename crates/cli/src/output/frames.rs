@@ -3,7 +3,7 @@
 use std::io;
 use std::path::Path;
 
-use endowire_core::insertion::{Script, Simulation};
+use endowire_core::insertion::Simulation;
 use endowire_core::shape::Shape;
 use endowire_core::vessel::{VesselMotion, Wall};
 use endowire_core::{Error, Vec3};
@@ -14,7 +14,9 @@ use serde::Serialize;
 use super::film;
 use super::injections::Injected;
 use super::recorder::Recorder;
+use crate::cache::Cache;
 use crate::failure::Failure;
+use crate::scenes;
 
 /// Where the C-arm stands in a plane.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -65,11 +67,19 @@ pub(crate) fn tomogram_holds(renderer: &Renderer) -> Option<String> {
 
 impl FrameWriter {
     /// Prepares what the scene file asks for; without a simulation nothing is drawn.
-    pub(crate) fn new(path: &Path, scene: &Scene, drawn: Option<&Simulation>) -> Result<Self, Failure> {
+    pub(crate) fn new(
+        path: &Path,
+        scene: &Scene,
+        drawn: Option<&Simulation>,
+        store: &Cache,
+    ) -> Result<Self, Failure> {
         let in_scene = |e: endowire_core::Error| Failure::from(e).at(path.display());
-        let spec = ViewSpec::of_scene(scene, path)?;
+        let mut spec = ViewSpec::of_scene(scene, path)?;
         spec.validate().map_err(in_scene)?;
         let drawn = drawn.filter(|_| !spec.views.is_empty());
+        if drawn.is_some() && spec.wants(View::Fluoro) {
+            scenes::let_medium_flow(&mut spec, scene, store).map_err(in_scene)?;
+        }
         let wall = drawn.map(|simulation| simulation.wall().clone());
         let motion = drawn.and_then(|simulation| simulation.motion().cloned());
         let planes = wall.as_ref().map_or(Ok(Vec::new()), |wall| planes(&spec, wall)).map_err(in_scene)?;
@@ -95,15 +105,6 @@ impl FrameWriter {
             PlaneTold { primary_deg, secondary_deg, camera_matrix: arm.matrix(), exposure }
         });
         told.collect()
-    }
-
-    /// Refuses a script that injects where its frames could not show it.
-    pub(crate) fn check(&self, script: &Script) -> Result<(), Error> {
-        if script.injects() && self.spec.wants(View::Fluoro) && self.spec.flow.tree.is_none() {
-            let mend = "a line of the script injects, and contrast medium flows along a centre line: give the vessel's";
-            return Err(Error::parameter("view.flow.tree", "none", mend));
-        }
-        Ok(())
     }
 
     /// Lets medium flow in the frames from the next on.

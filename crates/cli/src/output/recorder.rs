@@ -35,6 +35,8 @@ pub(crate) struct Summary {
     pub(crate) scene_file: PathBuf,
     /// Name of the method.
     pub(crate) method: &'static str,
+    /// Whether the vessel's centre line was needed, and found in its surface since the scene names none.
+    pub(crate) centreline_found: bool,
     /// What it has come to.
     #[serde(flatten)]
     pub(crate) outcome: RunOutcome,

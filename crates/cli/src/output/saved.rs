@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use endowire_core::insertion::{Script, ScriptCourse, ScriptRun, Simulation, State, Step, Tally};
+use endowire_core::vessel::NoStore;
 use endowire_methods::Scene;
 use endowire_sweep::seal;
 use serde::{Deserialize, Serialize};
@@ -40,7 +41,7 @@ impl Parts {
         let numbers = mesh.vertices_mm.iter().flat_map(|v| v.iter().flat_map(|c| c.to_le_bytes()));
         let indices = mesh.triangles.iter().flatten().flat_map(|index| index.to_le_bytes());
         // Where nothing flows a centre line decides nothing.
-        let tree = scene.vessel.flow.as_ref().and_then(|_| scene.centreline().ok().flatten());
+        let tree = scene.vessel.flow.as_ref().and_then(|_| scene.centreline(&NoStore).ok());
         let sheath = simulation.sheath();
         let place = sheath.position_mm.iter().chain(&sheath.direction);
         let sheath = place.chain([&sheath.friction_n, &sheath.friction]).flat_map(|c| c.to_le_bytes());

@@ -1,9 +1,10 @@
 //! A hand that follows the centre line with a shaped wire.
 //!
 //! It turns the tail until the tip points to where the way goes, pushes on, and where the tip has gone astray or makes no way it pulls
-//! back and tries another turn.
+//! back, and until it is past that place points aside of the way, each time elsewhere. A tip that falls into the way as it is pulled back is
+//! pushed on from there.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use super::{Action, Controller, Team};
 use crate::insertion::{Command, Move, Simulation};
@@ -24,6 +25,10 @@ const BACK_MM: f64 = 30.0;
 /// How far beyond the vessel's wall the tip has gone astray, mm. The axis is a polyline, outside of whose corners the wall bulges, and
 /// a tip that dips into the mouth of a branch slides on past it.
 const ASTRAY_MM: f64 = 3.0;
+/// Farther on the way by this is farther, mm.
+const FARTHER_MM: f64 = 1.0;
+/// So far beyond the place where the last try ended the hand points at the way again, mm.
+const PAST_MM: f64 = 10.0;
 /// Pushed in without getting farther, mm, before the hand tries something else.
 const PATIENCE_MM: f64 = 24.0;
 /// Golden angle: turns by it, one after another, fill the circle evenly.
@@ -38,12 +43,14 @@ pub struct FollowPath {
     /// Farthest point on the way so far, mm, and the insertion then.
     best_mm: f64,
     best_inserted_mm: f64,
-    /// Length that is still to be pulled back, mm, and turn to go with it, rad.
+    /// Length that is still to be pulled back, mm.
     back_mm: f64,
-    turn_rad: f64,
     retries: usize,
-    /// Until so much is inserted again, mm, the other turn is kept.
-    keep_until_mm: f64,
+    /// Farthest place within the way's vessel since it was pulled back last, mm, and that of the try before.
+    within_mm: f64,
+    failed_mm: f64,
+    /// Angle between the way ahead and where the tip is pointed, rad.
+    aside_rad: f64,
     /// Turns since the last push.
     turns: usize,
     /// Where on the way the tip of the whole line was at first, mm: that of a wire over which the lead follows.
@@ -60,9 +67,10 @@ impl FollowPath {
             best_mm: 0.0,
             best_inserted_mm: 0.0,
             back_mm: 0.0,
-            turn_rad: 0.0,
             retries: 0,
-            keep_until_mm: 0.0,
+            within_mm: 0.0,
+            failed_mm: 0.0,
+            aside_rad: 0.0,
             turns: 0,
             held_mm: None,
         }
@@ -91,29 +99,39 @@ impl FollowPath {
 
     fn command(&mut self, simulation: &Simulation, tip_mm: f64) -> Command {
         let inserted = self.team.inserted_mm(simulation);
+        let (on, within) = self.team.on_and_in(simulation, &self.path);
+        let is_within = within.distance_mm < within.radius_mm;
         if self.back_mm > 0.0 {
-            self.back_mm -= STEP_MM;
-            if self.back_mm <= 0.0 {
-                (self.best_mm, self.best_inserted_mm) = (0.0, inserted - STEP_MM);
+            if is_within && within.arc_mm > self.failed_mm + FARTHER_MM {
+                self.back_mm = 0.0;
+                (self.best_mm, self.best_inserted_mm) = (on.arc_mm, inserted);
+            } else {
+                self.back_mm -= STEP_MM;
+                if self.back_mm <= 0.0 {
+                    (self.best_mm, self.best_inserted_mm) = (0.0, inserted - STEP_MM);
+                }
+                return Command { advance_mm: -STEP_MM, rotate_rad: GOLDEN_RAD * STEP_MM / BACK_MM };
             }
-            let parts = BACK_MM / STEP_MM;
-            return Command { advance_mm: -STEP_MM, rotate_rad: self.turn_rad / parts };
         }
-        let on = self.team.on_path(simulation, &self.path);
-        if on.arc_mm > self.best_mm + 1.0 {
+        if on.arc_mm > self.best_mm + FARTHER_MM {
             (self.best_mm, self.best_inserted_mm) = (on.arc_mm, inserted);
         }
-        let astray = on.distance_mm > on.radius_mm + ASTRAY_MM;
+        if is_within {
+            self.within_mm = self.within_mm.max(within.arc_mm);
+            if within.arc_mm > self.failed_mm + PAST_MM {
+                self.aside_rad = 0.0;
+            }
+        }
+        let astray = within.distance_mm > within.radius_mm + ASTRAY_MM;
         let stuck = inserted - self.best_inserted_mm > PATIENCE_MM;
         if (astray || stuck) && inserted > BACK_MM + tip_mm {
             self.retries += 1;
-            self.keep_until_mm = inserted + STEP_MM;
             self.back_mm = BACK_MM;
-            self.turn_rad = GOLDEN_RAD;
+            self.failed_mm = std::mem::take(&mut self.within_mm);
+            self.aside_rad = (self.aside_rad + GOLDEN_RAD) % TAU;
             return Command::rotate(0.0);
         }
-        let kept = inserted < self.keep_until_mm;
-        let turn = if kept { 0.0 } else { self.aim(simulation, on.arc_mm, on.radius_mm, tip_mm) };
+        let turn = self.aim(simulation, on.arc_mm, on.radius_mm, tip_mm);
         // Far off the mark, the hand turns before it pushes on.
         if turn.abs() > 0.5 * TURN_RAD && self.turns < TURNS {
             self.turns += 1;
@@ -123,7 +141,7 @@ impl FollowPath {
         Command { advance_mm: STEP_MM, rotate_rad: turn }
     }
 
-    /// Turn of the tail that brings the bend of the tip towards the way ahead.
+    /// Turn of the tail that brings the bend of the tip towards the way ahead, or aside of it.
     fn aim(&self, simulation: &Simulation, reached_mm: f64, radius_mm: f64, tip_mm: f64) -> f64 {
         if tip_mm == 0.0 || self.team.inserted_mm(simulation) < tip_mm + 2.0 * STEP_MM {
             return 0.0;
@@ -141,8 +159,9 @@ impl FollowPath {
         if wish.norm() < 0.15 * (ahead + tip_mm) || bend.norm() < 1e-3 {
             return 0.0;
         }
-        let angle = axis.dot(&bend.cross(&wish)).atan2(bend.dot(&wish));
-        angle.clamp(-TURN_RAD, TURN_RAD)
+        let angle = axis.dot(&bend.cross(&wish)).atan2(bend.dot(&wish)) + self.aside_rad;
+        let nearest_way = (angle + PI).rem_euclid(TAU) - PI;
+        nearest_way.clamp(-TURN_RAD, TURN_RAD)
     }
 }
 

@@ -53,6 +53,12 @@ impl Team {
         path.nearest(&self.shape(simulation).tip_mm().unwrap_or_default())
     }
 
+    /// Where on a path the tip of the one that leads is, and in which place of its vessel.
+    pub(super) fn on_and_in(&self, simulation: &Simulation, path: &CentrelinePath) -> (OnPath, OnPath) {
+        let tip = self.shape(simulation).tip_mm().unwrap_or_default();
+        (path.nearest(&tip), path.deepest(&tip))
+    }
+
     /// Whether the tip of the one that leads is in the vessel and no more than `arrived_mm` before the end of a path.
     pub(super) fn has_arrived(
         &self,

@@ -50,6 +50,7 @@
 //! withdraw = true                       # all of it
 //! ```
 
+mod centreline;
 mod method_table;
 mod spec;
 mod tables;

@@ -1,6 +1,7 @@
 //! A scene file and what it builds.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
@@ -8,7 +9,6 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 use super::method_table;
 use super::tables::{DEPTH_MM, DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};
 use crate::device::{Device, DeviceFile, FileTable, Instrument, Stack, line_mm};
-use crate::flow::BloodFlow;
 use crate::input::{from_toml, parse_toml};
 use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
@@ -57,6 +57,9 @@ pub struct SceneOf<M> {
     folder: PathBuf,
     #[serde(skip)]
     text: String,
+    /// The vessel's centre line, once it was needed.
+    #[serde(skip)]
+    pub(super) centreline: OnceLock<CentrelineTree>,
 }
 
 /// A file of `[[script]]` tables alone.
@@ -85,7 +88,7 @@ fn in_table(table: &str, error: Error) -> Error {
 }
 
 /// A file that cannot be read, with the key that names it in front.
-fn missing(key: &str, error: Error) -> Error {
+pub(super) fn missing(key: &str, error: Error) -> Error {
     match error {
         Error::File { path, source } => Error::parameter(key, path.display(), source.to_string()),
         other => other,
@@ -93,7 +96,7 @@ fn missing(key: &str, error: Error) -> Error {
 }
 
 /// A tree that cannot be read, with a hint where a built-in vessel is meant.
-fn missing_tree(path: &Path, error: Error) -> Error {
+pub(super) fn missing_tree(path: &Path, error: Error) -> Error {
     let name = path.file_name().and_then(|name| name.to_str()).filter(|name| anatomy::NAMES.contains(name));
     match (missing("vessel.tree", error), name) {
         (Error::Parameter { name: key, value, mend }, Some(name)) => {
@@ -381,18 +384,18 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         script_commands(&self.script, device)
     }
 
-    /// The script, checked against what is pushed and the targets of the vessel.
+    /// The script, checked against what is pushed and the targets of the vessel, whose centre line is looked for where a line has one and the scene
+    /// names none; `store` keeps it.
     ///
     /// # Errors
     /// As [`Script::new`], [`SceneOf::inserted_mm`] and [`SceneOf::centreline`].
-    pub fn steps(&self, stack: &Stack) -> Result<Script> {
-        let has_target = |line: &ScriptLine| line.until.as_ref().is_some_and(|until| until.target.is_some());
+    pub fn steps(&self, stack: &Stack, store: &dyn WallStore) -> Result<Script> {
         // A file is not opened for nothing.
-        let centreline = match self.script.iter().any(has_target) {
-            true => self.centreline()?,
+        let centreline = match self.script.iter().any(ScriptLine::has_target) {
+            true => Some(self.centreline(store)?),
             false => None,
         };
-        let script = Script::new(&self.script, stack, &self.inserted_mm(stack)?, centreline.as_ref())?;
+        let script = Script::new(&self.script, stack, &self.inserted_mm(stack)?, centreline)?;
         let moves = VesselMotion::new(&self.vessel.motion)?.is_some_and(|motion| motion.changes());
         if moves && !script.is_empty() && !script.is_timed() {
             let mend = "no time goes by in the script: give its lines speeds (speed_mm_per_s, speed_deg_per_s), or wait_s";
@@ -403,44 +406,6 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             ));
         }
         Ok(script)
-    }
-
-    /// The vessel's centre line: the tree it is built from, or the one given beside its surface; none where there is neither.
-    ///
-    /// # Errors
-    /// A missing or unusable file; one given beside a tree.
-    pub fn centreline(&self) -> Result<Option<CentrelineTree>> {
-        let Some((key, path)) = self.centreline_path()? else { return Ok(None) };
-        CentrelineTree::read(&path).map(Some).map_err(|error| match key {
-            "vessel.tree" => missing_tree(&path, error),
-            _ => missing(key, error),
-        })
-    }
-
-    /// The file of the centre line and the key that names it.
-    fn centreline_path(&self) -> Result<Option<(&'static str, PathBuf)>> {
-        match (&self.vessel.tree, &self.vessel.centreline) {
-            (None, None) => Ok(None),
-            (Some(path), None) => Ok(Some(("vessel.tree", self.resolve(path)))),
-            (None, Some(path)) => Ok(Some(("vessel.centreline", self.resolve(path)))),
-            (Some(_), Some(path)) => {
-                let mend = "vessel.tree is given too, and is the centre line: keep one of the two";
-                Err(Error::parameter("vessel.centreline", path.display(), mend))
-            }
-        }
-    }
-
-    /// What flows through the vessel; none where it is left out.
-    ///
-    /// # Errors
-    /// As [`SceneOf::centreline`] and [`BloodFlow::new`]; flow without a centre line.
-    pub fn flow(&self) -> Result<Option<BloodFlow>> {
-        let Some(flow) = &self.vessel.flow else { return Ok(None) };
-        let Some(tree) = self.centreline()? else {
-            let mend = "blood flows along a centre line: give vessel.centreline beside the surface, or build the vessel from a tree";
-            return Err(Error::parameter("vessel.flow", "given", mend));
-        };
-        BloodFlow::new(&tree, flow).map(Some)
     }
 
     /// The simulation at the start, with walls from `store`: nothing inserted but what instruments say.
@@ -482,10 +447,11 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     }
 
     fn built(&self, wall: Wall, stack: Stack, sheath: Sheath, store: &dyn WallStore) -> Result<Simulation> {
+        let flow = self.flow(&wall, store)?;
         Simulation::builder(wall, stack, sheath)
             .properties(self.vessel.wall.clone())
             .motion(VesselMotion::new(&self.vessel.motion)?)
-            .flow(self.flow()?)
+            .flow(flow)
             .method(&self.method)
             .store(store)
             .build()

@@ -22,7 +22,7 @@ pub struct VesselSpec {
     pub axes: Option<PatientAxes>,
     /// Centre-line table (x y z radius parent, mm) that the wall is built from; rows may name targets.
     pub tree: Option<PathBuf>,
-    /// Centre-line table beside `file`, for its targets.
+    /// Centre-line table beside `file`, in place of the one that is found in it where something needs one.
     pub centreline: Option<PathBuf>,
     /// Edge length of the wall built from the tree, mm.
     pub edge_mm: Option<f64>,

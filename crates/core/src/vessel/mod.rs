@@ -42,6 +42,6 @@ pub use motion::{Displacement, MotionMode, VesselMotion};
 pub use opening::Opening;
 pub use path::{CentrelinePath, OnPath};
 pub use query::{Nearest, WallQuery};
-pub use recipe::{NoStore, WallRecipe, WallStore};
+pub use recipe::{CentrelineRecipe, NoStore, WallRecipe, WallStore};
 pub use survey::{LumenReport, SeptaReport, StartReport, Survey, survey};
 pub use wall::{NO_NEIGHBOUR, RepairReport, Wall};

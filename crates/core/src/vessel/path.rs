@@ -19,11 +19,19 @@ pub struct OnPath {
     pub radius_mm: f64,
 }
 
+/// Most that a radius changes over the length in which it does so, as far as the deepest place is concerned.
+const STEEPEST: f64 = 0.99;
+
 impl CentrelinePath {
     /// The way through these points with the vessel's radius in mm at each; none of fewer than two, or where two that follow coincide.
     pub fn new(points: Vec<(Vec3, f64)>) -> Option<Self> {
         let apart = points.windows(2).all(|pair| (pair[1].0 - pair[0].0).norm() > 0.0);
         (points.len() > 1 && apart).then_some(Self { points })
+    }
+
+    /// Its points with the vessel's radius at each, mm.
+    pub fn points(&self) -> &[(Vec3, f64)] {
+        &self.points
     }
 
     /// Its length, mm.
@@ -53,6 +61,31 @@ impl CentrelinePath {
             if distance_mm < best.distance_mm {
                 let radius_mm = pair[0].1.max(pair[1].1);
                 best = OnPath { arc_mm: before + u * length, distance_mm, radius_mm };
+            }
+            before += length;
+        }
+        best
+    }
+
+    /// The point of the path in whose vessel `x` is deepest: its distance less the radius there, which changes evenly between points, is the
+    /// least. At the mouth of a branch what is in the trunk is nearer to the branch's line, and deeper in the trunk.
+    pub(crate) fn deepest(&self, x: &Vec3) -> OnPath {
+        let mut best = OnPath { arc_mm: 0.0, distance_mm: f64::MAX, radius_mm: 0.0 };
+        let mut before = 0.0;
+        for pair in self.points.windows(2) {
+            let ((from, from_radius_mm), (to, to_radius_mm)) = (pair[0], pair[1]);
+            let (piece, slope_mm) = (to - from, to_radius_mm - from_radius_mm);
+            let length = piece.norm();
+            // Where the distance grows as fast as the radius does: beside the foot of the perpendicular by the slope's share of the height.
+            let foot = (x - from).dot(&piece) / length;
+            let height = (x - from - piece * (foot / length)).norm();
+            let sine = (slope_mm / length).clamp(-STEEPEST, STEEPEST);
+            let along = (foot + height * sine / (1.0 - sine * sine).sqrt()).clamp(0.0, length);
+            let part = along / length;
+            let distance_mm = (x - from - piece * part).norm();
+            let radius_mm = from_radius_mm + slope_mm * part;
+            if distance_mm - radius_mm < best.distance_mm - best.radius_mm {
+                best = OnPath { arc_mm: before + along, distance_mm, radius_mm };
             }
             before += length;
         }
@@ -90,6 +123,16 @@ mod tests {
         for arc_mm in [0.0, 13.0, 150.0, path.length_mm()] {
             let on = path.nearest(&path.at(arc_mm));
             assert!((on.arc_mm - arc_mm).abs() < 1e-9 && on.distance_mm < 1e-9, "{arc_mm} {on:?}");
+        }
+        // Beside the mouth of the branch, in the trunk: nearer to the branch's line, and deeper in the trunk.
+        let (fork_mm, in_branch_mm) = (path.at(201.0), path.at(224.0));
+        let aside = fork_mm + (in_branch_mm - fork_mm) * 0.6;
+        let (near, deep) = (path.nearest(&aside), path.deepest(&aside));
+        assert!(deep.distance_mm - deep.radius_mm <= near.distance_mm - path.place(near.arc_mm).1 + 1e-9);
+        for arc_mm in (0..=3000).map(|k| path.length_mm() * k as f64 / 3000.0) {
+            let (place, radius_mm) = path.place(arc_mm);
+            let deeper = (place - aside).norm() - radius_mm;
+            assert!(deeper >= deep.distance_mm - deep.radius_mm - 1e-6, "{arc_mm} {deeper} {deep:?}");
         }
         assert_eq!(path.at(1e9), path.end_mm());
         assert!(tree.path_to(0).is_none() && tree.path_to(1_000).is_none());

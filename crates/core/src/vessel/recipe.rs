@@ -1,8 +1,11 @@
-//! Walls by what they are made of, so that one that takes long to make can be kept and found again.
+//! Walls, and centre lines found in them, by what they are made of, so that one that takes long to make can be kept and found again.
 
 use serde::Serialize;
 
-use super::{CentrelineTree, Conditioning, GeneratedWall, Resolution, SurfaceMesh, Wall, condition};
+use super::{
+    CentrelineEnd, CentrelineTree, Conditioning, ExtractedCentreline, GeneratedWall, Resolution, SurfaceMesh,
+    Wall, condition,
+};
 use crate::Result;
 
 /// A wall that takes long to make, as all that decides its bits. Serialised, no two recipes are alike.
@@ -48,13 +51,38 @@ impl WallRecipe<'_> {
     }
 }
 
-/// Where walls that take long to make are kept. The core has no such place: a program brings one.
+/// The centre line that is found in a wall, as all that decides its bits.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct CentrelineRecipe<'a> {
+    /// The wall.
+    pub wall: &'a Wall,
+    /// Where it begins; the widest opening if none. It leads to all other openings.
+    pub from: Option<CentrelineEnd>,
+}
+
+impl CentrelineRecipe<'_> {
+    /// Finds the centre line.
+    ///
+    /// # Errors
+    /// As [`ExtractedCentreline::of`].
+    pub fn make(&self) -> Result<CentrelineTree> {
+        ExtractedCentreline::of(self.wall, self.from, &[]).map(|found| found.tree)
+    }
+}
+
+/// Where walls that take long to make, and their centre lines, are kept. The core has no such place: a program brings one.
 pub trait WallStore {
     /// The wall of a recipe, to the bit that of [`WallRecipe::make`], kept or made.
     ///
     /// # Errors
     /// Those of [`WallRecipe::make`]. What goes wrong with the store is none: then the wall is made.
     fn wall(&self, recipe: &WallRecipe<'_>) -> Result<Wall>;
+
+    /// The centre line of a recipe, to the bit that of [`CentrelineRecipe::make`], kept or found.
+    ///
+    /// # Errors
+    /// Those of [`CentrelineRecipe::make`].
+    fn centreline(&self, recipe: &CentrelineRecipe<'_>) -> Result<CentrelineTree>;
 }
 
 /// Keeps nothing.
@@ -63,6 +91,10 @@ pub struct NoStore;
 
 impl WallStore for NoStore {
     fn wall(&self, recipe: &WallRecipe<'_>) -> Result<Wall> {
+        recipe.make()
+    }
+
+    fn centreline(&self, recipe: &CentrelineRecipe<'_>) -> Result<CentrelineTree> {
         recipe.make()
     }
 }

@@ -3,6 +3,7 @@
 //! Blood enters the centre-line tree at its inlet and divides at bifurcations ([`flow_nodes`]). It comes as the heart pumps it: a part of the
 //! flow, the pulsatility, in systole, the rest all the time.
 
+use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use endowire_core::flow::{FlowNode, flow_nodes};
@@ -88,17 +89,12 @@ impl Flow {
         if spec.injection.is_empty() {
             return Ok(None);
         }
-        let Some(path) = &spec.flow.tree else {
+        let given = spec.flow.tree.as_deref().map(read).transpose()?;
+        let Some(tree) = given.as_ref().or(spec.flow.centreline.as_deref()) else {
             let mend = "contrast medium flows along a centre line; give view.flow.tree";
             return Err(Error::parameter("view.injection", format!("{} tables", spec.injection.len()), mend));
         };
-        let tree = CentrelineTree::read(path).map_err(|error| match error {
-            Error::File { path, source } => {
-                Error::parameter("view.flow.tree", path.display(), source.to_string())
-            }
-            other => other,
-        })?;
-        Self::new(&tree, &spec.flow, &spec.injection).map(Some)
+        Self::new(tree, &spec.flow, &spec.injection).map(Some)
     }
 
     pub(super) fn new(tree: &CentrelineTree, spec: &FlowSpec, injections: &[InjectionSpec]) -> Result<Self> {
@@ -190,6 +186,15 @@ impl Flow {
 pub(super) fn nearest(nodes: &[Node], point: &Vec3) -> usize {
     let distance = |i: &usize| (nodes[*i].position_mm - point).norm_squared();
     (0..nodes.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+}
+
+fn read(path: &Path) -> Result<CentrelineTree> {
+    CentrelineTree::read(path).map_err(|error| match error {
+        Error::File { path, source } => {
+            Error::parameter("view.flow.tree", path.display(), source.to_string())
+        }
+        other => other,
+    })
 }
 
 /// The tree's points and some between them, with the lumen before each.

@@ -1,7 +1,9 @@
 //! `[view.patient]`, `[view.flow]`, `[[view.injection]]` and `[[view.device]]`: what else is in the beam.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
+use endowire_core::vessel::CentrelineTree;
 use endowire_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -94,6 +96,9 @@ impl PatientSpec {
 pub struct FlowSpec {
     /// Centre-line table of the vessel (x y z radius parent, mm), of at most 50,000 points 2 mm apart or nearer.
     pub tree: Option<PathBuf>,
+    /// The vessel's centre line at hand, where `tree` names none.
+    #[serde(skip)]
+    pub centreline: Option<Arc<CentrelineTree>>,
     /// A point near the end of the tree where the blood comes in, each coordinate -100,000 to 100,000; absent: the widest end, and of
     /// those about as wide the one nearest to the head.
     pub inlet_mm: Option<[f64; 3]>,
@@ -118,6 +123,7 @@ impl Default for FlowSpec {
         // A resting heart pumps 5 l/min.
         Self {
             tree: None,
+            centreline: None,
             inlet_mm: None,
             inflow_ml_per_s: 80.0,
             split_exponent: 2.0,

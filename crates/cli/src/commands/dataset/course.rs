@@ -64,7 +64,7 @@ impl Course {
         let scene = scene(file, device, settings)?;
         let mut view = view(spec, &scene, file)?;
         let pushed = Pushed::new(&scene, &view).map_err(|e| Failure::from(e).at(file.display()))?;
-        let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(failed)?;
+        let script = scene.stack().and_then(|stack| scene.steps(&stack, cache)).map_err(failed)?;
         let mut simulation = scene.simulation(cache).map_err(failed)?;
         let instruments = simulation.stack().instruments().iter().map(|i| i.name.clone()).collect();
         let mut moments = Vec::new();
@@ -104,6 +104,8 @@ impl Course {
             tell(format_args!("endowire: {}: {remarks}", file.display()));
         }
         view.injection.extend(injected.iter().map(Injected::spec));
+        scenes::let_medium_flow(&mut view, &scene, cache).map_err(failed)?;
+        scenes::tell_found_centreline(file, &scene);
         view.validate().map_err(failed)?;
         let views = shot::planes(spec, &view, first);
         Ok(Self {

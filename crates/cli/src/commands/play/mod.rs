@@ -41,10 +41,13 @@ struct Document {
 pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
     let scene = scenes::with_script(&args.scene, &args.set.set, args.script.as_deref())?;
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
-    let view = ViewSpec::of_scene(&scene, &args.scene)?;
-    let simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
+    let cache = Cache::new(&args.cache);
+    let mut view = ViewSpec::of_scene(&scene, &args.scene)?;
+    let simulation = scene.simulation(&cache).map_err(in_scene)?;
     let limits = Limits { push_n: args.warn_n, torque_nmm: args.warn_nmm };
-    let script = scene.steps(simulation.stack()).map_err(in_scene)?;
+    let script = scene.steps(simulation.stack(), &cache).map_err(in_scene)?;
+    scenes::let_medium_flow(&mut view, &scene, &cache).map_err(in_scene)?;
+    scenes::tell_found_centreline(&args.scene, &scene);
     let session = Session::new(simulation, view, args.size, limits).map_err(in_scene)?;
     let session = begun(session.with_script(script), args).map_err(in_scene)?;
     let pictures =

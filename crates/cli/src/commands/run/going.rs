@@ -51,6 +51,7 @@ impl SoFar<'_> {
             scene: self.scene.name.clone(),
             scene_file: std::path::absolute(self.scene_file).unwrap_or_else(|_| self.scene_file.to_owned()),
             method: self.scene.method.name(),
+            centreline_found: self.scene.finds_centreline(),
             outcome: RunOutcome::new(&self.simulation, &self.hand, steps, tally, failure),
             step_time_s,
             wall_time_s: self.started.elapsed().as_secs_f64(),

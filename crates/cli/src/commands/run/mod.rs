@@ -30,20 +30,23 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     let in_scene = |e: endowire_core::Error| Failure::from(e).at(args.scene.display());
     let resume = args.resume.as_deref().filter(|path| is_there(path));
     let saved = resume.map(Saved::read).transpose()?;
-    let script = scene.stack().and_then(|stack| scene.steps(&stack)).map_err(in_scene)?;
+    let cache = Cache::new(&args.cache);
+    let script = scene.stack().and_then(|stack| scene.steps(&stack, &cache)).map_err(in_scene)?;
     if script.is_empty() {
         let text = "script = []: give at least one [[script]] table, what the hand does".to_owned();
         return Err(Failure::Input(text).at(args.scene.display()));
     }
-    let mut simulation = scene.simulation(&Cache::new(&args.cache)).map_err(in_scene)?;
+    let mut simulation = scene.simulation(&cache).map_err(in_scene)?;
     if !args.quiet {
         for hint in scene.hints(simulation.wall()).map_err(in_scene)? {
             tell(format_args!("{}: {hint}", args.scene.display()));
         }
     }
     let saver = args.save_state.as_ref().map(|path| Saver::new(path, &scene, &simulation));
-    let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation))?;
-    frames.check(&script).map_err(in_scene)?;
+    let mut frames = FrameWriter::new(&args.scene, &scene, Some(&simulation), &cache)?;
+    if !args.quiet {
+        scenes::tell_found_centreline(&args.scene, &scene);
+    }
     if let Some(held) = frames.held().filter(|_| !args.quiet) {
         tell(format_args!("{}: {held}", args.scene.display()));
     }

@@ -16,11 +16,13 @@ use endowire_viewer::{
 use serde::Serialize;
 
 use crate::args::{FrameArgs, ViewChoice};
+use crate::cache::Cache;
 use crate::failure::Failure;
 use crate::output::frames::tomogram_holds;
 use crate::output::manifest::Manifest;
 use crate::output::npz::write_map;
 use crate::output::{print_json, tell, to_json};
+use crate::scenes;
 use plane::{Plane, write_dicom};
 
 /// One moment to draw.
@@ -151,8 +153,12 @@ impl<'a> Studio<'a> {
         mut plan: Plan<'a>,
         wall: Wall,
         injections: impl IntoIterator<Item = InjectionSpec>,
+        (scene, store): (&Scene, &Cache),
     ) -> Result<Self, Failure> {
         plan.spec.injection.extend(injections);
+        if plan.spec.wants(View::Fluoro) {
+            scenes::let_medium_flow(&mut plan.spec, scene, store)?;
+        }
         let planes = Plane::all(&plan.spec, &wall)?;
         if let Some(held) = planes.first().and_then(|plane| tomogram_holds(&plane.renderer)) {
             tell(format_args!("endowire: {held}"));

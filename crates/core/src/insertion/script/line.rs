@@ -56,6 +56,11 @@ pub struct ScriptLine {
 }
 
 impl ScriptLine {
+    /// Whether it ends at a target of the vessel's centre line.
+    pub(crate) fn has_target(&self) -> bool {
+        self.until.as_ref().is_some_and(|until| until.target.is_some())
+    }
+
     /// The motions that the line means, one after another; `name` is what messages call it.
     ///
     /// # Errors

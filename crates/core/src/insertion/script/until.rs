@@ -98,7 +98,7 @@ impl Condition {
 /// Where a target is.
 fn place(key: &str, target: &str, centreline: Option<&CentrelineTree>) -> Result<Vec3> {
     let Some(tree) = centreline else {
-        let mend = "the vessel has no centre line that names targets: give vessel.tree, or vessel.centreline beside vessel.file";
+        let mend = "is a name of the vessel's centre line, and none is given";
         return Err(Error::parameter(key, format!("{target:?}"), mend));
     };
     match tree.target(target) {

@@ -22,7 +22,7 @@ use crate::{Error, Result, Vec3};
 const SPACINGS: [f64; 3] = [0.5, 0.25, 0.125];
 
 /// Where a centre line begins or ends.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub enum CentrelineEnd {
     /// An opening of the wall, by its number.
     Opening(usize),

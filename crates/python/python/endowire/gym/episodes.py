@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .. import Batch, EndOfWay, EndowireError
 from .centreline import Path, Ways
+from .scaling import shown
 from .task import Task
 from .vessels import Site
 
@@ -26,6 +27,7 @@ class Episodes:
         self.action_space = task.action_space()
         self._limits = task.limits()
         self._spaces = task.observation_spaces()
+        self._shown = shown(task)
         self.observation_space = spaces.Dict(self._spaces)
         instruments = len(task.instruments)
         self._lengths_mm = np.array([instrument.length_mm for instrument in task.instruments])
@@ -39,6 +41,8 @@ class Episodes:
         self.tip_mm = np.zeros((n, 3))
         #: Way along the centre line to the target, mm, shape (n,), now and before the last step.
         self.way_mm, self.way_before_mm = np.zeros(n), np.zeros(n)
+        #: The same when the episode began, shape (n,).
+        self.way_begun_mm = np.zeros(n)
         #: The way from the root of the centre line to the target, of each.
         self.paths: list[Path | None] = [None] * n
         #: Whether the tip is at the target, shape (n,).
@@ -76,7 +80,7 @@ class Episodes:
             self.failures.pop(k, None)
         self._look()
         for k in generators:
-            self.way_before_mm[k] = self.way_mm[k]
+            self.way_before_mm[k] = self.way_begun_mm[k] = self.way_mm[k]
 
     def step(self, velocities: NDArray[np.float64], moving: NDArray[np.bool_]) -> None:
         """Moves those environments by velocities, mm/s and rad/s, shape (n, n_instruments, 2), clipped to the limits; the others wait. Where one is NaN the
@@ -110,7 +114,7 @@ class Episodes:
     def observe(self) -> dict[str, NDArray[Any]]:
         """All parts of the observations, within their spaces."""
         observed = {}
-        for name, part in self.task.observations.items():
+        for name, part in self._shown.items():
             space = self._spaces[name]
             values = part.observe(self)
             observed[name] = (

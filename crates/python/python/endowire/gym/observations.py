@@ -1,4 +1,8 @@
-"""What is observed: parts of a dictionary, each with its space. All work on all environments of a vector at once."""
+"""What is observed: parts of a dictionary, each with its space. All work on all environments of a vector at once.
+
+Parts are in mm, N and N·mm; a part that has a ``unit`` can be shown scaled to numbers of about 1 (`scaling`), which is what a task shows unless it says
+``observed="physical"``.
+"""
 
 from __future__ import annotations
 
@@ -32,11 +36,20 @@ def _place(task: Task, *shape: int) -> spaces.Box:
     return spaces.Box(low, high, dtype=np.float32)
 
 
+def _of_vessels(task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Positions are scaled from the middle of the box of the vessels, in half of its longest side: alike in all directions."""
+    low, high = task.vessels.bounds_mm
+    return (low + high) / 2.0, np.full(3, (high - low).max() / 2.0)
+
+
 class Tip:
     """Position of the tip, mm, shape (3,)."""
 
     def space(self, task: Task) -> spaces.Box:
         return _place(task)
+
+    def unit(self, task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return _of_vessels(task)
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         return episodes.tip_mm
@@ -47,6 +60,9 @@ class Target:
 
     def space(self, task: Task) -> spaces.Box:
         return _place(task)
+
+    def unit(self, task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return _of_vessels(task)
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         return episodes.target_mm
@@ -60,6 +76,9 @@ class Shape:
 
     def space(self, task: Task) -> spaces.Box:
         return _place(task, len(self.from_tip_mm))
+
+    def unit(self, task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return _of_vessels(task)
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         return episodes.batch.points_mm(self.from_tip_mm)
@@ -123,6 +142,11 @@ class Hands:
         low = high * np.array([0.0, -1.0, -1.0], dtype=np.float32)
         return spaces.Box(low, high, dtype=np.float32)
 
+    def unit(self, task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lengths are scaled to parts of the instrument."""
+        lengths = np.array([[instrument.length_mm, 1.0, 1.0] for instrument in task.instruments])
+        return np.zeros_like(lengths), lengths
+
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         turn = episodes.batch.rotation_rad
         return np.stack([episodes.batch.inserted_mm, np.cos(turn), np.sin(turn)], axis=-1)
@@ -139,6 +163,10 @@ class Forces:
 
     def space(self, task: Task) -> spaces.Box:
         return spaces.Box(-self.largest, self.largest, (2 * len(task.instruments) + 1,), dtype=np.float32)
+
+    def unit(self, task: Task) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Newtons and newton millimetres are of about 1 as they are."""
+        return np.zeros(1), np.ones(1)
 
     def observe(self, episodes: Episodes) -> NDArray[np.float64]:
         batch = episodes.batch

@@ -49,6 +49,22 @@ class Approach:
         return self.worth_per_mm * (episodes.way_before_mm - episodes.way_mm)
 
 
+class Progress:
+    """So much for the whole way to the target, and for each part of it as it becomes shorter; taken back where it becomes longer.
+
+    It is the difference of a potential, the way that is left over that at the episode's beginning (Ng, Harada and Russell, ICML 1999, without discount):
+    what an episode has in all hangs on where it begins and ends alone, and no detour is worth anything.
+    """
+
+    def __init__(self, worth: float = 1.0) -> None:
+        self.worth = worth
+
+    def reward(self, episodes: Episodes) -> NDArray[np.float64]:
+        # A way that begins at the target has no parts.
+        whole_mm = np.maximum(episodes.way_begun_mm, episodes.task.threshold_mm)
+        return self.worth * (episodes.way_before_mm - episodes.way_mm) / whole_mm
+
+
 class Distance:
     """So much for every millimetre between tip and target."""
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from .. import InputError, Instrument, Simulation
 from . import ends, observations, rewards
+from .scaling import shown
 from .targets import CentrelineTarget, TargetSampler
 from .vessels import Site, VesselSource
 
@@ -26,7 +27,7 @@ def _observations() -> dict[str, observations.Observation]:
 
 
 def _rewards() -> list[rewards.Reward]:
-    return [rewards.Reached(), rewards.EachStep(), rewards.Approach()]
+    return [rewards.Reached(), rewards.EachStep(), rewards.Progress()]
 
 
 def _ends() -> list[ends.End]:
@@ -53,6 +54,8 @@ class Task:
     speed_limits: tuple[float, float] = (35.0, 3.14)
     #: What an action of an environment is: parts of these limits, from -1 to 1, which policies learn from as they are; or velocities, mm/s and rad/s.
     actions: Literal["scaled", "physical"] = "scaled"
+    #: What observations are: scaled to numbers of about 1 (see `scaling`; names lose the unit they end with, ``tip_mm`` is ``tip``), or in mm, N and N·mm.
+    observed: Literal["scaled", "physical"] = "scaled"
     #: Keys of `[vessel.wall]` of a scene file.
     wall: Mapping[str, Any] = field(default_factory=dict)
     #: Keys of `[method]` of a scene file.
@@ -67,6 +70,8 @@ class Task:
     def __post_init__(self) -> None:
         if self.actions not in ("scaled", "physical"):
             raise InputError(f"actions = {self.actions!r}: give scaled or physical")
+        if self.observed not in ("scaled", "physical"):
+            raise InputError(f"observed = {self.observed!r}: give scaled or physical")
 
     def limits(self) -> NDArray[np.float64]:
         """Fastest push in mm/s and turn in rad/s of each instrument, shape (n_instruments, 2)."""
@@ -83,8 +88,8 @@ class Task:
         return spaces.Box(-high, high, dtype=np.float32)
 
     def observation_spaces(self) -> dict[str, spaces.Box]:
-        """The space of each part of the observations."""
-        return {name: part.space(self) for name, part in self.observations.items()}
+        """The space of each part of the observations, as `observed` says."""
+        return {name: part.space(self) for name, part in shown(self).items()}
 
     def start(self, site: Site) -> Simulation:
         """The simulation of a site with nothing inserted, made once: copy it."""

@@ -34,14 +34,15 @@ def hooked_wire() -> Instrument:
 
 
 def curved_tube(**parts: Any) -> Task:
-    """The hooked wire in a tube that bends by 180°.
+    """The hooked wire in a tube that bends by 180°, 200 steps: five times as many as a straight push to its end takes.
 
     Elements of 7.5 mm and contact points four radii apart are enough in a tube without crests: after 1700 random steps in 15 episodes the tip is within
     0.002 mm of that with elements of 5 mm and points 1.5 radii apart, in two thirds of the time.
     """
     vessels = FixedVessel(Vessel.generate("curved_tube", edge_mm=1.5))
     method = {"name": "kirchhoff", "element_mm": 7.5, "contact_spacing_radii": 4.0}
-    return Task(**{"instruments": [hooked_wire()], "vessels": vessels, "method": method, **parts})
+    over = [ends.TargetReached(), ends.LeftVessel(), ends.StepLimit(200)]
+    return Task(**{"instruments": [hooked_wire()], "vessels": vessels, "method": method, "ends": over, **parts})
 
 
 def aortic_arch(**parts: Any) -> Task:
@@ -77,6 +78,8 @@ def arch_variety(**parts: Any) -> Task:
             "target_mm": observations.Target(),
             "last_action": observations.LastAction(),
         },
+        # As the original has it.
+        "rewards": [rewards.Reached(), rewards.EachStep(), rewards.Approach()],
         "wall": {"friction": 0.1, "deviation_mm": 0.0},
         "method": {"name": "kirchhoff", "element_mm": 7.5, "contact_spacing_radii": 4.0},
     }

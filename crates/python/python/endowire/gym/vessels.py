@@ -67,12 +67,14 @@ class FixedVessel:
     """The same vessel in every episode."""
 
     def __init__(self, vessel: Vessel, centreline: NDArray[np.float64] | None = None, **sheath: Any) -> None:
-        """A vessel with the centre line it was generated from, or another one (x, y, z, radius, parent; shape (n, 5))."""
+        """A vessel with the centre line it was made from, or another one (x, y, z, radius, parent; shape (n, 5)). In one of a surface alone it is found
+        in the lumen, from the sheath's ``opening`` if that is told.
+
+        Raises InputError for a surface in which none is found.
+        """
+        if centreline is None and vessel.centreline_found and "opening" in sheath:
+            vessel = vessel.with_centreline(sheath["opening"])
         table = vessel.centreline if centreline is None else np.asarray(centreline, dtype=float)
-        if table is None:
-            raise ValueError(
-                "centreline = None: give the centre line of a vessel that was not generated from one"
-            )
         self.site = Site(vessel, Centreline(table), sheath)
         low, high = vessel.vertices_mm.min(axis=0), vessel.vertices_mm.max(axis=0)
         # Instruments may leave through an opening.

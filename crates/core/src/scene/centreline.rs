@@ -1,0 +1,105 @@
+//! The centre line of a scene's vessel: the tree it is built from, the one given beside its surface, or the one found in that. It is looked
+//! for where something needs it, and once.
+
+use std::path::PathBuf;
+
+use serde::de::DeserializeOwned;
+
+use super::SceneOf;
+use super::spec::{missing, missing_tree};
+use crate::flow::BloodFlow;
+use crate::insertion::ScriptLine;
+use crate::methods::MethodChoice;
+use crate::vessel::{CentrelineEnd, CentrelineRecipe, CentrelineTree, Wall, WallStore};
+use crate::{Error, Result, Vec3};
+
+impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
+    /// The vessel's centre line: the tree it is built from, the one given beside its surface, or without either the one that is found in the
+    /// surface, from the sheath's opening (the widest, if the sheath is at a place) to all others, its targets called `opening 1`.
+    ///
+    /// # Errors
+    /// A missing or unusable file; one given beside a tree; a surface in which none is found.
+    pub fn centreline(&self, store: &dyn WallStore) -> Result<&CentrelineTree> {
+        self.known_or(store, || self.wall(store))
+    }
+
+    /// The centre line that was found in the surface so far: one was needed, and none is given.
+    pub fn found_centreline(&self) -> Option<&CentrelineTree> {
+        self.centreline.get().filter(|_| !self.gives_centreline())
+    }
+
+    /// Whether the centre line has to be found in the surface, or was: something needs one, and none is given.
+    pub fn finds_centreline(&self) -> bool {
+        let is_needed = self.vessel.flow.is_some() || self.script.iter().any(ScriptLine::has_target);
+        !self.gives_centreline() && (is_needed || self.centreline.get().is_some())
+    }
+
+    fn gives_centreline(&self) -> bool {
+        self.vessel.tree.is_some() || self.vessel.centreline.is_some()
+    }
+
+    /// What flows through the vessel, whose `wall` is at hand; none where it is left out.
+    ///
+    /// # Errors
+    /// As [`SceneOf::centreline`] and [`BloodFlow::new`].
+    pub fn flow(&self, wall: &Wall, store: &dyn WallStore) -> Result<Option<BloodFlow>> {
+        let Some(flow) = &self.vessel.flow else { return Ok(None) };
+        let tree = self.known_or(store, || Ok(wall.clone()))?;
+        BloodFlow::new(tree, flow).map(Some)
+    }
+
+    /// The file of the centre line and the key that names it; none where there is neither.
+    pub(super) fn centreline_path(&self) -> Result<Option<(&'static str, PathBuf)>> {
+        match (&self.vessel.tree, &self.vessel.centreline) {
+            (None, None) => Ok(None),
+            (Some(path), None) => Ok(Some(("vessel.tree", self.resolve(path)))),
+            (None, Some(path)) => Ok(Some(("vessel.centreline", self.resolve(path)))),
+            (Some(_), Some(path)) => {
+                let mend = "vessel.tree is given too, and is the centre line: keep one of the two";
+                Err(Error::parameter("vessel.centreline", path.display(), mend))
+            }
+        }
+    }
+
+    /// The centre line that is known, or that of the scene's files.
+    fn known_or(
+        &self,
+        store: &dyn WallStore,
+        wall: impl FnOnce() -> Result<Wall>,
+    ) -> Result<&CentrelineTree> {
+        if let Some(known) = self.centreline.get() {
+            return Ok(known);
+        }
+        let tree = match self.centreline_path()? {
+            Some((key, path)) => CentrelineTree::read(&path).map_err(|error| match key {
+                "vessel.tree" => missing_tree(&path, error),
+                _ => missing(key, error),
+            })?,
+            None => self.find(&wall()?, store)?,
+        };
+        Ok(self.centreline.get_or_init(|| tree))
+    }
+
+    /// Finds the centre line of the surface.
+    fn find(&self, wall: &Wall, store: &dyn WallStore) -> Result<CentrelineTree> {
+        let recipe = CentrelineRecipe { wall, from: self.begin(wall) };
+        store.centreline(&recipe).map_err(|error| {
+            let mend = format!(
+                "none is found in the surface ({error}): name a table of it, as `endowire vessel centreline SURFACE --from END --to END --out TABLE` \
+                 writes it between openings or places inside"
+            );
+            Error::parameter("vessel.centreline", "none", mend)
+        })
+    }
+
+    /// Where the centre line begins that is looked for: at the sheath, unless another opening is needed to lead to.
+    fn begin(&self, wall: &Wall) -> Option<CentrelineEnd> {
+        let count = wall.openings().len();
+        match (self.sheath.opening, self.sheath.position_mm) {
+            // One that is not there is refused where the sheath is placed.
+            (Some(opening), _) if opening < count => Some(CentrelineEnd::Opening(opening)),
+            (None, Some(position)) if count == 1 => Some(CentrelineEnd::Place(Vec3::from(position))),
+            _ => None,
+        }
+    }
+}
