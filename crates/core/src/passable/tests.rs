@@ -11,7 +11,11 @@ fn narrowing() -> CentrelinePath {
 
 /// Straight for 60 mm, a bend, and straight again, in a lumen of this radius.
 fn bend(bend_mm: f64, degrees: f64, radius_mm: f64) -> CentrelinePath {
-    let leg = 60.0;
+    bend_between(60.0, bend_mm, degrees, radius_mm)
+}
+
+/// The same, straight for so long.
+fn bend_between(leg: f64, bend_mm: f64, degrees: f64, radius_mm: f64) -> CentrelinePath {
     let arc = bend_mm * degrees.to_radians();
     let at = |s: f64| {
         let angle = (s - leg).clamp(0.0, arc) / bend_mm;
@@ -62,12 +66,13 @@ fn the_room_lets_a_device_cut_a_bend() {
     // for a small angle θ the radius in the middle is ¾ρ + 12 room/θ².
     let (bend_mm, degrees, room_mm) = (100.0, 20.0_f64, 1.0);
     let expected_mm = 0.75 * bend_mm + 12.0 * room_mm / degrees.to_radians().powi(2);
-    let wide = sharpest(&bend(bend_mm, degrees, 0.5 + room_mm));
+    // It comes in in the middle, far away.
+    let wide = sharpest(&bend_between(160.0, bend_mm, degrees, 0.5 + room_mm));
     assert!((wide.cut_radius_mm / expected_mm - 1.0).abs() < 0.05, "{wide:?} {expected_mm}");
     assert!((wide.bend_radius_mm / bend_mm - 1.0).abs() < 0.1, "{wide:?}");
     // A bend by little is straight for a wire that has room.
-    let slight = sharpest(&bend(30.0, 3.0, 4.0));
-    assert!(slight.cut_radius_mm > 1e4 && slight.bend_radius_mm < 100.0, "{slight:?}");
+    let [slight, narrow] = [4.0, 0.52].map(|lumen_mm| sharpest(&bend(30.0, 3.0, lumen_mm)));
+    assert!(slight.cut_radius_mm > 1e4 && narrow.cut_radius_mm < 200.0, "{slight:?} {narrow:?}");
 }
 
 #[test]

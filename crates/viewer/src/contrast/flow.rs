@@ -293,7 +293,7 @@ mod tests {
     fn a_tree_of_too_many_points_is_refused_before_it_is_made() {
         let node = |k: usize| CentrelineNode {
             position_mm: Vec3::x() * (1800.0 * k as f64),
-            radius_mm: 5.0,
+            radius_mm: 8.0,
             parent: k.checked_sub(1),
         };
         let long = CentrelineTree::new((0..=500).map(node).collect()).unwrap();

@@ -11,6 +11,9 @@ use super::glass::{Glass, Side};
 use crate::failure::Failure;
 use crate::output::chart::{self, COLOURS};
 
+/// A radius that a curve shows, mm.
+type Radius = fn(&WayPoint) -> f64;
+
 /// Size in pixels, of which the vessel takes so many on the left and its legend so many below it.
 const SIZE: (u32, u32) = (1700, 1000);
 const VESSEL_PX: i32 = 760;
@@ -235,7 +238,7 @@ impl Picture<'_> {
             .axis_desc_style(chart::font(17))
             .y_label_formatter(&chart::power)
             .draw()?;
-        let lines: [(fn(&WayPoint) -> f64, RGBColor, &str); 3] = [
+        let lines: [(Radius, RGBColor, &str); 3] = [
             (|p| p.bend_radius_mm, COLOURS[2], "centre line"),
             (|p| p.cut_radius_mm, LUMEN, "what the room lets a wire make of it"),
             (|p| p.bears_radius_mm, DEVICE, "the device takes this without force"),

@@ -285,7 +285,7 @@ fn a_tree_of_thousands_of_branches_is_refused_before_a_grid_is_made() {
         parent,
     };
     let mut nodes = vec![node(0.0, 0.0, 4.0, None)];
-    nodes.extend((0..6000).map(|k| node(20.0 + 0.2 * f64::from(k), 10.0, 1.0, Some(0))));
+    nodes.extend((0..6000).map(|k| node(20.0 + 0.02 * f64::from(k), 10.0, 1.0, Some(0))));
     let tree = CentrelineTree::new(nodes).unwrap();
     let error = GeneratedWall::new(&tree, Resolution::EdgeMm(1.0)).unwrap_err().to_string();
     assert!(error.starts_with("centreline rows = 6001: the first "), "{error}");
