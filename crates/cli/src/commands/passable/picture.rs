@@ -108,8 +108,8 @@ impl Picture<'_> {
             panel.draw(&Circle::new(at(first), 7, black.filled()))?;
             panel.draw(&Circle::new(at(last), 9, black.stroke_width(3)))?;
         }
-        mark(panel, at(&self.found.narrowest), NARROWEST, 0)?;
-        mark(panel, at(&self.found.sharpest), SHARPEST, 1)
+        mark_narrowest(panel, at(&self.found.narrowest))?;
+        mark_sharpest(panel, at(&self.found.sharpest))
     }
 
     /// What marks and colours are, and the scale of the vessel.
@@ -118,16 +118,16 @@ impl Picture<'_> {
         let narrow = &found.narrowest;
         let bend = &found.sharpest;
         let grey = RGBColor(90, 90, 90);
-        let told = [
+        let told: [(Mark<B>, String); 2] = [
             (
-                NARROWEST,
+                mark_narrowest,
                 format!(
                     "narrowest at {:.1} mm: {:.2} mm of room about the device",
                     narrow.arc_mm, narrow.clearance_mm
                 ),
             ),
             (
-                SHARPEST,
+                mark_sharpest,
                 format!(
                     "sharpest bend at {:.1} mm: radius {}, {} takes no force",
                     bend.arc_mm,
@@ -136,9 +136,9 @@ impl Picture<'_> {
                 ),
             ),
         ];
-        for (number, (colour, text)) in told.into_iter().enumerate() {
+        for (number, (mark, text)) in told.into_iter().enumerate() {
             let y = 14 + 30 * number as i32;
-            mark(legend, (36, y + 9), colour, number)?;
+            mark(legend, (36, y + 9))?;
             legend.draw(&Text::new(text, (60, y), chart::font(19)))?;
         }
         legend.draw(&Circle::new((36, 83), 6, RGBColor(20, 20, 20).filled()))?;
@@ -203,18 +203,18 @@ impl Picture<'_> {
         let along = |of: fn(&WayPoint) -> f64| found.way.iter().map(move |p| (p.arc_mm, of(p)));
         plot.draw_series(LineSeries::new(along(|p| p.lumen_radius_mm), LUMEN.stroke_width(3)))?
             .label("free radius of the lumen")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 26, y)], LUMEN.stroke_width(3)));
+            .legend(key(LUMEN, 3));
         plot.draw_series(LineSeries::new(along(|p| p.device_radius_mm), DEVICE.stroke_width(3)))?
             .label("radius of the device, its tip at the target")
-            .legend(|(x, y)| PathElement::new([(x, y), (x + 26, y)], DEVICE.stroke_width(3)));
+            .legend(key(DEVICE, 3));
         if found.reaches_mm < found.length_mm {
             let stop = [(found.reaches_mm, 0.0), (found.reaches_mm, HEADROOM * top_mm)];
             plot.draw_series([PathElement::new(stop, NARROWEST.stroke_width(2))])?
                 .label("the tip comes to here")
-                .legend(|(x, y)| PathElement::new([(x, y), (x + 26, y)], NARROWEST.stroke_width(2)));
+                .legend(key(NARROWEST, 2));
         }
         let at = plot.backend_coord(&(found.narrowest.arc_mm, found.narrowest.lumen_radius_mm));
-        mark(panel, self.in_panel(panel, at), NARROWEST, 0)?;
+        mark_narrowest(panel, self.in_panel(panel, at))?;
         legend_of(&mut plot)
     }
 
@@ -247,11 +247,11 @@ impl Picture<'_> {
             let line = found.way.iter().map(|p| (p.arc_mm, of(p).min(STRAIGHT_MM)));
             plot.draw_series(LineSeries::new(line, colour.stroke_width(3)))?
                 .label(name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 26, y)], colour.stroke_width(3)));
+                .legend(key(colour, 3));
         }
         let sharp = &found.sharpest;
         let at = plot.backend_coord(&(sharp.arc_mm, sharp.cut_radius_mm.min(STRAIGHT_MM)));
-        mark(panel, self.in_panel(panel, at), SHARPEST, 1)?;
+        mark_sharpest(panel, self.in_panel(panel, at))?;
         legend_of(&mut plot)
     }
 
@@ -262,18 +262,22 @@ impl Picture<'_> {
     }
 }
 
-/// A mark: of the narrowest place a ring, of the sharpest bend a triangle.
-fn mark<B: DrawingBackend>(
-    panel: &DrawingArea<B, Shift>,
-    at: (i32, i32),
-    colour: RGBColor,
-    kind: usize,
-) -> chart::Drawn<B> {
-    if kind == 0 {
-        panel.draw(&Circle::new(at, 10, colour.stroke_width(4)))
-    } else {
-        panel.draw(&TriangleMarker::new(at, 12, colour.filled()))
-    }
+/// What marks a place.
+type Mark<B> = fn(&DrawingArea<B, Shift>, (i32, i32)) -> chart::Drawn<B>;
+
+/// A ring, at the narrowest place.
+fn mark_narrowest<B: DrawingBackend>(panel: &DrawingArea<B, Shift>, at: (i32, i32)) -> chart::Drawn<B> {
+    panel.draw(&Circle::new(at, 10, NARROWEST.stroke_width(4)))
+}
+
+/// A triangle, at the sharpest bend.
+fn mark_sharpest<B: DrawingBackend>(panel: &DrawingArea<B, Shift>, at: (i32, i32)) -> chart::Drawn<B> {
+    panel.draw(&TriangleMarker::new(at, 12, SHARPEST.filled()))
+}
+
+/// What stands for a curve of a colour in the legend of a plot.
+fn key(colour: RGBColor, width: u32) -> impl Fn((i32, i32)) -> PathElement<(i32, i32)> {
+    move |(x, y)| PathElement::new([(x, y), (x + 26, y)], colour.stroke_width(width))
 }
 
 /// The legend of a plot.
