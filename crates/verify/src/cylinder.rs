@@ -54,9 +54,6 @@ struct Fineness {
     hardness: f64,
 }
 
-/// Least hardness of a wall from which a harder one is approached.
-const SOFTEST: f64 = 100.0;
-
 /// A rod wound into `turns` turns of about `angle` by the thrust that belongs to it: clamped at its start along the helix,
 /// otherwise free, so no moment about the cylinder's axis acts. What the ends disturb decays by a factor of 10⁴ in a turn.
 struct Helix {
@@ -96,11 +93,7 @@ impl Helix {
         let mut rod = TestRod::new(&cylinder(length, around)?, &setup, start, shape)?;
         rod.tolerance = 1e-8;
         rod.loads.forces = vec![(elements, Vec3::x() * -thrust(sine * sine))];
-        // A wall into which it presses itself by more than a hundredth of the play holds no helix: it winds up and folds.
-        for softness in [(SOFTEST / hardness).max(0.1), 1.0] {
-            rod.softness = softness;
-            rod.solve()?;
-        }
+        rod.solve()?;
         Ok(Self { rod, turns, per_turn })
     }
 

@@ -1,19 +1,16 @@
 //! A rod in equilibrium with walls and loads, without the insertion around it: the bench of the contact cases.
 
 use endowire_core::contact::Touch;
-use endowire_core::contact::{ContactCache, ContactSurface, Friction, HandMotion, SETTLED, WallContact};
+use endowire_core::contact::{ContactCache, ContactSurface, Friction, HandMotion, WallContact};
 use endowire_core::device::Device;
 use endowire_core::insertion::WallProperties;
 use endowire_core::methods::kirchhoff::{Fineness, Mesh};
 use endowire_core::rod::{Clamp, ElementData, PLAIN, RodState, Stencils, Supports};
-use endowire_core::solve::{External, Moved, Newton, NewtonOptions};
+use endowire_core::solve::{Contacts, External, Newton, NewtonOptions, Sizes};
 use endowire_core::statics::Loads;
 use endowire_core::vessel::{NoStore, Wall};
 use endowire_core::{Error, Result, Vec3};
 use nalgebra::Matrix3;
-
-/// Renewals of the forces that friction follows from.
-const RENEWALS: usize = 100;
 
 /// What lies on the bench.
 #[derive(Debug, Clone, Copy)]
@@ -40,8 +37,6 @@ pub(super) struct TestRod {
     newton: Newton<PLAIN>,
     /// Stiffness at a node of two plates without play along the plane z = 0, between which the rod lies.
     pub(super) plates: f64,
-    /// Part of the modulus that acts: a rigid wall is approached from a softer one.
-    pub(super) softness: f64,
     /// Residual over force scale at which a state is an equilibrium.
     pub(super) tolerance: f64,
     /// Loads on the nodes.
@@ -78,66 +73,16 @@ impl External for Outside<'_> {
         0.5 * self.plates * off + self.contact.value(elements, state) + self.loads.value(elements, state)
     }
 
-    fn is_steep(&self) -> bool {
-        self.contact.is_steep()
-    }
-
-    fn foresee(&mut self, moved: &Moved<'_>) -> bool {
-        self.contact.foresee(moved)
-    }
-
-    fn meet(
-        &mut self,
-        elements: &[ElementData],
-        states: (&RodState, &RodState),
-        part: f64,
-        moved: &Moved<'_>,
-    ) -> bool {
-        self.contact.meet(elements, states, part, moved)
-    }
-
-    fn press_or_let_go(
-        &mut self,
-        elements: &[ElementData],
-        base: &RodState,
-        moved: &Moved<'_>,
-        into: &mut dyn Stencils,
-    ) -> usize {
-        self.contact.press_or_let_go(elements, base, moved, into)
-    }
-
-    fn part_towards(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
-        self.contact.part_towards(moved, most)
-    }
-
-    fn hold_on(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> usize {
-        self.contact.hold_on(elements, base, into)
-    }
-
-    fn forget(&mut self) {
-        self.contact.forget();
-    }
-
-    fn stray(
-        &mut self,
-        elements: &[ElementData],
-        states: (&RodState, &RodState),
-        part: f64,
-        into: &mut dyn Stencils,
-    ) -> f64 {
-        self.contact.stray(elements, states, part, into)
-    }
-
-    fn rounding(&self) -> f64 {
-        self.contact.rounding()
-    }
-
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         self.contact.safe_fraction(elements, to)
     }
 
-    fn scale(&self) -> [f64; 2] {
-        self.loads.scale()
+    fn sizes(&self) -> Sizes {
+        Sizes { rounding_n: self.contact.sizes().rounding_n, ..self.loads.sizes() }
+    }
+
+    fn contacts(&mut self) -> Option<&mut dyn Contacts> {
+        self.contact.contacts()
     }
 }
 
@@ -174,7 +119,6 @@ impl TestRod {
             friction: Friction::default(),
             newton: Newton::new(mesh.elements.len()),
             plates: 0.0,
-            softness: 1.0,
             tolerance: NewtonOptions::default().tolerance,
             loads: Loads::default(),
             supports: Supports { start_tangent: true, start_angle: true, ..Supports::default() },
@@ -194,9 +138,7 @@ impl TestRod {
         job: impl FnOnce(&mut Newton<PLAIN>, &[ElementData], &mut Supports, &mut Outside<'_>, &mut RodState) -> T,
     ) -> T {
         let (points, bending) = (&self.mesh.points, self.setup.bending);
-        let mut contact =
-            WallContact::new(&self.surface, points, &mut self.cache, &mut self.friction, bending);
-        contact.softness = self.softness;
+        let contact = WallContact::new(&self.surface, points, &mut self.cache, &mut self.friction, bending);
         let mut outside = Outside { contact, loads: &mut self.loads, plates: self.plates };
         job(&mut self.newton, &self.mesh.elements, &mut self.supports, &mut outside, &mut self.state)
     }
@@ -204,22 +146,12 @@ impl TestRod {
     /// Moves the rod to a minimum of the energy, with friction to where Coulomb's law holds.
     pub(super) fn solve(&mut self) -> Result<()> {
         let options = NewtonOptions { tolerance: self.tolerance, ..NewtonOptions::default() };
-        let rubs = self.friction.acts();
         self.with(|newton, elements, supports, outside, state| {
-            for _ in 0..RENEWALS {
-                let found = newton.solve(elements, supports, outside, state, &options);
-                if !found.converged {
-                    return Err(Error::Computation(format!(
-                        "{} (residual {:.1e})",
-                        found.reason, found.residual
-                    )));
-                }
-                if !rubs || outside.contact.unsettled() < SETTLED {
-                    return Ok(());
-                }
-                outside.contact.unsettle_friction();
+            let found = newton.solve(elements, supports, outside, state, &options);
+            if found.converged {
+                return Ok(());
             }
-            Err(Error::Computation("friction does not settle".to_owned()))
+            Err(Error::Computation(format!("{} (residual {:.1e})", found.reason, found.residual)))
         })
     }
 

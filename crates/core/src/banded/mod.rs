@@ -1,7 +1,6 @@
 //! Matrices that couple neighbouring nodes alone, and their factorisations.
 //!
-//! [`matrix`] holds the symmetric block tridiagonal ones, [`ldlt`] factors them without pivoting and tells their inertia; [`lu`] is
-//! the band with row interchanges for those that are not symmetric.
+//! [`matrix`] holds the symmetric block tridiagonal ones, [`ldlt`] factors them without pivoting and tells their inertia.
 
 /// Runs a block for every index below `$end` ≤ 12, each on its own: loops whose bounds hang on another index would not be unrolled,
 /// and their rows not kept in registers.
@@ -16,11 +15,9 @@ macro_rules! unrolled {
 }
 
 pub mod ldlt;
-pub mod lu;
 pub mod matrix;
 
 pub use ldlt::{Factor, FactorError, Inertia};
-pub use lu::BandLu;
 pub use matrix::{BandMatrix, Shift};
 
 #[cfg(test)]

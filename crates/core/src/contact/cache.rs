@@ -40,9 +40,9 @@ pub(super) struct KnownPoint {
     pub(super) base_free_mm: f64,
     /// No wall is nearer to it than this, mm.
     pub(super) base_clearance_mm: f64,
-    /// Whether it presses on the wall there: the reading of the point is the one taken there, …
+    /// Whether it is active there ([`super::wall`]): the reading of the point is the one taken there.
     pub(super) presses: bool,
-    /// … and its force on the wall there, N; 0 where it does not press.
+    /// Its force on the wall, N; 0 where it is not active.
     pub(super) force_n: f64,
 }
 
@@ -92,12 +92,12 @@ pub struct ContactCache {
     /// all of them are looked at many times a step.
     pub(super) readings: Vec<TakenReading>,
     pub(super) proximity: ProximityCache,
-    /// Forces on the wall that a step leads to, N.
-    pub(super) aims: Vec<f64>,
-    /// What a step does to the contacts, to first order.
+    /// What a step does to the points near the wall, to first order, …
     pub(super) foreseen: Vec<Foreseen>,
-    /// What it does to the friction, where it was found anew.
+    /// … and to those with friction.
     pub(super) slipping: Vec<Slipping>,
+    /// Stiffness of the merit along it, over the least; none before one is asked for.
+    pub(super) stiffness: Option<f64>,
     /// Changes of gaps by a round of that, mm, and what it does to points with friction.
     pub(super) ends: (Vec<f64>, Vec<Slip>),
 }
@@ -142,9 +142,9 @@ impl ContactCache {
             pressing: Vec::new(),
             readings: Vec::new(),
             proximity,
-            aims: Vec::new(),
             foreseen: Vec::new(),
             slipping: Vec::new(),
+            stiffness: None,
             ends: (Vec::new(), Vec::new()),
         }
     }
@@ -154,7 +154,6 @@ impl ContactCache {
         self.points.reserve(points.saturating_sub(self.points.len()));
         self.spans.reserve(points.saturating_sub(self.spans.len()));
         self.pressing.reserve(points.saturating_sub(self.pressing.len()));
-        self.aims.reserve(points.saturating_sub(self.aims.len()));
         self.foreseen.reserve(points.saturating_sub(self.foreseen.len()));
         self.slipping.reserve(points.saturating_sub(self.slipping.len()));
         self.ends.0.reserve(points.saturating_sub(self.ends.0.len()));

@@ -20,18 +20,18 @@
 //! by less than ε a step, and ε is a thousandth of what the hand moved in it, or of the radius where it rests.
 //!
 //! The normal force N and the normal n are lagged: within one step of Newton's method D has fixed ones, so the energy keeps
-//! a symmetric Hessian and steps that descend; between steps they are renewed until they no longer change
-//! ([`Friction::follow`]). What is left at the end is Coulomb's law of the final state.
+//! a symmetric Hessian and steps that descend; between steps they are renewed ([`follow`]). What is left at the end is Coulomb's law of the
+//! final state.
 //!
 //! Where a wall is smoother in some places than in others μ is the largest coefficient, and N the normal force times the
 //! part of it that acts where the point is: the coefficient of a place is lagged with its force.
 
 mod between;
-mod coupling;
+mod follow;
 mod moving;
 
 pub use between::{Between, InnerFriction, Place};
-pub use coupling::Coupling;
+pub use follow::SETTLED;
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -55,14 +55,6 @@ const LEAST_STICK_MM: f64 = 1e-8;
 /// one that was felt where they come to lie, since the wall does not move.
 const TIP_RADII: f64 = 10.0;
 
-/// Normal forces are renewed once the last step of Newton's method has changed them by no more than this part; before, they
-/// have little to do with those of the equilibrium …
-const STEADY: f64 = 0.3;
-/// … and no more once they differ from the lagged ones by less than this part.
-pub const SETTLED: f64 = 1e-4;
-/// Renewals of a step; forces that have not settled by then seldom do, and are left alone.
-const RENEWALS: usize = 4;
-
 /// A contact point in a step with friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Slider {
@@ -80,8 +72,6 @@ struct Slider {
     begun: (Vec3, f64),
     /// Normal and force at the state seen last.
     seen: (Vec3, f64),
-    /// N in its matrix.
-    matrix_n: f64,
 }
 
 /// What presses at a contact point in an equilibrium.
@@ -116,12 +106,7 @@ pub struct Friction {
     stick_mm: f64,
     /// What it does not shrink below while the hand holds still, mm.
     least_stick_mm: f64,
-    /// Whether normal forces are no longer renewed in this step.
-    settled: bool,
-    /// How often normal forces were renewed in this step.
-    renewals: usize,
-    /// Whether normal forces follow the state at once: see [`coupling`].
-    coupled: bool,
+    renewal: follow::Renewal,
     /// Energy that was taken before the points were anchored anew, mJ.
     taken_mj: f64,
     sliders: Vec<Slider>,
@@ -183,9 +168,7 @@ impl Friction {
         hands: &[HandMotion],
     ) {
         self.sliders.clear();
-        self.settled = false;
-        self.renewals = 0;
-        self.coupled = false;
+        self.release();
         self.taken_mj = 0.0;
         if !self.acts() {
             return;
@@ -214,7 +197,6 @@ impl Friction {
                 force_n: 0.0,
                 begun: (Vec3::zeros(), 0.0),
                 seen: (Vec3::zeros(), 0.0),
-                matrix_n: 0.0,
             };
             let same = |old: &ContactPoint| old.instrument == point.instrument;
             if point.from_tip_mm < near_tip && old_points.get(index).is_none_or(same) {
@@ -287,7 +269,7 @@ impl Friction {
 
     /// Whether a point may be held by friction.
     pub(super) fn holds(&self, index: usize) -> bool {
-        self.sliders.get(index).is_some_and(|slider| self.coupled || slider.force_n > 0.0)
+        self.sliders.get(index).is_some_and(|slider| slider.force_n > 0.0)
     }
 
     /// Whether nothing rubs at a point, and nothing did where the step began.
@@ -344,9 +326,10 @@ impl Friction {
         sums_mj
     }
 
-    /// Slip begins anew at `state`, with the normal forces seen there: the hand holds still, and the device slides on to where it comes
+    /// Slip begins anew at `state`, with the normal forces seen there, which are held: the hand holds still, and the device slides on to where it comes
     /// to rest. What a point has slipped within ε it has slipped within the new, smaller one, in proportion: friction holds it as it did.
     pub fn anchor(&mut self, elements: &[ElementData], state: &RodState, points: &[ContactPoint]) {
+        self.hold();
         let taken_mj = self.taken_mj(elements, state, points);
         let stick_mm = (self.stick_mm * STICK_AT_REST).max(self.least_stick_mm);
         for (index, point) in points.iter().enumerate().take(self.sliders.len()) {
@@ -373,28 +356,15 @@ impl Friction {
         angle: f64,
         radius_mm: f64,
     ) -> Option<FrictionDerivatives> {
-        self.spring(index, (x, angle), radius_mm, false)
-    }
-
-    /// The same, or with the stiffness of a spring of that force after that slip, the `secant`: more than the second derivatives.
-    pub(crate) fn spring(
-        &self,
-        index: usize,
-        (x, angle): (&Vec3, f64),
-        radius_mm: f64,
-        secant: bool,
-    ) -> Option<FrictionDerivatives> {
         let slider = self.sliders.get(index).filter(|_| self.holds(index))?;
         let force = self.coefficient * slider.force_n;
-        let stiff = if self.coupled { self.coefficient * slider.matrix_n } else { force };
         let (slip, spin) = self.slip(index, x, angle, radius_mm);
         let y = slip.norm();
         let (over, second) = rates(y, self.stick_mm);
-        let second = if secant { over } else { second };
         let gradient = slip * (force * over);
         let unit = if y > 0.0 { slip / y } else { Vec3::zeros() };
         let plane = Matrix3::identity() - slider.normal * slider.normal.transpose();
-        let hessian = (plane * over + unit * unit.transpose() * (second - over)) * stiff;
+        let hessian = (plane * over + unit * unit.transpose() * (second - over)) * force;
         let mixed = hessian * spin;
         Some(FrictionDerivatives {
             gradient,
@@ -403,58 +373,6 @@ impl Friction {
             turn2: mixed.dot(&spin),
             mixed,
         })
-    }
-
-    /// Looks at what presses at the state that Newton's method has come to, the numbers of the points that do, ascending, each with a normal
-    /// and a force, and renews the lagged ones unless they are still on their way or have settled. `least_n` is a force not worth settling.
-    pub fn follow(&mut self, pressed: impl Iterator<Item = (usize, (Vec3, f64))>, least_n: f64) {
-        let (mut moved, mut sum) = (0.0, least_n);
-        let mut pressed = pressed.peekable();
-        for (index, slider) in self.sliders.iter_mut().enumerate() {
-            let now =
-                pressed.next_if(|(point, _)| *point == index).map_or((Vec3::zeros(), 0.0), |(_, now)| now);
-            // Most points press neither now nor before.
-            if now.1 > 0.0 || slider.seen.1 > 0.0 {
-                moved += (slider.seen.0 * slider.seen.1 - now.0 * now.1).norm();
-                sum += now.1;
-            }
-            slider.seen = now;
-        }
-        if self.settled || moved > STEADY * sum || self.renewals >= RENEWALS {
-            return;
-        }
-        self.settled = self.unsettled(least_n) < SETTLED;
-        self.renewals += 1;
-        for slider in &mut self.sliders {
-            (slider.normal, slider.force_n) = slider.seen;
-        }
-    }
-
-    /// How much of the normal force has changed since it was last renewed.
-    pub fn unsettled(&self, least_n: f64) -> f64 {
-        let (mut change, mut sum) = (0.0, least_n);
-        for slider in self.sliders.iter().filter(|slider| slider.force_n != 0.0 || slider.seen.1 > 0.0) {
-            change += (slider.normal * slider.force_n - slider.seen.0 * slider.seen.1).norm();
-            sum += slider.seen.1;
-        }
-        change / sum
-    }
-
-    /// Normal forces are renewed no more.
-    pub fn hold(&mut self) {
-        self.settled = true;
-    }
-
-    /// Normal forces are again those with which the step began, and are held.
-    pub fn rewind(&mut self) {
-        self.coupled = false;
-        self.settled = true;
-        self.sliders.iter_mut().for_each(|s| (s.normal, s.force_n) = s.begun);
-    }
-
-    /// Lets the normal forces be renewed again.
-    pub fn unsettle(&mut self) {
-        (self.settled, self.renewals) = (false, 0);
     }
 }
 

@@ -108,8 +108,8 @@ impl<'a> MovedWall<'a> {
     }
 
     /// As [`ContactSurface::stiffness`] of a material point, with derivatives in space.
-    pub(super) fn stiffness(&self, material: &Vec3, triangle: Option<u32>, softness: f64) -> Stiffness {
-        let Stiffness { factor, slope } = self.surface.stiffness(material, triangle, softness);
+    pub(super) fn stiffness(&self, material: &Vec3, triangle: Option<u32>) -> Stiffness {
+        let Stiffness { factor, slope } = self.surface.stiffness(material, triangle);
         let slope = slope.map(|(s1, s2)| match self.displacement {
             Some(displacement) => displacement.local(material).in_space(&s1, &s2),
             None => (s1, s2),
@@ -326,9 +326,9 @@ mod tests {
         for k in 0..12 {
             let material = Vec3::new(3.4, 0.2 * f64::from(k) - 1.0, 42.0 + f64::from(k));
             let triangle = surface.query.nearest(&material, 5.0).map(|near| near.triangle);
-            let at = |x: &Vec3| moved.stiffness(&moved.material(x), triangle, 1.0);
+            let at = |x: &Vec3| moved.stiffness(&moved.material(x), triangle);
             let x = field.place(&material);
-            assert_eq!(at(&x).factor, surface.stiffness(&moved.material(&x), triangle, 1.0).factor);
+            assert_eq!(at(&x).factor, surface.stiffness(&moved.material(&x), triangle).factor);
             let (s1, s2) = at(&x).slope.unwrap();
             let h = 1e-4;
             for k in 0..3 {

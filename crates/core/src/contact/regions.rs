@@ -97,8 +97,6 @@ impl Stiffness {
 pub struct RegionMap {
     /// ln(kᵢ/k₀) of every vertex; none if all are 0.
     ln_moduli: Vec<f64>,
-    /// ln of the largest modulus over k₀.
-    ln_stiffest: f64,
     /// μᵢ over the largest of all coefficients; none if all are 1.
     rough: Vec<f64>,
 }
@@ -116,18 +114,15 @@ impl RegionMap {
         if rough.iter().all(|r| *r == 1.0) {
             rough.clear();
         }
-        let ln_stiffest = (properties.stiffest_n_per_mm2() / properties.modulus_n_per_mm2).ln();
-        (!ln_moduli.is_empty() || !rough.is_empty()).then_some(Self { ln_moduli, ln_stiffest, rough })
+        (!ln_moduli.is_empty() || !rough.is_empty()).then_some(Self { ln_moduli, rough })
     }
 
-    /// The modulus at `x`, over `triangle` or close to it, with none beyond `softness` times the stiffest: so a rigid patch in a
-    /// soft wall is approached from softer ones, and the wall around it stays as it is.
-    pub(super) fn stiffness(&self, wall: &SmoothWall, x: &Vec3, triangle: u32, softness: f64) -> Stiffness {
+    /// The modulus at `x`, over `triangle` or close to it.
+    pub(super) fn stiffness(&self, wall: &SmoothWall, x: &Vec3, triangle: u32) -> Stiffness {
         if self.ln_moduli.is_empty() {
-            return Stiffness { factor: softness, slope: None };
+            return Stiffness { factor: 1.0, slope: None };
         }
-        let most = self.ln_stiffest + softness.ln();
-        let s = blend(wall, x, triangle, |v| self.ln_moduli[v as usize].min(most));
+        let s = blend(wall, x, triangle, |v| self.ln_moduli[v as usize]);
         Stiffness { factor: s.value.exp(), slope: Some((s.gradient, s.hessian)) }
     }
 
@@ -215,10 +210,10 @@ mod tests {
         }
 
         /// eˢψ with gradient and Hessian.
-        fn energy(&self, potential: &WallPotential, x: &Vec3, softness: f64) -> (f64, Vec3, Matrix3<f64>) {
+        fn energy(&self, potential: &WallPotential, x: &Vec3) -> (f64, Vec3, Matrix3<f64>) {
             let triangle = self.triangle(x);
             let d = self.smooth.distance(x, triangle).unwrap();
-            let stiffness = self.regions.as_ref().unwrap().stiffness(&self.smooth, x, triangle, softness);
+            let stiffness = self.regions.as_ref().unwrap().stiffness(&self.smooth, x, triangle);
             let (gradient, hessian) = stiffness.derivatives(potential, &d, 1.0);
             (stiffness.factor * potential.value(d.value_mm), gradient, hessian)
         }
@@ -246,29 +241,27 @@ mod tests {
                     ..WallProperties::default()
                 });
                 let potential = WallPotential { modulus_n_per_mm2: soft, radius_mm };
-                for softness in [1.0, 0.1] {
-                    for x in points() {
-                        let here = wall.energy(&potential, &x, softness);
-                        let triangle = wall.triangle(&x);
-                        let d = wall.smooth.distance(&x, triangle).unwrap().value_mm;
-                        if d - 10.0 * h < 0.0 {
-                            continue;
-                        }
-                        let regions = wall.regions.as_ref().unwrap();
-                        let s = regions.stiffness(&wall.smooth, &x, triangle, softness);
-                        across += u32::from(d < radius_mm && s.slope.unwrap().0.norm() > 0.1);
-                        // Differences round like the energy and its gradient.
-                        let scale = here.2.norm() + 10.0 * (here.1.norm() + here.0);
-                        for k in 0..3 {
-                            let e = Vec3::ith(k, h);
-                            let plus = wall.energy(&potential, &(x + e), softness);
-                            let minus = wall.energy(&potential, &(x - e), softness);
-                            let slope = (plus.0 - minus.0) / (2.0 * h);
-                            assert!((slope - here.1[k]).abs() <= 1e-6 * scale, "{x}: {slope} {}", here.1[k]);
-                            let column = (plus.1 - minus.1) / (2.0 * h);
-                            let error = (column - here.2.column(k)).norm();
-                            assert!(error <= 1e-4 * scale, "{x} at {d}: {error:e} of {scale:e}");
-                        }
+                for x in points() {
+                    let here = wall.energy(&potential, &x);
+                    let triangle = wall.triangle(&x);
+                    let d = wall.smooth.distance(&x, triangle).unwrap().value_mm;
+                    if d - 10.0 * h < 0.0 {
+                        continue;
+                    }
+                    let regions = wall.regions.as_ref().unwrap();
+                    let s = regions.stiffness(&wall.smooth, &x, triangle);
+                    across += u32::from(d < radius_mm && s.slope.unwrap().0.norm() > 0.1);
+                    // Differences round like the energy and its gradient.
+                    let scale = here.2.norm() + 10.0 * (here.1.norm() + here.0);
+                    for k in 0..3 {
+                        let e = Vec3::ith(k, h);
+                        let plus = wall.energy(&potential, &(x + e));
+                        let minus = wall.energy(&potential, &(x - e));
+                        let slope = (plus.0 - minus.0) / (2.0 * h);
+                        assert!((slope - here.1[k]).abs() <= 1e-6 * scale, "{x}: {slope} {}", here.1[k]);
+                        let column = (plus.1 - minus.1) / (2.0 * h);
+                        let error = (column - here.2.column(k)).norm();
+                        assert!(error <= 1e-4 * scale, "{x} at {d}: {error:e} of {scale:e}");
                     }
                 }
             }
@@ -284,11 +277,11 @@ mod tests {
         let x = Vec3::new(3.7, 0.0, 56.0);
         let triangle = wall.triangle(&x);
         let d = wall.smooth.distance(&x, triangle).unwrap();
-        let with = wall.regions.as_ref().unwrap().stiffness(&wall.smooth, &x, triangle, 1.0);
+        let with = wall.regions.as_ref().unwrap().stiffness(&wall.smooth, &x, triangle);
         let without = Stiffness { slope: None, ..with };
         let off = with.derivatives(&potential, &d, 1.0).0 - without.derivatives(&potential, &d, 1.0).0;
         let h = 1e-5;
-        let value = |x: Vec3| wall.energy(&potential, &x, 1.0).0;
+        let value = |x: Vec3| wall.energy(&potential, &x).0;
         let slope = (value(x + Vec3::z() * h) - value(x - Vec3::z() * h)) / (2.0 * h);
         // Softer ahead: the wall pushes on.
         assert!(
@@ -309,7 +302,7 @@ mod tests {
         let at = |x: f64, z: f64| {
             let place = Vec3::new(x, 0.0, z);
             let (regions, triangle) = (wall.regions.as_ref().unwrap(), wall.triangle(&place));
-            let k = 1e-2 * regions.stiffness(&wall.smooth, &place, triangle, 1.0).factor;
+            let k = 1e-2 * regions.stiffness(&wall.smooth, &place, triangle).factor;
             (k, 0.2 * regions.rough(&wall.smooth, &place, triangle))
         };
         let near = |found: (f64, f64), k: f64, friction: f64| {

@@ -137,12 +137,11 @@ impl ContactSurface {
         self.nearness(x, self.smooth.walk(triangle, x), f64::NEG_INFINITY).value_mm()
     }
 
-    /// The wall's modulus at `x`, whose nearest triangle is `triangle` or close to it; `softness` is the part of the stiffest
-    /// that acts.
-    pub(super) fn stiffness(&self, x: &Vec3, triangle: Option<u32>, softness: f64) -> Stiffness {
+    /// The wall's modulus at `x`, whose nearest triangle is `triangle` or close to it.
+    pub(super) fn stiffness(&self, x: &Vec3, triangle: Option<u32>) -> Stiffness {
         match self.regions.as_ref().zip(triangle) {
-            Some((regions, triangle)) => regions.stiffness(&self.smooth, x, triangle, softness),
-            None => Stiffness { factor: softness, slope: None },
+            Some((regions, triangle)) => regions.stiffness(&self.smooth, x, triangle),
+            None => Stiffness { factor: 1.0, slope: None },
         }
     }
 

@@ -7,14 +7,17 @@
 //!
 //! On a wall with regions ψ is multiplied by eˢ, s of the place ([`super::regions`]), and so is the cap's.
 //!
+//! What presses is no matter of depth alone: points have forces of their own ([`forces`]), which Newton's method solves for.
+//!
 //! A point asks the bounding volume hierarchy only when it may have come near something new: while it has moved less than
 //! its last clearance, nothing can touch it.
 
 mod clear;
-mod coupling;
-mod foresight;
+mod forces;
+mod model;
 mod passing;
 mod reading;
+mod rubbing;
 mod slipping;
 
 use super::cache::ContactCache;
@@ -23,10 +26,10 @@ use crate::Vec3;
 use crate::contact::{Between, Drag, Friction, MovedWall};
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
-use crate::solve::{External, Moved};
+use crate::solve::{ContactMerit, Contacts, External, Moved, Sizes};
 
 pub(super) use clear::Span;
-pub(super) use foresight::Foreseen;
+pub(super) use model::Foreseen;
 use reading::Reading;
 pub(super) use slipping::{Slip, Slipping};
 
@@ -46,10 +49,6 @@ pub struct WallContact<'a> {
     points: &'a [ContactPoint],
     /// Moment of the softest piece at a radius of 100 mm, N·mm.
     least_moment_nmm: f64,
-    /// Part of the (stiffest) modulus that acts: a rigid wall is approached from a softer one.
-    pub softness: f64,
-    /// Whether points that pressed in the last equilibrium are held to the wall, should they have come off it.
-    pub holding: bool,
     /// What the blood that flows does.
     drag: Option<&'a mut Drag>,
     cache: &'a mut ContactCache,
@@ -74,8 +73,6 @@ impl<'a> WallContact<'a> {
             surface: surface.into(),
             points,
             least_moment_nmm: softest_nmm2 / LEAST_BEND_MM,
-            softness: 1.0,
-            holding: false,
             drag: None,
             cache,
             friction,
@@ -125,28 +122,6 @@ impl<'a> WallContact<'a> {
         std::mem::take(&mut self.counters)
     }
 
-    /// Friction of point `index` at its base.
-    fn add_friction(
-        &mut self,
-        elements: &[ElementData],
-        state: &RodState,
-        into: &mut dyn Stencils,
-        sum: &mut PointSum,
-        index: usize,
-    ) {
-        if !self.friction.holds(index) {
-            return;
-        }
-        let (point, x) = (&self.points[index], &self.surface.place(&self.cache.points[index].base));
-        let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
-        let Some(f) = self.friction.derivatives(index, x, angle, radius_mm) else { return };
-        into.add_value(self.friction.value(index, x, angle, radius_mm));
-        self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * f.hessian.norm() * x.amax());
-        let e = point.element;
-        sum.add(point.xi, &f.gradient, into.wants_hessian().then_some(&f.hessian));
-        into.add_spin(state, &elements[e], (e, point.xi, point.set), &f.mixed, (f.turn, f.turn2));
-    }
-
     /// What point `index` feels at its base.
     fn gather(
         &mut self,
@@ -159,45 +134,17 @@ impl<'a> WallContact<'a> {
         self.add_friction(elements, state, into, sum, index);
         let Some(d) = self.cache.pressed(index) else { return };
         let (point, known) = (&self.points[index], &self.cache.points[index]);
-        let stiffness = self.surface.stiffness(&known.base, known.triangle, self.softness);
-        let w = point.weight_mm;
+        let stiffness = self.surface.stiffness(&known.base, known.base_triangle);
+        let (w, force_n) = (point.weight_mm, known.force_n);
         let spring = stiffness.factor * w * point.potential.modulus_n_per_mm2;
         self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * spring * known.base.amax());
-        let (gradient, hessian) = if self.holding {
-            stiffness.holding(&point.potential, d, w, known.force_n)
-        } else {
-            into.add_value(stiffness.factor * w * point.potential.value(d.value_mm));
-            let (gradient, hessian) = stiffness.derivatives(&point.potential, d, w);
-            self.cache.points[index].force_n = gradient.norm();
-            (gradient, hessian)
-        };
+        into.add_value(stiffness.factor * w * point.potential.value(d.value_mm));
+        let (gradient, hessian) = stiffness.holding(&point.potential, d, w, force_n);
+        if into.wants_hessian() {
+            let excess = gradient + d.gradient * force_n;
+            model::straighten(point, &elements[point.element], state, &excess, into);
+        }
         sum.add(point.xi, &gradient, into.wants_hessian().then_some(&hessian));
-    }
-
-    /// Adds the energy of point `index` at a state to a sum.
-    fn value_of(&mut self, elements: &[ElementData], state: &RodState, index: usize, mut sum: f64) -> f64 {
-        let point = self.points[index];
-        let x = point.position(elements, state);
-        let material = self.surface.material(&x);
-        let radius_mm = point.potential.radius_mm;
-        let limit_mm = self.asked_mm(radius_mm);
-        let value_mm = self.read_within(index, &material, limit_mm).distance_mm();
-        if value_mm < radius_mm {
-            let triangle = self.cache.points[index].triangle;
-            let factor = self.surface.stiffness(&material, triangle, self.softness).factor;
-            sum += factor * point.weight_mm * point.potential.value(value_mm);
-        }
-        if self.friction.holds(index) {
-            sum += self.friction.value(index, &x, point.angle(state), radius_mm);
-        }
-        sum
-    }
-
-    /// Length that point `index` stands for at its base, times the part of the modulus that acts there, mm.
-    fn weight_mm(&self, index: usize) -> f64 {
-        let known = &self.cache.points[index];
-        let factor = self.surface.stiffness(&known.base, known.triangle, self.softness).factor;
-        factor * self.points[index].weight_mm
     }
 
     /// Part of its way from the base to `to`, at most `fraction`, that point `index` may go.
@@ -240,7 +187,7 @@ impl<'a> WallContact<'a> {
         let Reading::Pressed(distance) = self.read(index, &material) else { return None };
         let penetration_mm = point.potential.penetration_mm(distance.value_mm);
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
-        let stiffness = self.surface.stiffness(&material, self.cache.points[index].triangle, 1.0);
+        let stiffness = self.surface.stiffness(&material, self.cache.points[index].triangle);
         let (mut normal, mut force_n) = point.pressed(&distance, stiffness.factor);
         if stiffness.slope.is_some() {
             let force = -stiffness.derivatives(&point.potential, &distance, point.weight_mm).0;
@@ -271,48 +218,12 @@ impl<'a> WallContact<'a> {
             }
         }
     }
-
-    /// How much the forces on the wall differ at a state from those of the last equilibrium, over the latter; 0 where there were none.
-    pub fn misfit(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
-        let (mut misfit_n, mut sum_n) = (0.0, 0.0);
-        for span in 0..self.cache.spans.len() {
-            for index in self.near(span, elements, state).into_iter().flatten() {
-                let point = self.points[index];
-                let x = self.material(index, elements, state);
-                let force_n = match self.read(index, &x) {
-                    Reading::Pressed(d) => {
-                        let triangle = self.cache.points[index].triangle;
-                        let factor = self.surface.stiffness(&x, triangle, self.softness).factor;
-                        point.pressed(&d, factor).1
-                    }
-                    Reading::Free(_) => 0.0,
-                };
-                let was_n = self.cache.points[index].force_n;
-                misfit_n += (force_n - was_n).abs();
-                sum_n += was_n;
-            }
-        }
-        if sum_n > 0.0 { misfit_n / sum_n } else { 0.0 }
-    }
 }
 
 impl External for WallContact<'_> {
     fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
         self.look_at_base(elements, state);
-        // Forces that hold are none that friction follows, unless it is solved for with them.
-        if self.friction.is_coupled() {
-            self.press_friction();
-        } else if self.friction.acts() && !self.holding {
-            let least_n = self.least_force_n();
-            let (surface, cache, softness) = (self.surface, &*self.cache, self.softness);
-            let pressed = cache.all_pressed().map(|(index, d)| {
-                let known = &cache.points[index];
-                let factor = surface.stiffness(&known.base, known.triangle, softness).factor;
-                let (normal, force) = self.points[index].pressed(d, factor);
-                (index, (normal, force * surface.rough(&known.base, known.triangle)))
-            });
-            self.friction.follow(pressed, least_n);
-        }
+        self.rub_with_contacts();
         self.friction.between.add(state, into);
         if let Some(drag) = &self.drag {
             drag.add(elements, state, into);
@@ -337,31 +248,47 @@ impl External for WallContact<'_> {
     fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
         let mut sum = self.friction.between.taken_mj(state);
         sum += self.drag_mj(elements, state);
+        let mut next = 0;
         for span in 0..self.cache.spans.len() {
             for index in self.near(span, elements, state).into_iter().flatten() {
-                sum = self.value_of(elements, state, index, sum);
+                sum += self.contact_mj(elements, state, index, &mut next);
+                sum += self.friction_mj(elements, state, index);
             }
         }
         sum
     }
 
-    fn foresee(&mut self, moved: &Moved<'_>) -> bool {
-        self.foresee_contacts(moved)
+    /// In a device that carries less, force and moment have no scale of their own to be compared with.
+    fn sizes(&self) -> Sizes {
+        Sizes {
+            force_n: self.least_force_n(),
+            moment_nmm: self.least_moment_nmm,
+            rounding_n: self.rounding_n,
+        }
     }
 
-    fn meet(
-        &mut self,
-        elements: &[ElementData],
-        (base, trial): (&RodState, &RodState),
-        part: f64,
-        moved: &Moved<'_>,
-    ) -> bool {
-        // Where the modulus changes by powers of ten from place to place, a plane and a spring are no model of what a trial has met.
-        if self.surface.regions.is_some() {
-            return false;
+    fn contacts(&mut self) -> Option<&mut dyn Contacts> {
+        Some(self)
+    }
+
+    /// A point may move by nearly its clearance, whatever the direction: the ball about it holds no wall. Farther it may go where its
+    /// straight way meets no wall, and nearly up to the wall where it does. A point that has sunk in knows its side, and the energy
+    /// holds it there.
+    fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
+        let mut fraction: f64 = 1.0;
+        for span in 0..self.cache.spans.len() {
+            for index in self.near_way(span, elements, to, fraction).into_iter().flatten() {
+                fraction = self.safe_fraction_of(elements, to, index, fraction);
+            }
         }
-        let slips = self.begin_slipping(base, moved);
-        self.meet_contacts(elements, trial, part, moved) || slips
+        fraction
+    }
+}
+
+impl Contacts for WallContact<'_> {
+    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &Moved<'_>) {
+        self.foresee_contacts(elements, base, moved);
+        self.foresee_slipping(base, moved);
     }
 
     fn press_or_let_go(
@@ -378,49 +305,17 @@ impl External for WallContact<'_> {
         self.part_towards_contacts(moved, most)
     }
 
-    fn hold_on(&mut self, elements: &[ElementData], base: &RodState, into: &mut dyn Stencils) -> usize {
-        self.hold_on_contacts(elements, base, into) + self.stiffen(elements, base, into)
+    fn merit(&mut self, moved: &Moved<'_>, stiffness: f64) -> ContactMerit {
+        self.contact_merit(moved, stiffness)
     }
 
-    fn forget(&mut self) {
-        self.cache.foreseen.clear();
-        self.cache.slipping.clear();
+    fn take(&mut self, part: f64) {
+        self.take_forces(part);
     }
 
-    fn stray(
-        &mut self,
-        elements: &[ElementData],
-        states: (&RodState, &RodState),
-        part: f64,
-        into: &mut dyn Stencils,
-    ) -> f64 {
-        self.stray_contacts(elements, states, part, into)
-    }
-
-    /// In a device that carries less, force and moment have no scale of their own to be compared with.
-    fn scale(&self) -> [f64; 2] {
-        [self.least_force_n(), self.least_moment_nmm]
-    }
-
-    fn rounding(&self) -> f64 {
-        self.rounding_n
-    }
-
-    fn is_steep(&self) -> bool {
-        true
-    }
-
-    /// A point may move by nearly its clearance, whatever the direction: the ball about it holds no wall. Farther it may go where its
-    /// straight way meets no wall, and nearly up to the wall where it does. A point that has sunk in knows its side, and the energy
-    /// holds it there.
-    fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
-        let mut fraction: f64 = 1.0;
-        for span in 0..self.cache.spans.len() {
-            for index in self.near_way(span, elements, to, fraction).into_iter().flatten() {
-                fraction = self.safe_fraction_of(elements, to, index, fraction);
-            }
-        }
-        fraction
+    fn settled(&mut self, tolerance: f64) -> bool {
+        let least_n = self.least_force_n();
+        self.let_go_of_pulling(tolerance) && self.friction.settles(least_n)
     }
 }
 

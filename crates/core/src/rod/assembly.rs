@@ -108,17 +108,6 @@ impl<const C: usize> Assembly<C> {
         }
     }
 
-    /// Gathers a residual of its own in `residual`: what `add` adds. That at hand stays as it is, and so does the matrix.
-    pub(crate) fn beside<T>(&mut self, residual: &mut Vec<f64>, add: impl FnOnce(&mut Self) -> T) -> T {
-        std::mem::swap(&mut self.residual, residual);
-        self.residual.fill(0.0);
-        let hessian = std::mem::replace(&mut self.hessian, false);
-        let told = add(self);
-        self.hessian = hessian;
-        std::mem::swap(&mut self.residual, residual);
-        told
-    }
-
     /// Slope of the energy, constraints included, along a step.
     pub(crate) fn slope(&self, step: &[f64]) -> f64 {
         let l = Layout::<C>;

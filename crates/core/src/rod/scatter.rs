@@ -10,8 +10,6 @@ use super::quadrature::{Point, hermite};
 use super::state::RodState;
 use super::stencils::{Stencils, Triple};
 use crate::Vec3;
-use crate::banded::BandLu;
-use crate::products::times;
 
 impl<const C: usize> Stencils for Assembly<C> {
     fn wants_hessian(&self) -> bool {
@@ -163,30 +161,4 @@ pub(crate) fn point_turn<const C: usize>((e, xi, set): (usize, f64, usize), d: &
         return 0.0;
     }
     angle_weights::<C>(e, xi, set).iter().map(|(row, share)| share * d[*row]).sum()
-}
-
-/// Adds the derivatives of a force on the point at ξ of element `e`, and of a moment about the tangent there on the instrument in a `set`
-/// of angles, in that point's position to a matrix that is not symmetric.
-pub(crate) fn add_unsymmetric<const C: usize>(
-    matrix: &mut BandLu<C>,
-    state: &RodState,
-    element: &ElementData,
-    (e, xi, set): (usize, f64, usize),
-    force: &Matrix3<f64>,
-    moment: &Vec3,
-) {
-    let columns = point_columns::<C>(state, element, e, xi);
-    for (column, way) in &columns {
-        let force = times(force, way);
-        for (row, to) in &columns {
-            matrix.add(*row, *column, to.dot(&force));
-        }
-    }
-    if Layout::<C>::ANGLES > 0 {
-        for (row, share) in angle_weights::<C>(e, xi, set) {
-            for (column, way) in &columns {
-                matrix.add(row, *column, share * moment.dot(way));
-            }
-        }
-    }
 }

@@ -1,44 +1,45 @@
-//! Contacts within a step: which of them press at its end, and how a trial is brought back to them.
+//! The step of Newton's method with the contacts at its end.
 //!
-//! Newton's step knows of the contacts that press where it begins. Where a trial runs into others it is refused, and is found anew with
-//! them: each by the plane in which the trial has met the wall, and those that would pull let go, until it is the minimum of the model
+//! Newton's step knows of the contacts that press where it begins. It is found anew with those at its end, as the minimum of the model
 //!
 //! ```text
-//! m(δ) = r·δ + ½ δᵀ K δ + Σ ½ wᵢ k (gᵢ + ∇dᵢ·δ)₋²
+//! m(δ) = r·δ + ½ δᵀ K δ + Σ ½ κᵢ (gᵢ + ∇dᵢ·δ)₋²
 //! ```
 //!
-//! of energy and contacts, K being the matrix without their springs. That is the semi-smooth Newton method of contact (M. Hintermüller, K. Ito,
-//! K. Kunisch, *The primal-dual active set strategy as a semismooth Newton method*, SIAM J. Optim. 13 (2002)) within the step, at the
-//! cost of a factorisation a round and no question to the wall. Whole steps of it go round in circles where dozens of contacts change at
-//! once; each goes as far as m falls along it, which is a search over the kinks of a parabola, and ends at the minimum where m
-//! is convex. Where a contact that is let go leaves a matrix that is not that of a minimum, those of the base are kept, and may pull.
+//! of energy and contacts, K being the matrix without their springs and gᵢ the gap at the base. That is the semi-smooth Newton method of contact
+//! (M. Hintermüller, K. Ito, K. Kunisch, *The primal-dual active set strategy as a semismooth Newton method*, SIAM J. Optim. 13 (2002))
+//! within the step, at the cost of a factorisation a round and no question to the wall. Whole steps of it go round in circles where dozens of
+//! contacts change at once; each goes as far as m falls along it, which is a search over the kinks of a parabola, and ends at the
+//! minimum where m is convex. Where it is not, or its minimum is uphill of the merit, the matrix is shifted until it is.
 //!
 //! Nothing but the contacts is asked for that search. Of a step δ that is a mean of solutions, with the same weights, r + Kδ = −Σ Fᵢ ∇dᵢ,
-//! where Fᵢ is that mean of the forces wᵢ k (gᵢ + ∇dᵢ·δ) of the springs in each; so along p = δ′ − δ, to the solution δ′ with the forces
+//! where Fᵢ is that mean of the forces κᵢ (gᵢ + ∇dᵢ·δ) of the springs in each; so along p = δ′ − δ, to the solution δ′ with the forces
 //! Fᵢ′,
 //!
 //! ```text
-//! dm/ds = Σ [wᵢ k (gᵢ + ∇dᵢ·(δ + s p))₋ − Fᵢ − s (Fᵢ′ − Fᵢ)] ∇dᵢ·p
+//! dm/ds = Σ [κᵢ (gᵢ + ∇dᵢ·(δ + s p))₋ − Fᵢ − s (Fᵢ′ − Fᵢ)] ∇dᵢ·p
 //! ```
 
-use super::external::External;
-use super::newton::{Newton, Problem};
-use super::trial::LARGEST_CORRECTION;
+use super::external::{ContactMerit, Contacts};
+use super::newton::{ENERGY_ROUNDING, Newton, Problem};
+use super::report::StopReason;
+use super::shift::LEAST_SHIFT;
 use crate::Vec3;
-use crate::banded::{FactorError, Inertia};
 use crate::rod::scatter::{point_step, point_turn};
 use crate::rod::{Assembly, ElementData, RodState};
 
-/// Most corrections of the contacts at a trial.
-const CORRECTIONS: usize = 3;
-/// Forces of contacts may be off what was foreseen by this part.
-const STRAYED: f64 = 0.1;
 /// Most rounds in which the contacts that a step leads to are looked for.
-const ROUNDS: usize = 15;
-/// A round that goes no farther than this part of its way is the last.
-const LEAST_PART: f64 = 1e-3;
-/// Turn of a step, rad, at which a round ends: planes and lines are no model of what is farther away.
+const ROUNDS: usize = 100;
+/// Turn of a step, rad, at which a round ends: planes are no model of what is farther away.
 const LARGEST_TURN: f64 = 1.0;
+/// Times that the merit's penalty is made stiffer for a step to be downhill, …
+const STIFFENINGS: usize = 8;
+/// … each time by this factor.
+const STIFFER: f64 = 30.0;
+/// A shift under which a step is uphill, or the model not convex, grows by this factor.
+const SHIFT_GROWTH: f64 = 8.0;
+/// Times that it grows.
+const SHIFTS: usize = 20;
 
 /// What a step does to points of the rod.
 pub(crate) fn moved<'a, const C: usize>(
@@ -53,116 +54,121 @@ pub(crate) fn moved<'a, const C: usize>(
 }
 
 impl<const C: usize> Newton<C> {
-    /// Has contacts foresee what the step does to them; returns whether there are any to foresee.
-    pub(super) fn foresee(&mut self, problem: &mut Problem<'_>, state: &RodState) -> bool {
-        let Problem { elements, external, .. } = problem;
-        external.foresee(&moved::<C>(elements, state, &self.step))
-    }
-
-    /// Finds the step anew with the contacts into which the trial, `part` of it, has run, under the same `shift`. Returns whether there is
-    /// such a step; otherwise the one at hand is left as it is.
+    /// Replaces the step from the assembled state, found under a `shift`, by that with the contacts at its end, where a minimum is looked for
+    /// and the matrix is that of the state. Returns what they add to the merit along it.
     pub(super) fn meet_contacts(
         &mut self,
         problem: &mut Problem<'_>,
         state: &RodState,
-        part: f64,
-        shift: f64,
-    ) -> bool {
-        let Problem { elements, ref mut external, .. } = *problem;
-        let arrived =
-            external.meet(elements, (state, &self.trial), part, &moved::<C>(elements, state, &self.step));
-        if !arrived {
-            return false;
+        shift: &mut f64,
+    ) -> Result<ContactMerit, StopReason> {
+        let elements = problem.elements;
+        if problem.external.contacts().is_none() {
+            return Ok(ContactMerit::default());
         }
-        self.spare.copy_from_slice(&self.step);
-        let regularisation = Self::regularisation(elements);
-        let sigma = if shift > regularisation { regularisation + shift } else { regularisation };
-        let minimum = |found: Result<Inertia, FactorError>| {
-            found.is_ok_and(|inertia| inertia.negative == elements.len())
-        };
-        let mut whole = true;
-        for round in 0..=ROUNDS {
-            let changed = self.change_contacts(problem, |external, step, into| {
-                external.press_or_let_go(elements, state, &moved::<C>(elements, state, step), into)
-            });
-            // The step at hand is the one that these contacts give.
-            if changed == 0 && round == 0 {
-                return false;
+        if !(problem.minimum && self.assembly.hessian) {
+            self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
+            return Ok(self.contact_merit(problem, state));
+        }
+        for _ in 0..SHIFTS {
+            self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
+            if self.contacts_at_end(problem, state, *shift) {
+                let merit = self.contact_merit(problem, state);
+                if !self.is_uphill(&merit) {
+                    return Ok(merit);
+                }
             }
-            if (changed == 0 && whole) || round == ROUNDS {
+            let least = LEAST_SHIFT * Self::regularisation(elements);
+            loop {
+                *shift = (SHIFT_GROWTH * *shift).max(least);
+                if !shift.is_finite() {
+                    return Err(StopReason::Singular);
+                }
+                if self.factors_minimum(problem, *shift) {
+                    break;
+                }
+            }
+        }
+        Err(StopReason::NoDescent)
+    }
+
+    /// Asks contacts what the step does to them.
+    fn with_contacts<T: Default>(
+        &self,
+        problem: &mut Problem<'_>,
+        state: &RodState,
+        ask: impl FnOnce(&mut dyn Contacts, &super::Moved<'_>) -> T,
+    ) -> T {
+        let moved = moved::<C>(problem.elements, state, &self.step);
+        problem.external.contacts().map_or_else(T::default, |contacts| ask(contacts, &moved))
+    }
+
+    /// Whether the step is uphill of the energy and this, beyond rounding.
+    fn is_uphill(&self, merit: &ContactMerit) -> bool {
+        let slope = self.assembly.slope(&self.step) + merit.slope_mj;
+        slope > ENERGY_ROUNDING * self.assembly.energy.total().abs()
+    }
+
+    /// The least stiff merit of contacts that the step descends, or the stiffest.
+    fn contact_merit(&self, problem: &mut Problem<'_>, state: &RodState) -> ContactMerit {
+        let mut stiffness = 1.0;
+        let mut merit = ContactMerit::default();
+        for _ in 0..=STIFFENINGS {
+            merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved, stiffness));
+            if !self.is_uphill(&merit) {
                 break;
             }
-            self.before.copy_from_slice(&self.step);
-            while !minimum(self.factor_step(sigma)) {
-                let held = self
-                    .change_contacts(problem, |external, _, into| external.hold_on(elements, state, into));
-                if held == 0 {
-                    self.step.copy_from_slice(&self.spare);
-                    problem.external.forget();
-                    return false;
-                }
+            stiffness *= STIFFER;
+        }
+        merit
+    }
+
+    /// Finds the minimum of the model under a `shift`. Returns whether it is convex in all rounds; otherwise the system has no minimum.
+    fn contacts_at_end(&mut self, problem: &mut Problem<'_>, state: &RodState, shift: f64) -> bool {
+        let elements = problem.elements;
+        // Whether the last round went all its way, or was ended by its turn: with the same contacts the next one would be too.
+        let mut done = true;
+        for _ in 0..ROUNDS {
+            let changed = self.change_contacts(problem, state);
+            if changed == 0 && done {
+                break;
+            }
+            self.spare.copy_from_slice(&self.step);
+            if !self.factors_minimum(problem, shift) {
+                return false;
             }
             let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
             let most = if turn > LARGEST_TURN { LARGEST_TURN / turn } else { 1.0 };
-            let part = problem.external.part_towards(&moved::<C>(elements, state, &self.step), most);
-            whole = part >= 1.0;
-            if !whole {
-                for (step, before) in self.step.iter_mut().zip(&self.before) {
+            let part =
+                self.with_contacts(problem, state, |contacts, moved| contacts.part_towards(moved, most));
+            done = part >= most;
+            if part < 1.0 {
+                for (step, before) in self.step.iter_mut().zip(&self.spare) {
                     *step = before + part * (*step - before);
                 }
             }
-            if part < LEAST_PART {
-                break;
-            }
         }
-        Self::restore_tensions(elements, &mut self.step);
         true
     }
 
-    /// Changes contacts in the assembled system. The slope of the energy stays that at the base: what they change is for the right-hand
-    /// side alone.
-    fn change_contacts(
-        &mut self,
-        problem: &mut Problem<'_>,
-        change: impl FnOnce(&mut dyn External, &[f64], &mut Assembly<C>) -> usize,
-    ) -> usize {
-        std::mem::swap(&mut self.assembly.residual, &mut self.assembly.correction);
-        let changed = change(&mut *problem.external, &self.step, &mut self.assembly);
-        std::mem::swap(&mut self.assembly.residual, &mut self.assembly.correction);
-        problem.supports.hold(&mut self.assembly);
-        changed
+    /// Factors the system under a shift and sets the step that answers it. Returns whether its matrix is that of a minimum.
+    fn factors_minimum(&mut self, problem: &Problem<'_>, shift: f64) -> bool {
+        let found = self.factor_step(Self::regularisation(problem.elements) + shift);
+        Self::restore_tensions(problem.elements, &mut self.step);
+        found.is_ok_and(|inertia| inertia.negative == problem.multipliers())
     }
 
-    /// Second-order corrections of the contacts at the trial, `part` of the step from the assembled state, with the factorisation at hand.
-    pub(super) fn correct_contacts(&mut self, problem: &mut Problem<'_>, state: &RodState, part: f64) {
+    /// Has those contacts in the system to which the step leads; returns how many that changes. The slope of the energy stays that at the
+    /// base: what they change is for the right-hand side alone.
+    fn change_contacts(&mut self, problem: &mut Problem<'_>, state: &RodState) -> usize {
         let Problem { elements, supports, external, .. } = problem;
-        let mut last = f64::INFINITY;
-        for round in 0..=CORRECTIONS {
-            let trial = &self.trial;
-            let stray = self
-                .assembly
-                .beside(&mut self.spare, |into| external.stray(elements, (state, trial), part, into));
-            if round > 0 && (stray.is_nan() || stray >= last) {
-                std::mem::swap(&mut self.trial, &mut self.other);
-                break;
-            }
-            if stray.is_nan() || stray <= STRAYED || round == CORRECTIONS {
-                break;
-            }
-            last = stray;
-            self.spare.iter_mut().for_each(|r| *r = -*r);
-            supports.held::<C>().into_iter().flatten().for_each(|row| self.spare[row] = 0.0);
-            self.factor.solve(&mut self.spare);
-            let (turn, _) = RodState::largest_turn::<C>(elements, &self.trial, &self.spare);
-            if turn.is_nan() || turn > LARGEST_CORRECTION {
-                break;
-            }
-            self.other.copy_from(&self.trial);
-            self.trial.advance::<C>(elements, &self.other, &self.spare, 1.0);
-            if external.safe_fraction(elements, &self.trial) < 1.0 {
-                std::mem::swap(&mut self.trial, &mut self.other);
-                break;
-            }
-        }
+        let Some(contacts) = external.contacts() else { return 0 };
+        let moved = moved::<C>(elements, state, &self.step);
+        let into: &mut Assembly<C> = &mut self.assembly;
+        std::mem::swap(&mut into.residual, &mut into.correction);
+        let changed = contacts.press_or_let_go(elements, state, &moved, into);
+        std::mem::swap(&mut into.residual, &mut into.correction);
+        supports.hold(into);
+        changed
     }
 }

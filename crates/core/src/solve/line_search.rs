@@ -1,9 +1,10 @@
 //! The line search: how much of a step is taken.
 //!
-//! The merit is the potential energy and, where the far end is held, the weighted distance from its conditions. The first trial is the
-//! whole step, or as much of it as turns no node too far and crosses no wall; others follow at the minimum of a parabola until the merit
+//! The merit is the potential energy, with contacts a merit of theirs, and where the far end is held the weighted distance from its conditions.
+//! The first trial is the whole step, or as much of it as turns no node too far and crosses no wall; others follow at the minimum of a parabola until the merit
 //! falls enough (Armijo's condition; Nocedal and Wright, *Numerical Optimization*, 2nd ed., section 3.1).
 
+use super::external::ContactMerit;
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::{StepRecord, StopReason};
 use super::shift::REGULARISATION;
@@ -16,8 +17,6 @@ const TRIALS: usize = 24;
 const ARMIJO: f64 = 1e-4;
 /// A step that is not whole counts as one where axial forces changed by less than 1 / STIFFENING of its turn times EI/L².
 const STIFFENING: f64 = 1e-2;
-/// How often a step is found anew with the contacts that a trial has run into.
-const MEETINGS: usize = 3;
 /// Trials after which loads without potential may let the residual grow.
 const PATIENCE: usize = 6;
 
@@ -90,75 +89,39 @@ impl Merit {
 }
 
 impl<const C: usize> Newton<C> {
-    /// Moves `state` along the step from the assembled state, whose relative residual and shift are given. Returns how far nodes were
-    /// turned by it.
+    /// Moves `state` along the step from the assembled state, whose relative residual and shift are given, and what contacts add to the merit.
+    /// Returns how far nodes were turned by it.
     pub(super) fn line_search(
         &mut self,
         problem: &mut Problem<'_>,
         state: &mut RodState,
         search: &mut LineSearch,
-        residual: f64,
-        shift: f64,
+        (residual, shift): (f64, f64),
+        contacts: &ContactMerit,
     ) -> Result<f64, StopReason> {
-        let Stride { mut merit, mut part, mut whole_turn, turn } =
-            self.stride(problem, state, search, shift)?;
+        let Stride { merit, mut part, whole_turn, turn } =
+            self.stride(problem, state, search, shift, contacts)?;
         let free = problem.supports.conditions() == 0;
         // What a step gains that is less than rounding, the energies need not be asked for.
-        let below_rounding = problem.minimum
-            && free
-            && turn <= SHORT
-            && merit.slope <= 0.0
-            && -merit.slope <= merit.rounding();
-        let turn_of = |part: f64, whole_turn: f64| if part == 1.0 { whole_turn } else { f64::INFINITY };
+        let below_rounding = problem.minimum && free && turn <= SHORT && -merit.slope <= merit.rounding();
         let multipliers = problem.supports.multipliers;
         let first = Layout::<C>.support(problem.elements.len());
         for j in 0..6 {
             problem.supports.multipliers[j] += self.step[first + j];
         }
-        let foreseen = problem.minimum && free && self.foresee(problem, state);
-        // Whether the matrix is that of the base, so that contacts can be met.
-        let modelled = problem.minimum && free && self.assembly.hessian && problem.external.is_steep();
-        let mut meetings = if modelled { MEETINGS } else { 0 };
-        let mut refused = None;
         for attempt in 0..TRIALS {
-            let wanted = part;
-            part = self.place_trial(problem, state, part, foreseen);
+            part = self.place_trial(problem, state, part);
             search.assembled = false;
-            let (mut energy_change, mut change);
+            let (energy_change, change);
             if below_rounding {
                 change = part * (1.0 - 0.5 * part) * merit.slope;
                 energy_change = change;
             } else {
                 energy_change = self.energy(problem.elements, problem.external, state) - merit.energy;
                 change = energy_change + search.weigh(&problem.supports.gaps(&self.trial)) - merit.gaps;
-                let accepted = self.accepts(problem, search, &merit, (residual, change, part), attempt);
-                if (part < wanted || !accepted) && meetings > 0 {
-                    meetings -= 1;
-                    if self.meet_contacts(problem, state, part, shift) {
-                        let stride = self.stride(problem, state, search, shift)?;
-                        if stride.merit.slope < 0.0 {
-                            Stride { merit, part, whole_turn, .. } = stride;
-                            refused = None;
-                            continue;
-                        }
-                        std::mem::swap(&mut self.step, &mut self.spare);
-                        problem.external.forget();
-                    }
-                    meetings = 0;
-                }
-                if !accepted {
-                    if problem.external.is_steep() {
-                        refused = Some(part);
-                    }
+                if !self.accepts(problem, search, &merit, (residual, change, part), attempt) {
                     part = merit.parabola(change, part);
                     continue;
-                }
-                // On a path of unstable states the energy says nothing; steps there are short and Newton's own.
-                if let Some(refused) = refused.filter(|_| problem.options.minimum) {
-                    let ends = (part, refused, energy_change);
-                    (part, energy_change) =
-                        self.reach_wall(problem.elements, problem.external, state, merit.energy, ends);
-                    (change, search.assembled) = (energy_change, false);
                 }
             }
             self.steps.push(StepRecord {
@@ -169,9 +132,12 @@ impl<const C: usize> Newton<C> {
                 fraction: part,
                 shift,
             });
+            if let Some(contacts) = problem.external.contacts() {
+                contacts.take(part);
+            }
             std::mem::swap(state, &mut self.trial);
             problem.supports.follow(state);
-            return Ok(turn_of(part, whole_turn));
+            return Ok(if part == 1.0 { whole_turn } else { f64::INFINITY });
         }
         problem.supports.multipliers = multipliers;
         Err(StopReason::NoDescent)
@@ -184,8 +150,12 @@ impl<const C: usize> Newton<C> {
         state: &RodState,
         search: &mut LineSearch,
         shift: f64,
+        contacts: &ContactMerit,
     ) -> Result<Stride, StopReason> {
-        let merit = self.merit_along(problem, state, search);
+        let mut merit = self.merit_along(problem, state, search);
+        merit.energy += contacts.excess_mj;
+        merit.slope += contacts.slope_mj;
+        merit.scale += contacts.size_mj;
         let (turn, _) = RodState::largest_turn::<C>(problem.elements, state, &self.step);
         if !turn.is_finite() {
             return Err(StopReason::NotFinite);
@@ -231,13 +201,7 @@ impl<const C: usize> Newton<C> {
     }
 
     /// Sets the trial to a part of the step, at most `part`, that crosses nothing; returns the part.
-    fn place_trial(
-        &mut self,
-        problem: &mut Problem<'_>,
-        state: &RodState,
-        mut part: f64,
-        foreseen: bool,
-    ) -> f64 {
+    fn place_trial(&mut self, problem: &mut Problem<'_>, state: &RodState, mut part: f64) -> f64 {
         let Problem { elements, supports, external, .. } = problem;
         self.trial.advance::<C>(elements, state, &self.step, part);
         for _ in 0..4 {
@@ -250,10 +214,7 @@ impl<const C: usize> Newton<C> {
         }
         if supports.conditions() > 0 {
             self.correct(elements, supports, Layout::<C>.support(elements.len()));
-        } else if foreseen {
-            self.correct_contacts(problem, state, part);
         }
-        let elements = problem.elements;
         self.trial.take_tensions::<C>(elements, state, &self.step);
         part
     }

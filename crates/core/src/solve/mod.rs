@@ -17,7 +17,7 @@ mod stop;
 mod trial;
 mod unsymmetric;
 
-pub use external::{External, Moved};
+pub use external::{ContactMerit, Contacts, External, Moved, Sizes};
 pub use newton::Newton;
 pub use report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 pub use residual::ResidualSize;

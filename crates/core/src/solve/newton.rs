@@ -37,8 +37,6 @@ pub struct Newton<const C: usize> {
     pub(super) factor: Factor<C>,
     pub(super) step: Vec<f64>,
     pub(super) spare: Vec<f64>,
-    /// The step before, while contacts within one are looked for.
-    pub(super) before: Vec<f64>,
     pub(super) columns: Vec<Vec<f64>>,
     pub(super) trial: RodState,
     pub(super) other: RodState,
@@ -59,7 +57,6 @@ impl<const C: usize> Newton<C> {
             factor: Factor::new(n),
             step: vec![0.0; n],
             spare: vec![0.0; n],
-            before: vec![0.0; n],
             columns: Vec::new(),
             trial: RodState::default(),
             other: RodState::default(),
@@ -86,7 +83,7 @@ impl<const C: usize> Newton<C> {
         }
         self.assembly.resize(elements);
         self.factor.resize(n);
-        for list in [&mut self.step, &mut self.spare, &mut self.before].into_iter().chain(&mut self.columns) {
+        for list in [&mut self.step, &mut self.spare].into_iter().chain(&mut self.columns) {
             list.resize(n, 0.0);
         }
     }
@@ -100,18 +97,6 @@ impl<const C: usize> Newton<C> {
         state: &RodState,
     ) {
         self.assembly.hessian = true;
-        self.assemble_parts(elements, supports, external, state);
-    }
-
-    /// Assembles residual and energies at `state`, and leaves the matrix empty.
-    pub(crate) fn assemble_residual(
-        &mut self,
-        elements: &[ElementData],
-        supports: &Supports,
-        external: &mut dyn External,
-        state: &RodState,
-    ) {
-        self.assembly.hessian = false;
         self.assemble_parts(elements, supports, external, state);
     }
 
@@ -160,6 +145,14 @@ impl<const C: usize> Newton<C> {
                 return report.stopped(StopReason::NotFinite);
             }
             let arrived = progress.has_arrived(&size, options.tolerance, &self.steps);
+            if arrived && !problem.settles() {
+                if report.iterations >= options.max_iterations {
+                    return report.stopped(StopReason::Unsettled);
+                }
+                progress = Progress::default();
+                report.iterations += 1;
+                continue;
+            }
             let natural = match self.descent_step(&problem, &mut shift, arrived) {
                 Ok(inertia) => inertia,
                 Err(reason) => return report.stopped(reason),
@@ -187,7 +180,11 @@ impl<const C: usize> Newton<C> {
             report.iterations += 1;
             self.unsymmetric();
             Self::restore_tensions(elements, &mut self.step);
-            match self.line_search(&mut problem, state, &mut search, size.relative, shift) {
+            let searched = self.meet_contacts(&mut problem, state, &mut shift).and_then(|contacts| {
+                let step = (size.relative, shift);
+                self.line_search(&mut problem, state, &mut search, step, &contacts)
+            });
+            match searched {
                 Ok(_) if self.neighbourhood.is_left_by(state) => return report.stopped(StopReason::Left),
                 Ok(turn) => progress.has_turned(turn),
                 Err(StopReason::NoDescent) => {
@@ -291,6 +288,12 @@ pub(super) struct Problem<'a> {
 }
 
 impl Problem<'_> {
+    /// Whether contacts, if there are any, leave an equilibrium one.
+    fn settles(&mut self) -> bool {
+        let tolerance = self.options.tolerance;
+        self.external.contacts().is_none_or(|contacts| contacts.settled(tolerance))
+    }
+
     /// Negative pivots of a minimum: one for each multiplier.
     pub(super) fn multipliers(&self) -> usize {
         self.elements.len() + self.supports.conditions()

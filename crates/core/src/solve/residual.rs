@@ -28,12 +28,11 @@ impl<const C: usize> Newton<C> {
         let l = Layout::<C>;
         let n = elements.len();
         let length: f64 = elements.iter().map(|e| e.length).sum();
-        let outside = external.scale();
-        let outside_floor = external.rounding();
+        let outside = external.sizes();
         let held = supports.multipliers;
-        let mut force = self.assembly.scale[0].max(outside[0]);
+        let mut force = self.assembly.scale[0].max(outside.force_n);
         force = held[..3].iter().fold(force, |m, v| m.max(v.abs()));
-        let mut moment = self.assembly.scale[1].max(outside[1]);
+        let mut moment = self.assembly.scale[1].max(outside.moment_nmm);
         moment = held[3..].iter().fold(moment, |m, v| m.max(v.abs()));
         if Layout::<C>::ANGLES > 0 {
             // Instruments that hold each other may exert nothing on the rest of the world.
@@ -56,7 +55,7 @@ impl<const C: usize> Newton<C> {
                 .map(|set| a.materials[set].torsion[2].max(b.materials[set].torsion[0]));
             let spun = twisted.fold(0.0, f64::max) / (h * h);
             // What rounding of unit vectors leaves of a force 12 EI/h² δ and of a moment 6 EI/h δ.
-            let floor = 100.0 * f64::EPSILON * stiff + outside_floor;
+            let floor = 100.0 * f64::EPSILON * stiff + outside.rounding_n;
             let mut rows = |value: f64, scale: f64, floor: f64| {
                 small &= value <= tolerance * scale;
                 rounding &= value <= tolerance * scale + floor;

@@ -11,7 +11,7 @@ use crate::rod::{Assembly, ElementData, Supports};
 /// Part of EI/L² that is always added as a uniform tension.
 pub(super) const REGULARISATION: f64 = 1e-8;
 /// Least shift, over the one that is always on.
-const LEAST_SHIFT: f64 = 1e5;
+pub(super) const LEAST_SHIFT: f64 = 1e5;
 /// Shifts tried before a matrix is called singular.
 const SHIFTS: usize = 60;
 

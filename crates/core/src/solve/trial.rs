@@ -4,11 +4,8 @@ use super::external::External;
 use super::newton::Newton;
 use crate::rod::{ElementData, Layout, RodState, Supports, stored_energy};
 
-/// Halvings towards the minimum along a step that a wall cut short.
-const REFINEMENTS: usize = 6;
-
 /// A correction that turns a node by more than this, rad, is none.
-pub(super) const LARGEST_CORRECTION: f64 = 0.3;
+const LARGEST_CORRECTION: f64 = 0.3;
 
 impl<const C: usize> Newton<C> {
     /// Undoes the change of multiplier of [`crate::rod::assembly`]: dN = m/(1 − γD).
@@ -59,35 +56,5 @@ impl<const C: usize> Newton<C> {
                 break;
             }
         }
-    }
-
-    /// A wall was hit on the way: the energy falls up to it and rises steeply beyond. The minimum between the accepted
-    /// and the refused part of the step lies in touch with it; short of it the next step would meet it again.
-    ///
-    /// `ends` are the accepted part, the refused part and the change of energy of the former; returns the part taken and
-    /// its change of energy.
-    pub(super) fn reach_wall(
-        &mut self,
-        elements: &[ElementData],
-        external: &mut dyn External,
-        state: &RodState,
-        before: f64,
-        ends: (f64, f64, f64),
-    ) -> (f64, f64) {
-        let (mut low, mut high, mut lowest) = ends;
-        for _ in 0..REFINEMENTS {
-            let middle = 0.5 * (low + high);
-            self.trial.advance::<C>(elements, state, &self.step, middle);
-            self.trial.take_tensions::<C>(elements, state, &self.step);
-            let change = self.energy(elements, external, state) - before;
-            if change < lowest {
-                (low, lowest) = (middle, change);
-            } else {
-                high = middle;
-            }
-        }
-        self.trial.advance::<C>(elements, state, &self.step, low);
-        self.trial.take_tensions::<C>(elements, state, &self.step);
-        (low, lowest)
     }
 }

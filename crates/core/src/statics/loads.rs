@@ -2,7 +2,7 @@
 
 use crate::Vec3;
 use crate::rod::{ElementData, Frame, RodState, Stencils, Triple};
-use crate::solve::External;
+use crate::solve::{External, Sizes};
 use nalgebra::Matrix3;
 
 /// Loads on a rod, at nodes and over elements.
@@ -131,11 +131,12 @@ impl External for Loads {
         self.moments.is_empty() && self.followers.is_empty()
     }
 
-    fn scale(&self) -> [f64; 2] {
+    fn sizes(&self) -> Sizes {
         let force = self.forces.iter().chain(&self.followers).map(|(_, f)| f.norm()).fold(0.0, f64::max);
         let moment = self.moments.iter().map(|(_, m)| m.norm()).fold(0.0, f64::max);
         let constant = self.constant.iter().map(|(_, f)| f.norm()).fold(0.0, f64::max);
-        [constant.max(force * self.factor.abs()), moment * self.factor.abs()]
+        let by = self.factor.abs();
+        Sizes { force_n: constant.max(force * by), moment_nmm: moment * by, rounding_n: 0.0 }
     }
 }
 

@@ -17,7 +17,6 @@ fn friction(slip: Vec3) -> (Friction, Vec3) {
         force_n: 2.0,
         begun: (normal, 2.0),
         seen: (normal, 2.0),
-        matrix_n: 0.0,
     };
     let at = slider.from_mm + (slip - normal * normal.dot(&slip));
     (Friction { coefficient: 0.25, stick_mm: 0.01, sliders: vec![slider], ..Friction::default() }, at)

@@ -98,8 +98,7 @@ fn nodes(element: usize, state: &RodState) -> Nodes {
 impl WallContact<'_> {
     /// Whether no point of a span can touch the wall at a state.
     fn is_free(&self, span: &Span, elements: &[ElementData], state: &RodState) -> bool {
-        // Friction that follows the state at once is asked for everywhere.
-        span.room.free_mm > 0.0 && !self.friction.is_coupled() && {
+        span.room.free_mm > 0.0 && {
             let to = nodes(span.element, state);
             self.motion_mm(&span.looked_at, &to, elements[span.element].length) < span.room.free_mm
         }
@@ -153,7 +152,7 @@ impl WallContact<'_> {
         if !std::mem::replace(&mut known.at_base, true) {
             for index in points.clone() {
                 let x = self.points[index].between(&base, length_mm);
-                self.read_base(index, &self.surface.material(&x));
+                self.read_base(index, elements, &self.surface.material(&x));
             }
         }
         points
@@ -185,6 +184,9 @@ impl WallContact<'_> {
     /// Has a state be the base, and looks at the points that may touch there.
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
         self.cache.pressing.clear();
+        self.cache.foreseen.clear();
+        self.cache.slipping.clear();
+        self.cache.stiffness = None;
         for span in 0..self.cache.spans.len() {
             let free = self.is_free(&self.cache.spans[span], elements, state);
             let known = &mut self.cache.spans[span];
@@ -197,7 +199,7 @@ impl WallContact<'_> {
             let mut room = Room::UNLIMITED;
             for index in points {
                 let x = self.material(index, elements, state);
-                let reading = self.read_base(index, &x);
+                let reading = self.read_base(index, elements, &x);
                 if self.cache.points[index].presses {
                     self.cache.pressing.push(index);
                 }
@@ -223,16 +225,23 @@ impl WallContact<'_> {
         Room { free_mm, clearance_mm: known.clearance_mm - moved_mm }
     }
 
-    /// Notes of a point that it is at `x` at the base, and what it reads there.
-    fn read_base(&mut self, index: usize, x: &Vec3) -> Reading {
+    /// Notes of a point that it is at `x` at the base, and what it reads there: also off the wall while it has a force.
+    fn read_base(&mut self, index: usize, elements: &[ElementData], x: &Vec3) -> Reading {
         let radius_mm = self.points[index].potential.radius_mm;
-        let held = self.holding && self.cache.points[index].presses;
-        let limit_mm = if held { (1.0 + FOLLOW) * radius_mm } else { radius_mm };
+        let force_n = self.cache.points[index].force_n;
+        let limit_mm = if force_n > 0.0 { (1.0 + FOLLOW) * radius_mm } else { radius_mm };
         let reading = self.read_within(index, x, limit_mm);
+        let presses = match &reading {
+            Reading::Free(_) => false,
+            Reading::Pressed(d) => {
+                let off_mm = (d.value_mm - radius_mm).max(0.0);
+                off_mm == 0.0 || force_n > self.penalty_n_per_mm(index, elements) * off_mm
+            }
+        };
         let known = &mut self.cache.points[index];
         known.base = *x;
         known.base_clearance_mm = reading.distance_mm();
-        known.presses = matches!(reading, Reading::Pressed(_));
+        known.presses = presses;
         (known.base_looked_at, known.base_triangle) = (known.looked_at, known.triangle);
         (known.base_looked_clearance_mm, known.base_free_mm) = (known.clearance_mm, known.free_mm);
         known.side = known.triangle.filter(|_| known.base_clearance_mm < SUNK * radius_mm);

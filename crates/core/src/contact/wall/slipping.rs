@@ -2,8 +2,8 @@
 //!
 //! A step knows of the friction where it begins: a point that sticks there holds like a spring, however far the step takes it, and one
 //! that slips drives the step on, also where it is led back and would be held. What friction takes, μ N φ(|u|), is convex in the slip,
-//! and the slip u is linear in the step. So where a step is found anew with the contacts that it leads to ([`super::foresight`]), it is found
-//! with this too: in every round with the force and the stiffness at the slip that the last one led to,
+//! and the slip u is linear in the step. So where a step is found anew with the contacts that it leads to ([`super::model`]), it is found
+//! with this too, in every round with the force and the stiffness at the slip that the last one led to,
 //!
 //! ```text
 //! f(u) + H(u) (u′ − u),    f = μ N φ′ û,    H = ∂f/∂u
@@ -44,19 +44,6 @@ pub(in crate::contact) struct Slipping {
     stiffness: (Matrix3<f64>, Vec3, f64),
     /// What the rod's own stiffness is in balance with.
     carried: Wrench,
-    /// How stiff it is.
-    as_stiff: Stiffness,
-}
-
-/// How stiff friction is in a step: no more than it must be for the step to have a minimum.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Stiffness {
-    /// As the second derivatives at its end.
-    Tangent,
-    /// As a spring that holds as it does at its end.
-    Secant,
-    /// As at the base.
-    Base,
 }
 
 /// What a round does to a point with friction.
@@ -90,23 +77,23 @@ impl Slipping {
         plus(&self.at_rest, 1.0, &times(&self.stiffness, way))
     }
 
-    /// Changes the system to another force without motion and another stiffness.
+    /// Changes the system to friction as it is at the end of the step.
     fn switch(
         &mut self,
-        to: (Wrench, (Matrix3<f64>, Vec3, f64)),
+        f: &FrictionDerivatives,
         (point, element): (&ContactPoint, &ElementData),
         base: &RodState,
         into: &mut dyn Stencils,
     ) {
-        let force = plus(&to.0, -1.0, &self.at_rest);
-        let (hessian, mixed, turn2) = to.1;
+        let at_rest = plus(&(f.gradient, f.turn), -1.0, &times(&stiffness(f), &self.way));
+        let force = plus(&at_rest, -1.0, &self.at_rest);
         let (old_hessian, old_mixed, old_turn2) = self.stiffness;
-        super::foresight::straighten(point, element, base, &force.0, into);
+        super::model::straighten(point, element, base, &force.0, into);
         let mut sum = PointSum::default();
-        sum.add(point.xi, &force.0, Some(&(hessian - old_hessian)));
+        sum.add(point.xi, &force.0, Some(&(f.hessian - old_hessian)));
         into.add_points(base, element, point.element, &sum);
-        into.add_spin(base, element, point.place(), &(mixed - old_mixed), (force.1, turn2 - old_turn2));
-        (self.at_rest, self.stiffness) = to;
+        into.add_spin(base, element, point.place(), &(f.mixed - old_mixed), (force.1, f.turn2 - old_turn2));
+        (self.at_rest, self.stiffness) = (at_rest, stiffness(f));
     }
 }
 
@@ -116,38 +103,30 @@ fn stiffness(f: &FrictionDerivatives) -> (Matrix3<f64>, Vec3, f64) {
 }
 
 impl WallContact<'_> {
-    /// Friction of a point after a motion from where it is at the base, as stiff as its derivatives or as its `secant`.
-    fn friction_after(&self, slipping: &Slipping, way: &Motion, secant: bool) -> Option<FrictionDerivatives> {
-        let radius_mm = self.points[slipping.index].potential.radius_mm;
-        let (x, angle) = plus(&slipping.base, 1.0, way);
-        self.friction.spring(slipping.index, (&x, angle), radius_mm, secant)
-    }
-
-    /// Begins to look at the friction of a step from the base; returns whether there is any.
-    pub(super) fn begin_slipping(&mut self, base: &RodState, moved: &Moved<'_>) -> bool {
+    /// Takes note of the friction in a step from the base that answers the system as it is.
+    pub(super) fn foresee_slipping(&mut self, base: &RodState, moved: &Moved<'_>) {
         let mut slipping = std::mem::take(&mut self.cache.slipping);
-        if slipping.is_empty() && self.friction.acts() && !self.friction.is_coupled() {
+        if slipping.is_empty() && self.friction.acts() {
             let rubbing = self.points.iter().enumerate().filter(|(index, _)| self.friction.holds(*index));
-            for (index, point) in rubbing {
+            slipping.extend(rubbing.filter_map(|(index, point)| {
                 let x = self.surface.place(&self.cache.points[index].base);
                 let (angle, radius_mm) = (point.angle(base), point.potential.radius_mm);
-                let Some(f) = self.friction.derivatives(index, &x, angle, radius_mm) else { continue };
-                let way = moved(point.place());
-                let mut new = Slipping {
+                let f = self.friction.derivatives(index, &x, angle, radius_mm)?;
+                Some(Slipping {
                     index,
                     base: (x, angle),
-                    way,
+                    way: (Vec3::zeros(), 0.0),
                     at_rest: (f.gradient, f.turn),
                     stiffness: stiffness(&f),
                     carried: (Vec3::zeros(), 0.0),
-                    as_stiff: Stiffness::Tangent,
-                };
-                new.carried = new.linear(&way);
-                slipping.push(new);
-            }
+                })
+            }));
+        }
+        for rubbing in &mut slipping {
+            rubbing.way = moved(self.points[rubbing.index].place());
+            rubbing.carried = rubbing.linear(&rubbing.way);
         }
         self.cache.slipping = slipping;
-        !self.cache.slipping.is_empty()
     }
 
     /// Has friction be that at the end of the step; returns at how many points that changes it.
@@ -159,63 +138,20 @@ impl WallContact<'_> {
         into: &mut dyn Stencils,
     ) -> usize {
         let mut changed = 0;
-        for k in 0..self.cache.slipping.len() {
-            let mut slipping = self.cache.slipping[k];
-            let point = &self.points[slipping.index];
-            let way = moved(point.place());
-            let Some(f) = self.friction_after(&slipping, &way, false) else { continue };
-            slipping.way = way;
-            let off = plus(&(f.gradient, f.turn), -1.0, &slipping.linear(&way));
-            if off.0.norm() > CHANGED * self.friction.largest_n(slipping.index) {
+        for slipping in &mut self.cache.slipping {
+            let (index, point) = (slipping.index, &self.points[slipping.index]);
+            slipping.way = moved(point.place());
+            let (x, angle) = plus(&slipping.base, 1.0, &slipping.way);
+            let Some(f) = self.friction.derivatives(index, &x, angle, point.potential.radius_mm) else {
+                continue;
+            };
+            let off = plus(&(f.gradient, f.turn), -1.0, &slipping.linear(&slipping.way));
+            if off.0.norm() > CHANGED * self.friction.largest_n(index) {
                 changed += 1;
-                self.switch(&mut slipping, f, (elements, base), into);
+                slipping.switch(&f, (point, &elements[point.element]), base, into);
             }
-            self.cache.slipping[k] = slipping;
         }
         changed
-    }
-
-    /// Has friction with the force `f` at the end of the step be in the system, as stiff as it is to be.
-    fn switch(
-        &self,
-        slipping: &mut Slipping,
-        f: FrictionDerivatives,
-        (elements, base): (&[ElementData], &RodState),
-        into: &mut dyn Stencils,
-    ) {
-        let point = &self.points[slipping.index];
-        let spring = match slipping.as_stiff {
-            Stiffness::Tangent => Some(f),
-            Stiffness::Secant => self.friction_after(slipping, &slipping.way, true),
-            Stiffness::Base => self.friction_after(slipping, &(Vec3::zeros(), 0.0), false),
-        };
-        let stiffness = spring.as_ref().map_or(slipping.stiffness, stiffness);
-        let at_rest = plus(&(f.gradient, f.turn), -1.0, &times(&stiffness, &slipping.way));
-        slipping.switch((at_rest, stiffness), (point, &elements[point.element]), base, into);
-    }
-
-    /// Has friction be stiffer; returns at how many points it could be.
-    pub(super) fn stiffen(
-        &mut self,
-        elements: &[ElementData],
-        base: &RodState,
-        into: &mut dyn Stencils,
-    ) -> usize {
-        let Some(least) = self.cache.slipping.iter().map(|slipping| slipping.as_stiff).min() else {
-            return 0;
-        };
-        let stiffer = if least == Stiffness::Tangent { Stiffness::Secant } else { Stiffness::Base };
-        let mut stiffened = 0;
-        for k in 0..self.cache.slipping.len() {
-            let mut slipping = self.cache.slipping[k];
-            let Some(f) = self.friction_after(&slipping, &slipping.way, false) else { continue };
-            if slipping.as_stiff < stiffer {
-                (slipping.as_stiff, stiffened) = (stiffer, stiffened + 1);
-                self.switch(&mut slipping, f, (elements, base), into);
-                self.cache.slipping[k] = slipping;
-            }
-        }
-        stiffened
     }
 
     /// What a round does to the points with friction.

@@ -13,7 +13,6 @@
 //! straight sheath ([`push_force`](crate::rod::Clamp::push_force)). F is the derivative of the stored energy with respect
 //! to the inserted length.
 
-mod active_set;
 mod balance;
 mod blocked;
 mod carried;
@@ -38,7 +37,6 @@ mod mesh;
 mod motion_tests;
 mod readout;
 mod search;
-mod settle;
 mod slopes;
 mod state;
 mod step_control;

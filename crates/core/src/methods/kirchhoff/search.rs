@@ -1,12 +1,11 @@
 //! From a prediction to the equilibrium next to it, or to where the device comes to rest.
 //!
-//! Newton's method goes from the prediction to a minimum with lagged normal forces, renewed on the way. There the wall may press otherwise than
-//! friction believes. Where renewing does not settle, friction and wall are solved for together ([`super::settle`]). What that does not find
+//! Newton's method goes from the prediction to a minimum, friction following the forces of contacts on the way. What that does not find
 //! is not near, and the part of the command is cut.
 //!
-//! At a fold, where nothing is near however short the part, the device moves. Friction is held to its normal forces meanwhile: the energy
-//! then is bounded, every step of Newton's method lowers it, and it ends at a minimum. Then the hand holds still and the device slides on:
-//! slip begins anew where it is, with the normal forces that are felt there, until they no longer change. Each slide begins all but at rest,
+//! Where nothing is near however short the part, friction is held to the normal forces that it began with: the energy then is bounded, every
+//! step of Newton's method lowers it, and it ends at a minimum. If friction that follows from there finds nothing near by, the hand holds still
+//! and the device slides on: slip begins anew where it is, with the normal forces that are felt there, until they no longer change. Each slide begins all but at rest,
 //! so that it ends lower than it began by what friction took,
 //!
 //! ```text
@@ -18,12 +17,11 @@
 //! the cones of Coulomb's law of its own normal forces: where a slow motion with friction comes to rest.
 
 use super::guess::Guess;
-use super::settle::Settle;
 use super::substep::Effort;
 use crate::contact::{SETTLED, WallContact};
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
-use crate::solve::{Newton, NewtonOptions, NewtonReport, StopReason};
+use crate::solve::{Newton, NewtonOptions, NewtonReport};
 
 /// Newton iterations of a solution near its prediction: from another one, nearer by, it is found in fewer.
 const MOST_NEAR: usize = 60;
@@ -31,10 +29,8 @@ const MOST_NEAR: usize = 60;
 const MOST_MOVING: usize = 300;
 /// … and of all of them.
 const LONGEST: usize = 2000;
-/// Newton iterations for friction and wall together. Those that find something mostly do in three to five.
-const TOGETHER: usize = 10;
-/// How often friction and wall may be solved for together: each time the equilibrium may turn out to be unstable, and be left.
-const ROUNDS: usize = 5;
+/// Newton iterations from an equilibrium with friction held to one where it follows.
+const FOLLOWING: usize = 20;
 /// Most slides with the hand held still. Two or three are the rule.
 const SLIDES: u32 = 400;
 /// Drag that changes by less than this part on the way to an equilibrium is taken as it is; …
@@ -45,7 +41,6 @@ const DRAG_RENEWALS: usize = 5;
 /// A search for an equilibrium.
 pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) newton: &'a mut Newton<C>,
-    pub(super) settle: &'a mut Settle<C>,
     pub(super) guess: &'a mut Guess,
     pub(super) contact: &'a mut WallContact<'b>,
     pub(super) supports: &'a mut Supports,
@@ -74,11 +69,6 @@ impl<const C: usize> Search<'_, '_, C> {
         if self.effort != Effort::Near {
             self.contact.hold_friction();
         }
-        if self.effort != Effort::Flight {
-            let Self { newton, guess, contact, supports, elements, state, .. } = self;
-            let moved = guess.active_set_step(newton, contact, supports, elements, state);
-            self.iterations += usize::from(moved);
-        }
         self.on()
     }
 
@@ -97,21 +87,21 @@ impl<const C: usize> Search<'_, '_, C> {
     /// From a state to the equilibrium that follows.
     pub(super) fn on(&mut self) -> NewtonReport {
         let found = self.newton();
-        if !found.converged || self.is_settled() {
+        if self.effort == Effort::Near || !found.converged || self.is_settled() {
             return found;
         }
         self.guess.other.copy_from(self.state);
-        if let Some(found) = self.together() {
+        let most = self.most;
+        self.most = most.min(self.iterations + FOLLOWING);
+        self.contact.release_friction();
+        let found = self.newton();
+        self.most = most;
+        if found.converged {
             return found;
         }
-        match self.effort {
-            Effort::Near => found.stopped(StopReason::Unsettled),
-            Effort::Held | Effort::Flight => {
-                self.state.copy_from(&self.guess.other);
-                self.contact.rewind_friction();
-                self.slide()
-            }
-        }
+        self.state.copy_from(&self.guess.other);
+        self.contact.rewind_friction();
+        self.slide()
     }
 
     /// Newton's method from the state on.
@@ -134,32 +124,9 @@ impl<const C: usize> Search<'_, '_, C> {
         let mut found = self.newton();
         while found.converged && !self.is_settled() && self.slides < SLIDES {
             self.contact.anchor_friction(self.elements, self.state);
-            self.contact.hold_friction();
             found = self.newton();
             self.slides += 1;
         }
         found
-    }
-
-    /// Friction and wall solved for together. What is found may be no minimum, and is left then.
-    fn together(&mut self) -> Option<NewtonReport> {
-        for _ in 0..ROUNDS {
-            let left = self.most.saturating_sub(self.iterations);
-            let limits = (self.tolerance, left.min(TOGETHER));
-            let system = (&mut *self.newton, &mut *self.contact, &mut *self.supports);
-            let (there, iterations) = self.settle.solve(system, self.elements, self.state, limits);
-            self.iterations += iterations;
-            if !there {
-                return None;
-            }
-            let found = self.newton();
-            if !found.converged {
-                return None;
-            }
-            if self.is_settled() {
-                return Some(found);
-            }
-        }
-        None
     }
 }

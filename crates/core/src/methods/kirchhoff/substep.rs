@@ -161,7 +161,6 @@ impl<const C: usize> Tools<C> {
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let mut search = Search {
             newton: &mut self.newton,
-            settle: &mut self.settle,
             guess: &mut self.guess,
             contact: &mut contact,
             supports: &mut supports,

@@ -4,7 +4,6 @@ use super::configuration::{Configuration, largest};
 use super::guess::Guess;
 use super::hands::{Hand, Way};
 use super::mesh::Mesh;
-use super::settle::Settle;
 use super::state::KirchhoffState;
 use super::{Environment, meshed};
 use crate::contact::{ContactCache, Counters, Drag, Friction, Touch};
@@ -31,7 +30,6 @@ pub(super) struct Workspace<const C: usize> {
 pub(super) struct Tools<const C: usize> {
     pub(super) newton: Newton<C>,
     pub(super) guess: Guess,
-    pub(super) settle: Settle<C>,
     pub(super) friction: Friction,
     pub(super) cache: ContactCache,
     /// What the flow does along the device.
@@ -70,7 +68,6 @@ impl<const C: usize> Workspace<C> {
         let mut tools = Tools {
             newton: Newton::new(1),
             guess: Guess::default(),
-            settle: Settle::default(),
             friction: Friction::new(surroundings.properties.largest_friction()),
             cache: ContactCache::new(environment.surface),
             drag: Drag::default(),
@@ -80,7 +77,6 @@ impl<const C: usize> Workspace<C> {
         };
         tools.newton.reserve(elements);
         tools.guess.reserve(elements);
-        tools.settle.reserve(elements);
         tools.friction.reserve(points);
         tools.cache.reserve(points);
         tools.touches.reserve(points);

@@ -1,0 +1,208 @@
+//! The model of a step that Newton's method asks contacts for: gaps to first order, and springs where they close.
+//!
+//! Point i has the gap gᵢ = dᵢ − r at the base and gᵢ + ∇dᵢ·δx at the end of a step, and presses there with κᵢ times that where it is negative. Planes are
+//! known of all points that may come to touch, whether they do at the base or not. See [`crate::solve`] for what the model is for, and
+//! [`super::forces`] for the merit along the step to its minimum.
+
+use nalgebra::Matrix3;
+
+use super::{Reading, WallContact};
+use crate::Vec3;
+use crate::contact::point::{ContactPoint, FOLLOW};
+use crate::rod::quadrature::hermite;
+use crate::rod::{ElementData, PointSum, RodState, Stencils};
+use crate::solve::Moved;
+
+/// A search ends where this part of the slope is left, …
+const SEARCHED: f64 = 1e-3;
+/// … and after so many trials.
+const SEARCHES: usize = 60;
+
+/// A contact in a step, and what that does to it.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::contact) struct Foreseen {
+    /// Number of the point.
+    pub(super) index: usize,
+    /// g at the base, mm, …
+    pub(super) gap_mm: f64,
+    /// … and its change by the whole step, to first order.
+    pub(super) change_mm: f64,
+    /// ∇d at the base.
+    pub(super) gradient: Vec3,
+    /// κ, N/mm.
+    pub(super) spring_n_per_mm: f64,
+    /// ρ, N/mm.
+    pub(super) penalty_n_per_mm: f64,
+    /// The force that the rod's own stiffness is in balance with, N, less than 0 where it presses.
+    pub(super) carried_n: f64,
+    /// Whether it presses in the system at the base, …
+    pub(super) at_base: bool,
+    /// … and whether it does now.
+    presses: bool,
+    /// f⁺: the force that the step leads to, N.
+    pub(super) aim_n: f64,
+    /// The force that the slope of the wall's modulus exerts at the base, as a gradient, N: a dead load in the step.
+    pub(super) along_n: Vec3,
+}
+
+impl Foreseen {
+    /// Force of its spring in the system after a step that changes its gap so much, N.
+    fn linear_n(&self, change_mm: f64) -> f64 {
+        if self.presses { self.spring_n_per_mm * (self.gap_mm + change_mm) } else { 0.0 }
+    }
+
+    /// Adds its spring to a system, or takes it away.
+    fn switch(
+        &self,
+        point: &ContactPoint,
+        elements: &[ElementData],
+        base: &RodState,
+        into: &mut dyn Stencils,
+    ) {
+        let sign = if self.presses { 1.0 } else { -1.0 };
+        let along = self.gradient * (sign * self.spring_n_per_mm);
+        let force = along * self.gap_mm;
+        let e = point.element;
+        straighten(point, &elements[e], base, &force, into);
+        let mut sum = PointSum::default();
+        sum.add(point.xi, &force, Some(&(along * self.gradient.transpose())));
+        into.add_points(base, &elements[e], e, &sum);
+    }
+}
+
+/// Part of a way, at most all of it, up to which a convex function falls whose slope is given (the Illinois method).
+pub(super) fn falls_until(slope: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = ((0.0, slope(0.0)), (1.0, slope(1.0)));
+    if high.1 <= 0.0 || low.1 >= 0.0 {
+        return 1.0;
+    }
+    let least = SEARCHED * -low.1;
+    let mut last = 0.0;
+    for _ in 0..SEARCHES {
+        let part = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+        let here = slope(part);
+        if here.abs() <= least {
+            return part;
+        }
+        let (end, other) = if here < 0.0 { (&mut low, &mut high) } else { (&mut high, &mut low) };
+        *end = (part, here);
+        if last * here > 0.0 {
+            other.1 *= 0.5;
+        }
+        last = here;
+    }
+    low.0
+}
+
+/// Takes away what a force on a point that is added to a system, as a gradient, does to the tangents as they turn: those of springs that
+/// are not under that force, or of friction that is linear, are none under which they do.
+pub(super) fn straighten(
+    point: &ContactPoint,
+    element: &ElementData,
+    base: &RodState,
+    force: &Vec3,
+    into: &mut dyn Stencils,
+) {
+    let [_, near, _, far] = hermite(point.xi);
+    for (node, share) in [(point.element, near), (point.element + 1, far)] {
+        let back = share * element.length * force.dot(&base.frames[node].t);
+        into.add_turn(node, &Vec3::zeros(), &Matrix3::from_diagonal(&Vec3::new(back, back, 0.0)));
+    }
+}
+
+impl WallContact<'_> {
+    /// See [`Contacts::foresee`](crate::solve::Contacts::foresee).
+    pub(super) fn foresee_contacts(&mut self, elements: &[ElementData], base: &RodState, moved: &Moved<'_>) {
+        let mut foreseen = std::mem::take(&mut self.cache.foreseen);
+        if foreseen.is_empty() {
+            for span in 0..self.cache.spans.len() {
+                for index in self.near(span, elements, base).into_iter().flatten() {
+                    foreseen.extend(self.at_base(index, elements));
+                }
+            }
+        }
+        for contact in &mut foreseen {
+            contact.change_mm = moved(self.points[contact.index].place()).0.dot(&contact.gradient);
+            contact.carried_n = contact.linear_n(contact.change_mm);
+        }
+        self.cache.foreseen = foreseen;
+    }
+
+    /// What is known at the base of a point that may come to touch.
+    fn at_base(&mut self, index: usize, elements: &[ElementData]) -> Option<Foreseen> {
+        let radius_mm = self.points[index].potential.radius_mm;
+        let at_base = self.cache.points[index].presses;
+        let d = if at_base {
+            *self.cache.pressed(index)?
+        } else {
+            let (x, near_mm) = (self.cache.points[index].base, (1.0 + FOLLOW) * radius_mm);
+            if self.cache.points[index].base_clearance_mm >= near_mm {
+                return None;
+            }
+            let Reading::Pressed(d) = self.read_within(index, &x, near_mm) else { return None };
+            d
+        };
+        let along_n = if at_base { self.along_n(index, &d) } else { Vec3::zeros() };
+        Some(Foreseen {
+            index,
+            gap_mm: d.value_mm - radius_mm,
+            change_mm: 0.0,
+            gradient: d.gradient,
+            spring_n_per_mm: self.spring_n_per_mm(index),
+            penalty_n_per_mm: self.penalty_n_per_mm(index, elements),
+            carried_n: 0.0,
+            at_base,
+            presses: at_base,
+            aim_n: 0.0,
+            along_n,
+        })
+    }
+
+    /// See [`Contacts::press_or_let_go`](crate::solve::Contacts::press_or_let_go).
+    pub(super) fn press_or_let_go_contacts(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        moved: &Moved<'_>,
+        into: &mut dyn Stencils,
+    ) -> usize {
+        let mut changed = 0;
+        for contact in &mut self.cache.foreseen {
+            let point = &self.points[contact.index];
+            contact.change_mm = moved(point.place()).0.dot(&contact.gradient);
+            let presses = contact.gap_mm + contact.change_mm < 0.0;
+            if presses != contact.presses {
+                (contact.presses, changed) = (presses, changed + 1);
+                contact.switch(point, elements, base, into);
+            }
+        }
+        changed
+    }
+
+    /// See [`Contacts::part_towards`](crate::solve::Contacts::part_towards).
+    pub(super) fn part_towards_contacts(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
+        let (mut ends, mut slips) = std::mem::take(&mut self.cache.ends);
+        ends.clear();
+        ends.extend(self.cache.foreseen.iter().map(|contact| {
+            let point = &self.points[contact.index];
+            moved(point.place()).0.dot(&contact.gradient)
+        }));
+        self.slips_to(moved, &mut slips);
+        let slope = |part: f64| -> f64 {
+            let each = self.cache.foreseen.iter().zip(&ends).map(|(contact, end)| {
+                let way = end - contact.change_mm;
+                let there = contact.gap_mm + contact.change_mm + part * way;
+                let carried = contact.carried_n + part * (contact.linear_n(*end) - contact.carried_n);
+                (contact.spring_n_per_mm * there.min(0.0) - carried) * way
+            });
+            each.sum::<f64>() + self.slipping_slope(&slips, part)
+        };
+        let part = falls_until(slope).min(most);
+        for (contact, end) in self.cache.foreseen.iter_mut().zip(&ends) {
+            contact.carried_n += part * (contact.linear_n(*end) - contact.carried_n);
+        }
+        self.carry_slipping(&slips, part);
+        self.cache.ends = (ends, slips);
+        part
+    }
+}

@@ -1,0 +1,76 @@
+//! Friction of the device on the wall: of which forces it is, and what it does at a point.
+
+use super::{ROUNDING, WallContact};
+use crate::rod::{ElementData, PointSum, RodState, Stencils};
+
+impl WallContact<'_> {
+    /// Has friction be of the forces of contacts at the base, unless it is held.
+    pub(super) fn rub_with_contacts(&mut self) {
+        if !self.friction.acts() {
+            return;
+        }
+        let least_n = self.least_force_n();
+        let pressed = self.cache.all_pressed().map(|(index, d)| {
+            let known = &self.cache.points[index];
+            let factor = self.surface.stiffness(&known.base, known.base_triangle).factor;
+            let rough = self.surface.rough(&known.base, known.base_triangle);
+            let (normal, presses_n) = self.points[index].pressed(d, factor);
+            (index, (normal, [known.force_n * d.gradient.norm(), presses_n].map(|force_n| force_n * rough)))
+        });
+        self.friction.follow(pressed, least_n);
+    }
+
+    /// Normal forces of friction stay as they are.
+    pub fn hold_friction(&mut self) {
+        self.friction.hold();
+    }
+
+    /// Normal forces of friction follow those of contacts again.
+    pub fn release_friction(&mut self) {
+        self.friction.release();
+    }
+
+    /// Normal forces of friction are again those with which the step began, and are held.
+    pub fn rewind_friction(&mut self) {
+        self.friction.rewind();
+    }
+
+    /// Slip begins anew at `state`, the state assembled last, with the normal forces there, which are held.
+    pub fn anchor_friction(&mut self, elements: &[ElementData], state: &RodState) {
+        self.friction.anchor(elements, state, self.points);
+    }
+
+    /// Part by which the normal forces of friction differ from those of the state assembled last.
+    pub fn unsettled(&self) -> f64 {
+        self.friction.unsettled(self.least_force_n())
+    }
+
+    /// Friction of point `index` at its base.
+    pub(super) fn add_friction(
+        &mut self,
+        elements: &[ElementData],
+        state: &RodState,
+        into: &mut dyn Stencils,
+        sum: &mut PointSum,
+        index: usize,
+    ) {
+        let (point, x) = (&self.points[index], &self.surface.place(&self.cache.points[index].base));
+        let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
+        let Some(f) = self.friction.derivatives(index, x, angle, radius_mm) else { return };
+        into.add_value(self.friction.value(index, x, angle, radius_mm));
+        self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * f.hessian.norm() * x.amax());
+        let e = point.element;
+        sum.add(point.xi, &f.gradient, into.wants_hessian().then_some(&f.hessian));
+        into.add_spin(state, &elements[e], (e, point.xi, point.set), &f.mixed, (f.turn, f.turn2));
+    }
+
+    /// Energy that friction takes from point `index` on its way to a state, mJ.
+    pub(super) fn friction_mj(&self, elements: &[ElementData], state: &RodState, index: usize) -> f64 {
+        if !self.friction.holds(index) {
+            return 0.0;
+        }
+        let point = &self.points[index];
+        let x = point.position(elements, state);
+        self.friction.value(index, &x, point.angle(state), point.potential.radius_mm)
+    }
+}
