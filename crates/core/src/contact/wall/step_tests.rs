@@ -3,7 +3,7 @@
 use super::model::falls_until;
 use super::tests::{RADIUS_MM, rod, straight};
 use super::*;
-use crate::contact::{ContactSurface, HandMotion};
+use crate::contact::{ContactSurface, HandMotion, SETTLED};
 use crate::rod::{Assembly, PLAIN, Supports};
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
 
@@ -116,10 +116,9 @@ fn rubbed(surface: &ContactSurface, foreseeing: bool) -> ([usize; 2], [f64; 2]) 
 fn a_rod_that_rubs_slips_and_sticks_in_few_steps() {
     let surface = straight();
     let ((few, with), (many, without)) = (rubbed(&surface, true), rubbed(&surface, false));
-    assert!(
-        (with[0] - without[0]).abs() < 1e-6 && (with[1] - without[1]).abs() < 1e-6,
-        "{with:?} {without:?}"
-    );
+    // As exactly as friction knows the normal forces.
+    let apart = |k: usize| (with[k] - without[k]).abs() < SETTLED * with[0];
+    assert!(apart(0) && apart(1), "{with:?} {without:?}");
     // It comes back to within what it sticks by, as it is held by less than it is bent.
     assert!(with[0] > 0.8 && with[1].abs() < 0.01, "{with:?}");
     assert!(few[0] + few[1] <= 30 && many[0] + many[1] > 2 * (few[0] + few[1]), "{few:?} {many:?}");
