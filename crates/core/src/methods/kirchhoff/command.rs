@@ -96,8 +96,10 @@ impl<const C: usize> Workspace<C> {
         let (mut sum, mut balanced) = (Sum::default(), true);
         tools.work = Work::default();
         let most = environment.options.max_iterations;
-        let travel = way.travel_mm(WORK_RAD).max(1.0);
-        let work = (WORK * travel) as usize;
+        let travel = way.travel_mm(WORK_RAD);
+        let work = (WORK * travel.max(1.0)) as usize;
+        // Where no hand moves the vessel does, or time goes by.
+        let travel = if travel > 0.0 { travel } else { 1.0 };
         let has_friction = surroundings.properties.has_friction();
         let mut control =
             StepControl::new(work.min(WORK_OF_ONE.saturating_mul(most)), from.stride, has_friction);
