@@ -96,8 +96,8 @@ pub struct ContactCache {
     pub(super) foreseen: Vec<Foreseen>,
     /// … and to those with friction.
     pub(super) slipping: Vec<Slipping>,
-    /// Stiffness of the merit along it, over the least; none before one is asked for.
-    pub(super) stiffness: Option<f64>,
+    /// Whether forces are aimed at.
+    pub(super) aimed: bool,
     /// Changes of gaps by a round of that, mm, and what it does to points with friction.
     pub(super) ends: (Vec<f64>, Vec<Slip>),
 }
@@ -144,7 +144,7 @@ impl ContactCache {
             proximity,
             foreseen: Vec::new(),
             slipping: Vec::new(),
-            stiffness: None,
+            aimed: false,
             ends: (Vec::new(), Vec::new()),
         }
     }

@@ -305,8 +305,8 @@ impl Contacts for WallContact<'_> {
         self.part_towards_contacts(moved, most)
     }
 
-    fn merit(&mut self, moved: &Moved<'_>, stiffness: f64) -> ContactMerit {
-        self.contact_merit(moved, stiffness)
+    fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
+        self.contact_merit(moved)
     }
 
     fn take(&mut self, part: f64) {

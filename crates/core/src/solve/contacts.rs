@@ -23,7 +23,7 @@
 use super::external::{ContactMerit, Contacts};
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::StopReason;
-use super::shift::LEAST_SHIFT;
+use super::shift::{LEAST_SHIFT, SHIFT_GROWTH, SHIFTS};
 use crate::Vec3;
 use crate::rod::scatter::{point_step, point_turn};
 use crate::rod::{Assembly, ElementData, RodState};
@@ -32,14 +32,6 @@ use crate::rod::{Assembly, ElementData, RodState};
 const ROUNDS: usize = 100;
 /// Turn of a step, rad, at which a round ends: planes are no model of what is farther away.
 const LARGEST_TURN: f64 = 1.0;
-/// Times that the merit's penalty is made stiffer for a step to be downhill, …
-const STIFFENINGS: usize = 8;
-/// … each time by this factor.
-const STIFFER: f64 = 30.0;
-/// A shift under which a step is uphill, or the model not convex, grows by this factor.
-const SHIFT_GROWTH: f64 = 8.0;
-/// Times that it grows.
-const SHIFTS: usize = 20;
 
 /// What a step does to points of the rod.
 pub(crate) fn moved<'a, const C: usize>(
@@ -66,26 +58,21 @@ impl<const C: usize> Newton<C> {
         if problem.external.contacts().is_none() {
             return Ok(ContactMerit::default());
         }
-        if !(problem.minimum && self.assembly.hessian) {
-            self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
-            return Ok(self.contact_merit(problem, state));
-        }
+        let looks = problem.minimum && self.assembly.hessian;
+        let least = LEAST_SHIFT * Self::regularisation(elements);
         for _ in 0..SHIFTS {
             self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
-            if self.contacts_at_end(problem, state, *shift) {
-                let merit = self.contact_merit(problem, state);
-                if !self.is_uphill(&merit) {
+            if !looks || self.contacts_at_end(problem, state, *shift) {
+                let merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved));
+                if !(looks && self.is_uphill(&merit)) {
                     return Ok(merit);
                 }
             }
-            let least = LEAST_SHIFT * Self::regularisation(elements);
-            loop {
-                *shift = (SHIFT_GROWTH * *shift).max(least);
+            *shift = (SHIFT_GROWTH * *shift).max(least);
+            while !self.factors_minimum(problem, *shift) {
+                *shift *= SHIFT_GROWTH;
                 if !shift.is_finite() {
                     return Err(StopReason::Singular);
-                }
-                if self.factors_minimum(problem, *shift) {
-                    break;
                 }
             }
         }
@@ -107,20 +94,6 @@ impl<const C: usize> Newton<C> {
     fn is_uphill(&self, merit: &ContactMerit) -> bool {
         let slope = self.assembly.slope(&self.step) + merit.slope_mj;
         slope > ENERGY_ROUNDING * self.assembly.energy.total().abs()
-    }
-
-    /// The least stiff merit of contacts that the step descends, or the stiffest.
-    fn contact_merit(&self, problem: &mut Problem<'_>, state: &RodState) -> ContactMerit {
-        let mut stiffness = 1.0;
-        let mut merit = ContactMerit::default();
-        for _ in 0..=STIFFENINGS {
-            merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved, stiffness));
-            if !self.is_uphill(&merit) {
-                break;
-            }
-            stiffness *= STIFFER;
-        }
-        merit
     }
 
     /// Finds the minimum of the model under a `shift`. Returns whether it is convex in all rounds; otherwise the system has no minimum.

@@ -83,9 +83,8 @@ pub trait Contacts {
     /// energy with springs where contacts press and none where they would pull. It is `most` at the most.
     fn part_towards(&mut self, moved: &Moved<'_>, most: f64) -> f64;
 
-    /// Aims at the forces to which a step leads. Their merit is the value from here on, until the next base; `stiffness` is that of its
-    /// penalty, over the least.
-    fn merit(&mut self, moved: &Moved<'_>, stiffness: f64) -> ContactMerit;
+    /// Aims at the forces to which a step leads. Their merit is the value from here on, until the next base.
+    fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit;
 
     /// Takes a part of the way to the forces that were aimed at.
     fn take(&mut self, part: f64);

@@ -12,8 +12,10 @@ use crate::rod::{Assembly, ElementData, Supports};
 pub(super) const REGULARISATION: f64 = 1e-8;
 /// Least shift, over the one that is always on.
 pub(super) const LEAST_SHIFT: f64 = 1e5;
+/// A shift that does not do grows by this factor.
+pub(super) const SHIFT_GROWTH: f64 = 4.0;
 /// Shifts tried before a matrix is called singular.
-const SHIFTS: usize = 60;
+pub(super) const SHIFTS: usize = 60;
 
 impl<const C: usize> Newton<C> {
     /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
@@ -90,7 +92,7 @@ impl<const C: usize> Newton<C> {
             if attempt > 20 && matches!(found, Err(FactorError::NotFinite { .. })) {
                 return Err(StopReason::NotFinite);
             }
-            sigma *= 4.0;
+            sigma *= SHIFT_GROWTH;
         }
         Err(StopReason::Singular)
     }

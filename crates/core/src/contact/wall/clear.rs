@@ -186,7 +186,7 @@ impl WallContact<'_> {
         self.cache.pressing.clear();
         self.cache.foreseen.clear();
         self.cache.slipping.clear();
-        self.cache.stiffness = None;
+        self.cache.aimed = false;
         for span in 0..self.cache.spans.len() {
             let free = self.is_free(&self.cache.spans[span], elements, state);
             let known = &mut self.cache.spans[span];

@@ -23,8 +23,7 @@
 //! E(x) + Σ [κ t²/(2 ρ (κ + ρ)) − f⁺²/(2 ρ)],    t = (f⁺ + ρ p)₊,    force κ t/(κ + ρ)
 //! ```
 //!
-//! which is as soft as the rod: what is of second order in a step costs nothing there. Where the step is not one that descends it, ρ is raised
-//! in it, towards ∞ where it is the energy itself, ½ κ p₊².
+//! which is as soft as the rod: what is of second order in a step costs nothing there.
 //!
 //! Where the modulus differs from place to place κ stays that of the base in a step, and ½ k p² ∇s, by which it pulls along the wall, is a dead load.
 
@@ -67,7 +66,7 @@ impl WallContact<'_> {
     }
 
     /// See [`Contacts::merit`](crate::solve::Contacts::merit).
-    pub(super) fn contact_merit(&mut self, moved: &Moved<'_>, stiffness: f64) -> ContactMerit {
+    pub(super) fn contact_merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
         let mut sum = ContactMerit::default();
         for k in 0..self.cache.foreseen.len() {
             let mut contact = self.cache.foreseen[k];
@@ -76,7 +75,7 @@ impl WallContact<'_> {
             contact.aim_n = (-contact.carried_n).max(0.0);
             self.cache.foreseen[k] = contact;
             let (kappa, depth_mm) = (contact.spring_n_per_mm, -contact.gap_mm);
-            let rho = stiffness * contact.penalty_n_per_mm;
+            let rho = contact.penalty_n_per_mm;
             let (value_mj, force_n) = merit(kappa, rho, contact.aim_n, depth_mm);
             let assembled_n = if contact.at_base { kappa * depth_mm } else { 0.0 };
             let stored_mj = 0.5 * kappa * depth_mm.max(0.0).powi(2);
@@ -84,11 +83,12 @@ impl WallContact<'_> {
             sum.excess_mj += value_mj - stored_mj;
             sum.size_mj += value_mj.abs() + contact.aim_n * contact.aim_n / rho;
         }
-        self.cache.stiffness = Some(stiffness);
+        self.cache.aimed = true;
         sum
     }
 
-    /// Merit of a point with a `stiffness` at a state, or what the wall stores there, mJ. `foreseen` are the points not yet asked for.
+    /// Merit of a point at a state, or what the wall stores there if no forces are aimed at, mJ. Points are asked for in ascending order; `next` is
+    /// the first of those foreseen that is not yet.
     pub(super) fn contact_mj(
         &mut self,
         elements: &[ElementData],
@@ -100,10 +100,10 @@ impl WallContact<'_> {
         let radius_mm = point.potential.radius_mm;
         let limit_mm = self.asked_mm(radius_mm);
         let depth_mm = radius_mm - self.read_within(index, &x, limit_mm).distance_mm();
-        let Some(stiffness) = self.cache.stiffness else {
+        if !self.cache.aimed {
             let factor = self.surface.stiffness(&x, self.cache.points[index].triangle).factor;
             return factor * point.weight_mm * point.potential.value(radius_mm - depth_mm);
-        };
+        }
         let foreseen = &self.cache.foreseen;
         *next += foreseen[*next..].partition_point(|contact| contact.index < index);
         let contact = foreseen.get(*next).filter(|contact| contact.index == index);
@@ -115,7 +115,7 @@ impl WallContact<'_> {
         if force_n == 0.0 && depth_mm <= 0.0 {
             return dead_mj;
         }
-        let rho = stiffness * self.penalty_n_per_mm(index, elements);
+        let rho = self.penalty_n_per_mm(index, elements);
         dead_mj + merit(self.spring_n_per_mm(index), rho, force_n, depth_mm).0
     }
 

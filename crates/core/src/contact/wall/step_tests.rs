@@ -51,8 +51,8 @@ impl Contacts for Pushed<'_> {
     fn part_towards(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
         self.wall.part_towards(moved, most)
     }
-    fn merit(&mut self, moved: &Moved<'_>, stiffness: f64) -> ContactMerit {
-        self.wall.merit(moved, stiffness)
+    fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
+        self.wall.merit(moved)
     }
     fn take(&mut self, part: f64) {
         self.wall.take(part);
@@ -174,7 +174,7 @@ fn forces_go_where_the_step_leads_as_far_as_it_is_taken() {
         let on = move |_: (usize, f64, usize)| (Vec3::x() * way_mm, 0.0);
         contact.foresee(&elements, &base, &on);
         let changed = contact.press_or_let_go(&elements, &base, &on, &mut assembly);
-        contact.merit(&on, 1.0);
+        contact.merit(&on);
         contact.take(part);
         (changed, contact.cache.points[0].force_n)
     };
