@@ -77,14 +77,58 @@ fn case(path: &Path) -> Result<bool> {
     Ok(kept != "LEFT")
 }
 
-/// Cases of which the path was left in silence.
-pub(crate) fn cases(only: Option<&str>) -> Result<usize> {
+/// Carries a scene's script out as it is, and prints a line of what it took, in the columns of `insertions`.
+fn line(path: &Path) -> Result<()> {
+    let scene = Scene::read(path)?;
+    let start = scene.simulation(&NoStore)?;
+    let script = scene.steps(start.stack(), &NoStore)?;
+    let (mut course, mut times_ms) = (Course::new(start), Vec::new());
+    let mut run = script.begin();
+    let mut now_s = 0.0;
+    while let Some(step) = run.next(&course.simulation)? {
+        let moves = step.moves.to_vec();
+        let times_s = step.time_s.map(|to| (std::mem::replace(&mut now_s, to), to));
+        run.carried_out();
+        let before_s = course.seconds;
+        course.go(&moves, times_s, 1);
+        if course.end.is_some() {
+            break;
+        }
+        times_ms.push(1e3 * (course.seconds - before_s));
+    }
+    times_ms.sort_by(f64::total_cmp);
+    println!(
+        "{}\t{}\t{}\t{}\t{}\t{:.4}\t{:.1}",
+        path.file_stem().unwrap_or_default().to_string_lossy(),
+        course.commands - course.unconverged,
+        course.iterations,
+        course.flights,
+        course.simulation.counters().queries,
+        times_ms.get(times_ms.len() / 2).copied().unwrap_or(0.0),
+        1e3 * course.seconds
+    );
+    Ok(())
+}
+
+/// Prints what the scenes take.
+pub(crate) fn lines(only: Option<&str>) -> Result<()> {
+    scenes(only)?.iter().try_for_each(|path| line(path))
+}
+
+/// Scenes of `benches/hard`.
+fn scenes(only: Option<&str>) -> Result<Vec<PathBuf>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("hard");
     let entries = std::fs::read_dir(&folder).map_err(|error| Error::file(&folder, error))?;
     let mut paths: Vec<PathBuf> = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).collect();
     paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
     paths.retain(|path| only.is_none_or(|only| path.to_string_lossy().contains(only)));
     paths.sort();
+    Ok(paths)
+}
+
+/// Cases of which the path was left in silence.
+pub(crate) fn cases(only: Option<&str>) -> Result<usize> {
+    let paths = scenes(only)?;
     println!(
         "{:<28} {:<5} {:>8} {:>5} {:>8} {:>5} {:>7} {:>7} {:>8} {:>8} {:>4} {:>4} {:>5} {:>5} {:>3}  ends",
         "case",

@@ -2,6 +2,7 @@
 //!
 //! ```sh
 //! cargo run --release -p endowire-benches --bin hard -- cases [NAME]         # scenes of benches/hard, each against steps of 0.1 mm
+//! cargo run --release -p endowire-benches --bin hard -- lines [NAME]         # what each of them takes, for `benches/ablation.sh`
 //! cargo run --release -p endowire-benches --bin hard -- turned [SCENE]       # 480 insertions of four scenes against steps of 0.25 mm
 //! cargo run --release -p endowire-benches --bin hard -- sequences [SEEDS]    # random commands, each against its parts of 1 mm
 //! ```
@@ -32,10 +33,14 @@ fn sequences(count: u64) -> Result<usize> {
 
 fn main() -> Result<ExitCode> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let mend = "say `cases [NAME]`, `turned [SCENE]` or `sequences [SEEDS]`";
+    let mend = "say `cases [NAME]`, `lines [NAME]`, `turned [SCENE]` or `sequences [SEEDS]`";
     let second = arguments.get(1).map(String::as_str);
     let wrong = match arguments.first().map(String::as_str) {
         Some("cases") => cases::cases(second)?,
+        Some("lines") => {
+            cases::lines(second)?;
+            return Ok(ExitCode::SUCCESS);
+        }
         Some("turned") => turned::turned(second)?,
         Some("sequences") => {
             let seeds = second.map_or(Ok(SEQUENCES), str::parse);
