@@ -44,20 +44,10 @@ pub(super) struct Correction {
     departures: Vec<Departure>,
     /// Of every set of angles in each of these.
     turns: Vec<Turn>,
-    /// Whether the device let go of something in it, which it will not do again.
-    snapped: bool,
 }
 
-/// Motions are the same if their parts differ by less than this, …
+/// Motions are the same, but for a factor, if their parts differ by less than this part of them.
 const SAME: f64 = 1e-6;
-/// … times a factor of at most this, or over it.
-const LONGER: f64 = 5.0;
-/// Where a tangent turned by more than this, rad, the device let go of something. …
-const LARGEST: f64 = 0.2;
-/// … Unless all tangents turned as in the step before, but for this, rad: a device that is stuck does not follow its own curve, but bends on.
-const AS_BEFORE: f64 = 0.1;
-/// Of turns as large as these a motion repeats at most so many times.
-const LONGER_BENT: f64 = 2.0;
 
 fn axes(f: &Frame) -> Matrix3<f64> {
     Matrix3::from_columns(&[f.t, f.u, f.v])
@@ -104,7 +94,6 @@ impl Correction {
         self.motions.clear();
         self.departures.clear();
         self.turns.clear();
-        self.snapped = false;
     }
 
     /// Elements that have learnt.
@@ -118,19 +107,11 @@ impl Correction {
         (n == 0 || n == elements) && self.turns.len() == n * sets
     }
 
-    /// Remembers the way from the slid device to the equilibrium that was found, where `before` was learnt in the step
-    /// before.
-    pub(super) fn learn(
-        &mut self,
-        motions: &[HandMotion],
-        (slid, found): (&RodState, &RodState),
-        before: &Self,
-    ) {
+    /// Remembers the way from the slid device to the equilibrium that was found.
+    pub(super) fn learn(&mut self, motions: &[HandMotion], slid: &RodState, found: &RodState) {
         self.clear();
         self.motions.extend(motions.iter().map(HandMotion::parts));
         let n = slid.elements();
-        let changed = |a: &Vec3, b: &Vec3| (a - b).norm();
-        let snapped = (1..=n).any(|i| changed(&found.frames[i].t, &slid.frames[i].t) > LARGEST);
         let mut twist: f64 = found.reference_twists.iter().sum();
         for e in (0..n).rev() {
             let (f, i) = (&slid.frames[e], e + 1);
@@ -145,35 +126,16 @@ impl Correction {
             }));
             twist -= found.reference_twists[e];
         }
-        self.snapped = snapped && !self.goes_on(before);
     }
 
-    /// Whether the device departed in the same way `before`.
-    fn goes_on(&self, before: &Self) -> bool {
-        let Some(factor) = before.times(self.motions.iter().copied()) else { return false };
-        let off = |(now, was): (&Departure, &Departure)| (now.tangent - was.tangent * factor).norm();
-        self.departures.iter().zip(&before.departures).all(|pair| off(pair) <= AS_BEFORE)
-    }
-
-    /// The largest turn of a tangent.
-    fn largest(&self) -> f64 {
-        self.departures.iter().fold(0.0, |most, by| most.max(by.tangent.norm()))
-    }
-
-    /// How many of the last motions of the hands these are; `None` if they are others, or what the device did then will not be done again.
+    /// How many of the last motions of the hands these are; `None` if they are others.
     pub(super) fn repeats(&self, motions: &[HandMotion]) -> Option<f64> {
-        self.times(motions.iter().map(HandMotion::parts))
-            .filter(|factor| !self.snapped && (*factor <= LONGER_BENT || self.largest() <= LARGEST))
-    }
-
-    /// How many of the last motions of the hands these are.
-    fn times(&self, motions: impl Iterator<Item = [f64; 2]> + Clone) -> Option<f64> {
-        let (now, last) = (motions.flatten(), self.motions.iter().flatten());
+        let (now, last) = (motions.iter().flat_map(HandMotion::parts), self.motions.iter().flatten());
         let way = size(now.clone());
         let factor = way / size(last.clone().copied());
         let off = size(now.zip(last).map(|(now, last)| now - factor * last));
-        let known = !self.departures.is_empty() && factor.is_finite();
-        (known && off <= SAME * way && (1.0 / LONGER..=LONGER).contains(&factor)).then_some(factor)
+        let known = !self.departures.is_empty() && way > 0.0 && factor.is_finite();
+        (known && off <= SAME * way).then_some(factor)
     }
 
     /// Sets `out` to what was learnt on the nodes `from`, on the nodes `to`. What was not in then is left alone.
@@ -251,31 +213,9 @@ mod tests {
         RodState::from_frames(elements, Vec3::zeros(), frames)
     }
 
-    #[test]
-    fn a_device_that_bends_on_as_before_has_let_go_of_nothing() {
-        let elements = [ElementData::plain(ELEMENT_MM, 1.0); NODES];
-        let motions = [advance(1.0, 0.0)];
-        let step = |before: &Correction, from_mm: f64, to_mm: f64| {
-            let mut now = Correction::default();
-            let states = (&hooked(&elements, from_mm), &hooked(&elements, to_mm));
-            now.learn(&motions, states, before);
-            now
-        };
-        let first = step(&Correction::default(), 7.0, 6.0);
-        assert_eq!(first.repeats(&motions), None);
-        let second = step(&first, 7.0, 5.9);
-        assert_eq!(second.repeats(&motions), Some(1.0));
-        // So large a turn is foreseen for a little more than it was learnt from.
-        assert_eq!(second.repeats(&[advance(3.0, 0.0)]), None);
-        // Another one, and the first after it.
-        let snap = step(&second, 7.0, 3.0);
-        assert_eq!(snap.repeats(&motions), None);
-        assert_eq!(step(&snap, 7.0, 6.0).repeats(&motions), None);
-    }
-
     fn learnt(motions: &[HandMotion], slid: &RodState, found: &RodState) -> Correction {
         let mut correction = Correction::default();
-        correction.learn(motions, (slid, found), &Correction::default());
+        correction.learn(motions, slid, found);
         correction
     }
 
@@ -291,9 +231,9 @@ mod tests {
         let factor = |mm: f64, rad: f64| known.repeats(&[advance(mm, rad)]);
         assert!((factor(1.0, 0.2).unwrap() - 1.0).abs() < 1e-12);
         assert!((factor(0.5, 0.1).unwrap() - 0.5).abs() < 1e-12);
-        assert!((factor(4.0, 0.8).unwrap() - 4.0).abs() < 1e-12);
-        // Back, turned the other way, turned more, and much farther.
-        for (mm, rad) in [(-1.0, -0.2), (1.0, -0.2), (1.0, 0.21), (10.0, 2.0), (0.1, 0.02), (0.0, 0.0)] {
+        assert!((factor(10.0, 2.0).unwrap() - 10.0).abs() < 1e-12);
+        // Back, turned the other way, turned more, and not at all.
+        for (mm, rad) in [(-1.0, -0.2), (1.0, -0.2), (1.0, 0.21), (0.0, 0.0)] {
             assert_eq!(factor(mm, rad), None, "{mm} mm, {rad} rad");
         }
         assert_eq!(Correction::default().repeats(&[advance(1.0, 0.2)]), None);

@@ -56,8 +56,8 @@ impl Guess {
         !contact.is_outside(elements, state)
     }
 
-    /// What an equilibrium that was found teaches, after what was learnt `before`.
-    pub(super) fn teach(&self, found: &RodState, (before, correction): (&Correction, &mut Correction)) {
-        correction.learn(&self.motions, (&self.slid, found), before);
+    /// What an equilibrium that was found teaches.
+    pub(super) fn teach(&self, found: &RodState, correction: &mut Correction) {
+        correction.learn(&self.motions, &self.slid, found);
     }
 }

@@ -220,8 +220,7 @@ impl<const C: usize> Tools<C> {
         let (dissipated_mj, released_mj) = balance.lost_mj(jumps);
         let farthest = || self.newton.neighbourhood.farthest(&after.rod);
         let jump = jumps.then(|| Jump { released_mj, position_mm: farthest() });
-        let corrections = (&start.state.correction, &mut after.correction);
-        self.guess.teach(&after.rod, corrections);
+        self.guess.teach(&after.rod, &mut after.correction);
         self.keep(mesh, after);
         Ok(Found { slides, dissipated_mj, residual: found.residual, unsettled, balanced, lacks, off, jump })
     }
