@@ -131,7 +131,9 @@ impl FollowPath {
             self.aside_rad = (self.aside_rad + GOLDEN_RAD) % TAU;
             return Command::rotate(0.0);
         }
-        let turn = self.aim(simulation, on.arc_mm, on.radius_mm, tip_mm);
+        // The two differ at the mouths of branches. Which of them leads on there is not known beforehand: every second try goes by the other.
+        let from = if self.retries.is_multiple_of(2) { on } else { within };
+        let turn = self.aim(simulation, from.arc_mm, from.radius_mm, tip_mm);
         // Far off the mark, the hand turns before it pushes on.
         if turn.abs() > 0.5 * TURN_RAD && self.turns < TURNS {
             self.turns += 1;
