@@ -4,7 +4,7 @@
 //! cargo run --release -p endowire-benches --bin follow                                   # the built-in anatomies
 //! cargo run --release -p endowire-benches --bin follow -- SURFACE [SURFACE@UNIT_MM ...]  # your own
 //! ```
-//! A shaped wire goes from the inlet (of a surface the widest opening) to every other opening. Ends with 1 where fewer than nine of ten are reached.
+//! A shaped wire goes from the inlet (of a surface [`Wall::inlet`]) to every other opening. Ends with 1 where fewer than nine of ten are reached.
 #![allow(clippy::print_stdout, reason = "a table is what it is for")]
 
 use std::path::Path;
@@ -113,7 +113,9 @@ fn main() -> Result<ExitCode> {
     let mut sum = [0, 0];
     let mut count = |[reached, ends]: [usize; 2]| sum = [sum[0] + reached, sum[1] + ends];
     for surface in &surfaces {
-        count(follow(surface.rsplit('/').next().unwrap_or(surface), &read(surface)?, 0)?);
+        let wall = read(surface)?;
+        let inlet = wall.inlet().map_or(0, |opening| opening.index);
+        count(follow(surface.rsplit('/').next().unwrap_or(surface), &wall, inlet)?);
     }
     for (name, edge_mm) in BUILT_IN.iter().filter(|_| surfaces.is_empty()) {
         let Some(tree) = anatomy::tree(name) else { continue };

@@ -25,7 +25,7 @@ use crate::instrument::Instrument;
 use crate::interrupt::interruptible;
 
 /// A vessel's wall, and its centre line: the one it was made from, or else one that is found in its lumen when something first needs it, from
-/// the widest opening (from the sheath's in the vessel of a scene) to all others. It never changes.
+/// the opening that devices come in by (from the sheath's in the vessel of a scene) to all others. It never changes.
 #[pyclass(frozen, module = "endowire", name = "Vessel")]
 pub(crate) struct Vessel {
     pub(crate) wall: Arc<Wall>,

@@ -22,9 +22,11 @@ pub(super) const TURN_RAD: f64 = 0.35;
 const TURNS: usize = 12;
 /// Pulled back after going astray, mm.
 const BACK_MM: f64 = 30.0;
-/// How far beyond the vessel's wall the tip has gone astray, mm. The axis is a polyline, outside of whose corners the wall bulges, and
-/// a tip that dips into the mouth of a branch slides on past it.
-const ASTRAY_MM: f64 = 3.0;
+/// How far beyond the vessel's wall the tip has gone astray, as a part of its bent length: as deep as a bend dips into the mouth of a branch
+/// while the wire behind it goes on past.
+const ASTRAY: f64 = 0.5;
+/// The least of it, mm: the axis is a polyline, outside of whose corners the wall bulges.
+const LEAST_ASTRAY_MM: f64 = 3.0;
 /// Farther on the way by this is farther, mm.
 const FARTHER_MM: f64 = 1.0;
 /// So far beyond the place where the last try ended the hand points at the way again, mm.
@@ -122,7 +124,8 @@ impl FollowPath {
                 self.aside_rad = 0.0;
             }
         }
-        let astray = within.distance_mm > within.radius_mm + ASTRAY_MM;
+        let astray_mm = (ASTRAY * tip_mm).max(LEAST_ASTRAY_MM);
+        let astray = within.distance_mm > within.radius_mm + astray_mm;
         let stuck = inserted - self.best_inserted_mm > PATIENCE_MM;
         if (astray || stuck) && inserted > BACK_MM + tip_mm {
             self.retries += 1;
@@ -131,7 +134,9 @@ impl FollowPath {
             self.aside_rad = (self.aside_rad + GOLDEN_RAD) % TAU;
             return Command::rotate(0.0);
         }
-        let turn = self.aim(simulation, on.arc_mm, on.radius_mm, tip_mm);
+        // The two differ at the mouths of branches. Which of them leads on there is not known beforehand: every second try goes by the other.
+        let from = if self.retries.is_multiple_of(2) { on } else { within };
+        let turn = self.aim(simulation, from.arc_mm, from.radius_mm, tip_mm);
         // Far off the mark, the hand turns before it pushes on.
         if turn.abs() > 0.5 * TURN_RAD && self.turns < TURNS {
             self.turns += 1;

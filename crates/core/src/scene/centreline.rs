@@ -15,7 +15,7 @@ use crate::{Error, Result, Vec3};
 
 impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// The vessel's centre line: the tree it is built from, the one given beside its surface, or without either the one that is found in the
-    /// surface, from the sheath's opening (the widest, if the sheath is at a place) to all others, its targets called `opening 1`.
+    /// surface, from the sheath's opening (`Wall::inlet`, if the sheath is at a place) to all others, its targets called `opening 1`.
     ///
     /// # Errors
     /// A missing or unusable file; one given beside a tree; a surface in which none is found.

@@ -51,6 +51,23 @@ impl SurfaceMesh {
         mesh
     }
 
+    /// Unit normals of vertices, outwards as the triangles are: those of the triangles about each, weighted by angle; zero where there is none.
+    pub fn vertex_normals(&self) -> Vec<Vec3> {
+        let mut normals = vec![Vec3::zeros(); self.vertices_mm.len()];
+        for (index, triangle) in self.triangles.iter().enumerate() {
+            let corner = self.corners(index);
+            let Some(outward) = (corner[1] - corner[0]).cross(&(corner[2] - corner[0])).try_normalize(0.0)
+            else {
+                continue;
+            };
+            for k in 0..3 {
+                let (e, f) = (corner[(k + 1) % 3] - corner[k], corner[(k + 2) % 3] - corner[k]);
+                normals[triangle[k] as usize] += outward * e.cross(&f).norm().atan2(e.dot(&f));
+            }
+        }
+        normals.into_iter().map(|normal| normal.try_normalize(1e-12).unwrap_or_default()).collect()
+    }
+
     /// Smallest and largest coordinates, or `None` without vertices.
     pub fn bounds_mm(&self) -> Option<(Vec3, Vec3)> {
         let first = *self.vertices_mm.first()?;
@@ -84,23 +101,10 @@ pub(crate) fn area(corners: &[Vec3; 3]) -> f64 {
     (b - a).cross(&(c - a)).norm() / 2.0
 }
 
-/// Unit inward normals of vertices, weighted by angle.
+/// Unit inward normals of vertices, weighted by angle; some direction where there is none.
 pub(crate) fn inward_vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
-    let mut normals = vec![Vec3::zeros(); mesh.vertices_mm.len()];
-    for (index, triangle) in mesh.triangles.iter().enumerate() {
-        let corner = mesh.corners(index);
-        let Some(outward) = (corner[1] - corner[0]).cross(&(corner[2] - corner[0])).try_normalize(0.0) else {
-            continue;
-        };
-        for k in 0..3 {
-            let (e, f) = (corner[(k + 1) % 3] - corner[k], corner[(k + 2) % 3] - corner[k]);
-            normals[triangle[k] as usize] -= outward * e.cross(&f).norm().atan2(e.dot(&f));
-        }
-    }
-    for normal in &mut normals {
-        *normal = normal.try_normalize(1e-12).unwrap_or_else(Vec3::x);
-    }
-    normals
+    let inward = |outward: Vec3| if outward == Vec3::zeros() { Vec3::x() } else { -outward };
+    mesh.vertex_normals().into_iter().map(inward).collect()
 }
 
 /// Keeps what `keep` says, in its order, by its number in the list and what it is.

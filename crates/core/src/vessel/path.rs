@@ -19,6 +19,14 @@ pub struct OnPath {
     pub radius_mm: f64,
 }
 
+/// From one point of a path to the next, with the vessel's radius at both.
+struct Piece {
+    from: Vec3,
+    along: Vec3,
+    length_mm: f64,
+    radii_mm: [f64; 2],
+}
+
 /// Most that a radius changes over the length in which it does so, as far as the deepest place is concerned.
 const STEEPEST: f64 = 0.99;
 
@@ -51,43 +59,47 @@ impl CentrelinePath {
 
     /// The point of the path nearest to `x`.
     pub fn nearest(&self, x: &Vec3) -> OnPath {
-        let mut best = OnPath { arc_mm: 0.0, distance_mm: f64::MAX, radius_mm: 0.0 };
-        let mut before = 0.0;
-        for pair in self.points.windows(2) {
-            let piece = pair[1].0 - pair[0].0;
-            let length = piece.norm();
-            let u = ((x - pair[0].0).dot(&piece) / (length * length)).clamp(0.0, 1.0);
-            let distance_mm = (x - pair[0].0 - piece * u).norm();
-            if distance_mm < best.distance_mm {
-                let radius_mm = pair[0].1.max(pair[1].1);
-                best = OnPath { arc_mm: before + u * length, distance_mm, radius_mm };
-            }
-            before += length;
-        }
-        best
+        let on_piece = |piece: &Piece| {
+            let u =
+                ((x - piece.from).dot(&piece.along) / (piece.length_mm * piece.length_mm)).clamp(0.0, 1.0);
+            let distance_mm = (x - piece.from - piece.along * u).norm();
+            let [from_radius_mm, to_radius_mm] = piece.radii_mm;
+            OnPath { arc_mm: u * piece.length_mm, distance_mm, radius_mm: from_radius_mm.max(to_radius_mm) }
+        };
+        self.least(on_piece, |on| on.distance_mm)
     }
 
     /// The point of the path in whose vessel `x` is deepest: its distance less the radius there, which changes evenly between points, is the
     /// least. At the mouth of a branch what is in the trunk is nearer to the branch's line, and deeper in the trunk.
     pub(crate) fn deepest(&self, x: &Vec3) -> OnPath {
-        let mut best = OnPath { arc_mm: 0.0, distance_mm: f64::MAX, radius_mm: 0.0 };
-        let mut before = 0.0;
-        for pair in self.points.windows(2) {
-            let ((from, from_radius_mm), (to, to_radius_mm)) = (pair[0], pair[1]);
-            let (piece, slope_mm) = (to - from, to_radius_mm - from_radius_mm);
-            let length = piece.norm();
+        let on_piece = |piece: &Piece| {
+            let &Piece { from, along, length_mm, radii_mm: [from_radius_mm, to_radius_mm] } = piece;
+            let slope_mm = to_radius_mm - from_radius_mm;
             // Where the distance grows as fast as the radius does: beside the foot of the perpendicular by the slope's share of the height.
-            let foot = (x - from).dot(&piece) / length;
-            let height = (x - from - piece * (foot / length)).norm();
-            let sine = (slope_mm / length).clamp(-STEEPEST, STEEPEST);
-            let along = (foot + height * sine / (1.0 - sine * sine).sqrt()).clamp(0.0, length);
-            let part = along / length;
-            let distance_mm = (x - from - piece * part).norm();
-            let radius_mm = from_radius_mm + slope_mm * part;
-            if distance_mm - radius_mm < best.distance_mm - best.radius_mm {
-                best = OnPath { arc_mm: before + along, distance_mm, radius_mm };
+            let foot_mm = (x - from).dot(&along) / length_mm;
+            let height_mm = (x - from - along * (foot_mm / length_mm)).norm();
+            let sine = (slope_mm / length_mm).clamp(-STEEPEST, STEEPEST);
+            let arc_mm = (foot_mm + height_mm * sine / (1.0 - sine * sine).sqrt()).clamp(0.0, length_mm);
+            let part = arc_mm / length_mm;
+            let distance_mm = (x - from - along * part).norm();
+            OnPath { arc_mm, distance_mm, radius_mm: from_radius_mm + slope_mm * part }
+        };
+        self.least(on_piece, |on| on.distance_mm - on.radius_mm)
+    }
+
+    /// Of the points that `on_piece` finds, one on each piece with its arc length from there, the first for which `of` is the least.
+    fn least(&self, on_piece: impl Fn(&Piece) -> OnPath, of: impl Fn(&OnPath) -> f64) -> OnPath {
+        let mut best = OnPath { arc_mm: 0.0, distance_mm: f64::MAX, radius_mm: 0.0 };
+        let mut before_mm = 0.0;
+        for pair in self.points.windows(2) {
+            let along = pair[1].0 - pair[0].0;
+            let piece =
+                Piece { from: pair[0].0, along, length_mm: along.norm(), radii_mm: [pair[0].1, pair[1].1] };
+            let on = on_piece(&piece);
+            if of(&on) < of(&best) {
+                best = OnPath { arc_mm: before_mm + on.arc_mm, ..on };
             }
-            before += length;
+            before_mm += piece.length_mm;
         }
         best
     }

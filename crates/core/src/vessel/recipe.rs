@@ -56,7 +56,7 @@ impl WallRecipe<'_> {
 pub struct CentrelineRecipe<'a> {
     /// The wall.
     pub wall: &'a Wall,
-    /// Where it begins; the widest opening if none. It leads to all other openings.
+    /// Where it begins; where devices come in ([`Wall::inlet`]) if none. It leads to all other openings.
     pub from: Option<CentrelineEnd>,
 }
 

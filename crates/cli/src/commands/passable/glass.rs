@@ -83,7 +83,8 @@ impl Glass {
     pub(super) fn of(vessel: &SurfaceMesh, side: &Side) -> Self {
         let [width, height] = side.size_px.map(|px| FINE * px);
         let mut glass = Self { width, left: vec![1.0; width * height] };
-        let takes: Vec<f64> = vertex_normals(vessel)
+        let takes: Vec<f64> = vessel
+            .vertex_normals()
             .iter()
             .map(|normal| {
                 STRAIGHT_ON + (ALONG - STRAIGHT_ON) * (1.0 - normal.dot(&side.towards).abs()).powi(RIM)
@@ -134,17 +135,6 @@ impl Glass {
             (takes > 0.0).then_some(((x as i32, y as i32), takes))
         })
     }
-}
-
-/// Unit normals at vertices: of the triangles about each, by their areas; zero where there are none.
-fn vertex_normals(mesh: &SurfaceMesh) -> Vec<Vec3> {
-    let mut normals = vec![Vec3::zeros(); mesh.vertices_mm.len()];
-    for (index, triangle) in mesh.triangles.iter().enumerate() {
-        let [a, b, c] = mesh.corners(index);
-        let normal = (b - a).cross(&(c - a));
-        triangle.iter().for_each(|v| normals[*v as usize] += normal);
-    }
-    normals.into_iter().map(|normal| normal.try_normalize(f64::MIN_POSITIVE).unwrap_or_default()).collect()
 }
 
 #[cfg(test)]

@@ -383,7 +383,9 @@ impl Corners {
     }
 }
 
-/// Outward unit normals at vertices: the normals of the triangles around, weighted by angle and area; zero where there is none.
+/// Outward unit normals at vertices of a mesh that is being changed: those of the triangles around that are
+/// left, weighted by angle and, other than those of [`SurfaceMesh::vertex_normals`](crate::vessel::SurfaceMesh::vertex_normals), by area; zero
+/// where there is none.
 pub(super) fn vertex_normals(triangles: &[[u32; 3]], at: &[Vec3]) -> Vec<Vec3> {
     let mut normals = vec![Vec3::zeros(); at.len()];
     for t in triangles.iter().filter(|t| t[0] != NONE) {
