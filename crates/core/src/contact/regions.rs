@@ -75,20 +75,9 @@ impl Stiffness {
         (gradient, hessian)
     }
 
-    /// The same for a point that is held to the wall, pressing or off it, and pressed with `force_n` before: the gradient of a spring
-    /// that also pulls, and its Hessian with that force.
-    pub(super) fn holding(
-        &self,
-        potential: &WallPotential,
-        d: &Distance,
-        length_mm: f64,
-        force_n: f64,
-    ) -> (Vec3, Matrix3<f64>) {
-        let w = self.factor * length_mm;
-        let (first, second) = potential.holding(d.value_mm);
-        let plane = d.gradient * d.gradient.transpose();
-        let along = self.slope.map_or_else(Vec3::zeros, |(s1, _)| s1 * (w * potential.value(d.value_mm)));
-        (d.gradient * (w * first) + along, plane * (w * second) - d.hessian * force_n)
+    /// Whether the modulus changes there.
+    pub(super) fn is_graded(&self) -> bool {
+        self.slope.is_some_and(|(slope, _)| slope != Vec3::zeros())
     }
 }
 

@@ -122,31 +122,6 @@ impl<'a> WallContact<'a> {
         std::mem::take(&mut self.counters)
     }
 
-    /// What point `index` feels at its base.
-    fn gather(
-        &mut self,
-        elements: &[ElementData],
-        state: &RodState,
-        into: &mut dyn Stencils,
-        sum: &mut PointSum,
-        index: usize,
-    ) {
-        self.add_friction(elements, state, into, sum, index);
-        let Some(d) = self.cache.pressed(index) else { return };
-        let (point, known) = (&self.points[index], &self.cache.points[index]);
-        let stiffness = self.surface.stiffness(&known.base, known.base_triangle);
-        let (w, force_n) = (point.weight_mm, known.force_n);
-        let spring = stiffness.factor * w * point.potential.modulus_n_per_mm2;
-        self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * spring * known.base.amax());
-        into.add_value(stiffness.factor * w * point.potential.value(d.value_mm));
-        let (gradient, hessian) = stiffness.holding(&point.potential, d, w, force_n);
-        if into.wants_hessian() {
-            let excess = gradient + d.gradient * force_n;
-            model::straighten(point, &elements[point.element], state, &excess, into);
-        }
-        sum.add(point.xi, &gradient, into.wants_hessian().then_some(&hessian));
-    }
-
     /// Part of its way from the base to `to`, at most `fraction`, that point `index` may go.
     fn safe_fraction_of(
         &mut self,
@@ -237,7 +212,8 @@ impl External for WallContact<'_> {
                 continue;
             }
             for index in points.clone() {
-                self.gather(elements, state, into, &mut sum, index);
+                self.add_friction(elements, state, into, &mut sum, index);
+                self.press((elements, state), into, &mut sum, index);
             }
             if !sum.is_empty() {
                 into.add_points(state, &elements[element], element, &std::mem::take(&mut sum));

@@ -25,12 +25,13 @@
 //!
 //! which is as soft as the rod: what is of second order in a step costs nothing there.
 //!
-//! Where the modulus differs from place to place κ stays that of the base in a step, and ½ k p² ∇s, by which it pulls along the wall, is a dead load.
+//! Where the modulus changes from place to place, by powers of ten within fractions of a millimetre, planes and springs are no model of a step, and
+//! points press by their depth alone: the energy ½ κ p₊² and its derivatives stand for them everywhere.
 
-use super::WallContact;
-use crate::Vec3;
-use crate::contact::Distance;
-use crate::rod::{ElementData, RodState};
+use super::model::straighten;
+use super::{ROUNDING, Reading, WallContact};
+use crate::contact::regions::Stiffness;
+use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::{ContactMerit, Moved};
 
 /// c: ρ over the stiffness of the element. Larger ones let points go and take them up by less depth, smaller ones by less force.
@@ -50,19 +51,63 @@ impl WallContact<'_> {
         PENALTY * point.weight_mm * element.bending[1] / element.length.powi(4)
     }
 
-    /// κ of a point at the base, N/mm.
-    pub(super) fn spring_n_per_mm(&self, index: usize) -> f64 {
+    /// The wall's modulus where a point is at the base.
+    fn stiffness_at_base(&self, index: usize) -> Stiffness {
         let known = &self.cache.points[index];
-        let factor = self.surface.stiffness(&known.base, known.base_triangle).factor;
-        factor * self.points[index].weight_mm * self.points[index].potential.modulus_n_per_mm2
+        self.surface.stiffness(&known.base, known.base_triangle)
     }
 
-    /// What the slope of the modulus does to a point that presses at the base, as a gradient, N.
-    pub(super) fn along_n(&self, index: usize, d: &Distance) -> Vec3 {
+    /// κ of a point where the wall has this modulus, N/mm.
+    fn spring_with(&self, index: usize, stiffness: &Stiffness) -> f64 {
+        let point = &self.points[index];
+        stiffness.factor * point.weight_mm * point.potential.modulus_n_per_mm2
+    }
+
+    /// κ of a point at the base, N/mm; none where it presses by its depth alone.
+    pub(super) fn spring_n_per_mm(&self, index: usize) -> Option<f64> {
+        let stiffness = self.stiffness_at_base(index);
+        (!stiffness.is_graded()).then(|| self.spring_with(index, &stiffness))
+    }
+
+    /// Whether a point with a reading at the base is active there. One that presses by its depth alone has the force of that.
+    pub(super) fn activate(&mut self, index: usize, elements: &[ElementData], reading: &Reading) -> bool {
+        let Reading::Pressed(d) = reading else { return false };
+        let depth_mm = self.points[index].potential.radius_mm - d.value_mm;
+        let stiffness = self.stiffness_at_base(index);
+        if stiffness.is_graded() {
+            self.cache.points[index].force_n = self.spring_with(index, &stiffness) * depth_mm.max(0.0);
+            return depth_mm > 0.0;
+        }
+        let force_n = self.cache.points[index].force_n;
+        depth_mm > 0.0 || force_n > -self.penalty_n_per_mm(index, elements) * depth_mm
+    }
+
+    /// What the wall does to point `index`, active at its base, as gradient, N, and Hessian, N/mm.
+    pub(super) fn press(
+        &mut self,
+        (elements, state): (&[ElementData], &RodState),
+        into: &mut dyn Stencils,
+        sum: &mut PointSum,
+        index: usize,
+    ) {
+        let Some(d) = self.cache.pressed(index) else { return };
         let (point, known) = (&self.points[index], &self.cache.points[index]);
-        let stiffness = self.surface.stiffness(&known.base, known.base_triangle);
-        let stored_mj = stiffness.factor * point.weight_mm * point.potential.value(d.value_mm);
-        stiffness.slope.map_or_else(Vec3::zeros, |(slope, _)| slope * stored_mj)
+        let stiffness = self.stiffness_at_base(index);
+        let kappa = self.spring_with(index, &stiffness);
+        self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * kappa * known.base.amax());
+        into.add_value(stiffness.factor * point.weight_mm * point.potential.value(d.value_mm));
+        let (gradient, hessian) = if stiffness.is_graded() {
+            stiffness.derivatives(&point.potential, d, point.weight_mm)
+        } else {
+            let gradient = d.gradient * (kappa * (d.value_mm - point.potential.radius_mm));
+            if into.wants_hessian() {
+                let excess = gradient + d.gradient * known.force_n;
+                straighten(point, &elements[point.element], state, &excess, into);
+            }
+            let plane = d.gradient * d.gradient.transpose();
+            (gradient, plane * kappa - d.hessian * known.force_n)
+        };
+        sum.add(point.xi, &gradient, into.wants_hessian().then_some(&hessian));
     }
 
     /// See [`Contacts::merit`](crate::solve::Contacts::merit).
@@ -100,23 +145,19 @@ impl WallContact<'_> {
         let radius_mm = point.potential.radius_mm;
         let limit_mm = self.asked_mm(radius_mm);
         let depth_mm = radius_mm - self.read_within(index, &x, limit_mm).distance_mm();
-        if !self.cache.aimed {
-            let factor = self.surface.stiffness(&x, self.cache.points[index].triangle).factor;
-            return factor * point.weight_mm * point.potential.value(radius_mm - depth_mm);
+        let stiffness = self.surface.stiffness(&x, self.cache.points[index].triangle);
+        if !self.cache.aimed || self.stiffness_at_base(index).is_graded() {
+            return stiffness.factor * point.weight_mm * point.potential.value(radius_mm - depth_mm);
         }
         let foreseen = &self.cache.foreseen;
         *next += foreseen[*next..].partition_point(|contact| contact.index < index);
         let contact = foreseen.get(*next).filter(|contact| contact.index == index);
         let force_n = contact.map_or(0.0, |contact| contact.aim_n);
-        let dead_mj = contact.filter(|contact| contact.along_n != Vec3::zeros()).map_or(0.0, |contact| {
-            let from = self.surface.place(&self.cache.points[index].base);
-            contact.along_n.dot(&(point.position(elements, state) - from))
-        });
         if force_n == 0.0 && depth_mm <= 0.0 {
-            return dead_mj;
+            return 0.0;
         }
         let rho = self.penalty_n_per_mm(index, elements);
-        dead_mj + merit(self.spring_n_per_mm(index), rho, force_n, depth_mm).0
+        merit(self.spring_with(index, &stiffness), rho, force_n, depth_mm).0
     }
 
     /// See [`Contacts::take`](crate::solve::Contacts::take).
@@ -132,7 +173,7 @@ impl WallContact<'_> {
         let (mut pull_n, mut press_n) = (0.0, self.least_force_n());
         for (index, d) in self.cache.all_pressed() {
             let depth_mm = self.points[index].potential.radius_mm - d.value_mm;
-            let force_n = self.spring_n_per_mm(index) * depth_mm;
+            let force_n = self.spring_with(index, &self.stiffness_at_base(index)) * depth_mm;
             pull_n -= force_n.min(0.0);
             press_n += force_n.max(0.0);
         }

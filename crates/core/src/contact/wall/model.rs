@@ -41,8 +41,6 @@ pub(in crate::contact) struct Foreseen {
     presses: bool,
     /// f⁺: the force that the step leads to, N.
     pub(super) aim_n: f64,
-    /// The force that the slope of the wall's modulus exerts at the base, as a gradient, N: a dead load in the step.
-    pub(super) along_n: Vec3,
 }
 
 impl Foreseen {
@@ -132,6 +130,7 @@ impl WallContact<'_> {
     fn at_base(&mut self, index: usize, elements: &[ElementData]) -> Option<Foreseen> {
         let radius_mm = self.points[index].potential.radius_mm;
         let at_base = self.cache.points[index].presses;
+        let spring_n_per_mm = self.spring_n_per_mm(index)?;
         let d = if at_base {
             *self.cache.pressed(index)?
         } else {
@@ -142,19 +141,17 @@ impl WallContact<'_> {
             let Reading::Pressed(d) = self.read_within(index, &x, near_mm) else { return None };
             d
         };
-        let along_n = if at_base { self.along_n(index, &d) } else { Vec3::zeros() };
         Some(Foreseen {
             index,
             gap_mm: d.value_mm - radius_mm,
             change_mm: 0.0,
             gradient: d.gradient,
-            spring_n_per_mm: self.spring_n_per_mm(index),
+            spring_n_per_mm,
             penalty_n_per_mm: self.penalty_n_per_mm(index, elements),
             carried_n: 0.0,
             at_base,
             presses: at_base,
             aim_n: 0.0,
-            along_n,
         })
     }
 
