@@ -64,20 +64,17 @@ impl Stiffness {
     ) -> (Vec3, Matrix3<f64>) {
         let w = self.factor * length_mm;
         let (first, second) = potential.derivatives(d.value_mm);
-        let mut gradient = d.gradient * (w * first);
-        let mut hessian = d.gradient * d.gradient.transpose() * (w * second) + d.hessian * (w * first);
-        if let Some((s1, s2)) = &self.slope {
-            let stored = w * potential.value(d.value_mm);
-            let mixed = gradient * s1.transpose();
-            gradient += s1 * stored;
-            hessian += mixed + mixed.transpose() + (s1 * s1.transpose() + s2) * stored;
-        }
-        (gradient, hessian)
+        let even = d.gradient * (w * first);
+        let (along, graded) = self.graded(w * potential.value(d.value_mm), &even);
+        let plane = d.gradient * d.gradient.transpose();
+        (even + along, plane * (w * second) + d.hessian * (w * first) + graded)
     }
 
-    /// Whether the modulus changes there.
-    pub(super) fn is_graded(&self) -> bool {
-        self.slope.is_some_and(|(slope, _)| slope != Vec3::zeros())
+    /// What changes of the modulus add to gradient and Hessian of so much energy that has the gradient `even` where it does not change.
+    pub(super) fn graded(&self, stored_mj: f64, even: &Vec3) -> (Vec3, Matrix3<f64>) {
+        let Some((s1, s2)) = &self.slope else { return (Vec3::zeros(), Matrix3::zeros()) };
+        let mixed = even * s1.transpose();
+        (s1 * stored_mj, mixed + mixed.transpose() + (s1 * s1.transpose() + s2) * stored_mj)
     }
 }
 

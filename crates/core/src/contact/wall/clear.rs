@@ -231,14 +231,18 @@ impl WallContact<'_> {
         let force_n = self.cache.points[index].force_n;
         let limit_mm = if force_n > 0.0 { (1.0 + FOLLOW) * radius_mm } else { radius_mm };
         let reading = self.read_within(index, x, limit_mm);
+        let presses = match &reading {
+            Reading::Free(_) => false,
+            Reading::Pressed(d) => {
+                force_n + self.penalty_n_per_mm(index, elements) * (radius_mm - d.value_mm) > 0.0
+            }
+        };
         let known = &mut self.cache.points[index];
         known.base = *x;
         known.base_clearance_mm = reading.distance_mm();
         (known.base_looked_at, known.base_triangle) = (known.looked_at, known.triangle);
         (known.base_looked_clearance_mm, known.base_free_mm) = (known.clearance_mm, known.free_mm);
         known.side = known.triangle.filter(|_| known.base_clearance_mm < SUNK * radius_mm);
-        let presses = self.activate(index, elements, &reading);
-        let known = &mut self.cache.points[index];
         known.presses = presses;
         if !presses {
             known.force_n = 0.0;

@@ -25,11 +25,18 @@
 //!
 //! which is as soft as the rod: what is of second order in a step costs nothing there.
 //!
-//! Where the modulus changes from place to place, by powers of ten within fractions of a millimetre, planes and springs are no model of a step, and
-//! points press by their depth alone: the energy ½ κ p₊² and its derivatives stand for them everywhere.
+//! Where the modulus changes from place to place, κ = κ₀ eˢ, the merit pulls towards where it is softer, too: with ½ κ p² ∇s where f = κ p, as the energy
+//! does, and beside that with
+//!
+//! ```text
+//! κ t²/(2 (κ + ρ)²) ∇s
+//! ```
+//!
+//! The Hessian has what that adds to the energy's ([`Stiffness::graded`]); planes of points that come to touch have not.
 
 use super::model::straighten;
-use super::{ROUNDING, Reading, WallContact};
+use super::{ROUNDING, WallContact};
+use crate::Vec3;
 use crate::contact::regions::Stiffness;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::{ContactMerit, Moved};
@@ -37,10 +44,12 @@ use crate::solve::{ContactMerit, Moved};
 /// c: ρ over the stiffness of the element. Larger ones let points go and take them up by less depth, smaller ones by less force.
 const PENALTY: f64 = 0.1;
 
-/// Merit of a point, mJ, and its force, N.
-fn merit(kappa: f64, rho: f64, force_n: f64, depth_mm: f64) -> (f64, f64) {
+/// Merit of a point, mJ, its force, N, and its slope in ln κ, mJ.
+fn merit(kappa: f64, rho: f64, force_n: f64, depth_mm: f64) -> (f64, f64, f64) {
     let t = (force_n + rho * depth_mm).max(0.0);
-    (0.5 * kappa * t * t / (rho * (kappa + rho)) - 0.5 * force_n * force_n / rho, kappa * t / (kappa + rho))
+    let by_force = t / (kappa + rho);
+    let value_mj = 0.5 * (kappa * t * by_force - force_n * force_n) / rho;
+    (value_mj, kappa * by_force, 0.5 * kappa * by_force * by_force)
 }
 
 impl WallContact<'_> {
@@ -63,23 +72,10 @@ impl WallContact<'_> {
         stiffness.factor * point.weight_mm * point.potential.modulus_n_per_mm2
     }
 
-    /// κ of a point at the base, N/mm; none where it presses by its depth alone.
-    pub(super) fn spring_n_per_mm(&self, index: usize) -> Option<f64> {
+    /// κ of a point at the base, N/mm, and ∇s, 1/mm.
+    pub(super) fn spring_at_base(&self, index: usize) -> (f64, Vec3) {
         let stiffness = self.stiffness_at_base(index);
-        (!stiffness.is_graded()).then(|| self.spring_with(index, &stiffness))
-    }
-
-    /// Whether a point with a reading at the base is active there. One that presses by its depth alone has the force of that.
-    pub(super) fn activate(&mut self, index: usize, elements: &[ElementData], reading: &Reading) -> bool {
-        let Reading::Pressed(d) = reading else { return false };
-        let depth_mm = self.points[index].potential.radius_mm - d.value_mm;
-        let stiffness = self.stiffness_at_base(index);
-        if stiffness.is_graded() {
-            self.cache.points[index].force_n = self.spring_with(index, &stiffness) * depth_mm.max(0.0);
-            return depth_mm > 0.0;
-        }
-        let force_n = self.cache.points[index].force_n;
-        depth_mm > 0.0 || force_n > -self.penalty_n_per_mm(index, elements) * depth_mm
+        (self.spring_with(index, &stiffness), stiffness.slope.map_or_else(Vec3::zeros, |(slope, _)| slope))
     }
 
     /// What the wall does to point `index`, active at its base, as gradient, N, and Hessian, N/mm.
@@ -95,19 +91,19 @@ impl WallContact<'_> {
         let stiffness = self.stiffness_at_base(index);
         let kappa = self.spring_with(index, &stiffness);
         self.rounding_n = self.rounding_n.max(ROUNDING * f64::EPSILON * kappa * known.base.amax());
-        into.add_value(stiffness.factor * point.weight_mm * point.potential.value(d.value_mm));
-        let (gradient, hessian) = if stiffness.is_graded() {
-            stiffness.derivatives(&point.potential, d, point.weight_mm)
-        } else {
-            let gradient = d.gradient * (kappa * (d.value_mm - point.potential.radius_mm));
-            if into.wants_hessian() {
-                let excess = gradient + d.gradient * known.force_n;
-                straighten(point, &elements[point.element], state, &excess, into);
-            }
-            let plane = d.gradient * d.gradient.transpose();
-            (gradient, plane * kappa - d.hessian * known.force_n)
-        };
-        sum.add(point.xi, &gradient, into.wants_hessian().then_some(&hessian));
+        let stored_mj = stiffness.factor * point.weight_mm * point.potential.value(d.value_mm);
+        into.add_value(stored_mj);
+        let pressing = d.gradient * (kappa * (d.value_mm - point.potential.radius_mm));
+        let (along, graded) = stiffness.graded(stored_mj, &pressing);
+        if !into.wants_hessian() {
+            sum.add(point.xi, &(pressing + along), None);
+            return;
+        }
+        let excess = pressing + d.gradient * known.force_n;
+        straighten(point, &elements[point.element], state, &excess, into);
+        let plane = d.gradient * d.gradient.transpose();
+        let hessian = plane * kappa - d.hessian * known.force_n + graded;
+        sum.add(point.xi, &(pressing + along), Some(&hessian));
     }
 
     /// See [`Contacts::merit`](crate::solve::Contacts::merit).
@@ -115,16 +111,18 @@ impl WallContact<'_> {
         let mut sum = ContactMerit::default();
         for k in 0..self.cache.foreseen.len() {
             let mut contact = self.cache.foreseen[k];
-            contact.change_mm = moved(self.points[contact.index].place()).0.dot(&contact.gradient);
+            let way = moved(self.points[contact.index].place()).0;
+            contact.change_mm = way.dot(&contact.gradient);
             // What the rod's own stiffness is in balance with, which is κ (p − ∇d·δx) where the contacts at the end are found.
             contact.aim_n = (-contact.carried_n).max(0.0);
             self.cache.foreseen[k] = contact;
             let (kappa, depth_mm) = (contact.spring_n_per_mm, -contact.gap_mm);
             let rho = contact.penalty_n_per_mm;
-            let (value_mj, force_n) = merit(kappa, rho, contact.aim_n, depth_mm);
+            let (value_mj, force_n, by_modulus_mj) = merit(kappa, rho, contact.aim_n, depth_mm);
             let assembled_n = if contact.at_base { kappa * depth_mm } else { 0.0 };
             let stored_mj = 0.5 * kappa * depth_mm.max(0.0).powi(2);
             sum.slope_mj += (assembled_n - force_n) * contact.change_mm;
+            sum.slope_mj += (by_modulus_mj - stored_mj) * way.dot(&contact.slope_per_mm);
             sum.excess_mj += value_mj - stored_mj;
             sum.size_mj += value_mj.abs() + contact.aim_n * contact.aim_n / rho;
         }
@@ -146,7 +144,7 @@ impl WallContact<'_> {
         let limit_mm = self.asked_mm(radius_mm);
         let depth_mm = radius_mm - self.read_within(index, &x, limit_mm).distance_mm();
         let stiffness = self.surface.stiffness(&x, self.cache.points[index].triangle);
-        if !self.cache.aimed || self.stiffness_at_base(index).is_graded() {
+        if !self.cache.aimed {
             return stiffness.factor * point.weight_mm * point.potential.value(radius_mm - depth_mm);
         }
         let foreseen = &self.cache.foreseen;
@@ -200,8 +198,12 @@ mod tests {
         for (force_n, depth_mm) in [(0.0, 0.1), (0.5, 0.02), (0.5, -0.1), (0.5, -0.3), (0.0, -0.1)] {
             let h = 1e-6;
             let at = |by: f64| merit(kappa, rho, force_n, depth_mm + by).0;
+            let stiffer = |by: f64| merit(kappa * by.exp(), rho, force_n, depth_mm).0;
             let slope = (at(h) - at(-h)) / (2.0 * h);
-            assert!((slope - merit(kappa, rho, force_n, depth_mm).1).abs() < 1e-8, "{force_n} {depth_mm}");
+            let (_, exerted_n, by_modulus_mj) = merit(kappa, rho, force_n, depth_mm);
+            assert!((slope - exerted_n).abs() < 1e-8, "{force_n} {depth_mm}");
+            let slope = (stiffer(h) - stiffer(-h)) / (2.0 * h);
+            assert!((slope - by_modulus_mj).abs() < 1e-8, "{force_n} {depth_mm}");
         }
         // At the depth of its force it exerts that, whatever the penalty.
         for rho in [0.1, 2.0, 1e4] {

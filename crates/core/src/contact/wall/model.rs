@@ -31,6 +31,8 @@ pub(in crate::contact) struct Foreseen {
     pub(super) gradient: Vec3,
     /// κ, N/mm.
     pub(super) spring_n_per_mm: f64,
+    /// ∇s, the relative slope of κ, 1/mm.
+    pub(super) slope_per_mm: Vec3,
     /// ρ, N/mm.
     pub(super) penalty_n_per_mm: f64,
     /// The force that the rod's own stiffness is in balance with, N, less than 0 where it presses.
@@ -130,7 +132,6 @@ impl WallContact<'_> {
     fn at_base(&mut self, index: usize, elements: &[ElementData]) -> Option<Foreseen> {
         let radius_mm = self.points[index].potential.radius_mm;
         let at_base = self.cache.points[index].presses;
-        let spring_n_per_mm = self.spring_n_per_mm(index)?;
         let d = if at_base {
             *self.cache.pressed(index)?
         } else {
@@ -141,12 +142,14 @@ impl WallContact<'_> {
             let Reading::Pressed(d) = self.read_within(index, &x, near_mm) else { return None };
             d
         };
+        let (spring_n_per_mm, slope_per_mm) = self.spring_at_base(index);
         Some(Foreseen {
             index,
             gap_mm: d.value_mm - radius_mm,
             change_mm: 0.0,
             gradient: d.gradient,
             spring_n_per_mm,
+            slope_per_mm,
             penalty_n_per_mm: self.penalty_n_per_mm(index, elements),
             carried_n: 0.0,
             at_base,
