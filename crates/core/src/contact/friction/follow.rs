@@ -12,8 +12,10 @@ pub const SETTLED: f64 = 1e-4;
 /// Whether normal forces are renewed at the next base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Renewal {
-    /// They are.
+    /// They are, for the first time: whether they settle shows from the second base on.
     #[default]
+    Begins,
+    /// They are.
     Follows,
     /// They are not, until an equilibrium shows that they are not what presses.
     Settled,
@@ -27,7 +29,7 @@ impl Friction {
     /// worth settling.
     pub fn follow(&mut self, active: impl Iterator<Item = (usize, (Vec3, [f64; 2]))>, least_n: f64) {
         let mut active = active.peekable();
-        let follows = self.renewal == Renewal::Follows;
+        let follows = matches!(self.renewal, Renewal::Begins | Renewal::Follows);
         let (mut change_n, mut sum_n) = (0.0, least_n);
         for (index, slider) in self.sliders.iter_mut().enumerate() {
             let (normal, [force_n, presses_n]) = active
@@ -40,9 +42,12 @@ impl Friction {
                 (slider.normal, slider.force_n) = (normal, force_n);
             }
         }
-        if follows && change_n < SETTLED * sum_n && self.unsettled(least_n) < SETTLED {
-            self.renewal = Renewal::Settled;
-        }
+        let steady = change_n < SETTLED * sum_n && self.unsettled(least_n) < SETTLED;
+        self.renewal = match self.renewal {
+            Renewal::Begins => Renewal::Follows,
+            Renewal::Follows if steady => Renewal::Settled,
+            same => same,
+        };
     }
 
     /// Whether normal forces at an equilibrium are what presses there, or are held; otherwise they follow again.
@@ -69,9 +74,9 @@ impl Friction {
         self.renewal = Renewal::Held;
     }
 
-    /// Normal forces follow again.
+    /// Normal forces follow from here on.
     pub fn release(&mut self) {
-        self.renewal = Renewal::Follows;
+        self.renewal = Renewal::Begins;
     }
 
     /// Normal forces are again those with which the step began, and are held.
