@@ -58,13 +58,13 @@ impl<const C: usize> Newton<C> {
         if problem.external.contacts().is_none() {
             return Ok(ContactMerit::default());
         }
-        let looks = problem.minimum && self.assembly.hessian;
+        let models = problem.minimum && self.assembly.hessian;
         let least = LEAST_SHIFT * Self::regularisation(elements);
         for _ in 0..SHIFTS {
             self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
-            if !looks || self.contacts_at_end(problem, state, *shift) {
+            if !models || self.contacts_at_end(problem, state, *shift) {
                 let merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved));
-                if !(looks && self.is_uphill(&merit)) {
+                if !(models && self.is_uphill(&merit)) {
                     return Ok(merit);
                 }
             }
