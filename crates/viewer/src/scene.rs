@@ -142,7 +142,7 @@ impl Setup {
                 Some(other) => Arc::clone(&other.patient),
                 None => Arc::new(Patient::new(spec, &wall)?),
             };
-            setup.flow = flow(spec, other)?;
+            setup.flow = flow(spec, &filled, other)?;
         }
         let beam: Vec<_> = match &setup.c_arm {
             Some(c_arm) if spec.camera.c_arm => {
@@ -159,12 +159,12 @@ impl Setup {
 }
 
 /// What carries the medium of a view, with what it has in common with that of another.
-fn flow(spec: &ViewSpec, other: Option<&Setup>) -> Result<Option<Arc<Flow>>> {
+fn flow(spec: &ViewSpec, filled: &SurfaceMesh, other: Option<&Setup>) -> Result<Option<Arc<Flow>>> {
     let known = other.filter(|other| other.spec.flow == spec.flow && !spec.injection.is_empty());
     match known.and_then(|other| Some((other.flow.as_ref()?, &other.spec.injection))) {
         Some((flow, injection)) if *injection == spec.injection => Ok(Some(Arc::clone(flow))),
         Some((flow, _)) => Ok(Some(Arc::new(flow.injected(&spec.injection)))),
-        None => Ok(Flow::of_view(spec)?.map(Arc::new)),
+        None => Ok(Flow::of_view(spec, filled)?.map(Arc::new)),
     }
 }
 

@@ -15,6 +15,7 @@ pub(crate) use devices::layers_in_beam;
 pub(crate) use devices::pixels_of;
 pub(crate) use fluoro::CpuPaths;
 pub(crate) use lumen::covered_by_half;
+pub(crate) use raster::ScreenTriangle;
 pub(crate) use wall::{check_closed, check_drawable, wall_crossings};
 
 use endowire_core::vessel::SurfaceMesh;
