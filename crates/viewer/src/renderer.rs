@@ -173,8 +173,8 @@ impl Renderer {
             }
             let fluoro = match &setup.c_arm {
                 Some(c_arm) => {
-                    let (scope, sequence, paths) = prepared(setup, engines, fluoro, kept)?;
-                    let mut image = sequence.next(scope, paths, &pulse, moment)?;
+                    let (scope, sequence, _) = prepared(setup, engines, fluoro, kept)?;
+                    let mut image = sequence.next(scope, &pulse, moment)?;
                     if setup.spec.c_arm.markers {
                         draw_markers(&mut image, c_arm.right_and_up());
                     }
@@ -317,8 +317,8 @@ impl Renderer {
     pub fn take_mask(&mut self, devices: &[DeviceView]) -> Result<()> {
         let devices = [RefinedDevice::all(devices)?];
         self.with_fallback(|setup, engines, fluoro, kept| {
-            let (scope, sequence, paths) = prepared(setup, engines, fluoro, kept)?;
-            sequence.take_mask(scope, paths, &devices)
+            let (scope, sequence, _) = prepared(setup, engines, fluoro, kept)?;
+            sequence.take_mask(scope, &devices)
         })
     }
 

@@ -84,11 +84,6 @@ impl Anatomy {
         Ok(moved)
     }
 
-    /// Number of rays.
-    pub(crate) fn rays(&self) -> usize {
-        self.lumen.len()
-    }
-
     /// Lengths in tissue, bone, lung and lumen.
     #[inline]
     pub(crate) fn at(&self, ray: usize) -> [f32; 4] {

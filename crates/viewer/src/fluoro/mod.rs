@@ -11,7 +11,8 @@
 //! reaches out of the body, and a phantom in air (B = 0). Devices are taken to lie inside the lumen: a part outside the wall
 //! displaces lumen filling all the same.
 //!
-//! Pixels collect energy over their area, so signals, not line integrals, are averaged over [`SUBRAYS`]² rays a pixel.
+//! Pixels collect energy over their area, so signals, not line integrals, are averaged over [`SUBRAYS`]² rays a pixel, and over many more
+//! where there are devices ([`DeviceCells`]).
 
 mod anatomy;
 mod display;
@@ -28,13 +29,14 @@ use rayon::prelude::*;
 
 pub(crate) use anatomy::Anatomy;
 pub(crate) use labels::labels;
+use rays::Room;
 use scatter::Scatter;
 pub use sequence::FrameTime;
 pub(crate) use sequence::{Afterglow, Sequence};
 
 use crate::c_arm::CArm;
 use crate::contrast::{ContrastMap, Medium, Shares};
-use crate::cpu::{covered_by_half, layers_in_beam};
+use crate::cpu::{DeviceCells, covered_by_half, layers_in_beam};
 use crate::device::RefinedDevice;
 use crate::engine::PathEngine;
 use crate::material::Material;
@@ -82,8 +84,6 @@ pub(crate) struct Still {
 #[derive(Debug)]
 pub(crate) struct Fluoroscope {
     pub(crate) c_arm: CArm,
-    /// The same view with one pixel a ray.
-    rays: CArm,
     pub(crate) exposure: Exposure,
     pub(crate) beam: Beam,
     anatomy: Arc<Anatomy>,
@@ -100,12 +100,10 @@ pub(crate) struct Fluoroscope {
     unblocked: Option<Still>,
     /// Pixels that show the vessel, once they were asked for.
     vessel: Option<Mask>,
-    /// Lengths inside devices by material, all zero between frames.
-    devices: Vec<(Material, Lanes, Vec<f32>)>,
-    /// Rays and pixels that devices touch in this frame.
-    touched: Vec<u32>,
-    pixels: Vec<u32>,
-    listed: Vec<bool>,
+    /// Lengths inside devices, none between frames.
+    devices: DeviceCells,
+    /// Attenuation of their materials in the order of those, and its mean.
+    device_lanes: Vec<(Material, Lanes, f32)>,
 }
 
 /// What another view of the same vessel and body needs too where it has the same rays: blades, modes, doses and injections do not change it.
@@ -164,7 +162,6 @@ impl Fluoroscope {
         let scatter = Scatter::new(&dark, c_arm, spec.detector.scatter_fraction);
         let mut fluoroscope = Self {
             c_arm: c_arm.clone(),
-            rays,
             exposure,
             beam,
             anatomy,
@@ -176,10 +173,8 @@ impl Fluoroscope {
             still: Still { signal: dark, scatter, between_blades: true },
             unblocked: None,
             vessel: None,
-            devices: vec![],
-            touched: vec![],
-            pixels: vec![],
-            listed: vec![false; pixels],
+            devices: DeviceCells::new(c_arm),
+            device_lanes: vec![],
         };
         fluoroscope.look(spec);
         Ok(fluoroscope)
@@ -187,8 +182,9 @@ impl Fluoroscope {
 
     /// Computes the signals of what stays from its lengths.
     fn look(&mut self, spec: &ViewSpec) {
-        let whole = (0..self.listed.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
-        let whole = whole.map_init(Lanes::new, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room));
+        let whole = (0..self.pixels()).into_par_iter().with_min_len(FEWEST_PIXELS);
+        let whole =
+            whole.map_init(Room::default, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room));
         let whole: Vec<[f32; 2]> = whole.collect();
         let behind = |between_blades: bool| {
             let open = |pixel: usize| self.openness(pixel, between_blades);
@@ -200,6 +196,11 @@ impl Fluoroscope {
         };
         let unblocked = self.c_arm.opening_px().map(|_| behind(false));
         (self.still, self.unblocked) = (behind(true), unblocked);
+    }
+
+    /// Number of pixels.
+    fn pixels(&self) -> usize {
+        self.c_arm.size_px().map(|n| n as usize).iter().product()
     }
 
     /// Share of a pixel that is open, to the blades' edges or where they are wide open.
@@ -255,22 +256,17 @@ impl Fluoroscope {
     }
 
     /// Signal with devices, the mean over the instants of a pulse, and the contrast medium of a time; without a time, before any injection.
-    pub(crate) fn signal(
-        &mut self,
-        engine: &mut dyn PathEngine,
-        pulse: &[Vec<RefinedDevice>],
-        time_s: Option<f64>,
-    ) -> Result<Signal> {
+    pub(crate) fn signal(&mut self, pulse: &[Vec<RefinedDevice>], time_s: Option<f64>) -> Result<Signal> {
         let tip = pulse.last().and_then(|devices| devices.first()).and_then(|device| device.points.last());
         let mut medium = match (&mut self.contrast, time_s) {
             (Some(contrast), Some(time)) => contrast.at(time, tip.map(|point| point.position_mm)),
             _ => vec![],
         };
         medium.retain(|m| m.fraction > LEAST_FRACTION || m.tissue_mm > LEAST_MEDIUM_MM);
-        let Some((first, others)) = pulse.split_first() else { return self.instant(engine, &[], &medium) };
-        let mut sum = self.instant(engine, first, &medium)?;
+        let Some((first, others)) = pulse.split_first() else { return self.instant(&[], &medium) };
+        let mut sum = self.instant(first, &medium)?;
         for devices in others {
-            let more = self.instant(engine, devices, &medium)?;
+            let more = self.instant(devices, &medium)?;
             sum.signal.iter_mut().zip(more.signal).for_each(|(sum, v)| *sum += v);
             sum.energy.iter_mut().zip(more.energy).for_each(|(sum, v)| *sum += v);
         }
@@ -282,49 +278,53 @@ impl Fluoroscope {
     }
 
     /// Signal with devices where they are at one instant.
-    fn instant(
-        &mut self,
-        engine: &mut dyn PathEngine,
-        devices: &[RefinedDevice],
-        medium: &[Medium],
-    ) -> Result<Signal> {
-        let cast = self.cast(engine, devices);
-        self.pixels.sort_unstable();
-        let now = cast.map(|()| self.draw(&self.still, &self.pixels, medium));
-        for (_, _, lengths) in &mut self.devices {
-            self.touched.iter().for_each(|&ray| lengths[ray as usize] = 0.0);
-        }
-        self.pixels.iter().for_each(|&pixel| self.listed[pixel as usize] = false);
-        self.touched.clear();
-        self.pixels.clear();
-        now
+    fn instant(&mut self, devices: &[RefinedDevice], medium: &[Medium]) -> Result<Signal> {
+        self.cast(devices)?;
+        let mut pixels = self.devices.pixels().to_vec();
+        pixels.sort_unstable();
+        let now = self.draw(&self.still, &pixels, medium);
+        self.devices.clear();
+        Ok(now)
     }
 
-    /// Adds up the lengths inside devices, and lists the pixels that they touch.
-    fn cast(&mut self, engine: &mut dyn PathEngine, devices: &[RefinedDevice]) -> Result<()> {
+    /// Takes the lengths inside devices.
+    fn cast(&mut self, devices: &[RefinedDevice]) -> Result<()> {
+        self.devices.clear();
         for device in devices {
-            for (layer, pieces) in layers_in_beam(&self.rays, device) {
-                let material = layer.material.unwrap_or(self.default_material);
-                let place = match self.devices.iter().position(|d| d.0 == material) {
-                    Some(place) => place,
-                    None => {
-                        let rays = self.anatomy.rays();
-                        self.devices.push((material, self.beam.excess(material, None)?, vec![0.0; rays]));
-                        self.devices.len() - 1
-                    }
-                };
-                engine.pieces(&self.rays, &pieces, &mut self.devices[place].2, &mut self.touched)?;
+            for (layer, pieces) in layers_in_beam(&self.c_arm, device) {
+                self.devices.add(layer.material.unwrap_or(self.default_material), &pieces);
             }
         }
-        let width = self.c_arm.size_px()[0];
-        let row = width * SUBRAYS;
-        for &ray in &self.touched {
-            let pixel = ray / row / SUBRAYS * width + ray % row / SUBRAYS;
-            if !std::mem::replace(&mut self.listed[pixel as usize], true) {
-                self.pixels.push(pixel);
-            }
+        for (material, _) in &self.devices.maps()[self.device_lanes.len()..] {
+            let lanes = self.beam.excess(*material, None)?;
+            let mean = self.beam.mean(&lanes);
+            self.device_lanes.push((*material, lanes, mean));
         }
         Ok(())
+    }
+
+    /// Mean lengths of pixels inside devices, by material.
+    pub(crate) fn inside_devices(&mut self, devices: &[RefinedDevice]) -> Result<Vec<(Material, Vec<f32>)>> {
+        self.cast(devices)?;
+        let means = self.devices.means();
+        self.devices.clear();
+        Ok(means)
+    }
+
+    /// What every pixel has of the open beam behind devices and medium: the picture's own signal, unscattered and with the blades open.
+    pub(crate) fn transmitted(&mut self, devices: &[RefinedDevice], medium: &[Medium]) -> Result<Vec<f32>> {
+        self.cast(devices)?;
+        let mut of_pixel = vec![[self.fraction, 0.0]; self.pixels()];
+        for m in medium {
+            of_pixel[m.pixel as usize] = [(self.fraction + m.fraction).min(1.0), m.tissue_mm];
+        }
+        let open = self.beam.ln_reference().exp() as f32;
+        let pixels = of_pixel.into_par_iter().enumerate().with_min_len(FEWEST_PIXELS);
+        let left = pixels
+            .map_init(Room::default, |room, (pixel, medium)| self.primary(pixel, medium, room)[0] * open);
+        let left = left.collect();
+        self.devices.clear();
+        Ok(left)
     }
 
     /// The medium injected by then, pixels rising.
@@ -381,7 +381,7 @@ impl Fluoroscope {
         let mut lost = Vec::with_capacity(medium.len());
         let anew = merged(pixels, medium);
         let drawn =
-            anew.par_iter().with_min_len(FEWEST_PIXELS).map_init(Lanes::new, |room, (pixel, more)| {
+            anew.par_iter().with_min_len(FEWEST_PIXELS).map_init(Room::default, |room, (pixel, more)| {
                 let pixel = *pixel as usize;
                 match self.openness(pixel, still.between_blades) {
                     0.0 => [0.0; 2],

@@ -6,7 +6,6 @@ use super::display::{Window, fitted, logarithm, picture};
 use super::scatter::shading;
 use super::{Fluoroscope, Signal};
 use crate::device::RefinedDevice;
-use crate::engine::PathEngine;
 use crate::output::Image;
 use crate::spec::{Mode, ViewSpec};
 use crate::xray::Detector;
@@ -137,20 +136,19 @@ impl Sequence {
     pub(crate) fn next(
         &mut self,
         fluoroscope: &mut Fluoroscope,
-        engine: &mut dyn PathEngine,
         pulse: &[Vec<RefinedDevice>],
         moment: FrameTime,
     ) -> Result<Image> {
         if self.mask.is_none() {
             match self.mode {
                 Mode::Fluoro | Mode::Cine => {}
-                Mode::Dsa => self.take_mask(fluoroscope, engine, pulse)?,
+                Mode::Dsa => self.take_mask(fluoroscope, pulse)?,
                 Mode::Roadmap => self.store_roadmap(fluoroscope)?,
             }
         }
         // The injections of a roadmap are those of its angiogram.
         let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
-        let signal = fluoroscope.signal(engine, pulse, time)?;
+        let signal = fluoroscope.signal(pulse, time)?;
         let read = self.detector.read(signal.signal, signal.energy, self.kev, moment.frame);
         let mut values = logarithm(read);
         if let Some(mask) = &self.mask {
@@ -178,10 +176,9 @@ impl Sequence {
     pub(crate) fn take_mask(
         &mut self,
         fluoroscope: &mut Fluoroscope,
-        engine: &mut dyn PathEngine,
         pulse: &[Vec<RefinedDevice>],
     ) -> Result<()> {
-        let signal = fluoroscope.signal(engine, pulse, None)?;
+        let signal = fluoroscope.signal(pulse, None)?;
         self.mask = Some(self.stored(&signal, self.kev));
         Ok(())
     }
