@@ -210,7 +210,7 @@ impl Renderer {
         Self::of_setup(self.setup.beside(spec)?.of_own_run())
     }
 
-    /// Tells where the tip of the innermost instrument is at a moment that is not drawn, in the vessel at rest: medium that is injected
+    /// Tells where the tip of the innermost instrument with a lumen is at a moment that is not drawn, in the vessel at rest: medium that is injected
     /// `at_tip` goes where the tip is meanwhile. Frames tell it themselves; between moments its way is straight. Where the tip was said to
     /// be elsewhere at that moment, what was said of it and of later ones is forgotten.
     ///
@@ -340,7 +340,7 @@ impl Renderer {
     pub fn labels(&mut self, devices: &[DeviceView], contacts_mm: &[Vec3]) -> Result<Labels> {
         let of_scope = self.with_fallback(|setup, engines, fluoro, kept| {
             let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
-            Ok((setup.lumen.then(|| scope.vessel(setup.filled_now())), scope.exposure))
+            Ok((setup.lumen.then(|| scope.vessel(setup.wall_now(), setup.filled_now())), scope.exposure))
         })?;
         let c_arm = self.setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
         labels(c_arm, devices, contacts_mm, self.setup.spec.xray.device_material, of_scope)

@@ -34,8 +34,8 @@ pub(crate) struct Setup {
 #[derive(Debug)]
 pub(crate) struct Moved {
     pub(crate) displacement: Displacement,
-    wall: SurfaceMesh,
-    filled: SurfaceMesh,
+    wall: Arc<SurfaceMesh>,
+    filled: Arc<SurfaceMesh>,
     /// The air of a generated body: diaphragm, borders of the heart and bowel go with what moves the vessel.
     air: Option<SurfaceMesh>,
 }
@@ -48,7 +48,11 @@ impl Setup {
             triangles: mesh.triangles.clone(),
         };
         self.moved = displacement.map(|displacement| {
-            let (wall, filled) = (moved(&self.wall, displacement), moved(&self.filled, displacement));
+            let wall = Arc::new(moved(&self.wall, displacement));
+            let filled = match Arc::ptr_eq(&self.wall, &self.filled) {
+                true => Arc::clone(&wall),
+                false => Arc::new(moved(&self.filled, displacement)),
+            };
             let air = self.patient.air().map(|air| moved(air, displacement));
             Arc::new(Moved { displacement: displacement.clone(), wall, filled, air })
         });

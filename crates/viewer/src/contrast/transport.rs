@@ -185,6 +185,10 @@ impl Transport {
             .injections
             .iter()
             .map(|i| {
+                // Of a tip that is not in nothing comes.
+                if i.at_tip && tip.at(start).is_none() {
+                    return 0.0;
+                }
                 let overlap = end.min(i.start_s + i.duration_s) - start.max(i.start_s);
                 1000.0 * i.rate_ml_per_s * overlap.max(0.0) / self.step_s
             })

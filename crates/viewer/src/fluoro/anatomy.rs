@@ -84,6 +84,11 @@ impl Anatomy {
         Ok(moved)
     }
 
+    /// Whether a ray meets the body at all.
+    pub(crate) fn is_body(&self, ray: usize) -> bool {
+        self.body[ray] > 0.0
+    }
+
     /// Lengths in tissue, bone, lung and lumen.
     #[inline]
     pub(crate) fn at(&self, ray: usize) -> [f32; 4] {

@@ -76,8 +76,6 @@ pub(crate) struct Signal {
 pub(crate) struct Still {
     pub(crate) signal: Signal,
     scatter: Scatter,
-    /// Whether it is what the blades leave; else they are wide open.
-    between_blades: bool,
 }
 
 /// Everything about a fluoroscopic view that stays from frame to frame, and the buffers of the next.
@@ -96,8 +94,6 @@ pub(crate) struct Fluoroscope {
     /// Material of devices that name none.
     default_material: Material,
     pub(crate) still: Still,
-    /// The same with the blades wide open, where there are any.
-    unblocked: Option<Still>,
     /// Pixels that show the vessel, once they were asked for.
     vessel: Option<Mask>,
     /// Lengths inside devices, none between frames.
@@ -170,8 +166,7 @@ impl Fluoroscope {
             fraction: spec.xray.contrast_fraction as f32,
             contrast,
             default_material: spec.xray.device_material,
-            still: Still { signal: dark, scatter, between_blades: true },
-            unblocked: None,
+            still: Still { signal: dark, scatter },
             vessel: None,
             devices: DeviceCells::new(c_arm),
             device_lanes: vec![],
@@ -186,26 +181,29 @@ impl Fluoroscope {
         let whole =
             whole.map_init(Room::default, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room));
         let whole: Vec<[f32; 2]> = whole.collect();
-        let behind = |between_blades: bool| {
-            let open = |pixel: usize| self.openness(pixel, between_blades);
-            let of = |i: usize| whole.iter().enumerate().map(|(pixel, v)| v[i] * open(pixel)).collect();
-            let mut signal = Signal { signal: of(0), energy: of(1) };
-            let scatter = Scatter::new(&signal, &self.c_arm, spec.detector.scatter_fraction);
-            scatter.add_still(&mut signal);
-            Still { signal, scatter, between_blades }
+        let of = |i: usize| {
+            whole.iter().enumerate().map(|(pixel, v)| v[i] * self.c_arm.openness(pixel) as f32).collect()
         };
-        let unblocked = self.c_arm.opening_px().map(|_| behind(false));
-        (self.still, self.unblocked) = (behind(true), unblocked);
+        let mut signal = Signal { signal: of(0), energy: of(1) };
+        let scatter = Scatter::new(&signal, &self.c_arm, spec.detector.scatter_fraction);
+        scatter.add_still(&mut signal);
+        self.still = Still { signal, scatter };
+    }
+
+    /// Whether a pixel shows the body, between the blades.
+    pub(crate) fn shows_body(&self) -> Vec<bool> {
+        let any = |pixel: usize| {
+            let (first, stride) = self.first_ray(pixel);
+            [first, first + 1, first + stride, first + stride + 1]
+                .iter()
+                .any(|&ray| self.anatomy.is_body(ray))
+        };
+        (0..self.pixels()).map(|pixel| self.c_arm.openness(pixel) >= 0.5 && any(pixel)).collect()
     }
 
     /// Number of pixels.
     fn pixels(&self) -> usize {
         self.c_arm.size_px().map(|n| n as usize).iter().product()
-    }
-
-    /// Share of a pixel that is open, to the blades' edges or where they are wide open.
-    fn openness(&self, pixel: usize, between_blades: bool) -> f32 {
-        if between_blades { self.c_arm.openness(pixel) as f32 } else { 1.0 }
     }
 
     /// Goes on with the vessel where it has moved to. Exposure, which a control would hold meanwhile, stays as it is.
@@ -226,14 +224,9 @@ impl Fluoroscope {
         Kept { rays: self.c_arm.fingerprint(), anatomy: self.anatomy, shares }
     }
 
-    /// What comes through the anatomy with the blades wide open: what the display adapts to, so that nothing open changes where they
-    /// close.
-    pub(crate) fn unblocked(&self) -> &Still {
-        self.unblocked.as_ref().unwrap_or(&self.still)
-    }
-
-    /// Pixels of which half or more is of the `filled` vessel, under no blade.
-    pub(crate) fn vessel(&mut self, filled: &SurfaceMesh) -> Mask {
+    /// Pixels of which half or more is of the vessel that `wall` closes, under no blade. What is filled may go on where its surface ends:
+    /// then lengths in it tell only where to look.
+    pub(crate) fn vessel(&mut self, wall: &SurfaceMesh, filled: &SurfaceMesh) -> Mask {
         if let Some(known) = &self.vessel {
             return known.clone();
         }
@@ -245,11 +238,11 @@ impl Fluoroscope {
                 .flat_map(|row| first + row * stride..first + row * stride + SUBRAYS as usize);
             match rays.filter(|&ray| self.anatomy.lumen[ray] > LEAST_LUMEN_MM).count() {
                 0 => {}
-                RAYS => inside.push(pixel),
+                RAYS if std::ptr::eq(wall, filled) => inside.push(pixel),
                 _ => edge.push(pixel),
             }
         }
-        inside.extend(covered_by_half(&self.c_arm, filled, &edge));
+        inside.extend(covered_by_half(&self.c_arm, wall, &edge));
         inside.retain(|&pixel| self.c_arm.openness(pixel as usize) >= 0.5);
         inside.sort_unstable();
         self.vessel.insert(Mask::new(size_px, inside)).clone()
@@ -257,9 +250,10 @@ impl Fluoroscope {
 
     /// Signal with devices, the mean over the instants of a pulse, and the contrast medium of a time; without a time, before any injection.
     pub(crate) fn signal(&mut self, pulse: &[Vec<RefinedDevice>], time_s: Option<f64>) -> Result<Signal> {
-        let tip = pulse.last().and_then(|devices| devices.first()).and_then(|device| device.points.last());
         let mut medium = match (&mut self.contrast, time_s) {
-            (Some(contrast), Some(time)) => contrast.at(time, tip.map(|point| point.position_mm)),
+            (Some(contrast), Some(time)) => {
+                contrast.at(time, pulse.last().and_then(|devices| injecting_tip_mm(devices)))
+            }
             _ => vec![],
         };
         medium.retain(|m| m.fraction > LEAST_FRACTION || m.tissue_mm > LEAST_MEDIUM_MM);
@@ -383,7 +377,7 @@ impl Fluoroscope {
         let drawn =
             anew.par_iter().with_min_len(FEWEST_PIXELS).map_init(Room::default, |room, (pixel, more)| {
                 let pixel = *pixel as usize;
-                match self.openness(pixel, still.between_blades) {
+                match self.c_arm.openness(pixel) as f32 {
                     0.0 => [0.0; 2],
                     open => {
                         let [more, tissue_mm] = more.map_or([0.0; 2], |m| [m.fraction, m.tissue_mm]);
@@ -408,6 +402,11 @@ impl Fluoroscope {
         }
         now
     }
+}
+
+/// Tip of the innermost device with a bore: where medium comes out.
+pub(crate) fn injecting_tip_mm(devices: &[RefinedDevice]) -> Option<Vec3> {
+    devices.iter().find(|device| device.has_bore())?.points.last().map(|tip| tip.position_mm)
 }
 
 /// Pixels of both lists, each rising, with what the second says of them.

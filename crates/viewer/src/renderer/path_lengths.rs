@@ -5,7 +5,7 @@ use endowire_core::Result;
 use super::{Renderer, no_fluoro, prepared};
 use crate::contrast::Medium;
 use crate::device::{DeviceView, RefinedDevice};
-use crate::fluoro::{Anatomy, Fluoroscope};
+use crate::fluoro::{Anatomy, Fluoroscope, injecting_tip_mm};
 use crate::scene::Setup;
 use crate::spec::Mode;
 use crate::xray::PathLengths;
@@ -103,8 +103,6 @@ fn injected(
     time_s: Option<f64>,
 ) -> Vec<Medium> {
     let injecting = setup.flow.is_some() && setup.spec.xray.mode != Mode::Roadmap;
-    let tip = devices.first().and_then(|device| device.points.last());
-    time_s
-        .filter(|_| injecting)
-        .map_or_else(Vec::new, |time_s| scope.injected(time_s, tip.map(|point| point.position_mm)))
+    let time_s = time_s.filter(|_| injecting);
+    time_s.map_or_else(Vec::new, |time_s| scope.injected(time_s, injecting_tip_mm(devices)))
 }
