@@ -45,7 +45,7 @@ pub(crate) struct Sequence {
     /// Absorbed energy of a pixel at a signal of one, keV.
     kev: f64,
     window: Window,
-    /// Pixels that are black whatever is read: those behind blades in differences, which are of noise alone there.
+    /// Pixels that are black whatever is read: those behind blades, where there is scatter and noise alone.
     shutter: Vec<u32>,
     bits: u32,
     noisy: bool,
@@ -97,11 +97,9 @@ impl Sequence {
             (Mode::Roadmap, None) => ROADMAP_WINDOW,
         };
         let closed = |pixel: &u32| c_arm.openness(*pixel as usize) < 0.5;
-        let shutter = match mode {
-            Mode::Dsa | Mode::Roadmap if c_arm.opening_px().is_some() => {
-                (0..c_arm.size_px().iter().product()).filter(closed).collect()
-            }
-            _ => vec![],
+        let shutter = match c_arm.opening_px() {
+            Some(_) => (0..c_arm.size_px().iter().product()).filter(closed).collect(),
+            None => vec![],
         };
         let kev = fluoroscope.beam.kev(c_arm.pixel_mm(), dose);
         // n quanta of the energy ε vary by √n ε.
