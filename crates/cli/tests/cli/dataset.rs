@@ -196,12 +196,12 @@ fn a_table_of_a_scene_never_dresses_another_device() {
     // Alone, another device is refused beside that table, and so is a bore that leaves nothing of the own one.
     let scene = folder.path().join("scene.toml");
     let set = format!("device.file={:?}", text(&wire));
+    let wide = folder.path().join("wide.toml");
+    let whole = std::fs::read_to_string(&scene).unwrap();
+    std::fs::write(&wide, whole.replace("inner_radius_mm = 0.3", "inner_radius_mm = 9.0")).unwrap();
     for (args, named) in [
         (vec!["run", text(&scene), "--set", set.as_str()], "[[view.device]]"),
-        (
-            vec!["fluoro", text(&scene), "--set", "device=[{ inner_radius_mm = 9.0 }]"],
-            "view.device[0].inner_radius_mm = 9",
-        ),
+        (vec!["fluoro", text(&wide)], "view.device[0].inner_radius_mm = 9"),
     ] {
         let output = endowire(&args, "1");
         assert!(output.status.code() == Some(2) && said(&output).contains(named), "{}", said(&output));
