@@ -31,6 +31,8 @@ fn lower(
     definition: &'static str,
     study: &'static str,
 ) -> Metric {
+    // An empty sum is −0.
+    let value = value.map(|value| value + 0.0);
     Metric { name, group, value, unit, better: Better::Lower, definition, study }
 }
 
@@ -57,16 +59,30 @@ fn rests(record: &Record) -> impl Iterator<Item = (f64, f64)> {
     rest.map(|(took_s, sample)| (sample.time_s - took_s, sample.time_s))
 }
 
+/// Time in which no hand moves, s.
+fn idle_s(record: &Record) -> f64 {
+    rests(record).map(|(from, to)| to - from).sum()
+}
+
+/// That of it with the beam on, s; none where the beam was not recorded.
+fn beam_on_idle_s(record: &Record) -> Option<f64> {
+    record.beam.as_ref()?;
+    rests(record).map(|(from, to)| record.beam_on_s(from, to)).sum()
+}
+
 fn time(record: &Record) -> Vec<Metric> {
     let of = |name, value, definition, study| lower(Group::Time, (name, "s"), value, definition, study);
-    let idle_s: f64 = rests(record).map(|(from, to)| to - from).sum();
     let beam_s = record.beam_on_s(0.0, record.end_s());
-    let beam_idle_s: Option<f64> = rests(record).map(|(from, to)| record.beam_on_s(from, to)).sum();
     vec![
         of("total_s", Some(record.end_s()), "time from the start to the end of the last step", REVIEW),
-        of("idle_s", Some(idle_s), "time of steps in which no hand moves or turns", RAFII),
+        of("idle_s", Some(idle_s(record)), "time of steps in which no hand moves or turns", RAFII),
         of("beam_on_s", beam_s, "time with the beam on", DURAN),
-        of("beam_on_idle_s", beam_idle_s, "time with the beam on while no hand moves or turns", REVIEW),
+        of(
+            "beam_on_idle_s",
+            beam_on_idle_s(record),
+            "time with the beam on while no hand moves or turns",
+            REVIEW,
+        ),
     ]
 }
 
@@ -141,7 +157,7 @@ fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
     let shortest_mm = way.zip(ends).map(|(way, (from, to))| way.length_mm(from, to));
     let ratio = shortest_mm.filter(|mm| *mm >= SHORTEST_MM).map(|mm| path_mm / mm);
     let speeds = speeds(record);
-    let moving_s: f64 = record.end_s() - rests(record).map(|(from, to)| to - from).sum::<f64>();
+    let moving_s = record.end_s() - idle_s(record);
     let (count, mean_s) = submovements(&speeds);
     let hands = || record.samples.iter().flat_map(|sample| sample.hands.iter().enumerate());
     let most = record.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0);
@@ -216,11 +232,10 @@ fn safety(record: &Record) -> Vec<Metric> {
         sample.hands.windows(2).any(|pair| pair[1].inserted_mm > pair[0].inserted_mm + REST_MM)
     };
     let ahead_s: f64 = record.timed().filter(|(_, sample)| ahead(sample)).map(|(s, _)| s).sum();
-    let rest_s: Option<f64> = rests(record).map(|(from, to)| record.beam_on_s(from, to)).sum();
-    let idle_s: f64 = rests(record).map(|(from, to)| to - from).sum();
+    let idle_s = idle_s(record);
     let blind_s = record
         .beam_on_s(0.0, record.end_s())
-        .zip(rest_s)
+        .zip(beam_on_idle_s(record))
         .map(|(on_s, on_idle_s)| (record.end_s() - idle_s - (on_s - on_idle_s)).max(0.0));
     let jumps = samples.iter().filter(|sample| sample.jumped).count();
     vec![
@@ -279,7 +294,7 @@ fn on_way(record: &Record, way: Option<&Way>) -> Vec<Metric> {
             "wrong_branches",
             "1",
             wrong,
-            "how often the tip went into a branch that is not on the way",
+            "how often the tip went deeper than its radius into a branch that is not on the way",
             BOYLE,
         ),
         of(

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub const BEAM: &str = "beam.csv";
 
 /// What one hand did in a step, and felt after it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Hand {
     /// Length pushed in, negative pulled back.
     pub advance_mm: f64,
@@ -25,7 +25,7 @@ pub struct Hand {
 }
 
 /// A step.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Sample {
     /// When it ended, since the start.
     pub time_s: f64,
@@ -42,7 +42,7 @@ pub struct Sample {
 }
 
 /// Contrast medium that was injected.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Injection {
     /// When it began.
     pub time_s: f64,
@@ -73,7 +73,7 @@ pub struct BeamState {
 }
 
 /// A procedure.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Record {
     /// Its steps, times rising.
     pub samples: Vec<Sample>,
@@ -84,11 +84,29 @@ pub struct Record {
 }
 
 impl Record {
-    /// Reads the folder of a run: steps.csv, and instruments.csv, injections.csv and beam.csv where they are there.
+    /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv, and instruments.csv, injections.csv and
+    /// beam.csv where they are there.
     ///
     /// # Errors
-    /// [`Error::Content`] for a table that is not there or does not fit, naming it.
-    pub fn read(folder: &Path) -> Result<Self> {
+    /// [`Error::Content`] for a file that is not there or does not fit, naming it.
+    pub fn read(path: &Path) -> Result<Self> {
+        if path.is_file() { Self::of_session(path) } else { Self::of_folder(path) }
+    }
+
+    fn of_session(path: &Path) -> Result<Self> {
+        #[derive(Deserialize)]
+        struct Session {
+            record: Record,
+        }
+        let bad = |error: String| {
+            Error::content(path, format!("{error}; give a session of endowire play or the folder of a run"))
+        };
+        let text = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
+        let session: Session = serde_json::from_slice(&text).map_err(|error| bad(error.to_string()))?;
+        Ok(session.record)
+    }
+
+    fn of_folder(folder: &Path) -> Result<Self> {
         let steps: Vec<Step> = rows(&folder.join("steps.csv"))?;
         let mut hands: BTreeMap<usize, Vec<Hand>> = BTreeMap::new();
         for row in optional::<InstrumentRow>(&folder.join("instruments.csv"))?.unwrap_or_default() {

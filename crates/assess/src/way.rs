@@ -61,7 +61,7 @@ impl Way {
         (self.path.nearest(to).arc_mm - self.path.nearest(from).arc_mm).abs()
     }
 
-    /// The wrong branch that a place is in: the first of its rows. None on the way.
+    /// The wrong branch that a place is in, deeper than its radius: the first of its rows. None on the way.
     pub(crate) fn wrong_branch(&self, place: &Vec3) -> Option<usize> {
         let nodes = self.tree.nodes();
         // A row stands for the stretch from the one before.
@@ -73,7 +73,8 @@ impl Way {
         };
         let mut at = (0..nodes.len()).min_by(|a, b| deep(a).total_cmp(&deep(b)))?;
         let on = self.path.nearest(place);
-        if self.right[at] || on.distance_mm <= on.radius_mm {
+        // A tip that slides along the wall dips into the mouths that it passes.
+        if self.right[at] || on.distance_mm <= on.radius_mm + nodes[at].radius_mm {
             return None;
         }
         while let Some(before) = nodes[at].parent.filter(|before| !self.right[*before]) {
