@@ -69,7 +69,7 @@ fn a_session_is_measured_with_its_rests_and_its_beam_and_its_script_without() {
     let script = folder.path().join("played.toml");
     let args = ["--script", text(&script), "--json", "--out", text(&out)];
     told(&endowire().arg("run").arg(scene("arch_vertebral.toml")).args(args).output().unwrap());
-    let again = assessed(&[text(&out), "--target", "left carotid"]);
+    let again = assessed(&[text(&out), "--target", "opening 4"]);
     assert!((value(&again, "tip_path_mm").unwrap() - of("tip_path_mm")).abs() < 1e-6);
     assert_eq!((value(&again, "beam_on_s"), value(&again, "arrived")), (None, Some(0.0)));
     // Both beside each other, and as a table.

@@ -231,6 +231,7 @@ impl Fluoroscope {
             return known.clone();
         }
         let size_px = self.c_arm.size_px();
+        let beyond = self.beyond(wall, filled);
         let (mut inside, mut edge) = (vec![], vec![]);
         for pixel in 0..size_px[0] * size_px[1] {
             let (first, stride) = self.first_ray(pixel as usize);
@@ -238,7 +239,7 @@ impl Fluoroscope {
                 .flat_map(|row| first + row * stride..first + row * stride + SUBRAYS as usize);
             match rays.filter(|&ray| self.anatomy.lumen[ray] > LEAST_LUMEN_MM).count() {
                 0 => {}
-                RAYS if std::ptr::eq(wall, filled) => inside.push(pixel),
+                RAYS if !beyond[pixel as usize] => inside.push(pixel),
                 _ => edge.push(pixel),
             }
         }
@@ -246,6 +247,25 @@ impl Fluoroscope {
         inside.retain(|&pixel| self.c_arm.openness(pixel as usize) >= 0.5);
         inside.sort_unstable();
         self.vessel.insert(Mask::new(size_px, inside)).clone()
+    }
+
+    /// Pixels near what is filled beyond the wall: triangles that the two do not have in common.
+    fn beyond(&self, wall: &SurfaceMesh, filled: &SurfaceMesh) -> Vec<bool> {
+        let mut near = vec![false; self.pixels()];
+        let [width, height] = self.c_arm.size_px();
+        let pairs = wall.triangles.iter().zip(&filled.triangles);
+        let common = pairs.take_while(|(a, b)| a == b).count();
+        for triangle in common..filled.triangles.len() {
+            let corners = filled.corners(triangle).map(|corner| self.c_arm.project(&corner));
+            let range = |k: usize, side: u32| {
+                let [low, high] =
+                    [f64::min, f64::max].map(|of| corners.iter().map(|c| c[k]).fold(corners[0][k], of));
+                low.clamp(0.0, f64::from(side)) as usize..(high.clamp(0.0, f64::from(side)).ceil() as usize)
+            };
+            let columns = range(0, width);
+            range(1, height).for_each(|y| near[y * width as usize..][columns.clone()].fill(true));
+        }
+        near
     }
 
     /// Signal with devices, the mean over the instants of a pulse, and the contrast medium of a time; without a time, before any injection.
