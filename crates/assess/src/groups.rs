@@ -17,11 +17,11 @@ const AGAINST_WALL_N: f64 = 1e-3;
 /// Shortest way to which one that was gone is compared, mm.
 const SHORTEST_MM: f64 = 1.0;
 
-const DURAN: &str = "Duran et al., Journal of Vascular Surgery 2015";
-const ESTRADA: &str = "Estrada, O'Malley, Duran, Schulz and Bismuth, IEEE 2014";
-const RAFII: &str = "Rafii-Tari et al., Annals of Biomedical Engineering 2017";
-const BOYLE: &str = "Boyle et al., Journal of Endovascular Therapy 2011";
-const REVIEW: &str = "review, European Journal of Vascular and Endovascular Surgery 2016";
+const ESTRADA: &str = "Estrada et al. 2014: smoothness of the tool's motion";
+const RAFII: &str = "Rafii-Tari et al. 2017: motion and forces of hands and catheters";
+const BOYLE: &str = "Boyle et al. 2011: scores of errors";
+const REVIEW: &str =
+    "review of simulator studies, European Journal of Vascular and Endovascular Surgery 2016";
 
 /// A measure that less of is better.
 fn lower(
@@ -76,7 +76,7 @@ fn time(record: &Record) -> Vec<Metric> {
     vec![
         of("total_s", Some(record.end_s()), "time from the start to the end of the last step", REVIEW),
         of("idle_s", Some(idle_s(record)), "time of steps in which no hand moves or turns", RAFII),
-        of("beam_on_s", beam_s, "time with the beam on", DURAN),
+        of("beam_on_s", beam_s, "time with the beam on", REVIEW),
         of(
             "beam_on_idle_s",
             beam_on_idle_s(record),
@@ -87,7 +87,7 @@ fn time(record: &Record) -> Vec<Metric> {
 }
 
 fn radiation(record: &Record) -> Vec<Metric> {
-    let of = |name, unit, value, definition| lower(Group::Radiation, (name, unit), value, definition, BOYLE);
+    let of = |name, unit, value, definition| lower(Group::Radiation, (name, unit), value, definition, REVIEW);
     let sum = |each: fn(&crate::BeamState) -> f64| {
         let on = record.beam_stretches()?.filter(|(state, _)| state.on);
         Some(on.map(|(state, end_s)| each(state) * (end_s - state.time_s)).sum::<f64>())
@@ -122,7 +122,7 @@ fn radiation(record: &Record) -> Vec<Metric> {
 
 fn contrast(record: &Record) -> Vec<Metric> {
     let of =
-        |name, unit, value, definition| lower(Group::Contrast, (name, unit), Some(value), definition, DURAN);
+        |name, unit, value, definition| lower(Group::Contrast, (name, unit), Some(value), definition, REVIEW);
     let volume = record.injections.iter().map(|one| one.volume_ml).sum();
     let fastest = record.injections.iter().map(|one| one.rate_ml_per_s).fold(0.0, f64::max);
     let against = |one: &&crate::Injection| {
@@ -302,7 +302,7 @@ fn on_way(record: &Record, way: Option<&Way>) -> Vec<Metric> {
             "s",
             up_s,
             "time until the tip is a radius beyond the first fork on its way: of arches, the time up the aorta",
-            DURAN,
+            REVIEW,
         ),
     ]
 }

@@ -52,7 +52,7 @@ pub enum Better {
 }
 
 /// A measure of a procedure.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Metric {
     /// What it is called, in lower case and with its unit.
     pub name: &'static str,

@@ -121,6 +121,9 @@ fn trainee(tree: &CentrelineTree, fault: Fault, seed: u64) -> Record {
     record
 }
 
+/// A fault, and the measures that it makes larger, smaller and leaves alone.
+type Expected = (Fault, &'static [&'static str], &'static [&'static str], &'static [&'static str]);
+
 /// Probability that a number of the second kind is larger than one of the first, half where they are equal.
 fn auc(first: &[f64], second: &[f64]) -> f64 {
     let pairs = first.iter().flat_map(|a| second.iter().map(move |b| (a, b)));
@@ -151,8 +154,7 @@ fn every_measure_tells_the_trainees_apart_that_it_should_and_no_others() {
     };
     let clean = group(Fault::None);
     assert!(values(&clean, "arrived").iter().all(|arrived| *arrived == 1.0));
-    // What a fault makes larger, smaller, and what it leaves alone.
-    let expected: [(Fault, &[&str], &[&str], &[&str]); 6] = [
+    let expected: [Expected; 6] = [
         (
             Fault::Tremor,
             &["tip_path_mm", "path_ratio", "reversals", "retracted_mm"],
