@@ -471,12 +471,15 @@ impl Session {
         .collect()
     }
 
-    /// What contrast medium goes through: the outermost instrument that is in. Of several that is one with a lumen.
+    /// What contrast medium goes through: the outermost instrument that is in and has a lumen.
     fn injects_through(&self) -> Option<usize> {
         let stack = self.simulation.stack();
+        // A device alone may leave its lumen to the pictures.
+        let in_view =
+            !stack.is_several() && self.lab.fluoro().device.iter().any(|part| part.inner_radius_mm > 0.0);
         let opens = |one: &usize| {
             let sections = stack.instruments()[*one].device.sections();
-            !stack.is_several() || sections.iter().all(|section| section.inner_radius_mm.is_some())
+            in_view || sections.iter().all(|section| section.inner_radius_mm.is_some())
         };
         let in_it = |one: &usize| self.simulation.tip_of_mm(*one).is_some();
         (0..stack.instruments().len()).rev().filter(opens).find(in_it)
