@@ -90,19 +90,23 @@ impl Record {
     /// # Errors
     /// [`Error::Content`] for a file that is not there or does not fit, naming it.
     pub fn read(path: &Path) -> Result<Self> {
-        if path.is_file() { Self::of_session(path) } else { Self::of_folder(path) }
+        if !path.is_file() {
+            return Self::of_folder(path);
+        }
+        let bytes = std::fs::read(path).map_err(|error| not_a_session(path, &error))?;
+        Self::from_session(&bytes, path)
     }
 
-    fn of_session(path: &Path) -> Result<Self> {
+    /// A session from the bytes of its file, which `path` names in messages.
+    ///
+    /// # Errors
+    /// [`Error::Content`] for what is none.
+    pub fn from_session(bytes: &[u8], path: &Path) -> Result<Self> {
         #[derive(Deserialize)]
         struct Session {
             record: Record,
         }
-        let bad = |error: String| {
-            Error::content(path, format!("{error}; give a session of endowire play or the folder of a run"))
-        };
-        let text = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
-        let session: Session = serde_json::from_slice(&text).map_err(|error| bad(error.to_string()))?;
+        let session: Session = serde_json::from_slice(bytes).map_err(|error| not_a_session(path, &error))?;
         Ok(session.record)
     }
 
@@ -225,6 +229,10 @@ impl InjectionRow {
         let Self { time_s, volume_ml, rate_ml_per_s } = self;
         Injection { time_s, volume_ml, rate_ml_per_s }
     }
+}
+
+fn not_a_session(path: &Path, error: &dyn std::fmt::Display) -> Error {
+    Error::content(path, format!("{error}; give a session of endowire play or the folder of a run"))
 }
 
 fn optional<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Option<Vec<T>>> {
