@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use endowire_assess::Record;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Sheath, Simulation, State};
 use endowire_core::statics::{StaticCase, StaticProblem};
@@ -54,6 +55,14 @@ pub fn vtp(bytes: &[u8]) -> Result<()> {
 /// As [`SurfaceMesh::from_bytes`].
 pub fn vtk(bytes: &[u8]) -> Result<()> {
     surface(bytes, "a.vtk")
+}
+
+/// A session that is assessed.
+///
+/// # Errors
+/// As [`Record::from_session`].
+pub fn session(bytes: &[u8]) -> Result<()> {
+    Record::from_session(bytes, Path::new("a.session.json")).map(drop)
 }
 
 /// A table of a centre-line tree.

@@ -15,6 +15,22 @@ use crate::output::tell;
 
 /// Reads a scene with these values of its keys.
 pub(crate) fn read(path: &Path, settings: &[Setting]) -> Result<Scene, Failure> {
+    let scene = with_any_device(path, settings)?;
+    let other =
+        settings.iter().find(|setting| ["device", "device.file"].contains(&&*setting.key.to_string()));
+    if let Some(setting) = other
+        && !ViewSpec::of_scene(&scene, path)?.device.is_empty()
+    {
+        return Err(Failure::Input(format!(
+            "--set {setting}: [[view.device]] of {} says what its own device is made of, and this is another: leave out those tables",
+            path.display()
+        )));
+    }
+    Ok(scene)
+}
+
+/// The same for those who leave out what the scene says its own device is made of, where another takes its place.
+pub(crate) fn with_any_device(path: &Path, settings: &[Setting]) -> Result<Scene, Failure> {
     Ok(scene_with(path, settings, |scene| ViewSpec::of_scene(scene, path).map(drop))?)
 }
 

@@ -1,5 +1,6 @@
 //! The room: C-arm, table, blades, pedal, injector, camera.
 
+use endowire_assess::BeamState;
 use endowire_core::vessel::{SurfaceMesh, Wall};
 use endowire_core::{Error, Result, Vec3};
 use endowire_viewer::{CameraSpec, InjectionSpec, Mode, Pose, View, ViewSpec};
@@ -109,15 +110,35 @@ impl Lab {
         (self.dose_ngy + self.room_ngy()) / 1000.0
     }
 
+    /// The beam from a time on, for those who assess a session.
+    pub(crate) fn beam(&self, time_s: f64) -> BeamState {
+        let arm = &self.fluoro.c_arm;
+        let side_mm = arm.field_mm.unwrap_or(0.0) / arm.magnification;
+        let [primary_deg, secondary_deg] = arm.angles_deg();
+        BeamState {
+            time_s,
+            on: self.down,
+            frames_per_s: self.fluoro.frames_per_s,
+            dose_ngy: self.frame_ngy(),
+            field_mm2: side_mm * side_mm * self.open[0] * self.open[1],
+            primary_deg,
+            secondary_deg,
+        }
+    }
+
     /// Air kerma at the detectors while the room was as it is.
     fn room_ngy(&self) -> f64 {
+        self.frame_ngy() * self.room_ticks as f64 * self.fluoro.frames_per_s / TICKS_PER_S
+    }
+
+    /// That of a frame.
+    fn frame_ngy(&self) -> f64 {
         let spec = &self.fluoro;
         let wanted_ngy = || {
             let plane_ngy = spec.detector.dose_ngy.unwrap_or_else(|| spec.xray.mode.dose_ngy());
             plane_ngy * spec.planes().len() as f64
         };
-        let frame_ngy = self.delivered_ngy.unwrap_or_else(wanted_ngy);
-        frame_ngy * self.room_ticks as f64 * spec.frames_per_s / TICKS_PER_S
+        self.delivered_ngy.unwrap_or_else(wanted_ngy)
     }
 
     /// Hears what a frame brings, if that is of the room as it is.

@@ -13,6 +13,7 @@ mod pictures;
 mod readout;
 mod script;
 mod session;
+mod telemetry;
 
 pub use hand::Motion;
 pub use input::Input;

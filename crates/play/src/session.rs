@@ -13,6 +13,7 @@ use crate::history::{Done, History, Injected, moves_by_itself};
 use crate::input::Input;
 use crate::lab::Lab;
 use crate::readout::{Event, EventKind, InstrumentReadout, LabReadout, Limits, Readout, Went};
+use crate::telemetry::Telemetry;
 
 /// Events that are kept.
 const MOST_EVENTS: usize = 1000;
@@ -35,6 +36,7 @@ pub struct Session {
     holds_still: bool,
     events: Vec<Event>,
     events_in_all: usize,
+    telemetry: Telemetry,
 }
 
 /// What is drawn of a moment.
@@ -97,6 +99,7 @@ impl Session {
             holds_still: false,
             events: Vec::new(),
             events_in_all: 0,
+            telemetry: Telemetry::default(),
         })
     }
 
@@ -217,6 +220,7 @@ impl Session {
         let flow = self.lab.inject(self.simulation.wall(), (ml, ml_per_s), at_mm, time_s)?;
         let after_step = self.history.steps();
         self.history.inject(Injected { instrument, ml, ml_per_s, after_step, flow });
+        self.telemetry.inject(time_s, ml, ml_per_s);
         Ok(())
     }
 
@@ -231,6 +235,7 @@ impl Session {
         if let Some(shown) = self.demonstration.take_if(|shown| !shown.paused) {
             self.demonstration = self.show(shown);
             self.moving = false;
+            self.note(&[]);
             return;
         }
         let lengths_mm = self.simulation.report().lengths_mm();
@@ -243,16 +248,33 @@ impl Session {
                 motions.push(Motion { instrument: index, advance_mm, rotate_deg });
             }
         }
-        let moving = !motions.is_empty();
-        if moving {
+        if !motions.is_empty() {
             if !self.moving {
                 self.history.begin_motion();
             }
-            self.step(motions, TICKS_PER_S);
-        } else if self.demonstration.is_none() && !self.holds_still && moves_by_itself(&self.simulation) {
+            let done = self.step(motions.clone(), TICKS_PER_S);
+            self.note(if done { &motions } else { &[] });
+            self.moving = true;
+            return;
+        }
+        if self.demonstration.is_none() && !self.holds_still && moves_by_itself(&self.simulation) {
             self.step(vec![], TICKS_PER_S);
         }
-        self.moving = moving;
+        self.moving = false;
+        self.note(&[]);
+    }
+
+    /// Notes what hands have done in this tick.
+    fn note(&mut self, motions: &[Motion]) {
+        let time_s = self.time_s();
+        // The beam of a tick is that at its beginning.
+        let beam = self.lab.beam((time_s - 1.0 / TICKS_PER_S).max(0.0));
+        self.telemetry.tick(time_s, motions, &self.simulation, beam);
+    }
+
+    /// What hands, beam and injector have done so far, for those who assess it: undone or not, rests included.
+    pub fn record(&self) -> &endowire_assess::Record {
+        self.telemetry.record()
     }
 
     /// Carries out what a script does in this tick; it, where it goes on.
@@ -449,12 +471,15 @@ impl Session {
         .collect()
     }
 
-    /// What contrast medium goes through: the outermost instrument that is in. Of several that is one with a lumen.
+    /// What contrast medium goes through: the outermost instrument that is in and has a lumen.
     fn injects_through(&self) -> Option<usize> {
         let stack = self.simulation.stack();
+        // A device alone may leave its lumen to the pictures.
+        let in_view =
+            !stack.is_several() && self.lab.fluoro().device.iter().any(|part| part.inner_radius_mm > 0.0);
         let opens = |one: &usize| {
             let sections = stack.instruments()[*one].device.sections();
-            !stack.is_several() || sections.iter().all(|section| section.inner_radius_mm.is_some())
+            in_view || sections.iter().all(|section| section.inner_radius_mm.is_some())
         };
         let in_it = |one: &usize| self.simulation.tip_of_mm(*one).is_some();
         (0..stack.instruments().len()).rev().filter(opens).find(in_it)

@@ -6,6 +6,7 @@
 #![allow(clippy::needless_pass_by_value, reason = "pyo3 hands over what it has extracted")]
 
 mod arrays;
+mod assess;
 mod batch;
 mod control;
 mod document;
@@ -31,6 +32,8 @@ use pyo3::prelude::*;
 mod _endowire {
     use pyo3::prelude::*;
 
+    #[pymodule_export]
+    use super::assess::assess;
     #[pymodule_export]
     use super::batch::Batch;
     #[pymodule_export]

@@ -11,26 +11,36 @@ use crate::material::Material;
 /// # Errors
 /// [`Error::Parameter`] for a material that is not known, with the part that names it and the nearest name.
 pub fn device_parts(file: &DeviceFile) -> Result<Vec<DevicePart>> {
+    Ok(named_parts(file)?.into_iter().map(|(part, _)| part).collect())
+}
+
+/// The names of these parts in the file; none where the materials of one are not known.
+pub(crate) fn device_part_names(file: &DeviceFile) -> Vec<String> {
+    named_parts(file).unwrap_or_default().into_iter().map(|(_, name)| name).collect()
+}
+
+fn named_parts(file: &DeviceFile) -> Result<Vec<(DevicePart, String)>> {
     let plain = |part: &Part| {
         part.material.is_none() && part.coat.is_none() && part.at(0.0).inner_radius_mm.is_none()
     };
     if file.parts.iter().all(plain) {
         return Ok(vec![]);
     }
-    let mut drawn: Vec<DevicePart> = Vec::new();
+    let mut named = Vec::new();
     for part in &file.parts {
         let layers = Layers::of(part)?;
         let mut begin_mm = part.from_tip_mm[0];
-        let first = drawn.len();
+        let mut drawn: Vec<DevicePart> = Vec::new();
         for section in part.sections() {
             let end_mm = begin_mm + section.length_mm;
             for layer in layers.across(&section, [begin_mm, end_mm]) {
-                push(&mut drawn, first, layer);
+                push(&mut drawn, layer);
             }
             begin_mm = end_mm;
         }
+        named.extend(drawn.into_iter().map(|layer| (layer, part.name.clone())));
     }
-    Ok(drawn)
+    Ok(named)
 }
 
 /// The sections of a device without a file, as tubes to draw; none where all are solid.
@@ -50,14 +60,11 @@ pub fn section_parts(device: &Device) -> Vec<DevicePart> {
 }
 
 /// Adds a stretch of a layer; where it only goes on, the layer grows.
-fn push(drawn: &mut Vec<DevicePart>, first: usize, layer: DevicePart) {
+fn push(drawn: &mut Vec<DevicePart>, layer: DevicePart) {
     let alike = |before: &&mut DevicePart| {
         DevicePart { from_tip_mm: None, ..**before } == DevicePart { from_tip_mm: None, ..layer }
     };
-    match (
-        drawn[first..].iter_mut().find(alike).and_then(|before| before.from_tip_mm.as_mut()),
-        layer.from_tip_mm,
-    ) {
+    match (drawn.iter_mut().find(alike).and_then(|before| before.from_tip_mm.as_mut()), layer.from_tip_mm) {
         (Some(before), Some(more)) => before[1] = more[1],
         _ => drawn.push(layer),
     }

@@ -4,7 +4,6 @@ use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 
 use crate::c_arm::CArm;
-use crate::device::Piece;
 use crate::output::Image;
 use crate::three_d::Solids;
 
@@ -12,16 +11,6 @@ use crate::three_d::Solids;
 pub(crate) trait PathEngine: Send + Sync {
     /// Length inside a closed mesh of the central ray of each pixel of `view`, row by row.
     fn mesh(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Vec<f32>>;
-
-    /// Adds the signed lengths inside frusta in beam coordinates to those of the pixels of `view`, and tells which it touched,
-    /// some perhaps repeatedly.
-    fn pieces(
-        &mut self,
-        view: &CArm,
-        pieces: &[(Piece, f64)],
-        lengths: &mut [f32],
-        touched: &mut Vec<u32>,
-    ) -> Result<()>;
 }
 
 /// Draws 3D frames of one set-up.

@@ -1,6 +1,6 @@
 //! What is pushed, as the viewer sees it: the device, or each of several instruments.
 
-use endowire_core::device::{Device, Stack, line_mm};
+use endowire_core::device::{Device, Kind, Stack, line_mm};
 use endowire_core::methods::MethodChoice;
 use endowire_core::scene::SceneOf;
 use endowire_core::shape::Shape;
@@ -8,8 +8,8 @@ use endowire_core::vessel::Displacement;
 use endowire_core::{Error, Result, Vec3};
 use serde::de::DeserializeOwned;
 
-use crate::device::{DevicePart, DeviceView};
-use crate::device_file::{device_parts, section_parts};
+use crate::device::{DevicePart, DeviceView, bore_too_wide};
+use crate::device_file::{device_part_names, device_parts, section_parts};
 use crate::spec::ViewSpec;
 
 /// Instruments of a scene and what they are made of.
@@ -18,19 +18,24 @@ pub struct Pushed {
     stack: Stack,
     /// Parts to draw of each.
     parts: Vec<Vec<DevicePart>>,
+    /// What each is, where its file says so.
+    kinds: Vec<Option<Kind>>,
+    /// The names of their parts, where files say so.
+    part_names: Vec<Vec<String>>,
 }
 
 impl Pushed {
     /// Those of a scene. A device alone is made of what the `[view]` table says, if it says so, and else everything of what its file says.
     ///
     /// # Errors
-    /// As [`SceneOf::stack`]; materials of a device file that are not known; a `[view]` table that describes one device where there are several.
+    /// As [`SceneOf::stack`]; materials of a device file that are not known; a `[view]` table that describes one device where there are several,
+    /// or another one; an injection through a tip where nothing has a lumen.
     pub fn new<M: MethodChoice + DeserializeOwned + Default>(
         scene: &SceneOf<M>,
         spec: &ViewSpec,
     ) -> Result<Self> {
         let stack = scene.stack()?;
-        let mut parts = Vec::new();
+        let (mut parts, mut kinds, mut part_names) = (Vec::new(), Vec::new(), Vec::new());
         for (file, device) in scene.device_files()?.iter().zip(stack.devices()) {
             parts.push(match file {
                 Some((path, file)) => {
@@ -38,14 +43,47 @@ impl Pushed {
                 }
                 None => section_parts(device),
             });
+            kinds.push(file.as_ref().and_then(|(_, file)| file.kind));
+            part_names.push(file.as_ref().map_or_else(Vec::new, |(_, file)| device_part_names(file)));
         }
         if let Some(own) = spec.own_parts(stack.is_several())? {
+            for (number, part) in own.iter().enumerate() {
+                check_bore(number, part, &stack.instruments()[0].device)?;
+            }
             parts[0] = own.to_vec();
+            part_names[0].clear();
         }
-        Ok(Self { stack, parts })
+        let pushed = Self { stack, parts, kinds, part_names };
+        let through_tip = spec.injection.iter().position(|one| one.at_tip);
+        if let Some(number) = through_tip.filter(|_| !(0..pushed.parts.len()).any(|i| pushed.has_lumen(i))) {
+            let mend =
+                "nothing that is pushed has a lumen: medium comes through a catheter, not along a wire";
+            return Err(Error::parameter(format!("view.injection[{number}].at_tip"), true, mend));
+        }
+        Ok(pushed)
     }
 
-    /// The tip of the innermost instrument that is in on this line, where these lengths are, mm; in the vessel at rest, where that is
+    /// Whether medium can come through an instrument.
+    pub fn has_lumen(&self, instrument: usize) -> bool {
+        let sections = self.stack.instruments()[instrument].device.sections();
+        sections.iter().any(|section| section.inner_radius_mm.is_some())
+            || self.parts[instrument].iter().any(|part| part.inner_radius_mm > 0.0)
+    }
+
+    /// Whether an instrument is a wire: its file says so, or it has no lumen.
+    pub fn is_wire(&self, instrument: usize) -> bool {
+        match self.kinds[instrument] {
+            Some(kind) => matches!(kind, Kind::Guidewire | Kind::Microwire),
+            None => !self.has_lumen(instrument),
+        }
+    }
+
+    /// What the file of an instrument calls a part that is drawn, by its number.
+    pub fn part_name(&self, instrument: usize, part: usize) -> Option<&str> {
+        self.part_names[instrument].get(part).map(String::as_str)
+    }
+
+    /// The tip of the innermost instrument with a lumen that is in on this line, where these lengths are, mm; in the vessel at rest, where that is
     /// displaced.
     pub fn tip_at_rest_mm(
         &self,
@@ -53,7 +91,8 @@ impl Pushed {
         inserted_mm: &[f64],
         displacement: Option<&Displacement>,
     ) -> Option<Vec3> {
-        let first_mm = inserted_mm.iter().find(|mm| **mm > 0.0)?;
+        let mut in_line = inserted_mm.iter().enumerate().filter(|(_, mm)| **mm > 0.0);
+        let (_, first_mm) = in_line.find(|(instrument, _)| self.has_lumen(*instrument))?;
         let tip_mm = shape.position_at(line_mm(inserted_mm.iter().copied()) - first_mm)?;
         Some(displacement.map_or(tip_mm, |displacement| displacement.material(&tip_mm)))
     }
@@ -73,4 +112,19 @@ impl Pushed {
         };
         each.zip(shapes).map(view).collect()
     }
+}
+
+/// Refuses a table of the view that is as wide inside as its device is outside: it was written for another.
+fn check_bore(number: usize, part: &DevicePart, device: &Device) -> Result<()> {
+    let [near, far] = part.from_tip_mm.unwrap_or([0.0, f64::INFINITY]);
+    let mut begin_mm = 0.0;
+    for section in device.sections() {
+        let end_mm = begin_mm + section.length_mm;
+        let outer_mm = part.outer_radius_mm.unwrap_or(section.radius_mm);
+        if near < end_mm && begin_mm < far && part.inner_radius_mm >= outer_mm {
+            return Err(bore_too_wide(&format!("view.device[{number}]"), part.inner_radius_mm, outer_mm));
+        }
+        begin_mm = end_mm;
+    }
+    Ok(())
 }

@@ -173,8 +173,8 @@ impl Renderer {
             }
             let fluoro = match &setup.c_arm {
                 Some(c_arm) => {
-                    let (scope, sequence, paths) = prepared(setup, engines, fluoro, kept)?;
-                    let mut image = sequence.next(scope, paths, &pulse, moment)?;
+                    let (scope, sequence, _) = prepared(setup, engines, fluoro, kept)?;
+                    let mut image = sequence.next(scope, &pulse, moment)?;
                     if setup.spec.c_arm.markers {
                         draw_markers(&mut image, c_arm.right_and_up());
                     }
@@ -210,7 +210,7 @@ impl Renderer {
         Self::of_setup(self.setup.beside(spec)?.of_own_run())
     }
 
-    /// Tells where the tip of the innermost instrument is at a moment that is not drawn, in the vessel at rest: medium that is injected
+    /// Tells where the tip of the innermost instrument with a lumen is at a moment that is not drawn, in the vessel at rest: medium that is injected
     /// `at_tip` goes where the tip is meanwhile. Frames tell it themselves; between moments its way is straight. Where the tip was said to
     /// be elsewhere at that moment, what was said of it and of later ones is forgotten.
     ///
@@ -317,8 +317,8 @@ impl Renderer {
     pub fn take_mask(&mut self, devices: &[DeviceView]) -> Result<()> {
         let devices = [RefinedDevice::all(devices)?];
         self.with_fallback(|setup, engines, fluoro, kept| {
-            let (scope, sequence, paths) = prepared(setup, engines, fluoro, kept)?;
-            sequence.take_mask(scope, paths, &devices)
+            let (scope, sequence, _) = prepared(setup, engines, fluoro, kept)?;
+            sequence.take_mask(scope, &devices)
         })
     }
 
@@ -340,7 +340,7 @@ impl Renderer {
     pub fn labels(&mut self, devices: &[DeviceView], contacts_mm: &[Vec3]) -> Result<Labels> {
         let of_scope = self.with_fallback(|setup, engines, fluoro, kept| {
             let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
-            Ok((setup.lumen.then(|| scope.vessel(setup.filled_now())), scope.exposure))
+            Ok((setup.lumen.then(|| scope.vessel(setup.wall_now(), setup.filled_now())), scope.exposure))
         })?;
         let c_arm = self.setup.c_arm.as_ref().ok_or_else(no_fluoro)?;
         labels(c_arm, devices, contacts_mm, self.setup.spec.xray.device_material, of_scope)

@@ -15,16 +15,6 @@ impl PathEngine for Broken {
     fn mesh(&mut self, _: &CArm, _: &SurfaceMesh) -> Result<Vec<f32>> {
         lost()
     }
-
-    fn pieces(
-        &mut self,
-        _: &CArm,
-        _: &[(crate::device::Piece, f64)],
-        _: &mut [f32],
-        _: &mut Vec<u32>,
-    ) -> Result<()> {
-        lost()
-    }
 }
 
 impl ThreeDEngine for Broken {

@@ -34,8 +34,8 @@ pub(crate) struct Setup {
 #[derive(Debug)]
 pub(crate) struct Moved {
     pub(crate) displacement: Displacement,
-    wall: SurfaceMesh,
-    filled: SurfaceMesh,
+    wall: Arc<SurfaceMesh>,
+    filled: Arc<SurfaceMesh>,
     /// The air of a generated body: diaphragm, borders of the heart and bowel go with what moves the vessel.
     air: Option<SurfaceMesh>,
 }
@@ -48,7 +48,11 @@ impl Setup {
             triangles: mesh.triangles.clone(),
         };
         self.moved = displacement.map(|displacement| {
-            let (wall, filled) = (moved(&self.wall, displacement), moved(&self.filled, displacement));
+            let wall = Arc::new(moved(&self.wall, displacement));
+            let filled = match Arc::ptr_eq(&self.wall, &self.filled) {
+                true => Arc::clone(&wall),
+                false => Arc::new(moved(&self.filled, displacement)),
+            };
             let air = self.patient.air().map(|air| moved(air, displacement));
             Arc::new(Moved { displacement: displacement.clone(), wall, filled, air })
         });
@@ -142,7 +146,7 @@ impl Setup {
                 Some(other) => Arc::clone(&other.patient),
                 None => Arc::new(Patient::new(spec, &wall)?),
             };
-            setup.flow = flow(spec, other)?;
+            setup.flow = flow(spec, &filled, other)?;
         }
         let beam: Vec<_> = match &setup.c_arm {
             Some(c_arm) if spec.camera.c_arm => {
@@ -159,12 +163,12 @@ impl Setup {
 }
 
 /// What carries the medium of a view, with what it has in common with that of another.
-fn flow(spec: &ViewSpec, other: Option<&Setup>) -> Result<Option<Arc<Flow>>> {
+fn flow(spec: &ViewSpec, filled: &SurfaceMesh, other: Option<&Setup>) -> Result<Option<Arc<Flow>>> {
     let known = other.filter(|other| other.spec.flow == spec.flow && !spec.injection.is_empty());
     match known.and_then(|other| Some((other.flow.as_ref()?, &other.spec.injection))) {
         Some((flow, injection)) if *injection == spec.injection => Ok(Some(Arc::clone(flow))),
         Some((flow, _)) => Ok(Some(Arc::new(flow.injected(&spec.injection)))),
-        None => Ok(Flow::of_view(spec)?.map(Arc::new)),
+        None => Ok(Flow::of_view(spec, filled)?.map(Arc::new)),
     }
 }
 

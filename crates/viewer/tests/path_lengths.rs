@@ -61,7 +61,7 @@ fn a_cylinder_mesh_is_right_within_half_a_percent() {
 fn a_device_is_an_exact_cylinder() {
     let radius = 0.45;
     let wire = device(7, radius, |w| Vec3::new(0.0, 0.0, 100.0 * w - 50.0));
-    let mut spec = spec(Backend::Cpu, 200, 0.05);
+    let mut spec = spec(Backend::Cpu, 200, 0.02);
     spec.c_arm.primary_deg = -50.0;
     for mut renderer in engines(&spec, &cylinder(10.0, 60.0, 40, Vec3::zeros())) {
         let maps = renderer.path_lengths(std::slice::from_ref(&wire)).unwrap().devices_mm;

@@ -194,6 +194,17 @@ fn damaged_vtk_files() {
 }
 
 #[test]
+fn sessions() {
+    let text = r#"{"scene_file": "a.toml", "set": [], "record": {"samples": [{"time_s": 0.5, "tip_mm": [1.0, 2.0, 3.0],
+        "hands": [{"advance_mm": 1.0, "rotate_rad": 0.0, "inserted_mm": 1.0, "push_force_n": null, "torque_nmm": 0.0}],
+        "wall_force_n": 0.1, "tip_force_n": 0.0, "jumped": false}],
+        "injections": [{"time_s": 0.1, "volume_ml": 2.0, "rate_ml_per_s": 1.0}],
+        "beam": [{"time_s": 0.0, "on": true, "frames_per_s": 7.5, "dose_ngy": 30.0, "field_mm2": 1e4, "primary_deg": 0.0,
+        "secondary_deg": 0.0}]}}"#;
+    reads_or_refuses(&[text.as_bytes().to_vec()], &["a.session.json"], readers::session);
+}
+
+#[test]
 fn damaged_centre_lines() {
     let places = ["line ", "centre-line points"];
     reads_or_refuses(&assets("vessels", "csv"), &places, readers::centreline);

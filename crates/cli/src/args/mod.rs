@@ -41,6 +41,8 @@ pub(crate) enum Command {
     Sweep(SweepArgs),
     /// Move the instruments of a scene by hand, under fluoroscopy: a window, or a protocol of JSON lines; what is done is recorded as a script
     Play(PlayArgs),
+    /// Score sessions of play, or recorded runs, by what studies of trainees measure: time, radiation, contrast, motion, safety, way, task
+    Assess(AssessArgs),
     /// Draw frames of a recorded run, from any position of the C-arm
     Render(RenderArgs),
     /// Write a recorded run as one page for a browser: the shape to turn and to scrub through time, forces, events, frames; or the tables
@@ -158,6 +160,27 @@ pub(crate) struct ReportArgs {
     pub(crate) set: Vec<Setting>,
     #[command(flatten)]
     pub(crate) cache: CacheArgs,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct AssessArgs {
+    /// Sessions of play (*.session.json), or folders of recorded runs; of several the values stand beside each other, in the order given
+    #[arg(required = true, value_name = "SESSION|DIR")]
+    pub(crate) sessions: Vec<PathBuf>,
+    /// Name of the point of the centre line that was to be reached; that of the script's last line with one if absent
+    #[arg(long, value_name = "NAME")]
+    pub(crate) target: Option<String>,
+    /// Distance from it at which the tip has arrived
+    #[arg(long, default_value_t = 5.0, value_name = "MM", allow_negative_numbers = true)]
+    pub(crate) within_mm: f64,
+    /// Scene file, where it is not the one that the sessions name
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) cache: CacheArgs,
+    /// Print the measures as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, clap::Args)]

@@ -1,5 +1,6 @@
 //! One file a command.
 
+mod assess;
 mod centreline;
 mod compare;
 mod dataset;
@@ -35,6 +36,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         Command::Run(args) => run::run(args),
         Command::Sweep(args) => sweep::sweep(args),
         Command::Play(args) => play::play(args),
+        Command::Assess(args) => assess::assess(args),
         Command::Render(args) => render::render(args),
         Command::Export(args) => export::export(args),
         Command::Fluoro(args) => fluoro::fluoro(args),

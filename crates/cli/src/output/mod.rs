@@ -14,6 +14,7 @@ pub(crate) mod provenance;
 pub(crate) mod recorder;
 pub(crate) mod recording;
 pub(crate) mod saved;
+pub(crate) mod session;
 pub(crate) mod vtk;
 
 use std::fmt::Display;
@@ -25,7 +26,7 @@ use serde::Serialize;
 use crate::failure::Failure;
 
 /// What a recording tells of itself.
-const SUMMARY: &str = "summary.json";
+pub(crate) const SUMMARY: &str = "summary.json";
 
 /// Prints a document and a line break on stdout. A reader that has left (`| head`) has what it wanted.
 pub(crate) fn print(document: impl Display) -> Result<(), Failure> {

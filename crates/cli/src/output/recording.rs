@@ -30,6 +30,14 @@ pub(crate) struct RecordedSummary {
     pub(crate) complete: bool,
 }
 
+impl RecordedSummary {
+    /// Reads a summary.json.
+    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+        let read = || -> io::Result<_> { Ok(serde_json::from_slice(&std::fs::read(path)?)?) };
+        read().map_err(|e| unreadable(path, &e))
+    }
+}
+
 fn yes() -> bool {
     true
 }
@@ -52,9 +60,7 @@ impl Recording {
     /// Reads what `endowire run` has left in a folder, also where it was killed: then all whole steps. Where the file of the scene is
     /// given, a summary that is damaged or lost is not missed.
     pub(crate) fn read(folder: &Path, scene: Option<&Path>) -> Result<Self, Failure> {
-        let path = folder.join(SUMMARY);
-        let read = || -> io::Result<_> { Ok(serde_json::from_slice(&std::fs::read(&path)?)?) };
-        let summary = match (read(), scene) {
+        let summary = match (RecordedSummary::read(&folder.join(SUMMARY)), scene) {
             (Ok(summary), _) => summary,
             (Err(_), Some(scene)) => {
                 let scene_file = scene.to_path_buf();
@@ -66,7 +72,7 @@ impl Recording {
                     complete: false,
                 }
             }
-            (Err(e), None) => return Err(unreadable(&path, &e)),
+            (Err(failure), None) => return Err(failure),
         };
         let packed = folder.join(arrays::PACKED);
         let growing = folder.join(arrays::GROWING);

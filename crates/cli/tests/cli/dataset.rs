@@ -103,13 +103,14 @@ fn annotations_are_those_of_coco_and_planes_know_each_other() {
         let category = categories.iter().find(|c| c["id"] == row["category_id"]).unwrap();
         category["name"].as_str().unwrap().to_owned()
     };
-    for kind in ["vessel", "instrument", "part"] {
+    for kind in ["vessel", "guidewire", "catheter", "part"] {
         assert!(annotations.iter().any(|row| name(row) == kind), "{kind}");
     }
     let ids: BTreeSet<u64> = annotations.iter().map(|row| row["id"].as_u64().unwrap()).collect();
     assert!(ids.len() == annotations.len() && !ids.contains(&0), "0 is no match for pycocotools");
     for category in categories {
-        let tip = (category["name"] == "instrument").then(|| serde_json::json!(["tip"]));
+        let is_device = ["guidewire", "catheter"].contains(&category["name"].as_str().unwrap());
+        let tip = is_device.then(|| serde_json::json!(["tip"]));
         assert_eq!(category.get("keypoints"), tip.as_ref());
         assert_eq!(category.get("skeleton").is_some(), tip.is_some());
     }
@@ -120,7 +121,8 @@ fn annotations_are_those_of_coco_and_planes_know_each_other() {
         assert_eq!(counts.iter().skip(1).step_by(2).sum::<u64>(), row["area"].as_u64().unwrap());
     }
     // The tip projects by the matrix of its picture to where its picture says.
-    let tips = annotations.iter().filter(|row| name(row) == "instrument");
+    let tips = annotations.iter().filter(|row| ["guidewire", "catheter"].contains(&name(row).as_str()));
+    assert!(annotations.iter().any(|row| name(row) == "part" && row["part"].is_string()), "parts have names");
     let (mut compared, mut outside) = (0, 0);
     for row in tips {
         let image = &images[row["image_id"].as_u64().unwrap() as usize];
@@ -168,6 +170,41 @@ fn a_specification_that_does_not_fit_is_refused_by_its_key() {
         let output = endowire(&["dataset", text(&spec), "--out", text(&folder.path().join("out"))], "1");
         let told = said(&output);
         assert!(output.status.code() == Some(2) && told.contains(named), "{to}: {told}");
+    }
+}
+
+/// A scene whose table of materials is that of a catheter, and a wire in its place.
+#[test]
+fn a_table_of_a_scene_never_dresses_another_device() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = "[[view.device]]\nmaterial = \"pebax_baso4_40\"\ninner_radius_mm = 0.3\n";
+    std::fs::write(folder.path().join("scene.toml"), scene_text("curved_tube_exact.toml", &[]) + table)
+        .unwrap();
+    let wire = assets().join("devices/microwire_014.toml");
+    let spec = folder.path().join("spec.toml");
+    let more = format!(
+        "scenes = [\"scene.toml\"]\ndevices = [{:?}]\nposes = 2\nmoments = 2\n[vary]\nprogress = [0.5, 1.0]\n[view]\nsize_px = [128, 128]\n",
+        text(&wire)
+    );
+    std::fs::write(&spec, &more).unwrap();
+    let out = folder.path().join("out");
+    told(&endowire(&["dataset", text(&spec), "--out", text(&out), "--json"], "2"));
+    let document = document(out.join("annotations.json"));
+    let annotations = document["annotations"].as_array().unwrap();
+    let materials: BTreeSet<&str> = annotations.iter().filter_map(|row| row["material"].as_str()).collect();
+    assert!(materials.contains("platinum") && !materials.contains("pebax_baso4_40"), "{materials:?}");
+    // Alone, another device is refused beside that table, and so is a bore that leaves nothing of the own one.
+    let scene = folder.path().join("scene.toml");
+    let set = format!("device.file={:?}", text(&wire));
+    let wide = folder.path().join("wide.toml");
+    let whole = std::fs::read_to_string(&scene).unwrap();
+    std::fs::write(&wide, whole.replace("inner_radius_mm = 0.3", "inner_radius_mm = 9.0")).unwrap();
+    for (args, named) in [
+        (vec!["run", text(&scene), "--set", set.as_str()], "[[view.device]]"),
+        (vec!["fluoro", text(&wide)], "view.device[0].inner_radius_mm = 9"),
+    ] {
+        let output = endowire(&args, "1");
+        assert!(output.status.code() == Some(2) && said(&output).contains(named), "{}", said(&output));
     }
 }
 

@@ -142,3 +142,38 @@ fn fluoroscopy_draws_the_materials_of_the_catalogue() {
         "{error}"
     );
 }
+
+#[test]
+fn medium_comes_through_what_has_a_lumen_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    let tree = workspace().join("assets/vessels/curved_tube.csv");
+    let scene = |device: &str, more: &str, in_view: &str| {
+        let device = workspace().join("assets/devices").join(device);
+        let text = format!(
+            "name = \"a\"\n[vessel]\nfile = {:?}\n[device]\nfile = {:?}\n[sheath]\nposition_mm = [0.0, 0.0, 1.0]\n\
+             direction = [0.0, 0.0, 1.0]\n[method]\nname = \"kirchhoff\"\n[[script]]\nadvance_mm = 4.0\nspeed_mm_per_s = 4.0\n{more}\n\
+             [view]\nviews = [\"fluoro\"]\nsize_px = [64, 64]\nflow.tree = {:?}\n{in_view}",
+            workspace().join("assets/vessels/curved_tube.stl"),
+            device,
+            tree
+        );
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let by_script = "[[script]]\ninject = { ml = 4.0, ml_per_s = 4.0 }\n";
+    let at_tip = "[[view.injection]]\nstart_s = 0.0\nduration_s = 1.0\nrate_ml_per_s = 2.0\nat_tip = true\n";
+    let out = folder.path().join("out");
+    let drawn = |device: &str, more: &str, in_view: &str| {
+        let scene = scene(device, more, in_view);
+        endowire(&["fluoro", &scene, "--steps", "2", "--out", out.to_str().unwrap()])
+    };
+    for (more, in_view, named) in [(by_script, "", "script.inject"), ("", at_tip, "view.injection[0].at_tip")]
+    {
+        let wire = drawn("wire_035_soft.toml", more, in_view);
+        assert!(wire.status.code() == Some(2) && said(&wire).contains(named), "{named}: {}", said(&wire));
+        // The twin: a catheter.
+        let catheter = drawn("catheter_4f_vertebral.toml", more, in_view);
+        assert!(catheter.status.success(), "{}", said(&catheter));
+    }
+}

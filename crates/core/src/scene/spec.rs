@@ -396,6 +396,14 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             false => None,
         };
         let script = Script::new(&self.script, stack, &self.inserted_mm(stack)?, centreline)?;
+        if script.injects() && self.device.as_ref().is_some_and(|device| device.file.is_some()) {
+            // Sections in the scene may leave the lumen to the pictures; a file says all of a device.
+            let solid = |device: &Device| device.sections().iter().all(|s| s.inner_radius_mm.is_none());
+            if stack.devices().all(solid) {
+                let mend = "its device has no lumen: medium comes through a catheter, not along a wire";
+                return Err(Error::parameter("script.inject", "given", mend));
+            }
+        }
         let moves = VesselMotion::new(&self.vessel.motion)?.is_some_and(|motion| motion.changes());
         if moves && !script.is_empty() && !script.is_timed() {
             let mend = "no time goes by in the script: give its lines speeds (speed_mm_per_s, speed_deg_per_s), or wait_s";

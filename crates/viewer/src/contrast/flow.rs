@@ -7,15 +7,16 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use endowire_core::flow::{FlowNode, flow_nodes};
-use endowire_core::vessel::CentrelineTree;
+use endowire_core::vessel::{CentrelineTree, SurfaceMesh};
 use endowire_core::{Error, Result, Vec3};
 
-use super::nearest::Cells;
+use super::mixing::Mixing;
 use super::tip_way::TipWay;
 use super::transport::Transport;
+use super::volumes::volumes_mm3;
 use crate::spec::{FlowSpec, InjectionSpec, ViewSpec};
 
-/// Part of its volume that counts of a stretch of a side branch inside the trunk: the trunk has the rest.
+/// A cell has at least this part of the volume that the centre line gives it: one of which the picture shows nothing must not stop time.
 const LEAST_PART: f64 = 0.25;
 /// Part of a heartbeat that systole takes.
 const SYSTOLE: f64 = 0.35;
@@ -29,7 +30,7 @@ pub(super) struct Node {
     pub(super) upstream: Option<usize>,
     /// Share of the inflow that passes here.
     pub(super) share: f64,
-    /// Lumen between the point before and this one, mm³.
+    /// Lumen that is its own, mm³.
     pub(super) volume_mm3: f64,
     /// Distance from the point before, mm.
     length_mm: f64,
@@ -41,8 +42,8 @@ pub(super) struct Node {
 #[derive(Debug)]
 pub(crate) struct Flow {
     pub(super) nodes: Vec<Node>,
-    /// Which of them is nearest to what in the lumen.
-    pub(super) cells: Arc<Mutex<Cells>>,
+    /// Whose blood is where in the lumen.
+    pub(super) mixing: Arc<Mixing>,
     largest: OnceLock<Vec<f32>>,
     carried: OnceLock<Mutex<Carried>>,
     pub(super) injections: Vec<InjectionSpec>,
@@ -81,11 +82,11 @@ impl Carried {
 }
 
 impl Flow {
-    /// The flow that the injections of `spec` go with; `None` where there are none.
+    /// The flow that the injections of `spec` go with, in the lumen that `filled` encloses; `None` where there are none.
     ///
     /// # Errors
     /// [`Error::Parameter`] without a centre line or for one that cannot be followed; [`Error::Content`] for its file.
-    pub(crate) fn of_view(spec: &ViewSpec) -> Result<Option<Self>> {
+    pub(crate) fn of_view(spec: &ViewSpec, filled: &SurfaceMesh) -> Result<Option<Self>> {
         if spec.injection.is_empty() {
             return Ok(None);
         }
@@ -94,13 +95,28 @@ impl Flow {
             let mend = "contrast medium flows along a centre line; give view.flow.tree";
             return Err(Error::parameter("view.injection", format!("{} tables", spec.injection.len()), mend));
         };
-        Self::new(tree, &spec.flow, &spec.injection).map(Some)
+        Self::new(tree, filled, &spec.flow, &spec.injection).map(Some)
     }
 
-    pub(super) fn new(tree: &CentrelineTree, spec: &FlowSpec, injections: &[InjectionSpec]) -> Result<Self> {
-        Ok(Self {
-            nodes: directed(tree, spec)?,
-            cells: Arc::default(),
+    pub(super) fn new(
+        tree: &CentrelineTree,
+        filled: &SurfaceMesh,
+        spec: &FlowSpec,
+        injections: &[InjectionSpec],
+    ) -> Result<Self> {
+        let mut nodes = directed(tree, spec)?;
+        let mut mixing = Mixing::new(&nodes);
+        let volumes = volumes_mm3(&mut mixing, nodes.len(), filled);
+        for (node, volume) in nodes.iter_mut().zip(volumes) {
+            node.volume_mm3 = volume.max(LEAST_PART * node.volume_mm3);
+        }
+        Ok(Self::of_nodes(nodes, mixing, spec, injections))
+    }
+
+    fn of_nodes(nodes: Vec<Node>, mixing: Mixing, spec: &FlowSpec, injections: &[InjectionSpec]) -> Self {
+        Self {
+            nodes,
+            mixing: Arc::new(mixing),
             largest: OnceLock::new(),
             carried: OnceLock::new(),
             injections: injections.to_vec(),
@@ -110,14 +126,33 @@ impl Flow {
             beat_s: 60.0 / spec.heart_rate_per_min,
             pulsatility: spec.pulsatility,
             dispersion: spec.dispersion,
-        })
+        }
+    }
+
+    /// In a lumen that is that of the centre line to the bit.
+    #[cfg(test)]
+    pub(super) fn in_cones(
+        tree: &CentrelineTree,
+        spec: &FlowSpec,
+        injections: &[InjectionSpec],
+    ) -> Result<Self> {
+        let nodes = directed(tree, spec)?;
+        let mixing = Mixing::new(&nodes);
+        Ok(Self::of_nodes(nodes, mixing, spec, injections))
+    }
+
+    /// The point nearest to a place.
+    #[cfg(test)]
+    pub(super) fn nearest(&self, place: &Vec3) -> usize {
+        let distance = |i: &usize| (self.nodes[*i].position_mm - place).norm_squared();
+        (0..self.nodes.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
     }
 
     /// The same vessel and blood with other injections.
     pub(crate) fn injected(&self, injections: &[InjectionSpec]) -> Self {
         Self {
             nodes: self.nodes.clone(),
-            cells: Arc::clone(&self.cells),
+            mixing: Arc::clone(&self.mixing),
             largest: OnceLock::new(),
             carried: OnceLock::new(),
             injections: injections.to_vec(),
@@ -183,11 +218,6 @@ impl Flow {
     }
 }
 
-pub(super) fn nearest(nodes: &[Node], point: &Vec3) -> usize {
-    let distance = |i: &usize| (nodes[*i].position_mm - point).norm_squared();
-    (0..nodes.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
-}
-
 fn read(path: &Path) -> Result<CentrelineTree> {
     CentrelineTree::read(path).map_err(|error| match error {
         Error::File { path, source } => {
@@ -197,7 +227,8 @@ fn read(path: &Path) -> Result<CentrelineTree> {
     })
 }
 
-/// The tree's points and some between them, with the lumen before each.
+/// The tree's points and some between them, with the volumes of cones from the point before. A branch begins where it leaves its trunk:
+/// before that its blood is the trunk's.
 fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
     let found = flow_nodes(
         tree,
@@ -205,8 +236,21 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
         spec.split_exponent,
         ["view.flow.tree", "view.flow.inlet_mm"],
     )?;
-    let mut nodes: Vec<Node> = found.iter().map(Node::from).collect();
-    found.iter().filter_map(|node| node.upstream).for_each(|up| nodes[up].is_end = false);
+    let mut goes_on = vec![false; found.len()];
+    found.iter().filter_map(|node| node.upstream).for_each(|up| goes_on[up] = true);
+    let mut nodes: Vec<Node> = Vec::with_capacity(found.len());
+    // What became of each.
+    let mut becomes: Vec<usize> = Vec::with_capacity(found.len());
+    for (node, goes_on) in found.iter().zip(goes_on) {
+        let upstream = node.upstream.map(|up| becomes[up]);
+        match upstream {
+            Some(trunk) if node.within_trunk && goes_on => becomes.push(trunk),
+            _ => {
+                becomes.push(nodes.len());
+                nodes.push(Node { upstream, is_end: !goes_on, ..Node::from(node) });
+            }
+        }
+    }
     // The inlet itself has the volume of the first stretch.
     if let Some(first) = nodes.get(1).map(|node| node.volume_mm3) {
         nodes[0].volume_mm3 = first;
@@ -216,12 +260,10 @@ fn directed(tree: &CentrelineTree, spec: &FlowSpec) -> Result<Vec<Node>> {
 
 impl From<&FlowNode> for Node {
     fn from(node: &FlowNode) -> Self {
-        let &FlowNode { position_mm, radius_mm, upstream, share, length_mm, from_radius_mm, within_trunk } =
-            node;
+        let &FlowNode { position_mm, radius_mm, upstream, share, length_mm, from_radius_mm, .. } = node;
         let [ra, rb] = [from_radius_mm, radius_mm];
-        let cone = std::f64::consts::PI * length_mm * (ra * ra + ra * rb + rb * rb) / 3.0;
-        let volume_mm3 = if within_trunk { LEAST_PART * cone } else { cone };
-        Self { position_mm, radius_mm, upstream, share, volume_mm3, length_mm, is_end: true }
+        let volume_mm3 = std::f64::consts::PI * length_mm * (ra * ra + ra * rb + rb * rb) / 3.0;
+        Self { position_mm, radius_mm, upstream, share, volume_mm3, length_mm, is_end: false }
     }
 }
 
@@ -254,13 +296,13 @@ mod tests {
     fn flow() -> Flow {
         let spec =
             FlowSpec { inflow_ml_per_s: 20.0, split_exponent: 3.0, pulsatility: 0.0, ..FlowSpec::default() };
-        Flow::new(&tree(), &spec, &[injection(None)]).unwrap()
+        Flow::in_cones(&tree(), &spec, &[injection(None)]).unwrap()
     }
 
     #[test]
     fn flow_divides_as_the_cube_of_the_radius_and_all_of_it_goes_on() {
         let flow = flow();
-        let at = |x: f64, y: f64| flow.nodes[nearest(&flow.nodes, &Vec3::new(x, y, 0.0))].share;
+        let at = |x: f64, y: f64| flow.nodes[flow.nearest(&Vec3::new(x, y, 0.0))].share;
         assert!((at(140.0, 30.0) / at(140.0, -30.0) - 8.0).abs() < 1e-12);
         assert!((at(140.0, 30.0) + at(140.0, -30.0) - 1.0).abs() < 1e-12);
         assert_eq!(at(50.0, 0.0), 1.0);
@@ -269,7 +311,7 @@ mod tests {
     #[test]
     fn the_bolus_arrives_after_the_volume_on_its_way_has_passed() {
         let flow = flow();
-        let end = nearest(&flow.nodes, &Vec3::new(100.0, 0.0, 0.0));
+        let end = flow.nearest(&Vec3::new(100.0, 0.0, 0.0));
         // 100 mm of 25π mm² at 25 ml/s.
         let transit = std::f64::consts::PI * 2500.0 / 25_000.0;
         let mut transport = Transport::new(&flow);
@@ -297,7 +339,7 @@ mod tests {
             parent: k.checked_sub(1),
         };
         let long = CentrelineTree::new((0..=500).map(node).collect()).unwrap();
-        let error = Flow::new(&long, &FlowSpec::default(), &[injection(None)]).unwrap_err().to_string();
+        let error = Flow::in_cones(&long, &FlowSpec::default(), &[injection(None)]).unwrap_err().to_string();
         assert!(error.contains("view.flow.tree") && error.contains("450000"), "{error}");
     }
 
@@ -319,7 +361,7 @@ mod tests {
             CentrelineTree::new(nodes).unwrap()
         };
         let first = |tree: &CentrelineTree| {
-            Flow::new(tree, &FlowSpec::default(), &[injection(None)]).unwrap().nodes[0].position_mm.z
+            Flow::in_cones(tree, &FlowSpec::default(), &[injection(None)]).unwrap().nodes[0].position_mm.z
         };
         assert_eq!(first(&tree(9.0, 9.0)), 120.0);
         assert_eq!(first(&tree(9.1, 9.0)), 120.0);
@@ -330,13 +372,13 @@ mod tests {
     fn the_inlet_may_be_any_end() {
         let spec =
             FlowSpec { inlet_mm: Some([150.0, 30.0, 0.0]), split_exponent: 3.0, ..FlowSpec::default() };
-        let flow = Flow::new(&tree(), &spec, &[injection(None)]).unwrap();
+        let flow = Flow::in_cones(&tree(), &spec, &[injection(None)]).unwrap();
         assert_eq!(flow.nodes[0].position_mm, Vec3::new(140.0, 30.0, 0.0));
         let astray = FlowSpec { inlet_mm: Some([150.0, 300.0, 0.0]), ..spec };
-        let refused = Flow::new(&tree(), &astray, &[injection(None)]).unwrap_err().to_string();
+        let refused = Flow::in_cones(&tree(), &astray, &[injection(None)]).unwrap_err().to_string();
         assert!(refused.starts_with("view.flow.inlet_mm = [150, 300, 0]: the nearest end"), "{refused}");
         // At the bifurcation the trunk and the small branch are downstream now.
-        let share = |x: f64, y: f64| flow.nodes[nearest(&flow.nodes, &Vec3::new(x, y, 0.0))].share;
+        let share = |x: f64, y: f64| flow.nodes[flow.nearest(&Vec3::new(x, y, 0.0))].share;
         assert!((share(0.0, 0.0) / share(140.0, -30.0) - 125.0 / 8.0).abs() < 1e-9);
     }
 }

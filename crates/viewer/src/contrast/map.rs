@@ -1,17 +1,18 @@
 //! What of a bolus each pixel sees: its lumen's length, shared out to the nodes of the tree.
 //!
-//! The stretches of a ray inside the wall are cut into short steps, and each step belongs to the node whose ball it is deepest
-//! in (the least |x − c|² − r², so that the trunk keeps what is inside it beside the origin of a small branch) and, by its place along
-//! the centre line, to that node's neighbour on its side: a bolus has no steps. A frame then needs one sparse product of these shares
-//! with the nodes' fractions.
+//! The stretches of a ray inside the wall are cut into short steps, and each step has the shares of its place ([`Mixing`]). A frame then
+//! needs one sparse product of the sums of these shares with the nodes' fractions.
 
 use std::sync::Arc;
 
 use endowire_core::Vec3;
 use endowire_core::vessel::{Displacement, SurfaceMesh};
 
+use rayon::prelude::*;
+
 use super::flow::Flow;
-use super::nearest::{Nearest, STEP_MM};
+use super::mixing::{Mixing, STEP_MM};
+use super::tissue::tissue;
 use crate::c_arm::CArm;
 use crate::cpu::wall_crossings;
 
@@ -25,10 +26,10 @@ pub(crate) struct Medium {
     pub(crate) tissue_mm: f32,
 }
 
-/// Distance of the middle of a tissue behind its vessel's end over its radius.
-const TISSUE_BEHIND: f64 = 0.8;
-/// Squared deviations from that middle beyond which nothing is seen.
-const TISSUE_REACH: f64 = 16.0;
+/// Fewest pixels worth handing to another thread.
+const FEWEST_PIXELS: usize = 256;
+/// Shares of a pixel's lumen below this are given to the others.
+const LEAST_SHARE: f32 = 1e-3;
 
 /// The medium that is seen from one place of the C-arm.
 #[derive(Debug)]
@@ -57,50 +58,20 @@ impl Shares {
         displacement: Option<&Displacement>,
     ) -> Self {
         let material = |x: Vec3| displacement.map_or(x, |displacement| displacement.material(&x));
-        let tissue = tissue(flow, c_arm, displacement);
-        let mut map = Self { pixels: vec![], shares: vec![], tissue };
         let mut crossings = wall_crossings(c_arm, wall);
-        crossings.sort_unstable_by(|a, b| {
+        crossings.par_sort_unstable_by(|a, b| {
             (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
         });
-        let source = c_arm.source_mm();
-        // Others wait for it from here on: no work may be shared out to threads, of which one may be another that waits.
-        let mut near = Nearest::new(flow);
-        let mut own: Vec<(u32, f32)> = Vec::new();
-        for of_pixel in crossings.chunk_by(|a, b| a.0 == b.0) {
-            let pixel = of_pixel[0].0;
-            let width = c_arm.size_px()[0];
-            let centre = [f64::from(pixel % width) + 0.5, f64::from(pixel / width) + 0.5];
-            let (_, direction) = c_arm.ray(centre);
-            own.clear();
-            let mut depth = 0;
-            for pair in of_pixel.windows(2) {
-                depth += if pair[0].2 { 1 } else { -1 };
-                let length = f64::from(pair[1].1 - pair[0].1);
-                if depth <= 0 || length <= 0.0 {
-                    continue;
-                }
-                let steps = (length / STEP_MM).ceil();
-                for k in 0..steps as usize {
-                    let at = f64::from(pair[0].1) + (k as f64 + 0.5) * length / steps;
-                    let shares = near.shares(&material(source + direction * at));
-                    for (node, share) in shares.into_iter().filter(|share| share.1 > 0.0) {
-                        let length = share * (length / steps) as f32;
-                        match own.iter_mut().find(|share| share.0 == node) {
-                            Some(share) => share.1 += length,
-                            None => own.push((node, length)),
-                        }
-                    }
-                }
-            }
-            let total: f32 = own.iter().map(|share| share.1).sum();
-            if total > 0.0 {
-                map.shares.extend(own.iter().map(|&(node, length)| (node, length / total)));
-                map.pixels.push((pixel, map.shares.len() as u32));
-            }
+        let of_pixels: Vec<_> = crossings.chunk_by(|a, b| a.0 == b.0).collect();
+        let shared = of_pixels.par_iter().with_min_len(FEWEST_PIXELS).map_init(Vec::new, |room, of_pixel| {
+            (of_pixel[0].0, of_ray(&flow.mixing, c_arm, of_pixel, material, room))
+        });
+        let mut map = Self { pixels: vec![], shares: vec![], tissue: tissue(flow, c_arm, displacement) };
+        for (pixel, shares) in shared.collect::<Vec<_>>().into_iter().filter(|(_, shares)| !shares.is_empty())
+        {
+            map.shares.extend(shares);
+            map.pixels.push((pixel, map.shares.len() as u32));
         }
-        map.shares.shrink_to_fit();
-        map.pixels.shrink_to_fit();
         map
     }
 
@@ -163,25 +134,41 @@ impl ContrastMap {
     }
 }
 
-/// The pixels that see the tissue behind each end: a Gaussian about a place behind it, of which the radius is two deviations.
-fn tissue(flow: &Flow, c_arm: &CArm, displacement: Option<&Displacement>) -> Vec<(usize, Vec<(u32, f32)>)> {
-    let Some(radius_mm) = flow.tissue_mm else { return vec![] };
-    let variance = (radius_mm / 2.0).powi(2);
-    let [width, height] = c_arm.size_px();
-    let ends = flow.nodes.iter().enumerate().filter(|(_, node)| node.is_end);
-    ends.map(|(end, node)| {
-        let before = node.upstream.map_or(node.position_mm, |up| flow.nodes[up].position_mm);
-        let onwards = (node.position_mm - before).try_normalize(0.0).unwrap_or_default();
-        let middle = node.position_mm + onwards * (TISSUE_BEHIND * radius_mm);
-        let middle = displacement.map_or(middle, |displacement| displacement.place(&middle));
-        let pixels = (0..width * height).filter_map(|pixel| {
-            let centre = [f64::from(pixel % width) + 0.5, f64::from(pixel / width) + 0.5];
-            let (source, direction) = c_arm.ray(centre);
-            let off = (middle - source).cross(&direction).norm_squared() / direction.norm_squared();
-            let length = (-off / (2.0 * variance)).exp() / (std::f64::consts::TAU * variance);
-            (off < TISSUE_REACH * variance).then_some((pixel, length as f32))
-        });
-        (end, pixels.collect())
-    })
-    .collect()
+/// The shares of a ray's length in the lumen; `room` is to work in.
+fn of_ray(
+    mixing: &Mixing,
+    c_arm: &CArm,
+    crossings: &[(u32, f32, bool)],
+    material: impl Fn(Vec3) -> Vec3,
+    room: &mut Vec<(u32, f32)>,
+) -> Vec<(u32, f32)> {
+    let (pixel, width) = (crossings[0].0, c_arm.size_px()[0]);
+    let (source, direction) = c_arm.ray([f64::from(pixel % width) + 0.5, f64::from(pixel / width) + 0.5]);
+    let (mut own, mut all): (Vec<(u32, f32)>, f32) = (vec![], 0.0);
+    let mut depth = 0;
+    for pair in crossings.windows(2) {
+        depth += if pair[0].2 { 1 } else { -1 };
+        let length = f64::from(pair[1].1 - pair[0].1);
+        if depth <= 0 || length <= 0.0 {
+            continue;
+        }
+        all += length as f32;
+        let steps = (length / STEP_MM).ceil();
+        for k in 0..steps as usize {
+            let at = f64::from(pair[0].1) + (k as f64 + 0.5) * length / steps;
+            mixing.shares(&material(source + direction * at), room);
+            for &(node, share) in room.iter() {
+                let length = share * (length / steps) as f32;
+                match own.iter_mut().find(|share| share.0 == node) {
+                    Some(share) => share.1 += length,
+                    None => own.push((node, length)),
+                }
+            }
+        }
+    }
+    let before: f32 = own.iter().map(|share| share.1).sum();
+    own.retain(|share| share.1 > LEAST_SHARE * all);
+    let kept: f32 = own.iter().map(|share| share.1).sum();
+    own.iter_mut().for_each(|share| share.1 *= before / (kept * all));
+    own
 }

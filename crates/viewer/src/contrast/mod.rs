@@ -2,9 +2,11 @@
 
 mod flow;
 mod map;
-mod nearest;
+mod mixing;
 mod tip_way;
+mod tissue;
 mod transport;
+mod volumes;
 
 pub(crate) use flow::Flow;
 pub(crate) use map::{ContrastMap, Medium, Shares};

@@ -17,7 +17,7 @@
 
 use endowire_core::Vec3;
 
-use super::flow::{Flow, nearest};
+use super::flow::Flow;
 use super::tip_way::TipWay;
 use crate::spec::InjectionSpec;
 
@@ -46,8 +46,8 @@ pub(super) struct Transport {
     left_mm3: f64,
     /// Flows through the faces upstream of cells, mm³/s.
     faces: Vec<f64>,
-    /// The cell that each injection goes into.
-    places: Vec<usize>,
+    /// The cells that each injection goes into, with the part of it that each gets.
+    places: Vec<Vec<(usize, f64)>>,
     /// Moments on the way, rising, and the least steps between them.
     marks: Vec<Self>,
     apart: i64,
@@ -67,7 +67,7 @@ impl Transport {
             tissue_mm3: vec![0.0; cells],
             left_mm3: 0.0,
             faces: vec![0.0; cells],
-            places: flow.injections.iter().map(|i| place(flow, i.at_mm.map(Vec3::from))).collect(),
+            places: flow.injections.iter().map(|i| parts(flow, i.at_mm.map(Vec3::from))).collect(),
             marks: vec![],
             apart: 1,
         }
@@ -185,21 +185,31 @@ impl Transport {
             .injections
             .iter()
             .map(|i| {
+                // Of a tip that is not in nothing comes.
+                if i.at_tip && tip.at(start).is_none() {
+                    return 0.0;
+                }
                 let overlap = end.min(i.start_s + i.duration_s) - start.max(i.start_s);
                 1000.0 * i.rate_ml_per_s * overlap.max(0.0) / self.step_s
             })
             .collect();
         for ((place_of, injection), rate) in self.places.iter_mut().zip(&flow.injections).zip(&rates) {
             if injection.at_tip && *rate > 0.0 {
-                *place_of = place(flow, tip.at(start));
+                *place_of = parts(flow, tip.at(start));
             }
         }
         let all = blood + rates.iter().sum::<f64>();
         for (face, node) in self.faces.iter_mut().zip(&flow.nodes) {
             *face = node.share * all;
         }
-        for (&place, rate) in self.places.iter().zip(&rates) {
-            let mut cell = Some(place);
+        let places = self.places.iter().zip(&rates).filter(|(_, rate)| **rate > 0.0);
+        let injected = || {
+            places
+                .clone()
+                .flat_map(|(parts, rate)| parts.iter().map(move |&(cell, part)| (cell, part * rate)))
+        };
+        for (cell, rate) in injected() {
+            let mut cell = Some(cell);
             while let Some(at) = cell {
                 self.faces[at] -= rate;
                 cell = flow.nodes[at].upstream;
@@ -227,7 +237,7 @@ impl Transport {
                 self.left_mm3 += washed;
             }
         }
-        self.places.iter().zip(&rates).for_each(|(&place, rate)| change[place] += rate * self.step_s);
+        injected().for_each(|(cell, rate)| change[cell] += rate * self.step_s);
         for (((now, before), change), node) in
             self.fractions.iter_mut().zip(before).zip(&change).zip(&flow.nodes)
         {
@@ -237,9 +247,15 @@ impl Transport {
     }
 }
 
-/// The cell at a point; the inlet's without one.
-fn place(flow: &Flow, point_mm: Option<Vec3>) -> usize {
-    point_mm.map_or(0, |point| nearest(&flow.nodes, &point))
+/// The cells whose blood is at a point, the inlet's without one, with the parts of an injection there that they get: all of it.
+fn parts(flow: &Flow, point_mm: Option<Vec3>) -> Vec<(usize, f64)> {
+    let mut shares = Vec::new();
+    flow.mixing.shares(&point_mm.unwrap_or(flow.nodes[0].position_mm), &mut shares);
+    let all: f64 = shares.iter().map(|share| f64::from(share.1)).sum();
+    if all <= 0.0 {
+        return vec![(0, 1.0)];
+    }
+    shares.iter().map(|&(cell, share)| (cell as usize, f64::from(share) / all)).collect()
 }
 
 /// The step at which no cell gives more than a part of what it holds, whatever is injected wherever.
@@ -281,7 +297,7 @@ mod tests {
         .unwrap();
         let injection =
             InjectionSpec { start_s: 1.003, duration_s: 0.517, rate_ml_per_s, at_mm, at_tip: false };
-        Flow::new(&tree, spec, &[injection]).unwrap()
+        Flow::in_cones(&tree, spec, &[injection]).unwrap()
     }
 
     fn nowhere() -> TipWay {
@@ -328,7 +344,7 @@ mod tests {
             let mut transport = Transport::new(&flow);
             transport.advance(&flow, 1.5, &nowhere());
             let late = transport.at(1.5);
-            let at = |x: f64, y: f64| late[nearest(&flow.nodes, &Vec3::new(x, y, 0.0))];
+            let at = |x: f64, y: f64| late[flow.nearest(&Vec3::new(x, y, 0.0))];
             // Before its place, in the other branch, at its end, in the trunk.
             [at(118.0, -24.0), at(118.0, 24.0), at(136.0, -48.0), at(80.0, 0.0)]
         };

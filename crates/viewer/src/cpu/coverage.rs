@@ -2,6 +2,9 @@
 //!
 //! The rays of a pixel are the bits of a word. Most pixels near a piece are told by the distance of their centre from the projected
 //! axis: those well inside the silhouette are covered, those well outside are not, and only what is between asks all its rays.
+//!
+//! A wire thinner than a pixel may cover half of none. It is a line there: the pixels that its axis runs through are in its mask too,
+//! so that a wire that is one piece has a mask of one piece.
 
 use std::ops::Range;
 
@@ -24,12 +27,14 @@ pub(crate) struct Coverage {
     words: Vec<u64>,
     /// Pixels with any.
     touched: Vec<u32>,
+    /// Pixels that the axis runs through, some perhaps repeatedly.
+    on_axis: Vec<u32>,
 }
 
 impl Coverage {
     pub(crate) fn new(c_arm: &CArm) -> Self {
         let pixels = c_arm.size_px().map(|n| n as usize).iter().product();
-        Self { words: vec![0; pixels], touched: vec![] }
+        Self { words: vec![0; pixels], touched: vec![], on_axis: vec![] }
     }
 
     /// Adds the rays that meet a piece in beam coordinates.
@@ -37,6 +42,7 @@ impl Coverage {
         let [columns, rows] = pixels_of(c_arm, piece);
         let width = c_arm.size_px()[0] as usize;
         let silhouette = Silhouette::new(c_arm, piece);
+        silhouette.walk(c_arm.size_px(), |pixel| self.on_axis.push(pixel));
         for y in rows {
             for x in columns.clone() {
                 let index = y * width + x;
@@ -66,15 +72,19 @@ impl Coverage {
             }
             *word |= other.words[pixel as usize];
         }
+        self.on_axis.extend(&other.on_axis);
     }
 
-    /// The pixels of which half are covered and that the blades leave half open; nothing is covered afterwards.
+    /// The pixels of which half are covered, or that the axis runs through, and that the blades leave half open; nothing is covered
+    /// afterwards.
     pub(crate) fn take(&mut self, c_arm: &CArm) -> Mask {
-        self.touched.sort_unstable();
         let words = &self.words;
         let half = |pixel: &u32| words[*pixel as usize].count_ones() >= RAYS * RAYS / 2;
         let seen = |pixel: &u32| c_arm.openness(*pixel as usize) >= 0.5;
-        let pixels = self.touched.iter().copied().filter(|pixel| half(pixel) && seen(pixel)).collect();
+        let covered = self.touched.iter().copied().filter(half);
+        let mut pixels: Vec<u32> = covered.chain(self.on_axis.drain(..)).filter(seen).collect();
+        pixels.sort_unstable();
+        pixels.dedup();
         self.touched.drain(..).for_each(|pixel| self.words[pixel as usize] = 0);
         Mask::new(c_arm.size_px(), pixels)
     }
@@ -157,6 +167,31 @@ impl Silhouette {
             inner_px: least * scale(far) * 0.98 - CORNER_PX,
             ends_px: outer_px + CORNER_PX,
             outer_px,
+        }
+    }
+
+    /// Calls `visit` for each pixel that the projected axis runs through, from side to side (Amanatides and Woo, A Fast Voxel Traversal
+    /// Algorithm, Eurographics 1987).
+    fn walk(&self, size_px: [u32; 2], mut visit: impl FnMut(u32)) {
+        let [width, height] = size_px.map(i64::from);
+        let end = [0, 1].map(|k| self.start[k] + self.along[k] * self.length_px);
+        let [mut at, last] = [self.start, end].map(|at| at.map(|x| x.floor() as i64));
+        // Part of the way to the next side in each direction, and from one to the next.
+        let next = |k: usize, at: i64| {
+            let run = end[k] - self.start[k];
+            let side = if run > 0.0 { at + 1 } else { at };
+            if run == 0.0 { f64::INFINITY } else { (side as f64 - self.start[k]) / run }
+        };
+        let steps = (last[0] - at[0]).unsigned_abs() + (last[1] - at[1]).unsigned_abs();
+        // A piece is a few millimetres long: what runs over more pixels passes by the source.
+        for step in 0..=steps.min(size_px.map(u64::from).iter().sum()) {
+            if (0..width).contains(&at[0]) && (0..height).contains(&at[1]) {
+                visit((at[1] * width + at[0]) as u32);
+            }
+            if step < steps {
+                let k = usize::from(next(1, at[1]) < next(0, at[0]));
+                at[k] += if end[k] > self.start[k] { 1 } else { -1 };
+            }
         }
     }
 

@@ -1,11 +1,10 @@
-//! Devices over a detector: which pixels a piece may touch, and its length on each ray.
+//! Devices over a detector: their frusta in the beam, and which pixels one may touch.
 
 use std::ops::Range;
 
 use endowire_core::Vec3;
 
 use crate::c_arm::CArm;
-use crate::cpu::piece::chord;
 use crate::cpu::raster::span;
 use crate::device::{DevicePoint, Layer, RefinedDevice};
 use crate::device::{Piece, pieces};
@@ -57,20 +56,4 @@ pub(crate) fn pixels_of(c_arm: &CArm, piece: &Piece) -> [Range<usize>; 2] {
         }
         span(low, high, size[k])
     })
-}
-
-/// Calls `visit(index, length_mm)` for every pixel whose central ray meets `piece`.
-pub(crate) fn cast(c_arm: &CArm, piece: &Piece, mut visit: impl FnMut(usize, f64)) {
-    let [columns, rows] = pixels_of(c_arm, piece);
-    let width = c_arm.size_px()[0] as usize;
-    for y in rows {
-        for x in columns.clone() {
-            let [sx, sy] = c_arm.slopes([x as f64 + 0.5, y as f64 + 0.5]);
-            let origin = Vec3::new(sx, sy, 0.0) * c_arm.sod_mm();
-            let length = chord(piece, &origin, &Vec3::new(sx, sy, 1.0));
-            if length > 0.0 {
-                visit(y * width + x, length);
-            }
-        }
-    }
 }

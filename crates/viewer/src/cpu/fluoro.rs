@@ -4,9 +4,7 @@ use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 
 use crate::c_arm::CArm;
-use crate::cpu::devices::cast;
 use crate::cpu::wall::wall_path_mm;
-use crate::device::Piece;
 use crate::engine::PathEngine;
 
 /// Casts rays one after the other.
@@ -16,21 +14,5 @@ pub(crate) struct CpuPaths;
 impl PathEngine for CpuPaths {
     fn mesh(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Vec<f32>> {
         Ok(wall_path_mm(view, mesh))
-    }
-
-    fn pieces(
-        &mut self,
-        view: &CArm,
-        pieces: &[(Piece, f64)],
-        lengths: &mut [f32],
-        touched: &mut Vec<u32>,
-    ) -> Result<()> {
-        for (piece, sign) in pieces {
-            cast(view, piece, |ray, length| {
-                lengths[ray] += (sign * length) as f32;
-                touched.push(ray as u32);
-            });
-        }
-        Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! Frames without any adapter: the exact fluoroscopic reference and a software rasteriser for the 3D view.
 
+mod cells;
 mod coverage;
 mod devices;
 mod fluoro;
@@ -9,12 +10,12 @@ mod raster;
 mod view3d;
 mod wall;
 
+pub(crate) use cells::{CELLS, DeviceCells, quarter};
 pub(crate) use coverage::Coverage;
 pub(crate) use devices::layers_in_beam;
-#[cfg(feature = "gpu")]
-pub(crate) use devices::pixels_of;
 pub(crate) use fluoro::CpuPaths;
 pub(crate) use lumen::covered_by_half;
+pub(crate) use raster::ScreenTriangle;
 pub(crate) use wall::{check_closed, check_drawable, wall_crossings};
 
 use endowire_core::vessel::SurfaceMesh;

@@ -66,7 +66,7 @@ pub struct DevicePart {
     /// Outer radius, 0.000001 to 1000; absent: that of the device.
     #[serde(default)]
     pub outer_radius_mm: Option<f64>,
-    /// Radius of the bore, 0 to 1000 and less than the outer radius; 0 is solid.
+    /// Radius of the bore, 0 to 1000 and less than the outer radius, also where that is the device's; 0 is solid.
     #[serde(default)]
     pub inner_radius_mm: f64,
 }
@@ -177,8 +177,10 @@ fn hermite(pair: &[DevicePoint], d: [Vec3; 2], w: f64) -> DevicePoint {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Layer {
     pub(crate) material: Option<Material>,
-    /// Stretch of the part that it is, from the tip in mm, if that says one; `None` of a device without parts.
-    pub(crate) part: Option<Option<[f64; 2]>>,
+    /// Number of the part that it is; `None` of a device without parts.
+    pub(crate) part: Option<usize>,
+    /// Stretch of that part, from the tip in mm, if it says one.
+    pub(crate) from_tip_mm: Option<[f64; 2]>,
     /// Pieces between consecutive points.
     pieces: Range<usize>,
     outer_radius_mm: Option<f64>,
@@ -217,6 +219,7 @@ impl RefinedDevice {
             let layer = Layer {
                 material: device.material,
                 part: None,
+                from_tip_mm: None,
                 pieces,
                 outer_radius_mm: None,
                 inner_radius_mm: 0.0,
@@ -256,9 +259,15 @@ impl RefinedDevice {
             let first = from_tip.partition_point(|&s| s > far + SAME_PLACE_MM);
             let last = from_tip.partition_point(|&s| s >= near - SAME_PLACE_MM).saturating_sub(1);
             if first < last {
+                let radii = points[first..=last].iter().map(|point| point.radius_mm);
+                let outer = part.outer_radius_mm.unwrap_or(radii.fold(f64::INFINITY, f64::min));
+                if part.inner_radius_mm >= outer {
+                    return Err(bore_too_wide(&format!("device.parts[{i}]"), part.inner_radius_mm, outer));
+                }
                 layers.push(Layer {
                     material: part.material.or(device.material),
-                    part: Some(part.from_tip_mm),
+                    part: Some(i),
+                    from_tip_mm: part.from_tip_mm,
                     pieces: first..last,
                     outer_radius_mm: part.outer_radius_mm,
                     inner_radius_mm: part.inner_radius_mm,
@@ -269,7 +278,21 @@ impl RefinedDevice {
     }
 }
 
+/// A part that would leave nothing of its device.
+pub(crate) fn bore_too_wide(name: &str, bore_mm: f64, outer_mm: f64) -> Error {
+    let mend = format!(
+        "the device is {outer_mm} mm thick there, and nothing is left of it: give a narrower bore, or leave out parts that were written for \
+         another device"
+    );
+    Error::parameter(format!("{name}.inner_radius_mm"), bore_mm, mend)
+}
+
 impl RefinedDevice {
+    /// Whether medium can come through it.
+    pub(crate) fn has_bore(&self) -> bool {
+        self.layers.iter().any(|layer| layer.inner_radius_mm > 0.0)
+    }
+
     /// Material and outer radius that are seen on a piece: those of the last part there.
     pub(crate) fn looks(&self, piece: usize) -> (Option<Material>, Option<f64>) {
         let layer = self.layers.iter().rev().find(|layer| layer.pieces.contains(&piece));
@@ -284,10 +307,7 @@ impl Layer {
         for piece in &pieces[self.pieces.clone()] {
             signed.push((self.outer_radius_mm.map_or(*piece, |radius| piece.with_radius(radius)), 1.0));
             if self.inner_radius_mm > 0.0 {
-                // A bore as wide as the device or wider leaves nothing.
-                let most = piece.radius.min(piece.radius + piece.slope * (piece.end - piece.start).norm());
-                let bore = self.inner_radius_mm.min(self.outer_radius_mm.unwrap_or(most));
-                signed.push((piece.with_radius(bore), -1.0));
+                signed.push((piece.with_radius(self.inner_radius_mm), -1.0));
             }
         }
         signed
@@ -384,6 +404,7 @@ mod tests {
             (DevicePart { from_tip_mm: Some([3.0, 2.0]), ..band }, "from_tip_mm"),
             (DevicePart { inner_radius_mm: 1.0, ..band }, "inner_radius_mm"),
             (DevicePart { outer_radius_mm: Some(f64::NAN), ..band }, "outer_radius_mm"),
+            (DevicePart { outer_radius_mm: None, ..band }, "inner_radius_mm"),
         ] {
             device.parts = vec![part];
             let error = RefinedDevice::all(std::slice::from_ref(&device)).unwrap_err().to_string();

@@ -84,9 +84,9 @@ impl Anatomy {
         Ok(moved)
     }
 
-    /// Number of rays.
-    pub(crate) fn rays(&self) -> usize {
-        self.lumen.len()
+    /// Whether a ray meets the body at all.
+    pub(crate) fn is_body(&self, ray: usize) -> bool {
+        self.body[ray] > 0.0
     }
 
     /// Lengths in tissue, bone, lung and lumen.

@@ -16,7 +16,7 @@ const WINDOW_BELOW: f32 = 0.12;
 const WINDOW_ABOVE: f32 = 0.4;
 /// Shares of the pixels that may be brighter or darker than the anatomy's range.
 const OUTLIERS: f64 = 0.01;
-/// The window is fitted to this part of the frame's width and height, around its middle: beyond the skin all may be white.
+/// The window is fitted to this part of the frame's width and height, around its middle.
 const FITTED: f64 = 0.8;
 /// Signals below this are told apart no more.
 const DARKEST: f32 = 1e-6;
@@ -34,14 +34,15 @@ pub(super) fn logarithm(mut signal: Vec<f32>) -> Vec<f32> {
     signal
 }
 
-/// The window that shows the middle of an anatomy.
-pub(super) fn fitted(values: &[f32], size: [u32; 2]) -> Window {
+/// The window that shows the middle of an anatomy where it is `shown`: blades that close on a part of it widen its contrast.
+pub(super) fn fitted(values: &[f32], shown: &[bool], size: [u32; 2]) -> Window {
     let width = size[0] as usize;
     let middle = |i: usize| {
         let off = |at: usize, n: u32| ((at as f64 + 0.5) / f64::from(n) - 0.5).abs();
         off(i % width, size[0]) <= FITTED / 2.0 && off(i / width, size[1]) <= FITTED / 2.0
     };
-    let mut sorted: Vec<f32> = (0..values.len()).filter(|&i| middle(i)).map(|i| values[i]).collect();
+    let mut sorted: Vec<f32> =
+        (0..values.len()).filter(|&i| shown[i] && middle(i)).map(|i| values[i]).collect();
     if sorted.is_empty() {
         return [0.0, 1.0];
     }

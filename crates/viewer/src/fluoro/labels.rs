@@ -67,9 +67,9 @@ fn device_label(
             pieces.iter().filter(|(_, sign)| *sign > 0.0).for_each(|(piece, _)| one.add(c_arm, piece));
             whole.join(one);
             let covered = one.take(c_arm);
-            if let Some(from_tip_mm) = layer.part {
-                let material = layer.material.unwrap_or(material);
-                parts.push(PartLabel { material, from_tip_mm, mask: covered });
+            if let Some(number) = layer.part {
+                let (material, from_tip_mm) = (layer.material.unwrap_or(material), layer.from_tip_mm);
+                parts.push(PartLabel { number, material, from_tip_mm, mask: covered });
             }
         }
         mask = whole.take(c_arm);

@@ -11,7 +11,8 @@
 //! reaches out of the body, and a phantom in air (B = 0). Devices are taken to lie inside the lumen: a part outside the wall
 //! displaces lumen filling all the same.
 //!
-//! Pixels collect energy over their area, so signals, not line integrals, are averaged over [`SUBRAYS`]² rays a pixel.
+//! Pixels collect energy over their area, so signals, not line integrals, are averaged over [`SUBRAYS`]² rays a pixel, and over many more
+//! where there are devices ([`DeviceCells`]).
 
 mod anatomy;
 mod display;
@@ -28,13 +29,14 @@ use rayon::prelude::*;
 
 pub(crate) use anatomy::Anatomy;
 pub(crate) use labels::labels;
+use rays::Room;
 use scatter::Scatter;
 pub use sequence::FrameTime;
 pub(crate) use sequence::{Afterglow, Sequence};
 
 use crate::c_arm::CArm;
 use crate::contrast::{ContrastMap, Medium, Shares};
-use crate::cpu::{covered_by_half, layers_in_beam};
+use crate::cpu::{DeviceCells, covered_by_half, layers_in_beam};
 use crate::device::RefinedDevice;
 use crate::engine::PathEngine;
 use crate::material::Material;
@@ -74,16 +76,12 @@ pub(crate) struct Signal {
 pub(crate) struct Still {
     pub(crate) signal: Signal,
     scatter: Scatter,
-    /// Whether it is what the blades leave; else they are wide open.
-    between_blades: bool,
 }
 
 /// Everything about a fluoroscopic view that stays from frame to frame, and the buffers of the next.
 #[derive(Debug)]
 pub(crate) struct Fluoroscope {
     pub(crate) c_arm: CArm,
-    /// The same view with one pixel a ray.
-    rays: CArm,
     pub(crate) exposure: Exposure,
     pub(crate) beam: Beam,
     anatomy: Arc<Anatomy>,
@@ -96,16 +94,12 @@ pub(crate) struct Fluoroscope {
     /// Material of devices that name none.
     default_material: Material,
     pub(crate) still: Still,
-    /// The same with the blades wide open, where there are any.
-    unblocked: Option<Still>,
     /// Pixels that show the vessel, once they were asked for.
     vessel: Option<Mask>,
-    /// Lengths inside devices by material, all zero between frames.
-    devices: Vec<(Material, Lanes, Vec<f32>)>,
-    /// Rays and pixels that devices touch in this frame.
-    touched: Vec<u32>,
-    pixels: Vec<u32>,
-    listed: Vec<bool>,
+    /// Lengths inside devices, none between frames.
+    devices: DeviceCells,
+    /// Attenuation of their materials in the order of those, and its mean.
+    device_lanes: Vec<(Material, Lanes, f32)>,
 }
 
 /// What another view of the same vessel and body needs too where it has the same rays: blades, modes, doses and injections do not change it.
@@ -164,7 +158,6 @@ impl Fluoroscope {
         let scatter = Scatter::new(&dark, c_arm, spec.detector.scatter_fraction);
         let mut fluoroscope = Self {
             c_arm: c_arm.clone(),
-            rays,
             exposure,
             beam,
             anatomy,
@@ -173,13 +166,10 @@ impl Fluoroscope {
             fraction: spec.xray.contrast_fraction as f32,
             contrast,
             default_material: spec.xray.device_material,
-            still: Still { signal: dark, scatter, between_blades: true },
-            unblocked: None,
+            still: Still { signal: dark, scatter },
             vessel: None,
-            devices: vec![],
-            touched: vec![],
-            pixels: vec![],
-            listed: vec![false; pixels],
+            devices: DeviceCells::new(c_arm),
+            device_lanes: vec![],
         };
         fluoroscope.look(spec);
         Ok(fluoroscope)
@@ -187,24 +177,33 @@ impl Fluoroscope {
 
     /// Computes the signals of what stays from its lengths.
     fn look(&mut self, spec: &ViewSpec) {
-        let whole = (0..self.listed.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
-        let whole = whole.map_init(Lanes::new, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room));
+        let whole = (0..self.pixels()).into_par_iter().with_min_len(FEWEST_PIXELS);
+        let whole =
+            whole.map_init(Room::default, |room, pixel| self.primary(pixel, [self.fraction, 0.0], room));
         let whole: Vec<[f32; 2]> = whole.collect();
-        let behind = |between_blades: bool| {
-            let open = |pixel: usize| self.openness(pixel, between_blades);
-            let of = |i: usize| whole.iter().enumerate().map(|(pixel, v)| v[i] * open(pixel)).collect();
-            let mut signal = Signal { signal: of(0), energy: of(1) };
-            let scatter = Scatter::new(&signal, &self.c_arm, spec.detector.scatter_fraction);
-            scatter.add_still(&mut signal);
-            Still { signal, scatter, between_blades }
+        let of = |i: usize| {
+            whole.iter().enumerate().map(|(pixel, v)| v[i] * self.c_arm.openness(pixel) as f32).collect()
         };
-        let unblocked = self.c_arm.opening_px().map(|_| behind(false));
-        (self.still, self.unblocked) = (behind(true), unblocked);
+        let mut signal = Signal { signal: of(0), energy: of(1) };
+        let scatter = Scatter::new(&signal, &self.c_arm, spec.detector.scatter_fraction);
+        scatter.add_still(&mut signal);
+        self.still = Still { signal, scatter };
     }
 
-    /// Share of a pixel that is open, to the blades' edges or where they are wide open.
-    fn openness(&self, pixel: usize, between_blades: bool) -> f32 {
-        if between_blades { self.c_arm.openness(pixel) as f32 } else { 1.0 }
+    /// Whether a pixel shows the body, between the blades.
+    pub(crate) fn shows_body(&self) -> Vec<bool> {
+        let any = |pixel: usize| {
+            let (first, stride) = self.first_ray(pixel);
+            [first, first + 1, first + stride, first + stride + 1]
+                .iter()
+                .any(|&ray| self.anatomy.is_body(ray))
+        };
+        (0..self.pixels()).map(|pixel| self.c_arm.openness(pixel) >= 0.5 && any(pixel)).collect()
+    }
+
+    /// Number of pixels.
+    fn pixels(&self) -> usize {
+        self.c_arm.size_px().map(|n| n as usize).iter().product()
     }
 
     /// Goes on with the vessel where it has moved to. Exposure, which a control would hold meanwhile, stays as it is.
@@ -225,18 +224,14 @@ impl Fluoroscope {
         Kept { rays: self.c_arm.fingerprint(), anatomy: self.anatomy, shares }
     }
 
-    /// What comes through the anatomy with the blades wide open: what the display adapts to, so that nothing open changes where they
-    /// close.
-    pub(crate) fn unblocked(&self) -> &Still {
-        self.unblocked.as_ref().unwrap_or(&self.still)
-    }
-
-    /// Pixels of which half or more is of the `filled` vessel, under no blade.
-    pub(crate) fn vessel(&mut self, filled: &SurfaceMesh) -> Mask {
+    /// Pixels of which half or more is of the vessel that `wall` closes, under no blade. What is filled may go on where its surface ends:
+    /// then lengths in it tell only where to look.
+    pub(crate) fn vessel(&mut self, wall: &SurfaceMesh, filled: &SurfaceMesh) -> Mask {
         if let Some(known) = &self.vessel {
             return known.clone();
         }
         let size_px = self.c_arm.size_px();
+        let beyond = self.beyond(wall, filled);
         let (mut inside, mut edge) = (vec![], vec![]);
         for pixel in 0..size_px[0] * size_px[1] {
             let (first, stride) = self.first_ray(pixel as usize);
@@ -244,33 +239,48 @@ impl Fluoroscope {
                 .flat_map(|row| first + row * stride..first + row * stride + SUBRAYS as usize);
             match rays.filter(|&ray| self.anatomy.lumen[ray] > LEAST_LUMEN_MM).count() {
                 0 => {}
-                RAYS => inside.push(pixel),
+                RAYS if !beyond[pixel as usize] => inside.push(pixel),
                 _ => edge.push(pixel),
             }
         }
-        inside.extend(covered_by_half(&self.c_arm, filled, &edge));
+        inside.extend(covered_by_half(&self.c_arm, wall, &edge));
         inside.retain(|&pixel| self.c_arm.openness(pixel as usize) >= 0.5);
         inside.sort_unstable();
         self.vessel.insert(Mask::new(size_px, inside)).clone()
     }
 
+    /// Pixels near what is filled beyond the wall: triangles that the two do not have in common.
+    fn beyond(&self, wall: &SurfaceMesh, filled: &SurfaceMesh) -> Vec<bool> {
+        let mut near = vec![false; self.pixels()];
+        let [width, height] = self.c_arm.size_px();
+        let pairs = wall.triangles.iter().zip(&filled.triangles);
+        let common = pairs.take_while(|(a, b)| a == b).count();
+        for triangle in common..filled.triangles.len() {
+            let corners = filled.corners(triangle).map(|corner| self.c_arm.project(&corner));
+            let range = |k: usize, side: u32| {
+                let [low, high] =
+                    [f64::min, f64::max].map(|of| corners.iter().map(|c| c[k]).fold(corners[0][k], of));
+                low.clamp(0.0, f64::from(side)) as usize..(high.clamp(0.0, f64::from(side)).ceil() as usize)
+            };
+            let columns = range(0, width);
+            range(1, height).for_each(|y| near[y * width as usize..][columns.clone()].fill(true));
+        }
+        near
+    }
+
     /// Signal with devices, the mean over the instants of a pulse, and the contrast medium of a time; without a time, before any injection.
-    pub(crate) fn signal(
-        &mut self,
-        engine: &mut dyn PathEngine,
-        pulse: &[Vec<RefinedDevice>],
-        time_s: Option<f64>,
-    ) -> Result<Signal> {
-        let tip = pulse.last().and_then(|devices| devices.first()).and_then(|device| device.points.last());
+    pub(crate) fn signal(&mut self, pulse: &[Vec<RefinedDevice>], time_s: Option<f64>) -> Result<Signal> {
         let mut medium = match (&mut self.contrast, time_s) {
-            (Some(contrast), Some(time)) => contrast.at(time, tip.map(|point| point.position_mm)),
+            (Some(contrast), Some(time)) => {
+                contrast.at(time, pulse.last().and_then(|devices| injecting_tip_mm(devices)))
+            }
             _ => vec![],
         };
         medium.retain(|m| m.fraction > LEAST_FRACTION || m.tissue_mm > LEAST_MEDIUM_MM);
-        let Some((first, others)) = pulse.split_first() else { return self.instant(engine, &[], &medium) };
-        let mut sum = self.instant(engine, first, &medium)?;
+        let Some((first, others)) = pulse.split_first() else { return self.instant(&[], &medium) };
+        let mut sum = self.instant(first, &medium)?;
         for devices in others {
-            let more = self.instant(engine, devices, &medium)?;
+            let more = self.instant(devices, &medium)?;
             sum.signal.iter_mut().zip(more.signal).for_each(|(sum, v)| *sum += v);
             sum.energy.iter_mut().zip(more.energy).for_each(|(sum, v)| *sum += v);
         }
@@ -282,49 +292,53 @@ impl Fluoroscope {
     }
 
     /// Signal with devices where they are at one instant.
-    fn instant(
-        &mut self,
-        engine: &mut dyn PathEngine,
-        devices: &[RefinedDevice],
-        medium: &[Medium],
-    ) -> Result<Signal> {
-        let cast = self.cast(engine, devices);
-        self.pixels.sort_unstable();
-        let now = cast.map(|()| self.draw(&self.still, &self.pixels, medium));
-        for (_, _, lengths) in &mut self.devices {
-            self.touched.iter().for_each(|&ray| lengths[ray as usize] = 0.0);
-        }
-        self.pixels.iter().for_each(|&pixel| self.listed[pixel as usize] = false);
-        self.touched.clear();
-        self.pixels.clear();
-        now
+    fn instant(&mut self, devices: &[RefinedDevice], medium: &[Medium]) -> Result<Signal> {
+        self.cast(devices)?;
+        let mut pixels = self.devices.pixels().to_vec();
+        pixels.sort_unstable();
+        let now = self.draw(&self.still, &pixels, medium);
+        self.devices.clear();
+        Ok(now)
     }
 
-    /// Adds up the lengths inside devices, and lists the pixels that they touch.
-    fn cast(&mut self, engine: &mut dyn PathEngine, devices: &[RefinedDevice]) -> Result<()> {
+    /// Takes the lengths inside devices.
+    fn cast(&mut self, devices: &[RefinedDevice]) -> Result<()> {
+        self.devices.clear();
         for device in devices {
-            for (layer, pieces) in layers_in_beam(&self.rays, device) {
-                let material = layer.material.unwrap_or(self.default_material);
-                let place = match self.devices.iter().position(|d| d.0 == material) {
-                    Some(place) => place,
-                    None => {
-                        let rays = self.anatomy.rays();
-                        self.devices.push((material, self.beam.excess(material, None)?, vec![0.0; rays]));
-                        self.devices.len() - 1
-                    }
-                };
-                engine.pieces(&self.rays, &pieces, &mut self.devices[place].2, &mut self.touched)?;
+            for (layer, pieces) in layers_in_beam(&self.c_arm, device) {
+                self.devices.add(layer.material.unwrap_or(self.default_material), &pieces);
             }
         }
-        let width = self.c_arm.size_px()[0];
-        let row = width * SUBRAYS;
-        for &ray in &self.touched {
-            let pixel = ray / row / SUBRAYS * width + ray % row / SUBRAYS;
-            if !std::mem::replace(&mut self.listed[pixel as usize], true) {
-                self.pixels.push(pixel);
-            }
+        for (material, _) in &self.devices.maps()[self.device_lanes.len()..] {
+            let lanes = self.beam.excess(*material, None)?;
+            let mean = self.beam.mean(&lanes);
+            self.device_lanes.push((*material, lanes, mean));
         }
         Ok(())
+    }
+
+    /// Mean lengths of pixels inside devices, by material.
+    pub(crate) fn inside_devices(&mut self, devices: &[RefinedDevice]) -> Result<Vec<(Material, Vec<f32>)>> {
+        self.cast(devices)?;
+        let means = self.devices.means();
+        self.devices.clear();
+        Ok(means)
+    }
+
+    /// What every pixel has of the open beam behind devices and medium: the picture's own signal, unscattered and with the blades open.
+    pub(crate) fn transmitted(&mut self, devices: &[RefinedDevice], medium: &[Medium]) -> Result<Vec<f32>> {
+        self.cast(devices)?;
+        let mut of_pixel = vec![[self.fraction, 0.0]; self.pixels()];
+        for m in medium {
+            of_pixel[m.pixel as usize] = [(self.fraction + m.fraction).min(1.0), m.tissue_mm];
+        }
+        let open = self.beam.ln_reference().exp() as f32;
+        let pixels = of_pixel.into_par_iter().enumerate().with_min_len(FEWEST_PIXELS);
+        let left = pixels
+            .map_init(Room::default, |room, (pixel, medium)| self.primary(pixel, medium, room)[0] * open);
+        let left = left.collect();
+        self.devices.clear();
+        Ok(left)
     }
 
     /// The medium injected by then, pixels rising.
@@ -381,9 +395,9 @@ impl Fluoroscope {
         let mut lost = Vec::with_capacity(medium.len());
         let anew = merged(pixels, medium);
         let drawn =
-            anew.par_iter().with_min_len(FEWEST_PIXELS).map_init(Lanes::new, |room, (pixel, more)| {
+            anew.par_iter().with_min_len(FEWEST_PIXELS).map_init(Room::default, |room, (pixel, more)| {
                 let pixel = *pixel as usize;
-                match self.openness(pixel, still.between_blades) {
+                match self.c_arm.openness(pixel) as f32 {
                     0.0 => [0.0; 2],
                     open => {
                         let [more, tissue_mm] = more.map_or([0.0; 2], |m| [m.fraction, m.tissue_mm]);
@@ -408,6 +422,11 @@ impl Fluoroscope {
         }
         now
     }
+}
+
+/// Tip of the innermost device with a bore: where medium comes out.
+pub(crate) fn injecting_tip_mm(devices: &[RefinedDevice]) -> Option<Vec3> {
+    devices.iter().find(|device| device.has_bore())?.points.last().map(|tip| tip.position_mm)
 }
 
 /// Pixels of both lists, each rising, with what the second says of them.

@@ -1,10 +1,31 @@
-//! From the rays of a pixel to its unscattered quanta.
+//! From the rays of a pixel, and the cells that devices cut it into, to its unscattered quanta.
 
 use super::{Fluoroscope, RAYS, SUBRAYS};
+use crate::cpu::{CELLS, quarter};
 use crate::xray::{LANES, Lanes};
 
 /// Line integrals of a pixel's rays that differ by less are averaged before the spectrum.
 const ALIKE: f32 = 3e-2;
+/// The same of cells: half of them are within an eighth, so what the variance leaves is below 10⁻⁴.
+const ALIKE_CELLS: f32 = 0.25;
+
+/// What to work in.
+#[derive(Debug, Default)]
+pub(super) struct Room {
+    lanes: Lanes,
+    alike: Vec<Alike>,
+}
+
+/// Cells of a pixel whose line integrals inside devices are alike.
+#[derive(Debug, Default)]
+struct Alike {
+    step: i32,
+    count: f32,
+    /// Sums of line integrals and their squares.
+    integrals: [f32; 2],
+    /// Sums of lengths, by material.
+    lengths: Vec<f32>,
+}
 
 impl Fluoroscope {
     /// First ray of a pixel, and rays a row.
@@ -14,57 +35,111 @@ impl Fluoroscope {
     }
 
     /// Signal and energy of the unscattered quanta of a pixel without blades, with a fraction of contrast medium in its lumen and a
-    /// length of it in tissue; `room` is to work in.
-    pub(super) fn primary(&self, pixel: usize, medium: [f32; 2], room: &mut Lanes) -> [f32; 2] {
+    /// length of it in tissue.
+    pub(super) fn primary(&self, pixel: usize, medium: [f32; 2], room: &mut Room) -> [f32; 2] {
         let (first, stride) = self.first_ray(pixel);
         let rays: [usize; RAYS] =
             std::array::from_fn(|k| first + k / SUBRAYS as usize * stride + k % SUBRAYS as usize);
         let mut layers = [[0.0; 5]; RAYS];
         // A loop is inlined where a map of the array is not, which is a tenth of the time of a picture.
         layers.iter_mut().zip(rays).for_each(|(layers, ray)| *layers = self.layers(ray, medium));
-        let moves = self.devices.iter().any(|device| rays.iter().any(|&ray| device.2[ray] != 0.0));
-        match self.alike(&layers).filter(|_| !moves) {
-            Some((mean, more)) => {
-                let [signal, energy] = self.behind(mean, None, room);
-                [more * signal.iter().sum::<f32>(), more * energy.iter().sum::<f32>()]
+        match (self.alike(&layers), self.devices.place(pixel)) {
+            (Some((mean, more)), None) => self.behind(mean, &[], &mut room.lanes).map(|v| more * v),
+            (None, None) => self.of_rays(&layers, &mut room.lanes),
+            (Some((mean, more)), Some(place)) => {
+                self.of_cells((place, 0..CELLS), mean, medium[0], room).map(|v| more * v)
             }
-            None => self.of_rays(rays, &layers, room),
+            (None, Some(place)) => {
+                let mut sum = [0.0; 2];
+                for (ray, layers) in layers.into_iter().enumerate() {
+                    let cells = (0..CELLS).filter(move |&cell| quarter(cell) == ray);
+                    let behind = self.of_cells((place, cells), layers, medium[0], room);
+                    (0..2).for_each(|i| sum[i] += behind[i] / RAYS as f32);
+                }
+                sum
+            }
         }
     }
 
     /// The mean over rays.
-    pub(super) fn of_rays(
-        &self,
-        rays: [usize; RAYS],
-        layers: &[[f32; 5]; RAYS],
-        room: &mut Lanes,
-    ) -> [f32; 2] {
+    pub(super) fn of_rays(&self, layers: &[[f32; 5]; RAYS], room: &mut Lanes) -> [f32; 2] {
         let mut sum = [0.0; 2];
-        for (ray, lengths) in rays.into_iter().zip(layers) {
-            let behind = self.behind(*lengths, Some(ray), room);
-            (0..2).for_each(|i| sum[i] += behind[i].iter().sum::<f32>());
+        for lengths in layers {
+            let behind = self.behind(*lengths, &[], room);
+            (0..2).for_each(|i| sum[i] += behind[i]);
         }
         sum.map(|sum| sum / RAYS as f32)
     }
 
-    /// Signal and energy, by lanes, behind lengths in what stays and what devices have on a ray.
-    #[inline]
-    fn behind(&self, lengths: [f32; 5], ray: Option<usize>, room: &mut Lanes) -> [[f32; LANES]; 2] {
-        let mut sum = [[0.0; LANES]; 2];
-        let still = self.lanes.iter().zip(lengths);
-        let devices = ray.into_iter().flat_map(|ray| self.devices.iter().map(move |d| (&d.1, d.2[ray])));
-        self.beam.add(still.chain(devices).filter(|layer| layer.1 != 0.0), room, &mut sum);
-        sum
+    /// The mean over some cells at a place, of which the rays are the same but for devices: cells that are alike are one.
+    fn of_cells(
+        &self,
+        (place, cells): (usize, impl Iterator<Item = usize>),
+        layers: [f32; 5],
+        fraction: f32,
+        room: &mut Room,
+    ) -> [f32; 2] {
+        let maps = self.devices.maps();
+        // What a device takes the place of.
+        let filling = self.mu[3] + fraction * self.mu[4];
+        let mut used = 0;
+        for cell in cells {
+            let lengths = || maps.iter().map(|map| map.1[place][cell]);
+            let p: f32 =
+                lengths().zip(&self.device_lanes).map(|(length, of)| (of.2 - filling) * length).sum();
+            let step = (p / ALIKE_CELLS).ceil() as i32;
+            let group = match room.alike[..used].iter().position(|group| group.step == step) {
+                Some(known) => &mut room.alike[known],
+                None => {
+                    if used == room.alike.len() {
+                        room.alike.push(Alike::default());
+                    }
+                    used += 1;
+                    let group = &mut room.alike[used - 1];
+                    (group.step, group.count, group.integrals) = (step, 0.0, [0.0; 2]);
+                    group.lengths.clear();
+                    group.lengths.resize(maps.len(), 0.0);
+                    group
+                }
+            };
+            group.count += 1.0;
+            group.integrals[0] += p;
+            group.integrals[1] += p * p;
+            group.lengths.iter_mut().zip(lengths()).for_each(|(sum, length)| *sum += length);
+        }
+        let (mut sum, mut count) = ([0.0; 2], 0.0);
+        for group in &mut room.alike[..used] {
+            let each = 1.0 / group.count;
+            group.lengths.iter_mut().for_each(|length| *length *= each);
+            let inside: f32 = group.lengths.iter().sum();
+            let mut layers = layers;
+            layers[3] -= inside;
+            layers[4] -= fraction * inside;
+            let mean = each * group.integrals[0];
+            let variance = (each * group.integrals[1] - mean * mean).max(0.0);
+            let weight = group.count * (1.0 + 0.5 * variance);
+            let behind = self.behind(layers, &group.lengths, &mut room.lanes);
+            (0..2).for_each(|i| sum[i] += weight * behind[i]);
+            count += group.count;
+        }
+        sum.map(|sum| sum / count)
     }
 
-    /// Lengths of a ray in what stays, as [`Beam::add`] wants them.
+    /// Signal and energy behind lengths in what stays and in the materials of devices.
+    #[inline]
+    fn behind(&self, lengths: [f32; 5], of_devices: &[f32], room: &mut Lanes) -> [f32; 2] {
+        let mut sum = [[0.0; LANES]; 2];
+        let still = self.lanes.iter().zip(lengths);
+        let devices = self.device_lanes.iter().map(|of| &of.1).zip(of_devices.iter().copied());
+        self.beam.add(still.chain(devices).filter(|layer| layer.1 != 0.0), room, &mut sum);
+        sum.map(|sum| sum.iter().sum::<f32>())
+    }
+
+    /// Lengths of a ray in what stays, as [`Beam::add`](crate::xray::Beam::add) wants them, as if there were no devices.
     #[inline]
     pub(super) fn layers(&self, ray: usize, [fraction, tissue_mm]: [f32; 2]) -> [f32; 5] {
         let [tissue, bone, lung, lumen] = self.anatomy.at(ray);
-        let devices: f32 = self.devices.iter().map(|(_, _, lengths)| lengths[ray]).sum();
-        // What devices leave of the lumen's filling.
-        let filling = lumen - devices;
-        [tissue - self.beam.reference_mm(), bone, lung, filling, filling * fraction + tissue_mm]
+        [tissue - self.beam.reference_mm(), bone, lung, lumen, lumen * fraction + tissue_mm]
     }
 
     /// Where the rays of a pixel differ by little: their mean lengths, and what the mean of their signals is over the signal of these,

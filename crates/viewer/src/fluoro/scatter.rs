@@ -73,11 +73,17 @@ fn add(scattered: &[[f32; 2]], to: &mut Signal) {
     }
 }
 
-/// The coarse part of logarithmic values.
-pub(super) fn shading(values: &[f32], c_arm: &CArm) -> Vec<f32> {
+/// The coarse part of logarithmic values where the body is `shown`, of those values alone. Elsewhere, in air and behind blades, it is the
+/// most of what it is there: what is before no body is then as bright as the brightest of it, and no skin is brighter than air.
+pub(super) fn shading(values: &[f32], shown: &[bool], c_arm: &CArm) -> Vec<f32> {
     let cells = Cells::new(c_arm, SHADING_MM);
-    let coarse = cells.blurred(&cells.gathered(values.iter().map(|v| [*v]).enumerate()));
-    cells.spread_out(&coarse).into_iter().map(|[v]| v).collect()
+    let weighted = values.iter().zip(shown).map(|(v, shown)| if *shown { [*v, 1.0] } else { [0.0; 2] });
+    let coarse = cells.spread_out(&cells.blurred(&cells.gathered(weighted.enumerate())));
+    let mean = |(of, shown): (&[f32; 2], &bool)| shown.then(|| of[0] / of[1].max(f32::MIN_POSITIVE));
+    let means: Vec<Option<f32>> = coarse.iter().zip(shown).map(mean).collect();
+    let most = means.iter().flatten().copied().fold(f32::NEG_INFINITY, f32::max);
+    let most = if most.is_finite() { most } else { 0.0 };
+    means.into_iter().map(|mean| mean.unwrap_or(most)).collect()
 }
 
 /// A picture in cells, a quarter of a deviation wide each.

@@ -6,7 +6,6 @@ use super::display::{Window, fitted, logarithm, picture};
 use super::scatter::shading;
 use super::{Fluoroscope, Signal};
 use crate::device::RefinedDevice;
-use crate::engine::PathEngine;
 use crate::output::Image;
 use crate::spec::{Mode, ViewSpec};
 use crate::xray::Detector;
@@ -46,7 +45,7 @@ pub(crate) struct Sequence {
     /// Absorbed energy of a pixel at a signal of one, keV.
     kev: f64,
     window: Window,
-    /// Pixels that are black whatever is read: those behind blades in differences, which are of noise alone there.
+    /// Pixels that are black whatever is read: those behind blades, where there is scatter and noise alone.
     shutter: Vec<u32>,
     bits: u32,
     noisy: bool,
@@ -73,20 +72,21 @@ impl Sequence {
         let dose = fluoroscope.exposure.dose_ngy;
         let offset = fluoroscope.beam.ln_reference();
         let share = spec.xray.harmonised as f32;
+        let shown = fluoroscope.shows_body();
         let mask: Option<Vec<f32>> = (matches!(mode, Mode::Fluoro | Mode::Cine) && share > 0.0).then(|| {
             // Relative to the reference, whose logarithm is zero: the middle keeps its grey.
-            let values = logarithm(fluoroscope.unblocked().signal.signal.clone());
-            shading(&values, c_arm).iter().map(|v| share * v).collect()
+            let values = logarithm(fluoroscope.still.signal.signal.clone());
+            shading(&values, &shown, c_arm).iter().map(|v| share * v).collect()
         });
         let window = match (mode, spec.xray.window) {
             // Line integrals against the open beam, where signals are told against the reference.
             (Mode::Fluoro | Mode::Cine, Some(window)) => window.map(|p| (p + offset) as f32),
             (Mode::Fluoro | Mode::Cine, None) => {
-                let mut values = logarithm(fluoroscope.unblocked().signal.signal.clone());
+                let mut values = logarithm(fluoroscope.still.signal.signal.clone());
                 if let Some(mask) = &mask {
                     values.iter_mut().zip(mask).for_each(|(v, mask)| *v -= mask);
                 }
-                let [white, black] = fitted(&values, c_arm.size_px());
+                let [white, black] = fitted(&values, &shown, c_arm.size_px());
                 [white, black.max(densest(fluoroscope, mask.as_deref()))]
             }
             (_, Some(window)) => window.map(|p| p as f32),
@@ -97,11 +97,9 @@ impl Sequence {
             (Mode::Roadmap, None) => ROADMAP_WINDOW,
         };
         let closed = |pixel: &u32| c_arm.openness(*pixel as usize) < 0.5;
-        let shutter = match mode {
-            Mode::Dsa | Mode::Roadmap if c_arm.opening_px().is_some() => {
-                (0..c_arm.size_px().iter().product()).filter(closed).collect()
-            }
-            _ => vec![],
+        let shutter = match c_arm.opening_px() {
+            Some(_) => (0..c_arm.size_px().iter().product()).filter(closed).collect(),
+            None => vec![],
         };
         let kev = fluoroscope.beam.kev(c_arm.pixel_mm(), dose);
         // n quanta of the energy ε vary by √n ε.
@@ -137,20 +135,19 @@ impl Sequence {
     pub(crate) fn next(
         &mut self,
         fluoroscope: &mut Fluoroscope,
-        engine: &mut dyn PathEngine,
         pulse: &[Vec<RefinedDevice>],
         moment: FrameTime,
     ) -> Result<Image> {
         if self.mask.is_none() {
             match self.mode {
                 Mode::Fluoro | Mode::Cine => {}
-                Mode::Dsa => self.take_mask(fluoroscope, engine, pulse)?,
+                Mode::Dsa => self.take_mask(fluoroscope, pulse)?,
                 Mode::Roadmap => self.store_roadmap(fluoroscope)?,
             }
         }
         // The injections of a roadmap are those of its angiogram.
         let time = (self.mode != Mode::Roadmap).then_some(moment.time_s);
-        let signal = fluoroscope.signal(engine, pulse, time)?;
+        let signal = fluoroscope.signal(pulse, time)?;
         let read = self.detector.read(signal.signal, signal.energy, self.kev, moment.frame);
         let mut values = logarithm(read);
         if let Some(mask) = &self.mask {
@@ -178,10 +175,9 @@ impl Sequence {
     pub(crate) fn take_mask(
         &mut self,
         fluoroscope: &mut Fluoroscope,
-        engine: &mut dyn PathEngine,
         pulse: &[Vec<RefinedDevice>],
     ) -> Result<()> {
-        let signal = fluoroscope.signal(engine, pulse, None)?;
+        let signal = fluoroscope.signal(pulse, None)?;
         self.mask = Some(self.stored(&signal, self.kev));
         Ok(())
     }
@@ -231,9 +227,9 @@ fn strongest(fluoroscope: &Fluoroscope) -> f32 {
     but_for_outliers(opacities.filter(|v| *v > LEAST_OPACITY).collect()).map_or(FAINTEST, |v| v.max(FAINTEST))
 }
 
-/// Values without contrast medium and with all that ever comes, blades wide open; none where nothing is injected.
+/// Values without contrast medium and with all that ever comes, between the blades; none where nothing is injected.
 fn opacified(fluoroscope: &Fluoroscope) -> Option<[Vec<f32>; 2]> {
-    let still = fluoroscope.unblocked();
+    let still = &fluoroscope.still;
     let full = fluoroscope.opacified(still).ok()?;
     Some([logarithm(still.signal.signal.clone()), logarithm(full.signal)])
 }
@@ -255,8 +251,14 @@ mod tests {
     use crate::scene::Setup;
     use crate::spec::{DetectorSpec, TorsoSpec, View};
 
-    /// What a frame of a trunk shows of each pixel, the mask of that display, and where the blades leave all open.
-    fn shown(collimation_mm: Option<[f64; 2]>) -> (Vec<f32>, Vec<f32>, Vec<bool>) {
+    fn arm(field_mm: f64) -> crate::CArm {
+        let wall = SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::repeat(40.0)], triangles: vec![] };
+        let spec = crate::CArmSpec { field_mm: Some(field_mm), ..crate::CArmSpec::default() };
+        crate::CArm::new(&spec, [128, 128], &wall).unwrap()
+    }
+
+    /// What a frame of a trunk shows of each pixel, the mask of that display, where the blades leave all open, and the window.
+    fn shown(field_mm: f64, collimation_mm: Option<[f64; 2]>) -> (Vec<f32>, Vec<f32>, Vec<bool>, Window) {
         let wall = SurfaceMesh {
             vertices_mm: vec![Vec3::zeros(), Vec3::x() * 40.0, Vec3::y() * 40.0, Vec3::z() * 40.0],
             triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
@@ -264,7 +266,7 @@ mod tests {
         let mut spec = ViewSpec { views: vec![View::Fluoro], size_px: [128, 128], ..ViewSpec::default() };
         spec.detector = DetectorSpec::ideal();
         spec.patient.torso = Some(TorsoSpec::default());
-        spec.c_arm.field_mm = Some(200.0);
+        spec.c_arm.field_mm = Some(field_mm);
         spec.c_arm.collimation_mm = collimation_mm;
         let setup = Setup::new(&spec, &wall).unwrap();
         let mut engine = cpu::CpuPaths;
@@ -273,25 +275,34 @@ mod tests {
         let mask = sequence.mask.unwrap();
         let values =
             logarithm(scope.still.signal.signal.clone()).iter().zip(&mask).map(|(v, m)| v - m).collect();
-        (values, mask, (0..128 * 128).map(|i| scope.c_arm.openness(i) == 1.0).collect())
+        let open = (0..128 * 128).map(|i| scope.c_arm.openness(i) == 1.0).collect();
+        (values, mask, open, sequence.window)
     }
 
+    /// Where a frame of a trunk in air shows the skin's edge, what air has there, and the window.
     #[test]
-    fn blades_that_close_elsewhere_change_no_open_pixel() {
-        let (whole, _, _) = shown(None);
-        let (closed, mask, open) = shown(Some([90.0, 70.0]));
-        let most = |values: &[f32]| {
-            let open = (0..whole.len()).filter(|&i| open[i]);
-            open.map(|i| f64::from((values[i] - whole[i]) / whole[i]).abs()).fold(0.0, f64::max)
+    fn air_is_never_darker_than_the_skin_and_blades_narrow_the_window_to_what_they_leave() {
+        let (values, mask, open, window) = shown(700.0, None);
+        let air = |i: usize| mask[i] == mask.iter().copied().fold(f32::MIN, f32::max) && values[i] < -2.0;
+        let brightest = |is: &dyn Fn(usize) -> bool| {
+            (0..values.len()).filter(|&i| is(i)).map(|i| values[i]).fold(f32::MAX, f32::min)
         };
-        assert!(most(&closed) <= 1e-6, "{}", most(&closed));
-        // The twin: shading of the picture with its blades brightens what is beside them.
-        let with_blades: Vec<f32> = closed.iter().zip(&mask).map(|(v, m)| v + m).collect();
-        let wall = SurfaceMesh { vertices_mm: vec![Vec3::zeros(), Vec3::repeat(40.0)], triangles: vec![] };
-        let spec = crate::CArmSpec { field_mm: Some(200.0), ..crate::CArmSpec::default() };
-        let arm = crate::CArm::new(&spec, [128, 128], &wall).unwrap();
-        let leaking = shading(&with_blades, &arm);
-        let leaking: Vec<f32> = with_blades.iter().zip(leaking).map(|(v, m)| v - 0.55 * m).collect();
-        assert!(most(&leaking) > 0.1, "{}", most(&leaking));
+        let darkest = (0..values.len()).filter(|&i| air(i)).map(|i| values[i]).fold(f32::MIN, f32::max);
+        assert!((0..values.len()).filter(|&i| air(i)).count() > 500 && open.iter().all(|open| *open));
+        let skin = brightest(&|i| !air(i));
+        assert!(darkest <= skin + 1e-3, "air {darkest}, skin {skin}");
+        // The twin: shading that takes air for a body leaves it darker than the skin beside it.
+        let raw: Vec<f32> = values.iter().zip(&mask).map(|(v, m)| v + m).collect();
+        let arm = arm(700.0);
+        let leaking = shading(&raw, &vec![true; raw.len()], &arm);
+        let leaking: Vec<f32> = raw.iter().zip(leaking).map(|(v, m)| v - 0.55 * m).collect();
+        let far = (0..leaking.len()).filter(|&i| air(i)).map(|i| leaking[i]).fold(f32::MIN, f32::max);
+        let rim = (0..leaking.len()).filter(|&i| !air(i)).map(|i| leaking[i]).fold(f32::MAX, f32::min);
+        assert!(far > rim + 0.1, "{far} {rim}");
+        // Blades that leave a part of the trunk: less to show, and less scatter.
+        let (wide, narrow) = (shown(200.0, None), shown(200.0, Some([60.0, 50.0])));
+        let width = |window: Window| window[1] - window[0];
+        assert!(width(narrow.3) < 0.95 * width(wide.3), "{:?} {:?}", narrow.3, wide.3);
+        assert!(width(window) > width(wide.3), "{window:?}");
     }
 }

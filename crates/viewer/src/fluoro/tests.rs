@@ -18,14 +18,15 @@ fn mean_lengths_of_rays_that_are_alike_tell_their_mean_signal() {
     let setup = Setup::new(&spec, &wall).unwrap();
     let scope = Fluoroscope::new(&setup, setup.c_arm.as_ref().unwrap(), None, &mut cpu::CpuPaths).unwrap();
     let (mut alike, mut worst, mut without) = (0, 0.0_f64, 0.0_f64);
-    let room = &mut Lanes::new();
+    let room = &mut Room::default();
     for pixel in 0..128 * 128 {
         let (first, stride) = scope.first_ray(pixel);
         let rays = [first, first + 1, first + stride, first + stride + 1];
         let layers = rays.map(|ray| scope.layers(ray, [0.0; 2]));
         let Some((_, more)) = scope.alike(&layers) else { continue };
         alike += 1;
-        let [every, mean] = [scope.of_rays(rays, &layers, room)[0], scope.primary(pixel, [0.0; 2], room)[0]];
+        let [every, mean] =
+            [scope.of_rays(&layers, &mut Lanes::new())[0], scope.primary(pixel, [0.0; 2], room)[0]];
         worst = worst.max((f64::from(mean) / f64::from(every) - 1.0).abs());
         without = without.max((f64::from(mean / more) / f64::from(every) - 1.0).abs());
     }

@@ -7,7 +7,7 @@
 //! own ray with the triangle's plane, so the rasteriser's rounding of corners to 1/256 pixel moves
 //! silhouettes only. All depths are given as the middle of the clip range: no plane can cut the mesh.
 //!
-//! Devices are rectangles, one for each mitred piece, whose pixels solve the cone of `cpu/piece.rs`.
+//! Devices are few pixels, and cast by the processor (`cpu/cells.rs`).
 
 use std::collections::HashMap;
 
@@ -16,8 +16,6 @@ use endowire_core::Result;
 use endowire_core::vessel::SurfaceMesh;
 
 use crate::c_arm::CArm;
-use crate::cpu::pixels_of;
-use crate::device::Piece;
 use crate::engine::PathEngine;
 use crate::gpu::context::{Gpu, color_pass};
 
@@ -33,19 +31,6 @@ struct WallVertex {
     plane: [f32; 4],
     /// Least and greatest depth of the triangle.
     range: [f32; 2],
-}
-
-/// A mitred piece of a device.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct PieceInstance {
-    /// Pixels it may touch: left, top, right, bottom.
-    rectangle: [f32; 4],
-    start_radius: [f32; 4],
-    axis_slope: [f32; 4],
-    /// Mitre planes: unit normals and their products with the centres.
-    planes: [[f32; 4]; 2],
-    weight: f32,
 }
 
 /// The shader's view of a C-arm.
@@ -67,12 +52,11 @@ impl ViewUniform {
     }
 }
 
-/// Pipelines, and a target for each size of picture.
+/// Pipeline, and a target for each size of picture.
 #[derive(Debug)]
 pub(crate) struct GpuPaths {
     gpu: Gpu,
     draw_wall: wgpu::RenderPipeline,
-    draw_pieces: wgpu::RenderPipeline,
     targets: HashMap<[u32; 2], wgpu::Texture>,
 }
 
@@ -87,18 +71,7 @@ impl GpuPaths {
                 attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x4, 2 => Float32x2],
             },
         );
-        let draw_pieces = path_pipeline(
-            gpu,
-            include_str!("pieces.wgsl"),
-            &wgpu::VertexBufferLayout {
-                array_stride: size_of::<PieceInstance>() as u64,
-                step_mode: wgpu::VertexStepMode::Instance,
-                attributes: &wgpu::vertex_attr_array![
-                    0 => Float32x4, 1 => Float32x4, 2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Float32
-                ],
-            },
-        );
-        Self { gpu: gpu.clone(), draw_wall, draw_pieces, targets: HashMap::new() }
+        Self { gpu: gpu.clone(), draw_wall, targets: HashMap::new() }
     }
 
     /// Draws `vertices` corners of `instances` into a target of the size of `view`, and reads it.
@@ -136,30 +109,6 @@ impl PathEngine for GpuPaths {
         let pipeline = self.draw_wall.clone();
         self.lengths(view, &pipeline, bytemuck::cast_slice(&vertices), [count, 1])
     }
-
-    fn pieces(
-        &mut self,
-        view: &CArm,
-        pieces: &[(Piece, f64)],
-        lengths: &mut [f32],
-        touched: &mut Vec<u32>,
-    ) -> Result<()> {
-        if pieces.is_empty() {
-            return Ok(());
-        }
-        let instances: Vec<PieceInstance> =
-            pieces.iter().map(|(piece, sign)| instance(view, piece, *sign)).collect();
-        let pipeline = self.draw_pieces.clone();
-        let drawn =
-            self.lengths(view, &pipeline, bytemuck::cast_slice(&instances), [6, instances.len() as u32])?;
-        for (ray, (sum, length)) in (0..).zip(lengths.iter_mut().zip(drawn)) {
-            if length != 0.0 {
-                *sum += length;
-                touched.push(ray);
-            }
-        }
-        Ok(())
-    }
 }
 
 fn wall_vertices(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<WallVertex> {
@@ -179,18 +128,6 @@ fn wall_vertices(c_arm: &CArm, wall: &SurfaceMesh) -> Vec<WallVertex> {
         }));
     }
     vertices
-}
-
-fn instance(c_arm: &CArm, piece: &Piece, weight: f64) -> PieceInstance {
-    let [columns, rows] = pixels_of(c_arm, piece);
-    let four = |v: &endowire_core::Vec3, w: f64| [v.x, v.y, v.z, w].map(|x| x as f32);
-    PieceInstance {
-        rectangle: [columns.start, rows.start, columns.end, rows.end].map(|n| n as f32),
-        start_radius: four(&piece.start, piece.radius),
-        axis_slope: four(&piece.axis, piece.slope),
-        planes: [0, 1].map(|k| four(&piece.planes[k], piece.offsets[k])),
-        weight: weight as f32,
-    }
 }
 
 /// A pipeline that adds path lengths.

@@ -19,10 +19,10 @@ pub struct Labels {
     pub devices: Vec<DeviceLabel>,
     /// Places where the wall holds a device.
     pub contacts: Vec<ContactLabel>,
-    /// Grey value k + 1 where half of the pixel or more is covered by device k, the last of several; 0 elsewhere.
+    /// Grey value k + 1 where the pixel is in the mask of device k, the last of several; 0 elsewhere.
     #[serde(skip)]
     pub mask: Image,
-    /// Pixels at least half of whose rays meet the lumen; absent where the wall is not closed.
+    /// Pixels at least half of whose rays meet the lumen that its surface has, without the ends that pictures add; absent where the wall is not closed.
     #[serde(skip)]
     pub vessel: Option<Mask>,
 }
@@ -44,7 +44,7 @@ pub struct DeviceLabel {
     pub tip_visible: bool,
     /// Its parts in order; none of a solid rod.
     pub parts: Vec<PartLabel>,
-    /// Pixels that it covers by half or more, under no blade.
+    /// Pixels that it covers by half or more, or that its axis runs through, under no blade.
     #[serde(skip)]
     pub mask: Mask,
 }
@@ -52,11 +52,13 @@ pub struct DeviceLabel {
 /// One part of a device in a frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PartLabel {
+    /// Its number among the parts of its device, also of those that are not in.
+    pub number: usize,
     /// What it is made of.
     pub material: Material,
     /// Where it begins and ends, in arc length from the tip; absent: the whole device.
     pub from_tip_mm: Option<[f64; 2]>,
-    /// Pixels that it covers by half or more, under no blade, whatever is before or behind it.
+    /// Pixels that it covers by half or more, or that its axis runs through, under no blade, whatever is before or behind it.
     #[serde(skip)]
     pub mask: Mask,
 }

@@ -3,15 +3,15 @@
 use endowire_core::Result;
 
 use super::{Renderer, no_fluoro, prepared};
-use crate::cpu;
+use crate::contrast::Medium;
 use crate::device::{DeviceView, RefinedDevice};
-use crate::fluoro::Anatomy;
-use crate::material::Material;
+use crate::fluoro::{Anatomy, Fluoroscope, injecting_tip_mm};
+use crate::scene::Setup;
 use crate::spec::Mode;
 use crate::xray::PathLengths;
 
 impl Renderer {
-    /// Path lengths of the rays through the pixel centres, before any injection.
+    /// Path lengths of the rays through the pixel centres, and inside devices the means of pixels, before any injection.
     ///
     /// # Errors
     /// As [`Self::render_at`], and [`Error::Parameter`](endowire_core::Error::Parameter) where the fluoroscopic view was not asked for.
@@ -31,7 +31,6 @@ impl Renderer {
         let c_arm = self.setup.c_arm.clone().ok_or_else(no_fluoro)?;
         let [width, height] = c_arm.size_px();
         let pixels = width as usize * height as usize;
-        let default = self.setup.spec.xray.device_material;
         let devices = RefinedDevice::all(devices)?;
         if self.central.is_none() {
             self.central = Some(self.with_fallback(|setup, engines, _, _| {
@@ -40,30 +39,9 @@ impl Renderer {
             })?);
         }
         let (devices_mm, injected) = self.with_fallback(|setup, engines, fluoro, kept| {
-            let engine = engines.paths.as_mut().ok_or_else(no_fluoro)?;
-            let mut maps: Vec<(Material, Vec<f32>)> = Vec::new();
-            for device in &devices {
-                for (layer, pieces) in cpu::layers_in_beam(&c_arm, device) {
-                    let material = layer.material.unwrap_or(default);
-                    let place = maps.iter().position(|map| map.0 == material).unwrap_or_else(|| {
-                        maps.push((material, vec![0.0; pixels]));
-                        maps.len() - 1
-                    });
-                    engine.pieces(&c_arm, &pieces, &mut maps[place].1, &mut Vec::new())?;
-                }
-            }
-            // A roadmap's injections are those of its angiogram.
-            let injecting = setup.flow.is_some() && setup.spec.xray.mode != Mode::Roadmap;
-            let injected = match time_s.filter(|_| injecting) {
-                Some(time_s) => {
-                    let tip = devices.first().and_then(|device| device.points.last());
-                    prepared(setup, engines, fluoro, kept)?
-                        .0
-                        .injected(time_s, tip.map(|point| point.position_mm))
-                }
-                None => vec![],
-            };
-            Ok((maps, injected))
+            let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
+            let maps = scope.inside_devices(&devices)?;
+            Ok((maps, injected(setup, scope, &devices, time_s)))
         })?;
         let Anatomy { body, bone, lung, lumen } = self.central.clone().unwrap_or_default();
         let fraction = self.setup.spec.xray.contrast_fraction as f32;
@@ -88,6 +66,20 @@ impl Renderer {
         })
     }
 
+    /// Transmitted share of the absorbed energy, pixel by pixel as the picture of a moment has it before scatter, blades and the detector: the
+    /// mean over a pixel's rays, where [`Self::transmission`] of its mean lengths would be less behind a thin wire. −ln of it is the line integral.
+    ///
+    /// # Errors
+    /// As [`Self::path_lengths`].
+    pub fn transmission_at(&mut self, devices: &[DeviceView], time_s: f64) -> Result<Vec<f32>> {
+        let devices = RefinedDevice::all(devices)?;
+        self.with_fallback(|setup, engines, fluoro, kept| {
+            let (scope, _, _) = prepared(setup, engines, fluoro, kept)?;
+            let medium = injected(setup, scope, &devices, Some(time_s));
+            scope.transmitted(&devices, &medium)
+        })
+    }
+
     /// Transmitted share of the absorbed energy behind the given path lengths, with this scene's spectrum and detector: the signal
     /// over that of the open beam. −ln of it is the line integral.
     ///
@@ -101,4 +93,16 @@ impl Renderer {
         self.transmitted = Some((paths.clone(), left.clone()));
         Ok(left)
     }
+}
+
+/// The medium that is in by a time; none without one. A roadmap's injections are those of its angiogram.
+fn injected(
+    setup: &Setup,
+    scope: &Fluoroscope,
+    devices: &[RefinedDevice],
+    time_s: Option<f64>,
+) -> Vec<Medium> {
+    let injecting = setup.flow.is_some() && setup.spec.xray.mode != Mode::Roadmap;
+    let time_s = time_s.filter(|_| injecting);
+    time_s.map_or_else(Vec::new, |time_s| scope.injected(time_s, injecting_tip_mm(devices)))
 }

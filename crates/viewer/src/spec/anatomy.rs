@@ -166,7 +166,7 @@ pub struct InjectionSpec {
     pub rate_ml_per_s: f64,
     /// Where: the nearest point of the centre line, each coordinate -100,000 to 100,000; absent: the inlet.
     pub at_mm: Option<[f64; 3]>,
-    /// Whether it comes out of the tip of the innermost instrument, wherever that is; not with `at_mm`.
+    /// Whether it comes out of the tip of the innermost instrument that has a lumen, wherever that is; not with `at_mm`.
     #[serde(default)]
     pub at_tip: bool,
 }

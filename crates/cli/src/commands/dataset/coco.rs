@@ -1,6 +1,6 @@
 //! Annotations in the form of COCO (Lin et al., ECCV 2014): images, categories, and masks as uncompressed run lengths.
 
-use endowire_viewer::{DeviceLabel, Labels, Mask};
+use endowire_viewer::{DeviceLabel, Labels, Mask, Pushed};
 use serde::{Deserialize, Serialize};
 
 /// What a mask is of.
@@ -21,15 +21,17 @@ struct Points {
 }
 
 const VESSEL: u32 = 1;
-const INSTRUMENT: u32 = 2;
-const PART: u32 = 3;
+const GUIDEWIRE: u32 = 2;
+const CATHETER: u32 = 3;
+const PART: u32 = 4;
 
-/// All categories.
-pub(super) fn categories() -> [Category; 3] {
+/// All categories: microwires are guidewires, and all that has a lumen is a catheter.
+pub(super) fn categories() -> [Category; 4] {
     let tip = Points { keypoints: ["tip"], skeleton: [] };
     [
         (VESSEL, "vessel", "anatomy", None),
-        (INSTRUMENT, "instrument", "device", Some(tip)),
+        (GUIDEWIRE, "guidewire", "device", Some(tip.clone())),
+        (CATHETER, "catheter", "device", Some(tip)),
         (PART, "part", "device", None),
     ]
     .map(|(id, name, supercategory, points)| Category { id, name, supercategory, points })
@@ -83,6 +85,9 @@ pub(super) struct Annotation {
     instrument: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none", default)]
     material: Option<String>,
+    /// What the device's file calls a part.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    part: Option<String>,
     /// Column, row, and whether it is seen (2) or behind a blade (1), of the tip; zeros where it is not in the picture.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     keypoints: Option<[f64; 3]>,
@@ -105,7 +110,14 @@ struct RunLengths {
 const MOST: usize = 1000;
 
 /// What is seen in a picture; things that no pixel shows are left out.
-pub(super) fn annotations(image: usize, labels: &Labels, instruments: &[String]) -> Vec<Annotation> {
+///
+/// `in_line` are the numbers and names of the instruments that the devices are.
+pub(super) fn annotations(
+    image: usize,
+    labels: &Labels,
+    pushed: &Pushed,
+    in_line: &[(usize, &str)],
+) -> Vec<Annotation> {
     let mut rows = Vec::new();
     let mut add = |category_id: u32, mask: &Mask, finish: &dyn Fn(&mut Annotation)| {
         let (Some(bbox), true) = (mask.bounds(), rows.len() < MOST) else { return };
@@ -121,6 +133,7 @@ pub(super) fn annotations(image: usize, labels: &Labels, instruments: &[String])
             segmentation,
             instrument: None,
             material: None,
+            part: None,
             keypoints: None,
             num_keypoints: None,
             tip_mm: None,
@@ -131,16 +144,18 @@ pub(super) fn annotations(image: usize, labels: &Labels, instruments: &[String])
     if let Some(vessel) = &labels.vessel {
         add(VESSEL, vessel, &|_| {});
     }
-    for (device, name) in labels.devices.iter().zip(instruments) {
-        add(INSTRUMENT, &device.mask, &|row| {
-            row.instrument = Some(name.clone());
+    for (device, &(instrument, name)) in labels.devices.iter().zip(in_line) {
+        let category = if pushed.is_wire(instrument) { GUIDEWIRE } else { CATHETER };
+        add(category, &device.mask, &|row| {
+            row.instrument = Some(name.to_owned());
             let tip = keypoint(device, labels.size_px);
             (row.keypoints, row.num_keypoints) = (Some(tip), Some(u32::from(tip[2] > 0.0)));
             row.tip_mm = device.tip_mm;
         });
         for part in &device.parts {
             add(PART, &part.mask, &|row| {
-                row.instrument = Some(name.clone());
+                row.instrument = Some(name.to_owned());
+                row.part = pushed.part_name(instrument, part.number).map(str::to_owned);
                 row.material = Some(part.material.name().to_owned());
             });
         }

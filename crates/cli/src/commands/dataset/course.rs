@@ -62,7 +62,7 @@ impl Course {
     ) -> Result<Self, Failure> {
         let failed = |e: endowire_core::Error| Failure::from(e).at(file.display());
         let scene = scene(file, device, settings)?;
-        let mut view = view(spec, &scene, file)?;
+        let mut view = view(spec, &scene, file, device.is_some())?;
         let pushed = Pushed::new(&scene, &view).map_err(|e| Failure::from(e).at(file.display()))?;
         let script = scene.stack().and_then(|stack| scene.steps(&stack, cache)).map_err(failed)?;
         let mut simulation = scene.simulation(cache).map_err(failed)?;
@@ -156,13 +156,18 @@ fn scene(file: &Path, device: Option<&Path>, settings: &[Setting]) -> Result<Sce
     let key = Key::parse("device")?;
     // The device comes first: what is set may be of its parts.
     let with_device = [&[Setting { key, value: named.into() }], settings].concat();
-    scenes::read(file, &with_device)
+    scenes::with_any_device(file, &with_device)
 }
 
-/// The view of a scene with the keys of the specification in their places.
-fn view(spec: &Spec, scene: &Scene, file: &Path) -> Result<ViewSpec, Failure> {
+/// The view of a scene with the keys of the specification in their places. Where another device takes the place of the scene's, what the
+/// scene says its own is made of is left out.
+fn view(spec: &Spec, scene: &Scene, file: &Path, other_device: bool) -> Result<ViewSpec, Failure> {
     let bad = |e: serde_json::Error| Failure::Input(format!("view: {e}")).at(file.display());
-    let mut table = serde_json::to_value(ViewSpec::of_scene(scene, file)?).map_err(bad)?;
+    let mut of_scene = ViewSpec::of_scene(scene, file)?;
+    if other_device {
+        of_scene.device.clear();
+    }
+    let mut table = serde_json::to_value(of_scene).map_err(bad)?;
     merge(&mut table, &spec.view);
     let mut view: ViewSpec = serde_json::from_value(table).map_err(bad)?;
     view.views = vec![View::Fluoro];

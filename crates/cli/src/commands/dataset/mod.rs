@@ -33,7 +33,7 @@ use spec::Spec;
 struct Document {
     info: Info,
     images: Vec<ImageRow>,
-    categories: [Category; 3],
+    categories: [Category; 4],
     annotations: Vec<Annotation>,
 }
 

@@ -58,8 +58,10 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
         let time_s = moment.time_s + of.within(What::Time, spec.vary.time_s);
         let way = course.way_of_tip(moment);
         let devices = course.pushed.views(&moment.shape, &moment.inserted_mm);
-        let in_line = course.instruments.iter().zip(&moment.inserted_mm).filter(|one| *one.1 > 0.0);
-        let names: Vec<String> = in_line.map(|one| one.0.clone()).collect();
+        let all = course.instruments.iter().zip(&moment.inserted_mm).enumerate();
+        let in_line: Vec<(usize, &str)> =
+            all.filter(|(_, one)| *one.1 > 0.0).map(|(i, one)| (i, one.0.as_str())).collect();
+        let names: Vec<String> = in_line.iter().map(|one| one.1.to_owned()).collect();
         let contacts: Vec<Vec3> = moment.contacts.iter().map(|c| c.position_mm).collect();
         for (plane, (renderer, view)) in renderers.iter_mut().zip(&views).enumerate() {
             let id = (shot * spec.moments + m) * spec.views() + plane;
@@ -72,7 +74,7 @@ pub(super) fn draw(spec: &Spec, course: &Course, shot: usize, folder: &Path) -> 
             image.write_png(folder.join(&file_name))?;
             let path = folder.join(&arrays);
             write_arrays(&path, &label_arrays(&labels)).map_err(|e| Failure::write(&path, &e))?;
-            part.annotations.extend(annotations(id, &labels, &names));
+            part.annotations.extend(annotations(id, &labels, &course.pushed, &in_line));
             let angles = view.c_arm.angles_deg();
             part.images.push(ImageRow {
                 id,
@@ -131,8 +133,10 @@ pub(super) fn planes(spec: &Spec, of_course: &ViewSpec, shot: usize) -> Vec<View
 fn label_arrays(labels: &Labels) -> Vec<Array> {
     let [width, height] = labels.size_px.map(|n| n as usize);
     let bytes = |name: &str, data: Vec<u8>| Array::of_bytes(name, vec![height, width], data);
+    // One after the other: an instrument in another is not hidden by it.
+    let masks = labels.devices.iter().flat_map(|device| device.mask.image().into_data());
     let mut arrays = vec![
-        bytes("mask", labels.mask.data().to_vec()),
+        Array::of_bytes("masks", vec![labels.devices.len(), height, width], masks.collect()),
         Array::of_floats("camera_matrix", vec![3, 4], labels.camera_matrix.iter().flatten().copied()),
     ];
     arrays.extend(labels.vessel.as_ref().map(|mask| bytes("vessel", mask.image().into_data())));

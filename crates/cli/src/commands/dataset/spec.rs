@@ -164,6 +164,7 @@ impl Spec {
             (&["c_arm", "pose"], "poses are drawn: give vary.primary_deg and vary.secondary_deg"),
             (&["c_arm", "primary_deg"], "poses are drawn: give vary.primary_deg"),
             (&["c_arm", "secondary_deg"], "poses are drawn: give vary.secondary_deg"),
+            (&["device"], "device files say what their devices are made of (devices)"),
             (&["detector", "seed"], "noise is drawn: give seed"),
         ] {
             let (first, others) = keys.split_first().map_or(("", keys), |(first, others)| (*first, others));

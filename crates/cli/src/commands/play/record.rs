@@ -8,6 +8,7 @@ use endowire_play::{Session, Went};
 
 use crate::args::PlayArgs;
 use crate::failure::Failure;
+use crate::output::session::SessionFile;
 use crate::output::{tell, whole};
 
 /// How often a session that goes on is written.
@@ -17,6 +18,8 @@ const EVERY: Duration = Duration::from_secs(2);
 pub(crate) struct Record {
     path: PathBuf,
     head: String,
+    scene: PathBuf,
+    set: Vec<String>,
     written: Instant,
 }
 
@@ -34,7 +37,8 @@ impl Record {
             shown(&args.scene),
             shown(&path)
         );
-        Self { path, head, written: Instant::now() }
+        let set = args.set.set.iter().map(ToString::to_string).collect();
+        Self { path, head, scene: args.scene.clone(), set, written: Instant::now() }
     }
 
     /// The folder that the script goes into.
@@ -58,9 +62,15 @@ impl Record {
         whole::write_bytes(&self.path, text.as_bytes()).map_err(|e| Failure::write(&self.path, &e))
     }
 
-    /// Writes the whole session and says where.
+    /// Writes the whole session, with what it is assessed by, and says where.
     pub(crate) fn finish(&self, session: &Session) -> Result<(), Failure> {
         self.write(session)?;
+        let of_session = SessionFile {
+            scene_file: self.scene.clone(),
+            set: self.set.clone(),
+            record: session.record().clone(),
+        };
+        of_session.write(&SessionFile::beside(&self.path))?;
         let Went { unconverged_steps, jumps, relaxations } = session.went();
         let counts = [
             (unconverged_steps, "without an equilibrium"),

@@ -308,7 +308,8 @@ impl<'a> Studio<'a> {
         if self.plan.args.raw {
             let renderer = &mut self.planes[plane].renderer;
             let paths = renderer.path_lengths_at(views, still.moment.time_s)?;
-            let line: Vec<f32> = renderer.transmission(&paths)?.iter().map(|t| -t.ln()).collect();
+            let left = renderer.transmission_at(views, still.moment.time_s)?;
+            let line: Vec<f32> = left.iter().map(|t| -t.ln()).collect();
             for (name, map) in maps(&paths, &line) {
                 let path = self.file(&format!("{}_{name}{ending}.npy", still.name))?;
                 write_map(&path, paths.width as usize, map).map_err(|e| Failure::write(&path, &e))?;

@@ -1,0 +1,331 @@
+//! The measures, group by group. Values come from the record alone: nothing is simulated again.
+
+use endowire_core::Vec3;
+
+use crate::metric::{Better, Group, Metric};
+use crate::record::Record;
+use crate::smoothness::{spectral_arc_length, speeds, submovements};
+use crate::way::Way;
+
+/// Part of the time in which forces are at most that of the 95th percentile.
+const MOST_OF_TIME: f64 = 0.95;
+/// Motions of hands below these are rest: lengths, mm, and turns, rad.
+const REST_MM: f64 = 1e-9;
+const REST_RAD: f64 = 1e-9;
+/// A tip is held against a wall by more than this, N.
+const AGAINST_WALL_N: f64 = 1e-3;
+/// Shortest way to which one that was gone is compared, mm.
+const SHORTEST_MM: f64 = 1.0;
+
+const ESTRADA: &str = "Estrada et al. 2014: smoothness of the tool's motion";
+const RAFII: &str = "Rafii-Tari et al. 2017: motion and forces of hands and catheters";
+const BOYLE: &str = "Boyle et al. 2011: scores of errors";
+const REVIEW: &str =
+    "review of simulator studies, European Journal of Vascular and Endovascular Surgery 2016";
+
+/// A measure that less of is better.
+fn lower(
+    group: Group,
+    (name, unit): (&'static str, &'static str),
+    value: Option<f64>,
+    definition: &'static str,
+    study: &'static str,
+) -> Metric {
+    // An empty sum is −0.
+    let value = value.map(|value| value + 0.0);
+    Metric { name, group, value, unit, better: Better::Lower, definition, study }
+}
+
+fn higher(metric: Metric) -> Metric {
+    Metric { better: Better::Higher, ..metric }
+}
+
+/// All measures of a procedure in the order of their groups, on a way if one is known.
+pub fn assess(record: &Record, way: Option<&Way>) -> Vec<Metric> {
+    let mut all = Vec::new();
+    all.extend(time(record));
+    all.extend(radiation(record));
+    all.extend(contrast(record));
+    all.extend(motion(record, way));
+    all.extend(safety(record));
+    all.extend(on_way(record, way));
+    all.extend(task(record, way));
+    all
+}
+
+fn rests(record: &Record) -> impl Iterator<Item = (f64, f64)> {
+    let moves = |hand: &crate::Hand| hand.advance_mm.abs() > REST_MM || hand.rotate_rad.abs() > REST_RAD;
+    let rest = record.timed().filter(move |(_, sample)| !sample.hands.iter().any(moves));
+    rest.map(|(took_s, sample)| (sample.time_s - took_s, sample.time_s))
+}
+
+/// Time in which no hand moves, s.
+fn idle_s(record: &Record) -> f64 {
+    rests(record).map(|(from, to)| to - from).sum()
+}
+
+/// That of it with the beam on, s; none where the beam was not recorded.
+fn beam_on_idle_s(record: &Record) -> Option<f64> {
+    record.beam.as_ref()?;
+    rests(record).map(|(from, to)| record.beam_on_s(from, to)).sum()
+}
+
+fn time(record: &Record) -> Vec<Metric> {
+    let of = |name, value, definition, study| lower(Group::Time, (name, "s"), value, definition, study);
+    let beam_s = record.beam_on_s(0.0, record.end_s());
+    vec![
+        of("total_s", Some(record.end_s()), "time from the start to the end of the last step", REVIEW),
+        of("idle_s", Some(idle_s(record)), "time of steps in which no hand moves or turns", RAFII),
+        of("beam_on_s", beam_s, "time with the beam on", REVIEW),
+        of(
+            "beam_on_idle_s",
+            beam_on_idle_s(record),
+            "time with the beam on while no hand moves or turns",
+            REVIEW,
+        ),
+    ]
+}
+
+fn radiation(record: &Record) -> Vec<Metric> {
+    let of = |name, unit, value, definition| lower(Group::Radiation, (name, unit), value, definition, REVIEW);
+    let sum = |each: fn(&crate::BeamState) -> f64| {
+        let on = record.beam_stretches()?.filter(|(state, _)| state.on);
+        Some(on.map(|(state, end_s)| each(state) * (end_s - state.time_s)).sum::<f64>())
+    };
+    let frames = sum(|state| state.frames_per_s);
+    let kerma = sum(|state| state.frames_per_s * state.dose_ngy * 1e-3);
+    // µGy mm² are 10⁻² µGy cm².
+    let kerma_area = sum(|state| state.frames_per_s * state.dose_ngy * 1e-3 * state.field_mm2 * 1e-2);
+    let area_s = sum(|state| state.field_mm2 * 1e-2);
+    let field = area_s.zip(sum(|_| 1.0)).filter(|(_, on_s)| *on_s > 0.0).map(|(area, on_s)| area / on_s);
+    let beam = record.beam.as_deref();
+    let pairs = |change: fn(&crate::BeamState, &crate::BeamState) -> bool| {
+        beam.map(|beam| beam.windows(2).filter(|pair| change(&pair[0], &pair[1])).count() as f64)
+    };
+    let first = beam.map(|beam| f64::from(u8::from(beam.first().is_some_and(|state| state.on))));
+    let runs = pairs(|a, b| !a.on && b.on).zip(first).map(|(later, first)| later + first);
+    let moves = pairs(|a, b| a.primary_deg != b.primary_deg || a.secondary_deg != b.secondary_deg);
+    vec![
+        of("kerma_ugy", "µGy", kerma, "air kerma at the detector, summed over frames"),
+        of(
+            "kerma_area_ugycm2",
+            "µGy·cm²",
+            kerma_area,
+            "air kerma at the detector times the open area, summed over frames",
+        ),
+        of("runs", "1", runs, "how often the beam was switched on"),
+        of("frames", "1", frames, "frames while the beam was on"),
+        of("field_cm2", "cm²", field, "mean open area at the detector while the beam was on"),
+        of("c_arm_moves", "1", moves, "changes of the C-arm's angles"),
+    ]
+}
+
+fn contrast(record: &Record) -> Vec<Metric> {
+    let of =
+        |name, unit, value, definition| lower(Group::Contrast, (name, unit), Some(value), definition, REVIEW);
+    let volume = record.injections.iter().map(|one| one.volume_ml).sum();
+    let fastest = record.injections.iter().map(|one| one.rate_ml_per_s).fold(0.0, f64::max);
+    let against = |one: &&crate::Injection| {
+        let during = record.samples.iter().find(|sample| sample.time_s >= one.time_s);
+        during.or(record.samples.last()).is_some_and(|sample| sample.tip_force_n > AGAINST_WALL_N)
+    };
+    let at_wall = record.injections.iter().filter(against).map(|one| one.volume_ml).sum();
+    vec![
+        of("contrast_ml", "ml", volume, "contrast medium injected"),
+        of("injections", "1", record.injections.len() as f64, "how often it was injected"),
+        of("largest_rate_ml_per_s", "ml/s", fastest, "fastest injection"),
+        of(
+            "against_wall_ml",
+            "ml",
+            at_wall,
+            "medium of injections that began with the tip held by a wall with more than 1 mN",
+        ),
+    ]
+}
+
+/// The tips in order.
+fn tips(record: &Record) -> Vec<Vec3> {
+    record.samples.iter().filter_map(|sample| sample.tip_mm).collect()
+}
+
+fn motion(record: &Record, way: Option<&Way>) -> Vec<Metric> {
+    let of =
+        |name, unit, value, definition, study| lower(Group::Motion, (name, unit), value, definition, study);
+    let tips = tips(record);
+    let path_mm: f64 = tips.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
+    let ends = tips.first().zip(tips.last());
+    let shortest_mm = way.zip(ends).map(|(way, (from, to))| way.length_mm(from, to));
+    let ratio = shortest_mm.filter(|mm| *mm >= SHORTEST_MM).map(|mm| path_mm / mm);
+    let speeds = speeds(record);
+    let moving_s = record.end_s() - idle_s(record);
+    let (count, mean_s) = submovements(&speeds);
+    let hands = || record.samples.iter().flat_map(|sample| sample.hands.iter().enumerate());
+    let most = record.samples.iter().map(|sample| sample.hands.len()).max().unwrap_or(0);
+    let reversals: usize = (0..most).map(|hand| reversals(record, hand)).sum();
+    let turned: f64 = hands().map(|(_, hand)| hand.rotate_rad.abs()).sum();
+    let retracted: f64 = hands().map(|(_, hand)| (-hand.advance_mm).max(0.0)).sum();
+    vec![
+        of("tip_path_mm", "mm", Some(path_mm), "way of the foremost tip", RAFII),
+        of(
+            "path_ratio",
+            "1",
+            ratio,
+            "way of the tip over the length of the centre line between its ends",
+            RAFII,
+        ),
+        higher(of(
+            "tip_speed_mm_per_s",
+            "mm/s",
+            (moving_s > 0.0).then(|| path_mm / moving_s),
+            "way of the tip over the time in which a hand moves",
+            ESTRADA,
+        )),
+        higher(of(
+            "spectral_arc_length",
+            "1",
+            spectral_arc_length(&speeds),
+            "less the arc length of the scaled amplitude spectrum of the tip's speed, sampled each 0.05 s, to 5 % of its largest amplitude",
+            ESTRADA,
+        )),
+        of(
+            "submovements",
+            "1",
+            Some(count as f64),
+            "stretches of at least 0.1 s with the tip faster than 2 mm/s",
+            ESTRADA,
+        ),
+        higher(of("submovement_s", "s", mean_s, "mean duration of these", ESTRADA)),
+        of("reversals", "1", Some(reversals as f64), "changes of hands between pushing and pulling", RAFII),
+        of("turns", "1", Some(turned / std::f64::consts::TAU), "turns of hands to either side", RAFII),
+        of("retracted_mm", "mm", Some(retracted), "length pulled back by hands", REVIEW),
+    ]
+}
+
+/// How often a hand changed between pushing and pulling.
+fn reversals(record: &Record, hand: usize) -> usize {
+    let advances = record.samples.iter().filter_map(|sample| sample.hands.get(hand));
+    let signs: Vec<bool> =
+        advances.map(|hand| hand.advance_mm).filter(|mm| mm.abs() > REST_MM).map(|mm| mm > 0.0).collect();
+    signs.windows(2).filter(|pair| pair[0] != pair[1]).count()
+}
+
+fn safety(record: &Record) -> Vec<Metric> {
+    let of =
+        |name, unit, value, definition, study| lower(Group::Safety, (name, unit), value, definition, study);
+    let samples = &record.samples;
+    let most = |each: &dyn Fn(&crate::Sample) -> f64| samples.iter().map(each).fold(0.0, f64::max);
+    let mut forces: Vec<(f64, f64)> = record.timed().map(|(s, sample)| (sample.wall_force_n, s)).collect();
+    forces.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut left_s = MOST_OF_TIME * record.end_s();
+    let percentile = forces.iter().find(|(_, took_s)| {
+        left_s -= took_s;
+        left_s <= 0.0
+    });
+    let impulse: f64 = record.timed().map(|(took_s, sample)| sample.wall_force_n * took_s).sum();
+    let hand_n = most(&|sample| {
+        let forces = sample.hands.iter().filter_map(|hand| hand.push_force_n);
+        forces.map(f64::abs).fold(0.0, f64::max)
+    });
+    let torque = most(&|sample| sample.hands.iter().map(|hand| hand.torque_nmm.abs()).fold(0.0, f64::max));
+    let several = samples.iter().any(|sample| sample.hands.len() > 1);
+    let ahead = |sample: &crate::Sample| {
+        sample.hands.windows(2).any(|pair| pair[1].inserted_mm > pair[0].inserted_mm + REST_MM)
+    };
+    let ahead_s: f64 = record.timed().filter(|(_, sample)| ahead(sample)).map(|(s, _)| s).sum();
+    let idle_s = idle_s(record);
+    let blind_s = record
+        .beam_on_s(0.0, record.end_s())
+        .zip(beam_on_idle_s(record))
+        .map(|(on_s, on_idle_s)| (record.end_s() - idle_s - (on_s - on_idle_s)).max(0.0));
+    let jumps = samples.iter().filter(|sample| sample.jumped).count();
+    vec![
+        of("wall_force_n", "N", Some(most(&|s| s.wall_force_n)), "largest sum of wall forces", RAFII),
+        of(
+            "wall_force_95_n",
+            "N",
+            percentile.map(|one| one.0),
+            "sum of wall forces that is not exceeded in 95 % of the time",
+            RAFII,
+        ),
+        of("tip_force_n", "N", Some(most(&|s| s.tip_force_n)), "largest wall force at the tip", RAFII),
+        of(
+            "wall_impulse_ns",
+            "N·s",
+            Some(impulse),
+            "sum of wall forces times the time that they last",
+            RAFII,
+        ),
+        of("hand_force_n", "N", Some(hand_n), "largest force of a hand, pushing or pulling", RAFII),
+        of("hand_torque_nmm", "N·mm", Some(torque), "largest torque of a hand", RAFII),
+        of(
+            "jumps",
+            "1",
+            Some(jumps as f64),
+            "steps in which the device snapped to another equilibrium",
+            REVIEW,
+        ),
+        of(
+            "catheter_ahead_s",
+            "s",
+            several.then_some(ahead_s),
+            "time with an instrument farther in than the one in it",
+            BOYLE,
+        ),
+        of("moving_without_beam_s", "s", blind_s, "time with a hand moving and the beam off", BOYLE),
+    ]
+}
+
+fn on_way(record: &Record, way: Option<&Way>) -> Vec<Metric> {
+    let wrong = way.map(|way| {
+        let branches: Vec<Option<usize>> = tips(record).iter().map(|tip| way.wrong_branch(tip)).collect();
+        let first = branches.first().is_some_and(Option::is_some);
+        let entered = branches.windows(2).filter(|pair| pair[1].is_some() && pair[0] != pair[1]).count();
+        (entered + usize::from(first)) as f64
+    });
+    let up_s = way.and_then(|way| {
+        let past = |sample: &&crate::Sample| {
+            sample.tip_mm.is_some_and(|tip| way.is_past_first_fork(&tip) == Some(true))
+        };
+        record.samples.iter().find(past).map(|sample| sample.time_s)
+    });
+    let of = |name, unit, value, definition, study| lower(Group::Way, (name, unit), value, definition, study);
+    vec![
+        of(
+            "wrong_branches",
+            "1",
+            wrong,
+            "how often the tip went deeper than its radius into a branch that is not on the way",
+            BOYLE,
+        ),
+        of(
+            "time_in_trunk_s",
+            "s",
+            up_s,
+            "time until the tip is a radius beyond the first fork on its way: of arches, the time up the aorta",
+            REVIEW,
+        ),
+    ]
+}
+
+fn task(record: &Record, way: Option<&Way>) -> Vec<Metric> {
+    let last = tips(record).last().copied();
+    let target = way.and_then(Way::target_mm);
+    let error = target.map(|(target, _)| last.map_or(f64::INFINITY, |tip| (tip - target).norm()));
+    let arrived = target.zip(error).map(|((_, within_mm), mm)| f64::from(u8::from(mm <= within_mm)));
+    vec![
+        higher(lower(
+            Group::Task,
+            ("arrived", "1"),
+            arrived,
+            "1 where the tip ends within the target's reach, else 0",
+            REVIEW,
+        )),
+        lower(
+            Group::Task,
+            ("placement_error_mm", "mm"),
+            error.filter(|mm| mm.is_finite()),
+            "distance of the tip from the target at the end",
+            REVIEW,
+        ),
+    ]
+}

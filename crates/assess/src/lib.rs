@@ -1,0 +1,23 @@
+//! What a trainee is scored by: measures of a recorded procedure, as studies of novices and experts have them.
+//!
+//! A [`Record`] is what hands, beam and injector have done and what came of it; a [`Way`] is where it was to go. [`assess`] measures both in
+//! seven groups. Every measure says its unit, how it is defined, whether less or more of it is better and in which study it was used; one
+//! that needs what was not recorded has no value.
+//!
+//! ```
+//! use endowire_assess::{Record, assess};
+//!
+//! let metrics = assess(&Record::default(), None);
+//! assert!(metrics.iter().all(|metric| !metric.definition.is_empty()));
+//! ```
+
+mod groups;
+mod metric;
+mod record;
+mod smoothness;
+mod way;
+
+pub use groups::assess;
+pub use metric::{Better, Group, Metric};
+pub use record::{BEAM, BeamState, Hand, Injection, Record, Sample};
+pub use way::Way;

@@ -1,0 +1,250 @@
+//! What was recorded of a procedure.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use endowire_core::{Error, Result, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// File of what the beam did, beside steps.csv or a session's script; there is none where no beam was recorded.
+pub const BEAM: &str = "beam.csv";
+
+/// What one hand did in a step, and felt after it.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Hand {
+    /// Length pushed in, negative pulled back.
+    pub advance_mm: f64,
+    /// Turn.
+    pub rotate_rad: f64,
+    /// Length inserted after it.
+    pub inserted_mm: f64,
+    /// Force with which it pushes; none where it is not defined.
+    pub push_force_n: Option<f64>,
+    /// Torque with which it holds.
+    pub torque_nmm: f64,
+}
+
+/// A step.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Sample {
+    /// When it ended, since the start.
+    pub time_s: f64,
+    /// Where the foremost tip is; none while nothing is in.
+    pub tip_mm: Option<Vec3>,
+    /// The hands, the innermost instrument first.
+    pub hands: Vec<Hand>,
+    /// Sum of the sizes of wall forces, and of those at the tip.
+    pub wall_force_n: f64,
+    /// That at the tip.
+    pub tip_force_n: f64,
+    /// Whether the device snapped from one equilibrium to another.
+    pub jumped: bool,
+}
+
+/// Contrast medium that was injected.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Injection {
+    /// When it began.
+    pub time_s: f64,
+    /// How much.
+    pub volume_ml: f64,
+    /// How fast.
+    pub rate_ml_per_s: f64,
+}
+
+/// What the beam and the C-arm are from a time on: a row of beam.csv.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BeamState {
+    /// Since the start, rising.
+    pub time_s: f64,
+    /// Whether the pedal is down.
+    pub on: bool,
+    /// Frames a second while it is.
+    pub frames_per_s: f64,
+    /// Air kerma at the detector, of a frame.
+    pub dose_ngy: f64,
+    /// Area that the blades leave open at the detector.
+    pub field_mm2: f64,
+    /// Angles of the C-arm.
+    pub primary_deg: f64,
+    /// That towards head or feet.
+    pub secondary_deg: f64,
+}
+
+/// A procedure.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Record {
+    /// Its steps, times rising.
+    pub samples: Vec<Sample>,
+    /// Injections in order.
+    pub injections: Vec<Injection>,
+    /// The beam, if it was recorded.
+    pub beam: Option<Vec<BeamState>>,
+}
+
+impl Record {
+    /// Reads a session of `endowire play` (*.session.json), or the folder of a run: steps.csv, and instruments.csv, injections.csv and
+    /// beam.csv where they are there.
+    ///
+    /// # Errors
+    /// [`Error::Content`] for a file that is not there or does not fit, naming it.
+    pub fn read(path: &Path) -> Result<Self> {
+        if !path.is_file() {
+            return Self::of_folder(path);
+        }
+        let bytes = std::fs::read(path).map_err(|error| not_a_session(path, &error))?;
+        Self::from_session(&bytes, path)
+    }
+
+    /// A session from the bytes of its file, which `path` names in messages.
+    ///
+    /// # Errors
+    /// [`Error::Content`] for what is none.
+    pub fn from_session(bytes: &[u8], path: &Path) -> Result<Self> {
+        #[derive(Deserialize)]
+        struct Session {
+            record: Record,
+        }
+        let session: Session = serde_json::from_slice(bytes).map_err(|error| not_a_session(path, &error))?;
+        Ok(session.record)
+    }
+
+    fn of_folder(folder: &Path) -> Result<Self> {
+        let steps: Vec<Step> = rows(&folder.join("steps.csv"))?;
+        let mut hands: BTreeMap<usize, Vec<Hand>> = BTreeMap::new();
+        for row in optional::<InstrumentRow>(&folder.join("instruments.csv"))?.unwrap_or_default() {
+            hands.entry(row.step).or_default().push(row.hand());
+        }
+        let injections = optional::<InjectionRow>(&folder.join("injections.csv"))?.unwrap_or_default();
+        let samples = steps.into_iter().map(|step| {
+            let alone = || vec![step.hand()];
+            step.sample(hands.remove(&step.step).unwrap_or_else(alone))
+        });
+        Ok(Self {
+            samples: samples.collect(),
+            injections: injections.into_iter().map(InjectionRow::injection).collect(),
+            beam: optional(&folder.join(BEAM))?,
+        })
+    }
+
+    /// Each sample with the time that it took.
+    pub(crate) fn timed(&self) -> impl Iterator<Item = (f64, &Sample)> {
+        let mut before_s = 0.0;
+        self.samples.iter().map(move |sample| {
+            let took_s = (sample.time_s - before_s).max(0.0);
+            before_s = sample.time_s;
+            (took_s, sample)
+        })
+    }
+
+    /// How long it took, s.
+    pub(crate) fn end_s(&self) -> f64 {
+        self.samples.last().map_or(0.0, |last| last.time_s)
+    }
+
+    /// Time between two moments during which the beam was on, s; none where it was not recorded.
+    pub(crate) fn beam_on_s(&self, from_s: f64, to_s: f64) -> Option<f64> {
+        let on = self.beam_stretches()?.filter(|(state, _)| state.on);
+        Some(on.map(|(state, end_s)| (end_s.min(to_s) - state.time_s.max(from_s)).max(0.0)).sum())
+    }
+
+    /// States of the beam with the times at which they end.
+    pub(crate) fn beam_stretches(&self) -> Option<impl Iterator<Item = (&BeamState, f64)>> {
+        let beam = self.beam.as_ref()?;
+        let ends = beam.iter().skip(1).map(|state| state.time_s).chain([f64::INFINITY]);
+        let end_s = self.end_s();
+        Some(beam.iter().zip(ends).map(move |(state, end)| (state, end.min(end_s).max(state.time_s))))
+    }
+}
+
+#[derive(Debug, Deserialize)]
+struct Step {
+    step: usize,
+    advance_mm: f64,
+    rotate_rad: f64,
+    inserted_mm: f64,
+    nodes: usize,
+    tip_x_mm: f64,
+    tip_y_mm: f64,
+    tip_z_mm: f64,
+    push_force_n: f64,
+    torque_nmm: f64,
+    jumped: bool,
+    wall_force_sum_n: f64,
+    wall_force_tip_n: f64,
+    time_s: f64,
+}
+
+impl Step {
+    fn hand(&self) -> Hand {
+        Hand {
+            advance_mm: self.advance_mm,
+            rotate_rad: self.rotate_rad,
+            inserted_mm: self.inserted_mm,
+            push_force_n: Some(self.push_force_n),
+            torque_nmm: self.torque_nmm,
+        }
+    }
+
+    fn sample(&self, hands: Vec<Hand>) -> Sample {
+        let tip_mm = Vec3::new(self.tip_x_mm, self.tip_y_mm, self.tip_z_mm);
+        Sample {
+            time_s: self.time_s,
+            tip_mm: (self.nodes > 0).then_some(tip_mm),
+            hands,
+            wall_force_n: self.wall_force_sum_n,
+            tip_force_n: self.wall_force_tip_n,
+            jumped: self.jumped,
+        }
+    }
+}
+
+#[derive(Debug, Deserialize)]
+struct InstrumentRow {
+    step: usize,
+    advance_mm: f64,
+    rotate_rad: f64,
+    inserted_mm: f64,
+    push_force_n: Option<f64>,
+    torque_nmm: f64,
+}
+
+impl InstrumentRow {
+    fn hand(&self) -> Hand {
+        let &Self { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm, .. } = self;
+        Hand { advance_mm, rotate_rad, inserted_mm, push_force_n, torque_nmm }
+    }
+}
+
+#[derive(Debug, Deserialize)]
+struct InjectionRow {
+    time_s: f64,
+    volume_ml: f64,
+    rate_ml_per_s: f64,
+}
+
+impl InjectionRow {
+    fn injection(self) -> Injection {
+        let Self { time_s, volume_ml, rate_ml_per_s } = self;
+        Injection { time_s, volume_ml, rate_ml_per_s }
+    }
+}
+
+fn not_a_session(path: &Path, error: &dyn std::fmt::Display) -> Error {
+    Error::content(path, format!("{error}; give a session of endowire play or the folder of a run"))
+}
+
+fn optional<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Option<Vec<T>>> {
+    if path.exists() { rows(path).map(Some) } else { Ok(None) }
+}
+
+/// The rows of a table; the last one of a run that was killed may be cut, and is left out.
+fn rows<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<Vec<T>> {
+    let mend = "give the folder of a recorded run (endowire run)";
+    let refuse = |error: String| Error::content(path, format!("{error}; {mend}"));
+    let mut text = std::fs::read(path).map_err(|error| refuse(error.to_string()))?;
+    text.truncate(text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1));
+    let rows = csv::Reader::from_reader(text.as_slice()).into_deserialize();
+    rows.collect::<std::result::Result<_, _>>().map_err(|error| refuse(error.to_string()))
+}

@@ -1,0 +1,99 @@
+//! How smooth a motion is: of the tip's speed, at even times.
+
+use realfft::RealFftPlanner;
+
+use crate::record::Record;
+
+/// Even times are so far apart, s: hands do nothing faster than ten times a second.
+const STEP_S: f64 = 0.05;
+/// Spectral arc length: zeros make the spectrum longer by two to this power, amplitudes below this part of the largest end it.
+const PADDING: u32 = 4;
+const LEAST_AMPLITUDE: f64 = 0.05;
+/// Most even times: a day.
+const MOST: usize = 1_728_000;
+/// A submovement is faster than this, mm/s, for at least this long, s.
+const MOVING_MM_PER_S: f64 = 2.0;
+const SHORTEST_S: f64 = 0.1;
+
+/// Speed of the tip at even times, mm/s; its way is straight between samples.
+pub(crate) fn speeds(record: &Record) -> Vec<f64> {
+    let places = record.samples.iter().filter_map(|sample| Some((sample.time_s, sample.tip_mm?)));
+    let places: Vec<_> = places.collect();
+    let (Some(first), Some(last)) = (places.first(), places.last()) else { return vec![] };
+    let count = (((last.0 - first.0) / STEP_S).floor() as usize).min(MOST);
+    let mut next = 0;
+    let mut at = |time_s: f64| {
+        while next + 1 < places.len() && places[next + 1].0 <= time_s {
+            next += 1;
+        }
+        let (from_s, from) = places[next];
+        let Some(&(to_s, to)) = places.get(next + 1) else { return from };
+        from + (to - from) * ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0)
+    };
+    let mut before = first.1;
+    let mut speed = |k: usize| {
+        let now = at(first.0 + k as f64 * STEP_S);
+        let speed = (now - before).norm() / STEP_S;
+        before = now;
+        speed
+    };
+    (1..=count).map(&mut speed).collect()
+}
+
+/// Spectral arc length (Balasubramanian, Melendez-Calderon and Burdet, IEEE Transactions on Biomedical Engineering 59, 2012, and with an
+/// adaptive end 2015): less the length of the amplitude spectrum of the speed, both scaled to one. Nearer to zero is smoother.
+pub(crate) fn spectral_arc_length(speeds: &[f64]) -> Option<f64> {
+    if speeds.len() < 2 || speeds.iter().all(|speed| *speed == 0.0) {
+        return None;
+    }
+    let length = speeds.len().next_power_of_two() << PADDING;
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+    let mut padded = transform.make_input_vec();
+    padded[..speeds.len()].copy_from_slice(speeds);
+    let mut spectrum = transform.make_output_vec();
+    transform.process(&mut padded, &mut spectrum).ok()?;
+    let amplitudes: Vec<f64> = spectrum.iter().map(|value| value.norm()).collect();
+    let largest = amplitudes.iter().copied().fold(0.0, f64::max);
+    let last = amplitudes.iter().rposition(|value| *value >= LEAST_AMPLITUDE * largest)?;
+    let step = 1.0 / last.max(1) as f64;
+    let pieces = amplitudes[..=last].windows(2);
+    let of_piece = |pair: &[f64]| step.hypot((pair[1] - pair[0]) / largest);
+    Some(-pieces.map(of_piece).sum::<f64>())
+}
+
+/// Number of submovements, and how long one takes on average, s.
+pub(crate) fn submovements(speeds: &[f64]) -> (usize, Option<f64>) {
+    let of = |stretch: &[f64]| stretch[0] > MOVING_MM_PER_S;
+    let stretches = speeds.chunk_by(|a, b| (*a > MOVING_MM_PER_S) == (*b > MOVING_MM_PER_S));
+    let lengths = stretches.filter(|stretch| of(stretch)).map(|stretch| stretch.len() as f64 * STEP_S);
+    let lengths: Vec<f64> = lengths.filter(|length_s| *length_s >= SHORTEST_S).collect();
+    let mean_s = lengths.iter().sum::<f64>() / lengths.len() as f64;
+    (lengths.len(), (!lengths.is_empty()).then_some(mean_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_bell_is_smoother_than_two_and_tremor_is_the_least_smooth() {
+        let bell = |k: usize| (std::f64::consts::PI * k as f64 / 40.0).sin().powi(2) * 20.0;
+        let one: Vec<f64> = (0..40).map(bell).collect();
+        let two: Vec<f64> = one.iter().chain(&one).copied().collect();
+        let tremor: Vec<f64> =
+            one.iter().enumerate().map(|(k, v)| v * (1.0 + 0.8 * (2.5 * k as f64).sin())).collect();
+        let [one, two, tremor] = [&one, &two, &tremor].map(|speeds| spectral_arc_length(speeds).unwrap());
+        assert!(one > two && one > tremor, "{one} {two} {tremor}");
+        // A bell of speed has −1.4 to −1.6 in the papers.
+        assert!((-1.9..-1.2).contains(&one), "{one}");
+        assert!(spectral_arc_length(&[0.0; 9]).is_none() && spectral_arc_length(&[]).is_none());
+    }
+
+    #[test]
+    fn submovements_are_counted_and_timed() {
+        let speeds = [0.0, 9.0, 9.0, 9.0, 9.0, 1.0, 3.0, 1.0, 5.0, 5.0];
+        let (count, mean_s) = submovements(&speeds);
+        assert_eq!(count, 2, "one of a twentieth of a second is none");
+        assert!((mean_s.unwrap() - 0.15).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,132 @@
+//! Measures of a small record against values computed by hand.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use endowire_assess::{BeamState, Group, Hand, Injection, Record, Sample, Way, assess};
+use endowire_core::Vec3;
+use endowire_core::vessel::{CentrelineNode, CentrelineTree, Target};
+
+/// A trunk of 100 mm along x that divides into branches of 50 mm towards +y and −y.
+fn tree() -> CentrelineTree {
+    let node = |x: f64, y: f64, radius_mm: f64, parent| CentrelineNode {
+        position_mm: Vec3::new(x, y, 0.0),
+        radius_mm,
+        parent,
+    };
+    let nodes = vec![
+        node(0.0, 0.0, 5.0, None),
+        node(100.0, 0.0, 5.0, Some(0)),
+        node(100.0, 50.0, 3.0, Some(1)),
+        node(100.0, -50.0, 3.0, Some(1)),
+    ];
+    let target = |name: &str, row| Target { name: name.to_owned(), row };
+    CentrelineTree::new(nodes).unwrap().with_targets(vec![target("left", 2), target("right", 3)]).unwrap()
+}
+
+fn sample(time_s: f64, [x, y]: [f64; 2], advance_mm: f64, wall_force_n: f64) -> Sample {
+    let hand = Hand { advance_mm, push_force_n: Some(-wall_force_n), ..Hand::default() };
+    Sample {
+        time_s,
+        tip_mm: Some(Vec3::new(x, y, 0.0)),
+        hands: vec![hand],
+        wall_force_n,
+        tip_force_n: 0.5 * wall_force_n,
+        jumped: wall_force_n > 0.25,
+    }
+}
+
+/// Ten seconds: into the trunk, into the wrong branch, back, a rest, into the right one.
+fn record() -> Record {
+    let on = |time_s: f64, on: bool, primary_deg: f64| BeamState {
+        time_s,
+        on,
+        frames_per_s: 10.0,
+        dose_ngy: 30.0,
+        field_mm2: 10_000.0,
+        primary_deg,
+        secondary_deg: 0.0,
+    };
+    Record {
+        samples: vec![
+            sample(1.0, [10.0, 0.0], 10.0, 0.0),
+            sample(3.0, [100.0, 0.0], 90.0, 0.1),
+            sample(4.0, [100.0, -20.0], 20.0, 0.3),
+            sample(5.0, [100.0, 0.0], -20.0, 0.1),
+            sample(7.0, [100.0, 0.0], 0.0, 0.1),
+            sample(10.0, [100.0, 48.0], 48.0, 0.2),
+        ],
+        injections: vec![
+            Injection { time_s: 0.5, volume_ml: 4.0, rate_ml_per_s: 2.0 },
+            Injection { time_s: 4.5, volume_ml: 6.0, rate_ml_per_s: 3.0 },
+        ],
+        beam: Some(vec![on(0.0, true, 0.0), on(2.0, false, 0.0), on(6.0, true, 30.0), on(8.0, false, 30.0)]),
+    }
+}
+
+#[test]
+fn each_measure_is_what_it_says() {
+    let way = Way::to_target(&tree(), "left", 5.0).unwrap().unwrap();
+    let metrics = assess(&record(), Some(&way));
+    let value = |name: &str| metrics.iter().find(|metric| metric.name == name).unwrap().value;
+    // The tip goes 90 + 20 + 20 + 48 mm; the centre line between its ends is 90 + 48 mm long.
+    let by_hand = [
+        ("total_s", 10.0),
+        ("idle_s", 2.0),
+        ("beam_on_s", 4.0),
+        ("beam_on_idle_s", 1.0),
+        ("kerma_ugy", 40.0 * 0.03),
+        ("kerma_area_ugycm2", 40.0 * 0.03 * 100.0),
+        ("runs", 2.0),
+        ("frames", 40.0),
+        ("field_cm2", 100.0),
+        ("c_arm_moves", 1.0),
+        ("contrast_ml", 10.0),
+        ("injections", 2.0),
+        ("largest_rate_ml_per_s", 3.0),
+        ("against_wall_ml", 6.0),
+        ("tip_path_mm", 178.0),
+        ("path_ratio", 178.0 / 138.0),
+        ("tip_speed_mm_per_s", 178.0 / 8.0),
+        ("submovements", 2.0),
+        ("submovement_s", 3.5),
+        ("reversals", 2.0),
+        ("turns", 0.0),
+        ("retracted_mm", 20.0),
+        ("wall_force_n", 0.3),
+        ("wall_force_95_n", 0.3),
+        ("tip_force_n", 0.15),
+        ("wall_impulse_ns", 0.1 * 2.0 + 0.3 + 0.1 + 0.1 * 2.0 + 0.2 * 3.0),
+        ("hand_force_n", 0.3),
+        ("hand_torque_nmm", 0.0),
+        ("jumps", 1.0),
+        ("moving_without_beam_s", 5.0),
+        ("wrong_branches", 1.0),
+        ("time_in_trunk_s", 10.0),
+        ("arrived", 1.0),
+        ("placement_error_mm", 2.0),
+    ];
+    for (name, expected) in by_hand {
+        let value = value(name).unwrap();
+        assert!((value - expected).abs() < 1e-9, "{name}: {value}, by hand {expected}");
+    }
+    assert!(value("spectral_arc_length").unwrap() < -1.0);
+    assert_eq!(value("catheter_ahead_s"), None, "of one instrument");
+    let told: Vec<&str> = metrics.iter().map(|metric| metric.name).collect();
+    assert_eq!(told.len(), by_hand.len() + 2);
+    assert!(Group::ALL.iter().all(|group| metrics.iter().any(|metric| metric.group == *group)));
+}
+
+#[test]
+fn what_was_not_recorded_has_no_value() {
+    let bare = Record { beam: None, ..record() };
+    let metrics = assess(&bare, None);
+    let none: Vec<&str> =
+        metrics.iter().filter(|metric| metric.value.is_none()).map(|metric| metric.name).collect();
+    for name in
+        ["beam_on_s", "kerma_ugy", "runs", "moving_without_beam_s", "path_ratio", "wrong_branches", "arrived"]
+    {
+        assert!(none.contains(&name), "{name} {none:?}");
+    }
+    assert!(!none.contains(&"total_s") && !none.contains(&"wall_force_n"));
+    assert!(Way::to_target(&tree(), "middle", 5.0).unwrap_err().to_string().contains("middle"));
+}

@@ -1,0 +1,50 @@
+//! What sessions and recorded runs are scored by.
+
+use std::path::PathBuf;
+
+use endowire_assess::{Record, Way};
+use endowire_core::vessel::CentrelineTree;
+use pyo3::prelude::*;
+
+use crate::document;
+use crate::error::{exception, refuse};
+use crate::interrupt::interruptible;
+
+/// Measures a session of `endowire play` (*.session.json) or the folder of a recorded run, as `endowire assess` does. `centreline` is the
+/// table of the vessel's centre line, and `target` the name of its point that was to be reached, within `within_mm` of it; without a
+/// table what depends on the way has no value, and without a target the way is that to where the tip ended.
+///
+/// Returns a list of dictionaries: name, group, value (None where what it needs was not recorded), unit, better ("lower" or "higher"),
+/// definition and study. Raises InputError for files that do not fit, and for a target that is not there.
+#[pyfunction]
+#[pyo3(signature = (path, *, centreline=None, target=None, within_mm=5.0))]
+pub(crate) fn assess<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    centreline: Option<PathBuf>,
+    target: Option<String>,
+    within_mm: f64,
+) -> PyResult<Bound<'py, PyAny>> {
+    if !(within_mm > 0.0 && within_mm.is_finite()) {
+        return Err(refuse("within_mm", within_mm, "must be a length above 0"));
+    }
+    if let (None, Some(target)) = (&centreline, &target) {
+        return Err(refuse(
+            "target",
+            format!("{target:?}"),
+            "is a point of a centre line: give centreline too",
+        ));
+    }
+    let measured = interruptible(py, move || {
+        let record = Record::read(&path)?;
+        let tree = centreline.map(|table| CentrelineTree::read(&table)).transpose()?;
+        let last_mm = record.samples.iter().rev().find_map(|sample| sample.tip_mm);
+        let way = match (&tree, &target, last_mm) {
+            (Some(tree), Some(name), _) => Way::to_target(tree, name, within_mm)?,
+            (Some(tree), None, Some(place_mm)) => Way::to_place(tree, &place_mm),
+            _ => None,
+        };
+        Ok::<_, endowire_core::Error>(endowire_assess::assess(&record, way.as_ref()))
+    })?;
+    document::write(py, &measured.map_err(exception)?)
+}

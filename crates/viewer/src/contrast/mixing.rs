@@ -1,0 +1,134 @@
+//! Whose blood is at a place in the lumen: the points of the tree, with their shares of it.
+//!
+//! Blood is mixed across a vessel and from a trunk into its branches, so what a place holds is a mean over the points about it. How far
+//! a place is from a point of radius r is told by its power over the radius, p = (|x − c|² − r²)/r, which is least for the vessel that
+//! the place is in. Shares fall from that least p to nothing with its difference, so they are continuous everywhere: along a
+//! vessel, and from one into the other. Only points that blood can come from on a short way through the tree have any: a vessel that
+//! merely passes by has none.
+
+use endowire_core::Vec3;
+use rustc_hash::FxHashMap;
+
+use super::flow::Node;
+
+/// Difference of p over which shares fall to nothing, mm: what is let go at a place is mixed with the blood of a vessel of
+/// radius r over √(20 r) on either side.
+const MIXED_MM: f64 = 20.0;
+/// Length over which medium fades beyond the ends of the tree, in their radii.
+const FADE_RADII: f64 = 2.0;
+/// Vessels thinner than this are mixed as if they had this radius: points are 2 mm apart.
+const THINNEST_MM: f64 = 1.0;
+/// Longest step of whoever asks along a line, and side of the cells that remember their nearest point, mm.
+pub(super) const STEP_MM: f64 = 1.25;
+
+/// The shares of a tree's points.
+#[derive(Debug)]
+pub(super) struct Mixing {
+    points: Vec<Point>,
+    /// The nearest point of each cell that is remembered.
+    cells: FxHashMap<[i32; 3], u32>,
+}
+
+#[derive(Debug)]
+struct Point {
+    position_mm: Vec3,
+    radius_mm: f64,
+    /// The way out of the tree where it ends, at the inlet too: beyond it medium fades.
+    outward: Option<Vec3>,
+    /// Points that may have a share where this is nearest.
+    about: Vec<u32>,
+}
+
+impl Point {
+    fn power_mm(&self, place: &Vec3) -> f64 {
+        let squared = (place - self.position_mm).norm_squared() - self.radius_mm * self.radius_mm;
+        squared / self.radius_mm.max(THINNEST_MM)
+    }
+
+    /// One within the tree, and less beyond its end.
+    fn left(&self, place: &Vec3) -> f64 {
+        let Some(outward) = self.outward else { return 1.0 };
+        let beyond = (place - self.position_mm).dot(&outward) / (FADE_RADII * self.radius_mm);
+        let left = 1.0 - beyond.clamp(0.0, 1.0);
+        left * left * (3.0 - 2.0 * left)
+    }
+}
+
+impl Mixing {
+    pub(super) fn new(nodes: &[Node]) -> Self {
+        let mut neighbours: Vec<Vec<usize>> = vec![vec![]; nodes.len()];
+        for (i, node) in nodes.iter().enumerate() {
+            if let Some(up) = node.upstream {
+                neighbours[i].push(up);
+                neighbours[up].push(i);
+            }
+        }
+        let point = |i: usize| {
+            let outward = match neighbours[i][..] {
+                [only] => (nodes[i].position_mm - nodes[only].position_mm).try_normalize(0.0),
+                _ => None,
+            };
+            let Node { position_mm, radius_mm, .. } = nodes[i];
+            Point { position_mm, radius_mm, outward, about: about(nodes, &neighbours, i) }
+        };
+        Self { points: (0..nodes.len()).map(point).collect(), cells: FxHashMap::default() }
+    }
+
+    /// Puts the shares of a place into `shares`. They add up to one, and to less beyond the ends of the tree.
+    pub(super) fn shares(&self, place: &Vec3, shares: &mut Vec<(u32, f32)>) {
+        let cell = cell(place);
+        let nearest = self.cells.get(&cell).copied().unwrap_or_else(|| self.nearest(cell));
+        shares.clear();
+        let about = &self.points[nearest as usize].about;
+        shares.extend(about.iter().map(|&i| (i, self.points[i as usize].power_mm(place) as f32)));
+        let least = shares.iter().map(|share| share.1).fold(f32::INFINITY, f32::min);
+        let weight = |power: f32| (1.0 - (power - least) / MIXED_MM as f32).max(0.0).powi(2);
+        shares.iter_mut().for_each(|share| share.1 = weight(share.1));
+        shares.retain(|share| share.1 > 0.0);
+        let all: f32 = shares.iter().map(|share| share.1).sum();
+        let each = self.points[nearest as usize].left(place) as f32 / all;
+        shares.iter_mut().for_each(|share| share.1 *= each);
+    }
+
+    /// Remembers the nearest point for all that is asked of the cell of a place.
+    pub(super) fn remember(&mut self, place: &Vec3) {
+        let cell = cell(place);
+        if !self.cells.contains_key(&cell) {
+            let nearest = self.nearest(cell);
+            self.cells.insert(cell, nearest);
+        }
+    }
+
+    /// The point nearest to the middle of a cell.
+    fn nearest(&self, cell: [i32; 3]) -> u32 {
+        let middle = Vec3::from(cell.map(|i| (f64::from(i) + 0.5) * STEP_MM));
+        let power = |point: &Point| point.power_mm(&middle);
+        let best = (0..).zip(&self.points).min_by(|a, b| power(a.1).total_cmp(&power(b.1)));
+        best.map_or(0, |(i, _)| i)
+    }
+}
+
+fn cell(place: &Vec3) -> [i32; 3] {
+    [place.x, place.y, place.z].map(|x| (x / STEP_MM).floor() as i32)
+}
+
+/// The points on short ways from a point: as far as shares reach in the wider of both, and a radius more, since a branch begins in the
+/// middle of its trunk.
+fn about(nodes: &[Node], neighbours: &[Vec<usize>], from: usize) -> Vec<u32> {
+    let reach = |i: usize| {
+        let radius = nodes[from].radius_mm.max(nodes[i].radius_mm).max(THINNEST_MM);
+        (MIXED_MM * radius).sqrt() + radius
+    };
+    let mut found = vec![from as u32];
+    let mut open = vec![(from, usize::MAX, 0.0)];
+    while let Some((at, before, way_mm)) = open.pop() {
+        for &next in neighbours[at].iter().filter(|&&next| next != before) {
+            let way_mm = way_mm + (nodes[next].position_mm - nodes[at].position_mm).norm();
+            if way_mm <= reach(next) {
+                found.push(next as u32);
+                open.push((next, at, way_mm));
+            }
+        }
+    }
+    found
+}

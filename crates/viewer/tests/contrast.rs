@@ -1,0 +1,140 @@
+//! Contrast medium in the picture is that which was injected, and has no steps.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::path::{Path, PathBuf};
+
+use endowire_core::vessel::{SurfaceMesh, Wall};
+use endowire_viewer::{Backend, CArmSpec, FlowSpec, InjectionSpec, PathLengths, Renderer, View, ViewSpec};
+
+fn vessel(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/vessels").join(name)
+}
+
+fn wall(name: &str) -> Wall {
+    let file = vessel(if name == "arch" { "aortic_arch.stl" } else { "hepatic.stl" });
+    Wall::from_surface(&SurfaceMesh::read(&file, 1.0).unwrap()).unwrap()
+}
+
+/// From so far away that all depths are magnified alike.
+fn far(view: ViewSpec) -> ViewSpec {
+    let c_arm = CArmSpec { sid_mm: 5000.0, sod_mm: 4900.0, field_mm: Some(420.0), ..view.c_arm };
+    ViewSpec { c_arm, size_px: [512, 512], ..view }
+}
+
+fn view(vessel_name: &str, inflow_ml_per_s: f64, pulsatility: f64, injection: InjectionSpec) -> ViewSpec {
+    let flow = FlowSpec {
+        tree: Some(vessel(&format!("{vessel_name}.csv"))),
+        inlet_mm: (vessel_name == "aortic_arch").then_some([-38.4, -54.8, 136.0]),
+        inflow_ml_per_s,
+        pulsatility,
+        tissue_mm: Some(20.0),
+        tissue_s: 1000.0,
+        ..FlowSpec::default()
+    };
+    ViewSpec {
+        views: vec![View::Fluoro],
+        backend: Backend::Cpu,
+        size_px: [512, 512],
+        flow,
+        injection: vec![injection],
+        ..ViewSpec::default()
+    }
+}
+
+fn injection(rate_ml_per_s: f64, at_mm: Option<[f64; 3]>) -> InjectionSpec {
+    InjectionSpec { start_s: 0.2, duration_s: 1.0, rate_ml_per_s, at_mm, at_tip: false }
+}
+
+fn seen_ml(renderer: &Renderer, paths: &PathLengths) -> f64 {
+    let c_arm = renderer.c_arm().unwrap();
+    let side_mm = c_arm.pixel_mm() * c_arm.sod_mm() / c_arm.sid_mm();
+    paths.contrast_mm.iter().map(|mm| f64::from(*mm)).sum::<f64>() * side_mm * side_mm / 1000.0
+}
+
+fn scenes() -> Vec<(&'static str, ViewSpec)> {
+    let mut all = vec![];
+    for pulsatility in [0.0, 0.6] {
+        all.push(("arch", view("aortic_arch", 80.0, pulsatility, injection(20.0, None))));
+        let in_artery = Some([-22.0, -39.0, 55.5]);
+        all.push(("liver", view("hepatic", 8.0, pulsatility, injection(2.0, in_artery))));
+    }
+    all
+}
+
+#[test]
+fn iodine_in_the_picture_is_what_was_injected_from_the_first_frame_on() {
+    for (name, view) in scenes() {
+        let wall = wall(name);
+        let rate = view.injection[0].rate_ml_per_s;
+        let mut renderer = Renderer::of_wall(&far(view.clone()), &wall).unwrap();
+        let mut before = f64::NAN;
+        for k in 1..=12 {
+            let time_s = 0.2 + f64::from(k) / 15.0;
+            let paths = renderer.path_lengths_at(&[], time_s).unwrap();
+            let injected = rate * (time_s - 0.2).min(1.0);
+            let seen = seen_ml(&renderer, &paths);
+            let ratio = seen / injected;
+            let pulsatility = view.flow.pulsatility;
+            assert!((ratio - 1.0).abs() < 0.02, "{name} {pulsatility} {time_s}: {ratio}");
+            // The twin: what was there a frame before is not what was injected now.
+            assert!(k == 1 || (before / injected - 1.0).abs() > 0.02, "{before} {injected}");
+            before = seen;
+        }
+    }
+}
+
+#[test]
+fn neighbouring_pixels_of_a_lumen_differ_by_little() {
+    for (name, view) in scenes() {
+        let wall = wall(name);
+        let mut renderer = Renderer::of_wall(&view, &wall).unwrap();
+        let mut cut = 0.0_f32;
+        for k in [1, 3, 6, 10, 15, 20, 30] {
+            let time_s = 0.2 + f64::from(k) / 15.0;
+            let paths = renderer.path_lengths_at(&[], time_s).unwrap();
+            let (step, place) = largest_step(&paths);
+            let pulsatility = view.flow.pulsatility;
+            eprintln!("{name} {pulsatility} {time_s:.3} s: step {step:.3} at {place:?}");
+            assert!(step <= 0.05, "{name} {pulsatility} {time_s}: {step} at {place:?}");
+            let mut full = paths;
+            let most = full.contrast_mm.iter().zip(&full.lumen_mm).map(|(c, l)| c / l.max(1.0));
+            let half = 0.5 * most.fold(0.0, f32::max);
+            full.contrast_mm.iter_mut().zip(&full.lumen_mm).for_each(|(c, l)| {
+                *c = if *c > half * l { *l } else { 0.0 };
+            });
+            cut = cut.max(largest_step(&full).0);
+        }
+        // The twin: medium that fills whole or not at all.
+        assert!(cut > 0.5, "{cut}");
+    }
+}
+
+/// Largest difference of the fraction between neighbours over the largest fraction, away from the edges of what vessels cover there.
+fn largest_step(paths: &PathLengths) -> (f32, [usize; 2]) {
+    const NEAR: usize = 3;
+    let (width, height) = (paths.width as usize, paths.height as usize);
+    let lumen = |x: usize, y: usize| paths.lumen_mm[y * width + x];
+    let even = |x: usize, y: usize| {
+        let about = (x - NEAR..=x + NEAR).flat_map(|i| (y - NEAR..=y + NEAR).map(move |j| lumen(i, j)));
+        let (low, high) = about.fold((f32::MAX, 0.0_f32), |(l, h), mm| (l.min(mm), h.max(mm)));
+        low > 0.75 * high && low > 0.0
+    };
+    let fraction = |x: usize, y: usize| paths.contrast_mm[y * width + x] / lumen(x, y);
+    let (mut largest, mut most, mut place) = (0.0_f32, 0.0_f32, [0; 2]);
+    for y in NEAR..height - NEAR - 1 {
+        for x in NEAR..width - NEAR - 1 {
+            if !even(x, y) {
+                continue;
+            }
+            most = most.max(fraction(x, y));
+            for (i, j) in [(x + 1, y), (x, y + 1)] {
+                let step = (fraction(x, y) - fraction(i, j)).abs();
+                if even(i, j) && step > largest {
+                    (largest, place) = (step, [x, y]);
+                }
+            }
+        }
+    }
+    (largest / most, place)
+}
