@@ -20,7 +20,7 @@
 //! by less than ε a step, and ε is a thousandth of what the hand moved in it, or of the radius where it rests.
 //!
 //! The normal force N and the normal n are lagged: within one step of Newton's method D has fixed ones, so the energy keeps
-//! a symmetric Hessian and steps that descend; between steps they are renewed ([`follow`]). What is left at the end is Coulomb's law of the
+//! a symmetric Hessian and steps that descend; between steps they are renewed (`friction/follow.rs`). What is left at the end is Coulomb's law of the
 //! final state.
 //!
 //! Where a wall is smoother in some places than in others μ is the largest coefficient, and N the normal force times the

@@ -7,7 +7,7 @@
 //!
 //! On a wall with regions ψ is multiplied by eˢ, s of the place ([`super::regions`]), and so is the cap's.
 //!
-//! What presses is no matter of depth alone: points have forces of their own ([`forces`]), which Newton's method solves for.
+//! What presses is no matter of depth alone: points have forces of their own (`wall/forces.rs`), which Newton's method solves for.
 //!
 //! A point asks the bounding volume hierarchy only when it may have come near something new: while it has moved less than
 //! its last clearance, nothing can touch it.

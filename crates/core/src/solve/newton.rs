@@ -2,7 +2,7 @@
 //!
 //! The merit is the potential energy itself: a step moves along the constraint manifold (see
 //! [`RodState::advance`]), so nothing has to be weighed against it. Contacts have a merit of their own, and every step is found with those at
-//! its end ([`super::contacts`]). Where the far end is held, the distance from its
+//! its end (`contacts.rs`). Where the far end is held, the distance from its
 //! conditions is added with a weight above the reactions (an exact penalty), after second-order corrections that
 //! re-use the factorisation; once the conditions hold the merit is the energy again. Every accepted step lowers the merit.
 //!
