@@ -245,6 +245,13 @@ impl RodState {
         }
     }
 
+    /// Whether an element bends by more than 120° from end to end: the curve that is drawn of it is shorter than it by a fiftieth then, and
+    /// by a tenth at 180°, where its twist is not defined any more.
+    pub fn is_folded(&self) -> bool {
+        const COSINE: f64 = -0.5;
+        self.frames.windows(2).any(|ends| ends[0].t.dot(&ends[1].t) < COSINE)
+    }
+
     /// The largest rotation a step holds, at nodes and in the middle of elements, and the largest change of angle.
     pub fn largest_turn<const C: usize>(elements: &[ElementData], base: &Self, d: &[f64]) -> (f64, f64) {
         let l = Layout::<C>;

@@ -186,6 +186,7 @@ impl<const C: usize> Newton<C> {
                 self.line_search(&mut problem, state, &mut search, step, &contacts)
             });
             match searched {
+                Ok(_) if state.is_folded() => return report.stopped(StopReason::Folded),
                 Ok(_) if self.neighbourhood.is_left_by(state) => return report.stopped(StopReason::Left),
                 Ok(turn) => progress.has_turned(turn),
                 Err(StopReason::NoDescent) => {

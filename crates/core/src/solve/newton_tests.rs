@@ -113,3 +113,15 @@ fn a_force_that_is_not_a_number_is_named() {
     assert_eq!(r.reason, super::StopReason::NotFinite);
     assert!(!r.converged);
 }
+
+#[test]
+fn an_element_that_would_fold_is_told_and_shorter_ones_bend() {
+    let back = || Tip(Vec3::new(-40.0, 1.0, 0.0));
+    let (state, r) = cantilever(1, &mut back());
+    assert_eq!(r.reason, super::StopReason::Folded);
+    assert!(!r.converged && state.is_folded());
+    let (state, r) = cantilever(32, &mut back());
+    assert!(r.converged && r.stable && !state.is_folded(), "{}", r.reason);
+    // From its clamped end to its tip it has turned round.
+    assert!(state.frames[0].t.dot(&state.frames[32].t) < -0.9);
+}

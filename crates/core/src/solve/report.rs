@@ -39,6 +39,8 @@ pub enum StopReason {
     Left,
     /// It is one with normal forces of friction that are not those of the wall.
     Unsettled,
+    /// An element bends farther than it can say ([`RodState::is_folded`](crate::rod::RodState::is_folded)).
+    Folded,
     /// The state or the matrix holds a number that is not finite.
     NotFinite,
 }
@@ -53,6 +55,7 @@ impl std::fmt::Display for StopReason {
             Self::Singular => "the stiffness matrix is singular",
             Self::Left => "what was found is far from where the device was predicted",
             Self::Unsettled => "friction and wall forces do not settle",
+            Self::Folded => "an element would bend by more than 120°: give shorter elements",
             Self::NotFinite => "a number is not finite",
         })
     }

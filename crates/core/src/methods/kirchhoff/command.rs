@@ -142,7 +142,8 @@ impl<const C: usize> Workspace<C> {
             let iterations = tools.work.iterations;
             let tried = tools.try_step(&there, here, attempt, next);
             let iterations = tools.work.iterations - iterations;
-            control.took(iterations);
+            // What is given up before its first iteration has its price as well.
+            control.took(iterations.max(1));
             match tried {
                 // Where the device has come to rest with energy that nobody put in, it was too far from where it was.
                 Ok(found) if found.lacks && control.can_shorten(part_mm) => control.shorten(part_mm),

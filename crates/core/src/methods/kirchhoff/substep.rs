@@ -186,7 +186,7 @@ impl<const C: usize> Tools<C> {
             (true, found) if !found.converged => Some(Lost::Unsolved(found.reason, found.residual)),
             (true, found) if !balanced => Some(Lost::Unsolved(StopReason::Unsettled, found.residual)),
             (true, found) if off > 1.0 => Some(Lost::Unsolved(StopReason::Left, found.residual)),
-            (false, found) if !found.residual.is_finite() => {
+            (false, found) if !found.residual.is_finite() || found.reason == StopReason::Folded => {
                 Some(Lost::Unsolved(found.reason, found.residual))
             }
             _ => {
