@@ -51,12 +51,14 @@ pub enum Kind {
     GuidingCatheter,
     /// Sheath.
     Sheath,
+    /// Embolisation coil on its pusher.
+    Coil,
 }
 
 impl Kind {
     /// Whether every part of it has a lumen.
     fn is_tube(self) -> bool {
-        !matches!(self, Self::Guidewire | Self::Microwire)
+        !matches!(self, Self::Guidewire | Self::Microwire | Self::Coil)
     }
 }
 
@@ -160,8 +162,7 @@ impl FileTable {
 
     fn of_parts(&self, length_mm: Option<f64>) -> Result<(Vec<Part>, Device)> {
         let Some(kind) = self.kind else {
-            let mend =
-                "say what it is: guidewire, microwire, microcatheter, catheter, guiding_catheter or sheath";
+            let mend = "say what it is: guidewire, microwire, microcatheter, catheter, guiding_catheter, sheath or coil";
             return Err(Error::parameter("kind", "absent", mend));
         };
         let lengths = self.lengths(length_mm)?;

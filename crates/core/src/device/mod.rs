@@ -9,7 +9,9 @@ mod file_tests;
 mod part;
 mod quantity;
 mod rest_shape;
+mod secondary;
 mod stack;
+mod winding;
 
 pub(crate) use file::FileTable;
 pub use file::{DeviceFile, Kind};

@@ -3,15 +3,17 @@
 use serde::Deserialize;
 
 use super::quantity::{Ends, Quantity, Way, one_of, second_moment_mm4};
+use super::secondary::{Arc, Secondary};
+use super::winding::Winding;
 use super::{LENGTH_LIMIT_MM, RADIUS_LIMIT_MM, STIFFNESS_LIMIT_NMM2, Section};
 use crate::{Error, Result};
 
 /// Millimetres in an inch.
-const INCH_MM: f64 = 25.4;
+pub(super) const INCH_MM: f64 = 25.4;
 /// Millimetres in a French (Charrière), as a diameter.
 const FRENCH_MM: f64 = 1.0 / 3.0;
 /// Stiffest material, MPa: diamond.
-const MODULUS_LIMIT_MPA: f64 = 1.2e6;
+pub(super) const MODULUS_LIMIT_MPA: f64 = 1.2e6;
 /// Most sections that a taper is cut into.
 const MOST_CUTS: usize = 200;
 /// Widest arc of a tip, degrees: three turns.
@@ -38,6 +40,8 @@ pub(crate) struct PartTable {
     flexural_modulus_mpa: Option<Ends>,
     flexural_modulus_gpa: Option<Ends>,
     torsional_stiffness_nmm2: Option<Ends>,
+    winding: Option<Winding>,
+    secondary: Option<Secondary>,
     sections: Option<usize>,
     material: Option<String>,
     coat: Option<Coat>,
@@ -86,7 +90,7 @@ pub struct CutError {
     pub stiffness: f64,
 }
 
-/// A named part of a device: constant or linearly tapered between its ends, of one curvature at rest.
+/// A named part of a device: constant or linearly tapered between its ends, of one curvature at rest or a line of arcs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
     /// Its name.
@@ -103,7 +107,8 @@ pub struct Part {
     inner_radius_mm: Option<Ends>,
     stiffness: Stiffness,
     torsion_nmm2: Option<Ends>,
-    rest_curvature_per_mm: [f64; 2],
+    /// Its arcs at rest, tip first; a part of several is not tapered.
+    arcs: Vec<Arc>,
     cuts: usize,
 }
 
@@ -120,9 +125,14 @@ impl Part {
             inner_radius_mm: section.inner_radius_mm.map(Ends::constant),
             stiffness: Stiffness::Bending(Ends::constant(section.bending_stiffness_nmm2)),
             torsion_nmm2: section.torsional_stiffness_nmm2.map(Ends::constant),
-            rest_curvature_per_mm: section.rest_curvature_per_mm,
+            arcs: vec![Arc { length_mm: section.length_mm, curvature_per_mm: section.rest_curvature_per_mm }],
             cuts: 1,
         }
+    }
+
+    /// Whether its shape at rest is more than one arc.
+    pub fn has_secondary_shape(&self) -> bool {
+        self.arcs.len() > 1
     }
 
     /// The part as it is at a fraction (0 to 1) of its length from the end towards the tip, as a section of its whole length.
@@ -140,12 +150,31 @@ impl Part {
                 }
             },
             torsional_stiffness_nmm2: self.torsion_nmm2.map(|gj| gj.at(fraction)),
-            rest_curvature_per_mm: self.rest_curvature_per_mm,
+            rest_curvature_per_mm: self.arc(fraction).curvature_per_mm,
         }
     }
 
-    /// The sections that stand for it, tip first: a taper is cut into equal lengths, each as the taper is in its middle.
+    /// The arc at a fraction of its length.
+    fn arc(&self, fraction: f64) -> Arc {
+        let mut left_mm = fraction * (self.from_tip_mm[1] - self.from_tip_mm[0]);
+        let here = self.arcs.iter().find(|arc| {
+            left_mm -= arc.length_mm;
+            left_mm < 0.0
+        });
+        *here.unwrap_or(&self.arcs[self.arcs.len() - 1])
+    }
+
+    /// The sections that stand for it, tip first: an arc each, and a taper is cut into equal lengths, each as the taper is in its middle.
     pub fn sections(&self) -> Vec<Section> {
+        if self.has_secondary_shape() {
+            let whole = self.at(0.0);
+            let section = |Arc { length_mm, curvature_per_mm }: &Arc| Section {
+                length_mm: *length_mm,
+                rest_curvature_per_mm: *curvature_per_mm,
+                ..whole
+            };
+            return self.arcs.iter().map(section).collect();
+        }
         let count = self.cuts as f64;
         let cut = |k: usize| {
             let middle = self.at((k as f64 + 0.5) / count);
@@ -158,6 +187,9 @@ impl Part {
     pub fn cut_error(&self) -> CutError {
         let count = self.cuts as f64;
         let mut error = CutError { radius_mm: 0.0, stiffness: 0.0 };
+        if self.has_secondary_shape() {
+            return error;
+        }
         for (k, section) in self.sections().iter().enumerate() {
             for end in [k, k + 1] {
                 let taper = self.at(end as f64 / count);
@@ -183,6 +215,11 @@ impl PartTable {
     pub(super) fn length_mm(&self) -> Result<Option<f64>> {
         let place = self.place();
         let length = one_of(&place, length_ways(self.length_mm, self.length_cm), LENGTH_LIMIT_MM)?;
+        if let Some(own_mm) = self.secondary.as_ref().and_then(Secondary::length_mm) {
+            let Some(length) = length else { return Ok(Some(own_mm)) };
+            let mend = format!("secondary.points_mm is a curve of {own_mm} mm: keep one of the two");
+            return Err(Error::parameter(format!("{place}.{}", length.key), length.given, mend));
+        }
         let Some(bend) = self.bend else { return Ok(length.map(|length| length.ends.at(0.0))) };
         if let Some(length) = length {
             let mend = "bend has the length radius_mm · angle: keep one of the two";
@@ -222,13 +259,21 @@ impl PartTable {
             return missing("inner_diameter_mm", mend);
         }
         self.check_layers(&place, outer, inner)?;
-        let Some((stiffness, stiffness_ends)) = self.stiffness(&place)? else {
-            let mend = "give bending_stiffness_nmm2, flexural_modulus_mpa or flexural_modulus_gpa";
+        let wound = self.winding.map(|winding| winding.resolve(&place, outer.ends)).transpose()?;
+        let given = self.stiffness(&place)?;
+        let wound_stiffness = wound.map(|wound| (Stiffness::Bending(wound.bending_nmm2), wound.bending_nmm2));
+        if wound.is_some() && (given.is_some() || self.torsional_stiffness_nmm2.is_some()) {
+            let mend = "the stiffness is given too, in numbers: keep one of the two";
+            return Err(Error::parameter(format!("{place}.winding"), "a table", mend));
+        }
+        let Some((stiffness, stiffness_ends)) = given.or(wound_stiffness) else {
+            let mend = "give bending_stiffness_nmm2, flexural_modulus_mpa, flexural_modulus_gpa or winding";
             return missing("bending_stiffness_nmm2", mend);
         };
         let torsion_way =
             Way { key: "torsional_stiffness_nmm2", given: self.torsional_stiffness_nmm2, factor: 1.0 };
         let torsion = one_of(&place, [torsion_way], STIFFNESS_LIMIT_NMM2)?.map(|q| q.ends);
+        let torsion = torsion.or(wound.map(|wound| wound.torsion_nmm2));
         let inner = inner.map(|inner| inner.ends);
         let tapered = [Some(outer.ends), inner, Some(stiffness_ends), torsion];
         let part = Part {
@@ -241,9 +286,13 @@ impl PartTable {
             inner_radius_mm: inner,
             stiffness,
             torsion_nmm2: torsion,
-            rest_curvature_per_mm: self.curvature(&place, outer.ends)?,
+            arcs: self.arcs(&place, length_mm, outer.ends)?,
             cuts: self.cuts(&place, tapered.into_iter().flatten().any(Ends::is_taper))?,
         };
+        if part.has_secondary_shape() && part.cuts > 1 {
+            let mend = "the part is tapered: a part with a secondary shape is the same everywhere";
+            return Err(Error::parameter(format!("{place}.secondary"), "a table", mend));
+        }
         // EI and GJ follow from other values: out of range they are known only now.
         [0.0, 1.0].iter().try_for_each(|end| part.at(*end).check(&place))?;
         Ok(part)
@@ -310,27 +359,36 @@ impl PartTable {
         Ok(())
     }
 
-    fn curvature(&self, place: &str, radius_mm: Ends) -> Result<[f64; 2]> {
-        match (self.bend, self.rest_curvature_per_mm) {
-            (Some(_), Some(curvature)) => {
-                let name = format!("{place}.rest_curvature_per_mm");
-                Err(Error::parameter(
-                    name,
-                    format!("{curvature:?}"),
-                    "bend is given too: keep one of the two",
-                ))
-            }
-            (Some(bend), None) => {
-                let widest_mm = radius_mm.0[0].max(radius_mm.0[1]);
-                if bend.radius_mm < widest_mm {
-                    let mend = format!("must be at least the part's own radius, {widest_mm:.4} mm");
-                    return Err(Error::parameter(format!("{place}.bend.radius_mm"), bend.radius_mm, mend));
-                }
-                let (sin, cos) = bend.direction_deg.to_radians().sin_cos();
-                Ok([cos / bend.radius_mm, sin / bend.radius_mm])
-            }
-            (None, curvature) => Ok(curvature.unwrap_or_default()),
+    /// Its arcs at rest: at most one key gives them, and none a straight part.
+    fn arcs(&self, place: &str, length_mm: f64, radius_mm: Ends) -> Result<Vec<Arc>> {
+        let widest_mm = radius_mm.0[0].max(radius_mm.0[1]);
+        let keys = [
+            ("bend", self.bend.is_some()),
+            ("rest_curvature_per_mm", self.rest_curvature_per_mm.is_some()),
+            ("secondary", self.secondary.is_some()),
+        ];
+        let mut given = keys.into_iter().filter_map(|(key, is_given)| is_given.then_some(key));
+        if let (Some(first), Some(second)) = (given.next(), given.next()) {
+            let value = self.rest_curvature_per_mm.filter(|_| second == "rest_curvature_per_mm");
+            let value = value.map_or_else(|| "a table".to_owned(), |curvature| format!("{curvature:?}"));
+            let mend = format!("{first} is given too: keep one of the two");
+            return Err(Error::parameter(format!("{place}.{second}"), value, mend));
         }
+        if let Some(secondary) = &self.secondary {
+            return secondary.arcs(place, length_mm, widest_mm);
+        }
+        let curvature_per_mm = match self.bend {
+            Some(bend) if bend.radius_mm < widest_mm => {
+                let mend = format!("must be at least the part's own radius, {widest_mm:.4} mm");
+                return Err(Error::parameter(format!("{place}.bend.radius_mm"), bend.radius_mm, mend));
+            }
+            Some(bend) => {
+                let (sin, cos) = bend.direction_deg.to_radians().sin_cos();
+                [cos / bend.radius_mm, sin / bend.radius_mm]
+            }
+            None => self.rest_curvature_per_mm.unwrap_or_default(),
+        };
+        Ok(vec![Arc { length_mm, curvature_per_mm }])
     }
 
     /// Number of sections.

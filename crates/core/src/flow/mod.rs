@@ -189,7 +189,7 @@ fn vector(x: &Vec3) -> Vector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vessel::{CentrelineNode, SurfaceMesh};
+    use crate::vessel::{CentrelineNode, SurfaceMesh, anatomy};
 
     /// A straight centre line along z.
     fn line(x_mm: f64, z_mm: [f64; 2]) -> CentrelineTree {
@@ -216,6 +216,23 @@ mod tests {
                 "{error}"
             );
         }
+    }
+
+    #[test]
+    fn what_a_sac_takes_in_comes_back() {
+        let vessel = anatomy::tree("basilar_aneurysm").unwrap();
+        let shares = |tree: &CentrelineTree| {
+            let nodes = flow_nodes(tree, Some(Vec3::zeros()), 3.0, ["a", "b"]).unwrap();
+            let at = |name: &str| tree.nodes()[tree.target(name).unwrap().row].position_mm;
+            let share = |name: &str| {
+                nodes.iter().find(|node| node.position_mm == at(name)).map_or(f64::NAN, |node| node.share)
+            };
+            ["dome", "left posterior cerebral", "right posterior cerebral"].map(share)
+        };
+        assert_eq!(shares(&vessel), [0.2, 0.5, 0.5]);
+        // Through an open end it would be lost.
+        let open = vessel.with_closed_ends(vec![]).unwrap();
+        assert!((shares(&open).iter().sum::<f64>() - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! A centre-line tree directed from its inlet, and how the flow divides in it.
 //!
 //! Blood enters at the inlet and divides at bifurcations in proportion to radiusⁿ: n = 2 gives all branches the same mean velocity, as in
-//! large arteries, n = 3 is Murray's law for small ones (Proceedings of the National Academy of Sciences 12, 1926).
+//! large arteries, n = 3 is Murray's law for small ones (Proceedings of the National Academy of Sciences 12, 1926). What a sac takes in
+//! comes back: it has a share of its own, and the other branches divide the whole.
 
 use crate::vessel::{CentrelineNode, CentrelineTree};
 use crate::{Error, Result, Vec3, error};
@@ -14,6 +15,9 @@ const SPACING_MM: f64 = 2.0;
 const MOST_NODES: f64 = 50_000.0;
 /// Ends of at least this part of the widest's radius are about as wide.
 const ABOUT_AS_WIDE: f64 = 0.95;
+
+/// Part of the flow past a sac that turns around in it: an estimate.
+const EXCHANGE: f64 = 0.2;
 
 /// A point of the tree, after those upstream of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,7 +69,8 @@ pub fn flow_nodes(
             neighbours[parent].push(i);
         }
     }
-    let ends = (0..points.len()).filter(|&i| neighbours[i].len() == 1);
+    let in_sac = tree.in_sacs();
+    let ends = (0..points.len()).filter(|&i| neighbours[i].len() == 1 && !in_sac[i]);
     let inlet = match inlet_mm {
         None => supplying(points, ends),
         Some(near) => {
@@ -102,10 +107,13 @@ pub fn flow_nodes(
     while let Some((at, before, becomes)) = open.pop() {
         let onwards: Vec<usize> = neighbours[at].iter().copied().filter(|&n| n != before).collect();
         let weight = |i: usize| points[i].radius_mm.powf(split_exponent);
-        let total: f64 = onwards.iter().map(|&i| weight(i)).sum();
+        // Within a sac all is of it.
+        let is_sac = |i: usize| in_sac[i] && !in_sac[at];
+        let total: f64 = onwards.iter().filter(|&&i| !is_sac(i)).map(|&i| weight(i)).sum();
         let widest = onwards.iter().map(|&i| points[i].radius_mm).fold(0.0, f64::max);
         for &next in &onwards {
-            let share = nodes[becomes].share * weight(next) / total;
+            let part = if is_sac(next) { EXCHANGE } else { weight(next) / total };
+            let share = nodes[becomes].share * part;
             let ((x0, r0), (x1, r1)) = (place(at), place(next));
             // A side branch begins where it leaves the trunk, and has its own radius from there on.
             let is_side = r1 < widest;

@@ -9,8 +9,16 @@ use super::{CentrelineNode, CentrelineTree, Resolution, Target};
 use crate::Vec3;
 
 /// Names of the built-in vessels, for messages.
-pub const NAMES: [&str; 6] =
-    ["straight_tube", "curved_tube", "aortic_arch", "aortic_arch_ii", "aortic_arch_iii", "hepatic"];
+pub const NAMES: [&str; 8] = [
+    "straight_tube",
+    "curved_tube",
+    "aortic_arch",
+    "aortic_arch_ii",
+    "aortic_arch_iii",
+    "hepatic",
+    "sidewall_aneurysm",
+    "basilar_aneurysm",
+];
 
 /// The built-in vessel of that name.
 pub fn tree(name: &str) -> Option<CentrelineTree> {
@@ -21,12 +29,18 @@ pub fn tree(name: &str) -> Option<CentrelineTree> {
         "aortic_arch_ii" => aortic_arch(&TYPE_II),
         "aortic_arch_iii" => aortic_arch(&TYPE_III),
         "hepatic" => hepatic(),
+        "sidewall_aneurysm" => sidewall_aneurysm(),
+        "basilar_aneurysm" => basilar_aneurysm(),
         _ => return None,
     };
-    let tree = CentrelineTree::new(nodes).ok()?;
+    let closed = targets(name).iter().filter(|(_, name)| *name == DOME).map(|(row, _)| *row);
+    let tree = CentrelineTree::new(nodes).ok()?.with_closed_ends(closed.collect()).ok()?;
     let named = targets(name).iter().map(|(row, name)| Target { name: (*name).to_owned(), row: *row });
     tree.with_targets(named.collect()).ok()
 }
+
+/// What the end of a sac is called.
+const DOME: &str = "dome";
 
 /// Rows that have names: ends of branches but for the coeliac trunk, which is on the way.
 fn targets(name: &str) -> &'static [(usize, &'static str)] {
@@ -42,6 +56,8 @@ fn targets(name: &str) -> &'static [(usize, &'static str)] {
             (25, "right hepatic"),
             (28, "left hepatic"),
         ],
+        "sidewall_aneurysm" => &[(5, "distal carotid"), (10, DOME)],
+        "basilar_aneurysm" => &[(8, DOME), (11, "left posterior cerebral"), (14, "right posterior cerebral")],
         _ => &[],
     }
 }
@@ -55,6 +71,8 @@ pub fn description(name: &str) -> Option<&'static str> {
         "aortic_arch_ii" => Some(AORTIC_ARCH_II),
         "aortic_arch_iii" => Some(AORTIC_ARCH_III),
         "hepatic" => Some(HEPATIC),
+        "sidewall_aneurysm" => Some(SIDEWALL_ANEURYSM),
+        "basilar_aneurysm" => Some(BASILAR_ANEURYSM),
         _ => None,
     }
 }
@@ -66,6 +84,7 @@ pub fn asset_resolution(name: &str) -> Resolution {
         "curved_tube" => Resolution::EdgeMm(1.2),
         "aortic_arch" | "aortic_arch_ii" => Resolution::EdgeMm(2.25),
         "aortic_arch_iii" => Resolution::EdgeMm(2.4),
+        "sidewall_aneurysm" | "basilar_aneurysm" => Resolution::EdgeMm(0.5),
         _ => Resolution::EdgeMm(1.1),
     }
 }
@@ -283,6 +302,47 @@ fn hepatic() -> Vec<CentrelineNode> {
         .to(Vec3::new(-46.0, -44.0, 102.0), 1.25)
         .to(Vec3::new(-38.0, -46.0, 112.0), 1.25)
         .nodes
+}
+
+const SIDEWALL_ANEURYSM: &str = "sidewall_aneurysm: an aneurysm on the side of the internal carotid artery; the inlet is the artery's lower end.
+Diameter of the artery 5.0 mm, that of the cavernous segment (Rai et al., J. NeuroIntervent. Surg. 5, 2013). Sac: dome 7 mm, neck 4 mm, 6.6 mm above the
+artery's wall: aspect ratio 1.65, of 1.91 +- 0.8 in 179 aneurysms of the anterior circulation (PMC4137168, 2014). Course drawn.
+Axes: +x left, +y posterior, +z cranial; origin at the lower end.";
+
+fn sidewall_aneurysm() -> Vec<CentrelineNode> {
+    let artery = [[0.0, 0.0], [0.3, 12.0], [1.0, 24.0], [2.0, 36.0], [3.2, 48.0], [4.6, 60.0]];
+    let mut course = Course::new().root(Vec3::zeros(), 2.5);
+    for [x, z] in &artery[1..] {
+        course = course.to(Vec3::new(*x, 0.0, *z), 2.5);
+    }
+    // Backwards from the artery's axis: the neck, and the ball that begins there.
+    course = course.at(3);
+    for (y, radius) in [(1.5, 2.0), (2.7, 2.0), (3.4, 2.72), (4.4, 3.29), (5.6, 3.5)] {
+        course = course.to(Vec3::new(2.0, y, 36.0), radius);
+    }
+    course.nodes
+}
+
+const BASILAR_ANEURYSM: &str = "basilar_aneurysm: an aneurysm at the tip of the basilar artery; the inlet is the artery's lower end.
+Diameters: basilar artery 3.6 to 3.1 mm over 27.3 mm, posterior cerebral arteries 2.2 mm (means of 100 adults, J. NeuroIntervent. Surg. 5, 597, 2013).
+Sac: dome 8 mm, neck 4 mm, 7.6 mm high: aspect ratio 1.9, of 2.75 +- 1.8 in 75 aneurysms of the posterior circulation (PMC4137168, 2014).
+Course drawn. Axes: +x left, +y posterior, +z cranial; origin at the lower end.";
+
+fn basilar_aneurysm() -> Vec<CentrelineNode> {
+    let mut course = Course::new().root(Vec3::zeros(), 1.8);
+    for (z, radius) in [(9.0, 1.72), (18.0, 1.63), (27.3, 1.55)] {
+        course = course.to(Vec3::new(0.0, 0.0, z), radius);
+    }
+    for (z, radius) in [(28.6, 1.6), (29.6, 2.0), (30.4, 2.86), (31.6, 3.67), (33.2, 4.0)] {
+        course = course.to(Vec3::new(0.0, 0.0, z), radius);
+    }
+    for side in [1.0, -1.0] {
+        course = course.at(3);
+        for [x, y, z] in [[6.0, 0.0, 27.5], [13.0, -1.0, 29.0], [20.0, -3.0, 29.0]] {
+            course = course.to(Vec3::new(side * x, y, z), 1.1);
+        }
+    }
+    course.nodes
 }
 
 /// A pen that draws a tree point by point.

@@ -2,7 +2,7 @@
 //!
 //! As a table, one point a line: `x y z radius parent`, separated by blanks, tabs, commas or semicolons; millimetres; `parent`
 //! is the row (counted from 0, without comments and header) of an earlier point, −1 for the root. Words behind it name the point as a
-//! target. `#` starts a comment, and the first line that is not a comment may be a header of words. Lists of points without parents are read
+//! target; the word `closed` alone, or after a name, closes the vessel there with a dome, as the sac of an aneurysm. `#` starts a comment, and the first line that is not a comment may be a header of words. Lists of points without parents are read
 //! too where the header names their columns ([`super::point_lists`]).
 
 use std::fmt::Write;
@@ -30,6 +30,9 @@ pub struct CentrelineNode {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CentrelineTree {
     nodes: Vec<CentrelineNode>,
+    /// Leaves where the vessel is closed by a dome, ascending.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    closed: Vec<usize>,
     /// Not of the vessel's shape: a wall is the same by whatever names.
     #[serde(skip)]
     targets: Vec<Target>,
@@ -59,7 +62,7 @@ impl CentrelineTree {
         if nodes.len() < 2 {
             return Err(Error::parameter("centreline rows", nodes.len(), "a vessel needs at least 2 points"));
         }
-        Ok(Self { nodes, targets: Vec::new() })
+        Ok(Self { nodes, closed: Vec::new(), targets: Vec::new() })
     }
 
     /// The tree with these rows named, in place of those that were.
@@ -78,6 +81,43 @@ impl CentrelineTree {
         }
         self.targets = targets;
         Ok(self)
+    }
+
+    /// The tree with the vessel closed at these leaves, in place of those that were: by half a ball of the leaf's radius, as the sac of an
+    /// aneurysm ends.
+    ///
+    /// # Errors
+    /// A row that is not there, or is no leaf: the root and points with others behind them go on.
+    pub fn with_closed_ends(mut self, mut rows: Vec<usize>) -> Result<Self> {
+        rows.sort_unstable();
+        rows.dedup();
+        let children = self.children();
+        if let Some(row) =
+            rows.iter().find(|row| **row == 0 || !children.get(**row).is_some_and(Vec::is_empty))
+        {
+            let mend = "must be the last point of a branch: elsewhere the vessel goes on";
+            return Err(Error::parameter("closed end, row", row, mend));
+        }
+        self.closed = rows;
+        Ok(self)
+    }
+
+    /// Rows of the leaves where the vessel is closed by a dome, ascending.
+    pub fn closed_ends(&self) -> &[usize] {
+        &self.closed
+    }
+
+    /// For each row whether all that lies behind it, seen from the root, and it itself end in closed ends: the sacs of the tree.
+    pub(crate) fn in_sacs(&self) -> Vec<bool> {
+        let children = self.children();
+        let mut inside = vec![false; self.nodes.len()];
+        for row in (1..self.nodes.len()).rev() {
+            inside[row] = match children[row].as_slice() {
+                [] => self.closed.binary_search(&row).is_ok(),
+                behind => behind.iter().all(|child| inside[*child]),
+            };
+        }
+        inside
     }
 
     /// The named points, in the order of the table.
@@ -141,7 +181,7 @@ impl CentrelineTree {
     /// Reads the text of a table; the error names line and value.
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut nodes: Vec<CentrelineNode> = Vec::new();
-        let mut targets: Vec<Target> = Vec::new();
+        let (mut targets, mut closed): (Vec<Target>, Vec<usize>) = (Vec::new(), Vec::new());
         let mut may_be_header = true;
         let mut columns: Option<Columns> = None;
         for (index, line) in text.lines().enumerate() {
@@ -178,6 +218,9 @@ impl CentrelineTree {
             }
             let (row, name) = words.split_at(words.len().min(COLUMNS));
             nodes.push(parse_row(row).map_err(|reason| format!("line {}: {reason}", index + 1))?);
+            let is_closed = name.last() == Some(&CLOSED);
+            closed.extend(is_closed.then(|| nodes.len() - 1));
+            let name = &name[..name.len() - usize::from(is_closed)];
             if !name.is_empty() {
                 let name = name.join(" ");
                 check_name(&name, &targets)
@@ -193,7 +236,8 @@ impl CentrelineTree {
         if nodes.len() < 2 {
             return Err(format!("{} centre-line points; a vessel needs at least 2", nodes.len()));
         }
-        Ok(Self { nodes, targets })
+        let tree = Self { nodes, closed: Vec::new(), targets };
+        tree.with_closed_ends(closed).map_err(|error| error.to_string())
     }
 
     /// Writes the table with `comment` above it. Reading it back gives the same bits.
@@ -208,11 +252,14 @@ impl CentrelineTree {
     pub fn table(&self, comment: &str) -> String {
         let mut out: String = comment.lines().map(|line| format!("# {line}\n")).collect();
         out.push_str("x,y,z,radius,parent");
-        out.push_str(if self.targets.is_empty() { "\n" } else { ",target\n" });
+        let is_plain = self.targets.is_empty() && self.closed.is_empty();
+        out.push_str(if is_plain { "\n" } else { ",target\n" });
         for (row, node) in self.nodes.iter().enumerate() {
             let (p, parent) = (node.position_mm, node.parent.map_or(-1, |row| row as i64));
             let name = self.targets.iter().find(|target| target.row == row);
-            let name = name.map_or(String::new(), |target| format!(",{}", target.name));
+            let closed = self.closed.binary_search(&row).is_ok().then_some(CLOSED);
+            let words = name.map(|target| target.name.as_str()).into_iter().chain(closed).collect::<Vec<_>>();
+            let name = if words.is_empty() { String::new() } else { format!(",{}", words.join(" ")) };
             // Writing to a string cannot fail.
             let _ = writeln!(out, "{},{},{},{},{parent}{name}", p.x, p.y, p.z, node.radius_mm);
         }
@@ -238,12 +285,17 @@ impl CentrelineTree {
 
 /// Values of a row without a name.
 const COLUMNS: usize = 5;
+/// The last word of a row where the vessel is closed.
+const CLOSED: &str = "closed";
 
 /// Why a name cannot be that of a target beside others, if it cannot.
 fn check_name(name: &str, others: &[Target]) -> std::result::Result<(), String> {
     let words = name.split(|c: char| c.is_whitespace() || c == ',' || c == ';');
     if name.contains('#') || words.clone().any(str::is_empty) || words.collect::<Vec<_>>().join(" ") != name {
         return Err("a name is words with a blank between them, without commas, semicolons and #".into());
+    }
+    if name.split(' ').next_back() == Some(CLOSED) {
+        return Err("ends in the word that closes a vessel in a table: call it otherwise".into());
     }
     if name.split(' ').all(|word| word.parse::<f64>().is_ok()) {
         return Err("is a number: a row is x y z radius parent, and a name if the point has one".into());
@@ -378,12 +430,31 @@ mod tests {
             ("0 0 0 1 -1\n0 0 1 1", "line 2: 4 values"),
             ("0 0 0 1 -1\n0 0 1 1 0 7", "line 2: target = \"7\": is a number"),
             ("0 0 0 1 -1 end\n0 0 1 1 0 end", "line 2: target = \"end\": is the name of an earlier row"),
+            ("0 0 0 1 -1\n0 0 1 1 0 closed\n0 0 2 1 1", "closed end, row = 1: must be the last point"),
             ("", "0 centre-line points"),
             ("0 0 0 1 -1", "1 centre-line points"),
         ] {
             let reason = CentrelineTree::parse(table).unwrap_err();
             assert!(reason.starts_with(expected), "{table:?}: {reason}");
         }
+    }
+
+    #[test]
+    fn a_row_may_close_the_vessel_with_a_name_or_without() {
+        let table =
+            "0 0 0 2 -1\n0 0 9 2 0\n0 0 20 2 1 distal\n0 3 9 2 1\n0 6 9 3 3 dome closed\n0 -3 9 2 1 closed\n";
+        let tree = CentrelineTree::parse(table).unwrap();
+        assert_eq!(tree.closed_ends(), [4, 5]);
+        assert_eq!(tree.target("dome").unwrap().row, 4);
+        assert_eq!(tree.targets().len(), 2);
+        assert_eq!(CentrelineTree::parse(&tree.table("")).unwrap(), tree);
+        assert_eq!(tree.in_sacs(), [false, false, false, true, true, true]);
+        // It is of the vessel's shape.
+        let open = CentrelineTree::new(tree.nodes().to_vec()).unwrap();
+        let json = |tree: &CentrelineTree| serde_json::to_string(tree).unwrap();
+        assert!(json(&open) != json(&tree));
+        let named = |name: &str| open.clone().with_targets(vec![Target { name: name.into(), row: 2 }]);
+        assert!(named("end closed").is_err() && named("closed end").is_ok());
     }
 
     #[test]

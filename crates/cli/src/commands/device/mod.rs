@@ -160,5 +160,6 @@ fn words(kind: Kind) -> &'static str {
         Kind::Catheter => "catheter",
         Kind::GuidingCatheter => "guiding catheter",
         Kind::Sheath => "sheath",
+        Kind::Coil => "coil",
     }
 }

@@ -137,7 +137,7 @@ fn caption(file: &DeviceFile, off_plane_mm: f64) -> String {
     let [mm, ..] = diameters([2.0 * device.min_radius_mm(), 2.0 * device.max_radius_mm()]);
     let size = format!("{mm} mm, {:.0} cm", device.length_mm() / 10.0);
     // What a tenth of a millimetre off its plane does is not seen.
-    if off_plane_mm < 0.1 { size } else { format!("{size}; up to {off_plane_mm:.0} mm off this plane") }
+    if off_plane_mm < 0.1 { size } else { format!("{size}, {off_plane_mm:.0} mm off plane") }
 }
 
 /// The centre line of a part.

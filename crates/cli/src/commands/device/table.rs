@@ -14,8 +14,11 @@ pub(super) struct PartRow {
     inner_diameter_mm: Option<[f64; 2]>,
     bending_stiffness_nmm2: [f64; 2],
     torsional_stiffness_nmm2: [f64; 2],
+    /// That of the arc next to the tip, where there are several.
     rest_curvature_per_mm: [f64; 2],
-    /// Angle that the part is bent by at rest.
+    /// Arcs of its shape at rest.
+    arcs: usize,
+    /// Angle that the part is bent by at rest, arc by arc.
     bend_deg: f64,
     /// Sections that stand for it.
     sections: usize,
@@ -40,6 +43,7 @@ impl PartRow {
         let [from_mm, to_mm] = part.from_tip_mm;
         let [first, second] = ends[0].rest_curvature_per_mm;
         let cut = part.cut_error();
+        let sections = part.sections();
         Self {
             part: part.name.clone(),
             from_mm,
@@ -52,8 +56,9 @@ impl PartRow {
             bending_stiffness_nmm2: both(|s| s.bending_stiffness_nmm2),
             torsional_stiffness_nmm2: both(Section::torsion_nmm2),
             rest_curvature_per_mm: [first, second],
-            bend_deg: (first.hypot(second) * (to_mm - from_mm)).to_degrees(),
-            sections: part.sections().len(),
+            arcs: if part.has_secondary_shape() { sections.len() } else { 1 },
+            bend_deg: sections.iter().map(bend_rad).sum::<f64>().to_degrees(),
+            sections: sections.len(),
             cut_radius_error_mm: cut.radius_mm,
             cut_stiffness_error: cut.stiffness,
             material: part.material.clone(),
@@ -72,6 +77,9 @@ impl PartRow {
         if curvature == 0.0 {
             return "–".to_owned();
         }
+        if self.arcs > 1 {
+            return format!("{curvature:.3} ({:.1} turns in {} arcs)", self.bend_deg / 360.0, self.arcs);
+        }
         let direction_deg = second.atan2(first).to_degrees();
         let direction =
             if direction_deg.abs() < 0.05 { String::new() } else { format!(" to {direction_deg:.0}°") };
@@ -88,10 +96,16 @@ impl PartRow {
 
     fn sections(&self) -> String {
         match self.sections {
-            1 => "1".to_owned(),
+            count if self.cut_stiffness_error == 0.0 => count.to_string(),
             count => format!("{count} (EI ±{} %)", digits(100.0 * self.cut_stiffness_error, 2)),
         }
     }
+}
+
+/// Angle that a section is bent by at rest, rad.
+fn bend_rad(section: &Section) -> f64 {
+    let [first, second] = section.rest_curvature_per_mm;
+    first.hypot(second) * section.length_mm
 }
 
 /// The table for people.

@@ -54,7 +54,7 @@ pub(super) struct Branch {
     pub(super) thickest: f64,
     /// Row of the root, if the branch begins there: an open end.
     pub(super) root_row: Option<usize>,
-    /// Row of the leaf, if the branch ends in one: an open end.
+    /// Row of the leaf, if the branch ends in one that is open.
     pub(super) leaf_row: Option<usize>,
     /// The course at each sample: where every search for a foot begins.
     pub(super) at_samples: Vec<Course>,
@@ -180,7 +180,8 @@ pub(super) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> {
             }
             last = rows[rows.len() - 1];
         }
-        found.push(fit(tree, &rows, leaves_parent, children[last].is_empty())?);
+        let is_open = children[last].is_empty() && tree.closed_ends().binary_search(&last).is_err();
+        found.push(fit(tree, &rows, leaves_parent, is_open)?);
         samples += found[found.len() - 1].samples.len();
         if found.len() > MOST_BRANCHES || samples > MOST_SAMPLES_IN_ALL {
             let mend = format!(
@@ -209,7 +210,7 @@ fn continuation(tree: &CentrelineTree, children: &[usize], direction: Option<Vec
 }
 
 /// Fits and resamples the curve through `rows`.
-fn fit(tree: &CentrelineTree, rows: &[usize], leaves_parent: bool, ends_in_leaf: bool) -> Result<Branch> {
+fn fit(tree: &CentrelineTree, rows: &[usize], leaves_parent: bool, ends_open: bool) -> Result<Branch> {
     let nodes = tree.nodes();
     let points: Vec<Vec3> = rows.iter().map(|&r| nodes[r].position_mm).collect();
     let mut radii: Vec<f64> = rows.iter().map(|&r| nodes[r].radius_mm).collect();
@@ -256,7 +257,7 @@ fn fit(tree: &CentrelineTree, rows: &[usize], leaves_parent: bool, ends_in_leaf:
         samples,
         step,
         root_row: (!leaves_parent).then_some(rows[0]),
-        leaf_row: ends_in_leaf.then_some(rows[rows.len() - 1]),
+        leaf_row: ends_open.then_some(rows[rows.len() - 1]),
         at_samples: Vec::new(),
         thickest: 0.0,
     };

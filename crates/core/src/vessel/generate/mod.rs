@@ -85,7 +85,7 @@ impl Resolution {
 /// A wall made from a centre-line tree.
 #[derive(Debug, Clone)]
 pub struct GeneratedWall {
-    /// The wall, open at the root and at every leaf.
+    /// The wall, open at the root and at every leaf that is not closed.
     pub wall: Wall,
     /// Which opening of the wall is the root of the tree.
     pub inlet: usize,

@@ -291,3 +291,24 @@ fn a_tree_of_thousands_of_branches_is_refused_before_a_grid_is_made() {
     assert!(error.starts_with("centreline rows = 6001: the first "), "{error}");
     assert!(error.contains("at most 5000 branches and 2000000 samples"), "{error}");
 }
+
+#[test]
+fn a_closed_end_is_half_a_ball_and_no_opening() {
+    let (radius, length) = (2.0, 20.0);
+    let tube =
+        tree(&[([0.0; 3], radius, -1), ([0.0, 0.0, 10.0], radius, 0), ([0.0, 0.0, length], radius, 1)]);
+    let open = generate(&tube, 0.3);
+    let closed = generate(&tube.clone().with_closed_ends(vec![2]).unwrap(), 0.3);
+    assert_eq!((open.ends.len(), closed.ends.len(), closed.wall.openings().len()), (2, 1, 1));
+    let (tube_mm3, cap_mm3) = (PI * radius * radius * length, 2.0 / 3.0 * PI * radius.powi(3));
+    let off = |found: f64, expected: f64| (found / expected - 1.0).abs();
+    assert!(off(closed.wall.volume_mm3(), tube_mm3 + cap_mm3) < 0.01, "{}", closed.wall.volume_mm3());
+    assert!(off(closed.wall.volume_mm3(), tube_mm3) > 0.05, "the cap is seen");
+    let top = closed.wall.mesh().vertices_mm.iter().map(|v| v.z).fold(0.0, f64::max);
+    assert!((top - length - radius).abs() < 0.02, "{top}");
+    // Only leaves close.
+    for row in [0, 1, 3] {
+        let error = tube.clone().with_closed_ends(vec![row]).unwrap_err().to_string();
+        assert!(error.contains(&format!("closed end, row = {row}")), "{error}");
+    }
+}
