@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Subcommand;
+use endowire_core::Vec3;
 use endowire_core::passable::NO_FORCE_N;
 use endowire_core::vessel::{CentrelineEnd, PatientAxes, SurfaceFrame};
 
@@ -29,6 +30,8 @@ pub(crate) enum VesselCommand {
     Generate(GenerateArgs),
     /// Find the centre line of a surface, with the radius of the largest sphere about each point
     Centreline(CentrelineArgs),
+    /// Measure the sac of an aneurysm: neck, volume, height
+    Sac(SacArgs),
     /// Say whether a device can follow the way to a target: room, narrowest place, sharpest bend; passes, tight, blocked or short
     Passable(PassableArgs),
 }
@@ -130,6 +133,23 @@ pub(crate) struct CentrelineArgs {
 }
 
 #[derive(Debug, clap::Args)]
+pub(crate) struct SacArgs {
+    /// Surface mesh (STL, OBJ, PLY, VTP or VTK)
+    pub(crate) file: PathBuf,
+    /// A place x,y,z within the sac in mm
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true)]
+    pub(crate) dome: Vec3,
+    /// A place x,y,z in the artery that it is on; the nearest one of the centre line that is found in the surface if absent
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true)]
+    pub(crate) parent: Option<Vec3>,
+    #[command(flatten)]
+    pub(crate) frame: CoordinateArgs,
+    /// Print what was measured as one JSON document on stdout
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
 pub(crate) struct PassableArgs {
     /// Surface mesh (STL, OBJ, PLY, VTP or VTK)
     pub(crate) file: PathBuf,
@@ -156,4 +176,12 @@ pub(crate) struct PassableArgs {
     /// Print what was found as one JSON document on stdout
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// A place as `x,y,z`.
+fn parse_place(text: &str) -> Result<Vec3, String> {
+    match parse_end(text) {
+        Ok(CentrelineEnd::Place(place_mm)) => Ok(place_mm),
+        _ => Err("expected a place x,y,z in mm".to_owned()),
+    }
 }

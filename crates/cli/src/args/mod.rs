@@ -15,7 +15,8 @@ use clap::{Parser, Subcommand};
 use endowire_sweep::{Setting, Shard};
 
 pub(crate) use inputs::{
-    CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, GenerateArgs, PassableArgs, VesselCommand,
+    CentrelineArgs, CoordinateArgs, DeviceCommand, FeltArgs, GenerateArgs, PassableArgs, SacArgs,
+    VesselCommand,
 };
 pub(crate) use pictures::{DatasetArgs, ExportArgs, FluoroArgs, FrameArgs, RenderArgs, ViewChoice};
 pub(crate) use studies::{

@@ -18,6 +18,7 @@ mod render;
 mod report;
 mod rod;
 mod run;
+mod sac;
 mod shell;
 mod studio;
 mod surfaces;
@@ -48,6 +49,7 @@ pub(crate) fn dispatch(args: &Args) -> Result<(), Failure> {
         }
         Command::Vessel(VesselCommand::Generate(args)) => vessel::generate(args),
         Command::Vessel(VesselCommand::Centreline(args)) => centreline::centreline(args),
+        Command::Vessel(VesselCommand::Sac(args)) => sac::sac(args),
         Command::Vessel(VesselCommand::Passable(args)) => passable::passable_file(args),
         Command::Device(DeviceCommand::Show { file, out, json }) => device::show(file, out.as_deref(), *json),
         Command::Device(DeviceCommand::List { folder, out, json }) => {

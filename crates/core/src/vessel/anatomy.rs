@@ -305,8 +305,8 @@ fn hepatic() -> Vec<CentrelineNode> {
 }
 
 const SIDEWALL_ANEURYSM: &str = "sidewall_aneurysm: an aneurysm on the side of the internal carotid artery; the inlet is the artery's lower end.
-Diameter of the artery 5.0 mm, that of the cavernous segment (Rai et al., J. NeuroIntervent. Surg. 5, 2013). Sac: dome 7 mm, neck 4 mm, 6.6 mm above the
-artery's wall: aspect ratio 1.65, of 1.91 +- 0.8 in 179 aneurysms of the anterior circulation (PMC4137168, 2014). Course drawn.
+Diameter of the artery 5.0 mm, that of the cavernous segment (Rai et al., J. NeuroIntervent. Surg. 5, 2013). Sac: dome 7 mm, neck 3.9 mm, 6.6 mm
+high (endowire vessel sac): aspect ratio 1.7, of 1.91 +- 0.8 in 179 aneurysms of the anterior circulation (PMC4137168, 2014). Course drawn.
 Axes: +x left, +y posterior, +z cranial; origin at the lower end.";
 
 fn sidewall_aneurysm() -> Vec<CentrelineNode> {
@@ -317,7 +317,7 @@ fn sidewall_aneurysm() -> Vec<CentrelineNode> {
     }
     // Backwards from the artery's axis: the neck, and the ball that begins there.
     course = course.at(3);
-    for (y, radius) in [(1.5, 2.0), (2.7, 2.0), (3.4, 2.72), (4.4, 3.29), (5.6, 3.5)] {
+    for (y, radius) in [(1.5, 1.6), (2.7, 1.6), (3.48, 2.607), (4.57, 3.271), (5.81, 3.5)] {
         course = course.to(Vec3::new(2.0, y, 36.0), radius);
     }
     course.nodes
@@ -325,7 +325,8 @@ fn sidewall_aneurysm() -> Vec<CentrelineNode> {
 
 const BASILAR_ANEURYSM: &str = "basilar_aneurysm: an aneurysm at the tip of the basilar artery; the inlet is the artery's lower end.
 Diameters: basilar artery 3.6 to 3.1 mm over 27.3 mm, posterior cerebral arteries 2.2 mm (means of 100 adults, J. NeuroIntervent. Surg. 5, 597, 2013).
-Sac: dome 8 mm, neck 4 mm, 7.6 mm high: aspect ratio 1.9, of 2.75 +- 1.8 in 75 aneurysms of the posterior circulation (PMC4137168, 2014).
+Sac: dome 8 mm, neck 3.7 mm, 8.2 mm high (endowire vessel sac): aspect ratio 2.2, of 2.75 +- 1.8 in 75 aneurysms of the posterior circulation
+(PMC4137168, 2014).
 Course drawn. Axes: +x left, +y posterior, +z cranial; origin at the lower end.";
 
 fn basilar_aneurysm() -> Vec<CentrelineNode> {
@@ -333,7 +334,7 @@ fn basilar_aneurysm() -> Vec<CentrelineNode> {
     for (z, radius) in [(9.0, 1.72), (18.0, 1.63), (27.3, 1.55)] {
         course = course.to(Vec3::new(0.0, 0.0, z), radius);
     }
-    for (z, radius) in [(28.6, 1.6), (29.6, 2.0), (30.4, 2.86), (31.6, 3.67), (33.2, 4.0)] {
+    for (z, radius) in [(28.6, 1.775), (29.6, 2.0), (30.47, 3.041), (31.68, 3.752), (33.06, 4.0)] {
         course = course.to(Vec3::new(0.0, 0.0, z), radius);
     }
     for side in [1.0, -1.0] {

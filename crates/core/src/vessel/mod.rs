@@ -20,6 +20,7 @@ mod point_lists;
 mod query;
 mod recipe;
 mod repair;
+mod sac;
 mod sliver;
 mod survey;
 #[cfg(test)]
@@ -43,5 +44,6 @@ pub use opening::Opening;
 pub use path::{CentrelinePath, OnPath};
 pub use query::{Nearest, WallQuery};
 pub use recipe::{CentrelineRecipe, NoStore, WallRecipe, WallStore};
+pub use sac::Sac;
 pub use survey::{LumenReport, SeptaReport, StartReport, Survey, survey};
 pub use wall::{NO_NEIGHBOUR, RepairReport, Wall};
