@@ -14,8 +14,6 @@ struct Document {
     #[serde(flatten)]
     provenance: Provenance,
     file: String,
-    /// A place in the artery, as it was given or found, mm.
-    parent_mm: Vec3,
     #[serde(flatten)]
     sac: Sac,
 }
@@ -24,17 +22,15 @@ struct Document {
 pub(crate) fn sac(args: &SacArgs) -> Result<(), Failure> {
     let provenance = Provenance::new(&[&read_input(&args.file)?], 0);
     let wall = Wall::from_surface(&SurfaceMesh::read(&args.file, args.frame)?)?;
-    let parent_mm = match args.parent {
-        Some(parent_mm) => parent_mm,
+    let at_file = |error: Error| as_flag(error).at(args.file.display());
+    let sac = match args.parent {
+        Some(parent_mm) => Sac::measure(&wall, args.dome, parent_mm).map_err(at_file)?,
         None => {
-            let line = ExtractedCentreline::of(&wall, None, &[])
-                .map_err(|error| Failure::from(error).at(args.file.display()))?
-                .tree;
-            line.nodes()[line.nearest_row(&args.dome)].position_mm
+            let line = ExtractedCentreline::of(&wall, None, &[]).map_err(at_file)?.tree;
+            Sac::on_artery(&wall, args.dome, &line).map_err(at_file)?
         }
     };
-    let sac = Sac::measure(&wall, args.dome, parent_mm).map_err(|e| as_flag(e).at(args.file.display()))?;
-    let document = Document { provenance, file: args.file.display().to_string(), parent_mm, sac };
+    let document = Document { provenance, file: args.file.display().to_string(), sac };
     answer(&document, args.json, || text(&document))
 }
 

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::{NO_NEIGHBOUR, Wall, WallQuery};
+use super::{CentrelineNode, CentrelineTree, NO_NEIGHBOUR, Wall, WallQuery};
 use crate::rod::Frame;
 use crate::{Error, Result, Vec3};
 
@@ -81,8 +81,32 @@ impl Sac {
     /// [`Error::Parameter`] for a place outside the lumen, and where no plane between them cuts off a sac without openings: it has no neck
     /// there, or is none.
     pub fn measure(wall: &Wall, dome_mm: Vec3, parent_mm: Vec3) -> Result<Self> {
-        let query = WallQuery::new(wall)?;
-        let (middle_mm, radius_mm) = middle(wall, &query, dome_mm)?;
+        let ball = middle(wall, dome_mm)?;
+        Self::beyond_neck(wall, ball, (dome_mm, parent_mm))
+    }
+
+    /// The same on the artery of a centre line: at its nearest place around which no ball in the lumen meets the sac's. The line may pass the
+    /// sac.
+    ///
+    /// # Errors
+    /// As [`Self::measure`]; where all of the line lies in the sac.
+    pub fn on_artery(wall: &Wall, dome_mm: Vec3, line: &CentrelineTree) -> Result<Self> {
+        let ball = middle(wall, dome_mm)?;
+        let away_mm = |node: &&CentrelineNode| (node.position_mm - ball.0).norm();
+        let outside = line.nodes().iter().filter(|node| away_mm(node) > ball.1 + node.radius_mm);
+        let Some(nearest) = outside.min_by(|a, b| away_mm(a).total_cmp(&away_mm(b))) else {
+            let mend = "the centre line does not leave the sac: give a place in the artery";
+            return Err(Error::parameter("parent", "absent", mend));
+        };
+        Self::beyond_neck(wall, ball, (dome_mm, nearest.position_mm))
+    }
+
+    /// What is beyond the neck between a ball in the sac and the artery.
+    fn beyond_neck(
+        wall: &Wall,
+        (middle_mm, radius_mm): (Vec3, f64),
+        (dome_mm, parent_mm): (Vec3, Vec3),
+    ) -> Result<Self> {
         let way = parent_mm - middle_mm;
         if way.norm() <= radius_mm {
             let mend = "the artery begins within the sac: give a place in the artery, or another in the sac";
@@ -115,7 +139,8 @@ impl Sac {
 }
 
 /// The middle of the largest ball that a place in the lumen leads to, and its radius, mm.
-fn middle(wall: &Wall, query: &WallQuery, dome_mm: Vec3) -> Result<(Vec3, f64)> {
+fn middle(wall: &Wall, dome_mm: Vec3) -> Result<(Vec3, f64)> {
+    let query = WallQuery::new(wall)?;
     let reach_mm = wall.mesh().bounds_mm().map_or(0.0, |(low, high)| (high - low).norm());
     let clearance =
         |at: &Vec3| query.nearest(at, reach_mm).filter(|near| near.distance_mm > 0.0 && !near.rim);
@@ -307,7 +332,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::vessel::{GeneratedWall, Resolution, anatomy};
+    use crate::vessel::{ExtractedCentreline, GeneratedWall, Resolution, anatomy};
 
     fn measured(name: &str, edge_mm: f64) -> (Sac, f64) {
         let tree = anatomy::tree(name).unwrap();
@@ -339,6 +364,13 @@ mod tests {
             (measured("basilar_aneurysm", 0.6), measured("basilar_aneurysm", 0.35));
         assert!((coarse.neck_area_mm2 / fine.neck_area_mm2 - 1.0).abs() < 0.05, "{coarse:?} {fine:?}");
         assert!((coarse.volume_mm3 / fine.volume_mm3 - 1.0).abs() < 0.03, "{coarse:?} {fine:?}");
+        // A line from one artery to the other may pass the sac.
+        let tree = anatomy::tree("basilar_aneurysm").unwrap();
+        let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(0.6)).unwrap().wall;
+        let dome_mm = tree.nodes()[8].position_mm;
+        let line = ExtractedCentreline::of(&wall, None, &[]).unwrap().tree;
+        let found = Sac::on_artery(&wall, dome_mm, &line).unwrap();
+        assert!((found.neck_area_mm2 / coarse.neck_area_mm2 - 1.0).abs() < 0.05, "{found:?}");
         assert!((fine.dome_diameter_mm - 8.0).abs() < 0.2 && fine.volume_mm3 < 0.5 * whole_mm3);
     }
 

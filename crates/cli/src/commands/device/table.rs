@@ -72,13 +72,14 @@ impl PartRow {
 
     /// A curvature as radius and angle, with its direction where it leaves the first plane.
     fn bend(&self) -> String {
+        if self.arcs > 1 {
+            let mean_per_mm = self.bend_deg.to_radians() / (self.to_mm - self.from_mm);
+            return format!("{mean_per_mm:.3} ({:.1} turns in {} arcs)", self.bend_deg / 360.0, self.arcs);
+        }
         let [first, second] = self.rest_curvature_per_mm;
         let curvature = first.hypot(second);
         if curvature == 0.0 {
             return "–".to_owned();
-        }
-        if self.arcs > 1 {
-            return format!("{curvature:.3} ({:.1} turns in {} arcs)", self.bend_deg / 360.0, self.arcs);
         }
         let direction_deg = second.atan2(first).to_degrees();
         let direction =
