@@ -104,6 +104,13 @@ impl Renderer {
         self.setup.c_arm.as_ref()
     }
 
+    /// Where a point is in the 3D view, pixels from the left and from the top; `None` without that view, and for points behind the camera.
+    pub fn three_d_pixel(&self, point_mm: &Vec3) -> Option<[f64; 2]> {
+        let camera = self.setup.camera.as_ref()?;
+        let view = camera.in_view(point_mm);
+        (view[2] < 0.0).then(|| camera.pixel_of(view, 1))
+    }
+
     /// How much of the vessel's surface the tomogram of its patient holds, 0 to 1; `None` without a tomogram, or fluoroscopy.
     pub fn vessel_held(&self) -> Option<f64> {
         self.setup.patient.vessel_held()

@@ -8,6 +8,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
 
 use endowire_core::{Error, Result};
 
+use crate::engine::process;
+
 /// The first failure an adapter has reported.
 type Failure = Arc<Mutex<Option<String>>>;
 
@@ -31,7 +33,7 @@ impl Gpu {
     pub(crate) fn open(features: wgpu::Features, software: bool) -> std::result::Result<Self, String> {
         // Drivers keep threads and locks of a process that one forked from it does not have: they would be waited for without end.
         static PROCESS: OnceLock<u32> = OnceLock::new();
-        if *PROCESS.get_or_init(std::process::id) != std::process::id() {
+        if *PROCESS.get_or_init(process) != process() {
             return Err("graphics were in use before this process was forked".into());
         }
         let descriptor = wgpu::InstanceDescriptor {
