@@ -326,7 +326,7 @@ impl PartTable {
                     let mend = format!("must be at least the part's own radius, {widest_mm:.4} mm");
                     return Err(Error::parameter(format!("{place}.bend.radius_mm"), bend.radius_mm, mend));
                 }
-                let (sin, cos) = bend.direction_deg.to_radians().sin_cos();
+                let (sin, cos) = libm::sincos(bend.direction_deg.to_radians());
                 Ok([cos / bend.radius_mm, sin / bend.radius_mm])
             }
             (None, curvature) => Ok(curvature.unwrap_or_default()),

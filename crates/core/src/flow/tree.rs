@@ -101,7 +101,7 @@ pub fn flow_nodes(
     let mut open = vec![(inlet, usize::MAX, 0_usize)];
     while let Some((at, before, becomes)) = open.pop() {
         let onwards: Vec<usize> = neighbours[at].iter().copied().filter(|&n| n != before).collect();
-        let weight = |i: usize| points[i].radius_mm.powf(split_exponent);
+        let weight = |i: usize| libm::pow(points[i].radius_mm, split_exponent);
         let total: f64 = onwards.iter().map(|&i| weight(i)).sum();
         let widest = onwards.iter().map(|&i| points[i].radius_mm).fold(0.0, f64::max);
         for &next in &onwards {
