@@ -302,6 +302,25 @@ impl Renderer {
         }
     }
 
+    /// The same with the rays cast by a graphics processor whose answers are waited for, as those of a browser; where it fails, by the processor.
+    /// What each frame needs is computed by the processor in any case.
+    ///
+    /// # Errors
+    /// As [`Self::render_at`].
+    #[cfg(feature = "gpu")]
+    pub async fn prepare_on(&mut self, graphics: &gpu::Graphics) -> Result<()> {
+        if let (Some(c_arm), None, None) = (&self.setup.c_arm, &self.fluoro, &self.kept) {
+            match graphics.anatomy(&self.setup, c_arm).await {
+                Ok(anatomy) => {
+                    self.kept = Some(Kept::of(c_arm, anatomy));
+                    self.engines.name = graphics.name().to_owned();
+                }
+                Err(error) => self.engines.name = format!("{} (adapter failed: {error})", cpu::NAME),
+            }
+        }
+        self.prepare()
+    }
+
     /// Prepares the next frame of a detector that holds what another place has left, if there was one.
     fn go_on_from(&mut self, stored: Option<Afterglow>) -> Result<()> {
         let Some(stored) = stored else { return Ok(()) };

@@ -51,6 +51,10 @@ depth_mm = 2.0
 [method]
 name = "kirchhoff"
 element_mm = 4.0
+
+[view.xray]
+contrast_fraction = 0.1   # contrast medium all the time, to see the vessel by
+tissue_mm = 200.0
 `;
 }
 

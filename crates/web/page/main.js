@@ -23,8 +23,12 @@ export async function openScene(path, script) {
   screen.clear();
   open = { path, name: path.split("/").pop().replace(/\.toml$/, "") };
   document.title = `endowire: ${open.name}`;
-  element("scenes").value = own.has(path) ? "" : path;
-  screen.tell(script ? "the script of the link is shown: move to take over" : "push with ↑ or the round field; F1 shows all keys");
+  const menu = element("scenes");
+  menu.querySelector("[value=own]")?.remove();
+  if (own.has(path)) menu.prepend(new Option("Own scene", "own"));
+  menu.value = own.has(path) ? "own" : path;
+  const how = matchMedia("(pointer: coarse)").matches ? "drag the round field up to push, sideways to turn" : "push with ↑ or the round field; F1 shows all keys";
+  screen.tell(script ? "the script is shown: move to take over" : how);
 }
 
 /** The same where nobody waits: what is wrong is told on the page. */
@@ -46,6 +50,22 @@ on.broken = (text) => screen.tell(`the simulator has stopped, load the page agai
 function head() {
   const path = own.has(open.path) ? "SCENE" : `assets/${open.path}`;
   return `# What hands have done in ${open.name}; carried out again by\n# endowire run ${path} --script played.toml\n\n`;
+}
+
+async function saveSession() {
+  const session = { scene_file: own.has(open.path) ? "scene.toml" : `assets/${open.path}`, set: [], record: await ask("record") };
+  save("played.session.json", JSON.stringify(session), "application/json");
+}
+
+async function saveTable() {
+  const { samples } = await ask("record");
+  const names = screen.readout.instruments.map((one) => one.name);
+  const head = ["time_s", "tip_x_mm", "tip_y_mm", "tip_z_mm", "wall_force_n", "tip_force_n"];
+  const felt = names.flatMap((name) => ["inserted_mm", "push_force_n", "torque_nmm"].map((what) => `${name}_${what}`));
+  const rows = samples.map(({ time_s, tip_mm, wall_force_n, tip_force_n, hands: held }) =>
+    [time_s, ...(tip_mm ?? ["", "", ""]), wall_force_n, tip_force_n,
+      ...held.flatMap((hand) => [hand.inserted_mm, hand.push_force_n ?? "", hand.torque_nmm])].join(","));
+  save(`${open.name}.csv`, [[...head, ...felt].join(","), ...rows, ""].join("\n"), "text/csv");
 }
 
 async function savePicture() {
@@ -92,6 +112,8 @@ element("scenes").addEventListener("change", ({ target }) => {
 });
 element("again").addEventListener("click", () => tryScene(open.path));
 element("save-script").addEventListener("click", async () => save("played.toml", head() + await ask("script"), "text/plain"));
+element("save-session").addEventListener("click", saveSession);
+element("save-table").addEventListener("click", saveTable);
 element("save-picture").addEventListener("click", savePicture);
 element("share").addEventListener("click", share);
 for (const button of document.querySelectorAll("nav button")) button.addEventListener("click", () => button.blur());

@@ -19,7 +19,9 @@ const pose = (lao, cra) => [side(lao, ["LAO", "RAO"]), side(cra, ["CRA", "CAU"])
 const modes = { fluoro: "fluoroscopy", cine: "cine", dsa: "DSA", roadmap: "roadmap" };
 const minutes = (s) => `${Math.floor(s / 60)}:${(s % 60).toFixed(1).padStart(4, "0")}`;
 
-const newtons = (n) => (Math.abs(n) < 0.1 ? `${(1000 * n).toFixed(1)} mN` : `${n.toFixed(2)} N`);
+/** A minus that is one, and none before zero. */
+const minus = (text) => text.replace(/^-(?=[0.]*$)/, "").replace("-", "−");
+const newtons = (n) => (Math.abs(n) < 0.1 ? `${minus((1000 * n).toFixed(1))} mN` : `${minus(n.toFixed(2))} N`);
 
 /** Shows a frame. */
 export function show({ readout: now, planes, three: view, backend }) {
@@ -66,8 +68,8 @@ function hands(now) {
     const push = one.push_force_n === null ? "–" : newtons(one.push_force_n);
     const [name, place, felt] = button.children;
     name.textContent = one.name;
-    place.textContent = `${one.inserted_mm.toFixed(1)} mm in, ${one.rotation_deg.toFixed(0)}°`;
-    felt.textContent = `push ${push}, torque ${one.torque_nmm.toFixed(2)} N·mm${one.warns ? " – beyond the limit" : ""}`;
+    place.textContent = `${one.inserted_mm.toFixed(1)} mm in, ${minus(one.rotation_deg.toFixed(0))}°`;
+    felt.textContent = `push ${push}, torque ${minus(one.torque_nmm.toFixed(2))} N·mm${one.warns ? " – beyond the limit" : ""}`;
     button.classList.toggle("warns", one.warns);
     button.classList.toggle("chosen", now.selected === one.name && now.instruments.length > 1);
   });

@@ -1,5 +1,5 @@
 // The session on a clock, beside the page: physics sixty times a second, pictures when there is time for them.
-import init, { Session, Surface, keys, sceneFiles } from "./pkg/endowire.js";
+import init, { Graphics, Session, Surface, keys, sceneFiles } from "./pkg/endowire.js";
 
 const TICK_MS = 1000 / 60;
 const FRAME_MS = 1000 / 30;
@@ -17,8 +17,12 @@ let inputAt = null;
 let hidden = false, stopped = false;
 let counted = { at: performance.now(), ticks: 0, live: 0 };
 
-const started = init().then((exports) => {
+/** The graphics processor, where the browser has one. */
+let graphics = null;
+
+const started = init().then(async (exports) => {
   memory = exports.memory;
+  if (navigator.gpu) graphics = await Graphics.open().catch(() => null);
   postMessage({ started: keys() });
 });
 
@@ -100,6 +104,7 @@ const asked = {
     const made = new Session(files, path, side);
     session?.free();
     session = made;
+    if (graphics) session.useGraphics(graphics);
     due = frameDue = performance.now();
     frames = 0;
     wasLive = false;
@@ -109,6 +114,7 @@ const asked = {
   },
   names: ({ text, path }) => sceneFiles(text, path),
   script: () => session?.script() ?? "",
+  record: () => session?.record() ?? null,
   positions: () => session?.positions() ?? new Float64Array(),
   survey({ name, bytes, unit, side }) {
     const surface = new Surface(name, bytes, unit, side);

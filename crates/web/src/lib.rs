@@ -5,6 +5,7 @@
 //! [`scene_files`] tells which a scene needs.
 
 mod files;
+mod graphics;
 mod pad;
 mod played;
 mod session;
@@ -16,6 +17,7 @@ use js_sys::Array;
 use serde::Serialize;
 use wasm_bindgen::prelude::*;
 
+pub use graphics::Graphics;
 pub use session::Session;
 pub use surface::Surface;
 

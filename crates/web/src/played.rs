@@ -7,7 +7,7 @@ use endowire_core::file::{Files, InMemory};
 use endowire_core::vessel::{CentrelineTree, NoStore};
 use endowire_core::{Error, Result};
 use endowire_methods::Scene;
-use endowire_play::{Input, Keys, Limits, Pictures, Session, Snapshot};
+use endowire_play::{Input, Keys, Limits, Pictures, Session, Sharpened, Sharpening, Snapshot};
 use endowire_viewer::{Backend, Image, PixelFormat, ViewSpec};
 
 /// A session as a page shows it.
@@ -79,15 +79,20 @@ impl Played {
         Ok(images)
     }
 
-    /// Computes what the sharp picture of a room needs that has come to rest; whether anything was computed.
+    /// What the sharp picture of a room needs that has come to rest.
     ///
     /// # Errors
-    /// As [`Pictures::sharpenings`] and [`Pictures::sharpened`].
-    pub(crate) fn sharpen(&mut self) -> Result<bool> {
-        let all = self.pictures.sharpenings(&self.session.snapshot())?;
-        let any = !all.is_empty();
-        all.into_iter().try_for_each(|one| self.pictures.sharpened(one.carry_out()))?;
-        Ok(any)
+    /// As [`Pictures::sharpenings`].
+    pub(crate) fn sharpenings(&mut self) -> Result<Vec<Sharpening>> {
+        self.pictures.sharpenings(&self.session.snapshot())
+    }
+
+    /// Takes what was computed of it.
+    ///
+    /// # Errors
+    /// As [`Pictures::sharpened`].
+    pub(crate) fn sharpened(&mut self, done: Sharpened) -> Result<()> {
+        self.pictures.sharpened(done)
     }
 
     /// The 3D view, where it is another than the last time.
@@ -118,7 +123,7 @@ fn view(scene: &Scene, path: &Path, files: &dyn Files) -> Result<ViewSpec> {
         let mend = "tomograms are read by the program alone: leave [view.patient.ct] out here";
         return Err(Error::parameter("view.patient.ct.file", ct.file.display(), mend));
     }
-    // A page has no graphics processor that answers at once.
+    // No graphics processor of a page answers at once.
     view.backend = Backend::Cpu;
     // The viewer reads from a file system, and there is none.
     if let Some(tree) = view.flow.tree.take() {

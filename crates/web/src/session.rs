@@ -1,14 +1,17 @@
 //! The class `Session` of the JavaScript package.
 
+use std::cell::RefCell;
 use std::path::Path;
+use std::rc::Rc;
 use std::sync::Arc;
 
-use endowire_play::{Input, Modifiers, Pad};
+use endowire_play::{Input, Modifiers, Pad, Sharpened};
 use endowire_viewer::Image;
 use js_sys::{Array, JSON, Map};
 use wasm_bindgen::Clamped;
 use wasm_bindgen::prelude::*;
 
+use crate::graphics::Graphics;
 use crate::played::{Played, rgba};
 use crate::{files, object, pad, thrown};
 
@@ -21,6 +24,9 @@ const TYPES: &'static str = include_str!("types.d.ts");
 pub struct Session {
     played: Played,
     pad: Pad,
+    graphics: Option<Rc<endowire_viewer::Graphics>>,
+    /// Sharp pictures that a graphics processor has answered meanwhile.
+    sharpened: Rc<RefCell<Vec<Sharpened>>>,
 }
 
 #[wasm_bindgen]
@@ -38,7 +44,13 @@ impl Session {
     ) -> Result<Session, JsError> {
         let files = Arc::new(files::of_map(files)?);
         let played = Played::new(&files, Path::new(path), side).map_err(thrown)?;
-        Ok(Self { played, pad: Pad::default() })
+        Ok(Self { played, pad: Pad::default(), graphics: None, sharpened: Rc::default() })
+    }
+
+    /// Has sharp pictures computed by a graphics processor from now on.
+    #[wasm_bindgen(js_name = useGraphics)]
+    pub fn use_graphics(&mut self, graphics: &Graphics) {
+        self.graphics = Some(graphics.shared());
     }
 
     /// Takes an input.
@@ -134,15 +146,30 @@ impl Session {
     /// What cannot be drawn, by key.
     #[wasm_bindgen(js_name = fluoroSoon, unchecked_return_type = "Picture[]")]
     pub fn fluoro_soon(&mut self) -> Result<Array, JsError> {
+        for done in self.sharpened.take() {
+            self.played.sharpened(done).map_err(thrown)?;
+        }
         self.played.soon().map_err(thrown)?.into_iter().map(picture).collect()
     }
 
-    /// Computes the sharp picture of a room that has come to rest, which takes a tenth of a second or more; whether there was one to compute.
+    /// Computes the sharp picture of a room that has come to rest: by a graphics processor meanwhile, or without one in a tenth of a second or more.
     ///
     /// # Errors
     /// What cannot be drawn, by key.
-    pub fn sharpen(&mut self) -> Result<bool, JsError> {
-        self.played.sharpen().map_err(thrown)
+    pub fn sharpen(&mut self) -> Result<(), JsError> {
+        for one in self.played.sharpenings().map_err(thrown)? {
+            match &self.graphics {
+                Some(graphics) => {
+                    let (graphics, sharpened) = (graphics.clone(), self.sharpened.clone());
+                    wasm_bindgen_futures::spawn_local(async move {
+                        let done = one.carry_out_on(&graphics).await;
+                        sharpened.borrow_mut().push(done);
+                    });
+                }
+                None => self.played.sharpened(one.carry_out()).map_err(thrown)?,
+            }
+        }
+        Ok(())
     }
 
     /// The 3D view; nothing where it is the one before.
@@ -160,6 +187,15 @@ impl Session {
     /// What draws the pictures, for people.
     pub fn backend(&self) -> Option<String> {
         self.played.backend().map(str::to_owned)
+    }
+
+    /// What hands, beam and injector have done, tick by tick: the `record` of a `*.session.json` that `endowire assess` measures.
+    ///
+    /// # Errors
+    /// None in a browser that is whole.
+    #[wasm_bindgen(unchecked_return_type = "SessionRecord")]
+    pub fn record(&self) -> Result<JsValue, JsError> {
+        object(self.played.session.record())
     }
 
     /// All motions, and what was injected, as the text of a script that `endowire run` carries out to the bit.

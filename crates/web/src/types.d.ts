@@ -33,6 +33,16 @@ export interface Readout {
   event: { step: number; time_s: number; kind: string; text: string } | null; events: number;
 }
 
+/** What hands, beam and injector have done: a sample for each tick, rests that follow each other being one. */
+export interface SessionRecord {
+  samples: {
+    time_s: number; tip_mm: [number, number, number] | null; wall_force_n: number; tip_force_n: number; jumped: boolean;
+    hands: { advance_mm: number; rotate_rad: number; inserted_mm: number; push_force_n: number | null; torque_nmm: number }[];
+  }[];
+  injections: { time_s: number; volume_ml: number; rate_ml_per_s: number }[];
+  beam: { time_s: number; on: boolean; frames_per_s: number; dose_ngy: number; field_mm2: number; primary_deg: number; secondary_deg: number }[];
+}
+
 /** What is known of a surface: hints in words, and its openings with their places in the picture, pixels. */
 export interface SurfaceReport {
   triangles: number; size_mm: [number, number, number]; notes: string[]; hints: string[]; inlet: number | null;

@@ -2,6 +2,7 @@
 
 mod context;
 mod fluoro;
+mod later;
 mod view3d;
 
 use crate::engine::{Engines, process};
@@ -9,6 +10,7 @@ use crate::fluoro::SUBRAYS;
 use crate::scene::Setup;
 use context::Gpu;
 use fluoro::GpuPaths;
+pub use later::Graphics;
 use view3d::GpuView3d;
 
 /// Opens an adapter and prepares the views of `setup`; software adapters only where `software` allows them.
