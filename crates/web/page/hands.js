@@ -73,15 +73,14 @@ export function buttons() {
   }
 }
 
-/** Presses and leans of the field and of a gamepad together: what is held last counts. */
-const held = { buttons: [], up: 0, right: 0 };
+/** How a gamepad is held, or the field as one: what was moved last counts. */
 const lean = (now) => hear("gamepad", [Uint8Array.from(now.buttons), now.up, now.right]);
 
 /** The round field: a stick under the finger. */
 export function field(hand, knob) {
   const move = (up, right) => {
     knob.style.transform = `translate(${right * 2.2}rem, ${-up * 2.2}rem)`;
-    lean({ ...held, up, right });
+    lean({ buttons: [], up, right });
   };
   hand.addEventListener("pointerdown", (event) => {
     hand.setPointerCapture(event.pointerId);

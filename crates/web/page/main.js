@@ -90,7 +90,9 @@ async function share() {
   return screen.tell("the link is in the address line and on the clipboard; scene and script are in it, and on no server");
 }
 
+/** Opens what the address says. */
 async function begin() {
+  own.clear();
   const fragment = new URLSearchParams(location.hash.slice(1));
   if (!fragment.has("s")) return tryScene(fragment.get("scene") ?? SCENES[0][0]);
   try {
@@ -124,6 +126,7 @@ hands.field(element("hand"), element("knob"));
 hands.gamepad();
 hands.views(screen.fluoro, screen.second, screen.three, () => screen.readout?.lab.field_mm ?? 0);
 hands.keyboard(() => dialogs.help());
+addEventListener("hashchange", begin);
 document.addEventListener("visibilitychange", () => {
   if (document.hidden) hear("letGo");
   hide(document.hidden);

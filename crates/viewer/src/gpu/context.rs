@@ -116,10 +116,17 @@ impl Gpu {
         }
     }
 
+    /// A buffer of these bytes, a multiple of four of them. Written by the queue: one that is made with contents is mapped, which panics where
+    /// the device is lost.
     pub(crate) fn buffer(&self, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
-        use wgpu::util::DeviceExt;
-        let label = Some("endowire");
-        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label, contents, usage })
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("endowire"),
+            size: contents.len() as u64,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.queue.write_buffer(&buffer, 0, contents);
+        buffer
     }
 
     /// A texture that is drawn into, then sampled or copied.

@@ -44,7 +44,7 @@ pub(crate) struct Browser {
     /// Where the page is served.
     pub(crate) address: String,
     _browser: Running,
-    _server: Running,
+    server: Option<Running>,
     _profile: tempfile::TempDir,
 }
 
@@ -97,7 +97,7 @@ impl Browser {
             console: vec![],
             address: address.clone(),
             _browser: Running(child),
-            _server: Running(server),
+            server: Some(Running(server)),
             _profile: profile,
         };
         let target = opened.call("Target.createTarget", &json!({ "url": "about:blank" }));
@@ -113,6 +113,11 @@ impl Browser {
         opened.call("Emulation.setDeviceMetricsOverride", &metrics);
         opened.call("Page.navigate", &json!({ "url": format!("{address}{fragment}") }));
         Some(opened)
+    }
+
+    /// Ends what serves the page.
+    pub(crate) fn cut_off(&mut self) {
+        self.server = None;
     }
 
     /// Calls a method of the protocol; its result.

@@ -327,3 +327,19 @@ fn nothing_but_the_pages_own_files_is_asked_for() {
         browser.console
     );
 }
+
+#[test]
+fn it_works_without_a_network_once_it_was_loaded() {
+    let Some(mut browser) = Browser::open("", LAPTOP) else { return };
+    browser.wait(READY);
+    browser
+        .wait("navigator.serviceWorker.getRegistration().then((one) => one?.active?.state === 'activated')");
+    browser.cut_off();
+    browser.eval("location.hash = '#scene=scenes/hepatic_breathing.toml'");
+    browser.wait("document.title === 'endowire: hepatic_breathing'");
+    browser.eval("window.before = true");
+    browser.call("Page.reload", &json!({}));
+    browser.wait(&format!("!window.before && document.title === 'endowire: hepatic_breathing' && {READY}"));
+    // The twin: what the page does not have is not there.
+    assert_eq!(browser.eval("fetch('other.txt').then((answer) => answer.ok, () => 'none')"), "none");
+}

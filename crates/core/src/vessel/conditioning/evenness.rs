@@ -133,7 +133,7 @@ mod tests {
             let corners = Corners::new(&mesh, 0.1);
             let angle = |[a, b, c]: [Vec3; 3]| {
                 let (x, y) = (b - a, c - a);
-                x.cross(&y).norm().atan2(x.dot(&y))
+                libm::atan2(x.cross(&y).norm(), x.dot(&y))
             };
             let least = (0..mesh.triangles.len())
                 .map(|t| mesh.corners(t))
