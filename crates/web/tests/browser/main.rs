@@ -6,6 +6,7 @@
 mod chromium;
 mod native;
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use chromium::Browser;
@@ -15,6 +16,12 @@ use serde_json::{Value, json};
 
 const LAPTOP: [u32; 2] = [1280, 800];
 const PHONE: [u32; 2] = [390, 844];
+/// Has tests run one after another: they measure, and each is a browser.
+fn alone() -> MutexGuard<'static, ()> {
+    static MACHINE: Mutex<()> = Mutex::new(());
+    MACHINE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// The page has a session.
 const READY: &str = "document.querySelector('#instruments')?.children.length > 0";
 
@@ -54,6 +61,7 @@ fn pace(browser: &mut Browser, what: &str) -> f64 {
 
 #[test]
 fn two_thousand_inputs_have_the_programs_bits_and_repeat_by_their_script() {
+    let _alone = alone();
     let Some(mut browser) = Browser::open("", LAPTOP) else { return };
     module(&mut browser, "arch_carotid.toml", 64);
     let mut dice = Dice(1);
@@ -83,6 +91,7 @@ fn two_thousand_inputs_have_the_programs_bits_and_repeat_by_their_script() {
 
 #[test]
 fn pictures_are_those_of_the_program() {
+    let _alone = alone();
     let Some(mut browser) = Browser::open("", LAPTOP) else { return };
     module(&mut browser, "arch_vertebral.toml", 128);
     let (mut session, mut pictures) = native::session("arch_vertebral.toml", 128);
@@ -119,6 +128,7 @@ fn pictures_are_those_of_the_program() {
 
 #[test]
 fn pictures_by_webgpu_are_those_of_the_reference() {
+    let _alone = alone();
     let webgpu = ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"];
     let Some(mut browser) = Browser::with(&webgpu, "", LAPTOP) else { return };
     module(&mut browser, "arch_carotid.toml", 192);
@@ -162,6 +172,7 @@ fn pictures_by_webgpu_are_those_of_the_reference() {
 
 #[test]
 fn a_wire_goes_into_the_carotid_by_keys_at_pace() {
+    let _alone = alone();
     let begun = Instant::now();
     let Some(mut browser) = Browser::open("", LAPTOP) else { return };
     browser.wait("document.readyState === 'complete'");
@@ -220,6 +231,7 @@ fn a_wire_goes_into_the_carotid_by_keys_at_pace() {
 
 #[test]
 fn five_thousand_random_inputs_break_nothing() {
+    let _alone = alone();
     let Some(mut browser) = Browser::open("#scene=scenes/curved_tube_friction.toml", LAPTOP) else { return };
     module(&mut browser, "curved_tube_friction.toml", 64);
     let mut dice = Dice(7);
@@ -257,6 +269,7 @@ fn drop_file(browser: &mut Browser, name: &str, bytes: &str) {
 
 #[test]
 fn a_surface_is_dropped_and_entered_and_what_is_none_is_told_in_the_cores_words() {
+    let _alone = alone();
     let Some(mut browser) = Browser::open("", PHONE) else { return };
     browser.wait(READY);
     let tube = "await (await fetch('assets/vessels/curved_tube.stl')).arrayBuffer()";
@@ -280,6 +293,7 @@ fn a_surface_is_dropped_and_entered_and_what_is_none_is_told_in_the_cores_words(
 
 #[test]
 fn a_link_carries_scene_and_script_and_a_hidden_page_stands_still() {
+    let _alone = alone();
     let Some(mut browser) = Browser::open("#scene=scenes/curved_tube_exact.toml", PHONE) else { return };
     browser.wait(READY);
     browser.key("ArrowUp", true);
@@ -311,6 +325,7 @@ fn a_link_carries_scene_and_script_and_a_hidden_page_stands_still() {
 
 #[test]
 fn nothing_but_the_pages_own_files_is_asked_for() {
+    let _alone = alone();
     let Some(mut browser) = Browser::open("", LAPTOP) else { return };
     browser.wait(READY);
     let address = browser.address.clone();
@@ -330,6 +345,7 @@ fn nothing_but_the_pages_own_files_is_asked_for() {
 
 #[test]
 fn it_works_without_a_network_once_it_was_loaded() {
+    let _alone = alone();
     let Some(mut browser) = Browser::open("", LAPTOP) else { return };
     browser.wait(READY);
     browser
