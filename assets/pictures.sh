@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Draws the pictures of README.md and of chapters 0, 1, 5 and 15 of the guide anew, in assets/pictures; a test runs it and compares
 # (crates/cli/tests/cli/pictures.rs). That of chapter 16 is a curve of learning:
-# `python crates/python/examples/learn_arch.py plot out/learn --picture assets/pictures/learning.png`.
+# `python crates/python/examples/learn_arch.py plot out/learn --picture assets/pictures/learning.png`. That of the page is a browser's, 1280 × 800, after
+# its first scene's script with the beam on.
 #
 #     assets/pictures.sh                      with a program that is built
 #     assets/pictures.sh ENDOWIRE FOLDER      with that program, into that folder: all but the poses, which an example draws

@@ -1,10 +1,53 @@
-//! Input files: regular ones of bounded size.
+//! Input files: regular ones of bounded size, or what a program without a file system has at hand.
 
+use std::collections::BTreeMap;
+use std::fmt::Debug;
 use std::fs::File;
-use std::io::Read;
-use std::path::Path;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
 
 use crate::{Error, Result};
+
+/// Where the files are that a scene names.
+pub trait Files: Debug + Send + Sync {
+    /// The bytes of a file.
+    ///
+    /// # Errors
+    /// [`Error::File`] for what cannot be read, [`Error::Content`] for what has more than `limit` bytes.
+    fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>>;
+}
+
+/// Those of the file system.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct FileSystem;
+
+impl Files for FileSystem {
+    fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>> {
+        read(path, limit)
+    }
+}
+
+/// Those that are in memory, by their paths as scenes resolve them: what a web page has fetched.
+#[derive(Debug, Clone, Default)]
+pub struct InMemory(pub BTreeMap<PathBuf, Vec<u8>>);
+
+impl Files for InMemory {
+    fn read(&self, path: &Path, limit: u64) -> Result<Vec<u8>> {
+        let bytes = self.0.get(path).ok_or_else(|| {
+            let missing = io::Error::new(io::ErrorKind::NotFound, "this file was not given");
+            Error::file(path, missing)
+        })?;
+        check_size(path, bytes.len() as u64, limit)?;
+        Ok(bytes.clone())
+    }
+}
+
+fn check_size(path: &Path, bytes: u64, limit: u64) -> Result<()> {
+    if bytes > limit {
+        return Err(Error::content(path, format!("is larger than {limit} bytes, the most that is read")));
+    }
+    Ok(())
+}
 
 /// The bytes of a regular file. Devices and pipes are refused, which could be endless or never answer.
 ///
@@ -24,9 +67,7 @@ pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
         .take(limit.saturating_add(1))
         .read_to_end(&mut bytes)
         .map_err(failed)?;
-    if bytes.len() as u64 > limit {
-        return Err(Error::content(path, format!("is larger than {limit} bytes, the most that is read")));
-    }
+    check_size(path, bytes.len() as u64, limit)?;
     Ok(bytes)
 }
 
@@ -45,5 +86,15 @@ mod tests {
         assert!(matches!(read(&folder.path().join("b"), 9), Err(Error::File { .. })));
         #[cfg(unix)]
         assert!(read(Path::new("/dev/zero"), 9).unwrap_err().to_string().contains("regular file"));
+    }
+
+    #[test]
+    fn files_in_memory_are_found_by_name_up_to_the_limit() {
+        let path = Path::new("vessels/a.csv");
+        let files = InMemory([(path.to_owned(), vec![7; 10])].into());
+        assert_eq!(files.read(path, 10).unwrap(), [7; 10]);
+        assert!(files.read(path, 9).unwrap_err().to_string().contains("larger than 9 bytes"));
+        let missing = files.read(Path::new("vessels/b.csv"), 10).unwrap_err();
+        assert!(matches!(missing, Error::File { .. }) && missing.to_string().contains("not given"));
     }
 }

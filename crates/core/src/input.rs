@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 use whole::Whole;
 
+use crate::file::{FileSystem, Files};
 use crate::{Error, Result};
 
 /// Largest input file in bytes: scenes and cases are kilobytes.
@@ -21,7 +22,15 @@ const SIMILAR: f64 = 0.75;
 /// A file that cannot be read, is no TOML, or does not fit `T`, lists longer than they may be included; unknown keys come with the nearest
 /// known one.
 pub fn from_toml<T: DeserializeOwned>(path: &Path) -> Result<(T, String)> {
-    let text = String::from_utf8(crate::file::read(path, SIZE_LIMIT)?)
+    from_toml_of(&FileSystem, path)
+}
+
+/// The same of a file that is among `files`.
+///
+/// # Errors
+/// As [`from_toml`].
+pub fn from_toml_of<T: DeserializeOwned>(files: &dyn Files, path: &Path) -> Result<(T, String)> {
+    let text = String::from_utf8(files.read(path, SIZE_LIMIT)?)
         .map_err(|e| Error::content(path, format!("is no text: {}", e.utf8_error())))?;
     Ok((parse_toml(&text, path)?, text))
 }

@@ -8,6 +8,9 @@
 //! The exact rod stands on its own: a [`statics::StaticCase`] (a file or a value) is solved into a
 //! [`statics::StaticSolution`] by [`solve::Newton`] on the elements of [`rod`].
 
+// The same bits on every machine.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 pub mod banded;
 pub mod contact;
 pub mod control;

@@ -61,6 +61,18 @@ impl Sharpening {
         let made = renderer.change(&spec).and_then(|()| renderer.prepare());
         Sharpened { plane, made: made.map(|()| (revision, renderer)) }
     }
+
+    /// The same with a graphics processor whose answers are waited for.
+    #[cfg(feature = "gpu")]
+    pub async fn carry_out_on(self, graphics: &endowire_viewer::Graphics) -> Sharpened {
+        let Self { plane, revision, spec, mut renderer } = self;
+        let made = async {
+            renderer.change(&spec)?;
+            renderer.prepare_on(graphics).await?;
+            Ok((revision, renderer))
+        };
+        Sharpened { plane, made: made.await }
+    }
 }
 
 impl Pictures {

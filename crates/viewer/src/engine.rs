@@ -18,6 +18,11 @@ pub(crate) trait ThreeDEngine: Send + Sync {
     fn frame(&mut self, solids: &Solids) -> Result<Image>;
 }
 
+/// Number of this process. A web page is one that is never forked.
+pub(crate) fn process() -> u32 {
+    if cfg!(target_family = "wasm") { 0 } else { std::process::id() }
+}
+
 /// The engines of the wanted views, all on the same processor.
 pub(crate) struct Engines {
     pub(crate) paths: Option<Box<dyn PathEngine>>,
@@ -32,7 +37,7 @@ pub(crate) struct Engines {
 impl Engines {
     /// Whether this process was forked from the one that made them.
     pub(crate) fn are_forked(&self) -> bool {
-        self.process != std::process::id()
+        self.process != process()
     }
 }
 

@@ -55,6 +55,8 @@ pub use c_arm::CArm;
 pub use device::{DevicePart, DevicePoint, DeviceView};
 pub use device_file::{device_parts, section_parts};
 pub use fluoro::FrameTime;
+#[cfg(feature = "gpu")]
+pub use gpu::Graphics;
 pub use material::Material;
 pub use output::{
     Angiogram, Animation, ContactLabel, DeviceLabel, Image, Labels, Mask, Pace, PartLabel, PixelFormat,

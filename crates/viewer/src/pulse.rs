@@ -114,7 +114,7 @@ impl Way {
     fn px(&self, arm: &CArm) -> f64 {
         let ways = self.from.iter().zip(&self.to).map(|((from, _), (to, _))| {
             let [a, b] = [arm.project(from), arm.project(to)];
-            (a[0] - b[0]).hypot(a[1] - b[1])
+            libm::hypot(a[0] - b[0], a[1] - b[1])
         });
         ways.filter(|way| way.is_finite()).fold(0.0, f64::max)
     }

@@ -104,6 +104,13 @@ impl Renderer {
         self.setup.c_arm.as_ref()
     }
 
+    /// Where a point is in the 3D view, pixels from the left and from the top; `None` without that view, and for points behind the camera.
+    pub fn three_d_pixel(&self, point_mm: &Vec3) -> Option<[f64; 2]> {
+        let camera = self.setup.camera.as_ref()?;
+        let view = camera.in_view(point_mm);
+        (view[2] < 0.0).then(|| camera.pixel_of(view, 1))
+    }
+
     /// How much of the vessel's surface the tomogram of its patient holds, 0 to 1; `None` without a tomogram, or fluoroscopy.
     pub fn vessel_held(&self) -> Option<f64> {
         self.setup.patient.vessel_held()
@@ -293,6 +300,25 @@ impl Renderer {
             }),
             None => Ok(()),
         }
+    }
+
+    /// The same with the rays cast by a graphics processor whose answers are waited for, as those of a browser; where it fails, by the processor.
+    /// What each frame needs is computed by the processor in any case.
+    ///
+    /// # Errors
+    /// As [`Self::render_at`].
+    #[cfg(feature = "gpu")]
+    pub async fn prepare_on(&mut self, graphics: &gpu::Graphics) -> Result<()> {
+        if let (Some(c_arm), None, None) = (&self.setup.c_arm, &self.fluoro, &self.kept) {
+            match graphics.anatomy(&self.setup, c_arm).await {
+                Ok(anatomy) => {
+                    self.kept = Some(Kept::of(c_arm, anatomy));
+                    self.engines.name = graphics.name().to_owned();
+                }
+                Err(error) => self.engines.name = format!("{} (adapter failed: {error})", cpu::NAME),
+            }
+        }
+        self.prepare()
     }
 
     /// Prepares the next frame of a detector that holds what another place has left, if there was one.

@@ -24,7 +24,7 @@ fn add_tail(mesh: &mut SurfaceMesh, opening: &Opening) {
     for ring in 1..RINGS {
         let part = f64::from(ring) / f64::from(RINGS);
         // Without a kink where it begins.
-        let scale = (part * std::f64::consts::FRAC_PI_2).cos();
+        let scale = libm::cos(part * std::f64::consts::FRAC_PI_2);
         let first = mesh.vertices_mm.len() as u32;
         for &vertex in &rim {
             let from_centre = mesh.vertices_mm[vertex as usize] - opening.centre_mm;

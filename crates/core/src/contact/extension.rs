@@ -128,7 +128,7 @@ fn ellipse(line: &[Vec3]) -> Vec<Vec3> {
     let (mut s, mut matrix, mut right) = (0.0, Matrix3::zeros(), Matrix3::zeros());
     let mut rows = Vec::with_capacity(count);
     for k in 0..count {
-        let row = Vec3::new(1.0, f64::cos(s), f64::sin(s));
+        let row = Vec3::new(1.0, libm::cos(s), libm::sin(s));
         let length = 0.5 * (side(k) + side((k + count - 1) % count));
         matrix += row * row.transpose() * length;
         right += row * line[k].transpose() * length;

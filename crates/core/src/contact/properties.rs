@@ -114,7 +114,7 @@ impl WallProperties {
                 continue;
             }
             if let Some(modulus) = region.modulus_n_per_mm2 {
-                let own = (modulus / self.modulus_n_per_mm2).ln();
+                let own = libm::log(modulus / self.modulus_n_per_mm2);
                 ln_modulus = if share == 1.0 { own } else { ln_modulus + (own - ln_modulus) * share };
             }
             if let Some(own) = region.friction {

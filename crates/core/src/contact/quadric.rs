@@ -248,8 +248,8 @@ impl Quadric {
     pub(super) fn opened(&self, local: &Local, behind: bool) -> Opened {
         let (value, rate) = (local.value, BELOW.0 / (NEARER * self.below_mm.0));
         if behind {
-            let t = (rate * value / BOUND).tanh();
-            let (e, slope) = ((-BOUND * t).exp(), rate * (1.0 - t * t));
+            let t = libm::tanh(rate * value / BOUND);
+            let (e, slope) = (libm::exp(-BOUND * t), rate * (1.0 - t * t));
             let second = (slope * slope + 2.0 * rate * slope * t / BOUND) * e;
             return Opened { value: e, in_q: -slope * e, in_qq: second, ..Opened::default() };
         }
@@ -261,7 +261,7 @@ impl Quadric {
         if b == 0.0 {
             return Opened::default();
         }
-        let e = (-rate * value).exp();
+        let e = libm::exp(-rate * value);
         let mut opened = Opened {
             value: b * e,
             in_q: (b1 / g - rate * b) * e,

@@ -128,7 +128,7 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &Ne
     }
     let found = matrix.cholesky().map_or_else(SVector::zeros, |c| c.solve(&right));
     // A fit that leans over is none; neither is one that is not a number.
-    let usable = found[0].hypot(found[1]) <= 0.5;
+    let usable = libm::hypot(found[0], found[1]) <= 0.5;
     let (tilt, bend) = if usable {
         (Vector2::new(found[0], found[1]), Matrix2::new(found[2], found[3], found[3], found[4]) / long)
     } else {
@@ -149,8 +149,8 @@ pub(super) fn fit(v: usize, vertices: &[Vec3], normals: &[Vec3], neighbours: &Ne
     let q = normal.cross(&p);
     let (pp, pq, qq) = (seen(&bend, &p, &p), seen(&bend, &p, &q), seen(&bend, &q, &q));
     let (mean, half) = (0.5 * (pp + qq), 0.5 * (pp - qq));
-    let apart = half.hypot(pq);
-    let (sin, cos) = (0.5 * pq.atan2(half)).sin_cos();
+    let apart = libm::hypot(half, pq);
+    let (sin, cos) = libm::sincos(0.5 * libm::atan2(pq, half));
     let axes = [p * cos + q * sin, q * cos - p * sin];
     let curvature = [mean + apart, mean - apart];
     Quadric {

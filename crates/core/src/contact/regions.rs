@@ -109,7 +109,7 @@ impl RegionMap {
             return Stiffness { factor: 1.0, slope: None };
         }
         let s = blend(wall, x, triangle, |v| self.ln_moduli[v as usize]);
-        Stiffness { factor: s.value.exp(), slope: Some((s.gradient, s.hessian)) }
+        Stiffness { factor: libm::exp(s.value), slope: Some((s.gradient, s.hessian)) }
     }
 
     /// Coefficient of friction at `x`, over the largest of all.

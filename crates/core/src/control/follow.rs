@@ -164,7 +164,7 @@ impl FollowPath {
         if wish.norm() < 0.15 * (ahead + tip_mm) || bend.norm() < 1e-3 {
             return 0.0;
         }
-        let angle = axis.dot(&bend.cross(&wish)).atan2(bend.dot(&wish)) + self.aside_rad;
+        let angle = libm::atan2(axis.dot(&bend.cross(&wish)), bend.dot(&wish)) + self.aside_rad;
         let nearest_way = (angle + PI).rem_euclid(TAU) - PI;
         nearest_way.clamp(-TURN_RAD, TURN_RAD)
     }

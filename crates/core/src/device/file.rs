@@ -32,7 +32,8 @@ use serde::{Deserialize, Serialize};
 use super::part::{Part, PartTable, length_ways};
 use super::quantity::{Quantity, one_of};
 use super::{Device, LENGTH_LIMIT_MM, Section};
-use crate::input::from_toml;
+use crate::file::{FileSystem, Files};
+use crate::input::from_toml_of;
 use crate::{Error, Result};
 
 /// What a device is.
@@ -102,7 +103,15 @@ impl DeviceFile {
     /// # Errors
     /// [`Error::File`] for what cannot be read; else [`Error::Content`] that names file, part, key, value and mend.
     pub fn read(path: &Path) -> Result<Self> {
-        let (table, _): (FileTable, _) = from_toml(path)?;
+        Self::read_of(&FileSystem, path)
+    }
+
+    /// The same of a device file that is among `files`.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_of(files: &dyn Files, path: &Path) -> Result<Self> {
+        let (table, _): (FileTable, _) = from_toml_of(files, path)?;
         let stem = || path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let named = if table.name.is_empty() { FileTable { name: stem(), ..table } } else { table };
         named.resolve().map_err(|e| Error::content(path, e.to_string()))

@@ -103,7 +103,7 @@ impl Section {
             return Err(Error::parameter(format!("{name}.inner_radius_mm"), inner, mend));
         }
         let curvature = self.rest_curvature_per_mm;
-        let bend = curvature[0].hypot(curvature[1]) * self.radius_mm;
+        let bend = libm::hypot(curvature[0], curvature[1]) * self.radius_mm;
         if bend.is_nan() || bend > 1.0 {
             return Err(Error::parameter(
                 format!("{name}.rest_curvature_per_mm"),

@@ -383,7 +383,7 @@ impl PartTable {
                 return Err(Error::parameter(format!("{place}.bend.radius_mm"), bend.radius_mm, mend));
             }
             Some(bend) => {
-                let (sin, cos) = bend.direction_deg.to_radians().sin_cos();
+                let (sin, cos) = libm::sincos(bend.direction_deg.to_radians());
                 [cos / bend.radius_mm, sin / bend.radius_mm]
             }
             None => self.rest_curvature_per_mm.unwrap_or_default(),

@@ -46,14 +46,14 @@ impl Device {
 
 /// From the beginning of an arc to the point at arc length `s`.
 fn along_arc(frame: &Frame, [first, second]: [f64; 2], s: f64) -> Vec3 {
-    let curvature = first.hypot(second);
+    let curvature = libm::hypot(first, second);
     let angle = curvature * s;
     if angle == 0.0 {
         return frame.t * s;
     }
     let across = (frame.u * first + frame.v * second) / curvature;
     // (1 − cos)/κ as 2 sin²(half)/κ, which small angles do not cancel.
-    frame.t * (angle.sin() / curvature) + across * (2.0 * (0.5 * angle).sin().powi(2) / curvature)
+    frame.t * (libm::sin(angle) / curvature) + across * (2.0 * libm::sin(0.5 * angle).powi(2) / curvature)
 }
 
 #[cfg(test)]

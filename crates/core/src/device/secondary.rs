@@ -104,7 +104,8 @@ impl Secondary {
 
 /// An arc of this curvature in a plane at an angle, rad, to the first material direction.
 fn turned(length_mm: f64, curvature: f64, angle: f64) -> Arc {
-    Arc { length_mm, curvature_per_mm: [curvature * angle.cos(), curvature * angle.sin()] }
+    let (sin, cos) = libm::sincos(angle);
+    Arc { length_mm, curvature_per_mm: [curvature * cos, curvature * sin] }
 }
 
 /// The radius of a shape, no less than the part's own.
@@ -128,11 +129,12 @@ fn check_count(place: &str, count: f64) -> Result<()> {
 
 /// Points, tip first, of a curve of this length on a ball: loops at a tilt, rad, that go on by `turn` of a loop about the axis.
 fn cage(length_mm: f64, ball_mm: f64, tilt: f64, turn: f64) -> Vec<[f64; 3]> {
-    let (sin, cos) = tilt.sin_cos();
+    let (sin_tilt, cos_tilt) = libm::sincos(tilt);
     let place = |k: usize| {
         let angle = k as f64 * CAGE_STEP;
-        let on_loop = Vec3::new(angle.cos(), angle.sin() * cos, angle.sin() * sin);
-        nalgebra::Rotation3::from_axis_angle(&Vec3::z_axis(), turn * angle) * on_loop * ball_mm
+        let ((sin, cos), (sin_turn, cos_turn)) = (libm::sincos(angle), libm::sincos(turn * angle));
+        let (x, y) = (cos, sin * cos_tilt);
+        Vec3::new(x * cos_turn - y * sin_turn, x * sin_turn + y * cos_turn, sin * sin_tilt) * ball_mm
     };
     let mut points = vec![place(0)];
     let mut left_mm = length_mm;
@@ -171,7 +173,7 @@ fn curve(place: &str, points_mm: &[[f64; 3]]) -> Result<Vec<Arc>> {
     for (k, ends) in chords.windows(2).enumerate() {
         let (length_mm, next) = (0.5 * (ends[0].norm() + ends[1].norm()), ends[1].normalize());
         let across = next - frame.t * next.dot(&frame.t);
-        let angle = across.norm().atan2(next.dot(&frame.t));
+        let angle = libm::atan2(across.norm(), next.dot(&frame.t));
         if angle > LARGEST_TURN {
             let value = format!("{:.0}° at point {}", angle.to_degrees(), points_mm.len() - 2 - k);
             return Err(Error::parameter(
@@ -210,7 +212,7 @@ mod tests {
     #[test]
     fn a_helix_has_its_diameter_its_pitch_and_is_right_handed() {
         let (diameter, pitch) = (4.0, 1.5);
-        let turn_mm = (std::f64::consts::PI * diameter).hypot(pitch);
+        let turn_mm = libm::hypot(std::f64::consts::PI * diameter, pitch);
         let helix = Secondary::Helix { diameter_mm: diameter, pitch_mm: pitch };
         let points = rest(&helix, 5.0 * turn_mm);
         let turn = points.len() / 5;
@@ -251,7 +253,7 @@ mod tests {
     #[test]
     fn a_curve_through_points_is_followed() {
         // It bends in all directions.
-        let at = |t: f64| [4.0 * t.sin(), 3.0 * (1.3 * t).cos(), 2.0 * t];
+        let at = |t: f64| [4.0 * libm::sin(t), 3.0 * libm::cos(1.3 * t), 2.0 * t];
         let points_mm: Vec<[f64; 3]> = (0..160).map(|k| at(f64::from(k) * 0.04)).collect();
         let curve = Secondary::Curve { points_mm: points_mm.clone() };
         let length_mm = curve.length_mm().unwrap();

@@ -106,7 +106,7 @@ pub fn flow_nodes(
     let mut open = vec![(inlet, usize::MAX, 0_usize)];
     while let Some((at, before, becomes)) = open.pop() {
         let onwards: Vec<usize> = neighbours[at].iter().copied().filter(|&n| n != before).collect();
-        let weight = |i: usize| points[i].radius_mm.powf(split_exponent);
+        let weight = |i: usize| libm::pow(points[i].radius_mm, split_exponent);
         // Within a sac all is of it.
         let is_sac = |i: usize| in_sac[i] && !in_sac[at];
         let total: f64 = onwards.iter().filter(|&&i| !is_sac(i)).map(|&i| weight(i)).sum();

@@ -81,7 +81,7 @@ impl ElementData {
         }
         let each = self.materials.iter().map(|material| {
             let (own, [u, v]) = (material.bending[1], material.rest_curvature[1]);
-            own * u.hypot(v) * (1.0 - own / all)
+            own * libm::hypot(u, v) * (1.0 - own / all)
         });
         each.fold(0.0, f64::max)
     }

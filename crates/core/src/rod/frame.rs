@@ -61,15 +61,15 @@ impl Frame {
 
     /// The triad turned about its tangent by `angle`.
     pub fn turned(&self, angle: f64) -> Self {
-        let (s, c) = angle.sin_cos();
+        let (s, c) = libm::sincos(angle);
         Self { t: self.t, u: self.u * c + self.v * s, v: self.v * c - self.u * s }
     }
 
     /// The tangent moved by `−log`: (a, b) such that `self.transported(a, b).t == t`.
     pub fn log(&self, t: &Vec3) -> (f64, f64) {
         let (a, b) = (self.u.dot(t), self.v.dot(t));
-        let s = a.hypot(b);
-        let angle = s.atan2(self.t.dot(t));
+        let s = libm::hypot(a, b);
+        let angle = libm::atan2(s, self.t.dot(t));
         if s < 1e-300 {
             return (angle, 0.0);
         }
@@ -90,7 +90,7 @@ pub(super) fn turn_parts(square: f64) -> (f64, f64) {
         return (1.0 - x * (1.0 / 6.0 - x * first), 0.5 - x * (1.0 / 24.0 - x * second));
     }
     let angle = square.sqrt();
-    let (sin, cos) = angle.sin_cos();
+    let (sin, cos) = libm::sincos(angle);
     (sin / angle, (1.0 - cos) / square)
 }
 
@@ -106,5 +106,5 @@ pub(super) fn normalised(w: &Vec3) -> Vec3 {
 /// decomposition; the reference twist of Bergou et al. 2010, sec. 6.
 pub(crate) fn reference_twist(first: &Frame, second: &Frame) -> f64 {
     let (u, v) = (first.local(&second.u), first.local(&second.v));
-    (u.z - v.y).atan2(u.y + v.z)
+    libm::atan2(u.z - v.y, u.y + v.z)
 }

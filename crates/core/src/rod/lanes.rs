@@ -85,7 +85,7 @@ impl<S: Simd> Lanes<S> {
         let sines: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut sine));
         let cosines: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut cosine));
         for k in 0..S::F64_LANES {
-            (sines[k], cosines[k]) = sines[k].sin_cos();
+            (sines[k], cosines[k]) = libm::sincos(sines[k]);
         }
         (Self { all: sine, ..self }, Self { all: cosine, ..self })
     }

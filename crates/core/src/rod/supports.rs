@@ -75,7 +75,7 @@ impl Supports {
         let Some(end) = &self.end_angle else { return 0.0 };
         let frame = &state.frames[state.elements()];
         let frame = self.end_tangent.map_or(*frame, |t| frame.transported_to(&t));
-        let angle = frame.v.dot(&end.normal).atan2(frame.u.dot(&end.normal)) + end.turns;
+        let angle = libm::atan2(frame.v.dot(&end.normal), frame.u.dot(&end.normal)) + end.turns;
         angle + ((end.target - angle) / std::f64::consts::TAU).round() * std::f64::consts::TAU
     }
 

@@ -71,7 +71,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             return Ok(known);
         }
         let tree = match self.centreline_path()? {
-            Some((key, path)) => CentrelineTree::read(&path).map_err(|error| match key {
+            Some((key, path)) => CentrelineTree::read_of(&*self.files, &path).map_err(|error| match key {
                 "vessel.tree" => missing_tree(&path, error),
                 _ => missing(key, error),
             })?,

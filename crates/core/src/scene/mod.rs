@@ -51,6 +51,8 @@
 //! ```
 
 mod centreline;
+#[cfg(test)]
+mod memory_tests;
 mod method_table;
 mod spec;
 mod tables;

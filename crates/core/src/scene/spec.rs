@@ -1,7 +1,7 @@
 //! A scene file and what it builds.
 
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
@@ -9,7 +9,8 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 use super::method_table;
 use super::tables::{DEPTH_MM, DeviceSpec, InstrumentSpec, SheathSpec, VesselSpec};
 use crate::device::{Device, DeviceFile, FileTable, Instrument, Stack, line_mm};
-use crate::input::{from_toml, parse_toml};
+use crate::file::{FileSystem, Files};
+use crate::input::{from_toml_of, parse_toml};
 use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
 use crate::vessel::{
@@ -57,9 +58,16 @@ pub struct SceneOf<M> {
     folder: PathBuf,
     #[serde(skip)]
     text: String,
+    /// Where the files are that it names.
+    #[serde(skip, default = "of_file_system")]
+    pub(super) files: Arc<dyn Files>,
     /// The vessel's centre line, once it was needed.
     #[serde(skip)]
     pub(super) centreline: OnceLock<CentrelineTree>,
+}
+
+fn of_file_system() -> Arc<dyn Files> {
+    Arc::new(FileSystem)
 }
 
 /// A file of `[[script]]` tables alone.
@@ -128,8 +136,16 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// # Errors
     /// Names file, line and key of what does not fit.
     pub fn read(path: &Path) -> Result<Self> {
-        let (scene, text): (Self, String) = from_toml(path)?;
-        scene.of_file(text, path)
+        Self::read_of(of_file_system(), path)
+    }
+
+    /// The same of a scene that is among `files`, where those that it names are too.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_of(files: Arc<dyn Files>, path: &Path) -> Result<Self> {
+        let (scene, text): (Self, String) = from_toml_of(&*files, path)?;
+        Self { files, ..scene }.of_file(text, path)
     }
 
     /// Reads a scene from the text of a file, from whose folder its paths start; errors call it `path`.
@@ -156,7 +172,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// # Errors
     /// Names file, line and key of what does not fit.
     pub fn take_script(&mut self, path: &Path) -> Result<()> {
-        let (file, _): (ScriptFile, String) = from_toml(path)?;
+        let (file, _): (ScriptFile, String) = from_toml_of(&*self.files, path)?;
         (self.script, self.script_file) = (file.script, Some(path.to_owned()));
         Ok(())
     }
@@ -213,7 +229,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 return Err(Error::parameter("vessel.axes", axes.name(), mend));
             }
             self.centreline_path()?;
-            let tree = CentrelineTree::read(&path).map_err(|e| missing_tree(&path, e))?;
+            let tree = CentrelineTree::read_of(&*self.files, &path).map_err(|e| missing_tree(&path, e))?;
             let resolution = spec.resolution(&tree)?;
             let recipe = WallRecipe::Generated { tree: &tree, resolution };
             return store.wall(&recipe).map_err(|error| match error {
@@ -231,12 +247,13 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 return Err(Error::parameter(name, value, "only with vessel.tree: a file has its own mesh"));
             }
         }
-        let surface = SurfaceMesh::read(&path, spec.frame()).map_err(|error| match error {
-            Error::Parameter { name, value, mend } => {
-                Error::Parameter { name: format!("vessel.{name}"), value, mend }
-            }
-            other => missing("vessel.file", other),
-        })?;
+        let surface =
+            SurfaceMesh::read_of(&*self.files, &path, spec.frame()).map_err(|error| match error {
+                Error::Parameter { name, value, mend } => {
+                    Error::Parameter { name: format!("vessel.{name}"), value, mend }
+                }
+                other => missing("vessel.file", other),
+            })?;
         let recipe = WallRecipe::Repaired { surface: &surface };
         store.wall(&recipe).map_err(|e| Error::content(&path, e.to_string()))
     }
@@ -362,7 +379,7 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             return Err(Error::parameter(key, file.display(), mend));
         }
         let path = self.resolve(file);
-        match DeviceFile::read(&path) {
+        match DeviceFile::read_of(&*self.files, &path) {
             Ok(file) => Ok(Some((path, file))),
             Err(error) => Err(missing(&key, error)),
         }

@@ -61,7 +61,7 @@ pub(super) fn towards_end(
     let score = |s: &RodState| {
         let g = supports.gaps(s);
         let place = (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt() / length;
-        place + 0.3 * g[3].hypot(g[4])
+        place + 0.3 * libm::hypot(g[3], g[4])
     };
     let mut best = rest_shape(elements, start, frame);
     let mut least = score(&best);
@@ -69,7 +69,7 @@ pub(super) fn towards_end(
         let k = f64::from(step) * PI / 12.0 / length;
         let ways = if step == 0 { 1 } else { 8 };
         for way in 0..ways {
-            let (sin, cos) = (f64::from(way) * PI / 4.0).sin_cos();
+            let (sin, cos) = libm::sincos(f64::from(way) * PI / 4.0);
             let trial = arc(elements, start, frame, [k * cos, k * sin]);
             let found = score(&trial);
             // Only what is clearly better: symmetric choices must not depend on rounding.
@@ -88,7 +88,7 @@ pub(super) fn towards_end(
             let mut frames = Vec::with_capacity(elements.len() + 1);
             for i in 0..=elements.len() {
                 let x = s / length;
-                let shape = if supports.start_tangent { (2.0 * PI * x).sin() } else { (PI * x).cos() };
+                let shape = if supports.start_tangent { libm::sin(2.0 * PI * x) } else { libm::cos(PI * x) };
                 frames.push(frame.transported(amplitude * shape, 0.0));
                 s += elements.get(i).map_or(0.0, |e| e.length);
             }

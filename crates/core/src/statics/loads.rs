@@ -110,11 +110,11 @@ impl External for Loads {
             let frame = &from.frames[*i];
             let (a, b) = frame.log(&to.frames[*i].t);
             sum += m.dot(&(frame.v * a - frame.u * b));
-            let turn = a.hypot(b);
+            let turn = libm::hypot(a, b);
             let twist = to.angles[*i] - from.angles[*i];
             let mean = if turn > 1e-6 {
-                frame.t * (turn.sin() / turn)
-                    + (frame.u * a + frame.v * b) * ((1.0 - turn.cos()) / (turn * turn))
+                frame.t * (libm::sin(turn) / turn)
+                    + (frame.u * a + frame.v * b) * ((1.0 - libm::cos(turn)) / (turn * turn))
             } else {
                 frame.t + (frame.u * a + frame.v * b) * 0.5
             };

@@ -284,7 +284,7 @@ impl StaticProblem {
         StaticSolution {
             tip: state.positions[n].into(),
             tip_tangent: frame.t.into(),
-            tip_angle: a.cross(b).norm().atan2(a.dot(b)),
+            tip_angle: libm::atan2(a.cross(b).norm(), a.dot(b)),
             arc_lengths,
             nodes: state.positions.iter().map(|p| (*p).into()).collect(),
             tangents: state.frames.iter().map(|f| f.t.into()).collect(),

@@ -131,7 +131,7 @@ impl Stack {
             let mut curvature = [0.0; 2];
             for (instrument, set) in self.instruments() {
                 let Some(set) = set else { continue };
-                let (sin, cos) = instrument.hand.sin_cos();
+                let (sin, cos) = libm::sincos(instrument.hand);
                 let own = &data.materials[set];
                 for (p, point) in GAUSS.iter().enumerate() {
                     let weight = point.weight * own.bending[p] / data.bending[p];

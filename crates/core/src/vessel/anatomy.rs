@@ -121,7 +121,8 @@ fn curved_tube() -> Vec<CentrelineNode> {
     let arc = steps(PI * BEND);
     for k in 1..=arc {
         let angle = PI * k as f64 / arc as f64;
-        course = course.to(Vec3::new(BEND - BEND * angle.cos(), 0.0, LEG + BEND * angle.sin()), RADIUS);
+        course =
+            course.to(Vec3::new(BEND - BEND * libm::cos(angle), 0.0, LEG + BEND * libm::sin(angle)), RADIUS);
     }
     let end = steps(END);
     for k in 1..=end {
@@ -229,7 +230,8 @@ fn aortic_arch(arch: &Arch) -> Vec<CentrelineNode> {
     let base = course.nodes[descending].position_mm;
     let on_arch = |degrees: f64| {
         let angle = degrees.to_radians();
-        base + across * (half_width * (1.0 - angle.cos())) + Vec3::z() * (arch.height_mm * angle.sin())
+        base + across * (half_width * (1.0 - libm::cos(angle)))
+            + Vec3::z() * (arch.height_mm * libm::sin(angle))
     };
     let mut branch_rows = [0; 3];
     for (degrees, diameter, branch) in arch.points {

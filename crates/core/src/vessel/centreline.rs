@@ -13,6 +13,7 @@ use serde::Serialize;
 use super::CentrelinePath;
 use super::point_lists::{self, Columns};
 use crate::error::nearest_name;
+use crate::file::{FileSystem, Files};
 use crate::{Error, Result, Vec3};
 
 /// A point of a centre line.
@@ -166,8 +167,15 @@ impl CentrelineTree {
     /// [`Error::File`] if it cannot be read; [`Error::Content`] naming line and value for what [`CentrelineTree::new`] refuses
     /// and for what is no number.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = crate::file::read(path, SIZE_LIMIT)?;
-        Self::from_bytes(&bytes, path)
+        Self::read_of(&FileSystem, path)
+    }
+
+    /// The same of a table that is among `files`.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_of(files: &dyn Files, path: &Path) -> Result<Self> {
+        Self::from_bytes(&files.read(path, SIZE_LIMIT)?, path)
     }
 
     /// Reads a table from the bytes of a file, which errors call `path`.

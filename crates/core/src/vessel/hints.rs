@@ -81,7 +81,7 @@ pub(crate) fn unit_hint(diagonal_mm: f64, half_lumen_mm: Option<f64>, unit_mm: f
 
 /// Three digits.
 fn rounded(value: f64) -> String {
-    let scale = 10_f64.powi(2 - value.abs().log10().floor() as i32);
+    let scale = 10_f64.powi(2 - libm::log10(value.abs()).floor() as i32);
     crate::error::number((value * scale).round() / scale)
 }
 

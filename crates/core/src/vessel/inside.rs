@@ -21,7 +21,7 @@ fn solid_angle(corners: [Vec3; 3]) -> f64 {
     let volume = a.dot(&b.cross(&c));
     let denominator = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
     // A point in the plane of the triangle: in its interior the angle has no sign, and we count none.
-    if volume == 0.0 { 0.0 } else { 2.0 * volume.atan2(denominator) }
+    if volume == 0.0 { 0.0 } else { 2.0 * libm::atan2(volume, denominator) }
 }
 
 /// Generalized winding number of `mesh` and `caps` around a point.

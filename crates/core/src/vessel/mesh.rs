@@ -62,7 +62,7 @@ impl SurfaceMesh {
             };
             for k in 0..3 {
                 let (e, f) = (corner[(k + 1) % 3] - corner[k], corner[(k + 2) % 3] - corner[k]);
-                normals[triangle[k] as usize] += outward * e.cross(&f).norm().atan2(e.dot(&f));
+                normals[triangle[k] as usize] += outward * libm::atan2(e.cross(&f).norm(), e.dot(&f));
             }
         }
         normals.into_iter().map(|normal| normal.try_normalize(1e-12).unwrap_or_default()).collect()

@@ -196,7 +196,7 @@ impl Search<'_> {
             for ring in 1..=TILTS.0 {
                 let size = LARGEST_TILT * ring as f64 / TILTS.0 as f64;
                 planes.extend((0..TILTS.1).map(|spoke| {
-                    let (sin, cos) = (std::f64::consts::TAU * spoke as f64 / TILTS.1 as f64).sin_cos();
+                    let (sin, cos) = libm::sincos(std::f64::consts::TAU * spoke as f64 / TILTS.1 as f64);
                     Plane { along, tilt: [size * cos, size * sin] }
                 }));
             }

@@ -190,7 +190,7 @@ fn start(wall: &Wall, query: &WallQuery, chords: &[(f64, Vec3)], size_mm: f64) -
     let mut longest = (0.0, Vec3::x());
     for k in 0..DIRECTIONS {
         let z = 1.0 - (2 * k + 1) as f64 / DIRECTIONS as f64;
-        let (sin, cos) = (golden * k as f64).sin_cos();
+        let (sin, cos) = libm::sincos(golden * k as f64);
         let across = (1.0 - z * z).sqrt();
         let direction = Vec3::new(across * cos, across * sin, z);
         // A way that leaves through an opening is as long as any.

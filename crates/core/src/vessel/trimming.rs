@@ -70,7 +70,7 @@ impl Line {
     fn seen(&self, x: &Vec3) -> (f64, SVector<f64, 5>) {
         let y = x - self.opening.centre_mm;
         let [u, v] = self.across.map(|axis| axis.dot(&y));
-        let r = u.hypot(v).max(f64::MIN_POSITIVE);
+        let r = libm::hypot(u, v).max(f64::MIN_POSITIVE);
         let (cos, sin) = (u / r, v / r);
         (
             y.dot(&self.opening.direction),

@@ -17,10 +17,11 @@ impl CArm {
         let (low, high) = wall.bounds_mm().ok_or_else(|| Error::Mesh("the wall has no vertices".into()))?;
         let angles_deg = spec.angles_deg();
         let [alpha, beta] = angles_deg.map(f64::to_radians);
-        let toward_left = Vec3::new(alpha.cos(), alpha.sin(), 0.0);
-        let detector = Vec3::new(alpha.sin(), -alpha.cos(), 0.0) * beta.cos() + Vec3::z() * beta.sin();
+        let toward_left = Vec3::new(libm::cos(alpha), libm::sin(alpha), 0.0);
+        let detector = Vec3::new(libm::sin(alpha), -libm::cos(alpha), 0.0) * libm::cos(beta)
+            + Vec3::z() * libm::sin(beta);
         let down = -detector.cross(&toward_left);
-        let (sin, cos) = spec.rotation_deg.to_radians().sin_cos();
+        let (sin, cos) = libm::sincos(spec.rotation_deg.to_radians());
         let mut arm = Self {
             isocentre_mm: spec.isocentre_mm.map_or((low + high) / 2.0, Vec3::from),
             axes: [toward_left * cos - down * sin, toward_left * sin + down * cos, detector],

@@ -192,7 +192,8 @@ impl Flow {
     /// Inflow at a time over its mean: a raised cosine in systole over a steady part.
     pub(super) fn pulse(&self, time_s: f64) -> f64 {
         let part = (time_s / self.beat_s).rem_euclid(1.0) / SYSTOLE;
-        let systole = if part < 1.0 { (1.0 - (std::f64::consts::TAU * part).cos()) / SYSTOLE } else { 0.0 };
+        let systole =
+            if part < 1.0 { (1.0 - libm::cos(std::f64::consts::TAU * part)) / SYSTOLE } else { 0.0 };
         1.0 - self.pulsatility + self.pulsatility * systole
     }
 

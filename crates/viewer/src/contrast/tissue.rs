@@ -81,7 +81,7 @@ fn add_cloud(c_arm: &CArm, middle: Vec3, deviation_mm: f64, part: f64, seen: &mu
         for x in range(u, width) {
             let (source, direction) = c_arm.ray([f64::from(x) + 0.5, f64::from(y) + 0.5]);
             let off = (middle - source).cross(&direction).norm_squared() / direction.norm_squared();
-            let length = (-off / (2.0 * variance)).exp() / (std::f64::consts::TAU * variance);
+            let length = libm::exp(-off / (2.0 * variance)) / (std::f64::consts::TAU * variance);
             *seen.entry(y * width + x).or_insert(0.0) += (part * length) as f32;
         }
     }

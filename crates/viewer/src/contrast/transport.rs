@@ -232,7 +232,7 @@ impl Transport {
                 let out = node.share * all * before[i] * self.step_s;
                 change[i] -= out;
                 self.tissue_mm3[i] += out;
-                let washed = self.tissue_mm3[i] * (1.0 - (-self.step_s / flow.tissue_s).exp());
+                let washed = self.tissue_mm3[i] * (1.0 - libm::exp(-self.step_s / flow.tissue_s));
                 self.tissue_mm3[i] -= washed;
                 self.left_mm3 += washed;
             }

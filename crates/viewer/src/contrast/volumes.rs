@@ -20,7 +20,7 @@ const MOST_ACROSS: f64 = 4000.0;
 pub(super) fn volumes_mm3(mixing: &mut Mixing, cells: usize, wall: &SurfaceMesh) -> Vec<f64> {
     let mut volumes = vec![0.0; cells];
     let Some((low, high)) = wall.bounds_mm() else { return volumes };
-    let wanted_mm = (wall.signed_volume_mm3().max(0.0) / PLACES).cbrt().min(APART_MM);
+    let wanted_mm = libm::cbrt(wall.signed_volume_mm3().max(0.0) / PLACES).min(APART_MM);
     let apart_mm = wanted_mm.max((high - low).amax() / MOST_ACROSS);
     if apart_mm <= 0.0 {
         return volumes;

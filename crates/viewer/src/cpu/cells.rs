@@ -171,7 +171,7 @@ fn mean_length(radius: f64, [from, to]: [f64; 2], length: impl Fn(f64) -> f64) -
         return 0.0;
     }
     let middle = 0.5 * (within[0] + within[1]);
-    let [a, b] = within.map(|s| s * (1.0 - s * s).sqrt() + s.asin());
+    let [a, b] = within.map(|s| s * (1.0 - s * s).sqrt() + libm::asin(s));
     let mean = 0.5 * (b - a) / (within[1] - within[0]);
     covered * length((middle * radius - from) / (to - from)) * mean / (1.0 - middle * middle).sqrt()
 }

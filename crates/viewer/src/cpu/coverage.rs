@@ -157,7 +157,7 @@ impl Silhouette {
         let [near, far] = [piece.start.z.min(piece.end.z) - reach, piece.start.z.max(piece.end.z) + reach];
         let [start, end] = [&piece.start, &piece.end].map(|at| c_arm.pixel_of(at));
         let [dx, dy] = [end[0] - start[0], end[1] - start[1]];
-        let length_px = dx.hypot(dy);
+        let length_px = libm::hypot(dx, dy);
         let least = piece.radius.min(piece.radius + piece.slope * (piece.end - piece.start).norm());
         let outer_px = if c_arm.sod_mm() + near > 0.0 { reach * scale(near) * 1.05 } else { f64::INFINITY };
         Self {

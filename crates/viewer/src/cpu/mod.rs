@@ -20,7 +20,7 @@ pub(crate) use wall::{check_closed, check_drawable, wall_crossings};
 
 use endowire_core::vessel::SurfaceMesh;
 
-use crate::engine::{Engines, ThreeDEngine};
+use crate::engine::{Engines, ThreeDEngine, process};
 use crate::three_d::Camera;
 use view3d::CpuView3d;
 
@@ -30,7 +30,7 @@ pub(crate) const NAME: &str = "CPU reference";
 /// Prepares the fluoroscopic view where it is wanted; the 3D view is made with the first frame ([`three_d`]).
 pub(crate) fn engines(fluoro: bool) -> Engines {
     let paths = fluoro.then(|| Box::new(CpuPaths) as _);
-    Engines { paths, three_d: None, name: NAME.into(), process: std::process::id() }
+    Engines { paths, three_d: None, name: NAME.into(), process: process() }
 }
 
 /// The 3D view with the picture of the wall.

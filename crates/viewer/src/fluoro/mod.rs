@@ -111,6 +111,12 @@ pub(crate) struct Kept {
 }
 
 impl Kept {
+    /// What was cast through a scene.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn of(c_arm: &CArm, anatomy: Anatomy) -> Self {
+        Self { rays: c_arm.fingerprint(), anatomy: Arc::new(anatomy), shares: None }
+    }
+
     /// What of it serves a set-up `after` that before.
     pub(crate) fn between(mut self, before: &Setup, after: &Setup) -> Option<Self> {
         let rays = after.c_arm.as_ref().map(CArm::fingerprint);
@@ -332,7 +338,7 @@ impl Fluoroscope {
         for m in medium {
             of_pixel[m.pixel as usize] = [(self.fraction + m.fraction).min(1.0), m.tissue_mm];
         }
-        let open = self.beam.ln_reference().exp() as f32;
+        let open = libm::exp(self.beam.ln_reference()) as f32;
         let pixels = of_pixel.into_par_iter().enumerate().with_min_len(FEWEST_PIXELS);
         let left = pixels
             .map_init(Room::default, |room, (pixel, medium)| self.primary(pixel, medium, room)[0] * open);
@@ -357,7 +363,7 @@ impl Fluoroscope {
             devices.push((self.beam.excess(*material, None)?, lengths));
         }
         let at = |map: &[f32], i: usize| map.get(i).copied().unwrap_or(0.0);
-        let open = self.beam.ln_reference().exp() as f32;
+        let open = libm::exp(self.beam.ln_reference()) as f32;
         let rays = (0..paths.lumen_mm.len()).into_par_iter().with_min_len(FEWEST_PIXELS);
         let before = before.filter(|before| before.0.is_like(paths));
         let behind = rays.map_init(Lanes::new, |room, i| {

@@ -151,7 +151,7 @@ impl Cells {
         let [width, height] = self.count.map(|n| n as isize);
         let reach = (REACH * CELLS) as isize;
         let weights: Vec<f32> =
-            (-reach..=reach).map(|k| (-0.5 * (k as f64 / CELLS).powi(2)).exp() as f32).collect();
+            (-reach..=reach).map(|k| libm::exp(-0.5 * (k as f64 / CELLS).powi(2)) as f32).collect();
         let total: f32 = weights.iter().sum();
         let along = |cells: &[[f32; N]], step: [isize; 2]| -> Vec<[f32; N]> {
             (0..cells.len() as isize)

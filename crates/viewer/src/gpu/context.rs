@@ -4,9 +4,12 @@
 //! handler keeps the first report, and every read-back returns it as an error: a failing adapter costs a
 //! frame, never the program.
 
-use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use endowire_core::{Error, Result};
+use futures_channel::oneshot;
+
+use crate::engine::process;
 
 /// The first failure an adapter has reported.
 type Failure = Arc<Mutex<Option<String>>>;
@@ -29,9 +32,23 @@ impl Gpu {
     /// # Errors
     /// Why there is none, as a clause.
     pub(crate) fn open(features: wgpu::Features, software: bool) -> std::result::Result<Self, String> {
+        if cfg!(target_family = "wasm") {
+            return Err("a browser's graphics answer later: give Graphics to what waits for it".into());
+        }
+        pollster::block_on(Self::request(features, software))
+    }
+
+    /// The same where an answer is waited for.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub(crate) async fn request(
+        features: wgpu::Features,
+        software: bool,
+    ) -> std::result::Result<Self, String> {
         // Drivers keep threads and locks of a process that one forked from it does not have: they would be waited for without end.
         static PROCESS: OnceLock<u32> = OnceLock::new();
-        if *PROCESS.get_or_init(std::process::id) != std::process::id() {
+        if *PROCESS.get_or_init(process) != process() {
             return Err("graphics were in use before this process was forked".into());
         }
         let descriptor = wgpu::InstanceDescriptor {
@@ -39,7 +56,7 @@ impl Gpu {
             ..wgpu::InstanceDescriptor::new_without_display_handle()
         };
         let instance = wgpu::Instance::new(descriptor);
-        let mut adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+        let mut adapters = instance.enumerate_adapters(wgpu::Backends::all()).await;
         let is_software = |a: &wgpu::Adapter| a.get_info().device_type == wgpu::DeviceType::Cpu;
         if !software && !adapters.is_empty() && adapters.iter().all(is_software) {
             let name = adapters[0].get_info().name;
@@ -66,7 +83,7 @@ impl Gpu {
             required_limits: adapter.limits(),
             ..Default::default()
         });
-        let (device, queue) = pollster::block_on(request).map_err(|e| format!("{}: {e}", info.name))?;
+        let (device, queue) = request.await.map_err(|e| format!("{}: {e}", info.name))?;
         let failure = Failure::default();
         let report = |failure: &Failure, text: String| {
             failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
@@ -78,7 +95,12 @@ impl Gpu {
             report(&heard, format!("the device was lost ({reason:?}) {text}"));
         });
         let largest_side = device.limits().max_texture_dimension_2d;
-        Ok(Self { device, queue, largest_side, name: format!("{:?} {}", info.backend, info.name), failure })
+        let name = match info.backend {
+            // A browser does not tell the adapter's name.
+            wgpu::Backend::BrowserWebGpu => "WebGPU".to_owned(),
+            backend => format!("{backend:?} {}", info.name),
+        };
+        Ok(Self { device, queue, largest_side, name, failure })
     }
 
     /// Graphics interface and adapter.
@@ -94,10 +116,17 @@ impl Gpu {
         }
     }
 
+    /// A buffer of these bytes, a multiple of four of them. Written by the queue: one that is made with contents is mapped, which panics where
+    /// the device is lost.
     pub(crate) fn buffer(&self, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
-        use wgpu::util::DeviceExt;
-        let label = Some("endowire");
-        self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label, contents, usage })
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("endowire"),
+            size: contents.len() as u64,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.queue.write_buffer(&buffer, 0, contents);
+        buffer
     }
 
     /// A texture that is drawn into, then sampled or copied.
@@ -143,9 +172,18 @@ impl Gpu {
     /// Submits `encoder` and returns the bytes of `texture` after it, rows without padding.
     pub(crate) fn read_back(
         &self,
-        mut encoder: wgpu::CommandEncoder,
+        encoder: wgpu::CommandEncoder,
         texture: &wgpu::Texture,
     ) -> Result<Vec<u8>> {
+        pollster::block_on(self.submit(encoder, texture)?.bytes())
+    }
+
+    /// Submits `encoder`; what reads `texture` after it.
+    pub(crate) fn submit(
+        &self,
+        mut encoder: wgpu::CommandEncoder,
+        texture: &wgpu::Texture,
+    ) -> Result<Reading> {
         let size = texture.size();
         let row = size.width * texture.format().block_copy_size(None).unwrap_or(4);
         let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
@@ -164,21 +202,42 @@ impl Gpu {
         );
         self.queue.submit([encoder.finish()]);
         self.check()?;
+        Ok(Reading { gpu: self.clone(), buffer, row: row as usize, padded: padded as usize })
+    }
+}
+
+/// A texture on its way back.
+#[derive(Debug)]
+pub(crate) struct Reading {
+    gpu: Gpu,
+    buffer: wgpu::Buffer,
+    /// Bytes of a row, and with its padding.
+    row: usize,
+    padded: usize,
+}
+
+impl Reading {
+    /// Its bytes, rows without padding.
+    ///
+    /// # Errors
+    /// What the adapter has reported.
+    pub(crate) async fn bytes(self) -> Result<Vec<u8>> {
+        let Self { gpu, buffer, row, padded } = self;
         let failed = |what: &str| Error::Computation(format!("reading a frame back: {what}"));
-        let (sender, receiver) = mpsc::channel();
-        // The receiver outlives the callback unless this function has returned with an error; then nobody
-        // waits.
+        let (sender, receiver) = oneshot::channel();
+        // The receiver outlives the callback unless this has returned with an error; then nobody waits.
         buffer.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(&e.to_string()))?;
-        match receiver.try_recv() {
+        // A browser does it by itself.
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(&e.to_string()))?;
+        match receiver.await {
             Ok(Ok(())) => {}
             Ok(Err(error)) => return Err(failed(&error.to_string())),
             Err(_) => return Err(failed("the adapter did not answer")),
         }
-        self.check()?;
+        gpu.check()?;
         let mapped = buffer.get_mapped_range(..).map_err(|e| failed(&e.to_string()))?;
-        let mut data = Vec::with_capacity(row as usize * size.height as usize);
-        mapped.chunks_exact(padded as usize).for_each(|line| data.extend_from_slice(&line[..row as usize]));
+        let mut data = Vec::with_capacity(mapped.len() / padded * row);
+        mapped.chunks_exact(padded).for_each(|line| data.extend_from_slice(&line[..row]));
         Ok(data)
     }
 }

@@ -17,7 +17,7 @@ use endowire_core::vessel::SurfaceMesh;
 
 use crate::c_arm::CArm;
 use crate::engine::PathEngine;
-use crate::gpu::context::{Gpu, color_pass};
+use crate::gpu::context::{Gpu, Reading, color_pass};
 
 const PATH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
 
@@ -74,20 +74,15 @@ impl GpuPaths {
         Self { gpu: gpu.clone(), draw_wall, targets: HashMap::new() }
     }
 
-    /// Draws `vertices` corners of `instances` into a target of the size of `view`, and reads it.
-    fn lengths(
-        &mut self,
-        view: &CArm,
-        pipeline: &wgpu::RenderPipeline,
-        data: &[u8],
-        [vertices, instances]: [u32; 2],
-    ) -> Result<Vec<f32>> {
-        let gpu = &self.gpu;
+    /// Draws a mesh into a target of the size of `view`; what reads the lengths in it.
+    pub(crate) fn submit(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Reading> {
+        let vertices = wall_vertices(view, mesh);
+        let (gpu, pipeline) = (&self.gpu, &self.draw_wall);
         let target =
             self.targets.entry(view.size_px()).or_insert_with_key(|size| gpu.target(*size, PATH_FORMAT, 1));
         let uniform = gpu.buffer(bytemuck::bytes_of(&ViewUniform::new(view)), wgpu::BufferUsages::UNIFORM);
         let group = gpu.bind(pipeline, &[uniform.as_entire_binding()]);
-        let buffer = gpu.buffer(data, wgpu::BufferUsages::VERTEX);
+        let buffer = gpu.buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         {
             let texture = target.create_view(&Default::default());
@@ -95,19 +90,21 @@ impl GpuPaths {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
             pass.set_vertex_buffer(0, buffer.slice(..));
-            pass.draw(0..vertices, 0..instances);
+            pass.draw(0..vertices.len() as u32, 0..1);
         }
-        let bytes = gpu.read_back(encoder, target)?;
-        Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+        gpu.submit(encoder, target)
     }
+}
+
+/// The lengths that were read.
+pub(crate) async fn lengths(reading: Reading) -> Result<Vec<f32>> {
+    let bytes = reading.bytes().await?;
+    Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
 }
 
 impl PathEngine for GpuPaths {
     fn mesh(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Vec<f32>> {
-        let vertices = wall_vertices(view, mesh);
-        let count = vertices.len() as u32;
-        let pipeline = self.draw_wall.clone();
-        self.lengths(view, &pipeline, bytemuck::cast_slice(&vertices), [count, 1])
+        pollster::block_on(lengths(self.submit(view, mesh)?))
     }
 }
 

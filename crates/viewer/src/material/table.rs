@@ -49,8 +49,8 @@ impl Table {
         let after = self.energies_kev.partition_point(|&e| e <= energy_kev);
         let i = after.clamp(1, self.energies_kev.len() - 1) - 1;
         let (e0, e1) = (self.energies_kev[i], self.energies_kev[i + 1]);
-        let w = (energy_kev / e0).ln() / (e1 / e0).ln();
-        (column[i].ln() * (1.0 - w) + column[i + 1].ln() * w).exp()
+        let w = libm::log(energy_kev / e0) / libm::log(e1 / e0);
+        libm::exp(libm::log(column[i]) * (1.0 - w) + libm::log(column[i + 1]) * w)
     }
 
     /// The K-edges: energies that stand twice.

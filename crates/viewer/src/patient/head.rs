@@ -48,7 +48,7 @@ impl Trunk {
             // The rim of the eye.
             let rim: Vec<(Vec3, f64)> = (0..=12)
                 .map(|k| {
-                    let (s, c) = (std::f64::consts::TAU * f64::from(k) / 12.0).sin_cos();
+                    let (s, c) = libm::sincos(std::f64::consts::TAU * f64::from(k) / 12.0);
                     (at(31.0 + 19.0 * c, -64.0 + 9.0 * c.max(0.0), 20.0 + 17.0 * s), 3.5)
                 })
                 .collect();

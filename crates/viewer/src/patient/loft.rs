@@ -55,7 +55,7 @@ pub(super) fn tube(mesh: &mut SurfaceMesh, points: &[(Vec3, f64)]) {
             let other = along.cross(&side);
             (0..TUBE_SIDES)
                 .map(|k| {
-                    let (s, c) = (TAU * k as f64 / TUBE_SIDES as f64).sin_cos();
+                    let (s, c) = libm::sincos(TAU * k as f64 / TUBE_SIDES as f64);
                     points[i].0 + (side * c + other * s) * points[i].1.max(TIP_MM)
                 })
                 .collect()
@@ -68,10 +68,10 @@ pub(super) fn tube(mesh: &mut SurfaceMesh, points: &[(Vec3, f64)]) {
 pub(super) fn ellipsoid(mesh: &mut SurfaceMesh, centre: Vec3, half: Vec3) {
     const RINGS: usize = 18;
     let ring = |i: usize| -> Vec<Vec3> {
-        let (s, c) = (std::f64::consts::PI * i as f64 / RINGS as f64).sin_cos();
+        let (s, c) = libm::sincos(std::f64::consts::PI * i as f64 / RINGS as f64);
         (0..2 * RINGS)
             .map(|k| {
-                let (v, u) = (TAU * k as f64 / (2 * RINGS) as f64).sin_cos();
+                let (v, u) = libm::sincos(TAU * k as f64 / (2 * RINGS) as f64);
                 centre + half.component_mul(&Vec3::new(s * u, s * v, -c))
             })
             .collect()
@@ -88,7 +88,7 @@ pub(super) fn smooth(points: &[(Vec3, f64)], inset: f64) -> Vec<(Vec3, f64)> {
         let along = (at(to).0 - at(from).0).normalize();
         [0.5, 1.0, 1.45].map(|angle: f64| {
             let radius = at(to).1 - inset;
-            (at(to).0 + along * (radius.max(0.0) * angle.sin()), radius * angle.cos())
+            (at(to).0 + along * (radius.max(0.0) * libm::sin(angle)), radius * libm::cos(angle))
         })
     };
     let mut curve: Vec<(Vec3, f64)> = cap(1, 0).into_iter().rev().collect();

@@ -74,10 +74,10 @@ impl Lung<'_> {
         let tip = ((z - trunk.apex + 55.0) / 57.0).clamp(0.0, 0.999);
         let narrow = (1.0 - tip * tip).sqrt();
         let half = [(wide - 2.0) * narrow, (deep - 2.0) * narrow];
-        let reach = (u.abs() / half[0]).powf(2.5) + ((y - middle).abs() / half[1]).powf(2.5);
-        let wall = (reach.powf(0.4) - 1.0) * half[0].min(half[1]);
+        let reach = libm::pow(u.abs() / half[0], 2.5) + libm::pow((y - middle).abs() / half[1], 2.5);
+        let wall = (libm::pow(reach, 0.4) - 1.0) * half[0].min(half[1]);
         // Great vessels, wider at arch and hilum.
-        let bump = |at: f64, width: f64| (-((z - at) / width).powi(2)).exp();
+        let bump = |at: f64, width: f64| libm::exp(-((z - at) / width).powi(2));
         let hilum = self.hilum_z();
         let bulge =
             7.0 * bump(trunk.apex - 62.0, 16.0) * f64::from(self.side > 0.0) + 6.0 * bump(hilum, 26.0);
@@ -85,8 +85,9 @@ impl Lung<'_> {
         let right = 7.0 * bump(trunk.diaphragm + 36.0, 34.0) + 4.0 * bump(hilum + 36.0, 26.0);
         let bulge = if self.side < 0.0 { right - 3.0 } else { bulge - 2.0 };
         let inner = [self.mediastinum * (0.9 + 0.1 * narrow) + bulge, 0.98 * deep];
-        let round =
-            |u: f64, v: f64, half: [f64; 2]| (1.0 - (u / half[0]).hypot(v / half[1])) * half[0].min(half[1]);
+        let round = |u: f64, v: f64, half: [f64; 2]| {
+            (1.0 - libm::hypot(u / half[0], v / half[1])) * half[0].min(half[1])
+        };
         let between = round(u, y - middle, inner);
         let spine = round(u, y - trunk.spine_y(z) - 4.0, [31.0, 30.0]);
         let [half, at] = HEART_MM;
@@ -126,7 +127,7 @@ impl Lung<'_> {
     /// the way.
     fn reach(&self, z: f64, angle: f64) -> f64 {
         let [u, y] = self.axis(z);
-        let (s, c) = angle.sin_cos();
+        let (s, c) = libm::sincos(angle);
         let is_inside = |r: f64| self.outside(u + r * c, y + r * s, z) < 0.0;
         let first =
             (1..).map(|k| STRIDE_MM * f64::from(k)).find(|r| *r > self.trunk.half_width || !is_inside(*r));
@@ -141,7 +142,7 @@ impl Lung<'_> {
 
     /// Height of the edge in a direction: lowest behind and at the side.
     fn edge(&self, angle: f64) -> f64 {
-        let (s, c) = angle.sin_cos();
+        let (s, c) = libm::sincos(angle);
         self.dome - DOME_MM - 16.0 * s - 10.0 * c
     }
 
@@ -153,12 +154,12 @@ impl Lung<'_> {
         let over = (1..=DOME_RINGS).map(|ring| ring as f64 / DOME_RINGS as f64).map(|part| {
             let at = |k: usize| {
                 let edge = self.edge(angle(k));
-                (edge + (self.dome - edge) * (1.0 - part.powf(2.4)), part * 0.995)
+                (edge + (self.dome - edge) * (1.0 - libm::pow(part, 2.4)), part * 0.995)
             };
             (0..SIDES).map(at).collect::<Vec<_>>()
         });
         // Closer together towards the tip, which is round.
-        let up = (0..=RINGS).map(|ring| (PI / 2.0 * ring as f64 / RINGS as f64).sin()).map(|part| {
+        let up = (0..=RINGS).map(|ring| libm::sin(PI / 2.0 * ring as f64 / RINGS as f64)).map(|part| {
             let at = |k: usize| (self.edge(angle(k)) + (top - self.edge(angle(k))) * part, 1.0);
             (0..SIDES).map(at).collect::<Vec<_>>()
         });
@@ -169,7 +170,7 @@ impl Lung<'_> {
         let reaches = smoothed(places.iter().map(reach).collect());
         let point = |k: usize, (z, part): (f64, f64), reach: f64| {
             let [u, y] = self.axis(z);
-            let (s, c) = angle(k).sin_cos();
+            let (s, c) = libm::sincos(angle(k));
             Vec3::new(self.trunk.spine[0] + self.side * (u + part * reach * c), y + part * reach * s, z)
         };
         let ring = |(places, reaches): (Vec<(f64, f64)>, Vec<f64>)| -> Vec<Vec3> {
@@ -187,8 +188,8 @@ impl Lung<'_> {
     fn holds(&self, point: &Vec3) -> bool {
         let u = self.side * (point.x - self.trunk.spine[0]);
         let [axis, y] = self.axis(point.z);
-        let off = (u - axis).hypot(point.y - y) / 75.0;
-        let diaphragm = self.dome - DOME_MM * off.powf(2.4).min(1.0);
+        let off = libm::hypot(u - axis, point.y - y) / 75.0;
+        let diaphragm = self.dome - DOME_MM * libm::pow(off, 2.4).min(1.0);
         self.outside(u, point.y, point.z) < -5.0 && point.z > diaphragm + 6.0
     }
 
@@ -196,7 +197,7 @@ impl Lung<'_> {
     fn vessel(&self, mesh: &mut SurfaceMesh, start: Vec3, along: Vec3, normal: Vec3, generation: u32) {
         let part = f64::from(generation) / f64::from(GENERATIONS);
         let [thick, thin] = VESSELS_MM;
-        let radius = |part: f64| thick * (thin / thick).powf(part.min(1.0));
+        let radius = |part: f64| thick * libm::pow(thin / thick, part.min(1.0));
         let length = 30.0 - 14.0 * part;
         let end = start + along * length;
         let bent = start + along * (0.5 * length) + normal * (0.05 * length);
@@ -210,9 +211,9 @@ impl Lung<'_> {
         }
         let other = along.cross(&normal);
         for sign in [1.0, -1.0] {
-            let (s, c) = (sign * FORK_RAD * (1.0 - 0.25 * sign * (part - 0.5))).sin_cos();
+            let (s, c) = libm::sincos(sign * FORK_RAD * (1.0 - 0.25 * sign * (part - 0.5)));
             let next = along * c + normal * s;
-            let (ts, tc) = TURN_RAD.sin_cos();
+            let (ts, tc) = libm::sincos(TURN_RAD);
             let turned = other * tc + (normal * c - along * s) * ts;
             let turned = turned - next * turned.dot(&next);
             self.vessel(mesh, end - along * (0.5 * to), next.normalize(), turned.normalize(), generation + 1);
@@ -269,7 +270,7 @@ impl Trunk {
         ];
         for (pair, number) in frame.windows(2).zip(0..) {
             for k in 0..4 {
-                let hash = |more: f64| (f64::from(number * 4 + k) * TURN_RAD + more).sin().abs();
+                let hash = |more: f64| libm::sin(f64::from(number * 4 + k) * TURN_RAD + more).abs();
                 if hash(0.4) < 0.45 {
                     continue;
                 }

@@ -43,7 +43,7 @@ impl Trunk {
         let ring = |(up, wide, deep, back): (f64, f64, f64, f64)| -> Vec<Vec3> {
             (0..28)
                 .map(|k| {
-                    let (s, c) = (TAU * f64::from(k) / 28.0).sin_cos();
+                    let (s, c) = libm::sincos(TAU * f64::from(k) / 28.0);
                     self.pelvic((wide - inset) * c, back + (deep - inset) * s, up)
                 })
                 .collect()
@@ -69,12 +69,12 @@ impl Trunk {
             let flare = step(up, 0.0, 1.0);
             let [from, to] = [1.25 - 0.85 * flare, 1.75 + 0.35 * flare];
             let angle = from + (to - from) * part;
-            let edge = (PI * part).sin().max(0.04).powf(0.4) * step(up, -0.12, 0.06).max(0.05);
+            let edge = libm::pow(libm::sin(PI * part).max(0.04), 0.4) * step(up, -0.12, 0.06).max(0.05);
             let thick = (3.0 + 9.0 * (1.0 - step(up, 0.0, 0.45))) * edge - inset.min(2.0 * edge);
             let [u, v] = [hip_side + 6.0 + 36.0 * flare, 58.0 + 14.0 * flare].map(|h| h + face * thick);
             let crest = 128.0 * up - 34.0 * up * up * (2.0 * part - 0.75).powi(2);
-            let back = v * angle.cos() - hip_front * (1.0 - flare) + 8.0;
-            self.pelvic(side * u * angle.sin(), back, crest - hip_down + 6.0)
+            let back = v * libm::cos(angle) - hip_front * (1.0 - flare) + 8.0;
+            self.pelvic(side * u * libm::sin(angle), back, crest - hip_down + 6.0)
         };
         let ring = |k: i32| -> Vec<Vec3> {
             let up = f64::from(k) / 16.0;

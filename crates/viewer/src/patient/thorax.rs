@@ -63,7 +63,7 @@ impl Trunk {
             (0.82, 0.3),
         ];
         let ring = |(h, waist): (f64, f64)| -> Vec<Vec3> {
-            let at = |k: i32| (TAU * f64::from(k) / 24.0).sin_cos();
+            let at = |k: i32| libm::sincos(TAU * f64::from(k) / 24.0);
             (0..24)
                 .map(at)
                 .map(|(s, c)| Vec3::new(x + wide * waist * c, y + deep * waist * s, z + half * h))
@@ -103,7 +103,7 @@ impl Trunk {
         let angle = from + (end - from) * part;
         // Out of the joint a little upwards, then down to the front.
         let drop =
-            fall * self.pitch() * (0.25 * part + 0.75 * step(part, -0.15, 1.0)) - 4.0 * (PI * part).sin();
+            fall * self.pitch() * (0.25 * part + 0.75 * step(part, -0.15, 1.0)) - 4.0 * libm::sin(PI * part);
         let free = self.chest_wall(side, z - drop, angle, RIB_OUT_MM);
         let joint = Vec3::new(self.spine[0] + side * 21.0, self.spine_y(z) + 17.0, z);
         joint + (free - joint) * step(part, -0.02, 0.16)
@@ -144,7 +144,7 @@ impl Trunk {
                     .map(|k| {
                         let part = f64::from(k) / 14.0;
                         let z = from.z + (to - from.z) * step(part, -0.2, 1.1)
-                            - 0.1 * self.pitch() * (PI * part).sin();
+                            - 0.1 * self.pitch() * libm::sin(PI * part);
                         let on = self.chest_wall(side, z, angle + (reach - angle) * part, RIB_OUT_MM);
                         (from + (on - from) * step(part, 0.0, 0.3), 4.4 - 0.9 * part)
                     })
@@ -186,7 +186,7 @@ impl Trunk {
             let front = self.chest_wall(1.0, z, PI, RIB_OUT_MM);
             (0..20)
                 .map(|k| {
-                    let (s, c) = (TAU * f64::from(k) / 20.0).sin_cos();
+                    let (s, c) = libm::sincos(TAU * f64::from(k) / 20.0);
                     front + Vec3::new((half - inset) * c, (5.5 - inset) * s, 0.0)
                 })
                 .collect()
@@ -224,7 +224,12 @@ impl Trunk {
                     let (part, face) = if k < SIDES { (t, -1.0) } else { (1.0 - t, 1.0) };
                     let angle = medial + (lateral - medial) * part;
                     let thick = 1.7 + 3.5 * step(part, 0.75, 1.0) - 0.8 * inset;
-                    self.chest_wall(side, z, angle, 17.0 + face * thick * (PI * part).sin().max(0.1).sqrt())
+                    self.chest_wall(
+                        side,
+                        z,
+                        angle,
+                        17.0 + face * thick * libm::sin(PI * part).max(0.1).sqrt(),
+                    )
                 })
                 .collect();
             if side < 0.0 {

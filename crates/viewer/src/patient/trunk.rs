@@ -54,8 +54,8 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
 
 /// A point of a superellipse, squarer than an ellipse for powers below one, at an angle from the back towards the left.
 fn oval(half: [f64; 2], power: f64, angle: f64) -> [f64; 2] {
-    let of = |v: f64| v.signum() * v.abs().powf(power);
-    [half[0] * of(angle.sin()), half[1] * of(angle.cos())]
+    let of = |v: f64| v.signum() * libm::pow(v.abs(), power);
+    [half[0] * of(libm::sin(angle)), half[1] * of(libm::cos(angle))]
 }
 
 impl Trunk {
@@ -108,14 +108,14 @@ impl Trunk {
     /// Posterior coordinate of the middle of the vertebral bodies: bent back in the chest, forward in loins and neck.
     pub(super) fn spine_y(&self, z: f64) -> f64 {
         let s = (z - self.diaphragm) / self.chest();
-        let bent = |s: f64| (std::f64::consts::PI * s.clamp(0.0, 1.0)).sin();
+        let bent = |s: f64| libm::sin(std::f64::consts::PI * s.clamp(0.0, 1.0));
         self.spine[1] + 8.0 * bent(s) - 4.0 * bent(-s / 1.1) - 9.0 * step(s, 1.0, 1.5)
     }
 
     /// Half width and half depth of the skin at a height, its middle (posterior) and how square it is.
     fn skin_at(&self, z: f64) -> ([f64; 2], f64, f64) {
         let [neck, head] = NECK_ABOVE_MM.map(|above| self.apex + above);
-        let waist = (-((z - self.diaphragm + 120.0) / 70.0).powi(2)).exp();
+        let waist = libm::exp(-((z - self.diaphragm + 120.0) / 70.0).powi(2));
         let [mut w, mut d] = [self.half_width * (1.0 - 0.05 * waist), self.half_depth];
         let mut y = self.middle_y;
         let shoulder = step(z, self.apex - 30.0, neck);
@@ -162,7 +162,7 @@ impl Trunk {
     /// ring of the first ribs.
     pub(super) fn chest_at(&self, z: f64) -> ([f64; 2], f64) {
         let down = ((self.apex + 4.0 - z) / (0.78 * self.chest())).clamp(0.0, 1.0);
-        let full = (1.0 - (1.0 - down).powf(2.3)).powf(1.0 / 2.3);
+        let full = libm::pow(1.0 - libm::pow(1.0 - down, 2.3), 1.0 / 2.3);
         let wide = [self.half_width, self.half_depth].map(|half| half - CHEST_WALL_MM);
         let half = [0, 1].map(|k| mix(FIRST_RIB_MM[k].min(wide[k]), wide[k], full));
         (half, mix(self.spine_y(z) - 30.0, self.middle_y, full))

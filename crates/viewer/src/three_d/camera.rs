@@ -43,7 +43,7 @@ impl Camera {
         };
         let axes = axes_from(&turned(&first, spec.turn_deg));
         let longer = f64::from(size_px[0].max(size_px[1]));
-        let tangents = size_px.map(|n| HALF_ANGLE_DEG.to_radians().tan() * f64::from(n) / longer);
+        let tangents = size_px.map(|n| libm::tan(HALF_ANGLE_DEG.to_radians()) * f64::from(n) / longer);
         if let Some(orbit_deg) = spec.orbit_deg {
             return Self::orbiting(&first, axes, orbit_deg, (tangents, size_px), wall, beside);
         }
@@ -145,7 +145,7 @@ impl Camera {
 
 /// A direction turned about the long axis of the patient.
 fn turned(direction: &Vec3, degrees: f64) -> Vec3 {
-    let (sin, cos) = degrees.to_radians().sin_cos();
+    let (sin, cos) = libm::sincos(degrees.to_radians());
     Vec3::new(cos * direction.x - sin * direction.y, sin * direction.x + cos * direction.y, direction.z)
 }
 
@@ -160,7 +160,7 @@ fn axes_from(back: &Vec3) -> [Vec3; 3] {
 /// Unit vector from the vessel to the camera.
 fn from_angles(azimuth_deg: f64, elevation_deg: f64) -> Vec3 {
     let (a, e) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
-    Vec3::new(a.sin() * e.cos(), -a.cos() * e.cos(), e.sin())
+    Vec3::new(libm::sin(a) * libm::cos(e), -libm::cos(a) * libm::cos(e), libm::sin(e))
 }
 
 /// The usual oblique front view; for a vessel that it shows edge-on, one across the vessel's plane instead.

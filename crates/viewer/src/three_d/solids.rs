@@ -111,7 +111,7 @@ fn device(camera: &Camera, device: &RefinedDevice, vertices: &mut Vec<Vertex>) {
 fn cap(end: Section, outwards: f64, sections: &mut Vec<Section>) {
     for ring in 0..CAP_RINGS {
         let step = if outwards < 0.0 { CAP_RINGS - ring } else { ring + 1 };
-        let (sin, cos) = (FRAC_PI_2 * step as f64 / CAP_RINGS as f64).sin_cos();
+        let (sin, cos) = libm::sincos(FRAC_PI_2 * step as f64 / CAP_RINGS as f64);
         sections.push(Section {
             centre: end.centre + end.along * (outwards * end.radius * sin),
             radius: end.radius * cos,
@@ -205,7 +205,7 @@ fn tube(camera: &Camera, sections: &[Section], vertices: &mut Vec<Vertex>) {
         let other = t.cross(&side);
         let [sin, cos] = section.tilt;
         let ring: [Vertex; SIDES] = std::array::from_fn(|k| {
-            let (s, c) = (TAU * k as f64 / SIDES as f64).sin_cos();
+            let (s, c) = libm::sincos(TAU * k as f64 / SIDES as f64);
             let radial = side * c + other * s;
             let position = section.centre + radial * section.radius;
             Vertex::new(camera, &position, &(radial * cos + t * sin), section.colour)

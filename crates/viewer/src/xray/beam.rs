@@ -53,7 +53,7 @@ pub(crate) type Lanes = Vec<[f32; LANES]>;
 
 /// Share of photons of an energy that the scintillator absorbs.
 fn absorbed(energy_kev: f64, csi_mm: f64) -> Result<f64> {
-    Ok(1.0 - (-Material::CaesiumIodide.attenuation_per_mm(energy_kev)? * csi_mm).exp())
+    Ok(1.0 - libm::exp(-Material::CaesiumIodide.attenuation_per_mm(energy_kev)? * csi_mm))
 }
 
 impl Beam {
@@ -74,7 +74,7 @@ impl Beam {
         let open: f64 = lines.iter().map(|line| line.1).sum();
         lines.retain(|line| line.1 > LEAST_LINE * open);
         for line in &mut lines {
-            line.1 *= (-Material::SoftTissue.attenuation_per_mm(line.0)? * reference_mm).exp();
+            line.1 *= libm::exp(-Material::SoftTissue.attenuation_per_mm(line.0)? * reference_mm);
         }
         let total: f64 = lines.iter().map(|line| line.1).sum();
         lines.iter_mut().for_each(|line| line.1 /= total);
@@ -150,7 +150,7 @@ impl Beam {
 
     /// Natural logarithm of the transmission at the reference.
     pub(crate) fn ln_reference(&self) -> f64 {
-        -self.open.ln()
+        -libm::log(self.open)
     }
 
     /// Energy in keV of the quanta that vary as the signal at the reference does: ∫NηE² / ∫NηE.

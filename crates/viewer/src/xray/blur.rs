@@ -29,7 +29,7 @@ impl Blur {
             (0..PARTS)
                 .map(|part| {
                     let x = k as f64 + (f64::from(part) + 0.5) / f64::from(PARTS) - 0.5;
-                    (-0.5 * (x / deviation_px.max(LEAST_PX)).powi(2)).exp()
+                    libm::exp(-0.5 * (x / deviation_px.max(LEAST_PX)).powi(2))
                 })
                 .sum()
         };

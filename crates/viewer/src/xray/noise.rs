@@ -38,7 +38,7 @@ pub(super) fn philox<const N: usize>(counters: [[u32; N]; 4], key: [u32; 2]) -> 
 /// Standard normal quantiles at the middles of [`QUANTILES`] equal shares, scaled to a variance of one.
 static NORMAL: LazyLock<Vec<f32>> = LazyLock::new(|| {
     // dz/dp = 1/φ(z), integrated by the classical Runge–Kutta method from the median; the table is odd.
-    let slope = |z: f64| (std::f64::consts::TAU).sqrt() * (z * z / 2.0).exp();
+    let slope = |z: f64| (std::f64::consts::TAU).sqrt() * libm::exp(z * z / 2.0);
     const STEPS: usize = 64;
     let half = QUANTILES / 2;
     let h = 1.0 / (QUANTILES * STEPS) as f64;
@@ -109,7 +109,7 @@ pub(super) fn poisson<const N: usize>(
 fn few(mean: f32, word: u32) -> f32 {
     let u = (f64::from(word) + 0.5) / 4_294_967_296.0;
     let mean = f64::from(mean.max(0.0));
-    let mut probability = (-mean).exp();
+    let mut probability = libm::exp(-mean);
     let mut sum = probability;
     let mut count = 0.0;
     // A mean of 12 exceeds 60 once in 10²².

@@ -47,7 +47,7 @@ impl Spectrum {
             let filter = Material::Aluminium.attenuation_per_mm(energy)? * aluminium_mm
                 + Material::Copper.attenuation_per_mm(energy)? * copper_mm;
             if photons > 0.0 {
-                lines.push((energy, photons * (-filter).exp()));
+                lines.push((energy, photons * libm::exp(-filter)));
             }
         }
         let total: f64 = lines.iter().map(|line| line.1).sum();
@@ -57,7 +57,7 @@ impl Spectrum {
 
     /// The spectrum behind something with the given line integral at each energy, not normalised.
     pub(crate) fn behind(&self, line_integral: impl Fn(f64) -> f64) -> Self {
-        Self { lines: self.lines.iter().map(|&(e, n)| (e, n * (-line_integral(e)).exp())).collect() }
+        Self { lines: self.lines.iter().map(|&(e, n)| (e, n * libm::exp(-line_integral(e)))).collect() }
     }
 
     /// Mean of a quantity over the photons.

@@ -95,7 +95,7 @@ impl Place {
     /// Slip around the line, and its size along and around it, mm.
     fn slip_mm(&self, state: &RodState) -> (f64, f64) {
         let around = self.radius_mm * (self.turned_rad(state) - self.from_rad);
-        (around, self.advance_mm.hypot(around))
+        (around, libm::hypot(self.advance_mm, around))
     }
 
     /// Parts of the largest friction along and around the line.

@@ -26,7 +26,7 @@ impl Slider {
         let axial =
             Vec3::new(turned.m32 - turned.m23, turned.m13 - turned.m31, turned.m21 - turned.m12) * 0.5;
         let t = self.along;
-        self.from_rad += axial.dot(&t).atan2(0.5 * (turned.trace() - t.dot(&(turned * t))));
+        self.from_rad += libm::atan2(axial.dot(&t), 0.5 * (turned.trace() - t.dot(&(turned * t))));
         self.along = (turned * t).normalize();
         // G⁻ᵀ = (F F₀⁻¹)⁻ᵀ.
         let across = turned.try_inverse().map_or(turned, |inverse| inverse.transpose());

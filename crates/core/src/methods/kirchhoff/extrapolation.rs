@@ -58,7 +58,7 @@ fn middle(state: &RodState, e: usize) -> Vec3 {
 }
 
 fn size(motions: impl Iterator<Item = f64>) -> f64 {
-    motions.fold(0.0, f64::hypot)
+    motions.fold(0.0, libm::hypot)
 }
 
 /// What `value` is at `x`, linear between ascending places `0..=last`, and beyond them that at the last. `k` is where to start looking:

@@ -69,7 +69,7 @@ fn stretches(device: &Device, element_mm: f64) -> impl Iterator<Item = Stretch> 
         for section in left.by_ref() {
             end += section.length_mm;
             let [u, v] = section.rest_curvature_per_mm;
-            curvature_per_mm = curvature_per_mm.max(u.hypot(v));
+            curvature_per_mm = curvature_per_mm.max(libm::hypot(u, v));
             if end - begin >= 0.5 * element_mm {
                 break;
             }

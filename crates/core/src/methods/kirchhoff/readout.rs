@@ -82,7 +82,7 @@ impl<const C: usize> Tools<C> {
         let device = &surroundings.stack.instruments()[outermost].device;
         let radius_mm = device.section_at(inserted_mm).radius_mm;
         let [advance_mm, turn_rad] = self.guess.motions[outermost].parts();
-        let slip_mm = advance_mm.hypot(radius_mm * turn_rad);
+        let slip_mm = libm::hypot(advance_mm, radius_mm * turn_rad);
         if slip_mm <= LEAST_SLIP_MM {
             return 0.0;
         }
@@ -115,7 +115,7 @@ impl<const C: usize> Tools<C> {
             let [[advance, turn], [outer_advance, outer_turn]] =
                 [inner, outer].map(|index| self.guess.motions[index].parts());
             let (advance_mm, turn_rad) = (advance - outer_advance, turn - outer_turn);
-            let slip_mm = advance_mm.hypot(radius_mm * turn_rad);
+            let slip_mm = libm::hypot(advance_mm, radius_mm * turn_rad);
             if slip_mm <= LEAST_SLIP_MM {
                 continue;
             }

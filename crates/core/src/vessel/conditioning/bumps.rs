@@ -202,7 +202,7 @@ impl Around {
             let y = offset(w) / edge_mm;
             let (u, v, z) = (first.dot(&y), second.dot(&y), normal.dot(&y));
             let facing = corners.vertices[w as usize].normal.dot(&normal).max(0.0);
-            let weight = facing * (-y.norm_squared() / (WIDTH * WIDTH)).exp();
+            let weight = facing * libm::exp(-y.norm_squared() / (WIDTH * WIDTH));
             let terms = Terms::from([1.0, u, v, u * u, u * v, v * v, z * z]);
             equations.ger(weight, &terms, &terms, 1.0);
             self.terms.push((terms, weight));

@@ -393,7 +393,7 @@ pub(super) fn vertex_normals(triangles: &[[u32; 3]], at: &[Vec3]) -> Vec<Vec3> {
         let area = (p[1] - p[0]).cross(&(p[2] - p[0]));
         for k in 0..3 {
             let (e, f) = (p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]);
-            normals[t[k] as usize] += area * area.norm().atan2(e.dot(&f));
+            normals[t[k] as usize] += area * libm::atan2(area.norm(), e.dot(&f));
         }
     }
     normals.iter().map(|n| n.try_normalize(0.0).filter(|n| n.x.is_finite()).unwrap_or_default()).collect()

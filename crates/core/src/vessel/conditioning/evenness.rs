@@ -48,7 +48,7 @@ impl Evenness {
             // The sine of what it is larger by tells nearly all apart, and takes no arc tangent.
             let beyond = sine * least.1 - cosine * least.0;
             if beyond.is_nan() || beyond <= DOUBT * (sine + cosine.abs()) * (least.0 + least.1.abs()) {
-                let angle = sine.atan2(cosine);
+                let angle = libm::atan2(sine, cosine);
                 if angle < least_angle {
                     (least_angle, least) = (angle, (sine, cosine));
                 }
@@ -84,8 +84,8 @@ impl Evenness {
             edge_median_mm: median,
             edge_max_mm: edges.iter().copied().fold(0.0, f64::max),
             least_angle,
-            largest_turn: cosines.iter().copied().fold(1.0, f64::min).acos(),
-            usual_turn: cosines.get(one_in_hundred).map_or(0.0, |c| c.acos()),
+            largest_turn: libm::acos(cosines.iter().copied().fold(1.0, f64::min)),
+            usual_turn: cosines.get(one_in_hundred).map_or(0.0, |c| libm::acos(*c)),
             largest_ratio,
         }
     }
@@ -133,7 +133,7 @@ mod tests {
             let corners = Corners::new(&mesh, 0.1);
             let angle = |[a, b, c]: [Vec3; 3]| {
                 let (x, y) = (b - a, c - a);
-                x.cross(&y).norm().atan2(x.dot(&y))
+                libm::atan2(x.cross(&y).norm(), x.dot(&y))
             };
             let least = (0..mesh.triangles.len())
                 .map(|t| mesh.corners(t))

@@ -357,7 +357,7 @@ fn by_valence(pair: &Pair) -> bool {
 /// The angles across the edge sum to more than π (the criterion of Delaunay).
 pub(super) fn by_angles(pair: &Pair) -> bool {
     let [a, b, c, d] = pair.at;
-    let angle = |at: Vec3| (a - at).cross(&(b - at)).norm().atan2((a - at).dot(&(b - at)));
+    let angle = |at: Vec3| libm::atan2((a - at).cross(&(b - at)).norm(), (a - at).dot(&(b - at)));
     angle(c) + angle(d) > std::f64::consts::PI + 1e-3
 }
 

@@ -61,7 +61,7 @@ pub(super) fn cut(corners: &mut Corners) {
 fn sharp(corners: &Corners, among: &[bool]) -> (Vec<bool>, Vec<bool>) {
     let mut found = vec![false; corners.vertices.len()];
     let mut folded = found.clone();
-    let (needle_cos, sharp_cos, fold_cos) = (NEEDLE.cos(), SHARP.cos(), FOLD.cos());
+    let (needle_cos, sharp_cos, fold_cos) = (libm::cos(NEEDLE), libm::cos(SHARP), libm::cos(FOLD));
     let moved = |e: &u32| among[corners.from(*e) as usize];
     for e in (0..corners.half_edges()).filter(|&e| corners.lives(e)).filter(moved) {
         let (a, b, c) = (corners.from(e), corners.to(e), corners.apex(e));

@@ -115,7 +115,7 @@ fn largest_across(lumen: &Lumen<'_>, sphere: &Sphere, along: &Vec3) -> Sphere {
             let here = best;
             for direction in 0..DIRECTIONS {
                 let angle = TAU * direction as f64 / DIRECTIONS as f64 + TURN * halving as f64;
-                let centre_mm = here.centre_mm + (e * angle.cos() + f * angle.sin()) * step_mm;
+                let centre_mm = here.centre_mm + (e * libm::cos(angle) + f * libm::sin(angle)) * step_mm;
                 let radius_mm = lumen.clearance_mm(&centre_mm);
                 if radius_mm > best.radius_mm {
                     best = Sphere { centre_mm, radius_mm };

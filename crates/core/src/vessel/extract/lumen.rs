@@ -178,7 +178,7 @@ fn longest_mm([a, b, c]: &[Vec3; 3]) -> f64 {
 
 /// Spheres of one level have radii of 2ᴸ to 2ᴸ⁺¹ mm.
 fn level(radius_mm: f64) -> i32 {
-    radius_mm.log2().floor() as i32
+    libm::log2(radius_mm).floor() as i32
 }
 
 /// The radius that spheres of a level are below.

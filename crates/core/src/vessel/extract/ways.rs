@@ -86,7 +86,7 @@ fn length_over_radius(a: &Sphere, b: &Sphere) -> f64 {
     let ratio = b.radius_mm / a.radius_mm;
     let mean_mm = match (ratio - 1.0).abs() < 1e-6 {
         true => a.radius_mm,
-        false => (b.radius_mm - a.radius_mm) / ratio.ln(),
+        false => (b.radius_mm - a.radius_mm) / libm::log(ratio),
     };
     length_mm / mean_mm
 }

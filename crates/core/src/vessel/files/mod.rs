@@ -15,6 +15,7 @@ mod vtk;
 use std::path::Path;
 
 use super::SurfaceMesh;
+use crate::file::{FileSystem, Files};
 use crate::{Error, Result, Vec3};
 use frame::ToldAxes;
 pub use frame::{PatientAxes, SurfaceFrame};
@@ -106,11 +107,19 @@ impl SurfaceMesh {
     /// [`Error::Parameter`] for a unit that is not finite and positive, [`Error::File`] for a file that cannot be read,
     /// [`Error::Content`] for an unknown extension, unusable content (the reason says where) or a surface over 10 m across.
     pub fn read(path: &Path, frame: impl Into<SurfaceFrame>) -> Result<Self> {
+        Self::read_of(&FileSystem, path, frame)
+    }
+
+    /// The same of a surface that is among `files`.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_of(files: &dyn Files, path: &Path, frame: impl Into<SurfaceFrame>) -> Result<Self> {
         let frame = frame.into();
         frame.check()?;
         // A name that tells no format is refused before a large file is read.
         format_of(path)?;
-        Self::from_bytes(&crate::file::read(path, SIZE_LIMIT)?, path, frame)
+        Self::from_bytes(&files.read(path, SIZE_LIMIT)?, path, frame)
     }
 
     /// Reads a surface from the bytes of a file; the extension of `path` tells the format, and errors name it.

@@ -417,7 +417,7 @@ fn check_end_is_free(field: &Field, end: &End) -> Result<()> {
     let local = field.local(&end.centre, 2.0 * end.radius);
     for k in 0..END_PROBES {
         let angle = TAU * k as f64 / END_PROBES as f64;
-        let at = end.centre + end.radius * (angle.cos() * u + angle.sin() * v);
+        let at = end.centre + end.radius * (libm::cos(angle) * u + libm::sin(angle) * v);
         let value = field.value(&local, &at).f;
         if value < -1e-3 * end.radius {
             return Err(Error::parameter(

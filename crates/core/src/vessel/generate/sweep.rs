@@ -29,7 +29,8 @@ pub(super) fn tube(branch: &Branch, edge_mm: f64) -> SurfaceMesh {
         let turn = if k % 2 == 0 { 0.0 } else { PI / around as f64 };
         for j in 0..around {
             let angle = TAU * j as f64 / around as f64 + turn;
-            mesh.vertices_mm.push(place.position + place.radius * (angle.cos() * u + angle.sin() * v));
+            mesh.vertices_mm
+                .push(place.position + place.radius * (libm::cos(angle) * u + libm::sin(angle) * v));
         }
     }
     let id = |k: usize, j: usize| (k * around + j % around) as u32;

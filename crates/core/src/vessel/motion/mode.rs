@@ -180,8 +180,8 @@ impl Mode {
     pub(super) fn amplitude(&self, time_s: f64) -> f64 {
         let phase = (time_s / self.period_s + self.phase).rem_euclid(1.0);
         match self.waveform {
-            Waveform::Breathing => (PI * phase).sin().powi(4),
-            Waveform::Heartbeat if phase < SYSTOLE => (PI * phase / SYSTOLE).sin().powi(2),
+            Waveform::Breathing => libm::sin(PI * phase).powi(4),
+            Waveform::Heartbeat if phase < SYSTOLE => libm::sin(PI * phase / SYSTOLE).powi(2),
             Waveform::Heartbeat => 0.0,
             Waveform::Steady => 1.0,
         }
@@ -205,7 +205,7 @@ impl Mode {
 
     /// Largest |R − I|: it grows with the angle up to half a turn.
     fn turning(&self) -> f64 {
-        self.turn.map_or(0.0, |(.., angle)| 2.0 * (0.5 * angle.abs()).sin())
+        self.turn.map_or(0.0, |(.., angle)| 2.0 * libm::sin(0.5 * angle.abs()))
     }
 
     /// |v| is never more than this at so far from a place, mm.

@@ -59,7 +59,7 @@ pub(super) fn drop_pieces(mesh: &mut SurfaceMesh, table: &EdgeTable) -> Dropped 
     let largest = pieces[main].area_mm2;
     for piece in pieces.iter_mut() {
         let share = piece.area_mm2 / largest;
-        let flat = piece.volume_mm3.abs() < FLAT * piece.area_mm2.powf(1.5);
+        let flat = piece.volume_mm3.abs() < FLAT * libm::pow(piece.area_mm2, 1.5);
         piece.gone = share < SPECK
             || (share < BLOB && (piece.loops == 0 || flat))
             || (share < SHEET && piece.loops > 0 && piece.sheet);

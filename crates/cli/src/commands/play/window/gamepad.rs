@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
+use endowire_play::{Button, Pad};
 use gilrs::{Axis, Button as Key, Gamepad, Gilrs};
 use winit::event_loop::EventLoopProxy;
 
 use super::Told;
-use super::pad::{Button, Pad};
+
 use crate::output::tell;
 
 /// How soon a window that was closed is noticed.

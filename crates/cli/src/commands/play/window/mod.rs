@@ -2,9 +2,6 @@
 
 #[cfg(feature = "gamepad")]
 mod gamepad;
-mod keys;
-#[cfg(any(test, feature = "gamepad"))]
-mod pad;
 mod screen;
 mod text;
 
@@ -15,13 +12,13 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use endowire_play::{Input, Pictures, Session, Snapshot};
+use endowire_play::{Input, KEYS, Keys, Modifiers, Pictures, Session, Snapshot};
 use endowire_viewer::Image;
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, EventLoop, EventLoopProxy, OwnedDisplayHandle};
-use winit::keyboard::PhysicalKey;
+use winit::keyboard::{KeyCode, ModifiersState, PhysicalKey};
 use winit::window::{Window, WindowId};
 
 use super::Channel;
@@ -31,7 +28,6 @@ use crate::args::PlayArgs;
 use crate::failure::Failure;
 use crate::output::chart::write_png;
 use crate::output::tell;
-use keys::{Asked, Keys};
 use screen::Layout;
 use text::{Canvas, Writer};
 
@@ -48,7 +44,7 @@ enum Told {
     Picture,
     /// How a gamepad is held that is connected, with its name; none when it has gone.
     #[cfg(feature = "gamepad")]
-    Gamepad(Option<(String, pad::Pad)>),
+    Gamepad(Option<(String, endowire_play::Pad)>),
     /// The session has ended.
     Ended,
 }
@@ -79,7 +75,7 @@ struct Shell {
     keys: Keys,
     /// How the gamepad is held.
     #[cfg(feature = "gamepad")]
-    pad: pad::Pad,
+    pad: endowire_play::Pad,
     surface: Option<softbuffer::Surface<OwnedDisplayHandle, Arc<Window>>>,
     /// Planes of fluoroscopy.
     planes: usize,
@@ -117,7 +113,7 @@ pub(super) fn run(
         to: sender,
         keys: Keys::new(names),
         #[cfg(feature = "gamepad")]
-        pad: pad::Pad::default(),
+        pad: endowire_play::Pad::default(),
         surface: None,
         planes: screen::planes(&session.readout()),
         cursor: [0.0; 2],
@@ -200,10 +196,16 @@ pub(super) fn write(
 /// What F1 shows: keys, and those of a gamepad where one is connected.
 fn help(gamepad: bool) -> Vec<screen::Help> {
     #[cfg(feature = "gamepad")]
-    let of_pad = pad::HELP;
+    let of_pad = endowire_play::PAD;
     #[cfg(not(feature = "gamepad"))]
     let of_pad: &[screen::Help] = &[];
-    keys::HELP.iter().chain(of_pad.iter().filter(|_| gamepad)).copied().collect()
+    let of_window = [("F1, Esc", "this help, end")];
+    KEYS.iter().copied().chain(of_window).chain(of_pad.iter().copied().filter(|_| gamepad)).collect()
+}
+
+/// What UI Events call a key: winit has its names.
+fn name(code: KeyCode) -> String {
+    format!("{code:?}")
 }
 
 impl Shell {
@@ -250,20 +252,21 @@ impl Shell {
 
     fn key(&mut self, events: &ActiveEventLoop, event: &KeyEvent) {
         let PhysicalKey::Code(code) = event.physical_key else { return };
-        let (inputs, asked) = self.keys.key(code, event.state == ElementState::Pressed, event.repeat);
+        let pressed = event.state == ElementState::Pressed;
+        let inputs = self.keys.key(&name(code), pressed, event.repeat);
         self.send(inputs);
-        match asked {
-            Some(Asked::Help) => {
+        match code {
+            KeyCode::F1 if pressed && !event.repeat => {
                 self.shared.help.fetch_xor(true, Ordering::Relaxed);
             }
-            Some(Asked::Quit) => events.exit(),
-            None => {}
+            KeyCode::Escape if pressed && !event.repeat => events.exit(),
+            _ => {}
         }
     }
 
     /// A gamepad is held otherwise; one that has gone is held by nobody.
     #[cfg(feature = "gamepad")]
-    fn held(&mut self, now: Option<(String, pad::Pad)>) {
+    fn held(&mut self, now: Option<(String, endowire_play::Pad)>) {
         let (name, now) = now.unzip();
         *self.shared.gamepad.lock().unwrap_or_else(PoisonError::into_inner) = name;
         let now = now.unwrap_or_default();
@@ -326,7 +329,11 @@ impl ApplicationHandler<Told> for Shell {
             }
             WindowEvent::KeyboardInput { event, .. } => self.key(events, &event),
             WindowEvent::ModifiersChanged(modifiers) => {
-                let inputs = self.keys.modify(modifiers.state());
+                let held = |key| modifiers.state().contains(key);
+                let inputs = self.keys.modify(Modifiers {
+                    shift: held(ModifiersState::SHIFT),
+                    control: held(ModifiersState::CONTROL),
+                });
                 self.send(inputs);
             }
             WindowEvent::Focused(false) => {
@@ -346,5 +353,29 @@ impl ApplicationHandler<Told> for Shell {
             }
             _ => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_have_the_names_that_the_table_knows() {
+        let mut keys = Keys::new(vec!["wire".to_owned()]);
+        for code in [
+            KeyCode::ArrowUp,
+            KeyCode::Space,
+            KeyCode::KeyC,
+            KeyCode::Enter,
+            KeyCode::Backspace,
+            KeyCode::Tab,
+            KeyCode::Digit1,
+            KeyCode::NumpadAdd,
+            KeyCode::Equal,
+        ] {
+            assert!(!keys.key(&name(code), true, false).is_empty(), "{code:?}");
+        }
+        assert!(keys.key(&name(KeyCode::F1), true, false).is_empty());
     }
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use winit::keyboard::{KeyCode, ModifiersState};
+use crate::keys::Modifiers;
 
 /// Buttons and sticks, and what they do.
-pub(super) const HELP: &[(&str, &str)] = &[
+pub const PAD: &[(&str, &str)] = &[
     ("left stick, up down", "push, pull, as fast as it leans"),
     ("right stick, left right", "turn, as fast as it leans"),
     ("right / left bumper with these", "coarse (four times) / fine (a fifth)"),
@@ -22,7 +22,8 @@ const DEAD_ZONE: f64 = 0.15;
 
 /// A button, by where it is: makers write different letters on them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Button {
+#[expect(missing_docs, reason = "each is where its name says")]
+pub enum Button {
     Lower,
     Right,
     Left,
@@ -41,7 +42,7 @@ pub(super) enum Button {
 
 impl Button {
     /// All of them.
-    pub(super) const ALL: [Self; 14] = [
+    pub const ALL: [Self; 14] = [
         Self::Lower,
         Self::Right,
         Self::Left,
@@ -59,50 +60,50 @@ impl Button {
     ];
 
     /// The key that does the same; none of bumpers, which are Shift and Ctrl.
-    fn key(self) -> Option<KeyCode> {
+    fn key(self) -> Option<&'static str> {
         Some(match self {
-            Self::Lower => KeyCode::KeyI,
-            Self::Right => KeyCode::Backspace,
-            Self::Left => KeyCode::KeyB,
-            Self::Upper => KeyCode::KeyV,
+            Self::Lower => "KeyI",
+            Self::Right => "Backspace",
+            Self::Left => "KeyB",
+            Self::Upper => "KeyV",
             Self::LeftBumper | Self::RightBumper => return None,
-            Self::LeftTrigger => KeyCode::KeyC,
-            Self::RightTrigger => KeyCode::Space,
-            Self::Select => KeyCode::Tab,
-            Self::Start => KeyCode::Enter,
-            Self::CrossLeft => KeyCode::KeyJ,
-            Self::CrossRight => KeyCode::KeyL,
-            Self::CrossUp => KeyCode::KeyO,
-            Self::CrossDown => KeyCode::KeyK,
+            Self::LeftTrigger => "KeyC",
+            Self::RightTrigger => "Space",
+            Self::Select => "Tab",
+            Self::Start => "Enter",
+            Self::CrossLeft => "KeyJ",
+            Self::CrossRight => "KeyL",
+            Self::CrossUp => "KeyO",
+            Self::CrossDown => "KeyK",
         })
     }
 }
 
 /// How a gamepad is held at a moment; nothing is pressed on one that is not there.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Pad {
+pub struct Pad {
     /// How far the left stick leans up, from -1 to 1.
-    pub(super) up: f64,
+    pub up: f64,
     /// How far the right stick leans to the right.
-    pub(super) right: f64,
-    pub(super) down: BTreeSet<Button>,
+    pub right: f64,
+    /// Buttons that are pressed.
+    pub down: BTreeSet<Button>,
 }
 
 impl Pad {
     /// Shares of the usual speeds of pushing and turning.
-    pub(super) fn leans(&self) -> [f64; 2] {
+    pub(crate) fn leans(&self) -> [f64; 2] {
         [self.up, self.right].map(share)
     }
 
     /// Keys that are held with the sticks.
-    pub(super) fn modifiers(&self) -> ModifiersState {
-        let held =
-            [(Button::RightBumper, ModifiersState::SHIFT), (Button::LeftBumper, ModifiersState::CONTROL)];
-        held.into_iter().filter(|(button, _)| self.down.contains(button)).map(|(_, key)| key).collect()
+    pub(crate) fn modifiers(&self) -> Modifiers {
+        let held = |button| self.down.contains(&button);
+        Modifiers { shift: held(Button::RightBumper), control: held(Button::LeftBumper) }
     }
 
     /// Keys that go up and down from a moment to this one.
-    pub(super) fn keys_since(&self, before: &Self) -> Vec<(KeyCode, bool)> {
+    pub(crate) fn keys_since(&self, before: &Self) -> Vec<(&'static str, bool)> {
         let up = before.down.difference(&self.down).map(|button| (button, false));
         let down = self.down.difference(&before.down).map(|button| (button, true));
         up.chain(down).filter_map(|(button, is_down)| Some((button.key()?, is_down))).collect()
@@ -119,11 +120,10 @@ fn share(lean: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use endowire_play::Input;
     use endowire_viewer::Mode;
 
-    use super::super::keys::Keys;
     use super::*;
+    use crate::{Input, Keys};
 
     fn held(up: f64, right: f64, down: &[Button]) -> Pad {
         Pad { up, right, down: down.iter().copied().collect() }
@@ -166,7 +166,7 @@ mod tests {
         // One that is unplugged lets go of all.
         assert_eq!(keys.pad(&next, &rest), [moved("catheter", 0.0, 0.0)]);
         // Arrows and a stick together are no faster than either.
-        keys.key(KeyCode::ArrowUp, true, false);
+        keys.key("ArrowUp", true, false);
         assert_eq!(keys.pad(&rest, &held(1.0, 0.0, &[])), [moved("catheter", 10.0, 0.0)]);
     }
 
@@ -212,9 +212,8 @@ mod tests {
 
     #[test]
     fn every_button_does_something_that_the_help_tells() {
-        let keys: BTreeSet<_> =
-            Button::ALL.into_iter().filter_map(Button::key).map(|k| format!("{k:?}")).collect();
+        let keys: BTreeSet<_> = Button::ALL.into_iter().filter_map(Button::key).collect();
         assert_eq!(keys.len(), Button::ALL.len() - 2, "bumpers have none, no two have one");
-        assert!(HELP.iter().any(|(name, _)| name.contains("bumper")));
+        assert!(PAD.iter().any(|(name, _)| name.contains("bumper")));
     }
 }

@@ -1,0 +1,142 @@
+//! A graphics processor that answers later, as that of a browser does: what stays in the beam is asked for in one go, and waited for.
+//!
+//! What asks is the code that casts rays at once ([`Anatomy::new`]): once with an engine that submits all of it and gives nothing back, and again
+//! with one that has the answers.
+
+use std::sync::{Mutex, PoisonError};
+
+use endowire_core::vessel::SurfaceMesh;
+use endowire_core::{Error, Result};
+
+use crate::c_arm::CArm;
+use crate::engine::PathEngine;
+use crate::fluoro::{Anatomy, SUBRAYS};
+use crate::gpu::context::{Gpu, Reading};
+use crate::gpu::fluoro::{GpuPaths, lengths};
+use crate::scene::Setup;
+
+/// An open graphics processor for those who wait for its answers ([`Renderer::prepare_on`](crate::Renderer::prepare_on)).
+#[derive(Debug)]
+pub struct Graphics {
+    gpu: Gpu,
+    paths: Mutex<GpuPaths>,
+}
+
+impl Graphics {
+    /// Opens the best adapter.
+    ///
+    /// # Errors
+    /// [`Error::Computation`] with the reason why there is none that fits.
+    pub async fn open() -> Result<Self> {
+        let gpu = Gpu::request(wgpu::Features::FLOAT32_BLENDABLE, true).await.map_err(Error::Computation)?;
+        let paths = Mutex::new(GpuPaths::new(&gpu));
+        gpu.check()?;
+        Ok(Self { gpu, paths })
+    }
+
+    /// Graphics interface and adapter.
+    pub fn name(&self) -> &str {
+        self.gpu.name()
+    }
+
+    /// What stays in the beam of a set-up.
+    pub(crate) async fn anatomy(&self, setup: &Setup, c_arm: &CArm) -> Result<Anatomy> {
+        let needed = c_arm.size_px().map(|n| n * SUBRAYS).into_iter().max().unwrap_or(0);
+        if needed > self.gpu.largest_side {
+            let most = self.gpu.largest_side;
+            return Err(Error::Computation(format!("it draws at most {most} pixels a side, not {needed}")));
+        }
+        let mut asking = Asking { graphics: self, readings: vec![] };
+        Anatomy::new(setup, c_arm, SUBRAYS, &mut asking)?;
+        let mut answers = Vec::with_capacity(asking.readings.len());
+        for reading in asking.readings {
+            answers.push(lengths(reading).await?);
+        }
+        Anatomy::new(setup, c_arm, SUBRAYS, &mut Answered(answers.into_iter()))
+    }
+}
+
+/// Submits what is asked for; nothing is known yet.
+struct Asking<'a> {
+    graphics: &'a Graphics,
+    readings: Vec<Reading>,
+}
+
+impl PathEngine for Asking<'_> {
+    fn mesh(&mut self, view: &CArm, mesh: &SurfaceMesh) -> Result<Vec<f32>> {
+        let mut paths = self.graphics.paths.lock().unwrap_or_else(PoisonError::into_inner);
+        self.readings.push(paths.submit(view, mesh)?);
+        Ok(vec![0.0; view.size_px().map(|n| n as usize).iter().product()])
+    }
+}
+
+/// Gives the answers in the order in which they were asked for.
+struct Answered(std::vec::IntoIter<Vec<f32>>);
+
+impl PathEngine for Answered {
+    fn mesh(&mut self, _: &CArm, _: &SurfaceMesh) -> Result<Vec<f32>> {
+        self.0.next().ok_or_else(|| Error::Computation("more was asked for than answered".into()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
+
+    use super::*;
+    use crate::spec::{Backend, DetectorSpec, TorsoSpec, View, ViewSpec};
+    use crate::{DeviceView, Renderer};
+
+    fn renderer(magnification: f64) -> Renderer {
+        let tree = anatomy::tree("aortic_arch").unwrap();
+        let wall = GeneratedWall::new(&tree, Resolution::Triangles(4000)).unwrap().wall;
+        let mut spec = ViewSpec {
+            views: vec![View::Fluoro],
+            size_px: [96; 2],
+            bits: 8,
+            backend: Backend::Cpu,
+            // A quantum more or less is no difference of the rays.
+            detector: DetectorSpec { noise: false, ..DetectorSpec::default() },
+            ..ViewSpec::default()
+        };
+        spec.patient.torso = Some(TorsoSpec::default());
+        spec.c_arm.magnification = magnification;
+        Renderer::of_wall(&spec, &wall).unwrap()
+    }
+
+    #[test]
+    fn pictures_by_a_processor_that_is_waited_for_are_those_of_the_reference() {
+        if crate::gpu::context::tests::opened().is_none() {
+            return;
+        }
+        let graphics = pollster::block_on(Graphics::open()).unwrap();
+        let devices: [DeviceView; 0] = [];
+        let mut by_graphics = renderer(1.0);
+        pollster::block_on(by_graphics.prepare_on(&graphics)).unwrap();
+        assert_eq!(by_graphics.backend(), graphics.name());
+        let seen = by_graphics.render(&devices).unwrap().fluoro.unwrap();
+        let beyond = |other: &mut Renderer| {
+            let other = other.render(&devices).unwrap().fluoro.unwrap();
+            let apart = seen.data().iter().zip(other.data()).map(|(a, b)| a.abs_diff(*b));
+            apart.filter(|apart| *apart > 2).count() as f64 / seen.data().len() as f64
+        };
+        // The rasteriser rounds corners of triangles, which moves silhouettes.
+        let share = beyond(&mut renderer(1.0));
+        assert!(share < 1e-3, "{share}");
+        // The twin: another place differs.
+        assert!(beyond(&mut renderer(1.2)) > 0.1);
+    }
+
+    #[test]
+    fn one_that_is_lost_leaves_the_work_to_the_reference() {
+        if crate::gpu::context::tests::opened().is_none() {
+            return;
+        }
+        let graphics = pollster::block_on(Graphics::open()).unwrap();
+        graphics.gpu.device.destroy();
+        let mut renderer = renderer(1.0);
+        pollster::block_on(renderer.prepare_on(&graphics)).unwrap();
+        assert!(renderer.backend().starts_with("CPU reference (adapter failed"), "{}", renderer.backend());
+        assert!(renderer.render(&[]).unwrap().fluoro.is_some());
+    }
+}

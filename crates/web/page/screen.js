@@ -1,0 +1,116 @@
+// What is on the screen: pictures, read-outs, what has happened.
+import { hear } from "./simulator.js";
+
+const element = (id) => document.getElementById(id);
+const canvases = ["fluoro", "second", "three"].map((id) => element(id).querySelector("canvas"));
+export const [fluoro, second, three] = canvases;
+
+/** The last readout. */
+export let readout = null;
+
+/** Puts a picture into a canvas. */
+export function paint(canvas, { width, height, data }) {
+  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+  canvas.getContext("2d").putImageData(new ImageData(data, width, height), 0, 0);
+}
+
+const side = (deg, names) => (Math.abs(deg) < 0.05 ? "" : `${names[deg < 0 ? 1 : 0]} ${Math.abs(deg).toFixed(0)}°`);
+const pose = (lao, cra) => [side(lao, ["LAO", "RAO"]), side(cra, ["CRA", "CAU"])].filter(Boolean).join(" ") || "AP";
+const modes = { fluoro: "fluoroscopy", cine: "cine", dsa: "DSA", roadmap: "roadmap" };
+const minutes = (s) => `${Math.floor(s / 60)}:${(s % 60).toFixed(1).padStart(4, "0")}`;
+
+/** A minus that is one, and none before zero. */
+const minus = (text) => text.replace(/^-(?=[0.]*$)/, "").replace("-", "−");
+const newtons = (n) => (Math.abs(n) < 0.1 ? `${minus((1000 * n).toFixed(1))} mN` : `${minus(n.toFixed(2))} N`);
+
+/** Shows a frame. */
+export function show({ readout: now, planes, three: view, backend }) {
+  readout = now;
+  if (planes[0]) {
+    paint(fluoro, planes[0]);
+    element("call").hidden = true;
+  }
+  if (planes[1]) paint(second, planes[1]);
+  if (view) paint(three, view);
+  const { lab } = now;
+  element("fluoro").classList.toggle("live", lab.live);
+  element("second").classList.toggle("live", lab.live);
+  element("second").hidden = !lab.second_deg;
+  element("views").classList.toggle("biplane", Boolean(lab.second_deg));
+  element("lock").classList.toggle("on", lab.live);
+  element("show").classList.toggle("on", now.demonstrates);
+  element("arm").textContent = pose(lab.lao_deg, lab.cra_deg);
+  if (lab.second_deg) element("second-arm").textContent = pose(...lab.second_deg);
+  element("beam").textContent = `${lab.live ? `${modes[lab.mode]} live` : "beam off"}\n${minutes(lab.beam_s)}  ${lab.dose_ugy.toFixed(1)} µGy`;
+  element("field").textContent = `${lab.field_mm.toFixed(0)} mm`;
+  element("backend").textContent = backend ? `pictures by ${backend}` : "";
+  hands(now);
+  happened(now);
+}
+
+function hands(now) {
+  const list = element("instruments");
+  if (list.children.length !== now.instruments.length) {
+    list.replaceChildren(...now.instruments.map((one) => {
+      const button = document.createElement("button");
+      button.className = "instrument";
+      button.append(...["b", "span", "span"].map((tag) => document.createElement(tag)));
+      button.lastChild.className = "felt";
+      button.addEventListener("click", () => {
+        hear("key", [`Digit${[...list.children].indexOf(button) + 1}`, true, false]);
+        button.blur();
+      });
+      return button;
+    }));
+  }
+  now.instruments.forEach((one, index) => {
+    const button = list.children[index];
+    const push = one.push_force_n === null ? "–" : newtons(one.push_force_n);
+    const [name, place, felt] = button.children;
+    name.textContent = one.name;
+    place.textContent = `${one.inserted_mm.toFixed(1)} mm in, ${minus(one.rotation_deg.toFixed(0))}°`;
+    felt.textContent = `push ${push}, torque ${minus(one.torque_nmm.toFixed(2))} N·mm${one.warns ? " – beyond the limit" : ""}`;
+    button.classList.toggle("warns", one.warns);
+    button.classList.toggle("chosen", now.selected === one.name && now.instruments.length > 1);
+  });
+}
+
+/** What is told until something else is. */
+let notice = { text: "", warns: false, until: 0 };
+
+/** Tells something for some seconds. */
+export function tell(text, warns = false, seconds = 8) {
+  notice = { text, warns, until: performance.now() + 1000 * seconds };
+  place(notice);
+}
+
+function place({ text, warns }) {
+  const line = element("told");
+  if (line.textContent !== text) line.textContent = text;
+  line.classList.toggle("warn", warns);
+}
+
+function happened(now) {
+  const recent = now.event && now.time_s - now.event.time_s < 6;
+  if (recent) return place({ text: now.event.text, warns: true });
+  if (performance.now() < notice.until) return place(notice);
+  const contacts = `${now.contacts} contacts, at most ${newtons(now.wall_force_n)}`;
+  place({ text: now.demonstrates ? "the script is shown: move to take over" : `step ${now.step}, ${contacts}`, warns: false });
+}
+
+/** Shows how fast it goes; numbers for those who measure are attributes. */
+export function pace({ ticks, frames, mib }, inputsMs) {
+  const sorted = inputsMs.toSorted((a, b) => a - b);
+  const median = sorted[Math.floor(sorted.length / 2)];
+  const line = element("pace");
+  const wait = median === undefined ? "" : `, ${median.toFixed(0)} ms from hand to picture`;
+  line.textContent = `${ticks.toFixed(0)} ticks and ${frames.toFixed(0)} live frames a second${wait}, ${mib.toFixed(0)} MiB`;
+  Object.assign(line.dataset, { ticks, frames, mib, inputMs: median ?? "" });
+}
+
+/** Forgets the pictures of the session before. */
+export function clear() {
+  for (const canvas of canvases) canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
+  element("call").hidden = false;
+  element("instruments").replaceChildren();
+}

@@ -1,0 +1,163 @@
+// The session on a clock, beside the page: physics sixty times a second, pictures when there is time for them.
+import init, { Graphics, Session, Surface, keys, sceneFiles } from "./pkg/endowire.js";
+
+const TICK_MS = 1000 / 60;
+const FRAME_MS = 1000 / 30;
+/** Beyond this the clock has been stopped, and what was missed is not made up for. */
+const LATE_MS = 100;
+/** The 3D view is drawn each so many frames: it helps, and the live picture leads. */
+const THREE_D_EVERY = 4;
+
+let session, memory;
+let due = 0, frameDue = 0, frames = 0, ticks = 0, live = 0, wasLive = false;
+/** Whether the page has shown the last frame: more are not made than it can show. */
+let shown = true;
+/** When the oldest input came in that no picture shows. */
+let inputAt = null;
+let hidden = false, stopped = false;
+let counted = { at: performance.now(), ticks: 0, live: 0 };
+
+/** The graphics processor, where the browser has one. */
+let graphics = null;
+
+const started = init().then(async (exports) => {
+  memory = exports.memory;
+  if (navigator.gpu) graphics = await Graphics.open().catch(() => null);
+  postMessage({ started: keys() });
+});
+
+/** What a panic has told; the module is of no use after one. */
+let panicked = "";
+const told = console.error;
+console.error = (...text) => { panicked = text.join(" "); told(...text); };
+
+/** Does something with the session; what the module refuses is told, and where it has broken down it stops. */
+function guarded(work) {
+  if (stopped) return undefined;
+  try {
+    return work();
+  } catch (error) {
+    if (error instanceof WebAssembly.RuntimeError) {
+      stopped = true;
+      postMessage({ broken: panicked || String(error) });
+    } else {
+      postMessage({ failed: error.message ?? String(error) });
+    }
+    return undefined;
+  }
+}
+
+function physics(until) {
+  const now = performance.now();
+  if (now - due > LATE_MS) due = now;
+  while (due <= performance.now() && performance.now() < until) {
+    session.tick();
+    ticks += 1;
+    due += TICK_MS;
+  }
+}
+
+function draw() {
+  const readout = session.readout();
+  const frame = { readout, inputAt, planes: [], three: null, backend: session.backend() };
+  const isLive = readout.lab.live;
+  if (isLive || wasLive) frame.planes = session.fluoroSoon();
+  if (isLive) live += 1;
+  wasLive = isLive;
+  if (frames % THREE_D_EVERY === 0) frame.three = session.threeD() ?? null;
+  frames += 1;
+  inputAt = null;
+  shown = false;
+  postMessage({ frame }, [...frame.planes, ...(frame.three ? [frame.three] : [])].map((one) => one.data.buffer));
+  if (isLive) session.sharpen();
+}
+
+function pace(now) {
+  if (now - counted.at < 1000) return;
+  const seconds = (now - counted.at) / 1000;
+  postMessage({
+    pace: { ticks: (ticks - counted.ticks) / seconds, frames: (live - counted.live) / seconds, mib: memory.buffer.byteLength / 2 ** 20 },
+  });
+  counted = { at: now, ticks, live };
+}
+
+function turn() {
+  if (session && !hidden) {
+    guarded(() => {
+      physics(performance.now() + FRAME_MS);
+      const now = performance.now();
+      if (shown && now >= frameDue) {
+        frameDue = Math.max(frameDue + FRAME_MS, now - FRAME_MS);
+        draw();
+      }
+      pace(now);
+    });
+  }
+  const next = hidden || !session ? performance.now() + FRAME_MS : Math.min(due, shown ? frameDue : Infinity);
+  setTimeout(turn, Math.max(0, next - performance.now()));
+}
+turn();
+
+/** What the page asks for; each answer goes back under its name. */
+const asked = {
+  async open({ files, path, side }) {
+    const made = new Session(files, path, side);
+    session?.free();
+    session = made;
+    if (graphics) session.useGraphics(graphics);
+    due = frameDue = performance.now();
+    frames = 0;
+    wasLive = false;
+    // The link of a session begins where it ends.
+    if (files.has("script.toml")) session.apply({ do: "script" });
+    return session.readout();
+  },
+  names: ({ text, path }) => sceneFiles(text, path),
+  script: () => session?.script() ?? "",
+  record: () => session?.record() ?? null,
+  positions: () => session?.positions() ?? new Float64Array(),
+  survey({ name, bytes, unit, side }) {
+    const surface = new Surface(name, bytes, unit, side);
+    const answer = { report: surface.report(), picture: surface.picture() };
+    surface.free();
+    return answer;
+  },
+};
+
+const heard = {
+  key: ([code, down, again]) => session.key(code, down, again),
+  modify: ([shift, control]) => session.modify(shift, control),
+  letGo: () => session.letGo(),
+  gamepad: ([pressed, up, right]) => session.gamepad(pressed, up, right),
+  input: (input) => session.apply(input),
+};
+
+onmessage = async ({ data }) => {
+  await started;
+  if (data.shown) {
+    shown = true;
+  } else if (data.hidden !== undefined) {
+    hidden = data.hidden;
+    due = frameDue = performance.now();
+    shown = true;
+  } else if (data.ask) {
+    try {
+      if (stopped) throw new Error("the simulator has stopped: load the page again");
+      postMessage({ answer: await asked[data.ask](data.with ?? {}), to: data.id });
+    } catch (error) {
+      if (error instanceof WebAssembly.RuntimeError) {
+        stopped = true;
+        postMessage({ broken: panicked || String(error) });
+      }
+      postMessage({ refused: error.message ?? String(error), to: data.id });
+    }
+  } else if (session) {
+    inputAt ??= data.at;
+    // What is refused is an event of the session, which the readout tells.
+    try {
+      heard[data.hear](data.what);
+    } catch (error) {
+      if (error instanceof WebAssembly.RuntimeError) guarded(() => { throw error; });
+    }
+  }
+};

@@ -1,0 +1,23 @@
+//! A `Map` of JavaScript as files.
+
+use endowire_core::file::InMemory;
+use js_sys::{Map, Uint8Array};
+use wasm_bindgen::prelude::*;
+
+use crate::thrown;
+
+/// Files by their paths.
+///
+/// # Errors
+/// A key that is no string, or a value that is no `Uint8Array`.
+pub(crate) fn of_map(map: &Map) -> Result<InMemory, JsError> {
+    let mut files = InMemory::default();
+    for entry in map.entries() {
+        let entry = js_sys::Array::from(&entry.map_err(|_| thrown("files: is no Map"))?);
+        let path = entry.get(0).as_string().ok_or_else(|| thrown("files: a path is no string"))?;
+        let bytes = entry.get(1).dyn_into::<Uint8Array>();
+        let bytes = bytes.map_err(|_| thrown(format!("files: {path}: must be a Uint8Array")))?;
+        files.0.insert(path.into(), bytes.to_vec());
+    }
+    Ok(files)
+}

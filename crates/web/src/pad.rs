@@ -1,0 +1,43 @@
+//! Gamepads of browsers, by the standard layout of the Gamepad API.
+
+use endowire_play::{Button, Pad};
+
+/// Buttons in the order of the layout; those it has and sessions do not are none.
+const BUTTONS: [Option<Button>; 16] = [
+    Some(Button::Lower),
+    Some(Button::Right),
+    Some(Button::Left),
+    Some(Button::Upper),
+    Some(Button::LeftBumper),
+    Some(Button::RightBumper),
+    Some(Button::LeftTrigger),
+    Some(Button::RightTrigger),
+    Some(Button::Select),
+    Some(Button::Start),
+    None,
+    None,
+    Some(Button::CrossUp),
+    Some(Button::CrossDown),
+    Some(Button::CrossLeft),
+    Some(Button::CrossRight),
+];
+
+/// How a gamepad is held: numbers of pressed buttons, and how far the left stick leans up and the right one to the right, −1 to 1.
+pub(crate) fn held(pressed: &[u8], up: f64, right: f64) -> Pad {
+    let down = pressed.iter().filter_map(|number| *BUTTONS.get(usize::from(*number))?).collect();
+    Pad { up, right, down }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_button_of_a_session_is_one_of_the_layout() {
+        for button in Button::ALL {
+            assert_eq!(BUTTONS.iter().flatten().filter(|one| **one == button).count(), 1, "{button:?}");
+        }
+        let pad = held(&[7, 10, 200], 0.5, -1.0);
+        assert_eq!((pad.up, pad.right, pad.down), (0.5, -1.0, [Button::RightTrigger].into()));
+    }
+}

@@ -1,0 +1,220 @@
+//! The class `Session` of the JavaScript package.
+
+use std::cell::RefCell;
+use std::path::Path;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use endowire_play::{Input, Modifiers, Pad, Sharpened};
+use endowire_viewer::Image;
+use js_sys::{Array, JSON, Map};
+use wasm_bindgen::Clamped;
+use wasm_bindgen::prelude::*;
+
+use crate::graphics::Graphics;
+use crate::played::{Played, rgba};
+use crate::{files, object, pad, thrown};
+
+#[wasm_bindgen(typescript_custom_section)]
+const TYPES: &'static str = include_str!("types.d.ts");
+
+/// Instruments moved by hand under fluoroscopy: inputs and ticks in, readouts, shapes and pictures out. It knows no clock.
+#[wasm_bindgen]
+#[derive(Debug)]
+pub struct Session {
+    played: Played,
+    pad: Pad,
+    graphics: Option<Rc<endowire_viewer::Graphics>>,
+    /// Sharp pictures that a graphics processor has answered meanwhile.
+    sharpened: Rc<RefCell<Vec<Sharpened>>>,
+}
+
+#[wasm_bindgen]
+impl Session {
+    /// A session of the scene at `path` of `files`, with the script of `script.toml` in place of its own if that is among them.
+    /// Pictures have `side` pixels a side.
+    ///
+    /// # Errors
+    /// What is wrong in which file, by line and key.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        #[wasm_bindgen(unchecked_param_type = "Map<string, Uint8Array>")] files: &Map,
+        path: &str,
+        side: u32,
+    ) -> Result<Session, JsError> {
+        let files = Arc::new(files::of_map(files)?);
+        let played = Played::new(&files, Path::new(path), side).map_err(thrown)?;
+        Ok(Self { played, pad: Pad::default(), graphics: None, sharpened: Rc::default() })
+    }
+
+    /// Has sharp pictures computed by a graphics processor from now on.
+    #[wasm_bindgen(js_name = useGraphics)]
+    pub fn use_graphics(&mut self, graphics: &Graphics) {
+        self.graphics = Some(graphics.shared());
+    }
+
+    /// Takes an input.
+    ///
+    /// # Errors
+    /// What is out of range or not there; then nothing has changed.
+    pub fn apply(
+        &mut self,
+        #[wasm_bindgen(unchecked_param_type = "Input")] input: &JsValue,
+    ) -> Result<(), JsError> {
+        let text = JSON::stringify(input).ok().and_then(|text| text.as_string()).unwrap_or_default();
+        let input: Input = serde_json::from_str(&text).map_err(thrown)?;
+        self.played.session.apply(&input).map_err(thrown)
+    }
+
+    /// Hears a key that goes down, once more while it is held (`again`), or up, by its `code`.
+    pub fn key(&mut self, code: &str, down: bool, again: bool) {
+        let inputs = self.played.keys.key(code, down, again);
+        self.played.take(&inputs);
+    }
+
+    /// Hears that Shift or Ctrl are held or not.
+    pub fn modify(&mut self, shift: bool, control: bool) {
+        let inputs = self.played.keys.modify(Modifiers { shift, control });
+        self.played.take(&inputs);
+    }
+
+    /// Lets go of what keys hold: the page has lost the keyboard.
+    #[wasm_bindgen(js_name = letGo)]
+    pub fn let_go(&mut self) {
+        let inputs = self.played.keys.let_go();
+        self.played.take(&inputs);
+    }
+
+    /// Hears how a gamepad is held: numbers of pressed buttons of the standard layout, and how far the left stick leans up and the right one to the
+    /// right, −1 to 1.
+    pub fn gamepad(&mut self, pressed: &[u8], up: f64, right: f64) {
+        let before = std::mem::replace(&mut self.pad, pad::held(pressed, up, right));
+        let inputs = self.played.keys.pad(&before, &self.pad);
+        self.played.take(&inputs);
+    }
+
+    /// A sixtieth of a second goes by.
+    pub fn tick(&mut self) {
+        self.played.session.tick();
+    }
+
+    /// What the operator reads.
+    ///
+    /// # Errors
+    /// None in a browser that is whole.
+    #[wasm_bindgen(unchecked_return_type = "Readout")]
+    pub fn readout(&self) -> Result<JsValue, JsError> {
+        object(&self.played.session.readout())
+    }
+
+    /// Nodes of the line of all instruments, from the sheath to the tip: x, y, z of each, mm.
+    pub fn positions(&self) -> Vec<f64> {
+        self.played
+            .session
+            .simulation()
+            .shape()
+            .positions_mm
+            .iter()
+            .flat_map(|at| [at.x, at.y, at.z])
+            .collect()
+    }
+
+    /// Contacts with the wall: place (mm) and force on the wall (N), six numbers each.
+    pub fn contacts(&self) -> Vec<f64> {
+        let contacts = &self.played.session.simulation().report().contacts;
+        contacts
+            .iter()
+            .flat_map(|one| {
+                let (at, force) = (one.position_mm, one.total_n());
+                [at.x, at.y, at.z, force.x, force.y, force.z]
+            })
+            .collect()
+    }
+
+    /// The fluoroscopic picture of each plane: live while the pedal is down, else the last ones.
+    ///
+    /// # Errors
+    /// What cannot be drawn, by key.
+    #[wasm_bindgen(unchecked_return_type = "Picture[]")]
+    pub fn fluoro(&mut self) -> Result<Array, JsError> {
+        self.played.fluoro().map_err(thrown)?.into_iter().map(picture).collect()
+    }
+
+    /// The same without delay: coarse pictures where the room has just changed, until `sharpen` was called while it rests.
+    ///
+    /// # Errors
+    /// What cannot be drawn, by key.
+    #[wasm_bindgen(js_name = fluoroSoon, unchecked_return_type = "Picture[]")]
+    pub fn fluoro_soon(&mut self) -> Result<Array, JsError> {
+        for done in self.sharpened.take() {
+            self.played.sharpened(done).map_err(thrown)?;
+        }
+        self.played.soon().map_err(thrown)?.into_iter().map(picture).collect()
+    }
+
+    /// Computes the sharp picture of a room that has come to rest: by a graphics processor meanwhile, or without one in a tenth of a second or more.
+    ///
+    /// # Errors
+    /// What cannot be drawn, by key.
+    pub fn sharpen(&mut self) -> Result<(), JsError> {
+        for one in self.played.sharpenings().map_err(thrown)? {
+            match &self.graphics {
+                Some(graphics) => {
+                    let (graphics, sharpened) = (graphics.clone(), self.sharpened.clone());
+                    wasm_bindgen_futures::spawn_local(async move {
+                        let done = one.carry_out_on(&graphics).await;
+                        sharpened.borrow_mut().push(done);
+                    });
+                }
+                None => self.played.sharpened(one.carry_out()).map_err(thrown)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// The 3D view; nothing where it is the one before.
+    ///
+    /// # Errors
+    /// What cannot be drawn, by key.
+    #[wasm_bindgen(js_name = threeD, unchecked_return_type = "Picture | undefined")]
+    pub fn three_d(&mut self) -> Result<JsValue, JsError> {
+        match self.played.three_d().map_err(thrown)? {
+            Some(image) => picture(image),
+            None => Ok(JsValue::UNDEFINED),
+        }
+    }
+
+    /// What draws the pictures, for people.
+    pub fn backend(&self) -> Option<String> {
+        self.played.backend().map(str::to_owned)
+    }
+
+    /// What hands, beam and injector have done, tick by tick: the `record` of a `*.session.json` that `endowire assess` measures.
+    ///
+    /// # Errors
+    /// None in a browser that is whole.
+    #[wasm_bindgen(unchecked_return_type = "SessionRecord")]
+    pub fn record(&self) -> Result<JsValue, JsError> {
+        object(self.played.session.record())
+    }
+
+    /// All motions, and what was injected, as the text of a script that `endowire run` carries out to the bit.
+    pub fn script(&self) -> String {
+        self.played.session.script()
+    }
+}
+
+/// A picture as JavaScript has it.
+pub(crate) fn picture(image: Image) -> Result<JsValue, JsError> {
+    let picture = js_sys::Object::new();
+    let (width, height) = (image.width(), image.height());
+    for (key, value) in [
+        ("width", JsValue::from(width)),
+        ("height", JsValue::from(height)),
+        ("data", JsValue::from(Clamped(rgba(image)))),
+    ] {
+        js_sys::Reflect::set(&picture, &key.into(), &value)
+            .map_err(|_| thrown("a picture cannot be made"))?;
+    }
+    Ok(picture.into())
+}

@@ -1,0 +1,124 @@
+//! The class `Surface` of the JavaScript package: what a file of a vessel's surface is good for.
+
+use std::path::Path;
+
+use endowire_core::vessel::{SurfaceMesh, Wall, wall_hints};
+use endowire_core::{Error, Result};
+use endowire_viewer::{Backend, Frames, Image, Renderer, View, ViewSpec};
+use serde::Serialize;
+use wasm_bindgen::prelude::*;
+
+use crate::session::picture;
+use crate::{object, thrown};
+
+/// A surface that was mended, and a picture of it.
+#[wasm_bindgen]
+#[derive(Debug)]
+pub struct Surface {
+    told: Told,
+    image: Image,
+}
+
+#[derive(Debug, Serialize)]
+struct Told {
+    triangles: usize,
+    size_mm: [f64; 3],
+    notes: Vec<String>,
+    hints: Vec<String>,
+    inlet: Option<usize>,
+    openings: Vec<Hole>,
+}
+
+#[derive(Debug, Serialize)]
+struct Hole {
+    index: usize,
+    radius_mm: f64,
+    centre_mm: [f64; 3],
+    pixel: Option<[f64; 2]>,
+}
+
+#[wasm_bindgen]
+impl Surface {
+    /// Reads and mends the bytes of a surface file (STL, OBJ, PLY, VTP, VTK), whose name tells the format, with so many millimetres a unit; draws it
+    /// with `side` pixels a side.
+    ///
+    /// # Errors
+    /// Why it cannot be used.
+    #[wasm_bindgen(constructor)]
+    pub fn new(name: &str, bytes: &[u8], unit_mm: f64, side: u32) -> std::result::Result<Surface, JsError> {
+        Self::of(Path::new(name), bytes, unit_mm, side).map_err(thrown)
+    }
+
+    /// What is known of it.
+    ///
+    /// # Errors
+    /// None in a browser that is whole.
+    #[wasm_bindgen(unchecked_return_type = "SurfaceReport")]
+    pub fn report(&self) -> std::result::Result<JsValue, JsError> {
+        object(&self.told)
+    }
+
+    /// A 3D picture of it.
+    ///
+    /// # Errors
+    /// None in a browser that is whole.
+    #[wasm_bindgen(unchecked_return_type = "Picture")]
+    pub fn picture(&self) -> std::result::Result<JsValue, JsError> {
+        picture(self.image.clone())
+    }
+}
+
+impl Surface {
+    fn of(name: &Path, bytes: &[u8], unit_mm: f64, side: u32) -> Result<Self> {
+        let surface = SurfaceMesh::from_bytes(bytes, name, unit_mm)?;
+        let wall = Wall::from_surface(&surface).map_err(|error| Error::content(name, error.to_string()))?;
+        let spec = ViewSpec {
+            views: vec![View::ThreeD],
+            size_px: [side; 2],
+            backend: Backend::Cpu,
+            ..ViewSpec::default()
+        };
+        let mut renderer = Renderer::of_wall(&spec, &wall)?;
+        let Frames { three_d: Some(image), .. } = renderer.render(&[])? else {
+            return Err(Error::parameter("view.views", "3d", "was not drawn"));
+        };
+        let hole = |one: &endowire_core::vessel::Opening| Hole {
+            index: one.index,
+            radius_mm: one.radius_mm,
+            centre_mm: one.centre_mm.into(),
+            pixel: renderer.three_d_pixel(&one.centre_mm),
+        };
+        let (low, high) = wall.mesh().bounds_mm().unwrap_or_default();
+        let told = Told {
+            triangles: wall.mesh().triangles.len(),
+            size_mm: (high - low).into(),
+            notes: wall.report().notes(),
+            hints: wall_hints(&wall, unit_mm)?,
+            inlet: wall.inlet().map(|one| one.index),
+            openings: wall.openings().iter().map(hole).collect(),
+        };
+        Ok(Self { told, image })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn openings_are_seen_where_they_are_and_what_is_no_surface_is_told() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/vessels/curved_tube.stl");
+        let bytes = std::fs::read(file).unwrap();
+        let surface = Surface::of(Path::new("tube.stl"), &bytes, 1.0, 128).unwrap();
+        assert_eq!(surface.told.openings.len(), 2);
+        assert!(surface.told.inlet.is_some() && surface.told.hints.is_empty(), "{:?}", surface.told);
+        for hole in &surface.told.openings {
+            let [x, y] = hole.pixel.unwrap();
+            assert!((0.0..128.0).contains(&x) && (0.0..128.0).contains(&y), "{hole:?}");
+        }
+        // In metres it would be a thousandth of a vessel.
+        assert!(!Surface::of(Path::new("tube.stl"), &bytes, 0.01, 128).unwrap().told.hints.is_empty());
+        let told = Surface::of(Path::new("tube.stl"), &bytes[..200], 1.0, 128).unwrap_err().to_string();
+        assert!(told.starts_with("tube.stl"), "{told}");
+    }
+}

@@ -1,0 +1,50 @@
+/** A picture: red, green, blue and alpha of each pixel, row by row from the top left. */
+export interface Picture { width: number; height: number; data: Uint8ClampedArray; }
+
+/** What a hand, a pedal or a switch does; an instrument that is not named is the one that was selected. */
+export type Input =
+  | { do: "select"; instrument: string }
+  | { do: "move"; instrument?: string; mm_per_s?: number; deg_per_s?: number }
+  | { do: "nudge"; instrument?: string; mm?: number; deg?: number }
+  | { do: "stop" } | { do: "script" } | { do: "undo" } | { do: "redo" }
+  | { do: "pedal"; down: boolean; mode?: "fluoro" | "cine" | "dsa" | "roadmap" }
+  | { do: "inject"; ml: number; ml_per_s: number }
+  | { do: "c_arm"; pose: string }
+  | { do: "turn_c_arm"; lao_deg?: number; cra_deg?: number }
+  | { do: "table"; right_mm?: number; down_mm?: number; second?: boolean }
+  | { do: "zoom"; factor: number }
+  | { do: "collimate"; width: number; height: number }
+  | { do: "turn_camera"; azimuth_deg?: number; elevation_deg?: number }
+  | { do: "go_to"; step: number };
+
+/** What the operator reads. */
+export interface Readout {
+  step: number; time_s: number; demonstrates: boolean; selected: string;
+  unconverged_steps: number; jumps: number; relaxations: number;
+  instruments: {
+    name: string; length_mm: number; inserted_mm: number; rotation_deg: number;
+    push_force_n: number | null; torque_nmm: number; warns: boolean;
+  }[];
+  tip_mm: [number, number, number] | null; contacts: number; wall_force_n: number;
+  lab: {
+    live: boolean; mode: string; lao_deg: number; cra_deg: number; second_deg: [number, number] | null;
+    magnification: number; field_mm: number; open: [number, number]; beam_s: number; dose_ugy: number;
+  };
+  event: { step: number; time_s: number; kind: string; text: string } | null; events: number;
+}
+
+/** What hands, beam and injector have done: a sample for each tick, rests that follow each other being one. */
+export interface SessionRecord {
+  samples: {
+    time_s: number; tip_mm: [number, number, number] | null; wall_force_n: number; tip_force_n: number; jumped: boolean;
+    hands: { advance_mm: number; rotate_rad: number; inserted_mm: number; push_force_n: number | null; torque_nmm: number }[];
+  }[];
+  injections: { time_s: number; volume_ml: number; rate_ml_per_s: number }[];
+  beam: { time_s: number; on: boolean; frames_per_s: number; dose_ngy: number; field_mm2: number; primary_deg: number; secondary_deg: number }[];
+}
+
+/** What is known of a surface: hints in words, and its openings with their places in the picture, pixels. */
+export interface SurfaceReport {
+  triangles: number; size_mm: [number, number, number]; notes: string[]; hints: string[]; inlet: number | null;
+  openings: { index: number; radius_mm: number; centre_mm: [number, number, number]; pixel: [number, number] | null }[];
+}
