@@ -263,6 +263,7 @@ pub fn unit_rod(elements: usize) -> StaticCase {
         },
         end: End { kind: EndKind::Free, ..End::default() },
         load: vec![],
+        self_contact: None,
         initial: None,
         solver: Solver::default(),
     }
