@@ -21,6 +21,7 @@
 //! ```
 
 use super::external::{ContactMerit, Contacts};
+use super::line_search::LineSearch;
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::StopReason;
 use super::shift::{LEAST_SHIFT, SHIFT_GROWTH, SHIFTS};
@@ -81,6 +82,7 @@ impl<const C: usize> Newton<C> {
         &mut self,
         problem: &mut Problem<'_>,
         state: &RodState,
+        search: &mut LineSearch,
         shift: &mut f64,
     ) -> Result<ContactMerit, StopReason> {
         let elements = problem.elements;
@@ -93,9 +95,7 @@ impl<const C: usize> Newton<C> {
             self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
             if !models || self.contacts_at_end(problem, state, *shift) {
                 let merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved));
-                // Where the far end is held a step may well be uphill of the energy alone.
-                let weighs = problem.supports.conditions() > 0;
-                if weighs || !(models && self.is_uphill(&merit)) {
+                if !(models && self.is_uphill(problem, state, search, &merit)) {
                     return Ok(merit);
                 }
             }
@@ -121,9 +121,15 @@ impl<const C: usize> Newton<C> {
         problem.external.contacts().map_or_else(T::default, |contacts| ask(contacts, &moved))
     }
 
-    /// Whether the step is uphill of the energy and this, beyond rounding.
-    fn is_uphill(&self, merit: &ContactMerit) -> bool {
-        let slope = self.assembly.slope(&self.step) + merit.slope_mj;
+    /// Whether the step is uphill of the merit with this, beyond rounding.
+    fn is_uphill(
+        &self,
+        problem: &Problem<'_>,
+        state: &RodState,
+        search: &mut LineSearch,
+        merit: &ContactMerit,
+    ) -> bool {
+        let slope = self.slope_along(problem, state, search) + merit.slope_mj;
         slope > ENERGY_ROUNDING * self.assembly.energy.total().abs()
     }
 

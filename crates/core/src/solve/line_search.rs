@@ -165,6 +165,16 @@ impl<const C: usize> Newton<C> {
         Ok(Stride { merit, part, turn, whole_turn: self.whole_turn(problem, turn, shift) })
     }
 
+    /// Slope of energy and weighed end conditions along the step.
+    pub(super) fn slope_along(
+        &self,
+        problem: &Problem<'_>,
+        state: &RodState,
+        search: &mut LineSearch,
+    ) -> f64 {
+        self.merit_along(problem, state, search).slope
+    }
+
     /// Weighs the end conditions above the reactions that the step leads to, and measures the merit along it.
     fn merit_along(&self, problem: &Problem<'_>, state: &RodState, search: &mut LineSearch) -> Merit {
         let l = Layout::<C>;

@@ -182,10 +182,11 @@ impl<const C: usize> Newton<C> {
             report.iterations += 1;
             self.unsymmetric();
             Self::restore_tensions(elements, &mut self.step);
-            let searched = self.meet_contacts(&mut problem, state, &mut shift).and_then(|contacts| {
-                let step = (size.relative, shift);
-                self.line_search(&mut problem, state, &mut search, step, &contacts)
-            });
+            let searched =
+                self.meet_contacts(&mut problem, state, &mut search, &mut shift).and_then(|contacts| {
+                    let step = (size.relative, shift);
+                    self.line_search(&mut problem, state, &mut search, step, &contacts)
+                });
             match searched {
                 Ok(_) if self.neighbourhood.is_left_by(state) => return report.stopped(StopReason::Left),
                 Ok(turn) => progress.has_turned(turn),

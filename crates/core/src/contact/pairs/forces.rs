@@ -102,6 +102,18 @@ impl SelfContact {
         false
     }
 
+    /// What is stored at the base, mJ.
+    pub(crate) fn stored_mj(&self) -> f64 {
+        let of = |pair: &Pair| 0.5 * pair.spring_n_per_mm * pair.depth_mm().max(0.0).powi(2);
+        self.pairs.iter().map(of).sum()
+    }
+
+    /// Where the rod presses on itself at a state that nothing is known of.
+    pub fn touching_at(&mut self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
+        self.look_at_base(elements, state);
+        self.touching(elements, state)
+    }
+
     /// Where the rod presses on itself at the base: at the last state of a solution.
     pub fn touching(&self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
         let curve = self.curve(elements, state);

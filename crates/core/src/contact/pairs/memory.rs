@@ -16,6 +16,10 @@ impl SelfContact {
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
         self.aimed = false;
         self.checked.1 = f64::NAN;
+        if self.look_whether_clear(elements, state) {
+            self.pairs.clear();
+            return;
+        }
         let curve = self.curve(elements, state);
         self.tree.place(&curve);
         self.counters.searches += 1;

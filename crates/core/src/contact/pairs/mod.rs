@@ -20,6 +20,7 @@
 //! than half their distance, by a bound on all pairs of elements, so that axes stay apart at any step, and what touches at a trial was nearer than 2 D at the base, where it is a pair.
 //! A state that is not reached like that has an infinite energy.
 
+mod clear;
 mod curve;
 mod forces;
 mod gap;
@@ -43,6 +44,8 @@ const SPACING_RADII: f64 = 1.0;
 const KNOWN: f64 = 2.0;
 /// Elements are looked at up to this many times that distance: a site may slide by as much as it is near.
 const LOOKED_AT: f64 = 4.0;
+/// Where nothing is nearer than that, motions of up to `FREE` of the distance of touch change nothing.
+const CLEAR: f64 = 8.0;
 /// Rounding by which a trial may go beyond what is safe.
 const BEYOND: f64 = 0.1;
 
@@ -140,6 +143,8 @@ pub struct SelfContact {
     before: Vec<Pair>,
     /// Whether forces are aimed at.
     aimed: bool,
+    /// Where nothing was near, if that was so where it was looked last.
+    clear: Option<clear::Clear>,
     /// The trial that was found safe last, and the part of its way that is.
     checked: (RodState, f64),
     rounding_n: f64,
@@ -149,9 +154,20 @@ pub struct SelfContact {
 impl SelfContact {
     /// That of a rod with these elements and their surfaces.
     pub fn new(elements: &[ElementData], skins: Vec<Skin>) -> Self {
-        let mut sites = Vec::new();
-        let mut first_sites = vec![0];
-        for (e, (element, skin)) in elements.iter().zip(&skins).enumerate() {
+        let mut contact = Self::default();
+        contact.renew(elements, skins);
+        contact
+    }
+
+    /// Is that of another rod from here on: nothing is known of it.
+    pub(crate) fn renew(&mut self, elements: &[ElementData], skins: impl IntoIterator<Item = Skin>) {
+        let Self { skins: known, sites, first_sites, .. } = self;
+        known.clear();
+        known.extend(skins);
+        sites.clear();
+        first_sites.clear();
+        first_sites.push(0);
+        for (e, (element, skin)) in elements.iter().zip(&*known).enumerate() {
             let count = (element.length / (SPACING_RADII * skin.radius_mm)).ceil().max(1.0);
             let site = |k: usize| Site {
                 place: Place { element: e, xi: (k as f64 + 0.5) / count },
@@ -160,8 +176,12 @@ impl SelfContact {
             sites.extend((0..count as usize).map(site));
             first_sites.push(sites.len());
         }
-        let largest_radius_mm = skins.iter().map(|skin| skin.radius_mm).fold(0.0, f64::max);
-        Self { skins, sites, first_sites, largest_radius_mm, ..Self::default() }
+        self.largest_radius_mm = known.iter().map(|skin| skin.radius_mm).fold(0.0, f64::max);
+        self.pairs.clear();
+        self.before.clear();
+        self.aimed = false;
+        self.checked.1 = f64::NAN;
+        self.clear = None;
     }
 
     /// The same of a rod that is a ring: its last node is held where its first one is.
@@ -192,6 +212,9 @@ impl External for SelfContact {
     }
 
     fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+        if self.stays_clear(elements, state) {
+            return 0.0;
+        }
         if self.safe_part(elements, state) < 1.0 - BEYOND {
             return f64::INFINITY;
         }
@@ -199,7 +222,7 @@ impl External for SelfContact {
     }
 
     fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
-        self.safe_part(elements, to)
+        if self.stays_clear(elements, to) { 1.0 } else { self.safe_part(elements, to) }
     }
 
     fn sizes(&self) -> Sizes {

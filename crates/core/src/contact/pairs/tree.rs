@@ -135,6 +135,14 @@ impl Tree {
         self.visit_within(&(0, 0..self.controls.len()), &is_near, &mut leaf);
     }
 
+    /// Whether an element at least `behind` from the rod's end comes nearer to a segment than `reach`.
+    pub(super) fn is_near_segment(&self, (from, to): (&Vec3, &Vec3), behind: f64, reach: f64) -> bool {
+        let n = self.controls.len();
+        let segment = [*from, from + (to - from) / 3.0, to - (to - from) / 3.0, *to];
+        let others = (0..n).filter(|e| self.starts[n] - self.starts[e + 1] >= behind);
+        others.into_iter().any(|e| lower_distance(&self.controls[e], &segment) < reach)
+    }
+
     /// Part, at most all, of the motion in which no two points of elements at least `apart` along the rod come nearer to each other by more than half
     /// their distance.
     pub(super) fn safe_part(&self, apart: f64) -> f64 {
