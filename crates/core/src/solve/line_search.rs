@@ -224,6 +224,10 @@ impl<const C: usize> Newton<C> {
         }
         if supports.conditions() > 0 {
             self.correct(elements, supports, Layout::<C>.support(elements.len()));
+            // The way back to the end conditions may lead through something: then the merit weighs how far off they are.
+            if external.safe_fraction(elements, &self.trial) < 1.0 {
+                self.trial.advance::<C>(elements, state, &self.step, part);
+            }
         }
         self.trial.take_tensions::<C>(elements, state, &self.step);
         part

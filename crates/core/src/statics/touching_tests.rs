@@ -1,59 +1,43 @@
-//! Static rods that touch themselves.
+//! Cases of rods that touch themselves, as they are written.
 
 use super::*;
-use std::f64::consts::{PI, TAU};
+use std::path::Path;
 
-fn trefoil(elements: usize, radius: f64) -> StaticCase {
-    let points: Vec<[f64; 3]> = (0..=600)
-        .map(|i| {
-            let a = TAU * f64::from(i) / 600.0;
-            let r = 2.0 + 0.5 * (3.0 * a).cos();
-            [r * (2.0 * a).cos(), r * (2.0 * a).sin(), 0.5 * (3.0 * a).sin()]
-        })
-        .collect();
-    let tangent = [points[1][0] - points[0][0], points[1][1] - points[0][1], points[1][2] - points[0][2]];
+fn case(rest: &str) -> crate::Result<StaticCase> {
     let text = format!(
-        r#"
-        [rod]
-        length = 1.0
-        elements = {elements}
-        section = [{{ until = 1.0, EI = 1.0 }}]
-        [start]
-        type = "clamped"
-        position = [0.0, 0.0, 0.0]
-        tangent = {tangent:?}
-        [end]
-        type = "clamped"
-        position = [0.0, 0.0, 0.0]
-        tangent = {tangent:?}
-        [self_contact]
-        radius = {radius:e}
-        [solver]
-        max_iterations = 2000
-        "#
+        "[rod]\nlength = 1.0\nelements = 8\nsection = [{{ until = 1.0, EI = 1.0 }}]\n[start]\ntype = \"clamped\"\n{rest}"
     );
-    let mut case = StaticCase::from_toml(&text, std::path::Path::new("trefoil")).unwrap();
-    case.initial = Some(Initial { points, ..Initial::default() });
-    case
+    StaticCase::from_toml(&text, Path::new("case.toml"))
 }
 
 #[test]
-fn a_trefoil_is_nearly_a_double_circle() {
-    let elements = std::env::var("N").map_or(96, |n| n.parse().unwrap());
-    let radius = std::env::var("R").map_or(5e-3, |n| n.parse().unwrap());
-    let problem = StaticProblem::new(&trefoil(elements, radius)).unwrap();
-    let start = std::time::Instant::now();
-    let solved = problem.solve_state().unwrap();
-    println!("{:?}", start.elapsed());
-    let solution = problem.solution(&solved);
-    println!("{} {} {} {:e}", solution.iterations, solution.stop, solution.stable, solution.residual);
-    println!("E L/B {} of {}", solution.energy.total, 8.0 * PI * PI);
-    println!(
-        "{} touching, deepest {:e}",
-        solution.touching.len(),
-        solution.touching.iter().map(|t| t.penetration).fold(0.0, f64::max) / radius
-    );
-    let total: f64 = solution.touching.iter().map(|t| t.force).sum();
-    println!("force {total}");
-    assert!(solution.converged);
+fn surfaces_and_curves_that_cannot_be_are_refused_by_key() {
+    for (rest, key) in [
+        ("[self_contact]\nradius = 0.0", "self_contact.radius"),
+        ("[self_contact]\nradius = 0.2", "self_contact.radius"),
+        ("[self_contact]\nradius = 1e-9", "self_contact.radius"),
+        ("[self_contact]\nradius = 0.01\nmodulus = -1.0", "self_contact.modulus"),
+        ("[initial]\npoints = [[0.0, 0.0, 0.0]]", "initial.points"),
+        ("[initial]\npoints = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]", "initial.points"),
+    ] {
+        let told = case(rest).unwrap_err().to_string();
+        assert!(told.contains(key), "{told}");
+    }
+    assert!(case("[self_contact]\nradius = 0.01").is_ok());
+}
+
+#[test]
+fn a_rod_begins_along_the_curve_that_is_given() {
+    // A quarter of a circle of radius 2/π.
+    let points: Vec<[f64; 3]> = (0..=40)
+        .map(|k| {
+            let (sin, cos) = (f64::from(k) / 40.0 * std::f64::consts::FRAC_PI_2).sin_cos();
+            [sin * 2.0 / std::f64::consts::PI, (1.0 - cos) * 2.0 / std::f64::consts::PI, 0.0]
+        })
+        .collect();
+    let case = StaticCase { initial: Some(Initial { points, ..Initial::default() }), ..case("").unwrap() };
+    let problem = StaticProblem::new(&case).unwrap();
+    let tip = problem.initial.positions[8];
+    let expected = crate::Vec3::new(1.0, 1.0, 0.0) * (2.0 / std::f64::consts::PI);
+    assert!((tip - expected).norm() < 2e-3, "{tip}");
 }

@@ -48,8 +48,11 @@ impl Clear {
 
 /// Whether a rod is bent so little that it cannot touch itself.
 fn is_open(state: &RodState) -> bool {
-    let turns = state.frames.windows(2).map(|w| (w[1].t - w[0].t).norm());
-    // The chord of a turn is no longer than it, and shorter by a twentieth at most where elements turn by a radian.
+    let turns = state.frames.windows(2).zip(&state.chords).map(|(ends, chord)| {
+        let along = chord / chord.norm();
+        (along - ends[0].t).norm() + (ends[1].t - along).norm()
+    });
+    // The chord of a turn is no longer than it, and shorter by a twentieth at most where it is a radian.
     1.05 * turns.sum::<f64>() < TURN
 }
 
@@ -78,7 +81,7 @@ impl SelfContact {
             return true;
         }
         self.clear = None;
-        self.tree.place(&super::Curve { elements, state, closed: false });
+        self.place_tree(elements);
         self.counters.searches += 1;
         self.tree.near(CLEAR * 2.0 * self.largest_radius_mm, self.apart_mm(), &mut self.near);
         if self.near.is_empty() {
@@ -97,6 +100,7 @@ impl SelfContact {
         if advance_mm <= 0.0 || self.skins.is_empty() || is_open(state) {
             return false;
         }
+        self.is_placed = false;
         self.tree.place(&super::Curve { elements, state, closed: false });
         let tip = state.positions[elements.len()];
         let from = tip - state.frames[elements.len()].t * advance_mm;
@@ -108,6 +112,7 @@ impl SelfContact {
         if self.skins.is_empty() || (is_open(from) && is_open(to)) {
             return false;
         }
+        self.is_placed = false;
         self.tree.place(&super::Curve { elements, state: from, closed: self.closed });
         self.tree.move_to(&super::Curve { elements, state: to, closed: self.closed });
         self.tree.safe_part(tree::half_turn(self.largest_radius_mm)) < 1.0

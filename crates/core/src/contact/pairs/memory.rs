@@ -16,12 +16,14 @@ impl SelfContact {
     pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
         self.aimed = false;
         self.checked.1 = f64::NAN;
+        self.base.copy_from(state);
+        self.is_placed = false;
         if self.look_whether_clear(elements, state) {
             self.pairs.clear();
             return;
         }
         let curve = self.curve(elements, state);
-        self.tree.place(&curve);
+        self.place_tree(elements);
         self.counters.searches += 1;
         let reach_mm = LOOKED_AT * 2.0 * self.largest_radius_mm;
         let mut near = std::mem::take(&mut self.near);
@@ -82,7 +84,7 @@ impl SelfContact {
             gap,
             touch_mm,
             spring_n_per_mm: weight_mm * softer,
-            penalty_n_per_mm: PENALTY * weight_mm * element.bending[1] / element.length.powi(4),
+            penalty_n_per_mm: weight_mm * element.bending[1] * PENALTY / element.length.powi(4),
             arc_mm,
             force_n: 0.0,
             at_base: false,
@@ -112,12 +114,20 @@ impl SelfContact {
         }
     }
 
+    /// Has the hierarchy be that of the base.
+    pub(super) fn place_tree(&mut self, elements: &[ElementData]) {
+        if !std::mem::replace(&mut self.is_placed, true) {
+            self.tree.place(&Curve { elements, state: &self.base, closed: self.closed });
+        }
+    }
+
     /// Part of the straight way from the base to a state in which no two stretches come too near to crossing.
     pub(super) fn safe_part(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
         let (known, part) = &self.checked;
         if !part.is_nan() && known.positions == to.positions && known.frames == to.frames {
             return *part;
         }
+        self.place_tree(elements);
         self.tree.move_to(&Curve { elements, state: to, closed: self.closed });
         let part = self.tree.safe_part(self.apart_mm());
         self.checked.0.copy_from(to);

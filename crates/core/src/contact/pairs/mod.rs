@@ -39,7 +39,7 @@ use gap::Gap;
 use tree::Tree;
 
 /// Most distance of sites, in radii.
-const SPACING_RADII: f64 = 1.0;
+const SPACING_RADII: f64 = 0.5;
 /// Pairs are known up to this many times the distance of touch: a step brings none nearer by more than half.
 const KNOWN: f64 = 2.0;
 /// Elements are looked at up to this many times that distance: a site may slide by as much as it is near.
@@ -137,6 +137,9 @@ pub struct SelfContact {
     /// Whether the rod's end is its start.
     closed: bool,
     tree: Tree,
+    /// Whether the hierarchy is that of the base.
+    is_placed: bool,
+    base: RodState,
     near: Vec<(usize, usize)>,
     pairs: Vec<Pair>,
     /// Those of the base before, for their forces.

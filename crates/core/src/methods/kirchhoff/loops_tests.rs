@@ -5,6 +5,7 @@ use crate::Vec3;
 use crate::device::{Device, Section, Stack};
 use crate::insertion::{Command, Sheath, Simulation, WallProperties};
 use crate::methods::{Method, Surroundings};
+use crate::random::{splitmix64, unit};
 use crate::rod::TWISTED;
 use crate::rod::quadrature::hermite;
 use crate::shape::Shape;
@@ -83,7 +84,6 @@ fn loops_lie_on_each_other_and_do_not_pass() {
             touching += usize::from(!found.is_empty());
             deepest_mm = found.iter().map(|t| t.penetration_mm).fold(deepest_mm, f64::max);
         }
-        println!("{self_contact}: {least_mm} {deepest_mm} {touching}");
         (least_mm, deepest_mm, touching)
     };
     let (least_mm, deepest_mm, touching) = run(true);
@@ -120,4 +120,75 @@ fn nothing_is_built_where_nothing_can_touch() {
     // A quarter of a circle turns by less than two radians.
     assert_eq!(searches(4.5).searches, 0);
     assert!(searches(40.0).pairs > 0);
+}
+
+/// Whether pieces of the axis that are near each other have changed sides between two shapes: a test that knows nothing of gaps and forces. Points
+/// are read at the same arc lengths from the sheath.
+fn has_passed(before: &[Vec3], after: &[Vec3]) -> bool {
+    let apart = 40;
+    let side = |points: &[Vec3], i: usize, j: usize| {
+        let (u, v) = (points[i + 1] - points[i], points[j + 1] - points[j]);
+        let across = u.cross(&v);
+        let between = points[j] - points[i];
+        // Of segments whose common normal meets both.
+        let (a, b, c) = (u.norm_squared(), u.dot(&v), v.norm_squared());
+        let det = a * c - b * b;
+        let (d, e) = (between.dot(&u), between.dot(&v));
+        let (s, t) = ((d * c - e * b) / det, (d * b - e * a) / det);
+        let meets = det > 0.01 * a * c && (-1.0..=2.0).contains(&s) && (-1.0..=2.0).contains(&t);
+        (meets && between.norm() < 5.0 * RADIUS_MM).then(|| across.dot(&between).signum())
+    };
+    let n = before.len().min(after.len()) - 1;
+    (0..n).any(|i| {
+        (i + apart..n).any(|j| match (side(before, i, j), side(after, i, j)) {
+            (Some(was), Some(is)) => was != is,
+            _ => false,
+        })
+    })
+}
+
+/// Pushes and turns a wire of a random shape at random. Returns the least distance of its axis from itself, mm, how many commands were carried out, and whether it passed
+/// through itself.
+fn at_random(seed: u64, self_contact: bool) -> (f64, usize, bool) {
+    let mut index = 0;
+    let mut draw = |low: f64, high: f64| {
+        index += 1;
+        low + (high - low) * unit(splitmix64(seed, index))
+    };
+    let (made, _, sheath) = parts(4.0);
+    let section = Section {
+        rest_curvature_per_mm: [draw(0.25, 0.5), draw(-0.1, 0.1)],
+        ..Section::straight(200.0, RADIUS_MM, draw(0.02, 0.2))
+    };
+    let device = Device::new(vec![section]).unwrap();
+    let builder = Simulation::builder(made.wall, device, sheath).properties(properties());
+    let mut simulation = builder.method(&method(self_contact)).build().unwrap();
+    let (mut least_mm, mut done, mut passed) = (f64::INFINITY, 0, false);
+    let from_sheath = |simulation: &Simulation| axis(simulation.shape());
+    let mut before = Vec::new();
+    for _ in 0..40 {
+        let command = Command { advance_mm: draw(-0.5, 2.0), rotate_rad: draw(-0.4, 0.4) };
+        if simulation.step(command).is_err() {
+            continue;
+        }
+        done += 1;
+        least_mm = least_mm.min(least_distance_mm(simulation.shape()));
+        let after = from_sheath(&simulation);
+        passed |= !before.is_empty() && has_passed(&before, &after);
+        before = after;
+    }
+    (least_mm, done, passed)
+}
+
+#[test]
+fn wires_pushed_and_turned_at_random_do_not_pass_through_themselves() {
+    let mut twins = 0;
+    for seed in 0..6 {
+        let (least_mm, done, passed) = at_random(seed, true);
+        assert!(least_mm > 1.98 * RADIUS_MM && !passed, "{seed}: {least_mm} mm, {passed}");
+        assert!(done > 25, "{seed}: {done}");
+        let (least_mm, _, passed) = at_random(seed, false);
+        twins += usize::from(passed || least_mm < RADIUS_MM);
+    }
+    assert!(twins > 3, "{twins}");
 }
