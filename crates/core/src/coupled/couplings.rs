@@ -46,6 +46,7 @@ impl<const C: usize> Couplings<C> {
     }
 
     /// Entry `(i, j)`; zero where no block is.
+    #[cfg(test)]
     pub(crate) fn get(&self, i: usize, j: usize) -> f64 {
         let (i, j) = if i <= j { (i, j) } else { (j, i) };
         let block = Self::BLOCK;

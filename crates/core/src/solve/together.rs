@@ -88,6 +88,6 @@ impl Contacts for Together<'_> {
 
     fn settled(&mut self, tolerance: f64) -> bool {
         // Each is asked, as what is not settled lets go.
-        self.each().fold(true, |all, part| part.settled(tolerance) && all)
+        self.each().filter_map(|part| (!part.settled(tolerance)).then_some(())).count() == 0
     }
 }
