@@ -1,7 +1,7 @@
 //! A rod that touches itself.
 //!
-//! Sites are quadrature points of the rod, in the middle of pieces about a radius long. Each has a gap Gᵢ ([`gap`]) from every other stretch of the rod that is near, and with D the sum of both
-//! radii and p = D − G the depth,
+//! Sites are quadrature points of the rod, in the middle of pieces about half a radius long. Each has a gap Gᵢ (`gap.rs`) from every other
+//! stretch of the rod that is near, and with D the sum of both radii and p = D − G the depth,
 //!
 //! ```text
 //! U = Σ ½ wᵢ ½ k p²  for p > 0
@@ -16,7 +16,7 @@
 //! (∇∇E − Σ f ∇∇G + Σ κ ∇G ∇Gᵀ) δx = −(∇E − Σ κ p ∇G),    f⁺ = κ (p − ∇G·δx),    κ = ½ w k
 //! ```
 //!
-//! **Which pairs there are** is asked anew at every base ([`tree`]). **No crossing**: along a step no two points of different stretches come nearer to each other by more
+//! **Which pairs there are** is asked anew at every base (`tree.rs`). **No crossing**: along a step no two points of different stretches come nearer to each other by more
 //! than half their distance, by a bound on all pairs of elements, so that axes stay apart at any step, and what touches at a trial was nearer than 2 D at the base, where it is a pair.
 //! A state that is not reached like that has an infinite energy.
 

@@ -2,7 +2,7 @@
 
 use super::{Kirchhoff, KirchhoffOptions};
 use crate::Vec3;
-use crate::device::{Device, Section, Stack};
+use crate::device::{Device, Instrument, Section, Stack};
 use crate::insertion::{Command, Sheath, Simulation, WallProperties};
 use crate::methods::{Method, Surroundings};
 use crate::random::{splitmix64, unit};
@@ -191,4 +191,15 @@ fn wires_pushed_and_turned_at_random_do_not_pass_through_themselves() {
         twins += usize::from(passed || least_mm < RADIUS_MM);
     }
     assert!(twins > 3, "{twins}");
+}
+
+#[test]
+fn several_instruments_are_told_that_their_loops_do_not_touch() {
+    let (made, device, sheath) = parts(4.0);
+    let outer = Section { inner_radius_mm: Some(0.3), ..Section::straight(100.0, 0.5, 1.0) };
+    let one = |name: &str, device: Device| Instrument { name: name.to_owned(), device, may_lead: true };
+    let outer = Device::new(vec![outer]).unwrap();
+    let stack = Stack::new(vec![one("wire", device), one("catheter", outer)]).unwrap();
+    let builder = Simulation::builder(made.wall, stack, sheath).method(&method(true)).build();
+    assert!(builder.err().unwrap().to_string().contains("method.self_contact"));
 }

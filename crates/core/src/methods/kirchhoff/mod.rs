@@ -229,6 +229,11 @@ impl<const C: usize> Kirchhoff<C> {
             let mend = "loops of several instruments on one line do not feel each other yet: leave it out";
             return Err(Error::parameter("method.self_contact", true, mend));
         }
+        if options.self_contact && surroundings.motion.is_some() {
+            let mend =
+                "a vessel that moves may take loops along through each other: leave it or vessel.motion out";
+            return Err(Error::parameter("method.self_contact", true, mend));
+        }
         if options.max_iterations == 0 {
             return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
         }
