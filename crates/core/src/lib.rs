@@ -14,6 +14,7 @@
 pub mod banded;
 pub mod contact;
 pub mod control;
+pub(crate) mod coupled;
 pub mod device;
 pub mod error;
 pub mod file;

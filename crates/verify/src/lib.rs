@@ -21,6 +21,7 @@ pub mod noise;
 mod planar;
 mod quadratic;
 mod regions;
+mod self_contact;
 pub mod sequences;
 mod spatial;
 pub mod stress;
@@ -249,6 +250,17 @@ pub const FAMILIES: &[Family] = &[
         title: "A wire turned and pushed in a bent catheter that rubs on it",
         run: turned_within::turned,
     },
+    Family {
+        id: "E2",
+        title: "Twisted rod wound about itself (Clauvelin, Audoly, Neukirch 2009)",
+        run: self_contact::plectoneme,
+    },
+    Family {
+        id: "E3",
+        title: "Elastic trefoil (Gerlach, Reiter, von der Mosel 2017)",
+        run: self_contact::trefoil,
+    },
+    Family { id: "E6", title: "Two cantilevers that cross", run: self_contact::crossing },
 ];
 
 /// A straight inextensible rod of length 1 and EI 1 along x, clamped at the origin, free at its end.
@@ -263,6 +275,7 @@ pub fn unit_rod(elements: usize) -> StaticCase {
         },
         end: End { kind: EndKind::Free, ..End::default() },
         load: vec![],
+        self_contact: None,
         initial: None,
         solver: Solver::default(),
     }

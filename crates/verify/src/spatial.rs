@@ -100,7 +100,7 @@ pub(super) fn ring() -> Result<Vec<Row>> {
             case.rod.section[0].gj = Some(gj);
             case.end.kind = EndKind::Clamped;
             case.end.position = Some([0.0; 3]);
-            case.initial = Some(Initial { curvature: [2.0 * PI, 0.0] });
+            case.initial = Some(Initial { curvature: [2.0 * PI, 0.0], ..Initial::default() });
             case
         };
         let found = critical_turns(&case(64), expected)?;

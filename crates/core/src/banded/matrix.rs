@@ -24,6 +24,11 @@ impl<const C: usize> BandMatrix<C> {
         self.rows.len()
     }
 
+    /// Row `i` of the upper triangle: the columns of its own block and of the next.
+    pub(crate) fn row(&self, i: usize) -> &[f64; C] {
+        &self.rows[i]
+    }
+
     /// Changes the dimension; keeps the memory, and no entry that means anything.
     pub fn resize(&mut self, dimension: usize) {
         self.rows.resize(dimension, [0.0; C]);

@@ -1,11 +1,13 @@
-//! What the wall does to a device: distance, energy, friction.
+//! What the wall does to a device, and what its own loops do to each other: distance, energy, friction.
 
 mod cache;
 pub mod distance;
 mod drag;
 pub mod extension;
+mod force;
 pub mod friction;
 mod moved;
+pub mod pairs;
 pub(crate) mod passage;
 pub mod point;
 pub mod potential;
@@ -27,6 +29,7 @@ pub use distance::{Distance, Nearness, SmoothWall};
 pub use drag::Drag;
 pub use friction::{Between, Friction, HandMotion, InnerFriction, NormalForce, Place, SETTLED};
 pub use moved::MovedWall;
+pub use pairs::{SelfContact, Skin, Touching};
 pub use point::{Contact, ContactPoint, Counters, Touch};
 pub use potential::WallPotential;
 pub use properties::{WallProperties, WallRegion};

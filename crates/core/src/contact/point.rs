@@ -8,7 +8,7 @@ use crate::rod::quadrature::{Point, hermite};
 use crate::rod::{ElementData, RodState};
 
 /// Beyond its radius, a point is followed within this part of it.
-pub(super) const FOLLOW: f64 = 0.5;
+pub(in crate::contact) const FOLLOW: f64 = 0.5;
 /// A triangle is the nearest, or close to it, within this part of a point's radius from where it was found.
 pub(super) const LOOK_AGAIN: f64 = 0.5;
 

@@ -277,8 +277,16 @@ impl Contacts for WallContact<'_> {
         self.press_or_let_go_contacts(elements, base, moved, into) + self.slip_on(elements, base, moved, into)
     }
 
-    fn part_towards(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
-        self.part_towards_contacts(moved, most)
+    fn look_towards(&mut self, moved: &Moved<'_>) {
+        self.look_towards_contacts(moved);
+    }
+
+    fn slope_towards(&mut self, part: f64) -> f64 {
+        self.slope_towards_contacts(part)
+    }
+
+    fn go_towards(&mut self, part: f64) {
+        self.go_towards_contacts(part);
     }
 
     fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::contact::{Counters, WallProperties};
+use crate::contact::{Counters, Touching, WallProperties};
 use crate::device::{Device, LENGTH_SLACK_MM, Stack, line_mm};
 use crate::flow::BloodFlow;
 use crate::insertion::SimulationBuilder;
@@ -160,6 +160,11 @@ impl Simulation {
     /// force across the line. None where nothing is outside the instrument or it has ended, at the sheath's mouth, and of a device alone.
     pub fn lateral_forces(&self, instrument: usize) -> Vec<LateralForce> {
         self.method.lateral_forces(&self.scene.surroundings([self.time_s; 2]), instrument)
+    }
+
+    /// Where loops of the device press on each other; nothing where the method does not know of them.
+    pub fn touching(&self) -> Vec<Touching> {
+        self.method.touching(&self.scene.surroundings([self.time_s; 2]))
     }
 
     /// The inserted centre line, sheath to tip.

@@ -16,7 +16,7 @@ use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::{Counters, WallProperties};
+use crate::contact::{Counters, Touching, WallProperties};
 use crate::device::{Device, Stack};
 use crate::flow::BloodFlow;
 use crate::shape::Shape;
@@ -108,6 +108,11 @@ pub trait Method: Send {
     /// Forces that the instruments outside one exert on it, at every node; none of methods that push one device.
     fn lateral_forces(&self, _surroundings: &Surroundings<'_>, _instrument: usize) -> Vec<LateralForce> {
         vec![LateralForce::default(); self.shape().len()]
+    }
+
+    /// Where loops of the device press on each other; nothing of methods that do not know.
+    fn touching(&self, _surroundings: &Surroundings<'_>) -> Vec<Touching> {
+        Vec::new()
     }
 
     /// All that the next step depends on.

@@ -13,7 +13,7 @@ pub struct Energy {
     pub bend: f64,
     /// Twist; 0 for methods without it.
     pub twist: f64,
-    /// Deformation of the vessel wall.
+    /// Deformation of the vessel wall, and of the device's surface where its loops touch each other.
     pub wall: f64,
 }
 

@@ -20,6 +20,7 @@ use super::lanes::Lanes;
 use super::layout::Layout;
 use super::state::RodState;
 use crate::banded::{BandMatrix, Shift};
+use crate::coupled::Couplings;
 use pulp::{Arch, Simd, WithSimd, bytemuck};
 
 /// A rank-one addition p qᵀ to the matrix that is not symmetric: loads that follow the rod.
@@ -40,6 +41,8 @@ pub(crate) struct RankOne {
 pub struct Assembly<const C: usize> {
     /// The augmented matrix.
     pub matrix: BandMatrix<C>,
+    /// What it has beside its band: blocks of nodes that touch.
+    pub(crate) couplings: Couplings<C>,
     /// Gradient of the Lagrangian; in the rows of N, c − D N; in support rows, the gaps.
     pub residual: Vec<f64>,
     /// γCᵀ(c − D N), which the right-hand side needs beside the residual.
@@ -62,6 +65,7 @@ impl<const C: usize> Assembly<C> {
         let n = Layout::<C>::dimension(elements);
         Self {
             matrix: BandMatrix::zeros(n),
+            couplings: Couplings::default(),
             residual: vec![0.0; n],
             correction: vec![0.0; n],
             energy: Energy::default(),
@@ -84,6 +88,7 @@ impl<const C: usize> Assembly<C> {
     pub fn assemble(&mut self, elements: &[ElementData], state: &RodState) {
         if self.hessian {
             self.matrix.begin_blocks();
+            self.couplings.clear();
         }
         self.residual.fill(0.0);
         self.correction.fill(0.0);

@@ -26,6 +26,7 @@ pub mod assembly;
 mod batch;
 mod bending;
 pub mod clamp;
+pub mod couples;
 pub mod element;
 mod element_torsion;
 pub mod frame;
@@ -44,6 +45,7 @@ mod torsion;
 
 pub use assembly::Assembly;
 pub use clamp::Clamp;
+pub use couples::Couple;
 pub use element::{ElementData, Energy, Material};
 pub use frame::Frame;
 pub use lagrangian::{element_energy, element_system};

@@ -3,6 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::assembly::{Assembly, RankOne};
+use super::couples::Couple;
 use super::element::ElementData;
 use super::layout::Layout;
 use super::points::PointSum;
@@ -31,6 +32,10 @@ impl<const C: usize> Stencils for Assembly<C> {
 
     fn add_points(&mut self, state: &RodState, element: &ElementData, e: usize, sum: &PointSum) {
         self.add_gathered(state, element, e, sum);
+    }
+
+    fn add_couple(&mut self, elements: &[ElementData], state: &RodState, couple: &Couple) {
+        self.add_coupled(elements, state, couple);
     }
 
     fn add_spin(

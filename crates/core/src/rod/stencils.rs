@@ -3,6 +3,7 @@
 
 use nalgebra::Matrix3;
 
+use super::couples::Couple;
 use super::element::ElementData;
 use super::points::PointSum;
 use super::state::RodState;
@@ -34,6 +35,9 @@ pub trait Stencils {
 
     /// Adds derivatives in the positions of points of element `e`, gathered.
     fn add_points(&mut self, state: &RodState, element: &ElementData, e: usize, sum: &PointSum);
+
+    /// Adds derivatives in the positions of two points of elements that are no neighbours.
+    fn add_couple(&mut self, elements: &[ElementData], state: &RodState, couple: &Couple);
 
     /// Adds those derivatives of the energy of a point (element, ξ and set of angles) that see the material angle there: the first and
     /// second `spin` derivatives in the angle, and the `mixed` one in angle and position.

@@ -175,6 +175,7 @@ impl Supports {
         for row in self.held::<C>().into_iter().flatten() {
             if assembly.hessian {
                 assembly.matrix.hold(row);
+                assembly.couplings.hold(row);
             }
             assembly.residual[row] = 0.0;
             assembly.correction[row] = 0.0;

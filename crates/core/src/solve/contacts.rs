@@ -21,6 +21,7 @@
 //! ```
 
 use super::external::{ContactMerit, Contacts};
+use super::line_search::LineSearch;
 use super::newton::{ENERGY_ROUNDING, Newton, Problem};
 use super::report::StopReason;
 use super::shift::{LEAST_SHIFT, SHIFT_GROWTH, SHIFTS};
@@ -32,6 +33,35 @@ use crate::rod::{Assembly, ElementData, RodState};
 const ROUNDS: usize = 100;
 /// Turn of a step, rad, at which a round ends: planes are no model of what is farther away.
 const LARGEST_TURN: f64 = 1.0;
+
+/// A search ends where this part of the slope is left, …
+const SEARCHED: f64 = 1e-3;
+/// … and after so many trials.
+const SEARCHES: usize = 60;
+
+/// Part of a way, at most all of it, up to which a convex function falls whose slope is given (the Illinois method).
+pub(crate) fn falls_until(mut slope: impl FnMut(f64) -> f64) -> f64 {
+    let (mut low, mut high) = ((0.0, slope(0.0)), (1.0, slope(1.0)));
+    if high.1 <= 0.0 || low.1 >= 0.0 {
+        return 1.0;
+    }
+    let least = SEARCHED * -low.1;
+    let mut last = 0.0;
+    for _ in 0..SEARCHES {
+        let part = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+        let here = slope(part);
+        if here.abs() <= least {
+            return part;
+        }
+        let (end, other) = if here < 0.0 { (&mut low, &mut high) } else { (&mut high, &mut low) };
+        *end = (part, here);
+        if last * here > 0.0 {
+            other.1 *= 0.5;
+        }
+        last = here;
+    }
+    low.0
+}
 
 /// What a step does to points of the rod.
 pub(crate) fn moved<'a, const C: usize>(
@@ -52,6 +82,7 @@ impl<const C: usize> Newton<C> {
         &mut self,
         problem: &mut Problem<'_>,
         state: &RodState,
+        search: &mut LineSearch,
         shift: &mut f64,
     ) -> Result<ContactMerit, StopReason> {
         let elements = problem.elements;
@@ -64,7 +95,7 @@ impl<const C: usize> Newton<C> {
             self.with_contacts(problem, state, |contacts, moved| contacts.foresee(elements, state, moved));
             if !models || self.contacts_at_end(problem, state, *shift) {
                 let merit = self.with_contacts(problem, state, |contacts, moved| contacts.merit(moved));
-                if !(models && self.is_uphill(&merit)) {
+                if !(models && self.is_uphill(problem, state, search, &merit)) {
                     return Ok(merit);
                 }
             }
@@ -90,9 +121,15 @@ impl<const C: usize> Newton<C> {
         problem.external.contacts().map_or_else(T::default, |contacts| ask(contacts, &moved))
     }
 
-    /// Whether the step is uphill of the energy and this, beyond rounding.
-    fn is_uphill(&self, merit: &ContactMerit) -> bool {
-        let slope = self.assembly.slope(&self.step) + merit.slope_mj;
+    /// Whether the step is uphill of the merit with this, beyond rounding.
+    fn is_uphill(
+        &self,
+        problem: &Problem<'_>,
+        state: &RodState,
+        search: &mut LineSearch,
+        merit: &ContactMerit,
+    ) -> bool {
+        let slope = self.slope_along(problem, state, search) + merit.slope_mj;
         slope > ENERGY_ROUNDING * self.assembly.energy.total().abs()
     }
 
@@ -112,8 +149,12 @@ impl<const C: usize> Newton<C> {
             }
             let (turn, _) = RodState::largest_turn::<C>(elements, state, &self.step);
             let most = if turn > LARGEST_TURN { LARGEST_TURN / turn } else { 1.0 };
-            let part =
-                self.with_contacts(problem, state, |contacts, moved| contacts.part_towards(moved, most));
+            let part = self.with_contacts(problem, state, |contacts, moved| {
+                contacts.look_towards(moved);
+                let part = falls_until(|part| contacts.slope_towards(part)).min(most);
+                contacts.go_towards(part);
+                part
+            });
             done = part >= most;
             if part < 1.0 {
                 for (step, before) in self.step.iter_mut().zip(&self.spare) {

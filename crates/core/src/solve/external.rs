@@ -79,9 +79,15 @@ pub trait Contacts {
         into: &mut dyn Stencils,
     ) -> usize;
 
-    /// Part of the way from the step noted last to another, which answers the system as it is, at which the model has its minimum: of the
-    /// energy with springs where contacts press and none where they would pull. It is `most` at the most.
-    fn part_towards(&mut self, moved: &Moved<'_>, most: f64) -> f64;
+    /// Takes note of another step, which answers the system as it is.
+    fn look_towards(&mut self, moved: &Moved<'_>);
+
+    /// Slope, at a part of the way from the step noted first to that, of the model: of the energy with springs where contacts press and none
+    /// where they would pull.
+    fn slope_towards(&mut self, part: f64) -> f64;
+
+    /// Goes a part of that way: where it leads is the step noted first from here on.
+    fn go_towards(&mut self, part: f64);
 
     /// Aims at the forces to which a step leads. Their merit is the value from here on, until the next base.
     fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit;

@@ -165,6 +165,16 @@ impl<const C: usize> Newton<C> {
         Ok(Stride { merit, part, turn, whole_turn: self.whole_turn(problem, turn, shift) })
     }
 
+    /// Slope of energy and weighed end conditions along the step.
+    pub(super) fn slope_along(
+        &self,
+        problem: &Problem<'_>,
+        state: &RodState,
+        search: &mut LineSearch,
+    ) -> f64 {
+        self.merit_along(problem, state, search).slope
+    }
+
     /// Weighs the end conditions above the reactions that the step leads to, and measures the merit along it.
     fn merit_along(&self, problem: &Problem<'_>, state: &RodState, search: &mut LineSearch) -> Merit {
         let l = Layout::<C>;
@@ -214,6 +224,10 @@ impl<const C: usize> Newton<C> {
         }
         if supports.conditions() > 0 {
             self.correct(elements, supports, Layout::<C>.support(elements.len()));
+            // The way back to the end conditions may lead through something: then the merit weighs how far off they are.
+            if external.safe_fraction(elements, &self.trial) < 1.0 {
+                self.trial.advance::<C>(elements, state, &self.step, part);
+            }
         }
         self.trial.take_tensions::<C>(elements, state, &self.step);
         part

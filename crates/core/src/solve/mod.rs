@@ -6,6 +6,7 @@
 
 pub(crate) mod contacts;
 pub mod external;
+mod factors;
 mod line_search;
 pub(crate) mod neighbourhood;
 pub mod newton;
@@ -14,6 +15,7 @@ mod residual;
 mod saddle;
 mod shift;
 mod stop;
+mod together;
 mod trial;
 mod unsymmetric;
 
@@ -21,6 +23,7 @@ pub use external::{ContactMerit, Contacts, External, Moved, Sizes};
 pub use newton::Newton;
 pub use report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 pub use residual::ResidualSize;
+pub use together::Together;
 
 #[cfg(test)]
 mod newton_tests;

@@ -14,12 +14,13 @@
 //! residual is never shifted.
 
 use super::external::External;
+use super::factors::Factors;
 use super::line_search::LineSearch;
 use super::neighbourhood::Neighbourhood;
 use super::report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 use super::residual::ResidualSize;
 use super::stop::Progress;
-use crate::banded::{Factor, Inertia, Shift};
+use crate::banded::{Inertia, Shift};
 use crate::rod::{Assembly, ElementData, Layout, RodState, Supports};
 
 /// Changes of energy below this part of the energies' size are rounding.
@@ -35,7 +36,7 @@ pub struct Newton<const C: usize> {
     /// Residual rows of the first two nodes before the first was held: its reactions.
     pub start_residual: [f64; C],
     pub(super) unit_shift: Shift,
-    pub(super) factor: Factor<C>,
+    pub(super) factor: Factors<C>,
     pub(super) step: Vec<f64>,
     pub(super) spare: Vec<f64>,
     pub(super) columns: Vec<Vec<f64>>,
@@ -55,7 +56,7 @@ impl<const C: usize> Newton<C> {
             assembly: Assembly::new(elements),
             start_residual: [0.0; C],
             unit_shift: Shift::default(),
-            factor: Factor::new(n),
+            factor: Factors::new(n),
             step: vec![0.0; n],
             spare: vec![0.0; n],
             columns: Vec::new(),
@@ -181,10 +182,11 @@ impl<const C: usize> Newton<C> {
             report.iterations += 1;
             self.unsymmetric();
             Self::restore_tensions(elements, &mut self.step);
-            let searched = self.meet_contacts(&mut problem, state, &mut shift).and_then(|contacts| {
-                let step = (size.relative, shift);
-                self.line_search(&mut problem, state, &mut search, step, &contacts)
-            });
+            let searched =
+                self.meet_contacts(&mut problem, state, &mut search, &mut shift).and_then(|contacts| {
+                    let step = (size.relative, shift);
+                    self.line_search(&mut problem, state, &mut search, step, &contacts)
+                });
             match searched {
                 Ok(_) if state.is_folded() => return report.stopped(StopReason::Folded),
                 Ok(_) if self.neighbourhood.is_left_by(state) => return report.stopped(StopReason::Left),

@@ -21,7 +21,7 @@ impl<const C: usize> Newton<C> {
     /// Inertia of the assembled matrix with the shift `sigma`; `None` where it cannot be factored.
     pub fn inertia(&mut self, elements: &[ElementData], supports: &Supports, sigma: f64) -> Option<Inertia> {
         Assembly::<C>::unit_shift(elements, &supports.held::<C>(), &mut self.unit_shift);
-        self.factor.factor_shifted(&self.assembly.matrix, &self.unit_shift, sigma).ok()
+        self.factor.factor_shifted(&self.assembly, &self.unit_shift, sigma).ok()
     }
 
     /// Factors the assembled matrix with the shift that is always on, for [`Self::apply_inverse`].
@@ -101,6 +101,6 @@ impl<const C: usize> Newton<C> {
     pub(super) fn factor_step(&mut self, sigma: f64) -> Result<Inertia, FactorError> {
         self.right_hand_side();
         let Self { assembly, unit_shift, step, .. } = self;
-        self.factor.factor_solve_shifted(&assembly.matrix, unit_shift, sigma, step)
+        self.factor.factor_solve_shifted(assembly, unit_shift, sigma, step)
     }
 }

@@ -20,6 +20,9 @@ pub struct StaticCase {
     /// Loads, any number.
     #[serde(default)]
     pub load: Vec<Load>,
+    /// The rod's surface, where its loops touch each other; where absent they pass through each other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub self_contact: Option<Surface>,
     /// Where the search starts; the unloaded shape, or a shape that meets the end, where absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial: Option<Initial>,
@@ -202,12 +205,27 @@ pub struct Load {
     pub value: [f64; 3],
 }
 
-/// A shape to start the search from: constant curvature.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A shape to start the search from: constant curvature, or a curve.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Initial {
     /// Curvature along the start's d₁ and d₂; zero = straight.
+    #[serde(default)]
     pub curvature: [f64; 2],
+    /// Points of a curve, the first of which is the start: the rod takes the directions of the curve, at the same parts of its length.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<[f64; 3]>,
+}
+
+/// The surface of a rod that touches itself.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Surface {
+    /// Radius of the rod.
+    pub radius: f64,
+    /// Force per length per depth by which two pieces press each other; 10 EI/radius⁴, which is rigid for a rod, where absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub modulus: Option<f64>,
 }
 
 /// How to solve.

@@ -41,6 +41,38 @@ pub(super) fn arc(elements: &[ElementData], start: Vec3, frame: Frame, curvature
     RodState::from_frames(elements, start, frames)
 }
 
+/// Directions of the curve through points, at the same parts of its length.
+pub(super) fn along(elements: &[ElementData], start: Vec3, frame: Frame, points: &[[f64; 3]]) -> RodState {
+    let points: Vec<Vec3> = points.iter().map(|p| Vec3::from(*p)).collect();
+    let arcs: Vec<f64> = std::iter::once(0.0)
+        .chain(points.windows(2).scan(0.0, |s, w| {
+            *s += (w[1] - w[0]).norm();
+            Some(*s)
+        }))
+        .collect();
+    let total: f64 = elements.iter().map(|e| e.length).sum();
+    let stretch = arcs[arcs.len() - 1] / total;
+    // Chords have the direction of the curve in their middle.
+    let middle = |k: usize| 0.5 * (arcs[k] + arcs[k + 1]);
+    let last = points.len() - 2;
+    let direction = |s: f64| {
+        let k = (1..last).find(|k| s < middle(*k)).unwrap_or(last.max(1)).max(1).min(last);
+        let chord = |k: usize| (points[k + 1] - points[k]).normalize();
+        if last == 0 {
+            return chord(0);
+        }
+        let share = (s - middle(k - 1)) / (middle(k) - middle(k - 1));
+        chord(k - 1) * (1.0 - share) + chord(k) * share
+    };
+    let (mut s, mut frames) = (0.0, vec![frame]);
+    for element in elements {
+        s += element.length * stretch;
+        let t = direction(s);
+        frames.push(frames[frames.len() - 1].transported_to(&t.normalize()));
+    }
+    RodState::from_frames(elements, start, frames)
+}
+
 /// A shape near one that meets the end: the rest shape or an arc, whichever comes closest, bowed where it is too straight for
 /// its span.
 pub(super) fn towards_end(

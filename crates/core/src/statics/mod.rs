@@ -27,12 +27,15 @@ mod validate;
 
 pub use case::{
     End, EndKind, Initial, Instrument, Load, LoadKind, Rod, Section, Solver, Start, StartKind, StaticCase,
+    Surface,
 };
 pub use continuation::PathPoint;
 pub use critical::Parameter;
 pub use loads::Loads;
 pub use problem::{Solved, StaticProblem};
-pub use solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution};
+pub use solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution, TouchSolution};
 
 #[cfg(test)]
 mod stack_tests;
+#[cfg(test)]
+mod touching_tests;

@@ -4,10 +4,11 @@ use super::case::{EndKind, LoadKind, Section, StartKind, StaticCase};
 use super::guess;
 use super::loads::Loads;
 use super::mesh::{self, ASSUMED_GJ_RATIO};
-use super::solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution};
+use super::solution::{Energies, InstrumentSolution, Reaction, Reactions, StaticSolution, TouchSolution};
 use super::stack::Stack;
+use crate::contact::{SelfContact, Skin, Touching};
 use crate::rod::{Clamp, ElementData, EndAngle, Frame, RodState, Supports};
-use crate::solve::{External, Newton, NewtonOptions, NewtonReport};
+use crate::solve::{External, Newton, NewtonOptions, NewtonReport, Together};
 use crate::{Error, Result, Vec3};
 
 /// Twist energy above this part of the rest shows that GJ did matter.
@@ -22,6 +23,8 @@ pub struct StaticProblem {
     pub supports: Supports,
     /// Loads.
     pub loads: Loads,
+    /// What loops of the rod do to each other, if they touch.
+    pub touching: Option<SelfContact>,
     /// Shape the search starts from.
     pub initial: RodState,
     /// Sets of angles that are carried: none where nothing twists.
@@ -54,6 +57,8 @@ pub struct Solved {
     pub start: Reaction,
     /// As in [`StaticSolution::push_force`].
     pub push_force: Option<f64>,
+    /// Where the rod presses on itself.
+    pub touching: Vec<Touching>,
     /// Of each of several instruments, as in [`InstrumentSolution`]: push force and torque.
     pub instruments: Vec<(Option<f64>, f64)>,
 }
@@ -104,6 +109,9 @@ impl StaticProblem {
         let supports = supports(case, &frame, angles > 0);
         let initial = match (&stack, &case.initial) {
             (Some(stack), _) => stack.untwisted(&elements, start, frame),
+            (None, Some(shape)) if !shape.points.is_empty() => {
+                guess::along(&elements, start, frame, &shape.points)
+            }
             (None, Some(shape)) => guess::arc(&elements, start, frame, shape.curvature),
             (None, None) if supports.conditions() > 0 => {
                 guess::towards_end(&elements, start, frame, &supports)
@@ -113,7 +121,28 @@ impl StaticProblem {
         let (max_iterations, tolerance) = (case.solver.max_iterations, case.solver.tolerance);
         let options = NewtonOptions { max_iterations, tolerance, ..NewtonOptions::default() };
         let load_steps = case.solver.load_steps;
-        Ok(Self { elements, supports, loads, initial, angles, options, load_steps, gj_given, first, stack })
+        let touching = case.self_contact.as_ref().map(|surface| {
+            let skin = |element: &ElementData| {
+                let rigid = Skin::rigid(surface.radius, element.bending[1]);
+                Skin { modulus_n_per_mm2: surface.modulus.unwrap_or(rigid.modulus_n_per_mm2), ..rigid }
+            };
+            let touching = SelfContact::new(&elements, elements.iter().map(skin).collect());
+            let closed = case.end.position == Some(case.start.position);
+            if closed { touching.closed() } else { touching }
+        });
+        Ok(Self {
+            elements,
+            supports,
+            loads,
+            touching,
+            initial,
+            angles,
+            options,
+            load_steps,
+            gj_given,
+            first,
+            stack,
+        })
     }
 
     /// Adds a constant force along the end's tangent that load factors leave alone.
@@ -155,7 +184,9 @@ impl StaticProblem {
     fn bend_after<const C: usize>(&self, solved: &Solved) -> f64 {
         let state = &solved.state;
         let mut newton = Newton::<C>::new(self.elements.len());
-        newton.assemble(&self.elements, &solved.supports, &mut self.loads.clone(), state);
+        let (mut loads, mut touching) = (self.loads.clone(), self.touching.clone());
+        let mut outside = outside(&mut loads, &mut touching);
+        newton.assemble(&self.elements, &solved.supports, &mut outside, state);
         let Some((_, step)) = newton.full_step(&self.elements, &solved.supports) else { return f64::NAN };
         let mut next = state.clone();
         next.advance::<C>(&self.elements, state, step, 1.0);
@@ -181,13 +212,15 @@ impl StaticProblem {
         } else {
             supports.begin(&state);
         }
-        let mut loads = self.loads.clone();
+        let (mut loads, mut touching) = (self.loads.clone(), self.touching.clone());
         let mut iterations = 0;
         let mut monotone = true;
         let mut last = None;
         for step in 1..=self.load_steps {
             loads.factor = self.loads.factor * step as f64 / self.load_steps as f64;
-            let report = newton.solve(&self.elements, &mut supports, &mut loads, &mut state, &self.options);
+            let mut outside = outside(&mut loads, &mut touching);
+            let report = newton.solve(&self.elements, &mut supports, &mut outside, &mut state, &self.options);
+            drop(outside);
             iterations += report.iterations;
             monotone &= !loads.is_conservative()
                 || newton.steps.iter().all(|s| s.merit_change <= 1e-12 * s.energy_scale);
@@ -198,7 +231,8 @@ impl StaticProblem {
             }
         }
         let mut report = last.unwrap_or_else(|| {
-            newton.solve(&self.elements, &mut supports, &mut loads, &mut state, &self.options)
+            let mut outside = outside(&mut loads, &mut touching);
+            newton.solve(&self.elements, &mut supports, &mut outside, &mut state, &self.options)
         });
         report.iterations = iterations;
         let stored = newton.assembly.energy;
@@ -223,7 +257,8 @@ impl StaticProblem {
             clamp.push_force(&frame.t, first.ei, first.gj.unwrap_or(ASSUMED_GJ_RATIO * first.ei), &rest)
         });
         let instruments = self.hands::<C>(&state, &supports, &mut loads, &clamp);
-        Solved { state, supports, report, monotone, energy, start, push_force, instruments }
+        let touching = touching.map_or_else(Vec::new, |touching| touching.touching(&self.elements, &state));
+        Solved { state, supports, report, monotone, energy, start, push_force, touching, instruments }
     }
 
     /// Push force and torque of each of several instruments at an equilibrium among energies outside the rod, as in
@@ -297,6 +332,7 @@ impl StaticProblem {
                 end: Reaction { force: force.into(), moment: moment.into(), torque: -m[5] },
             },
             push_force: solved.push_force,
+            touching: solved.touching.iter().map(TouchSolution::from).collect(),
             instruments: self.instruments(solved),
             iterations: report.iterations,
             residual: report.residual,
@@ -309,6 +345,12 @@ impl StaticProblem {
             monotone: solved.monotone,
         }
     }
+}
+
+/// Loads, and what loops of the rod do to each other, as one.
+fn outside<'a>(loads: &'a mut Loads, touching: &'a mut Option<SelfContact>) -> Together<'a> {
+    let touching = touching.as_mut().map(|touching| touching as &mut dyn External);
+    Together(std::iter::once(loads as &mut dyn External).chain(touching).collect())
 }
 
 /// The loads of a case on the nodes at these arc lengths.

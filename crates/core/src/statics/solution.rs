@@ -1,5 +1,6 @@
 //! What a static problem returns.
 
+use crate::contact::Touching;
 use serde::Serialize;
 
 /// Energies of the rod.
@@ -56,6 +57,30 @@ pub struct InstrumentSolution {
     pub torque: f64,
 }
 
+/// A place where the rod presses on itself.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TouchSolution {
+    /// Arc lengths of the two points.
+    pub arcs: [f64; 2],
+    /// Where they are.
+    pub positions: [[f64; 3]; 2],
+    /// Force on the first, along the line from the second to it; the second feels the opposite.
+    pub force: f64,
+    /// Depth to which the surfaces are in each other.
+    pub penetration: f64,
+}
+
+impl From<&Touching> for TouchSolution {
+    fn from(touching: &Touching) -> Self {
+        Self {
+            arcs: touching.arcs_mm,
+            positions: touching.positions_mm.map(Into::into),
+            force: touching.force_n,
+            penetration: touching.penetration_mm,
+        }
+    }
+}
+
 /// A solved case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StaticSolution {
@@ -84,6 +109,9 @@ pub struct StaticSolution {
     /// Force with which the rod must be pushed to stay where it is, if the clamp at its start is a frictionless sleeve that it
     /// slides through; `None` where the start is not clamped. See [`Clamp::push_force`](crate::rod::Clamp::push_force).
     pub push_force: Option<f64>,
+    /// Where the rod presses on itself, along it; left out where it does not.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub touching: Vec<TouchSolution>,
     /// Each instrument, in the order of the case; left out for a single rod.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub instruments: Vec<InstrumentSolution>,

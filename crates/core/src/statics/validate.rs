@@ -1,6 +1,6 @@
 //! Checks of a case before anything is computed. Every error names the key at fault.
 
-use super::case::{EndKind, LoadKind, Section, StartKind, StaticCase};
+use super::case::{EndKind, Initial, LoadKind, Section, StartKind, StaticCase, Surface};
 use crate::{Error, Result, Vec3};
 use std::fmt::Display;
 
@@ -14,6 +14,10 @@ const MAX_WORK: usize = 10_000_000;
 
 /// Tolerances that mean something: below, there is rounding alone; above, a shape that is no equilibrium would pass for one.
 const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-2;
+
+/// Least length over the radius of a rod that touches itself, and most places on it that may.
+const LEAST_SLENDERNESS: f64 = 10.0;
+const MAX_SITES: f64 = 1e6;
 
 /// A key of an entry of a list, written only where it is wrong.
 struct Key<'a> {
@@ -61,6 +65,20 @@ fn across(name: &str, normal: &[f64; 3], tangent: &[f64; 3]) -> Result<()> {
             format!("{normal:?}"),
             "is along the tangent; give a direction across it",
         ));
+    }
+    Ok(())
+}
+
+/// Points of a curve to begin with: two at least, no two in a row the same.
+fn check_points(initial: &Initial) -> Result<()> {
+    let points = &initial.points;
+    points.iter().try_for_each(|point| finite("initial.points", point))?;
+    if points.len() == 1 {
+        return Err(Error::parameter("initial.points", 1, "a curve has two points at least"));
+    }
+    if let Some(twice) = points.windows(2).find(|pair| pair[0] == pair[1]) {
+        let mend = "comes twice in a row; leave one out";
+        return Err(Error::parameter("initial.points", format!("{:?}", twice[0]), mend));
     }
     Ok(())
 }
@@ -170,6 +188,10 @@ impl StaticCase {
         }
         if let Some(initial) = &self.initial {
             finite("initial.curvature", &initial.curvature)?;
+            check_points(initial)?;
+        }
+        if let Some(surface) = &self.self_contact {
+            self.check_surface(surface)?;
         }
         for (key, value, most) in [
             ("solver.max_iterations", self.solver.max_iterations, MAX_ITERATIONS),
@@ -195,6 +217,30 @@ impl StaticCase {
                 tolerance,
                 format!("must be {least:e} to {most:e}: a part of the largest force in the rod"),
             ));
+        }
+        Ok(())
+    }
+
+    /// The surface of a rod that touches itself.
+    fn check_surface(&self, surface: &Surface) -> Result<()> {
+        positive("self_contact.radius", surface.radius)?;
+        let most = self.rod.line_length() / LEAST_SLENDERNESS;
+        if surface.radius > most {
+            let mend = format!("must be less than {most}: a rod is many times as long as it is thick");
+            return Err(Error::parameter("self_contact.radius", surface.radius, mend));
+        }
+        let sites = self.rod.line_length() / surface.radius;
+        if sites > MAX_SITES {
+            let mend =
+                format!("makes {sites:.0e} places that may touch, and at most {MAX_SITES:.0e} are looked at");
+            return Err(Error::parameter("self_contact.radius", surface.radius, mend));
+        }
+        if let Some(modulus) = surface.modulus {
+            positive("self_contact.modulus", modulus)?;
+        }
+        if !self.rod.instrument.is_empty() {
+            let mend = "it is for a single rod: leave it out, or give rod.section";
+            return Err(Error::parameter("self_contact", "given with instruments", mend));
         }
         Ok(())
     }

@@ -214,7 +214,9 @@ impl Search<'_> {
                 Plane { tilt: [a, b - turn], ..best.0 },
             ];
             let before = best.1.area_mm2;
-            best = around.into_iter().fold(Some(best), |best, plane| self.better(best, plane))?;
+            for plane in around {
+                best = self.better(Some(best), plane)?;
+            }
             if best.1.area_mm2 == before {
                 (part, turn) = (0.5 * part, 0.5 * turn);
             }

@@ -13,11 +13,6 @@ use crate::rod::quadrature::hermite;
 use crate::rod::{ElementData, PointSum, RodState, Stencils};
 use crate::solve::Moved;
 
-/// A search ends where this part of the slope is left, …
-const SEARCHED: f64 = 1e-3;
-/// … and after so many trials.
-const SEARCHES: usize = 60;
-
 /// A contact in a step, and what that does to it.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::contact) struct Foreseen {
@@ -68,30 +63,6 @@ impl Foreseen {
         sum.add(point.xi, &force, Some(&(along * self.gradient.transpose())));
         into.add_points(base, &elements[e], e, &sum);
     }
-}
-
-/// Part of a way, at most all of it, up to which a convex function falls whose slope is given (the Illinois method).
-pub(super) fn falls_until(slope: impl Fn(f64) -> f64) -> f64 {
-    let (mut low, mut high) = ((0.0, slope(0.0)), (1.0, slope(1.0)));
-    if high.1 <= 0.0 || low.1 >= 0.0 {
-        return 1.0;
-    }
-    let least = SEARCHED * -low.1;
-    let mut last = 0.0;
-    for _ in 0..SEARCHES {
-        let part = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
-        let here = slope(part);
-        if here.abs() <= least {
-            return part;
-        }
-        let (end, other) = if here < 0.0 { (&mut low, &mut high) } else { (&mut high, &mut low) };
-        *end = (part, here);
-        if last * here > 0.0 {
-            other.1 *= 0.5;
-        }
-        last = here;
-    }
-    low.0
 }
 
 /// Takes away what a force on a point that is added to a system, as a gradient, does to the tangents as they turn: those of springs that
@@ -179,8 +150,8 @@ impl WallContact<'_> {
         changed
     }
 
-    /// See [`Contacts::part_towards`](crate::solve::Contacts::part_towards).
-    pub(super) fn part_towards_contacts(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
+    /// See [`Contacts::look_towards`](crate::solve::Contacts::look_towards).
+    pub(super) fn look_towards_contacts(&mut self, moved: &Moved<'_>) {
         let (mut ends, mut slips) = std::mem::take(&mut self.cache.ends);
         ends.clear();
         ends.extend(self.cache.foreseen.iter().map(|contact| {
@@ -188,21 +159,28 @@ impl WallContact<'_> {
             moved(point.place()).0.dot(&contact.gradient)
         }));
         self.slips_to(moved, &mut slips);
-        let slope = |part: f64| -> f64 {
-            let each = self.cache.foreseen.iter().zip(&ends).map(|(contact, end)| {
-                let way = end - contact.change_mm;
-                let there = contact.gap_mm + contact.change_mm + part * way;
-                let carried = contact.carried_n + part * (contact.linear_n(*end) - contact.carried_n);
-                (contact.spring_n_per_mm * there.min(0.0) - carried) * way
-            });
-            each.sum::<f64>() + self.slipping_slope(&slips, part)
-        };
-        let part = falls_until(slope).min(most);
+        self.cache.ends = (ends, slips);
+    }
+
+    /// See [`Contacts::slope_towards`](crate::solve::Contacts::slope_towards).
+    pub(super) fn slope_towards_contacts(&self, part: f64) -> f64 {
+        let (ends, slips) = &self.cache.ends;
+        let each = self.cache.foreseen.iter().zip(ends).map(|(contact, end)| {
+            let way = end - contact.change_mm;
+            let there = contact.gap_mm + contact.change_mm + part * way;
+            let carried = contact.carried_n + part * (contact.linear_n(*end) - contact.carried_n);
+            (contact.spring_n_per_mm * there.min(0.0) - carried) * way
+        });
+        each.sum::<f64>() + self.slipping_slope(slips, part)
+    }
+
+    /// See [`Contacts::go_towards`](crate::solve::Contacts::go_towards).
+    pub(super) fn go_towards_contacts(&mut self, part: f64) {
+        let (ends, slips) = std::mem::take(&mut self.cache.ends);
         for (contact, end) in self.cache.foreseen.iter_mut().zip(&ends) {
             contact.carried_n += part * (contact.linear_n(*end) - contact.carried_n);
         }
         self.carry_slipping(&slips, part);
         self.cache.ends = (ends, slips);
-        part
     }
 }

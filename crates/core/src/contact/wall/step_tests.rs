@@ -1,10 +1,10 @@
 //! Steps of Newton's method on a wall: what they do to contacts and to friction.
 
-use super::model::falls_until;
 use super::tests::{RADIUS_MM, rod, straight};
 use super::*;
 use crate::contact::{ContactSurface, HandMotion};
 use crate::rod::{Assembly, PLAIN, Supports};
+use crate::solve::contacts::falls_until;
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
 
 /// A wall and a force on the tip; where it is not `foreseeing`, Newton's method is told nothing of the contacts at the end of a step.
@@ -48,8 +48,14 @@ impl Contacts for Pushed<'_> {
     ) -> usize {
         if self.foreseeing { self.wall.press_or_let_go(elements, base, moved, into) } else { 0 }
     }
-    fn part_towards(&mut self, moved: &Moved<'_>, most: f64) -> f64 {
-        self.wall.part_towards(moved, most)
+    fn look_towards(&mut self, moved: &Moved<'_>) {
+        self.wall.look_towards(moved);
+    }
+    fn slope_towards(&mut self, part: f64) -> f64 {
+        self.wall.slope_towards(part)
+    }
+    fn go_towards(&mut self, part: f64) {
+        self.wall.go_towards(part);
     }
     fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
         self.wall.merit(moved)

@@ -6,7 +6,7 @@
 use super::configuration::Start;
 use super::extrapolation::Correction;
 use super::mesh::Mesh;
-use crate::contact::{HandMotion, WallContact};
+use crate::contact::{HandMotion, SelfContact, WallContact};
 use crate::rod::RodState;
 
 /// The candidates.
@@ -30,11 +30,12 @@ impl Guess {
         self.room_mm.reserve((elements + 1).saturating_sub(self.room_mm.len()));
     }
 
-    /// Replaces the slid device in `state` by one that repeats what was learnt, unless that is beyond the wall. Returns whether what it is
+    /// Replaces the slid device in `state` by one that repeats what was learnt, unless that is beyond the wall or has gone through itself. Returns whether what it is
     /// now is not.
     pub(super) fn choose(
         &mut self,
         contact: &mut WallContact<'_>,
+        mut loops: Option<&mut SelfContact>,
         (start, mesh, state): (Start<'_>, &Mesh, &mut RodState),
     ) -> bool {
         self.slid.copy_from(state);
@@ -48,7 +49,9 @@ impl Guess {
                 correction.transfer(start.mesh, mesh, &mut self.learnt);
                 self.learnt.apply(factor, elements, state);
             }
-            if !contact.is_outside(elements, state) {
+            let mut crosses =
+                || loops.as_deref_mut().is_some_and(|loops| loops.crosses(elements, &self.slid, state));
+            if !contact.is_outside(elements, state) && !crosses() {
                 return true;
             }
             state.copy_from(&self.slid);

@@ -32,6 +32,9 @@ mod inner_friction;
 #[cfg(test)]
 mod inner_friction_tests;
 mod lateral;
+mod loops;
+#[cfg(test)]
+mod loops_tests;
 mod mesh;
 #[cfg(test)]
 mod motion_tests;
@@ -55,7 +58,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::{ContactSurface, Counters, MovedWall};
+use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching};
 use crate::device::line_mm;
 use crate::methods::{Command, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
@@ -82,6 +85,9 @@ pub struct KirchhoffOptions {
     /// Most distance of contact points, in radii of the device. At 1.5 a sharp crest between two of them is felt when it is two thirds of a
     /// radius from the axis, above 2 it may not be felt at all. On walls without sharp crests a few radii save time for little.
     pub contact_spacing_radii: f64,
+    /// Whether loops of the device touch each other. Off: most vessels are too narrow for a device to come back to itself in them, and
+    /// where it cannot, nothing is gained by looking; on wherever a loop has room.
+    pub self_contact: bool,
 }
 
 impl KirchhoffOptions {
@@ -98,6 +104,7 @@ impl Default for KirchhoffOptions {
             tolerance: 1e-9,
             max_iterations: 500,
             contact_spacing_radii: Fineness::CONTACT_SPACING_RADII,
+            self_contact: false,
         }
     }
 }
@@ -218,6 +225,15 @@ impl<const C: usize> Kirchhoff<C> {
                 ),
             ));
         }
+        if options.self_contact && surroundings.stack.is_several() {
+            let mend = "loops of several instruments on one line do not feel each other yet: leave it out";
+            return Err(Error::parameter("method.self_contact", true, mend));
+        }
+        if options.self_contact && surroundings.motion.is_some() {
+            let mend =
+                "a vessel that moves may take loops along through each other: leave it or vessel.motion out";
+            return Err(Error::parameter("method.self_contact", true, mend));
+        }
         if options.max_iterations == 0 {
             return Err(Error::parameter("method.max_iterations", 0, "allow at least one"));
         }
@@ -314,6 +330,19 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let pressing = lateral::pressing(&mesh, rod, &report.contacts);
         let line = Line { stack: surroundings.stack, mesh: &mesh, rod, pressing: &pressing, inner_friction };
         lateral::lateral_forces::<C>(&line, instrument)
+    }
+
+    fn touching(&self, surroundings: &Surroundings<'_>) -> Vec<Touching> {
+        if !self.options.self_contact {
+            return Vec::new();
+        }
+        let environment = Environment::new(surroundings, &self.surface, &self.options);
+        let mut hands = Vec::new();
+        hands::read(&self.state.report, &mut hands);
+        let mut mesh = Mesh::default();
+        meshed(&environment, &hands, &mut mesh);
+        let mut loops = SelfContact::new(&mesh.elements, loops::skins(&mesh).collect());
+        loops.touching_at(&mesh.elements, &self.state.rod)
     }
 
     fn state(&self) -> State {

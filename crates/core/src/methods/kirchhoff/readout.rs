@@ -49,6 +49,9 @@ impl<const C: usize> Tools<C> {
             report.max_penetration_mm = report.max_penetration_mm.max(touch.contact.penetration_mm);
             report.contacts.push(touch.contact);
         }
+        if environment.options.self_contact {
+            report.energy.wall += self.loops.stored_mj();
+        }
         let drag = surroundings.flow.map(|_| &self.drag);
         report.drag_n = drag.map_or_else(Vec3::zeros, Drag::total_n);
         let clamp = Clamp::new::<C>(&self.newton.start_residual, rod);

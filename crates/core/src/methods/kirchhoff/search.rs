@@ -17,8 +17,9 @@
 //! the cones of Coulomb's law of its own normal forces: where a slow motion with friction comes to rest.
 
 use super::guess::Guess;
+use super::loops;
 use super::substep::Effort;
-use crate::contact::{SETTLED, WallContact};
+use crate::contact::{SETTLED, SelfContact, WallContact};
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{Newton, NewtonOptions, NewtonReport};
@@ -43,6 +44,8 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     pub(super) newton: &'a mut Newton<C>,
     pub(super) guess: &'a mut Guess,
     pub(super) contact: &'a mut WallContact<'b>,
+    /// What the device's loops do to each other, if they touch.
+    pub(super) loops: Option<&'a mut SelfContact>,
     pub(super) supports: &'a mut Supports,
     pub(super) elements: &'a [ElementData],
     /// The prediction, and then what was found.
@@ -109,7 +112,9 @@ impl<const C: usize> Search<'_, '_, C> {
         let most = if self.effort == Effort::Flight { MOST_MOVING } else { MOST_NEAR };
         let max_iterations = most.min(self.most.saturating_sub(self.iterations));
         let options = NewtonOptions { max_iterations, tolerance: self.tolerance, ..NewtonOptions::default() };
-        let found = self.newton.solve(self.elements, self.supports, self.contact, self.state, &options);
+        let mut outside = loops::outside(self.contact, self.loops.as_deref_mut());
+        let found = self.newton.solve(self.elements, self.supports, &mut outside, self.state, &options);
+        drop(outside);
         self.iterations += found.iterations;
         found
     }

@@ -4,6 +4,7 @@ use super::balance::Balance;
 use super::carried::{Passage, WallWork};
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, motions};
+use super::loops::{is_in_its_own_way, skins};
 use super::mesh::Mesh;
 use super::search::Search;
 use super::state::KirchhoffState;
@@ -49,7 +50,7 @@ pub(super) struct Found {
 /// Why a part came to nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Lost {
-    /// The prediction is on the other side of the wall.
+    /// The prediction is on the other side of the wall, or of the device itself.
     Beyond,
     /// What was found is.
     Passed,
@@ -62,7 +63,7 @@ pub(super) enum Lost {
 impl std::fmt::Display for Lost {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Beyond => f.write_str("the device would be predicted beyond the wall"),
+            Self::Beyond => f.write_str("the device would be predicted beyond the wall or through itself"),
             Self::Passed => f.write_str("the device would pass through the wall"),
             Self::Unbalanced => f.write_str("more energy is stored and taken by friction than was put in"),
             Self::Unsolved(reason, residual) => write!(f, "{reason} (residual {residual:.1e})"),
@@ -149,9 +150,17 @@ impl<const C: usize> Tools<C> {
         let (cache, friction) = (&mut self.cache, &mut self.friction);
         let mut contact = WallContact::new(environment.wall(), &mesh.points, cache, friction, softest_nmm2);
         let slid_mj = contact.begin_drag(surroundings.flow, &mut self.drag, &mesh.elements, rod);
-        let inside = self.guess.choose(&mut contact, (start, &*mesh, &mut *rod));
+        let mut loops = options.self_contact.then_some(&mut self.loops);
+        let mut in_its_own_way = false;
+        if let Some(loops) = &mut loops {
+            loops.renew(&mesh.elements, skins(mesh));
+            let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
+            in_its_own_way = is_in_its_own_way(loops, mesh, rod, advance_mm);
+        }
+        let guessed = self.guess.choose(&mut contact, loops.as_deref_mut(), (start, &*mesh, &mut *rod));
+        let inside = guessed && !in_its_own_way;
         let near = effort != Effort::Flight;
-        if near && !inside {
+        if in_its_own_way || (near && !inside) {
             self.counters.add(&contact.count());
             return Err(Lost::Beyond);
         }
@@ -163,6 +172,7 @@ impl<const C: usize> Tools<C> {
             newton: &mut self.newton,
             guess: &mut self.guess,
             contact: &mut contact,
+            loops,
             supports: &mut supports,
             elements: &mesh.elements,
             state: rod,

@@ -6,7 +6,7 @@ use super::hands::{Hand, Way};
 use super::mesh::Mesh;
 use super::state::KirchhoffState;
 use super::{Environment, meshed};
-use crate::contact::{ContactCache, Counters, Drag, Friction, Touch};
+use crate::contact::{ContactCache, Counters, Drag, Friction, SelfContact, Touch};
 use crate::solve::Newton;
 
 /// The workspace of a simulation.
@@ -34,6 +34,8 @@ pub(super) struct Tools<const C: usize> {
     pub(super) cache: ContactCache,
     /// What the flow does along the device.
     pub(super) drag: Drag,
+    /// What its loops do to each other; nothing is known of them where they do not touch.
+    pub(super) loops: SelfContact,
     /// Points that press in the equilibrium found last, and what happens there.
     pub(super) touches: Vec<(usize, Touch)>,
     /// What the sub-steps of the command took.
@@ -71,6 +73,7 @@ impl<const C: usize> Workspace<C> {
             friction: Friction::new(surroundings.properties.largest_friction()),
             cache: ContactCache::new(environment.surface),
             drag: Drag::default(),
+            loops: SelfContact::default(),
             touches: Vec::new(),
             work: Work::default(),
             counters: Counters::default(),

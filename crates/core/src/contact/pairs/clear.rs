@@ -1,0 +1,120 @@
+//! Rods that cannot touch themselves where they are, and those that are clear of themselves.
+//!
+//! A curve whose tangent turns by less than K < π between two points has a chord of at least cos(K/2) of the arc between them (A. Schur, Math. Ann. 83 (1921)).
+//! Two pieces that touch are at least half a turn of the rod's radius apart along it; a rod that turns by less than two radians in all would have to lie within
+//! its own thickness between them. So most devices are asked for their tangents alone.
+//!
+//! Where no two pieces are nearer than 8 D, and no point has moved since by more than 3/4 D, none are nearer than 6½ D, and no step among such places brings two nearer
+//! by more than half of that.
+
+use super::{CLEAR, SelfContact, tree};
+use crate::Vec3;
+use crate::rod::{ElementData, RodState};
+
+/// Turn of a rod, rad, up to which nothing of it touches itself.
+const TURN: f64 = 2.0;
+/// Part of the distance of touch by which points may move where nothing was near.
+const FREE: f64 = 0.75;
+/// The largest of ξ (1 − ξ)².
+const BULGE: f64 = 4.0 / 27.0;
+
+/// Places and tangents of nodes where nothing was near.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Clear {
+    nodes: Vec<(Vec3, Vec3)>,
+}
+
+impl Clear {
+    fn of(state: &RodState) -> Self {
+        let nodes = state.positions.iter().zip(&state.frames);
+        Self { nodes: nodes.map(|(x, frame)| (*x, frame.t)).collect() }
+    }
+
+    /// Whether no point of a rod has moved by more than this to another state, mm.
+    fn holds(&self, elements: &[ElementData], state: &RodState, most_mm: f64) -> bool {
+        let moved = |(x, t): &(Vec3, Vec3), i: usize| {
+            ((state.positions[i] - x).norm(), (state.frames[i].t - t).norm())
+        };
+        let mut last = self.nodes.first().map_or((0.0, 0.0), |node| moved(node, 0));
+        self.nodes.len() == state.positions.len()
+            && self.nodes.iter().enumerate().skip(1).all(|(i, node)| {
+                let here = moved(node, i);
+                let most = last.0.max(here.0) + BULGE * elements[i - 1].length * (last.1 + here.1);
+                last = here;
+                most <= most_mm
+            })
+    }
+}
+
+/// Whether a rod is bent so little that it cannot touch itself.
+fn is_open(state: &RodState) -> bool {
+    let turns = state.frames.windows(2).zip(&state.chords).map(|(ends, chord)| {
+        let along = chord / chord.norm();
+        (along - ends[0].t).norm() + (ends[1].t - along).norm()
+    });
+    // The chord of a turn is no longer than it, and shorter by a twentieth at most where it is a radian.
+    1.05 * turns.sum::<f64>() < TURN
+}
+
+impl SelfContact {
+    /// Whether nothing is near, at the base and at a state, and no step between them leads by anything.
+    pub(super) fn stays_clear(&self, elements: &[ElementData], state: &RodState) -> bool {
+        let most_mm = FREE * 2.0 * self.largest_radius_mm;
+        self.pairs.is_empty()
+            && self.clear.as_ref().is_some_and(|clear| {
+                (clear.nodes.is_empty() && is_open(state)) || clear.holds(elements, state, most_mm)
+            })
+    }
+
+    /// Looks whether anything is near at a base. Returns whether nothing is.
+    pub(super) fn look_whether_clear(&mut self, elements: &[ElementData], state: &RodState) -> bool {
+        if self.closed {
+            return false;
+        }
+        if is_open(state) {
+            self.clear = Some(Clear::default());
+            return true;
+        }
+        let most_mm = FREE * 2.0 * self.largest_radius_mm;
+        let known = self.clear.as_ref().filter(|clear| !clear.nodes.is_empty());
+        if known.is_some_and(|clear| clear.holds(elements, state, most_mm)) {
+            return true;
+        }
+        self.clear = None;
+        self.place_tree(elements);
+        self.counters.searches += 1;
+        self.tree.near(CLEAR * 2.0 * self.largest_radius_mm, self.apart_mm(), &mut self.near);
+        if self.near.is_empty() {
+            self.clear = Some(Clear::of(state));
+        }
+        self.near.is_empty()
+    }
+
+    /// Whether the last `advance_mm` of the rod, pushed straight ahead, would run into the rest of it: come nearer to an axis than half of the distance of touch.
+    pub(crate) fn blocks_its_tip(
+        &mut self,
+        elements: &[ElementData],
+        state: &RodState,
+        advance_mm: f64,
+    ) -> bool {
+        if advance_mm <= 0.0 || self.skins.is_empty() || is_open(state) {
+            return false;
+        }
+        self.is_placed = false;
+        self.tree.place(&super::Curve { elements, state, closed: false });
+        let tip = state.positions[elements.len()];
+        let from = tip - state.frames[elements.len()].t * advance_mm;
+        self.tree.is_near_segment((&from, &tip), advance_mm + self.apart_mm(), self.largest_radius_mm)
+    }
+
+    /// Whether the way from one state to another leads through the rod itself.
+    pub(crate) fn crosses(&mut self, elements: &[ElementData], from: &RodState, to: &RodState) -> bool {
+        if self.skins.is_empty() || (is_open(from) && is_open(to)) {
+            return false;
+        }
+        self.is_placed = false;
+        self.tree.place(&super::Curve { elements, state: from, closed: self.closed });
+        self.tree.move_to(&super::Curve { elements, state: to, closed: self.closed });
+        self.tree.safe_part(tree::half_turn(self.largest_radius_mm)) < 1.0
+    }
+}

@@ -1,0 +1,148 @@
+//! What pairs exert: on the system of a step, in the merit along it, and as it is told.
+
+use super::curve::Curve;
+use super::gap::Gap;
+use super::{Pair, SelfContact};
+use crate::Vec3;
+use crate::contact::force::merit;
+use crate::rod::{Couple, ElementData, RodState, Stencils};
+use crate::solve::{ContactMerit, Moved};
+
+/// Roundings of a coordinate by which a distance is off.
+const ROUNDING: f64 = 4.0;
+
+/// Where a rod presses on itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touching {
+    /// Arc lengths of the two points from the first node, mm.
+    pub arcs_mm: [f64; 2],
+    /// Where they are, mm.
+    pub positions_mm: [Vec3; 2],
+    /// From the second to the first, unit length.
+    pub normal: Vec3,
+    /// Force by which the first is pushed along it, and the second against it, N.
+    pub force_n: f64,
+    /// Depth of the surfaces in each other, mm.
+    pub penetration_mm: f64,
+}
+
+impl SelfContact {
+    /// Adds what presses at the base.
+    pub(super) fn press(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+        let curve = self.curve(elements, state);
+        self.rounding_n = 0.0;
+        for pair in self.pairs.iter().filter(|pair| pair.at_base) {
+            let depth_mm = pair.depth_mm();
+            into.add_value(0.5 * pair.spring_n_per_mm * depth_mm.max(0.0).powi(2));
+            let farthest_mm =
+                pair.gap.at.map(|p| state.positions[p.element].amax()).into_iter().fold(0.0, f64::max);
+            self.rounding_n =
+                self.rounding_n.max(ROUNDING * f64::EPSILON * pair.spring_n_per_mm * farthest_mm);
+            let force_n = pair.spring_n_per_mm * depth_mm;
+            let couple = pair.couple(&curve, -force_n, pair.force_n, pair.spring_n_per_mm);
+            into.add_couple(elements, state, &couple);
+        }
+    }
+
+    /// Merit of all pairs at a state, or what they store there if no forces are aimed at, mJ.
+    pub(super) fn stored_or_merit_mj(&self, elements: &[ElementData], state: &RodState) -> f64 {
+        let curve = self.curve(elements, state);
+        let of = |pair: &Pair| {
+            let [_, to] = pair.gap.at;
+            let gap = Gap::find(&curve, self.sites[pair.site].place, pair.gap.slide, to, pair.touch_mm);
+            let depth_mm = pair.touch_mm - gap.distance;
+            if !self.aimed {
+                return 0.5 * pair.spring_n_per_mm * depth_mm.max(0.0).powi(2);
+            }
+            let force_n = if pair.foreseen { pair.aim_n } else { 0.0 };
+            if force_n == 0.0 && depth_mm <= 0.0 {
+                return 0.0;
+            }
+            merit(pair.spring_n_per_mm, pair.penalty_n_per_mm, force_n, depth_mm).0
+        };
+        self.pairs.iter().map(of).sum()
+    }
+
+    /// See [`Contacts::merit`](crate::solve::Contacts::merit).
+    pub(super) fn aim(&mut self, moved: &Moved<'_>) -> ContactMerit {
+        let mut sum = ContactMerit::default();
+        for pair in self.pairs.iter_mut().filter(|pair| pair.foreseen) {
+            pair.change_mm = pair.change(moved);
+            // What the rod's own stiffness is in balance with, which is κ (p − ∇G·δx) where the contacts at the end are found.
+            pair.aim_n = (-pair.carried_n).max(0.0);
+            let (kappa, rho, depth_mm) = (pair.spring_n_per_mm, pair.penalty_n_per_mm, pair.depth_mm());
+            let (value_mj, force_n, _) = merit(kappa, rho, pair.aim_n, depth_mm);
+            let (assembled_n, stored_mj) = if pair.at_base {
+                (kappa * depth_mm, 0.5 * kappa * depth_mm.max(0.0).powi(2))
+            } else {
+                (0.0, 0.0)
+            };
+            sum.slope_mj += (assembled_n - force_n) * pair.change_mm;
+            sum.excess_mj += value_mj - stored_mj;
+            sum.size_mj += value_mj.abs() + pair.aim_n * pair.aim_n / rho;
+        }
+        self.aimed = true;
+        sum
+    }
+
+    /// Lets pairs go that pull by more than this part of what the others press with. Returns whether there are none.
+    pub(super) fn let_go_of_pulling(&mut self, tolerance: f64) -> bool {
+        let (mut pull_n, mut press_n) = (0.0, 0.0);
+        for pair in self.pairs.iter().filter(|pair| pair.at_base) {
+            let force_n = pair.spring_n_per_mm * pair.depth_mm();
+            pull_n -= force_n.min(0.0);
+            press_n += force_n.max(0.0);
+        }
+        if pull_n <= tolerance * press_n {
+            return true;
+        }
+        for pair in self.pairs.iter_mut().filter(|pair| pair.depth_mm() < 0.0) {
+            pair.force_n = 0.0;
+        }
+        false
+    }
+
+    /// What is stored at the base, mJ.
+    pub(crate) fn stored_mj(&self) -> f64 {
+        let of = |pair: &Pair| 0.5 * pair.spring_n_per_mm * pair.depth_mm().max(0.0).powi(2);
+        self.pairs.iter().map(of).sum()
+    }
+
+    /// Where the rod presses on itself at a state that nothing is known of.
+    pub fn touching_at(&mut self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
+        self.look_at_base(elements, state);
+        self.touching(elements, state)
+    }
+
+    /// Where the rod presses on itself at the base: at the last state of a solution.
+    pub fn touching(&self, elements: &[ElementData], state: &RodState) -> Vec<Touching> {
+        let curve = self.curve(elements, state);
+        let of = |pair: &Pair| Touching {
+            arcs_mm: pair.gap.at.map(|place| self.tree.arc(place.element, place.xi)),
+            positions_mm: pair.gap.at.map(|place| curve.jet(place).at),
+            normal: pair.gap.between / pair.gap.between.norm(),
+            force_n: pair.spring_n_per_mm * pair.depth_mm() * pair.gap.direction().norm(),
+            penetration_mm: pair.touch_mm - pair.gap.between.norm(),
+        };
+        self.pairs.iter().filter(|pair| pair.at_base && pair.depth_mm() > 0.0).map(of).collect()
+    }
+}
+
+impl Pair {
+    /// Derivatives of an energy whose first and second in the gap are `first` and `second`, with the curvature of the gap under a force.
+    pub(super) fn couple(&self, curve: &Curve<'_>, first: f64, force_n: f64, second: f64) -> Couple {
+        let mut of = self.gap.derivatives(curve);
+        for k in 0..of.gradient.len() {
+            for l in k..of.gradient.len() {
+                let along = of.gradient[k] * (second * of.gradient[l].transpose());
+                of.hessian[k][l] = along - of.hessian[k][l] * force_n;
+            }
+        }
+        Couple {
+            elements: self.gap.at.map(|place| place.element),
+            gradient: of.gradient.map(|g| g * first),
+            carried: of.gradient.map(|g| g * -force_n),
+            hessian: of.hessian,
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! How far a site is from another stretch of the rod.
+//!
+//! A site is a quadrature point sᵢ of the rod. Its distance G from a stretch B is that from B's nearest point, the site itself being free to slide along its own
+//! centre line A against a weak spring,
+//!
+//! ```text
+//! ½ G² = min Φ,    Φ(s, t) = ½ |A(s) − B(t)|² + ½ ε (s − sᵢ)²
+//! ```
+//!
+//! (the Moreau envelope of the squared distance along A: J.-J. Moreau, Bull. Soc. Math. France 93 (1965)). Where the two are parallel, Φ
+//! has one minimum for each site, at s = sᵢ, and sites add up to the integral of a line contact. Where they cross at an angle α, the sites near the crossing find the crossing itself, their forces act there, and
+//! G² = d² + ε sin²α (sᵢ − s)²/(ε + sin²α) hardly depends on where sites lie: what are two formulations elsewhere, for lines and for points
+//! (C. Meier, W. A. Wall, A. Popp, *A unified approach for beam-to-beam contact*, CMAME 315 (2017)), is one.
+//!
+//! With r = A − B and q the eight vectors that both points depend on, r = Σ cₖ qₖ, the minimum depends on q by
+//!
+//! ```text
+//! G ∂G/∂qₖ = cₖ r
+//! ∂²(½G²)/∂qₖ∂qₗ = cₖ cₗ I − Σ Φ_ka (Φ_ab)⁻¹ Φ_lb,    Φ_ks = cₖ′ r + cₖ A′,  Φ_kt = cₖ′ r − cₖ B′
+//! ```
+//!
+//! with a, b among s and t as far as they are free: not at an end of the rod, and s within a window about sᵢ.
+
+use nalgebra::Matrix3;
+
+use super::curve::{Curve, Jet, Place, slopes};
+use crate::Vec3;
+use crate::rod::couples::PLACES;
+use crate::rod::quadrature::hermite;
+
+/// ε. Sites at a crossing differ in depth by ε/4 of their distance squared over that of the axes; arcs that are bent away from each other by more than ε over
+/// that distance are felt at their ends alone.
+const SLIDE: f64 = 0.1;
+/// Most of a site's slide, over the distance at which surfaces touch.
+const WINDOW: f64 = 2.0;
+/// Steps to the minimum.
+const STEPS: usize = 40;
+/// A step this short, over the distance of touch, is the last: the next would be its square.
+const SHORT: f64 = 1e-9;
+/// A Hessian with less than this part of the stiffness of straight lines is none of a minimum.
+const CONVEX: f64 = 1e-3;
+
+/// Second derivatives of Φ in s and t.
+type Stiffness = [f64; 3];
+
+/// The nearest points of a site and of another stretch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::contact) struct Gap {
+    /// Where both are.
+    pub(super) at: [Place; 2],
+    /// s − sᵢ.
+    pub(super) slide: f64,
+    /// Which of s and t are free.
+    free: [bool; 2],
+    /// From B to A.
+    pub(super) between: Vec3,
+    /// G.
+    pub(super) distance: f64,
+}
+
+/// First and second derivatives of a gap.
+pub(super) struct Derivatives {
+    pub(super) gradient: [Vec3; PLACES],
+    pub(super) hessian: [[Matrix3<f64>; PLACES]; PLACES],
+}
+
+/// Φ and its derivatives at s and t.
+struct Value {
+    phi: f64,
+    slope: [f64; 2],
+    stiffness: Stiffness,
+    straight: Stiffness,
+    between: Vec3,
+}
+
+fn value(a: &Jet, b: &Jet, slide: f64) -> Value {
+    let r = a.at - b.at;
+    let straight = [a.first.norm_squared() + SLIDE, -a.first.dot(&b.first), b.first.norm_squared()];
+    Value {
+        phi: 0.5 * (r.norm_squared() + SLIDE * slide * slide),
+        slope: [r.dot(&a.first) + SLIDE * slide, -r.dot(&b.first)],
+        stiffness: [straight[0] + r.dot(&a.second), straight[1], straight[2] - r.dot(&b.second)],
+        straight,
+        between: r,
+    }
+}
+
+/// Inverse of the free part; `None` where that is not convex.
+fn inverse([ss, st, tt]: Stiffness, free: [bool; 2]) -> Option<Stiffness> {
+    match free {
+        [true, true] => {
+            let det = ss * tt - st * st;
+            (ss > CONVEX && tt > CONVEX && det > CONVEX * SLIDE).then(|| [tt / det, -st / det, ss / det])
+        }
+        [true, false] => (ss > CONVEX).then(|| [1.0 / ss, 0.0, 0.0]),
+        [false, true] => (tt > CONVEX).then(|| [0.0, 0.0, 1.0 / tt]),
+        [false, false] => Some([0.0; 3]),
+    }
+}
+
+impl Gap {
+    /// That of a site from the stretch about a place, as near as a descent from a slide and that place leads. `touch` is the distance at which surfaces touch.
+    pub(super) fn find(curve: &Curve<'_>, site: Place, slide: f64, to: Place, touch: f64) -> Self {
+        let window = WINDOW * touch;
+        let at = |slide: f64| curve.walk(site, slide);
+        let mut slide = slide.clamp(-window, window);
+        let mut places = [at(slide), to];
+        let mut free = [true; 2];
+        let mut jets = places.map(|place| curve.jet(place));
+        let mut now = value(&jets[0], &jets[1], slide);
+        for _ in 0..STEPS {
+            let held = |down: f64, place: Place| down != 0.0 && curve.ends(place, down.signum());
+            let down = now.slope.map(|slope| -slope);
+            free = [
+                !(held(down[0], places[0]) || (slide.abs() >= window && down[0] * slide > 0.0)),
+                !held(down[1], places[1]),
+            ];
+            let Some([ss, st, tt]) = inverse(now.stiffness, free).or_else(|| inverse(now.straight, free))
+            else {
+                break;
+            };
+            let mut step = [ss * down[0] + st * down[1], st * down[0] + tt * down[1]];
+            let size = step[0].abs().max(step[1].abs());
+            if size > 2.0 * touch {
+                step = step.map(|s| s * 2.0 * touch / size);
+            }
+            let mut part = 1.0;
+            loop {
+                let there = (slide + part * step[0]).clamp(-window, window);
+                let next = [at(there), curve.walk(places[1], part * step[1])];
+                let reached = next.map(|place| curve.jet(place));
+                let then = value(&reached[0], &reached[1], there);
+                if then.phi <= now.phi || part < 1e-3 || size <= SHORT * touch {
+                    (slide, places, jets, now) = (there, next, reached, then);
+                    break;
+                }
+                part *= 0.5;
+            }
+            if size <= SHORT * touch {
+                break;
+            }
+        }
+        let _ = jets;
+        Self { at: places, slide, free, between: now.between, distance: (2.0 * now.phi).sqrt() }
+    }
+
+    /// The weights of the eight vectors in r.
+    pub(super) fn weights(&self) -> [f64; PLACES] {
+        let [a, b] = self.at.map(|place| hermite(place.xi));
+        [a[0], a[1], a[2], a[3], -b[0], -b[1], -b[2], -b[3]]
+    }
+
+    /// r/G: along it the two are pushed apart.
+    pub(super) fn direction(&self) -> Vec3 {
+        self.between / self.distance
+    }
+
+    /// Derivatives of G.
+    pub(super) fn derivatives(&self, curve: &Curve<'_>) -> Derivatives {
+        let [a, b] = self.at.map(|place| curve.jet(place));
+        let now = value(&a, &b, self.slide);
+        let r = self.between;
+        let c = self.weights();
+        let [ca, cb] = self.at.map(|place| slopes(place.xi, curve.elements[place.element].length));
+        let mut by_s = [Vec3::zeros(); PLACES];
+        let mut by_t = [Vec3::zeros(); PLACES];
+        for k in 0..PLACES {
+            by_s[k] = a.first * c[k];
+            by_t[k] = -b.first * c[k];
+            if k < 4 {
+                by_s[k] += r * ca[k];
+            } else {
+                by_t[k] -= r * cb[k - 4];
+            }
+        }
+        let [ss, st, tt] = inverse(now.stiffness, self.free)
+            .or_else(|| inverse(now.straight, self.free))
+            .unwrap_or_default();
+        let m = self.direction();
+        let gradient = c.map(|c| m * c);
+        let mut hessian = [[Matrix3::zeros(); PLACES]; PLACES];
+        for k in 0..PLACES {
+            let (s, t) = (by_s[k] * ss + by_t[k] * st, by_s[k] * st + by_t[k] * tt);
+            for l in k..PLACES {
+                let held = Matrix3::from_diagonal_element(c[k] * c[l])
+                    - s * by_s[l].transpose()
+                    - t * by_t[l].transpose()
+                    - gradient[k] * gradient[l].transpose();
+                hessian[k][l] = held / self.distance;
+            }
+        }
+        Derivatives { gradient, hessian }
+    }
+}

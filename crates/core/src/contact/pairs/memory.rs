@@ -1,0 +1,137 @@
+//! Which pairs there are at a base, and what is kept of those before.
+
+use super::curve::{Curve, Place};
+use super::gap::Gap;
+use super::{KNOWN, LOOKED_AT, Pair, SelfContact};
+use crate::contact::force::PENALTY;
+use crate::rod::{ElementData, RodState};
+
+/// A pair is that of the base before if its stretch is touched within this distance of where it was, over the distance of touch.
+const SAME: f64 = 2.0;
+/// Two finds this near to each other along the rod, over the distance of touch, are one.
+const TWICE: f64 = 1e-3;
+
+impl SelfContact {
+    /// Has a state be the base, and finds the pairs there.
+    pub(super) fn look_at_base(&mut self, elements: &[ElementData], state: &RodState) {
+        self.aimed = false;
+        self.checked.1 = f64::NAN;
+        self.base.copy_from(state);
+        self.is_placed = false;
+        if self.look_whether_clear(elements, state) {
+            self.pairs.clear();
+            return;
+        }
+        let curve = self.curve(elements, state);
+        self.place_tree(elements);
+        self.counters.searches += 1;
+        let reach_mm = LOOKED_AT * 2.0 * self.largest_radius_mm;
+        let mut near = std::mem::take(&mut self.near);
+        self.tree.near(reach_mm, self.apart_mm(), &mut near);
+        self.counters.elements += near.len() as u64;
+        std::mem::swap(&mut self.before, &mut self.pairs);
+        self.pairs.clear();
+        for (a, b) in &near {
+            self.find_between(&curve, *a, *b, reach_mm);
+            self.find_between(&curve, *b, *a, reach_mm);
+        }
+        self.near = near;
+        self.pairs.sort_by(|p, q| p.site.cmp(&q.site).then(p.arc_mm.total_cmp(&q.arc_mm)));
+        self.pairs.dedup_by(|q, p| p.site == q.site && (q.arc_mm - p.arc_mm).abs() < TWICE * p.touch_mm);
+        self.counters.pairs += self.pairs.len() as u64;
+        self.remember();
+    }
+
+    /// Finds the pairs of the sites of element `a` with element `b`: where the distance from a site to `b` has a minimum in it.
+    fn find_between(&mut self, curve: &Curve<'_>, a: usize, b: usize, reach_mm: f64) {
+        let elements = curve.elements;
+        let [from, to] = [0.0, 1.0].map(|xi| curve.jet(Place { element: b, xi }));
+        for site in self.first_sites[a]..self.first_sites[a + 1] {
+            let place = self.sites[site].place;
+            let x = curve.jet(place).at;
+            let rises = |end: &super::curve::Jet| -(x - end.at).dot(&end.first);
+            let (down, up) = (rises(&from), rises(&to));
+            let starts_here = down < 0.0 || (b == 0 && up >= 0.0 && !curve.closed);
+            let ends_here = up >= 0.0 || (b + 1 == elements.len() && down < 0.0 && !curve.closed);
+            if !(starts_here && ends_here) {
+                continue;
+            }
+            let xi = if down < 0.0 && up > 0.0 { down / (down - up) } else { f64::from(u8::from(up < 0.0)) };
+            if (x - curve.jet(Place { element: b, xi }).at).norm() > reach_mm {
+                continue;
+            }
+            let touch_mm = self.skins[a].radius_mm + self.skins[b].radius_mm;
+            let gap = Gap::find(curve, place, 0.0, Place { element: b, xi }, touch_mm);
+            if gap.distance < KNOWN * touch_mm {
+                self.pairs.extend(self.pair(elements, site, gap, touch_mm));
+            }
+        }
+    }
+
+    /// The pair of a site with this gap, unless that is of its own stretch.
+    fn pair(&self, elements: &[ElementData], site: usize, gap: Gap, touch_mm: f64) -> Option<Pair> {
+        let [a, b] = gap.at.map(|place| place.element);
+        let [here_mm, arc_mm] = gap.at.map(|place| self.tree.arc(place.element, place.xi));
+        if a.abs_diff(b) < 2 || self.tree.between(here_mm, arc_mm) < self.apart_mm() {
+            return None;
+        }
+        let [one, other] = [a, b].map(|e| &self.skins[e]);
+        let softer = 2.0 / (1.0 / one.modulus_n_per_mm2 + 1.0 / other.modulus_n_per_mm2);
+        let weight_mm = 0.5 * self.sites[site].weight_mm;
+        let element = &elements[a];
+        Some(Pair {
+            site,
+            gap,
+            touch_mm,
+            spring_n_per_mm: weight_mm * softer,
+            penalty_n_per_mm: weight_mm * element.bending[1] * PENALTY / element.length.powi(4),
+            arc_mm,
+            force_n: 0.0,
+            at_base: false,
+            presses: false,
+            foreseen: false,
+            change_mm: 0.0,
+            end_mm: 0.0,
+            carried_n: 0.0,
+            aim_n: 0.0,
+        })
+    }
+
+    /// Gives pairs the forces that they had at the base before, and has those press that do.
+    fn remember(&mut self) {
+        for pair in &mut self.pairs {
+            let first = self.before.partition_point(|old| old.site < pair.site);
+            let same = self.before[first..].iter().take_while(|old| old.site == pair.site);
+            let nearest =
+                same.min_by(|p, q| (p.arc_mm - pair.arc_mm).abs().total_cmp(&(q.arc_mm - pair.arc_mm).abs()));
+            let kept = nearest.filter(|old| (old.arc_mm - pair.arc_mm).abs() < SAME * pair.touch_mm);
+            pair.force_n = kept.map_or(0.0, |old| old.force_n);
+            pair.at_base = pair.force_n + pair.penalty_n_per_mm * pair.depth_mm() > 0.0;
+            pair.presses = pair.at_base;
+            if !pair.at_base {
+                pair.force_n = 0.0;
+            }
+        }
+    }
+
+    /// Has the hierarchy be that of the base.
+    pub(super) fn place_tree(&mut self, elements: &[ElementData]) {
+        if !std::mem::replace(&mut self.is_placed, true) {
+            self.tree.place(&Curve { elements, state: &self.base, closed: self.closed });
+        }
+    }
+
+    /// Part of the straight way from the base to a state in which no two stretches come too near to crossing.
+    pub(super) fn safe_part(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
+        let (known, part) = &self.checked;
+        if !part.is_nan() && known.positions == to.positions && known.frames == to.frames {
+            return *part;
+        }
+        self.place_tree(elements);
+        self.tree.move_to(&Curve { elements, state: to, closed: self.closed });
+        let part = self.tree.safe_part(self.apart_mm());
+        self.checked.0.copy_from(to);
+        self.checked.1 = part;
+        part
+    }
+}

@@ -1,0 +1,113 @@
+//! Gaps, pairs and their derivatives.
+
+use super::*;
+use crate::Vec3;
+use crate::rod::{Assembly, Frame, Layout, PLAIN, TWISTED};
+
+/// A rod along a curve, with nodes at equal steps of its parameter.
+pub(super) fn along(curve: impl Fn(f64) -> Vec3, to: f64, elements: usize) -> (Vec<ElementData>, RodState) {
+    let at = |i: f64| curve(to * i / elements as f64);
+    let tangent = |i: f64| (at(i + 1e-4) - at(i - 1e-4)).normalize();
+    let length = |e: usize| {
+        let parts = 64;
+        let place = |k: usize| at(e as f64 + k as f64 / parts as f64);
+        (0..parts).map(|k| (place(k + 1) - place(k)).norm()).sum()
+    };
+    let data: Vec<_> = (0..elements).map(|e| ElementData::plain(length(e), 1.0)).collect();
+    let frames = (0..=elements).map(|i| Frame::new(tangent(i as f64), None)).collect();
+    let mut state = RodState::from_frames(&data, curve(0.0), frames);
+    for (i, x) in state.positions.iter_mut().enumerate() {
+        *x = at(i as f64);
+    }
+    (data, state)
+}
+
+/// A coil of radius `wide` and this pitch.
+fn coil(wide: f64, pitch: f64) -> impl Fn(f64) -> Vec3 {
+    move |a: f64| Vec3::new(wide * a.cos(), wide * a.sin(), pitch * a / std::f64::consts::TAU)
+}
+
+/// A rod that goes over itself at an angle, `high` above.
+fn loop_over(high: f64) -> impl Fn(f64) -> Vec3 {
+    move |a: f64| {
+        let b = a - 2.5;
+        Vec3::new(1.6 * (1.3 * b).sin(), 0.9 * (2.6 * b).sin(), high * b / 2.4)
+    }
+}
+
+fn contact(elements: &[ElementData], radius_mm: f64) -> SelfContact {
+    SelfContact::new(elements, vec![Skin { radius_mm, modulus_n_per_mm2: 40.0 }; elements.len()])
+}
+
+fn derivatives_are_those_of_the_energy<const C: usize>(
+    elements: &[ElementData],
+    state: &RodState,
+    radius: f64,
+) {
+    let mut touching = contact(elements, radius);
+    let mut assembly = Assembly::<C>::new(elements.len());
+    touching.look_at_base(elements, state);
+    // Under the forces that the energy itself exerts.
+    for pair in &mut touching.pairs {
+        pair.force_n = if pair.at_base { pair.spring_n_per_mm * pair.depth_mm() } else { 0.0 };
+    }
+    touching.press(elements, state, &mut assembly);
+    assert!(touching.pairs.iter().filter(|pair| pair.at_base).count() > 3);
+    assert!(!assembly.couplings.is_empty());
+    let l = Layout::<C>;
+    let rows: Vec<usize> = (0..=elements.len())
+        .flat_map(|i| (0..5).map(move |a| if a < 3 { l.position(i) + a } else { l.tangent(i) + a - 3 }))
+        .collect();
+    let moved = |way: &[f64], h: f64| {
+        let mut to = state.clone();
+        for (i, w) in way.chunks_exact(5).enumerate() {
+            to.positions[i] += Vec3::new(w[0], w[1], w[2]) * h;
+            to.frames[i] = state.frames[i].transported(h * w[3], h * w[4]);
+        }
+        touching.stored_or_merit_mj(elements, &to)
+    };
+    for seed in 0..6 {
+        let way: Vec<f64> = (0..rows.len()).map(|k| (1.7 * f64::from(seed) + 2.3 * k as f64).sin()).collect();
+        let (h, here) = (1e-5, moved(&way, 0.0));
+        assert!((here - assembly.external_energy).abs() < 1e-12 * here);
+        let (plus, minus) = (moved(&way, h), moved(&way, -h));
+        let slope: f64 = rows.iter().zip(&way).map(|(row, w)| assembly.residual[*row] * w).sum();
+        let found = (plus - minus) / (2.0 * h);
+        assert!((found - slope).abs() < 1e-5 * (1.0 + slope.abs()), "direction {seed}: {found} and {slope}");
+        let mut curve = 0.0;
+        for (i, w) in rows.iter().zip(&way) {
+            for (j, v) in rows.iter().zip(&way) {
+                let block = Layout::<C>::BLOCK;
+                let near = (i / block).abs_diff(j / block) <= 1;
+                curve +=
+                    w * v * if near { assembly.matrix.get(*i, *j) } else { assembly.couplings.get(*i, *j) };
+            }
+        }
+        let found = (plus + minus - 2.0 * here) / (h * h);
+        assert!((found - curve).abs() < 1e-3 * (1.0 + curve.abs()), "direction {seed}: {found} and {curve}");
+    }
+}
+
+#[test]
+fn derivatives_are_those_of_the_energy_along_lines_and_at_crossings() {
+    let (elements, state) = along(coil(0.5, 0.19), 13.0, 40);
+    derivatives_are_those_of_the_energy::<PLAIN>(&elements, &state, 0.1);
+    derivatives_are_those_of_the_energy::<TWISTED>(&elements, &state, 0.1);
+    let (elements, state) = along(loop_over(0.09), 5.0, 30);
+    derivatives_are_those_of_the_energy::<PLAIN>(&elements, &state, 0.1);
+}
+
+#[test]
+fn a_crossing_is_felt_the_same_wherever_sites_lie() {
+    // The same crossing, cut into elements in other ways: the energy of a depth of a hundredth of the radius.
+    let energy = |elements: usize| {
+        let (elements, state) = along(loop_over(0.0826), 5.0, elements);
+        let mut touching = contact(&elements, 0.1);
+        touching.look_at_base(&elements, &state);
+        let force: f64 = touching.touching(&elements, &state).iter().map(|t| t.force_n).sum();
+        force
+    };
+    let all: Vec<f64> = (30..50).map(energy).collect();
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    assert!(mean > 0.0 && all.iter().all(|f| (f / mean - 1.0).abs() < 0.005), "{all:?}");
+}

@@ -1,0 +1,275 @@
+//! A hierarchy of boxes about the elements of a rod, in their order along it.
+//!
+//! Neighbours along the rod are neighbours in space, so halves of halves of it are as good a hierarchy as any. An element lies in the hull of its control points and, while these
+//! move along straight lines, so does its motion in the hull of theirs.
+
+use super::curve::Curve;
+use crate::Vec3;
+
+/// An element, or what it is moved by: four control points.
+pub(super) type Controls = [Vec3; 4];
+
+/// A box with its sides along the axes.
+#[derive(Debug, Clone, Copy)]
+struct Extent {
+    low: Vec3,
+    high: Vec3,
+}
+
+impl Extent {
+    const EMPTY: Self = Self {
+        low: Vec3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
+        high: Vec3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
+    };
+
+    fn of(points: &Controls) -> Self {
+        points.iter().fold(Self::EMPTY, |to, p| Self { low: to.low.inf(p), high: to.high.sup(p) })
+    }
+
+    fn with(&self, other: &Self) -> Self {
+        Self { low: self.low.inf(&other.low), high: self.high.sup(&other.high) }
+    }
+
+    /// Distance of the nearest points of two.
+    fn distance(&self, other: &Self) -> f64 {
+        (self.low - other.high).sup(&(other.low - self.high)).sup(&Vec3::zeros()).norm()
+    }
+
+    /// Distance of the farthest points of two.
+    fn span(&self, other: &Self) -> f64 {
+        (self.high - other.low).sup(&(other.high - self.low)).norm()
+    }
+}
+
+/// Boxes about stretches of a rod, and about their motions.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Tree {
+    controls: Vec<Controls>,
+    motions: Vec<Controls>,
+    /// Of each half: places and motions. The children of `i` are 2i + 1 and 2i + 2.
+    boxes: Vec<[Extent; 2]>,
+    /// Arc length at the begin of each element, and at the end of the last.
+    starts: Vec<f64>,
+    closed: bool,
+}
+
+/// A stretch of elements, and the number of its box.
+type Stretch = (usize, std::ops::Range<usize>);
+
+fn halves((at, range): &Stretch) -> [Stretch; 2] {
+    let middle = usize::midpoint(range.start, range.end);
+    [(2 * at + 1, range.start..middle), (2 * at + 2, middle..range.end)]
+}
+
+impl Tree {
+    /// That of a rod where it is, without a motion.
+    pub(super) fn place(&mut self, curve: &Curve<'_>) {
+        let n = curve.elements.len();
+        self.closed = curve.closed;
+        self.controls.clear();
+        self.controls.extend((0..n).map(|e| curve.controls(e)));
+        self.motions.clear();
+        self.motions.resize(n, [Vec3::zeros(); 4]);
+        self.starts.clear();
+        self.starts.push(0.0);
+        self.starts.extend(curve.elements.iter().scan(0.0, |s, e| {
+            *s += e.length;
+            Some(*s)
+        }));
+        self.boxes.clear();
+        self.boxes.resize(2 * n.next_power_of_two() * 2, [Extent::EMPTY; 2]);
+        self.enclose(&(0, 0..n));
+    }
+
+    /// Gives it the motion to where the rod is in another state.
+    pub(super) fn move_to(&mut self, curve: &Curve<'_>) {
+        for (e, motion) in self.motions.iter_mut().enumerate() {
+            let (to, from) = (curve.controls(e), &self.controls[e]);
+            *motion = [0, 1, 2, 3].map(|k| to[k] - from[k]);
+        }
+        self.enclose(&(0, 0..self.controls.len()));
+    }
+
+    fn enclose(&mut self, stretch: &Stretch) -> [Extent; 2] {
+        let found = if stretch.1.len() <= 1 {
+            let e = stretch.1.start;
+            let of = |list: &[Controls]| list.get(e).map_or(Extent::EMPTY, Extent::of);
+            [of(&self.controls), of(&self.motions)]
+        } else {
+            let [a, b] = halves(stretch).map(|half| self.enclose(&half));
+            [a[0].with(&b[0]), a[1].with(&b[1])]
+        };
+        self.boxes[stretch.0] = found;
+        found
+    }
+
+    /// Arc length from the first node to ξ of an element.
+    pub(super) fn arc(&self, e: usize, xi: f64) -> f64 {
+        self.starts[e] + xi * (self.starts[e + 1] - self.starts[e])
+    }
+
+    /// Whether two elements, the first before the second, are so far apart along the rod that they can touch.
+    fn may_touch(&self, a: usize, b: usize, apart: f64) -> bool {
+        let n = self.controls.len();
+        let around = self.starts[a] + self.starts[n] - self.starts[b + 1];
+        a + 1 < b
+            && self.starts[b] - self.starts[a + 1] >= apart
+            && !(self.closed && (a + n == b + 1 || around < apart))
+    }
+
+    /// Arc length between two places, the shorter way round of a closed rod.
+    pub(super) fn between(&self, a: f64, b: f64) -> f64 {
+        let apart = (a - b).abs();
+        if self.closed { apart.min(self.starts[self.controls.len()] - apart) } else { apart }
+    }
+
+    /// Elements (a, b), a before b, that may be nearer to each other than `reach`, and are at least `apart` from each other along the rod.
+    pub(super) fn near(&self, reach: f64, apart: f64, into: &mut Vec<(usize, usize)>) {
+        into.clear();
+        let is_near = |a: &Stretch, b: &Stretch| self.boxes[a.0][0].distance(&self.boxes[b.0][0]) < reach;
+        let mut leaf = |a: usize, b: usize| {
+            if self.may_touch(a, b, apart) && lower_distance(&self.controls[a], &self.controls[b]) < reach {
+                into.push((a, b));
+            }
+        };
+        self.visit_within(&(0, 0..self.controls.len()), &is_near, &mut leaf);
+    }
+
+    /// Whether an element at least `behind` from the rod's end comes nearer to a segment than `reach`.
+    pub(super) fn is_near_segment(&self, (from, to): (&Vec3, &Vec3), behind: f64, reach: f64) -> bool {
+        let n = self.controls.len();
+        let segment = [*from, from + (to - from) / 3.0, to - (to - from) / 3.0, *to];
+        let others = (0..n).filter(|e| self.starts[n] - self.starts[e + 1] >= behind);
+        others.into_iter().any(|e| lower_distance(&self.controls[e], &segment) < reach)
+    }
+
+    /// Part, at most all, of the motion in which no two points of elements at least `apart` along the rod come nearer to each other by more than half
+    /// their distance.
+    pub(super) fn safe_part(&self, apart: f64) -> f64 {
+        let part = std::cell::Cell::new(1.0f64);
+        let is_near = |a: &Stretch, b: &Stretch| {
+            let ([x, v], [y, w]) = (&self.boxes[a.0], &self.boxes[b.0]);
+            x.distance(y) < 2.0 * part.get() * v.span(w)
+        };
+        let mut leaf = |a: usize, b: usize| {
+            if self.may_touch(a, b, apart) {
+                let one = (self.controls[a], self.motions[a]);
+                let other = (self.controls[b], self.motions[b]);
+                part.set(safe_part(&one, &other, part.get(), SPLITS));
+            }
+        };
+        self.visit_within(&(0, 0..self.controls.len()), &is_near, &mut leaf);
+        part.get()
+    }
+
+    /// Pairs of elements within a stretch.
+    fn visit_within(
+        &self,
+        stretch: &Stretch,
+        is_near: &dyn Fn(&Stretch, &Stretch) -> bool,
+        leaf: &mut dyn FnMut(usize, usize),
+    ) {
+        if stretch.1.len() <= 1 {
+            return;
+        }
+        let [a, b] = halves(stretch);
+        self.visit_within(&a, is_near, leaf);
+        visit_between(&a, &b, is_near, leaf);
+        self.visit_within(&b, is_near, leaf);
+    }
+}
+
+/// Pairs of elements of two stretches.
+fn visit_between(
+    a: &Stretch,
+    b: &Stretch,
+    is_near: &dyn Fn(&Stretch, &Stretch) -> bool,
+    leaf: &mut dyn FnMut(usize, usize),
+) {
+    if !is_near(a, b) {
+        return;
+    }
+    if a.1.len() == 1 && b.1.len() == 1 {
+        leaf(a.1.start, b.1.start);
+    } else if a.1.len() >= b.1.len() {
+        halves(a).iter().for_each(|half| visit_between(half, b, is_near, leaf));
+    } else {
+        halves(b).iter().for_each(|half| visit_between(a, half, is_near, leaf));
+    }
+}
+
+/// How often an element is halved before its bound is taken as it is: what is left of its bulge is less than 10⁻⁴ of it.
+const SPLITS: usize = 7;
+
+/// Part of a motion that brings no two points of two curves nearer by more than half their distance; at most `part`.
+fn safe_part(a: &(Controls, Controls), b: &(Controls, Controls), part: f64, splits: usize) -> f64 {
+    let span = Extent::of(&a.1).span(&Extent::of(&b.1));
+    let distance = lower_distance(&a.0, &b.0);
+    if distance >= 2.0 * part * span {
+        return part;
+    }
+    let loose = bulge(&a.0) + bulge(&b.0) + 1e-12 * span;
+    if splits == 0 || distance > 8.0 * loose {
+        return (0.5 * distance.max(0.0) / span).min(part);
+    }
+    let halves = |c: &(Controls, Controls)| {
+        let (x, v) = (split(&c.0), split(&c.1));
+        [(x[0], v[0]), (x[1], v[1])]
+    };
+    let mut part = part;
+    if bulge(&a.0) >= bulge(&b.0) {
+        for half in halves(a) {
+            part = safe_part(&half, b, part, splits - 1);
+        }
+    } else {
+        for half in halves(b) {
+            part = safe_part(a, &half, part, splits - 1);
+        }
+    }
+    part
+}
+
+/// The two halves of a curve (de Casteljau).
+fn split([a, b, c, d]: &Controls) -> [Controls; 2] {
+    let mid = |p: &Vec3, q: &Vec3| (p + q) * 0.5;
+    let (ab, bc, cd) = (mid(a, b), mid(b, c), mid(c, d));
+    let (abc, bcd) = (mid(&ab, &bc), mid(&bc, &cd));
+    let middle = mid(&abc, &bcd);
+    [[*a, ab, abc, middle], [middle, bcd, cd, *d]]
+}
+
+/// Most distance of a curve from its chord.
+fn bulge([a, b, c, d]: &Controls) -> f64 {
+    let chord = d - a;
+    let square = chord.norm_squared();
+    let off = |p: &Vec3| {
+        let along = if square > 0.0 { ((p - a).dot(&chord) / square).clamp(0.0, 1.0) } else { 0.0 };
+        (p - a - chord * along).norm()
+    };
+    off(b).max(off(c))
+}
+
+/// A bound on the distance of two curves from below.
+fn lower_distance(a: &Controls, b: &Controls) -> f64 {
+    segments(&a[0], &a[3], &b[0], &b[3]) - bulge(a) - bulge(b)
+}
+
+/// Distance of two segments (C. Ericson, *Real-Time Collision Detection*, 2005, section 5.1.9).
+fn segments(a0: &Vec3, a1: &Vec3, b0: &Vec3, b1: &Vec3) -> f64 {
+    let (u, v, w) = (a1 - a0, b1 - b0, a0 - b0);
+    let (a, e, f) = (u.norm_squared(), v.norm_squared(), v.dot(&w));
+    let (b, c) = (u.dot(&v), u.dot(&w));
+    let det = a * e - b * b;
+    let mut s = if det > 1e-14 * a * e { ((b * f - c * e) / det).clamp(0.0, 1.0) } else { 0.0 };
+    let mut t = if e > 0.0 { (b * s + f) / e } else { 0.0 };
+    if !(0.0..=1.0).contains(&t) {
+        t = t.clamp(0.0, 1.0);
+        s = if a > 0.0 { ((b * t - c) / a).clamp(0.0, 1.0) } else { 0.0 };
+    }
+    (w + u * s - v * t).norm()
+}
+
+/// Arc length that two touching pieces of a rod are apart along it at least: half a turn of its least radius.
+pub(super) fn half_turn(radius: f64) -> f64 {
+    std::f64::consts::PI * radius
+}

@@ -1,0 +1,80 @@
+//! Blocks of a symmetric matrix that couple nodes which are no neighbours.
+
+use rustc_hash::FxHashMap;
+
+/// Blocks of `C / 2` rows and columns beside a [`BandMatrix`](crate::banded::BandMatrix) of the same unknowns: each couples a node with one
+/// at least two nodes after it.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Couplings<const C: usize> {
+    /// Nodes (i, j), i < j, of each block, in the order in which they came.
+    nodes: Vec<(usize, usize)>,
+    /// Entries, block by block and row by row; rows are those of the earlier node.
+    values: Vec<f64>,
+    /// Number of the block of two nodes.
+    numbers: FxHashMap<(usize, usize), usize>,
+}
+
+impl<const C: usize> Couplings<C> {
+    /// Rows of a block.
+    const BLOCK: usize = C / 2;
+
+    /// Whether nodes are coupled with neighbours alone.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Takes all blocks away; keeps the memory.
+    pub(crate) fn clear(&mut self) {
+        self.nodes.clear();
+        self.values.clear();
+        self.numbers.clear();
+    }
+
+    /// Adds `value` to entry `(i, j)` and, by symmetry, `(j, i)`, whose nodes are no neighbours.
+    pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
+        let (i, j) = if i <= j { (i, j) } else { (j, i) };
+        let block = Self::BLOCK;
+        let nodes = (i / block, j / block);
+        debug_assert!(nodes.0 + 1 < nodes.1, "entry ({i}, {j}) lies in the band");
+        let next = self.nodes.len();
+        let number = *self.numbers.entry(nodes).or_insert(next);
+        if number == next {
+            self.nodes.push(nodes);
+            self.values.resize((next + 1) * block * block, 0.0);
+        }
+        self.values[number * block * block + i % block * block + j % block] += value;
+    }
+
+    /// Entry `(i, j)`; zero where no block is.
+    #[cfg(test)]
+    pub(crate) fn get(&self, i: usize, j: usize) -> f64 {
+        let (i, j) = if i <= j { (i, j) } else { (j, i) };
+        let block = Self::BLOCK;
+        let number = self.numbers.get(&(i / block, j / block));
+        number.map_or(0.0, |number| self.values[number * block * block + i % block * block + j % block])
+    }
+
+    /// Clears row and column `i`: the unknown is held.
+    pub(crate) fn hold(&mut self, i: usize) {
+        let block = Self::BLOCK;
+        let (node, own) = (i / block, i % block);
+        for (number, nodes) in self.nodes.iter().enumerate() {
+            let entries = &mut self.values[number * block * block..(number + 1) * block * block];
+            if nodes.0 == node {
+                entries[own * block..(own + 1) * block].fill(0.0);
+            } else if nodes.1 == node {
+                entries.iter_mut().skip(own).step_by(block).for_each(|entry| *entry = 0.0);
+            }
+        }
+    }
+
+    /// Nodes (i, j), i < j, of each block.
+    pub(super) fn nodes(&self) -> &[(usize, usize)] {
+        &self.nodes
+    }
+
+    /// Entries of a block, row by row.
+    pub(super) fn entries(&self, number: usize) -> &[f64] {
+        &self.values[number * Self::BLOCK * Self::BLOCK..(number + 1) * Self::BLOCK * Self::BLOCK]
+    }
+}

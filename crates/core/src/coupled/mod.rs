@@ -1,0 +1,13 @@
+//! Matrices that couple distant nodes beside neighbouring ones, and their factorisation.
+//!
+//! Where a rod touches itself the Newton system has blocks far from its band. [`couplings`] holds them, [`ldlt`] factors band and
+//! blocks together.
+
+pub(crate) mod couplings;
+pub(crate) mod ldlt;
+
+pub(crate) use couplings::Couplings;
+pub(crate) use ldlt::CoupledFactor;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,205 @@
+//! Devices that come back to themselves.
+
+use super::{Kirchhoff, KirchhoffOptions};
+use crate::Vec3;
+use crate::device::{Device, Instrument, Section, Stack};
+use crate::insertion::{Command, Sheath, Simulation, WallProperties};
+use crate::methods::{Method, Surroundings};
+use crate::random::{splitmix64, unit};
+use crate::rod::TWISTED;
+use crate::rod::quadrature::hermite;
+use crate::shape::Shape;
+use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution, WallQuery};
+
+const RADIUS_MM: f64 = 0.2;
+
+/// A soft wire whose rest shape is a helix of 3 mm radius, a tube of this radius, and a sheath beside its axis.
+fn parts(tube_mm: f64) -> (GeneratedWall, Device, Sheath) {
+    let node = |i: usize| CentrelineNode {
+        position_mm: Vec3::z() * (20.0 * i as f64),
+        radius_mm: tube_mm,
+        parent: i.checked_sub(1),
+    };
+    let tree = CentrelineTree::new((0..4).map(node).collect()).unwrap();
+    let made = GeneratedWall::new(&tree, Resolution::EdgeMm(1.0)).unwrap();
+    let position_mm = Vec3::new(-0.5 * tube_mm, 0.0, 30.0);
+    let sheath = Sheath { position_mm, direction: Vec3::x(), friction: 0.0, friction_n: 0.0 };
+    let wire = Section::straight(200.0, RADIUS_MM, 0.05);
+    let section = Section { rest_curvature_per_mm: [1.0 / 3.0, 0.02], ..wire };
+    (made, Device::new(vec![section]).unwrap(), sheath)
+}
+
+fn properties() -> WallProperties {
+    WallProperties { modulus_n_per_mm2: 10.0, ..WallProperties::default() }
+}
+
+fn method(self_contact: bool) -> KirchhoffOptions {
+    KirchhoffOptions { element_mm: 1.0, self_contact, ..KirchhoffOptions::default() }
+}
+
+fn curling(tube_mm: f64, self_contact: bool) -> Simulation {
+    let (made, device, sheath) = parts(tube_mm);
+    let builder = Simulation::builder(made.wall, device, sheath).properties(properties());
+    builder.method(&method(self_contact)).build().unwrap()
+}
+
+/// Points of the device's axis, a twentieth of a millimetre apart or less.
+fn axis(shape: &Shape) -> Vec<Vec3> {
+    let mut points = Vec::new();
+    for e in 0..shape.len() - 1 {
+        let h = shape.from_tip_mm[e] - shape.from_tip_mm[e + 1];
+        let count = (h / 0.05).ceil();
+        for k in 0..count as usize {
+            let [w0, s0, w1, s1] = hermite(k as f64 / count);
+            let along = (shape.tangents[e] * s0 + shape.tangents[e + 1] * s1) * h;
+            points.push(shape.positions_mm[e] * w0 + shape.positions_mm[e + 1] * w1 + along);
+        }
+    }
+    points
+}
+
+/// Least distance of two pieces of the device's axis that are not next to each other, mm.
+fn least_distance_mm(shape: &Shape) -> f64 {
+    let points = axis(shape);
+    let apart = 40;
+    let mut least = f64::INFINITY;
+    for (i, a) in points.iter().enumerate() {
+        for b in points.iter().skip(i + apart) {
+            least = least.min((a - b).norm());
+        }
+    }
+    least
+}
+
+#[test]
+fn loops_lie_on_each_other_and_do_not_pass() {
+    let run = |self_contact: bool| {
+        let mut simulation = curling(4.0, self_contact);
+        let (mut least_mm, mut deepest_mm, mut touching) = (f64::INFINITY, 0.0f64, 0);
+        for step in 0..120 {
+            let done = simulation.step(Command::advance(0.5));
+            assert!(done.is_ok(), "step {step}: {done:?}");
+            least_mm = least_mm.min(least_distance_mm(simulation.shape()));
+            let found = simulation.touching();
+            touching += usize::from(!found.is_empty());
+            deepest_mm = found.iter().map(|t| t.penetration_mm).fold(deepest_mm, f64::max);
+        }
+        (least_mm, deepest_mm, touching)
+    };
+    let (least_mm, deepest_mm, touching) = run(true);
+    assert!(touching > 10 && deepest_mm < 0.01 * RADIUS_MM, "{touching} {deepest_mm}");
+    assert!(least_mm > 1.98 * RADIUS_MM, "{least_mm}");
+    // The twin: without it they pass through each other.
+    let (least_mm, _, touching) = run(false);
+    assert!(touching == 0 && least_mm < RADIUS_MM, "{least_mm}");
+}
+
+#[test]
+fn nothing_is_built_where_nothing_can_touch() {
+    let (made, device, sheath) = parts(4.0);
+    let (query, stack) = (WallQuery::new(&made.wall).unwrap(), Stack::from(device));
+    let properties = properties();
+    let surroundings = Surroundings {
+        wall: &made.wall,
+        properties: &properties,
+        query: &query,
+        sheath: &sheath,
+        device: stack.first(),
+        stack: &stack,
+        motion: None,
+        flow: None,
+        time_s: [0.0; 2],
+    };
+    let searches = |to_mm: f64| {
+        let mut wire = Kirchhoff::<TWISTED>::new(method(true), &surroundings, &NoStore).unwrap();
+        while wire.report().inserted_mm < to_mm {
+            wire.step(&surroundings, Command::advance(0.5)).unwrap();
+        }
+        wire.workspace.as_ref().unwrap().tools.loops.counters()
+    };
+    // A quarter of a circle turns by less than two radians.
+    assert_eq!(searches(4.5).searches, 0);
+    assert!(searches(40.0).pairs > 0);
+}
+
+/// Whether pieces of the axis that are near each other have changed sides between two shapes: a test that knows nothing of gaps and forces. Points
+/// are read at the same arc lengths from the sheath.
+fn has_passed(before: &[Vec3], after: &[Vec3]) -> bool {
+    let apart = 40;
+    let side = |points: &[Vec3], i: usize, j: usize| {
+        let (u, v) = (points[i + 1] - points[i], points[j + 1] - points[j]);
+        let across = u.cross(&v);
+        let between = points[j] - points[i];
+        // Of segments whose common normal meets both.
+        let (a, b, c) = (u.norm_squared(), u.dot(&v), v.norm_squared());
+        let det = a * c - b * b;
+        let (d, e) = (between.dot(&u), between.dot(&v));
+        let (s, t) = ((d * c - e * b) / det, (d * b - e * a) / det);
+        let meets = det > 0.01 * a * c && (-1.0..=2.0).contains(&s) && (-1.0..=2.0).contains(&t);
+        (meets && between.norm() < 5.0 * RADIUS_MM).then(|| across.dot(&between).signum())
+    };
+    let n = before.len().min(after.len()) - 1;
+    (0..n).any(|i| {
+        (i + apart..n).any(|j| match (side(before, i, j), side(after, i, j)) {
+            (Some(was), Some(is)) => was != is,
+            _ => false,
+        })
+    })
+}
+
+/// Pushes and turns a wire of a random shape at random. Returns the least distance of its axis from itself, mm, how many commands were carried out, and whether it passed
+/// through itself.
+fn at_random(seed: u64, self_contact: bool) -> (f64, usize, bool) {
+    let mut index = 0;
+    let mut draw = |low: f64, high: f64| {
+        index += 1;
+        low + (high - low) * unit(splitmix64(seed, index))
+    };
+    let (made, _, sheath) = parts(4.0);
+    let section = Section {
+        rest_curvature_per_mm: [draw(0.25, 0.5), draw(-0.1, 0.1)],
+        ..Section::straight(200.0, RADIUS_MM, draw(0.02, 0.2))
+    };
+    let device = Device::new(vec![section]).unwrap();
+    let builder = Simulation::builder(made.wall, device, sheath).properties(properties());
+    let mut simulation = builder.method(&method(self_contact)).build().unwrap();
+    let (mut least_mm, mut done, mut passed) = (f64::INFINITY, 0, false);
+    let from_sheath = |simulation: &Simulation| axis(simulation.shape());
+    let mut before = Vec::new();
+    for _ in 0..40 {
+        let command = Command { advance_mm: draw(-0.5, 2.0), rotate_rad: draw(-0.4, 0.4) };
+        if simulation.step(command).is_err() {
+            continue;
+        }
+        done += 1;
+        least_mm = least_mm.min(least_distance_mm(simulation.shape()));
+        let after = from_sheath(&simulation);
+        passed |= !before.is_empty() && has_passed(&before, &after);
+        before = after;
+    }
+    (least_mm, done, passed)
+}
+
+#[test]
+fn wires_pushed_and_turned_at_random_do_not_pass_through_themselves() {
+    let mut twins = 0;
+    for seed in 0..6 {
+        let (least_mm, done, passed) = at_random(seed, true);
+        assert!(least_mm > 1.98 * RADIUS_MM && !passed, "{seed}: {least_mm} mm, {passed}");
+        assert!(done > 25, "{seed}: {done}");
+        let (least_mm, _, passed) = at_random(seed, false);
+        twins += usize::from(passed || least_mm < RADIUS_MM);
+    }
+    assert!(twins > 3, "{twins}");
+}
+
+#[test]
+fn several_instruments_are_told_that_their_loops_do_not_touch() {
+    let (made, device, sheath) = parts(4.0);
+    let outer = Section { inner_radius_mm: Some(0.3), ..Section::straight(100.0, 0.5, 1.0) };
+    let one = |name: &str, device: Device| Instrument { name: name.to_owned(), device, may_lead: true };
+    let outer = Device::new(vec![outer]).unwrap();
+    let stack = Stack::new(vec![one("wire", device), one("catheter", outer)]).unwrap();
+    let builder = Simulation::builder(made.wall, stack, sheath).method(&method(true)).build();
+    assert!(builder.err().unwrap().to_string().contains("method.self_contact"));
+}

@@ -1,0 +1,93 @@
+//! Several energies outside the rod as one.
+
+use super::external::{ContactMerit, Contacts, External, Moved, Sizes};
+use crate::rod::{ElementData, RodState, Stencils};
+
+/// Energies outside the rod that act together: loads, a wall, and what the rod does to itself.
+pub struct Together<'a>(pub Vec<&'a mut dyn External>);
+
+impl Together<'_> {
+    /// The contacts of all that have some.
+    fn each(&mut self) -> impl Iterator<Item = &mut dyn Contacts> {
+        self.0.iter_mut().filter_map(|part| part.contacts())
+    }
+}
+
+impl External for Together<'_> {
+    fn linearise(&mut self, elements: &[ElementData], state: &RodState, into: &mut dyn Stencils) {
+        self.0.iter_mut().for_each(|part| part.linearise(elements, state, into));
+    }
+
+    fn value(&mut self, elements: &[ElementData], state: &RodState) -> f64 {
+        self.0.iter_mut().map(|part| part.value(elements, state)).sum()
+    }
+
+    fn safe_fraction(&mut self, elements: &[ElementData], to: &RodState) -> f64 {
+        self.0.iter_mut().map(|part| part.safe_fraction(elements, to)).fold(1.0, f64::min)
+    }
+
+    fn sizes(&self) -> Sizes {
+        self.0.iter().map(|part| part.sizes()).fold(Sizes::default(), |a, b| Sizes {
+            force_n: a.force_n.max(b.force_n),
+            moment_nmm: a.moment_nmm.max(b.moment_nmm),
+            rounding_n: a.rounding_n.max(b.rounding_n),
+        })
+    }
+
+    fn is_conservative(&self) -> bool {
+        self.0.iter().all(|part| part.is_conservative())
+    }
+
+    fn work(&self, from: &RodState, to: &RodState) -> f64 {
+        self.0.iter().map(|part| part.work(from, to)).sum()
+    }
+
+    fn contacts(&mut self) -> Option<&mut dyn Contacts> {
+        if self.each().next().is_some() { Some(self) } else { None }
+    }
+}
+
+impl Contacts for Together<'_> {
+    fn foresee(&mut self, elements: &[ElementData], base: &RodState, moved: &Moved<'_>) {
+        self.each().for_each(|part| part.foresee(elements, base, moved));
+    }
+
+    fn press_or_let_go(
+        &mut self,
+        elements: &[ElementData],
+        base: &RodState,
+        moved: &Moved<'_>,
+        into: &mut dyn Stencils,
+    ) -> usize {
+        self.each().map(|part| part.press_or_let_go(elements, base, moved, into)).sum()
+    }
+
+    fn look_towards(&mut self, moved: &Moved<'_>) {
+        self.each().for_each(|part| part.look_towards(moved));
+    }
+
+    fn slope_towards(&mut self, part: f64) -> f64 {
+        self.each().map(|one| one.slope_towards(part)).sum()
+    }
+
+    fn go_towards(&mut self, part: f64) {
+        self.each().for_each(|one| one.go_towards(part));
+    }
+
+    fn merit(&mut self, moved: &Moved<'_>) -> ContactMerit {
+        self.each().map(|part| part.merit(moved)).fold(ContactMerit::default(), |a, b| ContactMerit {
+            excess_mj: a.excess_mj + b.excess_mj,
+            slope_mj: a.slope_mj + b.slope_mj,
+            size_mj: a.size_mj + b.size_mj,
+        })
+    }
+
+    fn take(&mut self, part: f64) {
+        self.each().for_each(|one| one.take(part));
+    }
+
+    fn settled(&mut self, tolerance: f64) -> bool {
+        // Each is asked, as what is not settled lets go.
+        self.each().filter_map(|part| (!part.settled(tolerance)).then_some(())).count() == 0
+    }
+}
