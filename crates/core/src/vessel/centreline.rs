@@ -189,7 +189,9 @@ impl CentrelineTree {
     /// Reads the text of a table; the error names line and value.
     fn parse(text: &str) -> std::result::Result<Self, String> {
         let mut nodes: Vec<CentrelineNode> = Vec::new();
-        let (mut targets, mut closed): (Vec<Target>, Vec<usize>) = (Vec::new(), Vec::new());
+        let mut targets: Vec<Target> = Vec::new();
+        // Rows that are closed, and their lines.
+        let mut closed: Vec<(usize, usize)> = Vec::new();
         let mut may_be_header = true;
         let mut columns: Option<Columns> = None;
         for (index, line) in text.lines().enumerate() {
@@ -227,7 +229,7 @@ impl CentrelineTree {
             let (row, name) = words.split_at(words.len().min(COLUMNS));
             nodes.push(parse_row(row).map_err(|reason| format!("line {}: {reason}", index + 1))?);
             let is_closed = name.last() == Some(&CLOSED);
-            closed.extend(is_closed.then(|| nodes.len() - 1));
+            closed.extend(is_closed.then(|| (nodes.len() - 1, index + 1)));
             let name = &name[..name.len() - usize::from(is_closed)];
             if !name.is_empty() {
                 let name = name.join(" ");
@@ -244,8 +246,14 @@ impl CentrelineTree {
         if nodes.len() < 2 {
             return Err(format!("{} centre-line points; a vessel needs at least 2", nodes.len()));
         }
-        let tree = Self { nodes, closed: Vec::new(), targets };
-        tree.with_closed_ends(closed).map_err(|error| error.to_string())
+        let goes_on = |row: usize| row == 0 || nodes.iter().any(|node| node.parent == Some(row));
+        if let Some((_, line)) = closed.iter().find(|(row, _)| goes_on(*row)) {
+            return Err(format!(
+                "line {line}: closed: must be the last point of a branch: elsewhere the vessel goes on"
+            ));
+        }
+        let closed = closed.into_iter().map(|(row, _)| row).collect();
+        Ok(Self { nodes, closed, targets })
     }
 
     /// Writes the table with `comment` above it. Reading it back gives the same bits.
@@ -438,7 +446,7 @@ mod tests {
             ("0 0 0 1 -1\n0 0 1 1", "line 2: 4 values"),
             ("0 0 0 1 -1\n0 0 1 1 0 7", "line 2: target = \"7\": is a number"),
             ("0 0 0 1 -1 end\n0 0 1 1 0 end", "line 2: target = \"end\": is the name of an earlier row"),
-            ("0 0 0 1 -1\n0 0 1 1 0 closed\n0 0 2 1 1", "closed end, row = 1: must be the last point"),
+            ("0 0 0 1 -1\n0 0 1 1 0 closed\n0 0 2 1 1", "line 2: closed: must be the last point"),
             ("", "0 centre-line points"),
             ("0 0 0 1 -1", "1 centre-line points"),
         ] {

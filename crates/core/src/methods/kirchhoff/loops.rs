@@ -1,9 +1,8 @@
 //! Loops of the device that touch each other.
 
 use super::mesh::Mesh;
-use crate::contact::{SelfContact, Skin, WallContact};
+use crate::contact::{SelfContact, Skin};
 use crate::rod::RodState;
-use crate::solve::{External, Together};
 
 /// The surface of each element: as thick as the wall feels it, and as hard as a rod can tell.
 pub(super) fn skins(mesh: &Mesh) -> impl Iterator<Item = Skin> + '_ {
@@ -26,10 +25,4 @@ pub(super) fn is_in_its_own_way(
     advance_mm: f64,
 ) -> bool {
     loops.blocks_its_tip(&mesh.elements, slid, advance_mm)
-}
-
-/// The wall and the device's own loops as one, where these touch.
-pub(super) fn outside<'a>(wall: &'a mut WallContact<'_>, loops: Option<&'a mut SelfContact>) -> Together<'a> {
-    let loops = loops.map(|loops| loops as &mut dyn External);
-    Together(std::iter::once(wall as &mut dyn External).chain(loops).collect())
 }

@@ -17,12 +17,11 @@
 //! the cones of Coulomb's law of its own normal forces: where a slow motion with friction comes to rest.
 
 use super::guess::Guess;
-use super::loops;
 use super::substep::Effort;
 use crate::contact::{SETTLED, SelfContact, WallContact};
 use crate::flow::BloodFlow;
 use crate::rod::{ElementData, RodState, Supports};
-use crate::solve::{Newton, NewtonOptions, NewtonReport};
+use crate::solve::{Newton, NewtonOptions, NewtonReport, Together};
 
 /// Newton iterations of a solution near its prediction: from another one, nearer by, it is found in fewer.
 const MOST_NEAR: usize = 60;
@@ -112,9 +111,14 @@ impl<const C: usize> Search<'_, '_, C> {
         let most = if self.effort == Effort::Flight { MOST_MOVING } else { MOST_NEAR };
         let max_iterations = most.min(self.most.saturating_sub(self.iterations));
         let options = NewtonOptions { max_iterations, tolerance: self.tolerance, ..NewtonOptions::default() };
-        let mut outside = loops::outside(self.contact, self.loops.as_deref_mut());
-        let found = self.newton.solve(self.elements, self.supports, &mut outside, self.state, &options);
-        drop(outside);
+        let (elements, supports) = (self.elements, &mut *self.supports);
+        let found = match self.loops.as_deref_mut() {
+            Some(loops) => {
+                let mut outside = Together(vec![&mut *self.contact, loops]);
+                self.newton.solve(elements, supports, &mut outside, self.state, &options)
+            }
+            None => self.newton.solve(elements, supports, self.contact, self.state, &options),
+        };
         self.iterations += found.iterations;
         found
     }
