@@ -2,7 +2,8 @@
 //!
 //! As a table, one point a line: `x y z radius parent`, separated by blanks, tabs, commas or semicolons; millimetres; `parent`
 //! is the row (counted from 0, without comments and header) of an earlier point, −1 for the root. Words behind it name the point as a
-//! target; the word `closed` alone, or after a name, closes the vessel there with a dome, as the sac of an aneurysm. `#` starts a comment, and the first line that is not a comment may be a header of words. Lists of points without parents are read
+//! target; the word `closed` alone, or after a name, closes the vessel there with a dome, as the sac of an aneurysm.
+//! `#` starts a comment, and the first line that is not a comment may be a header of words. Lists of points without parents are read
 //! too where the header names their columns ([`super::point_lists`]).
 
 use std::fmt::Write;

@@ -114,16 +114,13 @@ impl Sac {
         }
         let neighbours = wall.neighbours();
         let search = Search { wall, neighbours, middle_mm, way, frame: Frame::new(-way, None) };
-        let Some((plane, cut)) = search.least() else {
+        let Some(Neck { plane, cut, beyond }) = search.least() else {
             let mend =
                 "no plane between it and the artery cuts off a sac: it has no neck, or an opening of its own";
             return Err(Error::parameter("dome", crate::error::vector(&dome_mm), mend));
         };
         let normal = search.normal(plane);
         let neck_mm = cut.points_mm.iter().sum::<Vec3>() / cut.points_mm.len() as f64;
-        let Some(beyond) = search.beyond(plane, &cut) else {
-            return Err(Error::parameter("dome", crate::error::vector(&dome_mm), "has no sac of its own"));
-        };
         let neck_diameter_mm = (4.0 * cut.area_mm2 / std::f64::consts::PI).sqrt();
         Ok(Self {
             neck_mm,
@@ -168,6 +165,13 @@ struct Beyond {
     height_mm: f64,
 }
 
+/// A plane that cuts off a sac.
+struct Neck {
+    plane: Plane,
+    cut: Cut,
+    beyond: Beyond,
+}
+
 struct Search<'a> {
     wall: &'a Wall,
     neighbours: Vec<[u32; 3]>,
@@ -188,7 +192,7 @@ impl Search<'_> {
     }
 
     /// The plane of least area that cuts off a sac.
-    fn least(&self) -> Option<(Plane, Cut)> {
+    fn least(&self) -> Option<Neck> {
         let mut planes = Vec::new();
         for k in 0..PLACES {
             let along = k as f64 / PLACES as f64;
@@ -204,33 +208,31 @@ impl Search<'_> {
         let mut best = planes.into_iter().fold(None, |best, plane| self.better(best, plane))?;
         let (mut part, mut turn) = (1.0 / PLACES as f64, LARGEST_TILT / TILTS.0 as f64);
         for _ in 0..HALVINGS {
-            let Plane { along, tilt: [a, b] } = best.0;
+            let Plane { along, tilt: [a, b] } = best.plane;
             let around = [
-                Plane { along: (along + part).min(1.0), ..best.0 },
-                Plane { along: (along - part).max(0.0), ..best.0 },
-                Plane { tilt: [a + turn, b], ..best.0 },
-                Plane { tilt: [a - turn, b], ..best.0 },
-                Plane { tilt: [a, b + turn], ..best.0 },
-                Plane { tilt: [a, b - turn], ..best.0 },
+                Plane { along: (along + part).min(1.0), ..best.plane },
+                Plane { along: (along - part).max(0.0), ..best.plane },
+                Plane { tilt: [a + turn, b], ..best.plane },
+                Plane { tilt: [a - turn, b], ..best.plane },
+                Plane { tilt: [a, b + turn], ..best.plane },
+                Plane { tilt: [a, b - turn], ..best.plane },
             ];
-            let before = best.1.area_mm2;
+            let before = best.cut.area_mm2;
             for plane in around {
                 best = self.better(Some(best), plane)?;
             }
-            if best.1.area_mm2 == before {
+            if best.cut.area_mm2 == before {
                 (part, turn) = (0.5 * part, 0.5 * turn);
             }
         }
         Some(best)
     }
 
-    fn better(&self, best: Option<(Plane, Cut)>, plane: Plane) -> Option<(Plane, Cut)> {
-        let least = best.as_ref().map_or(f64::INFINITY, |(_, cut)| cut.area_mm2);
+    fn better(&self, best: Option<Neck>, plane: Plane) -> Option<Neck> {
+        let least = best.as_ref().map_or(f64::INFINITY, |best| best.cut.area_mm2);
         let cut = self.cut(plane).filter(|cut| cut.area_mm2 < least);
-        match cut.filter(|cut| self.beyond(plane, cut).is_some()) {
-            Some(cut) => Some((plane, cut)),
-            None => best,
-        }
+        let found = cut.and_then(|cut| Some(Neck { plane, beyond: self.beyond(plane, &cut)?, cut }));
+        found.or(best)
     }
 
     /// Heights of the vertices above a plane.

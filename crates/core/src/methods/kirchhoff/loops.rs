@@ -1,8 +1,7 @@
 //! Loops of the device that touch each other.
 
 use super::mesh::Mesh;
-use crate::contact::{SelfContact, Skin};
-use crate::rod::RodState;
+use crate::contact::Skin;
 
 /// The surface of each element: as thick as the wall feels it, and as hard as a rod can tell.
 pub(super) fn skins(mesh: &Mesh) -> impl Iterator<Item = Skin> + '_ {
@@ -15,14 +14,4 @@ pub(super) fn skins(mesh: &Mesh) -> impl Iterator<Item = Skin> + '_ {
         .into_iter()
         .zip(&mesh.elements)
         .map(|(radius_mm, element)| Skin::rigid(radius_mm, element.bending[1]))
-}
-
-/// Whether a device that has slid on along its own curve, by so much at its tip, would have run into itself.
-pub(super) fn is_in_its_own_way(
-    loops: &mut SelfContact,
-    mesh: &Mesh,
-    slid: &RodState,
-    advance_mm: f64,
-) -> bool {
-    loops.blocks_its_tip(&mesh.elements, slid, advance_mm)
 }

@@ -4,7 +4,7 @@ use super::balance::Balance;
 use super::carried::{Passage, WallWork};
 use super::configuration::{Configuration, Start};
 use super::hands::{Hand, motions};
-use super::loops::{is_in_its_own_way, skins};
+use super::loops::skins;
 use super::mesh::Mesh;
 use super::search::Search;
 use super::state::KirchhoffState;
@@ -155,7 +155,7 @@ impl<const C: usize> Tools<C> {
         if let Some(loops) = &mut loops {
             loops.renew(&mesh.elements, skins(mesh));
             let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
-            in_its_own_way = is_in_its_own_way(loops, mesh, rod, advance_mm);
+            in_its_own_way = loops.blocks_its_tip(&mesh.elements, rod, advance_mm);
         }
         let guessed = self.guess.choose(&mut contact, loops.as_deref_mut(), (start, &*mesh, &mut *rod));
         let inside = guessed && !in_its_own_way;
