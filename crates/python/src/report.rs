@@ -139,10 +139,24 @@ impl StepReport {
         self.report.left_through
     }
 
-    /// Iterations (linear solves) of this step.
+    /// Newton iterations of this step.
     #[getter]
     fn iterations(&self) -> u32 {
         self.report.iterations
+    }
+
+    /// Linear solves of these.
+    #[getter]
+    fn solves(&self) -> u32 {
+        self.report.solves
+    }
+
+    /// What hands have done in ticks that the instruments have not yet followed: advance_mm and rotate_rad of each, of shape
+    /// (n_instruments, 2). None where nothing is left over; zeros where the instruments are on their way to where they come to rest.
+    #[getter]
+    fn behind<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let behind: Vec<_> = self.report.behind.iter().map(|c| vec![c.advance_mm, c.rotate_rad]).collect();
+        if behind.is_empty() { Ok(None) } else { Ok(Some(PyArray2::from_vec2(py, &behind)?)) }
     }
 
     /// Parts that the command was cut into.

@@ -68,6 +68,19 @@ impl Simulation {
         &self.start.get().instruments
     }
 
+    /// What hands do, each by its own command.
+    fn moves(
+        &self,
+        advance_mm: Option<&Bound<'_, PyAny>>,
+        rotate_rad: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Vec<insertion::Move>> {
+        let hands = self.pushed().len();
+        let lengths_mm = of_each("advance_mm", advance_mm, hands)?;
+        let turns_rad = of_each("rotate_rad", rotate_rad, hands)?;
+        let commands = lengths_mm.into_iter().zip(turns_rad);
+        Ok(together(commands.map(|(advance_mm, rotate_rad)| Command { advance_mm, rotate_rad })))
+    }
+
     /// The simulation, alone. Never wait for it with the interpreter held: whoever has it may step for long.
     fn lock(&self) -> MutexGuard<'_, insertion::Simulation> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
@@ -177,13 +190,29 @@ impl Simulation {
         rotate_rad: Option<&Bound<'_, PyAny>>,
         time_s: Option<f64>,
     ) -> PyResult<StepReport> {
-        let hands = self.pushed().len();
-        let lengths_mm = of_each("advance_mm", advance_mm, hands)?;
-        let turns_rad = of_each("rotate_rad", rotate_rad, hands)?;
-        let commands = lengths_mm.into_iter().zip(turns_rad);
-        let moves = together(commands.map(|(advance_mm, rotate_rad)| Command { advance_mm, rotate_rad }));
+        let moves = self.moves(advance_mm, rotate_rad)?;
         let stepped = self.with(py, |simulation| simulation.step_until(&moves, time_s).cloned());
         stepped.map(StepReport::new).map_err(exception)
+    }
+
+    /// As `step` in a tick of fixed cost, for haptics and screens that must have an answer in time: about so many linear solves
+    /// (`StepReport.solves`), whether the instruments come to rest in them or not. What is left over is told (`StepReport.behind`), and the next
+    /// tick or step goes on with it; with hands at rest ticks lead to an equilibrium. Eight solves follow hands at 1 kHz.
+    ///
+    /// Raises what `step` raises, except where no equilibrium is found within the tick; what hands have done and the instruments have not is
+    /// forgotten then.
+    #[pyo3(signature = (advance_mm=None, rotate_rad=None, *, solves, time_s=None))]
+    fn tick(
+        &self,
+        py: Python<'_>,
+        advance_mm: Option<&Bound<'_, PyAny>>,
+        rotate_rad: Option<&Bound<'_, PyAny>>,
+        solves: i64,
+        time_s: Option<f64>,
+    ) -> PyResult<StepReport> {
+        let (moves, solves) = (self.moves(advance_mm, rotate_rad)?, natural("solves", solves)?);
+        let ticked = self.with(py, |simulation| simulation.tick(&moves, solves, time_s).cloned());
+        ticked.map(StepReport::new).map_err(exception)
     }
 
     /// Carries out commands one after the other: an array of shape (steps, n_instruments, 2) of advance_mm and rotate_rad. Returns the last

@@ -26,6 +26,24 @@ def test_a_step_tells_what_is_seen_and_felt(simulation):
     assert np.array_equal(simulation.points_mm(simulation.from_tip_mm), simulation.positions_mm)
 
 
+def test_a_tick_has_a_fixed_cost_and_tells_what_it_leaves_over(simulation):
+    simulation.run(np.tile([[2.0, 0.05]], (60, 1, 1)))
+    stepped = copy.deepcopy(simulation)
+    stepped.step(1.0, 0.2)
+    report = simulation.tick(1.0, 0.2, solves=1)
+    assert report.behind.shape == (1, 2) and report.behind[0] == pytest.approx([1.0, 0.2])
+    assert 1 <= report.solves == report.to_dict()["solves"] < 20
+    ticks = 0
+    while simulation.report.behind is not None and ticks < 100:
+        simulation.tick(solves=8)
+        ticks += 1
+    assert ticks < 100 and simulation.report.converged
+    assert simulation.tip_mm == pytest.approx(stepped.tip_mm, abs=1e-3)
+    for wrong in (0, -1):
+        with pytest.raises(endowire.InputError, match="solves"):
+            simulation.tick(1.0, solves=wrong)
+
+
 def test_copies_share_the_vessel_and_nothing_else(simulation):
     simulation.step(50.0)
     other = copy.deepcopy(simulation)

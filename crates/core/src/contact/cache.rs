@@ -222,6 +222,13 @@ impl ContactCache {
         self.readings.resize(self.points.len(), TakenReading::NONE);
     }
 
+    /// Goes on with what was kept of the same points.
+    pub fn resume(&mut self, known: &KnownPoints) {
+        self.points.clone_from(&known.points);
+        self.readings.clear();
+        self.readings.resize(self.points.len(), TakenReading::NONE);
+    }
+
     /// Keeps what is known at the end of a step.
     pub fn keep(&self, known: &mut KnownPoints) {
         known.points.clone_from(&self.points);

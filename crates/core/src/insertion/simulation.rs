@@ -62,12 +62,7 @@ impl Simulation {
     /// A command that is not finite, turns more than a thousand times, pushes in more than the device's length or pulls out more than is inserted
     /// (all [`Error::Parameter`]); a step that found no equilibrium ([`Error::Computation`]).
     pub fn step(&mut self, command: Command) -> Result<&StepReport> {
-        if self.scene.stack.is_several() {
-            return self.step_together(&[Move { instrument: 0, command }]);
-        }
-        check_command(command, self.method.report().inserted_mm, self.scene.stack.length_mm())?;
-        self.method.step(&self.scene.surroundings([self.time_s; 2]), command)?;
-        Ok(self.method.report())
+        self.step_together(&[Move { instrument: 0, command }])
     }
 
     /// Moves instruments, each by its own command, all at the same time. After an error the state is as before, to the bit.
@@ -85,11 +80,7 @@ impl Simulation {
     /// As [`Simulation::step_together`], and a time before that of the last step or none at all.
     pub fn step_until(&mut self, moves: &[Move], time_s: Option<f64>) -> Result<&StepReport> {
         self.check_moves(moves)?;
-        let time_s = time_s.unwrap_or(self.time_s);
-        if !(self.time_s..=LATEST_S).contains(&time_s) {
-            let mend = format!("must be a time from that of the last step, {} s, to {LATEST_S}", self.time_s);
-            return Err(Error::parameter("time_s", time_s, mend));
-        }
+        let time_s = self.check_time(time_s)?;
         let surroundings = self.scene.surroundings([self.time_s, time_s]);
         if self.scene.stack.is_several() {
             self.method.step_together(&surroundings, moves)?;
@@ -101,11 +92,43 @@ impl Simulation {
         Ok(self.method.report())
     }
 
+    /// As [`Simulation::step_until`] in a tick of fixed cost: in about `solves` linear solves ([`StepReport::solves`]), whether the device comes to rest in them or not.
+    /// For haptics and screens that must have an answer in time.
+    ///
+    /// What is left over is told ([`StepReport::behind`], [`StepReport::imbalance`]), and the next tick or step goes on with it; with hands at rest ticks lead to
+    /// an equilibrium. No state lies beyond a wall: hands whose way is blocked in the tick wait. Where the vessel moves and so many solves do not do, the tick takes
+    /// what a step takes. Methods other than `kirchhoff` step.
+    ///
+    /// # Errors
+    /// As [`Simulation::step_until`], and no solves at all.
+    pub fn tick(&mut self, moves: &[Move], solves: usize, time_s: Option<f64>) -> Result<&StepReport> {
+        if solves == 0 {
+            return Err(Error::parameter("solves", solves, "allow at least one"));
+        }
+        self.check_moves(moves)?;
+        let time_s = self.check_time(time_s)?;
+        self.method.tick(&self.scene.surroundings([self.time_s, time_s]), moves, solves)?;
+        self.time_s = time_s;
+        Ok(self.method.report())
+    }
+
+    /// The time that a step ends at.
+    fn check_time(&self, time_s: Option<f64>) -> Result<f64> {
+        let time_s = time_s.unwrap_or(self.time_s);
+        if (self.time_s..=LATEST_S).contains(&time_s) {
+            return Ok(time_s);
+        }
+        let mend = format!("must be a time from that of the last step, {} s, to {LATEST_S}", self.time_s);
+        Err(Error::parameter("time_s", time_s, mend))
+    }
+
     fn check_moves(&self, moves: &[Move]) -> Result<()> {
         let report = self.method.report();
         let instruments = self.scene.stack.instruments();
-        let inserted =
-            |index: usize| report.instruments.get(index).map_or(report.inserted_mm, |i| i.inserted_mm);
+        // With what ticks have left over.
+        let inserted = |index: usize| {
+            report.hand(index).inserted_mm + report.behind.get(index).map_or(0.0, |left| left.advance_mm)
+        };
         for (index, one) in moves.iter().enumerate() {
             let Some(instrument) = instruments.get(one.instrument) else {
                 let mend = format!("there are {}, the innermost is 0", instruments.len());

@@ -94,6 +94,19 @@ pub trait Method: Send {
         Err(Error::parameter("moves", moves.len(), mend))
     }
 
+    /// Moves instruments in about so many linear solves, whether the device comes to rest in them or not: no state lies beyond a wall, and what is left over, of
+    /// the hands' motions or of forces, the next tick or step goes on with ([`StepReport::behind`]). Where the vessel moves, and takes the device
+    /// where that many do not do, it takes as many as a step does. Methods that know of no ticks step.
+    ///
+    /// # Errors
+    /// As [`Method::step`], except that an equilibrium that is not found is none.
+    fn tick(&mut self, surroundings: &Surroundings<'_>, moves: &[Move], _solves: usize) -> Result<()> {
+        if surroundings.stack.is_several() {
+            return self.step_together(surroundings, moves);
+        }
+        self.step(surroundings, moves.first().map_or_else(Command::default, |one| one.command))
+    }
+
     /// The inserted centre line.
     fn shape(&self) -> &Shape;
 

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::command::Command;
 use crate::Vec3;
 use crate::contact::Contact;
 use crate::shape::Shape;
@@ -27,7 +28,7 @@ impl Energy {
 impl StepReport {
     /// What a step tells in which the hand does nothing.
     pub(crate) fn rest(&mut self) {
-        (self.iterations, self.substeps) = (0, 0);
+        (self.iterations, self.solves, self.substeps) = (0, 0, 0);
         (self.dissipated_mj, self.jumped, self.jump) = (0.0, false, None);
         (self.relaxations, self.slides) = (0, 0);
     }
@@ -160,8 +161,10 @@ pub struct StepReport {
     pub drag_n: Vec3,
     /// The opening through which the tip has left the vessel, while it is beyond it.
     pub left_through: Option<usize>,
-    /// Iterations (linear solves) of this step, those of attempts in vain included.
+    /// Newton iterations of this step, those of attempts in vain included.
     pub iterations: u32,
+    /// Linear solves of these: in an iteration as often as it takes to find which contacts press at its end.
+    pub solves: u32,
     /// Parts that the command was cut into.
     pub substeps: u32,
     /// How often the device slid on while the hand held still, because friction and wall forces were not to be had in one step.
@@ -183,6 +186,9 @@ pub struct StepReport {
     pub nodes_solved: u64,
     /// Whether the step met the method's own convergence test.
     pub converged: bool,
+    /// What each hand, of a device alone the one, has done in ticks ([`Method::tick`](crate::methods::Method::tick)) that the device has not yet followed: the next tick or
+    /// step goes on with it. Empty where nothing is left over.
+    pub behind: Vec<Command>,
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ mod trial;
 mod unsymmetric;
 
 pub use external::{ContactMerit, Contacts, External, Moved, Sizes};
+pub(crate) use neighbourhood::Neighbourhood;
 pub use newton::Newton;
 pub use report::{NewtonOptions, NewtonReport, StepRecord, StopReason};
 pub use residual::ResidualSize;

@@ -6,6 +6,8 @@
 //! 2004, chapter 5). What is near in a vessel says the vessel: a node has as much room as it has clearance, and one that touches has its
 //! radius.
 
+use serde::{Deserialize, Serialize};
+
 use crate::Vec3;
 use crate::rod::RodState;
 
@@ -17,7 +19,7 @@ const LARGEST_TURN: f64 = 1.0;
 const STRAY: f64 = 3.0;
 
 /// Where the nodes of a rod were predicted, and how far each may be from there.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Neighbourhood {
     nodes: Vec<(Vec3, f64)>,
     angles: Vec<f64>,

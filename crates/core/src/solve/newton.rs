@@ -44,6 +44,8 @@ pub struct Newton<const C: usize> {
     pub(super) other: RodState,
     /// The steps that the last solution took.
     pub steps: Vec<StepRecord>,
+    /// Linear solves that it took.
+    pub(super) solves: usize,
     /// Where solutions are looked for.
     pub(crate) neighbourhood: Neighbourhood,
 }
@@ -63,6 +65,7 @@ impl<const C: usize> Newton<C> {
             trial: RodState::default(),
             other: RodState::default(),
             steps: Vec::with_capacity(STEPS),
+            solves: 0,
             neighbourhood: Neighbourhood::default(),
         }
     }
@@ -128,6 +131,19 @@ impl<const C: usize> Newton<C> {
         state: &mut RodState,
         options: &NewtonOptions,
     ) -> NewtonReport {
+        self.solves = 0;
+        let report = self.iterate(elements, supports, external, state, options);
+        NewtonReport { solves: self.solves, ..report }
+    }
+
+    fn iterate(
+        &mut self,
+        elements: &[ElementData],
+        supports: &mut Supports,
+        external: &mut dyn External,
+        state: &mut RodState,
+        options: &NewtonOptions,
+    ) -> NewtonReport {
         let mut report = NewtonReport::of(elements.len() + supports.conditions());
         self.trial.copy_from(state);
         self.other.copy_from(state);
@@ -139,6 +155,8 @@ impl<const C: usize> Newton<C> {
         let mut progress = Progress::default();
         let mut search = LineSearch::new(elements);
         let mut shift = 0.0;
+        // Whether the last state was an equilibrium but for what its contacts and friction know of each other.
+        let mut renewed = false;
         loop {
             let size =
                 self.residual_at(&mut problem, state, &progress, std::mem::take(&mut search.assembled));
@@ -146,14 +164,22 @@ impl<const C: usize> Newton<C> {
             if !size.relative.is_finite() {
                 return report.stopped(StopReason::NotFinite);
             }
-            let arrived = progress.has_arrived(&size, options.tolerance, &self.steps);
+            let mut arrived = progress.has_arrived(&size, options.tolerance, &self.steps);
             if arrived && !problem.settles() {
                 if report.iterations >= options.max_iterations {
                     return report.stopped(StopReason::Unsettled);
                 }
                 progress = Progress::default();
-                report.iterations += 1;
-                continue;
+                // Where that does not come of the next base, it takes a step: forces of contacts change with those alone.
+                if !std::mem::replace(&mut renewed, true) {
+                    report.iterations += 1;
+                    continue;
+                }
+                arrived = false;
+            }
+            renewed = false;
+            if self.solves >= options.max_solves {
+                return report.stopped(StopReason::MaxIterations);
             }
             let natural = match self.descent_step(&problem, &mut shift, arrived) {
                 Ok(inertia) => inertia,

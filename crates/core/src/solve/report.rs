@@ -5,8 +5,11 @@ use crate::banded::Inertia;
 /// Settings of Newton's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewtonOptions {
-    /// Iterations (factorisations with a step) allowed.
+    /// Iterations (steps) allowed.
     pub max_iterations: usize,
+    /// Linear solves allowed, those included that look for contacts and for the shift of an iteration: no iteration begins when they are used
+    /// up, and the last may take a few more.
+    pub max_solves: usize,
     /// Residual over force scale below which a state is an equilibrium.
     pub tolerance: f64,
     /// Largest rotation of a node in one step, in radians. Somewhat less than a right angle is best: a dead load across a rod turns it
@@ -18,7 +21,7 @@ pub struct NewtonOptions {
 
 impl Default for NewtonOptions {
     fn default() -> Self {
-        Self { max_iterations: 500, tolerance: 1e-10, max_turn: 1.4, minimum: true }
+        Self { max_iterations: 500, max_solves: usize::MAX, tolerance: 1e-10, max_turn: 1.4, minimum: true }
     }
 }
 
@@ -29,7 +32,7 @@ pub enum StopReason {
     Converged,
     /// The residual is as small as rounding lets it be on this mesh.
     RoundingFloor,
-    /// The iterations allowed are used up.
+    /// The iterations or linear solves allowed are used up.
     MaxIterations,
     /// No step along the search direction lowers the merit.
     NoDescent,
@@ -83,6 +86,8 @@ pub struct StepRecord {
 pub struct NewtonReport {
     /// Steps taken.
     pub iterations: usize,
+    /// Linear solves taken.
+    pub solves: usize,
     /// Relative residual of the final state.
     pub residual: f64,
     /// Inertia of the final matrix.
@@ -102,6 +107,7 @@ impl NewtonReport {
     pub(super) fn of(multipliers: usize) -> Self {
         Self {
             iterations: 0,
+            solves: 0,
             residual: f64::INFINITY,
             inertia: Inertia::default(),
             multipliers,

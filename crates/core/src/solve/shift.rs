@@ -99,6 +99,7 @@ impl<const C: usize> Newton<C> {
 
     /// Factors the assembled matrix with a shift, and sets the step that it answers.
     pub(super) fn factor_step(&mut self, sigma: f64) -> Result<Inertia, FactorError> {
+        self.solves += 1;
         self.right_hand_side();
         let Self { assembly, unit_shift, step, .. } = self;
         self.factor.factor_solve_shifted(assembly, unit_shift, sigma, step)

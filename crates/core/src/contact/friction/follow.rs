@@ -3,7 +3,7 @@
 //! In a step of Newton's method they are those of its base, so that friction has a potential. They are renewed at every base until they
 //! are what presses there and hardly change, and after the equilibrium with them if they turn out not to be what presses in that.
 
-use super::Friction;
+use super::{Friction, NormalForce};
 use crate::Vec3;
 
 /// Normal forces are settled once they change, and differ from what presses, by less than this part.
@@ -77,6 +77,12 @@ impl Friction {
     /// Normal forces follow from here on.
     pub fn release(&mut self) {
         self.renewal = Renewal::Begins;
+    }
+
+    /// Normal forces are those that a solution has come to, one for each point, and follow from there.
+    pub fn resume(&mut self, forces: &[NormalForce]) {
+        self.release();
+        self.sliders.iter_mut().zip(forces).for_each(|(s, f)| (s.normal, s.force_n) = (f.normal, f.force_n));
     }
 
     /// Normal forces are again those with which the step began, and are held.

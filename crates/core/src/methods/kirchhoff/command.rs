@@ -6,7 +6,7 @@ use super::blocked::{refuse_narrow, refuse_wedged};
 use super::carried::carried;
 use super::configuration::Start;
 use super::hands::lengths;
-use super::state::KirchhoffState;
+use super::state::{KirchhoffState, Ticking};
 use super::step_control::StepControl;
 use super::substep::{Attempt, Effort, Found};
 use super::workspace::{Work, Workspace};
@@ -21,15 +21,15 @@ const SUBSTEP_LIMIT: usize = 4096;
 /// included, before it comes to rest as it can: its cost is bounded.
 const WORK: f64 = 280.0;
 /// See [`WORK`], rad.
-const WORK_RAD: f64 = 0.1;
+pub(super) const WORK_RAD: f64 = 0.1;
 /// … and never more than so many times what one solution may take.
 const WORK_OF_ONE: usize = 10;
 /// How often a device that came to rest at the end of its way, but in no equilibrium, is let go on from there with the hand held still.
 const AGAIN: usize = 4;
 /// What moved by less than this in another last resort, in its least radii, is at rest.
-const REST_RADII: f64 = 1e-3;
+pub(super) const REST_RADII: f64 = 1e-3;
 /// Residual over force scale above which what has stopped is not at rest.
-const AT_REST: f64 = 0.05;
+pub(super) const AT_REST: f64 = 0.05;
 
 /// What the sub-steps of a command come to.
 #[derive(Debug, Clone, Copy, Default)]
@@ -138,7 +138,8 @@ impl<const C: usize> Workspace<C> {
                 break;
             }
             let left = passage.map(|passage| (was, passage));
-            let attempt = Attempt { hands, effort, most: control.budget(), left };
+            let most = control.budget();
+            let attempt = Attempt { hands, effort, most, solves: usize::MAX, left, resumed: None };
             let iterations = tools.work.iterations;
             let tried = tools.try_step(&there, here, attempt, next);
             let iterations = tools.work.iterations - iterations;
@@ -180,13 +181,13 @@ impl<const C: usize> Workspace<C> {
             refuse_narrow(&there, now.start(), &way.commands)?;
         }
         let state = now.parts().1;
-        state.stride = control.stride();
+        (state.stride, state.tick) = (control.stride(), Ticking::Rest);
         let report = &mut state.report;
         sum.write(report);
         report.converged = balanced;
+        report.behind.clear();
         report.angles = from.report.angles;
-        report.iterations = tools.work.iterations as u32;
-        report.nodes_solved = from.report.nodes_solved + tools.work.nodes_solved;
+        tools.work.write(report, from.report.nodes_solved);
         Ok(())
     }
 }

@@ -59,6 +59,12 @@ impl Guess {
         !contact.is_outside(elements, state)
     }
 
+    /// Goes on from where a solution has come to: `state`, which is the slid device, becomes that.
+    pub(super) fn resume(&mut self, under_way: &RodState, state: &mut RodState) {
+        self.slid.copy_from(state);
+        state.copy_from(under_way);
+    }
+
     /// What an equilibrium that was found teaches.
     pub(super) fn teach(&self, found: &RodState, correction: &mut Correction) {
         correction.learn(&self.motions, &self.slid, found);

@@ -1,5 +1,7 @@
 //! Where the hands are: of a device alone one, of several instruments one each.
 
+use serde::{Deserialize, Serialize};
+
 use crate::contact::HandMotion;
 use crate::device::Stack;
 use crate::methods::{Command, Move, StepReport};
@@ -8,7 +10,7 @@ use crate::methods::{Command, Move, StepReport};
 const ZERO_LENGTH_MM: f64 = 1e-9;
 
 /// What a hand has done since the start.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Hand {
     /// Length inserted, mm.
     pub(super) inserted_mm: f64,
@@ -52,13 +54,16 @@ pub(super) struct Way {
 }
 
 impl Way {
-    /// Sets the way of these moves from a state.
+    /// Sets the way of these moves from a state, with what ticks have left over.
     pub(super) fn begin(&mut self, stack: &Stack, report: &StepReport, moves: &[Move]) {
         read(report, &mut self.start);
         self.commands.clear();
         self.commands.resize(self.start.len(), Command::default());
+        self.commands.iter_mut().zip(&report.behind).for_each(|(command, behind)| *command = *behind);
         for one in moves {
-            self.commands[one.instrument] = one.command;
+            let command = &mut self.commands[one.instrument];
+            command.advance_mm += one.command.advance_mm;
+            command.rotate_rad += one.command.rotate_rad;
         }
         self.target.clear();
         for ((hand, command), device) in self.start.iter().zip(&self.commands).zip(stack.devices()) {
@@ -76,6 +81,18 @@ impl Way {
             let inserted_mm = if part == 1.0 { to } else { from + (to - from) * part };
             hands.push(Hand { inserted_mm, turn_rad: start.turn_rad + command.rotate_rad * part });
         }
+    }
+
+    /// What is left of each hand's command where the hands are at `hands`; empty where nothing is.
+    pub(super) fn rest(&self, hands: &[Hand]) -> Vec<Command> {
+        if hands == self.target {
+            return Vec::new();
+        }
+        let rest = |(target, hand): (&Hand, &Hand)| Command {
+            advance_mm: target.inserted_mm - hand.inserted_mm,
+            rotate_rad: target.turn_rad - hand.turn_rad,
+        };
+        self.target.iter().zip(hands).map(rest).collect()
     }
 
     /// Longest way of a hand, mm, a turn of `turn_rad` counting as one.

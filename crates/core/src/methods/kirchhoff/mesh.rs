@@ -8,15 +8,15 @@ use crate::rod::{ElementData, Material};
 /// At the tip they begin this close, in radii, and double: a tip that touches the wall at an angle leaves it within a
 /// tenth of its radius.
 const TIP_SPACING_RADII: f64 = 1.0 / 256.0;
-/// Fewest and most intervals between contact points in an element.
-const INTERVALS: (f64, f64) = (2.0, 16.0);
+/// Fewest intervals between contact points in an element: a wire that is thick for its elements is felt in their midst as well.
+const FEWEST_INTERVALS: f64 = 2.0;
 /// Ends of sections nearer to each other than this part of an element share a node: over an element that is shorter, differences of unit
 /// vectors have lost the digits that curvature is made of.
 pub(super) const NEAR: f64 = 1e-3;
 /// Most that the rest shape turns by over an element, rad.
 const LARGEST_TURN: f64 = 0.75;
-/// No element has more contact points: at the tip of the thinnest device they double from 4·10⁻⁹ mm up to half of the longest element,
-/// ten metres, 42 times at most.
+/// An element at the tip has no more contact points beside those that are evenly spaced: they double from 4·10⁻⁹ mm up to half of the longest
+/// element, ten metres, 42 times at most.
 pub(super) const MOST_POINTS: usize = 64;
 
 /// How finely a device is meshed.
@@ -31,6 +31,12 @@ pub struct Fineness {
 impl Fineness {
     /// A sharp crest between two contact points is felt when it is two thirds of a radius from the axis. At 2 radii it would reach it.
     pub const CONTACT_SPACING_RADII: f64 = 1.5;
+
+    /// About how many contact points a device has.
+    pub(super) fn points(&self, device: &Device) -> usize {
+        let each = device.sections().iter().map(|section| section.length_mm / section.radius_mm);
+        (each.sum::<f64>() / self.contact_spacing_radii) as usize
+    }
 
     /// Elements of this length, with contact points that feel any crest.
     pub fn of_elements(element_mm: f64) -> Self {
@@ -175,14 +181,16 @@ impl Mesh {
         let Fineness { element_mm, contact_spacing_radii } = fineness;
         nodes_from_tip(device, inserted_mm, element_mm, &mut self.from_tip_mm);
         self.points.clear();
+        let most = 1.0 + fineness.points(device) as f64;
         // Half of the interval beyond the point at hand; beyond the tip there is its cap.
         let mut half_beyond = device.section_at(0.0).radius_mm;
         let last = self.from_tip_mm.len() - 2;
         for (e, ends) in self.from_tip_mm.windows(2).enumerate().rev() {
             let length = ends[0] - ends[1];
             let radius_mm = device.section_at(ends[1]).radius_mm;
-            let intervals =
-                (length / (contact_spacing_radii * radius_mm)).ceil().clamp(INTERVALS.0, INTERVALS.1);
+            // A thin tip that is too short for an element of its own gives that its radius, and asks for no more points than the whole device does.
+            let intervals = (length / (contact_spacing_radii * radius_mm)).ceil();
+            let intervals = intervals.min(most).max(FEWEST_INTERVALS);
             let spacing = length / intervals;
             // Distance from the element's far end.
             let mut at = 0.0;
@@ -274,17 +282,17 @@ mod tests {
     }
 
     #[test]
-    fn devices_of_mixed_scales_have_few_contact_points() {
-        let (thin, thick) = (Section::straight(1.0, 1e-6, 10.0), Section::straight(9999.0, 1.0, 10.0));
-        for sections in [vec![thin, thick], vec![thick, thin], vec![Section { length_mm: 1e4, ..thin }]] {
+    fn devices_of_mixed_scales_have_as_many_contact_points_as_their_sections_ask_for() {
+        let (thin, thick) = (Section::straight(1.0, 1e-3, 10.0), Section::straight(9999.0, 1.0, 10.0));
+        for sections in [vec![thin, thick], vec![thick, thin], vec![Section { length_mm: 30.0, ..thin }]] {
             let device = Device::new(sections).unwrap();
             for element_mm in [1e4, 3000.0, 1.0] {
                 let mut mesh = Mesh::default();
                 mesh.build(&device, device.length_mm(), Fineness::of_elements(element_mm), 1.0);
-                let most = MOST_POINTS + INTERVALS.1 as usize * mesh.elements.len();
+                let asked = Fineness::of_elements(element_mm).points(&device);
+                let most = 2 * asked + MOST_POINTS + 2 * mesh.elements.len();
                 assert!(mesh.points.len() <= most, "{} points, {element_mm} mm", mesh.points.len());
-                let first = mesh.points.iter().filter(|p| p.element + 1 == mesh.elements.len()).count();
-                assert!(first <= MOST_POINTS, "{first} points in the first element, {element_mm} mm");
+                assert!(mesh.points.len() >= asked, "{} points, {element_mm} mm", mesh.points.len());
             }
         }
     }

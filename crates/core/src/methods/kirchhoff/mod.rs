@@ -44,6 +44,9 @@ mod slopes;
 mod state;
 mod step_control;
 mod substep;
+mod tick;
+#[cfg(test)]
+mod tick_tests;
 #[cfg(test)]
 mod touch_tests;
 mod transport;
@@ -69,7 +72,8 @@ use crate::{Error, Result};
 use coaxial::Nodes;
 use hands::{Hand, lengths};
 use lateral::Line;
-use state::Belongs;
+use state::{Belongs, Ticking};
+use tick::Ticked;
 use workspace::Workspace;
 
 /// Options of the exact rod.
@@ -150,6 +154,8 @@ fn several(
 const LARGEST_TOLERANCE: f64 = 1e-2;
 /// Contact points farther apart than this leave most of a device unfelt.
 const LARGEST_CONTACT_SPACING_RADII: f64 = 10.0;
+/// Most contact points of all instruments: hundreds of bytes each.
+const POINT_LIMIT: usize = 1_000_000;
 /// Most elements of a device: some kilobytes each.
 const ELEMENT_LIMIT: f64 = 100_000.0;
 
@@ -225,6 +231,14 @@ impl<const C: usize> Kirchhoff<C> {
                 ),
             ));
         }
+        let points: usize =
+            surroundings.stack.devices().map(|device| options.fineness().points(device)).sum();
+        if points > POINT_LIMIT {
+            let mend = format!(
+                "makes {points} contact points along the device, and more than {POINT_LIMIT} take gigabytes: allow them farther apart"
+            );
+            return Err(Error::parameter("method.contact_spacing_radii", spacing_radii, mend));
+        }
         if options.self_contact && surroundings.stack.is_several() {
             let mend = "loops of several instruments on one line do not feel each other yet: leave it out";
             return Err(Error::parameter("method.self_contact", true, mend));
@@ -251,6 +265,64 @@ impl<const C: usize> Kirchhoff<C> {
         };
         method.write_shape(&[0.0]);
         Ok(method)
+    }
+
+    /// Has the workspace work on what is left to do, if anything is, and takes its new state if it says that there is one.
+    fn work<T>(
+        &mut self,
+        surroundings: &Surroundings<'_>,
+        moves: &[Move],
+        work: impl FnOnce(&mut Workspace<C>, &Environment<'_>, &KirchhoffState) -> Result<(bool, T)>,
+    ) -> Result<Option<T>> {
+        let rests = moves.iter().all(|one| one.command == Command::default());
+        if rests && !surroundings.moves() && self.state.report.behind.is_empty() {
+            Arc::make_mut(&mut self.state).report.rest();
+            return Ok(None);
+        }
+        let environment = Environment::new(surroundings, &self.surface, &self.options);
+        let mut workspace = match self.workspace.take() {
+            Some(workspace) => workspace,
+            None => {
+                let workspace = Workspace::new(&environment, &self.state);
+                self.shape.reserve(workspace.most.0 + 1);
+                workspace
+            }
+        };
+        let done = work(&mut workspace, &environment, &self.state);
+        self.counters.add(&std::mem::take(&mut workspace.tools.counters));
+        if let Ok((true, _)) = done {
+            std::mem::swap(&mut self.state, &mut workspace.now.state);
+            std::mem::swap(&mut workspace.mesh, &mut workspace.now.mesh);
+            self.write_shape(&workspace.mesh.from_tip_mm);
+        }
+        self.workspace = Some(workspace);
+        Ok(Some(done?.1))
+    }
+
+    /// Checks that a state may be one of this simulation where the hands are at `hands`, and returns the mesh that it has then.
+    fn check(&self, surroundings: &Surroundings<'_>, state: &KirchhoffState, hands: &[Hand]) -> Result<Mesh> {
+        let devices = surroundings.stack.devices();
+        if hands.len() != devices.len() {
+            let mend = format!("there are {} instruments here: restore a state of this scene", devices.len());
+            return Err(Error::parameter("state.instruments", hands.len(), mend));
+        }
+        for (hand, device) in hands.iter().zip(devices) {
+            crate::methods::check_inserted(hand.inserted_mm, device)?;
+        }
+        surroundings.stack.check_places(hands.iter().map(|hand| hand.inserted_mm))?;
+        let environment = Environment::new(surroundings, &self.surface, &self.options);
+        let mut mesh = Mesh::default();
+        meshed(&environment, hands, &mut mesh);
+        state.check(&Belongs {
+            surface: &self.surface,
+            sheath: surroundings.sheath,
+            elements: mesh.elements.len(),
+            points: mesh.points.len(),
+            sets: Layout::<C>::ANGLES,
+            inner_friction: surroundings.properties.has_friction(),
+            inner: if surroundings.stack.has_inner_friction() { hands.len() - 1 } else { 0 },
+        })?;
+        Ok(mesh)
     }
 
     /// The centre line of the state, with nodes at these arc lengths from the tip.
@@ -284,28 +356,40 @@ impl<const C: usize> Method for Kirchhoff<C> {
     }
 
     fn step_together(&mut self, surroundings: &Surroundings<'_>, moves: &[Move]) -> Result<()> {
-        if moves.iter().all(|one| one.command == Command::default()) && !surroundings.moves() {
-            Arc::make_mut(&mut self.state).report.rest();
-            return Ok(());
-        }
-        let environment = Environment::new(surroundings, &self.surface, &self.options);
-        let mut workspace = match self.workspace.take() {
-            Some(workspace) => workspace,
-            None => {
-                let workspace = Workspace::new(&environment, &self.state);
-                self.shape.reserve(workspace.most.0 + 1);
-                workspace
+        self.work(surroundings, moves, |workspace, environment, state| {
+            workspace.carry_out(environment, state, moves).map(|()| (true, ()))
+        })?;
+        Ok(())
+    }
+
+    fn tick(&mut self, surroundings: &Surroundings<'_>, moves: &[Move], solves: usize) -> Result<()> {
+        let ticked = self.work(surroundings, moves, |workspace, environment, state| {
+            let ticked = workspace.tick(environment, state, moves, solves)?;
+            Ok((matches!(ticked, Ticked::Moved), ticked))
+        });
+        match ticked {
+            Ok(None | Some(Ticked::Moved)) => Ok(()),
+            // Time goes on: what the vessel does to the device cannot wait.
+            Ok(Some(Ticked::Overtaken)) => self.step_together(surroundings, moves),
+            Ok(Some(Ticked::Rests(longest_mm, begun))) => {
+                let state = Arc::make_mut(&mut self.state);
+                (state.stride.part_mm, state.tick) = (longest_mm, begun);
+                let nodes_solved = state.report.nodes_solved;
+                state.report.rest();
+                if let Some(Workspace { tools, way, .. }) = self.workspace.as_deref() {
+                    state.report.behind = way.rest(&way.start);
+                    tools.work.write(&mut state.report, nodes_solved);
+                }
+                Ok(())
             }
-        };
-        let done = workspace.carry_out(&environment, &self.state, moves);
-        self.counters.add(&std::mem::take(&mut workspace.tools.counters));
-        if done.is_ok() {
-            std::mem::swap(&mut self.state, &mut workspace.now.state);
-            std::mem::swap(&mut workspace.mesh, &mut workspace.now.mesh);
-            self.write_shape(&workspace.mesh.from_tip_mm);
+            Err(error) => {
+                // The wall has stopped the hands.
+                let state = Arc::make_mut(&mut self.state);
+                state.tick = Ticking::Rest;
+                state.report.behind.clear();
+                Err(error)
+            }
         }
-        self.workspace = Some(workspace);
-        done
     }
 
     fn shape(&self) -> &Shape {
@@ -353,27 +437,10 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let Content::Kirchhoff(state) = state.of(NAME)? else { return Err(state.of_another(NAME)) };
         let mut hands = Vec::new();
         hands::read(&state.report, &mut hands);
-        let devices = surroundings.stack.devices();
-        if hands.len() != devices.len() {
-            let mend = format!("there are {} instruments here: restore a state of this scene", devices.len());
-            return Err(Error::parameter("state.instruments", hands.len(), mend));
+        let mesh = self.check(surroundings, state, &hands)?;
+        if let Ticking::Solving(under_way) = &state.tick {
+            self.check(surroundings, &under_way.state, &under_way.hands)?;
         }
-        for (hand, device) in hands.iter().zip(devices) {
-            crate::methods::check_inserted(hand.inserted_mm, device)?;
-        }
-        surroundings.stack.check_places(hands.iter().map(|hand| hand.inserted_mm))?;
-        let environment = Environment::new(surroundings, &self.surface, &self.options);
-        let mut mesh = Mesh::default();
-        meshed(&environment, &hands, &mut mesh);
-        state.check(&Belongs {
-            surface: &self.surface,
-            sheath: surroundings.sheath,
-            elements: mesh.elements.len(),
-            points: mesh.points.len(),
-            sets: Layout::<C>::ANGLES,
-            inner_friction: surroundings.properties.has_friction(),
-            inner: if surroundings.stack.has_inner_friction() { hands.len() - 1 } else { 0 },
-        })?;
         self.state = Arc::clone(state);
         self.write_shape(&mesh.from_tip_mm);
         if let Some(workspace) = &mut self.workspace {

@@ -24,11 +24,11 @@ use crate::rod::{ElementData, RodState, Supports};
 use crate::solve::{Newton, NewtonOptions, NewtonReport, Together};
 
 /// Newton iterations of a solution near its prediction: from another one, nearer by, it is found in fewer.
-const MOST_NEAR: usize = 60;
+pub(super) const MOST_NEAR: usize = 60;
 /// Newton iterations of a solution while the device moves, …
 const MOST_MOVING: usize = 300;
 /// … and of all of them.
-const LONGEST: usize = 2000;
+pub(super) const LONGEST: usize = 2000;
 /// Newton iterations from an equilibrium with friction held to one where it follows.
 const FOLLOWING: usize = 20;
 /// Most slides with the hand held still. Two or three are the rule.
@@ -54,10 +54,14 @@ pub(super) struct Search<'a, 'b, const C: usize> {
     /// Residual over force scale of an equilibrium.
     pub(super) tolerance: f64,
     pub(super) effort: Effort,
-    /// Most Newton iterations.
+    /// Most Newton iterations, …
     pub(super) most: usize,
-    /// Newton iterations that were taken.
+    /// … and linear solves.
+    pub(super) most_solves: usize,
+    /// Newton iterations that were taken, …
     pub(super) iterations: usize,
+    /// … and linear solves.
+    pub(super) solves: usize,
     /// How often the device slid on while the hand held still.
     pub(super) slides: u32,
 }
@@ -89,7 +93,7 @@ impl<const C: usize> Search<'_, '_, C> {
     /// From a state to the equilibrium that follows.
     pub(super) fn on(&mut self) -> NewtonReport {
         let found = self.newton();
-        if self.effort == Effort::Near || !found.converged || self.is_settled() {
+        if matches!(self.effort, Effort::Near | Effort::Moving) || !found.converged || self.is_settled() {
             return found;
         }
         self.guess.other.copy_from(self.state);
@@ -109,8 +113,12 @@ impl<const C: usize> Search<'_, '_, C> {
     /// Newton's method from the state on.
     fn newton(&mut self) -> NewtonReport {
         let most = if self.effort == Effort::Flight { MOST_MOVING } else { MOST_NEAR };
-        let max_iterations = most.min(self.most.saturating_sub(self.iterations));
-        let options = NewtonOptions { max_iterations, tolerance: self.tolerance, ..NewtonOptions::default() };
+        let options = NewtonOptions {
+            max_iterations: most.min(self.most.saturating_sub(self.iterations)),
+            max_solves: self.most_solves.saturating_sub(self.solves),
+            tolerance: self.tolerance,
+            ..NewtonOptions::default()
+        };
         let (elements, supports) = (self.elements, &mut *self.supports);
         let found = match self.loops.as_deref_mut() {
             Some(loops) => {
@@ -120,6 +128,7 @@ impl<const C: usize> Search<'_, '_, C> {
             None => self.newton.solve(elements, supports, self.contact, self.state, &options),
         };
         self.iterations += found.iterations;
+        self.solves += found.solves;
         found
     }
 

@@ -11,6 +11,7 @@ use crate::contact::{ContactSurface, InnerFriction, KnownPoints, NormalForce};
 use crate::device::Stack;
 use crate::methods::{InstrumentReport, Sheath, StepReport, Surroundings};
 use crate::rod::{Frame, RodState};
+use crate::solve::Neighbourhood;
 use crate::{Error, Result, Vec3};
 
 /// The state of the exact rod: where it lies and with which forces, what the predictor has learnt, what its contact points know of the
@@ -26,7 +27,36 @@ pub struct KirchhoffState {
     pub(super) correction: Correction,
     /// How the next part of a command goes.
     pub(super) stride: Stride,
+    /// What ticks have begun.
+    pub(super) tick: Ticking,
     pub(super) report: StepReport,
+}
+
+/// Where ticks have come to.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) enum Ticking {
+    /// The device is at rest, and nothing has begun.
+    #[default]
+    Rest,
+    /// It is at rest, and a part to another place is being solved for.
+    Solving(Box<UnderWay>),
+    /// It is on its way to where it comes to rest, for so many Newton iterations.
+    Moving(usize),
+}
+
+/// A part of a command that ticks have begun to solve for.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct UnderWay {
+    /// Where the hands are after it, …
+    pub(super) hands: Vec<Hand>,
+    /// … and the longest way of one there, mm.
+    pub(super) part_mm: f64,
+    /// Where the device is in the solution, and what it presses with.
+    pub(super) state: KirchhoffState,
+    /// Where it was predicted.
+    pub(super) neighbourhood: Neighbourhood,
+    /// Newton iterations that were taken.
+    pub(super) iterations: usize,
 }
 
 /// What a mesh says of the states that belong to it.
@@ -63,6 +93,7 @@ impl KirchhoffState {
             known: KnownPoints::default(),
             correction: Correction::default(),
             stride: Stride { part_mm: stack.length_mm(), held: false },
+            tick: Ticking::Rest,
             report: StepReport { converged: true, instruments, ..StepReport::default() },
         }
     }

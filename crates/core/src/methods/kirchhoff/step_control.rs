@@ -9,14 +9,14 @@ use serde::{Deserialize, Serialize};
 use super::substep::{Effort, Found};
 
 /// Longest way of the hands in which the device moves from a fold, mm: how exactly the place of a fold is known.
-const FOLD_MM: f64 = 0.05;
+pub(super) const FOLD_MM: f64 = 0.05;
 /// Longest part in which friction is held for the first time, mm: longer ones mostly fail since they are too long.
-const HELD_MM: f64 = 0.5;
+pub(super) const HELD_MM: f64 = 0.5;
 /// Shortest way of the hands in which it moves, mm.
 const LEAST_MM: f64 = 1e-3;
 /// An equilibrium nearer to its prediction than this part of what is far is followed by a part twice as long. Predictions of first order are
 /// twice as far then, those of second order four times.
-const NEARER: f64 = 0.2;
+pub(super) const NEARER: f64 = 0.2;
 
 /// How parts go, as the last ones went: what one command hands on to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use super::hands::{Hand, motions};
 use super::loops::skins;
 use super::mesh::Mesh;
 use super::search::Search;
-use super::state::KirchhoffState;
+use super::state::{KirchhoffState, UnderWay};
 use super::transport::{transport, transport_together};
 use super::workspace::Tools;
 use super::{Environment, inner_friction, meshed};
@@ -25,6 +25,8 @@ pub(super) enum Effort {
     Held,
     /// To where the device comes to rest, however far away.
     Flight,
+    /// As far to where it comes to rest as a tick goes.
+    Moving,
 }
 
 /// What a part of a command has come to.
@@ -58,6 +60,8 @@ pub(super) enum Lost {
     Unbalanced,
     /// No equilibrium was found, and that residual over force scale is left.
     Unsolved(StopReason, f64),
+    /// The linear solves of a tick were used up first.
+    UnderWay,
 }
 
 impl std::fmt::Display for Lost {
@@ -67,6 +71,7 @@ impl std::fmt::Display for Lost {
             Self::Passed => f.write_str("the device would pass through the wall"),
             Self::Unbalanced => f.write_str("more energy is stored and taken by friction than was put in"),
             Self::Unsolved(reason, residual) => write!(f, "{reason} (residual {residual:.1e})"),
+            Self::UnderWay => f.write_str("the linear solves of the tick are used up"),
         }
     }
 }
@@ -80,6 +85,10 @@ pub(super) struct Attempt<'a> {
     pub(super) effort: Effort,
     /// Most Newton iterations.
     pub(super) most: usize,
+    /// Most linear solves: those of a tick, as many as it takes in a step.
+    pub(super) solves: usize,
+    /// How far ticks have come with this part already.
+    pub(super) resumed: Option<&'a UnderWay>,
     /// Where the vessel moves: what was before it did, and how it does. The part then starts with the device taken along.
     pub(super) left: Option<(Start<'a>, Passage<'a>)>,
 }
@@ -90,7 +99,7 @@ impl<const C: usize> Tools<C> {
         &mut self,
         environment: &Environment<'_>,
         start: Start<'_>,
-        Attempt { hands, left, .. }: Attempt<'_>,
+        Attempt { hands, left, resumed, .. }: Attempt<'_>,
         next: &mut Configuration,
     ) {
         let (mesh, after) = next.parts();
@@ -119,11 +128,17 @@ impl<const C: usize> Tools<C> {
             transport_from(start, &mut after.rod);
         }
         let (places, moves) = (&mut self.friction.between, &self.guess.motions);
-        inner_friction::begin(stack, start, (mesh, &after.rod), moves, places);
+        let pressed = resumed.map_or(start, |resumed| Start { mesh, state: &resumed.state });
+        inner_friction::begin(stack, pressed, (mesh, &after.rod), moves, places);
         after.turn_tails(stack, hands);
         self.newton.resize(mesh.elements.len());
-        let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
-        self.cache.begin(&start.state.known, &start.mesh.points, &mesh.points, advance_mm);
+        if let Some(resumed) = resumed {
+            self.friction.resume(&resumed.state.forces);
+            self.cache.resume(&resumed.state.known);
+        } else {
+            let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
+            self.cache.begin(&start.state.known, &start.mesh.points, &mesh.points, advance_mm);
+        }
     }
 
     /// Gives the state what the next sub-step starts with.
@@ -142,7 +157,7 @@ impl<const C: usize> Tools<C> {
         next: &mut Configuration,
     ) -> std::result::Result<Found, Lost> {
         let (surroundings, options) = (&environment.surroundings, environment.options);
-        let Attempt { hands, effort, most, left } = attempt;
+        let Attempt { hands, effort, most, left, resumed, .. } = attempt;
         self.transport_to(environment, start, attempt, next);
         let (mesh, after) = next.parts();
         let rod = &mut after.rod;
@@ -157,15 +172,20 @@ impl<const C: usize> Tools<C> {
             let advance_mm = mesh.from_tip_mm[0] - start.mesh.from_tip_mm[0];
             in_its_own_way = loops.blocks_its_tip(&mesh.elements, rod, advance_mm);
         }
-        let guessed = self.guess.choose(&mut contact, loops.as_deref_mut(), (start, &*mesh, &mut *rod));
-        let inside = guessed && !in_its_own_way;
-        let near = effort != Effort::Flight;
-        if in_its_own_way || (near && !inside) {
-            self.counters.add(&contact.count());
-            return Err(Lost::Beyond);
+        let near = matches!(effort, Effort::Near | Effort::Held);
+        if let Some(resumed) = resumed {
+            self.guess.resume(&resumed.state.rod, rod);
+            self.newton.neighbourhood.clone_from(&resumed.neighbourhood);
+        } else {
+            let guessed = self.guess.choose(&mut contact, loops.as_deref_mut(), (start, &*mesh, &mut *rod));
+            let inside = guessed && !in_its_own_way;
+            if in_its_own_way || (effort != Effort::Flight && !inside) {
+                self.counters.add(&contact.count());
+                return Err(Lost::Beyond);
+            }
+            contact.rooms(&mesh.elements, rod, &mut self.guess.room_mm);
+            self.newton.neighbourhood.begin(rod, &self.guess.room_mm);
         }
-        contact.rooms(&mesh.elements, rod, &mut self.guess.room_mm);
-        self.newton.neighbourhood.begin(rod, &self.guess.room_mm);
         self.newton.neighbourhood.bounds = near;
         let mut supports = Supports { start_tangent: true, start_angle: true, ..Supports::default() };
         let mut search = Search {
@@ -180,19 +200,23 @@ impl<const C: usize> Tools<C> {
             tolerance: options.tolerance,
             effort,
             most: most.min(options.max_iterations),
+            most_solves: attempt.solves,
             iterations: 0,
+            solves: 0,
             slides: 0,
         };
         let found = search.run();
         let found = search.dragged(found, surroundings.flow);
         let (found, lagging) = search.rubbed(found, surroundings.stack, mesh);
-        let (iterations, slides) = (search.iterations, search.slides);
+        let (taken, slides) = ((search.iterations, search.solves), search.slides);
         let off = self.newton.neighbourhood.off(rod);
         let unsettled = if surroundings.properties.has_friction() { contact.unsettled() } else { 0.0 };
         let unsettled = unsettled.max(lagging);
         // What has come to rest is in equilibrium as exactly as friction is with the wall elsewhere.
         let balanced = (found.converged || (!near && found.residual < SETTLED)) && unsettled < SETTLED;
+        let used_up = found.reason == StopReason::MaxIterations && taken.1 >= attempt.solves;
         let wrong = match (near, &found) {
+            (true, found) if !found.converged && used_up => Some(Lost::UnderWay),
             (true, found) if !found.converged => Some(Lost::Unsolved(found.reason, found.residual)),
             (true, found) if !balanced => Some(Lost::Unsolved(StopReason::Unsettled, found.residual)),
             (true, found) if off > 1.0 => Some(Lost::Unsolved(StopReason::Left, found.residual)),
@@ -207,11 +231,18 @@ impl<const C: usize> Tools<C> {
         };
         if wrong.is_none() {
             contact.touches(&mesh.elements, rod, &mut self.touches);
+            if effort == Effort::Moving && !balanced {
+                // The next tick slides on from here, with what presses here.
+                contact.anchor_friction(&mesh.elements, rod);
+            }
         }
         let aside_mj = (contact.drag_mj(&mesh.elements, rod) - slid_mj).abs();
         self.counters.add(&contact.count());
-        self.work.add(iterations, mesh.elements.len());
+        self.work.add(taken, mesh.elements.len());
         if let Some(wrong) = wrong {
+            if wrong == Lost::UnderWay {
+                self.keep(mesh, after);
+            }
             return Err(wrong);
         }
         let (least_mj, most_mj) = self.friction.dissipated_mj(&mesh.elements, rod, &mesh.points);
@@ -226,7 +257,7 @@ impl<const C: usize> Tools<C> {
         if near && lacks {
             return Err(Lost::Unbalanced);
         }
-        let jumps = (!near && off > 1.0) || balance.is_set_free();
+        let jumps = (effort == Effort::Flight && off > 1.0) || balance.is_set_free();
         let (dissipated_mj, released_mj) = balance.lost_mj(jumps);
         let farthest = || self.newton.neighbourhood.farthest(&after.rod);
         let jump = jumps.then(|| Jump { released_mj, position_mm: farthest() });

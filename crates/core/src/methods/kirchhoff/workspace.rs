@@ -7,6 +7,7 @@ use super::mesh::Mesh;
 use super::state::KirchhoffState;
 use super::{Environment, meshed};
 use crate::contact::{ContactCache, Counters, Drag, Friction, SelfContact, Touch};
+use crate::methods::StepReport;
 use crate::solve::Newton;
 
 /// The workspace of a simulation.
@@ -47,17 +48,26 @@ pub(super) struct Tools<const C: usize> {
 /// What sub-steps take, those in vain included.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Work {
-    /// Newton iterations.
+    /// Newton iterations, …
     pub(super) iterations: usize,
+    /// … and linear solves.
+    pub(super) solves: usize,
     /// Nodes of the sub-steps in which the device moved.
     pub(super) nodes_solved: u64,
 }
 
 impl Work {
-    /// Adds a sub-step of so many elements.
-    pub(super) fn add(&mut self, iterations: usize, elements: usize) {
+    /// Adds the iterations and linear solves of a sub-step of so many elements.
+    pub(super) fn add(&mut self, (iterations, solves): (usize, usize), elements: usize) {
         self.iterations += iterations;
+        self.solves += solves;
         self.nodes_solved += if iterations > 0 { elements as u64 + 1 } else { 0 };
+    }
+
+    /// Tells what it took beside the nodes that were solved for before.
+    pub(super) fn write(&self, report: &mut StepReport, nodes_solved: u64) {
+        (report.iterations, report.solves) = (self.iterations as u32, self.solves as u32);
+        report.nodes_solved = nodes_solved + self.nodes_solved;
     }
 }
 

@@ -1,0 +1,207 @@
+//! Ticks of fixed cost follow steps.
+
+use crate::device::{Device, Instrument, Section, Stack};
+use crate::insertion::{Command, Move, Sheath, Simulation, WallProperties};
+use crate::methods::State;
+use crate::methods::kirchhoff::KirchhoffOptions;
+use crate::random::{splitmix64, unit};
+use crate::vessel::motion::{MotionMode, VesselMotion, Waveform};
+use crate::vessel::{GeneratedWall, Resolution, Wall, anatomy};
+
+/// Linear solves of a tick: fewer than most parts take, so that most ticks leave something over.
+const SOLVES: usize = 3;
+
+/// A tube of radius 4 mm that is straight for 100 mm and bends then.
+fn tube() -> Wall {
+    GeneratedWall::new(&anatomy::tree("curved_tube").unwrap(), Resolution::EdgeMm(1.5)).unwrap().wall
+}
+
+/// A bent wire in a bent catheter in the tube, 110 and 90 mm far.
+fn two(motion: &[MotionMode]) -> Simulation {
+    let bent = |length_mm: f64, radius_mm: f64, bending: f64, inner_radius_mm: Option<f64>| {
+        let shaft = Section { inner_radius_mm, ..Section::straight(length_mm, radius_mm, bending) };
+        let tip = Section { rest_curvature_per_mm: [0.06, 0.0], length_mm: 15.0, ..shaft };
+        Device::new(vec![tip, shaft]).unwrap()
+    };
+    let instrument = |name: &str, device: Device| Instrument { name: name.into(), device, may_lead: true };
+    let stack = Stack::new(vec![
+        instrument("wire", bent(285.0, 0.3, 5.0, None)),
+        instrument("catheter", bent(225.0, 0.6, 15.0, Some(0.35))),
+    ]);
+    let properties = WallProperties { friction: 0.1, deviation_mm: 0.0, ..WallProperties::default() };
+    let options = KirchhoffOptions { element_mm: 4.0, tolerance: 1e-6, ..KirchhoffOptions::default() };
+    let sheath = Sheath::new(crate::Vec3::z() * 6.0, crate::Vec3::z()).unwrap();
+    let mut two = Simulation::builder(tube(), stack.unwrap().rubbing(vec![0.1, 0.0]).unwrap(), sheath)
+        .properties(properties)
+        .motion(VesselMotion::new(motion).unwrap())
+        .method(&options)
+        .build()
+        .unwrap();
+    for _ in 0..22 {
+        two.step_together(&pushed([5.0, 0.0], [4.0, 0.0])).unwrap();
+    }
+    two
+}
+
+fn pushed(wire: [f64; 2], catheter: [f64; 2]) -> [Move; 2] {
+    let mut instrument = 0..;
+    [wire, catheter].map(|[advance_mm, rotate_rad]| Move {
+        instrument: instrument.next().unwrap(),
+        command: Command { advance_mm, rotate_rad },
+    })
+}
+
+/// Hands that go to and fro at 1 kHz, with new speeds every 50 ms, and rest for 20 ms before that.
+fn hands(seed: u64, tick: u64) -> [Move; 2] {
+    let speed = |k: u64, most: f64| most * (2.0 * unit(splitmix64(seed, 4 * (tick / 50) + k)) - 1.0);
+    if tick % 50 >= 30 {
+        return pushed([0.0; 2], [0.0; 2]);
+    }
+    pushed([speed(0, 0.04), speed(1, 0.01)], [speed(2, 0.03), speed(3, 0.01)])
+}
+
+fn apart_mm(a: &Simulation, b: &Simulation) -> f64 {
+    (a.tip_of_mm(0).unwrap() - b.tip_of_mm(0).unwrap()).norm()
+}
+
+fn bytes(state: &State) -> Vec<u8> {
+    serde_json::to_vec(state).unwrap()
+}
+
+#[test]
+fn ticks_are_where_steps_are_once_hands_rest() {
+    let (mut ticking, mut stepping) = (two(&[]), two(&[]));
+    let (mut behind, mut most, mut farthest_mm) = (0, 0, 0.0f64);
+    for tick in 0..400 {
+        stepping.step_together(&hands(1, tick)).unwrap();
+        let report = ticking.tick(&hands(1, tick), SOLVES, None).unwrap();
+        assert!(report.converged);
+        behind += usize::from(!report.behind.is_empty());
+        most = most.max(report.solves);
+        if tick % 50 == 49 {
+            assert!(report.behind.is_empty() && report.iterations == 0, "{tick}");
+            assert_eq!(ticking.report().lengths_mm().len(), 2);
+            let off = ticking.report().lengths_mm()[0] - stepping.report().lengths_mm()[0];
+            assert!(off.abs() < 1e-9, "{off}");
+            farthest_mm = farthest_mm.max(apart_mm(&ticking, &stepping));
+        }
+    }
+    assert!(farthest_mm < 0.02, "{farthest_mm}");
+    // Ticks end in the midst of a part, …
+    assert!(behind > 100, "{behind}");
+    // … at most an iteration after their solves are used up.
+    assert!(most < 25, "{most}");
+    // The twin: on its way a device is behind its hands, and elsewhere.
+    for tick in 0..10 {
+        stepping.step_together(&hands(2, tick)).unwrap();
+        ticking.tick(&hands(2, tick), 1, None).unwrap();
+    }
+    assert!(apart_mm(&ticking, &stepping) > 0.02);
+}
+
+#[test]
+fn what_a_tick_leaves_over_the_next_step_does() {
+    let (mut ticking, mut stepping) = (two(&[]), two(&[]));
+    let moves = pushed([0.4, 0.1], [0.2, 0.0]);
+    ticking.tick(&moves, 1, None).unwrap();
+    let behind = ticking.report().behind.clone();
+    assert_eq!(behind.len(), 2);
+    assert!((behind[0].advance_mm - 0.4).abs() < 1e-12 && (behind[1].advance_mm - 0.2).abs() < 1e-12);
+    // Hands that wait have gone as far as they have.
+    let room_mm = 300.0 - ticking.report().lengths_mm()[0];
+    let refused = ticking.tick(&pushed([room_mm - 0.3, 0.0], [0.0; 2]), 1, None).unwrap_err().to_string();
+    assert!(refused.contains("wire.advance_mm"), "{refused}");
+    ticking.step_together(&[]).unwrap();
+    stepping.step_together(&moves).unwrap();
+    assert!(ticking.report().behind.is_empty());
+    assert!(apart_mm(&ticking, &stepping) < 1e-4);
+    let refused = ticking.tick(&moves, 0, None).unwrap_err().to_string();
+    assert!(refused.contains("solves"), "{refused}");
+}
+
+#[test]
+fn a_clone_and_a_saved_state_go_on_in_the_midst_of_a_part() {
+    let mut ticking = two(&[]);
+    for tick in 0..7 {
+        ticking.tick(&hands(1, tick), SOLVES, None).unwrap();
+    }
+    assert!(!ticking.report().behind.is_empty());
+    let saved = bytes(&ticking.state());
+    let mut clone = ticking.clone();
+    let mut restored = two(&[]);
+    restored.restore(&serde_json::from_slice(&saved).unwrap()).unwrap();
+    for tick in 7..60 {
+        for each in [&mut ticking, &mut clone, &mut restored] {
+            each.tick(&hands(1, tick), SOLVES, None).unwrap();
+        }
+        clone.drop_workspace();
+    }
+    let [a, b, c] = [&ticking, &clone, &restored].map(|each| bytes(&each.state()));
+    assert!(a == b, "the clone");
+    assert!(a == c, "the restored one");
+    // A state whose part under way is none of this scene is refused.
+    let text = String::from_utf8(saved).unwrap();
+    let hands = text.rfind("\"inserted_mm\"").unwrap();
+    let wrong = format!("{}\"inserted_mm\":99.0,\"was\"{}", &text[..hands], &text[hands + 13..]);
+    assert!(serde_json::from_str::<State>(&wrong).map_or(true, |state| restored.restore(&state).is_err()));
+}
+
+#[test]
+fn a_device_is_seen_on_its_way_from_a_fold_and_comes_to_rest_as_in_a_step() {
+    // A bent wire in a bent tube whips when it is turned.
+    let bent = Section { rest_curvature_per_mm: [0.02, 0.0], ..Section::straight(60.0, 0.4, 10.0) };
+    let wire = Device::new(vec![bent, Section::straight(190.0, 0.4, 10.0)]).unwrap();
+    let sheath = Sheath::new(crate::Vec3::z() * 6.0, crate::Vec3::z()).unwrap();
+    let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
+    let options = KirchhoffOptions { element_mm: 4.0, ..KirchhoffOptions::default() };
+    let built = Simulation::builder(tube(), wire, sheath).properties(properties).method(&options).build();
+    let mut stepping = built.unwrap();
+    for _ in 0..32 {
+        stepping.step(Command::advance(5.0)).unwrap();
+    }
+    let mut ticking = stepping.clone();
+    let (mut jumps, mut moving, mut rest_mm) = (0, 0, 0.0f64);
+    for _ in 0..100 {
+        let moves = [Move { instrument: 0, command: Command::rotate(0.05) }];
+        jumps += usize::from(stepping.step_together(&moves).unwrap().jumped);
+        moving += usize::from(!ticking.tick(&moves, 8, None).unwrap().converged);
+        rest_mm = rest_mm.max(ticking.report().max_penetration_mm);
+    }
+    let mut ticks = 0;
+    while !ticking.report().behind.is_empty() && ticks < 200 {
+        ticking.tick(&[], 8, None).unwrap();
+        ticks += 1;
+    }
+    assert!(jumps == 1 && moving > 5 && ticks < 200, "{jumps} {moving} {ticks}");
+    let [a, b] = [&ticking, &stepping].map(|each| each.shape().tip_mm().unwrap());
+    assert!((a - b).norm() < 1e-3, "{a} {b}");
+    // On its way it stays within the wall.
+    assert!(rest_mm < 0.4, "{rest_mm}");
+}
+
+#[test]
+fn a_vessel_that_moves_takes_the_device_along_in_every_tick() {
+    let heaving = MotionMode {
+        waveform: Waveform::Breathing,
+        period_s: Some(1.0),
+        phase: 0.0,
+        displacement_mm: [1.5, 0.0, 0.0],
+        turn: None,
+        still: None,
+        within: None,
+    };
+    let mut ticking = two(&[heaving]);
+    for tick in 1..=150u32 {
+        let time_s = 1e-3 * f64::from(tick);
+        let report = ticking.tick(&hands(1, u64::from(tick)), 6, Some(time_s)).unwrap();
+        assert!(report.max_penetration_mm < 0.1, "{}", report.max_penetration_mm);
+        assert_eq!(ticking.time_s(), time_s);
+    }
+    // With time at rest ticks come to an equilibrium of where the vessel is.
+    let mut ticks = 0;
+    while !ticking.report().behind.is_empty() && ticks < 100 {
+        ticking.tick(&[], 6, None).unwrap();
+        ticks += 1;
+    }
+    assert!(ticks < 100 && ticking.report().converged);
+}
