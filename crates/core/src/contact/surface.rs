@@ -41,7 +41,8 @@ pub struct ContactSurface {
 #[derive(Debug)]
 enum Felt {
     Mesh(Box<FeltMesh>),
-    Swept(SweptField),
+    /// With the radius of the thickest piece of the device, mm.
+    Swept(SweptField, f64),
 }
 
 /// Where the wall is looked for.
@@ -102,7 +103,7 @@ impl ContactSurface {
         match lumen {
             Lumen::Swept(vessel) if properties.region.is_empty() => {
                 let reach_mm = reach_mm(radii_mm.1, 0.0);
-                let felt = Felt::Swept(vessel.field(reach_mm));
+                let felt = Felt::Swept(vessel.field(reach_mm), radii_mm.1);
                 Ok(Self { felt, thinnest_mm: radii_mm.0, reach_mm })
             }
             _ => Self::new(lumen.wall(store)?, radii_mm, properties, store),
@@ -113,7 +114,7 @@ impl ContactSurface {
     pub fn mesh(&self) -> Option<&FeltMesh> {
         match &self.felt {
             Felt::Mesh(mesh) => Some(mesh),
-            Felt::Swept(_) => None,
+            Felt::Swept(..) => None,
         }
     }
 
@@ -121,11 +122,11 @@ impl ContactSurface {
     pub(crate) fn pieces(&self) -> usize {
         match &self.felt {
             Felt::Mesh(mesh) => mesh.query.triangles(),
-            Felt::Swept(field) => field.pieces(),
+            Felt::Swept(field, _) => field.pieces(),
         }
     }
 
-    /// The piece that is nearest to `x`; none where it is `limit_mm` away or farther.
+    /// The piece that is nearest to `x`; one that is `limit_mm` away or farther need not be found.
     pub(super) fn nearest(&self, x: &Vec3, limit_mm: f64) -> Option<NearPiece> {
         match &self.felt {
             Felt::Mesh(mesh) => {
@@ -133,11 +134,11 @@ impl ContactSurface {
                 let piece = (!near.rim).then_some(near.triangle);
                 Some(NearPiece { distance_mm: near.distance_mm, piece, bound: near.triangle })
             }
-            Felt::Swept(field) => {
+            Felt::Swept(field, _) => {
                 let near = field.near(x);
-                let is_near = near.clearance_mm.abs() < limit_mm;
+                let is_number = !near.clearance_mm.is_nan();
                 let (distance_mm, piece) = (near.clearance_mm, near.piece);
-                is_near.then_some(NearPiece { distance_mm, piece: Some(piece), bound: piece })
+                is_number.then_some(NearPiece { distance_mm, piece: Some(piece), bound: piece })
             }
         }
     }
@@ -149,7 +150,7 @@ impl ContactSurface {
 
     /// The piece nearest to `x` within `reach_mm`, with how far it is, mm, or less; none past the end of the vessel.
     pub fn nearest_piece(&self, x: &Vec3, reach_mm: f64) -> Option<(u32, f64)> {
-        let near = self.nearest(x, reach_mm)?;
+        let near = self.nearest(x, reach_mm).filter(|near| near.distance_mm.abs() < reach_mm)?;
         Some((near.piece?, near.distance_mm))
     }
 
@@ -157,7 +158,7 @@ impl ContactSurface {
     pub fn distance(&self, x: &Vec3, piece: u32) -> Option<Distance> {
         match &self.felt {
             Felt::Mesh(mesh) => mesh.smooth.distance(x, piece),
-            Felt::Swept(_) => match self.nearness(x, Hint::Near(piece), f64::INFINITY) {
+            Felt::Swept(..) => match self.nearness(x, Hint::Near(piece), f64::INFINITY) {
                 Nearness::Within(distance) => Some(distance),
                 Nearness::Beyond(_) => None,
             },
@@ -166,11 +167,16 @@ impl ContactSurface {
 
     /// How near `x` is; with derivatives below `limit_mm`.
     pub(crate) fn nearness(&self, x: &Vec3, hint: Hint, limit_mm: f64) -> Nearness {
-        let field = match &self.felt {
+        let (field, thickest_mm) = match &self.felt {
             Felt::Mesh(mesh) => return mesh.nearness(x, hint.piece(), limit_mm),
-            Felt::Swept(field) => field,
+            Felt::Swept(field, thickest_mm) => (field, *thickest_mm),
         };
-        let Some(closest) = field.closest(x, from(hint)) else { return Nearness::Beyond(self.reach_mm) };
+        // What is farther than any device is thick presses nowhere, and how far it is need not be known exactly.
+        let closest = match field.closer_than(x, from(hint), limit_mm.max(thickest_mm)) {
+            Ok(Some(closest)) => closest,
+            Ok(None) => return Nearness::Beyond(self.reach_mm),
+            Err(room_mm) => return Nearness::Beyond(room_mm),
+        };
         let value_mm = closest.distance_mm();
         if value_mm < limit_mm {
             Nearness::Within(Distance { value_mm, gradient: closest.normal(), hessian: closest.hessian() })
@@ -183,7 +189,7 @@ impl ContactSurface {
     pub(super) fn follow(&self, side: u32, x: &Vec3) -> u32 {
         match &self.felt {
             Felt::Mesh(mesh) => mesh.smooth.walk(side, x),
-            Felt::Swept(field) => {
+            Felt::Swept(field, _) => {
                 field.closest(x, ClosestFrom::Side(side)).map_or(side, |found| found.piece())
             }
         }
@@ -193,7 +199,7 @@ impl ContactSurface {
     pub(super) fn side(&self, x: &Vec3, hint: Hint) -> u32 {
         match &self.felt {
             Felt::Mesh(_) => hint.piece(),
-            Felt::Swept(field) => field.closest(x, from(hint)).map_or(hint.piece(), |found| found.piece()),
+            Felt::Swept(field, _) => field.closest(x, from(hint)).map_or(hint.piece(), |found| found.piece()),
         }
     }
 
@@ -202,7 +208,7 @@ impl ContactSurface {
     pub(super) fn distance_from(&self, piece: u32, x: &Vec3) -> f64 {
         match &self.felt {
             Felt::Mesh(mesh) => mesh.distance_from(piece, x),
-            Felt::Swept(_) => self.nearness(x, Hint::Side(piece), f64::NEG_INFINITY).value_mm(),
+            Felt::Swept(..) => self.nearness(x, Hint::Side(piece), f64::NEG_INFINITY).value_mm(),
         }
     }
 
@@ -220,7 +226,7 @@ impl ContactSurface {
     pub(super) fn crossing(&self, from: &Vec3, to: &Vec3, farthest: f64) -> Option<f64> {
         match &self.felt {
             Felt::Mesh(mesh) => mesh.query.crossing(from, to, farthest),
-            Felt::Swept(field) => field.crossing(from, to, farthest),
+            Felt::Swept(field, _) => field.crossing(from, to, farthest),
         }
     }
 
@@ -252,7 +258,7 @@ impl ContactSurface {
                 Some(flat) => flat.distance_mm,
                 None => self.reach_mm,
             },
-            Felt::Swept(field) => {
+            Felt::Swept(field, _) => {
                 let near = field.near(x);
                 let found = field.closest(x, ClosestFrom::Space(near.piece));
                 found.map_or(near.clearance_mm, |found| found.distance_mm())

@@ -45,6 +45,8 @@ mod state;
 mod step_control;
 mod substep;
 #[cfg(test)]
+mod swept_tests;
+#[cfg(test)]
 mod touch_tests;
 mod transport;
 #[cfg(test)]

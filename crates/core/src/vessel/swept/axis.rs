@@ -31,6 +31,16 @@ struct Knot {
     slope: f64,
 }
 
+/// The knot next to a point.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct NearKnot {
+    /// How far it is, mm.
+    pub(super) away: f64,
+    pub(super) knot: usize,
+    /// An arc length next to the foot of the point.
+    pub(super) near: f64,
+}
+
 /// How an axis ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum End {
@@ -220,9 +230,9 @@ impl Axis {
         (s, place)
     }
 
-    /// The knot nearest to a point among these, and how far it is, mm. Of a branch that comes back to where it was it is that of the stretch whose
+    /// The knot nearest to a point among these, how far it is, mm, and an arc length next to the foot. Of a branch that comes back to where it was it is that of the stretch whose
     /// middle is nearest.
-    pub(super) fn nearest(&self, x: &Vec3, from: usize, to: usize) -> (f64, usize) {
+    pub(super) fn nearest(&self, x: &Vec3, from: usize, to: usize) -> NearKnot {
         let away = |k: usize| (self.knots[k].position - x).norm_squared();
         let (mut knot, mut least) = (to, away(to));
         for k in (from..to).step_by(COARSE) {
@@ -231,13 +241,17 @@ impl Axis {
                 (knot, least) = (k, here);
             }
         }
-        // Newton's method gets near, and single steps the rest of the way.
-        for _ in 0..JUMPS {
-            let Knot { position, tangent, moment, .. } = self.knots[knot];
+        // Steps of Newton's method, by how many knots.
+        let jump = |k: usize| {
+            let Knot { position, tangent, moment, .. } = &self.knots[k];
             let offset = x - position;
-            let stretch = (tangent.norm_squared() - offset.dot(&moment)).max(0.25);
-            let jump = (offset.dot(&tangent) / (stretch * self.step)).clamp(-(COARSE as f64), COARSE as f64);
-            let next = (knot as f64 + jump.round()).clamp(from as f64, to as f64) as usize;
+            let stretch = (tangent.norm_squared() - offset.dot(moment)).max(0.25);
+            offset.dot(tangent) / (stretch * self.step)
+        };
+        // They get near, and single knots the rest of the way.
+        for _ in 0..JUMPS {
+            let by = jump(knot).clamp(-(COARSE as f64), COARSE as f64);
+            let next = (knot as f64 + by.round()).clamp(from as f64, to as f64) as usize;
             let here = away(next);
             if here >= least {
                 break;
@@ -245,7 +259,8 @@ impl Axis {
             (knot, least) = (next, here);
         }
         let knot = self.follow(x, knot).clamp(from, to);
-        (away(knot).sqrt(), knot)
+        let near = self.step * (knot as f64 + jump(knot).clamp(-1.0, 1.0));
+        NearKnot { away: away(knot).sqrt(), knot, near }
     }
 
     /// The knot nearest to a point, along the axis from one on.

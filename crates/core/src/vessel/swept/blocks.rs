@@ -74,11 +74,6 @@ impl Blocks {
         self.steepness[branch]
     }
 
-    /// How far from the vessel parts are complete, mm.
-    pub(super) fn reach(&self) -> f64 {
-        self.reach
-    }
-
     /// Number of a knot among all.
     pub(super) fn piece(&self, branch: u32, knot: u32) -> u32 {
         self.first[branch as usize].1 + knot

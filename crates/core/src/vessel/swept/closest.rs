@@ -31,6 +31,8 @@ const PATIENCE: usize = 3;
 /// The wall of a branch that lies in the lumen by more than this part of its radius is none: another branch opens there. Where they are joined it does by
 /// a sixth of the joint's width, 0.23 radii.
 const HOLE: f64 = 0.3;
+/// How far the wall may be from where the first step to it ends, in radii of the vessel.
+const NEARBY: f64 = 0.1;
 /// Where the wall bends towards a sunk point, and the point is nearer than this to the middle of the bend, in parts of its radius, the distance bends no more.
 const FOCUS: f64 = 0.05;
 /// A way into the wall is followed by steps of this part of the vessel's radius at least.
@@ -118,8 +120,8 @@ impl SweptField {
         let mut best: Option<Value> = None;
         let mut ask = |part: Part, lowest: &mut f64| {
             let axis = &self.axes[part.branch as usize];
-            let (_, knot) = axis.nearest(x, part.from as usize, part.to as usize);
-            let value = self.branch(part.branch as usize, x, axis.step() * knot as f64);
+            let near = axis.nearest(x, part.from as usize, part.to as usize).near;
+            let value = self.branch(part.branch as usize, x, near);
             if value.f < *lowest {
                 (*lowest, best) = (value.f, Some(value));
             }
@@ -136,9 +138,8 @@ impl SweptField {
             }
         }
         let Some(value) = best else { return Near { clearance_mm: f64::NAN, piece: 0 } };
-        // The lumen of a branch is part of that of all.
-        let steepness = if value.f < 0.0 { self.blocks.steepness(value.branch as usize) } else { 1.0 };
-        Near { clearance_mm: -value.f / steepness, piece: self.piece(&value) }
+        let clearance_mm = if value.f < 0.0 { value.room } else { -value.f };
+        Near { clearance_mm, piece: self.piece(&value) }
     }
 
     /// Whether a point is in the lumen, what goes on beyond open ends included.
@@ -154,7 +155,7 @@ impl SweptField {
 
     fn level(&self, near: Near, x: &Vec3) -> Option<Value> {
         let (branch, knot) = self.blocks.knot(near.piece);
-        self.value(&mut self.feet(self.blocks.about(branch, knot), x), x)
+        self.value(&mut self.feet(self.blocks.about(branch, knot), x, 0.0), x)
     }
 
     /// Where a straight way leaves the lumen, as a part of it, up to `farthest` times its length.
@@ -175,6 +176,16 @@ impl SweptField {
 
     /// The place of the wall next to a point. None of a point that is not finite.
     pub(crate) fn closest(&self, x: &Vec3, from: From) -> Option<Closest<'_>> {
+        self.closer_than(x, from, f64::INFINITY).ok()?
+    }
+
+    /// The same if it may be nearer than `limit_mm`; else how far it is at least, mm.
+    pub(crate) fn closer_than(
+        &self,
+        x: &Vec3,
+        from: From,
+        limit_mm: f64,
+    ) -> Result<Option<Closest<'_>>, f64> {
         let piece = match from {
             From::Space(piece) => piece,
             From::Side(piece) => {
@@ -186,10 +197,10 @@ impl SweptField {
                 let start = place.position + offset * (radius / offset.norm().max(f64::MIN_POSITIVE));
                 let knot = axis.knot_at(s);
                 let parts = self.blocks.about(branch, knot);
-                let mut feet = self.feet(parts, &start);
-                let value = self.value(&mut feet, &start)?;
+                let mut feet = self.feet(parts, &start, HOLE * radius);
+                let Some(value) = self.value(&mut feet, &start) else { return Ok(None) };
                 if value.f > -HOLE * radius {
-                    return self.descend(x, feet, start, value);
+                    return Ok(self.descend(x, feet, start, value));
                 }
                 // Another branch opens where this one's wall would be.
                 self.blocks.piece(branch as u32, knot as u32)
@@ -197,13 +208,21 @@ impl SweptField {
         };
         let (branch, knot) = self.blocks.knot(piece);
         let parts = self.blocks.about(branch, knot);
-        let mut feet = self.feet(parts, x);
-        let value = self.value(&mut feet, x)?;
+        let mut feet = self.feet(parts, x, 0.0);
+        let Some(value) = self.value(&mut feet, x) else { return Ok(None) };
+        if value.room >= limit_mm {
+            return Err(value.room);
+        }
         if value.is_distance {
             let outside = value.f;
-            return Some(Closest { field: self, feet, place: *x, value, outside, is_distance: true });
+            return Ok(Some(Closest { field: self, feet, place: *x, value, outside, is_distance: true }));
         }
-        self.descend(x, feet, *x, value)
+        // The wall is about as far as f says; from near there on all that counts is known.
+        let size = value.gradient.norm();
+        let start = x - value.gradient * (value.f / (size * size));
+        let mut feet = self.feet(parts, &start, NEARBY * value.radius);
+        let Some(value) = self.value(&mut feet, &start) else { return Ok(None) };
+        Ok(self.descend(x, feet, start, value))
     }
 
     /// The place of the wall next to `x`, from a place on where the field is `value`.

@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 use nalgebra::Matrix3;
 
-use super::axis::{Axis, End, stretch};
+use super::axis::{Axis, End, NearKnot, stretch};
 use super::blocks::{Blocks, Part};
 use crate::Vec3;
 use crate::products::outer;
@@ -28,8 +28,8 @@ use crate::vessel::generate::{BLEND, BLEND_COSINES, HIDDEN};
 
 /// Step of differences over the radius: with what rounding and the third derivative leave, ten digits of a Hessian.
 const DIFFERENCE: f64 = 1e-4;
-/// How much farther the wall may be than the nearest branch says, in radii: where branches are joined.
-const NEARBY: f64 = 0.25;
+/// How much wider than the nearest branch one is taken for that it is joined with, for a third that is joined with both.
+const WIDER: f64 = 2.0;
 /// Most branches that are joined at one place: of more, those that begin first count.
 const MOST_JOINED: usize = 16;
 
@@ -54,6 +54,8 @@ pub(crate) struct Value {
     pub(super) is_joint: bool,
     /// Whether f is the distance: a single branch that does not taper.
     pub(super) is_distance: bool,
+    /// No wall is nearer than this, mm: in the lumen of a branch its own wall, for that lumen is part of all.
+    pub(super) room: f64,
     /// The branch that it is of, or most of it, and the arc length of the foot.
     pub(super) branch: u32,
     pub(super) foot: f64,
@@ -114,8 +116,9 @@ impl SweptField {
                 exposure_slope = along * (rate * (outwards / (HIDDEN * radius) - part * taper / radius));
             }
         }
+        let f = distance - radius;
         Value {
-            f: distance - radius,
+            f,
             gradient,
             towards: gradient,
             turning: hessian,
@@ -125,37 +128,41 @@ impl SweptField {
             exposure_slope,
             is_joint: false,
             is_distance: taper == 0.0 && flare == 0.0,
+            room: -f / self.blocks.steepness(branch),
             branch: branch as u32,
             foot: s,
         }
     }
 
-    /// What of these parts of branches, in their order, may count at a place, and from there to the wall if that is within the reach of the field.
-    pub(super) fn feet(&self, parts: &[Part], x: &Vec3) -> Feet {
+    /// What of these parts of branches, in their order, may count at a place and within `way` mm of it.
+    pub(super) fn feet(&self, parts: &[Part], x: &Vec3, way: f64) -> Feet {
         let nearest =
             |part: &Part| self.axes[part.branch as usize].nearest(x, part.from as usize, part.to as usize);
-        // A branch that is higher than another by the most width of a joint leaves no trace.
-        let (mut known, mut lowest) = ([(0.0, 0); MOST_JOINED], f64::INFINITY);
+        let mut known = [NearKnot::default(); MOST_JOINED];
+        let mut low = (f64::INFINITY, 0.0);
         for (index, part) in parts.iter().enumerate() {
             let found = nearest(part);
-            lowest = lowest.min(found.0 - self.axes[part.branch as usize].radius(found.1));
+            let radius = self.axes[part.branch as usize].radius(found.knot);
+            if found.away - radius < low.0 {
+                low = (found.away - radius, radius);
+            }
             if let Some(known) = known.get_mut(index) {
                 *known = found;
             }
         }
-        let way = lowest.abs().min(self.blocks.reach());
         let mut feet = Feet { all: [(0, 0.0); MOST_JOINED], count: 0 };
         for (index, part) in parts.iter().enumerate() {
             let axis = &self.axes[part.branch as usize];
-            let (away, knot) = known.get(index).copied().unwrap_or_else(|| nearest(part));
+            let NearKnot { away, knot, near } = known.get(index).copied().unwrap_or_else(|| nearest(part));
             let radius = axis.radius(knot);
-            // Between knots a branch comes nearer by a step at most, and its radius changes by less; not so what goes on beyond its ends.
-            let least = away - radius - 2.0 * (axis.step() + way) - NEARBY * radius;
-            if axis.is_inner(knot) && least > lowest + BLEND * radius {
+            // Between knots a branch comes nearer by a step at most, and its radius changes by less; not so what goes on beyond its ends. What
+            // is higher than another by the most width of a joint leaves no trace; a joint is between a thin branch and the mean of others at most.
+            let least = away - radius - 2.0 * (axis.step() + way);
+            if axis.is_inner(knot) && least > low.0 + BLEND * radius.min(WIDER * low.1) {
                 continue;
             }
             if let Some(foot) = feet.all.get_mut(feet.count) {
-                *foot = (part.branch, axis.step() * knot as f64);
+                *foot = (part.branch, near);
                 feet.count += 1;
             }
         }
@@ -249,6 +256,7 @@ fn join(a: &Value, b: &Value) -> Value {
             + k_slope * (high.exposure - low.exposure),
         is_joint: true,
         is_distance: false,
+        room: low.room,
         branch: low.branch,
         foot: low.foot,
     }
