@@ -117,8 +117,8 @@ impl Insertion {
         let sheath = surroundings.sheath;
         let chain = Chain { start_mm: sheath.position_mm, direction: sheath.direction, ..Chain::default() };
         let progress = Progress { posture: chain.straight(), chain, from_tip_mm: vec![0.0] };
-        let Surroundings { wall, stack, properties, .. } = surroundings;
-        let wall = ContactSurface::new(wall, stack.radii_mm(), properties, store)?;
+        let Surroundings { lumen, stack, properties, .. } = surroundings;
+        let wall = ContactSurface::of(lumen, stack.radii_mm(), properties, store)?;
         let mut insertion = Self {
             model,
             options,
@@ -166,7 +166,8 @@ impl Insertion {
         let report = &mut self.report;
         report.inserted_mm = from_tip_mm[0];
         let tip = posture.positions_mm[posture.positions_mm.len() - 1];
-        report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening.index);
+        report.left_through =
+            left_through(surroundings.lumen.openings(), &tip).map(|(opening, _)| opening.index);
         let mut load = WallLoad::new(&self.wall, surroundings, from_tip_mm);
         let wall = load.contacts(&posture.positions_mm, &mut report.contacts);
         let bend = chain.bending_energy_mj(posture);

@@ -11,14 +11,14 @@ use crate::{NodalLoad, Push};
 
 /// How far beyond its radius a node looks for the wall, mm: what it sees it need not ask for again.
 const LOOK_MM: f64 = 3.0;
-/// A node near the wall looks for its nearest triangle again when it has moved by this part of its radius.
+/// A node near the wall looks for its nearest piece again when it has moved by this part of its radius.
 const LOOK_AGAIN: f64 = 0.5;
 
 /// What a node knows of the wall.
 #[derive(Debug, Clone, Copy, Default)]
 struct Known {
     asked_at: Vec3,
-    /// Nearest triangle and its distance, mm.
+    /// Nearest piece of wall and its distance, mm.
     near: Option<(u32, f64)>,
     fresh: bool,
 }
@@ -51,25 +51,24 @@ impl<'a> WallLoad<'a> {
         Self { wall, known: vec![Known::default(); n + 1], radii, stiffness }
     }
 
-    /// Depth of the surface beyond the wall at `x`, the wall's normal and its triangle.
+    /// Depth of the surface beyond the wall at `x`, the wall's normal and its piece.
     fn depth(&mut self, node: usize, x: &Vec3) -> Option<(f64, Vec3, u32)> {
         let radius = self.radii[node];
         let known = &mut self.known[node];
         let moved = (x - known.asked_at).norm();
-        // Clear of the wall by more than it has moved, or so little moved that the same triangle will do.
+        // Clear of the wall by more than it has moved, or so little moved that the same piece will do.
         let clear = known.near.map_or(LOOK_MM, |(_, distance)| distance - 2.0 * radius);
         if !known.fresh || moved > clear.max(LOOK_AGAIN * radius) {
-            let near = self.wall.query.nearest(x, radius + LOOK_MM).filter(|near| !near.rim);
-            *known =
-                Known { asked_at: *x, near: near.map(|near| (near.triangle, near.distance_mm)), fresh: true };
+            let near = self.wall.nearest_piece(x, radius + LOOK_MM);
+            *known = Known { asked_at: *x, near, fresh: true };
         }
-        let (triangle, flat) = known.near?;
+        let (piece, flat) = known.near?;
         if flat - moved > 2.0 * radius {
             return None;
         }
-        let distance = self.wall.smooth.distance(x, triangle)?;
+        let distance = self.wall.distance(x, piece)?;
         let depth = radius - distance.value_mm;
-        (depth > 0.0).then_some((depth, distance.gradient, triangle))
+        (depth > 0.0).then_some((depth, distance.gradient, piece))
     }
 
     /// The wall's energy in mJ and its contacts at the nodes of a chain.

@@ -2,7 +2,7 @@
 
 use endowire_core::insertion::{InstrumentReport, Script, Simulation};
 use endowire_core::shape::Shape;
-use endowire_core::vessel::Displacement;
+use endowire_core::vessel::{Displacement, NoStore};
 use endowire_core::{Error, PhysicalEnd, Result, Vec3};
 use endowire_viewer::{ContactView, FrameTime, ViewSpec};
 
@@ -82,7 +82,7 @@ impl Session {
         for (name, limit) in [("warn_n", limits.push_n), ("warn_nmm", limits.torque_nmm)] {
             endowire_core::error::in_range(name, limit, 1e6)?;
         }
-        let lab = Lab::new(view, side_px, simulation.wall().mesh())?;
+        let lab = Lab::new(view, side_px, simulation.lumen().wall(&NoStore)?.mesh())?;
         let hands = vec![Hand::default(); simulation.stack().instruments().len()];
         let history = History::new(&simulation);
         Ok(Self {
@@ -217,7 +217,7 @@ impl Session {
             |tip: Vec3| displacement.as_ref().map_or(tip, |displacement| displacement.material(&tip));
         let at_mm = instrument.and_then(|one| self.simulation.tip_of_mm(one)).map(at_rest);
         let time_s = self.time_s();
-        let flow = self.lab.inject(self.simulation.wall(), (ml, ml_per_s), at_mm, time_s)?;
+        let flow = self.lab.inject(self.simulation.lumen().wall(&NoStore)?, (ml, ml_per_s), at_mm, time_s)?;
         let after_step = self.history.steps();
         self.history.inject(Injected { instrument, ml, ml_per_s, after_step, flow });
         self.telemetry.inject(time_s, ml, ml_per_s);

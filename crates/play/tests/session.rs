@@ -223,7 +223,7 @@ fn a_vessel_breathes_while_hands_rest_and_what_is_recorded_has_the_same_bits() {
 #[test]
 fn pictures_show_where_the_vessel_is() {
     let (scene, mut session) = session("hepatic_breathing.toml");
-    let wall = session.simulation().wall().clone();
+    let wall = session.simulation().lumen().wall(&NoStore).unwrap().clone();
     let mut pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
     let rest = pictures.three_d(&session.snapshot()).unwrap();
     (0..120).for_each(|_| session.tick());
@@ -338,8 +338,12 @@ fn hands_stop_at_the_ends_and_limits_warn() {
 #[test]
 fn pictures_follow_the_pedal() {
     let (scene, mut session) = session("arch_angiography.toml");
-    let mut pictures =
-        Pictures::new(&scene, &session.snapshot(), session.simulation().wall().clone()).unwrap();
+    let mut pictures = Pictures::new(
+        &scene,
+        &session.snapshot(),
+        session.simulation().lumen().wall(&NoStore).unwrap().clone(),
+    )
+    .unwrap();
     assert!(pictures.fluoro(&session.snapshot()).unwrap().is_empty());
     let show = |session: &mut Session, pictures: &mut Pictures, input: Input| {
         session.apply(&input).unwrap();
@@ -380,7 +384,7 @@ fn two_planes_are_live_together_and_a_room_that_changes_is_coarse_until_it_is_sh
     let mut view = ViewSpec::of_scene(&scene, &path).unwrap();
     view.biplane_deg = Some(90.0);
     let mut session = Session::new(scene.simulation(&NoStore).unwrap(), view, 64, Limits::default()).unwrap();
-    let wall = session.simulation().wall().clone();
+    let wall = session.simulation().lumen().wall(&NoStore).unwrap().clone();
     let mut pictures = Pictures::new(&scene, &session.snapshot(), wall.clone()).unwrap();
     session.apply(&Input::Pedal { down: true, mode: Some(Mode::Fluoro) }).unwrap();
     session.tick();
@@ -435,7 +439,7 @@ fn dose_is_what_exposure_control_brings() {
         view.exposure = Some(control);
         let simulation = scene.simulation(&NoStore).unwrap();
         let mut session = Session::new(simulation, view, 64, Limits::default()).unwrap();
-        let wall = session.simulation().wall().clone();
+        let wall = session.simulation().lumen().wall(&NoStore).unwrap().clone();
         let mut pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
         session.apply(&Input::Pedal { down: true, mode: Some(Mode::Fluoro) }).unwrap();
         for tick in 0..60 {

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use endowire_core::Vec3;
+use endowire_core::vessel::NoStore;
 use endowire_viewer::{self as viewer, DevicePart, FrameTime, Image, PixelFormat, View, ViewSpec};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -49,7 +50,7 @@ impl Renderer {
         if spec.wants(View::Fluoro) && !spec.injection.is_empty() && spec.flow.tree.is_none() {
             spec.flow.centreline = Some(Arc::new(vessel.tree(py)?.clone()));
         }
-        let wall = Arc::clone(&vessel.wall);
+        let lumen = vessel.lumen.clone();
         let mut planes = spec.planes();
         let Some(place) = usize::try_from(plane).ok().filter(|place| *place < planes.len()) else {
             let mend = match planes.len() {
@@ -59,7 +60,7 @@ impl Renderer {
             return Err(refuse("plane", plane, mend));
         };
         let spec = planes.swap_remove(place);
-        let made = interruptible(py, move || viewer::Renderer::of_wall(&spec, &wall))?;
+        let made = interruptible(py, move || viewer::Renderer::of_wall(&spec, lumen.wall(&NoStore)?))?;
         Ok(Self { inner: Mutex::new(made.map_err(exception)?) })
     }
 

@@ -158,7 +158,7 @@ impl Simulation {
         let nowhere = opening.is_none() && position_mm.is_none() && direction.is_none();
         let inlet = || {
             let vessel = vessel.get();
-            vessel.inlet().or_else(|| vessel.wall.inlet().map(|opening| opening.index)).unwrap_or(0)
+            vessel.inlet().or_else(|| vessel.lumen.inlet().map(|opening| opening.index)).unwrap_or(0)
         };
         let arguments = Arguments {
             opening: opening.or_else(|| nowhere.then(inlet)),

@@ -1,6 +1,6 @@
 //! What simulations begin from. Copies have it in common, and so it is written once into a pickle of many; what each has of its own is its state.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use endowire_core::device::{self, Stack};
 use endowire_core::insertion::{self, WallProperties};
@@ -54,14 +54,14 @@ impl Start {
         instruments: Vec<Instrument>,
         arguments: Arguments,
     ) -> PyResult<Self> {
-        let (stack, wall) = (arguments.stack(&instruments)?, Arc::clone(&vessel.get().wall));
+        let (stack, lumen) = (arguments.stack(&instruments)?, vessel.get().lumen.clone());
         let Arguments { opening, depth_mm, position_mm, direction, .. } = arguments;
         let (friction_n, friction) = (arguments.sheath_friction_n, arguments.sheath_friction);
         let sheath = SheathSpec { opening, depth_mm, position_mm, direction, friction_n, friction };
         let (properties, method) = (arguments.wall.clone(), arguments.method.clone());
         let built = interruptible(py, move || {
-            let sheath = sheath.place(&wall)?;
-            let builder = insertion::Simulation::builder((*wall).clone(), stack, sheath);
+            let sheath = sheath.place(&lumen)?;
+            let builder = insertion::Simulation::builder(lumen, stack, sheath);
             builder.properties(properties).method(&method).store(&NoStore).build()
         })?;
         let simulation = Mutex::new(built.map_err(exception)?);

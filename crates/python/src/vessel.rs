@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::ffi::CString;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use endowire_core::passable::passable;
 use endowire_core::vessel::{
-    CentrelineEnd, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline, GeneratedWall,
-    NoStore, Opening, Resolution, SurfaceFrame, SurfaceMesh, Target, Wall, anatomy, check_with, wall_hints,
+    CentrelineEnd, CentrelineNode, CentrelinePath, CentrelineTree, ExtractedCentreline, Lumen, NoStore,
+    Opening, Resolution, SurfaceFrame, SurfaceMesh, SweptVessel, Target, Wall, anatomy, check_with,
+    wall_hints,
 };
 use endowire_core::{Error, Vec3};
 use endowire_methods::Scene;
@@ -28,7 +29,7 @@ use crate::interrupt::interruptible;
 /// the opening that devices come in by (from the sheath's in the vessel of a scene) to all others. It never changes.
 #[pyclass(frozen, module = "endowire", name = "Vessel")]
 pub(crate) struct Vessel {
-    pub(crate) wall: Arc<Wall>,
+    pub(crate) lumen: Lumen,
     /// The centre line it was made with.
     given: Option<Line>,
     /// Without one, that which was found, once one was needed, …
@@ -80,9 +81,23 @@ fn as_argument(error: Error) -> Error {
     }
 }
 
-/// The bytes of a wall, its centre line, its inlet, and names with their rows.
+/// What a vessel is made of, its centre line, its inlet, and names with their rows.
 type Pickled<'py> =
-    (Bound<'py, PyBytes>, Option<Bound<'py, PyArray2<f64>>>, Option<usize>, Vec<(String, usize)>);
+    (PickledLumen<'py>, Option<Bound<'py, PyArray2<f64>>>, Option<usize>, Vec<(String, usize)>);
+
+/// The bytes of a wall; or a tree, its closed rows, and how fine its mesh is.
+#[derive(IntoPyObject)]
+enum PickledLumen<'py> {
+    Wall(Bound<'py, PyBytes>),
+    Tree(Bound<'py, PyArray2<f64>>, Vec<usize>, Option<f64>, Option<usize>),
+}
+
+/// The same as it is read.
+#[derive(FromPyObject)]
+enum UnpickledLumen<'py> {
+    Wall(Vec<u8>),
+    Tree(Numbers<'py>, Vec<usize>, Option<f64>, Option<usize>),
+}
 
 /// A centre-line tree: the path of its table or the name of a built-in anatomy, or an array.
 #[derive(FromPyObject)]
@@ -149,7 +164,10 @@ impl Vessel {
     /// Builds the wall of a centre-line tree: a built-in anatomy ("straight_tube", "curved_tube", "aortic_arch", "hepatic"), the path of a
     /// table, or an array of shape (n, 5) of x, y, z, radius (mm) and the row of the parent (-1 for the root).
     ///
-    /// `edge_mm` or `triangles` say how fine; without them edges are a quarter of the smallest radius.
+    /// Devices feel the surface that the tree says, not triangles: those are made when something draws, writes or asks for them, and `edge_mm` or
+    /// `triangles` say how fine; without them edges are a quarter of the smallest radius.
+    ///
+    /// Raises InputError for a tree that makes no vessel. Where no mesh can be made of one that does, what asks for it raises.
     #[staticmethod]
     #[pyo3(signature = (tree, edge_mm = None, triangles = None))]
     fn generate(
@@ -167,28 +185,26 @@ impl Vessel {
                 return Err(refuse("edge_mm", edge_mm, "triangles is given too: keep one of the two"));
             }
         };
-        let made = interruptible(py, move || GeneratedWall::new(&tree, resolution).map(|made| (made, tree)))?;
-        let (made, tree) = made.map_err(exception)?;
-        Ok(Self::of_line(Arc::new(made.wall), Some(Line { tree, inlet: Some(made.inlet) })))
+        interruptible(py, move || Self::swept(tree, resolution))?.map_err(exception)
     }
 
     /// Vertices of the wall, mm, shape (n, 3).
     #[getter]
     fn vertices_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        points(py, self.wall.mesh().vertices_mm.iter().copied())
+        points(py, self.wall(py)?.mesh().vertices_mm.iter().copied())
     }
 
     /// Vertex indices of its triangles, shape (m, 3).
     #[getter]
     fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
-        let triangles = &self.wall.mesh().triangles;
+        let triangles = &self.wall(py)?.mesh().triangles;
         array(py, triangles.as_flattened().to_vec(), [triangles.len(), 3])
     }
 
     /// Its openings, largest first: dictionaries of index, centre_mm, radius_mm and direction (out of the vessel).
     #[getter]
     fn openings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let openings: Vec<OpeningDocument> = (self.wall.openings().iter())
+        let openings: Vec<OpeningDocument> = (self.lumen.openings().iter())
             .map(|o| OpeningDocument {
                 index: o.index,
                 centre_mm: o.centre_mm.into(),
@@ -218,7 +234,7 @@ impl Vessel {
     pub(crate) fn inlet(&self) -> Option<usize> {
         match &self.given {
             Some(line) => line.inlet,
-            None => Some(self.begins).filter(|opening| *opening < self.wall.openings().len()),
+            None => Some(self.begins).filter(|opening| *opening < self.lumen.openings().len()),
         }
     }
 
@@ -254,17 +270,17 @@ impl Vessel {
     /// Raises InputError naming `start` or `ends` for an opening that is not there, a place outside, and one that no way leads to.
     #[pyo3(signature = (start = None, ends = None))]
     fn with_centreline(&self, py: Python<'_>, start: Option<End>, ends: Option<Vec<End>>) -> PyResult<Self> {
-        let wall = self.wall.clone();
+        let lumen = self.lumen.clone();
         let from = start.map(End::core);
         let to: Vec<CentrelineEnd> = ends.unwrap_or_default().into_iter().map(End::core).collect();
-        let found = interruptible(py, move || ExtractedCentreline::of(&wall, from, &to))?;
+        let found = interruptible(py, move || ExtractedCentreline::of(lumen.wall(&NoStore)?, from, &to))?;
         let found = found.map_err(|error| exception(as_argument(error)))?;
         let inlet = match from {
-            None => self.wall.inlet().map(|opening| opening.index),
+            None => self.lumen.inlet().map(|opening| opening.index),
             Some(CentrelineEnd::Opening(opening)) => Some(opening),
             Some(CentrelineEnd::Place(_)) => None,
         };
-        Ok(Self::of_line(self.wall.clone(), Some(Line { tree: found.tree, inlet })))
+        Ok(Self::of_line(self.lumen.clone(), Some(Line { tree: found.tree, inlet })))
     }
 
     /// Stretches of its centre line between root, forks and ends: dictionaries of from and to (rows of `centreline`), length_mm and
@@ -300,15 +316,15 @@ impl Vessel {
     /// Whether points (mm, shape (n, 3)) are inside: booleans of shape (n,).
     fn contains<'py>(&self, py: Python<'py>, points_mm: Numbers<'_>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         let points = rows("points_mm", &points_mm)?;
-        let wall = &self.wall;
+        let lumen = &self.lumen;
         let inside: endowire_core::Result<Vec<bool>> =
-            py.detach(|| points.into_iter().map(|p: [f64; 3]| wall.contains(&Vec3::from(p))).collect());
+            py.detach(|| points.into_iter().map(|p: [f64; 3]| lumen.contains(&Vec3::from(p))).collect());
         Ok(PyArray1::from_vec(py, inside.map_err(exception)?))
     }
 
     /// Writes the wall as a surface file; the ending (stl, obj, ply) says which.
-    fn write(&self, path: PathBuf) -> PyResult<()> {
-        self.wall.mesh().write(&path).map_err(exception)
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        self.wall(py)?.mesh().write(&path).map_err(exception)
     }
 
     /// Nothing changes a vessel: its copy is itself.
@@ -322,63 +338,101 @@ impl Vessel {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
         let (py, vessel) = (slf.py(), slf.get());
-        let wall = postcard::to_allocvec(&*vessel.wall)
-            .map_err(|e| InputError::new_err(format!("the vessel cannot be written: {e}")))?;
+        let lumen = match &vessel.lumen {
+            Lumen::Meshed(_) => {
+                let wall = postcard::to_allocvec(vessel.wall(py)?)
+                    .map_err(|e| InputError::new_err(format!("the vessel cannot be written: {e}")))?;
+                PickledLumen::Wall(PyBytes::new(py, &wall))
+            }
+            Lumen::Swept(swept) => {
+                let (edge_mm, triangles) = match swept.resolution() {
+                    Resolution::EdgeMm(edge_mm) => (Some(edge_mm), None),
+                    Resolution::Triangles(count) => (None, Some(count)),
+                };
+                let tree = swept.tree();
+                PickledLumen::Tree(table(py, tree)?, tree.closed_ends().to_vec(), edge_mm, triangles)
+            }
+        };
         let given = vessel.given.as_ref();
         let targets = given.iter().flat_map(|line| line.tree.targets());
         let targets = targets.map(|target| (target.name.clone(), target.row)).collect();
         let rows = given.map(|line| table(py, &line.tree)).transpose()?;
-        let parts = (PyBytes::new(py, &wall), rows, vessel.inlet(), targets);
+        let parts = (lumen, rows, vessel.inlet(), targets);
         Ok((slf.get_type().getattr("_unpickled")?, parts))
     }
 
     #[staticmethod]
     fn _unpickled(
-        wall: &[u8],
+        lumen: UnpickledLumen<'_>,
         centreline: Option<Numbers<'_>>,
         inlet: Option<usize>,
         targets: Vec<(String, usize)>,
     ) -> PyResult<Self> {
-        let wall = postcard::from_bytes(wall)
-            .map_err(|e| InputError::new_err(format!("the bytes of a vessel: {e}")))?;
+        let lumen = match lumen {
+            UnpickledLumen::Wall(wall) => postcard::from_bytes::<Wall>(&wall)
+                .map(Lumen::from)
+                .map_err(|e| InputError::new_err(format!("the bytes of a vessel: {e}")))?,
+            UnpickledLumen::Tree(table, closed, edge_mm, triangles) => {
+                let tree = Tree::Table(table).tree()?.with_closed_ends(closed).map_err(exception)?;
+                let resolution = match (edge_mm, triangles) {
+                    (Some(edge_mm), _) => Resolution::EdgeMm(edge_mm),
+                    (None, count) => Resolution::Triangles(count.unwrap_or_default()),
+                };
+                SweptVessel::new(tree, resolution).map_err(exception)?.into()
+            }
+        };
         let targets: Vec<Target> = targets.into_iter().map(|(name, row)| Target { name, row }).collect();
         let tree = centreline.map(|table| Tree::Table(table).tree()).transpose()?;
         let tree = tree.map(|tree| tree.with_targets(targets)).transpose().map_err(exception)?;
         let line = tree.map(|tree| Line { tree, inlet });
-        Ok(Self { begins: inlet.unwrap_or(0), ..Self::of_line(Arc::new(wall), line) })
+        Ok(Self { begins: inlet.unwrap_or(0), ..Self::of_line(lumen, line) })
     }
 
-    fn __repr__(&self) -> String {
-        format!(
-            "<endowire.Vessel: {} triangles, {} openings>",
-            self.wall.mesh().triangles.len(),
-            self.wall.openings().len()
-        )
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let made_of = match &self.lumen {
+            Lumen::Meshed(_) => format!("{} triangles", self.wall(py)?.mesh().triangles.len()),
+            Lumen::Swept(swept) => format!("{} points of a centre line", swept.tree().nodes().len()),
+        };
+        Ok(format!("<endowire.Vessel: {made_of}, {} openings>", self.lumen.openings().len()))
     }
 }
 
 impl Vessel {
     /// That of a surface alone.
     pub(crate) fn of_wall(wall: Wall) -> Self {
-        Self::of_line(Arc::new(wall), None)
+        Self::of_line(wall.into(), None)
     }
 
     /// The vessel of a scene.
     pub(crate) fn of_scene(scene: &Scene) -> endowire_core::Result<Self> {
-        let wall = scene.wall(&NoStore)?;
+        let lumen = scene.lumen(&NoStore)?;
         let begins = scene.sheath.opening.unwrap_or(0);
         if scene.vessel.tree.is_none() && scene.vessel.centreline.is_none() {
-            return Ok(Self { begins, ..Self::of_wall(wall) });
+            return Ok(Self { begins, ..Self::of_line(lumen, None) });
         }
         let tree = scene.centreline(&NoStore)?.clone();
         let root_mm = tree.nodes()[0].position_mm;
         let at_root = |opening: &&Opening| (opening.centre_mm - root_mm).norm() < opening.radius_mm;
-        let inlet = wall.openings().iter().find(at_root).map(|opening| opening.index);
-        Ok(Self::of_line(Arc::new(wall), Some(Line { tree, inlet })))
+        let inlet = lumen.openings().iter().find(at_root).map(|opening| opening.index);
+        Ok(Self::of_line(lumen, Some(Line { tree, inlet })))
     }
 
-    fn of_line(wall: Arc<Wall>, given: Option<Line>) -> Self {
-        Self { wall, given, found: OnceLock::new(), begins: 0 }
+    /// That of a centre-line tree.
+    fn swept(tree: CentrelineTree, resolution: Resolution) -> endowire_core::Result<Self> {
+        let vessel = SweptVessel::new(tree, resolution)?;
+        let line = Line { tree: vessel.tree().clone(), inlet: Some(vessel.inlet()) };
+        Ok(Self::of_line(vessel.into(), Some(line)))
+    }
+
+    fn of_line(lumen: Lumen, given: Option<Line>) -> Self {
+        Self { lumen, given, found: OnceLock::new(), begins: 0 }
+    }
+
+    /// Its wall as triangles, made if there are none yet.
+    pub(crate) fn wall(&self, py: Python<'_>) -> PyResult<&Wall> {
+        let lumen = self.lumen.clone();
+        interruptible(py, move || lumen.wall(&NoStore).map(|_| ()))?.map_err(exception)?;
+        self.lumen.wall(&NoStore).map_err(exception)
     }
 
     /// Its centre line, found if there is none.
@@ -386,9 +440,9 @@ impl Vessel {
         if let Some(line) = self.given.as_ref().or(self.found.get()) {
             return Ok(line);
         }
-        let (wall, inlet) = (self.wall.clone(), self.inlet());
+        let (lumen, inlet) = (self.lumen.clone(), self.inlet());
         let from = inlet.map(CentrelineEnd::Opening);
-        let found = interruptible(py, move || ExtractedCentreline::of(&wall, from, &[]))?;
+        let found = interruptible(py, move || ExtractedCentreline::of(lumen.wall(&NoStore)?, from, &[]))?;
         let found = found.map_err(|error| {
             let mend = format!("none is found in the vessel ({error}): take vessel.with_centreline(start, ends), of openings or places inside");
             refuse("centreline", "None", &mend)

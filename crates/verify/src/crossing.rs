@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use endowire_core::Vec3;
 use endowire_core::insertion::Simulation;
 use endowire_core::shape::Shape;
-use endowire_core::vessel::{SurfaceMesh, Wall};
+use endowire_core::vessel::{NoStore, SurfaceMesh, Wall};
 
 /// Chords per element: with 4 of them, a curve of radius 10 mm in an element of 5 mm is met within 0.02 mm.
 const CHORDS: usize = 4;
@@ -137,7 +137,11 @@ impl CrossingTest {
     /// Whether the device of a simulation is behind the triangles without having sunk in there as deep as it is.
     pub fn is_crossed_by(&self, simulation: &Simulation) -> bool {
         let felt_mm = FELT_MM.max(FELT_EDGES * self.edge_mm);
-        self.missing_mm(simulation.wall(), simulation).is_some_and(|missing_mm| missing_mm > felt_mm)
+        // The triangles are those of its wall, so it has one.
+        let wall = simulation.lumen().wall(&NoStore);
+        wall.is_ok_and(|wall| {
+            self.missing_mm(wall, simulation).is_some_and(|missing_mm| missing_mm > felt_mm)
+        })
     }
 
     /// Distance of a point from the nearest triangle, mm, if one is within `reach_mm`.

@@ -37,7 +37,7 @@ impl Played {
         let script = scene.steps(simulation.stack(), &NoStore)?;
         let view = view(&scene, path, &**files)?;
         let names = simulation.stack().instruments().iter().map(|one| one.name.clone()).collect();
-        let wall = simulation.wall().clone();
+        let wall = simulation.lumen().wall(&NoStore)?.clone();
         let session = Session::new(simulation, view, side_px, Limits::default())?.with_script(script);
         let pictures = Pictures::new(&scene, &session.snapshot(), wall)?;
         Ok(Self { session, keys: Keys::new(names), pictures, drawn_3d: None })

@@ -35,7 +35,7 @@ fn wander(count: usize) -> Tally {
     let mut scene = Scene::read(&asset("scenes/arch_carotid.toml")).unwrap();
     scene.vessel.triangles = Some(20_000);
     let mut simulation = scene.simulation(&NoStore).unwrap();
-    let crossing = CrossingTest::new(simulation.wall().mesh());
+    let crossing = CrossingTest::new(simulation.lumen().wall(&NoStore).unwrap().mesh());
     let mut noise = Noise(1);
     let mut tally = Tally::default();
     let clock = std::time::Instant::now();
@@ -111,7 +111,7 @@ fn the_bookkeeping_can_fail() {
     assert!(!tally.step(&mut simulation, &crossing, Command::advance(1e4)));
     assert!(tally.is_safe() && !tally.is_clean());
     // A wall right across the tube is crossed.
-    let mut across = simulation.wall().mesh().clone();
+    let mut across = simulation.lumen().wall(&NoStore).unwrap().mesh().clone();
     let first = across.vertices_mm.len() as u32;
     across.vertices_mm.extend([[-9.0, -9.0], [9.0, -9.0], [0.0, 18.0]].map(|[x, y]| Vec3::new(x, y, 50.0)));
     across.triangles.push([first, first + 1, first + 2]);

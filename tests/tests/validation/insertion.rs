@@ -4,7 +4,7 @@ use endowire_core::contact::Counters;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
 use endowire_core::methods::kirchhoff::KirchhoffOptions;
-use endowire_core::vessel::{GeneratedWall, Resolution, Wall, anatomy};
+use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, Wall, anatomy};
 use endowire_tests::crossing::CrossingTest;
 
 fn kirchhoff(element_mm: f64) -> KirchhoffOptions {
@@ -34,7 +34,9 @@ fn the_result_does_not_depend_on_the_increment() {
         for _ in 0..(200.0 / step_mm).round() as usize {
             simulation.step(Command::advance(step_mm)).unwrap();
         }
-        assert!(!CrossingTest::new(simulation.wall().mesh()).is_crossed_by(&simulation));
+        assert!(
+            !CrossingTest::new(simulation.lumen().wall(&NoStore).unwrap().mesh()).is_crossed_by(&simulation)
+        );
         (simulation.shape().tip_mm().unwrap(), simulation.report().push_force_n)
     };
     let (tip, force) = run(1.0);
@@ -149,7 +151,7 @@ fn in_and_out_returns_to_the_same_energy() {
 fn walls_of_any_stiffness_are_met_and_never_passed_through() {
     for modulus in [1e-3, 1e-1, 1e2, 1e4] {
         let mut simulation = in_curved_tube(modulus);
-        let crossing = CrossingTest::new(simulation.wall().mesh());
+        let crossing = CrossingTest::new(simulation.lumen().wall(&NoStore).unwrap().mesh());
         for _ in 0..50 {
             simulation.step(Command::advance(4.0)).unwrap_or_else(|e| panic!("{modulus} N/mm²: {e}"));
             assert!(!crossing.is_crossed_by(&simulation), "{modulus} N/mm²");
@@ -183,7 +185,7 @@ fn a_shaped_tip_turns_with_the_tail_and_finds_its_way_through_the_arch() {
     let wire = Device::new(vec![tip, Section::straight(400.0, 0.445, 15.0)]).unwrap();
     let mut simulation =
         Simulation::builder(arch.wall, wire, sheath).method(&kirchhoff(4.0)).build().unwrap();
-    let crossing = CrossingTest::new(simulation.wall().mesh());
+    let crossing = CrossingTest::new(simulation.lumen().wall(&NoStore).unwrap().mesh());
     for _ in 0..50 {
         let report = simulation.step(Command { advance_mm: 5.0, rotate_rad: 0.1 }).unwrap();
         assert!(report.converged);

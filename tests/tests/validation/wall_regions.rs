@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use endowire_core::Vec3;
 use endowire_core::device::Device;
 use endowire_core::insertion::{Command, Sheath, Simulation, StepReport, WallProperties, WallRegion};
-use endowire_core::vessel::{GeneratedWall, Resolution, anatomy};
+use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, anatomy};
 use endowire_tests::crossing::CrossingTest;
 
 /// Where the tip passes along the outer side of the curved tube between 150 and 170 mm inserted.
@@ -118,7 +118,7 @@ fn over_a_patch_and_back_returns_to_the_same_energy() {
 fn patches_of_any_stiffness_are_met_and_never_passed_through() {
     for (outside, inside) in [(1e-3, 1e4), (1e4, 1e-3), (1.0, 1e4)] {
         let mut simulation = in_curved_tube(patched(outside, inside));
-        let crossing = CrossingTest::new(simulation.wall().mesh());
+        let crossing = CrossingTest::new(simulation.lumen().wall(&NoStore).unwrap().mesh());
         for _ in 0..50 {
             let stepped = simulation.step(Command::advance(4.0));
             assert!(stepped.is_ok(), "{outside} and {inside} N/mm²: {}", stepped.unwrap_err());

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use endowire_core::contact::{ContactSurface, WallProperties};
+use endowire_core::contact::{FeltMesh, WallProperties};
 use endowire_core::vessel::{Conditioned, Conditioning, NoStore, SurfaceMesh, Wall, WallQuery, condition};
 use endowire_core::{Error, Vec3};
 use serde::Serialize;
@@ -59,7 +59,7 @@ impl FeltReport {
         // As it is meshed now.
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
         let meshed = Wall::welded(&felt.mesh)?;
-        let smooth = ContactSurface::new(&meshed, (RADIUS_MM, RADIUS_MM), &properties, &NoStore)?;
+        let smooth = FeltMesh::new(&meshed, RADIUS_MM, &properties, &NoStore)?;
         let deviation = smooth.deviation(&wall)?;
         let mut written = Vec::new();
         if let Some(path) = &args.felt {

@@ -41,7 +41,7 @@ pub(crate) fn fluoro(args: &FluoroArgs) -> Result<(), Failure> {
         _ => Some(scene.simulation(&cache).map_err(in_scene)?),
     };
     let wall = match &simulation {
-        Some(simulation) => simulation.wall().clone(),
+        Some(simulation) => simulation.lumen().wall(&cache).map_err(in_scene)?.clone(),
         None => scene.wall(&cache).map_err(in_scene)?,
     };
     let now = match &mut simulation {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use endowire_core::device::DeviceFile;
 use endowire_core::vessel::{
-    GeneratedWall, Opening, Resolution, SurfaceFrame, SurfaceMesh, Wall, anatomy, wall_hints,
+    Lumen, NoStore, Opening, Resolution, SurfaceFrame, SurfaceMesh, SweptVessel, Wall, anatomy, wall_hints,
 };
 
 use crate::args::NewArgs;
@@ -68,11 +68,9 @@ fn vessel(wanted: &Path, frame: SurfaceFrame, folder: &Path) -> Result<Vessel, F
         let table = format!(
             "tree = \"vessel.csv\"       # a centre line with radii, and names of targets\ntriangles = {TRIANGLES}"
         );
-        return Ok(Vessel {
-            table,
-            wall: GeneratedWall::new(&tree, Resolution::Triangles(TRIANGLES))?.wall,
-            pose,
-        });
+        // Openings are numbered as they are without a mesh.
+        let lumen = Lumen::from(SweptVessel::new(tree, Resolution::Triangles(TRIANGLES))?);
+        return Ok(Vessel { table, wall: lumen.into_wall(&NoStore)?, pose });
     }
     if !wanted.exists() {
         let names = anatomy::NAMES.join(", ");

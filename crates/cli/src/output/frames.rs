@@ -80,7 +80,8 @@ impl FrameWriter {
         if drawn.is_some() && spec.wants(View::Fluoro) {
             scenes::let_medium_flow(&mut spec, scene, store).map_err(in_scene)?;
         }
-        let wall = drawn.map(|simulation| simulation.wall().clone());
+        let wall = drawn.map(|simulation| simulation.lumen().wall(store).cloned());
+        let wall = wall.transpose().map_err(in_scene)?;
         let motion = drawn.and_then(|simulation| simulation.motion().cloned());
         let planes = wall.as_ref().map_or(Ok(Vec::new()), |wall| planes(&spec, wall)).map_err(in_scene)?;
         let pushed = Pushed::new(scene, &spec).map_err(in_scene)?;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use endowire_core::insertion::{Script, ScriptCourse, ScriptRun, Simulation, State, Step, Tally};
-use endowire_core::vessel::NoStore;
+use endowire_core::vessel::{Lumen, NoStore, Wall};
 use endowire_methods::Scene;
 use endowire_sweep::seal;
 use serde::{Deserialize, Serialize};
@@ -33,20 +33,29 @@ pub(crate) struct Parts {
     method: String,
 }
 
+/// What is the same in two vessels that are the same: triangles, or a centre line.
+fn vessel(lumen: &Lumen) -> String {
+    if let Lumen::Swept(vessel) = lumen {
+        return hash(serde_json::to_vec(&(vessel.tree(), vessel.resolution())).unwrap_or_default());
+    }
+    let mesh = lumen.wall(&NoStore).map(Wall::mesh).ok();
+    let vertices = mesh.iter().flat_map(|mesh| &mesh.vertices_mm);
+    let numbers = vertices.flat_map(|v| v.iter().flat_map(|c| c.to_le_bytes()));
+    let indices = mesh.iter().flat_map(|mesh| mesh.triangles.iter().flatten());
+    hash(numbers.chain(indices.flat_map(|index| index.to_le_bytes())).collect())
+}
+
 impl Parts {
     /// Those of a simulation of `scene`.
     fn new(scene: &Scene, simulation: &Simulation) -> Self {
         let json = |value: Result<Vec<u8>, serde_json::Error>| hash(value.unwrap_or_default());
-        let mesh = simulation.wall().mesh();
-        let numbers = mesh.vertices_mm.iter().flat_map(|v| v.iter().flat_map(|c| c.to_le_bytes()));
-        let indices = mesh.triangles.iter().flatten().flat_map(|index| index.to_le_bytes());
         // Where nothing flows a centre line decides nothing.
         let tree = scene.vessel.flow.as_ref().and_then(|_| scene.centreline(&NoStore).ok());
         let sheath = simulation.sheath();
         let place = sheath.position_mm.iter().chain(&sheath.direction);
         let sheath = place.chain([&sheath.friction_n, &sheath.friction]).flat_map(|c| c.to_le_bytes());
         Self {
-            vessel: hash(numbers.chain(indices).collect()),
+            vessel: vessel(simulation.lumen()),
             motion: json(serde_json::to_vec(&scene.vessel.motion)),
             flow: json(serde_json::to_vec(&(&scene.vessel.flow, tree))),
             wall: json(serde_json::to_vec(&scene.vessel.wall)),

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::distance::{Distance, Nearness};
 use super::point::{FOLLOW, LOOK_AGAIN};
 use super::proximity::ProximityCache;
+use super::surface::Hint;
 use super::wall::{Foreseen, Slip, Slipping, Span};
 use super::{ContactPoint, ContactSurface};
 use crate::Vec3;
@@ -21,19 +22,19 @@ pub(super) struct KnownPoint {
     pub(super) from_tip_mm: f64,
     /// No wall is nearer to that place than this, mm.
     pub(super) clearance_mm: f64,
-    /// The nearest triangle then, if the wall was near.
-    pub(super) triangle: Option<u32>,
+    /// The nearest piece then ([`super::surface`]), if the wall was near.
+    pub(super) piece: Option<u32>,
     /// While it is no farther than this from there, mm, it is free whatever else would be found.
     pub(super) free_mm: f64,
-    /// Of a point that has sunk into the wall at its base, a triangle of the wall that it has sunk into.
+    /// Of a point that has sunk into the wall at its base, a piece of the wall that it has sunk into.
     pub(super) side: Option<u32>,
     /// The material point where it is at the state that Newton's method is leaving.
     pub(super) base: Vec3,
-    /// Where the wall was looked for when that state was assembled, and the triangle that was found: what points feel on the way from
+    /// Where the wall was looked for when that state was assembled, and the piece that was found: what points feel on the way from
     /// there hangs on where they are alone, not on other steps that were tried.
     pub(super) base_looked_at: Vec3,
     /// See `base_looked_at`.
-    pub(super) base_triangle: Option<u32>,
+    pub(super) base_piece: Option<u32>,
     /// See `base_looked_at`.
     pub(super) base_looked_clearance_mm: f64,
     /// See `base_looked_at`.
@@ -50,12 +51,12 @@ const NOTHING: KnownPoint = KnownPoint {
     looked_at: Vec3::new(0.0, 0.0, 0.0),
     from_tip_mm: 0.0,
     clearance_mm: -1.0,
-    triangle: None,
+    piece: None,
     free_mm: 0.0,
     side: None,
     base: Vec3::new(f64::NAN, f64::NAN, f64::NAN),
     base_looked_at: Vec3::new(f64::NAN, f64::NAN, f64::NAN),
-    base_triangle: None,
+    base_piece: None,
     base_looked_clearance_mm: -1.0,
     base_free_mm: 0.0,
     base_clearance_mm: 0.0,
@@ -68,16 +69,19 @@ const NOTHING: KnownPoint = KnownPoint {
 pub(super) struct TakenReading {
     /// Where, mm.
     pub(super) at_mm: Vec3,
-    /// The triangle about which it was read: where two pieces of wall are near, they read differently.
-    pub(super) triangle: u32,
+    /// The piece of wall about which it was read: where two are near, they read differently.
+    pub(super) hint: Hint,
     /// How near the wall is.
     pub(super) nearness: Nearness,
 }
 
 impl TakenReading {
     /// That of a point that has read nothing since the step began.
-    const NONE: Self =
-        Self { at_mm: Vec3::new(f64::NAN, f64::NAN, f64::NAN), triangle: 0, nearness: Nearness::Beyond(0.0) };
+    const NONE: Self = Self {
+        at_mm: Vec3::new(f64::NAN, f64::NAN, f64::NAN),
+        hint: Hint::Near(0),
+        nearness: Nearness::Beyond(0.0),
+    };
 }
 
 /// The memory of all contact points of a device in a step.
@@ -124,11 +128,11 @@ impl KnownPoints {
         self.points.len()
     }
 
-    /// Whether they may be what a device of `points` points knows of a wall of `triangles` triangles.
-    pub(crate) fn fits(&self, points: usize, triangles: usize) -> bool {
-        let there = |triangle: Option<u32>| triangle.is_none_or(|t| (t as usize) < triangles);
+    /// Whether they may be what a device of `points` points knows of a wall of `pieces` pieces.
+    pub(crate) fn fits(&self, points: usize, pieces: usize) -> bool {
+        let there = |piece: Option<u32>| piece.is_none_or(|piece| (piece as usize) < pieces);
         self.points.len() == points
-            && self.points.iter().all(|p| there(p.triangle) && there(p.side) && there(p.base_triangle))
+            && self.points.iter().all(|p| there(p.piece) && there(p.side) && there(p.base_piece))
     }
 }
 

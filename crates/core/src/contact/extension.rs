@@ -151,8 +151,8 @@ pub fn leave_mm(opening: &Opening) -> f64 {
 }
 
 /// The opening beyond whose plane `x` lies, within its extension, and how far, mm.
-pub fn left_through<'a>(wall: &'a Wall, x: &Vec3) -> Option<(&'a Opening, f64)> {
-    wall.openings().iter().find_map(|o| {
+pub fn left_through<'a>(openings: &'a [Opening], x: &Vec3) -> Option<(&'a Opening, f64)> {
+    openings.iter().find_map(|o| {
         let (beyond, aside) = o.beyond_and_aside_mm(x);
         (beyond > 0.0 && beyond <= o.beyond_mm && aside < 1.5 * o.radius_mm).then_some((o, beyond))
     })
@@ -162,8 +162,8 @@ pub fn left_through<'a>(wall: &'a Wall, x: &Vec3) -> Option<(&'a Opening, f64)> 
 ///
 /// # Errors
 /// [`PhysicalEnd::Left`].
-pub fn check_inside(wall: &Wall, tip_mm: &Vec3, ahead_mm: f64) -> Result<()> {
-    let Some((opening, beyond_mm)) = left_through(wall, tip_mm) else { return Ok(()) };
+pub fn check_inside(openings: &[Opening], tip_mm: &Vec3, ahead_mm: f64) -> Result<()> {
+    let Some((opening, beyond_mm)) = left_through(openings, tip_mm) else { return Ok(()) };
     let limit_mm = leave_mm(opening);
     if beyond_mm + ahead_mm > limit_mm {
         return Err(Error::End(PhysicalEnd::Left { opening: opening.index, beyond_mm, limit_mm }));
@@ -252,8 +252,8 @@ mod tests {
             .unwrap()
             .wall;
         let top = wall.openings().iter().find(|o| o.direction.z > 0.5).unwrap();
-        let found = left_through(&wall, &Vec3::new(1.0, 0.0, 105.0)).unwrap();
+        let found = left_through(wall.openings(), &Vec3::new(1.0, 0.0, 105.0)).unwrap();
         assert!(found.0.index == top.index && (found.1 - 5.0).abs() < 1e-6);
-        assert!(left_through(&wall, &Vec3::new(1.0, 0.0, 95.0)).is_none());
+        assert!(left_through(wall.openings(), &Vec3::new(1.0, 0.0, 95.0)).is_none());
     }
 }

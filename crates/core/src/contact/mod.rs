@@ -36,5 +36,5 @@ pub use properties::{WallProperties, WallRegion};
 pub(crate) use properties::{check_friction, check_valve};
 pub use reader::WallReader;
 pub use regions::RegionMap;
-pub use surface::{ContactSurface, Deviation};
+pub use surface::{ContactSurface, Deviation, FeltMesh, Hint};
 pub use wall::WallContact;

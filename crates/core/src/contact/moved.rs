@@ -32,6 +32,7 @@ use std::ops::Deref;
 
 use super::distance::Nearness;
 use super::regions::Stiffness;
+use super::surface::Hint;
 use super::{ContactSurface, Distance};
 use crate::Vec3;
 use crate::products::outer;
@@ -88,13 +89,13 @@ impl<'a> MovedWall<'a> {
     }
 
     /// As [`ContactSurface::nearness`] of a material point, with the distance in space.
-    pub(super) fn nearness(&self, material: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
+    pub(super) fn nearness(&self, material: &Vec3, hint: Hint, limit_mm: f64) -> Nearness {
         let Some(displacement) = self.displacement else {
-            return self.surface.nearness(material, triangle, limit_mm);
+            return self.surface.nearness(material, hint, limit_mm);
         };
         // The value in space takes the gradient in the reference.
         let wanted_mm = limit_mm.max(self.surface.reach_mm) * displacement.stretch();
-        match self.surface.nearness(material, triangle, wanted_mm) {
+        match self.surface.nearness(material, hint, wanted_mm) {
             Nearness::Beyond(value_mm) => Nearness::Beyond(value_mm / displacement.stretch()),
             Nearness::Within(distance) => {
                 let moved = moved(&distance, &displacement.local(material));
@@ -325,7 +326,7 @@ mod tests {
         let mut steepest: f64 = 0.0;
         for k in 0..12 {
             let material = Vec3::new(3.4, 0.2 * f64::from(k) - 1.0, 42.0 + f64::from(k));
-            let triangle = surface.query.nearest(&material, 5.0).map(|near| near.triangle);
+            let triangle = surface.nearest_piece(&material, 5.0).map(|(piece, _)| piece);
             let at = |x: &Vec3| moved.stiffness(&moved.material(x), triangle);
             let x = field.place(&material);
             assert_eq!(at(&x).factor, surface.stiffness(&moved.material(&x), triangle).factor);
@@ -357,10 +358,10 @@ mod tests {
         let mut seen = 0;
         for (index, vertex) in wall.mesh().vertices_mm.iter().enumerate().step_by(17) {
             let material = vertex + Vec3::new(0.3, -0.2, 0.1) * f64::from(index as u32 % 3);
-            let Some(near) = surface.query.nearest(&material, 5.0) else { continue };
+            let Some((piece, _)) = surface.nearest_piece(&material, 5.0) else { continue };
             let x = field.place(&material);
-            let found = displaced.nearness(&displaced.material(&x), near.triangle, 0.5);
-            match (at_rest.nearness(&material, near.triangle, 0.5), found) {
+            let found = displaced.nearness(&displaced.material(&x), Hint::Near(piece), 0.5);
+            match (at_rest.nearness(&material, Hint::Near(piece), 0.5), found) {
                 (Nearness::Within(was), Nearness::Within(is)) => {
                     seen += 1;
                     assert!((was.value_mm - is.value_mm).abs() < 1e-12);

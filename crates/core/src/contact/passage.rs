@@ -18,7 +18,7 @@ use super::ContactSurface;
 use super::extension::left_through;
 use crate::Vec3;
 use crate::rod::Frame;
-use crate::vessel::Wall;
+use crate::vessel::Opening;
 
 /// Spacings of the grids, in radii of the device.
 const SPACINGS: [f64; 2] = [0.25, 0.0625];
@@ -45,13 +45,13 @@ pub(crate) struct Narrow {
 /// places of the device in the reference, from the tip on, a radius or two apart; at least two of them.
 pub(crate) fn narrow_ahead(
     surface: &ContactSurface,
-    wall: &Wall,
+    openings: &[Opening],
     axis_mm: &[Vec3],
     radius_mm: f64,
 ) -> Option<Narrow> {
     let front = front(axis_mm, radius_mm)?;
     for spacing in SPACINGS {
-        let grid = Grid::new((surface, wall), front, radius_mm, spacing * radius_mm)?;
+        let grid = Grid::new((surface, openings), front, radius_mm, spacing * radius_mm)?;
         let widest = grid.widest()?;
         if widest.radius_mm >= radius_mm {
             return None;
@@ -81,7 +81,7 @@ fn front(axis_mm: &[Vec3], radius_mm: f64) -> Option<&[Vec3]> {
 /// The lumen about a front, on a grid about its tip.
 struct Grid<'a> {
     surface: &'a ContactSurface,
-    wall: &'a Wall,
+    openings: &'a [Opening],
     /// Places of the device from the tip to the cross-section at which its front begins.
     piece: &'a [Vec3],
     /// The middle of that cross-section, and its triad: across it towards the tip, and two directions in it.
@@ -117,7 +117,7 @@ impl PartialOrd for Way {
 impl<'a> Grid<'a> {
     /// About a front, places from the tip to one behind its cross-section, the last but one.
     fn new(
-        (surface, wall): (&'a ContactSurface, &'a Wall),
+        (surface, openings): (&'a ContactSurface, &'a [Opening]),
         front: &'a [Vec3],
         radius_mm: f64,
         spacing_mm: f64,
@@ -125,7 +125,7 @@ impl<'a> Grid<'a> {
         let [piece @ .., behind] = front else { return None };
         let [.., ahead, middle] = piece else { return None };
         let frame = Frame::new(ahead - behind, None);
-        Some(Self { surface, wall, piece, middle: *middle, frame, radius_mm, spacing_mm })
+        Some(Self { surface, openings, piece, middle: *middle, frame, radius_mm, spacing_mm })
     }
 
     /// The narrowest place of the widest way; none where the front is not in the lumen, or where that takes too long to find.
@@ -138,7 +138,8 @@ impl<'a> Grid<'a> {
         let mut seen: FxHashSet<Cell> = ways.iter().map(|way| way.to).collect();
         while let Some(way) = ways.pop() {
             let at = self.place(way.to);
-            if self.distance_mm(&at).0 >= AHEAD * self.radius_mm || left_through(self.wall, &at).is_some() {
+            if self.distance_mm(&at).0 >= AHEAD * self.radius_mm || left_through(self.openings, &at).is_some()
+            {
                 return Some(Narrow { radius_mm: way.least_mm, place_mm: self.place(way.narrowest) });
             }
             if seen.len() > MOST_ASKED {
@@ -170,14 +171,7 @@ impl<'a> Grid<'a> {
 
     /// How far a place is from the felt wall, at least as far as a device sees; not positive outside the lumen.
     fn clearance_mm(&self, x: &Vec3) -> f64 {
-        let reach_mm = self.surface.reach_mm;
-        match self.surface.query.nearest(x, reach_mm) {
-            Some(flat) if flat.distance_mm > -self.radius_mm => {
-                self.surface.nearness(x, flat.triangle, f64::NEG_INFINITY).value_mm()
-            }
-            Some(flat) => flat.distance_mm,
-            None => reach_mm,
-        }
+        self.surface.clearance_mm(x, self.radius_mm)
     }
 
     /// How far a place is from the front, mm, and whether that is ahead of its tip.
@@ -258,7 +252,7 @@ fn around([i, j, k]: Cell) -> impl Iterator<Item = Cell> {
 mod tests {
     use super::*;
     use crate::contact::WallProperties;
-    use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution};
+    use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution, Wall};
 
     /// A vessel along z whose radius changes as stated, with a side branch of 1 mm at z = 20 mm where one is wanted.
     fn vessel(radius_mm: impl Fn(f64) -> f64, branch: bool) -> (ContactSurface, Wall) {
@@ -282,7 +276,7 @@ mod tests {
     /// What is said of a wire of radius 0.4 mm whose tip is at z, aside by x.
     fn ahead((surface, wall): &(ContactSurface, Wall), z: f64, x: f64) -> Option<Narrow> {
         let axis: Vec<Vec3> = (0..20).map(|k| Vec3::new(x, 0.0, z - 0.6 * f64::from(k))).collect();
-        narrow_ahead(surface, wall, &axis, 0.4)
+        narrow_ahead(surface, wall.openings(), &axis, 0.4)
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{in_range, number, vector};
-use crate::vessel::SurfaceMesh;
+use crate::vessel::{Lumen, WallStore};
 use crate::{Error, Result, Vec3};
 
 /// Largest foundation modulus, N/mm².
@@ -141,11 +141,11 @@ impl WallProperties {
         ))
     }
 
-    /// Checks all values, and that every region has a place on `mesh`.
+    /// Checks all values, and that every region has a place on the wall of `lumen`, whose mesh comes from `store` if there are any.
     ///
     /// # Errors
     /// Values out of range, a region that changes nothing or reaches no vertex.
-    pub(crate) fn check(&self, mesh: &SurfaceMesh) -> Result<()> {
+    pub(crate) fn check(&self, lumen: &Lumen, store: &dyn WallStore) -> Result<()> {
         in_range("vessel.wall.modulus_n_per_mm2", self.modulus_n_per_mm2, LARGEST_MODULUS)?;
         check_friction("vessel.wall.friction", self.friction)?;
         if !(0.0..=LARGEST_DEVIATION_MM).contains(&self.deviation_mm) {
@@ -180,7 +180,7 @@ impl WallProperties {
                 return Err(Error::parameter(name, "{}", "give modulus_n_per_mm2, friction or both"));
             }
             let away = |v: &Vec3| (v - region.centre()).norm();
-            let nearest = mesh.vertices_mm.iter().map(away).fold(f64::MAX, f64::min);
+            let nearest = lumen.wall(store)?.mesh().vertices_mm.iter().map(away).fold(f64::MAX, f64::min);
             if nearest > region.radius_mm {
                 return Err(Error::parameter(
                     key("radius_mm"),

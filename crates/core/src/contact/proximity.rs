@@ -5,7 +5,7 @@
 //! depend on the cell alone, not on what was asked before.
 
 use crate::Vec3;
-use crate::vessel::WallQuery;
+use crate::contact::ContactSurface;
 
 /// Cells that are remembered at a time; a power of two. A device of a metre lies in some thousands.
 const CELLS: usize = 1 << 14;
@@ -28,8 +28,8 @@ pub(super) struct Proximity {
     pub(super) middle: Vec3,
     /// No wall is nearer to it than this, mm.
     pub(super) clearance_mm: f64,
-    /// The nearest triangle; none beyond the reach of the question or past the end of the vessel.
-    pub(super) triangle: Option<u32>,
+    /// The nearest piece; none beyond the reach of the question or past the end of the vessel.
+    pub(super) piece: Option<u32>,
 }
 
 impl Proximity {
@@ -43,7 +43,7 @@ impl Proximity {
 #[derive(Debug, Clone, Copy)]
 struct Cell {
     key: [i32; 3],
-    triangle: u32,
+    piece: u32,
     clearance_mm: f64,
 }
 
@@ -53,7 +53,7 @@ pub(super) struct ProximityCache {
     size_mm: f64,
     reach_mm: f64,
     cells: Vec<Cell>,
-    /// The triangle that was found last.
+    /// The piece that was found last.
     last: u32,
     /// Questions to the hierarchy since they were counted last.
     pub(super) queries: u64,
@@ -63,51 +63,54 @@ impl ProximityCache {
     /// Cells no point of which is farther than `radius_mm` from the middle, from which walls are looked for up to
     /// `reach_mm` away.
     pub(super) fn new(radius_mm: f64, reach_mm: f64) -> Self {
-        let unknown = Cell { key: [i32::MIN; 3], triangle: NONE, clearance_mm: 0.0 };
+        let unknown = Cell { key: [i32::MIN; 3], piece: NONE, clearance_mm: 0.0 };
         let size_mm = radius_mm * 2.0 / 3f64.sqrt();
         Self { size_mm, reach_mm, cells: vec![unknown; CELLS], last: NONE, queries: 0 }
     }
 
     /// What is nearest to `x` itself.
-    fn ask(&mut self, query: &WallQuery, x: &Vec3) -> Proximity {
+    fn ask(&mut self, surface: &ContactSurface, x: &Vec3) -> Proximity {
         self.queries += 1;
         // Where no wall is near, the point may be far from it on either side. A question without a limit would look at most of the wall;
         // what was found last is mostly close to what is sought, and nothing farther is the answer. Which of several triangles at one
         // distance is found does not hang on the limit.
         let found_mm = match self.last {
             NONE => f64::MAX,
-            last => query.distance_to(last, x) * (1.0 + CLOSE) + self.reach_mm * CLOSE,
+            last => {
+                let far_mm = surface.distance_to(last, x);
+                far_mm.map_or(f64::MAX, |mm| mm * (1.0 + CLOSE) + self.reach_mm * CLOSE)
+            }
         };
         let reaches = (0..FARTHER).map(|k| self.reach_mm * FARTHER_BY.powi(k)).chain([f64::MAX]);
         let mut limits =
             reaches.map(|reach_mm| if found_mm < FARTHER_BY * reach_mm { found_mm } else { reach_mm });
-        let nearest = limits.find_map(|limit_mm| query.nearest(x, limit_mm));
-        self.last = nearest.map_or(NONE, |n| n.triangle);
+        let nearest = limits.find_map(|limit_mm| surface.nearest(x, limit_mm));
+        self.last = nearest.map_or(NONE, |n| n.bound);
         Proximity {
             middle: *x,
             clearance_mm: nearest.map_or(self.reach_mm, |n| n.distance_mm),
-            triangle: nearest.filter(|n| !n.rim).map(|n| n.triangle),
+            piece: nearest.and_then(|n| n.piece),
         }
     }
 
     /// What is nearest to the middle of the cell that `x` lies in.
-    pub(super) fn around(&mut self, query: &WallQuery, x: &Vec3) -> Proximity {
+    pub(super) fn around(&mut self, surface: &ContactSurface, x: &Vec3) -> Proximity {
         let at = x.map(|c| (c / self.size_mm).floor());
         // Also for what is not a number.
         if !at.iter().all(|c| c.abs() < FARTHEST) {
-            return self.ask(query, x);
+            return self.ask(surface, x);
         }
         let key: [i32; 3] = [at.x as i32, at.y as i32, at.z as i32];
         let middle = at.map(|c| (c + 0.5) * self.size_mm);
         let slot = slot(key);
         let known = self.cells[slot];
         if known.key == key {
-            let triangle = (known.triangle != NONE).then_some(known.triangle);
-            return Proximity { middle, clearance_mm: known.clearance_mm, triangle };
+            let piece = (known.piece != NONE).then_some(known.piece);
+            return Proximity { middle, clearance_mm: known.clearance_mm, piece };
         }
-        let place = self.ask(query, &middle);
-        let triangle = place.triangle.unwrap_or(NONE);
-        self.cells[slot] = Cell { key, triangle, clearance_mm: place.clearance_mm };
+        let place = self.ask(surface, &middle);
+        let piece = place.piece.unwrap_or(NONE);
+        self.cells[slot] = Cell { key, piece, clearance_mm: place.clearance_mm };
         place
     }
 }
@@ -123,53 +126,56 @@ fn slot(key: [i32; 3]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vessel::{GeneratedWall, Resolution, anatomy};
+    use crate::contact::WallProperties;
+    use crate::vessel::{GeneratedWall, NoStore, Resolution, anatomy};
 
-    fn tube(edge_mm: f64) -> WallQuery {
+    fn tube(edge_mm: f64) -> ContactSurface {
         let tree = anatomy::tree("straight_tube").unwrap();
-        WallQuery::new(&GeneratedWall::new(&tree, Resolution::EdgeMm(edge_mm)).unwrap().wall).unwrap()
+        let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(edge_mm)).unwrap().wall;
+        let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
+        ContactSurface::new(&wall, (0.2, 0.2), &properties, &NoStore).unwrap()
     }
 
     #[test]
     fn a_cell_is_asked_once_and_answers_as_the_hierarchy_does() {
-        let query = tube(1.0);
+        let surface = tube(1.0);
         let mut proximity = ProximityCache::new(0.2, 3.0);
         let at = |i: i32| Vec3::new(2.5 * f64::from(i).sin(), 2.5 * f64::from(i).cos(), 0.02 * f64::from(i));
         for i in 0..3000 {
             let x = at(i);
-            let place = proximity.around(&query, &x);
+            let place = proximity.around(&surface, &x);
             assert!((x - place.middle).norm() <= 0.2);
-            let nearest = query.nearest(&place.middle, 3.0).unwrap();
-            assert_eq!((place.triangle, place.clearance_mm), (Some(nearest.triangle), nearest.distance_mm));
+            let (nearest, far_mm) = surface.nearest_piece(&place.middle, 3.0).unwrap();
+            assert_eq!((place.piece, place.clearance_mm), (Some(nearest), far_mm));
         }
         let asked = proximity.queries;
         assert!(asked <= 3000);
-        proximity.around(&query, &at(2999));
+        proximity.around(&surface, &at(2999));
         assert_eq!(proximity.queries, asked);
     }
 
     #[test]
     fn what_was_found_before_leads_to_the_same_answers() {
-        let query = tube(0.7);
+        let surface = tube(0.7);
         let mut proximity = ProximityCache::new(0.2, 0.5);
         // On a lattice about the axis many triangles are at one distance.
         let at =
             |k: i32| Vec3::new(f64::from(k % 7 - 3), f64::from(k / 7 % 7 - 3), f64::from(k / 49 % 40)) * 0.9;
         for k in 0..2000 {
             let x = at(k * 611 % 2000);
-            let place = proximity.ask(&query, &x);
-            let fresh = ProximityCache::new(0.2, 0.5).ask(&query, &x);
-            assert_eq!((place.triangle, place.clearance_mm), (fresh.triangle, fresh.clearance_mm), "{x}");
+            let place = proximity.ask(&surface, &x);
+            let fresh = ProximityCache::new(0.2, 0.5).ask(&surface, &x);
+            assert_eq!((place.piece, place.clearance_mm), (fresh.piece, fresh.clearance_mm), "{x}");
         }
     }
 
     #[test]
     fn no_number_is_no_place_and_a_far_wall_is_found() {
-        let query = tube(2.0);
+        let surface = tube(2.0);
         let mut proximity = ProximityCache::new(0.2, 1.0);
-        let place = proximity.around(&query, &Vec3::repeat(f64::NAN));
-        assert!(place.triangle.is_none() && place.clearance_mm == 1.0);
-        let place = proximity.around(&query, &Vec3::new(0.0, 0.0, 50.0));
-        assert!(place.triangle.is_some() && (3.0..4.0).contains(&place.clearance_mm));
+        let place = proximity.around(&surface, &Vec3::repeat(f64::NAN));
+        assert!(place.piece.is_none() && place.clearance_mm == 1.0);
+        let place = proximity.around(&surface, &Vec3::new(0.0, 0.0, 50.0));
+        assert!(place.piece.is_some() && (3.0..4.0).contains(&place.clearance_mm));
     }
 }

@@ -1,6 +1,6 @@
 //! The smooth wall about a rim that was cut from triangle to triangle, aslant, in a surface made of voxels.
 
-use super::surface::ContactSurface;
+use super::surface::{ContactSurface, Hint};
 use crate::Vec3;
 use crate::insertion::WallProperties;
 use crate::random::{splitmix64, unit};
@@ -76,13 +76,13 @@ fn no_spikes_stand_on_the_teeth_of_a_rim() {
             let (angle, r) = (std::f64::consts::TAU * angle, RADIUS_MM * r.sqrt());
             let x = r * angle.cos();
             let x = Vec3::new(x, r * angle.sin(), 20.0 + 0.45 * x + 6.0 * (up - 0.5));
-            let Some(near) = surface.query.nearest(&x, surface.reach_mm) else { continue };
-            if near.distance_mm < 0.2 {
+            let Some((triangle, flat_mm)) = surface.nearest_piece(&x, surface.reach_mm) else { continue };
+            if flat_mm < 0.2 {
                 continue;
             }
-            let felt_mm = surface.nearness(&x, near.triangle, f64::INFINITY).value_mm();
-            let place = usize::from(felt_mm > near.distance_mm);
-            farthest[place] = farthest[place].max((felt_mm - near.distance_mm).abs());
+            let felt_mm = surface.nearness(&x, Hint::Near(triangle), f64::INFINITY).value_mm();
+            let place = usize::from(felt_mm > flat_mm);
+            farthest[place] = farthest[place].max((felt_mm - flat_mm).abs());
         }
         all = [all[0].max(farthest[0]), all[1].max(farthest[1])];
     }

@@ -1,190 +1,294 @@
-//! The vessel as a device feels it: evenly meshed, extended beyond its openings, smooth, and ready for queries.
+//! The wall as a device feels it: that of a surface, evenly meshed, extended beyond its openings, smooth and ready for queries
+//! ([`FeltMesh`]), or that of a centre line, which is all of this by itself ([`SweptField`]).
+//!
+//! What a point of a device knows of the wall about it is the *piece* that is next to it: a triangle of the felt mesh, or a place on the
+//! centre line. A point looks for the wall through space, near a piece ([`Hint::Near`]); one that has sunk in follows it along the wall
+//! from the piece that it sank into ([`Hint::Side`]).
 
 mod deviation;
+mod mesh;
 
-use std::borrow::Cow;
-
-use nalgebra::Matrix3;
-
+use super::Distance;
 use super::distance::Nearness;
-use super::extension::extended;
 use super::point::{FOLLOW, LOOK_AGAIN};
 use super::properties::WallProperties;
 use super::regions::{RegionMap, Stiffness};
-use super::{Distance, SmoothWall};
-use crate::vessel::{Conditioning, Wall, WallQuery, WallRecipe, WallStore};
-use crate::{Result, Vec3, parallel};
+use crate::vessel::{ClosestFrom, Lumen, SweptField, Wall, WallStore};
+use crate::{Result, Vec3};
 pub use deviation::Deviation;
+pub use mesh::FeltMesh;
+
+/// How much farther than it must a point looks for the wall, mm: while it moves less it need not ask again. A point on the axis of a
+/// tube has all of its triangles at one distance, and a question that reaches them looks at all: asking a little farther is enough.
+const LOOK_MM: f64 = 0.5;
+
+/// How far a point of a device must see, whose thickest radius is that, where a smooth wall lies inside of flat triangles by so much, mm.
+fn reach_mm(thickest_mm: f64, inset_mm: f64) -> f64 {
+    (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + inset_mm + LOOK_MM
+}
 
 /// A wall prepared for the contact of devices.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct ContactSurface {
-    /// Its smooth distance.
-    pub smooth: SmoothWall,
-    /// Nearest triangles and clearances.
-    pub query: WallQuery,
-    /// Modulus and friction, where they are not the same everywhere.
-    pub regions: Option<RegionMap>,
+    felt: Felt,
     /// Radius of the thinnest piece of the device, mm.
     pub(super) thinnest_mm: f64,
     /// How far a point of the device must see, mm.
     pub(super) reach_mm: f64,
 }
 
-/// How much farther than it must a point looks for the wall, mm: while it moves less it need not ask again. A point on the axis of a
-/// tube has all of its triangles at one distance, and a question that reaches them looks at all: asking a little farther is enough.
-const LOOK_MM: f64 = 0.5;
+/// What the wall is made of.
+#[derive(Debug)]
+enum Felt {
+    Mesh(Box<FeltMesh>),
+    /// With the radius of the thickest piece of the device, mm.
+    Swept(SweptField, f64),
+}
 
-/// What lies inside by more than this part of the thickest radius is looked at above the triangles, …
-const CREST: f64 = 0.3;
-/// … at so many heights, so many radii apart.
-const OVER: (u32, f64) = (6, 0.5);
+/// Where the wall is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hint {
+    /// Through space, of a point whose nearest piece is that or close to it.
+    Near(u32),
+    /// Along the wall, of a point that has sunk into it at that piece.
+    Side(u32),
+}
 
-/// Coverage below which the flat triangles take part.
-const COVERED: f64 = 0.15;
-
-/// `wall` as an even mesh, or as it is where it is felt as it is meshed.
-fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) -> Result<Cow<'a, Wall>> {
-    if properties.deviation_mm == 0.0 {
-        return Ok(Cow::Borrowed(wall));
+impl Hint {
+    /// Its piece.
+    pub(super) fn piece(self) -> u32 {
+        match self {
+            Self::Near(piece) | Self::Side(piece) => piece,
+        }
     }
-    let options = Conditioning { deviation_mm: properties.deviation_mm, ..Conditioning::default() };
-    store.wall(&WallRecipe::Even { wall, options }).map(Cow::Owned)
+}
+
+/// The wall that is nearest to a point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NearPiece {
+    /// How far it is, mm, or less; negative beyond the wall.
+    pub(super) distance_mm: f64,
+    /// The piece; none past the end of the vessel, …
+    pub(super) piece: Option<u32>,
+    /// … and what was nearest there.
+    pub(super) bound: u32,
 }
 
 impl ContactSurface {
     /// Prepares `wall` for devices of this smallest and largest radius, mm, with its even mesh from `store`.
     ///
     /// # Errors
-    /// A wall that has no triangles left to query.
+    /// As [`FeltMesh::new`].
     pub fn new(
         wall: &Wall,
         (thinnest_mm, thickest_mm): (f64, f64),
         properties: &WallProperties,
         store: &dyn WallStore,
     ) -> Result<Self> {
-        let surface = extended(&*even(wall, properties, store)?, thickest_mm);
-        let surface = Wall::welded(&surface)?;
-        let smooth = SmoothWall::new(&surface, thickest_mm);
-        let regions = if properties.region.is_empty() { None } else { RegionMap::new(&smooth, properties) };
-        let reach_mm = |smooth: &SmoothWall| {
-            (1.0 + FOLLOW + LOOK_AGAIN) * thickest_mm + smooth.deepest_inset_mm() + LOOK_MM
-        };
-        let query = WallQuery::new(&surface)?;
-        // The first step would wait for it.
-        query.prepare();
-        let mut surface = Self { reach_mm: reach_mm(&smooth), smooth, query, regions, thinnest_mm };
-        let crests = surface.over_crests(thickest_mm);
-        surface.smooth.deepen(crests.into_iter().flatten());
-        surface.reach_mm = reach_mm(&surface.smooth);
-        Ok(surface)
+        let mesh = FeltMesh::new(wall, thickest_mm, properties, store)?;
+        Ok(Self { reach_mm: mesh.reach_mm, felt: Felt::Mesh(Box::new(mesh)), thinnest_mm })
     }
 
-    /// How far the smooth wall lies inside the flat one over triangles where that is much, mm: beside a crest it ends farther above them than it
-    /// does on them, and a point that is taken for free there would press from one place to the next.
-    fn over_crests(&self, thickest_mm: f64) -> Vec<Vec<(u32, f64)>> {
-        let crests = self.smooth.inside_of(CREST * thickest_mm);
-        let step_mm = OVER.1 * thickest_mm;
-        parallel::map(crests.len(), |index| {
-            let triangle = crests[index];
-            let [a, b, c] = self.query.corners(triangle);
-            let (middle, normal) = ((a + b + c) / 3.0, self.query.inward_normal(triangle));
-            let places = [middle, (a + middle) * 0.5, (b + middle) * 0.5, (c + middle) * 0.5];
-            let over = places
-                .into_iter()
-                .flat_map(|x| (1..=OVER.0).map(move |k| x + normal * (f64::from(k) * step_mm)));
-            over.filter_map(|x| {
-                let flat = self.query.nearest(&x, self.reach_mm).filter(|flat| flat.distance_mm > 0.0)?;
-                let felt_mm = self.nearness(&x, flat.triangle, f64::NEG_INFINITY).value_mm();
-                Some((flat.triangle, flat.distance_mm - felt_mm))
-            })
-            .collect()
+    /// Prepares the wall of `lumen`. One that is given by a centre line is felt as it is, unless the wall has regions: those are laid over the vertices
+    /// of a mesh.
+    ///
+    /// # Errors
+    /// As [`Lumen::wall`] and [`ContactSurface::new`].
+    pub fn of(
+        lumen: &Lumen,
+        radii_mm: (f64, f64),
+        properties: &WallProperties,
+        store: &dyn WallStore,
+    ) -> Result<Self> {
+        match lumen {
+            Lumen::Swept(vessel) if properties.region.is_empty() => {
+                let reach_mm = reach_mm(radii_mm.1, 0.0);
+                let felt = Felt::Swept(vessel.field(reach_mm), radii_mm.1);
+                Ok(Self { felt, thinnest_mm: radii_mm.0, reach_mm })
+            }
+            _ => Self::new(lumen.wall(store)?, radii_mm, properties, store),
+        }
+    }
+
+    /// Its mesh; none of a centre line.
+    pub fn mesh(&self) -> Option<&FeltMesh> {
+        match &self.felt {
+            Felt::Mesh(mesh) => Some(mesh),
+            Felt::Swept(..) => None,
+        }
+    }
+
+    /// Number of its pieces.
+    pub(crate) fn pieces(&self) -> usize {
+        match &self.felt {
+            Felt::Mesh(mesh) => mesh.query.triangles(),
+            Felt::Swept(field, _) => field.pieces(),
+        }
+    }
+
+    /// The piece that is nearest to `x`; one that is `limit_mm` away or farther need not be found.
+    pub(super) fn nearest(&self, x: &Vec3, limit_mm: f64) -> Option<NearPiece> {
+        match &self.felt {
+            Felt::Mesh(mesh) => {
+                let near = mesh.query.nearest(x, limit_mm)?;
+                let piece = (!near.rim).then_some(near.triangle);
+                Some(NearPiece { distance_mm: near.distance_mm, piece, bound: near.triangle })
+            }
+            Felt::Swept(field, _) => {
+                let near = field.near(x);
+                let is_number = !near.clearance_mm.is_nan();
+                let (distance_mm, piece) = (near.clearance_mm, near.piece);
+                is_number.then_some(NearPiece { distance_mm, piece: Some(piece), bound: piece })
+            }
+        }
+    }
+
+    /// How far `x` is from a piece, mm, for a bound of what is nearest; none of a centre line, which needs no bound.
+    pub(super) fn distance_to(&self, piece: u32, x: &Vec3) -> Option<f64> {
+        self.mesh().map(|mesh| mesh.query.distance_to(piece, x))
+    }
+
+    /// The piece nearest to `x` within `reach_mm`, with how far it is, mm, or less; none past the end of the vessel.
+    pub fn nearest_piece(&self, x: &Vec3, reach_mm: f64) -> Option<(u32, f64)> {
+        let near = self.nearest(x, reach_mm).filter(|near| near.distance_mm.abs() < reach_mm)?;
+        Some((near.piece?, near.distance_mm))
+    }
+
+    /// Distance of `x`, whose nearest piece is that or close to it. None where no wall is known there.
+    pub fn distance(&self, x: &Vec3, piece: u32) -> Option<Distance> {
+        match &self.felt {
+            Felt::Mesh(mesh) => mesh.smooth.distance(x, piece),
+            Felt::Swept(..) => match self.nearness(x, Hint::Near(piece), f64::INFINITY) {
+                Nearness::Within(distance) => Some(distance),
+                Nearness::Beyond(_) => None,
+            },
+        }
+    }
+
+    /// How near `x` is; with derivatives below `limit_mm`.
+    pub(crate) fn nearness(&self, x: &Vec3, hint: Hint, limit_mm: f64) -> Nearness {
+        let (field, thickest_mm) = match &self.felt {
+            Felt::Mesh(mesh) => return mesh.nearness(x, hint.piece(), limit_mm),
+            Felt::Swept(field, thickest_mm) => (field, *thickest_mm),
+        };
+        // What is farther than any device is thick presses nowhere, and how far it is need not be known exactly.
+        let closest = match field.closer_than(x, from(hint), limit_mm.max(thickest_mm)) {
+            Ok(Some(closest)) => closest,
+            Ok(None) => return Nearness::Beyond(self.reach_mm),
+            Err(room_mm) => return Nearness::Beyond(room_mm),
+        };
+        let value_mm = closest.distance_mm();
+        if value_mm < limit_mm {
+            Nearness::Within(Distance { value_mm, gradient: closest.normal(), hessian: closest.hessian() })
+        } else {
+            Nearness::Beyond(value_mm)
+        }
+    }
+
+    /// The piece next to `x` along the wall, from one that it has sunk into.
+    pub(super) fn follow(&self, side: u32, x: &Vec3) -> u32 {
+        match &self.felt {
+            Felt::Mesh(mesh) => mesh.smooth.walk(side, x),
+            Felt::Swept(field, _) => {
+                field.closest(x, ClosestFrom::Side(side)).map_or(side, |found| found.piece())
+            }
+        }
+    }
+
+    /// The piece that a point at `x` has sunk into, which found the wall with that hint.
+    pub(super) fn side(&self, x: &Vec3, hint: Hint) -> u32 {
+        match &self.felt {
+            Felt::Mesh(_) => hint.piece(),
+            Felt::Swept(field, _) => field.closest(x, from(hint)).map_or(hint.piece(), |found| found.piece()),
+        }
+    }
+
+    /// Distance of `x` from the piece of wall that is next to it seen from a piece, mm: negative behind that piece, whatever wall is
+    /// nearest.
+    pub(super) fn distance_from(&self, piece: u32, x: &Vec3) -> f64 {
+        match &self.felt {
+            Felt::Mesh(mesh) => mesh.distance_from(piece, x),
+            Felt::Swept(..) => self.nearness(x, Hint::Side(piece), f64::NEG_INFINITY).value_mm(),
+        }
+    }
+
+    /// How far the felt wall lies inside of what [`ContactSurface::nearest`] tells of a piece, mm.
+    pub(super) fn inset_mm(&self, piece: u32) -> f64 {
+        self.mesh().map_or(0.0, |mesh| mesh.smooth.inset_mm(piece))
+    }
+
+    /// The largest of all [`ContactSurface::inset_mm`].
+    pub(super) fn deepest_inset_mm(&self) -> f64 {
+        self.mesh().map_or(0.0, |mesh| mesh.smooth.deepest_inset_mm())
+    }
+
+    /// Where a straight way meets the wall first, as a part of it, up to `farthest` times its length.
+    pub(super) fn crossing(&self, from: &Vec3, to: &Vec3, farthest: f64) -> Option<f64> {
+        match &self.felt {
+            Felt::Mesh(mesh) => mesh.query.crossing(from, to, farthest),
+            Felt::Swept(field, _) => field.crossing(from, to, farthest),
+        }
+    }
+
+    /// Whether what looks as if it were in the lumen at `x` is outside of it, by more than a point may sink.
+    ///
+    /// What the smooth wall of a mesh takes for the lumen may be that of another wall, seen through one that is thin, or the far side of a
+    /// lumen much narrower than the device. Where facets are coarse the smooth wall stands beyond them, and what is outside of
+    /// those is still in front of their own piece of it: by no more than the wall stands beyond them, or ever less, the farther
+    /// behind the facet. From another it goes away. The wall of a centre line has one lumen.
+    pub(super) fn is_beyond(&self, x: &Vec3, sunk_mm: f64) -> bool {
+        let Some(mesh) = self.mesh() else { return false };
+        mesh.query.nearest(x, self.reach_mm).is_some_and(|flat| {
+            if flat.distance_mm >= -(sunk_mm + mesh.smooth.outset_mm(flat.triangle)) {
+                return false;
+            }
+            let here_mm = mesh.distance_from(flat.triangle, x);
+            here_mm < 0.0 || here_mm >= mesh.distance_from(flat.triangle, &flat.point_mm)
         })
     }
 
-    /// How near `x` is, whose nearest triangle is `triangle` or close to it; with derivatives below `limit_mm`.
-    ///
-    /// Where quadrics hardly reach, the flat triangles take their place bit by bit: with their coverage C, F = f + λ(C) (d − f) goes
-    /// from the smooth distance f to that of the triangles, d.
-    pub(crate) fn nearness(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
-        if let Some((nearness, coverage)) = self.smooth.within(x, triangle, limit_mm)
-            && coverage >= COVERED
-        {
-            return nearness;
+    /// How far `x` is from the felt wall, mm, at least as far as a device sees; not positive outside the lumen. Of what is deeper outside than
+    /// `radius_mm` it may be any such number.
+    pub(super) fn clearance_mm(&self, x: &Vec3, radius_mm: f64) -> f64 {
+        match &self.felt {
+            Felt::Mesh(mesh) => match mesh.query.nearest(x, self.reach_mm) {
+                Some(flat) if flat.distance_mm > -radius_mm => {
+                    mesh.nearness(x, flat.triangle, f64::NEG_INFINITY).value_mm()
+                }
+                Some(flat) => flat.distance_mm,
+                None => self.reach_mm,
+            },
+            Felt::Swept(field, _) => {
+                let near = field.near(x);
+                let found = field.closest(x, ClosestFrom::Space(near.piece));
+                found.map_or(near.clearance_mm, |found| found.distance_mm())
+            }
         }
-        let Some(flat) = self.query.nearest(x, self.reach_mm) else { return Nearness::Beyond(self.reach_mm) };
-        let mut found =
-            Distance { value_mm: flat.distance_mm, gradient: flat.normal, hessian: Matrix3::zeros() };
-        if let Some((smooth, coverage, slope)) = self.smooth.covered(x, triangle) {
-            let t = coverage / COVERED;
-            let (share, rate) = ((1.0 - t) * (1.0 - t), -2.0 * (1.0 - t) / COVERED);
-            let apart = found.value_mm - smooth.value_mm;
-            let turn = slope * rate;
-            let away = found.gradient - smooth.gradient;
-            found = Distance {
-                value_mm: smooth.value_mm + share * apart,
-                gradient: smooth.gradient + away * share + turn * apart,
-                // Without the second derivatives of C: Newton's method is a little slower there.
-                hessian: smooth.hessian * (1.0 - share) + turn * away.transpose() + away * turn.transpose(),
-            };
-        }
-        if found.value_mm < limit_mm { Nearness::Within(found) } else { Nearness::Beyond(found.value_mm) }
     }
 
-    /// Distance of `x` from the piece of wall that is next to it seen from `triangle`, mm: negative behind that piece, whatever wall is
-    /// nearest.
-    pub(super) fn distance_from(&self, triangle: u32, x: &Vec3) -> f64 {
-        self.nearness(x, self.smooth.walk(triangle, x), f64::NEG_INFINITY).value_mm()
-    }
-
-    /// The wall's modulus at `x`, whose nearest triangle is `triangle` or close to it.
-    pub(super) fn stiffness(&self, x: &Vec3, triangle: Option<u32>) -> Stiffness {
-        match self.regions.as_ref().zip(triangle) {
-            Some((regions, triangle)) => regions.stiffness(&self.smooth, x, triangle),
+    /// The wall's modulus at `x`, whose nearest piece is that or close to it.
+    pub(super) fn stiffness(&self, x: &Vec3, piece: Option<u32>) -> Stiffness {
+        match self.regions(piece) {
+            Some((mesh, regions, triangle)) => regions.stiffness(&mesh.smooth, x, triangle),
             None => Stiffness { factor: 1.0, slope: None },
         }
     }
 
     /// Coefficient of friction there, over the largest of all.
-    pub(super) fn rough(&self, x: &Vec3, triangle: Option<u32>) -> f64 {
-        self.regions.as_ref().zip(triangle).map_or(1.0, |(g, triangle)| g.rough(&self.smooth, x, triangle))
+    pub(super) fn rough(&self, x: &Vec3, piece: Option<u32>) -> f64 {
+        self.regions(piece).map_or(1.0, |(mesh, regions, triangle)| regions.rough(&mesh.smooth, x, triangle))
+    }
+
+    fn regions(&self, piece: Option<u32>) -> Option<(&FeltMesh, &RegionMap, u32)> {
+        let mesh = self.mesh()?;
+        Some((mesh, mesh.regions.as_ref()?, piece?))
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::random::{splitmix64, unit};
-    use crate::vessel::{GeneratedWall, NoStore, Resolution, anatomy};
-
-    #[test]
-    fn what_is_free_of_the_triangles_is_free_of_the_smooth_wall() {
-        const RADIUS_MM: f64 = 0.445;
-        // Coarse, so that the crotches of its forks are crests far inside the triangles.
-        let tree = anatomy::tree("aortic_arch").unwrap();
-        let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(6.0)).unwrap().wall;
-        let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
-        let surface = ContactSurface::new(&wall, (RADIUS_MM, RADIUS_MM), &properties, &NoStore).unwrap();
-        // With insets as they are on the triangles alone.
-        let on_them = SmoothWall::new(&Wall::welded(&extended(&wall, RADIUS_MM)).unwrap(), RADIUS_MM);
-        let mut pressing = [0, 0];
-        for triangle in surface.smooth.inside_of(0.1) {
-            let ([a, b, c], normal) =
-                (surface.query.corners(triangle), surface.query.inward_normal(triangle));
-            for k in 0..60 {
-                let [u, v, up] = [0, 1, 2].map(|n| unit(splitmix64(u64::from(triangle), 3 * k + n)));
-                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-                let x = a + (b - a) * u + (c - a) * v + normal * (6.0 * RADIUS_MM * up);
-                let Some(flat) = surface.query.nearest(&x, surface.reach_mm) else { continue };
-                let felt_mm = surface.nearness(&x, flat.triangle, f64::NEG_INFINITY).value_mm();
-                for (smooth, count) in [&surface.smooth, &on_them].into_iter().zip(&mut pressing) {
-                    let free_mm =
-                        flat.distance_mm - (1.0 + FOLLOW) * RADIUS_MM - smooth.inset_mm(flat.triangle);
-                    *count += u32::from(free_mm >= 0.0 && felt_mm < RADIUS_MM);
-                }
-            }
-        }
-        assert_eq!(pressing[0], 0);
-        assert!(pressing[1] > 10, "{pressing:?}");
+/// Where the search for the wall of a centre line begins.
+fn from(hint: Hint) -> ClosestFrom {
+    match hint {
+        Hint::Near(piece) => ClosestFrom::Space(piece),
+        Hint::Side(piece) => ClosestFrom::Side(piece),
     }
 }

@@ -137,12 +137,12 @@ impl<'a> WallContact<'a> {
             return fraction;
         }
         self.counters.queries += 1;
-        let Some(met) = self.surface.query.crossing(&known.base, &x, fraction / SAFE) else {
+        let Some(met) = self.surface.crossing(&known.base, &x, fraction / SAFE) else {
             return fraction;
         };
         // Near the wall flat triangles may stand into the smooth lumen, and what it says counts.
         let from_mm = known.base_clearance_mm;
-        match known.triangle.map(|triangle| self.surface.distance_from(triangle, &x)) {
+        match known.piece.map(|triangle| self.surface.distance_from(triangle, &x)) {
             Some(to_mm) if to_mm > 0.0 => fraction,
             Some(to_mm) => fraction.min(SAFE * from_mm / (from_mm - to_mm)),
             None => SAFE * met,
@@ -162,7 +162,7 @@ impl<'a> WallContact<'a> {
         let Reading::Pressed(distance) = self.read(index, &material) else { return None };
         let penetration_mm = point.potential.penetration_mm(distance.value_mm);
         let (angle, radius_mm) = (point.angle(state), point.potential.radius_mm);
-        let stiffness = self.surface.stiffness(&material, self.cache.points[index].triangle);
+        let stiffness = self.surface.stiffness(&material, self.cache.points[index].piece);
         let (mut normal, mut force_n) = point.pressed(&distance, stiffness.factor);
         if stiffness.slope.is_some() {
             let force = -stiffness.derivatives(&point.potential, &distance, point.weight_mm).0;
@@ -178,7 +178,7 @@ impl<'a> WallContact<'a> {
                 force_n,
                 friction_n: rub.map_or_else(Vec3::zeros, |f| -f.gradient),
                 penetration_mm,
-                triangle: self.cache.points[index].triangle.unwrap_or(0),
+                triangle: self.cache.points[index].piece.unwrap_or(0),
             },
             friction_nmm: rub.map_or(0.0, |f| -f.turn),
         })

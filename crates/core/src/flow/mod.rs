@@ -37,7 +37,7 @@ use parry3d_f64::shape::Polyline;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{self, in_range};
-use crate::vessel::{CentrelineTree, Wall};
+use crate::vessel::{CentrelineTree, Lumen};
 use crate::{Error, Result, Vec3};
 
 /// Most of what flows in, ml/s: ten times the heart's.
@@ -136,14 +136,14 @@ impl BloodFlow {
         })
     }
 
-    /// Refuses a centre line of which nothing lies within `wall`; its ends may stick out.
-    pub(crate) fn check_within(&self, wall: &Wall) -> Result<()> {
-        let Some((low, high)) = wall.mesh().bounds_mm() else { return Ok(()) };
+    /// Refuses a centre line of which nothing lies within the vessel; its ends may stick out.
+    pub(crate) fn check_within(&self, lumen: &Lumen) -> Result<()> {
+        let Some((low, high)) = lumen.bounds_mm() else { return Ok(()) };
         let points = self.nodes.iter().map(|node| node.position_mm);
         let near: Vec<Vec3> =
             points.clone().filter(|x| (*x - x.sup(&low).inf(&high)).norm() == 0.0).collect();
         let asked = near.iter().step_by(near.len().div_ceil(POINTS_ASKED).max(1));
-        if asked.into_iter().any(|x| wall.winding_number(x) > 0.5) {
+        if asked.into_iter().any(|x| lumen.holds(x)) {
             return Ok(());
         }
         let nowhere = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
@@ -238,8 +238,8 @@ mod tests {
     #[test]
     fn a_centre_line_that_is_nowhere_in_the_vessel_is_refused() {
         let cuboid = SurfaceMesh::cuboid(Vec3::new(-4.0, -4.0, 0.0), Vec3::new(4.0, 4.0, 50.0), 2.0);
-        let wall = Wall::from_surface(&cuboid).unwrap();
-        let within = |x_mm, z_mm| flow(&line(x_mm, z_mm), None).unwrap().check_within(&wall);
+        let lumen = Lumen::from(crate::vessel::Wall::from_surface(&cuboid).unwrap());
+        let within = |x_mm, z_mm| flow(&line(x_mm, z_mm), None).unwrap().check_within(&lumen);
         // It may stick out at its ends, or be that of a longer vessel.
         for z_mm in [[0.0, 50.0], [-3.0, 55.0], [-200.0, 300.0], [45.0, 300.0]] {
             assert!(within(0.0, z_mm).is_ok(), "{z_mm:?}");

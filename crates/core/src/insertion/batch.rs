@@ -131,7 +131,7 @@ mod tests {
         let each = [("wire", hollow(None, 0.2, 300.0)), ("catheter", hollow(Some(0.3), 0.5, 200.0))];
         let each = each.map(|(name, device)| Instrument { name: name.to_owned(), device, may_lead: true });
         let stack = Stack::new(each.into()).unwrap();
-        let start = Simulation::builder(one.wall().clone(), stack, *one.sheath()).build().unwrap();
+        let start = Simulation::builder(one.lumen().clone(), stack, *one.sheath()).build().unwrap();
         let moves = |k: usize| -> Vec<Move> {
             let command = |mm: f64| Command::advance(mm * (1.0 + 0.2 * k as f64));
             vec![Move { instrument: 0, command: command(3.0) }, Move { instrument: 1, command: command(2.0) }]

@@ -10,12 +10,12 @@ use crate::flow::BloodFlow;
 use crate::methods::MethodChoice;
 use crate::methods::kirchhoff::KirchhoffOptions;
 use crate::rod::MAX_ANGLES;
-use crate::vessel::{NoStore, VesselMotion, Wall, WallQuery, WallStore};
+use crate::vessel::{Lumen, NoStore, VesselMotion, WallStore};
 use crate::{Error, Result};
 
-/// A simulation to be built: wall, device and sheath, and what else is told.
+/// A simulation to be built: vessel, device and sheath, and what else is told.
 pub struct SimulationBuilder<'a> {
-    wall: Wall,
+    lumen: Lumen,
     stack: Stack,
     sheath: Sheath,
     properties: WallProperties,
@@ -30,9 +30,9 @@ pub struct SimulationBuilder<'a> {
 const MOUTH_MM: f64 = 1e-3;
 
 impl<'a> SimulationBuilder<'a> {
-    pub(super) fn new(wall: Wall, stack: Stack, sheath: Sheath) -> Self {
+    pub(super) fn new(lumen: Lumen, stack: Stack, sheath: Sheath) -> Self {
         let properties = WallProperties::default();
-        Self { wall, stack, sheath, properties, motion: None, flow: None, method: None, store: &NoStore }
+        Self { lumen, stack, sheath, properties, motion: None, flow: None, method: None, store: &NoStore }
     }
 
     /// How the wall yields and rubs; [`WallProperties::default`] unless told.
@@ -76,18 +76,18 @@ impl<'a> SimulationBuilder<'a> {
     /// A sheath that is not inside the vessel, a device too thick for the vessel at the sheath's mouth, a wall too broken to
     /// tell, blood that flows nowhere in the vessel, wall properties or method options out of range, more than three instruments with friction, and what the method cannot do.
     pub fn build(self) -> Result<Simulation> {
-        let Self { wall, stack, sheath, properties, motion, flow, method, store } = self;
-        properties.check(wall.mesh())?;
-        check_inside(&wall, &sheath)?;
-        flow.iter().try_for_each(|flow| flow.check_within(&wall))?;
-        let query = WallQuery::new(&wall)?;
-        stack.devices().try_for_each(|device| check_mouth(&query, device, &sheath))?;
-        motion.iter().try_for_each(|motion| check_still(&query, motion, &stack, &sheath))?;
+        let Self { lumen, stack, sheath, properties, motion, flow, method, store } = self;
+        properties.check(&lumen, store)?;
+        check_inside(&lumen, &sheath)?;
+        flow.iter().try_for_each(|flow| flow.check_within(&lumen))?;
+        let room_mm = lumen.distance_mm(&sheath.position_mm)?;
+        stack.devices().try_for_each(|device| check_mouth(room_mm, device, &sheath))?;
+        motion.iter().try_for_each(|motion| check_still(room_mm, motion, &stack, &sheath))?;
         // Of more than three those without a shape rub along the line alone.
         let rub = stack.has_inner_friction() && stack.instruments().len() <= MAX_ANGLES;
         let twists = stack.is_several() && (properties.has_friction() || rub);
         let stack = if twists { stack.twisted()? } else { stack };
-        let scene = Environment { wall, properties, query, sheath, stack, motion, flow };
+        let scene = Environment { lumen, properties, sheath, stack, motion, flow };
         let own = KirchhoffOptions::default();
         let method = method.unwrap_or(&own);
         if scene.stack.is_several() && !method.takes_several() {
@@ -100,11 +100,11 @@ impl<'a> SimulationBuilder<'a> {
 }
 
 /// Refuses a sheath whose mouth is outside the vessel.
-fn check_inside(wall: &Wall, sheath: &Sheath) -> Result<()> {
-    if wall.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
+fn check_inside(lumen: &Lumen, sheath: &Sheath) -> Result<()> {
+    if lumen.contains(&(sheath.position_mm + sheath.direction * MOUTH_MM))? {
         return Ok(());
     }
-    let openings: Vec<String> = wall
+    let openings: Vec<String> = lumen
         .openings()
         .iter()
         .map(|o| format!("{} at [{:.1}, {:.1}, {:.1}]", o.index, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z))
@@ -119,11 +119,11 @@ fn check_inside(wall: &Wall, sheath: &Sheath) -> Result<()> {
     ))
 }
 
-/// Refuses a motion that takes the wall through what lies in the sheath's mouth, which stays where it is.
-fn check_still(query: &WallQuery, motion: &VesselMotion, stack: &Stack, sheath: &Sheath) -> Result<()> {
+/// Refuses a motion that takes the wall, which is `mouth_mm` away, through what lies in the sheath's mouth, which stays where it is.
+fn check_still(mouth_mm: f64, motion: &VesselMotion, stack: &Stack, sheath: &Sheath) -> Result<()> {
     let mouth = &sheath.position_mm;
     let radius_mm = stack.radii_mm().1;
-    let room_mm = query.distance_mm(mouth) - radius_mm;
+    let room_mm = mouth_mm - radius_mm;
     let moved_mm = motion.farthest_mm(mouth, room_mm + radius_mm);
     if moved_mm <= room_mm {
         return Ok(());
@@ -139,9 +139,8 @@ fn check_still(query: &WallQuery, motion: &VesselMotion, stack: &Stack, sheath: 
 /// A device so many times as thick as the vessel comes from another unit.
 const MISFIT: f64 = 5.0;
 
-/// Refuses a device that is in the wall from the start. Further in a vessel may be narrower: there the device does not pass.
-fn check_mouth(query: &WallQuery, device: &Device, sheath: &Sheath) -> Result<()> {
-    let room_mm = query.distance_mm(&sheath.position_mm);
+/// Refuses a device that is in the wall from the start, which is `room_mm` from the sheath's mouth. Further in a vessel may be narrower: there the device does not pass.
+fn check_mouth(room_mm: f64, device: &Device, sheath: &Sheath) -> Result<()> {
     let thickest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0));
     match device.sections().iter().map(|s| s.radius_mm).enumerate().max_by(thickest) {
         Some((section, radius_mm)) if radius_mm > room_mm => Err(Error::parameter(

@@ -10,7 +10,7 @@ use crate::methods::{
     Command, LateralForce, Method, Move, Sheath, State, StepReport, Surroundings, WallForce,
 };
 use crate::shape::Shape;
-use crate::vessel::{Displacement, VesselMotion, Wall, WallQuery};
+use crate::vessel::{Displacement, Lumen, VesselMotion};
 use crate::{Error, Result, Vec3};
 
 /// An insertion under way.
@@ -26,9 +26,8 @@ pub struct Simulation {
 
 /// What a simulation never changes.
 pub(super) struct Environment {
-    pub(super) wall: Wall,
+    pub(super) lumen: Lumen,
     pub(super) properties: WallProperties,
-    pub(super) query: WallQuery,
     pub(super) sheath: Sheath,
     pub(super) stack: Stack,
     pub(super) motion: Option<VesselMotion>,
@@ -38,9 +37,9 @@ pub(super) struct Environment {
 impl Environment {
     /// In a step from one time to another, s.
     pub(super) fn surroundings(&self, time_s: [f64; 2]) -> Surroundings<'_> {
-        let Self { wall, properties, query, sheath, stack, motion, flow } = self;
+        let Self { lumen, properties, sheath, stack, motion, flow } = self;
         let (device, motion, flow) = (stack.first(), motion.as_ref(), flow.as_ref());
-        Surroundings { wall, properties, query, sheath, device, stack, motion, flow, time_s }
+        Surroundings { lumen, properties, sheath, device, stack, motion, flow, time_s }
     }
 }
 
@@ -51,9 +50,13 @@ impl Clone for Simulation {
 }
 
 impl Simulation {
-    /// A simulation of a device, or of several instruments, that enter `wall` through `sheath`, to be built.
-    pub fn builder<'a>(wall: Wall, stack: impl Into<Stack>, sheath: Sheath) -> SimulationBuilder<'a> {
-        SimulationBuilder::new(wall, stack.into(), sheath)
+    /// A simulation of a device, or of several instruments, that enter a vessel through `sheath`, to be built.
+    pub fn builder<'a>(
+        lumen: impl Into<Lumen>,
+        stack: impl Into<Stack>,
+        sheath: Sheath,
+    ) -> SimulationBuilder<'a> {
+        SimulationBuilder::new(lumen.into(), stack.into(), sheath)
     }
 
     /// Carries out one command, of several instruments on the innermost. After an error the state is as before, to the bit.
@@ -233,8 +236,8 @@ impl Simulation {
     }
 
     /// The vessel, as it is at rest.
-    pub fn wall(&self) -> &Wall {
-        &self.scene.wall
+    pub fn lumen(&self) -> &Lumen {
+        &self.scene.lumen
     }
 
     /// The device; of several instruments the innermost.

@@ -20,7 +20,7 @@ use crate::contact::{Counters, Touching, WallProperties};
 use crate::device::{Device, Stack};
 use crate::flow::BloodFlow;
 use crate::shape::Shape;
-use crate::vessel::{Displacement, VesselMotion, Wall, WallQuery, WallStore};
+use crate::vessel::{Displacement, Lumen, VesselMotion, WallStore};
 use crate::{Error, Result};
 use kirchhoff::KirchhoffOptions;
 
@@ -28,11 +28,9 @@ use kirchhoff::KirchhoffOptions;
 #[derive(Clone, Copy)]
 pub struct Surroundings<'a> {
     /// The vessel.
-    pub wall: &'a Wall,
+    pub lumen: &'a Lumen,
     /// How the vessel's wall yields and rubs.
     pub properties: &'a WallProperties,
-    /// Distance queries to the vessel wall.
-    pub query: &'a WallQuery,
     /// Where the device comes from.
     pub sheath: &'a Sheath,
     /// The device; of several instruments the innermost.

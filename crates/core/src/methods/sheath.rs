@@ -1,7 +1,7 @@
 //! The introducer sheath: where the device comes out, and in which direction.
 
 use crate::contact::{check_friction, check_valve};
-use crate::vessel::Wall;
+use crate::vessel::Opening;
 use crate::{Error, Result, Vec3};
 
 /// The mouth of the introducer sheath. It prescribes position and tangent of the device there, and may rub on it: against its slip u, along and around,
@@ -83,14 +83,14 @@ impl Sheath {
         Ok(Self { position_mm, direction: unit, friction_n: 0.0, friction: 0.0 })
     }
 
-    /// A sheath in the middle of an opening of the wall, pointing into the vessel.
+    /// A sheath in the middle of an opening of a vessel ([`Lumen`](crate::vessel::Lumen) or [`Wall`](crate::vessel::Wall)), pointing into it.
     ///
     /// `depth_mm` is how far inside the opening's plane the mouth lies.
     ///
     /// # Errors
-    /// An opening that the wall does not have, or a depth that is not 0 or more.
-    pub fn at_opening(wall: &Wall, opening: usize, depth_mm: f64) -> Result<Self> {
-        let openings = wall.openings();
+    /// An opening that the vessel does not have, or a depth that is not 0 or more.
+    pub fn at_opening(vessel: &impl AsRef<[Opening]>, opening: usize, depth_mm: f64) -> Result<Self> {
+        let openings = vessel.as_ref();
         let Some(place) = openings.get(opening) else {
             let mend = if openings.is_empty() {
                 "the vessel is closed: give sheath.position_mm, a point inside, and sheath.direction instead (endowire vessel \

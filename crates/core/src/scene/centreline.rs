@@ -10,7 +10,7 @@ use super::spec::{missing, missing_tree};
 use crate::flow::BloodFlow;
 use crate::insertion::ScriptLine;
 use crate::methods::MethodChoice;
-use crate::vessel::{CentrelineEnd, CentrelineRecipe, CentrelineTree, Wall, WallStore};
+use crate::vessel::{CentrelineEnd, CentrelineRecipe, CentrelineTree, Lumen, Wall, WallStore};
 use crate::{Error, Result, Vec3};
 
 impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
@@ -38,13 +38,13 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         self.vessel.tree.is_some() || self.vessel.centreline.is_some()
     }
 
-    /// What flows through the vessel, whose `wall` is at hand; none where it is left out.
+    /// What flows through the vessel, which is at hand; none where it is left out.
     ///
     /// # Errors
     /// As [`SceneOf::centreline`] and [`BloodFlow::new`].
-    pub fn flow(&self, wall: &Wall, store: &dyn WallStore) -> Result<Option<BloodFlow>> {
+    pub fn flow(&self, lumen: &Lumen, store: &dyn WallStore) -> Result<Option<BloodFlow>> {
         let Some(flow) = &self.vessel.flow else { return Ok(None) };
-        let tree = self.known_or(store, || Ok(wall.clone()))?;
+        let tree = self.known_or(store, || lumen.wall(store).cloned())?;
         BloodFlow::new(tree, flow).map(Some)
     }
 

@@ -14,7 +14,8 @@ use crate::input::{from_toml_of, parse_toml};
 use crate::insertion::{Command, Move, Script, ScriptLine, Sheath, Simulation, script_commands};
 use crate::methods::{MethodChoice, OwnMethod};
 use crate::vessel::{
-    CentrelineTree, SurfaceMesh, VesselMotion, Wall, WallRecipe, WallStore, anatomy, wall_hints,
+    CentrelineTree, Lumen, NoStore, Opening, SurfaceMesh, SweptVessel, VesselMotion, Wall, WallRecipe,
+    WallStore, anatomy, wall_hints,
 };
 use crate::{Error, Result};
 
@@ -213,11 +214,19 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         named.flatten().map(|path| self.resolve(path)).chain(self.script_file.clone()).collect()
     }
 
-    /// Reads the vessel wall or builds it, or has it from `store` ([`NoStore`](crate::vessel::NoStore) keeps nothing).
+    /// The wall of the vessel as triangles, read, built, or from `store` ([`NoStore`](crate::vessel::NoStore) keeps nothing).
+    ///
+    /// # Errors
+    /// As [`SceneOf::lumen`], and a centre line of which no mesh comes.
+    pub fn wall(&self, store: &dyn WallStore) -> Result<Wall> {
+        self.lumen(store)?.into_wall(store).map_err(|error| self.of_tree(error))
+    }
+
+    /// The vessel: a surface that is read, or has been and is kept in `store`, or what its centre line says, of which a mesh is made when somebody wants one.
     ///
     /// # Errors
     /// A missing or unusable file, options that do not belong together, a wall that cannot be used.
-    pub fn wall(&self, store: &dyn WallStore) -> Result<Wall> {
+    pub fn lumen(&self, store: &dyn WallStore) -> Result<Lumen> {
         let path = self.vessel_path()?;
         let spec = &self.vessel;
         if spec.tree.is_some() {
@@ -231,13 +240,8 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
             self.centreline_path()?;
             let tree = CentrelineTree::read_of(&*self.files, &path).map_err(|e| missing_tree(&path, e))?;
             let resolution = spec.resolution(&tree)?;
-            let recipe = WallRecipe::Generated { tree: &tree, resolution };
-            return store.wall(&recipe).map_err(|error| match error {
-                Error::Parameter { name, value, mend } if name == "edge_mm" || name == "triangles" => {
-                    Error::parameter(format!("vessel.{name}"), value, format!("{}: {mend}", path.display()))
-                }
-                other => Error::content(&path, other.to_string()),
-            });
+            let vessel = SweptVessel::new(tree, resolution).map_err(|error| self.of_tree(error))?;
+            return Ok(vessel.into());
         }
         for (name, given) in [
             ("vessel.edge_mm", spec.edge_mm.map(|v| v.to_string())),
@@ -255,7 +259,18 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
                 other => missing("vessel.file", other),
             })?;
         let recipe = WallRecipe::Repaired { surface: &surface };
-        store.wall(&recipe).map_err(|e| Error::content(&path, e.to_string()))
+        store.wall(&recipe).map(Lumen::from).map_err(|e| Error::content(&path, e.to_string()))
+    }
+
+    /// What is wrong with a vessel that comes from a tree is wrong with its file.
+    fn of_tree(&self, error: Error) -> Error {
+        let Some(path) = self.vessel.tree.as_ref().map(|path| self.resolve(path)) else { return error };
+        match error {
+            Error::Parameter { name, value, mend } if name == "edge_mm" || name == "triangles" => {
+                Error::parameter(format!("vessel.{name}"), value, format!("{}: {mend}", path.display()))
+            }
+            other => Error::content(&path, other.to_string()),
+        }
     }
 
     /// The device of a scene that pushes one.
@@ -385,12 +400,12 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
         }
     }
 
-    /// The sheath in `wall`.
+    /// The sheath in the vessel.
     ///
     /// # Errors
     /// An opening that is not there, keys that contradict each other, values that are not finite.
-    pub fn sheath(&self, wall: &Wall) -> Result<Sheath> {
-        self.sheath.place(wall)
+    pub fn sheath(&self, vessel: &impl AsRef<[Opening]>) -> Result<Sheath> {
+        self.sheath.place(vessel)
     }
 
     /// The commands of the script of a device alone, checked against it.
@@ -438,16 +453,16 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     /// # Errors
     /// As [`SceneOf::wall`], [`SceneOf::stack`], [`SceneOf::sheath`], [`SceneOf::inserted_mm`], [`Simulation::step_together`] and [`SimulationBuilder::build`](crate::insertion::SimulationBuilder::build).
     pub fn simulation(&self, store: &dyn WallStore) -> Result<Simulation> {
-        let wall = self.wall(store)?;
+        let lumen = self.lumen(store)?;
         let hints = |error| match &error {
             // A vessel of an absurd size is the likeliest cause of whatever is wrong with it.
             Error::Parameter { .. } | Error::Content { .. } => {
-                let told = self.wall(store).and_then(|wall| self.hints(&wall)).unwrap_or_default();
+                let told = self.lumen(store).and_then(|lumen| self.hints(&lumen)).unwrap_or_default();
                 told.iter().fold(error, |error, hint| with_hint(error, hint))
             }
             _ => error,
         };
-        self.simulation_in(wall, store).map_err(hints)
+        self.simulation_in(lumen, store).map_err(hints)
     }
 
     /// What the user may want to know of the wall of a surface file, a sentence each, as
@@ -455,25 +470,25 @@ impl<M: MethodChoice + DeserializeOwned + Default> SceneOf<M> {
     ///
     /// # Errors
     /// As [`wall_hints`](crate::vessel::wall_hints).
-    pub fn hints(&self, wall: &Wall) -> Result<Vec<String>> {
-        match self.vessel.file {
-            Some(_) => wall_hints(wall, self.vessel.frame().unit_mm),
-            None => Ok(Vec::new()),
+    pub fn hints(&self, lumen: &Lumen) -> Result<Vec<String>> {
+        match lumen {
+            Lumen::Meshed(_) => wall_hints(lumen.wall(&NoStore)?, self.vessel.frame().unit_mm),
+            Lumen::Swept(_) => Ok(Vec::new()),
         }
     }
 
-    fn simulation_in(&self, wall: Wall, store: &dyn WallStore) -> Result<Simulation> {
-        let sheath = self.sheath(&wall)?;
+    fn simulation_in(&self, lumen: Lumen, store: &dyn WallStore) -> Result<Simulation> {
+        let sheath = self.sheath(&lumen)?;
         let stack = self.stack()?;
         let inserted_mm = self.inserted_mm(&stack)?;
-        let mut simulation = self.built(wall, stack, sheath, store)?;
+        let mut simulation = self.built(lumen, stack, sheath, store)?;
         push_in(&mut simulation, &inserted_mm)?;
         Ok(simulation)
     }
 
-    fn built(&self, wall: Wall, stack: Stack, sheath: Sheath, store: &dyn WallStore) -> Result<Simulation> {
-        let flow = self.flow(&wall, store)?;
-        Simulation::builder(wall, stack, sheath)
+    fn built(&self, lumen: Lumen, stack: Stack, sheath: Sheath, store: &dyn WallStore) -> Result<Simulation> {
+        let flow = self.flow(&lumen, store)?;
+        Simulation::builder(lumen, stack, sheath)
             .properties(self.vessel.wall.clone())
             .motion(VesselMotion::new(&self.vessel.motion)?)
             .flow(flow)

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::device::{FileTable, Kind, PartTable, Section};
 use crate::flow::VesselFlow;
 use crate::insertion::{Sheath, WallProperties};
-use crate::vessel::{CentrelineTree, MotionMode, PatientAxes, Resolution, SurfaceFrame, Wall};
+use crate::vessel::{CentrelineTree, MotionMode, Opening, PatientAxes, Resolution, SurfaceFrame};
 use crate::{Error, Result, Vec3};
 
 /// `[vessel]`: a surface file, or a centre-line tree to build the surface from.
@@ -174,14 +174,14 @@ impl SheathSpec {
         format!("{{{}}}", given.join(", "))
     }
 
-    /// The sheath in `wall`.
+    /// The sheath in a vessel.
     ///
     /// # Errors
     /// An opening that is not there, keys that contradict each other, values that are not finite or out of range.
-    pub fn place(&self, wall: &Wall) -> Result<Sheath> {
+    pub fn place(&self, vessel: &impl AsRef<[Opening]>) -> Result<Sheath> {
         let sheath = match (self.opening, self.position_mm, self.direction) {
             (Some(opening), None, None) => {
-                Sheath::at_opening(wall, opening, self.depth_mm.unwrap_or(DEPTH_MM))
+                Sheath::at_opening(vessel, opening, self.depth_mm.unwrap_or(DEPTH_MM))
             }
             (None, Some(position), Some(direction)) if self.depth_mm.is_none() => {
                 Sheath::new(Vec3::from(position), Vec3::from(direction))

@@ -1,5 +1,6 @@
 //! The holes of a wall: where blood and devices pass.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use super::SurfaceMesh;
@@ -26,7 +27,7 @@ pub struct Opening {
     pub radius_mm: f64,
     /// Unit vector along the loop's vector area, pointing out of the vessel. Pushing a device in goes against it.
     pub direction: Vec3,
-    /// The loop's vertices, in the direction in which the triangles of a cap would run along it.
+    /// The loop's vertices, in the direction in which the triangles of a cap would run along it; none where there is no mesh.
     pub boundary: Vec<u32>,
     /// How far the vessel may be drawn out straight beyond it, mm, before that meets the vessel again or what is drawn out of
     /// another opening.
@@ -46,6 +47,11 @@ impl Opening {
         // A slit encloses no area; any direction is as good as another, but it must be a unit vector.
         let direction = area.try_normalize(1e-12 * radius_mm * radius_mm).unwrap_or_else(Vec3::x);
         Self { index: 0, centre_mm, radius_mm, direction, boundary, beyond_mm: MOST_BEYOND_MM }
+    }
+
+    /// The end of a tube of which there is no mesh. `index` is left 0.
+    pub(super) fn at_end(centre_mm: Vec3, radius_mm: f64, direction: Vec3) -> Self {
+        Self { index: 0, centre_mm, radius_mm, direction, boundary: Vec::new(), beyond_mm: MOST_BEYOND_MM }
     }
 
     /// Length of the boundary, mm.
@@ -84,8 +90,14 @@ pub(super) fn inlet(openings: &[Opening]) -> Option<&Opening> {
     trunks.min_by(|a, b| a.centre_mm.z.total_cmp(&b.centre_mm.z))
 }
 
-/// Shortens what may be drawn out beyond the openings of `mesh` to where it meets nothing.
-pub(super) fn keep_apart(mesh: &SurfaceMesh, openings: &mut [Opening]) {
+/// The places of a mesh that stand for all of it there: its vertices and the middles of its triangles.
+pub(super) fn places(mesh: &SurfaceMesh) -> impl Iterator<Item = Vec3> {
+    let centres = (0..mesh.triangles.len()).map(|t| mesh.corners(t).iter().sum::<Vec3>() / 3.0);
+    mesh.vertices_mm.iter().copied().chain(centres)
+}
+
+/// Shortens what may be drawn out beyond the openings to where it meets nothing: no other, and none of these places of the wall.
+pub(super) fn keep_apart(wall: impl Iterator<Item = Vec3>, openings: &mut [Opening]) {
     let mut beyond = vec![MOST_BEYOND_MM; openings.len()];
     for (i, a) in openings.iter().enumerate() {
         for (j, b) in openings.iter().enumerate().skip(i + 1) {
@@ -104,8 +116,7 @@ pub(super) fn keep_apart(mesh: &SurfaceMesh, openings: &mut [Opening]) {
             beyond[j] = low.min(beyond[j]);
         }
     }
-    let centres = (0..mesh.triangles.len()).map(|t| mesh.corners(t).iter().sum::<Vec3>() / 3.0);
-    for x in mesh.vertices_mm.iter().copied().chain(centres) {
+    for x in wall {
         for (opening, beyond) in openings.iter().zip(&mut beyond) {
             let free = FREE_RADII * opening.radius_mm;
             let (along, aside) = opening.beyond_and_aside_mm(&x);
@@ -156,6 +167,21 @@ pub(super) fn facing(openings: &[Opening]) -> Vec<[usize; 2]> {
         }
     }
     pairs
+}
+
+/// How openings are numbered, as [`Opening::index`] says.
+fn order(a: &Opening, b: &Opening) -> Ordering {
+    let key = |o: &Opening| [-o.radius_mm, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z];
+    let order = |k: usize| key(a)[k].total_cmp(&key(b)[k]);
+    order(0).then(order(1)).then(order(2)).then(order(3))
+}
+
+/// Numbers openings.
+pub(super) fn number(openings: &mut [Opening]) {
+    openings.sort_by(order);
+    for (index, opening) in openings.iter_mut().enumerate() {
+        opening.index = index;
+    }
 }
 
 /// Boundary loops of a consistently oriented mesh.
@@ -213,11 +239,7 @@ pub(crate) fn boundary(mesh: &SurfaceMesh, table: &EdgeTable) -> Boundary {
             loops.push((Opening::of_loop(mesh, simple), start.0));
         }
     }
-    loops.sort_by(|(a, _), (b, _)| {
-        let key = |o: &Opening| [-o.radius_mm, o.centre_mm.x, o.centre_mm.y, o.centre_mm.z];
-        let order = |k: usize| key(a)[k].total_cmp(&key(b)[k]);
-        order(0).then(order(1)).then(order(2)).then(order(3)).then(a.boundary.cmp(&b.boundary))
-    });
+    loops.sort_by(|(a, _), (b, _)| order(a, b).then(a.boundary.cmp(&b.boundary)));
     for (index, (opening, _)) in loops.iter_mut().enumerate() {
         opening.index = index;
     }
@@ -319,7 +341,7 @@ mod tests {
         let beyond = |mesh: &SurfaceMesh, turned: f64| {
             let mut pair =
                 [opening(-5.0, Vec3::new(turned, 0.0, 1.0)), opening(5.0, Vec3::new(-turned, 0.0, 1.0))];
-            keep_apart(mesh, &mut pair);
+            keep_apart(places(mesh), &mut pair);
             pair.map(|o| o.beyond_mm)
         };
         let nothing = SurfaceMesh::default();

@@ -212,7 +212,7 @@ impl Wall {
         let mut boundary = opening::boundary(&mesh, table);
         report.openings = boundary.openings.len();
         report.stray_edges = boundary.stray_edges;
-        opening::keep_apart(&mesh, &mut boundary.openings);
+        opening::keep_apart(opening::places(&mesh), &mut boundary.openings);
         let caps = boundary.openings.iter().flat_map(|o| o.cap(&mesh).collect::<Vec<_>>()).collect();
         Self { mesh, openings: boundary.openings, caps, report }
     }
@@ -230,6 +230,30 @@ impl Wall {
     /// The openings, largest first.
     pub fn openings(&self) -> &[Opening] {
         &self.openings
+    }
+
+    /// Numbers its openings as those of the same vessel before it had a mesh: of openings of one size rounding would say which comes first.
+    ///
+    /// # Errors
+    /// Another number of openings.
+    pub(super) fn number_openings_as(&mut self, known: &[Opening]) -> Result<()> {
+        if known.len() != self.openings.len() {
+            return Err(Error::Mesh(format!(
+                "the tree has {} open ends, but the wall has {} openings: branches overlap near an end, or its mesh is too coarse",
+                known.len(),
+                self.openings.len()
+            )));
+        }
+        let nearest = |opening: &Opening| {
+            let away = |k: &usize| (known[*k].centre_mm - opening.centre_mm).norm();
+            (0..known.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)
+        };
+        let order: Vec<usize> = self.openings.iter().map(nearest).collect();
+        for (opening, index) in self.openings.iter_mut().zip(order) {
+            opening.index = index;
+        }
+        self.openings.sort_by_key(|opening| opening.index);
+        Ok(())
     }
 
     /// The opening that devices come in by unless told: the lowest (least z: the nearest to the feet, in patient axes) of those that have

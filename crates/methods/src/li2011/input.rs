@@ -118,11 +118,11 @@ impl Input {
             let before = state.touched.get(nodes - 1 - index).copied().flatten();
             let gap_mm = if before.is_some() { HOLD_RADII * radius_mm } else { 0.0 };
             let direction = self.chain.directions.get(index).unwrap_or(&self.chain.start_tangent);
-            let met = self.wall.met(surroundings.query, x, direction, (radius_mm, gap_mm));
+            let met = self.wall.met(x, direction, (radius_mm, gap_mm));
             self.clear_mm.push(met.err().unwrap_or(0.0));
             // A plane goes on where its triangle does not.
             let met = match self.wall {
-                FeltWall::Triangle => met.ok().or(before.map(|plane| Met { plane, across: None })),
+                FeltWall::Triangle(_) => met.ok().or(before.map(|plane| Met { plane, across: None })),
                 FeltWall::Smooth(..) => met.ok(),
             };
             self.met.push(met);
@@ -173,7 +173,7 @@ impl Input {
         for (index, (x, solved)) in self.positions_mm.iter().zip(&self.solved_mm).enumerate() {
             let radius_mm = surroundings.device.section_at(self.from_tip_mm[index + 1]).radius_mm;
             let clear = (x - self.predicted_mm[index]).norm() < self.clear_mm[index];
-            let depth_mm = if clear { 0.0 } else { self.wall.depth_mm(surroundings.query, x, radius_mm) };
+            let depth_mm = if clear { 0.0 } else { self.wall.depth_mm(x, radius_mm) };
             let taken_mm = self.met[index].map_or(0.0, |met| met.plane.offset_mm - met.plane.normal.dot(x));
             let misfit_mm = (taken_mm - depth_mm).abs();
             self.misfit_mm = self.misfit_mm.max(misfit_mm);
@@ -248,6 +248,7 @@ impl Input {
             _ => 0.0,
         };
         let tip = self.positions_mm.last().unwrap_or(&sheath.position_mm);
-        report.left_through = left_through(surroundings.wall, tip).map(|(opening, _)| opening.index);
+        report.left_through =
+            left_through(surroundings.lumen.openings(), tip).map(|(opening, _)| opening.index);
     }
 }

@@ -60,10 +60,10 @@ impl Li2011 {
     ) -> Result<Self> {
         options.check(solver, surroundings)?;
         let wall = match options.contact {
-            ContactReading::Triangle => FeltWall::Triangle,
+            ContactReading::Triangle => FeltWall::Triangle(Arc::clone(surroundings.lumen.query(store)?)),
             ContactReading::Smooth => {
-                let Surroundings { wall, stack, properties, .. } = surroundings;
-                let surface = ContactSurface::new(wall, stack.radii_mm(), properties, store)?;
+                let Surroundings { lumen, stack, properties, .. } = surroundings;
+                let surface = ContactSurface::of(lumen, stack.radii_mm(), properties, store)?;
                 FeltWall::Smooth(Arc::new(surface), None)
             }
         };
@@ -138,7 +138,7 @@ impl Method for Li2011 {
         let travel_mm = target_mm - self.state.report.inserted_mm;
         if travel_mm > 0.0 {
             let tip_mm = self.state.shape.tip_mm().unwrap_or(surroundings.sheath.position_mm);
-            check_inside(surroundings.wall, &tip_mm, travel_mm)?;
+            check_inside(surroundings.lumen.openings(), &tip_mm, travel_mm)?;
         }
         let before = self.state.clone();
         match self.carry(surroundings, target_mm) {

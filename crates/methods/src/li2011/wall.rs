@@ -53,7 +53,7 @@ pub(super) enum FeltWall {
     /// Core's smooth wall, and what was read of it.
     Smooth(Arc<ContactSurface>, Option<WallReader>),
     /// The triangles of the vessel.
-    Triangle,
+    Triangle(Arc<WallQuery>),
 }
 
 impl FeltWall {
@@ -66,16 +66,10 @@ impl FeltWall {
 
     /// What a node at `x` with the tangent `t` meets, whose surface of radius `radius_mm` is less than `gap_mm` from the wall; or by how much it is
     /// clear of the wall in all directions, mm, as far as that is known.
-    pub(super) fn met(
-        &mut self,
-        query: &WallQuery,
-        x: &Vec3,
-        t: &Vec3,
-        (radius_mm, gap_mm): (f64, f64),
-    ) -> Result<Met, f64> {
+    pub(super) fn met(&mut self, x: &Vec3, t: &Vec3, (radius_mm, gap_mm): (f64, f64)) -> Result<Met, f64> {
         let (surface, reader) = match self {
             Self::Smooth(surface, reader) => (surface, reader),
-            Self::Triangle => return reached(query, x, radius_mm).ok_or(0.0),
+            Self::Triangle(query) => return reached(query, x, radius_mm).ok_or(0.0),
         };
         let reader = reader.get_or_insert_with(|| WallReader::new(surface));
         let (d, triangle) = match reader.read(surface, x, radius_mm + gap_mm) {
@@ -100,14 +94,14 @@ impl FeltWall {
     }
 
     /// How far the surface of a node at `x` is in the wall, mm; 0 where it is clear of it.
-    pub(super) fn depth_mm(&mut self, query: &WallQuery, x: &Vec3, radius_mm: f64) -> f64 {
+    pub(super) fn depth_mm(&mut self, x: &Vec3, radius_mm: f64) -> f64 {
         match self {
             Self::Smooth(surface, reader) => {
                 let reader = reader.get_or_insert_with(|| WallReader::new(surface));
                 let (near, _) = reader.read(surface, x, f64::NEG_INFINITY);
                 (radius_mm - near.value_mm()).max(0.0)
             }
-            Self::Triangle => reached(query, x, radius_mm).map_or(0.0, |met| met.plane.depth_mm),
+            Self::Triangle(query) => reached(query, x, radius_mm).map_or(0.0, |met| met.plane.depth_mm),
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::crossing::CrossingTest;
-use endowire_core::contact::{ContactSurface, WallProperties};
+use endowire_core::contact::{FeltMesh, WallProperties};
 use endowire_core::insertion::Sheath;
 use endowire_core::vessel::{
     Conditioning, NoStore, SurfaceFrame, SurfaceMesh, Wall, WallQuery, WallRecipe, WallStore,
@@ -112,8 +112,7 @@ impl Surface {
             };
             match start {
                 Some((sheath, found)) => {
-                    let felt =
-                        ContactSurface::new(&surface.even, (radius_mm, radius_mm), &properties, &NoStore)?;
+                    let felt = FeltMesh::new(&surface.even, radius_mm, &properties, &NoStore)?;
                     let stated_mm = felt.deviation(&surface.wall)?.most_mm.max(aimed.deviation_mm);
                     let smooth_mm = felt.deviation(&surface.even)?.most_mm;
                     surface.places.push(Place { wire, sheath, found, stated_mm, smooth_mm });

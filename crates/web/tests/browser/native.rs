@@ -22,7 +22,7 @@ pub(crate) fn session(name: &str, side_px: u32) -> (Session, Pictures) {
     let mut view = ViewSpec::of_scene(&scene, &path).unwrap();
     view.backend = Backend::Cpu;
     let simulation = scene.simulation(&NoStore).unwrap();
-    let wall = simulation.wall().clone();
+    let wall = simulation.lumen().wall(&NoStore).unwrap().clone();
     let session = Session::new(simulation, view, side_px, Limits::default()).unwrap();
     let pictures = Pictures::new(&scene, &session.snapshot(), wall).unwrap();
     (session, pictures)

@@ -112,7 +112,7 @@ impl Course {
             scene: scene.name.clone(),
             device: device.and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned()),
             instruments,
-            renderer: Renderer::of_wall(&views[0], simulation.wall())?,
+            renderer: Renderer::of_wall(&views[0], simulation.lumen().wall(cache).map_err(failed)?)?,
             view,
             pushed,
             moments,

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use endowire_core::Vec3;
 use endowire_core::device::{Device, Section};
 use endowire_core::insertion::{Command, Sheath, Simulation, WallProperties};
-use endowire_core::vessel::{SurfaceMesh, Wall};
+use endowire_core::vessel::{NoStore, SurfaceMesh, Wall};
 use endowire_viewer::ViewSpec;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -111,7 +111,7 @@ fn push(
     let mut camera = match out {
         Some(folder) => {
             let spec = ViewSpec { size_px: [480, 720], ..ViewSpec::default() };
-            Some(Camera::new(folder, &format!("loop_{method}"), spec, simulation.wall())?)
+            Some(Camera::new(folder, &format!("loop_{method}"), spec, simulation.lumen().wall(&NoStore)?)?)
         }
         None => None,
     };

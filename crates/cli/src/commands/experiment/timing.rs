@@ -14,7 +14,7 @@ use endowire_core::Vec3;
 use endowire_core::device::{Device, Stack};
 use endowire_core::insertion::{Command, Sheath, Surroundings, WallProperties};
 use endowire_core::methods::Method;
-use endowire_core::vessel::{GeneratedWall, NoStore, Resolution, Wall, WallQuery, anatomy};
+use endowire_core::vessel::{GeneratedWall, Lumen, NoStore, Resolution, Wall, anatomy};
 use endowire_methods::li2011::{Chain, Li2011, Li2011Options, LinearSolver, banded, dense};
 use serde::Serialize;
 
@@ -94,14 +94,13 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), Failure> {
     }
     let tree = anatomy::tree("curved_tube").ok_or_else(|| Failure::Input("no curved_tube".to_owned()))?;
     let generated = GeneratedWall::new(&tree, Resolution::fitting(&tree))?;
-    let query = WallQuery::new(&generated.wall)?;
+    let lumen = Lumen::from(generated.wall.clone());
     let sheath = Sheath::at_opening(&generated.wall, generated.inlet, 1.0)?;
     let device = Device::uniform(INSERTED_MM + TIMED_MM * args.repeats as f64, RADIUS_MM, STIFFNESS_NMM2)?;
     let stack = Stack::from(device.clone());
     let surroundings = Surroundings {
-        wall: &generated.wall,
+        lumen: &lumen,
         properties: &WallProperties::default(),
-        query: &query,
         sheath: &sheath,
         device: &device,
         stack: &stack,

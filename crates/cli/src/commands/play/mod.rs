@@ -44,14 +44,16 @@ pub(crate) fn play(args: &PlayArgs) -> Result<(), Failure> {
     let cache = Cache::new(&args.cache);
     let mut view = ViewSpec::of_scene(&scene, &args.scene)?;
     let simulation = scene.simulation(&cache).map_err(in_scene)?;
+    // Kept by the cache before the session asks for it.
+    simulation.lumen().wall(&cache).map_err(in_scene)?;
     let limits = Limits { push_n: args.warn_n, torque_nmm: args.warn_nmm };
     let script = scene.steps(simulation.stack(), &cache).map_err(in_scene)?;
     scenes::let_medium_flow(&mut view, &scene, &cache).map_err(in_scene)?;
     scenes::tell_found_centreline(&args.scene, &scene);
     let session = Session::new(simulation, view, args.size, limits).map_err(in_scene)?;
     let session = begun(session.with_script(script), args).map_err(in_scene)?;
-    let pictures =
-        Pictures::new(&scene, &session.snapshot(), session.simulation().wall().clone()).map_err(in_scene)?;
+    let wall = session.simulation().lumen().wall(&cache).map_err(in_scene)?.clone();
+    let pictures = Pictures::new(&scene, &session.snapshot(), wall).map_err(in_scene)?;
     let mut record = Record::new(args, &scene);
     let (sender, messages) = mpsc::channel();
     if let Some(address) = args.listen {

@@ -38,7 +38,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
     let mut simulation = scene.simulation(&cache).map_err(in_scene)?;
     if !args.quiet {
-        for hint in scene.hints(simulation.wall()).map_err(in_scene)? {
+        for hint in scene.hints(simulation.lumen()).map_err(in_scene)? {
             tell(format_args!("{}: {hint}", args.scene.display()));
         }
     }

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use super::ContactSurface;
+use super::FeltMesh;
 use crate::vessel::{SurfaceMesh, Wall, WallQuery};
 use crate::{Result, Vec3, parallel};
 
@@ -38,7 +38,7 @@ pub struct Deviation {
     pub worst_at_mm: Vec3,
 }
 
-impl ContactSurface {
+impl FeltMesh {
     /// How far this wall and `given` are from each other, its extensions beyond openings left out.
     ///
     /// # Errors
@@ -154,7 +154,7 @@ mod tests {
     fn it_is_the_sag_of_triangles_and_the_distance_of_another_tube() {
         let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
         let given = tube(4.0);
-        let surface = ContactSurface::new(&given, (0.2, 0.2), &properties, &NoStore).unwrap();
+        let surface = FeltMesh::new(&given, 0.2, &properties, &NoStore).unwrap();
         let own = surface.deviation(&given).unwrap();
         // The middle of a chord of 1 mm, and a little more in the middle of a triangle.
         let sag_mm = 1.0 / 32.0;

@@ -18,6 +18,7 @@ use std::ops::Range;
 use super::{Reading, SAFE, SUNK, WallContact};
 use crate::Vec3;
 use crate::contact::point::{ContactPoint, FOLLOW};
+use crate::contact::surface::Hint;
 use crate::rod::{ElementData, RodState};
 
 /// The largest of ξ (1 − ξ)².
@@ -216,7 +217,7 @@ impl WallContact<'_> {
         // A look from within the room must change nothing that is known, so no triangle is; what has pressed in the last equilibrium may
         // be held to the wall; and what is no number has no room.
         let free = matches!(reading, Reading::Free(_))
-            && known.triangle.is_none()
+            && known.piece.is_none()
             && known.side.is_none()
             && !known.presses
             && self.friction.is_free(index)
@@ -240,9 +241,11 @@ impl WallContact<'_> {
         let known = &mut self.cache.points[index];
         known.base = *x;
         known.base_clearance_mm = reading.distance_mm();
-        (known.base_looked_at, known.base_triangle) = (known.looked_at, known.triangle);
+        (known.base_looked_at, known.base_piece) = (known.looked_at, known.piece);
         (known.base_looked_clearance_mm, known.base_free_mm) = (known.clearance_mm, known.free_mm);
-        known.side = known.triangle.filter(|_| known.base_clearance_mm < SUNK * radius_mm);
+        let hint = known.piece.map(if known.side.is_some() { Hint::Side } else { Hint::Near });
+        let sunk = hint.filter(|_| known.base_clearance_mm < SUNK * radius_mm);
+        known.side = sunk.map(|hint| self.surface.side(x, hint));
         known.presses = presses;
         if !presses {
             known.force_n = 0.0;

@@ -53,7 +53,7 @@ impl WallContact<'_> {
     /// The wall's modulus where a point is at the base.
     fn stiffness_at_base(&self, index: usize) -> Stiffness {
         let known = &self.cache.points[index];
-        self.surface.stiffness(&known.base, known.base_triangle)
+        self.surface.stiffness(&known.base, known.base_piece)
     }
 
     /// κ of a point where the wall has this modulus, N/mm.
@@ -133,7 +133,7 @@ impl WallContact<'_> {
         let radius_mm = point.potential.radius_mm;
         let limit_mm = self.asked_mm(radius_mm);
         let depth_mm = radius_mm - self.read_within(index, &x, limit_mm).distance_mm();
-        let stiffness = self.surface.stiffness(&x, self.cache.points[index].triangle);
+        let stiffness = self.surface.stiffness(&x, self.cache.points[index].piece);
         if !self.cache.aimed {
             return stiffness.factor * point.weight_mm * point.potential.value(radius_mm - depth_mm);
         }

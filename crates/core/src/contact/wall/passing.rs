@@ -3,7 +3,6 @@
 use super::clear::Room;
 use super::{SAFE, SUNK, WallContact};
 use crate::Vec3;
-use crate::contact::ContactSurface;
 use crate::rod::{ElementData, RodState};
 use crate::solve::External;
 
@@ -24,20 +23,8 @@ impl WallContact<'_> {
                 (last, sunk) = (None, true);
                 continue;
             }
-            // What the smooth wall takes for the lumen may be that of another wall, seen through one that is thin, or the far side of a
-            // lumen much narrower than the device. Where facets are coarse the smooth wall stands beyond them, and what is outside of
-            // those is still in front of their own piece of it: by no more than the wall stands beyond them, or ever less, the farther
-            // behind the facet. From another it goes away.
-            let beyond = |surface: &ContactSurface| {
-                surface.query.nearest(&x, surface.reach_mm).is_some_and(|flat| {
-                    if flat.distance_mm >= -(sunk_mm + surface.smooth.outset_mm(flat.triangle)) {
-                        return false;
-                    }
-                    let here_mm = surface.distance_from(flat.triangle, &x);
-                    here_mm < 0.0 || here_mm >= surface.distance_from(flat.triangle, &flat.point_mm)
-                })
-            };
-            if std::mem::take(&mut sunk) && beyond(&self.surface) {
+            let beyond = || self.surface.is_beyond(&x, sunk_mm);
+            if std::mem::take(&mut sunk) && beyond() {
                 return true;
             }
             if let Some((from, clearance_mm)) = last
@@ -45,10 +32,9 @@ impl WallContact<'_> {
             {
                 self.counters.queries += 1;
                 // A flat triangle may stand into the smooth lumen: what has gone through is behind the piece of wall that is next to it.
-                let beside = self.cache.points[index + 1].triangle;
+                let beside = self.cache.points[index + 1].piece;
                 let behind = |triangle| self.surface.distance_from(triangle, &x) < 0.0;
-                if self.surface.query.crossing(&from, &x, 1.0).is_some()
-                    && (beside.is_none_or(behind) || beyond(&self.surface))
+                if self.surface.crossing(&from, &x, 1.0).is_some() && (beside.is_none_or(behind) || beyond())
                 {
                     return true;
                 }

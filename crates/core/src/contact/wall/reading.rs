@@ -4,13 +4,14 @@
 //! So are lengths between them, and clearances that are remembered; what a reading tells is a distance in space.
 //!
 //! On the way from a base what a point reads hangs on where it is alone, not on other steps that were tried: within half its radius of
-//! where the wall was looked for at the base, it is read about the triangle that was found there.
+//! where the wall was looked for at the base, it is read about the piece of wall that was found there.
 
 use super::{SUNK, WallContact};
 use crate::Vec3;
 use crate::contact::cache::TakenReading;
 use crate::contact::distance::{Distance, Nearness};
 use crate::contact::point::{FOLLOW, LOOK_AGAIN};
+use crate::contact::surface::Hint;
 
 /// How near a point stands.
 #[derive(Debug, Clone, Copy)]
@@ -63,40 +64,41 @@ impl WallContact<'_> {
         if self.friction.acts() { radius_mm } else { f64::NEG_INFINITY }
     }
 
-    /// The reading that was taken at `x` about `triangle`, if it tells enough.
-    pub(super) fn read_there(&self, index: usize, x: &Vec3, triangle: u32, limit_mm: f64) -> Option<Reading> {
-        let TakenReading { at_mm, triangle: about, nearness } = self.cache.readings[index];
+    /// The reading that was taken at `x` with that hint, if it tells enough.
+    pub(super) fn read_there(&self, index: usize, x: &Vec3, hint: Hint, limit_mm: f64) -> Option<Reading> {
+        let TakenReading { at_mm, hint: taken, nearness } = self.cache.readings[index];
         let told = matches!(nearness, Nearness::Within(_)) || nearness.value_mm() >= limit_mm;
-        (at_mm == *x && about == triangle && told).then(|| Reading::of(nearness, limit_mm))
+        (at_mm == *x && taken == hint && told).then(|| Reading::of(nearness, limit_mm))
     }
 
     /// Of a point that has sunk into the wall: followed from there along the surface.
     pub(super) fn read_from_side(&mut self, index: usize, x: &Vec3, side: u32, limit_mm: f64) -> Reading {
         let point = &self.points[index];
         let known = &mut self.cache.points[index];
-        let triangle = match known.base_triangle {
-            Some(triangle) if (x - known.base_looked_at).norm() < LOOK_AGAIN * point.potential.radius_mm => {
+        let piece = match known.base_piece {
+            Some(piece) if (x - known.base_looked_at).norm() < LOOK_AGAIN * point.potential.radius_mm => {
                 known.looked_at = known.base_looked_at;
-                triangle
+                piece
             }
             _ => {
                 known.looked_at = *x;
-                self.surface.smooth.walk(side, x)
+                self.surface.follow(side, x)
             }
         };
         known.from_tip_mm = point.from_tip_mm;
-        (known.clearance_mm, known.triangle, known.free_mm) = (0.0, Some(triangle), 0.0);
-        if let Some(reading) = self.read_there(index, x, triangle, limit_mm) {
+        (known.clearance_mm, known.piece, known.free_mm) = (0.0, Some(piece), 0.0);
+        let hint = Hint::Side(piece);
+        if let Some(reading) = self.read_there(index, x, hint, limit_mm) {
             self.counters.avoided += 1;
             return reading;
         }
         self.counters.near += 1;
-        let nearness = self.surface.nearness(x, triangle, limit_mm);
-        self.cache.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
+        let nearness = self.surface.nearness(x, hint, limit_mm);
+        self.cache.readings[index] = TakenReading { at_mm: *x, hint, nearness };
         Reading::of(nearness, limit_mm)
     }
 
-    /// What clearances and the last triangle say without a query.
+    /// What clearances and the last piece say without a query.
     pub(super) fn read_known(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Option<Reading> {
         let radius = self.points[index].potential.radius_mm;
         let stretch = self.surface.stretch();
@@ -105,39 +107,39 @@ impl WallContact<'_> {
         let moved = (x - known.base_looked_at).norm();
         if moved < known.base_free_mm {
             self.counters.avoided += 1;
-            (known.looked_at, known.triangle) = (known.base_looked_at, None);
+            (known.looked_at, known.piece) = (known.base_looked_at, None);
             (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, known.base_free_mm);
             return Some(Reading::Free((known.clearance_mm - moved) / stretch));
         }
         let moved = (x - known.looked_at).norm();
-        let free_mm = known.clearance_mm - near - self.surface.smooth.deepest_inset_mm();
+        let free_mm = known.clearance_mm - near - self.surface.deepest_inset_mm();
         if moved < free_mm {
             self.counters.avoided += 1;
             known.free_mm = free_mm;
             return Some(Reading::Free((known.clearance_mm - moved) / stretch));
         }
-        if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius && known.base_triangle.is_some() {
-            (known.looked_at, known.triangle) = (known.base_looked_at, known.base_triangle);
+        if (x - known.base_looked_at).norm() < LOOK_AGAIN * radius && known.base_piece.is_some() {
+            (known.looked_at, known.piece) = (known.base_looked_at, known.base_piece);
             (known.clearance_mm, known.free_mm) = (known.base_looked_clearance_mm, 0.0);
         }
-        let (triangle, looked_at) = (known.triangle?, known.looked_at);
-        if let Some(reading) = self.read_there(index, x, triangle, limit_mm) {
+        let (hint, looked_at) = (Hint::Near(known.piece?), known.looked_at);
+        if let Some(reading) = self.read_there(index, x, hint, limit_mm) {
             self.counters.avoided += 1;
             return Some(reading);
         }
         if (x - looked_at).norm() >= LOOK_AGAIN * radius {
             return None;
         }
-        let nearness = self.surface.nearness(x, triangle, limit_mm);
+        let nearness = self.surface.nearness(x, hint, limit_mm);
         if nearness.value_mm() <= 0.0 {
             return None;
         }
         self.counters.near += 1;
-        self.cache.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
+        self.cache.readings[index] = TakenReading { at_mm: *x, hint, nearness };
         Some(Reading::of(nearness, limit_mm))
     }
 
-    /// From the triangle that is nearest through space.
+    /// From the piece that is nearest through space.
     pub(super) fn read_anew(&mut self, index: usize, x: &Vec3, limit_mm: f64) -> Reading {
         let radius = self.points[index].potential.radius_mm;
         let stretch = self.surface.stretch();
@@ -145,23 +147,24 @@ impl WallContact<'_> {
         let known = &mut self.cache.points[index];
         let proximity = &mut self.cache.proximity;
         let asked = proximity.queries;
-        let place = proximity.around(&self.surface.query, x);
+        let place = proximity.around(&self.surface, x);
         self.counters.avoided += u64::from(proximity.queries == asked);
         (known.looked_at, known.from_tip_mm) = (place.middle, self.points[index].from_tip_mm);
-        (known.clearance_mm, known.triangle) = (place.clearance_mm, None);
+        (known.clearance_mm, known.piece) = (place.clearance_mm, None);
         let clearance = place.clearance(x) / stretch;
-        let Some(triangle) = place.triangle else {
+        let Some(piece) = place.piece else {
             // Past an opening there is no wall.
             known.free_mm = (x - place.middle).norm() + LOOK_AGAIN * radius;
             return Reading::Free(clearance);
         };
-        known.free_mm = place.clearance_mm - near - self.surface.smooth.inset_mm(triangle);
+        known.free_mm = place.clearance_mm - near - self.surface.inset_mm(piece);
         if (x - place.middle).norm() < known.free_mm {
             return Reading::Free(clearance);
         }
-        (known.triangle, known.free_mm) = (Some(triangle), 0.0);
-        let nearness = self.surface.nearness(x, triangle, limit_mm);
-        self.cache.readings[index] = TakenReading { at_mm: *x, triangle, nearness };
+        (known.piece, known.free_mm) = (Some(piece), 0.0);
+        let hint = Hint::Near(piece);
+        let nearness = self.surface.nearness(x, hint, limit_mm);
+        self.cache.readings[index] = TakenReading { at_mm: *x, hint, nearness };
         Reading::of(nearness, limit_mm)
     }
 }

@@ -12,8 +12,8 @@ impl WallContact<'_> {
         let least_n = self.least_force_n();
         let pressed = self.cache.all_pressed().map(|(index, d)| {
             let known = &self.cache.points[index];
-            let factor = self.surface.stiffness(&known.base, known.base_triangle).factor;
-            let rough = self.surface.rough(&known.base, known.base_triangle);
+            let factor = self.surface.stiffness(&known.base, known.base_piece).factor;
+            let rough = self.surface.rough(&known.base, known.base_piece);
             let (normal, presses_n) = self.points[index].pressed(d, factor);
             (index, (normal, [known.force_n * d.gradient.norm(), presses_n].map(|force_n| force_n * rough)))
         });

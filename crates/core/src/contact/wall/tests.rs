@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::*;
-use crate::contact::{ContactSurface, WallPotential, WallProperties};
+use crate::contact::{ContactSurface, Hint, WallPotential, WallProperties};
 use crate::rod::Frame;
 use crate::vessel::{NoStore, SurfaceMesh, Wall};
 
@@ -112,17 +112,17 @@ impl Rod<'_> {
 fn a_place_has_a_reading_for_each_triangle() {
     let surface = slit();
     let x = Vec3::new(0.4, 0.1, 20.1);
-    let about = |y: f64| surface.query.nearest(&Vec3::new(0.4, y, 20.1), 1.0).unwrap().triangle;
+    let about = |y: f64| surface.nearest_piece(&Vec3::new(0.4, y, 20.1), 1.0).unwrap().0;
     let (near, far) = (about(0.38), about(-0.38));
     let mut rod = rod(&surface, 1, &[1.0], 1e3);
     let mut contact = rod.contact();
     let ask = |contact: &mut WallContact<'_>, triangle: u32| {
         let known = &mut contact.cache.points[0];
-        (known.base_looked_at, known.base_triangle) = (x, Some(triangle));
-        (known.looked_at, known.triangle) = (x, Some(triangle));
+        (known.base_looked_at, known.base_piece) = (x, Some(triangle));
+        (known.looked_at, known.piece) = (x, Some(triangle));
         contact.read_within(0, &x, 1.0).distance_mm()
     };
-    let direct = |triangle: u32| surface.nearness(&x, triangle, 1.0).value_mm();
+    let direct = |triangle: u32| surface.nearness(&x, Hint::Near(triangle), 1.0).value_mm();
     assert!((direct(near) - 0.3).abs() < 0.02 && (direct(far) - 0.5).abs() < 0.02);
     for triangle in [near, far, near, near, far] {
         assert_eq!(ask(&mut contact, triangle), direct(triangle));
@@ -130,7 +130,7 @@ fn a_place_has_a_reading_for_each_triangle() {
     let counted = contact.count();
     assert_eq!((counted.near, counted.avoided), (4, 1));
     // What was read about one and is taken for the other is wrong.
-    contact.cache.readings[0].triangle = near;
+    contact.cache.readings[0].hint = Hint::Near(near);
     assert_eq!(ask(&mut contact, near), direct(far));
 }
 
@@ -138,37 +138,41 @@ fn a_place_has_a_reading_for_each_triangle() {
 fn what_has_come_back_out_of_the_wall_reads_what_is_nearest() {
     let surface = slit();
     let place = |y: f64| Vec3::new(0.4, y, 20.1);
-    let about = |y: f64| surface.query.nearest(&place(y), 1.0).unwrap().triangle;
+    let about = |y: f64| surface.nearest_piece(&place(y), 1.0).unwrap().0;
     let (near, far) = (about(0.38), about(-0.38));
     let mut rod = rod(&surface, 1, &[1.0], 1e3);
     let mut contact = rod.contact();
     let mut ask = |y: f64, side: u32| {
         let known = &mut contact.cache.points[0];
-        (known.base_looked_at, known.base_triangle) = (place(y), Some(side));
+        (known.base_looked_at, known.base_piece) = (place(y), Some(side));
         known.side = Some(side);
         contact.read_within(0, &place(y), 1.0).distance_mm()
     };
     // Sunk in at one side it stays with that, also behind it; across the lumen it presses on the other.
     for (y, side) in [(0.3, near), (0.42, near), (-0.3, far), (-0.42, far)] {
-        assert_eq!(ask(y, side), surface.nearness(&place(y), side, 1.0).value_mm(), "{y}");
+        assert_eq!(ask(y, side), surface.nearness(&place(y), Hint::Side(side), 1.0).value_mm(), "{y}");
     }
     for (y, side, other) in [(0.3, far, near), (0.42, far, near), (-0.42, near, far)] {
-        let across = surface.nearness(&place(y), side, 1.0).value_mm();
+        let across = surface.nearness(&place(y), Hint::Side(side), 1.0).value_mm();
         assert!(ask(y, side) < 0.15 && across > 0.6, "{y}: {across}");
-        assert!((ask(y, side) - surface.nearness(&place(y), other, 1.0).value_mm()).abs() < 1e-9, "{y}");
+        assert!(
+            (ask(y, side) - surface.nearness(&place(y), Hint::Near(other), 1.0).value_mm()).abs() < 1e-9,
+            "{y}"
+        );
     }
 }
 
 /// What a point reads after a move of some hundredths of a millimetre, and what it would read if nothing were known of where it was.
 fn on_the_way(contact: &mut WallContact<'_>, from: Vec3, to: Vec3) -> [f64; 2] {
-    let triangle = contact.surface.query.nearest(&from, 5.0).unwrap().triangle;
+    let (triangle, _) = contact.surface.nearest_piece(&from, 5.0).unwrap();
     let radius_mm = contact.points[0].potential.radius_mm;
     let known = &mut contact.cache.points[0];
-    (known.base_looked_at, known.base_triangle) = (from, Some(triangle));
-    (known.looked_at, known.triangle) = (from, Some(triangle));
+    (known.base_looked_at, known.base_piece) = (from, Some(triangle));
+    (known.looked_at, known.piece) = (from, Some(triangle));
     contact.read_within(0, &from, radius_mm);
     let told = contact.read_within(0, &to, radius_mm).distance_mm();
-    [told, contact.surface.nearness(&to, triangle, radius_mm).value_mm()].map(|mm| mm.min(radius_mm))
+    [told, contact.surface.nearness(&to, Hint::Near(triangle), radius_mm).value_mm()]
+        .map(|mm| mm.min(radius_mm))
 }
 
 #[test]
@@ -185,8 +189,8 @@ fn what_a_point_reads_hangs_on_where_it_is_not_on_where_it_was() {
         let [told, fresh] = on_the_way(&mut contact, from, to);
         assert!((told - fresh).abs() < 1e-12, "{from:?} {to:?}: {told} for {fresh}");
         presses += usize::from(fresh > 0.0 && fresh < 0.2);
-        let triangle = surface.query.nearest(&from, 5.0).unwrap().triangle;
-        let lost_mm = surface.nearness(&from, triangle, f64::INFINITY).value_mm() - 0.2;
+        let (triangle, _) = surface.nearest_piece(&from, 5.0).unwrap();
+        let lost_mm = surface.nearness(&from, Hint::Near(triangle), f64::INFINITY).value_mm() - 0.2;
         steep += usize::from(fresh > 0.0 && fresh < 0.2 && lost_mm > 2.0 * (to - from).norm());
     }
     assert!(presses > 200 && steep > 3, "{presses} {steep}");
@@ -208,7 +212,7 @@ fn behind_a_coarse_facet_is_not_yet_through_the_wall() {
     let side = Vec3::new((0.2 * PI).cos(), (0.2 * PI).sin(), 0.0);
     let along =
         |from_mm: f64, to_mm: f64| (side * from_mm + Vec3::z() * 16.0, side * to_mm + Vec3::z() * 20.9);
-    let flat = |x: &Vec3| coarse.query.nearest(x, 10.0).unwrap().distance_mm;
+    let flat = |x: &Vec3| coarse.nearest_piece(x, 10.0).unwrap().1;
     let (start, end) = along(3.0, 3.6);
     assert!(flat(&start) > 0.2 && flat(&end) < -SUNK * RADIUS_MM, "{} {}", flat(&start), flat(&end));
     assert!(!has_passed(&coarse, start, end));

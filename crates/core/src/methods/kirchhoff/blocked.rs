@@ -77,7 +77,7 @@ fn narrow(
     let wall = environment.wall();
     let places = (0..FRONT).map(|k| tip_mm + k as f64 * radius_mm).take_while(|mm| *mm < line_mm);
     let axis_mm: Vec<Vec3> = places.map(|mm| wall.material(&place(mesh, &state.rod, mm))).collect();
-    let narrow = narrow_ahead(&wall, environment.surroundings.wall, &axis_mm, radius_mm)?;
+    let narrow = narrow_ahead(&wall, environment.surroundings.lumen.openings(), &axis_mm, radius_mm)?;
     Some((narrow, radius_mm))
 }
 
@@ -98,7 +98,7 @@ mod tests {
     use crate::methods::Method;
     use crate::methods::kirchhoff::workspace::Workspace;
     use crate::methods::kirchhoff::{Kirchhoff, KirchhoffOptions};
-    use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution, WallQuery};
+    use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Lumen, NoStore, Resolution};
 
     /// What is said of a wire of radius 0.4 mm that is pushed into a tube which narrows from 3 mm to `end_mm`.
     fn pushed_into(end_mm: f64) -> Option<PhysicalEnd> {
@@ -111,12 +111,11 @@ mod tests {
         let made = GeneratedWall::new(&tree, Resolution::EdgeMm(0.3)).unwrap();
         let sheath = Sheath::at_opening(&made.wall, made.inlet, 1.0).unwrap();
         let (device, properties) = (Device::uniform(60.0, 0.4, 10.0).unwrap(), WallProperties::default());
-        let query = WallQuery::new(&made.wall).unwrap();
+        let lumen = Lumen::from(made.wall);
         let stack = Stack::from(device.clone());
         let surroundings = Surroundings {
-            wall: &made.wall,
+            lumen: &lumen,
             properties: &properties,
-            query: &query,
             sheath: &sheath,
             device: &device,
             stack: &stack,

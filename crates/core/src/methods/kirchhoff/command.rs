@@ -91,7 +91,7 @@ impl<const C: usize> Workspace<C> {
         let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
         if target > start {
             let tip_mm = environment.displaced(displaced.as_ref()).wall().material(&from.tip_mm());
-            check_inside(surroundings.wall, &tip_mm, target - start)?;
+            check_inside(surroundings.lumen.openings(), &tip_mm, target - start)?;
         }
         let (mut sum, mut balanced) = (Sum::default(), true);
         tools.work = Work::default();
@@ -156,7 +156,11 @@ impl<const C: usize> Workspace<C> {
                         && found.residual <= AT_REST
                         && was.state.rod.farthest_mm(&next.state.rod) <= REST_RADII * thinnest_mm;
                     balanced = (found.balanced && !found.lacks) || rests;
-                    check_inside(surroundings.wall, &there.wall().material(&next.state.tip_mm()), 0.0)?;
+                    check_inside(
+                        surroundings.lumen.openings(),
+                        &there.wall().material(&next.state.tip_mm()),
+                        0.0,
+                    )?;
                     std::mem::swap(now, next);
                     displaced = then;
                     moved = true;

@@ -9,7 +9,7 @@ use crate::random::{splitmix64, unit};
 use crate::rod::TWISTED;
 use crate::rod::quadrature::hermite;
 use crate::shape::Shape;
-use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, NoStore, Resolution, WallQuery};
+use crate::vessel::{CentrelineNode, CentrelineTree, GeneratedWall, Lumen, NoStore, Resolution};
 
 const RADIUS_MM: f64 = 0.2;
 
@@ -97,12 +97,11 @@ fn loops_lie_on_each_other_and_do_not_pass() {
 #[test]
 fn nothing_is_built_where_nothing_can_touch() {
     let (made, device, sheath) = parts(4.0);
-    let (query, stack) = (WallQuery::new(&made.wall).unwrap(), Stack::from(device));
+    let (lumen, stack) = (Lumen::from(made.wall), Stack::from(device));
     let properties = properties();
     let surroundings = Surroundings {
-        wall: &made.wall,
+        lumen: &lumen,
         properties: &properties,
-        query: &query,
         sheath: &sheath,
         device: stack.first(),
         stack: &stack,

@@ -44,6 +44,8 @@ mod slopes;
 mod state;
 mod step_control;
 mod substep;
+#[cfg(test)]
+mod swept_tests;
 mod tick;
 #[cfg(test)]
 mod tick_tests;
@@ -253,8 +255,8 @@ impl<const C: usize> Kirchhoff<C> {
         }
         let mut state = KirchhoffState::at(surroundings);
         state.report.angles = Layout::<C>::ANGLES > 0;
-        let Surroundings { wall, properties, stack, .. } = *surroundings;
-        let surface = ContactSurface::new(wall, stack.radii_mm(), properties, store)?;
+        let Surroundings { lumen, properties, stack, .. } = *surroundings;
+        let surface = ContactSurface::of(lumen, stack.radii_mm(), properties, store)?;
         let mut method = Self {
             options,
             surface: Arc::new(surface),

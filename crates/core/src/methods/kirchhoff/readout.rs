@@ -32,7 +32,8 @@ impl<const C: usize> Tools<C> {
         report.tip_rotation_rad = report.rotation_rad;
         let tip = rod.positions[rod.elements()];
         let tip = environment.wall().material(&tip);
-        report.left_through = left_through(surroundings.wall, &tip).map(|(opening, _)| opening.index);
+        report.left_through =
+            left_through(surroundings.lumen.openings(), &tip).map(|(opening, _)| opening.index);
         if mesh.elements.is_empty() {
             report.energy = Energy::default();
             (report.push_force_n, report.torque_nmm) = (0.0, 0.0);

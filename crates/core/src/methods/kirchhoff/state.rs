@@ -171,11 +171,11 @@ impl KirchhoffState {
             let mend = format!("at {} nodes {} instruments may rub in others here", n + 1, belongs.inner);
             return Err(other("inner_friction", self.inner_friction.len(), mend));
         }
-        if !self.known.fits(belongs.points, belongs.surface.query.triangles()) {
+        if !self.known.fits(belongs.points, belongs.surface.pieces()) {
             let mend = format!(
-                "{} contact points on {} triangles are surface here: another vessel, device or wall",
+                "{} contact points on {} pieces of wall are here: another vessel, device or wall",
                 belongs.points,
-                belongs.surface.query.triangles()
+                belongs.surface.pieces()
             );
             return Err(other("known", self.known.len(), mend));
         }

@@ -114,7 +114,11 @@ impl<const C: usize> Workspace<C> {
         way.begin(surroundings.stack, &from.report, moves);
         let (start, target) = (line_mm(lengths(&way.start)), line_mm(lengths(&way.target)));
         if target > start {
-            check_inside(surroundings.wall, &at_start.wall().material(&from.tip_mm()), target - start)?;
+            check_inside(
+                surroundings.lumen.openings(),
+                &at_start.wall().material(&from.tip_mm()),
+                target - start,
+            )?;
         }
         tools.work = Work::default();
         // What a device with friction does from a part of this length on it may do near by.
@@ -144,7 +148,11 @@ impl<const C: usize> Workspace<C> {
                     (longest_mm, begun) = (0.5 * part_mm, &rest);
                 }
                 Ok(found) => {
-                    check_inside(surroundings.wall, &there.wall().material(&next.state.tip_mm()), 0.0)?;
+                    check_inside(
+                        surroundings.lumen.openings(),
+                        &there.wall().material(&next.state.tip_mm()),
+                        0.0,
+                    )?;
                     std::mem::swap(now, next);
                     let state = now.parts().1;
                     let way_mm = here.state.rod.farthest_mm(&state.rod);

@@ -32,50 +32,50 @@ const PIECES: usize = 16;
 
 /// A sample of a branch.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sample {
+pub(in crate::vessel) struct Sample {
     /// Position, mm.
-    pub(super) position: Vec3,
+    pub(in crate::vessel) position: Vec3,
     /// Unit tangent.
-    pub(super) tangent: Vec3,
+    pub(in crate::vessel) tangent: Vec3,
     /// Radius, mm.
-    pub(super) radius: f64,
+    pub(in crate::vessel) radius: f64,
     /// d radius / d arc length.
-    pub(super) slope: f64,
+    pub(in crate::vessel) slope: f64,
 }
 
 /// A branch: from the root or from a point on its parent's axis to a leaf, or to a sharp fork.
 #[derive(Debug, Clone)]
-pub(super) struct Branch {
+pub(in crate::vessel) struct Branch {
     /// At least two, evenly spaced.
-    pub(super) samples: Vec<Sample>,
+    pub(in crate::vessel) samples: Vec<Sample>,
     /// Spacing of samples in mm.
-    pub(super) step: f64,
+    pub(in crate::vessel) step: f64,
     /// Largest radius, also of what goes on straight beyond its ends, mm.
-    pub(super) thickest: f64,
+    pub(in crate::vessel) thickest: f64,
     /// Row of the root, if the branch begins there: an open end.
-    pub(super) root_row: Option<usize>,
+    pub(in crate::vessel) root_row: Option<usize>,
     /// Row of the leaf, if the branch ends in one that is open.
-    pub(super) leaf_row: Option<usize>,
+    pub(in crate::vessel) leaf_row: Option<usize>,
     /// The course at each sample: where every search for a foot begins.
-    pub(super) at_samples: Vec<Course>,
+    pub(in crate::vessel) at_samples: Vec<Course>,
 }
 
 /// Position and derivatives of a centre line at an arc length.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Course {
-    pub(super) position: Vec3,
-    pub(super) first: Vec3,
-    pub(super) second: Vec3,
+pub(in crate::vessel) struct Course {
+    pub(in crate::vessel) position: Vec3,
+    pub(in crate::vessel) first: Vec3,
+    pub(in crate::vessel) second: Vec3,
 }
 
 /// Position and derivatives at an arc length.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
-    pub(super) position: Vec3,
-    pub(super) first: Vec3,
-    pub(super) second: Vec3,
-    pub(super) radius: f64,
-    pub(super) slope: f64,
+pub(in crate::vessel) struct Place {
+    pub(in crate::vessel) position: Vec3,
+    pub(in crate::vessel) first: Vec3,
+    pub(in crate::vessel) second: Vec3,
+    pub(in crate::vessel) radius: f64,
+    pub(in crate::vessel) slope: f64,
 }
 
 impl Branch {
@@ -148,7 +148,7 @@ impl Branch {
 
 /// Cuts `tree` into branches. At a fork the widest child (the straightest of equals) goes on unless it turns sharply; the
 /// others start on the parent's axis with their own radius.
-pub(super) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> {
+pub(in crate::vessel) fn branches(tree: &CentrelineTree) -> Result<Vec<Branch>> {
     let (nodes, children) = (tree.nodes(), tree.children());
     let mut found: Vec<Branch> = Vec::new();
     let mut samples = 0;
@@ -350,7 +350,7 @@ impl Spline {
 }
 
 /// Second derivatives of the natural cubic spline: a tridiagonal, diagonally dominant system (Thomas algorithm).
-fn natural_moments(points: &[Vec3], chords: &[f64]) -> Vec<Vec3> {
+pub(in crate::vessel) fn natural_moments(points: &[Vec3], chords: &[f64]) -> Vec<Vec3> {
     let count = points.len();
     let mut moments = vec![Vec3::zeros(); count];
     let mut factor = vec![0.0; count];

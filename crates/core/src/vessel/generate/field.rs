@@ -13,14 +13,14 @@ use super::curve::Branch;
 use crate::Vec3;
 
 /// Blend width over the radius of the thinner branch: makes a fillet of about that radius at a right-angled fork.
-const BLEND: f64 = 1.4;
+pub(in crate::vessel) const BLEND: f64 = 1.4;
 
 /// Cosines of the angle between gradients at which blending begins and is complete: 20° and 60°.
-const BLEND_COSINES: [f64; 2] = [0.94, 0.5];
+pub(in crate::vessel) const BLEND_COSINES: [f64; 2] = [0.94, 0.5];
 
 /// Length over radius in which blending sets in behind a closed end. Such an end is hidden inside another branch; if its round cap
 /// blended, the other branch would bulge over it.
-const HIDDEN: f64 = 0.3;
+pub(in crate::vessel) const HIDDEN: f64 = 0.3;
 
 /// Newton steps to the foot; from a sample a quarter radius away three are enough.
 const FOOT_STEPS: usize = 8;

@@ -5,7 +5,7 @@
 
 mod cell;
 mod coarsen;
-mod curve;
+pub(super) mod curve;
 mod field;
 mod nets;
 mod sweep;
@@ -21,7 +21,10 @@ use super::wall::drop_unreferenced;
 use super::{CentrelineTree, SurfaceMesh, Wall};
 use crate::{Error, Result, Vec3, parallel};
 use field::Field;
+pub(super) use field::{BLEND, BLEND_COSINES, HIDDEN};
+pub(super) use sweep::any_perpendicular;
 use trim::End;
+pub(super) use trim::{End as TreeEnd, ends as open_ends};
 
 /// Vertices are projected until the field is this small.
 const ON_SURFACE_MM: f64 = 1e-10;
@@ -107,16 +110,11 @@ impl GeneratedWall {
     /// inside another one. [`Error::Mesh`] if branches come so close that the grid cannot tell them apart.
     pub fn new(tree: &CentrelineTree, resolution: Resolution) -> Result<Self> {
         let branches = curve::branches(tree)?;
-        let edge_mm = match resolution {
-            Resolution::EdgeMm(edge_mm) => edge_mm,
-            Resolution::Triangles(0) => {
-                return Err(Error::parameter("triangles", 0, "must be positive"));
-            }
-            Resolution::Triangles(count) => {
-                return Self::with_count(&branches, count);
-            }
-        };
-        Self::with_edge(&branches, edge_mm, &mut None)
+        check_resolution(&branches, resolution)?;
+        match resolution {
+            Resolution::EdgeMm(edge_mm) => Self::with_edge(&branches, edge_mm, &mut None),
+            Resolution::Triangles(count) => Self::with_count(&branches, count),
+        }
     }
 
     fn with_count(branches: &[curve::Branch], count: usize) -> Result<Self> {
@@ -146,22 +144,9 @@ impl GeneratedWall {
 
     /// `nets` keeps the nets of the last grid: in a tree of thin branches many edge lengths have the same.
     fn with_edge(branches: &[curve::Branch], edge_mm: f64, nets: &mut Option<TrimmedNets>) -> Result<Self> {
-        let largest = branches.iter().flat_map(|b| b.samples.iter().map(|s| s.radius)).fold(0.0, f64::max);
-        if edge_mm.is_nan() || edge_mm <= 0.0 || edge_mm > largest {
-            let mend = format!(
-                "must be positive and at most the largest radius, {largest:.3} mm, to resolve the vessel"
-            );
-            return Err(Error::parameter("edge_mm", edge_mm, mend));
-        }
-        let grid = edge_mm.min(GRID_PER_RADIUS * smallest_radius(branches));
-        let expected = branch_area(branches) * TRIANGLES_PER_FACE / (grid * grid);
-        if expected > MOST_TRIANGLES {
-            let mend =
-                format!("would need about {expected:.1e} triangles; at most {MOST_TRIANGLES:.0e} are made");
-            return Err(Error::parameter("edge_mm", edge_mm, mend));
-        }
+        let grid = checked_grid(branches, edge_mm)?;
         let field = Field::new(branches.to_vec(), 4.0 * grid);
-        let ends = trim::ends(&field);
+        let ends = trim::ends(branches);
         let mesh = match branches {
             [only] if ends.len() == 2 => {
                 let mesh = sweep::tube(only, edge_mm);
@@ -188,12 +173,44 @@ pub(super) fn axes(tree: &CentrelineTree) -> Result<Vec<Vec<(Vec3, f64)>>> {
 fn check_apart(mesh: &SurfaceMesh) -> Result<()> {
     let found = self_intersections(mesh, 0.0);
     let Some([triangle, _]) = found.first.first() else { return Ok(()) };
-    let at = mesh.corners(*triangle)[0];
-    Err(Error::Mesh(format!(
+    Err(Error::Mesh(wall_cuts_itself(&mesh.corners(*triangle)[0])))
+}
+
+/// What is said of a tube that runs into itself.
+pub(super) fn wall_cuts_itself(at: &Vec3) -> String {
+    format!(
         "the wall cuts itself near ({:.2}, {:.2}, {:.2}) mm: the vessel bends tighter than it is wide or runs into itself; \
          smooth the centre line",
         at.x, at.y, at.z
-    )))
+    )
+}
+
+/// Refuses a resolution before a mesh is made.
+pub(super) fn check_resolution(branches: &[curve::Branch], resolution: Resolution) -> Result<()> {
+    match resolution {
+        Resolution::EdgeMm(edge_mm) => checked_grid(branches, edge_mm).map(|_| ()),
+        Resolution::Triangles(0) => Err(Error::parameter("triangles", 0, "must be positive")),
+        Resolution::Triangles(_) => Ok(()),
+    }
+}
+
+/// Spacing of the grid for edges of a length that the branches can be meshed with, mm.
+fn checked_grid(branches: &[curve::Branch], edge_mm: f64) -> Result<f64> {
+    let largest = branches.iter().flat_map(|b| b.samples.iter().map(|s| s.radius)).fold(0.0, f64::max);
+    if edge_mm.is_nan() || edge_mm <= 0.0 || edge_mm > largest {
+        let mend = format!(
+            "must be positive and at most the largest radius, {largest:.3} mm, to resolve the vessel"
+        );
+        return Err(Error::parameter("edge_mm", edge_mm, mend));
+    }
+    let grid = edge_mm.min(GRID_PER_RADIUS * smallest_radius(branches));
+    let expected = branch_area(branches) * TRIANGLES_PER_FACE / (grid * grid);
+    if expected > MOST_TRIANGLES {
+        let mend =
+            format!("would need about {expected:.1e} triangles; at most {MOST_TRIANGLES:.0e} are made");
+        return Err(Error::parameter("edge_mm", edge_mm, mend));
+    }
+    Ok(grid)
 }
 
 /// Area of all branches taken alone, mm².
@@ -218,7 +235,8 @@ fn implicit_mesh(
     kept: &mut Option<TrimmedNets>,
 ) -> Result<SurfaceMesh> {
     for end in ends {
-        check_end_is_free(field, end)?;
+        let local = field.local(&end.centre, 2.0 * end.radius);
+        check_end_is_free(end, |x| field.value(&local, x).f)?;
     }
     let spacing = edge.min(GRID_PER_RADIUS * smallest_radius(&field.branches));
     let TrimmedNets { nets, mesh, .. } = match kept.take() {
@@ -411,15 +429,13 @@ fn push_polygon(vertices: &[Vec3], polygon: &[u32], triangles: &mut Vec<[u32; 3]
 const END_PROBES: usize = 24;
 
 /// Refuses an end that another branch reaches: its rim would be no clean loop.
-fn check_end_is_free(field: &Field, end: &End) -> Result<()> {
+pub(super) fn check_end_is_free(end: &End, field: impl Fn(&Vec3) -> f64) -> Result<()> {
     let u = sweep::any_perpendicular(&end.outward);
     let v = end.outward.cross(&u);
-    let local = field.local(&end.centre, 2.0 * end.radius);
     for k in 0..END_PROBES {
         let angle = TAU * k as f64 / END_PROBES as f64;
         let at = end.centre + end.radius * (libm::cos(angle) * u + libm::sin(angle) * v);
-        let value = field.value(&local, &at).f;
-        if value < -1e-3 * end.radius {
+        if field(&at) < -1e-3 * end.radius {
             return Err(Error::parameter(
                 format!("centreline row {}", end.row),
                 format!("({:.3}, {:.3}, {:.3})", end.centre.x, end.centre.y, end.centre.z),

@@ -67,7 +67,7 @@ fn frames(places: &[Place]) -> Vec<(Vec3, Vec3)> {
 }
 
 /// A unit vector across `axis`, from the coordinate axis least along it.
-pub(super) fn any_perpendicular(axis: &Vec3) -> Vec3 {
+pub(in crate::vessel) fn any_perpendicular(axis: &Vec3) -> Vec3 {
     let least = Vec3::ith_axis(axis.iamin()).into_inner();
     (least - axis * axis.dot(&least)).normalize()
 }

@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 
+use super::curve::Branch;
 use super::field::{Field, Local};
 use crate::Vec3;
 use crate::vessel::SurfaceMesh;
@@ -14,21 +15,21 @@ const SNAP: f64 = 0.4;
 
 /// An open end of the tree.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct End {
+pub(in crate::vessel) struct End {
     /// Row of the centre-line table.
-    pub(super) row: usize,
+    pub(in crate::vessel) row: usize,
     /// Branch that ends here.
-    pub(super) branch: usize,
-    pub(super) centre: Vec3,
+    pub(in crate::vessel) branch: usize,
+    pub(in crate::vessel) centre: Vec3,
     /// Unit vector out of the vessel.
-    pub(super) outward: Vec3,
-    pub(super) radius: f64,
+    pub(in crate::vessel) outward: Vec3,
+    pub(in crate::vessel) radius: f64,
 }
 
 /// All open ends, the root first.
-pub(super) fn ends(field: &Field) -> Vec<End> {
+pub(in crate::vessel) fn ends(branches: &[Branch]) -> Vec<End> {
     let mut ends = Vec::new();
-    for (branch, curve) in field.branches.iter().enumerate() {
+    for (branch, curve) in branches.iter().enumerate() {
         let (first, last) = (&curve.samples[0], &curve.samples[curve.samples.len() - 1]);
         if let Some(row) = curve.root_row {
             ends.push(End {

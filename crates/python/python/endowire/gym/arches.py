@@ -192,9 +192,9 @@ def arch(rng: np.random.Generator) -> tuple[Array, int]:
 
 
 class ArchVariety:
-    """An arch of type I for each episode, with walls whose edges are about ``edge_mm``.
+    """An arch of type I for each episode, drawn with edges of about ``edge_mm``; devices feel the surface that the centre line says.
 
-    An arch takes a tenth of a second to make. With ``count``, there are so many, made from ``seed`` when they first come, and kept; with None there is
+    With ``count``, there are so many, made from ``seed`` when they first come, and kept; with None there is
     a new one for each episode.
     """
 

@@ -1,0 +1,167 @@
+//! The felt wall of a surface: evenly meshed, extended beyond its openings, smooth, and ready for queries.
+
+use std::borrow::Cow;
+
+use nalgebra::Matrix3;
+
+use super::reach_mm;
+use crate::contact::distance::Nearness;
+use crate::contact::extension::extended;
+use crate::contact::properties::WallProperties;
+use crate::contact::regions::RegionMap;
+use crate::contact::{Distance, SmoothWall};
+use crate::vessel::{Conditioning, Wall, WallQuery, WallRecipe, WallStore};
+use crate::{Result, Vec3, parallel};
+
+/// A mesh prepared for the contact of devices.
+#[derive(Debug, Clone)]
+pub struct FeltMesh {
+    /// Its smooth distance.
+    pub smooth: SmoothWall,
+    /// Nearest triangles and clearances.
+    pub query: WallQuery,
+    /// Modulus and friction, where they are not the same everywhere.
+    pub regions: Option<RegionMap>,
+    /// How far a point of the device must see, mm.
+    pub(in crate::contact) reach_mm: f64,
+}
+
+/// What lies inside by more than this part of the thickest radius is looked at above the triangles, …
+const CREST: f64 = 0.3;
+/// … at so many heights, so many radii apart.
+const OVER: (u32, f64) = (6, 0.5);
+
+/// Coverage below which the flat triangles take part.
+const COVERED: f64 = 0.15;
+
+/// `wall` as an even mesh, or as it is where it is felt as it is meshed.
+fn even<'a>(wall: &'a Wall, properties: &WallProperties, store: &dyn WallStore) -> Result<Cow<'a, Wall>> {
+    if properties.deviation_mm == 0.0 {
+        return Ok(Cow::Borrowed(wall));
+    }
+    let options = Conditioning { deviation_mm: properties.deviation_mm, ..Conditioning::default() };
+    store.wall(&WallRecipe::Even { wall, options }).map(Cow::Owned)
+}
+
+impl FeltMesh {
+    /// Prepares `wall` for devices up to this radius, mm, with its even mesh from `store`.
+    ///
+    /// # Errors
+    /// A wall that has no triangles left to query.
+    pub fn new(
+        wall: &Wall,
+        thickest_mm: f64,
+        properties: &WallProperties,
+        store: &dyn WallStore,
+    ) -> Result<Self> {
+        let surface = extended(&*even(wall, properties, store)?, thickest_mm);
+        let surface = Wall::welded(&surface)?;
+        let smooth = SmoothWall::new(&surface, thickest_mm);
+        let regions = if properties.region.is_empty() { None } else { RegionMap::new(&smooth, properties) };
+        let reach_mm = |smooth: &SmoothWall| reach_mm(thickest_mm, smooth.deepest_inset_mm());
+        let query = WallQuery::new(&surface)?;
+        // The first step would wait for it.
+        query.prepare();
+        let mut surface = Self { reach_mm: reach_mm(&smooth), smooth, query, regions };
+        let crests = surface.over_crests(thickest_mm);
+        surface.smooth.deepen(crests.into_iter().flatten());
+        surface.reach_mm = reach_mm(&surface.smooth);
+        Ok(surface)
+    }
+
+    /// How far the smooth wall lies inside the flat one over triangles where that is much, mm: beside a crest it ends farther above them than it
+    /// does on them, and a point that is taken for free there would press from one place to the next.
+    fn over_crests(&self, thickest_mm: f64) -> Vec<Vec<(u32, f64)>> {
+        let crests = self.smooth.inside_of(CREST * thickest_mm);
+        let step_mm = OVER.1 * thickest_mm;
+        parallel::map(crests.len(), |index| {
+            let triangle = crests[index];
+            let [a, b, c] = self.query.corners(triangle);
+            let (middle, normal) = ((a + b + c) / 3.0, self.query.inward_normal(triangle));
+            let places = [middle, (a + middle) * 0.5, (b + middle) * 0.5, (c + middle) * 0.5];
+            let over = places
+                .into_iter()
+                .flat_map(|x| (1..=OVER.0).map(move |k| x + normal * (f64::from(k) * step_mm)));
+            over.filter_map(|x| {
+                let flat = self.query.nearest(&x, self.reach_mm).filter(|flat| flat.distance_mm > 0.0)?;
+                let felt_mm = self.nearness(&x, flat.triangle, f64::NEG_INFINITY).value_mm();
+                Some((flat.triangle, flat.distance_mm - felt_mm))
+            })
+            .collect()
+        })
+    }
+
+    /// How near `x` is, whose nearest triangle is `triangle` or close to it; with derivatives below `limit_mm`.
+    ///
+    /// Where quadrics hardly reach, the flat triangles take their place bit by bit: with their coverage C, F = f + λ(C) (d − f) goes
+    /// from the smooth distance f to that of the triangles, d.
+    pub(in crate::contact) fn nearness(&self, x: &Vec3, triangle: u32, limit_mm: f64) -> Nearness {
+        if let Some((nearness, coverage)) = self.smooth.within(x, triangle, limit_mm)
+            && coverage >= COVERED
+        {
+            return nearness;
+        }
+        let Some(flat) = self.query.nearest(x, self.reach_mm) else { return Nearness::Beyond(self.reach_mm) };
+        let mut found =
+            Distance { value_mm: flat.distance_mm, gradient: flat.normal, hessian: Matrix3::zeros() };
+        if let Some((smooth, coverage, slope)) = self.smooth.covered(x, triangle) {
+            let t = coverage / COVERED;
+            let (share, rate) = ((1.0 - t) * (1.0 - t), -2.0 * (1.0 - t) / COVERED);
+            let apart = found.value_mm - smooth.value_mm;
+            let turn = slope * rate;
+            let away = found.gradient - smooth.gradient;
+            found = Distance {
+                value_mm: smooth.value_mm + share * apart,
+                gradient: smooth.gradient + away * share + turn * apart,
+                // Without the second derivatives of C: Newton's method is a little slower there.
+                hessian: smooth.hessian * (1.0 - share) + turn * away.transpose() + away * turn.transpose(),
+            };
+        }
+        if found.value_mm < limit_mm { Nearness::Within(found) } else { Nearness::Beyond(found.value_mm) }
+    }
+
+    /// Distance of `x` from the piece of wall that is next to it seen from `triangle`, mm: negative behind that piece, whatever wall is
+    /// nearest.
+    pub(in crate::contact) fn distance_from(&self, triangle: u32, x: &Vec3) -> f64 {
+        self.nearness(x, self.smooth.walk(triangle, x), f64::NEG_INFINITY).value_mm()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::point::FOLLOW;
+    use crate::random::{splitmix64, unit};
+    use crate::vessel::{GeneratedWall, NoStore, Resolution, anatomy};
+
+    #[test]
+    fn what_is_free_of_the_triangles_is_free_of_the_smooth_wall() {
+        const RADIUS_MM: f64 = 0.445;
+        // Coarse, so that the crotches of its forks are crests far inside the triangles.
+        let tree = anatomy::tree("aortic_arch").unwrap();
+        let wall = GeneratedWall::new(&tree, Resolution::EdgeMm(6.0)).unwrap().wall;
+        let properties = WallProperties { deviation_mm: 0.0, ..WallProperties::default() };
+        let surface = FeltMesh::new(&wall, RADIUS_MM, &properties, &NoStore).unwrap();
+        // With insets as they are on the triangles alone.
+        let on_them = SmoothWall::new(&Wall::welded(&extended(&wall, RADIUS_MM)).unwrap(), RADIUS_MM);
+        let mut pressing = [0, 0];
+        for triangle in surface.smooth.inside_of(0.1) {
+            let ([a, b, c], normal) =
+                (surface.query.corners(triangle), surface.query.inward_normal(triangle));
+            for k in 0..60 {
+                let [u, v, up] = [0, 1, 2].map(|n| unit(splitmix64(u64::from(triangle), 3 * k + n)));
+                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                let x = a + (b - a) * u + (c - a) * v + normal * (6.0 * RADIUS_MM * up);
+                let Some(flat) = surface.query.nearest(&x, surface.reach_mm) else { continue };
+                let felt_mm = surface.nearness(&x, flat.triangle, f64::NEG_INFINITY).value_mm();
+                for (smooth, count) in [&surface.smooth, &on_them].into_iter().zip(&mut pressing) {
+                    let free_mm =
+                        flat.distance_mm - (1.0 + FOLLOW) * RADIUS_MM - smooth.inset_mm(flat.triangle);
+                    *count += u32::from(free_mm >= 0.0 && felt_mm < RADIUS_MM);
+                }
+            }
+        }
+        assert_eq!(pressing[0], 0);
+        assert!(pressing[1] > 10, "{pressing:?}");
+    }
+}

@@ -1,0 +1,68 @@
+//! Vessels that are felt by their centre lines.
+
+use crate::Vec3;
+use crate::contact::ContactSurface;
+use crate::device::Device;
+use crate::insertion::{Command, Sheath, Simulation, WallProperties, WallRegion};
+use crate::vessel::{CentrelineTree, GeneratedWall, Lumen, NoStore, Resolution, SweptVessel, anatomy};
+
+fn swept(tree: &CentrelineTree) -> Lumen {
+    SweptVessel::new(tree.clone(), Resolution::EdgeMm(1.0)).unwrap().into()
+}
+
+/// The shape of a wire after every step of 2 mm.
+fn pushed(lumen: Lumen, inlet: usize, friction: f64, steps: usize) -> Vec<Vec<Vec3>> {
+    let sheath = Sheath::at_opening(&lumen, inlet, 2.0).unwrap();
+    let wire = Device::uniform(600.0, 0.445, 60.0).unwrap();
+    let properties = WallProperties { friction, ..WallProperties::default() };
+    let mut simulation = Simulation::builder(lumen, wire, sheath).properties(properties).build().unwrap();
+    let after = |_| {
+        simulation.step(Command::advance(2.0)).unwrap();
+        simulation.shape().positions_mm.clone()
+    };
+    (0..steps).map(after).collect()
+}
+
+fn farthest_mm(one: &[Vec<Vec3>], other: &[Vec<Vec3>]) -> f64 {
+    let points = one.iter().zip(other).flat_map(|(a, b)| a.iter().zip(b));
+    points.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_wire_goes_the_way_that_it_goes_in_a_fine_mesh() {
+    for (name, steps) in [("curved_tube", 60), ("aortic_arch", 110)] {
+        let tree = anatomy::tree(name).unwrap();
+        let least_mm = tree.nodes().iter().map(|node| node.radius_mm).fold(f64::MAX, f64::min);
+        for friction in [0.0, 0.1] {
+            let in_mesh = |edge_mm: f64| {
+                let made = GeneratedWall::new(&tree, Resolution::EdgeMm(edge_mm)).unwrap();
+                pushed(made.wall.into(), made.inlet, friction, steps)
+            };
+            let lumen = swept(&tree);
+            let felt = pushed(lumen.clone(), lumen.inlet().unwrap().index, friction, steps);
+            let off_mm = farthest_mm(&felt, &in_mesh(least_mm / 4.0));
+            assert!(off_mm < 0.02, "{name}, friction {friction}: {off_mm}");
+            // Triangles half as large as the vessel are another one.
+            let coarse_mm = farthest_mm(&felt, &in_mesh(0.6 * least_mm));
+            assert!(coarse_mm > 0.02, "{name}, friction {friction}: {coarse_mm}");
+        }
+    }
+}
+
+#[test]
+fn no_mesh_is_made_to_feel_a_centre_line_unless_the_wall_has_regions() {
+    let lumen = swept(&anatomy::tree("curved_tube").unwrap());
+    let felt = |properties: &WallProperties| {
+        ContactSurface::of(&lumen, (0.2, 0.2), properties, &NoStore).unwrap().mesh().is_some()
+    };
+    assert!(!felt(&WallProperties::default()));
+    let place_mm = lumen.openings()[0].centre_mm;
+    let region = WallRegion {
+        centre_mm: place_mm.into(),
+        radius_mm: 8.0,
+        transition_mm: None,
+        modulus_n_per_mm2: Some(10.0),
+        friction: None,
+    };
+    assert!(felt(&WallProperties { region: vec![region], ..WallProperties::default() }));
+}

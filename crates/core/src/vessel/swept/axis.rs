@@ -1,0 +1,284 @@
+//! The axis of a branch as a device feels its wall: where it runs, and how wide it is.
+//!
+//! The course is the natural cubic spline through the samples that a mesh is made from ([`Branch`]), which joins them by cubics of their own:
+//! between those the curvature jumps by a little, and with it the slope of the wall of a branch that tapers. Both run through the same
+//! points and differ by the fourth power of the samples' distance.
+
+use crate::Vec3;
+use crate::vessel::generate::curve::{Branch, natural_moments};
+
+/// Steepest taper that an open end goes on with: beyond it its radius changes by 4/27 of that at most.
+const STEEPEST: f64 = 0.67;
+/// Newton steps to the foot of a point, from a sample a quarter of the radius away: three are enough.
+const FOOT_STEPS: usize = 8;
+/// Knots from one that is looked at to the next, where the nearest is not known to some radii; and steps from there on.
+const COARSE: usize = 16;
+/// See [`COARSE`].
+const JUMPS: usize = 4;
+/// Last of these steps, in distances of the samples: what is left of the way is of the order of its square.
+const FOOT: f64 = 1e-6;
+
+/// A knot of the spline.
+#[derive(Debug, Clone, Copy)]
+struct Knot {
+    position: Vec3,
+    /// Derivative of the course, of nearly unit length, …
+    tangent: Vec3,
+    /// … and the second one, 1/mm.
+    moment: Vec3,
+    radius: f64,
+    /// Slope of the radius.
+    slope: f64,
+}
+
+/// The knot next to a point.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct NearKnot {
+    /// How far it is, mm.
+    pub(super) away: f64,
+    pub(super) knot: usize,
+    /// An arc length next to the foot of the point.
+    pub(super) near: f64,
+}
+
+/// How an axis ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum End {
+    /// By half a ball: a sac's dome, or an end that is hidden in another branch.
+    Round,
+    /// Open: the tube goes on straight for so much, mm, and ends by half a ball there, where nobody gets.
+    Open(f64),
+}
+
+impl End {
+    /// How far the axis goes on, mm.
+    fn beyond_mm(self) -> f64 {
+        match self {
+            Self::Round => 0.0,
+            Self::Open(beyond_mm) => beyond_mm,
+        }
+    }
+}
+
+/// Course and radius, with derivatives by arc length.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    pub(super) position: Vec3,
+    pub(super) first: Vec3,
+    pub(super) second: Vec3,
+    pub(super) third: Vec3,
+    pub(super) radius: [f64; 3],
+}
+
+impl Place {
+    /// What is a little farther along.
+    fn shift(&mut self, by: f64) {
+        self.position += (self.first + (self.second * 0.5 + self.third * (by / 6.0)) * by) * by;
+        self.first += (self.second + self.third * (0.5 * by)) * by;
+        self.second += self.third * by;
+        let [_, slope, flare] = self.radius;
+        self.radius[0] += (slope + 0.5 * flare * by) * by;
+        self.radius[1] += flare * by;
+    }
+}
+
+/// The axis of a branch.
+#[derive(Debug, Clone)]
+pub(super) struct Axis {
+    knots: Vec<Knot>,
+    /// Distance of the knots, mm.
+    step: f64,
+    pub(super) ends: [End; 2],
+}
+
+impl Axis {
+    pub(super) fn new(branch: &Branch, ends: [End; 2]) -> Self {
+        let positions: Vec<Vec3> = branch.samples.iter().map(|sample| sample.position).collect();
+        let moments = natural_moments(&positions, &vec![branch.step; positions.len() - 1]);
+        let last = positions.len() - 1;
+        let tangent = |k: usize| {
+            let (a, b) = (k.min(last - 1), k.min(last - 1) + 1);
+            let chord = (positions[b] - positions[a]) / branch.step;
+            let bend = if k == a { moments[a] * -2.0 - moments[b] } else { moments[a] + moments[b] * 2.0 };
+            chord + bend * (branch.step / 6.0)
+        };
+        let knots = branch.samples.iter().enumerate().map(|(k, sample)| Knot {
+            position: sample.position,
+            tangent: tangent(k),
+            moment: moments[k],
+            radius: sample.radius,
+            slope: sample.slope,
+        });
+        Self { knots: knots.collect(), step: branch.step, ends }
+    }
+
+    /// Number of knots.
+    pub(super) fn len(&self) -> usize {
+        self.knots.len()
+    }
+
+    /// Distance of the knots, mm.
+    pub(super) fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// Length without what is beyond its ends, mm.
+    pub(super) fn length(&self) -> f64 {
+        self.step * (self.knots.len() - 1) as f64
+    }
+
+    pub(super) fn position(&self, knot: usize) -> Vec3 {
+        self.knots[knot].position
+    }
+
+    pub(super) fn radius(&self, knot: usize) -> f64 {
+        self.knots[knot].radius
+    }
+
+    /// Whether there is an axis on both sides of a knot, and none beyond its ends near it.
+    pub(super) fn is_inner(&self, knot: usize) -> bool {
+        (knot > 0 || self.ends[0] == End::Round)
+            && (knot + 1 < self.knots.len() || self.ends[1] == End::Round)
+    }
+
+    /// Most that the field of this branch changes in its lumen over what a distance does.
+    pub(super) fn steepness(&self) -> f64 {
+        let of = |k: usize| {
+            let Knot { moment, radius, slope, .. } = self.knots[k];
+            let along = slope / (1.0 - radius * moment.norm()).max(0.05);
+            (1.0 + along * along).sqrt()
+        };
+        (0..self.knots.len()).map(of).fold(1.0, f64::max)
+    }
+
+    /// The knot nearest to an arc length.
+    pub(super) fn knot_at(&self, s: f64) -> usize {
+        ((s / self.step).round().max(0.0) as usize).min(self.knots.len() - 1)
+    }
+
+    /// Arc lengths between which there is a wall.
+    pub(super) fn range(&self) -> [f64; 2] {
+        [-self.ends[0].beyond_mm(), self.length() + self.ends[1].beyond_mm()]
+    }
+
+    /// Course and radius at an arc length.
+    pub(super) fn at(&self, s: f64) -> Place {
+        let length = self.length();
+        if s < 0.0 {
+            return self.beyond(0, s, -s);
+        }
+        if s > length {
+            return self.beyond(self.knots.len() - 1, s - length, s - length);
+        }
+        let k = ((s / self.step) as usize).min(self.knots.len() - 2);
+        let (a, b, h, u) = (&self.knots[k], &self.knots[k + 1], self.step, s - self.step * k as f64);
+        let third = (b.moment - a.moment) / h;
+        let slope = (b.position - a.position) / h - (a.moment * 2.0 + b.moment) * (h / 6.0);
+        // Positions relative to a knot, so that far-away anatomies lose no digits.
+        let position = a.position + (slope + (a.moment * 0.5 + third * (u / 6.0)) * u) * u;
+        let first = slope + (a.moment + third * (0.5 * u)) * u;
+        let second = a.moment + third * u;
+        let (t, rise) = (u / h, b.radius - a.radius);
+        let (sa, sb) = (a.slope * h, b.slope * h);
+        let (quadratic, cubic) = (3.0 * rise - 2.0 * sa - sb, sa + sb - 2.0 * rise);
+        let radius = [
+            a.radius + t * (sa + t * (quadratic + t * cubic)),
+            (sa + t * (2.0 * quadratic + 3.0 * t * cubic)) / h,
+            (2.0 * quadratic + 6.0 * t * cubic) / (h * h),
+        ];
+        Place { position, first, second, third, radius }
+    }
+
+    /// Straight on from a knot at an end, by so much along the axis and `way` mm outwards. The taper goes on less and less over a radius,
+    /// x(w) = w (1 − w/R)², as it does where surfaces are drawn out beyond their openings.
+    fn beyond(&self, knot: usize, along: f64, way: f64) -> Place {
+        let Knot { position, tangent, radius, slope, .. } = self.knots[knot];
+        let (outwards, x) = (along.signum(), (way / radius).min(1.0));
+        let taper = (slope * outwards).clamp(-STEEPEST, STEEPEST);
+        let radius = [
+            radius + taper * way * (1.0 - x) * (1.0 - x),
+            outwards * taper * (1.0 - x) * (1.0 - 3.0 * x),
+            if x < 1.0 { taper * (6.0 * x - 4.0) / radius } else { 0.0 },
+        ];
+        Place {
+            position: position + tangent * along,
+            first: tangent,
+            second: Vec3::zeros(),
+            third: Vec3::zeros(),
+            radius,
+        }
+    }
+
+    /// Arc length of the foot of a point, from near it on, and what is there.
+    pub(super) fn foot(&self, x: &Vec3, near: f64) -> (f64, Place) {
+        let ([low, high], length) = (self.range(), self.length());
+        let mut s = near.clamp(low, high);
+        let mut place = self.at(s);
+        for _ in 0..FOOT_STEPS {
+            let offset = x - place.position;
+            let limit = if s > 0.0 && s < length { self.step } else { f64::INFINITY };
+            let change = offset.dot(&place.first) / stretch(&place, &offset);
+            let next = (s + change.clamp(-limit, limit)).clamp(low, high);
+            let moved = next - s;
+            s = next;
+            if moved.abs() <= FOOT * self.step {
+                place.shift(moved);
+                break;
+            }
+            place = self.at(s);
+        }
+        (s, place)
+    }
+
+    /// The knot nearest to a point among these, how far it is, mm, and an arc length next to the foot. Of a branch that comes back to where it was it is that of the stretch whose
+    /// middle is nearest.
+    pub(super) fn nearest(&self, x: &Vec3, from: usize, to: usize) -> NearKnot {
+        let away = |k: usize| (self.knots[k].position - x).norm_squared();
+        let (mut knot, mut least) = (to, away(to));
+        for k in (from..to).step_by(COARSE) {
+            let here = away(k);
+            if here < least {
+                (knot, least) = (k, here);
+            }
+        }
+        // Steps of Newton's method, by how many knots.
+        let jump = |k: usize| {
+            let Knot { position, tangent, moment, .. } = &self.knots[k];
+            let offset = x - position;
+            let stretch = (tangent.norm_squared() - offset.dot(moment)).max(0.25);
+            offset.dot(tangent) / (stretch * self.step)
+        };
+        // They get near, and single knots the rest of the way.
+        for _ in 0..JUMPS {
+            let by = jump(knot).clamp(-(COARSE as f64), COARSE as f64);
+            let next = (knot as f64 + by.round()).clamp(from as f64, to as f64) as usize;
+            let here = away(next);
+            if here >= least {
+                break;
+            }
+            (knot, least) = (next, here);
+        }
+        let knot = self.follow(x, knot).clamp(from, to);
+        let near = self.step * (knot as f64 + jump(knot).clamp(-1.0, 1.0));
+        NearKnot { away: away(knot).sqrt(), knot, near }
+    }
+
+    /// The knot nearest to a point, along the axis from one on.
+    pub(super) fn follow(&self, x: &Vec3, from: usize) -> usize {
+        let away = |k: usize| (self.knots[k].position - x).norm_squared();
+        let mut k = from;
+        loop {
+            let here = away(k);
+            k = match k {
+                _ if k + 1 < self.knots.len() && away(k + 1) < here => k + 1,
+                _ if k > 0 && away(k - 1) < here => k - 1,
+                _ => return k,
+            };
+        }
+    }
+}
+
+/// Half the second derivative of the squared distance from the axis; positive at a foot, since bends are wider than the vessel.
+pub(super) fn stretch(place: &Place, offset: &Vec3) -> f64 {
+    (place.first.norm_squared() - offset.dot(&place.second)).max(0.05)
+}

@@ -1,0 +1,139 @@
+//! What of a tree is near a place.
+//!
+//! Axes are cut into blocks of a few radii, each in a ball with the lumen about it. A place far from all is as far from a branch as from its
+//! balls at least; near a block the parts of branches that can matter are known.
+
+use std::sync::OnceLock;
+
+use super::axis::Axis;
+use crate::Vec3;
+use crate::vessel::generate::BLEND;
+
+/// Steps of the axis in a block: there are four to the branch's least radius.
+const STEPS: usize = 16;
+/// Most blocks whose parts are all looked for at once, so that steps allocate nothing.
+const AT_ONCE: usize = 3000;
+
+/// A stretch of a branch from one of its knots to another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Part {
+    pub(super) branch: u32,
+    pub(super) from: u32,
+    pub(super) to: u32,
+}
+
+#[derive(Debug)]
+struct Block {
+    part: Part,
+    centre: Vec3,
+    /// Of the ball that holds its lumen, mm.
+    reach: f64,
+    /// Largest radius of the vessel in it, mm.
+    radius: f64,
+    near: OnceLock<Box<[Part]>>,
+}
+
+/// The blocks of all axes.
+#[derive(Debug)]
+pub(crate) struct Blocks {
+    blocks: Vec<Block>,
+    /// The first block of each branch, and the number of its first knot among all.
+    first: Vec<(usize, u32)>,
+    /// Steepness of each branch.
+    steepness: Vec<f64>,
+    /// How far from the vessel parts are complete, mm.
+    reach: f64,
+}
+
+impl Blocks {
+    /// For places no farther than `reach_mm` outside the lumen.
+    pub(super) fn new(axes: &[Axis], reach_mm: f64) -> Self {
+        let (mut blocks, mut first, mut knots) = (Vec::new(), Vec::new(), 0);
+        for (branch, axis) in axes.iter().enumerate() {
+            first.push((blocks.len(), knots));
+            let last = axis.len() - 1;
+            knots += axis.len() as u32;
+            for from in (0..last).step_by(STEPS) {
+                let to = (from + STEPS).min(last);
+                blocks
+                    .push(Block::new(axis, Part { branch: branch as u32, from: from as u32, to: to as u32 }));
+            }
+        }
+        let steepness = axes.iter().map(Axis::steepness).collect();
+        let all = Self { blocks, first, steepness, reach: reach_mm };
+        if all.blocks.len() <= AT_ONCE {
+            (0..all.blocks.len()).for_each(|block| {
+                all.near(block);
+            });
+        }
+        all
+    }
+
+    /// Most that the field of a branch changes in its lumen over what a distance does.
+    pub(super) fn steepness(&self, branch: usize) -> f64 {
+        self.steepness[branch]
+    }
+
+    /// Number of a knot among all.
+    pub(super) fn piece(&self, branch: u32, knot: u32) -> u32 {
+        self.first[branch as usize].1 + knot
+    }
+
+    /// Branch and knot of that number.
+    pub(super) fn knot(&self, piece: u32) -> (usize, usize) {
+        let branch = self.first.partition_point(|(_, first)| *first <= piece) - 1;
+        (branch, (piece - self.first[branch].1) as usize)
+    }
+
+    /// The parts of branches near a knot.
+    pub(super) fn about(&self, branch: usize, knot: usize) -> &[Part] {
+        let first = self.first[branch].0;
+        let end = self.first.get(branch + 1).map_or(self.blocks.len(), |(next, _)| *next);
+        self.near((first + knot / STEPS).min(end - 1))
+    }
+
+    /// Of every block, how near its lumen is at least: less than 0 in its ball, mm.
+    pub(super) fn gaps<'a>(&'a self, x: &'a Vec3) -> impl Iterator<Item = (f64, Part)> + 'a {
+        self.blocks.iter().map(move |block| ((x - block.centre).norm() - block.reach, block.part))
+    }
+
+    fn near(&self, block: usize) -> &[Part] {
+        let own = &self.blocks[block];
+        own.near.get_or_init(|| {
+            let mut parts: Vec<Part> = Vec::new();
+            for other in &self.blocks {
+                let away = (other.centre - own.centre).norm() - own.reach - other.reach - self.reach;
+                if away > BLEND * own.radius.min(other.radius) {
+                    continue;
+                }
+                match parts.last_mut() {
+                    Some(last) if last.branch == other.part.branch && last.to == other.part.from => {
+                        last.to = other.part.to;
+                    }
+                    _ => parts.push(other.part),
+                }
+            }
+            parts.into_boxed_slice()
+        })
+    }
+}
+
+impl Block {
+    fn new(axis: &Axis, part: Part) -> Self {
+        let (from, to) = (part.from as usize, part.to as usize);
+        let step = axis.step();
+        let [low, high] = axis.range();
+        // What goes on beyond an end belongs to the block there.
+        let begin = if from == 0 { low } else { step * from as f64 };
+        let end = if to + 1 == axis.len() { high } else { step * to as f64 };
+        let centre = axis.at(0.5 * (begin + end)).position;
+        let places = (from..=to).map(|k| axis.at(step * k as f64)).chain([axis.at(begin), axis.at(end)]);
+        let (mut reach, mut radius) = (0.0_f64, 0.0_f64);
+        for place in places {
+            radius = radius.max(place.radius[0]);
+            reach = reach.max((place.position - centre).norm() + place.radius[0]);
+        }
+        // Beyond an open end it widens by 4/27 of its taper at most; between knots by next to nothing.
+        Self { part, centre, reach: reach + step + 0.1 * radius, radius, near: OnceLock::new() }
+    }
+}

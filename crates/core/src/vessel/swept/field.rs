@@ -1,0 +1,263 @@
+//! The implicit surface of a tree with the derivatives that contact needs.
+//!
+//! f is that of the generator (`generate/field.rs`): of a branch f = |x − c(s)| − r(s), s the foot of x on its axis, of several their smooth
+//! minimum. With the offset o = x − c ⊥ c′, u = o/|o| and σ = 1/(c′·c′ − o·c″),
+//!
+//! ```text
+//! ∇s = σ c′,    ∇∇s = σ² (c′c″ᵀ + c″c′ᵀ − σ (3 c′·c″ − o·c‴) c′c′ᵀ)
+//! ∇f = u − r′ ∇s,    ∇∇f = (I − uuᵀ − σ c′c′ᵀ)/|o| − r″ ∇s∇sᵀ − r′ ∇∇s
+//! ```
+//!
+//! Two of them, f ≤ g, are joined on a width w, which has a slope of its own: with h = 1 − (g − f)/w and k = ½ h²
+//!
+//! ```text
+//! F = f − w h³/6,    ∇F = (1 − k) ∇f + k ∇g + (h³/3 − h²/2) ∇w
+//! ```
+//!
+//! ∇w takes the Hessians of both. ∇∇w would take their third derivatives: the Hessian of a joint comes from differences of its gradient.
+
+use std::sync::Arc;
+
+use nalgebra::Matrix3;
+
+use super::axis::{Axis, End, NearKnot, stretch};
+use super::blocks::{Blocks, Part};
+use crate::Vec3;
+use crate::products::outer;
+use crate::vessel::generate::{BLEND, BLEND_COSINES, HIDDEN};
+
+/// Step of differences over the radius: with what rounding and the third derivative leave, ten digits of a Hessian.
+const DIFFERENCE: f64 = 1e-4;
+/// How much wider than the nearest branch one is taken for that it is joined with, for a third that is joined with both.
+const WIDER: f64 = 2.0;
+/// Most branches that are joined at one place: of more, those that begin first count.
+const MOST_JOINED: usize = 16;
+
+/// The field of one or more branches at a place.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Value {
+    /// f, mm: negative in the lumen.
+    pub(super) f: f64,
+    /// ∇f.
+    pub(super) gradient: Vec3,
+    /// The gradient that the width of a joint takes, without that of the widths before it, …
+    towards: Vec3,
+    /// … and its derivative, near ∇∇f: in a single branch it is.
+    pub(super) turning: Matrix3<f64>,
+    /// Radius of the vessel, mm, and its gradient.
+    pub(super) radius: f64,
+    radius_slope: Vec3,
+    /// How far joining has set in: 0 at a round end, 1 away from it; and its gradient.
+    exposure: f64,
+    exposure_slope: Vec3,
+    /// Whether branches are joined here.
+    pub(super) is_joint: bool,
+    /// Whether f is the distance: a single branch that does not taper.
+    pub(super) is_distance: bool,
+    /// No wall is nearer than this, mm: in the lumen of a branch its own wall, for that lumen is part of all.
+    pub(super) room: f64,
+    /// The branch that it is of, or most of it, and the arc length of the foot.
+    pub(super) branch: u32,
+    pub(super) foot: f64,
+}
+
+/// The branches that may count at a place, in their order, each with an arc length near the foot.
+#[derive(Debug, Clone)]
+pub(super) struct Feet {
+    all: [(u32, f64); MOST_JOINED],
+    count: usize,
+}
+
+/// A tree as an implicit surface.
+#[derive(Debug)]
+pub(crate) struct SweptField {
+    pub(super) axes: Arc<[Axis]>,
+    pub(super) blocks: Blocks,
+}
+
+/// 3t² − 2t³ between 0 and 1, and its derivative.
+fn smooth_step(t: f64) -> (f64, f64) {
+    let t = t.clamp(0.0, 1.0);
+    (t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t))
+}
+
+impl SweptField {
+    /// The field of a single branch, whose foot is near an arc length.
+    pub(super) fn branch(&self, branch: usize, x: &Vec3, near: f64) -> Value {
+        let axis = &self.axes[branch];
+        let (s, place) = axis.foot(x, near);
+        let offset = x - place.position;
+        let distance = offset.norm().max(f64::MIN_POSITIVE);
+        let u = offset / distance;
+        let [radius, taper, flare] = place.radius;
+        let [low, high] = axis.range();
+        let is_free = s > low && s < high;
+        let sigma = if is_free { 1.0 / stretch(&place, &offset) } else { 0.0 };
+        let along = place.first * sigma;
+        let mut gradient = u;
+        let mut hessian = (Matrix3::identity() - outer(&u, &u) - outer(&place.first, &along)) / distance;
+        if taper != 0.0 || flare != 0.0 {
+            let mixed = outer(&place.first, &place.second) * (sigma * sigma);
+            let turn = sigma * (3.0 * place.first.dot(&place.second) - offset.dot(&place.third));
+            gradient -= along * taper;
+            hessian -= outer(&along, &along) * (flare - taper * turn) + (mixed + mixed.transpose()) * taper;
+        }
+        let (mut exposure, mut exposure_slope) = (1.0, Vec3::zeros());
+        let [from_low, from_high] = [s, axis.length() - s];
+        for (end, from_end, outwards) in [(axis.ends[0], from_low, 1.0), (axis.ends[1], from_high, -1.0)] {
+            if end != End::Round {
+                continue;
+            }
+            let part = from_end / (HIDDEN * radius);
+            let (share, rate) = smooth_step(part);
+            // Only the nearer end hides a branch.
+            if share < exposure {
+                exposure = share;
+                exposure_slope = along * (rate * (outwards / (HIDDEN * radius) - part * taper / radius));
+            }
+        }
+        let f = distance - radius;
+        Value {
+            f,
+            gradient,
+            towards: gradient,
+            turning: hessian,
+            radius,
+            radius_slope: along * taper,
+            exposure,
+            exposure_slope,
+            is_joint: false,
+            is_distance: taper == 0.0 && flare == 0.0,
+            room: -f / self.blocks.steepness(branch),
+            branch: branch as u32,
+            foot: s,
+        }
+    }
+
+    /// What of these parts of branches, in their order, may count at a place and within `way` mm of it.
+    pub(super) fn feet(&self, parts: &[Part], x: &Vec3, way: f64) -> Feet {
+        let nearest =
+            |part: &Part| self.axes[part.branch as usize].nearest(x, part.from as usize, part.to as usize);
+        let mut known = [NearKnot::default(); MOST_JOINED];
+        let mut low = (f64::INFINITY, 0.0);
+        for (index, part) in parts.iter().enumerate() {
+            let found = nearest(part);
+            let radius = self.axes[part.branch as usize].radius(found.knot);
+            if found.away - radius < low.0 {
+                low = (found.away - radius, radius);
+            }
+            if let Some(known) = known.get_mut(index) {
+                *known = found;
+            }
+        }
+        let mut feet = Feet { all: [(0, 0.0); MOST_JOINED], count: 0 };
+        for (index, part) in parts.iter().enumerate() {
+            let axis = &self.axes[part.branch as usize];
+            let NearKnot { away, knot, near } = known.get(index).copied().unwrap_or_else(|| nearest(part));
+            let radius = axis.radius(knot);
+            // Between knots a branch comes nearer by a step at most, and its radius changes by less; not so what goes on beyond its ends. What
+            // is higher than another by the most width of a joint leaves no trace; a joint is between a thin branch and the mean of others at most.
+            let least = away - radius - 2.0 * (axis.step() + way);
+            if axis.is_inner(knot) && least > low.0 + BLEND * radius.min(WIDER * low.1) {
+                continue;
+            }
+            if let Some(foot) = feet.all.get_mut(feet.count) {
+                *foot = (part.branch, near);
+                feet.count += 1;
+            }
+        }
+        feet
+    }
+
+    /// The field at a place, and its feet there. None where nothing counts.
+    pub(super) fn value(&self, feet: &mut Feet, x: &Vec3) -> Option<Value> {
+        let mut joined: Option<Value> = None;
+        let mut last: Option<Value> = None;
+        for (branch, near) in &mut feet.all[..feet.count] {
+            let value = self.branch(*branch as usize, x, *near);
+            *near = value.foot;
+            match &mut last {
+                // A branch that comes back counts where it is nearest.
+                Some(other) if other.branch == *branch => {
+                    if value.f < other.f {
+                        *other = value;
+                    }
+                }
+                _ => {
+                    if let Some(done) = last.replace(value) {
+                        joined = Some(joined.map_or(done, |before| join(&before, &done)));
+                    }
+                }
+            }
+        }
+        let done = last?;
+        Some(joined.map_or(done, |before| join(&before, &done)))
+    }
+
+    /// ∇∇f at a place where the field is that.
+    pub(super) fn hessian(&self, feet: &Feet, x: &Vec3, value: &Value) -> Matrix3<f64> {
+        if !value.is_joint {
+            return value.turning;
+        }
+        let step = DIFFERENCE * value.radius;
+        let gradient =
+            |x: Vec3| self.value(&mut feet.clone(), &x).map_or(value.gradient, |value| value.gradient);
+        let column = |axis: usize| {
+            let way = Vec3::ith(axis, step);
+            (gradient(x + way) - gradient(x - way)) / (2.0 * step)
+        };
+        let hessian = Matrix3::from_columns(&[column(0), column(1), column(2)]);
+        (hessian + hessian.transpose()) * 0.5
+    }
+}
+
+/// The smooth minimum of two values: a cubic polynomial on a width that hangs on the angle between the gradients.
+fn join(a: &Value, b: &Value) -> Value {
+    let (low, high) = if a.f <= b.f { (a, b) } else { (b, a) };
+    let thin = if a.radius <= b.radius { a } else { b };
+    if high.f - low.f >= BLEND * thin.radius {
+        return *low;
+    }
+    let (sizes, cosine) = {
+        let sizes = [low, high].map(|v| v.towards.norm().max(f64::MIN_POSITIVE));
+        (sizes, low.towards.dot(&high.towards) / (sizes[0] * sizes[1]))
+    };
+    let span = BLEND_COSINES[0] - BLEND_COSINES[1];
+    let (opposed, rate) = smooth_step((BLEND_COSINES[0] - cosine) / span);
+    let full = BLEND * thin.radius;
+    let exposure = low.exposure * high.exposure;
+    let width = full * opposed * exposure;
+    let gap = width - (high.f - low.f);
+    if gap <= 0.0 {
+        return *low;
+    }
+    let [l, m] = [low.towards / sizes[0], high.towards / sizes[1]];
+    let cosine_slope =
+        low.turning.tr_mul(&(m - l * cosine)) / sizes[0] + high.turning.tr_mul(&(l - m * cosine)) / sizes[1];
+    let width_slope = thin.radius_slope * (BLEND * opposed * exposure)
+        - cosine_slope * (full * exposure * rate / span)
+        + (low.exposure_slope * high.exposure + high.exposure_slope * low.exposure) * (full * opposed);
+    let h = gap / width;
+    let k = 0.5 * h * h;
+    let h_slope = (low.gradient - high.gradient + width_slope * (1.0 - h)) / width;
+    let k_slope = h_slope * h;
+    Value {
+        f: low.f - h * h * h * width / 6.0,
+        gradient: low.gradient * (1.0 - k) + high.gradient * k + width_slope * (h * h * (h / 3.0 - 0.5)),
+        towards: low.towards * (1.0 - k) + high.towards * k,
+        turning: low.turning * (1.0 - k) + high.turning * k + outer(&(high.towards - low.towards), &k_slope),
+        radius: low.radius * (1.0 - k) + high.radius * k,
+        radius_slope: low.radius_slope * (1.0 - k)
+            + high.radius_slope * k
+            + k_slope * (high.radius - low.radius),
+        exposure: low.exposure * (1.0 - k) + high.exposure * k,
+        exposure_slope: low.exposure_slope * (1.0 - k)
+            + high.exposure_slope * k
+            + k_slope * (high.exposure - low.exposure),
+        is_joint: true,
+        is_distance: false,
+        room: low.room,
+        branch: low.branch,
+        foot: low.foot,
+    }
+}

@@ -1,0 +1,244 @@
+use nalgebra::Matrix3;
+
+use super::closest::Closest;
+use super::*;
+use crate::random::{splitmix64, unit};
+use crate::vessel::{CentrelineNode, GeneratedWall, Lumen, NoStore, WallQuery, anatomy};
+
+fn vessel(tree: CentrelineTree) -> SweptVessel {
+    SweptVessel::new(tree, Resolution::EdgeMm(1.0)).unwrap()
+}
+
+fn named(name: &str) -> SweptVessel {
+    vessel(anatomy::tree(name).unwrap())
+}
+
+/// A tree of rows x, y, z, radius and parent.
+fn tree(rows: &[([f64; 4], Option<usize>)]) -> CentrelineTree {
+    let node = |([x, y, z, radius_mm], parent): &([f64; 4], Option<usize>)| CentrelineNode {
+        position_mm: Vec3::new(*x, *y, *z),
+        radius_mm: *radius_mm,
+        parent: *parent,
+    };
+    CentrelineTree::new(rows.iter().map(node).collect()).unwrap()
+}
+
+/// A tube along z whose radius goes from 3 mm to this over 40 mm.
+fn cone(end_mm: f64) -> CentrelineTree {
+    let row = |k: usize| {
+        let part = k as f64 / 10.0;
+        ([0.0, 0.0, 40.0 * part, 3.0 + (end_mm - 3.0) * part], k.checked_sub(1))
+    };
+    tree(&(0..=10).map(row).collect::<Vec<_>>())
+}
+
+/// A tube of 2 mm along z, and a branch as wide that leaves it and runs beside it from z = 24 mm on, 0.3 mm apart.
+fn side_by_side() -> CentrelineTree {
+    let trunk = |k: usize| ([0.0, 0.0, 10.0 * k as f64 - 30.0, 2.0], k.checked_sub(1));
+    let mut rows: Vec<_> = (0..9).map(trunk).collect();
+    let way = [[6.0, 1.0], [8.0, 6.0], [6.5, 14.0], [4.3, 24.0], [4.3, 32.0], [4.3, 40.0], [4.3, 50.0]];
+    for (k, [x, z]) in way.into_iter().enumerate() {
+        rows.push(([x, 0.0, z, 2.0], Some(if k == 0 { 3 } else { rows.len() - 1 })));
+    }
+    tree(&rows)
+}
+
+/// Places in front of the wall by up to `depth_mm` and behind it by a fifth of that, all over a vessel.
+fn places(field: &SweptField, depth_mm: f64, count: u64) -> impl Iterator<Item = Vec3> + '_ {
+    (0..count).map(move |k| {
+        let number = |n: u64| unit(splitmix64(11, 4 * k + n));
+        let (branch, knot) = field.blocks.knot((number(0) * field.pieces() as f64) as u32);
+        let place = field.axes[branch].at(field.axes[branch].step() * knot as f64);
+        let u = any_perpendicular(&place.first.normalize());
+        let v = place.first.normalize().cross(&u);
+        let (sin, cos) = (TAU * number(1)).sin_cos();
+        place.position + (u * cos + v * sin) * (place.radius[0] - depth_mm * (1.2 * number(2) - 0.2))
+    })
+}
+
+fn closest<'a>(field: &'a SweptField, x: &Vec3) -> Closest<'a> {
+    field.closest(x, From::Space(field.near(x).piece)).unwrap()
+}
+
+#[test]
+fn derivatives_are_those_of_the_distance() {
+    let h = 1e-4;
+    for (vessel, depth_mm, has_joints) in [
+        (vessel(cone(1.5)), 1.0, false),
+        (named("curved_tube"), 1.0, false),
+        (named("aortic_arch"), 1.0, true),
+        (named("hepatic"), 0.5, true),
+    ] {
+        let field = vessel.field(2.0);
+        let (mut asked, mut joints, mut bent) = (0, 0, 0);
+        for x in places(&field, depth_mm, 2000) {
+            let here = closest(&field, &x);
+            if !(-0.2 * depth_mm..=depth_mm).contains(&here.distance_mm()) {
+                continue;
+            }
+            asked += 1;
+            joints += usize::from(here.is_in_joint());
+            let (normal, hessian) = (here.normal(), here.hessian());
+            for k in 0..3 {
+                let [plus, minus] = [h, -h].map(|way| closest(&field, &(x + Vec3::ith(k, way))));
+                let slope = (plus.distance_mm() - minus.distance_mm()) / (2.0 * h);
+                let bend = (plus.normal() - minus.normal()) / (2.0 * h);
+                // Where a width begins or a radius changes its curvature the Hessian jumps, and differences see both of it.
+                assert!((slope - normal[k]).abs() < 1e-4, "{x:?}: {slope} {}", normal[k]);
+                bent += usize::from((bend - hessian.column(k)).norm() > 1e-3 * (1.0 + hessian.norm()));
+            }
+            assert!((hessian - hessian.transpose()).norm() < 1e-12);
+        }
+        assert!(asked > 1000 && (joints > 20) == has_joints, "{asked} {joints}");
+        assert!(bent < asked / 50, "{bent} of {asked}");
+    }
+}
+
+#[test]
+fn the_distance_in_a_cone_is_exact() {
+    let field = vessel(cone(1.5)).field(1.0);
+    let (taper, mut plain) = (-1.5 / 40.0_f64, 0.0_f64);
+    let cosine = 1.0 / (1.0 + taper * taper).sqrt();
+    for k in 0..200 {
+        let (z, depth) = (8.0 + 0.12 * f64::from(k), 0.8 * f64::from(k % 7) / 6.0 - 0.1);
+        let radius = 3.0 + taper * z;
+        let x = Vec3::new((radius - depth) * f64::from(k).cos(), (radius - depth) * f64::from(k).sin(), z);
+        let found = closest(&field, &x);
+        assert!((found.distance_mm() - depth * cosine).abs() < 1e-9, "{} {depth}", found.distance_mm());
+        assert!((found.normal().z - taper * cosine).abs() < 1e-9);
+        plain = plain.max((depth - depth * cosine).abs());
+        // Along the generator a cone is straight, around it as curved as the circle across the wall.
+        let hessian: Matrix3<f64> = found.hessian();
+        let size = cosine / (radius - depth);
+        assert!((hessian.trace() + size).abs() < 1e-6 * size, "{} {size}", hessian.trace());
+    }
+    // What the radial gap would be off by.
+    assert!(plain > 4e-4, "{plain}");
+}
+
+#[test]
+fn the_wall_is_that_which_is_meshed() {
+    for name in ["curved_tube", "aortic_arch", "hepatic"] {
+        let swept = named(name);
+        let field = swept.field(1.0);
+        let made = GeneratedWall::new(swept.tree(), anatomy::asset_resolution(name)).unwrap();
+        let off = |x: &Vec3| closest(&field, x).distance_mm();
+        let vertices = &made.wall.mesh().vertices_mm;
+        let worst = vertices.iter().step_by(3).map(|x| off(x).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-4, "{name}: {worst}");
+        // A place in a triangle lies inside of the wall by its sag.
+        let sag = (0..300).map(|t| off(&(made.wall.mesh().corners(t).iter().sum::<Vec3>() / 3.0)).abs());
+        assert!(sag.fold(0.0, f64::max) > 1e-3, "{name}");
+    }
+}
+
+#[test]
+fn ways_leave_the_lumen_where_they_meet_the_mesh() {
+    let swept = named("aortic_arch");
+    let field = swept.field(1.0);
+    let wall = GeneratedWall::new(swept.tree(), Resolution::EdgeMm(1.5)).unwrap().wall;
+    let query = WallQuery::new(&wall).unwrap();
+    let (mut left, mut stayed) = (0, 0);
+    for (k, from) in places(&field, 6.0, 600).enumerate() {
+        if !swept.contains(&from) || query.distance_mm(&from) < 1.0 {
+            continue;
+        }
+        let number = |n: u64| unit(splitmix64(5, 4 * k as u64 + n)) - 0.5;
+        let to = from + Vec3::new(number(0), number(1), number(2)) * 60.0;
+        // Beyond an opening the field goes on, and the mesh does not.
+        let out = |x: &Vec3| swept.openings().iter().any(|o| o.beyond_and_aside_mm(x).0 > -1.0);
+        match (field.crossing(&from, &to, 1.0), query.crossing(&from, &to, 1.0)) {
+            (Some(one), Some(other)) => {
+                left += 1;
+                let apart_mm = (one - other).abs() * (to - from).norm();
+                assert!(apart_mm < 1.0 || out(&(from + (to - from) * one)), "{apart_mm} at {from:?}");
+            }
+            (None, None) => stayed += 1,
+            // A chord of the mesh lies inside of the wall, and some ways graze it.
+            (one, other) => {
+                let part = one.or(other).unwrap();
+                let x = from + (to - from) * part;
+                let off_mm = closest(&field, &x).distance_mm().abs();
+                assert!(off_mm < 0.1 || out(&x) || out(&to), "{off_mm}: {from:?} {to:?}");
+            }
+        }
+        let inside = from + (to - from) * 0.5;
+        if query.distance_mm(&inside) > 0.1 && !out(&inside) {
+            assert_eq!(swept.contains(&inside), wall.contains(&inside).unwrap(), "{inside:?}");
+        }
+    }
+    assert!(left > 200 && stayed > 10, "{left} {stayed}");
+}
+
+#[test]
+fn what_has_sunk_into_a_septum_keeps_its_side() {
+    let field = vessel(side_by_side()).field(2.0);
+    let side = field.near(&Vec3::new(4.3, 0.0, 36.0)).piece;
+    for depth in [-0.5, -0.1, 0.1, 0.28, 0.8, 1.5] {
+        // From the lumen of the branch to that of the tube: beyond 0.3 mm it is in the other one.
+        let x = Vec3::new(2.3 - depth, 0.0, 36.0);
+        let found = field.closest(&x, From::Side(side)).unwrap();
+        assert!((found.distance_mm() + depth).abs() < 0.02, "{depth}: {}", found.distance_mm());
+        assert!(found.normal().x > 0.99);
+        let space_mm = closest(&field, &x).distance_mm();
+        assert_eq!(space_mm > 0.0, !(0.0..0.3).contains(&depth), "{depth}: {space_mm}");
+    }
+    // Where the branch begins there is no wall to keep to: the tube is open there.
+    let begin = field.near(&Vec3::new(2.2, 0.0, 0.4)).piece;
+    let found = field.closest(&Vec3::new(-1.0, 0.0, 0.5), From::Side(begin)).unwrap();
+    assert!(found.distance_mm() > 0.8, "{}", found.distance_mm());
+}
+
+#[test]
+fn openings_are_where_and_what_those_of_the_mesh_are() {
+    for name in ["straight_tube", "curved_tube", "aortic_arch", "hepatic", "sidewall_aneurysm"] {
+        let swept = named(name);
+        let lumen =
+            Lumen::from(SweptVessel::new(swept.tree().clone(), anatomy::asset_resolution(name)).unwrap());
+        let meshed = lumen.wall(&NoStore).unwrap().openings();
+        assert_eq!(meshed.len(), swept.openings().len(), "{name}");
+        for (one, other) in swept.openings().iter().zip(meshed) {
+            assert_eq!(one.index, other.index);
+            assert!((one.centre_mm - other.centre_mm).norm() < 0.1, "{name}: {one:?}");
+            assert!(
+                (one.radius_mm - other.radius_mm).abs() < 0.1 && one.direction.dot(&other.direction) > 0.999
+            );
+            assert!(
+                (one.beyond_mm - other.beyond_mm).abs() < 1.0,
+                "{name}: {} {}",
+                one.beyond_mm,
+                other.beyond_mm
+            );
+            // It goes on straight, and nobody feels where that ends.
+            let field = swept.field(1.0);
+            let x = one.centre_mm + one.direction * (one.beyond_mm - 2.0);
+            assert!(closest(&field, &x).distance_mm() > 0.9 * one.radius_mm.min(2.0 + one.radius_mm));
+            assert!(!swept.contains(&x) && swept.contains(&(one.centre_mm - one.direction)));
+        }
+    }
+}
+
+#[test]
+fn what_makes_no_vessel_is_refused() {
+    let told = |tree: CentrelineTree, edge_mm: f64| {
+        SweptVessel::new(tree, Resolution::EdgeMm(edge_mm)).unwrap_err().to_string()
+    };
+    // A tube that comes back through itself.
+    let ring = |k: usize| {
+        let (sin, cos) = (0.25 * k as f64).sin_cos();
+        ([12.0 * cos, 12.0 * sin, 0.1 * k as f64, 2.0], k.checked_sub(1))
+    };
+    let ring = |count: usize| tree(&(0..count).map(ring).collect::<Vec<_>>());
+    assert!(told(ring(30), 1.0).contains("the wall cuts itself"));
+    assert!(SweptVessel::new(ring(22), Resolution::EdgeMm(1.0)).is_ok());
+    // A branch that ends in its parent.
+    let stump = |x: f64| {
+        let trunk = |k: usize| ([0.0, 0.0, 10.0 * k as f64, 5.0], k.checked_sub(1));
+        let mut rows: Vec<_> = (0..5).map(trunk).collect();
+        rows.push(([x, 0.0, 20.0, 2.0], Some(2)));
+        tree(&rows)
+    };
+    assert!(told(stump(4.0), 1.0).contains("lies in or touches another branch"));
+    assert!(SweptVessel::new(stump(14.0), Resolution::EdgeMm(1.0)).is_ok());
+    assert!(told(cone(3.0), 4.0).contains("edge_mm = 4"));
+}
