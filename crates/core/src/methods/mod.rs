@@ -2,12 +2,14 @@
 //! they tell.
 
 mod command;
+mod detached;
 pub mod kirchhoff;
 mod report;
 mod sheath;
 mod state;
 
 pub use command::{Command, Move};
+pub use detached::DetachedCoil;
 pub use report::{Energy, InstrumentReport, Jump, LateralForce, StepReport, WallForce};
 pub use sheath::Sheath;
 pub use state::{ChainState, Content, NodesState, State, TouchedPlane, check_inserted};
@@ -92,6 +94,20 @@ pub trait Method: Send {
     fn step_together(&mut self, _surroundings: &Surroundings<'_>, moves: &[Move]) -> Result<()> {
         let mend = "this method pushes one device: use step";
         Err(Error::parameter("moves", moves.len(), mend))
+    }
+
+    /// Leaves the coil of an instrument behind and takes its pusher out; asked of methods that know coils, and of no other.
+    ///
+    /// # Errors
+    /// An instrument that is no coil, is detached already or is not out yet (input); a coil, or what is left, that does not come to rest
+    /// (computation).
+    fn detach(&mut self, _surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
+        Err(Error::parameter("detach", instrument, "this method knows no coils: use kirchhoff"))
+    }
+
+    /// Coils that were detached, in their order.
+    fn coils(&self) -> &[DetachedCoil] {
+        &[]
     }
 
     /// The inserted centre line.

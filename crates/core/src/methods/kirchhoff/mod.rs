@@ -23,6 +23,9 @@ mod coaxial_friction_tests;
 mod coaxial_tests;
 mod command;
 mod configuration;
+mod detach;
+#[cfg(test)]
+mod detach_tests;
 #[cfg(test)]
 mod drag_tests;
 mod extrapolation;
@@ -60,7 +63,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::{ContactSurface, Counters, MovedWall, SelfContact, Touching};
 use crate::device::line_mm;
-use crate::methods::{Command, LateralForce, Move, StepReport, Surroundings};
+use crate::methods::{Command, DetachedCoil, LateralForce, Move, StepReport, Surroundings};
 use crate::methods::{Content, Method, MethodChoice, State};
 use crate::rod::{Layout, PLAIN, TWISTED};
 use crate::shape::Shape;
@@ -138,7 +141,7 @@ fn several(
     surroundings: &Surroundings<'_>,
     store: &dyn WallStore,
 ) -> Result<Box<dyn Method>> {
-    Ok(match surroundings.stack.sets().iter().flatten().count() {
+    Ok(match surroundings.stack.angles() {
         0 => Box::new(Kirchhoff::<PLAIN>::new(options, surroundings, store)?),
         1 => Box::new(Kirchhoff::<TWISTED>::new(options, surroundings, store)?),
         2 => Box::new(Kirchhoff::<{ PLAIN + 8 }>::new(options, surroundings, store)?),
@@ -225,10 +228,6 @@ impl<const C: usize> Kirchhoff<C> {
                 ),
             ));
         }
-        if options.self_contact && surroundings.stack.is_several() {
-            let mend = "loops of several instruments on one line do not feel each other yet: leave it out";
-            return Err(Error::parameter("method.self_contact", true, mend));
-        }
         if options.self_contact && surroundings.motion.is_some() {
             let mend =
                 "a vessel that moves may take loops along through each other: leave it or vessel.motion out";
@@ -251,6 +250,32 @@ impl<const C: usize> Kirchhoff<C> {
         };
         method.write_shape(&[0.0]);
         Ok(method)
+    }
+
+    /// Goes on to the state that some work leaves in the workspace; where that fails, to none.
+    fn work_on(
+        &mut self,
+        surroundings: &Surroundings<'_>,
+        work: impl FnOnce(&mut Workspace<C>, &Environment<'_>, &KirchhoffState) -> Result<()>,
+    ) -> Result<()> {
+        let environment = Environment::new(surroundings, &self.surface, &self.options);
+        let mut workspace = match self.workspace.take() {
+            Some(workspace) => workspace,
+            None => {
+                let workspace = Workspace::new(&environment, &self.state);
+                self.shape.reserve(workspace.most.0 + 1);
+                workspace
+            }
+        };
+        let done = work(&mut workspace, &environment, &self.state);
+        self.counters.add(&std::mem::take(&mut workspace.tools.counters));
+        if done.is_ok() {
+            std::mem::swap(&mut self.state, &mut workspace.now.state);
+            std::mem::swap(&mut workspace.mesh, &mut workspace.now.mesh);
+            self.write_shape(&workspace.mesh.from_tip_mm);
+        }
+        self.workspace = Some(workspace);
+        done
     }
 
     /// The centre line of the state, with nodes at these arc lengths from the tip.
@@ -288,24 +313,19 @@ impl<const C: usize> Method for Kirchhoff<C> {
             Arc::make_mut(&mut self.state).report.rest();
             return Ok(());
         }
-        let environment = Environment::new(surroundings, &self.surface, &self.options);
-        let mut workspace = match self.workspace.take() {
-            Some(workspace) => workspace,
-            None => {
-                let workspace = Workspace::new(&environment, &self.state);
-                self.shape.reserve(workspace.most.0 + 1);
-                workspace
-            }
-        };
-        let done = workspace.carry_out(&environment, &self.state, moves);
-        self.counters.add(&std::mem::take(&mut workspace.tools.counters));
-        if done.is_ok() {
-            std::mem::swap(&mut self.state, &mut workspace.now.state);
-            std::mem::swap(&mut workspace.mesh, &mut workspace.now.mesh);
-            self.write_shape(&workspace.mesh.from_tip_mm);
-        }
-        self.workspace = Some(workspace);
-        done
+        self.work_on(surroundings, |workspace, environment, state| {
+            workspace.carry_out(environment, state, moves)
+        })
+    }
+
+    fn detach(&mut self, surroundings: &Surroundings<'_>, instrument: usize) -> Result<()> {
+        self.work_on(surroundings, |workspace, environment, state| {
+            workspace.detach(environment, state, instrument)
+        })
+    }
+
+    fn coils(&self) -> &[DetachedCoil] {
+        &self.state.coils
     }
 
     fn shape(&self) -> &Shape {
@@ -341,7 +361,8 @@ impl<const C: usize> Method for Kirchhoff<C> {
         hands::read(&self.state.report, &mut hands);
         let mut mesh = Mesh::default();
         meshed(&environment, &hands, &mut mesh);
-        let mut loops = SelfContact::new(&mesh.elements, loops::skins(&mesh).collect());
+        let mut loops = SelfContact::new(&mesh.elements, loops::skins(&mesh, surroundings.stack).collect());
+        loops.beside(&DetachedCoil::elements(&self.state.coils, surroundings.stack).into());
         loops.touching_at(&mesh.elements, &self.state.rod)
     }
 
@@ -366,6 +387,7 @@ impl<const C: usize> Method for Kirchhoff<C> {
         let mut mesh = Mesh::default();
         meshed(&environment, &hands, &mut mesh);
         state.check(&Belongs {
+            stack: surroundings.stack,
             surface: &self.surface,
             sheath: surroundings.sheath,
             elements: mesh.elements.len(),
