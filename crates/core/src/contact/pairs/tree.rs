@@ -161,7 +161,7 @@ impl Tree {
         let (n, length) = (self.controls.len(), self.length());
         let segment = [*from, from + (to - from) / 3.0, to - (to - from) / 3.0, *to];
         let others = (0..n).filter(|e| *e >= self.own || length - self.arcs[*e][1] >= behind);
-        others.into_iter().any(|e| lower_distance(&self.controls[e], &segment) < reach(e))
+        others.into_iter().any(|e| is_near(&self.controls[e], &segment, reach(e), SPLITS))
     }
 
     /// Part, at most all, of the motion in which no two points of elements at least `apart` along the rod come nearer to each other by more than half
@@ -250,6 +250,14 @@ fn safe_part(a: &(Controls, Controls), b: &(Controls, Controls), part: f64, spli
         }
     }
     part
+}
+
+/// Whether a curve comes nearer to a segment than `reach`, but for what is left of its bulge.
+fn is_near(curve: &Controls, segment: &Controls, reach: f64, splits: usize) -> bool {
+    if lower_distance(curve, segment) >= reach {
+        return false;
+    }
+    splits == 0 || split(curve).iter().any(|half| is_near(half, segment, reach, splits - 1))
 }
 
 /// The two halves of a curve (de Casteljau).
